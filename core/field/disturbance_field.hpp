@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/field/proximity_model.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/types/model.hpp"
+
+namespace backwash::field {
+
+/// Σ at a point and its parts, (m/s²)²: sigma = base + ground + corner + wall.
+struct Breakdown {
+  Variance base, ground, corner, wall;
+  Variance sigma() const noexcept { return base + ground + corner + wall; }
+};
+
+/// Exact evaluation of model.md section 2 at any point. Holds the elements in buckets; the grid must outlive it.
+class ProximityField {
+ public:
+  ProximityField(const map::OccupancyGrid& grid, const Model& model);
+  /// Σ(p) = Σ_0 + Σ_e over visible elements e. O(elements within the model's ranges). Thread-safe.
+  Breakdown at(const Vec3& p_W) const;
+  const Model& model() const noexcept { return model_; }
+  const map::OccupancyGrid& grid() const noexcept { return *grid_; }
+
+ private:
+  const map::OccupancyGrid* grid_;
+  Model model_;
+  Index3 bucket_count_;
+  double bucket_edge_;
+  std::vector<std::vector<Element>> buckets_;
+};
+
+/// Σ stored at free voxel centres, (m/s²)² (model.md section 2, last paragraph).
+class DisturbanceField {
+ public:
+  /// Empty field over the grid's extent: every voxel's Σ is unset.
+  explicit DisturbanceField(const map::OccupancyGrid& grid);
+
+  /// Evaluates Σ at the centres of the listed free voxels (linear indices of the grid). Distinct voxels may be filled
+  /// from several threads at once.
+  void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
+
+  /// Whether Σ is stored at a voxel; false outside the grid.
+  bool has(const Index3& v) const noexcept;
+  /// Σ at a voxel centre. Precondition: has(v).
+  Variance at(const Index3& v) const noexcept;
+  /// Trilinear interpolation, weights of the stored voxels renormalised; `fallback` where none of the eight is stored.
+  /// Real-time: wait-free, no allocation.
+  Variance interpolated(const Vec3& p_W, const Variance& fallback) const noexcept;
+
+ private:
+  Vec3 origin_W_;
+  double resolution_;
+  Index3 size_;
+  std::vector<std::array<float, 6>> sigma_;  // xx < 0: not stored
+};
+
+}  // namespace backwash::field

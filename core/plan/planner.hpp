@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/plan/bspline.hpp"
+#include "core/plan/world.hpp"
+
+namespace backwash::plan {
+
+enum class PlanStatus { ok, no_path, infeasible, start_blocked, goal_blocked, deadline };
+/// "ok", "no_path", … as in the JSON of `plan` (interfaces.md).
+const char* to_string(PlanStatus status) noexcept;
+
+struct PlanOptions {
+  double v_max;                ///< m/s per axis
+  double a_max;                ///< m/s² per axis
+  double deadline_s = 10.0;    ///< whole plan, monotonic clock
+  std::size_t max_nodes = 400'000;
+};
+
+struct PlanMetrics {
+  double length_m = 0, time_s = 0;
+  double jerk2 = 0;            ///< ∫‖p⃛‖² dt of the command trajectory, (m/s³)² s
+  double min_clearance_m = 0;  ///< over the verified swept tube (model.md section 4)
+  double search_ms = 0, optimise_ms = 0, verify_ms = 0;
+  std::size_t expanded = 0, evaluations = 0;
+};
+
+struct Plan {
+  PlanStatus status = PlanStatus::no_path;
+  std::string message;             ///< one line: why not, and where; empty when ok
+  BSpline trajectory;
+  std::vector<Setpoint> commands;  ///< every 20 ms
+  reach::ReachTube tube;           ///< verified: one entry more than commands
+  PlanMetrics metrics;
+};
+
+/// Start of a plan: the state estimated now and the command active now (for continuity).
+struct PlanStart {
+  State estimated;
+  Setpoint command;
+};
+
+/// Kinodynamic search → B-spline fit → optimisation → verification of the whole swept tube (model.md section 5b). What
+/// fails verification is re-optimised with a larger margin, then slowed, then refused; never returned as ok.
+Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const PlanOptions& options);
+
+/// Smallest clearance of a tube swept through the world, m (negative: not clear): prism query over each interval with the
+/// centre's motion, less body.radius and estimation.position; with a constant margin, ball of that radius.
+double tube_clearance(const World& world, const reach::ReachTube& tube);
+
+/// Lowest clear hover height z_safe (m, W) of the column through p, and the floor below it; nothing if there is none.
+/// Take-off and landing move vertically in this column (model.md section 4).
+struct Column {
+  double z_floor;  ///< top of the first obstacle below, m
+  double z_safe;   ///< m
+};
+std::optional<Column> takeoff_column(const World& world, const Vec3& p_W);
+
+/// Vertical commands from `from` to `to` (same column), rest to rest, minimum-jerk profile within the limits.
+std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
+
+/// Smallest lateral clearance of a vertical tube: obstacles beside it, not the floor below (model.md section 4), m.
+double lateral_clearance(const World& world, const reach::ReachTube& tube);
+
+}  // namespace backwash::plan

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "core/field/disturbance_field.hpp"
+#include "core/map/distance_field.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/reach/hover_set.hpp"
+#include "core/reach/reach_tube.hpp"
+
+namespace backwash::plan {
+
+/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when all
+/// are done. core itself knows no threads: services pass their own.
+using Parallel = std::function<void(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work)>;
+void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
+
+/// Immutable picture of the surroundings for one vehicle: everything the planner and the checks read.
+struct World {
+  map::OccupancyGrid grid;
+  map::DistanceField distance;
+  field::DisturbanceField field;
+  reach::BoundField bounds;
+  reach::HoverMap hover;
+  reach::Reachability reach;
+  double constant_margin;  ///< < 0: reachable sets; ≥ 0: constant margin, m
+};
+
+/// Builds all of it. Σ is stored at every free voxel where the vehicle's centre can be (distance ≥ body radius less one
+/// voxel diagonal). The model's r0 is taken from the vehicle.
+std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
+                                         reach::Method method = reach::Method::tight, double constant_margin = -1,
+                                         const Parallel& parallel = run_serial);
+
+}  // namespace backwash::plan

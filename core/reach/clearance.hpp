@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/map/distance_field.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/types/geometry.hpp"
+
+namespace backwash::reach {
+
+/// Distance from an octagonal prism to the nearest face of an occupied or unknown voxel, m, 0 if they meet
+/// (model.md section 4, "Clearance", before body and estimation are taken off). The prism is
+/// {center + e : |unit(d)·e| ≤ half_widths[d] for every Direction d}; outside the grid is unknown.
+/// Exact up to `limit`; returns `limit` if nothing is nearer. O((extent/a)³).
+double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
+                      double limit);
+
+/// The same for a prism that moves from one centre to another: the convex hull of both, enclosed by the prism at their
+/// midpoint whose half widths grow by half the motion in each direction.
+double swept_prism_distance(const map::OccupancyGrid& grid, const Vec3& from_W, const Vec3& to_W,
+                            const PerDirection& half_widths, double limit);
+
+}  // namespace backwash::reach

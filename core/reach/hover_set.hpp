@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/map/distance_field.hpp"
+#include "core/reach/reach_tube.hpp"
+
+namespace backwash::reach {
+
+/// The infinite-time set of a vehicle hovering at a point (model.md sections 3 and 5).
+struct HoverSet {
+  PerDirection half_widths{};  ///< m
+  double clearance = 0;        ///< distance of the set to obstacles − body.radius − estimation.position, m, capped at 1 m
+  bool bounded = false;        ///< false: the fixed point left the clear space before it converged
+  bool safe() const noexcept { return bounded && clearance > 0; }
+};
+
+/// Smallest fixed point of h = h_∞ × max w̄(p ± h), then its clearance. Stops as unbounded when h exceeds the free
+/// distance. `constant_margin` > = 0 replaces the set by a ball of that radius (the baseline of `--margin`).
+HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
+                   const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);
+
+/// Whether hovering at each voxel's centre is safe, and how wide the set is.
+class HoverMap {
+ public:
+  explicit HoverMap(const map::OccupancyGrid& grid);
+  /// Computes the listed voxels (linear indices); distinct voxels may be computed from several threads at once.
+  void fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
+            const BoundField& bounds, std::span<const std::size_t> voxels, double constant_margin = -1);
+  /// False outside the grid and where nothing was computed.
+  bool safe(const Index3& v) const noexcept;
+  /// Clearance of the hover set, m; negative where not safe or not computed.
+  double clearance(const Index3& v) const noexcept;
+  /// Half widths x, y, z, m; zero where not computed or unbounded.
+  Vec3 half_widths(const Index3& v) const noexcept;
+
+ private:
+  Index3 size_;
+  std::vector<std::array<float, 4>> cells_;  // clearance, half widths x, y, z
+};
+
+}  // namespace backwash::reach

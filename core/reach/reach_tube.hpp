@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/field/disturbance_field.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/reach/ellipsoid.hpp"
+#include "core/reach/error_dynamics.hpp"
+#include "core/types/disturbance.hpp"
+#include "core/types/state.hpp"
+
+namespace backwash::reach {
+
+enum class Method { tight, paper };
+
+/// w̄ at every voxel of a stored field, for maxima over sets (model.md section 3, "Over the set, not at its centre").
+class BoundField {
+ public:
+  /// Unstored voxels count as 0 (the vehicle's centre cannot be there).
+  BoundField(const map::OccupancyGrid& grid, const field::DisturbanceField& field, const BoundModel& model);
+  /// Component-wise maximum of w̄ over the voxels that meet the closed box [low, high], m in W.
+  DisturbanceBound max_over(const Vec3& low_W, const Vec3& high_W) const noexcept;
+  DisturbanceBound at(const Index3& v) const noexcept;
+
+ private:
+  Vec3 origin_W_;
+  double resolution_;
+  Index3 size_;
+  std::vector<std::array<float, kDirections>> w_;
+};
+
+/// The exact support of the position error in the five directions, propagated by the FIR of model.md section 5.2.
+class SupportRecursion {
+ public:
+  /// Starts at the ellipsoid diag(position² I, velocity² I) of the vehicle's initial error.
+  SupportRecursion(const AxisResponse& horizontal, const AxisResponse& vertical, const Vehicle& vehicle);
+  /// One step of 20 ms under w̄ (m/s²).
+  void step(const DisturbanceBound& w_bar);
+  /// Half widths at the current sample instant, m.
+  PerDirection half_widths() const;
+  /// Half widths valid from the current sample instant until the next one, if the next step's bound is `next`, m.
+  PerDirection half_widths_until_next(const DisturbanceBound& next) const;
+
+ private:
+  const AxisResponse* horizontal_;
+  const AxisResponse* vertical_;
+  double position_, velocity_;
+  std::vector<DisturbanceBound> history_;
+};
+
+/// One entry of a tube: the set at t = k·0.02 s, after k steps.
+struct TubeStep {
+  double t;                           ///< s since the tube's start
+  State center;                       ///< predicted motion
+  DisturbanceBound w_bar;             ///< bound held from here to the next entry (last entry: the last one held)
+  PerDirection half_widths;           ///< position error, at t, m (tight: exact; paper: the ellipsoid's support)
+  PerDirection half_widths_interval;  ///< valid from t to t + 0.02 s, m
+  Mat3 shape;                         ///< paper only: position block of Q, m²; zero for tight
+  /// Largest half axis: √λ_max(shape) for paper, ‖(x, y, z)‖₂ of the half widths for tight, m.
+  double r_max;
+};
+using ReachTube = std::vector<TubeStep>;
+
+/// Everything about a vehicle's loop that tubes need, computed once.
+struct Reachability {
+  Reachability(const Vehicle& vehicle, Method method = Method::tight, Loop loop = Loop::vehicle);
+  Vehicle vehicle;
+  Method method;
+  Loop loop;
+  AxisResponse horizontal, vertical;
+};
+
+/// Tube along held commands with the bound given for each step (command k and bound k hold during step k; sizes equal):
+/// N commands give N + 1 entries. The centre starts at `start`.
+ReachTube tube_with_bounds(const Reachability& reach, const State& start, const Setpoint& previous,
+                           std::span<const Setpoint> commands, std::span<const DisturbanceBound> bounds);
+
+/// Tube along held commands through a map: the bound of each step is the maximum over the voxels that the set can reach
+/// in that step (hull of the step's two centres ± interval half widths).
+ReachTube tube_over_field(const Reachability& reach, const State& start, const Setpoint& previous,
+                          std::span<const Setpoint> commands, const BoundField& bounds);
+
+}  // namespace backwash::reach
