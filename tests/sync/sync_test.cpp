@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <thread>
+
+#include "core/sync/handover.hpp"
+#include "core/sync/latest_value.hpp"
+#include "core/sync/record_ring.hpp"
+
+namespace backwash::sync {
+namespace {
+
+// A value whose every word must agree: a torn read shows at once.
+using Wide = std::array<std::uint64_t, 64>;
+Wide wide(std::uint64_t n) {
+  Wide w;
+  w.fill(n);
+  return w;
+}
+bool whole(const Wide& w) {
+  for (const auto word : w)
+    if (word != w[0]) return false;
+  return true;
+}
+constexpr std::uint64_t kRounds = 300'000;
+
+TEST(LatestValue, IsEmptyUntilWrittenAndReadOnce) {
+  LatestValue<int> value;
+  EXPECT_FALSE(value.read_new());
+  value.write(1);
+  value.write(2);
+  EXPECT_EQ(value.read_new(), 2);
+  EXPECT_FALSE(value.read_new());
+}
+
+TEST(LatestValue, NeverTearsNeverGoesBackAndEndsWithTheLast) {
+  LatestValue<Wide> value;
+  std::thread writer([&] {
+    for (std::uint64_t n = 1; n <= kRounds; ++n) value.write(wide(n));
+  });
+  std::uint64_t last = 0;
+  bool good = true;
+  while (good && last < kRounds) {
+    if (const auto w = value.read_new()) {
+      good = whole(*w) && (*w)[0] > last;
+      last = (*w)[0];
+    }
+  }
+  writer.join();
+  EXPECT_TRUE(good) << "torn or old value after " << last;
+}
+
+TEST(RecordRing, RefusesWhatDoesNotFitAndCountsIt) {
+  RecordRing<int, 4> ring;
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(ring.push(i));
+  EXPECT_FALSE(ring.push(4));
+  EXPECT_EQ(ring.lost(), 1u);
+  EXPECT_EQ(ring.pop(), 0);
+  EXPECT_TRUE(ring.push(5));
+  for (const int expected : {1, 2, 3, 5}) EXPECT_EQ(ring.pop(), expected);
+  EXPECT_FALSE(ring.pop());
+}
+
+TEST(RecordRing, DeliversEveryAcceptedRecordWholeAndInOrder) {
+  RecordRing<Wide, 64> ring;
+  std::uint64_t accepted = 0;
+  std::atomic<bool> done{false};
+  std::thread writer([&] {
+    for (std::uint64_t n = 1; n <= kRounds; ++n) accepted += ring.push(wide(n)) ? 1 : 0;
+    done = true;
+  });
+  std::uint64_t last = 0, received = 0;
+  bool good = true;
+  for (;;) {
+    const bool finished = done;
+    if (const auto w = ring.pop()) {
+      good = good && whole(*w) && (*w)[0] > last;
+      last = (*w)[0];
+      ++received;
+    } else if (finished) {
+      break;
+    }
+  }
+  writer.join();
+  EXPECT_TRUE(good);
+  EXPECT_EQ(received, accepted);
+  EXPECT_EQ(accepted + ring.lost(), kRounds);
+}
+
+// Counts its own instances: a leak or a double free shows as a wrong count.
+struct Counted {
+  static inline std::atomic<int> alive{0};
+  explicit Counted(std::uint64_t n) : value(wide(n)) { ++alive; }
+  ~Counted() {
+    value = wide(0);
+    --alive;
+  }
+  Wide value;
+};
+
+TEST(Handover, GivesWholeObjectsAndFreesEachExactlyOnce) {
+  constexpr std::uint64_t kObjects = 20'000;
+  {
+    Handover<Counted> handover;
+    std::atomic<bool> good{true};
+    std::thread reader([&] {
+      std::uint64_t last = 0;
+      while (good && last < kObjects) {
+        if (const Counted* object = handover.newest()) {
+          good = whole(object->value) && object->value[0] >= last;
+          last = object->value[0];
+        }
+      }
+    });
+    // The last object stays on offer; collecting is what lets a reader that gave back a full ring go on.
+    for (std::uint64_t n = 1; n <= kObjects; ++n) handover.offer(std::make_unique<const Counted>(n));
+    while (Counted::alive > 1 && good) handover.collect();
+    reader.join();
+    EXPECT_TRUE(good);
+  }
+  EXPECT_EQ(Counted::alive, 0);
+}
+
+TEST(Handover, KeepsWhatItHasUntilSomethingNewIsOffered) {
+  Handover<int> handover;
+  EXPECT_EQ(handover.newest(), nullptr);
+  handover.offer(std::make_unique<const int>(1));
+  const int* first = handover.newest();
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(*first, 1);
+  EXPECT_EQ(handover.newest(), first);
+  handover.offer(std::make_unique<const int>(2));
+  EXPECT_EQ(*handover.newest(), 2);
+}
+
+}  // namespace
+}  // namespace backwash::sync
