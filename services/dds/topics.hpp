@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "backwash_msgs.h"
+#include "ros2.h"
+#include "services/dds/dds.hpp"
+
+/// The topics of interfaces.md: name, type and delivery in one place.
+namespace backwash::dds {
+
+using Odometry = nav_msgs_msg_dds__Odometry_;
+using Path = nav_msgs_msg_dds__Path_;
+using PoseStamped = geometry_msgs_msg_dds__PoseStamped_;
+using Octomap = octomap_msgs_msg_dds__Octomap_;
+using Command = backwash_msgs_msg_dds__Command_;
+using Ack = backwash_msgs_msg_dds__Ack_;
+using Status = backwash_msgs_msg_dds__Status_;
+using Timing = backwash_msgs_msg_dds__Timing_;
+using Tube = backwash_msgs_msg_dds__ReachTube_;
+using TubeStep = backwash_msgs_msg_dds__ReachStep_;
+
+/// Topic `name` of the vehicle with this name space, as ROS 2 spells it on the wire: rt/NAMESPACE/NAME.
+inline std::string topic(const std::string& name_space, const std::string& name) {
+  return "rt/" + name_space + "/" + name;
+}
+
+template <typename T>
+struct TopicOf;
+template <>
+struct TopicOf<Odometry> {
+  static const dds_topic_descriptor& type() { return nav_msgs_msg_dds__Odometry__desc; }
+  static constexpr const char* kName = "odometry";
+  static constexpr Delivery kDelivery = Delivery::latest;
+};
+template <>
+struct TopicOf<Octomap> {
+  static const dds_topic_descriptor& type() { return octomap_msgs_msg_dds__Octomap__desc; }
+  static constexpr const char* kName = "map";
+  static constexpr Delivery kDelivery = Delivery::state;
+};
+template <>
+struct TopicOf<Command> {
+  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Command__desc; }
+  static constexpr const char* kName = "command";
+  static constexpr Delivery kDelivery = Delivery::reliable;
+};
+template <>
+struct TopicOf<Ack> {
+  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Ack__desc; }
+  static constexpr const char* kName = "ack";
+  static constexpr Delivery kDelivery = Delivery::reliable;
+};
+template <>
+struct TopicOf<Status> {
+  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Status__desc; }
+  static constexpr const char* kName = "status";
+  static constexpr Delivery kDelivery = Delivery::latest;
+};
+template <>
+struct TopicOf<Tube> {
+  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__ReachTube__desc; }
+  static constexpr const char* kName = "tube";
+  static constexpr Delivery kDelivery = Delivery::state;
+};
+template <>
+struct TopicOf<Path> {
+  static const dds_topic_descriptor& type() { return nav_msgs_msg_dds__Path__desc; }
+  static constexpr const char* kName = "trajectory";
+  static constexpr Delivery kDelivery = Delivery::state;
+};
+
+template <typename T>
+Reader<T> make_reader(const Participant& participant, const std::string& name_space) {
+  return {participant, TopicOf<T>::type(), topic(name_space, TopicOf<T>::kName), TopicOf<T>::kDelivery};
+}
+template <typename T>
+Writer<T> make_writer(const Participant& participant, const std::string& name_space) {
+  return {participant, TopicOf<T>::type(), topic(name_space, TopicOf<T>::kName), TopicOf<T>::kDelivery};
+}
+
+}  // namespace backwash::dds
