@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/track/supervisor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/types/geometry.hpp"
+
+namespace backwash::track {
+namespace {
+
+SupervisorInput healthy() {
+  SupervisorInput in;
+  in.odometry_age = 0.01;
+  in.heartbeat_age = 0.5;
+  in.armed = in.offboard = in.frames_aligned = true;
+  return in;
+}
+
+// A supervisor that an operator enabled and the autopilot follows.
+Supervisor flying() {
+  Supervisor s;
+  SupervisorInput in = healthy();
+  in.request = Request::enable;
+  s.step(in);
+  in.request = Request::none;
+  s.step(in);
+  EXPECT_EQ(s.mode(), Mode::tracking);
+  return s;
+}
+
+// Steps until the mode is `wanted`; returns the ticks it took, or −1 after `most`.
+template <typename Change>
+int ticks_until(Supervisor& s, Mode wanted, int most, Change change) {
+  for (int tick = 1; tick <= most; ++tick) {
+    SupervisorInput in = healthy();
+    change(in, tick);
+    if (s.step(in).mode == wanted) return tick;
+  }
+  return -1;
+}
+
+TEST(Supervisor, SendsNothingAfterAStartWithTheVehicleArmed) {
+  Supervisor s;
+  for (int tick = 0; tick < 100; ++tick) {
+    const auto out = s.step(healthy());
+    EXPECT_EQ(out.mode, Mode::passive);
+    EXPECT_FALSE(out.send_setpoint || out.send_heartbeat || out.forward_odometry || out.request_offboard ||
+                 out.request_land);
+  }
+}
+
+TEST(Supervisor, NeverStreamsSetpointsUnlessEnabled) {
+  Supervisor s;
+  SupervisorInput in = healthy();
+  in.armed = false;
+  for (int tick = 0; tick < 100; ++tick) EXPECT_FALSE(s.step(in).send_setpoint);
+}
+
+TEST(Supervisor, RefusesToEnableWithoutOdometryOrHeartbeat) {
+  for (const bool odometry : {true, false}) {
+    Supervisor s;
+    SupervisorInput in = healthy();
+    (odometry ? in.odometry_age : in.heartbeat_age) = std::numeric_limits<double>::infinity();
+    in.request = Request::enable;
+    EXPECT_EQ(s.step(in).mode, Mode::passive);
+  }
+}
+
+TEST(Supervisor, StreamsBeforeItAsksForOffboardAndOnlyInAlignedFrames) {
+  Supervisor s;
+  SupervisorInput in = healthy();
+  in.armed = in.offboard = in.frames_aligned = false;
+  in.request = Request::enable;
+  s.step(in);
+  in.request = Request::none;
+  for (int tick = 0; tick < 20; ++tick) EXPECT_FALSE(s.step(in).send_setpoint);
+  in.frames_aligned = true;
+  int streamed = 0, asked_after = -1;
+  for (int tick = 0; tick < 150 && asked_after < 0; ++tick) {
+    const auto out = s.step(in);
+    streamed += out.send_setpoint;
+    if (out.request_offboard) asked_after = streamed;
+  }
+  EXPECT_GE(asked_after, 25);
+}
+
+TEST(Supervisor, GivesUpEnablingAfterFiveSeconds) {
+  Supervisor s;
+  SupervisorInput in = healthy();
+  in.offboard = false;
+  in.request = Request::enable;
+  s.step(in);
+  EXPECT_EQ(ticks_until(s, Mode::passive, 300, [](auto& i, int) { i.offboard = false; }), 251);
+  EXPECT_EQ(s.reason(), Reason::enable_timeout);
+}
+
+TEST(Supervisor, HoldsWithin100msLandsWithin400msThenGoesQuietWhenOdometryStops) {
+  Supervisor s = flying();
+  // The worst phase: the last sample arrived just after a tick, so the first tick sees it one period old.
+  const auto lost = [](auto& in, int tick) { in.odometry_age = tick * kControlPeriod; };
+  const int hold = ticks_until(s, Mode::hold, 50, lost);
+  EXPECT_GT(hold, 0);
+  EXPECT_LE(hold * kControlPeriod, 0.100 + 1e-9);
+  int tick = hold;
+  SupervisorInput in = healthy();
+  SupervisorOutput out;
+  do {
+    in.odometry_age = ++tick * kControlPeriod;
+    out = s.step(in);
+    if (out.mode == Mode::hold) {
+      EXPECT_TRUE(out.freeze && out.send_setpoint);
+    }
+  } while (out.mode == Mode::hold && tick < 100);
+  EXPECT_EQ(out.mode, Mode::land);
+  EXPECT_TRUE(out.request_land);
+  EXPECT_FALSE(out.send_setpoint);
+  EXPECT_LE(tick * kControlPeriod, 0.400 + 1e-9);
+  EXPECT_GT(ticks_until(s, Mode::quiet, 50, [](auto& i, int) { i.odometry_age = 1; }), 0);
+  out = s.step(healthy());
+  EXPECT_FALSE(out.send_setpoint || out.send_heartbeat || out.forward_odometry || out.request_land);
+}
+
+TEST(Supervisor, ComesBackFromAnUntrustedPoseOnlyByLanding) {
+  Supervisor s = flying();
+  ticks_until(s, Mode::hold, 50, [](auto& in, int) { in.odometry_jump = true; });
+  EXPECT_EQ(s.reason(), Reason::odometry_jump);
+  const int land = ticks_until(s, Mode::land, 50, [](auto& in, int) { in.new_segment = true; });
+  EXPECT_GT(land, 0);
+  EXPECT_LE(land * kControlPeriod, 0.4);
+}
+
+TEST(Supervisor, HoldsAfterThreeTicksOutsideTheSetAndNotBefore) {
+  Supervisor s = flying();
+  EXPECT_EQ(ticks_until(s, Mode::hold, 20, [](auto& in, int tick) { in.inside = tick % 3 == 0; }), -1);
+  s.step(healthy());
+  EXPECT_EQ(ticks_until(s, Mode::hold, 20, [](auto& in, int) { in.inside = false; }), Supervisor::kOutsideTicks);
+  EXPECT_EQ(ticks_until(s, Mode::tracking, 20, [](auto& in, int) { in.new_segment = true; }), 1);
+}
+
+TEST(Supervisor, GoesQuietWhenTheLinkOrTheClockFails) {
+  const auto expect_quiet = [](Reason reason, auto change) {
+    Supervisor s = flying();
+    EXPECT_EQ(ticks_until(s, Mode::quiet, 2, change), 1) << to_string(reason);
+    EXPECT_EQ(s.reason(), reason);
+    // A link that comes back changes nothing until an operator enables again.
+    EXPECT_EQ(s.step(healthy()).mode, Mode::quiet);
+  };
+  expect_quiet(Reason::port_lost, [](auto& in, int) { in.port_open = false; });
+  expect_quiet(Reason::transmit_full, [](auto& in, int) { in.transmit_failed = true; });
+  expect_quiet(Reason::autopilot_silent, [](auto& in, int) { in.heartbeat_age = 1.51; });
+  expect_quiet(Reason::deadline_missed, [](auto& in, int) { in.missed_periods = 25; });
+}
+
+TEST(Supervisor, NeverFightsAPilotWhoLeavesOffboard) {
+  Supervisor s = flying();
+  EXPECT_EQ(ticks_until(s, Mode::passive, 2, [](auto& in, int) { in.offboard = false; }), 1);
+  for (int tick = 0; tick < 500; ++tick) {
+    SupervisorInput in = healthy();
+    in.offboard = false;
+    const auto out = s.step(in);
+    EXPECT_FALSE(out.request_offboard || out.send_setpoint);
+  }
+}
+
+TEST(Supervisor, LandsOnRequestAndIsPassiveOnceDisarmed) {
+  Supervisor s = flying();
+  SupervisorInput in = healthy();
+  in.request = Request::land;
+  EXPECT_TRUE(s.step(in).request_land);
+  EXPECT_EQ(ticks_until(s, Mode::quiet, 100, [](auto& i, int) { i.offboard = false; }), -1);
+  EXPECT_EQ(ticks_until(s, Mode::passive, 2, [](auto& i, int) { i.armed = i.offboard = false; }), 1);
+  EXPECT_EQ(s.reason(), Reason::landed);
+}
+
+}  // namespace
+}  // namespace backwash::track
