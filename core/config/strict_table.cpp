@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iterator>
 #include <set>
 #include <sstream>
@@ -47,7 +48,11 @@ std::string range_text(const Range& range) {
 std::string value_text(const toml::node& node) {
   if (node.is_table()) return "{…}";
   std::ostringstream out;
-  out << toml::node_view<const toml::node>{node};
+  // As people write it: TOML's own formatter prints 8.8 with 17 digits.
+  if (const auto* number = node.as_floating_point())
+    out << std::setprecision(15) << number->get();
+  else
+    out << toml::node_view<const toml::node>{node};
   std::string text = out.str().substr(0, 60);
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < ' '; }, ' ');
