@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+
+#include "core/config/config.hpp"
+
+namespace backwash::config {
+
+/// The daemon's one configuration file (an example with comments: files/backwashd.daemon.toml).
+struct Daemon {
+  std::string vehicle, model;      ///< files, or builtin:NAME
+  struct {
+    int domain = 0;
+    std::string interface;         ///< network interface by name
+    std::string name_space;        ///< topics are rt/NAMESPACE/…: several vehicles share a domain
+    std::string odometry_topic;    ///< whole name on the wire, for any VIO
+  } dds;
+  struct {
+    std::string device;            ///< serial port or pty
+    int baud = 0;
+    int system = 1;                ///< MAVLink system id of the vehicle
+  } link;
+  struct {
+    int priority = 0;              ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
+  } control;
+  struct {
+    std::string file;              ///< raw log, made anew at each start
+  } log;
+};
+
+/// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
+/// `builtin:backwashd` is the shipped example.
+tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
+
+}  // namespace backwash::config

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/config/daemon_config.hpp"
+#include "core/config/strict_table.hpp"
+
+namespace backwash::config {
+
+tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
+  const auto file = StrictTable::open(path, ".daemon.toml");
+  if (!file) return tl::unexpected(file.error());
+
+  Daemon d;
+  double domain = 0, baud = 0, system = 0, priority = 0;
+  const NumberKey numbers[] = {
+      {"dds.domain", &domain, {0, 230}},
+      {"link.baud", &baud, {9600, 4'000'000}},
+      {"link.system", &system, {1, 250}},
+      {"control.priority", &priority, {0, 98}},
+  };
+  const std::pair<std::string_view, std::string*> texts[] = {
+      {"vehicle", &d.vehicle},
+      {"model", &d.model},
+      {"dds.interface", &d.dds.interface},
+      {"dds.namespace", &d.dds.name_space},
+      {"dds.odometry_topic", &d.dds.odometry_topic},
+      {"link.device", &d.link.device},
+      {"log.file", &d.log.file},
+  };
+  std::vector<std::string_view> text_keys;
+  for (const auto& [key, target] : texts) text_keys.push_back(key);
+  if (auto read = file->read(numbers, text_keys); !read) return tl::unexpected(read.error());
+  for (const auto& [key, target] : texts) {
+    auto text = file->text(key);
+    if (!text) return tl::unexpected(text.error());
+    *target = std::move(*text);
+  }
+  for (const auto& [key, value] : {std::pair{"dds.domain", domain}, std::pair{"link.baud", baud},
+                                   std::pair{"link.system", system}, std::pair{"control.priority", priority}})
+    if (value != static_cast<int>(value)) return tl::unexpected(file->error(key, "needs a whole number"));
+  d.dds.domain = static_cast<int>(domain);
+  d.link.baud = static_cast<int>(baud);
+  d.link.system = static_cast<int>(system);
+  d.control.priority = static_cast<int>(priority);
+  return d;
+}
+
+}  // namespace backwash::config

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/track/frame_alignment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace backwash::track {
+namespace {
+
+// The truth of the test: an isometry built by Eigen, applied to a vehicle that hovers with some noise.
+struct Frames {
+  Eigen::Isometry3d local_from_map;
+  double yaw;
+  Frames(double yaw_offset, const Vec3& t) : local_from_map(Eigen::Isometry3d::Identity()), yaw(yaw_offset) {
+    local_from_map.rotate(Eigen::AngleAxisd(yaw_offset, Vec3::UnitZ())).pretranslate(t);
+  }
+  YawPose local(const YawPose& map) const { return {local_from_map * map.p, map.yaw + yaw}; }
+};
+
+TEST(FrameAlignment, FindsYawAndTranslationAcrossTheWrap) {
+  std::mt19937_64 rng(1);
+  std::normal_distribution<double> noise(0, 0.005);
+  for (const double yaw : {0.0, 0.7, -2.5, 3.1, std::numbers::pi}) {
+    const Frames truth(yaw, {12, -7, 0.4});
+    FrameAlignment alignment;
+    EXPECT_FALSE(alignment.aligned());
+    for (int i = 0; i < 200; ++i) {
+      const YawPose map{{2 + noise(rng), 3 + noise(rng), 1 + noise(rng)}, 3.0 + noise(rng)};
+      YawPose local = truth.local(map);
+      local.p += Vec3(noise(rng), noise(rng), noise(rng));
+      alignment.update(map, local, true);
+    }
+    ASSERT_TRUE(alignment.aligned()) << yaw;
+    const Setpoint sent = alignment.to_local({{2.5, 3.5, 1.2}, {1, 2, 0.5}, {0.1, 0.2, 0.3}, 0.25});
+    EXPECT_LT((sent.p_W - truth.local_from_map * Vec3(2.5, 3.5, 1.2)).norm(), 0.01);
+    EXPECT_LT((sent.v_W - truth.local_from_map.linear() * Vec3(1, 2, 0.5)).norm(), 0.02);
+    EXPECT_LT(std::abs(wrap_angle(sent.yaw - 0.25 - yaw)), 0.01);
+  }
+}
+
+TEST(FrameAlignment, NoticesWithinAFewTicksThatTheControllerReset) {
+  const Frames truth(0.5, {1, 2, 3});
+  FrameAlignment alignment;
+  const YawPose map{{1, 1, 1}, 0};
+  for (int i = 0; i < 100; ++i) alignment.update(map, truth.local(map), true);
+  ASSERT_TRUE(alignment.aligned());
+  YawPose jumped = truth.local(map);
+  jumped.p.x() += 0.8;
+  int ticks = 0;
+  while (alignment.aligned() && ticks < 50) alignment.update(map, jumped, false), ++ticks;
+  EXPECT_LE(ticks, 2);
+}
+
+TEST(FrameAlignment, DoesNotAlignFramesThatKeepTurning) {
+  FrameAlignment alignment;
+  for (int i = 0; i < 300; ++i)
+    alignment.update({{1, 1, 1}, 0}, Frames(0.02 * i, {0, 0, 0}).local({{1, 1, 1}, 0}), true);
+  EXPECT_FALSE(alignment.aligned());
+}
+
+}  // namespace
+}  // namespace backwash::track
