@@ -17,10 +17,9 @@ class Handover {
   Handover() = default;
   Handover(const Handover&) = delete;
   Handover& operator=(const Handover&) = delete;
-  /// Precondition: writer and reader have stopped.
+  /// Precondition: writer and reader have stopped. Frees all but what the reader took and did not give back.
   ~Handover() {
     delete offered_.load();
-    delete current_;
     collect();
   }
 
@@ -29,23 +28,26 @@ class Handover {
     collect();
     delete offered_.exchange(object.release(), std::memory_order_acq_rel);
   }
-  /// The newest object taken so far, or null; it stays valid until the next call. Takes a new one only while there is room
-  /// to give the old one back. Real-time: wait-free, no allocation.
-  const T* newest() noexcept {
-    if (!offered_.load(std::memory_order_relaxed)) return current_;
-    if (current_ && !retired_.push(current_)) return current_;
-    current_ = offered_.exchange(nullptr, std::memory_order_acq_rel);
-    return current_;
-  }
   /// Frees what the reader gave back. Writer's thread only; not real-time.
   void collect() {
-    while (const auto retired = retired_.pop()) delete *retired;
+    while (const auto returned = returned_.pop()) delete *returned;
+  }
+
+  /// The newest object not yet taken, or null (also while there is no room to give one back). The reader keeps it, however
+  /// many are offered later, and gives it back exactly once. Real-time: wait-free, no allocation.
+  const T* take() noexcept {
+    if (!offered_.load(std::memory_order_relaxed) || returned_.full()) return nullptr;
+    return offered_.exchange(nullptr, std::memory_order_acq_rel);
+  }
+  /// Hands an object back to be freed. Null is allowed. Precondition: at most one object is held beyond the one taken last,
+  /// as when a new one takes an old one's place. Real-time: wait-free, no allocation.
+  void give_back(const T* object) noexcept {
+    if (object) returned_.push(object);
   }
 
  private:
   std::atomic<const T*> offered_{nullptr};
-  const T* current_ = nullptr;
-  RecordRing<const T*, 8> retired_;
+  RecordRing<const T*, 8> returned_;
 };
 
 }  // namespace backwash::sync

@@ -21,11 +21,11 @@ class RecordRing {
  public:
   /// False, and counted, if the ring is full. Real-time: wait-free, no allocation.
   bool push(const T& record) noexcept {
-    const std::size_t tail = tail_.load(std::memory_order_relaxed);
-    if (tail - head_.load(std::memory_order_acquire) == kCapacity) {
+    if (full()) {
       lost_.fetch_add(1, std::memory_order_relaxed);
       return false;
     }
+    const std::size_t tail = tail_.load(std::memory_order_relaxed);
     records_[tail % kCapacity] = record;
     tail_.store(tail + 1, std::memory_order_release);
     return true;
@@ -37,6 +37,10 @@ class RecordRing {
     const T record = records_[head % kCapacity];
     head_.store(head + 1, std::memory_order_release);
     return record;
+  }
+  /// Whether push() would refuse now; writer's thread only.
+  bool full() const noexcept {
+    return tail_.load(std::memory_order_relaxed) - head_.load(std::memory_order_acquire) == kCapacity;
   }
   /// Records refused so far.
   std::uint64_t lost() const noexcept { return lost_.load(std::memory_order_relaxed); }

@@ -1,46 +1,62 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
+#include <cstdint>
 #include <vector>
 
 #include "core/reach/reach_tube.hpp"
 #include "core/types/state.hpp"
+#include "core/types/vehicle.hpp"
 
 namespace backwash::track {
 
-/// An accepted piece of flight: commands every 20 ms and the tube propagated once, at acceptance.
+/// A piece of flight whose swept tube was verified: commands every 20 ms and the tube propagated once, from the state
+/// estimated at acceptance. A segment that `continues` another shares its start and its first `branch` commands and
+/// differs after them, so that it can take over in flight without a new start.
 struct AcceptedSegment {
+  std::uint64_t id = 0;         ///< unique, > 0
+  std::uint64_t continues = 0;  ///< id of the segment it continues; 0: starts at its first command
+  std::size_t branch = 0;       ///< first command that differs from the continued segment's
   std::vector<Setpoint> commands;
-  reach::ReachTube tube;  ///< commands.size() + 1 entries; past its end the last entry holds
+  reach::ReachTube tube;        ///< commands.size() + 1 entries; past its end the last entry holds
 };
 
 /// What one tick says about the measured position (model.md section 5.4).
 struct Inside {
+  bool judged = false;         ///< false before the first segment: nothing is claimed
   bool inside = true;          ///< |e_n| ≤ h_n in all five directions
   PerDirection error{};        ///< e_n = unit(n)·(measured − centre), m
   PerDirection half_widths{};  ///< h_n, m
+  Vec3 center = Vec3::Zero();  ///< m, W
 };
 
-/// Steps through accepted segments, one command a tick; holds the last position at rest after the end. In a tick: judge
-/// the measurement taken now, then step.
+/// Steps through accepted segments, one command a tick; holds the last position at rest after the end. In a tick:
+/// accept if there is something new, judge the measurement taken now, then step.
 class Tracker {
  public:
-  explicit Tracker(const Setpoint& hold);
-  /// Takes over at the next step. Not real-time (moves memory).
-  void accept(std::shared_ptr<const AcceptedSegment> segment);
-  /// Judges the measured position at this tick, before its step(), against the set predicted for it. Past the end of
-  /// the segment the last set holds. Before the first accepted segment nothing is claimed: inside, with half widths 0.
-  /// Real-time: wait-free, no allocation.
+  /// `initial`: half axes of the first set (model.md section 5): how far the state may have moved since the tube's start.
+  Tracker(const Setpoint& hold, const Vehicle& vehicle);
+  /// Takes a segment over, or refuses it: a new one must start where the vehicle is now (its state within the ellipsoid
+  /// Q_0 around the tube's start), a continued one must be of the current segment and not yet past its branch. The segment
+  /// must outlive its use. Real-time: wait-free, no allocation.
+  bool accept(const AcceptedSegment& segment, const State& measured) noexcept;
+  /// Holds this command's position from now on; the set of the last segment is no longer judged. Real-time: wait-free,
+  /// no allocation.
+  void hold_at(const Setpoint& setpoint) noexcept;
+  /// Judges the measured position at this tick against the set predicted for it. Real-time: wait-free, no allocation.
   Inside judge(const Vec3& measured_W) const noexcept;
   /// Command of this tick, then moves on. Real-time: wait-free, no allocation.
   Setpoint step() noexcept;
-  bool finished() const noexcept;
+  bool finished() const noexcept { return !segment_ || next_ >= segment_->commands.size(); }
+  std::uint64_t segment() const noexcept { return segment_ ? segment_->id : 0; }
+  std::size_t index() const noexcept { return next_; }  ///< of the command that the next step() gives
+  const Setpoint& held() const noexcept { return hold_; }
 
  private:
-  std::shared_ptr<const AcceptedSegment> segment_;
+  const AcceptedSegment* segment_ = nullptr;
   std::size_t next_ = 0;
   Setpoint hold_;
+  double position_, velocity_;
 };
 
 }  // namespace backwash::track

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
@@ -106,35 +107,43 @@ TEST(Handover, GivesWholeObjectsAndFreesEachExactlyOnce) {
   constexpr std::uint64_t kObjects = 20'000;
   {
     Handover<Counted> handover;
-    std::atomic<bool> good{true};
+    std::atomic<bool> good{true}, finished{false};
     std::thread reader([&] {
-      std::uint64_t last = 0;
-      while (good && last < kObjects) {
-        if (const Counted* object = handover.newest()) {
-          good = whole(object->value) && object->value[0] >= last;
-          last = object->value[0];
+      const Counted* current = nullptr;
+      while (good && !(current && current->value[0] == kObjects)) {
+        if (const Counted* object = handover.take()) {
+          good = whole(object->value) && (!current || object->value[0] > current->value[0]);
+          // Every third object is refused: it goes straight back, and the old one must still be whole.
+          const bool refused = current && object->value[0] % 3 == 1 && object->value[0] != kObjects;
+          handover.give_back(refused ? object : std::exchange(current, object));
         }
+        if (current) good = good && whole(current->value);
       }
+      handover.give_back(current);
+      finished = true;
     });
-    // The last object stays on offer; collecting is what lets a reader that gave back a full ring go on.
     for (std::uint64_t n = 1; n <= kObjects; ++n) handover.offer(std::make_unique<const Counted>(n));
-    while (Counted::alive > 1 && good) handover.collect();
+    while (!finished) handover.collect();  // frees room, so that a reader with a full ring goes on
     reader.join();
     EXPECT_TRUE(good);
   }
   EXPECT_EQ(Counted::alive, 0);
 }
 
-TEST(Handover, KeepsWhatItHasUntilSomethingNewIsOffered) {
+TEST(Handover, KeepsATakenObjectAliveUntilItIsGivenBack) {
   Handover<int> handover;
-  EXPECT_EQ(handover.newest(), nullptr);
+  EXPECT_EQ(handover.take(), nullptr);
   handover.offer(std::make_unique<const int>(1));
-  const int* first = handover.newest();
+  const int* first = handover.take();
   ASSERT_NE(first, nullptr);
-  EXPECT_EQ(*first, 1);
-  EXPECT_EQ(handover.newest(), first);
+  EXPECT_EQ(handover.take(), nullptr);
   handover.offer(std::make_unique<const int>(2));
-  EXPECT_EQ(*handover.newest(), 2);
+  handover.offer(std::make_unique<const int>(3));
+  EXPECT_EQ(*first, 1);
+  const int* last = handover.take();
+  EXPECT_EQ(*last, 3);
+  handover.give_back(first);
+  handover.give_back(last);
 }
 
 }  // namespace

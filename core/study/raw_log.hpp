@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/study/flight_log.hpp"
+#include "core/types/geometry.hpp"
+
+namespace backwash::study {
+
+/// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is the line
+/// kRawLogMagic, then records: RecordHeader and `size` bytes, little-endian, no padding between records.
+inline constexpr char kRawLogMagic[] = "backwash raw log 1\n";
+
+enum class RecordKind : std::uint32_t {
+  configuration = 1,  ///< text: the vehicle, model and daemon files as given
+  odometry = 2,       ///< OdometryRecord
+  map = 3,            ///< MapRecord, then the octomap data
+  command = 4,        ///< text, one line
+  ack = 5,            ///< text, one line
+  frame_in = 6,       ///< one MAVLink frame received
+  frame_out = 7,      ///< one MAVLink frame handed to the port
+  tick = 8,           ///< TickRecord
+  segment = 9,        ///< SegmentRecord, then its commands (10 doubles each: p, v, a, yaw)
+};
+
+struct RecordHeader {
+  std::int64_t t_ns;    ///< CLOCK_MONOTONIC when the daemon saw it
+  RecordKind kind;
+  std::uint32_t size;   ///< bytes that follow
+};
+static_assert(sizeof(RecordHeader) == 16);
+
+struct OdometryRecord {
+  std::int64_t stamp_ns;  ///< the sender's stamp
+  double p[3], v[3];      ///< m, m/s, map frame
+  double q[4];            ///< body to map: w, x, y, z
+};
+
+struct MapRecord {
+  double resolution;      ///< m
+  std::uint32_t binary;   ///< octomap_msgs/Octomap.binary
+  std::uint32_t accepted;
+};
+
+struct SegmentRecord {
+  std::uint64_t id, continues, commands;
+  double start_p[3], start_v[3];  ///< state from which the tube was propagated, map frame
+};
+
+/// One control tick.
+struct TickRecord {
+  std::uint64_t tick;
+  std::uint64_t segment, index;     ///< accepted segment and the command of it that this tick sent; 0 before the first
+  std::uint32_t mode, reason;       ///< track::Mode, track::Reason
+  std::uint32_t sent;               ///< bit 0: set-point, bit 1: heartbeat, bit 2: odometry forwarded
+  std::uint32_t judged, inside;     ///< whether the error was judged this tick, and the verdict
+  std::uint32_t missed_periods;
+  float compute_us, lateness_us;    ///< of the tick before this one
+  float odometry_to_wire_us;        ///< from the reception of a sample to the set-point that first used it; < 0: none new
+  float frame_residual_m, frame_residual_rad;
+  std::uint32_t page_faults;        ///< of the control thread since start
+  double p[3], v[3];                ///< newest odometry, map frame
+  double cmd_p[3], cmd_v[3], cmd_a[3], cmd_yaw;  ///< command in the map frame
+  double center[3], half_widths[kDirections];    ///< set predicted for this tick, m
+};
+static_assert(sizeof(TickRecord) % 8 == 0);
+
+/// A record as read back.
+struct RawRecord {
+  RecordHeader header;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// Reads a raw log; a last record cut short by a crash is dropped. Errors: not_found; bad_data with the byte offset.
+tl::expected<std::vector<RawRecord>, LogError> read_raw_log(const std::string& path);
+
+/// The payload as T, or nothing if it is shorter.
+template <typename T>
+const T* payload(const RawRecord& record) {
+  return record.bytes.size() >= sizeof(T) ? reinterpret_cast<const T*>(record.bytes.data()) : nullptr;
+}
+
+}  // namespace backwash::study
