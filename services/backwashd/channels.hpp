@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/plan/world.hpp"
+#include "core/study/raw_log.hpp"
+#include "core/sync/handover.hpp"
+#include "core/sync/latest_value.hpp"
+#include "core/sync/record_ring.hpp"
+#include "core/track/supervisor.hpp"
+#include "core/track/tracker.hpp"
+#include "services/backwashd/timing.hpp"
+
+/// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is
+/// wait-free; the picture is in services/backwashd/README.md.
+namespace backwash::daemon {
+
+/// CLOCK_MONOTONIC, ns.
+inline std::int64_t now_ns() noexcept {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+/// One odometry message, in the map frame.
+struct OdometrySample {
+  std::int64_t received_ns = 0;
+  std::int64_t stamp_ns = 0;            ///< the sender's stamp
+  State state;                          ///< m, m/s
+  std::array<double, 4> q{1, 0, 0, 0};  ///< body to map: w, x, y, z
+};
+
+/// One octomap_msgs/Octomap as received.
+struct MapMessage {
+  std::vector<std::int8_t> data;
+  double resolution = 0;
+  bool binary = true;
+  std::string id;
+};
+
+/// One command as received; strings that do not fit are cut, which no valid station has.
+struct CommandMessage {
+  std::array<char, 64> station{};
+  std::uint64_t session = 0;
+  std::uint32_t sequence = 0;
+  std::uint8_t verb = 0;
+  Vec3 position = Vec3::Zero();
+  double yaw = 0;
+};
+
+/// What the control thread shows to the others, once a tick.
+struct ControlView {
+  std::int64_t t_ns = 0;
+  track::Mode mode = track::Mode::passive;
+  track::Reason reason = track::Reason::started;
+  bool armed = false, offboard = false, landed = true, aligned = false;
+  double odometry_age = 1e9, heartbeat_age = 1e9;  ///< s
+  State state;                      ///< newest good odometry
+  Setpoint command;                 ///< sent or held this tick, map frame
+  std::uint64_t segment = 0;        ///< accepted segment, 0 before the first
+  std::uint64_t index = 0;          ///< of its next command
+  bool finished = true;             ///< the segment's commands are all sent
+  std::uint64_t refused_segment = 0;  ///< the last one refused
+  std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
+  std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
+  double residual_m = 0, residual_rad = 0;
+  TimingHistogram tick, lateness, odometry_to_wire;
+};
+
+/// One record of the control thread for the raw log.
+struct ControlRecord {
+  study::RecordHeader header{};
+  std::array<std::uint8_t, 512> bytes{};
+};
+
+/// Anything else for the raw log.
+struct BulkRecord {
+  study::RecordHeader header{};
+  std::vector<std::uint8_t> bytes;
+};
+
+/// What the mission asks the planner for.
+struct PlanJob {
+  enum class Kind { takeoff, go_to, brake } kind = Kind::takeoff;
+  std::uint64_t id = 0;
+  Vec3 position = Vec3::Zero();  ///< goal; take-off: z counts
+  double yaw = 0;
+  std::shared_ptr<const plan::World> world;
+};
+
+/// How a job ended.
+struct PlanOutcome {
+  std::uint64_t job = 0;
+  bool ok = false;
+  std::array<char, 160> reason{};  ///< one line when not ok
+};
+
+struct Channels {
+  sync::LatestValue<OdometrySample> odometry;                  // DDS reader → control
+  sync::RecordRing<CommandMessage, 64> commands;               // DDS reader → mission
+  sync::Handover<MapMessage> maps;                             // DDS reader → map worker
+  sync::Handover<std::shared_ptr<const plan::World>> worlds;   // map worker → mission
+  sync::RecordRing<track::Request, 16> requests;               // mission → control
+  std::atomic<bool> arm{false};                                // mission → control: arm once
+  sync::Handover<PlanJob> jobs;                                // mission → planner
+  sync::RecordRing<PlanOutcome, 16> outcomes;                  // planner → mission
+  sync::Handover<track::AcceptedSegment> segments;             // planner → control
+  sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
+  sync::RecordRing<ControlRecord, 2048> control_log;           // control → recorder
+  std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
+  std::atomic<bool> stop{false};
+};
+
+}  // namespace backwash::daemon
