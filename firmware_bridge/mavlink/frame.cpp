@@ -41,6 +41,11 @@ Header read_header(std::span<const std::uint8_t> b) noexcept {
   return h;
 }
 
+bool continues(const Sender& last, const Sender& now) noexcept {
+  return now.system == last.system && now.component == last.component &&
+         now.sequence == static_cast<std::uint8_t>(last.sequence + 1);
+}
+
 bool checksum_right(std::span<const std::uint8_t> b, const Header& h, std::uint8_t crc_extra) noexcept {
   Crc crc;
   crc.add(b.subspan(1, h.length - 1 + h.payload));
@@ -70,9 +75,10 @@ std::optional<Frame> Parser::next() noexcept {
     ++counters_.skipped_bytes;
     in_step_ = false;
   };
-  const auto pass_whole = [&](std::size_t total) {
-    begin_ += total;
+  const auto pass_whole = [&](const Header& h) {
+    begin_ += h.total;
     in_step_ = true;
+    last_sender_ = h.sender;
   };
   while (begin_ < end_) {
     const std::span<const std::uint8_t> b{buffer_.data() + begin_, end_ - begin_};
@@ -84,10 +90,11 @@ std::optional<Frame> Parser::next() noexcept {
     if (h.length == 0) return std::nullopt;
     const MessageInfo* known = find_message(h.id);
     if (known == nullptr) {
-      if (in_step_ && b.size() <= h.total) return std::nullopt;
-      if (in_step_ && is_magic(b[h.total])) {
+      const bool plausible = in_step_ && continues(last_sender_, h.sender);
+      if (plausible && b.size() <= h.total) return std::nullopt;
+      if (plausible && is_magic(b[h.total])) {
         ++counters_.unknown_id;
-        pass_whole(h.total);
+        pass_whole(h);
       } else {
         skip_byte();
       }
@@ -105,7 +112,7 @@ std::optional<Frame> Parser::next() noexcept {
       continue;
     }
     if (b.size() < h.total) return std::nullopt;
-    pass_whole(h.total);
+    pass_whole(h);
     if ((h.incompat & ~kIncompatSigned) != 0) {
       ++counters_.unknown_incompat;
       continue;

@@ -50,8 +50,8 @@ struct ParserCounters {
 /// After a wrong checksum only the false start byte is passed over and the bytes behind it are looked at again, so a
 /// false or damaged frame never swallows a good one: every undamaged frame of a known message that does not begin
 /// inside an accepted or passed-over frame is found. A message not in KnownMessages has no checksum that could be
-/// tested; it is passed over whole only where the stream is in step (it begins where the last frame ended) and a start
-/// byte follows it, which one byte lost or added in its header undoes.
+/// tested: it is passed over whole only if it begins where the last frame ended, continues that frame's sender and
+/// count, and is followed by a start byte; otherwise it is searched like noise.
 ///
 /// Real-time: wait-free, no allocation; at most one frame (280 bytes) is held back.
 class Parser {
@@ -72,7 +72,8 @@ class Parser {
 
   std::array<std::uint8_t, 2 * kMaxFrame> buffer_{};
   std::size_t begin_ = 0, end_ = 0;  // bytes not yet judged
-  bool in_step_ = true;              // begin_ is where the last frame ended
+  bool in_step_ = false;             // begin_ is where the last frame ended
+  Sender last_sender_;               // of that frame
   ParserCounters counters_;
 };
 

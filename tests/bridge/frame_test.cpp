@@ -182,67 +182,77 @@ bool frame_is_good(const Bytes& b) {
   return crc_by_bits(summed) == (b[b.size() - 2] | b[b.size() - 1] << 8);
 }
 
-TEST(MavlinkParser, AcceptsNoBadFrameAndLosesAtMostOneGoodFrameAfterEachDamagedOne) {
-  std::mt19937 random(20250101);
-  const auto below = [&](std::uint32_t n) { return random() % n; };
-  std::size_t bytes = 0, damaged_frames = 0, lost = 0, sent = 0, accepted = 0, lost_in_a_row = 0, worst = 0;
+/// Damages frames as a serial line does; the number in a frame's time_boot_ms tells which one arrived.
+class NoisyLine {
+ public:
+  struct Sent {
+    Bytes bytes;
+    bool damaged;  // not all of the frame's bytes are there and right
+  };
+  Bytes whole(std::uint32_t number) {
+    const auto f32 = [&] { return std::bit_cast<float>(static_cast<std::uint32_t>(random_())); };
+    const LocalPositionNed m{number, f32(), f32(), f32(), f32(), f32(), f32()};
+    const auto f = encode_frame({1, 1, static_cast<std::uint8_t>(number)}, m);
+    return {f.view().begin(), f.view().end()};
+  }
+  Sent damage(Bytes frame) {
+    switch (below(8)) {
+      case 0:
+        for (std::size_t k = 0; k < 1 + below(4); ++k)
+          frame[below(frame.size())] ^= static_cast<std::uint8_t>(1U << below(8));
+        return {frame, true};
+      case 1:
+        frame.resize(below(frame.size()));
+        return {frame, true};
+      case 2: {  // garbage before it, rich in start bytes
+        Bytes garbage(below(60));
+        for (auto& g : garbage) g = static_cast<std::uint8_t>(below(4) == 0 ? 0xFD + below(2) : below(256));
+        return {garbage + frame, false};
+      }
+      default:
+        return {frame, false};
+    }
+  }
+  std::size_t below(std::size_t n) { return random_() % n; }
+
+ private:
+  std::mt19937 random_{20250101};
+};
+
+TEST(MavlinkParser, AcceptsNoBadFrameAndIsBackInStepWithinOneFrame) {
+  NoisyLine line;
   Parser parser;
   std::vector<Received> out;
-  std::uint32_t number = 0;
-  std::vector<std::uint32_t> whole;  // numbers of undamaged frames, in order
-  while (bytes < 1'000'000) {
-    // The number travels in time_boot_ms, so that each arrival is recognised.
-    ++number;
-    Bytes frame;
-    const auto use = [&](const EncodedFrame& f) { frame.assign(f.view().begin(), f.view().end()); };
-    const Sender sender{1, 1, static_cast<std::uint8_t>(number)};
-    const auto f32 = [&] { return std::bit_cast<float>(static_cast<std::uint32_t>(random())); };
-    use(encode_frame(sender, LocalPositionNed{number, f32(), f32(), f32(), f32(), f32(), f32()}));
-    const auto fate = below(8);
-    if (fate == 0) {  // bits flipped
-      for (std::uint32_t k = 0; k < 1 + below(4); ++k)
-        frame[below(static_cast<std::uint32_t>(frame.size()))] ^= static_cast<std::uint8_t>(1U << below(8));
-    } else if (fate == 1) {  // half a frame
-      frame.resize(below(static_cast<std::uint32_t>(frame.size())));
-    } else if (fate == 2) {  // garbage before it, rich in start bytes
-      Bytes garbage(below(60));
-      for (auto& g : garbage)
-        g = below(4) == 0 ? static_cast<std::uint8_t>(0xFD + below(2)) : static_cast<std::uint8_t>(random());
-      frame = garbage + frame;
-    }
-    if (fate <= 1) {
-      ++damaged_frames;
-    } else {
-      whole.push_back(number);
-    }
-    bytes += frame.size();
-    ++sent;
-    collect(parser, frame, out);
+  std::vector<std::uint32_t> whole;  // numbers of the known frames that were sent undamaged
+  std::size_t bytes = 0, damaged = 0;
+  for (std::uint32_t number = 1; bytes < 1'000'000; ++number) {
+    const bool unknown = line.below(4) == 0;
+    const auto sent = line.damage(unknown ? unknown_message(static_cast<std::uint8_t>(number)) : line.whole(number));
+    damaged += sent.damaged;
+    if (!sent.damaged && !unknown) whole.push_back(number);
+    bytes += sent.bytes.size();
+    collect(parser, sent.bytes, out);
   }
   collect(parser, Bytes(2 * kMaxFrame, 0), out);
-  std::size_t next = 0;
+  std::vector<std::uint32_t> arrived;
   for (const Received& r : out) {
     ASSERT_TRUE(frame_is_good(r.bytes));
-    ++accepted;
-    const auto got = decode<LocalPositionNed>(r.payload).time_boot_ms;
-    const auto at = std::find(whole.begin() + static_cast<std::ptrdiff_t>(next), whole.end(), got);
-    if (at == whole.end()) continue;  // two flips of one bit: whole again
-    lost_in_a_row = static_cast<std::size_t>(at - whole.begin()) - next;
-    worst = std::max(worst, lost_in_a_row);
-    lost += lost_in_a_row;
-    next = static_cast<std::size_t>(at - whole.begin()) + 1;
+    arrived.push_back(decode<LocalPositionNed>(r.payload).time_boot_ms);
   }
-  lost += whole.size() - next;
-  EXPECT_LE(worst, 1U);
-  EXPECT_LE(lost, damaged_frames / 100) << "of " << whole.size() << " whole frames";
-  EXPECT_GT(damaged_frames, 2000U);
-  EXPECT_GE(accepted + lost, whole.size());
-  const auto& c = parser.counters();
-  EXPECT_EQ(c.bytes, bytes + 2 * kMaxFrame);
-  EXPECT_GT(c.bad_crc, 500U);
-  RecordProperty("lost_whole_frames", static_cast<int>(lost));
-  std::printf("fuzz: %zu bytes, %zu frames sent, %zu damaged, %zu accepted, %zu whole frames lost\n", bytes, sent,
-              damaged_frames, accepted, lost);
+  ASSERT_TRUE(std::ranges::is_sorted(arrived));
+  std::vector<std::uint32_t> lost;
+  std::ranges::set_difference(whole, arrived, std::back_inserter(lost));
+  // An unknown message cut short may seem to end at a start byte inside the next frame, which is then lost: 1 in about
+  // 5000 damaged frames, and never two in a row.
+  EXPECT_LE(lost.size(), damaged / 1000);
+  const auto adjacent = [&](auto a, auto b) { return std::ranges::find(whole, a) + 1 == std::ranges::find(whole, b); };
+  EXPECT_EQ(std::ranges::adjacent_find(lost, adjacent), lost.end());
+  // Damaged frames can come through whole (one bit flipped twice), so `arrived` may hold more.
+  EXPECT_LE(arrived.size(), whole.size() + damaged / 50);
+  EXPECT_GT(damaged, 4000U);
+  EXPECT_EQ(parser.counters().bytes, bytes + 2 * kMaxFrame);
+  EXPECT_GT(parser.counters().bad_crc, 1000U);
+  EXPECT_GT(parser.counters().unknown_id, 1000U);
 }
 
 TEST(MavlinkParser, AcceptsNothingFromNoise) {
