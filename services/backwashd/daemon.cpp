@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/daemon.hpp"
+
+#include <pthread.h>
+#include <signal.h>
+#include <spdlog/spdlog.h>
+
+#include <thread>
+
+#include "services/backwashd/control_loop.hpp"
+#include "services/backwashd/dds_front.hpp"
+#include "services/backwashd/map_worker.hpp"
+#include "services/backwashd/planner_worker.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+constexpr int kInputOutput = 74;
+
+// Every thread started after this leaves the signals to wait_for_signal().
+sigset_t block_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  return set;
+}
+
+}  // namespace
+
+tl::expected<Settings, std::string> load_settings(const std::string& path) {
+  auto daemon = config::load_daemon(path);
+  if (!daemon) return tl::unexpected(daemon.error().message);
+  auto vehicle = config::load_vehicle(daemon->vehicle);
+  if (!vehicle) return tl::unexpected(vehicle.error().message);
+  auto model = config::load_model(daemon->model);
+  if (!model) return tl::unexpected(model.error().message);
+  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model)};
+}
+
+int run(const Settings& settings) {
+  const sigset_t signals = block_signals();
+  auto channels = std::make_unique<Channels>();
+  Recorder recorder(settings.daemon.log.file);
+  auto port = firmware_bridge::SerialPort::open(settings.daemon.link.device,
+                                                static_cast<unsigned>(settings.daemon.link.baud));
+  if (!port) {
+    spdlog::error("{}: {}", settings.daemon.link.device, describe(port.error()));
+    return kInputOutput;
+  }
+  firmware_bridge::AutopilotLink link(std::move(*port), static_cast<std::uint8_t>(settings.daemon.link.system),
+                                      std::chrono::steady_clock::now());
+  DdsFront front(settings.daemon, *channels, recorder);
+  Mission mission(*channels);
+  ControlLoop loop(*channels, link, settings.vehicle);
+  {
+    std::vector<std::jthread> threads;
+    threads.emplace_back([&] { recorder.run(*channels); });
+    threads.emplace_back([&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle); });
+    threads.emplace_back([&] {
+      run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); });
+    });
+    threads.emplace_back([&] {
+      run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); });
+    });
+    threads.emplace_back([&] { front.run_status(settings.vehicle); });
+    threads.emplace_back([&] {
+      make_real_time(settings.daemon.control.priority);
+      run_control(*channels, loop);
+    });
+    threads.emplace_back([&] { front.run_readers(); });
+    spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}", settings.vehicle.name,
+                 settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space);
+    int signal = 0;
+    sigwait(&signals, &signal);
+    channels->stop = true;
+  }
+  spdlog::info("stopped");
+  return 0;
+}
+
+}  // namespace backwash::daemon

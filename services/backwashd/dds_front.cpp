@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/dds_front.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <thread>
+
+namespace backwash::daemon {
+namespace {
+
+// The frame that everything on our topics is in.
+const std::string kMapFrame = "map";
+
+builtin_interfaces_msg_dds__Time_ wall_clock() {
+  const auto since = std::chrono::system_clock::now().time_since_epoch();
+  const auto s = std::chrono::duration_cast<std::chrono::seconds>(since);
+  return {static_cast<std::int32_t>(s.count()),
+          static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since - s).count())};
+}
+
+geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+dds::Timing timing(const TimingHistogram& h) {
+  return {static_cast<float>(h.quantile(0.5)), static_cast<float>(h.quantile(0.99)), static_cast<float>(h.max_us)};
+}
+
+}  // namespace
+
+DdsFront::DdsFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
+    : channels_(channels),
+      recorder_(recorder),
+      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface),
+      odometry_(participant_, dds::TopicOf<dds::Odometry>::type(), config.dds.odometry_topic,
+                dds::TopicOf<dds::Odometry>::kDelivery),
+      maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
+      commands_(dds::make_reader<dds::Command>(participant_, config.dds.name_space)),
+      acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
+      status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
+      tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
+      trajectory_(dds::make_writer<dds::Path>(participant_, config.dds.name_space)),
+      waitset_(participant_) {
+  waitset_.add(odometry_);
+  waitset_.add(maps_);
+  waitset_.add(commands_);
+}
+
+void DdsFront::take_odometry() {
+  odometry_.take([&](const dds::Odometry& m) {
+    const auto& p = m.pose.pose.position;
+    const auto& q = m.pose.pose.orientation;
+    const auto& v = m.twist.twist.linear;
+    OdometrySample s;
+    s.received_ns = now_ns();
+    s.stamp_ns = std::int64_t{m.header.stamp.sec} * 1'000'000'000 + m.header.stamp.nanosec;
+    s.q = {q.w, q.x, q.y, q.z};
+    s.state.p_W = {p.x, p.y, p.z};
+    // nav_msgs/Odometry: the twist is in the child (body) frame.
+    s.state.v_W = Eigen::Quaterniond(q.w, q.x, q.y, q.z) * Vec3(v.x, v.y, v.z);
+    channels_.odometry.write(s);
+  });
+}
+
+void DdsFront::take_maps() {
+  maps_.take([&](const dds::Octomap& m) {
+    MapMessage message;
+    message.data.assign(reinterpret_cast<const std::int8_t*>(m.data._buffer),
+                        reinterpret_cast<const std::int8_t*>(m.data._buffer) + m.data._length);
+    message.resolution = m.resolution;
+    message.binary = m.binary;
+    message.id = m.id ? m.id : "";
+    channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+  });
+}
+
+void DdsFront::take_commands() {
+  commands_.take([&](const dds::Command& m) {
+    CommandMessage c;
+    std::snprintf(c.station.data(), c.station.size(), "%s", m.station ? m.station : "");
+    c.session = m.session;
+    c.sequence = m.sequence_number;
+    c.verb = m.verb;
+    c.position = {m.position.x, m.position.y, m.position.z};
+    c.yaw = m.yaw;
+    char line[256];
+    std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f", c.station.data(),
+                  static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
+                  c.position.z(), c.yaw);
+    recorder_.append(study::RecordKind::command, line);
+    if (!channels_.commands.push(c)) ++channels_.commands_refused;
+  });
+}
+
+void DdsFront::run_readers() {
+  while (!channels_.stop) {
+    waitset_.wait(0.1);
+    take_odometry();
+    take_commands();
+    take_maps();
+  }
+}
+
+void DdsFront::send(const CommandMessage& command, const Answer& answer) {
+  const std::string station(command.station.data());
+  const dds::Ack ack{dds::c_string(station), command.session, command.sequence, answer.result,
+                     dds::c_string(answer.reason)};
+  acks_.write(ack);
+  recorder_.append(study::RecordKind::ack, station + " " + std::to_string(command.sequence) + " result " +
+                                               std::to_string(answer.result) + ": " + answer.reason);
+}
+
+void DdsFront::send(const track::AcceptedSegment& segment) {
+  const std_msgs_msg_dds__Header_ header{wall_clock(), dds::c_string(kMapFrame)};
+  std::vector<dds::TubeStep> steps;
+  std::vector<dds::PoseStamped> poses;
+  for (const auto& s : segment.tube) {
+    dds::TubeStep step{s.t, point(s.center.p_W), {}};
+    std::copy(s.half_widths_interval.begin(), s.half_widths_interval.end(), step.half_widths);
+    steps.push_back(step);
+  }
+  for (const Setpoint& c : segment.commands)
+    poses.push_back({header, {point(c.p_W), {0, 0, std::sin(c.yaw / 2), std::cos(c.yaw / 2)}}});
+  dds::Tube tube{};
+  tube.header = header;
+  tube.steps = {static_cast<std::uint32_t>(steps.size()), static_cast<std::uint32_t>(steps.size()), steps.data(), false};
+  tube_.write(tube);
+  dds::Path path{};
+  path.header = header;
+  path.poses = {static_cast<std::uint32_t>(poses.size()), static_cast<std::uint32_t>(poses.size()), poses.data(), false};
+  trajectory_.write(path);
+}
+
+void DdsFront::run_status(const Vehicle& vehicle) {
+  ControlView view;
+  track::Mode last_mode = track::Mode::passive;
+  track::Reason last_reason = track::Reason::started;
+  auto next = std::chrono::steady_clock::now();
+  while (!channels_.stop) {
+    next += std::chrono::milliseconds(100);
+    std::this_thread::sleep_until(next);
+    if (const auto newest = channels_.view_status.read_new()) view = *newest;
+    if (view.mode != last_mode || view.reason != last_reason)
+      spdlog::info("{}: {}", to_string(last_mode = view.mode), to_string(last_reason = view.reason));
+    const std::string mode = to_string(view.mode), reason = to_string(view.reason);
+    dds::Status s{};
+    s.stamp = wall_clock();
+    s.vehicle = dds::c_string(vehicle.name);
+    s.state = dds::c_string(mode);
+    s.reason = dds::c_string(reason);
+    s.armed = view.armed;
+    s.offboard = view.offboard;
+    s.landed = view.landed;
+    s.moving = !view.finished;
+    s.frames_aligned = view.aligned;
+    s.position = point(view.state.p_W);
+    s.setpoint = point(view.command.p_W);
+    s.ticks = view.ticks;
+    s.ticks_missed = view.missed;
+    s.setpoints_sent = view.setpoints;
+    s.samples_inside = view.inside;
+    s.samples_outside = view.outside;
+    s.odometry_received = view.odometry_received;
+    s.odometry_rejected = view.odometry_rejected;
+    s.maps_accepted = channels_.maps_accepted;
+    s.maps_rejected = channels_.maps_rejected;
+    s.commands_refused = channels_.commands_refused;
+    s.frames_bad = view.frames_bad;
+    s.records_lost = channels_.control_log.lost() + recorder_.lost();
+    s.page_faults = view.page_faults;
+    s.frame_residual_m = view.residual_m;
+    s.frame_residual_rad = view.residual_rad;
+    s.odometry_age = view.odometry_age;
+    s.tick = timing(view.tick);
+    s.lateness = timing(view.lateness);
+    s.odometry_to_wire = timing(view.odometry_to_wire);
+    status_.write(s);
+  }
+}
+
+}  // namespace backwash::daemon

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/mission.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <thread>
+
+#include "services/dds/topics.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED;
+constexpr std::uint8_t kRefused = backwash_msgs_msg_dds__ACK_REFUSED;
+constexpr std::uint8_t kNotYours = backwash_msgs_msg_dds__ACK_NOT_YOURS;
+constexpr std::uint8_t kInvalid = backwash_msgs_msg_dds__ACK_INVALID;
+
+Answer accepted(std::string what) { return {kAccepted, std::move(what)}; }
+Answer refused(std::string why) { return {kRefused, std::move(why)}; }
+
+double seconds_now() { return static_cast<double>(now_ns()) * 1e-9; }
+
+}  // namespace
+
+void Mission::refresh() {
+  channels_.jobs.collect();
+  if (const auto view = channels_.view_mission.read_new()) view_ = *view;
+  if (const auto* world = channels_.worlds.take()) {
+    world_ = *world;
+    channels_.worlds.give_back(world);
+  }
+  while (const auto outcome = channels_.outcomes.pop()) {
+    if (job_ == outcome->job) job_.reset();
+    if (!outcome->ok) spdlog::warn("refused: {}", outcome->reason.data());
+  }
+}
+
+std::string Mission::station(double now_s) const {
+  return lease_ && now_s < lease_->until_s ? lease_->station : std::string();
+}
+
+Answer Mission::handle(const CommandMessage& command, double now_s) {
+  const std::string from(command.station.data());
+  if (from.empty() || !command.position.allFinite() || !std::isfinite(command.yaw))
+    return {kInvalid, "a command needs a station name and finite numbers"};
+  if (const std::string holder = station(now_s); !holder.empty() && holder != from) {
+    ++channels_.commands_refused;
+    return {kNotYours, "session held by " + holder};
+  }
+  if (!lease_ || lease_->station != from || lease_->session != command.session) {
+    lease_ = Lease{from, command.session, command.sequence, 0, {}};
+  } else if (command.sequence == lease_->sequence) {
+    return lease_->last;
+  } else if (command.sequence < lease_->sequence) {
+    return {kInvalid, "sequence number " + std::to_string(command.sequence) + " is older than " +
+                          std::to_string(lease_->sequence)};
+  }
+  lease_->sequence = command.sequence;
+  lease_->until_s = now_s + kLease;
+  lease_->last = decide(command);
+  const Answer answer = lease_->last;
+  if (answer.result != kAccepted) ++channels_.commands_refused;
+  if (command.verb == backwash_msgs_msg_dds__COMMAND_RELEASE) lease_.reset();
+  return answer;
+}
+
+Answer Mission::decide(const CommandMessage& command) {
+  const bool commanding = view_.mode == track::Mode::tracking || view_.mode == track::Mode::hold;
+  switch (command.verb) {
+    case backwash_msgs_msg_dds__COMMAND_ENABLE: return enable();
+    case backwash_msgs_msg_dds__COMMAND_DISABLE:
+      if (view_.armed) return refused("the vehicle is armed: land first");
+      channels_.requests.push(track::Request::disable);
+      return accepted("disabling");
+    case backwash_msgs_msg_dds__COMMAND_TAKEOFF: return take_off(command);
+    case backwash_msgs_msg_dds__COMMAND_GOTO: return go_to(command);
+    case backwash_msgs_msg_dds__COMMAND_HOLD:
+      if (!commanding) return refused("not enabled");
+      return start(PlanJob::Kind::brake, command);
+    case backwash_msgs_msg_dds__COMMAND_LAND:
+      if (!commanding) return refused("not enabled");
+      channels_.requests.push(track::Request::land);
+      return accepted("landing");
+    case backwash_msgs_msg_dds__COMMAND_RELEASE: return accepted("session released");
+    default: return {kInvalid, "unknown command " + std::to_string(command.verb)};
+  }
+}
+
+// What has to be right before the daemon takes control; the frames are judged by the supervisor while it is enabling.
+Answer Mission::enable() {
+  if (view_.mode != track::Mode::passive && view_.mode != track::Mode::quiet)
+    return refused(std::string("already ") + to_string(view_.mode));
+  if (!world_) return refused("no map was received yet");
+  if (view_.odometry_age > track::Supervisor::kHoldAfter) return refused("no odometry");
+  if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");
+  if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
+  channels_.requests.push(track::Request::enable);
+  return accepted("enabling");
+}
+
+Answer Mission::take_off(const CommandMessage& command) {
+  if (view_.mode != track::Mode::tracking) return refused("not enabled");
+  if (!view_.landed) return refused("already in the air");
+  channels_.arm.store(true);
+  return start(PlanJob::Kind::takeoff, command);
+}
+
+Answer Mission::go_to(const CommandMessage& command) {
+  if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return refused("not enabled");
+  if (view_.landed) return refused("on the ground: take off first");
+  if (!view_.finished) return refused("flying: hold first");
+  return start(PlanJob::Kind::go_to, command);
+}
+
+Answer Mission::start(PlanJob::Kind kind, const CommandMessage& command) {
+  if (!world_) return refused("no map was received yet");
+  if (job_ && kind != PlanJob::Kind::brake) return refused("still planning the last command");
+  job_ = ++last_job_;
+  channels_.jobs.offer(
+      std::make_unique<const PlanJob>(PlanJob{kind, *job_, command.position, command.yaw, world_}));
+  return accepted("planning");
+}
+
+void run_mission(Channels& channels, Mission& mission, const SendAnswer& answer) {
+  while (!channels.stop) {
+    mission.refresh();
+    while (const auto command = channels.commands.pop()) {
+      const Answer a = mission.handle(*command, seconds_now());
+      spdlog::info("command {} from {}: {}", command->verb, command->station.data(), a.reason);
+      answer(*command, a);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+}  // namespace backwash::daemon

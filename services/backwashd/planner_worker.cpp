@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/planner_worker.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <optional>
+#include <thread>
+
+#include "core/plan/planner.hpp"
+#include "core/plan/stop.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kAttempts = 25;            // offers of one segment, each from a fresh state
+constexpr int kBranchAfter = 15;         // commands (0.3 s) that a continued segment leaves untouched
+constexpr double kHoldAfter = 2.0;       // s of hover at the end, so that the last set is the hover set's
+
+/// The segment that flies now, with what is needed to continue it.
+struct Flying {
+  track::AcceptedSegment segment;
+  State start;
+  Setpoint previous;
+};
+
+class Planner {
+ public:
+  Planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted)
+      : channels_(channels), recorder_(recorder), accepted_(accepted) {}
+
+  /// Why the job could not be done; nothing when it is flying.
+  std::optional<std::string> perform(const PlanJob& job) {
+    switch (job.kind) {
+      case PlanJob::Kind::takeoff: return take_off(job);
+      case PlanJob::Kind::go_to: return go_to(job);
+      default: return brake(job);
+    }
+  }
+  void refresh() {
+    channels_.segments.collect();
+    if (const auto view = channels_.view_planner.read_new()) view_ = *view;
+  }
+
+ private:
+  std::optional<std::string> take_off(const PlanJob& job) {
+    refresh();
+    const Vec3 here = view_.state.p_W;
+    const auto column = plan::takeoff_column(*job.world, here);
+    if (!column) return "there is no clear hover height above a known floor here";
+    Vec3 target = here;
+    target.z() = std::max(job.position.z(), column->z_safe);
+    if (target.z() > here.z() && !job.world->hover.safe(job.world->grid.index(target)))
+      return "hovering at the height asked for is not safe";
+    const auto& limits = job.world->reach.vehicle.limits;
+    const auto commands = [&] { return plan::vertical_commands(here, target, limits.v_max, limits.a_max); };
+    return fly(job, commands(), [&](const reach::ReachTube& tube) { return takeoff_clearance(*job.world, tube, column->z_safe); });
+  }
+
+  std::optional<std::string> go_to(const PlanJob& job) {
+    refresh();
+    const auto& limits = job.world->reach.vehicle.limits;
+    plan::PlanOptions options{};
+    options.v_max = limits.v_max;
+    options.a_max = limits.a_max;
+    const auto planned = plan::plan(*job.world, {view_.state, view_.command}, job.position, options);
+    spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
+                 plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
+                 planned.metrics.verify_ms, planned.metrics.min_clearance_m);
+    if (planned.status != plan::PlanStatus::ok)
+      return std::string(plan::to_string(planned.status)) + ": " + planned.message;
+    return fly(job, planned.commands,
+               [&](const reach::ReachTube& tube) { return plan::tube_clearance(*job.world, tube); });
+  }
+
+  /// The current segment, slowed to rest on its own path from a little ahead of now.
+  std::optional<std::string> brake(const PlanJob& job) {
+    refresh();
+    if (view_.finished || !flying_ || view_.segment != flying_->segment.id) return std::nullopt;  // already at rest
+    const std::size_t branch = view_.index + kBranchAfter;
+    auto commands = plan::stop_along(flying_->segment.commands, branch, job.world->reach.vehicle.limits.a_max);
+    if (commands.empty()) return std::nullopt;  // it ends by itself before that
+    append_hold(commands);
+    Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}}, flying_->start, flying_->previous};
+    next.segment.tube = reach::tube_over_field(job.world->reach, next.start, next.previous, next.segment.commands,
+                                               job.world->bounds);
+    if (const double clearance = plan::tube_clearance(*job.world, next.segment.tube); !(clearance > 0))
+      return "braking here is not clear: " + std::to_string(clearance) + " m";
+    return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
+  }
+
+  static double takeoff_clearance(const plan::World& world, const reach::ReachTube& tube, double z_safe) {
+    const auto clear = std::find_if(tube.begin(), tube.end(), [&](const auto& s) { return s.center.p_W.z() >= z_safe; });
+    const double beside = plan::lateral_clearance(world, {tube.begin(), clear});
+    return clear == tube.end() ? beside : std::min(beside, plan::tube_clearance(world, {clear, tube.end()}));
+  }
+
+  static void append_hold(std::vector<Setpoint>& commands) {
+    Setpoint hold = commands.back();
+    hold.v_W = hold.a_W = Vec3::Zero();
+    commands.insert(commands.end(), static_cast<std::size_t>(kHoldAfter / kControlPeriod), hold);
+  }
+
+  /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may have
+  /// moved further than the first set allows.
+  template <typename Clearance>
+  std::optional<std::string> fly(const PlanJob& job, std::vector<Setpoint> commands, Clearance clearance_of) {
+    append_hold(commands);
+    for (Setpoint& command : commands) command.yaw = view_.command.yaw;
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      refresh();
+      if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
+      Flying next{{++last_id_, 0, 0, commands, {}}, view_.state, view_.command};
+      next.segment.tube =
+          reach::tube_over_field(job.world->reach, next.start, next.previous, commands, job.world->bounds);
+      if (const double clearance = clearance_of(next.segment.tube); !(clearance > 0)) {
+        char line[96];
+        std::snprintf(line, sizeof line, "the tube from the state estimated now is not clear: %.3f m", clearance);
+        return line;
+      }
+      if (offer(std::move(next))) return std::nullopt;
+    }
+    return "the vehicle is not still enough to start: its state left the first set each time";
+  }
+
+  bool offer(Flying next) {
+    const std::uint64_t id = next.segment.id;
+    channels_.segments.offer(std::make_unique<const track::AcceptedSegment>(next.segment));
+    for (int wait = 0; wait < 100 && !channels_.stop; ++wait) {
+      std::this_thread::sleep_for(1ms);
+      refresh();
+      if (view_.segment == id) {
+        record(next);
+        accepted_(next.segment);
+        flying_ = std::move(next);
+        return true;
+      }
+      if (view_.refused_segment == id) return false;
+    }
+    return false;
+  }
+
+  void record(const Flying& flying) {
+    const auto& s = flying.segment;
+    study::SegmentRecord head{s.id, s.continues, s.commands.size(), {}, {}};
+    std::copy_n(flying.start.p_W.data(), 3, head.start_p);
+    std::copy_n(flying.start.v_W.data(), 3, head.start_v);
+    std::vector<std::uint8_t> bytes(sizeof head + s.commands.size() * 10 * sizeof(double));
+    std::memcpy(bytes.data(), &head, sizeof head);
+    auto* at = bytes.data() + sizeof head;
+    for (const Setpoint& c : s.commands) {
+      const double row[10] = {c.p_W.x(), c.p_W.y(), c.p_W.z(), c.v_W.x(), c.v_W.y(),
+                              c.v_W.z(), c.a_W.x(), c.a_W.y(), c.a_W.z(), c.yaw};
+      std::memcpy(at, row, sizeof row);
+      at += sizeof row;
+    }
+    recorder_.append(study::RecordKind::segment, bytes);
+  }
+
+  Channels& channels_;
+  Recorder& recorder_;
+  const SegmentAccepted& accepted_;
+  ControlView view_;
+  std::uint64_t last_id_ = 0;
+  std::optional<Flying> flying_;
+};
+
+}  // namespace
+
+void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted) {
+  Planner planner(channels, recorder, accepted);
+  while (!channels.stop) {
+    const PlanJob* job = channels.jobs.take();
+    if (!job) {
+      std::this_thread::sleep_for(2ms);
+      planner.refresh();
+      continue;
+    }
+    const auto refused = planner.perform(*job);
+    PlanOutcome outcome{job->id, !refused, {}};
+    if (refused) std::snprintf(outcome.reason.data(), outcome.reason.size(), "%s", refused->c_str());
+    channels.jobs.give_back(job);
+    channels.outcomes.push(outcome);
+  }
+}
+
+}  // namespace backwash::daemon

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <pthread.h>
+#include <sched.h>
+#include <spdlog/spdlog.h>
+#include <sys/mman.h>
+#include <time.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "services/backwashd/control_loop.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+constexpr std::int64_t kPeriod_ns = 20'000'000;
+constexpr std::size_t kStackToTouch = 256 * 1024;
+
+// Touches stack below the current frame, so that the loop's first deep call faults no page.
+void prefault_stack() {
+  volatile char stack[kStackToTouch];
+  for (std::size_t i = 0; i < kStackToTouch; i += 4096) stack[i] = 0;
+  (void)stack[0];
+}
+
+}  // namespace
+
+void make_real_time(int priority) {
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+    spdlog::warn("memory is not locked ({}): page faults may delay ticks; grant CAP_IPC_LOCK or LimitMEMLOCK",
+                 std::strerror(errno));
+  prefault_stack();
+  if (priority == 0) return;
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters); error != 0)
+    spdlog::warn("SCHED_FIFO {} is not allowed ({}): ticks may be late; grant CAP_SYS_NICE or LimitRTPRIO", priority,
+                 std::strerror(error));
+}
+
+void run_control(Channels& channels, ControlLoop& loop) {
+  std::int64_t due = now_ns() + kPeriod_ns;
+  while (!channels.stop) {
+    const timespec wake{due / 1'000'000'000, due % 1'000'000'000};
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr) == EINTR) {
+    }
+    const std::int64_t woken = now_ns();
+    // Whole periods that have passed since this one was due are skipped; the phase stays.
+    const std::int64_t missed = (woken - due) / kPeriod_ns;
+    due += missed * kPeriod_ns;
+    loop.tick(woken, static_cast<int>(missed), static_cast<double>(woken - due) * 1e-3);
+    loop.took(static_cast<double>(now_ns() - woken) * 1e-3);
+    due += kPeriod_ns;
+  }
+}
+
+}  // namespace backwash::daemon

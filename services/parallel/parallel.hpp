@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace backwash {
+
+/// plan::Parallel on all processors: threads take ranges of 256 until all are done.
+void run_parallel(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
+
+}  // namespace backwash
