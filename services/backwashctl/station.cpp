@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashctl/station.hpp"
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+namespace backwash::ctl {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+
+std::string text(const char* s) { return s ? s : ""; }
+
+}  // namespace
+
+Station::Station(const Options& options)
+    : options_(options),
+      session_(std::uint64_t{std::random_device{}()} << 32 | std::random_device{}()),
+      participant_(static_cast<std::uint32_t>(options.domain), options.interface),
+      commands_(dds::make_writer<dds::Command>(participant_, options.name_space)),
+      acks_(dds::make_reader<dds::Ack>(participant_, options.name_space)),
+      statuses_(dds::make_reader<dds::Status>(participant_, options.name_space)),
+      waitset_(participant_) {
+  waitset_.add(acks_);
+  waitset_.add(statuses_);
+}
+
+std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& position, double yaw) {
+  constexpr double kRepeat = 0.5;  // s
+  const auto begun = Clock::now();
+  while (commands_.matched() == 0 && since(begun) < options_.timeout_s)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  dds::Command command{};
+  command.station = dds::c_string(options_.station);
+  command.session = session_;
+  command.sequence_number = ++sequence_;
+  command.verb = verb;
+  command.position = {position.x(), position.y(), position.z()};
+  command.yaw = yaw;
+  std::optional<Result> result;
+  auto sent = Clock::time_point{};
+  while (!result && since(begun) < options_.timeout_s) {
+    if (since(sent) > kRepeat) {
+      commands_.write(command);
+      sent = Clock::now();
+    }
+    waitset_.wait(0.05);
+    acks_.take([&](const dds::Ack& ack) {
+      if (ack.session == session_ && ack.sequence_number == sequence_) result = Result{ack.result, text(ack.reason)};
+    });
+  }
+  return result;
+}
+
+std::optional<StatusCopy> Station::status(double timeout_s) {
+  const auto begun = Clock::now();
+  std::optional<StatusCopy> newest;
+  while (!newest && since(begun) < timeout_s) {
+    waitset_.wait(0.05);
+    acks_.take([](const dds::Ack&) {});
+    statuses_.take([&](const dds::Status& s) {
+      newest = StatusCopy{s, text(s.vehicle), text(s.state), text(s.reason)};
+      newest->numbers.vehicle = newest->numbers.state = newest->numbers.reason = nullptr;
+    });
+  }
+  return newest;
+}
+
+bool Station::wait(double timeout_s, const std::function<bool(const StatusCopy&)>& done,
+                   const std::function<bool(const StatusCopy&)>& failed) {
+  const auto begun = Clock::now();
+  while (since(begun) < timeout_s) {
+    const auto now = status(1.0);
+    if (!now) continue;
+    if (done(*now)) return true;
+    if (failed(*now)) return false;
+  }
+  return false;
+}
+
+}  // namespace backwash::ctl

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "core/types/geometry.hpp"
+#include "services/dds/topics.hpp"
+
+namespace backwash::ctl {
+
+/// Where the daemon is and who asks.
+struct Options {
+  int domain = 0;
+  std::string interface = "lo", name_space = "backwash", station;
+  double timeout_s = 5;
+};
+
+/// A copy of the daemon's status that owns its strings.
+struct StatusCopy {
+  dds::Status numbers{};  ///< its string members are null
+  std::string vehicle, state, reason;
+};
+
+/// One ground station: sends commands, waits for their acknowledgement and watches the status.
+class Station {
+ public:
+  explicit Station(const Options& options);
+
+  struct Result {
+    int result;          ///< ACK_… code
+    std::string reason;
+  };
+  /// Sends a command and repeats it, with the same sequence number, until it is acknowledged; nothing if it never is.
+  std::optional<Result> send(std::uint8_t verb, const Vec3& position = Vec3::Zero(), double yaw = 0);
+  /// The next status; nothing after the timeout.
+  std::optional<StatusCopy> status(double timeout_s);
+  /// Waits until `done` holds for a status; false after `timeout_s`. `failed` ends the wait early with false.
+  bool wait(double timeout_s, const std::function<bool(const StatusCopy&)>& done,
+            const std::function<bool(const StatusCopy&)>& failed);
+
+ private:
+  Options options_;
+  std::uint64_t session_;
+  std::uint32_t sequence_ = 0;
+  dds::Participant participant_;
+  dds::Writer<dds::Command> commands_;
+  dds::Reader<dds::Ack> acks_;
+  dds::Reader<dds::Status> statuses_;
+  dds::WaitSet waitset_;
+};
+
+}  // namespace backwash::ctl

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "services/backwashctl/station.hpp"
+
+namespace backwash::ctl {
+
+/// The verbs of backwashctl: enable, disable, takeoff, goto, hold, land, release, status, watch.
+class Verbs {
+ public:
+  explicit Verbs(CLI::App& app);
+  /// Runs the chosen verb. 0: done (with --wait: reached); 69: refused, lost or not reached, with one line on stderr.
+  int run();
+
+ private:
+  int command(const std::string& name, std::uint8_t verb, const Vec3& position,
+              const std::function<bool(const StatusCopy&)>& done, double patience_s);
+  int status();
+  int watch();
+
+  Options options_;
+  std::vector<double> goal_;
+  double height_ = 0, yaw_ = 0, patience_s_ = 0;
+  bool wait_ = false, json_ = false;
+  std::function<int()> chosen_;
+};
+
+}  // namespace backwash::ctl
