@@ -3,11 +3,11 @@
 #include <iostream>
 
 #include "services/backwashctl/verbs.hpp"
-#include "services/version/version.hpp"
+#include "version.hpp"
 
 int main(int argc, char** argv) {
   CLI::App app{"backwashctl: ground station of a backwash daemon"};
-  app.set_version_flag("--version", backwash::version());
+  app.set_version_flag("--version", std::string("backwashctl ") + backwash::kVersion);
   backwash::ctl::Verbs verbs(app);
   try {
     app.parse(argc, argv);

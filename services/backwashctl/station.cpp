@@ -62,8 +62,8 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
     waitset_.wait(0.05);
     acks_.take([](const dds::Ack&) {});
     statuses_.take([&](const dds::Status& s) {
-      newest = StatusCopy{s, text(s.vehicle), text(s.state), text(s.reason)};
-      newest->numbers.vehicle = newest->numbers.state = newest->numbers.reason = nullptr;
+      newest = StatusCopy{s, text(s.vehicle), text(s.state), text(s.reason), text(s.task)};
+      newest->numbers.vehicle = newest->numbers.state = newest->numbers.reason = newest->numbers.task = nullptr;
     });
   }
   return newest;

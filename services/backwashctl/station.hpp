@@ -20,7 +20,7 @@ struct Options {
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its string members are null
-  std::string vehicle, state, reason;
+  std::string vehicle, state, reason, task;
 };
 
 /// One ground station: sends commands, waits for their acknowledgement and watches the status.

@@ -26,6 +26,7 @@ nlohmann::json json_of(const StatusCopy& s) {
   return {{"vehicle", s.vehicle},
           {"state", s.state},
           {"reason", s.reason},
+          {"task", s.task},
           {"armed", static_cast<bool>(n.armed)},
           {"offboard", static_cast<bool>(n.offboard)},
           {"landed", static_cast<bool>(n.landed)},
@@ -156,7 +157,8 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
   station.status(1.0);
   std::string last = "no status";
   const bool reached = station.wait(patience_s, done, [&](const StatusCopy& s) {
-    last = s.state + " (" + s.reason + ")";
+    last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task);
+    if (s.task.starts_with("refused")) return true;
     const bool lost = s.state == "quiet" || s.state == "hold" || (s.state == "passive" && name != "land");
     return lost && name != "hold";
   });

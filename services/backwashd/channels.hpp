@@ -113,6 +113,7 @@ struct Channels {
   sync::Handover<track::AcceptedSegment> segments;             // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   sync::RecordRing<ControlRecord, 2048> control_log;           // control → recorder
+  sync::LatestValue<std::array<char, 192>> task;               // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<bool> stop{false};
 };

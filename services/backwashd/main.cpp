@@ -6,7 +6,7 @@
 
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/daemon.hpp"
-#include "services/version/version.hpp"
+#include "version.hpp"
 
 namespace {
 
@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
   bool check = false;
   app.add_option("--config", path, "configuration file, or builtin:backwashd")->required();
   app.add_flag("--check-config", check, "only read the configuration; exit 78 and say what is wrong with it");
-  app.set_version_flag("--version", backwash::version());
+  app.set_version_flag("--version", std::string("backwashd ") + backwash::kVersion);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {

@@ -30,9 +30,17 @@ void Mission::refresh() {
     channels_.worlds.give_back(world);
   }
   while (const auto outcome = channels_.outcomes.pop()) {
-    if (job_ == outcome->job) job_.reset();
+    if (job_ != outcome->job) continue;  // a newer command took its place
+    job_.reset();
+    report(outcome->ok ? "" : std::string("refused: ") + outcome->reason.data());
     if (!outcome->ok) spdlog::warn("refused: {}", outcome->reason.data());
   }
+}
+
+void Mission::report(const std::string& task) {
+  std::array<char, 192> line{};
+  std::snprintf(line.data(), line.size(), "%s", task.c_str());
+  channels_.task.write(line);
 }
 
 std::string Mission::station(double now_s) const {
@@ -118,6 +126,7 @@ Answer Mission::start(PlanJob::Kind kind, const CommandMessage& command) {
   job_ = ++last_job_;
   channels_.jobs.offer(
       std::make_unique<const PlanJob>(PlanJob{kind, *job_, command.position, command.yaw, world_}));
+  report("planning");
   return accepted("planning");
 }
 

@@ -38,6 +38,7 @@ class Mission {
   Answer enable();
   Answer take_off(const CommandMessage& command);
   Answer go_to(const CommandMessage& command);
+  void report(const std::string& task);
   Answer start(PlanJob::Kind kind, const CommandMessage& command);
 
   Channels& channels_;
