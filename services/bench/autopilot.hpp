@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <deque>
+#include <fstream>
+#include <optional>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/sim/airflow_truth.hpp"
+#include "core/sim/quadrotor.hpp"
+#include "firmware_bridge/mavlink/frame.hpp"
+#include "firmware_bridge/mavlink/messages.hpp"
+
+namespace backwash::bench {
+
+/// Where the controller's own local frame lies: p_local = R_z(yaw) p_map + origin.
+struct LocalFrame {
+  double yaw = 0;                ///< rad
+  Vec3 origin = Vec3::Zero();    ///< m
+};
+
+/// An emulated PX4-like flight controller: MAVLink on one side, the simulated vehicle in the airflow truth on the other.
+/// It flies on the odometry it is sent (its own inertial sensors bridge the time since the sample's stamp), answers
+/// commands, follows offboard set-points only while they stream, and lands by itself when they stop for 0.5 s.
+class Autopilot {
+ public:
+  static constexpr double kOffboardTimeout = 0.5;  ///< s without a set-point until the failsafe lands
+  static constexpr double kDescent = 0.5;          ///< m/s
+
+  /// Stands disarmed at `ground_W` (the vehicle's centre, map frame).
+  Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, const Vec3& ground_W, const LocalFrame& frame,
+            std::uint64_t seed, std::uint8_t system);
+
+  /// Frames from the companion computer, received at `t` (s, monotonic).
+  void receive(std::span<const std::uint8_t> bytes, double t);
+  /// One step of 1 ms that ends at `t`; the bytes to send are appended to `out`.
+  void step(double t, std::vector<std::uint8_t>& out);
+
+  const State& truth() const noexcept { return vehicle_.state(); }
+  Eigen::Quaterniond attitude() const { return vehicle_.attitude(); }
+  const Vec3& acceleration() const noexcept { return vehicle_.acceleration(); }
+  double thrust() const noexcept { return armed_ ? vehicle_.thrust() : 0; }
+  bool armed() const noexcept { return armed_; }
+  bool landed() const noexcept { return landed_; }
+  const char* mode() const noexcept;
+  std::uint64_t setpoints() const noexcept { return setpoints_; }
+
+  /// While true no telemetry is sent (heartbeat lost, faults.md row 21).
+  bool mute = false;
+  /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position.
+  void log_wire(const std::string& path);
+
+ private:
+  enum class Mode { manual, offboard, land };
+  void on(const mavlink::SetPositionTargetLocalNed& m, double t);
+  void on(const mavlink::Odometry& m, double t);
+  void on(const mavlink::CommandLong& m, double t);
+  template <typename Other>
+  void on(const Other&, double) {}
+  Setpoint to_map(const Setpoint& local) const;
+  State believed() const;
+  void fly(double t);
+  void telemetry(double t, std::vector<std::uint8_t>& out);
+  template <typename Message>
+  void send(const Message& message, std::vector<std::uint8_t>& out);
+
+  sim::Quadrotor vehicle_;
+  sim::AirflowTruth air_;
+  LocalFrame frame_;
+  std::uint8_t system_, sequence_ = 0;
+  mavlink::Parser parser_;
+  bool armed_ = false, landed_ = true, local_position_ = false;
+  Mode mode_ = Mode::manual;
+  double t_ = 0, last_setpoint_ = -1e9, landed_since_ = 0;
+  long steps_ = 0;
+  std::uint64_t setpoints_ = 0;
+  Setpoint target_;                               // map frame
+  std::deque<std::pair<double, State>> history_;  // truth of the last second
+  State error_;                                   // what the newest odometry said, less the truth at its stamp
+  std::vector<mavlink::CommandAck> acks_;
+  std::ofstream wire_;
+};
+
+}  // namespace backwash::bench

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/map/occupancy_grid.hpp"
+#include "core/types/vehicle.hpp"
+#include "services/bench/autopilot.hpp"
+
+namespace backwash::bench {
+
+struct Options {
+  std::string map, vehicle, link, log, wire;
+  Vec3 start = Vec3::Zero();         ///< above the place where the vehicle stands, m
+  LocalFrame frame;
+  std::uint64_t seed = 1;
+  int domain = 0;
+  std::string interface = "lo", name_space = "backwash";
+  double duration_s = 600;
+  std::optional<double> stop_odometry_s, stop_heartbeat_s;  ///< s after arming
+};
+
+/// Runs the emulated flight controller, VIO (100 Hz) and mapper in real time until the duration has passed or SIGINT or
+/// SIGTERM. Returns the exit code; throws std::runtime_error at start.
+int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle);
+
+}  // namespace backwash::bench

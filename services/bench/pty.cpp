@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/bench/pty.hpp"
+
+#include <fcntl.h>
+#include <stdlib.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+namespace backwash::bench {
+
+Pty::Pty(const std::string& link) : fd_(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)), link_(link) {
+  char name[128];
+  if (fd_ < 0 || grantpt(fd_) != 0 || unlockpt(fd_) != 0 || ptsname_r(fd_, name, sizeof name) != 0)
+    throw std::runtime_error(std::string("no pseudo-terminal: ") + std::strerror(errno));
+  // The other end stays open here too: then a companion that closes it does not look like a hang-up.
+  other_ = open(name, O_RDWR | O_NOCTTY);
+  termios raw{};
+  if (other_ < 0 || tcgetattr(other_, &raw) != 0) throw std::runtime_error(std::string(name) + ": " + std::strerror(errno));
+  cfmakeraw(&raw);
+  tcsetattr(other_, TCSANOW, &raw);
+  unlink(link.c_str());
+  if (symlink(name, link.c_str()) != 0) throw std::runtime_error(link + ": cannot be made: " + std::strerror(errno));
+}
+
+Pty::~Pty() {
+  unlink(link_.c_str());
+  close(other_);
+  close(fd_);
+}
+
+std::vector<std::uint8_t> Pty::read() {
+  std::vector<std::uint8_t> bytes(4096);
+  const ssize_t n = ::read(fd_, bytes.data(), bytes.size());
+  bytes.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
+  return bytes;
+}
+
+void Pty::write(std::span<const std::uint8_t> bytes) {
+  if (!bytes.empty()) (void)!::write(fd_, bytes.data(), bytes.size());
+}
+
+}  // namespace backwash::bench
