@@ -17,7 +17,7 @@ struct HorizontalVertical {
 constexpr HorizontalVertical kBase{0.0024, 0.0036};
 constexpr HorizontalVertical kFloor{0.040, 0.076};
 constexpr double kFloorLength = 1.05;
-constexpr double kWallNormal = 0.21, kWallTangential = 0.01, kWallVertical = 0.045, kWallLength = 0.5;
+constexpr double kWallNormal = 0.19, kWallTangential = 0.01, kWallVertical = 0.038, kWallLength = 0.5;
 constexpr double kCornerNormal = 0.16, kCornerTangential = 0.06, kCornerVertical = 0.18;
 constexpr double kCornerLength = 0.5, kCornerHeight = 0.9;
 constexpr double kCeiling = 0.004, kCeilingLength = 0.2;
