@@ -205,7 +205,7 @@ TEST(PrismDistance, TakesTheOutsideOfTheGridAsObstacle) {
 TEST(PrismDistance, ReturnsTheLimitWhenNothingIsNearer) {
   const map::OccupancyGrid grid = one_voxel(Vec3(1.0, 0, 0));
   const PerDirection h{0.1, 0.1, 0.1, 0.1, 0.1};
-  EXPECT_EQ(prism_distance(grid, Vec3::Zero(), h, 0.5), 0.5);
+  EXPECT_DOUBLE_EQ(prism_distance(grid, Vec3::Zero(), h, 0.5), 0.5);
   EXPECT_NEAR(prism_distance(grid, Vec3::Zero(), h, 1.5), 0.9, 1e-9);
 }
 
