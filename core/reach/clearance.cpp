@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/clearance.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+namespace backwash::reach {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+/// Supports of the octagon {|x| ≤ x, |y| ≤ y, |x + y| ≤ sum, |x − y| ≤ difference} and the half height z of the prism.
+/// Tight: each is attained. Only then do supports add in a Minkowski sum, and do they give the corners.
+struct Supports {
+  double x, y, z, sum, difference;
+};
+
+/// Duality: the largest value in a direction is the least combination of two slabs whose normals enclose it.
+Supports tight_supports(const PerDirection& h) {
+  const double sqrt2 = std::sqrt(2.0);
+  const double x = h[kX], y = h[kY], s = sqrt2 * h[kXyPlus], d = sqrt2 * h[kXyMinus];
+  return {std::min({x, s + y, d + y, (s + d) / 2}), std::min({y, s + x, d + x, (s + d) / 2}), h[kZ],
+          std::min({s, x + y, d + 2 * x, d + 2 * y}), std::min({d, x + y, s + 2 * x, s + 2 * y})};
+}
+
+/// Distance of points to the octagon ⊕ a voxel's square, whose centre is the origin.
+class FatOctagon {
+ public:
+  FatOctagon(const Supports& s, double half_edge)
+      : x_(s.x + half_edge),
+        y_(s.y + half_edge),
+        sum_(s.sum + 2 * half_edge),
+        difference_(s.difference + 2 * half_edge) {
+    // Half of the corners, counter-clockwise from the right edge's lower end; the others are their mirror images.
+    corners_ = {Vec2{x_, x_ - difference_}, Vec2{x_, sum_ - x_}, Vec2{sum_ - y_, y_}, Vec2{y_ - difference_, y_},
+                Vec2{-x_, difference_ - x_}};
+  }
+  double squared_distance(const Vec2& p) const noexcept {
+    if (std::abs(p.x()) <= x_ && std::abs(p.y()) <= y_ && std::abs(p.x() + p.y()) <= sum_ &&
+        std::abs(p.x() - p.y()) <= difference_) {
+      return 0;
+    }
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t c = 0; c + 1 < corners_.size(); ++c) {
+      nearest = std::min(
+          {nearest, to_segment(p, corners_[c], corners_[c + 1]), to_segment(-p, corners_[c], corners_[c + 1])});
+    }
+    return nearest;
+  }
+
+ private:
+  static double to_segment(const Vec2& p, const Vec2& from, const Vec2& to) noexcept {
+    const Vec2 along = to - from, r = p - from;
+    const double length2 = along.squaredNorm();
+    const double t = length2 > 0 ? std::clamp(r.dot(along) / length2, 0.0, 1.0) : 0.0;
+    return (r - t * along).squaredNorm();
+  }
+  double x_, y_, sum_, difference_;
+  std::array<Vec2, 5> corners_;
+};
+
+/// First cell of [from, to) that is not free, or `to`. Eight cells at a time.
+const map::Cell* first_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+  static_assert(sizeof(map::Cell) == 1);
+  constexpr std::uint64_t kAllFree = 0x0101010101010101u * static_cast<std::uint64_t>(map::Cell::free);
+  for (std::uint64_t word = 0; to - from >= 8; from += 8) {
+    std::memcpy(&word, from, 8);
+    if (word != kAllFree) break;
+  }
+  while (from != to && *from == map::Cell::free) ++from;
+  return from;
+}
+
+/// Distance of a prism to the outside of the grid: the complement of a box is six half-spaces.
+double distance_to_outside(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s) {
+  const Vec3 low = center_W - grid.origin();
+  const Vec3 high = grid.size().cast<double>() * grid.resolution() - low;
+  return std::max(0.0, (low.cwiseMin(high) - Vec3(s.x, s.y, s.z)).minCoeff());
+}
+
+/// Search for the obstacle nearest to a prism: voxels from the centre outwards, so that what is found early shortens
+/// the rest.
+class Scan {
+ public:
+  Scan(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit)
+      : grid_(grid),
+        center_(center_W - grid.origin()),
+        half_(s.x, s.y, s.z),
+        octagon_(s, grid.resolution() / 2),
+        nearest2_(limit * limit) {}
+
+  double nearest() {
+    outwards(2, 0, [&](int k, double gap2_z) {
+      outwards(1, gap2_z, [&](int j, double gap2_y) { row(j, k, gap2_y, gap2_z); });
+    });
+    return std::sqrt(nearest2_);
+  }
+
+ private:
+  /// Squared gap along an axis between the prism and the voxels with this index, m².
+  double gap2(int axis, int index) const noexcept {
+    const double low = index * grid_.resolution() - center_[axis];
+    const double gap = std::max({0.0, low - half_[axis], -low - grid_.resolution() - half_[axis]});
+    return gap * gap;
+  }
+  /// Visits the layers of an axis whose gap, with `others2` in the other axes, is less than the nearest so far.
+  template <class Visit>
+  void outwards(int axis, double others2, const Visit& visit) {
+    const int size = grid_.size()[axis];
+    const int middle = std::clamp(static_cast<int>(center_[axis] / grid_.resolution()), 0, size - 1);
+    bool nearer = true;
+    const auto layer = [&](int n) {
+      if (n < 0 || n >= size) return;
+      const double g = gap2(axis, n);
+      if (others2 + g >= nearest2_) return;
+      nearer = true;
+      visit(n, g);
+    };
+    for (int up = middle, down = middle - 1; nearer; ++up, --down) {
+      nearer = false;
+      layer(up);
+      layer(down);
+    }
+  }
+  void row(int j, int k, double gap2_y, double gap2_z) {
+    const double edge = grid_.resolution();
+    const double reach = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
+    const int from = std::max(0, static_cast<int>(std::floor((center_.x() - reach) / edge)));
+    const int to = std::min(grid_.size().x() - 1, static_cast<int>(std::floor((center_.x() + reach) / edge)));
+    if (from > to) return;
+    const map::Cell* const cells = grid_.cells().data() + grid_.linear(Index3(0, j, k));
+    const map::Cell* const end = cells + to + 1;
+    for (const map::Cell* c = first_obstacle(cells + from, end); c != end; c = first_obstacle(c + 1, end)) {
+      const int i = static_cast<int>(c - cells);
+      if (gap2(0, i) + gap2_y + gap2_z >= nearest2_) continue;
+      const Vec2 voxel = edge * Vec2(i + 0.5, j + 0.5);
+      nearest2_ = std::min(nearest2_, octagon_.squared_distance(voxel - center_.head<2>()) + gap2_z);
+    }
+  }
+
+  const map::OccupancyGrid& grid_;
+  Vec3 center_;  // from the grid's origin, m
+  Vec3 half_;
+  FatOctagon octagon_;
+  double nearest2_;  // m²
+};
+
+double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit) {
+  const double nearest = std::min(limit, distance_to_outside(grid, center_W, s));
+  return nearest > 0 ? Scan(grid, center_W, s, nearest).nearest() : 0;
+}
+
+}  // namespace
+
+// A voxel is a box, so its distance to the prism is that of its centre to prism ⊕ box, whose supports are the sums.
+double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
+                      double limit) {
+  return distance(grid, center_W, tight_supports(half_widths), limit);
+}
+
+double swept_prism_distance(const map::OccupancyGrid& grid, const Vec3& from_W, const Vec3& to_W,
+                            const PerDirection& half_widths, double limit) {
+  const Vec3 half = (to_W - from_W) / 2;
+  Supports s = tight_supports(half_widths);
+  s.x += std::abs(half.x());
+  s.y += std::abs(half.y());
+  s.z += std::abs(half.z());
+  s.sum += std::abs(half.x() + half.y());
+  s.difference += std::abs(half.x() - half.y());
+  return distance(grid, from_W + half, s, limit);
+}
+
+}  // namespace backwash::reach
