@@ -7,15 +7,16 @@
 namespace backwash::sim {
 
 ClosedLoop::ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, const State& start, std::uint64_t seed)
-    : quadrotor_(vehicle, start), airflow_(grid, vehicle, seed), vio_(vehicle, seed + 1), estimated_(start) {
-  estimated_ = vio_.measure(start, 0);
-}
+    : quadrotor_(vehicle, start),
+      airflow_(grid, vehicle, seed),
+      // The sets reserve estimation.position; an estimate that used all of it would leave nothing for the map's share.
+      vio_(0.75 * vehicle.estimation.position, seed + 1),
+      estimated_(vio_.estimate(start, 0)) {}
 
 FlightSample ClosedLoop::sample(const Setpoint& command, int segment) const {
-  return {quadrotor_.time(),     segment,
-          quadrotor_.state(),    estimated_,
-          quadrotor_.acceleration(), quadrotor_.attitude(),
-          quadrotor_.thrust(),   command};
+  return {
+      quadrotor_.time(),   segment, quadrotor_.state(), estimated_, quadrotor_.acceleration(), quadrotor_.attitude(),
+      quadrotor_.thrust(), command};
 }
 
 void ClosedLoop::fly(const Setpoint& command) {
@@ -23,7 +24,7 @@ void ClosedLoop::fly(const Setpoint& command) {
   const int steps = static_cast<int>(std::lround(kControlPeriod / Quadrotor::kStep));
   for (int i = 0; i < steps; ++i) {
     quadrotor_.step(airflow_.step(quadrotor_.state().p_W, Quadrotor::kStep), estimated_);
-    estimated_ = vio_.measure(quadrotor_.state(), Quadrotor::kStep);
+    estimated_ = vio_.estimate(quadrotor_.state(), quadrotor_.time());
   }
 }
 

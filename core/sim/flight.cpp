@@ -15,9 +15,7 @@ double milliseconds_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-tl::unexpected<FlightRefused> refuse(const std::string& message) {
-  return tl::make_unexpected(FlightRefused{message});
-}
+tl::unexpected<FlightRefused> refuse(const std::string& message) { return tl::make_unexpected(FlightRefused{message}); }
 
 std::string text(const Vec3& p) {
   char line[80];
@@ -118,7 +116,8 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
     if (auto why = obstacle_to_hover(world, name, p); !why.empty()) return refuse(why);
   }
   const auto column = plan::takeoff_column(world, options.start_W);
-  if (!column) return refuse("start " + text(options.start_W) + " has no known floor to take off from; choose a start above one");
+  if (!column)
+    return refuse("start " + text(options.start_W) + " has no known floor to take off from; choose a start above one");
 
   // Take-off: from the floor to the start, and a settling hover there.
   Setpoint ground;
@@ -182,9 +181,11 @@ FlightSummary summarise(const Flight& flight, const plan::World& world, const Ve
   s.goal_reached = s.goal_error_m <= Vec3(h[kX], h[kY], h[kZ]).norm() + world.reach.vehicle.estimation.position;
   s.touched = s.clearance_m <= 0;
   for (const auto& step : flight.route.accepted.tube) {
-    s.tight_largest_half_axis_m = std::max({s.tight_largest_half_axis_m, step.half_widths[kX], step.half_widths[kY], step.half_widths[kZ]});
+    s.tight_largest_half_axis_m =
+        std::max({s.tight_largest_half_axis_m, step.half_widths[kX], step.half_widths[kY], step.half_widths[kZ]});
   }
-  for (const auto& step : flight.paper.tube) s.paper_largest_half_axis_m = std::max(s.paper_largest_half_axis_m, step.r_max);
+  for (const auto& step : flight.paper.tube)
+    s.paper_largest_half_axis_m = std::max(s.paper_largest_half_axis_m, step.r_max);
   return s;
 }
 

@@ -17,13 +17,13 @@ namespace backwash::sim {
 
 /// What a log row holds: the vehicle at a tick and the command it gets there.
 struct FlightSample {
-  double t;                       ///< s
-  int segment;                    ///< hover position number, −1 in transit
-  State truth;                    ///< where the vehicle really is
-  State estimated;                ///< what VIO says: feeds the controller and is judged
-  Vec3 acceleration;              ///< m/s², W, gravity removed
-  Eigen::Quaterniond attitude;    ///< body to world
-  double thrust;                  ///< normalised collective command
+  double t;                     ///< s
+  int segment;                  ///< hover position number, −1 in transit
+  State truth;                  ///< where the vehicle really is
+  State estimated;              ///< what VIO says: feeds the controller and is judged
+  Vec3 acceleration;            ///< m/s², W, gravity removed
+  Eigen::Quaterniond attitude;  ///< body to world
+  double thrust;                ///< normalised collective command
   Setpoint command;
 };
 
@@ -40,7 +40,7 @@ class ClosedLoop {
  private:
   Quadrotor quadrotor_;
   AirflowTruth airflow_;
-  Vio vio_;
+  EmulatedVio vio_;
   State estimated_;
 };
 
@@ -54,20 +54,20 @@ std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds);
 study::FlightLog to_log(const std::vector<FlightSample>& samples);
 
 struct FlightOptions {
-  Vec3 start_W, goal_W;        ///< hover points, m
-  std::uint64_t seed = 1;      ///< of the airflow and the VIO error
-  double sigma_scale = 1;      ///< judge with sets of Σ·sigma_scale: below 1 a mutant that must be caught
+  Vec3 start_W, goal_W;    ///< hover points, m
+  std::uint64_t seed = 1;  ///< of the airflow and the VIO error
+  double sigma_scale = 1;  ///< judge with sets of Σ·sigma_scale: below 1 a mutant that must be caught
   plan::PlanOptions limits;
-  double settle_s = 2;         ///< hover at the start, s
-  double hold_s = 3;           ///< hover at the goal, s
+  double settle_s = 2;  ///< hover at the start, s
+  double hold_s = 3;    ///< hover at the goal, s
 };
 
 /// One accepted piece of the flight and what was measured on it: sample k meets entry k of the tube.
 struct FlightPiece {
-  track::AcceptedSegment accepted;        ///< the tube that it is judged with
-  std::vector<FlightSample> samples;      ///< one per entry of the tube
-  std::vector<track::Inside> judged;      ///< one per sample
-  std::vector<double> clearance_m;        ///< truth to the obstacles that count − body radius, one per sample
+  track::AcceptedSegment accepted;    ///< the tube that it is judged with
+  std::vector<FlightSample> samples;  ///< one per entry of the tube
+  std::vector<track::Inside> judged;  ///< one per sample
+  std::vector<double> clearance_m;    ///< truth to the obstacles that count − body radius, one per sample
 };
 
 /// The paper's method on the commands that were flown, propagated beside the flight and not flown.
@@ -83,8 +83,8 @@ struct Flight {
   plan::Plan plan;
   FlightPiece take_off, route;
   PaperTube paper;
-  double tube_ms;             ///< time to propagate the tight tube on the same commands
-  double planned_clearance_m; ///< smallest clearance of the route's tube, the hold included
+  double tube_ms;              ///< time to propagate the tight tube on the same commands
+  double planned_clearance_m;  ///< smallest clearance of the route's tube, the hold included
 };
 
 /// Why no flight took place; one line that says where and what would be right.
@@ -100,12 +100,12 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
 
 /// The flight in figures.
 struct FlightSummary {
-  double length_m, time_s;          ///< path really flown, and the flight's duration, take-off to the end of the hold
-  double clearance_m;               ///< smallest true clearance: below z_safe lateral only
+  double length_m, time_s;  ///< path really flown, and the flight's duration, take-off to the end of the hold
+  double clearance_m;       ///< smallest true clearance: below z_safe lateral only
   double planned_clearance_m;
-  Vec3 largest_ratio;               ///< largest |e|/h per axis
+  Vec3 largest_ratio;  ///< largest |e|/h per axis
   std::size_t samples, inside;
-  double goal_error_m;              ///< truth to goal at the end
+  double goal_error_m;  ///< truth to goal at the end
   bool goal_reached, touched;
   double paper_largest_half_axis_m, tight_largest_half_axis_m;  ///< √λ_max of the paper; the largest axis half width
   bool ok() const noexcept { return goal_reached && !touched && inside == samples; }

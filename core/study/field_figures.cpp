@@ -23,13 +23,14 @@ struct Raster {
 
 Raster empty_raster(int axis, const Index3& low, const Index3& size) {
   Raster raster{axis == 0 ? 1 : 0, axis == 2 ? 1 : 2, low, size, {}};
-  raster.value.assign(static_cast<std::size_t>(size[raster.horizontal]) * static_cast<std::size_t>(size[raster.vertical]),
-                      kNothing);
+  raster.value.assign(
+      static_cast<std::size_t>(size[raster.horizontal]) * static_cast<std::size_t>(size[raster.vertical]), kNothing);
   return raster;
 }
 
 void set(Raster& raster, const Index3& v, double value) {
-  const int i = v[raster.horizontal] - raster.low[raster.horizontal], j = v[raster.vertical] - raster.low[raster.vertical];
+  const int i = v[raster.horizontal] - raster.low[raster.horizontal],
+            j = v[raster.vertical] - raster.low[raster.vertical];
   if (i < 0 || j < 0 || i >= raster.size[raster.horizontal] || j >= raster.size[raster.vertical]) return;
   raster.value[static_cast<std::size_t>(j) * static_cast<std::size_t>(raster.size[raster.horizontal]) +
                static_cast<std::size_t>(i)] = value;
@@ -81,9 +82,10 @@ Figure field_slice_figure(const map::OccupancyGrid& grid, const Slice& slice, co
          << "set xrange [" << grid.origin()[blank.horizontal] << ':'
          << grid.origin()[blank.horizontal] + grid.resolution() * span_h << "]\nset yrange ["
          << grid.origin()[blank.vertical] << ':' << grid.origin()[blank.vertical] + grid.resolution() * span_v << "]\n"
-         << "set multiplot layout " << (beside ? "1,3" : "3,1") << " title 'disturbance at " << names[slice.axis] << " = "
-         << slice.coordinate << " m (grey: not free)'\n";
-  for (const char* name : names) script << "set title 'along " << name << "'\nplot $" << name << " using 1:2:3 with image notitle\n";
+         << "set multiplot layout " << (beside ? "1,3" : "3,1") << " title 'disturbance at " << names[slice.axis]
+         << " = " << slice.coordinate << " m (grey: not free)'\n";
+  for (const char* name : names)
+    script << "set title 'along " << name << "'\nplot $" << name << " using 1:2:3 with image notitle\n";
   script << "unset multiplot\n";
   const double panel = 900.0, ratio = span_v / span_h;
   const int width = beside ? 1400 : static_cast<int>(panel) + 180;
@@ -103,7 +105,8 @@ Figure flight_field_figure(const sim::Flight& flight, const plan::World& world) 
     path << sample.truth.p_W.x() << ' ' << sample.truth.p_W.y() << '\n';
   }
   const Vec3 around(2, 2, 0);
-  const Index3 first = grid.index(low - around).cwiseMax(0), last = grid.index(high + around).cwiseMin(grid.size() - Index3::Ones());
+  const Index3 first = grid.index(low - around).cwiseMax(0),
+               last = grid.index(high + around).cwiseMin(grid.size() - Index3::Ones());
   Raster raster = empty_raster(2, first, last - first + Index3::Ones());
   double largest = 0;
   for (int j = first.y(); j <= last.y(); ++j) {
@@ -124,8 +127,7 @@ Figure flight_field_figure(const sim::Flight& flight, const plan::World& world) 
          << kPalette << "set cbrange [0:" << largest
          << "]\nset size ratio -1\nset tics out nomirror\nset border 3\nset xlabel 'x, m'\nset ylabel 'y, m'\n"
          << "set cblabel 'vertical standard deviation √Σ_{zz}, m/s^2'\nset key outside top center horizontal\n"
-         << "plot $field using 1:2:3 with image notitle, "
-         << plot_cells()
+         << "plot $field using 1:2:3 with image notitle, " << plot_cells()
          << "$path using 1:2 with lines linewidth 2.5 linecolor '#0b3d91' title 'path flown'\n";
   const double ratio = (last - first).y() / std::max(1.0, static_cast<double>((last - first).x()));
   return draw(script.str(), Format::svg, 1000, std::clamp(static_cast<int>(820 * ratio) + 130, 300, 1100));

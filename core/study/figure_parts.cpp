@@ -30,9 +30,10 @@ std::string cell_blocks(const map::OccupancyGrid& grid, const Index3& first, con
       while (i <= last.x() && column(grid, i, j, k_low, k_high) == cell) ++i;
       if (cell == map::Cell::free) continue;
       const double a = grid.resolution();
-      const Vec3 low = grid.center({begin, j, 0}) - Vec3::Constant(a / 2), high = grid.center({i - 1, j, 0}) + Vec3::Constant(a / 2);
-      blocks[cell == map::Cell::occupied ? 0 : 1] << low.x() << ' ' << low.y() << ' ' << low.x() << ' ' << high.x() << ' '
-                                                  << low.y() << ' ' << high.y() << '\n';
+      const Vec3 low = grid.center({begin, j, 0}) - Vec3::Constant(a / 2),
+                 high = grid.center({i - 1, j, 0}) + Vec3::Constant(a / 2);
+      blocks[cell == map::Cell::occupied ? 0 : 1] << low.x() << ' ' << low.y() << ' ' << low.x() << ' ' << high.x()
+                                                  << ' ' << low.y() << ' ' << high.y() << '\n';
     }
   }
   // gnuplot refuses empty blocks: a rectangle without extent stands in.

@@ -7,9 +7,9 @@
 
 namespace backwash::study {
 
-/// gnuplot data blocks $occupied and $unknown with the cells between two voxels (inclusive) seen from above: a column is
-/// occupied if it is so anywhere between the heights z_low and z_high (m), else unknown if it is so anywhere.
-/// Runs along x are merged into one rectangle (x, y, x_low, x_high, y_low, y_high).
+/// gnuplot data blocks $occupied and $unknown with the cells between two voxels (inclusive) seen from above: a column
+/// is occupied if it is so anywhere between the heights z_low and z_high (m), else unknown if it is so anywhere. Runs
+/// along x are merged into one rectangle (x, y, x_low, x_high, y_low, y_high).
 std::string cell_blocks(const map::OccupancyGrid& grid, const Index3& first, const Index3& last, double z_low,
                         double z_high);
 

@@ -59,13 +59,15 @@ int run_gnuplot(const std::string& script, const std::string& complaints) {
 
 tl::expected<std::string, PlotError> draw(const std::string& script, Format format, int width, int height) {
   const TemporaryFolder folder;
-  if (folder.path.empty()) return fail("no folder for temporary files can be made; set TMPDIR to one that can be written");
-  const auto script_path = folder.path / "script.gp", picture = folder.path / "picture", complaints = folder.path / "stderr";
+  if (folder.path.empty())
+    return fail("no folder for temporary files can be made; set TMPDIR to one that can be written");
+  const auto script_path = folder.path / "script.gp", picture = folder.path / "picture",
+             complaints = folder.path / "stderr";
   const bool svg = format == Format::svg;
   {
     std::ofstream file(script_path, std::ios::binary);
-    file << "set encoding utf8\nset terminal " << (svg ? "svg dynamic" : "pngcairo") << " size " << width << ',' << height
-         << " enhanced font 'DejaVu Sans," << (svg ? 13 : 10) << "' background 'white'\n"
+    file << "set encoding utf8\nset terminal " << (svg ? "svg dynamic" : "pngcairo") << " size " << width << ','
+         << height << " enhanced font 'DejaVu Sans," << (svg ? 13 : 10) << "' background 'white'\n"
          << "set output '" << picture.string() << "'\n"
          << script;
     if (!file.flush()) return fail("the plot script cannot be written; free some space in TMPDIR");

@@ -68,8 +68,8 @@ reach::Reachability read_reachability(const Vehicle& vehicle, reach::Method meth
   try {
     return reach::Reachability(vehicle, method, loop);
   } catch (const std::invalid_argument& unstable) {
-    throw Failure(kConfiguration, vehicle_path + ":1: " + unstable.what() +
-                                      "; choose gains, delay and lag of a stable loop");
+    throw Failure(kConfiguration,
+                  vehicle_path + ":1: " + unstable.what() + "; choose gains, delay and lag of a stable loop");
   }
 }
 

@@ -12,8 +12,8 @@
 
 namespace backwash::services {
 
-/// Readers of a verb's inputs. Each throws Failure with the documented exit code: 66 for what does not exist, 65 for bad
-/// data, 78 for a configuration that is not valid.
+/// Readers of a verb's inputs. Each throws Failure with the documented exit code: 66 for what does not exist, 65 for
+/// bad data, 78 for a configuration that is not valid.
 map::OccupancyGrid read_map(const std::string& path);
 Model read_model(const std::string& path);
 Vehicle read_vehicle(const std::string& path);

@@ -36,8 +36,9 @@ void print_text(const plan::Plan& plan) {
   const auto& m = plan.metrics;
   std::printf("status         %s\n", plan::to_string(plan.status));
   if (plan.status == plan::PlanStatus::ok) {
-    std::printf("length         %.2f m\ntime           %.2f s\njerk squared   %.2f m2/s5\nclearance      %.3f m at least\n",
-                m.length_m, m.time_s, m.jerk2, m.min_clearance_m);
+    std::printf(
+        "length         %.2f m\ntime           %.2f s\njerk squared   %.2f m2/s5\nclearance      %.3f m at least\n",
+        m.length_m, m.time_s, m.jerk2, m.min_clearance_m);
   }
   std::printf("search         %.1f ms, %zu states\noptimisation   %.1f ms, %zu evaluations\nverification   %.1f ms\n",
               m.search_ms, m.expanded, m.optimise_ms, m.evaluations, m.verify_ms);
@@ -47,10 +48,12 @@ int run(const Options& options) {
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
   const auto method = read_method(options.method);
-  read_reachability(vehicle, method, reach::Loop::vehicle, options.vehicle);  // names an unstable loop before the map is read
+  read_reachability(vehicle, method, reach::Loop::vehicle,
+                    options.vehicle);  // names an unstable loop before the map is read
   auto grid = read_map(options.map);
   progress("building the world");
-  const auto world = plan::build_world(std::move(grid), model, vehicle, method, options.margin.value_or(-1), run_parallel);
+  const auto world =
+      plan::build_world(std::move(grid), model, vehicle, method, options.margin.value_or(-1), run_parallel);
   progress("planning");
   const plan::PlanOptions limits{.v_max = options.v_max.value_or(vehicle.limits.v_max),
                                  .a_max = options.a_max.value_or(vehicle.limits.a_max)};
@@ -72,9 +75,12 @@ Verb plan_verb(CLI::App& app) {
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
   add_point(*command, "--start", options->start, "m")->required();
   add_point(*command, "--goal", options->goal, "m")->required();
-  command->add_option("--margin", options->margin, "constant margin in place of the sets, m")->check(CLI::NonNegativeNumber);
-  command->add_option("--vmax", options->v_max, "m/s per axis; the vehicle's limit by default")->check(CLI::PositiveNumber);
-  command->add_option("--amax", options->a_max, "m/s2 per axis; the vehicle's limit by default")->check(CLI::PositiveNumber);
+  command->add_option("--margin", options->margin, "constant margin in place of the sets, m")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--vmax", options->v_max, "m/s per axis; the vehicle's limit by default")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--amax", options->a_max, "m/s2 per axis; the vehicle's limit by default")
+      ->check(CLI::PositiveNumber);
   command->add_option("--method", options->method, "tight: exact supports; paper: ellipsoids")
       ->check(CLI::IsMember({"tight", "paper"}));
   command->add_flag("--json", options->json, "one JSON object on stdout");

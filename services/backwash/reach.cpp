@@ -37,7 +37,8 @@ void check_times(const std::string& path, const study::FlightLog& track) {
 
 std::vector<Setpoint> read_commands(const std::string& path, const study::FlightLog& track) {
   for (const char* name : {"cmd_x_m", "cmd_y_m", "cmd_z_m"}) {
-    if (!track.has(name)) throw Failure(kBadData, path + ":1: no column '" + name + "'; commands need cmd_x_m,cmd_y_m,cmd_z_m");
+    if (!track.has(name))
+      throw Failure(kBadData, path + ":1: no column '" + name + "'; commands need cmd_x_m,cmd_y_m,cmd_z_m");
   }
   const auto vector = [&](const std::string& unit, std::size_t row) {
     Vec3 value = Vec3::Zero();
@@ -59,7 +60,9 @@ bool has_variances(const std::string& path, const study::FlightLog& track) {
   const auto present = std::count_if(std::begin(kSigmaColumns), std::end(kSigmaColumns),
                                      [&](const char* name) { return track.has(name); });
   if (present != 0 && present != 6) {
-    throw Failure(kBadData, path + ":1: some sigma columns are missing; give sigma_xx,sigma_xy,sigma_xz,sigma_yy,sigma_yz,sigma_zz");
+    throw Failure(
+        kBadData,
+        path + ":1: some sigma columns are missing; give sigma_xx,sigma_xy,sigma_xz,sigma_yy,sigma_yz,sigma_zz");
   }
   return present == 6;
 }

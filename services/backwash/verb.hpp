@@ -46,7 +46,8 @@ Verb simulate_verb(CLI::App& app);
 Verb feasibility_verb(CLI::App& app);
 
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.
-CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional<Vec3>& target, const std::string& help);
+CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional<Vec3>& target,
+                       const std::string& help);
 
 /// A line on stderr if that is a terminal, nothing otherwise.
 void progress(const std::string& line);
