@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
@@ -32,6 +33,41 @@ std::optional<Segment> open_part(const Vec3& origin_W, double voxel_edge, const 
 /// Whether the segment meets the closed box of a voxel, with the tolerance kTouch: the slab test.
 bool meets(const Segment& segment, const Index3& voxel) noexcept;
 
+/// clear() for a segment whose dominant axis is u: fixed at compile time, the march stays in registers.
+template <int u, typename EmptyRadius>
+bool clear_along(const Segment& segment, const EmptyRadius& empty_radius) noexcept {
+  constexpr int v = (u + 1) % 3, w = (u + 2) % 3;
+  constexpr double kReach = 2 * kTouch;    // candidates reach further than meets(), so that rounding loses none
+  constexpr double kStep = 0.01 * kTouch;  // past a slab's end, so that the next cell is in the next slab
+  const double length = std::abs(segment.delta[u]);
+  const double inverse = length > 0 ? 1 / length : 0;
+  const bool upward = segment.delta[u] >= 0;
+  const double direction = upward ? 1 : -1, slope_v = segment.delta[v] * inverse, slope_w = segment.delta[w] * inverse;
+  const double end = length + kReach;
+  Index3 cell;
+  for (double s = -kReach; s <= end;) {
+    const double x = segment.from[u] + s * direction;
+    const double y = segment.from[v] + s * slope_v, z = segment.from[w] + s * slope_w;
+    cell[u] = floor_to_int(x), cell[v] = floor_to_int(y), cell[w] = floor_to_int(z);
+    if (const int radius = empty_radius(cell); radius > 1) {
+      s += radius - 1 - kReach;
+      continue;
+    }
+    double piece = upward ? cell[u] + 1 - x : x - cell[u];
+    int u0 = cell[u], u1 = cell[u];
+    if (piece < kReach) piece += 1, (upward ? ++u1 : --u0);  // grazes the slab's end: take it with the next slab
+    const double y1 = y + piece * slope_v, z1 = z + piece * slope_w;
+    const int v0 = floor_to_int(std::min(y, y1) - kReach), v1 = floor_to_int(std::max(y, y1) + kReach);
+    const int w0 = floor_to_int(std::min(z, z1) - kReach), w1 = floor_to_int(std::max(z, z1) + kReach);
+    for (cell[u] = u0; cell[u] <= u1; ++cell[u])
+      for (cell[v] = v0; cell[v] <= v1; ++cell[v])
+        for (cell[w] = w0; cell[w] <= w1; ++cell[w])
+          if (empty_radius(cell) == 0 && meets(segment, cell)) return false;
+    s += piece + kStep;
+  }
+  return true;
+}
+
 /// Whether a segment meets no occupied voxel. `empty_radius(v)`: 0 at an occupied voxel, else r ≥ 1 such that no voxel
 /// nearer than r in the Chebyshev distance is occupied; r = 1 everywhere free is correct, a larger r is faster.
 ///
@@ -40,38 +76,9 @@ bool meets(const Segment& segment, const Index3& voxel) noexcept;
 /// bounding rectangle in the other two axes, one to four of them, and only an occupied one is tested exactly.
 template <typename EmptyRadius>
 bool clear(const Segment& segment, const EmptyRadius& empty_radius) noexcept {
-  constexpr double kReach = 2 * kTouch;    // candidates reach further than meets() so that rounding loses none
-  constexpr double kStep = 0.01 * kTouch;  // past a slab's end, so that the next floor() lands in the next slab
-  int u = 0;
-  const double length = segment.delta.cwiseAbs().maxCoeff(&u);
-  const Vec3 slope = length > 0 ? Vec3(segment.delta / length) : Vec3::UnitX();  // a point: any direction will do
-  const int v = (u + 1) % 3, w = (u + 2) % 3;
-  const double end = length + kReach;
-  for (double s = -kReach; s <= end;) {
-    const Vec3 x = segment.from + s * slope;
-    const Index3 cell(floor_to_int(x.x()), floor_to_int(x.y()), floor_to_int(x.z()));
-    if (const int radius = empty_radius(cell); radius > 1) {
-      s += radius - 1 - kReach;
-      continue;
-    }
-    double piece = slope[u] > 0 ? cell[u] + 1 - x[u] : x[u] - cell[u];
-    int last_u = cell[u];
-    if (piece < kReach) {  // grazing the end of a slab: take it together with the next one
-      piece += 1;
-      last_u += slope[u] > 0 ? 1 : -1;
-    }
-    const auto [first_u, final_u] = std::minmax(cell[u], last_u);
-    const double yv = x[v] + piece * slope[v], yw = x[w] + piece * slope[w];
-    const int v0 = floor_to_int(std::min(x[v], yv) - kReach), v1 = floor_to_int(std::max(x[v], yv) + kReach);
-    const int w0 = floor_to_int(std::min(x[w], yw) - kReach), w1 = floor_to_int(std::max(x[w], yw) + kReach);
-    Index3 candidate;
-    for (candidate[u] = first_u; candidate[u] <= final_u; ++candidate[u])
-      for (candidate[v] = v0; candidate[v] <= v1; ++candidate[v])
-        for (candidate[w] = w0; candidate[w] <= w1; ++candidate[w])
-          if (empty_radius(candidate) == 0 && meets(segment, candidate)) return false;
-    s += piece + kStep;
-  }
-  return true;
+  const Vec3 extent = segment.delta.cwiseAbs();
+  if (extent.x() >= extent.y() && extent.x() >= extent.z()) return clear_along<0>(segment, empty_radius);
+  return extent.y() >= extent.z() ? clear_along<1>(segment, empty_radius) : clear_along<2>(segment, empty_radius);
 }
 
 /// Whether the segment from p to c, its last 2a left out, meets no occupied voxel (model.md section 1, "Visible").

@@ -8,8 +8,9 @@
 
 namespace backwash::sim {
 
-/// What really shakes the simulated vehicle. Its formulas are not the model's (core/sim/README.md says how they differ):
-/// own decay laws in the distances found by casting rays, intermittent gusts, heavy-tailed variance, a mean push.
+/// What really shakes the simulated vehicle. Its formulas are not the model's (core/sim/README.md says how they
+/// differ): own decay laws in the distances found by casting rays, intermittent gusts, heavy-tailed variance, a mean
+/// push.
 class AirflowTruth {
  public:
   AirflowTruth(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::uint64_t seed);
