@@ -13,18 +13,37 @@ namespace backwash::sim {
 /// push.
 class AirflowTruth {
  public:
+  /// Largest gust, in long-time standard deviations: what the rotors can throw is finite. In the horizontal plane it
+  /// limits the gust's norm, so it holds in every direction.
+  static constexpr double kLargestGust = 3.2;
+
+  /// The grid must outlive it. Only the vehicle's rotor radius matters: it sets the strength of the wash.
   AirflowTruth(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::uint64_t seed);
-  /// Disturbance acceleration over the next dt (s) at p, m/s² in W. Deterministic for a seed and a call sequence.
+  /// Disturbance acceleration over the next dt (s) at p, m/s² in W. Deterministic for a seed and a call sequence; its
+  /// statistics do not depend on dt.
   Vec3 step(const Vec3& p_W, double dt);
   /// Long-time variance of step() per axis at p, (m/s²)²: for tests and docs, never read by the estimator.
   Vec3 variance(const Vec3& p_W) const;
+  /// Long-time mean of step() at p, m/s²: for tests and docs, never read by the estimator.
+  Vec3 mean(const Vec3& p_W) const;
 
  private:
+  /// Flow at a point for strength 1: covariance of the gust (z uncorrelated with x and y) and mean push.
+  struct Flow {
+    double xx, xy, yy, zz;
+    Vec3 mean;
+  };
+  Flow flow(const Vec3& p_W) const;
+  void advance(double dt);
+
   const map::OccupancyGrid* grid_;
-  double strength_;
+  double strength_;  // factor on the variance
   std::mt19937_64 rng_;
-  Vec3 gust_ = Vec3::Zero();
-  double log_intensity_ = 0, burst_ = 0;
+  std::normal_distribution<double> normal_;
+  Vec3 gust_, gust_rate_;  // unit variance; 1/s
+  double log_intensity_;   // slow modulation
+  bool bursting_ = false;
+  double burst_ = 0;  // smoothed bursting_
 };
 
 }  // namespace backwash::sim

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <utility>
 
 namespace backwash::sim {
 namespace {
@@ -14,10 +15,12 @@ long steps_in(double seconds) { return std::lround(seconds / Quadrotor::kStep); 
 }  // namespace
 
 Quadrotor::Quadrotor(const Vehicle& vehicle, const State& start, std::optional<double> z_floor)
-    : vehicle_(vehicle), state_(start), z_floor_(z_floor) {
+    : vehicle_(vehicle),
+      state_(start),
+      z_floor_(z_floor),
+      feedback_(static_cast<std::size_t>(steps_in(vehicle.controller.feedback_delay)), start) {
   active_.p_W = start.p_W;
   on_ground_ = z_floor && start.p_W.z() <= *z_floor;
-  feedback_.assign(static_cast<std::size_t>(steps_in(vehicle.controller.feedback_delay)), start);
 }
 
 void Quadrotor::command(const Setpoint& setpoint) {
@@ -46,9 +49,9 @@ void Quadrotor::step(const Vec3& w_W, const State& estimated) {
     active_ = in_transit_.front().second;
     in_transit_.pop_front();
   }
-  feedback_.push_back(estimated);
-  const Vec3 wanted = specific_force(feedback_.front()) - kGravityUp;
-  feedback_.pop_front();
+  State believed = estimated;
+  if (!feedback_.empty()) std::swap(believed, feedback_[static_cast<std::size_t>(steps_) % feedback_.size()]);
+  const Vec3 wanted = specific_force(believed) - kGravityUp;
 
   const double lag = vehicle_.controller.attitude_lag;
   const Vec3 before = lag > 0 ? produced_ : wanted;

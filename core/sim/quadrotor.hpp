@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <deque>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
@@ -55,7 +57,7 @@ class Quadrotor {
   Setpoint active_;
   double yaw_ = 0;
   std::deque<std::pair<long, Setpoint>> in_transit_;  // with the step of arrival
-  std::deque<State> feedback_;                        // newest last
+  std::vector<State> feedback_;                       // ring of the delayed estimates
 };
 
 }  // namespace backwash::sim
