@@ -39,11 +39,13 @@ class FatOctagon {
     corners_ = {Vec2{x_, x_ - difference_}, Vec2{x_, sum_ - x_}, Vec2{sum_ - y_, y_}, Vec2{y_ - difference_, y_},
                 Vec2{-x_, difference_ - x_}};
   }
+  /// Largest violation of a side: at most the distance, 0 inside. Cheap.
+  double separation(const Vec2& p) const noexcept {
+    const double diagonal = std::max(std::abs(p.x() + p.y()) - sum_, std::abs(p.x() - p.y()) - difference_);
+    return std::max({0.0, std::abs(p.x()) - x_, std::abs(p.y()) - y_, diagonal / std::sqrt(2.0)});
+  }
   double squared_distance(const Vec2& p) const noexcept {
-    if (std::abs(p.x()) <= x_ && std::abs(p.y()) <= y_ && std::abs(p.x() + p.y()) <= sum_ &&
-        std::abs(p.x() - p.y()) <= difference_) {
-      return 0;
-    }
+    if (separation(p) == 0) return 0;
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t c = 0; c + 1 < corners_.size(); ++c) {
       nearest = std::min(
@@ -63,16 +65,27 @@ class FatOctagon {
   std::array<Vec2, 5> corners_;
 };
 
-/// First cell of [from, to) that is not free, or `to`. Eight cells at a time.
-const map::Cell* first_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+bool eight_free(const map::Cell* cells) noexcept {
   static_assert(sizeof(map::Cell) == 1);
   constexpr std::uint64_t kAllFree = 0x0101010101010101u * static_cast<std::uint64_t>(map::Cell::free);
-  for (std::uint64_t word = 0; to - from >= 8; from += 8) {
-    std::memcpy(&word, from, 8);
-    if (word != kAllFree) break;
-  }
-  while (from != to && *from == map::Cell::free) ++from;
+  std::uint64_t word = 0;
+  std::memcpy(&word, cells, 8);
+  return word == kAllFree;
+}
+
+/// First cell of [from, to) that is not free, or `to`.
+const map::Cell* first_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+  while (to - from >= 8 && eight_free(from)) from += 8;
+  while (from < to && *from == map::Cell::free) ++from;
   return from;
+}
+
+/// Last cell of [from, to) that is not free, or `to`.
+const map::Cell* last_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+  const map::Cell* c = to;
+  while (c - from >= 8 && eight_free(c - 8)) c -= 8;
+  while (c > from && *(c - 1) == map::Cell::free) --c;
+  return c > from ? c - 1 : to;
 }
 
 /// Distance of a prism to the outside of the grid: the complement of a box is six half-spaces.
@@ -126,20 +139,29 @@ class Scan {
       layer(down);
     }
   }
+  /// A row of voxels along x. Distance is convex in x: it only grows beyond the prism's bounding box, so that on either
+  /// side of it the first obstacle is enough.
   void row(int j, int k, double gap2_y, double gap2_z) {
     const double edge = grid_.resolution();
-    const double reach = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
-    const int from = std::max(0, static_cast<int>(std::floor((center_.x() - reach) / edge)));
-    const int to = std::min(grid_.size().x() - 1, static_cast<int>(std::floor((center_.x() + reach) / edge)));
-    if (from > to) return;
+    const int last = grid_.size().x() - 1;
     const map::Cell* const cells = grid_.cells().data() + grid_.linear(Index3(0, j, k));
-    const map::Cell* const end = cells + to + 1;
-    for (const map::Cell* c = first_obstacle(cells + from, end); c != end; c = first_obstacle(c + 1, end)) {
-      const int i = static_cast<int>(c - cells);
-      if (gap2(0, i) + gap2_y + gap2_z >= nearest2_) continue;
-      const Vec2 voxel = edge * Vec2(i + 0.5, j + 0.5);
-      nearest2_ = std::min(nearest2_, octagon_.squared_distance(voxel - center_.head<2>()) + gap2_z);
-    }
+    const auto column = [&](double x) { return static_cast<int>(std::clamp(std::floor(x / edge), -1.0, last + 1.0)); };
+    const auto consider = [&](const map::Cell* c) {
+      const Vec2 voxel = edge * Vec2(static_cast<double>(c - cells) + 0.5, j + 0.5);
+      const Vec2 p = voxel - center_.head<2>();
+      const double separation = octagon_.separation(p);
+      if (separation * separation + gap2_z >= nearest2_) return;
+      nearest2_ = std::min(nearest2_, octagon_.squared_distance(p) + gap2_z);
+    };
+    const map::Cell* const under = cells + std::max(0, column(center_.x() - half_.x()));
+    const map::Cell* const right = cells + std::min(last, column(center_.x() + half_.x())) + 1;
+    for (const map::Cell* c = first_obstacle(under, right); c != right; c = first_obstacle(c + 1, right)) consider(c);
+    if (nearest2_ <= gap2_y + gap2_z) return;
+    const double reach = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
+    const map::Cell* const from = cells + std::max(0, column(center_.x() - reach));
+    const map::Cell* const to = cells + std::min(last, column(center_.x() + reach)) + 1;
+    if (const map::Cell* c = first_obstacle(right, to); c != to) consider(c);
+    if (const map::Cell* c = last_obstacle(from, under); c != under) consider(c);
   }
 
   const map::OccupancyGrid& grid_;
