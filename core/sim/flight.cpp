@@ -63,6 +63,7 @@ double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) 
   if (p_W.z() >= z_safe) return world.distance.exact(world.grid, p_W) - vehicle.body.radius;
   reach::TubeStep point{};
   point.center.p_W = p_W;
+  point.shape.setZero();
   return plan::lateral_clearance(world, {point}) + vehicle.estimation.position;
 }
 

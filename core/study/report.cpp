@@ -51,7 +51,9 @@ std::string row(const std::string& name, const std::string& value) {
 }
 
 std::string point(const Vec3& p) {
-  return "(" + number(p.x(), 2, "") + ", " + number(p.y(), 2, "") + ", " + number(p.z(), 2, "") + ")\u00a0m";
+  char text[96];
+  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)\u00a0m", p.x(), p.y(), p.z());
+  return text;
 }
 
 std::string verdict(const sim::FlightSummary& s) {

@@ -33,7 +33,9 @@ std::string to_text(double value, int decimals) {
 }
 
 std::string to_text(const Vec3& p) {
-  return "(" + to_text(p.x(), 2) + ", " + to_text(p.y(), 2) + ", " + to_text(p.z(), 2) + ")";
+  char text[96];
+  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
+  return text;
 }
 
 }  // namespace backwash::services
