@@ -157,6 +157,31 @@ TEST(PrismDistance, EqualsBruteForceOnRandomGrids) {
   EXPECT_GT(apart, 80);  // neither touching nor out of range: the comparison means something
 }
 
+TEST(PrismDistance, ToSolidBlocksEqualsBruteForce) {
+  std::mt19937 random(10);
+  std::uniform_int_distribution<int> low(-4, 18), length(2, 7);
+  int apart = 0;
+  for (int trial = 0; trial < 150; ++trial) {
+    map::OccupancyGrid grid = random_grid(random, 0.0);
+    for (int block = 0; block < 2; ++block) {
+      const Index3 corner(low(random), low(random), low(random));
+      const Index3 size(length(random), length(random), length(random));
+      for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+        const Index3 offset = grid.voxel(n) - corner;
+        if ((offset.array() >= 0).all() && (offset.array() < size.array()).all()) {
+          grid.set(grid.voxel(n), map::Cell::occupied);
+        }
+      }
+    }
+    const Vec3 p = random_point(random, grid);
+    const PerDirection h = random_half_widths(random);
+    const double expected = brute_force(grid, p, h, 0.6);
+    EXPECT_NEAR(prism_distance(grid, p, h, 0.6), expected, 1e-9);
+    apart += expected > 0 && expected < 0.6;
+  }
+  EXPECT_GT(apart, 50);
+}
+
 TEST(PrismDistance, OfAPointIsTheDistanceToTheNearestBox) {
   std::mt19937 random(6);
   const map::OccupancyGrid grid = random_grid(random, 0.005);
