@@ -217,6 +217,21 @@ TEST(PrismDistance, OfASliverAlongADiagonalEndsWhereTheAxesCutIt) {
   EXPECT_NEAR(prism_distance(one_voxel(Vec3(0.5, -0.6, 0.0)), Vec3(0, 0, 0.05), sliver, kFar), 0.5 * kSqrt2, 1e-9);
 }
 
+TEST(PrismDistance, ToABarIsTheGapToItsNearEndInEveryDirection) {
+  const PerDirection h{0.2, 0.2, 0.2, 10.0, 10.0};
+  for (const int axis : {0, 1, 2}) {
+    for (const int sign : {1, -1}) {
+      map::OccupancyGrid grid(Vec3(-4, -4, -4), 0.1, Index3(80, 80, 80), map::Cell::free);
+      for (int n = 0; n < 20; ++n) {
+        Vec3 p = Vec3::Constant(0.05);
+        p[axis] = sign * (0.85 + 0.1 * n);
+        grid.set(grid.index(p), map::Cell::occupied);
+      }
+      EXPECT_NEAR(prism_distance(grid, Vec3::Zero(), h, kFar), 0.6, 1e-9);
+    }
+  }
+}
+
 TEST(PrismDistance, TakesTheOutsideOfTheGridAsObstacle) {
   const map::OccupancyGrid grid(Vec3::Zero(), 0.1, Index3(40, 40, 40), map::Cell::free);
   const PerDirection h{0.3, 0.2, 0.1, 0.25, 0.25};
