@@ -113,6 +113,7 @@ void AutopilotLink::discard_unsent() noexcept {
 }
 
 void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
+  if (tap_) tap_(tap_context_, false, frame.bytes);
   if (frame.sender.component != kFlightController) return;
   const auto expected = heard_ ? heard_ : configured_vehicle_;
   if (expected && frame.sender.system != *expected) return;
@@ -173,7 +174,9 @@ template <class Message>
 bool AutopilotLink::send(const Message& message, TransmitQueue::Kind kind) noexcept {
   if (!heard_ || lost_) return false;
   flush();  // first, so that an older set-point that fits by now is not counted as missed
-  queue_.push(mavlink::encode_frame({*heard_, kOnboardComputer, sequence_++}, message), kind);
+  const mavlink::EncodedFrame frame = mavlink::encode_frame({*heard_, kOnboardComputer, sequence_++}, message);
+  if (tap_) tap_(tap_context_, true, frame.view());
+  queue_.push(frame, kind);
   flush();
   return !lost_;
 }

@@ -78,6 +78,10 @@ class AutopilotLink {
   std::optional<Time::duration> heartbeat_age(Time now) const noexcept;
   /// The gravest fault now; absent: none, or still within the first two seconds.
   std::optional<LinkFault> fault(Time now) const noexcept;
+  /// Called with each frame that was accepted from the line, and each that was handed to the port's queue: for a raw log.
+  /// Must itself be real-time. Null: none.
+  using Tap = void (*)(void* context, bool outgoing, std::span<const std::uint8_t> frame) noexcept;
+  void tap(Tap each, void* context) noexcept { tap_ = each, tap_context_ = context; }
   const mavlink::ParserCounters& received() const noexcept { return parser_.counters(); }
   const TransmitQueue& transmit() const noexcept { return queue_; }
 
@@ -124,6 +128,8 @@ class AutopilotLink {
   std::optional<Received<ClockOffset>> clock_;
   std::int64_t timesync_asked_ns_ = 0;
   std::uint8_t sequence_ = 0;
+  Tap tap_ = nullptr;
+  void* tap_context_ = nullptr;
 };
 
 }  // namespace backwash::firmware_bridge

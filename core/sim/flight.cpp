@@ -71,8 +71,8 @@ double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) 
 FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
                       double z_safe, std::size_t hover_from, int hover_number) {
   FlightPiece piece{std::move(accepted), {}, {}, {}};
-  track::Tracker tracker(piece.accepted.commands.front());
-  tracker.accept(std::make_shared<const track::AcceptedSegment>(piece.accepted));
+  track::Tracker tracker(piece.accepted.commands.front(), world.reach.vehicle);
+  tracker.accept(piece.accepted, piece.accepted.tube.front().center);  // its tube was propagated from the state of now
   for (std::size_t k = 0; k < piece.accepted.tube.size(); ++k) {
     piece.judged.push_back(tracker.judge(loop.estimated().p_W));
     const Setpoint command = tracker.step();
@@ -132,7 +132,7 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, ground, commands, bounds, options.sigma_scale);
   Flight flight{};
   flight.column = *column;
-  flight.take_off = fly_piece(loop, world, {commands, tube}, 0, column->z_safe, risen, 0);
+  flight.take_off = fly_piece(loop, world, {1, 0, 0, commands, tube}, 0, column->z_safe, risen, 0);
 
   // Route: planned from the state estimated now, with the hold at the goal; its tube is propagated once, here.
   Setpoint hover;
@@ -151,7 +151,7 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   flight.planned_clearance_m = plan::tube_clearance(world, tube);
   flight.paper = paper_beside(world, start, hover, commands);
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, hover, commands, bounds, options.sigma_scale);
-  flight.route = fly_piece(loop, world, {commands, tube}, flight.take_off.samples.back().t, column->z_safe, arrived, 1);
+  flight.route = fly_piece(loop, world, {2, 0, 0, commands, tube}, flight.take_off.samples.back().t, column->z_safe, arrived, 1);
   return flight;
 }
 

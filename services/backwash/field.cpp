@@ -6,6 +6,7 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {

@@ -2,12 +2,8 @@
 #include "services/backwash/files.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
-#include <thread>
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
@@ -71,27 +67,6 @@ reach::Reachability read_reachability(const Vehicle& vehicle, reach::Method meth
     throw Failure(kConfiguration,
                   vehicle_path + ":1: " + unstable.what() + "; choose gains, delay and lag of a stable loop");
   }
-}
-
-void run_parallel(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
-  constexpr std::size_t kChunk = 1024;  // small enough to balance rooms against walls
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
-  const auto loop = [&] {
-    try {
-      for (std::size_t begin; (begin = next.fetch_add(kChunk)) < count;) work(begin, std::min(begin + kChunk, count));
-    } catch (...) {
-      const std::lock_guard lock(failure_mutex);
-      failure = std::current_exception();
-    }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(loop);
-    loop();
-  }
-  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace backwash::services

@@ -31,7 +31,4 @@ void write_file(const std::string& path, const std::string& content, bool force)
 reach::Reachability read_reachability(const Vehicle& vehicle, reach::Method method, reach::Loop loop,
                                       const std::string& vehicle_path);
 
-/// plan::Parallel on all processors.
-void run_parallel(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
-
 }  // namespace backwash::services

@@ -3,6 +3,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstring>

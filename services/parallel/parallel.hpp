@@ -6,7 +6,7 @@
 
 namespace backwash {
 
-/// plan::Parallel on all processors: threads take ranges of 256 until all are done.
+/// plan::Parallel on all processors. What `work` throws is thrown again here, once.
 void run_parallel(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
 
 }  // namespace backwash

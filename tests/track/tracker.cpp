@@ -11,10 +11,11 @@ namespace backwash::track {
 namespace {
 
 /// n commands along x, entry k centred at (k, 0, 1) with half widths 0.1 + 0.01 k, until the next sample 0.5 wider.
-std::shared_ptr<const AcceptedSegment> segment(int n) {
-  auto s = std::make_shared<AcceptedSegment>();
+AcceptedSegment segment(int n) {
+  AcceptedSegment s;
+  s.id = static_cast<std::uint64_t>(n);
   for (int k = 0; k < n; ++k)
-    s->commands.push_back({.p_W = Vec3(k, 0, 1), .v_W = Vec3(1, 0, 0), .a_W = Vec3(0, 2, 0), .yaw = 0.1 * k});
+    s.commands.push_back({.p_W = Vec3(k, 0, 1), .v_W = Vec3(1, 0, 0), .a_W = Vec3(0, 2, 0), .yaw = 0.1 * k});
   for (int k = 0; k <= n; ++k) {
     reach::TubeStep step{};
     step.t = k * kControlPeriod;
@@ -22,10 +23,20 @@ std::shared_ptr<const AcceptedSegment> segment(int n) {
     step.shape = Mat3::Zero();
     step.half_widths.fill(0.1 + 0.01 * k);
     step.half_widths_interval.fill(0.6 + 0.01 * k);
-    s->tube.push_back(step);
+    s.tube.push_back(step);
   }
   return s;
 }
+
+/// First set of 0.1 m and 0.5 m/s.
+Vehicle vehicle() {
+  Vehicle v;
+  v.initial_error = {0.1, 0.5};
+  return v;
+}
+
+/// Where the segments start.
+const State kAtStart{Vec3(0, 0, 1), Vec3::Zero()};
 
 Setpoint start() { return {.p_W = Vec3(-1, -2, 3), .v_W = Vec3(1, 1, 1), .a_W = Vec3(1, 1, 1), .yaw = 0.5}; }
 
@@ -37,15 +48,16 @@ void expect_rest(const Setpoint& s, const Vec3& p_W, double yaw) {
 }
 
 TEST(Tracker, HoldsAtRestBeforeTheFirstSegment) {
-  Tracker tracker(start());
+  Tracker tracker(start(), vehicle());
   EXPECT_TRUE(tracker.finished());
   for (int i = 0; i < 3; ++i) expect_rest(tracker.step(), Vec3(-1, -2, 3), 0.5);
   EXPECT_TRUE(tracker.judge(Vec3(9, 9, 9)).inside);  // nothing was claimed
 }
 
 TEST(Tracker, GivesOneCommandATickThenHoldsTheLastAtRest) {
-  Tracker tracker(start());
-  tracker.accept(segment(4));
+  Tracker tracker(start(), vehicle());
+  const auto s4 = segment(4);
+  ASSERT_TRUE(tracker.accept(s4, kAtStart));
   for (int k = 0; k < 4; ++k) {
     EXPECT_FALSE(tracker.finished());
     const Setpoint s = tracker.step();
@@ -58,8 +70,9 @@ TEST(Tracker, GivesOneCommandATickThenHoldsTheLastAtRest) {
 }
 
 TEST(Tracker, JudgesAgainstTheSetOfTheTick) {
-  Tracker tracker(start());
-  tracker.accept(segment(4));
+  Tracker tracker(start(), vehicle());
+  const auto s4 = segment(4);
+  ASSERT_TRUE(tracker.accept(s4, kAtStart));
   for (int k = 0; k <= 4; ++k) {
     const double h = 0.1 + 0.01 * k;
     const Inside at = tracker.judge(Vec3(k + 0.9 * h, 0, 1));
@@ -73,8 +86,9 @@ TEST(Tracker, JudgesAgainstTheSetOfTheTick) {
 }
 
 TEST(Tracker, HoldsTheIntervalOfTheLastSetPastTheEnd) {
-  Tracker tracker(start());
-  tracker.accept(segment(4));
+  Tracker tracker(start(), vehicle());
+  const auto s4 = segment(4);
+  ASSERT_TRUE(tracker.accept(s4, kAtStart));
   for (int i = 0; i < 5; ++i) tracker.step();
   for (int i = 0; i < 3; ++i) {
     EXPECT_DOUBLE_EQ(tracker.judge(Vec3(4, 0, 1)).half_widths[kX], 0.64);
@@ -87,10 +101,10 @@ TEST(Tracker, HoldsTheIntervalOfTheLastSetPastTheEnd) {
 TEST(Tracker, EveryDirectionCanPutItOutside) {
   for (std::size_t d = 0; d < kDirections; ++d) {
     const Vec3 n = unit(static_cast<Direction>(d));
-    auto s = std::make_shared<AcceptedSegment>(*segment(1));
-    for (std::size_t other = 0; other < kDirections; ++other) s->tube[0].half_widths[other] = other == d ? 0.1 : 10;
-    Tracker tracker(start());
-    tracker.accept(s);
+    auto s = segment(1);
+    for (std::size_t other = 0; other < kDirections; ++other) s.tube[0].half_widths[other] = other == d ? 0.1 : 10;
+    Tracker tracker(start(), vehicle());
+    ASSERT_TRUE(tracker.accept(s, kAtStart));
     for (const double side : {-1.0, 1.0}) {
       EXPECT_TRUE(tracker.judge(Vec3(0, 0, 1) + side * 0.099 * n).inside);
       EXPECT_FALSE(tracker.judge(Vec3(0, 0, 1) + side * 0.101 * n).inside);
@@ -100,17 +114,20 @@ TEST(Tracker, EveryDirectionCanPutItOutside) {
 }
 
 TEST(Tracker, AMeasurementThatIsNoNumberIsNotInside) {
-  Tracker tracker(start());
-  tracker.accept(segment(1));
+  Tracker tracker(start(), vehicle());
+  const auto s1 = segment(1);
+  ASSERT_TRUE(tracker.accept(s1, kAtStart));
   EXPECT_FALSE(tracker.judge(Vec3(0, 0, std::numeric_limits<double>::quiet_NaN())).inside);
 }
 
 TEST(Tracker, ANewSegmentTakesOverAtTheNextStep) {
-  Tracker tracker(start());
-  tracker.accept(segment(4));
+  Tracker tracker(start(), vehicle());
+  const auto s4 = segment(4);
+  ASSERT_TRUE(tracker.accept(s4, kAtStart));
   tracker.step();
   tracker.step();
-  tracker.accept(segment(2));
+  const auto s2 = segment(2);
+  ASSERT_TRUE(tracker.accept(s2, kAtStart));
   EXPECT_EQ(tracker.step().p_W, Vec3(0, 0, 1));
   EXPECT_EQ(tracker.step().p_W, Vec3(1, 0, 1));
   EXPECT_TRUE(tracker.finished());
@@ -118,8 +135,9 @@ TEST(Tracker, ANewSegmentTakesOverAtTheNextStep) {
 }
 
 TEST(Tracker, NeitherStepNorJudgeAllocates) {
-  Tracker tracker(start());
-  tracker.accept(segment(50));
+  Tracker tracker(start(), vehicle());
+  const auto s50 = segment(50);
+  ASSERT_TRUE(tracker.accept(s50, kAtStart));
   bool inside = true;
   const auto fly = [&] {
     for (int k = 0; k < 100; ++k) {
@@ -130,7 +148,38 @@ TEST(Tracker, NeitherStepNorJudgeAllocates) {
   EXPECT_EQ(test::allocations_during(fly), 0);
   EXPECT_TRUE(inside);
   // The trap works: what is not real-time is counted.
-  EXPECT_GT(test::allocations_during([&] { tracker.accept(segment(2)); }), 0);
+  EXPECT_GT(test::allocations_during([] { segment(2); }), 0);
+}
+
+TEST(Tracker, RefusesASegmentThatStartsElsewhereThanTheVehicleIs) {
+  Tracker tracker(start(), vehicle());
+  const auto s = segment(4);
+  const auto moved = [](double dx, double dv) { return State{Vec3(dx, 0, 1), Vec3(0, dv, 0)}; };
+  // The ellipsoid of the first set: half axes 0.1 m and 0.5 m/s.
+  EXPECT_FALSE(tracker.accept(s, moved(0.101, 0)));
+  EXPECT_FALSE(tracker.accept(s, moved(0, 0.501)));
+  EXPECT_FALSE(tracker.accept(s, moved(0.08, 0.4)));
+  EXPECT_FALSE(tracker.accept(s, moved(std::numeric_limits<double>::quiet_NaN(), 0)));
+  expect_rest(tracker.step(), Vec3(-1, -2, 3), 0.5);
+  EXPECT_TRUE(tracker.accept(s, moved(0.06, 0.3)));
+}
+
+TEST(Tracker, AContinuedSegmentTakesOverWhereItBranchesAndNotLater) {
+  auto next = segment(6);
+  next.id = 9;
+  next.continues = 4;
+  next.branch = 2;
+  next.commands[2].p_W.y() = 5;
+  const auto s4 = segment(4);
+  for (const int flown : {0, 1, 2, 3}) {
+    Tracker tracker(start(), vehicle());
+    EXPECT_FALSE(tracker.accept(next, kAtStart));  // there is nothing to continue
+    ASSERT_TRUE(tracker.accept(s4, kAtStart));
+    for (int k = 0; k < flown; ++k) tracker.step();
+    ASSERT_EQ(tracker.accept(next, State{}), flown <= 2);
+    if (flown > 2) continue;
+    for (int k = flown; k < 6; ++k) EXPECT_EQ(tracker.step().p_W, Vec3(k, k == 2 ? 5 : 0, 1));
+  }
 }
 
 }  // namespace
