@@ -25,6 +25,7 @@ class ProximityField {
  public:
   /// O(cells).
   ProximityField(const map::OccupancyGrid& grid, const Model& model);
+  ProximityField(map::OccupancyGrid&&, const Model&) = delete;  // would leave grid() dangling
   /// Σ(p) = Σ_0 + Σ_e over visible elements e, for any finite p. O(elements within the model's ranges). Thread-safe.
   Breakdown at(const Vec3& p_W) const;
   const Model& model() const noexcept { return model_; }

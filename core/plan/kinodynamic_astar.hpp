@@ -35,10 +35,10 @@ struct SearchResult {
 /// Hybrid-state A* (paper Sec. V-A, model.md section 5b) over (p, v): acceleration grid × two durations, cost
 /// G = ∫‖u‖² dt + ρT, each motion checked as a swept set and against the limits per axis, closed by the optimal cubic
 /// to the goal. The heuristic is cost_to_go over durations that the way through passable voxels needs at least
-/// (SafeSpace::hops_to, least_stopping_time): admissible, used without factor. States whose f = G + H falls into the
-/// same band of width kBand × H(start) are taken deepest first, so the cost is within that band of the best in the
-/// discretisation. A start faster than v_max may only slow down. Deterministic.
-/// Errors: no_path (none exists, or the node cap was reached: the message says which), deadline.
+/// (SafeSpace::hops_to, least_stopping_time): admissible. The open set is taken by bands of f = G + H as wide as
+/// H(start), so the cost is below twice the best of the discretisation; inside a band by G + 2H. A start faster than
+/// v_max may only slow down. Deterministic. Errors: no_path (none exists, or the node cap was reached: the message says
+/// which), deadline.
 tl::expected<SearchResult, SearchFailure> search(const SafeSpace& space, const State& start, const Vec3& goal_W,
                                                  const SearchOptions& options);
 

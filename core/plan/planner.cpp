@@ -223,9 +223,9 @@ Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
   const double taken = vehicle.body.radius + vehicle.estimation.position + std::max(constant, 0.0);
   const auto half_widths = [&](std::size_t k) { return constant >= 0 ? PerDirection{} : tube[k].half_widths_interval; };
   const auto next = [&](std::size_t k) { return std::min(k + 1, tube.size() - 1); };
-  // The stored distance differs from the true one by less than a voxel diagonal (both are 1-Lipschitz between centres):
+  // Distance is 1-Lipschitz, so the interpolated one is off by a voxel diagonal at most:
   // that bounds each step from below and leaves few exact queries.
-  const double slack = 2 * world.grid.resolution() * std::sqrt(3.0);
+  const double slack = world.grid.resolution() * std::sqrt(3.0);
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t k = 0; k < tube.size(); ++k) {
     const PerDirection h = half_widths(k);
