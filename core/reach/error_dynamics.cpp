@@ -16,6 +16,12 @@ AxisLoop axis_loop(const Vehicle& vehicle, bool vertical, Loop loop) {
   return axis;
 }
 
+Vec3 commanded_acceleration(const Vehicle& vehicle, const State& state, const Setpoint& command) noexcept {
+  const auto& c = vehicle.controller;
+  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
+  return command.a_W + kp.cwiseProduct(command.p_W - state.p_W) + kd.cwiseProduct(command.v_W - state.v_W);
+}
+
 void refuse(const AxisLoop& axis, const char* why) {
   std::ostringstream text;
   text << "error dynamics with k_p = " << axis.kp << " 1/s², k_d = " << axis.kd

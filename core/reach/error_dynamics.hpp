@@ -57,6 +57,10 @@ inline constexpr double kMinFeedbackDelay = 1e-4;  ///< s
 /// gains, delay and lag, if the loop is unstable or does not contract within two minutes (no useful support exists).
 AxisResponse axis_response(const AxisLoop& axis, Loop loop);
 
+/// Acceleration that the controller commands in a state, a_cmd + k_p (p_cmd − p) + k_d (v_cmd − v), m/s²: the start of
+/// CentrePredictor for which the sets' assumption holds that the acceleration's error is 0 at first.
+Vec3 commanded_acceleration(const Vehicle& vehicle, const State& state, const Setpoint& command) noexcept;
+
 /// Predicted motion of the vehicle under held, delayed commands without disturbance: the centre of the sets
 /// (model.md section 4, "Centre"):  lag·ȧ = r(t) − k_p p(t − δ) − k_d v(t − δ) − a,  r = k_p p_cmd + k_d v_cmd + a_cmd.
 /// The set-point is held for one period and acts `latency` later: in a period the older command acts for the remainder
@@ -70,7 +74,7 @@ class CentrePredictor {
  public:
   static constexpr int kMaxDelaySteps = 16;  ///< longest latency and feedback delay, periods
 
-  /// Starts at `start` with acceleration `a_W` (m/s², the commanded one when in doubt). Errors: throws
+  /// Starts at `start` with acceleration `a_W` (m/s²; commanded_acceleration() when it is not known). Errors: throws
   /// std::invalid_argument for a negative or too long latency or feedback delay.
   CentrePredictor(const Vehicle& vehicle, Loop loop, const State& start, const Vec3& a_W, const Setpoint& previous);
   /// Issues the command of the next period and moves on by 20 ms. Real-time: wait-free, no allocation.

@@ -67,11 +67,8 @@ double largest_half_axis(const Mat3& shape, const PerDirection& h, Method method
 // Centres at t = 0, 20 ms, …: one more than commands.
 std::vector<State> centres(const Reachability& reach, const State& start, const Setpoint& previous,
                            std::span<const Setpoint> commands) {
-  const auto& c = reach.vehicle.controller;
-  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
-  const Vec3 commanded =
-      previous.a_W + kp.cwiseProduct(previous.p_W - start.p_W) + kd.cwiseProduct(previous.v_W - start.v_W);
-  CentrePredictor predictor(reach.vehicle, reach.loop, start, commanded, previous);
+  const Vec3 a_W = commanded_acceleration(reach.vehicle, start, previous);
+  CentrePredictor predictor(reach.vehicle, reach.loop, start, a_W, previous);
   std::vector<State> states{start};
   states.reserve(commands.size() + 1);
   for (const Setpoint& command : commands) states.push_back(predictor.step(command));

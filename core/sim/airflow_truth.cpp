@@ -14,10 +14,10 @@ namespace {
 struct HorizontalVertical {
   double horizontal, vertical;
 };
-constexpr HorizontalVertical kBase{0.0026, 0.0039};
-constexpr HorizontalVertical kFloor{0.040, 0.080};
+constexpr HorizontalVertical kBase{0.0024, 0.0036};
+constexpr HorizontalVertical kFloor{0.040, 0.076};
 constexpr double kFloorLength = 1.05;
-constexpr double kWallNormal = 0.21, kWallTangential = 0.01, kWallVertical = 0.045, kWallLength = 0.5;
+constexpr double kWallNormal = 0.19, kWallTangential = 0.01, kWallVertical = 0.038, kWallLength = 0.5;
 constexpr double kCornerNormal = 0.16, kCornerTangential = 0.06, kCornerVertical = 0.18;
 constexpr double kCornerLength = 0.5, kCornerHeight = 0.9;
 constexpr double kCeiling = 0.004, kCeilingLength = 0.2;
@@ -25,7 +25,7 @@ constexpr double kWallPull = 0.12, kWallPullLength = 0.6, kLargestWallPull = 0.0
 constexpr double kFountainHeight = 0.5;
 constexpr double kFloorLift = 0.035, kFloorLiftLength = 0.4, kCeilingPull = 0.010;
 
-constexpr double kDownRange = 4, kUpRange = 1.5, kSideRange = 2.5;
+constexpr double kDownRange = 4, kUpRange = 1.5, kSideRange = 2;
 constexpr int kSideRays = 24;
 constexpr double kSlant = 35 * std::numbers::pi / 180;  // of the four outer rays to the floor
 
@@ -138,7 +138,8 @@ void AirflowTruth::advance(double dt) {
 
 Vec3 AirflowTruth::step(const Vec3& p_W, double dt) {
   advance(dt);
-  const Flow f = flow(p_W);
+  if (!last_cast_ || (p_W - last_cast_->first).norm() > kRecast) last_cast_.emplace(p_W, flow(p_W));
+  const Flow& f = last_cast_->second;
   const double intensity = std::exp(log_intensity_) * (1 + (kBurstFactor - 1) * burst_);
   const Eigen::Vector2d horizontal = kScaleHorizontal * intensity * gust_.head<2>();
   const double vertical = kScaleVertical * intensity * gust_.z();

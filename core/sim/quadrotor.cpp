@@ -56,14 +56,14 @@ void Quadrotor::step(const Vec3& w_W, const State& estimated) {
   const double lag = vehicle_.controller.attitude_lag;
   const Vec3 before = lag > 0 ? produced_ : wanted;
   produced_ = lag > 0 ? Vec3(wanted + std::exp(-kStep / lag) * (produced_ - wanted)) : wanted;
-  const Vec3 v_before = state_.v_W;
+  const State start = state_;
   acceleration_ = 0.5 * (before + produced_) + w_W;
   state_.v_W += kStep * acceleration_;
-  state_.p_W += kStep * 0.5 * (v_before + state_.v_W);
+  state_.p_W += kStep * 0.5 * (start.v_W + state_.v_W);
 
   on_ground_ = z_floor_ && state_.p_W.z() <= *z_floor_ && acceleration_.z() <= 0;
   if (on_ground_) {  // friction holds it where it stands
-    state_.p_W = Vec3(state_.p_W.x(), state_.p_W.y(), *z_floor_);
+    state_.p_W = Vec3(start.p_W.x(), start.p_W.y(), *z_floor_);
     state_.v_W = acceleration_ = Vec3::Zero();
   }
   const double turn = std::remainder(active_.yaw - yaw_, 2 * std::numbers::pi);
@@ -74,9 +74,9 @@ void Quadrotor::step(const Vec3& w_W, const State& estimated) {
 Eigen::Quaterniond Quadrotor::attitude() const {
   const Vec3 force = produced_ + kGravityUp;
   const Vec3 z = !on_ground_ && force.norm() > 1e-6 ? Vec3(force.normalized()) : Vec3(Vec3::UnitZ());
-  const Vec3 y = z.cross(Vec3(std::cos(yaw_), std::sin(yaw_), 0)).normalized();
+  const Vec3 x = Vec3(-std::sin(yaw_), std::cos(yaw_), 0).cross(z).normalized();  // its heading is the yaw exactly
   Mat3 R_WB;
-  R_WB << y.cross(z), y, z;
+  R_WB << x, z.cross(x), z;
   return Eigen::Quaterniond(R_WB);
 }
 

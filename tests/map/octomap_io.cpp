@@ -143,13 +143,31 @@ TEST(OctomapMessage, RefusesForeignTreesAndImpossibleResolutions) {
   }
 }
 
+/// A well-formed tree of one free leaf below `inner` nested inner nodes.
+Bytes chain(int inner, bool binary) {
+  Bytes data;
+  for (int level = 0; level < inner; ++level) {
+    if (binary) {
+      data.insert(data.end(), {static_cast<std::int8_t>(level + 1 < inner ? 3 : 1), 0});
+    } else {
+      data.insert(data.end(), {0, 0, 0, 0, 1});
+    }
+  }
+  if (!binary) data.insert(data.end(), {0, 0, 0, -0x80, 0});  // log-odds −0: even
+  return data;
+}
+
 TEST(OctomapMessage, RefusesTreesDeeperThanSixteenLevels) {
-  Bytes deep;  // child 0 is an inner node, again and again
-  for (int level = 0; level < 100000; ++level) deep.insert(deep.end(), {3, 0});
-  EXPECT_FALSE(decode_octomap(deep, 0.1, true, "OcTree"));
-  Bytes full;
-  for (int level = 0; level < 100000; ++level) full.insert(full.end(), {0, 0, 0, 0, 1});
-  EXPECT_FALSE(decode_octomap(full, 0.1, false, "OcTree"));
+  for (const bool binary : {true, false}) {
+    const auto voxel = decode_octomap(chain(16, binary), 0.1, binary, "OcTree");
+    ASSERT_TRUE(voxel) << voxel.error().message;
+    EXPECT_EQ(voxel->size(), Index3(1, 1, 1));
+    for (const int levels : {17, 18, 100000}) {
+      const auto grid = decode_octomap(chain(levels, binary), 0.1, binary, "OcTree");
+      ASSERT_FALSE(grid) << levels;
+      EXPECT_NE(grid.error().message.find("deeper"), std::string::npos) << grid.error().message;
+    }
+  }
 }
 
 std::size_t peak_address_space_kib() {

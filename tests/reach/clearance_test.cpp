@@ -157,6 +157,31 @@ TEST(PrismDistance, EqualsBruteForceOnRandomGrids) {
   EXPECT_GT(apart, 80);  // neither touching nor out of range: the comparison means something
 }
 
+TEST(PrismDistance, ToSolidBlocksEqualsBruteForce) {
+  std::mt19937 random(10);
+  std::uniform_int_distribution<int> low(-4, 18), length(2, 7);
+  int apart = 0;
+  for (int trial = 0; trial < 150; ++trial) {
+    map::OccupancyGrid grid = random_grid(random, 0.0);
+    for (int block = 0; block < 2; ++block) {
+      const Index3 corner(low(random), low(random), low(random));
+      const Index3 size(length(random), length(random), length(random));
+      for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+        const Index3 offset = grid.voxel(n) - corner;
+        if ((offset.array() >= 0).all() && (offset.array() < size.array()).all()) {
+          grid.set(grid.voxel(n), map::Cell::occupied);
+        }
+      }
+    }
+    const Vec3 p = random_point(random, grid);
+    const PerDirection h = random_half_widths(random);
+    const double expected = brute_force(grid, p, h, 0.6);
+    EXPECT_NEAR(prism_distance(grid, p, h, 0.6), expected, 1e-9);
+    apart += expected > 0 && expected < 0.6;
+  }
+  EXPECT_GT(apart, 50);
+}
+
 TEST(PrismDistance, OfAPointIsTheDistanceToTheNearestBox) {
   std::mt19937 random(6);
   const map::OccupancyGrid grid = random_grid(random, 0.005);
@@ -190,6 +215,21 @@ TEST(PrismDistance, OfASliverAlongADiagonalEndsWhereTheAxesCutIt) {
   const PerDirection sliver{0.3, 0.5, 0.1, 10.0, 0.0};  // the segment from (−0.3, −0.3) to (0.3, 0.3)
   EXPECT_NEAR(prism_distance(one_voxel(Vec3(1.0, 1.0, 0.0)), Vec3(0, 0, 0.05), sliver, kFar), 0.7 * kSqrt2, 1e-9);
   EXPECT_NEAR(prism_distance(one_voxel(Vec3(0.5, -0.6, 0.0)), Vec3(0, 0, 0.05), sliver, kFar), 0.5 * kSqrt2, 1e-9);
+}
+
+TEST(PrismDistance, ToABarIsTheGapToItsNearEndInEveryDirection) {
+  const PerDirection h{0.2, 0.2, 0.2, 10.0, 10.0};
+  for (const int axis : {0, 1, 2}) {
+    for (const int sign : {1, -1}) {
+      map::OccupancyGrid grid(Vec3(-4, -4, -4), 0.1, Index3(80, 80, 80), map::Cell::free);
+      for (int n = 0; n < 20; ++n) {
+        Vec3 p = Vec3::Constant(0.05);
+        p[axis] = sign * (0.85 + 0.1 * n);
+        grid.set(grid.index(p), map::Cell::occupied);
+      }
+      EXPECT_NEAR(prism_distance(grid, Vec3::Zero(), h, kFar), 0.6, 1e-9);
+    }
+  }
 }
 
 TEST(PrismDistance, TakesTheOutsideOfTheGridAsObstacle) {
