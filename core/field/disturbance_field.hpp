@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
+#include "core/field/element_buckets.hpp"
 #include "core/field/proximity_model.hpp"
+#include "core/field/sight.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/model.hpp"
 
@@ -16,11 +19,14 @@ struct Breakdown {
   Variance sigma() const noexcept { return base + ground + corner + wall; }
 };
 
-/// Exact evaluation of model.md section 2 at any point. Holds the elements in buckets; the grid must outlive it.
+/// Exact evaluation of model.md section 2 at any point. Holds the elements in buckets and its own copy of the occupied
+/// voxels, as they were when it was made; the grid must outlive it.
 class ProximityField {
  public:
+  /// O(cells).
   ProximityField(const map::OccupancyGrid& grid, const Model& model);
-  /// Σ(p) = Σ_0 + Σ_e over visible elements e. O(elements within the model's ranges). Thread-safe.
+  ProximityField(map::OccupancyGrid&&, const Model&) = delete;  // would leave grid() dangling
+  /// Σ(p) = Σ_0 + Σ_e over visible elements e, for any finite p. O(elements within the model's ranges). Thread-safe.
   Breakdown at(const Vec3& p_W) const;
   const Model& model() const noexcept { return model_; }
   const map::OccupancyGrid& grid() const noexcept { return *grid_; }
@@ -28,9 +34,9 @@ class ProximityField {
  private:
   const map::OccupancyGrid* grid_;
   Model model_;
-  Index3 bucket_count_;
-  double bucket_edge_;
-  std::vector<std::vector<Element>> buckets_;
+  ProximityModel terms_;
+  SightMap sight_;
+  ElementBuckets up_, lateral_;
 };
 
 /// Σ stored at free voxel centres, (m/s²)² (model.md section 2, last paragraph).
@@ -52,6 +58,8 @@ class DisturbanceField {
   Variance interpolated(const Vec3& p_W, const Variance& fallback) const noexcept;
 
  private:
+  std::size_t linear(const Index3& v) const noexcept;
+
   Vec3 origin_W_;
   double resolution_;
   Index3 size_;

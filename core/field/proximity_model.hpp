@@ -6,10 +6,30 @@
 
 namespace backwash::field {
 
-/// Contribution of one visible element to Σ at p, (m/s²)²: the three terms of model.md section 2 (paper Eq. 1–3), all
-/// gates included, visibility not. Each is zero for the wrong kind of element.
-Variance ground_term(const Model& model, double voxel_edge, const Element& element, const Vec3& p_W) noexcept;
-Variance corner_term(const Model& model, double voxel_edge, const Element& element, const Vec3& p_W) noexcept;
-Variance wall_term(const Model& model, double voxel_edge, const Element& element, const Vec3& p_W) noexcept;
+/// Contribution of one visible element to Σ at p, (m/s²)²: the three terms of model.md section 2 (paper Eq. 1–3), gates
+/// included, visibility not. With r = c − p, l = max(|r|, a/2) and θ the angle between r and straight down. Each term
+/// is zero for the wrong kind of element. Gates include their limit within 1e-9 (m or rad), so that a wall voxel
+/// exactly level with the vehicle (θ = π/2) counts whatever the rounding.
+class ProximityModel {
+ public:
+  /// `voxel_edge`: a, m.
+  ProximityModel(const Model& model, double voxel_edge) noexcept;
+
+  /// Up elements: s = A [λ_g/l² + k_g1 exp(−k_g2 l²)] per component (horizontal, vertical) if (θ ≤ θ̄_g and l ≤ l̄_g) or
+  /// (l sin θ ≤ r0 and θ < π/2 and l ≤ l̄_u).
+  Variance ground(const Element& element, const Vec3& p_W) const noexcept;
+  /// Lateral elements with a corner k: s = A (φ̄_c − φ) λ_c/(d_c² + h_c⁶) per component (normal, tangential, vertical)
+  /// if φ ≤ φ̄_c, l_c ≤ l̄_c and |r| ≤ l̄_w. The denominator is at least (a/2)⁶, its value half a voxel straight above k,
+  /// so that s is finite at k itself, where no vehicle can be.
+  Variance corner(const Element& element, const Vec3& p_W) const noexcept;
+  /// Lateral elements: s = A k_w1 exp(−k_w2 l²) per component if θ_w ≤ θ ≤ π/2 and l ≤ l̄_w.
+  Variance wall(const Element& element, const Vec3& p_W) const noexcept;
+
+ private:
+  Model model_;
+  double least_l_;  ///< a/2, m
+  // Angles are compared by their cosines: θ̄ ≤ θ' exactly where cos θ̄ ≥ cos θ'.
+  double cos_ground_max_, cos_wall_min_, cos_level_;
+};
 
 }  // namespace backwash::field

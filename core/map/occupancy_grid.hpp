@@ -30,7 +30,8 @@ class OccupancyGrid {
   std::size_t linear(const Index3& v) const noexcept {
     return static_cast<std::size_t>(v.x()) +
            static_cast<std::size_t>(size_.x()) *
-               (static_cast<std::size_t>(v.y()) + static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z()));
+               (static_cast<std::size_t>(v.y()) +
+                static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z()));
   }
   Index3 voxel(std::size_t linear) const noexcept;
 
@@ -44,9 +45,7 @@ class OccupancyGrid {
   bool occupied(const Index3& v) const noexcept { return at(v) == Cell::occupied; }
 
   /// Voxel that contains p (a point on a face belongs to the upper voxel); may lie outside the grid.
-  Index3 index(const Vec3& p_W) const noexcept {
-    return ((p_W - origin_W_) / resolution_).array().floor().cast<int>();
-  }
+  Index3 index(const Vec3& p_W) const noexcept { return ((p_W - origin_W_) / resolution_).array().floor().cast<int>(); }
   /// Centre of a voxel, m in W; defined outside the grid too.
   Vec3 center(const Index3& v) const noexcept {
     return origin_W_ + resolution_ * (v.cast<double>() + Vec3::Constant(0.5));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/map/distance_field.hpp"
+#include "core/reach/bound_field.hpp"
 #include "core/reach/reach_tube.hpp"
 
 namespace backwash::reach {
@@ -12,13 +13,15 @@ namespace backwash::reach {
 /// The infinite-time set of a vehicle hovering at a point (model.md sections 3 and 5).
 struct HoverSet {
   PerDirection half_widths{};  ///< m
-  double clearance = 0;        ///< distance of the set to obstacles − body.radius − estimation.position, m, capped at 1 m
-  bool bounded = false;        ///< false: the fixed point left the clear space before it converged
+  double clearance = 0;  ///< distance of the set to obstacles − body.radius − estimation.position, m, capped at 1 m
+  bool bounded = false;  ///< false: the fixed point left the clear space before it converged
   bool safe() const noexcept { return bounded && clearance > 0; }
 };
 
-/// Smallest fixed point of h = h_∞ × max w̄(p ± h), then its clearance. Stops as unbounded when h exceeds the free
-/// distance. `constant_margin` > = 0 replaces the set by a ball of that radius (the baseline of `--margin`).
+/// Smallest fixed point of h = h_∞ × max w̄(p ± h), then its clearance. For method paper h is the support of the
+/// infinite-time ellipsoid instead. Unbounded, with the clearance of touching, when h exceeds the free distance and
+/// where p is not in a free voxel. `constant_margin` >= 0 replaces the set by a ball of that radius (the baseline of
+/// `--margin`). Cost: some look-ups of max_over and one prism_distance, which the distance field limits.
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
                    const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);
 
@@ -31,12 +34,16 @@ class HoverMap {
             const BoundField& bounds, std::span<const std::size_t> voxels, double constant_margin = -1);
   /// False outside the grid and where nothing was computed.
   bool safe(const Index3& v) const noexcept;
-  /// Clearance of the hover set, m; negative where not safe or not computed.
+  /// Clearance of the hover set, m; ≤ 0 where not safe, −1 where not computed and outside the grid.
   double clearance(const Index3& v) const noexcept;
   /// Half widths x, y, z, m; zero where not computed or unbounded.
   Vec3 half_widths(const Index3& v) const noexcept;
 
  private:
+  static constexpr std::array<float, 4> kNotComputed{-1, 0, 0, 0};
+  bool inside(const Index3& v) const noexcept;
+  const std::array<float, 4>& cell(const Index3& v) const noexcept;
+
   Index3 size_;
   std::vector<std::array<float, 4>> cells_;  // clearance, half widths x, y, z
 };

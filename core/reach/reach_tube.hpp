@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "core/field/disturbance_field.hpp"
-#include "core/map/occupancy_grid.hpp"
+#include "core/reach/bound_field.hpp"
 #include "core/reach/ellipsoid.hpp"
 #include "core/reach/error_dynamics.hpp"
+#include "core/reach/support.hpp"
 #include "core/types/disturbance.hpp"
 #include "core/types/state.hpp"
 
@@ -15,40 +15,6 @@ namespace backwash::reach {
 
 enum class Method { tight, paper };
 
-/// w̄ at every voxel of a stored field, for maxima over sets (model.md section 3, "Over the set, not at its centre").
-class BoundField {
- public:
-  /// Unstored voxels count as 0 (the vehicle's centre cannot be there).
-  BoundField(const map::OccupancyGrid& grid, const field::DisturbanceField& field, const BoundModel& model);
-  /// Component-wise maximum of w̄ over the voxels that meet the closed box [low, high], m in W.
-  DisturbanceBound max_over(const Vec3& low_W, const Vec3& high_W) const noexcept;
-  DisturbanceBound at(const Index3& v) const noexcept;
-
- private:
-  Vec3 origin_W_;
-  double resolution_;
-  Index3 size_;
-  std::vector<std::array<float, kDirections>> w_;
-};
-
-/// The exact support of the position error in the five directions, propagated by the FIR of model.md section 5.2.
-class SupportRecursion {
- public:
-  /// Starts at the ellipsoid diag(position² I, velocity² I) of the vehicle's initial error.
-  SupportRecursion(const AxisResponse& horizontal, const AxisResponse& vertical, const Vehicle& vehicle);
-  /// One step of 20 ms under w̄ (m/s²).
-  void step(const DisturbanceBound& w_bar);
-  /// Half widths at the current sample instant, m.
-  PerDirection half_widths() const;
-  /// Half widths valid from the current sample instant until the next one, if the next step's bound is `next`, m.
-  PerDirection half_widths_until_next(const DisturbanceBound& next) const;
-
- private:
-  const AxisResponse* horizontal_;
-  const AxisResponse* vertical_;
-  double position_, velocity_;
-  std::vector<DisturbanceBound> history_;
-};
 
 /// One entry of a tube: the set at t = k·0.02 s, after k steps.
 struct TubeStep {

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/config/strict_table.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <iterator>
+#include <set>
+#include <sstream>
+
+#include "core/config/builtin_files.hpp"
+
+namespace backwash::config {
+namespace {
+
+constexpr std::string_view kBuiltin = "builtin:";
+
+tl::expected<std::string, ConfigError> builtin_contents(const std::string& path, std::string_view suffix) {
+  std::string wanted = path.substr(kBuiltin.size());
+  wanted += suffix;
+  std::ostringstream message;
+  message << path << ": no such built-in file; there are";
+  for (const BuiltinFile& file : builtin_files()) {
+    if (file.name == wanted) return std::string(file.text);
+    if (file.name.ends_with(suffix))
+      message << " " << kBuiltin << file.name.substr(0, file.name.size() - suffix.size());
+  }
+  return tl::unexpected(ConfigError{ConfigError::Kind::not_found, message.str()});
+}
+
+tl::expected<std::string, ConfigError> contents(const std::string& path, std::string_view suffix) {
+  if (path.starts_with(kBuiltin)) return builtin_contents(path, suffix);
+  std::ifstream in(path, std::ios::binary);
+  if (!in || std::filesystem::is_directory(path))
+    return tl::unexpected(
+        ConfigError{ConfigError::Kind::not_found, path + ": cannot be read; needs the path of a TOML file"});
+  return std::string(std::istreambuf_iterator<char>(in), {});
+}
+
+std::string range_text(const Range& range) {
+  std::ostringstream out;
+  out << "needs a number in " << (range.above_low ? "(" : "[") << range.low << ", " << range.high << "]";
+  return out.str();
+}
+
+/// The value on one line, shortened.
+std::string value_text(const toml::node& node) {
+  if (node.is_table()) return "{…}";
+  std::ostringstream out;
+  // As people write it: TOML's own formatter prints 8.8 with 17 digits.
+  if (const auto* number = node.as_floating_point())
+    out << std::setprecision(15) << number->get();
+  else
+    out << toml::node_view<const toml::node>{node};
+  std::string text = out.str().substr(0, 60);
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' '; }, ' ');
+  return text;
+}
+
+std::string_view parent_of(std::string_view path) {
+  const std::size_t dot = path.rfind('.');
+  return dot == std::string_view::npos ? std::string_view{} : path.substr(0, dot);
+}
+
+/// Names that may follow `prefix` ("" or "a."), in the order in which they are described.
+std::string names_below(std::string_view prefix, std::span<const NumberKey> keys,
+                        std::span<const std::string_view> others) {
+  std::string list;
+  std::set<std::string_view> seen;
+  const auto add = [&](std::string_view path) {
+    if (!path.starts_with(prefix)) return;
+    const std::string_view name = path.substr(prefix.size(), path.find('.', prefix.size()) - prefix.size());
+    if (seen.insert(name).second) list += (list.empty() ? "" : ", ") + std::string(name);
+  };
+  for (const std::string_view other : others) add(other);
+  for (const NumberKey& key : keys) add(key.path);
+  return list;
+}
+
+}  // namespace
+
+tl::expected<StrictTable, ConfigError> StrictTable::open(const std::string& path, std::string_view suffix) {
+  const auto text = contents(path, suffix);
+  if (!text) return tl::unexpected(text.error());
+  try {
+    return StrictTable(path, toml::parse(*text, path));
+  } catch (const toml::parse_error& e) {
+    std::ostringstream message;
+    message << path << ":" << e.source().begin.line << ": not valid TOML: " << e.description();
+    return tl::unexpected(ConfigError{ConfigError::Kind::invalid, message.str()});
+  }
+}
+
+ConfigError StrictTable::error(std::string_view path, const std::string& what_would_be_right) const {
+  toml::source_index line = 0;
+  for (std::string_view at = path; line == 0 && !at.empty(); at = parent_of(at))
+    if (const toml::node* node = root_.at_path(at).node()) line = node->source().begin.line;
+  const toml::node* node = root_.at_path(path).node();
+  std::ostringstream message;
+  message << file_ << ":" << (line > 0 ? line : 1) << ": key '" << path
+          << "' = " << (node ? value_text(*node) : "(missing)") << ": " << what_would_be_right;
+  return {ConfigError::Kind::invalid, message.str()};
+}
+
+tl::expected<void, ConfigError> StrictTable::reject_unknown(const toml::table& table, const std::string& prefix,
+                                                            std::span<const NumberKey> keys,
+                                                            std::span<const std::string_view> others) const {
+  for (const auto& [key, node] : table) {
+    const std::string path = prefix + std::string(key.str());
+    if (std::find(others.begin(), others.end(), path) != others.end()) continue;
+    // A quoted key with a dot in it only looks like a path.
+    const bool quoted_path = key.str().find('.') != std::string_view::npos;
+    if (!quoted_path && std::any_of(keys.begin(), keys.end(), [&](const NumberKey& k) { return k.path == path; }))
+      continue;
+    if (quoted_path ||
+        std::none_of(keys.begin(), keys.end(), [&](const NumberKey& k) { return k.path.starts_with(path + "."); })) {
+      std::ostringstream message;
+      message << file_ << ":" << key.source().begin.line << ": key '" << path << "' = " << value_text(node)
+              << ": unknown; known here: " << names_below(prefix, keys, others);
+      return tl::unexpected(ConfigError{ConfigError::Kind::invalid, message.str()});
+    }
+    if (!node.is_table())
+      return tl::unexpected(error(path, "needs a table with " + names_below(path + ".", keys, others)));
+    if (auto below = reject_unknown(*node.as_table(), path + ".", keys, others); !below) return below;
+  }
+  return {};
+}
+
+tl::expected<void, ConfigError> StrictTable::read(std::span<const NumberKey> keys,
+                                                  std::span<const std::string_view> others) const {
+  if (auto known = reject_unknown(root_, "", keys, others); !known) return known;
+  for (const NumberKey& key : keys) {
+    const toml::node* node = root_.at_path(key.path).node();
+    const Range& range = key.range;
+    if (!node) {
+      const bool may_miss = key.presence == NumberKey::Presence::optional ||
+                            (key.presence == NumberKey::Presence::with_parent && !has(parent_of(key.path)));
+      if (may_miss) continue;
+      return tl::unexpected(error(key.path, range_text(range)));
+    }
+    // A TOML boolean would convert to a number; only integers and floats are meant.
+    const auto number = node->is_number() ? node->value<double>() : std::nullopt;
+    const bool fits = number && (range.above_low ? *number > range.low : *number >= range.low) && *number <= range.high;
+    if (!fits) return tl::unexpected(error(key.path, range_text(range)));
+    *key.target = *number;
+  }
+  return {};
+}
+
+tl::expected<std::string, ConfigError> StrictTable::text(std::string_view path) const {
+  const auto value = root_.at_path(path).value<std::string>();
+  if (!value || value->empty()) return tl::unexpected(error(path, "needs a string that is not empty"));
+  return *value;
+}
+
+}  // namespace backwash::config

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <toml++/toml.h>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+
+#include "core/config/config.hpp"
+
+namespace backwash::config {
+
+/// Numbers from low to high; the lower end left out when `above_low`.
+struct Range {
+  double low, high;
+  bool above_low = false;
+};
+
+/// One number of a file: the only description of its name, range and whether it may be absent.
+struct NumberKey {
+  enum class Presence {
+    required,
+    optional,     ///< the target keeps its default
+    with_parent,  ///< the table that holds it may be absent as a whole, not this key alone
+  };
+  std::string_view path;  ///< dotted
+  double* target;
+  Range range;
+  Presence presence = Presence::required;
+};
+
+/// A TOML document that accepts exactly the keys it is told of. Every error is one line
+/// `FILE:LINE: key 'a.b' = value: what would be right`.
+class StrictTable {
+ public:
+  /// `path`: a file, or `builtin:NAME` for the embedded NAME`suffix`. Errors: not_found; invalid for bad TOML.
+  static tl::expected<StrictTable, ConfigError> open(const std::string& path, std::string_view suffix);
+
+  /// Stores every number. `others`: keys that are allowed and left alone, whatever they hold. Error: the first unknown
+  /// key, wrong type, value out of range (NaN is in no range) or missing key.
+  tl::expected<void, ConfigError> read(std::span<const NumberKey> keys, std::span<const std::string_view> others) const;
+  /// A string that is not empty.
+  tl::expected<std::string, ConfigError> text(std::string_view path) const;
+  bool has(std::string_view path) const { return static_cast<bool>(root_.at_path(path)); }
+  /// Error about a key that is in the file or missing from it: names its line (the parent's, if missing) and value.
+  ConfigError error(std::string_view path, const std::string& what_would_be_right) const;
+
+ private:
+  StrictTable(std::string file, toml::table root) : file_(std::move(file)), root_(std::move(root)) {}
+  tl::expected<void, ConfigError> reject_unknown(const toml::table& table, const std::string& prefix,
+                                                 std::span<const NumberKey> keys,
+                                                 std::span<const std::string_view> others) const;
+
+  std::string file_;
+  toml::table root_;
+};
+
+}  // namespace backwash::config

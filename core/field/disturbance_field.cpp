@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/field/disturbance_field.hpp"
+
+#include <algorithm>
+
+namespace backwash::field {
+namespace {
+
+std::vector<Element> elements_of(const map::OccupancyGrid& grid, Element::Kind kind) {
+  std::vector<Element> elements = surface_elements(grid);
+  std::erase_if(elements, [kind](const Element& e) { return e.kind != kind; });
+  return elements;
+}
+
+bool nonzero(const Variance& v) noexcept { return v.xx != 0 || v.yy != 0 || v.zz != 0; }
+
+constexpr double kInPlane = 1e-9;  // m: a point in an element's own plane does not see it, whatever the rounding
+
+}  // namespace
+
+ProximityField::ProximityField(const map::OccupancyGrid& grid, const Model& model)
+    : grid_(&grid),
+      model_(model),
+      terms_(model, grid.resolution()),
+      sight_(grid),
+      up_(grid, elements_of(grid, Element::Kind::up)),
+      lateral_(grid, elements_of(grid, Element::Kind::lateral)) {}
+
+Breakdown ProximityField::at(const Vec3& p_W) const {
+  Breakdown b;
+  b.base = Variance::horizontal_vertical(model_.base.horizontal, model_.base.vertical);
+  const auto faces = [&](const Element& e) { return e.normal.dot(p_W - e.c_W) > kInPlane; };
+  // The terms first: most elements in the boxes are outside every gate, and the line of sight is the dear part.
+  const auto& g = model_.ground;
+  up_.for_each_near(p_W, {g.l_max, g.r0, g.l_footprint_max}, [&](const Element& e) {
+    if (!faces(e)) return;
+    const Variance ground = terms_.ground(e, p_W);
+    if (nonzero(ground) && sight_.line_of_sight(p_W, e.c_W)) b.ground += ground;
+  });
+  lateral_.for_each_near(p_W, {.ball = model_.wall.l_max}, [&](const Element& e) {
+    if (!faces(e)) return;
+    const Variance corner = terms_.corner(e, p_W), wall = terms_.wall(e, p_W);
+    if ((nonzero(corner) || nonzero(wall)) && sight_.line_of_sight(p_W, e.c_W)) b.corner += corner, b.wall += wall;
+  });
+  return b;
+}
+
+DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid)
+    : origin_W_(grid.origin()),
+      resolution_(grid.resolution()),
+      size_(grid.size()),
+      sigma_(grid.cell_count(), {-1, 0, 0, 0, 0, 0}) {}
+
+void DisturbanceField::fill(const ProximityField& exact, std::span<const std::size_t> voxels) {
+  for (const std::size_t n : voxels) {
+    const Variance s = exact.at(exact.grid().center(exact.grid().voxel(n))).sigma();
+    sigma_[n] = {static_cast<float>(s.xx), static_cast<float>(s.xy), static_cast<float>(s.xz),
+                 static_cast<float>(s.yy), static_cast<float>(s.yz), static_cast<float>(s.zz)};
+  }
+}
+
+std::size_t DisturbanceField::linear(const Index3& v) const noexcept {
+  const auto nx = static_cast<std::size_t>(size_.x()), ny = static_cast<std::size_t>(size_.y());
+  return static_cast<std::size_t>(v.x()) +
+         nx * (static_cast<std::size_t>(v.y()) + ny * static_cast<std::size_t>(v.z()));
+}
+
+bool DisturbanceField::has(const Index3& v) const noexcept {
+  const bool inside = (v.array() >= 0).all() && (v.array() < size_.array()).all();
+  return inside && sigma_[linear(v)][0] >= 0;
+}
+
+Variance DisturbanceField::at(const Index3& v) const noexcept {
+  const auto& s = sigma_[linear(v)];
+  return {s[0], s[1], s[2], s[3], s[4], s[5]};
+}
+
+Variance DisturbanceField::interpolated(const Vec3& p_W, const Variance& fallback) const noexcept {
+  const Vec3 x = (p_W - origin_W_) / resolution_ - Vec3::Constant(0.5);  // voxel centres at the integers
+  // Beyond one voxel around the grid nothing is stored; also keeps the conversion to int within its range.
+  if (!((x.array() > -1).all() && (x.array() < size_.array().cast<double>()).all())) return fallback;
+  const Vec3 low = x.array().floor(), t = x - low;
+  const Index3 corner = low.cast<int>();
+  Variance sum;
+  double total = 0;
+  for (int n = 0; n < 8; ++n) {
+    const Index3 d(n & 1, n >> 1 & 1, n >> 2);
+    const Index3 v = corner + d;
+    if (!has(v)) continue;
+    const double weight = (d.x() ? t.x() : 1 - t.x()) * (d.y() ? t.y() : 1 - t.y()) * (d.z() ? t.z() : 1 - t.z());
+    sum += weight * at(v);
+    total += weight;
+  }
+  return total > 0 ? (1 / total) * sum : fallback;
+}
+
+}  // namespace backwash::field

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/field/proximity_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace backwash::field {
+namespace {
+
+constexpr double kTolerance = 1e-9;  // of gates, m and rad
+
+/// Cosine of an upper limit of θ ∈ [0, π], lowered by the tolerance; below −1 where the limit excludes nothing.
+double cos_upper(double limit) {
+  const double angle = limit + kTolerance;
+  return angle >= std::numbers::pi ? -2 : angle < 0 ? 2 : std::cos(angle);
+}
+/// Cosine of a lower limit, raised by the tolerance.
+double cos_lower(double limit) {
+  const double angle = limit - kTolerance;
+  return angle <= 0 ? 2 : angle > std::numbers::pi ? -2 : std::cos(angle);
+}
+
+}  // namespace
+
+ProximityModel::ProximityModel(const Model& model, double voxel_edge) noexcept
+    : model_(model),
+      least_l_(0.5 * voxel_edge),
+      cos_ground_max_(cos_upper(model.ground.theta_max)),
+      cos_wall_min_(cos_lower(model.wall.theta_min)),
+      cos_level_(cos_upper(std::numbers::pi / 2)) {}
+
+Variance ProximityModel::ground(const Element& element, const Vec3& p_W) const noexcept {
+  if (element.kind != Element::Kind::up) return {};
+  const auto& g = model_.ground;
+  const Vec3 r = element.c_W - p_W;
+  const double distance = r.norm(), l = std::max(distance, least_l_);
+  const double cos_theta = distance > 0 ? -r.z() / distance : 1;
+  const double sin_theta = distance > 0 ? r.head<2>().norm() / distance : 0;
+  const bool in_cone = cos_theta >= cos_ground_max_ && l <= g.l_max + kTolerance;
+  const bool in_footprint = l * sin_theta <= g.r0 + kTolerance && cos_theta > 0 && l <= g.l_footprint_max + kTolerance;
+  if (!in_cone && !in_footprint) return {};
+  const double inverse_square = 1 / (l * l), decay = std::exp(-g.k2 * l * l);
+  return Variance::horizontal_vertical(element.area * (g.lambda.horizontal * inverse_square + g.k1.horizontal * decay),
+                                       element.area * (g.lambda.vertical * inverse_square + g.k1.vertical * decay));
+}
+
+Variance ProximityModel::corner(const Element& element, const Vec3& p_W) const noexcept {
+  if (!element.corner_W) return {};
+  const auto& k = model_.corner;
+  if ((element.c_W - p_W).norm() > model_.wall.l_max + kTolerance) return {};
+  const Vec3 above = p_W - *element.corner_W;
+  if (above.norm() > k.l_max + kTolerance) return {};
+  const double d2 = above.head<2>().squaredNorm(), h = above.z(), phi = std::atan2(std::sqrt(d2), h);
+  if (phi >= k.phi_max) return {};  // at φ̄_c itself the term is zero
+  const auto sixth = [](double x) { return x * x * x * x * x * x; };
+  const double s = element.area * (k.phi_max - phi) / std::max(d2 + sixth(h), sixth(least_l_));
+  return Variance::about_normal(element.normal, s * k.lambda.normal, s * k.lambda.tangential, s * k.lambda.vertical);
+}
+
+Variance ProximityModel::wall(const Element& element, const Vec3& p_W) const noexcept {
+  if (element.kind != Element::Kind::lateral) return {};
+  const auto& k = model_.wall;
+  const Vec3 r = element.c_W - p_W;
+  const double distance = r.norm(), l = std::max(distance, least_l_);
+  const double cos_theta = distance > 0 ? -r.z() / distance : 1;
+  if (l > k.l_max + kTolerance || cos_theta > cos_wall_min_ || cos_theta < cos_level_) return {};
+  const double s = element.area * std::exp(-k.k2 * l * l);
+  return Variance::about_normal(element.normal, s * k.k1.normal, s * k.k1.tangential, s * k.k1.vertical);
+}
+
+}  // namespace backwash::field

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/clearance.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+namespace backwash::reach {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+/// Supports of the octagon {|x| ≤ x, |y| ≤ y, |x + y| ≤ sum, |x − y| ≤ difference} and the half height z of the prism.
+/// Tight: each is attained. Only then do supports add in a Minkowski sum, and do they give the corners.
+struct Supports {
+  double x, y, z, sum, difference;
+};
+
+/// Duality: the largest value in a direction is the least combination of two slabs whose normals enclose it.
+Supports tight_supports(const PerDirection& h) {
+  const double sqrt2 = std::sqrt(2.0);
+  const double x = h[kX], y = h[kY], s = sqrt2 * h[kXyPlus], d = sqrt2 * h[kXyMinus];
+  return {std::min({x, s + y, d + y, (s + d) / 2}), std::min({y, s + x, d + x, (s + d) / 2}), h[kZ],
+          std::min({s, x + y, d + 2 * x, d + 2 * y}), std::min({d, x + y, s + 2 * x, s + 2 * y})};
+}
+
+/// The octagon ⊕ a voxel's square, around the origin. Lengths in voxels.
+class FatOctagon {
+ public:
+  explicit FatOctagon(const Supports& s)
+      : x_(s.x + 0.5), y_(s.y + 0.5), sum_(s.sum + 1), difference_(s.difference + 1) {
+    // Half of the corners, counter-clockwise from the right edge's lower end; the others are their mirror images.
+    corners_ = {Vec2{x_, x_ - difference_}, Vec2{x_, sum_ - x_}, Vec2{sum_ - y_, y_}, Vec2{y_ - difference_, y_},
+                Vec2{-x_, difference_ - x_}};
+  }
+  /// Largest violation of a side: at most the distance, 0 inside. Cheap.
+  double separation(const Vec2& p) const noexcept {
+    const double diagonal = std::max(std::abs(p.x() + p.y()) - sum_, std::abs(p.x() - p.y()) - difference_);
+    return std::max({0.0, std::abs(p.x()) - x_, std::abs(p.y()) - y_, diagonal / std::sqrt(2.0)});
+  }
+  double squared_distance(const Vec2& p) const noexcept {
+    if (separation(p) == 0) return 0;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t c = 0; c + 1 < corners_.size(); ++c) {
+      nearest = std::min(
+          {nearest, to_segment(p, corners_[c], corners_[c + 1]), to_segment(-p, corners_[c], corners_[c + 1])});
+    }
+    return nearest;
+  }
+
+ private:
+  static double to_segment(const Vec2& p, const Vec2& from, const Vec2& to) noexcept {
+    const Vec2 along = to - from, r = p - from;
+    const double length2 = along.squaredNorm();
+    const double t = length2 > 0 ? std::clamp(r.dot(along) / length2, 0.0, 1.0) : 0.0;
+    return (r - t * along).squaredNorm();
+  }
+  double x_, y_, sum_, difference_;
+  std::array<Vec2, 5> corners_;
+};
+
+bool eight_free(const map::Cell* cells) noexcept {
+  static_assert(sizeof(map::Cell) == 1);
+  constexpr std::uint64_t kAllFree = 0x0101010101010101u * static_cast<std::uint64_t>(map::Cell::free);
+  std::uint64_t word = 0;
+  std::memcpy(&word, cells, 8);
+  return word == kAllFree;
+}
+
+/// First cell of [from, to) that is not free, or `to`.
+const map::Cell* first_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+  while (to - from >= 8 && eight_free(from)) from += 8;
+  while (from < to && *from == map::Cell::free) ++from;
+  return from;
+}
+
+/// Last cell of [from, to) that is not free, or `to`.
+const map::Cell* last_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+  const map::Cell* c = to;
+  while (c - from >= 8 && eight_free(c - 8)) c -= 8;
+  while (c > from && *(c - 1) == map::Cell::free) --c;
+  return c > from ? c - 1 : to;
+}
+
+/// Search for the obstacle nearest to a prism: voxels from the centre outwards, so that what is found early shortens
+/// the rest. Lengths are in voxels, from the grid's origin. Precondition: the prism lies inside the grid.
+class Scan {
+ public:
+  Scan(const map::OccupancyGrid& grid, const Vec3& center, const Supports& s, double limit)
+      : grid_(grid),
+        center_(center),
+        half_(s.x, s.y, s.z),
+        under_from_(std::max(0, static_cast<int>(center.x() - s.x))),
+        under_to_(std::min(grid.size().x(), static_cast<int>(center.x() + s.x) + 1)),
+        octagon_(s),
+        nearest2_(limit * limit) {}
+
+  /// Squared distance; the squared limit if nothing is nearer.
+  double nearest2() {
+    outwards(2, 0, [&](int k, double gap2_z) {
+      outwards(1, gap2_z, [&](int j, double gap2_y) { row(j, k, gap2_y, gap2_z); });
+    });
+    return nearest2_;
+  }
+
+ private:
+  /// Squared gap along an axis between the prism and the voxels with this index.
+  double gap2(int axis, int index) const noexcept {
+    const double gap = std::max({0.0, index - center_[axis] - half_[axis], center_[axis] - half_[axis] - index - 1});
+    return gap * gap;
+  }
+  /// Visits the layers of an axis whose gap, with `others2` in the other axes, is less than the nearest so far.
+  template <class Visit>
+  void outwards(int axis, double others2, const Visit& visit) {
+    const int size = grid_.size()[axis], middle = static_cast<int>(center_[axis]);
+    bool nearer = true;
+    const auto layer = [&](int n) {
+      if (n < 0 || n >= size) return;
+      const double g = gap2(axis, n);
+      if (others2 + g >= nearest2_) return;
+      nearer = true;
+      visit(n, g);
+    };
+    for (int up = middle, down = middle - 1; nearer; ++up, --down) {
+      nearer = false;
+      layer(up);
+      layer(down);
+    }
+  }
+  /// A row of voxels along x. Distance is convex in x: it only grows beyond the prism's bounding box, so that on either
+  /// side of it the first obstacle is enough.
+  void row(int j, int k, double gap2_y, double gap2_z) {
+    const map::Cell* const cells = grid_.cells().data() + grid_.linear(Index3(0, j, k));
+    const auto consider = [&](const map::Cell* c) {
+      const Vec2 p(static_cast<double>(c - cells) + 0.5 - center_.x(), j + 0.5 - center_.y());
+      const double separation = octagon_.separation(p);
+      if (separation * separation + gap2_z >= nearest2_) return;
+      nearest2_ = std::min(nearest2_, octagon_.squared_distance(p) + gap2_z);
+    };
+    const map::Cell *const under = cells + under_from_, *const right = cells + under_to_;
+    for (const map::Cell* c = first_obstacle(under, right); c != right; c = first_obstacle(c + 1, right)) consider(c);
+    if (nearest2_ <= gap2_y + gap2_z) return;
+    const double reach = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
+    const map::Cell* const from = cells + std::max(0, static_cast<int>(center_.x() - reach));
+    const map::Cell* const to = cells + std::min(grid_.size().x(), static_cast<int>(center_.x() + reach) + 1);
+    if (const map::Cell* c = first_obstacle(right, to); c != to) consider(c);
+    if (const map::Cell* c = last_obstacle(from, under); c != under) consider(c);
+  }
+
+  const map::OccupancyGrid& grid_;
+  Vec3 center_, half_;
+  int under_from_, under_to_;  // columns that the prism's bounding box meets
+  FatOctagon octagon_;
+  double nearest2_;
+};
+
+double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit) {
+  const double a = grid.resolution();
+  const Vec3 center = (center_W - grid.origin()) / a;
+  const Supports in_voxels{s.x / a, s.y / a, s.z / a, s.sum / a, s.difference / a};
+  // The outside is the complement of a box: six half-spaces.
+  const Vec3 to_side =
+      center.cwiseMin(grid.size().cast<double>() - center) - Vec3(in_voxels.x, in_voxels.y, in_voxels.z);
+  const double outside = to_side.minCoeff();
+  if (!(outside > 0)) return 0;
+  const double nearest2 = Scan(grid, center, in_voxels, std::min(limit / a, outside)).nearest2();
+  return std::min(limit, a * std::sqrt(nearest2));
+}
+
+}  // namespace
+
+// A voxel is a box, so its distance to the prism is that of its centre to prism ⊕ box, whose supports are the sums.
+double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
+                      double limit) {
+  return distance(grid, center_W, tight_supports(half_widths), limit);
+}
+
+double swept_prism_distance(const map::OccupancyGrid& grid, const Vec3& from_W, const Vec3& to_W,
+                            const PerDirection& half_widths, double limit) {
+  const Vec3 half = (to_W - from_W) / 2;
+  Supports s = tight_supports(half_widths);
+  s.x += std::abs(half.x());
+  s.y += std::abs(half.y());
+  s.z += std::abs(half.z());
+  s.sum += std::abs(half.x() + half.y());
+  s.difference += std::abs(half.x() - half.y());
+  return distance(grid, from_W + half, s, limit);
+}
+
+}  // namespace backwash::reach
