@@ -114,8 +114,11 @@ tl::expected<void, ConfigError> StrictTable::reject_unknown(const toml::table& t
     const bool quoted_path = key.str().find('.') != std::string_view::npos;
     if (!quoted_path && std::any_of(keys.begin(), keys.end(), [&](const NumberKey& k) { return k.path == path; }))
       continue;
-    if (quoted_path ||
-        std::none_of(keys.begin(), keys.end(), [&](const NumberKey& k) { return k.path.starts_with(path + "."); })) {
+    const bool table_of_numbers =
+        std::any_of(keys.begin(), keys.end(), [&](const NumberKey& k) { return k.path.starts_with(path + "."); });
+    const bool table_of_others =
+        std::any_of(others.begin(), others.end(), [&](std::string_view o) { return o.starts_with(path + "."); });
+    if (quoted_path || !(table_of_numbers || table_of_others)) {
       std::ostringstream message;
       message << file_ << ":" << key.source().begin.line << ": key '" << path << "' = " << value_text(node)
               << ": unknown; known here: " << names_below(prefix, keys, others);

@@ -18,7 +18,8 @@ Entity checked(dds_return_t code, const std::string& what) {
 
 std::string configuration(const std::string& interface, std::size_t max_sample_bytes) {
   return "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"" + interface +
-         "\"/></Interfaces></General><Internal><MaxSampleSize>" + std::to_string(max_sample_bytes) +
+         "\"/></Interfaces>" + (interface == "lo" ? "<AllowMulticast>false</AllowMulticast>" : "") +
+         "</General><Internal><MaxSampleSize>" + std::to_string(max_sample_bytes) +
          "B</MaxSampleSize></Internal></Domain></CycloneDDS>";
 }
 

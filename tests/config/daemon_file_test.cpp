@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "core/config/daemon_config.hpp"
+
+namespace backwash::config {
+namespace {
+
+std::string shipped() {
+  std::ifstream in(std::string(BACKWASH_SOURCE_DIR) + "/core/config/files/backwashd.daemon.toml");
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// What the shipped file says of itself once `from` is replaced by `to`.
+std::string error_after(const std::string& from, const std::string& to) {
+  std::string text = shipped();
+  const auto at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  text.replace(at, from.size(), to);
+  const auto path = std::filesystem::temp_directory_path() / "backwash_daemon_file_test.toml";
+  std::ofstream(path) << text;
+  const auto read = load_daemon(path);
+  std::filesystem::remove(path);
+  return read ? std::string("no error") : read.error().message;
+}
+
+TEST(DaemonFile, ReadsTheShippedExample) {
+  const auto d = load_daemon("builtin:backwashd");
+  ASSERT_TRUE(d) << d.error().message;
+  EXPECT_EQ(d->vehicle, "builtin:quad-5in");
+  EXPECT_EQ(d->dds.name_space, "backwash");
+  EXPECT_EQ(d->link.baud, 921600);
+  EXPECT_EQ(d->control.priority, 80);
+}
+
+TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
+  const auto names = [](const std::string& message, int line, const std::string& key) {
+    return message.find(".toml:" + std::to_string(line) + ": key '" + key + "'") != std::string::npos;
+  };
+  EXPECT_TRUE(names(error_after("domain = 0", "domain = 231"), 7, "dds.domain"));
+  EXPECT_TRUE(names(error_after("domain = 0", "domain = 1.5"), 7, "dds.domain"));
+  EXPECT_TRUE(names(error_after("baud = 921600", "baud = \"fast\""), 14, "link.baud"));
+  EXPECT_TRUE(names(error_after("baud = 921600", "bauds = 921600"), 14, "link.bauds"));
+  EXPECT_TRUE(names(error_after("device = \"/dev/ttyAMA0\"", "device = \"\""), 13, "link.device"));
+  EXPECT_TRUE(names(error_after("file = ", "path = "), 21, "log.path"));
+  EXPECT_TRUE(names(error_after("[control]", "[controls]"), 17, "controls"));
+}
+
+}  // namespace
+}  // namespace backwash::config
