@@ -26,6 +26,8 @@ class MavlinkVectors : public testing::Test {
   json data_;
 };
 
+// The functions that touch JSON or gtest are not templates: the sanitizers' compile time needs small instances.
+
 double number(const json& j) {
   if (!j.is_string()) return j.get<double>();
   const auto text = j.get<std::string>();
@@ -33,10 +35,14 @@ double number(const json& j) {
   return text == "Infinity" ? HUGE_VAL : -HUGE_VAL;
 }
 
+std::uint64_t integer_bits(const json& j) {
+  return j.is_number_unsigned() ? j.get<std::uint64_t>() : static_cast<std::uint64_t>(j.get<std::int64_t>());
+}
+
 template <class T>
 T scalar(const json& j) {
   if constexpr (std::is_floating_point_v<T>) return static_cast<T>(number(j));
-  return j.get<T>();
+  return static_cast<T>(integer_bits(j));
 }
 
 template <class T>
@@ -46,7 +52,7 @@ void assign(T& member, const json& j) {
 template <class T, std::size_t N>
 void assign(std::array<T, N>& member, const json& j) {
   if constexpr (std::is_same_v<T, char>) {
-    const auto text = j.get<std::string>();
+    const auto& text = j.get_ref<const std::string&>();
     std::copy_n(text.begin(), std::min(N, text.size()), member.begin());
   } else {
     for (std::size_t i = 0; i < N; ++i) member[i] = scalar<T>(j.at(i));
@@ -79,7 +85,6 @@ bool same(const std::array<T, N>& a, const std::array<T, N>& b) {
   }
   return true;
 }
-// Not a template: the many instances of its callers stay small, which the sanitizers' compile time needs.
 void expect_same(bool equal, std::string_view field) { EXPECT_TRUE(equal) << field; }
 
 template <class Message>
