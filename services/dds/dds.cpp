@@ -17,9 +17,14 @@ Entity checked(dds_return_t code, const std::string& what) {
 }
 
 std::string configuration(const std::string& interface, std::size_t max_sample_bytes) {
+  // The loopback interface has no multicast: participants find each other by asking the first thirty ports in turn.
+  const bool loopback = interface == "lo";
   return "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"" + interface +
-         "\"/></Interfaces>" + (interface == "lo" ? "<AllowMulticast>false</AllowMulticast>" : "") +
-         "</General><Internal><MaxSampleSize>" + std::to_string(max_sample_bytes) +
+         "\"/></Interfaces>" + (loopback ? "<AllowMulticast>false</AllowMulticast>" : "") + "</General>" +
+         (loopback ? "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>30"
+                     "</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>"
+                   : "") +
+         "<Internal><MaxSampleSize>" + std::to_string(max_sample_bytes) +
          "B</MaxSampleSize></Internal></Domain></CycloneDDS>";
 }
 

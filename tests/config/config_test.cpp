@@ -144,7 +144,8 @@ TEST_P(ShippedFile, RefusesAWrongType) {
 
 TEST_P(ShippedFile, RefusesAMissingKeyUnlessItIsOptional) {
   const std::vector<std::string> optional = {"controller.latency", "controller.feedback_delay",
-                                             "controller.attitude_lag", "ground.r0", "bound.tau_w"};
+                                             "controller.attitude_lag", "ground.r0", "ground.l_footprint_max",
+                                             "bound.kappa", "bound.tau_w"};
   for (const Place& p : numbers(text)) {
     const std::string changed = std::string(text).erase(p.entry_begin, p.entry_end - p.entry_begin);
     if (std::find(optional.begin(), optional.end(), p.path) != optional.end())
