@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/plan/bspline_optimizer.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <nlopt.hpp>
 #include <utility>
@@ -114,47 +115,91 @@ SplineCost::PointCost SplineCost::collision(const BSpline& spline) const {
 
 namespace {
 
+constexpr double kStiffness = 1e-3;  ///< of single control points, beside that of the third differences
+
+/// Variables in which f_s is well conditioned: with the Hessian of f_s, DᵀD + μI = LLᵀ over the interior control
+/// points, the solver sees y = Lᵀq of each axis. A step then bends the curve smoothly instead of moving single control
+/// points, and L-BFGS needs tens of evaluations where the plain variables need hundreds.
+class SmoothVariables {
+ public:
+  explicit SmoothVariables(std::size_t points) {
+    const auto n = static_cast<Eigen::Index>(points);
+    Eigen::MatrixXd D = Eigen::MatrixXd::Zero(n + 3, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      D(i, i) = 1;
+      D(i + 1, i) = -3;
+      D(i + 2, i) = 3;
+      D(i + 3, i) = -1;
+    }
+    L_ = (D.transpose() * D + kStiffness * Eigen::MatrixXd::Identity(n, n)).llt().matrixL();
+  }
+  std::vector<double> from_points(const std::vector<double>& x) const {
+    return per_axis(x, [&](const auto& q) { return (L_.transpose() * q).eval(); });
+  }
+  std::vector<double> to_points(const std::vector<double>& y) const {
+    return per_axis(y, [&](const auto& v) { return L_.transpose().triangularView<Eigen::Upper>().solve(v).eval(); });
+  }
+  std::vector<double> gradient(const std::vector<double>& by_points) const {
+    return per_axis(by_points, [&](const auto& g) { return L_.triangularView<Eigen::Lower>().solve(g).eval(); });
+  }
+
+ private:
+  using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  template <class Map>
+  std::vector<double> per_axis(const std::vector<double>& x, const Map& map) const {
+    std::vector<double> result(x.size());
+    Eigen::Map<Columns>(result.data(), L_.rows(), 3) = map(Eigen::Map<const Columns>(x.data(), L_.rows(), 3));
+    return result;
+  }
+  Eigen::MatrixXd L_;
+};
+
 /// What the solver's callback needs, and the best point it has seen.
 struct Run {
   const SplineCost& cost;
+  const SmoothVariables& variables;
   Clock::time_point deadline;
   double scale, best_f;
   std::vector<double> best_x;
-  std::size_t evaluations = 0;
+  std::size_t evaluations = 1;
 };
 
-double evaluate(const std::vector<double>& x, std::vector<double>& gradient, void* data) {
+double evaluate(const std::vector<double>& y, std::vector<double>& gradient, void* data) {
   Run& run = *static_cast<Run*>(data);
   if (Clock::now() > run.deadline) throw nlopt::forced_stop();
+  std::vector<double> x = run.variables.to_points(y);
   const auto value = run.cost(x);
   ++run.evaluations;
-  if (value.f < run.best_f) run.best_f = value.f, run.best_x = x;
   if (!gradient.empty())
-    std::ranges::transform(value.gradient, gradient.begin(), [&](double g) { return run.scale * g; });
+    std::ranges::transform(run.variables.gradient(value.gradient), gradient.begin(),
+                           [&](double g) { return run.scale * g; });
+  if (value.f < run.best_f) run.best_f = value.f, run.best_x = std::move(x);
   return run.scale * value.f;
 }
 
 }  // namespace
 
 OptimizerResult optimise(const SplineCost& cost, std::size_t max_evaluations, Clock::time_point deadline) {
-  std::vector<double> x = cost.start_point();
+  const std::vector<double> x = cost.start_point();
   const auto first = cost(x);
+  const SmoothVariables variables(x.size() / 3);
   double steepest = 0;
-  for (const double g : first.gradient) steepest = std::max(steepest, std::abs(g));
-  Run run{cost, deadline, steepest > 0 ? 0.1 / steepest : 1, first.f, x};
+  for (const double g : variables.gradient(first.gradient)) steepest = std::max(steepest, std::abs(g));
+  Run run{cost, variables, deadline, steepest > 0 ? 0.1 / steepest : 1, first.f, x};
   if (steepest > 0) {
     nlopt::opt solver(nlopt::LD_LBFGS, static_cast<unsigned>(x.size()));
     solver.set_min_objective(evaluate, &run);
     solver.set_maxeval(static_cast<int>(max_evaluations));
     solver.set_ftol_rel(1e-4);
+    std::vector<double> y = variables.from_points(x);
     try {
       double f = 0;
-      solver.optimize(x, f);
+      solver.optimize(y, f);
     } catch (const std::exception&) {
       // Deadline or "nlopt failure" of a line search: the best point seen stands.
     }
   }
-  return {cost.spline_at(run.best_x), run.best_f, run.evaluations + 1};
+  return {cost.spline_at(run.best_x), run.best_f, run.evaluations};
 }
 
 }  // namespace backwash::plan
