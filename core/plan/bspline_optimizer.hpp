@@ -5,7 +5,7 @@
 
 #include "core/map/distance_field.hpp"
 #include "core/plan/bspline.hpp"
-#include "core/plan/centre_map.hpp"
+#include "core/plan/centre_adjoint.hpp"
 #include "core/plan/kinodynamic_astar.hpp"
 
 namespace backwash::plan {

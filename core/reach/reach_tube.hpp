@@ -15,7 +15,6 @@ namespace backwash::reach {
 
 enum class Method { tight, paper };
 
-
 /// One entry of a tube: the set at t = k·0.02 s, after k steps.
 struct TubeStep {
   double t;                           ///< s since the tube's start
