@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <limits>
 
 namespace backwash::sim {
 namespace {
@@ -52,7 +53,8 @@ reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& t
   return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled);
 }
 
-/// Clearance of a true position: walls only below z_safe (the vehicle comes from the floor), everything above.
+/// Clearance of a true position: below z_safe what stands beside it (the vehicle comes from the floor), above
+/// everything.
 double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) {
   const auto& vehicle = world.reach.vehicle;
   if (p_W.z() >= z_safe) return world.distance.exact(world.grid, p_W) - vehicle.body.radius;
@@ -149,7 +151,8 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   flight.paper = method_tube(world, paper, start, hover, commands);
   tube = flight.tight.tube;
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, hover, commands, bounds, options.sigma_scale);
-  flight.route = fly_piece(loop, world, {commands, tube}, flight.take_off.samples.back().t, column->z_safe, arrived, 1);
+  constexpr double kEverywhere = -std::numeric_limits<double>::infinity();  // the take-off's exception ends with it
+  flight.route = fly_piece(loop, world, {commands, tube}, flight.take_off.samples.back().t, kEverywhere, arrived, 1);
   return flight;
 }
 

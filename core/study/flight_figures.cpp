@@ -121,9 +121,8 @@ Figure height_figure(const sim::Flight& flight, const plan::World& world) {
          << kAxes
          << "set xlabel 'way along the commands seen from above, m'\nset ylabel 'z, m'\nset key outside top center "
             "horizontal\n"
-         << "stats $heights using 2 nooutput\nfloor = STATS_min - 0.15\nstats $heights using 3 nooutput\nceiling = "
-            "STATS_min + 0.15 < "
-         << top << " ? STATS_min + 0.15 : " << top << "\nset yrange [floor:ceiling]\n"
+         << "stats $heights using 2 nooutput\nfloor = STATS_min - 0.15\nceiling = " << top
+         << "\nset yrange [floor:ceiling]\n"
          << "plot $heights using 1:(floor):2 with filledcurves linecolor '#3c3c42' title 'floor or obstacle', "
          << "$heights using 1:3:(ceiling > $3 ? ceiling : $3) with filledcurves linecolor '#3c3c42' notitle, "
          << "$heights using 1:4:5 with filledcurves linecolor '#9cc6ec' title 'reachable tube', $heights using 1:6 "

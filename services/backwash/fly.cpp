@@ -29,7 +29,7 @@ struct DefaultFlight {
 };
 const DefaultFlight kDefaultFlights[] = {
     {"builtin:apartment", {3.0, 4.2, 1.2}, {7.4, 3.0, 1.2}},  // living room to bedroom through the doorway at x = 5.9 m
-    {"geb079.bt", {12.5, 0.1, 1.1}, {26.0, 0.1, 1.1}},        // along the corridor
+    {"geb079.bt", {13.08, 0.68, 1.16}, {26.52, -0.52, 0.76}},        // along the corridor
 };
 
 study::HoverPair choose_ends(const Options& options, const plan::World& world) {
