@@ -11,10 +11,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double milliseconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-}
-
 tl::unexpected<FlightRefused> refuse(const std::string& message) { return tl::make_unexpected(FlightRefused{message}); }
 
 std::string text(const Vec3& p) {
@@ -57,7 +53,8 @@ reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& t
   return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled);
 }
 
-/// Clearance of a true position: walls only below z_safe (the vehicle comes from the floor), everything above.
+/// Clearance of a true position: below z_safe what stands beside it (the vehicle comes from the floor), above
+/// everything.
 double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) {
   const auto& vehicle = world.reach.vehicle;
   if (p_W.z() >= z_safe) return world.distance.exact(world.grid, p_W) - vehicle.body.radius;
@@ -99,14 +96,18 @@ std::string obstacle_to_take_off(const plan::World& world, const reach::ReachTub
          metres(std::min(beside, around)) + "); choose a start with more room below and beside it";
 }
 
-PaperTube paper_beside(const plan::World& world, const State& start, const Setpoint& previous,
-                       const std::vector<Setpoint>& commands) {
-  const reach::Reachability paper(world.reach.vehicle, reach::Method::paper, reach::Loop::continuous);
+MethodTube method_tube(const plan::World& world, const reach::Reachability& reach, const State& start,
+                       const Setpoint& previous, const std::vector<Setpoint>& commands) {
   const auto begin = Clock::now();
-  PaperTube beside{reach::tube_over_field(paper, start, previous, commands, world.bounds), 0, 0};
-  beside.tube_ms = milliseconds_since(begin);
-  beside.clearance_m = plan::tube_clearance(world, beside.tube);
-  return beside;
+  MethodTube method{reach::tube_over_field(reach, start, previous, commands, world.bounds), 0, 0, 0};
+  method.tube_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+  method.clearance_m = plan::tube_clearance(world, method.tube);
+  for (const auto& step : method.tube) {
+    const auto& h = step.half_widths;
+    const double axis = reach.method == reach::Method::paper ? step.r_max : std::max({h[kX], h[kY], h[kZ]});
+    method.largest_half_axis_m = std::max(method.largest_half_axis_m, axis);
+  }
+  return method;
 }
 
 }  // namespace
@@ -145,20 +146,24 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   commands = flight.plan.commands;
   const std::size_t arrived = commands.size();
   append(commands, hold_commands(options.goal_W, options.hold_s));
-  const auto begin = Clock::now();
-  tube = reach::tube_over_field(world.reach, start, hover, commands, world.bounds);
-  flight.tube_ms = milliseconds_since(begin);
-  flight.planned_clearance_m = plan::tube_clearance(world, tube);
-  flight.paper = paper_beside(world, start, hover, commands);
+  flight.tight = method_tube(world, world.reach, start, hover, commands);
+  const reach::Reachability paper(vehicle, reach::Method::paper, reach::Loop::continuous);
+  flight.paper = method_tube(world, paper, start, hover, commands);
+  tube = flight.tight.tube;
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, hover, commands, bounds, options.sigma_scale);
-  flight.route = fly_piece(loop, world, {2, 0, 0, commands, tube}, flight.take_off.samples.back().t, column->z_safe, arrived, 1);
+  constexpr double kEverywhere = -std::numeric_limits<double>::infinity();  // the take-off's exception ends with it
+  flight.route =
+      fly_piece(loop, world, {2, 0, 0, commands, tube}, flight.take_off.samples.back().t, kEverywhere, arrived, 1);
   return flight;
 }
 
 FlightSummary summarise(const Flight& flight, const plan::World& world, const Vec3& goal_W) {
   FlightSummary s{};
-  s.clearance_m = std::numeric_limits<double>::infinity();
-  s.planned_clearance_m = flight.planned_clearance_m;
+  const auto smallest = [](const std::vector<double>& values) {
+    return *std::min_element(values.begin(), values.end());
+  };
+  s.clearance_m = smallest(flight.route.clearance_m);
+  s.take_off_clearance_m = smallest(flight.take_off.clearance_m);
   s.largest_ratio = Vec3::Zero();
   for (const auto* piece : {&flight.take_off, &flight.route}) {
     for (std::size_t k = 0; k < piece->samples.size(); ++k) {
@@ -169,7 +174,6 @@ FlightSummary summarise(const Flight& flight, const plan::World& world, const Ve
       }
       s.samples += 1;
       s.inside += judged.inside ? 1 : 0;
-      s.clearance_m = std::min(s.clearance_m, piece->clearance_m[k]);
       if (k > 0) s.length_m += (piece->samples[k].truth.p_W - piece->samples[k - 1].truth.p_W).norm();
     }
   }
@@ -180,13 +184,7 @@ FlightSummary summarise(const Flight& flight, const plan::World& world, const Ve
   const auto at_goal = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, goal_W);
   const auto& h = at_goal.half_widths;
   s.goal_reached = s.goal_error_m <= Vec3(h[kX], h[kY], h[kZ]).norm() + world.reach.vehicle.estimation.position;
-  s.touched = s.clearance_m <= 0;
-  for (const auto& step : flight.route.accepted.tube) {
-    s.tight_largest_half_axis_m =
-        std::max({s.tight_largest_half_axis_m, step.half_widths[kX], step.half_widths[kY], step.half_widths[kZ]});
-  }
-  for (const auto& step : flight.paper.tube)
-    s.paper_largest_half_axis_m = std::max(s.paper_largest_half_axis_m, step.r_max);
+  s.touched = std::min(s.clearance_m, s.take_off_clearance_m) <= 0;
   return s;
 }
 

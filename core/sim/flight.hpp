@@ -70,11 +70,12 @@ struct FlightPiece {
   std::vector<double> clearance_m;    ///< truth to the obstacles that count − body radius, one per sample
 };
 
-/// The paper's method on the commands that were flown, propagated beside the flight and not flown.
-struct PaperTube {
+/// What one method says about the route, from the state estimated when it was accepted.
+struct MethodTube {
   reach::ReachTube tube;
-  double clearance_m;  ///< of the swept tube; > 0: clear
-  double tube_ms;      ///< time to propagate it
+  double clearance_m;          ///< of the swept tube; > 0: clear
+  double tube_ms;              ///< time to propagate it
+  double largest_half_axis_m;  ///< largest half width on an axis for tight, √λ_max for paper
 };
 
 /// A whole flight: vertical take-off with a settling hover, then the planned route with a hold at the goal.
@@ -82,9 +83,8 @@ struct Flight {
   plan::Column column;
   plan::Plan plan;
   FlightPiece take_off, route;
-  PaperTube paper;
-  double tube_ms;              ///< time to propagate the tight tube on the same commands
-  double planned_clearance_m;  ///< smallest clearance of the route's tube, the hold included
+  MethodTube tight;  ///< flown: what the route was planned and accepted with
+  MethodTube paper;  ///< on the same commands, beside the flight
 };
 
 /// Why no flight took place; one line that says where and what would be right.
@@ -100,14 +100,13 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
 
 /// The flight in figures.
 struct FlightSummary {
-  double length_m, time_s;  ///< path really flown, and the flight's duration, take-off to the end of the hold
-  double clearance_m;       ///< smallest true clearance: below z_safe lateral only
-  double planned_clearance_m;
-  Vec3 largest_ratio;  ///< largest |e|/h per axis
+  double length_m, time_s;      ///< path really flown, and the flight's duration, take-off to the end of the hold
+  double clearance_m;           ///< smallest true clearance on the route, body to obstacle
+  double take_off_clearance_m;  ///< during take-off and settling; below z_safe lateral only
+  Vec3 largest_ratio;           ///< largest |e|/h per axis
   std::size_t samples, inside;
   double goal_error_m;  ///< truth to goal at the end
   bool goal_reached, touched;
-  double paper_largest_half_axis_m, tight_largest_half_axis_m;  ///< √λ_max of the paper; the largest axis half width
   bool ok() const noexcept { return goal_reached && !touched && inside == samples; }
 };
 FlightSummary summarise(const Flight& flight, const plan::World& world, const Vec3& goal_W);

@@ -124,8 +124,8 @@ Figure flight_field_figure(const sim::Flight& flight, const plan::World& world) 
   std::ostringstream script;
   script << block("field", raster, grid) << cell_blocks(grid, first, last, height, height) << "$path << EOD\n"
          << path.str() << "EOD\n"
-         << kPalette << "set cbrange [0:" << largest
-         << "]\nset size ratio -1\nset tics out nomirror\nset border 3\nset xlabel 'x, m'\nset ylabel 'y, m'\n"
+         << kPalette << "set cbrange [0:" << largest << "]\nset tics out nomirror\nset border 3\n"
+         << view_from_above(grid, first, last)
          << "set cblabel 'vertical standard deviation √Σ_{zz}, m/s^2'\nset key outside top center horizontal\n"
          << "plot $field using 1:2:3 with image notitle, " << plot_cells()
          << "$path using 1:2 with lines linewidth 2.5 linecolor '#0b3d91' title 'path flown'\n";

@@ -42,6 +42,15 @@ std::string cell_blocks(const map::OccupancyGrid& grid, const Index3& first, con
   return "$occupied << EOD\n" + text(0) + "EOD\n$unknown << EOD\n" + text(1) + "EOD\n";
 }
 
+std::string view_from_above(const map::OccupancyGrid& grid, const Index3& first, const Index3& last) {
+  const Vec3 half = Vec3::Constant(grid.resolution() / 2), low = grid.center(first) - half,
+             high = grid.center(last) + half;
+  std::ostringstream text;
+  text << "set xrange [" << low.x() << ':' << high.x() << "]\nset yrange [" << low.y() << ':' << high.y()
+       << "]\nset size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\n";
+  return text.str();
+}
+
 std::string plot_cells() {
   return "$unknown with boxxyerror fillstyle solid noborder linecolor '#d5d5d5' title 'unknown', "
          "$occupied with boxxyerror fillstyle solid noborder linecolor '#3c3c42' title 'occupied', ";

@@ -13,6 +13,9 @@ namespace backwash::study {
 std::string cell_blocks(const map::OccupancyGrid& grid, const Index3& first, const Index3& last, double z_low,
                         double z_high);
 
+/// Ranges and scale of a figure that shows those cells from above: metres equal on both axes.
+std::string view_from_above(const map::OccupancyGrid& grid, const Index3& first, const Index3& last);
+
 /// The part of a plot command that draws those blocks, a comma at its end.
 std::string plot_cells();
 

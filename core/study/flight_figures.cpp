@@ -80,7 +80,7 @@ Figure map_figure(const sim::Flight& flight, const plan::World& world) {
     low = low.cwiseMin(step.center.p_W - extent), high = high.cwiseMax(step.center.p_W + extent);
   }
   const auto& grid = world.grid;
-  const Vec3 around(1.5, 1.5, 0);
+  const Vec3 around(2, 2, 0);
   const Index3 first = grid.index(low - around).cwiseMax(0),
                last = grid.index(high + around).cwiseMin(grid.size() - Index3::Ones());
   std::ostringstream script;
@@ -91,7 +91,7 @@ Figure map_figure(const sim::Flight& flight, const plan::World& world) {
   }
   const Vec3 begin = flight.route.samples.front().command.p_W, end = flight.route.samples.back().command.p_W;
   script << "EOD\n"
-         << kAxes << "set size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\nset key outside top center horizontal\n"
+         << kAxes << view_from_above(grid, first, last) << "set key outside top center horizontal\n"
          << "set label 1 'start' at " << begin.x() << ',' << begin.y()
          << " point pointtype 7 pointsize 0.7 linecolor '#0b3d91' offset 0.8,0.6 front\n"
          << "set label 2 'goal' at " << end.x() << ',' << end.y()
@@ -121,9 +121,8 @@ Figure height_figure(const sim::Flight& flight, const plan::World& world) {
          << kAxes
          << "set xlabel 'way along the commands seen from above, m'\nset ylabel 'z, m'\nset key outside top center "
             "horizontal\n"
-         << "stats $heights using 2 nooutput\nfloor = STATS_min - 0.15\nstats $heights using 3 nooutput\nceiling = "
-            "STATS_min + 0.15 < "
-         << top << " ? STATS_min + 0.15 : " << top << "\nset yrange [floor:ceiling]\n"
+         << "stats $heights using 2 nooutput\nfloor = STATS_min - 0.15\nceiling = " << top
+         << "\nset yrange [floor:ceiling]\n"
          << "plot $heights using 1:(floor):2 with filledcurves linecolor '#3c3c42' title 'floor or obstacle', "
          << "$heights using 1:3:(ceiling > $3 ? ceiling : $3) with filledcurves linecolor '#3c3c42' notitle, "
          << "$heights using 1:4:5 with filledcurves linecolor '#9cc6ec' title 'reachable tube', $heights using 1:6 "

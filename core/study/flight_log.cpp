@@ -83,7 +83,9 @@ tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::s
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const auto value = finite_number(cells[i]);
       if (!value)
-        return bad(path, line, "column '" + names[i] + "' holds '" + std::string(cells[i]) + "', which is not a finite number; give one");
+        return bad(
+            path, line,
+            "column '" + names[i] + "' holds '" + std::string(cells[i]) + "', which is not a finite number; give one");
       values[i].push_back(*value);
     }
   }

@@ -69,8 +69,9 @@ std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
   std::string text = "<section><h2>In figures</h2>\n<table>\n";
   text += row("Path flown, take-off to hold", number(s.length_m, 2, "m"));
   text += row("Time", number(s.time_s, 2, "s"));
-  text += row("Smallest true clearance, body to obstacle", number(s.clearance_m, 3, "m"));
-  text += row("Smallest clearance left over by the reachable set", number(s.planned_clearance_m, 3, "m"));
+  text += row("Smallest true clearance on the route, body to obstacle", number(s.clearance_m, 3, "m"));
+  text += row("Smallest true clearance during take-off and settling", number(s.take_off_clearance_m, 3, "m"));
+  text += row("Smallest clearance left over by the reachable set", number(flight.tight.clearance_m, 3, "m"));
   text += row("Largest error over bound, x / y / z", number(s.largest_ratio.x(), 2, "") + " / " +
                                                          number(s.largest_ratio.y(), 2, "") + " / " +
                                                          number(s.largest_ratio.z(), 2, ""));
@@ -85,12 +86,12 @@ std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
   const auto pair = [](const std::string& name, const std::string& a, const std::string& b) {
     return "<tr><th>" + name + "</th><td>" + a + "</td><td>" + b + "</td></tr>\n";
   };
-  text += pair("Largest half axis", number(s.tight_largest_half_axis_m, 3, "m"),
-               number(s.paper_largest_half_axis_m, 3, "m"));
-  text += pair("Clearance of the swept tube", number(s.planned_clearance_m, 3, "m"),
+  text += pair("Largest half axis", number(flight.tight.largest_half_axis_m, 3, "m"),
+               number(flight.paper.largest_half_axis_m, 3, "m"));
+  text += pair("Clearance of the swept tube", number(flight.tight.clearance_m, 3, "m"),
                number(flight.paper.clearance_m, 3, "m"));
-  text += pair("Clear", s.planned_clearance_m > 0 ? "yes" : "no", flight.paper.clearance_m > 0 ? "yes" : "no");
-  text += pair("Propagation of the tube", number(flight.tube_ms, 1, "ms"), number(flight.paper.tube_ms, 1, "ms"));
+  text += pair("Clear", flight.tight.clearance_m > 0 ? "yes" : "no", flight.paper.clearance_m > 0 ? "yes" : "no");
+  text += pair("Propagation of the tube", number(flight.tight.tube_ms, 1, "ms"), number(flight.paper.tube_ms, 1, "ms"));
   return text + "</table>\n</section>\n";
 }
 

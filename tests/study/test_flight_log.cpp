@@ -71,16 +71,16 @@ TEST_F(FlightLogFile, EveryFaultIsNamedWithFileAndLine) {
   struct Fault {
     const char *text, *line, *words;
   };
-  for (const Fault& f :
-       {Fault{"", ":1:", "empty"}, Fault{"x_m,y_m\n1,2\n", ":1:", "no column 't_s'"},
-        Fault{"t_s,x_m,x_m\n0,1,2\n", ":1:", "'x_m' is named twice"},
-        Fault{"t_s,,x_m\n0,1,2\n", ":1:", "column 2 has no name"},
-        Fault{"t_s,x_m\n0,1\n0.02\n", ":3:", "1 cells where the first line names 2"},
-        Fault{"t_s,x_m\n0,1\n0.02,2,3\n", ":3:", "3 cells where the first line names 2"},
-        Fault{"t_s,x_m\n0,1\n\n0.02,nan\n", ":4:", "column 'x_m' holds 'nan'"},
-        Fault{"t_s,x_m\n0,inf\n", ":2:", "column 'x_m' holds 'inf'"}, Fault{"t_s,x_m\n0,1e999\n", ":2:", "finite number"},
-        Fault{"t_s,x_m\n0,1.5m\n", ":2:", "column 'x_m' holds '1.5m'"},
-        Fault{"t_s,x_m\n0,\n", ":2:", "column 'x_m' holds ''"}}) {
+  for (const Fault& f : {Fault{"", ":1:", "empty"}, Fault{"x_m,y_m\n1,2\n", ":1:", "no column 't_s'"},
+                         Fault{"t_s,x_m,x_m\n0,1,2\n", ":1:", "'x_m' is named twice"},
+                         Fault{"t_s,,x_m\n0,1,2\n", ":1:", "column 2 has no name"},
+                         Fault{"t_s,x_m\n0,1\n0.02\n", ":3:", "1 cells where the first line names 2"},
+                         Fault{"t_s,x_m\n0,1\n0.02,2,3\n", ":3:", "3 cells where the first line names 2"},
+                         Fault{"t_s,x_m\n0,1\n\n0.02,nan\n", ":4:", "column 'x_m' holds 'nan'"},
+                         Fault{"t_s,x_m\n0,inf\n", ":2:", "column 'x_m' holds 'inf'"},
+                         Fault{"t_s,x_m\n0,1e999\n", ":2:", "finite number"},
+                         Fault{"t_s,x_m\n0,1.5m\n", ":2:", "column 'x_m' holds '1.5m'"},
+                         Fault{"t_s,x_m\n0,\n", ":2:", "column 'x_m' holds ''"}}) {
     const auto log = read_csv(with(f.text));
     ASSERT_FALSE(log) << f.text;
     EXPECT_EQ(log.error().kind, Kind::bad_data);
