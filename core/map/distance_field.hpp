@@ -17,7 +17,9 @@ class DistanceField {
 
   /// At a voxel's centre, m; 0 outside the grid.
   double at(const Index3& v) const noexcept;
-  /// Trilinear interpolation between voxel centres, m; 0 outside the grid. Real-time: wait-free, no allocation.
+  /// Trilinear interpolation between voxel centres, m; 0 outside the grid. Off exact() by at most √3/2·a, and too large
+  /// near faces (a/4 on a flat one, 0.56a on a convex corner): for gradients and search; exact() for what must hold.
+  /// Real-time: wait-free, no allocation.
   double interpolated(const Vec3& p_W) const noexcept;
   /// Gradient of interpolated(), unitless; zero outside the grid. Real-time: wait-free, no allocation.
   Vec3 gradient(const Vec3& p_W) const noexcept;

@@ -72,7 +72,7 @@ std::vector<std::int8_t> encode_octomap(const OccupancyGrid& grid) {
 
 tl::expected<OccupancyGrid, MapError> decode_octomap(std::span<const std::int8_t> data, double resolution, bool binary,
                                                      const std::string& id, std::size_t max_bytes) {
-  if (id != "OcTree") return corrupt("the tree's id is '" + id.substr(0, 40) + "', expected 'OcTree'");
+  if (id != "OcTree") return corrupt("the id is not 'OcTree', the only tree type read");
   if (!(resolution >= 1e-3 && resolution <= 10)) {
     return corrupt("resolution " + std::to_string(resolution) + " m, expected 0.001 to 10 m");
   }

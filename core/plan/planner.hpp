@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/plan/bspline.hpp"
+#include "core/plan/bspline_optimizer.hpp"
 #include "core/plan/world.hpp"
 
 namespace backwash::plan {
@@ -14,9 +15,9 @@ enum class PlanStatus { ok, no_path, infeasible, start_blocked, goal_blocked, de
 const char* to_string(PlanStatus status) noexcept;
 
 struct PlanOptions {
-  double v_max;                ///< m/s per axis
-  double a_max;                ///< m/s² per axis
-  double deadline_s = 10.0;    ///< whole plan, monotonic clock
+  double v_max;              ///< m/s per axis; a start that is faster may not speed up
+  double a_max;              ///< m/s² per axis
+  double deadline_s = 10.0;  ///< whole plan, monotonic clock
   std::size_t max_nodes = 400'000;
 };
 
@@ -30,25 +31,28 @@ struct PlanMetrics {
 
 struct Plan {
   PlanStatus status = PlanStatus::no_path;
-  std::string message;             ///< one line: why not, and where; empty when ok
+  std::string message;  ///< one line: why not, and where; empty when ok
   BSpline trajectory;
-  std::vector<Setpoint> commands;  ///< every 20 ms
+  std::vector<Setpoint> commands;  ///< every 20 ms, followed by one second of holding the goal
   reach::ReachTube tube;           ///< verified: one entry more than commands
   PlanMetrics metrics;
 };
 
 /// Start of a plan: the state estimated now and the command active now (for continuity).
-struct PlanStart {
-  State estimated;
-  Setpoint command;
-};
-
 /// Kinodynamic search → B-spline fit → optimisation → verification of the whole swept tube (model.md section 5b). What
 /// fails verification is re-optimised with a larger margin, then slowed, then refused; never returned as ok.
 Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const PlanOptions& options);
 
-/// Smallest clearance of a tube swept through the world, m (negative: not clear): prism query over each interval with the
-/// centre's motion, less body.radius and estimation.position; with a constant margin, ball of that radius.
+/// Where a tube comes nearest to obstacles.
+struct Approach {
+  double clearance;  ///< m, capped at 2 m; negative: not clear
+  State center;      ///< predicted motion there
+  double t;          ///< s since the tube's start
+};
+/// The smallest clearance of a tube swept through the world: prism query over each interval with the centre's motion,
+/// less body.radius and estimation.position; with a constant margin, ball of that radius. Precondition: not empty.
+Approach nearest_approach(const World& world, const reach::ReachTube& tube);
+/// Its clearance, m.
 double tube_clearance(const World& world, const reach::ReachTube& tube);
 
 /// Lowest clear hover height z_safe (m, W) of the column through p, and the floor below it; nothing if there is none.

@@ -27,23 +27,22 @@ Supports tight_supports(const PerDirection& h) {
           std::min({s, x + y, d + 2 * x, d + 2 * y}), std::min({d, x + y, s + 2 * x, s + 2 * y})};
 }
 
-/// Distance of points to the octagon ⊕ a voxel's square, whose centre is the origin.
+/// The octagon ⊕ a voxel's square, around the origin. Lengths in voxels.
 class FatOctagon {
  public:
-  FatOctagon(const Supports& s, double half_edge)
-      : x_(s.x + half_edge),
-        y_(s.y + half_edge),
-        sum_(s.sum + 2 * half_edge),
-        difference_(s.difference + 2 * half_edge) {
+  explicit FatOctagon(const Supports& s)
+      : x_(s.x + 0.5), y_(s.y + 0.5), sum_(s.sum + 1), difference_(s.difference + 1) {
     // Half of the corners, counter-clockwise from the right edge's lower end; the others are their mirror images.
     corners_ = {Vec2{x_, x_ - difference_}, Vec2{x_, sum_ - x_}, Vec2{sum_ - y_, y_}, Vec2{y_ - difference_, y_},
                 Vec2{-x_, difference_ - x_}};
   }
+  /// Largest violation of a side: at most the distance, 0 inside. Cheap.
+  double separation(const Vec2& p) const noexcept {
+    const double diagonal = std::max(std::abs(p.x() + p.y()) - sum_, std::abs(p.x() - p.y()) - difference_);
+    return std::max({0.0, std::abs(p.x()) - x_, std::abs(p.y()) - y_, diagonal / std::sqrt(2.0)});
+  }
   double squared_distance(const Vec2& p) const noexcept {
-    if (std::abs(p.x()) <= x_ && std::abs(p.y()) <= y_ && std::abs(p.x() + p.y()) <= sum_ &&
-        std::abs(p.x() - p.y()) <= difference_) {
-      return 0;
-    }
+    if (separation(p) == 0) return 0;
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t c = 0; c + 1 < corners_.size(); ++c) {
       nearest = std::min(
@@ -63,55 +62,60 @@ class FatOctagon {
   std::array<Vec2, 5> corners_;
 };
 
-/// First cell of [from, to) that is not free, or `to`. Eight cells at a time.
-const map::Cell* first_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+bool eight_free(const map::Cell* cells) noexcept {
   static_assert(sizeof(map::Cell) == 1);
   constexpr std::uint64_t kAllFree = 0x0101010101010101u * static_cast<std::uint64_t>(map::Cell::free);
-  for (std::uint64_t word = 0; to - from >= 8; from += 8) {
-    std::memcpy(&word, from, 8);
-    if (word != kAllFree) break;
-  }
-  while (from != to && *from == map::Cell::free) ++from;
+  std::uint64_t word = 0;
+  std::memcpy(&word, cells, 8);
+  return word == kAllFree;
+}
+
+/// First cell of [from, to) that is not free, or `to`.
+const map::Cell* first_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+  while (to - from >= 8 && eight_free(from)) from += 8;
+  while (from < to && *from == map::Cell::free) ++from;
   return from;
 }
 
-/// Distance of a prism to the outside of the grid: the complement of a box is six half-spaces.
-double distance_to_outside(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s) {
-  const Vec3 low = center_W - grid.origin();
-  const Vec3 high = grid.size().cast<double>() * grid.resolution() - low;
-  return std::max(0.0, (low.cwiseMin(high) - Vec3(s.x, s.y, s.z)).minCoeff());
+/// Last cell of [from, to) that is not free, or `to`.
+const map::Cell* last_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
+  const map::Cell* c = to;
+  while (c - from >= 8 && eight_free(c - 8)) c -= 8;
+  while (c > from && *(c - 1) == map::Cell::free) --c;
+  return c > from ? c - 1 : to;
 }
 
 /// Search for the obstacle nearest to a prism: voxels from the centre outwards, so that what is found early shortens
-/// the rest.
+/// the rest. Lengths are in voxels, from the grid's origin. Precondition: the prism lies inside the grid.
 class Scan {
  public:
-  Scan(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit)
+  Scan(const map::OccupancyGrid& grid, const Vec3& center, const Supports& s, double limit)
       : grid_(grid),
-        center_(center_W - grid.origin()),
+        center_(center),
         half_(s.x, s.y, s.z),
-        octagon_(s, grid.resolution() / 2),
+        under_from_(std::max(0, static_cast<int>(center.x() - s.x))),
+        under_to_(std::min(grid.size().x(), static_cast<int>(center.x() + s.x) + 1)),
+        octagon_(s),
         nearest2_(limit * limit) {}
 
-  double nearest() {
+  /// Squared distance; the squared limit if nothing is nearer.
+  double nearest2() {
     outwards(2, 0, [&](int k, double gap2_z) {
       outwards(1, gap2_z, [&](int j, double gap2_y) { row(j, k, gap2_y, gap2_z); });
     });
-    return std::sqrt(nearest2_);
+    return nearest2_;
   }
 
  private:
-  /// Squared gap along an axis between the prism and the voxels with this index, m².
+  /// Squared gap along an axis between the prism and the voxels with this index.
   double gap2(int axis, int index) const noexcept {
-    const double low = index * grid_.resolution() - center_[axis];
-    const double gap = std::max({0.0, low - half_[axis], -low - grid_.resolution() - half_[axis]});
+    const double gap = std::max({0.0, index - center_[axis] - half_[axis], center_[axis] - half_[axis] - index - 1});
     return gap * gap;
   }
   /// Visits the layers of an axis whose gap, with `others2` in the other axes, is less than the nearest so far.
   template <class Visit>
   void outwards(int axis, double others2, const Visit& visit) {
-    const int size = grid_.size()[axis];
-    const int middle = std::clamp(static_cast<int>(center_[axis] / grid_.resolution()), 0, size - 1);
+    const int size = grid_.size()[axis], middle = static_cast<int>(center_[axis]);
     bool nearer = true;
     const auto layer = [&](int n) {
       if (n < 0 || n >= size) return;
@@ -126,32 +130,44 @@ class Scan {
       layer(down);
     }
   }
+  /// A row of voxels along x. Distance is convex in x: it only grows beyond the prism's bounding box, so that on either
+  /// side of it the first obstacle is enough.
   void row(int j, int k, double gap2_y, double gap2_z) {
-    const double edge = grid_.resolution();
-    const double reach = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
-    const int from = std::max(0, static_cast<int>(std::floor((center_.x() - reach) / edge)));
-    const int to = std::min(grid_.size().x() - 1, static_cast<int>(std::floor((center_.x() + reach) / edge)));
-    if (from > to) return;
     const map::Cell* const cells = grid_.cells().data() + grid_.linear(Index3(0, j, k));
-    const map::Cell* const end = cells + to + 1;
-    for (const map::Cell* c = first_obstacle(cells + from, end); c != end; c = first_obstacle(c + 1, end)) {
-      const int i = static_cast<int>(c - cells);
-      if (gap2(0, i) + gap2_y + gap2_z >= nearest2_) continue;
-      const Vec2 voxel = edge * Vec2(i + 0.5, j + 0.5);
-      nearest2_ = std::min(nearest2_, octagon_.squared_distance(voxel - center_.head<2>()) + gap2_z);
-    }
+    const auto consider = [&](const map::Cell* c) {
+      const Vec2 p(static_cast<double>(c - cells) + 0.5 - center_.x(), j + 0.5 - center_.y());
+      const double separation = octagon_.separation(p);
+      if (separation * separation + gap2_z >= nearest2_) return;
+      nearest2_ = std::min(nearest2_, octagon_.squared_distance(p) + gap2_z);
+    };
+    const map::Cell *const under = cells + under_from_, *const right = cells + under_to_;
+    for (const map::Cell* c = first_obstacle(under, right); c != right; c = first_obstacle(c + 1, right)) consider(c);
+    if (nearest2_ <= gap2_y + gap2_z) return;
+    const double reach = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
+    const map::Cell* const from = cells + std::max(0, static_cast<int>(center_.x() - reach));
+    const map::Cell* const to = cells + std::min(grid_.size().x(), static_cast<int>(center_.x() + reach) + 1);
+    if (const map::Cell* c = first_obstacle(right, to); c != to) consider(c);
+    if (const map::Cell* c = last_obstacle(from, under); c != under) consider(c);
   }
 
   const map::OccupancyGrid& grid_;
-  Vec3 center_;  // from the grid's origin, m
-  Vec3 half_;
+  Vec3 center_, half_;
+  int under_from_, under_to_;  // columns that the prism's bounding box meets
   FatOctagon octagon_;
-  double nearest2_;  // m²
+  double nearest2_;
 };
 
 double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit) {
-  const double nearest = std::min(limit, distance_to_outside(grid, center_W, s));
-  return nearest > 0 ? Scan(grid, center_W, s, nearest).nearest() : 0;
+  const double a = grid.resolution();
+  const Vec3 center = (center_W - grid.origin()) / a;
+  const Supports in_voxels{s.x / a, s.y / a, s.z / a, s.sum / a, s.difference / a};
+  // The outside is the complement of a box: six half-spaces.
+  const Vec3 to_side =
+      center.cwiseMin(grid.size().cast<double>() - center) - Vec3(in_voxels.x, in_voxels.y, in_voxels.z);
+  const double outside = to_side.minCoeff();
+  if (!(outside > 0)) return 0;
+  const double nearest2 = Scan(grid, center, in_voxels, std::min(limit / a, outside)).nearest2();
+  return std::min(limit, a * std::sqrt(nearest2));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "core/types/geometry.hpp"
 #include "core/types/vehicle.hpp"
@@ -22,18 +23,26 @@ class EllipsoidRecursion {
   /// Q⁺ = e^{Φdt}((1 + b/a) Q + (1 + a/b) Q_d) e^{Φᵀdt}. X_i is constant: no Lyapunov solve here.
   /// Real-time: wait-free, no allocation.
   void step(const Vec3& w_bar) noexcept;
-  const Mat6& Q() const noexcept { return Q_; }
+  /// Shape matrix, order (p_x, p_y, p_z, v_x, v_y, v_z).
+  Mat6 Q() const noexcept;
   /// Position set: the block Q_pp, m².
-  Mat3 position_shape() const noexcept { return Q_.topLeftCorner<3, 3>(); }
+  Mat3 position_shape() const noexcept;
 
  private:
-  Mat6 transition_;          // e^{Φ dt}
-  std::array<Mat6, 3> X_;    // ∫₀^dt e^{−Φτ} D_i D_iᵀ e^{−Φᵀτ} dτ
-  Mat6 Q_;
+  // Axes never couple: Q_0, every X_i and e^{Φdt} are block diagonal, so Q is carried as one (p, v) block per axis.
+  std::array<Eigen::Matrix2d, 3> transition_;  // e^{Φ dt}
+  std::array<Eigen::Matrix2d, 3> X_;  // block i of ∫₀^dt e^{−Φτ} D_i D_iᵀ e^{−Φᵀτ} dτ; the others are 0
+  std::array<Eigen::Matrix2d, 3> Q_;
 };
 
-/// Position shape (m²) of the paper's infinite-time set under constant channel bounds w̄ (m/s²): the fixed point of the
-/// recursion (closed form with equal gains, otherwise one scalar root, model.md section 5.1). O(1).
+/// X_i of one axis over 20 ms, block (p, v), the solution of
+/// −ΦX − XΦᵀ = e^{−Φdt} D Dᵀ e^{−Φᵀdt} − D Dᵀ for Φ = (0 1; −k_p −k_d), D = (0, 1).
+Eigen::Matrix2d step_gramian(double kp, double kd);
+
+/// Position shape (m²) of the paper's infinite-time set under constant channel bounds w̄ (m/s², ≥ 0): the fixed point of
+/// the 20 ms recursion above, not of its limit dt → 0 (0.8 % smaller at (6, 4)), rounded up. With r = √(tr Q_d/tr Q) a
+/// fixed point solves Q = (1 + r) e^{Φdt}(Q + Q_d/r) e^{Φᵀdt}, linear in Q; r is the root of one increasing scalar
+/// function. O(1). Errors: throws std::invalid_argument for gains that are not positive.
 Mat3 hover_ellipsoid(const Vehicle& vehicle, const Vec3& w_bar);
 
 }  // namespace backwash::reach

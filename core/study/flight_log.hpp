@@ -23,8 +23,9 @@ struct LogError {
   std::string message;
 };
 
-/// Reads comma-separated numbers under a line of column names. Errors: missing file, no t_s column (unless `time_column`
-/// names another or is empty), a duplicated name, a row with too few or too many cells, a cell that is not a finite number.
+/// Reads comma-separated numbers under a line of column names. Errors: missing file, no t_s column (unless
+/// `time_column` names another or is empty), a duplicated name, a row with too few or too many cells, a cell that is
+/// not a finite number.
 tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column = "t_s");
 
 /// Writes t_s first, then the columns in name order, with enough digits to read back bit for bit.

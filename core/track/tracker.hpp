@@ -17,18 +17,21 @@ struct AcceptedSegment {
 
 /// What one tick says about the measured position (model.md section 5.4).
 struct Inside {
-  bool inside = true;      ///< |e_n| ≤ h_n in all five directions
-  PerDirection error{};    ///< e_n = unit(n)·(measured − centre), m
+  bool inside = true;          ///< |e_n| ≤ h_n in all five directions
+  PerDirection error{};        ///< e_n = unit(n)·(measured − centre), m
   PerDirection half_widths{};  ///< h_n, m
 };
 
-/// Steps through accepted segments, one command a tick; holds the last position at rest after the end.
+/// Steps through accepted segments, one command a tick; holds the last position at rest after the end. In a tick: judge
+/// the measurement taken now, then step.
 class Tracker {
  public:
   explicit Tracker(const Setpoint& hold);
   /// Takes over at the next step. Not real-time (moves memory).
   void accept(std::shared_ptr<const AcceptedSegment> segment);
-  /// Judges the measured position at this tick against the set predicted for it. Real-time: wait-free, no allocation.
+  /// Judges the measured position at this tick, before its step(), against the set predicted for it. Past the end of
+  /// the segment the last set holds. Before the first accepted segment nothing is claimed: inside, with half widths 0.
+  /// Real-time: wait-free, no allocation.
   Inside judge(const Vec3& measured_W) const noexcept;
   /// Command of this tick, then moves on. Real-time: wait-free, no allocation.
   Setpoint step() noexcept;

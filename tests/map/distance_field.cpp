@@ -61,18 +61,44 @@ TEST(DistanceField, ExactIsZeroOnFacesAndAtTheSidesOfTheGrid) {
   EXPECT_EQ(field.exact(grid, {0.5, 0.75, 9.0}), 0.0);
 }
 
-TEST(DistanceField, IsHalfTheWidthInTheMiddleOfALongLine) {
-  for (const int n : {1, 2, 7, 3001}) {
-    for (int axis = 0; axis < 3; ++axis) {
-      Index3 size(1, 1, 1);
-      size[axis] = n;
-      // The other axes are one voxel wide, so the outside is at a/2 everywhere: widen them to see the long axis.
-      OccupancyGrid grid({0, 0, 0}, 0.1, size, Cell::free);
-      EXPECT_NEAR(DistanceField(grid).at(Index3::Zero()), 0.05, 1e-8);
+TEST(DistanceField, EqualsBruteForceFarFromSparseObstacles) {
+  std::mt19937_64 random(4);
+  for (const Index3& size : {Index3(45, 50, 55), Index3(120, 40, 30), Index3(30, 120, 40), Index3(40, 30, 120)}) {
+    OccupancyGrid grid({-1, 2, -3}, 0.1, size, Cell::free);
+    for (int i = 0; i < 12; ++i) grid.set(grid.voxel(random() % grid.cell_count()), Cell::occupied);
+    const DistanceField field(grid);
+    for (int i = 0; i < 200; ++i) {
+      const Index3 v = grid.voxel(random() % grid.cell_count());
+      ASSERT_NEAR(field.at(v), brute_force(grid, grid.center(v)), 1e-6) << v.transpose();
+      const Vec3 p = grid.center(v) + Vec3(0.037, -0.021, 0.049);
+      ASSERT_NEAR(field.exact(grid, p), brute_force(grid, p), 1e-9) << p.transpose();
     }
   }
-  const OccupancyGrid cube({-5, -5, -5}, 0.1, {100, 101, 103}, Cell::free);
-  EXPECT_NEAR(DistanceField(cube).at({50, 50, 50}), 4.95, 1e-6);
+}
+
+TEST(DistanceField, MeasuresToTheSidesOfAnEmptyGrid) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index3 line = Index3::Ones() + 3000 * Index3::Unit(axis);
+    EXPECT_NEAR(DistanceField(OccupancyGrid({0, 0, 0}, 0.1, line, Cell::free)).at(1500 * Index3::Unit(axis)), 0.05,
+                1e-8);
+    const Index3 slab = Index3::Constant(70) - 29 * Index3::Unit(axis);  // 41 voxels along one axis
+    const DistanceField field(OccupancyGrid({0, 0, 0}, 0.1, slab, Cell::free));
+    EXPECT_NEAR(field.at(slab / 2), 2.05, 1e-6);
+  }
+}
+
+TEST(DistanceField, InterpolatedStaysWithinSqrtThreeHalvesOfAVoxelOfExact) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (int round = 0; round < 40; ++round) {
+    const auto grid = random_grid(random, 14);
+    const DistanceField field(grid);
+    for (int i = 0; i < 200; ++i) {
+      const Vec3 extent = grid.resolution() * grid.size().cast<double>();
+      const Vec3 p = grid.origin() + extent.cwiseProduct(Vec3(unit(random), unit(random), unit(random)));
+      ASSERT_NEAR(field.interpolated(p), field.exact(grid, p), std::sqrt(0.75) * grid.resolution());
+    }
+  }
 }
 
 TEST(DistanceField, InterpolatedPassesThroughTheCentresAndIsLinearBeforeAFlatWall) {

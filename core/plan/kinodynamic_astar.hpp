@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/plan/safe_space.hpp"
+
+namespace backwash::plan {
+
+using Clock = std::chrono::steady_clock;
+
+struct SearchOptions {
+  double v_max;           ///< m/s per axis
+  double a_max;           ///< m/s² per axis
+  std::size_t max_nodes;  ///< states kept
+  Clock::time_point deadline;
+};
+
+struct SearchFailure {
+  enum class Kind { no_path, deadline } kind;
+  std::string message;  ///< one line
+};
+
+/// A found path: motions that join with equal position and velocity; the last ends at rest exactly at the goal.
+struct SearchResult {
+  std::vector<Motion> motions;
+  double cost;         ///< G = ∫‖u‖² dt + ρT, m²/s³
+  double lower_bound;  ///< of the cost of any path, by the heuristic at the start
+  std::size_t expanded;
+};
+
+/// Hybrid-state A* (paper Sec. V-A, model.md section 5b) over (p, v): acceleration grid × two durations, cost
+/// G = ∫‖u‖² dt + ρT, each motion checked as a swept set and against the limits per axis, closed by the optimal cubic
+/// to the goal. The heuristic is cost_to_go over durations that the way through passable voxels needs at least
+/// (SafeSpace::hops_to, least_stopping_time): admissible. The open set is taken by bands of f = G + H as wide as
+/// H(start), so the cost is below twice the best of the discretisation; inside a band by G + 2H. A start faster than
+/// v_max may only slow down. Deterministic. Errors: no_path (none exists, or the node cap was reached: the message says
+/// which), deadline.
+tl::expected<SearchResult, SearchFailure> search(const SafeSpace& space, const State& start, const Vec3& goal_W,
+                                                 const SearchOptions& options);
+
+/// Positions every `step` along the motions, both ends included: the step is shortened to divide the duration, and the
+/// one used is returned with them.
+struct PathSamples {
+  std::vector<Vec3> positions;  ///< m
+  double step;                  ///< s
+};
+PathSamples sample(const std::vector<Motion>& motions, double step);
+
+}  // namespace backwash::plan

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/plan/planner.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include "core/reach/clearance.hpp"
+
+namespace backwash::plan {
+
+namespace {
+
+// Search and optimisation aim below the limits so that re-timing has little left to do.
+constexpr double kSearchShare = 0.9;
+constexpr double kOptimiseShare = 0.97;
+constexpr double kFirstMargin = 0.02;          ///< m beyond the tube, in the collision cost of the first round
+constexpr std::size_t kRounds = 4;             ///< per pace, the tube recomputed in between
+constexpr std::size_t kEvaluations = 120;      ///< per round
+constexpr std::size_t kHoldCommands = 50;      ///< verified hover at the goal: one second
+constexpr double kClearanceCap = 2.0;          ///< m
+constexpr double kPaces[] = {1.0, 0.7, 0.45};  ///< share of the searched path's speed
+
+double ms_since(Clock::time_point t) { return std::chrono::duration<double, std::milli>(Clock::now() - t).count(); }
+
+std::string text(const Vec3& p) {
+  char buffer[96];
+  std::snprintf(buffer, sizeof buffer, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
+  return buffer;
+}
+
+std::string metres(double d) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.3f m", d);
+  return buffer;
+}
+
+Plan refused(Plan plan, PlanStatus status, std::string message) {
+  plan.status = status;
+  plan.message = std::move(message);
+  return plan;
+}
+
+/// Why hovering at p is not safe; nothing where it is.
+std::optional<std::string> why_blocked(const World& world, const Vec3& p_W) {
+  const Index3 v = world.grid.index(p_W);
+  if (!p_W.allFinite() || !world.grid.inside(v)) return text(p_W) + " is outside the map";
+  if (world.grid.occupied(v)) return text(p_W) + " is occupied";
+  if (!world.grid.free(v)) return text(p_W) + " is unknown space";
+  const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin);
+  if (!set.bounded) return text(p_W) + " is too near to obstacles: the hover set there has no bound in free space";
+  if (!set.safe()) return text(p_W) + " is not clear: the hover set's clearance is " + metres(set.clearance);
+  return std::nullopt;
+}
+
+/// Hover-safe voxels; start and goal were checked at their exact points, so their voxels count as safe.
+SafeSpace hover_safe_space(const World& world, const Vec3& start_W, const Vec3& goal_W) {
+  std::vector<std::uint8_t> passable(world.grid.cell_count());
+  std::size_t cell = 0;
+  for (int k = 0; k < world.grid.size().z(); ++k)
+    for (int j = 0; j < world.grid.size().y(); ++j)
+      for (int i = 0; i < world.grid.size().x(); ++i) passable[cell++] = world.hover.safe({i, j, k});
+  for (const Vec3& p : {start_W, goal_W}) passable[world.grid.linear(world.grid.index(p))] = 1;
+  return SafeSpace(world.grid, std::move(passable));
+}
+
+/// Time between control points: 0.3 m of flight at full speed.
+double knot_span(double v_max) { return std::clamp(0.3 / v_max, 0.12, 0.6); }
+
+BSpline fit_path(const std::vector<Motion>& motions, const PlanStart& start, const Vec3& goal_W, double v_max,
+                 double pace) {
+  PathSamples samples = sample(motions, pace * knot_span(v_max * pace));
+  samples.positions.front() = start.command.p_W;
+  samples.positions.back() = goal_W;
+  return fit(samples.positions, samples.step / pace, start.command.v_W, start.command.a_W, Vec3::Zero(), Vec3::Zero());
+}
+
+/// Lengthens the knot span until the control points of velocity and acceleration keep the limits; what the start fixes
+/// (its velocity and acceleration) is kept and not judged.
+BSpline retimed(BSpline spline, const PlanStart& start, const Vec3& v_limit, const Vec3& a_limit) {
+  for (int i = 0; i < 30; ++i) {
+    const auto velocity = spline.velocity_points(), acceleration = spline.acceleration_points();
+    double stretch = 1;
+    for (std::size_t n = 2; n < velocity.size(); ++n)
+      stretch = std::max(stretch, (velocity[n].array().abs() / v_limit.array()).maxCoeff());
+    for (std::size_t n = 1; n < acceleration.size(); ++n)
+      stretch = std::max(stretch, std::sqrt((acceleration[n].array().abs() / a_limit.array()).maxCoeff()));
+    if (stretch <= 1) break;
+    spline.knot_span *= 1.0001 * std::min(stretch, 1.5);
+    std::ranges::copy(end_control_points(start.command.p_W, start.command.v_W, start.command.a_W, spline.knot_span),
+                      spline.control_points.begin());
+  }
+  return spline;
+}
+
+bool keeps_limits(const BSpline& spline, const Vec3& v_limit, const Vec3& a_limit) {
+  const auto within = [](const std::vector<Vec3>& points, std::size_t first, const Vec3& limit) {
+    return std::all_of(points.begin() + static_cast<std::ptrdiff_t>(first), points.end(),
+                       [&](const Vec3& p) { return (p.array().abs() <= limit.array()).all(); });
+  };
+  return within(spline.velocity_points(), 2, v_limit) && within(spline.acceleration_points(), 1, a_limit);
+}
+
+struct Flight {
+  std::vector<Setpoint> commands;
+  reach::ReachTube tube;
+};
+Flight fly(const World& world, const PlanStart& start, const BSpline& spline) {
+  Flight flight{spline.commands(), {}};
+  const Setpoint hold = flight.commands.back();
+  flight.commands.insert(flight.commands.end(), kHoldCommands, hold);
+  flight.tube = reach::tube_over_field(world.reach, start.estimated, start.command, flight.commands, world.bounds);
+  return flight;
+}
+
+/// Distance that each step of the predicted motion must keep from obstacles: body, estimation, margin and the set's
+/// support towards the nearest obstacle (model.md section 5b).
+std::vector<double> keep_away(const World& world, const reach::ReachTube& tube, double margin) {
+  const auto& vehicle = world.reach.vehicle;
+  std::vector<double> r;
+  for (const auto& step : tube) {
+    const auto& h = step.half_widths_interval;
+    double extent = world.constant_margin;
+    if (extent < 0) {
+      const Vec3 g = world.distance.gradient(step.center.p_W), half(h[kX], h[kY], h[kZ]);
+      extent = g.norm() > 0 ? g.cwiseAbs().dot(half) / g.norm() : half.norm();
+    }
+    r.push_back(vehicle.body.radius + vehicle.estimation.position + extent + margin);
+  }
+  return r;
+}
+
+PlanMetrics measured(PlanMetrics metrics, const BSpline& spline, double clearance) {
+  metrics.time_s = spline.duration();
+  metrics.jerk2 = spline.jerk2();
+  metrics.min_clearance_m = clearance;
+  const auto commands = spline.commands();
+  for (std::size_t k = 0; k + 1 < commands.size(); ++k)
+    metrics.length_m += (commands[k + 1].p_W - commands[k].p_W).norm();
+  return metrics;
+}
+
+}  // namespace
+
+const char* to_string(PlanStatus status) noexcept {
+  switch (status) {
+    case PlanStatus::ok:
+      return "ok";
+    case PlanStatus::no_path:
+      return "no_path";
+    case PlanStatus::infeasible:
+      return "infeasible";
+    case PlanStatus::start_blocked:
+      return "start_blocked";
+    case PlanStatus::goal_blocked:
+      return "goal_blocked";
+    default:
+      return "deadline";
+  }
+}
+
+Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const PlanOptions& options) {
+  const auto begun = Clock::now();
+  const auto deadline =
+      begun + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.deadline_s));
+  Plan result;
+  if (const auto why = why_blocked(world, start.command.p_W))
+    return refused(result, PlanStatus::start_blocked, "start " + *why);
+  if (const auto why = why_blocked(world, goal_W)) return refused(result, PlanStatus::goal_blocked, "goal " + *why);
+
+  const auto path =
+      search(hover_safe_space(world, start.command.p_W, goal_W), {start.command.p_W, start.command.v_W}, goal_W,
+             {kSearchShare * options.v_max, kSearchShare * options.a_max, options.max_nodes, deadline});
+  result.metrics.search_ms = ms_since(begun);
+  if (!path)
+    return refused(result,
+                   path.error().kind == SearchFailure::Kind::deadline ? PlanStatus::deadline : PlanStatus::no_path,
+                   path.error().message);
+  result.metrics.expanded = path->expanded;
+
+  const Vec3 v_limit = start.command.v_W.cwiseAbs().cwiseMax(options.v_max);
+  const Vec3 a_limit = start.command.a_W.cwiseAbs().cwiseMax(options.a_max);
+  std::string why;
+  for (const double pace : kPaces) {
+    BSpline spline = fit_path(path->motions, start, goal_W, options.v_max, pace);
+    reach::ReachTube tube = fly(world, start, spline).tube;
+    double margin = kFirstMargin;
+    for (std::size_t round = 0; round < kRounds; ++round) {
+      if (Clock::now() > deadline) return refused(result, PlanStatus::deadline, "optimisation ran out of time");
+      const auto optimising = Clock::now();
+      const SplineCost cost(world.distance, world.reach.vehicle, world.reach.loop, start, spline,
+                            keep_away(world, tube, margin), kOptimiseShare * v_limit, kOptimiseShare * a_limit, {});
+      const auto optimum = optimise(cost, kEvaluations, deadline);
+      spline = retimed(optimum.spline, start, v_limit, a_limit);
+      result.metrics.optimise_ms += ms_since(optimising);
+      result.metrics.evaluations += optimum.evaluations;
+
+      const auto verifying = Clock::now();
+      Flight flight = fly(world, start, spline);
+      const Approach nearest = nearest_approach(world, flight.tube);
+      result.metrics.verify_ms += ms_since(verifying);
+      if (nearest.clearance > 0 && keeps_limits(spline, v_limit, a_limit)) {
+        result.metrics = measured(result.metrics, spline, nearest.clearance);
+        result.status = PlanStatus::ok;
+        result.trajectory = std::move(spline);
+        result.commands = std::move(flight.commands);
+        result.tube = std::move(flight.tube);
+        return result;
+      }
+      why = nearest.clearance > 0
+                ? "no timing keeps the limits from this start"
+                : "the tube touches at " + text(nearest.center.p_W) + ": clearance " + metres(nearest.clearance);
+      margin += 0.02;
+      tube = std::move(flight.tube);
+    }
+  }
+  return refused(result, PlanStatus::infeasible, why);
+}
+
+Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
+  const auto& vehicle = world.reach.vehicle;
+  const double constant = world.constant_margin;
+  const double taken = vehicle.body.radius + vehicle.estimation.position + std::max(constant, 0.0);
+  const auto half_widths = [&](std::size_t k) { return constant >= 0 ? PerDirection{} : tube[k].half_widths_interval; };
+  const auto next = [&](std::size_t k) { return std::min(k + 1, tube.size() - 1); };
+  // Distance is 1-Lipschitz, so the interpolated one is off by a voxel diagonal at most:
+  // that bounds each step from below and leaves few exact queries.
+  const double slack = world.grid.resolution() * std::sqrt(3.0);
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t k = 0; k < tube.size(); ++k) {
+    const PerDirection h = half_widths(k);
+    const double extent = Vec3(h[kX], h[kY], h[kZ]).norm();
+    const double motion = (tube[next(k)].center.p_W - tube[k].center.p_W).norm();
+    order.emplace_back(world.distance.interpolated(tube[k].center.p_W) - slack - extent - 2 * motion, k);
+  }
+  std::ranges::sort(order);
+  double least = kClearanceCap + taken;
+  std::size_t where = order.front().second;
+  for (const auto& [bound, k] : order) {
+    if (bound >= least) break;
+    const double distance =
+        reach::swept_prism_distance(world.grid, tube[k].center.p_W, tube[next(k)].center.p_W, half_widths(k), least);
+    if (distance < least) least = distance, where = k;
+  }
+  return {least - taken, tube[where].center, tube[where].t};
+}
+
+double tube_clearance(const World& world, const reach::ReachTube& tube) {
+  return nearest_approach(world, tube).clearance;
+}
+
+}  // namespace backwash::plan

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Take-off and landing: the vertical corridor below the lowest clear hover height (model.md section 4).
+#include <algorithm>
+
+#include "core/plan/planner.hpp"
+
+namespace backwash::plan {
+
+namespace {
+constexpr double kLateralCap = 1.0;  ///< m
+}
+
+std::optional<Column> takeoff_column(const World& world, const Vec3& p_W) {
+  const auto& grid = world.grid;
+  Index3 v = grid.index(p_W);
+  if (!p_W.allFinite() || !grid.free(v)) return std::nullopt;
+  while (grid.free(v - Index3::UnitZ())) --v.z();
+  const double a = grid.resolution();
+  const double z_floor = grid.origin().z() + a * v.z();
+  for (; grid.free(v); ++v.z()) {
+    const Vec3 hover_W(p_W.x(), p_W.y(), grid.center(v).z());
+    if (reach::hover_set(world.reach, grid, world.distance, world.bounds, hover_W, world.constant_margin).safe())
+      return Column{z_floor, hover_W.z()};
+  }
+  return std::nullopt;
+}
+
+std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max) {
+  // p(s) = 10 s³ − 15 s⁴ + 6 s⁵ has peaks 15/8 of velocity and 10/√3 of acceleration.
+  const Vec3 way = to_W - from_W;
+  const double distance = way.norm();
+  const double least = std::max(15.0 / 8 * distance / v_max, std::sqrt(10 / std::sqrt(3.0) * distance / a_max));
+  const auto periods = static_cast<std::size_t>(std::max(1.0, std::ceil(least / kControlPeriod)));
+  const double T = static_cast<double>(periods) * kControlPeriod;
+  std::vector<Setpoint> commands(periods + 1);
+  for (std::size_t k = 0; k <= periods; ++k) {
+    const double s = static_cast<double>(k) / static_cast<double>(periods);
+    commands[k].p_W = from_W + s * s * s * (10 - 15 * s + 6 * s * s) * way;
+    commands[k].v_W = 30 * s * s * (1 - s) * (1 - s) / T * way;
+    commands[k].a_W = 60 * s * (1 - s) * (1 - 2 * s) / (T * T) * way;
+  }
+  return commands;
+}
+
+double lateral_clearance(const World& world, const reach::ReachTube& tube) {
+  const auto& grid = world.grid;
+  const auto& vehicle = world.reach.vehicle;
+  const double a = grid.resolution(), body = vehicle.body.radius + vehicle.estimation.position;
+  double least = kLateralCap;
+  for (std::size_t n = 0; n < tube.size(); ++n) {
+    const Vec3& from = tube[n].center.p_W;
+    const Vec3& to = tube[std::min(n + 1, tube.size() - 1)].center.p_W;
+    const Vec3 middle = (from + to) / 2;
+    PerDirection h = tube[n].half_widths_interval;
+    if (world.constant_margin >= 0) h.fill(world.constant_margin);
+    for (std::size_t d = 0; d < kDirections; ++d) h[d] += std::abs(unit(static_cast<Direction>(d)).dot(to - from)) / 2;
+
+    // Layers beside the body and the set: from the first free one under the centre, so that the floor does not count.
+    const Index3 center = grid.index(middle);
+    if (!grid.free(center)) return -body;
+    const int lowest = grid.index(middle - Vec3(0, 0, h[kZ] + body)).z();
+    const int highest = grid.index(middle + Vec3(0, 0, h[kZ] + body)).z();
+    Index3 v = center;
+    while (v.z() > lowest && grid.free(v - Index3::UnitZ())) --v.z();
+    const int reach_x = static_cast<int>(std::ceil((h[kX] + body + least) / a)) + 1;
+    const int reach_y = static_cast<int>(std::ceil((h[kY] + body + least) / a)) + 1;
+    for (int k = v.z(); k <= highest; ++k)
+      for (int j = center.y() - reach_y; j <= center.y() + reach_y; ++j)
+        for (int i = center.x() - reach_x; i <= center.x() + reach_x; ++i) {
+          if (grid.free({i, j, k})) continue;
+          // Largest separation along the octagon's normals: its sign is exact, its value never too large.
+          const Vec3 to_voxel = grid.center({i, j, k}) - middle;
+          double gap = -INFINITY;
+          for (const Direction d : {kX, kY, kXyPlus, kXyMinus}) {
+            const Vec3 n_d = unit(d);
+            gap = std::max(gap, std::abs(n_d.dot(to_voxel)) - h[d] - a / 2 * (std::abs(n_d.x()) + std::abs(n_d.y())));
+          }
+          least = std::min(least, gap - body);
+        }
+  }
+  return least;
+}
+
+}  // namespace backwash::plan

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/ellipsoid.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <unsupported/Eigen/MatrixFunctions>
+
+namespace backwash::reach {
+namespace {
+
+using Eigen::Matrix2d;
+using Blocks = std::array<Matrix2d, 3>;
+
+Matrix2d error_matrix(double kp, double kd) { return (Matrix2d() << 0, 1, -kp, -kd).finished(); }
+
+double trace(const Blocks& Q) { return Q[0].trace() + Q[1].trace() + Q[2].trace(); }
+
+// Q_d = (Σ_i √tr Q_i)(Σ_i Q_i/√tr Q_i) with Q_i = dt w̄_i² X_i + ε dt² I.
+Blocks step_shape(const Blocks& X, const Vec3& w_bar) {
+  constexpr double dt = kControlPeriod, floor = EllipsoidRecursion::kEpsilon * dt * dt;
+  Blocks Q_d{Matrix2d::Zero(), Matrix2d::Zero(), Matrix2d::Zero()};
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Matrix2d Q_i = dt * w_bar[static_cast<Eigen::Index>(i)] * w_bar[static_cast<Eigen::Index>(i)] * X[i];
+    const double root = std::sqrt(Q_i.trace() + 6 * floor);
+    if (root == 0) continue;  // Q_i/√tr Q_i → 0
+    sum += root;
+    Q_d[i] += Q_i / root;
+    for (Matrix2d& block : Q_d) block += floor / root * Matrix2d::Identity();
+  }
+  for (Matrix2d& block : Q_d) block *= sum;
+  return Q_d;
+}
+
+// Symmetric 2×2 solution of Q = s E Q Eᵀ + C.
+Matrix2d discrete_lyapunov(const Matrix2d& E, double s, const Matrix2d& C) {
+  const double a = E(0, 0), b = E(0, 1), c = E(1, 0), d = E(1, 1);
+  Mat3 M;  // acting on (Q_pp, Q_pv, Q_vv)
+  M << a * a, 2 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2 * c * d, d * d;
+  const Vec3 q = (Mat3::Identity() - s * M).inverse() * Vec3(C(0, 0), C(0, 1), C(1, 1));
+  return (Matrix2d() << q[0], q[1], q[1], q[2]).finished();
+}
+
+// The larger real part of the roots of s² + k_d s + k_p.
+double slowest_root(double kp, double kd) {
+  const double under_root = kd * kd / 4 - kp;
+  return -kd / 2 + (under_root > 0 ? std::sqrt(under_root) : 0.0);
+}
+
+struct Axis {
+  Matrix2d transition, X;
+};
+Axis axis_of(double kp, double kd) { return {(error_matrix(kp, kd) * kControlPeriod).exp(), step_gramian(kp, kd)}; }
+
+}  // namespace
+
+Matrix2d step_gramian(double kp, double kd) {
+  // Van Loan: exp(dt (Φ, DDᵀ; 0, −Φᵀ)) = (·, e^{Φdt}X; 0, e^{−Φᵀdt}).
+  const Matrix2d Phi = error_matrix(kp, kd);
+  Eigen::Matrix4d M = Eigen::Matrix4d::Zero();
+  M.topLeftCorner<2, 2>() = Phi;
+  M(1, 3) = 1;
+  M.bottomRightCorner<2, 2>() = -Phi.transpose();
+  const Eigen::Matrix4d T = (M * kControlPeriod).exp();
+  const Matrix2d X = T.bottomRightCorner<2, 2>().transpose() * T.topRightCorner<2, 2>();
+  return (X + X.transpose()) / 2;
+}
+
+EllipsoidRecursion::EllipsoidRecursion(const Vehicle& vehicle) {
+  const auto& c = vehicle.controller;
+  const Axis h = axis_of(c.kp.horizontal, c.kd.horizontal), v = axis_of(c.kp.vertical, c.kd.vertical);
+  transition_ = {h.transition, h.transition, v.transition};
+  X_ = {h.X, h.X, v.X};
+  const double position = vehicle.initial_error.position, velocity = vehicle.initial_error.velocity;
+  Q_.fill((Matrix2d() << position * position, 0, 0, velocity * velocity).finished());
+}
+
+void EllipsoidRecursion::step(const Vec3& w_bar) noexcept {
+  const Blocks Q_d = step_shape(X_, w_bar);
+  const double a = std::sqrt(trace(Q_)), b = std::sqrt(trace(Q_d));
+  // (1 + b/a) Q_k vanishes with Q_k, (1 + a/b) Q_d with Q_d.
+  const double of_Q = a > 0 ? 1 + b / a : 0, of_Q_d = b > 0 ? 1 + a / b : 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    Q_[i] = transition_[i] * (of_Q * Q_[i] + of_Q_d * Q_d[i]) * transition_[i].transpose();
+}
+
+Mat6 EllipsoidRecursion::Q() const noexcept {
+  Mat6 Q = Mat6::Zero();
+  for (Eigen::Index i = 0; i < 3; ++i)
+    for (Eigen::Index row = 0; row < 2; ++row)
+      for (Eigen::Index column = 0; column < 2; ++column)
+        Q(i + 3 * row, i + 3 * column) = Q_[static_cast<std::size_t>(i)](row, column);
+  return Q;
+}
+
+Mat3 EllipsoidRecursion::position_shape() const noexcept {
+  return Vec3(Q_[0](0, 0), Q_[1](0, 0), Q_[2](0, 0)).asDiagonal();
+}
+
+Mat3 hover_ellipsoid(const Vehicle& vehicle, const Vec3& w_bar) {
+  const auto& c = vehicle.controller;
+  const double slowest =
+      std::max(slowest_root(c.kp.horizontal, c.kd.horizontal), slowest_root(c.kp.vertical, c.kd.vertical));
+  if (!(slowest < 0)) throw std::invalid_argument("hover_ellipsoid: the gains k_p and k_d must be positive");
+  const Axis h = axis_of(c.kp.horizontal, c.kd.horizontal), v = axis_of(c.kp.vertical, c.kd.vertical);
+  const Blocks Q_d = step_shape({h.X, h.X, v.X}, w_bar);
+  const double trace_d = trace(Q_d);
+
+  const auto solution = [&](double r) {
+    Blocks Q;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Matrix2d& E = i < 2 ? h.transition : v.transition;
+      Q[i] = discrete_lyapunov(E, 1 + r, (1 + 1 / r) * E * Q_d[i] * E.transpose());
+    }
+    return Q;
+  };
+  // r² tr Q(r) grows with r, from 0 to infinity at (1 + r) e^{2 slowest dt} = 1.
+  double low = 0, high = std::expm1(-2 * slowest * kControlPeriod);
+  for (int i = 0; i < 50; ++i) {
+    const double r = (low + high) / 2;
+    (r * r * trace(solution(r)) < trace_d ? low : high) = r;
+  }
+  const Blocks Q = solution(low);
+  constexpr double kRoundUp = 1 + 1e-6;  // covers the root's width
+  return kRoundUp * Mat3(Vec3(Q[0](0, 0), Q[1](0, 0), Q[2](0, 0)).asDiagonal());
+}
+
+}  // namespace backwash::reach

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/sim/flight.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <limits>
+
+namespace backwash::sim {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+tl::unexpected<FlightRefused> refuse(const std::string& message) { return tl::make_unexpected(FlightRefused{message}); }
+
+std::string text(const Vec3& p) {
+  char line[80];
+  std::snprintf(line, sizeof line, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
+  return line;
+}
+
+std::string metres(double value) {
+  char line[40];
+  std::snprintf(line, sizeof line, "%.3f m", value);
+  return line;
+}
+
+/// What keeps a vehicle from hovering at a point; empty if nothing does.
+std::string obstacle_to_hover(const plan::World& world, const std::string& name, const Vec3& p_W) {
+  const auto v = world.grid.index(p_W);
+  const std::string where = name + " " + text(p_W) + " ";
+  if (!world.grid.inside(v)) return where + "lies outside the map; choose a point in it";
+  if (world.grid.occupied(v)) return where + "lies in an occupied voxel; choose free space";
+  if (!world.grid.free(v)) return where + "lies in unknown space; choose space that the map knows to be free";
+  const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin);
+  if (set.safe()) return {};
+  return where + "is not hover-safe: " + metres(world.distance.exact(world.grid, p_W)) +
+         " to the nearest obstacle, body and reachable set need more; choose a more open point";
+}
+
+/// The tube a piece is judged with: w̄ of Σ scaled, propagated from the same state along the same commands.
+reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& tube, const Setpoint& previous,
+                             const std::vector<Setpoint>& commands, const BoundModel& bounds, double sigma_scale) {
+  std::vector<DisturbanceBound> scaled;
+  for (std::size_t k = 0; k < commands.size(); ++k) {
+    DisturbanceBound b = tube[k].w_bar;
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      const double mean = d == kZ ? bounds.mean_vertical : bounds.mean_horizontal;
+      b.w[d] = mean + std::sqrt(sigma_scale) * (b.w[d] - mean);
+    }
+    scaled.push_back(b);
+  }
+  return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled);
+}
+
+/// Clearance of a true position: walls only below z_safe (the vehicle comes from the floor), everything above.
+double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) {
+  const auto& vehicle = world.reach.vehicle;
+  if (p_W.z() >= z_safe) return world.distance.exact(world.grid, p_W) - vehicle.body.radius;
+  reach::TubeStep point{};
+  point.center.p_W = p_W;
+  point.shape.setZero();
+  return plan::lateral_clearance(world, {point}) + vehicle.estimation.position;
+}
+
+/// Flies a piece whose tube was propagated at its acceptance, and judges every measured position against it.
+FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
+                      double z_safe, std::size_t hover_from, int hover_number) {
+  FlightPiece piece{std::move(accepted), {}, {}, {}};
+  track::Tracker tracker(piece.accepted.commands.front());
+  tracker.accept(std::make_shared<const track::AcceptedSegment>(piece.accepted));
+  for (std::size_t k = 0; k < piece.accepted.tube.size(); ++k) {
+    piece.judged.push_back(tracker.judge(loop.estimated().p_W));
+    const Setpoint command = tracker.step();
+    auto sample = loop.sample(command, k >= hover_from ? hover_number : -1);
+    sample.t = t_start + static_cast<double>(k) * kControlPeriod;
+    piece.clearance_m.push_back(true_clearance(world, sample.truth.p_W, z_safe));
+    piece.samples.push_back(sample);
+    if (k + 1 < piece.accepted.tube.size()) loop.fly(command);
+  }
+  return piece;
+}
+
+void append(std::vector<Setpoint>& commands, const std::vector<Setpoint>& more) {
+  commands.insert(commands.end(), more.begin(), more.end());
+}
+
+/// Why a take-off tube may not be flown; empty if it may: beside the column below z_safe, all around above.
+std::string obstacle_to_take_off(const plan::World& world, const reach::ReachTube& tube, double z_safe) {
+  const auto clear = std::find_if(tube.begin(), tube.end(), [&](const auto& s) { return s.center.p_W.z() >= z_safe; });
+  const double beside = plan::lateral_clearance(world, {tube.begin(), clear});
+  const double around = clear == tube.end() ? beside : plan::tube_clearance(world, {clear, tube.end()});
+  if (beside > 0 && around > 0) return {};
+  return "the take-off column under " + text(tube.back().center.p_W) + " is not clear (" +
+         metres(std::min(beside, around)) + "); choose a start with more room below and beside it";
+}
+
+PaperTube paper_beside(const plan::World& world, const State& start, const Setpoint& previous,
+                       const std::vector<Setpoint>& commands) {
+  const reach::Reachability paper(world.reach.vehicle, reach::Method::paper, reach::Loop::continuous);
+  const auto begin = Clock::now();
+  PaperTube beside{reach::tube_over_field(paper, start, previous, commands, world.bounds), 0, 0};
+  beside.tube_ms = milliseconds_since(begin);
+  beside.clearance_m = plan::tube_clearance(world, beside.tube);
+  return beside;
+}
+
+}  // namespace
+
+tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle& vehicle, const BoundModel& bounds,
+                                        const FlightOptions& options) {
+  for (const auto& [name, p] : {std::pair{"start", options.start_W}, std::pair{"goal", options.goal_W}}) {
+    if (auto why = obstacle_to_hover(world, name, p); !why.empty()) return refuse(why);
+  }
+  const auto column = plan::takeoff_column(world, options.start_W);
+  if (!column)
+    return refuse("start " + text(options.start_W) + " has no known floor to take off from; choose a start above one");
+
+  // Take-off: from the floor to the start, and a settling hover there.
+  Setpoint ground;
+  ground.p_W = {options.start_W.x(), options.start_W.y(), column->z_floor + vehicle.body.radius};
+  auto commands = plan::vertical_commands(ground.p_W, options.start_W, options.limits.v_max, options.limits.a_max);
+  const std::size_t risen = commands.size();
+  append(commands, hold_commands(options.start_W, options.settle_s));
+  ClosedLoop loop(world.grid, vehicle, {ground.p_W, Vec3::Zero()}, options.seed);
+  auto tube = reach::tube_over_field(world.reach, loop.estimated(), ground, commands, world.bounds);
+  if (auto why = obstacle_to_take_off(world, tube, column->z_safe); !why.empty()) return refuse(why);
+  if (options.sigma_scale != 1) tube = scaled_tube(world, tube, ground, commands, bounds, options.sigma_scale);
+  Flight flight{};
+  flight.column = *column;
+  flight.take_off = fly_piece(loop, world, {commands, tube}, 0, column->z_safe, risen, 0);
+
+  // Route: planned from the state estimated now, with the hold at the goal; its tube is propagated once, here.
+  Setpoint hover;
+  hover.p_W = options.start_W;
+  const State start = loop.estimated();
+  flight.plan = plan::plan(world, {start, hover}, options.goal_W, options.limits);
+  if (flight.plan.status != plan::PlanStatus::ok) {
+    return refuse(std::string(plan::to_string(flight.plan.status)) + ": " + flight.plan.message);
+  }
+  commands = flight.plan.commands;
+  const std::size_t arrived = commands.size();
+  append(commands, hold_commands(options.goal_W, options.hold_s));
+  const auto begin = Clock::now();
+  tube = reach::tube_over_field(world.reach, start, hover, commands, world.bounds);
+  flight.tube_ms = milliseconds_since(begin);
+  flight.planned_clearance_m = plan::tube_clearance(world, tube);
+  flight.paper = paper_beside(world, start, hover, commands);
+  if (options.sigma_scale != 1) tube = scaled_tube(world, tube, hover, commands, bounds, options.sigma_scale);
+  flight.route = fly_piece(loop, world, {commands, tube}, flight.take_off.samples.back().t, column->z_safe, arrived, 1);
+  return flight;
+}
+
+FlightSummary summarise(const Flight& flight, const plan::World& world, const Vec3& goal_W) {
+  FlightSummary s{};
+  s.clearance_m = std::numeric_limits<double>::infinity();
+  s.planned_clearance_m = flight.planned_clearance_m;
+  s.largest_ratio = Vec3::Zero();
+  for (const auto* piece : {&flight.take_off, &flight.route}) {
+    for (std::size_t k = 0; k < piece->samples.size(); ++k) {
+      const auto& judged = piece->judged[k];
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto d = static_cast<std::size_t>(axis);
+        s.largest_ratio[axis] = std::max(s.largest_ratio[axis], std::abs(judged.error[d]) / judged.half_widths[d]);
+      }
+      s.samples += 1;
+      s.inside += judged.inside ? 1 : 0;
+      s.clearance_m = std::min(s.clearance_m, piece->clearance_m[k]);
+      if (k > 0) s.length_m += (piece->samples[k].truth.p_W - piece->samples[k - 1].truth.p_W).norm();
+    }
+  }
+  const auto& last = flight.route.samples.back();
+  s.time_s = last.t;
+  s.goal_error_m = (last.truth.p_W - goal_W).norm();
+  // At the end the vehicle must be within the hover set of the goal, measured with the vehicle's own uncertainty.
+  const auto at_goal = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, goal_W);
+  const auto& h = at_goal.half_widths;
+  s.goal_reached = s.goal_error_m <= Vec3(h[kX], h[kY], h[kZ]).norm() + world.reach.vehicle.estimation.position;
+  s.touched = s.clearance_m <= 0;
+  for (const auto& step : flight.route.accepted.tube) {
+    s.tight_largest_half_axis_m =
+        std::max({s.tight_largest_half_axis_m, step.half_widths[kX], step.half_widths[kY], step.half_widths[kZ]});
+  }
+  for (const auto& step : flight.paper.tube)
+    s.paper_largest_half_axis_m = std::max(s.paper_largest_half_axis_m, step.r_max);
+  return s;
+}
+
+}  // namespace backwash::sim

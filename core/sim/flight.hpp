@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/plan/planner.hpp"
+#include "core/sim/airflow_truth.hpp"
+#include "core/sim/quadrotor.hpp"
+#include "core/sim/vio.hpp"
+#include "core/study/flight_log.hpp"
+#include "core/track/tracker.hpp"
+
+namespace backwash::sim {
+
+/// What a log row holds: the vehicle at a tick and the command it gets there.
+struct FlightSample {
+  double t;                     ///< s
+  int segment;                  ///< hover position number, −1 in transit
+  State truth;                  ///< where the vehicle really is
+  State estimated;              ///< what VIO says: feeds the controller and is judged
+  Vec3 acceleration;            ///< m/s², W, gravity removed
+  Eigen::Quaterniond attitude;  ///< body to world
+  double thrust;                ///< normalised collective command
+  Setpoint command;
+};
+
+/// Vehicle, real airflow and emulated VIO in one closed loop: commands at 50 Hz, physics at 1 kHz.
+class ClosedLoop {
+ public:
+  ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, const State& start, std::uint64_t seed);
+  const State& estimated() const noexcept { return estimated_; }
+  /// The vehicle now; `command` and `segment` are what the caller is about to fly.
+  FlightSample sample(const Setpoint& command, int segment) const;
+  /// Issues a command and moves on by one control period (20 ms).
+  void fly(const Setpoint& command);
+
+ private:
+  Quadrotor quadrotor_;
+  AirflowTruth airflow_;
+  EmulatedVio vio_;
+  State estimated_;
+};
+
+/// Commands every 20 ms on the straight line between two points, rest to rest with a minimum-jerk profile within the
+/// limits (m/s and m/s² along the line), the last one at `to`.
+std::vector<Setpoint> straight_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
+/// The same command `seconds` long.
+std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds);
+
+/// Columns of interfaces.md, "Flight log, CSV"; position, velocity and attitude as estimated on board.
+study::FlightLog to_log(const std::vector<FlightSample>& samples);
+
+struct FlightOptions {
+  Vec3 start_W, goal_W;    ///< hover points, m
+  std::uint64_t seed = 1;  ///< of the airflow and the VIO error
+  double sigma_scale = 1;  ///< judge with sets of Σ·sigma_scale: below 1 a mutant that must be caught
+  plan::PlanOptions limits;
+  double settle_s = 2;  ///< hover at the start, s
+  double hold_s = 3;    ///< hover at the goal, s
+};
+
+/// One accepted piece of the flight and what was measured on it: sample k meets entry k of the tube.
+struct FlightPiece {
+  track::AcceptedSegment accepted;    ///< the tube that it is judged with
+  std::vector<FlightSample> samples;  ///< one per entry of the tube
+  std::vector<track::Inside> judged;  ///< one per sample
+  std::vector<double> clearance_m;    ///< truth to the obstacles that count − body radius, one per sample
+};
+
+/// The paper's method on the commands that were flown, propagated beside the flight and not flown.
+struct PaperTube {
+  reach::ReachTube tube;
+  double clearance_m;  ///< of the swept tube; > 0: clear
+  double tube_ms;      ///< time to propagate it
+};
+
+/// A whole flight: vertical take-off with a settling hover, then the planned route with a hold at the goal.
+struct Flight {
+  plan::Column column;
+  plan::Plan plan;
+  FlightPiece take_off, route;
+  PaperTube paper;
+  double tube_ms;              ///< time to propagate the tight tube on the same commands
+  double planned_clearance_m;  ///< smallest clearance of the route's tube, the hold included
+};
+
+/// Why no flight took place; one line that says where and what would be right.
+struct FlightRefused {
+  std::string message;
+};
+
+/// Checks start, goal and take-off column, takes off, settles, plans from the estimated state, follows and holds: one
+/// closed-loop flight, deterministic for its options but for the planner's deadline. The vehicle waits at its set-point
+/// while the plan is made, so planning takes no simulated time.
+tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle& vehicle, const BoundModel& bounds,
+                                        const FlightOptions& options);
+
+/// The flight in figures.
+struct FlightSummary {
+  double length_m, time_s;  ///< path really flown, and the flight's duration, take-off to the end of the hold
+  double clearance_m;       ///< smallest true clearance: below z_safe lateral only
+  double planned_clearance_m;
+  Vec3 largest_ratio;  ///< largest |e|/h per axis
+  std::size_t samples, inside;
+  double goal_error_m;  ///< truth to goal at the end
+  bool goal_reached, touched;
+  double paper_largest_half_axis_m, tight_largest_half_axis_m;  ///< √λ_max of the paper; the largest axis half width
+  bool ok() const noexcept { return goal_reached && !touched && inside == samples; }
+};
+FlightSummary summarise(const Flight& flight, const plan::World& world, const Vec3& goal_W);
+
+}  // namespace backwash::sim

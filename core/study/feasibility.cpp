@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/feasibility.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <queue>
+
+#include "core/plan/planner.hpp"
+
+namespace backwash::study {
+namespace {
+
+const std::array<Index3, 6> kNeighbours = {Index3{1, 0, 0},  Index3{-1, 0, 0}, Index3{0, 1, 0},
+                                           Index3{0, -1, 0}, Index3{0, 0, 1},  Index3{0, 0, -1}};
+
+Region flood(const plan::World& world, std::size_t seed, int number, std::vector<int>& of_voxel) {
+  const auto& grid = world.grid;
+  const Vec3 half = Vec3::Constant(grid.resolution() / 2);
+  Region region;
+  region.first_voxel = seed;
+  region.low_W = region.high_W = region.widest_W = grid.center(grid.voxel(seed));
+  region.widest_clearance_m = -1;
+  std::vector<std::size_t> open = {seed};
+  of_voxel[seed] = number;
+  while (!open.empty()) {
+    const Index3 v = grid.voxel(open.back());
+    open.pop_back();
+    const Vec3 p = grid.center(v);
+    region.voxels += 1;
+    region.low_W = region.low_W.cwiseMin(p - half), region.high_W = region.high_W.cwiseMax(p + half);
+    if (world.hover.clearance(v) > region.widest_clearance_m) {
+      region.widest_clearance_m = world.hover.clearance(v);
+      region.widest_W = p;
+    }
+    for (const auto& step : kNeighbours) {
+      const Index3 next = v + step;
+      if (!world.hover.safe(next) || of_voxel[grid.linear(next)] >= 0) continue;
+      of_voxel[grid.linear(next)] = number;
+      open.push_back(grid.linear(next));
+    }
+  }
+  region.volume_m3 = static_cast<double>(region.voxels) * std::pow(grid.resolution(), 3);
+  return region;
+}
+
+/// Width of a voxel on a way: hover-safe ones by the clearance of their set, all others below every safe one.
+struct Width {
+  bool safe;
+  double metres;
+  auto operator<=>(const Width&) const = default;
+};
+
+Width width(const plan::World& world, const Index3& v) {
+  if (world.hover.safe(v)) return {true, world.hover.clearance(v)};
+  return {false, world.distance.at(v)};
+}
+
+}  // namespace
+
+Regions hover_regions(const plan::World& world) {
+  Regions found{{}, std::vector<int>(world.grid.cell_count(), -1)};
+  for (std::size_t i = 0; i < found.of_voxel.size(); ++i) {
+    if (found.of_voxel[i] >= 0 || !world.hover.safe(world.grid.voxel(i))) continue;
+    found.regions.push_back(flood(world, i, static_cast<int>(found.regions.size()), found.of_voxel));
+  }
+  std::vector<int> order(found.regions.size()), rank(order.size());
+  for (std::size_t n = 0; n < order.size(); ++n) order[n] = static_cast<int>(n);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return found.regions[static_cast<std::size_t>(a)].voxels > found.regions[static_cast<std::size_t>(b)].voxels;
+  });
+  std::vector<Region> sorted;
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    sorted.push_back(found.regions[static_cast<std::size_t>(order[n])]);
+    rank[static_cast<std::size_t>(order[n])] = static_cast<int>(n);
+  }
+  for (int& region : found.of_voxel) {
+    if (region >= 0) region = rank[static_cast<std::size_t>(region)];
+  }
+  found.regions = std::move(sorted);
+  return found;
+}
+
+std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_W, const Vec3& to_W) {
+  const auto& grid = world.grid;
+  const Index3 from = grid.index(from_W), to = grid.index(to_W);
+  if (!grid.free(from) || !grid.free(to)) return std::nullopt;
+  constexpr auto kNone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> parent(grid.cell_count(), kNone);
+  std::vector<char> closed(grid.cell_count());
+  using Entry = std::pair<Width, std::size_t>;
+  std::priority_queue<Entry> open;
+  open.push({width(world, from), grid.linear(from)});
+  parent[grid.linear(from)] = grid.linear(from);
+  const std::size_t goal = grid.linear(to);
+  while (!open.empty() && !closed[goal]) {
+    const auto [widest, i] = open.top();
+    open.pop();
+    if (closed[i]) continue;
+    closed[i] = 1;
+    for (const auto& step : kNeighbours) {
+      const Index3 next = grid.voxel(i) + step;
+      if (!grid.free(next) || parent[grid.linear(next)] != kNone) continue;
+      // The first parent popped is the widest one, so a voxel need not be pushed twice.
+      parent[grid.linear(next)] = i;
+      open.push({std::min(widest, width(world, next)), grid.linear(next)});
+    }
+  }
+  if (!closed[goal]) return std::nullopt;
+  std::size_t tightest = goal;
+  double length = 0;
+  for (std::size_t i = goal;; i = parent[i]) {
+    if (width(world, grid.voxel(i)) < width(world, grid.voxel(tightest))) tightest = i;
+    if (parent[i] == i) break;
+    length += grid.resolution();
+  }
+  const Vec3 place = grid.center(grid.voxel(tightest));
+  const auto set = reach::hover_set(world.reach, grid, world.distance, world.bounds, place, world.constant_margin);
+  return Bottleneck{world.hover.safe(grid.voxel(tightest)), place, set.clearance, world.distance.exact(grid, place),
+                    length};
+}
+
+std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions) {
+  const auto& grid = world.grid;
+  // One hover point a column: the voxel with the largest clearance of the largest region.
+  std::vector<Vec3> candidates;
+  for (int j = 0; j < grid.size().y(); ++j) {
+    for (int i = 0; i < grid.size().x(); ++i) {
+      std::optional<Index3> best;
+      for (int k = 0; k < grid.size().z(); ++k) {
+        const Index3 v(i, j, k);
+        if (regions.of_voxel[grid.linear(v)] != 0) continue;
+        if (!best || world.hover.clearance(v) > world.hover.clearance(*best)) best = v;
+      }
+      if (best && plan::takeoff_column(world, grid.center(*best))) candidates.push_back(grid.center(*best));
+    }
+  }
+  if (candidates.empty()) return std::nullopt;
+  const auto farthest = [&](const Vec3& from) {
+    return *std::max_element(candidates.begin(), candidates.end(), [&](const Vec3& a, const Vec3& b) {
+      return (a - from).squaredNorm() < (b - from).squaredNorm();
+    });
+  };
+  const Vec3 start = farthest(candidates.front());
+  return HoverPair{start, farthest(start)};
+}
+
+}  // namespace backwash::study

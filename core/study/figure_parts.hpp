@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "core/map/occupancy_grid.hpp"
+
+namespace backwash::study {
+
+/// gnuplot data blocks $occupied and $unknown with the cells between two voxels (inclusive) seen from above: a column
+/// is occupied if it is so anywhere between the heights z_low and z_high (m), else unknown if it is so anywhere. Runs
+/// along x are merged into one rectangle (x, y, x_low, x_high, y_low, y_high).
+std::string cell_blocks(const map::OccupancyGrid& grid, const Index3& first, const Index3& last, double z_low,
+                        double z_high);
+
+/// The part of a plot command that draws those blocks, a comma at its end.
+std::string plot_cells();
+
+}  // namespace backwash::study

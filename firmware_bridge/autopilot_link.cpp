@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "firmware_bridge/autopilot_link.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "firmware_bridge/mavlink/frames.hpp"
+
+namespace backwash::firmware_bridge {
+namespace {
+
+using namespace std::chrono;
+
+constexpr int kReadsPerPoll = 16;
+constexpr std::size_t kReadSize = 512;
+constexpr std::uint8_t kFlightController = 1;  // MAV_COMP_ID_AUTOPILOT1
+
+// Values of common.xml.
+constexpr std::uint8_t kTypeOnboardController = 18, kAutopilotInvalid = 8, kStateActive = 4, kMavlinkVersion = 3;
+constexpr std::uint8_t kFrameLocalNed = 1, kFrameBodyFrd = 12, kFrameLocalFrd = 20, kEstimatorVio = 3;
+constexpr std::uint16_t kIgnoreYawRate = 1 << 11;
+constexpr float kCustomModeEnabled = 1, kPx4MainModeOffboard = 6, kCopterModeGuided = 4;
+
+std::int64_t nanoseconds_of(Time t) noexcept { return duration_cast<nanoseconds>(t.time_since_epoch()).count(); }
+std::uint32_t milliseconds_of(Time t) noexcept {
+  return static_cast<std::uint32_t>(duration_cast<milliseconds>(t.time_since_epoch()).count());
+}
+
+using UpperTriangle = std::array<float, 21>;
+
+/// Upper triangle of the 6×6 diag(first, second); an absent first part marks all of it unknown, as MAVLink has it.
+UpperTriangle covariance(const std::optional<Vec3>& first, const std::optional<Vec3>& second) noexcept {
+  constexpr std::array<std::size_t, 6> kDiagonal{0, 6, 11, 15, 18, 20};
+  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+  UpperTriangle c{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    c[kDiagonal[i]] = first ? static_cast<float>((*first)(static_cast<int>(i))) : kUnknown;
+    c[kDiagonal[i + 3]] = second ? static_cast<float>((*second)(static_cast<int>(i))) : kUnknown;
+  }
+  return c;
+}
+
+/// A permutation of axes permutes variances; no sign changes them.
+std::optional<Vec3> swap_variance_ned(const std::optional<Vec3>& v) noexcept {
+  if (!v) return std::nullopt;
+  return mavlink::swap_ned(*v).cwiseAbs();
+}
+
+bool finite(const VioSample& s) noexcept {
+  const auto finite_or_absent = [](const std::optional<Vec3>& v) { return !v || v->allFinite(); };
+  return s.p_O.allFinite() && s.v_B.allFinite() && s.omega_B.allFinite() && s.q_OB.coeffs().allFinite() &&
+         finite_or_absent(s.position_variance_O) && finite_or_absent(s.attitude_variance_O) &&
+         finite_or_absent(s.velocity_variance_B);
+}
+
+}  // namespace
+
+std::string_view name(LinkFault fault) noexcept {
+  switch (fault) {
+    case LinkFault::kPortLost:
+      return "port lost";
+    case LinkFault::kNothingReceived:
+      return "nothing received";
+    case LinkFault::kNoValidFrame:
+      return "no valid frame (wrong baud rate?)";
+    case LinkFault::kHeartbeatLost:
+      return "heartbeat lost";
+    case LinkFault::kTransmitStalled:
+      return "transmit stalled";
+  }
+  return "unknown";
+}
+
+AutopilotLink::AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now)
+    : port_(std::move(port)), configured_vehicle_(vehicle), opened_at_(now) {}
+
+void AutopilotLink::reconnect(Port port, Time now) noexcept {
+  port_ = std::move(port);
+  opened_at_ = now;
+  lost_.reset();
+  parser_ = {};
+  telemetry_ = {};
+  queue_.clear();
+  heard_.reset();
+  clock_.reset();
+  timesync_asked_ns_ = 0;
+}
+
+tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {
+  std::array<std::uint8_t, kReadSize> bytes;
+  for (int i = 0; i < kReadsPerPoll && !lost_; ++i) {
+    const auto n = std::visit([&](auto& port) { return port.read(bytes); }, port_);
+    if (!n) lost_ = n.error();
+    if (!n || *n == 0) break;
+    parser_.feed(std::span(bytes).first(*n), [&](const mavlink::Frame& frame) { take_frame(frame, now); });
+  }
+  flush();
+  if (lost_) return tl::unexpected(*lost_);
+  return {};
+}
+
+void AutopilotLink::flush() noexcept {
+  if (lost_) return;
+  const auto done = queue_.flush([&](std::span<const std::uint8_t> bytes) noexcept {
+    return std::visit([&](auto& port) { return port.write(bytes); }, port_);
+  });
+  if (!done) lost_ = done.error();
+}
+
+void AutopilotLink::discard_unsent() noexcept {
+  queue_.clear();
+  std::visit([](auto& port) { port.discard_output(); }, port_);
+}
+
+void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
+  if (frame.sender.component != kFlightController) return;
+  const auto expected = heard_ ? heard_ : configured_vehicle_;
+  if (expected && frame.sender.system != *expected) return;
+  if (frame.id == mavlink::Heartbeat::kId) {
+    const auto m = mavlink::decode<mavlink::Heartbeat>(frame.payload);
+    if (m.autopilot == kAutopilotInvalid) return;
+    heard_ = frame.sender.system;
+    telemetry_.take(m, now);
+    return;
+  }
+  if (!heard_) return;
+  mavlink::decode_and_visit(frame.id, frame.payload, [&]<class Message>(const Message& m) noexcept {
+    if constexpr (std::is_same_v<Message, mavlink::Timesync>) {
+      take_timesync(m, now);
+    } else if constexpr (std::is_same_v<Message, mavlink::CommandAck>) {
+      if (for_us(m.target_system, m.target_component)) telemetry_.take(m, now);
+    } else if constexpr (requires { telemetry_.take(m, now); }) {
+      telemetry_.take(m, now);
+    }
+  });
+}
+
+/// Older senders name no target: then both ids are 0.
+bool AutopilotLink::for_us(std::uint8_t system, std::uint8_t component) const noexcept {
+  return (system == 0 || system == heard_) && (component == 0 || component == kOnboardComputer);
+}
+
+void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept {
+  if (!for_us(m.target_system, m.target_component)) return;
+  const std::int64_t now_ns = nanoseconds_of(now);
+  if (m.tc1 == 0) {
+    send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
+  } else if (m.ts1 == timesync_asked_ns_ && timesync_asked_ns_ != 0) {
+    timesync_asked_ns_ = 0;
+    const std::int64_t round_trip = now_ns - m.ts1;
+    clock_ = {ClockOffset{m.tc1 - (m.ts1 + round_trip / 2), round_trip}, now};
+  }
+}
+
+std::optional<Time::duration> AutopilotLink::heartbeat_age(Time now) const noexcept {
+  if (!telemetry_.status) return std::nullopt;
+  return now - telemetry_.status->at;
+}
+
+std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
+  if (lost_) return LinkFault::kPortLost;
+  const auto age = heartbeat_age(now);
+  if (!age && now - opened_at_ >= kFirstFrameTimeout) {
+    if (received().bytes == 0) return LinkFault::kNothingReceived;
+    return received().frames == 0 ? LinkFault::kNoValidFrame : LinkFault::kHeartbeatLost;
+  }
+  if (age && *age >= kHeartbeatTimeout) return LinkFault::kHeartbeatLost;
+  if (queue_.missed_setpoints() >= kMaxMissedSetpoints) return LinkFault::kTransmitStalled;
+  return std::nullopt;
+}
+
+template <class Message>
+bool AutopilotLink::send(const Message& message, TransmitQueue::Kind kind) noexcept {
+  if (!heard_ || lost_) return false;
+  flush();  // first, so that an older set-point that fits by now is not counted as missed
+  queue_.push(mavlink::encode_frame({*heard_, kOnboardComputer, sequence_++}, message), kind);
+  flush();
+  return !lost_;
+}
+
+bool AutopilotLink::send_setpoint(const Setpoint& s, Time now) noexcept {
+  if (!s.p_W.allFinite() || !s.v_W.allFinite() || !s.a_W.allFinite() || !std::isfinite(s.yaw)) return false;
+  const Eigen::Vector3f p = mavlink::swap_ned(s.p_W).cast<float>();
+  const Eigen::Vector3f v = mavlink::swap_ned(s.v_W).cast<float>();
+  const Eigen::Vector3f a = mavlink::swap_ned(s.a_W).cast<float>();
+  return send(mavlink::SetPositionTargetLocalNed{.time_boot_ms = milliseconds_of(now),
+                                                 .x = p.x(),
+                                                 .y = p.y(),
+                                                 .z = p.z(),
+                                                 .vx = v.x(),
+                                                 .vy = v.y(),
+                                                 .vz = v.z(),
+                                                 .afx = a.x(),
+                                                 .afy = a.y(),
+                                                 .afz = a.z(),
+                                                 .yaw = static_cast<float>(mavlink::swap_yaw(s.yaw)),
+                                                 .type_mask = kIgnoreYawRate,
+                                                 .target_system = heard_.value_or(0),
+                                                 .target_component = kFlightController,
+                                                 .coordinate_frame = kFrameLocalNed},
+              TransmitQueue::Kind::kSetpoint);
+}
+
+bool AutopilotLink::send_heartbeat() noexcept {
+  return send(mavlink::Heartbeat{.type = kTypeOnboardController,
+                                 .autopilot = kAutopilotInvalid,
+                                 .system_status = kStateActive,
+                                 .mavlink_version = kMavlinkVersion});
+}
+
+bool AutopilotLink::send_odometry(const VioSample& s) noexcept {
+  if (!finite(s)) return false;
+  const Eigen::Vector3f p = mavlink::swap_ned(s.p_O).cast<float>();
+  const Eigen::Quaternionf q = mavlink::swap_ned_frd(s.q_OB).cast<float>();
+  const Eigen::Vector3f v = mavlink::swap_frd(s.v_B).cast<float>();
+  const Eigen::Vector3f w = mavlink::swap_frd(s.omega_B).cast<float>();
+  return send(mavlink::Odometry{
+      .time_usec = s.time_us,
+      .x = p.x(),
+      .y = p.y(),
+      .z = p.z(),
+      .q = {q.w(), q.x(), q.y(), q.z()},
+      .vx = v.x(),
+      .vy = v.y(),
+      .vz = v.z(),
+      .rollspeed = w.x(),
+      .pitchspeed = w.y(),
+      .yawspeed = w.z(),
+      .pose_covariance = covariance(swap_variance_ned(s.position_variance_O), swap_variance_ned(s.attitude_variance_O)),
+      .velocity_covariance = covariance(s.velocity_variance_B, std::nullopt),
+      .frame_id = kFrameLocalFrd,
+      .child_frame_id = kFrameBodyFrd,
+      .reset_counter = s.reset_counter,
+      .estimator_type = kEstimatorVio});
+}
+
+bool AutopilotLink::send_statustext(std::uint8_t severity, std::string_view text) noexcept {
+  mavlink::Statustext m{.severity = severity};
+  std::ranges::copy(text.substr(0, m.text.size()), m.text.begin());
+  return send(m);
+}
+
+bool AutopilotLink::send_timesync(Time now) noexcept {
+  timesync_asked_ns_ = nanoseconds_of(now);
+  return send(mavlink::Timesync{0, timesync_asked_ns_, heard_.value_or(0), kFlightController});
+}
+
+bool AutopilotLink::send_command(std::uint16_t command, const std::array<float, 7>& p) noexcept {
+  for (const float value : p) {
+    if (!std::isfinite(value)) return false;
+  }
+  return send(mavlink::CommandLong{p[0], p[1], p[2], p[3], p[4], p[5], p[6], command, heard_.value_or(0),
+                                   kFlightController, 0});
+}
+
+bool AutopilotLink::send_arm(bool arm) noexcept { return send_command(kCommandArm, {arm ? 1.0F : 0.0F}); }
+
+bool AutopilotLink::send_follow_setpoints() noexcept {
+  if (!telemetry_.status) return false;
+  switch (telemetry_.status->value.autopilot) {
+    case Autopilot::kPx4:
+      return send_command(kCommandSetMode, {kCustomModeEnabled, kPx4MainModeOffboard});
+    case Autopilot::kArduPilot:
+      return send_command(kCommandSetMode, {kCustomModeEnabled, kCopterModeGuided});
+    case Autopilot::kUnknown:
+      return false;
+  }
+  return false;
+}
+
+bool AutopilotLink::send_land() noexcept { return send_command(kCommandLand, {}); }
+
+bool AutopilotLink::send_message_interval(std::uint32_t message_id, double rate_hz) noexcept {
+  if (!(rate_hz > 0)) return false;
+  return send_command(kCommandInterval, {static_cast<float>(message_id), static_cast<float>(1e6 / rate_hz)});
+}
+
+}  // namespace backwash::firmware_bridge

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <chrono>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "firmware_bridge/serial_port.hpp"
+#include "firmware_bridge/telemetry.hpp"
+#include "firmware_bridge/transmit_queue.hpp"
+#include "firmware_bridge/udp_port.hpp"
+
+namespace backwash::firmware_bridge {
+
+using Port = std::variant<SerialPort, UdpPort>;
+
+inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< faults.md row 21
+inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);         ///< faults.md row 19
+inline constexpr int kMaxMissedSetpoints = 2;                               ///< faults.md row 20
+inline constexpr std::uint8_t kOnboardComputer = 191;                       ///< our component id
+
+/// Commands that the link sends (MAV_CMD), to ask telemetry().result_of() for their answers.
+inline constexpr std::uint16_t kCommandLand = 21, kCommandSetMode = 176, kCommandArm = 400, kCommandInterval = 511;
+
+/// What is wrong with the link, the gravest first.
+enum class LinkFault : std::uint8_t {
+  kPortLost,         ///< row 17: unplugged; reconnect() with a new port
+  kNothingReceived,  ///< row 19: not one byte within 2 s: cable, or the controller is off
+  kNoValidFrame,     ///< row 19: bytes, but no frame within 2 s: wrong baud rate or no MAVLink
+  kHeartbeatLost,    ///< row 21: none from the flight controller for 1.5 s
+  kTransmitStalled,  ///< row 20: two set-points in a row did not get out
+};
+std::string_view name(LinkFault fault) noexcept;
+
+/// Clock of the flight controller against ours, from TIMESYNC.
+struct ClockOffset {
+  std::int64_t offset_ns = 0;      ///< controller's time − our monotonic time
+  std::int64_t round_trip_ns = 0;  ///< of the exchange; the offset is good to half of it
+};
+
+/// A VIO sample to be forwarded. The VIO's frame O is z-up; sending it as one frame with the controller's local frame L
+/// means that a controller that follows it in position and yaw has L = O.
+struct VioSample {
+  std::uint64_t time_us = 0;                                     ///< monotonic
+  Vec3 p_O;                                                      ///< m
+  Eigen::Quaterniond q_OB;                                       ///< body FLU to O
+  Vec3 v_B;                                                      ///< velocity of the body, in body FLU, m/s
+  Vec3 omega_B;                                                  ///< rad/s, FLU
+  std::optional<Vec3> position_variance_O, attitude_variance_O;  ///< per axis of O, m², rad²
+  std::optional<Vec3> velocity_variance_B;                       ///< per axis of B, (m/s)²
+  std::uint8_t reset_counter = 0;                                ///< counts jumps of O, as loop closures make them
+};
+
+/// The MAVLink connection to one flight controller. Owned and called by the control thread alone: one thread sends both
+/// set-points and heartbeat, so that both stop when it does.
+///
+/// Nothing is sent before the vehicle's heartbeat is heard, nor of itself: each frame has a caller, but for answers to
+/// TIMESYNC. Frames of other systems and components are not acted upon. Every function but the constructor is
+/// real-time: non-blocking system calls only, no allocation.
+class AutopilotLink {
+ public:
+  /// `vehicle`: its system id; absent: that of the first flight controller heard.
+  AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now);
+
+  /// Takes a newly opened port after a loss. All that was known of the vehicle is forgotten; nothing waits to be sent.
+  void reconnect(Port port, Time now) noexcept;
+
+  /// Reads what has arrived (at most 8 KiB), then sends what waits. Error: kLost, also on every later call.
+  tl::expected<void, PortError> poll(Time now) noexcept;
+
+  const Telemetry& telemetry() const noexcept { return telemetry_; }
+  const std::optional<Received<ClockOffset>>& clock() const noexcept { return clock_; }
+  /// System id of the vehicle once its heartbeat was heard.
+  std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
+  /// Time since the vehicle's last heartbeat; absent: there was none.
+  std::optional<Time::duration> heartbeat_age(Time now) const noexcept;
+  /// The gravest fault now; absent: none, or still within the first two seconds.
+  std::optional<LinkFault> fault(Time now) const noexcept;
+  const mavlink::ParserCounters& received() const noexcept { return parser_.counters(); }
+  const TransmitQueue& transmit() const noexcept { return queue_; }
+
+  /// Each of these encodes one frame and hands it to the port, or keeps it for poll(). False: refused, because no
+  /// vehicle is known, the port is lost, or a value is not finite.
+  ///
+  /// Set-point in the controller's local frame L, z-up (p_W stands for p_L and so on): position, velocity,
+  /// acceleration and yaw; the yaw rate is left to the controller.
+  bool send_setpoint(const Setpoint& setpoint_L, Time now) noexcept;
+  bool send_heartbeat() noexcept;
+  bool send_odometry(const VioSample& sample) noexcept;
+  /// At most 50 characters are sent. Severity as syslog.
+  bool send_statustext(std::uint8_t severity, std::string_view text) noexcept;
+  bool send_timesync(Time now) noexcept;
+  /// COMMAND_LONG to the flight controller.
+  bool send_command(std::uint16_t command, const std::array<float, 7>& parameters) noexcept;
+  bool send_arm(bool arm) noexcept;
+  /// PX4's offboard or ArduPilot's guided mode; false also when the autopilot is neither.
+  bool send_follow_setpoints() noexcept;
+  /// The autopilot's own landing.
+  bool send_land() noexcept;
+  /// Asks for a message at `rate_hz` > 0.
+  bool send_message_interval(std::uint32_t message_id, double rate_hz) noexcept;
+
+  /// Forgets what waits to be sent, here and in the kernel: QUIET means that not even an old set-point follows.
+  void discard_unsent() noexcept;
+
+ private:
+  template <class Message>
+  bool send(const Message& message, TransmitQueue::Kind kind = TransmitQueue::Kind::kOther) noexcept;
+  void flush() noexcept;
+  void take_frame(const mavlink::Frame& frame, Time now) noexcept;
+  void take_timesync(const mavlink::Timesync& m, Time now) noexcept;
+  bool for_us(std::uint8_t system, std::uint8_t component) const noexcept;
+
+  Port port_;
+  std::optional<std::uint8_t> configured_vehicle_;
+  Time opened_at_;
+  std::optional<PortError> lost_;
+  mavlink::Parser parser_;
+  Telemetry telemetry_;
+  TransmitQueue queue_;
+  std::optional<std::uint8_t> heard_;
+  std::optional<Received<ClockOffset>> clock_;
+  std::int64_t timesync_asked_ns_ = 0;
+  std::uint8_t sequence_ = 0;
+};
+
+}  // namespace backwash::firmware_bridge

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace backwash::firmware_bridge {
+
+/// Why a port could not be opened or used.
+struct PortError {
+  enum class Kind {
+    kOpen,       ///< the path or socket could not be opened
+    kBusy,       ///< another program holds the serial port
+    kNotSerial,  ///< the path is not a terminal device
+    kBaudRate,   ///< not a rate that termios knows
+    kConfigure,  ///< the device refused its settings
+    kAddress,    ///< not a numeric IPv4 address
+    kLost,       ///< unplugged, hung up, or a failing device; open it again
+  };
+  Kind kind;
+  int system_error = 0;  ///< errno; 0 where there is none (hang-up)
+};
+
+/// One line for the operator. Not real-time.
+std::string describe(const PortError& error);
+
+/// Owns a file descriptor.
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int fd = -1) noexcept : fd_(fd) {}
+  FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+  ~FileDescriptor();
+  int get() const noexcept { return fd_; }
+
+ private:
+  int fd_;
+};
+
+}  // namespace backwash::firmware_bridge

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "firmware_bridge/telemetry.hpp"
+
+#include "firmware_bridge/mavlink/frames.hpp"
+
+namespace backwash::firmware_bridge {
+namespace {
+
+// Values of common.xml and of the autopilots' own mode numbers.
+constexpr std::uint8_t kAutopilotArduPilot = 3, kAutopilotPx4 = 12;
+constexpr std::uint8_t kCustomModeEnabled = 1, kSafetyArmed = 128;
+constexpr std::uint32_t kPx4MainModeOffboard = 6, kCopterModeGuided = 4;
+constexpr std::uint16_t kNoCell = 65535, kNoVoltage = 65535;
+
+Autopilot autopilot_of(std::uint8_t number) noexcept {
+  if (number == kAutopilotPx4) return Autopilot::kPx4;
+  return number == kAutopilotArduPilot ? Autopilot::kArduPilot : Autopilot::kUnknown;
+}
+
+bool follows_setpoints(const mavlink::Heartbeat& m) noexcept {
+  if ((m.base_mode & kCustomModeEnabled) == 0) return false;
+  switch (autopilot_of(m.autopilot)) {
+    case Autopilot::kPx4:
+      return (m.custom_mode >> 16 & 0xFF) == kPx4MainModeOffboard;
+    case Autopilot::kArduPilot:
+      return m.custom_mode == kCopterModeGuided;
+    case Autopilot::kUnknown:
+      return false;
+  }
+  return false;
+}
+
+std::optional<double> share(std::int8_t percent) noexcept {
+  if (percent < 0 || percent > 100) return std::nullopt;
+  return percent / 100.0;
+}
+
+}  // namespace
+
+void Telemetry::take(const mavlink::Heartbeat& m, Time now) noexcept {
+  const VehicleStatus s{autopilot_of(m.autopilot), (m.base_mode & kSafetyArmed) != 0, follows_setpoints(m),
+                        m.custom_mode, m.system_status};
+  status = {s, now};
+}
+
+bool Telemetry::in_order(std::optional<std::uint32_t>& last_ms, std::uint32_t now_ms) noexcept {
+  // A clock more than a second back is a restarted controller, not a late packet.
+  const auto ahead = last_ms ? static_cast<std::int32_t>(now_ms - *last_ms) : 0;
+  if (ahead < 0 && ahead > -1000) {
+    ++out_of_order;
+    return false;
+  }
+  last_ms = now_ms;
+  return true;
+}
+
+void Telemetry::take(const mavlink::LocalPositionNed& m, Time now) noexcept {
+  const State s{mavlink::swap_ned({m.x, m.y, m.z}), mavlink::swap_ned({m.vx, m.vy, m.vz})};
+  if (!s.p_W.allFinite() || !s.v_W.allFinite()) {
+    ++broken;
+    return;
+  }
+  if (in_order(position_ms_, m.time_boot_ms)) local_state = {s, now};
+}
+
+void Telemetry::take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
+                              Time now) noexcept {
+  const double norm = q_NF.norm();
+  if (!(std::abs(norm - 1) < 0.01) || !omega_F.allFinite()) {
+    ++broken;
+    return;
+  }
+  const VehicleAttitude a{mavlink::swap_ned_frd(q_NF.normalized()), mavlink::swap_frd(omega_F)};
+  if (in_order(attitude_ms_, time_boot_ms)) attitude = {a, now};
+}
+
+void Telemetry::take(const mavlink::AttitudeQuaternion& m, Time now) noexcept {
+  take_attitude({m.q1, m.q2, m.q3, m.q4}, {m.rollspeed, m.pitchspeed, m.yawspeed}, m.time_boot_ms, now);
+}
+
+void Telemetry::take(const mavlink::Attitude& m, Time now) noexcept {
+  const Eigen::Quaterniond q_NF = Eigen::AngleAxisd(m.yaw, Vec3::UnitZ()) * Eigen::AngleAxisd(m.pitch, Vec3::UnitY()) *
+                                  Eigen::AngleAxisd(m.roll, Vec3::UnitX());
+  take_attitude(q_NF, {m.rollspeed, m.pitchspeed, m.yawspeed}, m.time_boot_ms, now);
+}
+
+void Telemetry::take(const mavlink::Odometry& m, Time now) noexcept { reset_counter = {m.reset_counter, now}; }
+
+void Telemetry::take_imu(const Vec3& force_F, const Vec3& omega_F, Time now) noexcept {
+  if (!force_F.allFinite() || !omega_F.allFinite()) {
+    ++broken;
+    return;
+  }
+  imu = {Imu{mavlink::swap_frd(force_F), mavlink::swap_frd(omega_F)}, now};
+}
+
+void Telemetry::take(const mavlink::HighresImu& m, Time now) noexcept {
+  take_imu({m.xacc, m.yacc, m.zacc}, {m.xgyro, m.ygyro, m.zgyro}, now);
+}
+
+void Telemetry::take(const mavlink::ScaledImu2& m, Time now) noexcept {
+  const Vec3 force_mG(m.xacc, m.yacc, m.zacc), omega_mrad(m.xgyro, m.ygyro, m.zgyro);
+  take_imu(force_mG * (kGravity / 1000), omega_mrad / 1000, now);
+}
+
+void Telemetry::take(const mavlink::BatteryStatus& m, Time now) noexcept {
+  if (m.id != 0) return;
+  battery_status_seen_ = true;
+  Battery b{std::nullopt, share(m.battery_remaining)};
+  double millivolts = 0;
+  for (const auto cell : m.voltages) millivolts += cell == kNoCell ? 0 : cell;
+  for (const auto cell : m.voltages_ext) millivolts += cell == kNoCell ? 0 : cell;
+  if (millivolts > 0) b.voltage = millivolts / 1000;
+  battery = {b, now};
+}
+
+void Telemetry::take(const mavlink::SysStatus& m, Time now) noexcept {
+  if (battery_status_seen_) return;
+  Battery b{std::nullopt, share(m.battery_remaining)};
+  if (m.voltage_battery != kNoVoltage && m.voltage_battery != 0) b.voltage = m.voltage_battery / 1000.0;
+  if (b.voltage || b.remaining) battery = {b, now};
+}
+
+void Telemetry::take(const mavlink::ExtendedSysState& m, Time now) noexcept {
+  if (m.landed_state > static_cast<std::uint8_t>(LandedState::kLanding)) {
+    ++broken;
+    return;
+  }
+  landed_state = {static_cast<LandedState>(m.landed_state), now};
+}
+
+void Telemetry::take(const mavlink::CommandAck& m, Time now) noexcept {
+  const Received<CommandResult> answer{{m.command, m.result}, now};
+  for (auto& r : results_) {
+    if (r && r->value.command == m.command) {
+      r = answer;
+      return;
+    }
+  }
+  results_[next_result_] = answer;
+  next_result_ = (next_result_ + 1) % results_.size();
+}
+
+Latest<CommandResult> Telemetry::result_of(std::uint16_t command) const noexcept {
+  for (const auto& r : results_) {
+    if (r && r->value.command == command) return r;
+  }
+  return std::nullopt;
+}
+
+void Telemetry::take(const mavlink::Statustext& m, Time now) noexcept {
+  StatusLine line{m.severity, {}};
+  std::ranges::copy(m.text, line.text.begin());
+  text = {line, now};
+}
+
+}  // namespace backwash::firmware_bridge

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <chrono>
+#include <optional>
+
+#include "core/types/state.hpp"
+#include "firmware_bridge/mavlink/messages.hpp"
+
+namespace backwash::firmware_bridge {
+
+/// Monotonic time; the caller passes it in, so that tests can count it in ticks.
+using Time = std::chrono::steady_clock::time_point;
+
+/// A value and when it arrived here.
+template <class T>
+struct Received {
+  T value;
+  Time at;
+};
+template <class T>
+using Latest = std::optional<Received<T>>;
+
+enum class Autopilot : std::uint8_t { kUnknown, kArduPilot, kPx4 };
+
+/// From HEARTBEAT.
+struct VehicleStatus {
+  Autopilot autopilot = Autopilot::kUnknown;
+  bool armed = false;
+  bool follows_setpoints = false;  ///< PX4's offboard or ArduPilot's guided mode
+  std::uint32_t custom_mode = 0;
+  std::uint8_t system_status = 0;  ///< MAV_STATE: 3 standby, 4 active, 5 critical (a failsafe acts), 6 emergency
+};
+
+/// From ATTITUDE_QUATERNION or ATTITUDE.
+struct VehicleAttitude {
+  Eigen::Quaterniond q_LB;  ///< body FLU to the controller's local frame L, z-up
+  Vec3 omega_B;             ///< rad/s, FLU
+};
+
+/// From HIGHRES_IMU or SCALED_IMU2.
+struct Imu {
+  Vec3 specific_force_B;  ///< acceleration without gravity's pull (+g e_z at rest), m/s², FLU
+  Vec3 omega_B;           ///< rad/s, FLU
+};
+
+/// From BATTERY_STATUS of battery 0; from SYS_STATUS where the controller sends none.
+struct Battery {
+  std::optional<double> voltage;    ///< V
+  std::optional<double> remaining;  ///< 0…1
+};
+
+/// From EXTENDED_SYS_STATE.
+enum class LandedState : std::uint8_t { kUndefined, kOnGround, kInAir, kTakingOff, kLanding };
+
+/// From COMMAND_ACK.
+struct CommandResult {
+  std::uint16_t command = 0;  ///< MAV_CMD
+  std::uint8_t result = 0;    ///< MAV_RESULT, 0 = accepted
+};
+
+/// From STATUSTEXT.
+struct StatusLine {
+  std::uint8_t severity = 0;    ///< 0 emergency … 7 debug
+  std::array<char, 51> text{};  ///< zero-terminated
+};
+
+/// The newest of everything that the flight controller said, converted to z-up and FLU. What never came is absent; what
+/// came broken (not finite, no unit quaternion) or after its successor is dropped and counted.
+/// Real-time: take() is wait-free, no allocation.
+class Telemetry {
+ public:
+  Latest<VehicleStatus> status;
+  Latest<State> local_state;  ///< in the controller's own local frame L, z-up (p_W, v_W stand for p_L, v_L)
+  Latest<VehicleAttitude> attitude;
+  Latest<std::uint8_t> reset_counter;  ///< of the controller's estimator, from ODOMETRY; a change: L has moved
+  Latest<Imu> imu;
+  Latest<Battery> battery;
+  Latest<LandedState> landed_state;
+  Latest<StatusLine> text;
+  std::uint64_t broken = 0;        ///< messages with values that cannot be
+  std::uint64_t out_of_order = 0;  ///< messages older than their predecessor
+
+  /// Newest answer to this command, if any came since the start.
+  Latest<CommandResult> result_of(std::uint16_t command) const noexcept;
+
+  void take(const mavlink::Heartbeat& m, Time now) noexcept;
+  void take(const mavlink::LocalPositionNed& m, Time now) noexcept;
+  void take(const mavlink::AttitudeQuaternion& m, Time now) noexcept;
+  void take(const mavlink::Attitude& m, Time now) noexcept;
+  void take(const mavlink::Odometry& m, Time now) noexcept;
+  void take(const mavlink::HighresImu& m, Time now) noexcept;
+  void take(const mavlink::ScaledImu2& m, Time now) noexcept;
+  void take(const mavlink::BatteryStatus& m, Time now) noexcept;
+  void take(const mavlink::SysStatus& m, Time now) noexcept;
+  void take(const mavlink::ExtendedSysState& m, Time now) noexcept;
+  void take(const mavlink::CommandAck& m, Time now) noexcept;
+  void take(const mavlink::Statustext& m, Time now) noexcept;
+
+ private:
+  void take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
+                     Time now) noexcept;
+  void take_imu(const Vec3& force_F, const Vec3& omega_F, Time now) noexcept;
+  bool in_order(std::optional<std::uint32_t>& last_ms, std::uint32_t now_ms) noexcept;
+
+  std::optional<std::uint32_t> position_ms_, attitude_ms_;  // sender's clock
+  bool battery_status_seen_ = false;
+  std::array<Latest<CommandResult>, 8> results_;
+  std::size_t next_result_ = 0;
+};
+
+}  // namespace backwash::firmware_bridge

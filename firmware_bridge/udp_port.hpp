@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "firmware_bridge/port.hpp"
+
+namespace backwash::firmware_bridge {
+
+/// A UDP socket with one peer, non-blocking. The peer is given, or is the first that sends anything; nobody else is
+/// heard after that. For simulators and bench set-ups: UDP itself does not authenticate anyone.
+class UdpPort {
+ public:
+  struct Endpoint {
+    std::string address;  ///< numeric IPv4
+    std::uint16_t port = 0;
+  };
+
+  /// Binds to `local` (port 0: any free one). Errors: kAddress, kOpen. Not real-time.
+  static tl::expected<UdpPort, PortError> open(const Endpoint& local, const std::optional<Endpoint>& peer);
+
+  /// One datagram (its excess over `into` is lost), 0 bytes when there is none. Error: kLost. Real-time: at most two
+  /// non-blocking system calls, no allocation.
+  tl::expected<std::size_t, PortError> read(std::span<std::uint8_t> into) noexcept;
+
+  /// All bytes as one datagram, or 0 when the kernel's buffer is full or no peer is known. Error: kLost. Real-time: one
+  /// non-blocking system call, no allocation.
+  tl::expected<std::size_t, PortError> write(std::span<const std::uint8_t> bytes) noexcept;
+
+  /// Does nothing: a datagram that was written has left.
+  void discard_output() noexcept {}
+
+  /// The port that open() bound to.
+  std::uint16_t local_port() const noexcept { return local_port_; }
+
+ private:
+  UdpPort(FileDescriptor fd, std::uint16_t local_port, bool has_peer) noexcept
+      : fd_(std::move(fd)), local_port_(local_port), has_peer_(has_peer) {}
+  FileDescriptor fd_;
+  std::uint16_t local_port_;
+  bool has_peer_;
+};
+
+}  // namespace backwash::firmware_bridge

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/feasibility.hpp"
+
+#include <cstdio>
+
+#include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct Options {
+  std::string map, model, vehicle, method = "tight";
+  std::optional<Vec3> start, goal;
+  std::optional<double> margin;
+  bool json = false;
+};
+
+/// The question about one way: its ends' regions and its tightest place.
+struct Way {
+  int start_region, goal_region;
+  std::optional<study::Bottleneck> bottleneck;
+};
+
+int region_of(const plan::World& world, const study::Regions& regions, const Vec3& p) {
+  const auto v = world.grid.index(p);
+  return world.grid.inside(v) ? regions.of_voxel[world.grid.linear(v)] : -1;
+}
+
+Json to_json(const study::Region& r, const plan::World&) {
+  return {{"voxels", r.voxels},
+          {"volume_m3", r.volume_m3},
+          {"low", services::to_json(r.low_W)},
+          {"high", services::to_json(r.high_W)},
+          {"widest", {{"p", services::to_json(r.widest_W)}, {"clearance_m", r.widest_clearance_m}}}};
+}
+
+void print_json(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way) {
+  Json list = Json::array();
+  std::size_t voxels = 0;
+  for (const auto& region : regions.regions) {
+    list.push_back(to_json(region, world));
+    voxels += region.voxels;
+  }
+  Json json = {{"resolution_m", world.grid.resolution()}, {"hover_safe_voxels", voxels}, {"regions", std::move(list)}};
+  if (way) {
+    Json entry = {{"start_region", way->start_region < 0 ? Json() : Json(way->start_region)},
+                  {"goal_region", way->goal_region < 0 ? Json() : Json(way->goal_region)},
+                  {"connected", way->start_region >= 0 && way->start_region == way->goal_region}};
+    entry["bottleneck"] = nullptr;
+    if (way->bottleneck) {
+      const auto& b = *way->bottleneck;
+      entry["bottleneck"] = {{"p", services::to_json(b.place_W)},
+                             {"hover_safe", b.passable},
+                             {"clearance_m", b.clearance_m},
+                             {"free_distance_m", b.free_distance_m},
+                             {"way_length_m", b.length_m}};
+    }
+    json["way"] = std::move(entry);
+  }
+  print(json);
+}
+
+void print_text(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way) {
+  std::printf("%zu hover-safe regions, voxels of %.3f m\n", regions.regions.size(), world.grid.resolution());
+  constexpr std::size_t kShown = 10;
+  for (std::size_t n = 0; n < std::min(kShown, regions.regions.size()); ++n) {
+    const auto& r = regions.regions[n];
+    std::printf("%3zu: %8zu voxels %9.3f m3, from %s to %s, widest at %s: %.3f m to spare\n", n, r.voxels, r.volume_m3,
+                to_text(r.low_W).c_str(), to_text(r.high_W).c_str(), to_text(r.widest_W).c_str(), r.widest_clearance_m);
+  }
+  if (regions.regions.size() > kShown) std::printf("     and %zu smaller ones\n", regions.regions.size() - kShown);
+  if (!way) return;
+  const auto name = [](int region) {
+    return region < 0 ? std::string("no region") : "region " + std::to_string(region);
+  };
+  std::printf("start in %s, goal in %s: %s\n", name(way->start_region).c_str(), name(way->goal_region).c_str(),
+              way->start_region >= 0 && way->start_region == way->goal_region ? "connected" : "not connected");
+  if (!way->bottleneck) {
+    std::printf("no way through free voxels\n");
+    return;
+  }
+  const auto& b = *way->bottleneck;
+  std::printf("tightest place of the widest way (%.1f m): %s, %.3f m to the nearest obstacle, %s\n", b.length_m,
+              to_text(b.place_W).c_str(), b.free_distance_m,
+              b.passable ? (to_text(b.clearance_m, 3) + " m to spare").c_str() : "too tight for body and hover set");
+}
+
+int run(const Options& options) {
+  if (options.start.has_value() != options.goal.has_value())
+    throw Failure(kUsage, "give both --start and --goal, or neither");
+  const auto vehicle = read_vehicle(options.vehicle);
+  const auto model = read_model(options.model);
+  auto grid = read_map(options.map);
+  progress("building the world");
+  const auto world = plan::build_world(std::move(grid), model, vehicle, read_method(options.method),
+                                       options.margin.value_or(-1), run_parallel);
+  const auto regions = study::hover_regions(*world);
+  std::optional<Way> way;
+  if (options.start) {
+    way = Way{region_of(*world, regions, *options.start), region_of(*world, regions, *options.goal),
+              study::widest_way(*world, *options.start, *options.goal)};
+  }
+  options.json ? print_json(*world, regions, way) : print_text(*world, regions, way);
+  return kOk;
+}
+
+}  // namespace
+
+Verb feasibility_verb(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand("feasibility", "Where a vehicle can hover safely, and where a way is too tight");
+  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
+  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
+  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
+  command->add_option("--method", options->method, "tight: exact supports; paper: ellipsoids")
+      ->check(CLI::IsMember({"tight", "paper"}));
+  command->add_option("--margin", options->margin, "constant margin in place of the sets, m")
+      ->check(CLI::NonNegativeNumber);
+  add_point(*command, "--start", options->start, "one end of a way, m");
+  add_point(*command, "--goal", options->goal, "its other end, m");
+  command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->footer(
+      "Example:\n  backwash feasibility --map builtin:apartment --model builtin:quad-5in --vehicle builtin:quad-5in "
+      "\\\n"
+      "    --start 4,2,1.2 --goal 8,2,1.2");
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

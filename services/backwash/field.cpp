@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+
+#include "core/field/disturbance_field.hpp"
+#include "core/study/figures.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct Options {
+  std::string map, model, vehicle, points, slice, out;
+  std::optional<Vec3> at;
+  bool interpolated = false, json = false, force = false;
+};
+
+/// Σ at a point; parts only where it was evaluated exactly, nothing where no stored voxel is near.
+struct Value {
+  Vec3 p_W;
+  std::optional<Variance> sigma;
+  std::optional<field::Breakdown> parts;
+};
+
+std::vector<Vec3> read_points(const std::string& path) {
+  const auto table = read_table(path, "");
+  for (const char* name : {"x_m", "y_m", "z_m"}) {
+    if (!table.has(name)) throw Failure(kBadData, path + ":1: no column '" + name + "'; the columns are x_m,y_m,z_m");
+  }
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < table.column("x_m").size(); ++i) {
+    points.emplace_back(table.column("x_m")[i], table.column("y_m")[i], table.column("z_m")[i]);
+  }
+  return points;
+}
+
+study::Slice read_slice(const std::string& text) {
+  char axis = 0, rest = 0;
+  study::Slice slice{};
+  if (std::sscanf(text.c_str(), "%c=%lf%c", &axis, &slice.coordinate, &rest) != 2 || axis < 'x' || axis > 'z') {
+    throw Failure(kUsage, "--slice: '" + text + "' must be x=, y= or z= and a number in metres, as in z=0.5");
+  }
+  slice.axis = axis - 'x';
+  return slice;
+}
+
+/// Centres of the free voxels that a slice cuts, moved into its plane.
+std::vector<Vec3> slice_points(const map::OccupancyGrid& grid, const study::Slice& slice) {
+  Vec3 on_plane = grid.origin();
+  on_plane[slice.axis] = slice.coordinate;
+  const int layer = grid.index(on_plane)[slice.axis];
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < grid.cell_count(); ++i) {
+    const Index3 v = grid.voxel(i);
+    if (v[slice.axis] != layer || !grid.free(v)) continue;
+    points.push_back(grid.center(v));
+    points.back()[slice.axis] = slice.coordinate;
+  }
+  return points;
+}
+
+/// The eight voxels around a point whose centres trilinear interpolation uses.
+std::vector<Index3> corners(const map::OccupancyGrid& grid, const Vec3& p) {
+  const Index3 low = grid.index(p - Vec3::Constant(0.5 * grid.resolution()));
+  std::vector<Index3> around;
+  for (int n = 0; n < 8; ++n) around.push_back(low + Index3(n & 1, n >> 1 & 1, n >> 2 & 1));
+  return around;
+}
+
+std::vector<Value> interpolated(const field::ProximityField& exact, const std::vector<Vec3>& points) {
+  const auto& grid = exact.grid();
+  std::vector<char> wanted(grid.cell_count());
+  for (const auto& p : points) {
+    for (const auto& v : corners(grid, p)) {
+      if (grid.free(v)) wanted[grid.linear(v)] = 1;
+    }
+  }
+  std::vector<std::size_t> voxels;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (wanted[i]) voxels.push_back(i);
+  }
+  field::DisturbanceField stored(grid);
+  run_parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
+    stored.fill(exact, std::span(voxels).subspan(begin, end - begin));
+  });
+  std::vector<Value> values;
+  for (const auto& p : points) {
+    values.push_back({p, std::nullopt, std::nullopt});
+    for (const auto& v : corners(grid, p)) {
+      if (stored.has(v)) values.back().sigma = stored.interpolated(p, Variance{});
+    }
+  }
+  return values;
+}
+
+std::vector<Value> evaluated(const field::ProximityField& exact, const std::vector<Vec3>& points) {
+  std::vector<Value> values(points.size());
+  run_parallel(points.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto parts = exact.at(points[i]);
+      values[i] = {points[i], parts.sigma(), parts};
+    }
+  });
+  return values;
+}
+
+void print_json(const std::vector<Value>& values) {
+  Json points = Json::array();
+  for (const auto& value : values) {
+    Json entry = {{"p", to_json(value.p_W)}, {"sigma", value.sigma ? to_json(*value.sigma) : Json()}};
+    if (value.parts) {
+      entry["ground"] = to_json(value.parts->ground);
+      entry["corner"] = to_json(value.parts->corner);
+      entry["wall"] = to_json(value.parts->wall);
+      entry["base"] = to_json(value.parts->base);
+    }
+    points.push_back(std::move(entry));
+  }
+  print(Json{{"points", std::move(points)}});
+}
+
+void print_table(const std::vector<Value>& values) {
+  std::printf("%9s %9s %9s  %10s %10s %10s %10s %10s %10s   variance in (m/s2)2\n", "x_m", "y_m", "z_m", "xx", "xy",
+              "xz", "yy", "yz", "zz");
+  for (const auto& value : values) {
+    const auto& p = value.p_W;
+    std::printf("%9.3f %9.3f %9.3f  ", p.x(), p.y(), p.z());
+    if (!value.sigma) {
+      std::printf("no free voxel around this point\n");
+      continue;
+    }
+    const auto& s = *value.sigma;
+    std::printf("%10.6f %10.6f %10.6f %10.6f %10.6f %10.6f\n", s.xx, s.xy, s.xz, s.yy, s.yz, s.zz);
+  }
+}
+
+void write_picture(const Options& options, const map::OccupancyGrid& grid, const study::Slice& slice,
+                   const std::vector<Value>& values) {
+  std::vector<study::FieldSample> samples;
+  for (const auto& value : values) {
+    if (value.sigma) samples.push_back({value.p_W, *value.sigma});
+  }
+  const auto format = options.out.ends_with(".png") ? study::Format::png : study::Format::svg;
+  const auto picture = study::field_slice_figure(grid, slice, samples, format);
+  if (!picture) throw Failure(kUnavailable, options.out + ":1: " + picture.error().message);
+  write_file(options.out, *picture, options.force);
+}
+
+int run(const Options& options) {
+  if (options.points.empty() + options.slice.empty() + !options.at != 2) {
+    throw Failure(kUsage, "give exactly one of --points, --slice and --at");
+  }
+  if (!options.out.empty() && options.slice.empty()) throw Failure(kUsage, "--out is a picture of a --slice; give one");
+  refuse_to_overwrite(options.out, options.force);
+  std::optional<study::Slice> slice;
+  if (!options.slice.empty()) slice = read_slice(options.slice);
+  const auto grid = read_map(options.map);
+  auto model = read_model(options.model);
+  if (!options.vehicle.empty()) model.ground.r0 = read_vehicle(options.vehicle).body.diagonal_radius;
+
+  std::vector<Vec3> points;
+  if (options.at) points = {*options.at};
+  if (!options.points.empty()) points = read_points(options.points);
+  if (slice) points = slice_points(grid, *slice);
+  if (slice && points.empty()) throw Failure(kBadData, options.map + ":1: no free voxel in the slice " + options.slice);
+
+  progress("evaluating " + std::to_string(points.size()) + " points");
+  const field::ProximityField exact(grid, model);
+  const auto values = options.interpolated || slice ? interpolated(exact, points) : evaluated(exact, points);
+  if (!options.out.empty()) write_picture(options, grid, *slice, values);
+  options.json ? print_json(values) : print_table(values);
+  return kOk;
+}
+
+}  // namespace
+
+Verb field_verb(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand("field", "Variance of the disturbance at points or in a slice of a map");
+  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
+  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
+  command->add_option("--vehicle", options->vehicle,
+                      "vehicle file or builtin:NAME: its diagonal_radius takes r0's place");
+  command->add_option("--points", options->points, "CSV with the columns x_m,y_m,z_m");
+  command->add_option("--slice", options->slice, "plane, as in z=0.5: the free voxels it cuts");
+  add_point(*command, "--at", options->at, "one point, m");
+  command->add_flag("--interpolated", options->interpolated,
+                    "from the stored field instead of exactly (slices always)");
+  command->add_option("--out", options->out, "picture of the slice, .svg or .png");
+  command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->add_flag("--force", options->force, "overwrite --out");
+  command->footer(
+      "Example:\n  backwash field --map builtin:apartment --model builtin:quad-5in --slice z=1.0 --out slice.svg");
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "core/map/occupancy_grid.hpp"
+#include "core/plan/world.hpp"
+#include "core/reach/reach_tube.hpp"
+#include "core/study/flight_log.hpp"
+#include "core/types/model.hpp"
+#include "core/types/vehicle.hpp"
+
+namespace backwash::services {
+
+/// Readers of a verb's inputs. Each throws Failure with the documented exit code: 66 for what does not exist, 65 for
+/// bad data, 78 for a configuration that is not valid.
+map::OccupancyGrid read_map(const std::string& path);
+Model read_model(const std::string& path);
+Vehicle read_vehicle(const std::string& path);
+study::FlightLog read_table(const std::string& path, const std::string& time_column);
+
+/// `tight` or `paper`.
+reach::Method read_method(const std::string& name);
+
+/// Throws Failure 73 if the file exists and `force` is not given: asked before work is spent on it.
+void refuse_to_overwrite(const std::string& path, bool force);
+/// Writes a whole file. Throws Failure 73 (exists, cannot be created) or 74 (cannot be written).
+void write_file(const std::string& path, const std::string& content, bool force);
+
+/// Reach sets of a vehicle; an unstable loop is a configuration failure (78).
+reach::Reachability read_reachability(const Vehicle& vehicle, reach::Method method, reach::Loop loop,
+                                      const std::string& vehicle_path);
+
+/// plan::Parallel on all processors.
+void run_parallel(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
+
+}  // namespace backwash::services

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/json.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+namespace backwash::services {
+
+Json to_json(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+Json to_json(const Variance& s) { return {s.xx, s.xy, s.xz, s.yy, s.yz, s.zz}; }
+
+Json to_json(const PerDirection& h) {
+  return {{"x", h[kX]}, {"y", h[kY]}, {"z", h[kZ]}, {"xy_plus", h[kXyPlus]}, {"xy_minus", h[kXyMinus]}};
+}
+
+Json symmetric_to_json(const Mat3& q) { return {q(0, 0), q(0, 1), q(0, 2), q(1, 1), q(1, 2), q(2, 2)}; }
+
+double support(const reach::TubeStep& step, reach::Method method, const Vec3& n) {
+  if (method == reach::Method::paper) return std::sqrt(n.dot(step.shape * n));
+  // The horizontal part is a sum of the two neighbouring face normals with weights ≥ 0, and supports are subadditive.
+  const double a = std::abs(n.x()), b = std::abs(n.y());
+  const Direction axis = a >= b ? kX : kY;
+  const Direction diagonal = n.x() * n.y() >= 0 ? kXyPlus : kXyMinus;
+  const auto& h = step.half_widths;
+  return std::abs(a - b) * h[axis] + std::sqrt(2.0) * std::min(a, b) * h[diagonal] + std::abs(n.z()) * h[kZ];
+}
+
+Json to_json(const reach::ReachTube& tube, reach::Method method, const std::optional<Vec3>& direction) {
+  Json steps = Json::array();
+  for (const auto& step : tube) {
+    Json entry = {{"t", step.t}, {"center", to_json(step.center.p_W)}};
+    if (method == reach::Method::paper) entry["shape"] = symmetric_to_json(step.shape);
+    entry["half_widths"] = to_json(step.half_widths);
+    entry["half_widths_interval"] = to_json(step.half_widths_interval);
+    entry["r_max"] = step.r_max;
+    if (direction) entry["support"] = support(step, method, *direction);
+    steps.push_back(std::move(entry));
+  }
+  return steps;
+}
+
+Json to_json(const plan::PlanMetrics& m) {
+  return {{"length_m", m.length_m},
+          {"time_s", m.time_s},
+          {"jerk2", m.jerk2},
+          {"min_clearance_m", m.min_clearance_m},
+          {"search_ms", m.search_ms},
+          {"optimise_ms", m.optimise_ms},
+          {"verify_ms", m.verify_ms},
+          {"expanded", m.expanded},
+          {"evaluations", m.evaluations}};
+}
+
+void print(const Json& json) { std::printf("%s\n", json.dump().c_str()); }
+
+}  // namespace backwash::services

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+
+#include "core/plan/planner.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct Options {
+  std::string map, model, vehicle, method = "tight";
+  std::optional<Vec3> start, goal;
+  std::optional<double> margin, v_max, a_max;
+  bool json = false;
+};
+
+void print_json(const plan::Plan& plan, reach::Method method) {
+  Json trajectory = Json::array();
+  for (std::size_t k = 0; k < plan.commands.size(); ++k) {
+    const auto& c = plan.commands[k];
+    trajectory.push_back({{"t", static_cast<double>(k) * kControlPeriod},
+                          {"p", to_json(c.p_W)},
+                          {"v", to_json(c.v_W)},
+                          {"a", to_json(c.a_W)}});
+  }
+  print(Json{{"status", plan::to_string(plan.status)},
+             {"message", plan.message},
+             {"metrics", to_json(plan.metrics)},
+             {"trajectory", std::move(trajectory)},
+             {"tube", to_json(plan.tube, method)}});
+}
+
+void print_text(const plan::Plan& plan) {
+  const auto& m = plan.metrics;
+  std::printf("status         %s\n", plan::to_string(plan.status));
+  if (plan.status == plan::PlanStatus::ok) {
+    std::printf(
+        "length         %.2f m\ntime           %.2f s\njerk squared   %.2f m2/s5\nclearance      %.3f m at least\n",
+        m.length_m, m.time_s, m.jerk2, m.min_clearance_m);
+  }
+  std::printf("search         %.1f ms, %zu states\noptimisation   %.1f ms, %zu evaluations\nverification   %.1f ms\n",
+              m.search_ms, m.expanded, m.optimise_ms, m.evaluations, m.verify_ms);
+}
+
+int run(const Options& options) {
+  const auto vehicle = read_vehicle(options.vehicle);
+  const auto model = read_model(options.model);
+  const auto method = read_method(options.method);
+  read_reachability(vehicle, method, reach::Loop::vehicle,
+                    options.vehicle);  // names an unstable loop before the map is read
+  auto grid = read_map(options.map);
+  progress("building the world");
+  const auto world =
+      plan::build_world(std::move(grid), model, vehicle, method, options.margin.value_or(-1), run_parallel);
+  progress("planning");
+  const plan::PlanOptions limits{.v_max = options.v_max.value_or(vehicle.limits.v_max),
+                                 .a_max = options.a_max.value_or(vehicle.limits.a_max)};
+  Setpoint hover;
+  hover.p_W = *options.start;
+  const auto plan = plan::plan(*world, {State{*options.start, Vec3::Zero()}, hover}, *options.goal, limits);
+  options.json ? print_json(plan, method) : print_text(plan);
+  if (plan.status == plan::PlanStatus::ok) return kOk;
+  throw Failure(kUnavailable, options.map + ":1: " + plan::to_string(plan.status) + ": " + plan.message);
+}
+
+}  // namespace
+
+Verb plan_verb(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand("plan", "Trajectory whose clearance is its reachable set");
+  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
+  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
+  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
+  add_point(*command, "--start", options->start, "m")->required();
+  add_point(*command, "--goal", options->goal, "m")->required();
+  command->add_option("--margin", options->margin, "constant margin in place of the sets, m")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--vmax", options->v_max, "m/s per axis; the vehicle's limit by default")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--amax", options->a_max, "m/s2 per axis; the vehicle's limit by default")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--method", options->method, "tight: exact supports; paper: ellipsoids")
+      ->check(CLI::IsMember({"tight", "paper"}));
+  command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->footer(
+      "Exit code 0 when a trajectory was found and verified, 69 otherwise.\nExample:\n"
+      "  backwash plan --map builtin:narrow-gap --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
+      "    --start 1,2,1 --goal 5,2,1 --json");
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

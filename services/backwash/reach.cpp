@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/reach_tube.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <cstdio>
+
+#include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct Options {
+  std::string vehicle, track, map, model, method = "tight", loop;
+  std::optional<Vec3> direction;
+  bool json = false;
+};
+
+const char* const kSigmaColumns[] = {"sigma_xx", "sigma_xy", "sigma_xz", "sigma_yy", "sigma_yz", "sigma_zz"};
+
+/// Line of a row in the file (comment-free CSV: the names are line 1).
+std::string at_row(const std::string& path, std::size_t row) {
+  return path + ":" + std::to_string(row + 2) + ": row " + std::to_string(row + 1) + ": ";
+}
+
+void check_times(const std::string& path, const study::FlightLog& track) {
+  if (track.t_s.empty()) throw Failure(kBadData, path + ":2: no rows; give one command per 20 ms");
+  for (std::size_t i = 1; i < track.t_s.size(); ++i) {
+    if (std::abs(track.t_s[i] - track.t_s[i - 1] - kControlPeriod) > 1e-4) {
+      throw Failure(kBadData, at_row(path, i) + "t_s is " + to_text(track.t_s[i], 4) + " after " +
+                                  to_text(track.t_s[i - 1], 4) + "; rows must be 0.02 s apart");
+    }
+  }
+}
+
+std::vector<Setpoint> read_commands(const std::string& path, const study::FlightLog& track) {
+  for (const char* name : {"cmd_x_m", "cmd_y_m", "cmd_z_m"}) {
+    if (!track.has(name))
+      throw Failure(kBadData, path + ":1: no column '" + name + "'; commands need cmd_x_m,cmd_y_m,cmd_z_m");
+  }
+  const auto vector = [&](const std::string& unit, std::size_t row) {
+    Vec3 value = Vec3::Zero();
+    const std::string prefix = unit == "_m" ? "cmd_" : unit == "_mps" ? "cmd_v" : "cmd_a";
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::string name = prefix + std::string("xyz")[static_cast<std::size_t>(axis)] + unit;
+      if (track.has(name)) value[axis] = track.column(name)[row];
+    }
+    return value;
+  };
+  std::vector<Setpoint> commands;
+  for (std::size_t i = 0; i < track.t_s.size(); ++i) {
+    commands.push_back({vector("_m", i), vector("_mps", i), vector("_mps2", i), 0.0});
+  }
+  return commands;
+}
+
+bool has_variances(const std::string& path, const study::FlightLog& track) {
+  const auto present = std::count_if(std::begin(kSigmaColumns), std::end(kSigmaColumns),
+                                     [&](const char* name) { return track.has(name); });
+  if (present != 0 && present != 6) {
+    throw Failure(
+        kBadData,
+        path + ":1: some sigma columns are missing; give sigma_xx,sigma_xy,sigma_xz,sigma_yy,sigma_yz,sigma_zz");
+  }
+  return present == 6;
+}
+
+std::vector<DisturbanceBound> read_bounds(const std::string& path, const study::FlightLog& track,
+                                          const BoundModel& model) {
+  std::vector<DisturbanceBound> bounds;
+  for (std::size_t i = 0; i < track.t_s.size(); ++i) {
+    double s[6];
+    for (std::size_t n = 0; n < 6; ++n) s[n] = track.column(kSigmaColumns[n])[i];
+    Mat3 sigma;
+    sigma << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+    const double smallest = Eigen::SelfAdjointEigenSolver<Mat3>(sigma, Eigen::EigenvaluesOnly).eigenvalues()[0];
+    if (smallest < -1e-9 * sigma.cwiseAbs().maxCoeff()) {  // rounding of printed values
+      throw Failure(kBadData, at_row(path, i) + "the variance has the eigenvalue " + to_text(smallest, 6) +
+                                  "; it must be positive semidefinite");
+    }
+    bounds.push_back(bound(Variance{s[0], s[1], s[2], s[3], s[4], s[5]}, model));
+  }
+  return bounds;
+}
+
+reach::Loop read_loop(const Options& options) {
+  if (options.method == "paper") {
+    if (options.loop == "vehicle" || options.loop == "sampled") {
+      throw Failure(kUsage, "--method paper knows only --loop continuous; the second-order loop of the paper");
+    }
+    return reach::Loop::continuous;
+  }
+  if (options.loop == "continuous") return reach::Loop::continuous;
+  return options.loop == "sampled" ? reach::Loop::sampled : reach::Loop::vehicle;
+}
+
+reach::ReachTube tube(const Options& options, const reach::Reachability& reach) {
+  const auto track = read_table(options.track, "t_s");
+  check_times(options.track, track);
+  const auto commands = read_commands(options.track, track);
+  const State start{commands[0].p_W, commands[0].v_W};
+  if (has_variances(options.track, track)) {
+    if (!options.map.empty()) throw Failure(kUsage, "the track has sigma columns; give either those or --map");
+    const BoundModel bounds = options.model.empty() ? BoundModel{} : read_model(options.model).bound;
+    return reach::tube_with_bounds(reach, start, commands[0], commands, read_bounds(options.track, track, bounds));
+  }
+  if (options.map.empty() || options.model.empty()) {
+    throw Failure(kUsage, "the track has no sigma columns; add them or give --map and --model");
+  }
+  progress("building the world");
+  const auto world = plan::build_world(read_map(options.map), read_model(options.model), reach.vehicle, reach.method,
+                                       -1, run_parallel);
+  return reach::tube_over_field(reach, start, commands[0], commands, world->bounds);
+}
+
+void print_table(const reach::ReachTube& tube, const Options& options) {
+  const auto method = read_method(options.method);
+  std::printf("%8s %9s %9s %9s   %8s %8s %8s %8s %8s %8s   half widths in m\n", "t_s", "x_m", "y_m", "z_m", "x", "y",
+              "z", "xy_plus", "xy_minus", "r_max");
+  for (const auto& step : tube) {
+    const auto& p = step.center.p_W;
+    const auto& h = step.half_widths;
+    std::printf("%8.3f %9.4f %9.4f %9.4f   %8.5f %8.5f %8.5f %8.5f %8.5f %8.5f", step.t, p.x(), p.y(), p.z(), h[kX],
+                h[kY], h[kZ], h[kXyPlus], h[kXyMinus], step.r_max);
+    if (options.direction) std::printf("   support %8.5f", support(step, method, *options.direction));
+    std::printf("\n");
+  }
+}
+
+int run(Options options) {
+  if (options.direction) {
+    if (options.direction->norm() == 0) throw Failure(kUsage, "--direction: 0,0,0 has no direction; give another");
+    options.direction->normalize();
+  }
+  const auto method = read_method(options.method);
+  const auto reach = read_reachability(read_vehicle(options.vehicle), method, read_loop(options), options.vehicle);
+  const auto steps = tube(options, reach);
+  if (!options.json) {
+    print_table(steps, options);
+    return kOk;
+  }
+  print(Json{{"method", options.method}, {"steps", to_json(steps, method, options.direction)}});
+  return kOk;
+}
+
+}  // namespace
+
+Verb reach_verb(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand("reach", "Reachable sets of the position error along a track of commands");
+  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
+  command->add_option("--track", options->track, "CSV: t_s, cmd_x_m … cmd_az_mps2, and sigma_xx … sigma_zz or --map")
+      ->required();
+  command->add_option("--method", options->method, "tight: exact supports; paper: ellipsoids")
+      ->check(CLI::IsMember({"tight", "paper"}));
+  command->add_option("--loop", options->loop, "vehicle (default), continuous (always with paper) or sampled")
+      ->check(CLI::IsMember({"vehicle", "continuous", "sampled"}));
+  command->add_option("--map", options->map, "OctoMap file or builtin:NAME, for tracks without sigma columns");
+  command->add_option("--model", options->model, "model file or builtin:NAME: its bound, and its field with --map");
+  add_point(*command, "--direction", options->direction, "also the support along this direction");
+  command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->footer("Example:\n  backwash reach --vehicle builtin:quad-5in --track track.csv --method paper --json");
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/verb.hpp"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace backwash::services {
+
+CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional<Vec3>& target,
+                       const std::string& help) {
+  const auto parse = [&target, name](const std::string& text) {
+    Vec3 p;
+    char rest = 0;
+    const int read = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &p.x(), &p.y(), &p.z(), &rest);
+    if (read != 3 || !p.allFinite()) {
+      throw CLI::ValidationError(name + ": '" + text + "' must be three numbers x,y,z in metres");
+    }
+    target = p;
+  };
+  return command.add_option_function<std::string>(name, parse, help)->type_name("X,Y,Z");
+}
+
+void progress(const std::string& line) {
+  if (::isatty(STDERR_FILENO)) std::fprintf(stderr, "%s\n", line.c_str());
+}
+
+std::string to_text(double value, int decimals) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  return text;
+}
+
+std::string to_text(const Vec3& p) {
+  char text[96];
+  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
+  return text;
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+
+#include "tests/bridge/emulated_controller.hpp"
+
+namespace {
+thread_local std::size_t allocations = 0;
+
+void* counted(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size)) return p;
+  throw std::bad_alloc();
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete[](void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+
+namespace backwash::firmware_bridge::test {
+namespace {
+
+TEST(AllocationCounter, Counts) {
+  const auto before = allocations;
+  delete new int(1);
+  EXPECT_EQ(allocations, before + 1);
+}
+
+TEST_F(LinkTest, AllocatesNothingWhileItReadsAndSends) {
+  introduce_vehicle();
+  const VioSample vio{1, Vec3::Zero(), Eigen::Quaterniond::Identity(), Vec3::Zero(), Vec3::Zero(), {}, {}, {}, 0};
+  std::size_t in_link = 0;
+  bool ok = true;
+  for (int i = 0; i < 200; ++i) {
+    say(mavlink::LocalPositionNed{.time_boot_ms = static_cast<std::uint32_t>(i)});
+    say(mavlink::Attitude{.time_boot_ms = static_cast<std::uint32_t>(i)});
+    say(mavlink::Statustext{});
+    say(mavlink::CommandAck{.command = static_cast<std::uint16_t>(i)});
+    say(mavlink::Timesync{0, 5});
+    say(px4_heartbeat(true, 6));
+    if (i % 10 == 0) far_.write(Bytes{0xFD, 1, 2, 3, 0xFE, 9, 9});
+    const auto before = allocations;
+    ok = link_.poll(kStart).has_value() && ok;
+    ok = link_.send_setpoint({}, kStart) && ok;
+    ok = link_.send_odometry(vio) && link_.send_heartbeat() && link_.send_statustext(6, "text") && ok;
+    ok = link_.send_arm(true) && link_.send_timesync(kStart) && !link_.fault(kStart) && ok;
+    in_link += allocations - before;
+    far_.read();
+  }
+  EXPECT_TRUE(ok);
+  EXPECT_EQ(in_link, 0U);
+  EXPECT_GT(link_.received().frames, 1000U);
+  EXPECT_GT(link_.transmit().sent(), 1000U);
+}
+
+}  // namespace
+}  // namespace backwash::firmware_bridge::test

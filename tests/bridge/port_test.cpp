@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <numeric>
+
+#include "firmware_bridge/serial_port.hpp"
+#include "firmware_bridge/udp_port.hpp"
+#include "tests/bridge/pseudo_terminal.hpp"
+
+namespace backwash::firmware_bridge::test {
+namespace {
+
+using mavlink::test::operator+;
+using Kind = PortError::Kind;
+
+Bytes every_byte() {
+  Bytes bytes(256);
+  std::iota(bytes.begin(), bytes.end(), std::uint8_t{0});
+  return bytes;
+}
+
+/// Reads until `size` bytes have come, for at most a second.
+template <class AnyPort>
+Bytes read_all(AnyPort& port, std::size_t size) {
+  Bytes all;
+  std::array<std::uint8_t, 512> chunk;
+  for (int i = 0; i < 1000 && all.size() < size; ++i) {
+    const auto n = port.read(chunk);
+    if (!n) break;
+    all.insert(all.end(), chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(*n));
+    if (*n == 0) ::usleep(1000);
+  }
+  return all;
+}
+
+TEST(SerialPort, CarriesEveryByteValueUnchangedBothWays) {
+  PseudoTerminal far;
+  auto port = SerialPort::open(far.path(), 921600);
+  ASSERT_TRUE(port);
+  ASSERT_EQ(port->write(every_byte()), 256U);
+  EXPECT_EQ(far.await(), every_byte());
+  far.write(every_byte());
+  EXPECT_EQ(read_all(*port, 256), every_byte());
+  EXPECT_TRUE(far.read().empty()) << "nothing is echoed";
+}
+
+TEST(SerialPort, ReadsNothingWithoutWaiting) {
+  PseudoTerminal far;
+  auto port = SerialPort::open(far.path(), 57600);
+  ASSERT_TRUE(port);
+  std::array<std::uint8_t, 8> bytes;
+  const auto n = port->read(bytes);
+  ASSERT_TRUE(n);
+  EXPECT_EQ(*n, 0U);
+}
+
+TEST(SerialPort, ReportsAHangUpOnReadAndOnWrite) {
+  PseudoTerminal far;
+  auto port = SerialPort::open(far.path(), 115200);
+  ASSERT_TRUE(port);
+  far.hang_up();
+  std::array<std::uint8_t, 8> bytes{};
+  const auto read = port->read(bytes);
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().kind, Kind::kLost);
+  const auto written = port->write(bytes);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().kind, Kind::kLost);
+}
+
+TEST(SerialPort, TakesNoMoreThanTheKernelHasRoomForAndNeverBlocks) {
+  PseudoTerminal far;
+  auto port = SerialPort::open(far.path(), 115200);
+  ASSERT_TRUE(port);
+  const Bytes block(1000, 0x5A);
+  std::size_t taken = 0;
+  int refused = 0;
+  for (int i = 0; i < 200; ++i) {
+    const auto n = port->write(block);
+    ASSERT_TRUE(n);
+    taken += *n;
+    refused += *n == 0;
+  }
+  EXPECT_GT(refused, 10);
+  EXPECT_LT(taken, 200'000U);
+  std::size_t arrived = 0;
+  for (Bytes b; !(b = far.read()).empty();) arrived += b.size();
+  EXPECT_EQ(arrived, taken);
+}
+
+TEST(SerialPort, DiscardsWhatTheKernelHasNotSent) {
+  PseudoTerminal far;
+  auto port = SerialPort::open(far.path(), 115200);
+  ASSERT_TRUE(port);
+  std::size_t taken = 0;
+  while (const auto n = port->write(Bytes(1000, 1)).value_or(0)) taken += n;
+  port->discard_output();
+  ASSERT_EQ(port->write(Bytes{7}), 1U);
+  Bytes arrived;
+  while (arrived.empty() || (arrived.back() != 7 && arrived.size() <= taken)) arrived = arrived + far.await();
+  // What the far end's line discipline holds (4096 bytes) counts as received.
+  EXPECT_GT(taken, 8000U);
+  EXPECT_LE(arrived.size(), 4097U);
+  EXPECT_EQ(arrived.back(), 7);
+}
+
+TEST(SerialPort, NamesWhyItCannotBeOpened) {
+  PseudoTerminal far;
+  EXPECT_EQ(SerialPort::open("/nonexistent/tty", 115200).error().kind, Kind::kOpen);
+  EXPECT_EQ(SerialPort::open("/dev/null", 115200).error().kind, Kind::kNotSerial);
+  EXPECT_EQ(SerialPort::open(far.path(), 115201).error().kind, Kind::kBaudRate);
+  EXPECT_NE(describe(SerialPort::open("/nonexistent/tty", 115200).error()).find("No such file"), std::string::npos);
+}
+
+TEST(UdpPort, TalksToAGivenPeerAndHearsNobodyElse) {
+  auto a = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
+  ASSERT_TRUE(a);
+  auto b = UdpPort::open({"127.0.0.1", 0}, UdpPort::Endpoint{"127.0.0.1", a->local_port()});
+  auto stranger = UdpPort::open({"127.0.0.1", 0}, UdpPort::Endpoint{"127.0.0.1", a->local_port()});
+  ASSERT_TRUE(b);
+  ASSERT_TRUE(stranger);
+  EXPECT_EQ(a->write(every_byte()), 0U) << "no peer yet";
+  ASSERT_EQ(b->write(every_byte()), 256U);
+  EXPECT_EQ(read_all(*a, 256), every_byte());
+  ASSERT_EQ(stranger->write(Bytes{1, 2, 3}), 3U);
+  ASSERT_EQ(b->write(Bytes{4}), 1U);
+  EXPECT_EQ(read_all(*a, 1), Bytes{4}) << "the first sender stays the only peer";
+  ASSERT_EQ(a->write(Bytes{9}), 1U);
+  EXPECT_EQ(read_all(*b, 1), Bytes{9});
+}
+
+TEST(UdpPort, OutlivesAPeerThatIsNotThere) {
+  std::uint16_t closed_port = 0;
+  {
+    const auto gone = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
+    ASSERT_TRUE(gone);
+    closed_port = gone->local_port();
+  }
+  auto port = UdpPort::open({"127.0.0.1", 0}, UdpPort::Endpoint{"127.0.0.1", closed_port});
+  ASSERT_TRUE(port);
+  std::array<std::uint8_t, 8> bytes{};
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_TRUE(port->write(bytes));
+    EXPECT_TRUE(port->read(bytes));
+  }
+}
+
+TEST(UdpPort, NamesAnAddressThatIsNone) {
+  EXPECT_EQ(UdpPort::open({"nowhere", 0}, std::nullopt).error().kind, Kind::kAddress);
+}
+
+}  // namespace
+}  // namespace backwash::firmware_bridge::test

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "firmware_bridge/telemetry.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <limits>
+#include <numbers>
+
+namespace backwash::firmware_bridge::test {
+namespace {
+
+using namespace std::chrono_literals;
+const Time kNow = Time{} + 5s;
+
+mavlink::Heartbeat heartbeat(std::uint8_t autopilot, std::uint8_t base_mode, std::uint32_t custom_mode) {
+  return {.custom_mode = custom_mode, .autopilot = autopilot, .base_mode = base_mode, .system_status = 4};
+}
+
+TEST(Telemetry, HoldsNothingThatNeverCame) {
+  const Telemetry t;
+  EXPECT_FALSE(t.status || t.local_state || t.attitude || t.reset_counter || t.imu || t.battery || t.landed_state);
+  EXPECT_FALSE(t.result_of(400));
+}
+
+TEST(Telemetry, TellsOffboardAndGuidedFromOtherModes) {
+  const auto follows = [](const mavlink::Heartbeat& m) {
+    Telemetry t;
+    t.take(m, kNow);
+    return t.status->value.follows_setpoints;
+  };
+  EXPECT_TRUE(follows(heartbeat(12, 0x81, 6 << 16)));              // PX4 offboard
+  EXPECT_FALSE(follows(heartbeat(12, 0x81, 3 << 16)));             // PX4 position
+  EXPECT_FALSE(follows(heartbeat(12, 0x80, 6 << 16)));             // custom mode not in use
+  EXPECT_FALSE(follows(heartbeat(12, 0x81, 4 << 16 | 6U << 24)));  // PX4 auto land: the 6 is a sub mode
+  EXPECT_TRUE(follows(heartbeat(3, 0x81, 4)));                     // Copter guided
+  EXPECT_FALSE(follows(heartbeat(3, 0x81, 6 << 16)));
+  EXPECT_FALSE(follows(heartbeat(3, 0x81, 9)));  // Copter land
+  EXPECT_FALSE(follows(heartbeat(0, 0x81, 4)));  // some other autopilot
+}
+
+TEST(Telemetry, ReadsTheArmedBit) {
+  Telemetry t;
+  t.take(heartbeat(12, 0x81, 0), kNow);
+  EXPECT_TRUE(t.status->value.armed);
+  t.take(heartbeat(12, 0x7F, 0), kNow + 1s);
+  EXPECT_FALSE(t.status->value.armed);
+  EXPECT_EQ(t.status->at, kNow + 1s);
+}
+
+TEST(Telemetry, ConvertsPositionAndVelocityToZUp) {
+  Telemetry t;
+  t.take(mavlink::LocalPositionNed{10, 1, 2, -3, 0.1F, 0.2F, -0.3F}, kNow);
+  // North 1, east 2, 3 above: x east, y north.
+  EXPECT_TRUE(t.local_state->value.p_W.isApprox(Vec3(2, 1, 3)));
+  EXPECT_TRUE(t.local_state->value.v_W.isApprox(Vec3(0.2F, 0.1F, 0.3F)));
+}
+
+TEST(Telemetry, ConvertsBothAttitudeMessagesToTheSameAttitude) {
+  // 30° to the right of north, nose 20° up, right side 10° down.
+  const double roll = 10 * std::numbers::pi / 180, pitch = 20 * std::numbers::pi / 180,
+               yaw = 30 * std::numbers::pi / 180;
+  Telemetry a, b;
+  a.take(mavlink::Attitude{1, static_cast<float>(roll), static_cast<float>(pitch), static_cast<float>(yaw), 1, 2, 3},
+         kNow);
+  const double cr = std::cos(roll / 2), sr = std::sin(roll / 2), cp = std::cos(pitch / 2), sp = std::sin(pitch / 2),
+               cy = std::cos(yaw / 2), sy = std::sin(yaw / 2);
+  const auto f = [](double x) { return static_cast<float>(x); };
+  b.take(mavlink::AttitudeQuaternion{1, f(cr * cp * cy + sr * sp * sy), f(sr * cp * cy - cr * sp * sy),
+                                     f(cr * sp * cy + sr * cp * sy), f(cr * cp * sy - sr * sp * cy), 1, 2, 3},
+         kNow);
+  for (const auto* t : {&a, &b}) {
+    const Mat3 R = t->attitude->value.q_LB.toRotationMatrix();
+    // The nose points cos(20°) along the heading and sin(20°) up; east is x.
+    const Vec3 nose(std::cos(pitch) * std::sin(yaw), std::cos(pitch) * std::cos(yaw), std::sin(pitch));
+    EXPECT_LT((R.col(0) - nose).norm(), 1e-6);
+    // Rolled right, the left side rises: its height is sin(roll) cos(pitch).
+    EXPECT_NEAR(R(2, 1), std::sin(roll) * std::cos(pitch), 1e-6);
+    EXPECT_TRUE(t->attitude->value.omega_B.isApprox(Vec3(1, -2, -3)));
+  }
+}
+
+TEST(Telemetry, DropsAndCountsWhatCannotBe) {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  Telemetry t;
+  t.take(mavlink::LocalPositionNed{1, nan, 0, 0, 0, 0, 0}, kNow);
+  t.take(mavlink::LocalPositionNed{1, 0, 0, 0, 0, 0, std::numeric_limits<float>::infinity()}, kNow);
+  t.take(mavlink::AttitudeQuaternion{1, 0, 0, 0, 0, 0, 0, 0}, kNow);
+  t.take(mavlink::AttitudeQuaternion{1, nan, 0, 0, 0, 0, 0, 0}, kNow);
+  t.take(mavlink::Attitude{1, nan, 0, 0, 0, 0, 0}, kNow);
+  t.take(mavlink::HighresImu{.xacc = nan}, kNow);
+  t.take(mavlink::ExtendedSysState{0, 9}, kNow);
+  EXPECT_EQ(t.broken, 7U);
+  EXPECT_FALSE(t.local_state || t.attitude || t.imu || t.landed_state);
+}
+
+TEST(Telemetry, DropsSwappedPacketsButFollowsARestartedClock) {
+  Telemetry t;
+  const auto position_at = [](std::uint32_t ms, float x) {
+    return mavlink::LocalPositionNed{.time_boot_ms = ms, .x = x};
+  };
+  t.take(position_at(5020, 2), kNow);
+  t.take(position_at(5000, 1), kNow);
+  EXPECT_EQ(t.local_state->value.p_W.y(), 2);
+  EXPECT_EQ(t.out_of_order, 1U);
+  t.take(position_at(100, 7), kNow);
+  EXPECT_EQ(t.local_state->value.p_W.y(), 7) << "4.9 s back: the controller restarted";
+  t.take(position_at(0xFFFFFFFF, 8), kNow);
+  EXPECT_EQ(t.local_state->value.p_W.y(), 7);
+  t.take(position_at(0xFFFFFFFFU - 100'000, 9), kNow);
+  t.take(position_at(20, 10), kNow);
+  EXPECT_EQ(t.local_state->value.p_W.y(), 10) << "the sender's counter may wrap";
+}
+
+TEST(Telemetry, ScalesTheImuToSiAndFlu) {
+  Telemetry t;
+  t.take(mavlink::ScaledImu2{.xacc = 100, .yacc = 200, .zacc = -1000, .xgyro = 10, .ygyro = 20, .zgyro = 30}, kNow);
+  EXPECT_TRUE(t.imu->value.specific_force_B.isApprox(Vec3(0.980665, -1.96133, 9.80665), 1e-9));
+  EXPECT_TRUE(t.imu->value.omega_B.isApprox(Vec3(0.01, -0.02, -0.03), 1e-9));
+}
+
+TEST(Telemetry, AddsUpCellsAndLeavesAbsentValuesAbsent) {
+  Telemetry t;
+  t.take(mavlink::SysStatus{.voltage_battery = 65535, .battery_remaining = -1}, kNow);
+  EXPECT_FALSE(t.battery);
+  t.take(mavlink::SysStatus{.voltage_battery = 12600, .battery_remaining = -1}, kNow);
+  EXPECT_DOUBLE_EQ(*t.battery->value.voltage, 12.6);
+  EXPECT_FALSE(t.battery->value.remaining);
+  mavlink::BatteryStatus b{.battery_remaining = 47};
+  b.voltages.fill(65535);
+  b.voltages[0] = 4200, b.voltages[1] = 4100;
+  t.take(b, kNow);
+  EXPECT_DOUBLE_EQ(*t.battery->value.voltage, 8.3);
+  EXPECT_DOUBLE_EQ(*t.battery->value.remaining, 0.47);
+  t.take(mavlink::SysStatus{.voltage_battery = 1, .battery_remaining = 1}, kNow);
+  EXPECT_DOUBLE_EQ(*t.battery->value.voltage, 8.3) << "BATTERY_STATUS goes before SYS_STATUS";
+  b.id = 1, b.battery_remaining = 3;
+  t.take(b, kNow);
+  EXPECT_DOUBLE_EQ(*t.battery->value.remaining, 0.47) << "a second battery is not the flight battery";
+}
+
+TEST(Telemetry, KeepsTheNewestAnswerToEachCommand) {
+  Telemetry t;
+  t.take(mavlink::CommandAck{.command = 400, .result = 1}, kNow);
+  t.take(mavlink::CommandAck{.command = 176, .result = 2}, kNow);
+  t.take(mavlink::CommandAck{.command = 400, .result = 0}, kNow + 1s);
+  EXPECT_EQ(t.result_of(400)->value.result, 0);
+  EXPECT_EQ(t.result_of(400)->at, kNow + 1s);
+  EXPECT_EQ(t.result_of(176)->value.result, 2);
+  EXPECT_FALSE(t.result_of(21));
+}
+
+TEST(Telemetry, TerminatesATextOfFullLength) {
+  Telemetry t;
+  mavlink::Statustext m{.severity = 3};
+  m.text.fill('x');
+  t.take(m, kNow);
+  EXPECT_EQ(std::string(t.text->value.text.data()), std::string(50, 'x'));
+}
+
+}  // namespace
+}  // namespace backwash::firmware_bridge::test

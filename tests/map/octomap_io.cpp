@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Oracle: liboctomap itself, with which files are exchanged in both directions.
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/map/load_map.hpp"
+#include "tests/map/liboctomap.hpp"
+#include "tests/map/random_grid.hpp"
+
+namespace backwash::map {
+namespace {
+
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& extension)
+      : path_(testing::TempDir() + "backwash_map_" + std::to_string(getpid()) + extension) {}
+  ~TemporaryFile() { std::filesystem::remove(path_); }
+  const std::string& path() const { return path_; }
+  void write(const std::string& content) const { std::ofstream(path_, std::ios::binary) << content; }
+  std::string content() const {
+    std::ifstream file(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+ private:
+  std::string path_;
+};
+
+TEST(OctomapFile, RoundTripsRandomGrids) {
+  std::mt19937_64 random(3);
+  const TemporaryFile file(".bt");
+  for (int round = 0; round < 100; ++round) {
+    const auto grid = random_grid(random, 30);
+    ASSERT_TRUE(write_octomap(grid, file.path()));
+    const auto loaded = load_octomap(file.path());
+    ASSERT_EQ(loaded.has_value(), has_known_cells(grid));
+    if (loaded) expect_same_world(*loaded, grid);
+  }
+}
+
+TEST(OctomapFile, IsReadBackByLiboctomap) {
+  std::mt19937_64 random(4);
+  const TemporaryFile file(".bt");
+  for (int round = 0; round < 20; ++round) {
+    const auto grid = random_grid(random, 20);
+    if (!has_known_cells(grid)) continue;
+    ASSERT_TRUE(write_octomap(grid, file.path()));
+    const octomap::OcTree tree(file.path());
+    ASSERT_EQ(tree.getResolution(), grid.resolution());
+    for (std::size_t i = 0; i < grid.cell_count(); ++i) {
+      ASSERT_EQ(cell_of(tree, grid.center(grid.voxel(i))), grid.at(i));
+    }
+  }
+}
+
+TEST(OctomapFile, ReadsBothFormatsOfLiboctomap) {
+  const auto world = builtin_scene("apartment", 0.1).value();
+  auto tree = tree_of(world);
+  for (const std::string extension : {".bt", ".ot"}) {
+    const TemporaryFile file(extension);
+    ASSERT_TRUE(extension == ".bt" ? tree.writeBinary(file.path()) : tree.write(file.path()));
+    const auto loaded = load_map(file.path());
+    ASSERT_TRUE(loaded) << loaded.error().message;
+    expect_same_world(*loaded, world);
+  }
+}
+
+/// A small world in both formats, to be damaged.
+std::vector<std::string> sample_files() {
+  auto tree = tree_of(builtin_scene("narrow-gap", 0.2).value());
+  std::vector<std::string> contents;
+  for (const std::string extension : {".bt", ".ot"}) {
+    const TemporaryFile file(extension);
+    extension == ".bt" ? tree.writeBinary(file.path()) : tree.write(file.path());
+    contents.push_back(file.content());
+  }
+  return contents;
+}
+
+TEST(OctomapFile, RefusesTruncations) {
+  const TemporaryFile file(".bt");
+  for (const auto& content : sample_files()) {
+    for (std::size_t length = 0; length < content.size(); length += length < 150 ? 1 : content.size() / 60) {
+      file.write(content.substr(0, length));
+      const auto grid = load_octomap(file.path());
+      ASSERT_FALSE(grid) << length << " of " << content.size();
+      ASSERT_EQ(grid.error().kind, MapError::Kind::corrupt);
+    }
+    file.write(content + '\0');
+    EXPECT_FALSE(load_octomap(file.path())) << "a byte too many";
+    file.write(content);
+    EXPECT_TRUE(load_octomap(file.path()));
+  }
+}
+
+TEST(OctomapFile, DamagedBytesGiveAnErrorOrAGridWithinTheCap) {
+  constexpr std::size_t kCap = 8U << 20;
+  std::mt19937_64 random(5);
+  const TemporaryFile file(".bt");
+  int refused = 0;
+  for (const auto& content : sample_files()) {
+    for (int round = 0; round < 300; ++round) {
+      file.write(damaged(content, random));
+      const auto grid = load_octomap(file.path(), kCap);
+      if (grid) {
+        ASSERT_LE(grid->cell_count() * sizeof(Cell), kCap);
+      } else {
+        ASSERT_TRUE(grid.error().message.starts_with(file.path() + ": "));
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GT(refused, 100);
+}
+
+TEST(OctomapFile, NamesTheFileAndTheFaultInOneLine) {
+  const std::string good = sample_files().front();
+  const TemporaryFile file(".bt");
+  const auto replaced = [&](const std::string& line, const std::string& by) {
+    std::string content = good;
+    const auto at = content.find("\n" + line) + 1;
+    return content.replace(at, content.find('\n', at) + 1 - at, by);
+  };
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"", "first line"},
+      {"ply\n" + good, "first line"},
+      {replaced("id ", "id ColorOcTree\n"), "OcTree"},
+      {replaced("id ", ""), "OcTree"},
+      {replaced("res ", "res 0\n"), "resolution"},
+      {replaced("res ", "res -0.1\n"), "resolution"},
+      {replaced("res ", "res nan\n"), "resolution"},
+      {replaced("res ", "res 1e300\n"), "resolution"},
+      {replaced("res ", "res 1e999\n"), "res METRES"},
+      {replaced("res ", "res 0.1m\n"), "res METRES"},
+      {replaced("res ", ""), "res METRES"},
+      {replaced("size ", "size 7\n"), "size 7"},
+      {replaced("size ", "size 18446744073709551615\n"), "size 18446744073709551615"},
+      {replaced("size ", "size 99999999999999999999\n"), "size NODES"},
+      {replaced("size ", "size -1\n"), "size NODES"},
+      {replaced("data", ""), "data"},
+  };
+  for (const auto& [content, word] : cases) {
+    file.write(content);
+    const auto grid = load_octomap(file.path());
+    ASSERT_FALSE(grid) << word;
+    EXPECT_EQ(grid.error().kind, MapError::Kind::corrupt) << grid.error().message;
+    EXPECT_TRUE(grid.error().message.starts_with(file.path() + ": ")) << grid.error().message;
+    EXPECT_NE(grid.error().message.find(word, file.path().size()), std::string::npos) << grid.error().message;
+    EXPECT_EQ(grid.error().message.find('\n'), std::string::npos);
+  }
+}
+
+TEST(OctomapFile, SaysWhatIsNotAFile) {
+  for (const std::string path : {"/nowhere/at/all.bt", "/tmp", "/dev/zero", ""}) {
+    const auto grid = load_octomap(path);
+    ASSERT_FALSE(grid);
+    EXPECT_EQ(grid.error().kind, MapError::Kind::not_found) << grid.error().message;
+  }
+  const auto written = write_octomap(OccupancyGrid({0, 0, 0}, 0.1, {1, 1, 1}, Cell::free), "/nowhere/at/all.bt");
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().kind, MapError::Kind::cannot_write);
+}
+
+class RealMap : public testing::TestWithParam<const char*> {
+ protected:
+  std::string path() const { return std::string(BACKWASH_SHARED_DATA "/maps/") + GetParam(); }
+};
+
+TEST_P(RealMap, EqualsLiboctomapsReading) {
+  if (!std::filesystem::exists(path())) GTEST_SKIP() << path() << " is absent";
+  const auto grid = load_octomap(path());
+  ASSERT_TRUE(grid) << grid.error().message;
+  octomap::OcTree tree(path());
+  ASSERT_EQ(grid->resolution(), tree.getResolution());
+  Vec3 low;
+  Vec3 high;
+  tree.getMetricMin(low.x(), low.y(), low.z());
+  tree.getMetricMax(high.x(), high.y(), high.z());
+  EXPECT_NEAR((grid->origin() - low).norm(), 0, 1e-6);
+  EXPECT_NEAR((grid->origin() + grid->resolution() * grid->size().cast<double>() - high).norm(), 0, 1e-6);
+  for (std::size_t i = 0; i < grid->cell_count(); ++i) {
+    ASSERT_EQ(grid->at(i), cell_of(tree, grid->center(grid->voxel(i)))) << grid->voxel(i).transpose();
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Shared, RealMap, testing::Values("geb079.bt", "huayu_room_0.05.bt"),
+                         [](const auto& map) { return std::string(map.param).substr(0, 4); });
+
+TEST(Geb079, HasItsPublishedExtentFloorAndCeiling) {
+  const std::string path = BACKWASH_SHARED_DATA "/maps/geb079.bt";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is absent";
+  const auto grid = load_octomap(path).value();
+  EXPECT_EQ(grid.resolution(), 0.08);
+  const Vec3 extent = grid.resolution() * grid.size().cast<double>();
+  EXPECT_NEAR(extent.x(), 39, 0.5);
+  EXPECT_NEAR(extent.y(), 15, 0.5);
+  EXPECT_NEAR(extent.z(), 3.1, 0.05);
+  std::vector<int> layers(static_cast<std::size_t>(grid.size().z()));
+  for (std::size_t i = 0; i < grid.cell_count(); ++i) {
+    if (grid.at(i) == Cell::occupied) ++layers[static_cast<std::size_t>(grid.voxel(i).z())];
+  }
+  const auto layer = [&](double z) { return grid.index({0, 0, z}).z(); };
+  const auto between = *std::max_element(layers.begin() + layer(0.04), layers.begin() + layer(2.6));
+  EXPECT_GT(layers.at(static_cast<std::size_t>(layer(-0.15))), 1.5 * between) << "floor";
+  EXPECT_GT(layers.at(static_cast<std::size_t>(layer(2.7))), 1.5 * between) << "ceiling";
+}
+
+}  // namespace
+}  // namespace backwash::map

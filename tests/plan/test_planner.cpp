@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "core/plan/planner.hpp"
+
+namespace backwash::plan {
+namespace {
+
+using map::Cell;
+using map::OccupancyGrid;
+
+Vehicle test_vehicle() {
+  Vehicle v;
+  v.body = {0.16, 0.18, 0.0635, 0.9};
+  v.controller = {{10, 12}, {5.5, 6}, 0.02, 0, 0.05};
+  v.estimation.position = 0.02;
+  v.limits = {1.5, 2};
+  v.initial_error = {0.02, 0.05};
+  return v;
+}
+
+/// The default model with short ranges (worlds build fast) and stronger walls.
+Model short_ranged_model() {
+  Model m;
+  m.ground.l_max = m.ground.l_footprint_max = m.corner.l_max = m.wall.l_max = 0.5;
+  m.wall.k1 = {1.0, 0.4, 0.4};
+  return m;
+}
+
+void fill(OccupancyGrid& grid, const Vec3& low, const Vec3& high, Cell cell) {
+  const Index3 a = grid.index(low + Vec3::Constant(1e-6)), b = grid.index(high - Vec3::Constant(1e-6));
+  for (int k = a.z(); k <= b.z(); ++k)
+    for (int j = a.y(); j <= b.y(); ++j)
+      for (int i = a.x(); i <= b.x(); ++i) grid.set({i, j, k}, cell);
+}
+
+/// Free room 0…6 × 0…4 × 0…1.6 m, walled on all sides, with a 0.1 m wall at x = 3 that leaves y > gap_from open.
+OccupancyGrid room(double gap_from) {
+  OccupancyGrid grid({-0.1, -0.1, -0.1}, 0.1, {62, 42, 18}, Cell::occupied);
+  fill(grid, {0, 0, 0}, {6, 4, 1.6}, Cell::free);
+  if (gap_from > 0) fill(grid, {3, 0, 0}, {3.1, gap_from, 1.6}, Cell::occupied);
+  return grid;
+}
+
+const World& gap_world() {
+  static const auto world = build_world(room(2.8), short_ranged_model(), test_vehicle());
+  return *world;
+}
+const World& closed_world() {
+  static const auto world = build_world(room(4.0), short_ranged_model(), test_vehicle());
+  return *world;
+}
+
+PlanStart at_rest(const Vec3& p) { return {{p, Vec3::Zero()}, {p, Vec3::Zero(), Vec3::Zero(), 0}}; }
+
+/// A set of half width `half` that stays at p for `steps` steps.
+reach::ReachTube still_tube(const Vec3& p, std::size_t steps, double half) {
+  reach::ReachTube tube;
+  PerDirection widths;
+  widths.fill(half);
+  for (std::size_t k = 0; k < steps; ++k)
+    tube.push_back({static_cast<double>(k) * kControlPeriod, {p, Vec3::Zero()}, {}, widths, widths, Mat3::Zero(), 0});
+  return tube;
+}
+
+const Vec3 kStart(1.03, 1.02, 0.81), kGoal(5.01, 0.97, 0.83);
+
+/// Everything that an accepted plan promises, checked on its own samples.
+void expect_sound(const World& world, const Plan& p, const PlanStart& start, const Vec3& goal, const PlanOptions& o) {
+  ASSERT_EQ(p.status, PlanStatus::ok) << p.message;
+  EXPECT_EQ(p.tube.size(), p.commands.size() + 1);
+  EXPECT_LT((p.commands.front().p_W - start.command.p_W).norm(), 1e-9);
+  EXPECT_LT((p.commands.front().v_W - start.command.v_W).norm(), 1e-9);
+  EXPECT_LT((p.commands.back().p_W - goal).norm(), 1e-9);
+  EXPECT_EQ(p.commands.back().v_W, Vec3::Zero());
+  for (double t = 0; t <= p.trajectory.duration(); t += 0.003) {
+    EXPECT_LE(p.trajectory.derivative(t, 1).cwiseAbs().maxCoeff(), o.v_max * (1 + 1e-9));
+    EXPECT_LE(p.trajectory.derivative(t, 2).cwiseAbs().maxCoeff(), o.a_max * (1 + 1e-9));
+  }
+  // The box of each set, grown by the body as a box of half its edge, meets no voxel that is not free: brute force.
+  const double body = (world.reach.vehicle.body.radius + world.reach.vehicle.estimation.position) / std::sqrt(3.0);
+  double least = INFINITY;
+  for (const auto& step : p.tube) {
+    const auto& h = step.half_widths;
+    const Vec3 half = Vec3(h[kX], h[kY], h[kZ]) + Vec3::Constant(body);
+    const Index3 low = world.grid.index(step.center.p_W - half), high = world.grid.index(step.center.p_W + half);
+    for (int x = low.x(); x <= high.x(); ++x)
+      for (int y = low.y(); y <= high.y(); ++y)
+        for (int z = low.z(); z <= high.z(); ++z) {
+          // The horizontal set is the octagon: corners of the box beyond it do not count.
+          const Vec3 d = (world.grid.center({x, y, z}) - step.center.p_W).cwiseAbs();
+          const double diagonal = std::max(h[kXyPlus], h[kXyMinus]) + body * std::sqrt(2.0);
+          if ((d.x() + d.y() - 0.1) / std::sqrt(2.0) > diagonal) continue;
+          EXPECT_TRUE(world.grid.free({x, y, z})) << step.t;
+        }
+    least = std::min(least, world.distance.exact(world.grid, step.center.p_W));
+  }
+  EXPECT_GT(p.metrics.min_clearance_m, 0);
+  EXPECT_LE(p.metrics.min_clearance_m,
+            least - world.reach.vehicle.body.radius - world.reach.vehicle.estimation.position);
+  EXPECT_NEAR(p.metrics.min_clearance_m, tube_clearance(world, p.tube), 1e-9);
+}
+
+TEST(Plan, GoesRoundAThinWallToItsFarGapAtEverySpeed) {
+  for (const double v_max : {0.3, 0.5, 1.0, 1.5, 2.0, 3.0}) {
+    const PlanOptions options{v_max, 2.0};
+    const Plan p = plan(gap_world(), at_rest(kStart), kGoal, options);
+    SCOPED_TRACE(v_max);
+    expect_sound(gap_world(), p, at_rest(kStart), kGoal, options);
+    for (const auto& step : p.tube) {
+      const Vec3& c = step.center.p_W;
+      EXPECT_TRUE(std::abs(c.x() - 3.05) > 0.1 || c.y() > 2.8 + 0.18) << c.transpose();
+    }
+  }
+}
+
+TEST(Plan, ReportsLengthTimeAndJerkOfItsOwnTrajectory) {
+  const Plan p = plan(gap_world(), at_rest(kStart), kGoal, {1.5, 2});
+  ASSERT_EQ(p.status, PlanStatus::ok) << p.message;
+  double length = 0, jerk2 = 0;
+  const double step = 1e-3;
+  for (double t = step / 2; t < p.trajectory.duration(); t += step) {
+    length += p.trajectory.derivative(t, 1).norm() * step;
+    jerk2 += p.trajectory.derivative(t, 3).squaredNorm() * step;
+  }
+  EXPECT_NEAR(p.metrics.length_m, length, 1e-2 * length);
+  EXPECT_NEAR(p.metrics.jerk2, jerk2, 1e-2 * jerk2);
+  EXPECT_NEAR(p.metrics.time_s, p.trajectory.duration(), 1e-12);
+  EXPECT_GT(p.metrics.length_m, 2 * std::hypot(2.0, 1.9));  // round the end of the wall
+}
+
+TEST(Plan, FromMotionContinuesTheCommand) {
+  PlanStart start = at_rest(kStart);
+  start.command.v_W = {0.6, 0.4, 0};
+  start.command.a_W = {0.3, -0.2, 0.1};
+  start.estimated = {kStart + Vec3(-0.02, 0.01, 0.01), {0.55, 0.42, 0.02}};
+  const Plan p = plan(gap_world(), start, kGoal, {1.5, 2});
+  expect_sound(gap_world(), p, start, kGoal, {1.5, 2});
+  EXPECT_LT((p.commands.front().a_W - start.command.a_W).norm(), 1e-9);
+  EXPECT_EQ(p.tube.front().center.p_W, start.estimated.p_W);
+}
+
+TEST(Plan, FromAboveTheLimitSlowsDown) {
+  PlanStart start = at_rest({1.0, 3.2, 0.8});
+  start.command.v_W = start.estimated.v_W = {1.2, 0, 0};
+  const Plan p = plan(gap_world(), start, {5, 3.2, 0.8}, {0.8, 2});
+  ASSERT_EQ(p.status, PlanStatus::ok) << p.message;
+  for (double t = 0; t <= p.trajectory.duration(); t += 0.003) {
+    EXPECT_LE(p.trajectory.derivative(t, 1).x(), 1.2 + 1e-9);
+    EXPECT_LE(p.trajectory.derivative(t, 1).tail<2>().cwiseAbs().maxCoeff(), 0.8 + 1e-9);
+  }
+}
+
+TEST(Plan, SaysNoPathBehindAClosedWall) {
+  const Plan p = plan(closed_world(), at_rest(kStart), kGoal, {1.5, 2});
+  EXPECT_EQ(p.status, PlanStatus::no_path);
+  EXPECT_FALSE(p.message.empty());
+  EXPECT_TRUE(p.commands.empty());
+}
+
+TEST(Plan, SaysWhereAndWhyAStartOrGoalIsBlocked) {
+  const World& world = gap_world();
+  const auto status = [&](const Vec3& from, const Vec3& to) { return plan(world, at_rest(from), to, {1.5, 2}); };
+  const Plan occupied = status({3.05, 1, 0.8}, kGoal), outside = status(kStart, {9, 1, 0.8}),
+             near_wall = status(kStart, {2.85, 1, 0.8}), not_finite = status(kStart, {NAN, 1, 0.8});
+  EXPECT_EQ(occupied.status, PlanStatus::start_blocked);
+  EXPECT_NE(occupied.message.find("(3.05, 1.00, 0.80) is occupied"), std::string::npos) << occupied.message;
+  EXPECT_EQ(outside.status, PlanStatus::goal_blocked);
+  EXPECT_NE(outside.message.find("outside the map"), std::string::npos) << outside.message;
+  EXPECT_EQ(near_wall.status, PlanStatus::goal_blocked);
+  EXPECT_NE(near_wall.message.find("clear"), std::string::npos) << near_wall.message;
+  EXPECT_EQ(not_finite.status, PlanStatus::goal_blocked);
+}
+
+TEST(Plan, KeepsItsDeadline) {
+  const Plan p = plan(gap_world(), at_rest(kStart), kGoal, {0.3, 2, 0.0});
+  EXPECT_EQ(p.status, PlanStatus::deadline);
+  EXPECT_TRUE(p.commands.empty());
+}
+
+TEST(Plan, KeepsAConstantMarginFromEverything) {
+  const auto world = build_world(room(2.8), short_ranged_model(), test_vehicle(), reach::Method::tight, 0.2);
+  const Plan p = plan(*world, at_rest(kStart), kGoal, {1.5, 2});
+  ASSERT_EQ(p.status, PlanStatus::ok) << p.message;
+  for (const auto& step : p.tube)
+    EXPECT_GT(world->distance.exact(world->grid, step.center.p_W), 0.16 + 0.02 + 0.2 - 1e-9);
+  // In a gap narrower than twice body, estimation and margin there is no way.
+  const auto narrow = build_world(room(3.3), short_ranged_model(), test_vehicle(), reach::Method::tight, 0.2);
+  EXPECT_EQ(plan(*narrow, at_rest(kStart), kGoal, {1.5, 2}).status, PlanStatus::no_path);
+}
+
+TEST(NearestApproach, FindsTheOneStepThatTouches) {
+  const World& world = gap_world();
+  reach::ReachTube tube = still_tube({1.5, 2, 0.8}, 100, 0.05);
+  EXPECT_NEAR(tube_clearance(world, tube), 0.8 - 0.05 - 0.18, 1e-6);  // floor and ceiling
+  tube[60].half_widths_interval[kZ] = 0.65;
+  const Approach nearest = nearest_approach(world, tube);
+  EXPECT_LT(nearest.clearance, 0);
+  EXPECT_NEAR(nearest.t, 1.2, 1e-12);
+}
+
+TEST(TakeoffColumn, FindsTheFloorAndTheLowestClearHover) {
+  const World& world = gap_world();
+  const auto column = takeoff_column(world, {1.5, 1.5, 0.3});
+  ASSERT_TRUE(column);
+  EXPECT_NEAR(column->z_floor, 0, 1e-9);
+  EXPECT_GT(column->z_safe, 0.18);
+  const auto safe = [&](double z) {
+    return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, {1.5, 1.5, z}).safe();
+  };
+  EXPECT_TRUE(safe(column->z_safe));
+  EXPECT_FALSE(safe(column->z_safe - 0.1));
+  EXPECT_FALSE(takeoff_column(world, {3.05, 1, 0.8}));  // in the wall
+  EXPECT_FALSE(takeoff_column(world, {2.9, 1, 0.8}));   // too near to it at any height
+}
+
+TEST(VerticalCommands, RestToRestWithinTheLimits) {
+  const Vec3 from(1, 2, 0.1), to(1, 2, 1.3);
+  for (const double v_max : {0.2, 5.0}) {
+    const auto commands = vertical_commands(from, to, v_max, 1.0);
+    EXPECT_EQ(commands.front().p_W, from);
+    EXPECT_LT((commands.back().p_W - to).norm(), 1e-12);
+    EXPECT_LT(commands.back().v_W.norm() + commands.back().a_W.norm() + commands.front().a_W.norm(), 1e-12);
+    double v_peak = 0, a_peak = 0;
+    for (std::size_t k = 1; k + 1 < commands.size(); ++k) {
+      v_peak = std::max(v_peak, std::abs(commands[k].v_W.z()));
+      a_peak = std::max(a_peak, std::abs(commands[k].a_W.z()));
+      const double slope = (commands[k + 1].p_W.z() - commands[k - 1].p_W.z()) / 0.04;
+      EXPECT_NEAR(commands[k].v_W.z(), slope, 5e-3);
+      EXPECT_NEAR(commands[k].a_W.z(), (commands[k + 1].v_W.z() - commands[k - 1].v_W.z()) / 0.04, 2e-2);
+    }
+    EXPECT_LE(v_peak, v_max * (1 + 1e-9));
+    EXPECT_LE(a_peak, 1 + 1e-9);
+    EXPECT_GT(std::max(v_peak / v_max, a_peak), 0.95);  // no slower than needed
+  }
+}
+
+TEST(LateralClearance, IgnoresTheFloorButNotWhatStandsBeside) {
+  const World& world = gap_world();
+  const auto tube_at = [](const Vec3& p) { return still_tube(p, 2, 0.05); };
+  EXPECT_NEAR(lateral_clearance(world, tube_at({2.5, 1.5, 0.1})), 0.5 - 0.05 - 0.18, 1e-6);  // the wall at x = 3
+  EXPECT_NEAR(lateral_clearance(world, tube_at({1.5, 2, 0.1})), 1.0, 1e-9);                  // capped
+  EXPECT_LT(lateral_clearance(world, tube_at({2.85, 1.5, 0.1})), 0);
+  EXPECT_LT(lateral_clearance(world, tube_at({1.5, 2, 1.5})), 0);  // the ceiling is not the floor
+}
+
+}  // namespace
+}  // namespace backwash::plan

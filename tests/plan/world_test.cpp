@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/plan/world.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+
+namespace backwash::plan {
+namespace {
+
+Vehicle vehicle_5in() { return config::load_vehicle("builtin:quad-5in").value(); }
+map::OccupancyGrid corridor() { return map::builtin_scene("parallel-walls-2m", 0.2).value(); }
+
+TEST(World, StoresTheFieldExactlyWhereTheVehiclesCentreCanBe) {
+  const Vehicle vehicle = vehicle_5in();
+  const auto world = build_world(corridor(), Model{}, vehicle);
+  std::size_t stored = 0;
+  for (std::size_t n = 0; n < world->grid.cell_count(); ++n) {
+    const Index3 v = world->grid.voxel(n);
+    const double least = vehicle.body.radius - 0.2 * std::sqrt(3.0) / 2;
+    const bool possible = world->grid.free(v) && world->distance.at(v) >= least;
+    ASSERT_EQ(world->field.has(v), possible);
+    stored += possible;
+    if (!possible) {
+      EXPECT_FALSE(world->hover.safe(v));
+    }
+  }
+  EXPECT_GT(stored, 100u);
+}
+
+TEST(World, TakesTheFootprintOfTheGroundTermFromTheVehicle) {
+  Vehicle vehicle = vehicle_5in();
+  vehicle.body.diagonal_radius = 0.5;
+  const auto world = build_world(corridor(), Model{}, vehicle);
+  EXPECT_NE(Model{}.ground.r0, 0.5);
+  Model expected;
+  expected.ground.r0 = 0.5;
+  const field::ProximityField exact(world->grid, expected);
+  for (std::size_t n = 0; n < world->grid.cell_count(); n += 7) {
+    const Index3 v = world->grid.voxel(n);
+    if (!world->field.has(v)) continue;
+    const double zz = exact.at(world->grid.center(v)).sigma().zz;
+    EXPECT_NEAR(world->field.at(v).zz, zz, 1e-6 * zz);
+  }
+}
+
+TEST(World, DoesNotDependOnHowTheWorkIsDivided) {
+  const auto whole = build_world(corridor(), Model{}, vehicle_5in());
+  const Parallel backwards_in_parts = [](std::size_t count, const auto& work) {
+    for (std::size_t end = count; end > 0;) {
+      const std::size_t begin = end > 37 ? end - 37 : 0;
+      work(begin, end);
+      end = begin;
+    }
+  };
+  const auto parts = build_world(corridor(), Model{}, vehicle_5in(), reach::Method::tight, -1, backwards_in_parts);
+  std::size_t safe = 0;
+  for (std::size_t n = 0; n < whole->grid.cell_count(); ++n) {
+    const Index3 v = whole->grid.voxel(n);
+    EXPECT_EQ(whole->bounds.at(v).w, parts->bounds.at(v).w);
+    EXPECT_EQ(whole->hover.clearance(v), parts->hover.clearance(v));
+    EXPECT_EQ(whole->hover.half_widths(v), parts->hover.half_widths(v));
+    safe += whole->hover.safe(v);
+  }
+  EXPECT_GT(safe, 10u);
+}
+
+TEST(World, UsesThePapersLoopForThePapersMethodOnly) {
+  EXPECT_EQ(build_world(corridor(), Model{}, vehicle_5in(), reach::Method::paper)->reach.loop, reach::Loop::continuous);
+  EXPECT_EQ(build_world(corridor(), Model{}, vehicle_5in(), reach::Method::tight)->reach.loop, reach::Loop::vehicle);
+}
+
+TEST(World, KeepsTheConstantMargin) {
+  const auto world = build_world(corridor(), Model{}, vehicle_5in(), reach::Method::tight, 0.1);
+  EXPECT_EQ(world->constant_margin, 0.1);
+  for (std::size_t n = 0; n < world->grid.cell_count(); ++n) {
+    const Index3 v = world->grid.voxel(n);
+    if (world->field.has(v)) {
+      EXPECT_NEAR(world->hover.half_widths(v).x(), 0.1, 1e-6);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace backwash::plan

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+
+#include "core/reach/ellipsoid.hpp"
+#include "core/reach/support.hpp"
+
+namespace {
+thread_local std::size_t allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size > 0 ? size : 1)) return p;
+  throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+
+namespace backwash::reach {
+namespace {
+
+TEST(RealTime, StepsOfCentreAndSetsDoNotAllocate) {
+  Vehicle vehicle;
+  vehicle.controller.kp = {20, 20};
+  vehicle.controller.kd = {4, 4};
+  vehicle.controller.latency = 0.033;
+  vehicle.controller.feedback_delay = 0.0124;
+  vehicle.controller.attitude_lag = 0.05;
+  const AxisResponse response = axis_response(axis_loop(vehicle, false, Loop::vehicle), Loop::vehicle);
+  SupportRecursion support(response, response, vehicle);
+  EllipsoidRecursion ellipsoid(vehicle);
+  CentrePredictor delayed(vehicle, Loop::vehicle, {}, Vec3::Zero(), {});
+  CentrePredictor sampled(vehicle, Loop::sampled, {}, Vec3::Zero(), {});
+  const DisturbanceBound bound{{1, 1, 1, 1, 1}};
+  const std::size_t before = allocations;
+  EXPECT_GT(before, 0u);  // the counter counts
+  for (std::size_t k = 0; k < 3 * response.G.size(); ++k) {
+    support.step(bound);
+    ellipsoid.step(Vec3::Ones());
+    delayed.step(Setpoint{});
+    sampled.step(Setpoint{});
+    support.half_widths_until_next(bound);
+  }
+  EXPECT_EQ(allocations, before);
+}
+
+}  // namespace
+}  // namespace backwash::reach

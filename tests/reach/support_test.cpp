@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <stdexcept>
+
+#include "tests/reach/axis_rollouts.hpp"
+
+namespace backwash::reach {
+namespace {
+
+using Batch = AxisRollouts::Batch;
+constexpr double kH = 2e-3;  // step of the rollouts, s
+constexpr int kPerStep = 10;
+
+struct Case {
+  Vehicle vehicle;
+  Loop loop;
+  AxisLoop axis() const { return axis_loop(vehicle, false, loop); }
+  bool sampled() const { return loop == Loop::sampled; }
+  AxisResponse response;
+};
+
+// Every gain set under every loop that flies it. All of them are stable (asserted by the first test).
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const auto& [kp, kd] : kGainSets)
+    for (const auto& [loop, lag, delay] :
+         {std::tuple(Loop::continuous, 0.05, 0.03), std::tuple(Loop::vehicle, 0.05, 0.0),
+          std::tuple(Loop::vehicle, 0.05, 0.03), std::tuple(Loop::vehicle, 0.0, 0.03),
+          std::tuple(Loop::sampled, 0.0, 0.0), std::tuple(Loop::sampled, 0.05, 0.03)}) {
+      Case c{{}, loop, {}};
+      c.vehicle.controller.kp = {kp, kp};
+      c.vehicle.controller.kd = {kd, kd};
+      c.vehicle.controller.attitude_lag = lag;
+      c.vehicle.controller.feedback_delay = delay;
+      c.vehicle.initial_error.position = 0.02;
+      c.vehicle.initial_error.velocity = 0.05;
+      c.response = axis_response(c.axis(), loop);
+      all.push_back(std::move(c));
+    }
+  return all;
+}
+
+std::string name(const Case& c) {
+  const AxisLoop axis = c.axis();
+  return (c.sampled() ? "sampled, gains " : "continuous feedback, gains ") + std::to_string(axis.kp) + " " +
+         std::to_string(axis.kd) + ", delay " + std::to_string(axis.feedback_delay) + ", lag " +
+         std::to_string(axis.attitude_lag);
+}
+
+// Bounds that vary as along a flight: smooth, with jumps and quiet stretches.
+std::vector<DisturbanceBound> varying_bounds(std::mt19937& random, std::size_t steps) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<DisturbanceBound> bounds(steps);
+  double level = 1;
+  for (DisturbanceBound& b : bounds) {
+    if (uniform(random) < 0.05) level = uniform(random) < 0.3 ? 0 : 2.5 * uniform(random);
+    const double x = level * (0.8 + 0.4 * uniform(random)), y = level * (0.5 + uniform(random));
+    const double correlation = 0.6 * (2 * uniform(random) - 1);
+    const Variance sigma{x * x, correlation * x * y, 0, y * y, 0, level * level};
+    b = bound(sigma, BoundModel{1, 0, 0, 0.15});
+  }
+  return bounds;
+}
+
+struct Tube {
+  std::vector<PerDirection> at, until_next;
+};
+Tube propagate(const Case& c, const std::vector<DisturbanceBound>& bounds) {
+  SupportRecursion support(c.response, c.response, c.vehicle);
+  Tube tube;
+  for (const DisturbanceBound& b : bounds) {
+    tube.at.push_back(support.half_widths());
+    tube.until_next.push_back(support.half_widths_until_next(b));
+    support.step(b);
+  }
+  tube.at.push_back(support.half_widths());
+  return tube;
+}
+
+TEST(SupportRecursion, ContainsRandomRolloutsInEveryDirection) {
+  constexpr std::size_t kSteps = 60;
+  constexpr Eigen::Index kRollouts = 2000;
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (const Case& c : cases()) {
+    const auto bounds = varying_bounds(random, kSteps);
+    const Tube tube = propagate(c, bounds);
+
+    // Starts on the surface of the first set, per axis.
+    std::array<Batch, 3> p0, v0;
+    for (std::size_t axis = 0; axis < 3; ++axis) p0[axis] = v0[axis] = Batch::Zero(kRollouts);
+    std::vector<Vec3> push(kRollouts);
+    std::vector<double> switching(kRollouts);
+    for (Eigen::Index i = 0; i < kRollouts; ++i) {
+      Eigen::Vector<double, 6> e;
+      for (double& x : e) x = normal(random);
+      e.normalize();
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        p0[axis][i] = c.vehicle.initial_error.position * e[static_cast<Eigen::Index>(axis)];
+        v0[axis][i] = c.vehicle.initial_error.velocity * e[static_cast<Eigen::Index>(axis) + 3];
+      }
+      switching[static_cast<std::size_t>(i)] = std::pow(10.0, -2.5 * uniform(random));  // per 2 ms
+    }
+    std::array<AxisRollouts, 3> e{AxisRollouts(c.axis(), c.sampled(), kH, p0[0], v0[0]),
+                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[1], v0[1]),
+                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[2], v0[2])};
+    double worst = 0, worst_between = 0;  // |e|/h
+    const auto check = [&](const PerDirection& h) {
+      double largest = 0;
+      for (std::size_t d = 0; d < kDirections; ++d) {
+        const Vec3 n = unit(static_cast<Direction>(d));
+        const Batch along = n.x() * e[0].p() + n.y() * e[1].p() + n.z() * e[2].p();
+        largest = std::max(largest, along.abs().maxCoeff() / h[d]);
+      }
+      return largest;
+    };
+    std::array<Batch, 3> w{Batch::Zero(kRollouts), Batch::Zero(kRollouts), Batch::Zero(kRollouts)};
+    for (std::size_t k = 0; k < kSteps; ++k) {
+      worst = std::max(worst, check(tube.at[k]));
+      for (int i = 0; i < kPerStep; ++i) {
+        worst_between = std::max(worst_between, check(tube.until_next[k]));
+        for (std::size_t n = 0; n < push.size(); ++n) {
+          if (i == 0 && k == 0) push[n] = Vec3(normal(random), normal(random), normal(random));
+          if (uniform(random) < switching[n]) {
+            push[n] = uniform(random) < 0.7 ? Vec3(-push[n]) : Vec3(normal(random), normal(random), normal(random));
+          }
+          // As far as the slabs allow: horizontally and vertically on their own.
+          double horizontal = 1e300;
+          for (const Direction d : {kX, kY, kXyPlus, kXyMinus})
+            horizontal = std::min(horizontal, bounds[k].w[d] / (std::abs(unit(d).dot(push[n])) + 1e-300));
+          const auto j = static_cast<Eigen::Index>(n);
+          w[0][j] = horizontal * push[n].x();
+          w[1][j] = horizontal * push[n].y();
+          w[2][j] = std::copysign(bounds[k].w[kZ], push[n].z());
+        }
+        for (std::size_t axis = 0; axis < 3; ++axis) e[axis].step(w[axis]);
+      }
+      worst_between = std::max(worst_between, check(tube.until_next[k]));
+    }
+    worst = std::max(worst, check(tube.at[kSteps]));
+    EXPECT_LE(worst, 1 + 1e-7) << name(c);
+    EXPECT_LE(worst_between, 1 + 1e-7) << name(c);
+    EXPECT_GT(worst, 0.4) << name(c);  // the rollouts come near
+  }
+}
+
+// Position at every 2 ms after a unit push of 2 ms that starts at each of the ten instants of a step: by superposition
+// the position at any time under any disturbance that is constant for 2 ms.
+struct PushResponse {
+  PushResponse(const Case& c, std::size_t steps) {
+    AxisRollouts push(c.axis(), c.sampled(), kH, Batch::Zero(kPerStep), Batch::Zero(kPerStep));
+    AxisRollouts initial(c.axis(), c.sampled(), kH, Batch{{1, 0}}, Batch{{0, 1}});
+    for (std::size_t i = 0; i <= steps * kPerStep; ++i) {
+      position.push_back(push.p());
+      from_initial.push_back(initial.p());
+      Batch w = Batch::Zero(kPerStep);
+      if (i < kPerStep) w[static_cast<Eigen::Index>(i)] = 1;
+      push.step(w);
+      initial.step(Batch{{0, 0}});
+    }
+  }
+  // At time `to` (in 2 ms) after the push of the 2 ms that start at `from`.
+  double at(std::size_t from, std::size_t to) const {
+    return position[to - from / kPerStep * kPerStep][static_cast<Eigen::Index>(from % kPerStep)];
+  }
+  std::vector<Batch> position, from_initial;
+};
+
+// The start and the bang-bang disturbance that push farthest at time `to`.
+struct WorstCase {
+  double p0, v0;
+  std::vector<double> sign;
+};
+WorstCase worst_case(const Case& c, const PushResponse& response, std::size_t to) {
+  const double p = c.vehicle.initial_error.position, v = c.vehicle.initial_error.velocity;
+  const Batch& r = response.from_initial[to];
+  const double norm = std::hypot(p * r[0], v * r[1]);
+  WorstCase worst{p * p * r[0] / norm, v * v * r[1] / norm, {}};
+  for (std::size_t i = 0; i < to; ++i) worst.sign.push_back(response.at(i, to) < 0 ? -1 : 1);
+  return worst;
+}
+
+TEST(SupportRecursion, IsReachedByTheWorstDisturbanceAndNeverLeft) {
+  constexpr std::size_t kSteps = 100;
+  constexpr Eigen::Index kTimes = 200;
+  std::mt19937 random(11);
+  std::uniform_int_distribution<std::size_t> any_step(3, kSteps), any_instant(30, kSteps * kPerStep - 1);
+  for (const Case& c : cases()) {
+    const auto bounds = varying_bounds(random, kSteps);
+    const Tube tube = propagate(c, bounds);
+    const PushResponse response(c, kSteps);
+    std::vector<std::size_t> times;  // half of them at samples
+    std::vector<WorstCase> worst;
+    Batch p0(kTimes), v0(kTimes);
+    for (Eigen::Index i = 0; i < kTimes; ++i) {
+      times.push_back(i % 2 == 0 ? any_step(random) * kPerStep : any_instant(random));
+      worst.push_back(worst_case(c, response, times.back()));
+      p0[i] = worst.back().p0;
+      v0[i] = worst.back().v0;
+    }
+    AxisRollouts e(c.axis(), c.sampled(), kH, p0, v0);
+    for (std::size_t i = 0; i <= kSteps * kPerStep; ++i) {
+      const std::size_t k = std::min(i / kPerStep, kSteps - 1);
+      for (Eigen::Index n = 0; n < kTimes; ++n) {
+        const double reached = e.p()[n];
+        ASSERT_LE(std::abs(reached), tube.until_next[k][kX] * (1 + 1e-7)) << name(c) << " at " << i;
+        if (i % kPerStep == 0) {
+          ASSERT_LE(std::abs(reached), tube.at[i / kPerStep][kX] * (1 + 1e-7)) << name(c) << " at " << i;
+          if (i == times[static_cast<std::size_t>(n)]) {
+            ASSERT_GE(reached, 0.999 * tube.at[i / kPerStep][kX]) << name(c) << " at " << i;
+          }
+        }
+      }
+      if (i == kSteps * kPerStep) break;
+      Batch w(kTimes);
+      for (Eigen::Index n = 0; n < kTimes; ++n) {
+        const auto& sign = worst[static_cast<std::size_t>(n)].sign;
+        w[n] = (i < sign.size() ? sign[i] : 1) * bounds[k].w[kX];
+      }
+      e.step(w);
+    }
+  }
+}
+
+// The support between samples, from its definition by superposition.
+TEST(SupportRecursion, IntervalIsTheLargestSupportWithinHalfAPerCent) {
+  constexpr std::size_t kSteps = 80;
+  std::mt19937 random(3);
+  for (const Case& c : cases()) {
+    const auto bounds = varying_bounds(random, kSteps);
+    const Tube tube = propagate(c, bounds);
+    const PushResponse response(c, kSteps);
+    for (std::size_t k = 0; k < kSteps; ++k) {
+      double largest = 0;
+      for (std::size_t to = k * kPerStep; to <= (k + 1) * kPerStep; ++to) {
+        double h = std::hypot(c.vehicle.initial_error.position * response.from_initial[to][0],
+                              c.vehicle.initial_error.velocity * response.from_initial[to][1]);
+        for (std::size_t i = 0; i < to; ++i) h += bounds[i / kPerStep].w[kX] * std::abs(response.at(i, to));
+        largest = std::max(largest, h);
+      }
+      ASSERT_GE(tube.until_next[k][kX], largest * (1 - 1e-7)) << name(c) << " step " << k;
+      ASSERT_LE(tube.until_next[k][kX], largest * 1.005) << name(c) << " step " << k;
+    }
+  }
+}
+
+TEST(SupportRecursion, BeyondTheTableTheTailKeepsTheSumCovered) {
+  Case c{{}, Loop::vehicle, {}};
+  c.vehicle.controller.kp = {20, 20};
+  c.vehicle.controller.kd = {4, 4};
+  c.response = axis_response(c.axis(), c.loop);
+  SupportRecursion support(c.response, c.response, c.vehicle);
+  DisturbanceBound b;
+  b.w.fill(2);
+  const std::size_t N = c.response.G.size();
+  for (std::size_t k = 0; k < 3 * N + 5; ++k) {
+    support.step(b);
+    const double least = 2 * c.response.P[std::min(k + 1, N) * AxisResponse::kPhases];
+    ASSERT_GE(support.half_widths()[kX], least - 1e-14);
+    ASSERT_LE(support.half_widths()[kX], least + 2 * c.response.tail + 1e-14);
+    ASSERT_EQ(support.half_widths()[kX], support.half_widths()[kXyMinus]);
+  }
+  // A storm in the past: what is left of it is never forgotten altogether.
+  for (std::size_t k = 0; k < N + 3; ++k) support.step(DisturbanceBound{});
+  EXPECT_GT(support.half_widths()[kZ], 0);
+  EXPECT_LE(support.half_widths()[kZ], 2 * c.response.tail);
+}
+
+TEST(SupportRecursion, AxesAndDirectionsAreTheirOwn) {
+  Case c{{}, Loop::continuous, {}};
+  c.vehicle.controller.kp = {6, 16};
+  c.vehicle.controller.kd = {4, 8};
+  const AxisResponse horizontal = axis_response(axis_loop(c.vehicle, false, c.loop), c.loop);
+  const AxisResponse vertical = axis_response(axis_loop(c.vehicle, true, c.loop), c.loop);
+  SupportRecursion support(horizontal, vertical, c.vehicle);
+  const DisturbanceBound b{{0.5, 1, 2, 3, 4}};
+  for (int k = 0; k < 400; ++k) support.step(b);
+  const PerDirection h = support.half_widths();
+  const double closed_form = 0.170633990;  // (6, 4), see AxisResponse.HoverHalfWidthIsTheClosedForm
+  EXPECT_NEAR(h[kX], 0.5 * closed_form, 1e-6);
+  EXPECT_NEAR(h[kY], closed_form, 1e-6);
+  EXPECT_NEAR(h[kXyPlus], 3 * closed_form, 1e-6);
+  EXPECT_NEAR(h[kXyMinus], 4 * closed_form, 1e-6);
+  EXPECT_NEAR(h[kZ], 2.0 / 16, 1e-6);
+}
+
+}  // namespace
+}  // namespace backwash::reach

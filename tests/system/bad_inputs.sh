@@ -1,0 +1,92 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Every bad input gives the documented exit code and exactly one line on stderr that names the verb and what is wrong.
+set -uo pipefail
+backwash=${1:?usage: bad_inputs.sh BACKWASH}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+failed=0
+
+# refused CODE WORDS ARGUMENTS…: runs backwash and checks code, one line, its beginning, and the words in it.
+refused() {
+  local code=$1 words=$2 line
+  shift 2
+  "$backwash" "$@" >stdout 2>stderr
+  local got=$?
+  line=$(cat stderr)
+  if [[ $got != "$code" || $(wc -l <stderr) != 1 || $line != "backwash${1:+ }${1:-}:"* || $line != *"$words"* ]]; then
+    echo "backwash $*"
+    echo "  wanted exit $code and one line with '$words'; got exit $got and:"
+    sed 's/^/  /' stderr
+    failed=1
+  fi
+}
+
+quad=builtin:quad-5in
+fly=(fly --map builtin:narrow-gap)
+printf 'not a map at all\n' >corrupt.bt
+printf '[base]\nhorizontal = 0.004\nvertical = 0.006\nsideways = 1\n' >unknown_key.toml
+printf 't_s,cmd_x_m,cmd_y_m,cmd_z_m\n0,0,0,1\n0.02,0,0,1\n0.05,0,0,1\n' >gap.csv
+header=t_s,cmd_x_m,cmd_y_m,cmd_z_m,sigma_xx,sigma_xy,sigma_xz,sigma_yy,sigma_yz,sigma_zz
+printf '%s\n0,0,0,1,1,0,0,1,0,1\n0.02,0,0,1,1,2,0,1,0,1\n' $header >indefinite.csv
+printf '%s\n0,0,0,1,1,0,0,1,0,1\n0.02,0,0,one,1,0,0,1,0,1\n' $header >word.csv
+printf 't_s,cmd_x_m,cmd_y_m\n0,0,0\n' >no_z.csv
+printf 'x_m,y_m\n0,0\n' >no_z_points.csv
+printf 'start = [1, 0, 1]\n[[hover]]\np = [2, 0, 1]\ndwel = 3\n' >spec_key.toml
+printf 'start = [1, 1.5, 1]\n[[hover]]\np = [5, 1.5, 1]\ndwell = 3\n' >spec_wall.toml
+touch exists
+# An OctoMap of two free cubes, from (-1.6, -1.6, -1.6) to the origin and from there to (1.6, 1.6, 1.6); the rest of its
+# extent is unknown. Two bytes a node, two bits a child: 00 unknown, 10 free, 11 inner.
+{
+  printf '# Octomap OcTree binary file\nid OcTree\nsize 25\nres 0.1\ndata\n\x03\xc0'
+  for _ in 1 2 3 4 5 6 7 8 9 10; do printf '\x00\xc0'; done
+  printf '\x00\x40'
+  for _ in 1 2 3 4 5 6 7 8 9 10; do printf '\x03\x00'; done
+  printf '\x01\x00'
+} >two_rooms.bt
+
+# usage
+refused 64 "--nonsense" fly --nonsense
+refused 64 "three numbers" fly --start 1,2 --goal 1,0,3
+refused 64 "both --start and --goal" fly --start 1,0,1
+refused 64 "--vehicle" reach --track gap.csv
+refused 64 "exactly one" field --map builtin:narrow-gap --model $quad
+refused 64 "z=0.5" field --map builtin:narrow-gap --model $quad --slice w=3
+refused 64 "continuous" reach --vehicle $quad --track gap.csv --method paper --loop vehicle
+refused 64 "magic" reach --vehicle $quad --track gap.csv --method magic
+# inputs that are not there
+refused 66 "absent.bt" fly --map absent.bt
+refused 66 "apartment" fly --map builtin:no-such-world
+refused 66 "absent.toml" fly --vehicle absent.toml
+refused 66 "absent.csv" reach --vehicle $quad --track absent.csv
+refused 66 "absent.toml" simulate --map builtin:narrow-gap --vehicle $quad --flight absent.toml --out log.csv
+# bad data
+refused 65 "corrupt.bt" fly --map corrupt.bt
+refused 65 "gap.csv:4:" reach --vehicle $quad --track gap.csv
+refused 65 "indefinite.csv:3:" reach --vehicle $quad --track indefinite.csv
+refused 65 "word.csv:3:" reach --vehicle $quad --track word.csv
+refused 65 "cmd_z_m" reach --vehicle $quad --track no_z.csv
+refused 65 "z_m" field --map builtin:narrow-gap --model $quad --points no_z_points.csv
+refused 65 "spec_wall.toml" simulate --map builtin:narrow-gap --vehicle $quad --flight spec_wall.toml --out log.csv
+# configuration
+refused 78 "unknown_key.toml:4:" fly --model unknown_key.toml
+refused 78 "spec_key.toml:4:" simulate --map builtin:narrow-gap --vehicle $quad --flight spec_key.toml --out log.csv
+# nothing is overwritten
+refused 73 "--force" fly --report exists
+refused 73 "--force" fly --log exists
+refused 73 "--force" field --map builtin:narrow-gap --model $quad --slice z=1 --out exists
+# places that cannot be flown from or to
+refused 69 "occupied" "${fly[@]}" --start 3,1.2,1 --goal 5,0,1
+refused 69 "unknown" fly --map two_rooms.bt --start 0.8,-0.8,0.8 --goal 0.8,0.8,0.8
+refused 69 "not hover-safe" "${fly[@]}" --start 1,-1.75,1 --goal 5,0,1
+refused 69 "outside the map" "${fly[@]}" --start 1,0,1 --goal 50,0,1
+refused 69 "start_blocked" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 3,1.2,1 --goal 5,0,1
+grep -q '^status  *start_blocked' stdout || { echo "plan does not say its status on stdout"; failed=1; }
+refused 69 "goal_blocked" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 50,0,1 --json
+python3 -c 'import json, sys; assert json.load(open("stdout"))["status"] == "goal_blocked"' || { echo "plan --json is not JSON when refused"; failed=1; }
+
+# a bare call is a usage error as well, without a verb to name
+"$backwash" >stdout 2>stderr
+[[ $? == 64 && $(wc -l <stderr) == 1 ]] || { echo "bare call: not 64 with one line"; failed=1; }
+exit $failed

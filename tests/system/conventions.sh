@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Conventions of every verb: --help with an example, --version with a commit, --json that is one JSON object.
+set -euo pipefail
+backwash=${1:?usage: conventions.sh BACKWASH}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+die() { echo "$*"; exit 1; }
+
+for verb in fly plan reach field simulate feasibility; do
+  "$backwash" "$verb" --help >help || die "$verb --help fails"
+  grep -q "backwash $verb " help || die "$verb --help has no example"
+done
+"$backwash" --version | grep -Eq '^backwash [0-9.]+ \([0-9a-f]{12}\)$|unknown commit' || die "--version has no version and commit"
+
+quad=builtin:quad-5in
+printf 't_s,cmd_x_m,cmd_y_m,cmd_z_m,sigma_xx,sigma_xy,sigma_xz,sigma_yy,sigma_yz,sigma_zz\n' >track.csv
+for k in 0 1 2 3 4; do printf '%s,1,2,3,0.09,0.01,0,0.04,0,0.01\n' "0.0$((2 * k))" >>track.csv; done
+for method in tight paper; do
+  "$backwash" reach --vehicle $quad --track track.csv --method $method --direction 1,1,0 --json >$method.json
+done
+"$backwash" field --map builtin:parallel-walls-1m --model $quad --vehicle $quad --at 0,0,1 --json >exact.json
+"$backwash" field --map builtin:parallel-walls-1m --model $quad --vehicle $quad --at 0,0,1 --interpolated --json >stored.json
+"$backwash" field --map builtin:parallel-walls-1m --model $quad --slice z=1 --out slice.svg --json >slice.json
+grep -q '<svg' slice.svg || die "the slice's picture is not an SVG"
+printf 'start = [1, 0, 1]\n[[hover]]\np = [1.5, 0, 1]\ndwell = 1.0\n[[hover]]\np = [1, 0, 1.2]\ndwell = 2.0\n' >spec.toml
+"$backwash" simulate --map builtin:narrow-gap --vehicle $quad --flight spec.toml --seed 3 --out a.csv --json >simulate.json
+"$backwash" simulate --map builtin:narrow-gap --vehicle $quad --flight spec.toml --seed 3 --out b.csv >/dev/null
+"$backwash" simulate --map builtin:narrow-gap --vehicle $quad --flight spec.toml --seed 4 --out c.csv >/dev/null
+cmp -s a.csv b.csv || die "the same seed gives another log"
+! cmp -s a.csv c.csv || die "another seed gives the same log"
+
+python3 - <<'PYTHON'
+import csv, json, math
+for method in ("tight", "paper"):
+    reach = json.load(open(method + ".json"))
+    assert reach["method"] == method and len(reach["steps"]) == 6, method
+    for k, step in enumerate(reach["steps"]):
+        assert abs(step["t"] - 0.02 * k) < 1e-12
+        assert ("shape" in step) == (method == "paper")
+        h = step["half_widths"]
+        assert set(h) == {"x", "y", "z", "xy_plus", "xy_minus"} == set(step["half_widths_interval"])
+        assert all(step["half_widths_interval"][d] >= h[d] - 1e-12 for d in h)
+        assert abs(step["support"] - h["xy_plus"]) < 1e-9
+        assert step["center"] == reach["steps"][0]["center"] or max(abs(a - b) for a, b in zip(step["center"], [1, 2, 3])) < 1e-9
+    assert all(abs(reach["steps"][0]["half_widths"][d] - 0.02) < 1e-12 for d in h), "the first set is the initial error"
+    q = reach["steps"][-1].get("shape")
+    if q:  # the ellipsoid's own support and largest axis follow from its shape
+        h = reach["steps"][-1]["half_widths"]
+        assert abs(h["x"] - math.sqrt(q[0])) < 1e-12 and abs(h["xy_plus"] - math.sqrt((q[0] + 2 * q[1] + q[3]) / 2)) < 1e-12
+exact = json.load(open("exact.json"))["points"][0]
+parts = [sum(exact[part][n] for part in ("ground", "corner", "wall", "base")) for n in range(6)]
+assert all(abs(a - b) < 1e-12 for a, b in zip(parts, exact["sigma"])), "parts do not sum to sigma"
+stored = json.load(open("stored.json"))["points"][0]["sigma"]
+assert abs(stored[5] - exact["sigma"][5]) < 0.1 * exact["sigma"][5], "stored and exact differ"
+assert len(json.load(open("slice.json"))["points"]) > 100
+rows = list(csv.DictReader(open("a.csv")))
+assert json.load(open("simulate.json"))["rows"] == len(rows)
+assert {row["segment"] for row in rows} == {"-1", "0", "1"}
+assert sum(row["segment"] == "1" for row in rows) == 100, "2 s of dwell at 50 Hz"
+PYTHON

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/track/tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/support/allocations.hpp"
+
+namespace backwash::track {
+namespace {
+
+/// n commands along x, entry k centred at (k, 0, 1) with half widths 0.1 + 0.01 k, until the next sample 0.5 wider.
+std::shared_ptr<const AcceptedSegment> segment(int n) {
+  auto s = std::make_shared<AcceptedSegment>();
+  for (int k = 0; k < n; ++k)
+    s->commands.push_back({.p_W = Vec3(k, 0, 1), .v_W = Vec3(1, 0, 0), .a_W = Vec3(0, 2, 0), .yaw = 0.1 * k});
+  for (int k = 0; k <= n; ++k) {
+    reach::TubeStep step{};
+    step.t = k * kControlPeriod;
+    step.center.p_W = Vec3(k, 0, 1);
+    step.shape = Mat3::Zero();
+    step.half_widths.fill(0.1 + 0.01 * k);
+    step.half_widths_interval.fill(0.6 + 0.01 * k);
+    s->tube.push_back(step);
+  }
+  return s;
+}
+
+Setpoint start() { return {.p_W = Vec3(-1, -2, 3), .v_W = Vec3(1, 1, 1), .a_W = Vec3(1, 1, 1), .yaw = 0.5}; }
+
+void expect_rest(const Setpoint& s, const Vec3& p_W, double yaw) {
+  EXPECT_EQ(s.p_W, p_W);
+  EXPECT_EQ(s.v_W, Vec3::Zero());
+  EXPECT_EQ(s.a_W, Vec3::Zero());
+  EXPECT_EQ(s.yaw, yaw);
+}
+
+TEST(Tracker, HoldsAtRestBeforeTheFirstSegment) {
+  Tracker tracker(start());
+  EXPECT_TRUE(tracker.finished());
+  for (int i = 0; i < 3; ++i) expect_rest(tracker.step(), Vec3(-1, -2, 3), 0.5);
+  EXPECT_TRUE(tracker.judge(Vec3(9, 9, 9)).inside);  // nothing was claimed
+}
+
+TEST(Tracker, GivesOneCommandATickThenHoldsTheLastAtRest) {
+  Tracker tracker(start());
+  tracker.accept(segment(4));
+  for (int k = 0; k < 4; ++k) {
+    EXPECT_FALSE(tracker.finished());
+    const Setpoint s = tracker.step();
+    EXPECT_EQ(s.p_W, Vec3(k, 0, 1));
+    EXPECT_EQ(s.v_W, Vec3(1, 0, 0));
+    EXPECT_EQ(s.a_W, Vec3(0, 2, 0));
+  }
+  EXPECT_TRUE(tracker.finished());
+  for (int i = 0; i < 3; ++i) expect_rest(tracker.step(), Vec3(3, 0, 1), 0.1 * 3);
+}
+
+TEST(Tracker, JudgesAgainstTheSetOfTheTick) {
+  Tracker tracker(start());
+  tracker.accept(segment(4));
+  for (int k = 0; k <= 4; ++k) {
+    const double h = 0.1 + 0.01 * k;
+    const Inside at = tracker.judge(Vec3(k + 0.9 * h, 0, 1));
+    EXPECT_TRUE(at.inside);
+    EXPECT_NEAR(at.error[kX], 0.9 * h, 1e-12);
+    EXPECT_DOUBLE_EQ(at.half_widths[kX], h);
+    EXPECT_FALSE(tracker.judge(Vec3(k + 1.1 * h, 0, 1)).inside);
+    EXPECT_FALSE(tracker.judge(Vec3(k - 1.1 * h, 0, 1)).inside);
+    tracker.step();
+  }
+}
+
+TEST(Tracker, HoldsTheIntervalOfTheLastSetPastTheEnd) {
+  Tracker tracker(start());
+  tracker.accept(segment(4));
+  for (int i = 0; i < 5; ++i) tracker.step();
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_DOUBLE_EQ(tracker.judge(Vec3(4, 0, 1)).half_widths[kX], 0.64);
+    EXPECT_TRUE(tracker.judge(Vec3(4.63, 0, 1)).inside);
+    EXPECT_FALSE(tracker.judge(Vec3(4.65, 0, 1)).inside);
+    tracker.step();
+  }
+}
+
+TEST(Tracker, EveryDirectionCanPutItOutside) {
+  for (std::size_t d = 0; d < kDirections; ++d) {
+    const Vec3 n = unit(static_cast<Direction>(d));
+    auto s = std::make_shared<AcceptedSegment>(*segment(1));
+    for (std::size_t other = 0; other < kDirections; ++other) s->tube[0].half_widths[other] = other == d ? 0.1 : 10;
+    Tracker tracker(start());
+    tracker.accept(s);
+    for (const double side : {-1.0, 1.0}) {
+      EXPECT_TRUE(tracker.judge(Vec3(0, 0, 1) + side * 0.099 * n).inside);
+      EXPECT_FALSE(tracker.judge(Vec3(0, 0, 1) + side * 0.101 * n).inside);
+      EXPECT_NEAR(tracker.judge(Vec3(0, 0, 1) + side * 0.101 * n).error[d], side * 0.101, 1e-12);
+    }
+  }
+}
+
+TEST(Tracker, AMeasurementThatIsNoNumberIsNotInside) {
+  Tracker tracker(start());
+  tracker.accept(segment(1));
+  EXPECT_FALSE(tracker.judge(Vec3(0, 0, std::numeric_limits<double>::quiet_NaN())).inside);
+}
+
+TEST(Tracker, ANewSegmentTakesOverAtTheNextStep) {
+  Tracker tracker(start());
+  tracker.accept(segment(4));
+  tracker.step();
+  tracker.step();
+  tracker.accept(segment(2));
+  EXPECT_EQ(tracker.step().p_W, Vec3(0, 0, 1));
+  EXPECT_EQ(tracker.step().p_W, Vec3(1, 0, 1));
+  EXPECT_TRUE(tracker.finished());
+  expect_rest(tracker.step(), Vec3(1, 0, 1), 0.1);
+}
+
+TEST(Tracker, NeitherStepNorJudgeAllocates) {
+  Tracker tracker(start());
+  tracker.accept(segment(50));
+  bool inside = true;
+  const auto fly = [&] {
+    for (int k = 0; k < 100; ++k) {
+      inside = tracker.judge(Vec3(k < 50 ? k : 50, 0, 1)).inside && inside;
+      tracker.step();
+    }
+  };
+  EXPECT_EQ(test::allocations_during(fly), 0);
+  EXPECT_TRUE(inside);
+  // The trap works: what is not real-time is counted.
+  EXPECT_GT(test::allocations_during([&] { tracker.accept(segment(2)); }), 0);
+}
+
+}  // namespace
+}  // namespace backwash::track
