@@ -30,17 +30,18 @@ Breakdown ProximityField::at(const Vec3& p_W) const {
   Breakdown b;
   b.base = Variance::horizontal_vertical(model_.base.horizontal, model_.base.vertical);
   const auto faces = [&](const Element& e) { return e.normal.dot(p_W - e.c_W) > kInPlane; };
+  const SightMap::Viewpoint view = sight_.viewpoint(p_W);
   // The terms first: most elements in the boxes are outside every gate, and the line of sight is the dear part.
   const auto& g = model_.ground;
   up_.for_each_near(p_W, {g.l_max, g.r0, g.l_footprint_max}, [&](const Element& e) {
     if (!faces(e)) return;
     const Variance ground = terms_.ground(e, p_W);
-    if (nonzero(ground) && sight_.line_of_sight(p_W, e.c_W)) b.ground += ground;
+    if (nonzero(ground) && sight_.line_of_sight(view, e.c_W)) b.ground += ground;
   });
   lateral_.for_each_near(p_W, {.ball = model_.wall.l_max}, [&](const Element& e) {
     if (!faces(e)) return;
     const Variance corner = terms_.corner(e, p_W), wall = terms_.wall(e, p_W);
-    if ((nonzero(corner) || nonzero(wall)) && sight_.line_of_sight(p_W, e.c_W)) b.corner += corner, b.wall += wall;
+    if ((nonzero(corner) || nonzero(wall)) && sight_.line_of_sight(view, e.c_W)) b.corner += corner, b.wall += wall;
   });
   return b;
 }

@@ -9,11 +9,12 @@
 
 namespace backwash::field {
 
-/// Where the elements that may act on a vehicle at p lie: in a ball about p, or in a vertical column through p.
+/// Where the elements that may act on a vehicle at p lie: in a ball about p, or in a vertical column through p cut by a
+/// larger ball.
 struct Reach {
   double ball = 0;           ///< radius, m
   double column_radius = 0;  ///< m
-  double column_length = 0;  ///< up and down from p, m
+  double column_length = 0;  ///< radius of the larger ball, m
 };
 
 /// Elements sorted into cubes so that those near a point are found without looking at the others.
@@ -21,25 +22,34 @@ class ElementBuckets {
  public:
   ElementBuckets(const map::OccupancyGrid& grid, std::vector<Element> elements);
 
-  /// Calls visit(element) for every element within the reach of p and some outside it, in a fixed order.
+  /// Calls visit(element) for every element within the reach of p (and none further than 2 µm outside), in a fixed
+  /// order.
   template <typename Visit>
   void for_each_near(const Vec3& p_W, const Reach& reach, const Visit& visit) const {
     const double horizontal = std::max(reach.ball, reach.column_radius) + kSlack;
     const double vertical = std::max(reach.ball, reach.column_length) + kSlack;
+    const auto squared = [](double x) { return (x + kSlack) * (x + kSlack); };
+    const double ball2 = squared(reach.ball), column2 = squared(reach.column_radius),
+                 length2 = squared(reach.column_length);
     const Vec3 extent(horizontal, horizontal, vertical);
     const Index3 low = bucket_of(p_W - extent), high = bucket_of(p_W + extent);
     for (int j = low.y(); j <= high.y(); ++j)
       for (int i = low.x(); i <= high.x(); ++i) {
-        const double flat = std::hypot(gap(p_W, i, 0), gap(p_W, j, 1));
+        const double gap_x = gap(p_W, i, 0), gap_y = gap(p_W, j, 1);
+        const double flat = std::sqrt(gap_x * gap_x + gap_y * gap_y);
         if (flat > horizontal) continue;
-        const double half_chord = std::sqrt(std::max(0.0, (reach.ball + kSlack) * (reach.ball + kSlack) - flat * flat));
+        const double half_chord = std::sqrt(std::max(0.0, ball2 - flat * flat));
         const double half =
             flat <= reach.column_radius + kSlack ? std::max(half_chord, reach.column_length + kSlack) : half_chord;
         const int k0 = bucket_of(p_W - Vec3(0, 0, half)).z(), k1 = bucket_of(p_W + Vec3(0, 0, half)).z();
         // Buckets of one column are neighbours in memory: one run of elements.
         const std::size_t begin = first_[column(i, j) + static_cast<std::size_t>(k0)];
         const std::size_t end = first_[column(i, j) + static_cast<std::size_t>(k1) + 1];
-        for (std::size_t n = begin; n < end; ++n) visit(elements_[n]);
+        for (std::size_t n = begin; n < end; ++n) {
+          const Vec3 r = positions_[n] - p_W;
+          const double flat2 = r.x() * r.x() + r.y() * r.y(), r2 = flat2 + r.z() * r.z();
+          if (r2 <= ball2 || (flat2 <= column2 && r2 <= length2)) visit(elements_[n]);
+        }
       }
   }
 
@@ -65,6 +75,7 @@ class ElementBuckets {
   Vec3 origin_W_;
   Index3 count_;
   std::vector<Element> elements_;
+  std::vector<Vec3> positions_;     ///< of the elements: all that most of them are asked for, a quarter of the memory
   std::vector<std::size_t> first_;  ///< bucket n holds elements first_[n] … first_[n + 1] − 1
 };
 

@@ -48,9 +48,12 @@ Variance ProximityModel::ground(const Element& element, const Vec3& p_W) const n
 Variance ProximityModel::corner(const Element& element, const Vec3& p_W) const noexcept {
   if (!element.corner_W) return {};
   const auto& k = model_.corner;
-  if ((element.c_W - p_W).norm() > model_.wall.l_max + kTolerance) return {};
+  const auto beyond = [](const Vec3& r, double limit) {
+    return r.squaredNorm() > (limit + kTolerance) * (limit + kTolerance);
+  };
+  if (beyond(element.c_W - p_W, model_.wall.l_max)) return {};
   const Vec3 above = p_W - *element.corner_W;
-  if (above.norm() > k.l_max + kTolerance) return {};
+  if (beyond(above, k.l_max)) return {};
   const double d2 = above.head<2>().squaredNorm(), h = above.z(), phi = std::atan2(std::sqrt(d2), h);
   if (phi >= k.phi_max) return {};  // at φ̄_c itself the term is zero
   const auto sixth = [](double x) { return x * x * x * x * x * x; };

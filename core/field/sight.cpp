@@ -34,9 +34,16 @@ bool line_of_sight(const map::OccupancyGrid& grid, const Vec3& p_W, const Vec3& 
   return !segment || clear(*segment, [&](const Index3& v) { return grid.occupied(v) ? 0 : 1; });
 }
 
-bool SightMap::line_of_sight(const Vec3& p_W, const Vec3& c_W) const noexcept {
-  const auto segment = open_part(origin_W_, resolution_, p_W, c_W);
-  return !segment || clear(*segment, [this](const Index3& v) { return empty_radius(v); });
+SightMap::Viewpoint SightMap::viewpoint(const Vec3& p_W) const noexcept {
+  const Vec3 x =
+      ((p_W - origin_W_) / resolution_).cwiseMax(-1.0).cwiseMin(Vec3(nx_, ny_, nz_));  // within the int range
+  return {p_W, empty_radius(Index3(x.array().floor().cast<int>()))};
+}
+
+bool SightMap::line_of_sight(const Viewpoint& from, const Vec3& c_W) const noexcept {
+  const auto segment = open_part(origin_W_, resolution_, from.p_W, c_W);
+  return !segment || clear(
+                         *segment, [this](const Index3& v) { return empty_radius(v); }, from.empty_radius);
 }
 
 namespace {

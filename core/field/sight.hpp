@@ -35,7 +35,7 @@ bool meets(const Segment& segment, const Index3& voxel) noexcept;
 
 /// clear() for a segment whose dominant axis is u: fixed at compile time, the march stays in registers.
 template <int u, typename EmptyRadius>
-bool clear_along(const Segment& segment, const EmptyRadius& empty_radius) noexcept {
+bool clear_along(const Segment& segment, const EmptyRadius& empty_radius, int empty_start) noexcept {
   constexpr int v = (u + 1) % 3, w = (u + 2) % 3;
   constexpr double kReach = 2 * kTouch;    // candidates reach further than meets(), so that rounding loses none
   constexpr double kStep = 0.01 * kTouch;  // past a slab's end, so that the next cell is in the next slab
@@ -45,7 +45,7 @@ bool clear_along(const Segment& segment, const EmptyRadius& empty_radius) noexce
   const double direction = upward ? 1 : -1, slope_v = segment.delta[v] * inverse, slope_w = segment.delta[w] * inverse;
   const double end = length + kReach;
   Index3 cell;
-  for (double s = -kReach; s <= end;) {
+  for (double s = std::max(empty_start - 1, 0) - kReach; s <= end;) {
     const double x = segment.from[u] + s * direction;
     const double y = segment.from[v] + s * slope_v, z = segment.from[w] + s * slope_w;
     cell[u] = floor_to_int(x), cell[v] = floor_to_int(y), cell[w] = floor_to_int(z);
@@ -74,11 +74,13 @@ bool clear_along(const Segment& segment, const EmptyRadius& empty_radius) noexce
 /// Marches along the dominant axis. From a point in a voxel of radius r, the next r − 1 are empty: jump. Near occupied
 /// voxels (r ≤ 1) it goes slab by slab of unit thickness: the voxels that the piece in a slab can touch lie in its
 /// bounding rectangle in the other two axes, one to four of them, and only an occupied one is tested exactly.
+/// `empty_start`: empty_radius of the voxel of segment.from if known, else 0.
 template <typename EmptyRadius>
-bool clear(const Segment& segment, const EmptyRadius& empty_radius) noexcept {
+bool clear(const Segment& segment, const EmptyRadius& empty_radius, int empty_start = 0) noexcept {
   const Vec3 extent = segment.delta.cwiseAbs();
-  if (extent.x() >= extent.y() && extent.x() >= extent.z()) return clear_along<0>(segment, empty_radius);
-  return extent.y() >= extent.z() ? clear_along<1>(segment, empty_radius) : clear_along<2>(segment, empty_radius);
+  if (extent.x() >= extent.y() && extent.x() >= extent.z()) return clear_along<0>(segment, empty_radius, empty_start);
+  return extent.y() >= extent.z() ? clear_along<1>(segment, empty_radius, empty_start)
+                                  : clear_along<2>(segment, empty_radius, empty_start);
 }
 
 /// Whether the segment from p to c, its last 2a left out, meets no occupied voxel (model.md section 1, "Visible").
@@ -87,13 +89,20 @@ bool clear(const Segment& segment, const EmptyRadius& empty_radius) noexcept {
 bool line_of_sight(const map::OccupancyGrid& grid, const Vec3& p_W, const Vec3& c_W) noexcept;
 
 /// A copy of a grid's occupied voxels made for fast lines of sight: the Chebyshev distance from each voxel to the
-/// nearest occupied one, one byte each. Gives exactly the answers of line_of_sight().
+/// nearest occupied one, one byte each. Gives exactly the answers of line_of_sight(). Thread-safe.
 class SightMap {
  public:
   /// O(cells).
   explicit SightMap(const map::OccupancyGrid& grid);
-  /// As field::line_of_sight(grid, p, c). Thread-safe. About 5 jumps for a line across a room.
-  bool line_of_sight(const Vec3& p_W, const Vec3& c_W) const noexcept;
+
+  /// A point to look from, with what all lines from it share.
+  struct Viewpoint {
+    Vec3 p_W;
+    int empty_radius;
+  };
+  Viewpoint viewpoint(const Vec3& p_W) const noexcept;
+  /// As field::line_of_sight(grid, p, c). Three or four jumps for a line across a room.
+  bool line_of_sight(const Viewpoint& from, const Vec3& c_W) const noexcept;
 
  private:
   int empty_radius(const Index3& v) const noexcept {
