@@ -66,6 +66,10 @@ std::optional<Column> takeoff_column(const World& world, const Vec3& p_W);
 /// Vertical commands from `from` to `to` (same column), rest to rest, minimum-jerk profile within the limits.
 std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
 
+/// Clearance that a take-off tube must have (model.md section 4): beside it only while its centre is below z_safe (m, W), all
+/// around from there on, m.
+double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe);
+
 /// Smallest lateral clearance of a vertical tube: obstacles beside it, not the floor below (model.md section 4), m.
 double lateral_clearance(const World& world, const reach::ReachTube& tube);
 

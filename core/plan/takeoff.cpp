@@ -81,4 +81,10 @@ double lateral_clearance(const World& world, const reach::ReachTube& tube) {
   return least;
 }
 
+double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe) {
+  const auto clear = std::find_if(tube.begin(), tube.end(), [&](const auto& s) { return s.center.p_W.z() >= z_safe; });
+  const double beside = lateral_clearance(world, {tube.begin(), clear});
+  return clear == tube.end() ? beside : std::min(beside, tube_clearance(world, {clear, tube.end()}));
+}
+
 }  // namespace backwash::plan

@@ -53,17 +53,6 @@ reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& t
   return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled);
 }
 
-/// Clearance of a true position: below z_safe what stands beside it (the vehicle comes from the floor), above
-/// everything.
-double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) {
-  const auto& vehicle = world.reach.vehicle;
-  if (p_W.z() >= z_safe) return world.distance.exact(world.grid, p_W) - vehicle.body.radius;
-  reach::TubeStep point{};
-  point.center.p_W = p_W;
-  point.shape.setZero();
-  return plan::lateral_clearance(world, {point}) + vehicle.estimation.position;
-}
-
 /// Flies a piece whose tube was propagated at its acceptance, and judges every measured position against it.
 FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
                       double z_safe, std::size_t hover_from, int hover_number) {
@@ -86,14 +75,23 @@ void append(std::vector<Setpoint>& commands, const std::vector<Setpoint>& more) 
   commands.insert(commands.end(), more.begin(), more.end());
 }
 
-/// Why a take-off tube may not be flown; empty if it may: beside the column below z_safe, all around above.
+/// Why a take-off tube may not be flown; empty if it may.
 std::string obstacle_to_take_off(const plan::World& world, const reach::ReachTube& tube, double z_safe) {
-  const auto clear = std::find_if(tube.begin(), tube.end(), [&](const auto& s) { return s.center.p_W.z() >= z_safe; });
-  const double beside = plan::lateral_clearance(world, {tube.begin(), clear});
-  const double around = clear == tube.end() ? beside : plan::tube_clearance(world, {clear, tube.end()});
-  if (beside > 0 && around > 0) return {};
-  return "the take-off column under " + text(tube.back().center.p_W) + " is not clear (" +
-         metres(std::min(beside, around)) + "); choose a start with more room below and beside it";
+  const double clearance = plan::takeoff_clearance(world, tube, z_safe);
+  if (clearance > 0) return {};
+  return "the take-off column under " + text(tube.back().center.p_W) + " is not clear (" + metres(clearance) +
+         "); choose a start with more room below and beside it";
+}
+
+}  // namespace
+
+double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) {
+  const auto& vehicle = world.reach.vehicle;
+  if (p_W.z() >= z_safe) return world.distance.exact(world.grid, p_W) - vehicle.body.radius;
+  reach::TubeStep point{};
+  point.center.p_W = p_W;
+  point.shape.setZero();
+  return plan::lateral_clearance(world, {point}) + vehicle.estimation.position;
 }
 
 MethodTube method_tube(const plan::World& world, const reach::Reachability& reach, const State& start,
@@ -109,8 +107,6 @@ MethodTube method_tube(const plan::World& world, const reach::Reachability& reac
   }
   return method;
 }
-
-}  // namespace
 
 tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle& vehicle, const BoundModel& bounds,
                                         const FlightOptions& options) {

@@ -87,6 +87,12 @@ struct Flight {
   MethodTube paper;  ///< on the same commands, beside the flight
 };
 
+/// The tube of a method along commands, timed and measured.
+MethodTube method_tube(const plan::World& world, const reach::Reachability& reach, const State& start,
+                       const Setpoint& previous, const std::vector<Setpoint>& commands);
+/// Clearance of a true position, body to obstacle, m: beside it only below z_safe (the vehicle comes from the floor).
+double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe);
+
 /// Why no flight took place; one line that says where and what would be right.
 struct FlightRefused {
   std::string message;

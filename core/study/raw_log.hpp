@@ -25,7 +25,7 @@ enum class RecordKind : std::uint32_t {
   frame_in = 6,       ///< one MAVLink frame received
   frame_out = 7,      ///< one MAVLink frame handed to the port
   tick = 8,           ///< TickRecord
-  segment = 9,        ///< SegmentRecord, then its commands (10 doubles each: p, v, a, yaw)
+  segment = 9,        ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
 };
 
 struct RecordHeader {
@@ -50,6 +50,7 @@ struct MapRecord {
 struct SegmentRecord {
   std::uint64_t id, continues, commands;
   double start_p[3], start_v[3];  ///< state from which the tube was propagated, map frame
+  double search_ms, optimise_ms, verify_ms;
 };
 
 /// One control tick.

@@ -27,6 +27,7 @@ struct Flying {
   track::AcceptedSegment segment;
   State start;
   Setpoint previous;
+  plan::PlanMetrics metrics;
 };
 
 class Planner {
@@ -58,8 +59,8 @@ class Planner {
     if (target.z() > here.z() && !job.world->hover.safe(job.world->grid.index(target)))
       return "hovering at the height asked for is not safe";
     const auto& limits = job.world->reach.vehicle.limits;
-    const auto commands = [&] { return plan::vertical_commands(here, target, limits.v_max, limits.a_max); };
-    return fly(job, commands(), [&](const reach::ReachTube& tube) { return takeoff_clearance(*job.world, tube, column->z_safe); });
+    const auto commands = plan::vertical_commands(here, target, limits.v_max, limits.a_max);
+    return fly(job, commands, {}, [&](const reach::ReachTube& tube) { return plan::takeoff_clearance(*job.world, tube, column->z_safe); });
   }
 
   std::optional<std::string> go_to(const PlanJob& job) {
@@ -74,7 +75,7 @@ class Planner {
                  planned.metrics.verify_ms, planned.metrics.min_clearance_m);
     if (planned.status != plan::PlanStatus::ok)
       return std::string(plan::to_string(planned.status)) + ": " + planned.message;
-    return fly(job, planned.commands,
+    return fly(job, planned.commands, planned.metrics,
                [&](const reach::ReachTube& tube) { return plan::tube_clearance(*job.world, tube); });
   }
 
@@ -86,18 +87,13 @@ class Planner {
     auto commands = plan::stop_along(flying_->segment.commands, branch, job.world->reach.vehicle.limits.a_max);
     if (commands.empty()) return std::nullopt;  // it ends by itself before that
     append_hold(commands);
-    Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}}, flying_->start, flying_->previous};
+    Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}},
+                flying_->start, flying_->previous, flying_->metrics};
     next.segment.tube = reach::tube_over_field(job.world->reach, next.start, next.previous, next.segment.commands,
                                                job.world->bounds);
     if (const double clearance = plan::tube_clearance(*job.world, next.segment.tube); !(clearance > 0))
       return "braking here is not clear: " + std::to_string(clearance) + " m";
     return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
-  }
-
-  static double takeoff_clearance(const plan::World& world, const reach::ReachTube& tube, double z_safe) {
-    const auto clear = std::find_if(tube.begin(), tube.end(), [&](const auto& s) { return s.center.p_W.z() >= z_safe; });
-    const double beside = plan::lateral_clearance(world, {tube.begin(), clear});
-    return clear == tube.end() ? beside : std::min(beside, plan::tube_clearance(world, {clear, tube.end()}));
   }
 
   static void append_hold(std::vector<Setpoint>& commands) {
@@ -109,13 +105,14 @@ class Planner {
   /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may have
   /// moved further than the first set allows.
   template <typename Clearance>
-  std::optional<std::string> fly(const PlanJob& job, std::vector<Setpoint> commands, Clearance clearance_of) {
+  std::optional<std::string> fly(const PlanJob& job, std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
+                                 Clearance clearance_of) {
     append_hold(commands);
     for (Setpoint& command : commands) command.yaw = view_.command.yaw;
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       refresh();
       if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
-      Flying next{{++last_id_, 0, 0, commands, {}}, view_.state, view_.command};
+      Flying next{{++last_id_, 0, 0, commands, {}}, view_.state, view_.command, metrics};
       next.segment.tube =
           reach::tube_over_field(job.world->reach, next.start, next.previous, commands, job.world->bounds);
       if (const double clearance = clearance_of(next.segment.tube); !(clearance > 0)) {
@@ -147,18 +144,25 @@ class Planner {
 
   void record(const Flying& flying) {
     const auto& s = flying.segment;
-    study::SegmentRecord head{s.id, s.continues, s.commands.size(), {}, {}};
+    study::SegmentRecord head{};
+    head.id = s.id;
+    head.continues = s.continues;
+    head.commands = s.commands.size();
+    head.search_ms = flying.metrics.search_ms;
+    head.optimise_ms = flying.metrics.optimise_ms;
+    head.verify_ms = flying.metrics.verify_ms;
     std::copy_n(flying.start.p_W.data(), 3, head.start_p);
     std::copy_n(flying.start.v_W.data(), 3, head.start_v);
-    std::vector<std::uint8_t> bytes(sizeof head + s.commands.size() * 10 * sizeof(double));
+    std::vector<double> rows;
+    const auto add = [&rows](const Setpoint& c) {
+      for (const Vec3& v : {c.p_W, c.v_W, c.a_W}) rows.insert(rows.end(), v.data(), v.data() + 3);
+      rows.push_back(c.yaw);
+    };
+    add(flying.previous);
+    for (const Setpoint& c : s.commands) add(c);
+    std::vector<std::uint8_t> bytes(sizeof head + rows.size() * sizeof(double));
     std::memcpy(bytes.data(), &head, sizeof head);
-    auto* at = bytes.data() + sizeof head;
-    for (const Setpoint& c : s.commands) {
-      const double row[10] = {c.p_W.x(), c.p_W.y(), c.p_W.z(), c.v_W.x(), c.v_W.y(),
-                              c.v_W.z(), c.a_W.x(), c.a_W.y(), c.a_W.z(), c.yaw};
-      std::memcpy(at, row, sizeof row);
-      at += sizeof row;
-    }
+    std::memcpy(bytes.data() + sizeof head, rows.data(), rows.size() * sizeof(double));
     recorder_.append(study::RecordKind::segment, bytes);
   }
 

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "core/sim/flight.hpp"
+#include "core/study/report.hpp"
+
+namespace backwash::services {
+
+/// A judged flight and where it came from: what `fly` and `report` say about it.
+struct JudgedFlight {
+  const sim::Flight& flight;
+  const plan::World& world;
+  const study::ReportContext& context;
+  sim::FlightSummary summary;
+};
+
+/// Prints the summary (one JSON object or text), after writing the HTML page to `report` unless that is empty. Returns
+/// kOk; throws Failure with what went wrong, as one line, when the flight was not good.
+int conclude(const JudgedFlight& judged, const std::string& report, bool json, bool force);
+
+}  // namespace backwash::services

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/recorded_flight.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/flight_output.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/verb.hpp"
+#include "services/parallel/parallel.hpp"
+#include "version.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct Options {
+  std::string log, truth, vehicle = "builtin:quad-5in", model = "builtin:quad-5in", out;
+  bool json = false, force = false;
+};
+
+template <typename T>
+T take(tl::expected<T, study::LogError> value) {
+  if (value) return std::move(*value);
+  throw Failure(value.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, value.error().message);
+}
+
+int run(const Options& options) {
+  refuse_to_overwrite(options.out, options.force);
+  const auto vehicle = read_vehicle(options.vehicle);
+  const auto model = read_model(options.model);
+  const auto log = take(study::read_raw_log(options.log));
+  const auto truth = take(study::read_csv(options.truth));
+  progress("building the world");
+  const auto world = plan::build_world(take(study::recorded_map(log)), model, vehicle, reach::Method::tight, -1,
+                                       run_parallel);
+  const auto flight = take(study::recorded_flight(log, truth, *world));
+  const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
+  const study::ReportContext context{options.log, options.model, options.vehicle, kVersion, start, goal, 0, 1};
+  return conclude({flight, *world, context, sim::summarise(flight, *world, goal)}, options.out, options.json,
+                  options.force);
+}
+
+}  // namespace
+
+Verb report_verb(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
+  command->add_option("--log", options->log, "raw log of backwashd")->required();
+  command->add_option("--truth", options->truth, "log of the truth by backwash-bench, CSV")->required();
+  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->capture_default_str();
+  command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
+  command->add_option("--out", options->out, "HTML page to write");
+  command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->add_flag("--force", options->force, "overwrite --out");
+  command->footer(
+      "The same judgement and exit codes as fly.\nExample:\n"
+      "  backwash report --log flight.bwlog --truth truth.csv --out flight.html");
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services
