@@ -81,7 +81,7 @@ TEST(CentrePredictor, EqualsIndependentIntegrationForEveryLatency) {
   for (const double lag : {0.0, 0.05, 0.012})
     for (const double latency : {0.0, 0.013, 0.02, 0.0467, 0.06, 0.32})
       for (const Loop loop : {Loop::vehicle, Loop::continuous})
-        EXPECT_LT(deviation(vehicle_with(latency, 0, lag), loop, 60), 1e-9) << "lag " << lag << " latency " << latency;
+        EXPECT_LT(deviation(vehicle_with(latency, 0, lag), loop, 30), 1e-9) << "lag " << lag << " latency " << latency;
 }
 
 TEST(CentrePredictor, EqualsIndependentIntegrationWithDelayedFeedback) {
@@ -89,7 +89,7 @@ TEST(CentrePredictor, EqualsIndependentIntegrationWithDelayedFeedback) {
     for (const double delay : {0.03, 0.0124, 0.0005, 0.02, 0.0611})
       for (const double latency : {0.0, 0.02, 0.0331})
         // Commands that jump by 10 m/s² and more: without lag their kinks are what costs accuracy.
-        EXPECT_LT(deviation(vehicle_with(latency, delay, lag), Loop::vehicle, 60), lag > 0 ? 1e-7 : 3e-6)
+        EXPECT_LT(deviation(vehicle_with(latency, delay, lag), Loop::vehicle, 30), lag > 0 ? 1e-7 : 3e-6)
             << "lag " << lag << " delay " << delay << " latency " << latency;
 }
 
@@ -97,7 +97,7 @@ TEST(CentrePredictor, EqualsIndependentIntegrationWithSampledFeedback) {
   for (const double lag : {0.0, 0.05})
     for (const double delay : {0.0, 0.0124, 0.02, 0.03})
       for (const double latency : {0.0, 0.0076, 0.02, 0.031})
-        EXPECT_LT(deviation(vehicle_with(latency, delay, lag), Loop::sampled, 60), 1e-9)
+        EXPECT_LT(deviation(vehicle_with(latency, delay, lag), Loop::sampled, 30), 1e-9)
             << "lag " << lag << " delay " << delay << " latency " << latency;
 }
 
