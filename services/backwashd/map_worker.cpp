@@ -2,6 +2,8 @@
 #include "services/backwashd/map_worker.hpp"
 
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstring>
@@ -24,6 +26,9 @@ void record(Recorder& recorder, const MapMessage& message, bool accepted) {
 }  // namespace
 
 void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle) {
+  // Below everything else in the process, and below the kernel's workers that carry the serial line; inherited by the
+  // threads that build the world.
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
   while (!channels.stop) {
     const MapMessage* message = channels.maps.take();
     if (!message) {
