@@ -112,28 +112,39 @@ MethodTube method_tube(const plan::World& world, const reach::Reachability& reac
 
 }  // namespace
 
+tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const FlightOptions& options) {
+  const auto column = plan::takeoff_column(world, options.start_W);
+  if (!column) {
+    return refuse("start " + text(options.start_W) + " has no known floor to take off from; choose a start above one");
+  }
+  TakeOff rise{*column, {}, {}, 0};
+  rise.ground.p_W = options.start_W;
+  rise.ground.p_W.z() = column->z_floor + world.reach.vehicle.body.radius;
+  rise.commands = plan::vertical_commands(rise.ground.p_W, options.start_W, options.limits.v_max, options.limits.a_max);
+  rise.risen = rise.commands.size();
+  append(rise.commands, hold_commands(options.start_W, options.settle_s));
+  const auto tube =
+      reach::tube_over_field(world.reach, {rise.ground.p_W, Vec3::Zero()}, rise.ground, rise.commands, world.bounds);
+  if (auto why = obstacle_to_take_off(world, tube, column->z_safe); !why.empty()) return refuse(why);
+  return rise;
+}
+
 tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle& vehicle, const BoundModel& bounds,
                                         const FlightOptions& options) {
   for (const auto& [name, p] : {std::pair{"start", options.start_W}, std::pair{"goal", options.goal_W}}) {
     if (auto why = obstacle_to_hover(world, name, p); !why.empty()) return refuse(why);
   }
-  const auto column = plan::takeoff_column(world, options.start_W);
-  if (!column)
-    return refuse("start " + text(options.start_W) + " has no known floor to take off from; choose a start above one");
-
-  // Take-off: from the floor to the start, and a settling hover there.
-  Setpoint ground;
-  ground.p_W = {options.start_W.x(), options.start_W.y(), column->z_floor + vehicle.body.radius};
-  auto commands = plan::vertical_commands(ground.p_W, options.start_W, options.limits.v_max, options.limits.a_max);
-  const std::size_t risen = commands.size();
-  append(commands, hold_commands(options.start_W, options.settle_s));
-  ClosedLoop loop(world.grid, vehicle, {ground.p_W, Vec3::Zero()}, options.seed);
-  auto tube = reach::tube_over_field(world.reach, loop.estimated(), ground, commands, world.bounds);
-  if (auto why = obstacle_to_take_off(world, tube, column->z_safe); !why.empty()) return refuse(why);
-  if (options.sigma_scale != 1) tube = scaled_tube(world, tube, ground, commands, bounds, options.sigma_scale);
+  const auto rise = take_off(world, options);
+  if (!rise) return tl::make_unexpected(rise.error());
+  const double z_safe = rise->column.z_safe;
+  ClosedLoop loop(world.grid, vehicle, {rise->ground.p_W, Vec3::Zero()}, options.seed);
+  auto commands = rise->commands;
+  auto tube = reach::tube_over_field(world.reach, loop.estimated(), rise->ground, commands, world.bounds);
+  if (auto why = obstacle_to_take_off(world, tube, z_safe); !why.empty()) return refuse(why);
+  if (options.sigma_scale != 1) tube = scaled_tube(world, tube, rise->ground, commands, bounds, options.sigma_scale);
   Flight flight{};
-  flight.column = *column;
-  flight.take_off = fly_piece(loop, world, {1, 0, 0, commands, tube}, 0, column->z_safe, risen, 0);
+  flight.column = rise->column;
+  flight.take_off = fly_piece(loop, world, {1, 0, 0, commands, tube}, 0, z_safe, rise->risen, 0);
 
   // Route: planned from the state estimated now, with the hold at the goal; its tube is propagated once, here.
   Setpoint hover;

@@ -92,6 +92,17 @@ struct FlightRefused {
   std::string message;
 };
 
+/// Vertical commands from the floor under the start up to it, and a settling hover there.
+struct TakeOff {
+  plan::Column column;
+  Setpoint ground;  ///< at rest on the floor
+  std::vector<Setpoint> commands;
+  std::size_t risen;  ///< commands before the hover
+};
+/// Refused where there is no known floor, or where the tube of a vehicle that knows its position exactly is not clear:
+/// beside it below z_safe, all around above (model.md section 4).
+tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const FlightOptions& options);
+
 /// Checks start, goal and take-off column, takes off, settles, plans from the estimated state, follows and holds: one
 /// closed-loop flight, deterministic for its options but for the planner's deadline. The vehicle waits at its set-point
 /// while the plan is made, so planning takes no simulated time.

@@ -6,8 +6,6 @@
 #include <limits>
 #include <queue>
 
-#include "core/plan/planner.hpp"
-
 namespace backwash::study {
 namespace {
 
@@ -120,9 +118,10 @@ std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_
                     length};
 }
 
-std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions) {
+std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions,
+                                       const std::function<bool(const Vec3&)>& can_take_off) {
   const auto& grid = world.grid;
-  // One hover point a column: the voxel with the largest clearance of the largest region.
+  // One hover point a column: the voxel of the largest region with the largest clearance.
   std::vector<Vec3> candidates;
   for (int j = 0; j < grid.size().y(); ++j) {
     for (int i = 0; i < grid.size().x(); ++i) {
@@ -132,17 +131,21 @@ std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& 
         if (regions.of_voxel[grid.linear(v)] != 0) continue;
         if (!best || world.hover.clearance(v) > world.hover.clearance(*best)) best = v;
       }
-      if (best && plan::takeoff_column(world, grid.center(*best))) candidates.push_back(grid.center(*best));
+      if (best) candidates.push_back(grid.center(*best));
     }
   }
-  if (candidates.empty()) return std::nullopt;
-  const auto farthest = [&](const Vec3& from) {
-    return *std::max_element(candidates.begin(), candidates.end(), [&](const Vec3& a, const Vec3& b) {
-      return (a - from).squaredNorm() < (b - from).squaredNorm();
+  const auto farthest_first = [&candidates](const Vec3& from) {
+    std::stable_sort(candidates.begin(), candidates.end(), [&from](const Vec3& a, const Vec3& b) {
+      return (a - from).squaredNorm() > (b - from).squaredNorm();
     });
   };
-  const Vec3 start = farthest(candidates.front());
-  return HoverPair{start, farthest(start)};
+  if (candidates.empty()) return std::nullopt;
+  farthest_first(Vec3(candidates.front()));
+  const auto start = std::find_if(candidates.begin(), candidates.end(), can_take_off);
+  if (start == candidates.end()) return std::nullopt;
+  const Vec3 start_W = *start;
+  farthest_first(start_W);
+  return HoverPair{start_W, candidates.front()};
 }
 
 }  // namespace backwash::study

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -40,10 +41,12 @@ struct Bottleneck {
 /// the set does not fit. Nothing if the points are not joined by free voxels. O(cells log cells).
 std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_W, const Vec3& to_W);
 
-/// Two hover points far apart in the largest region, each above a known floor: deterministic for a world.
+/// Two hover points far apart in the largest region, one a column where its clearance is largest; the first one passes
+/// `can_take_off`. Deterministic for a world.
 struct HoverPair {
   Vec3 start_W, goal_W;
 };
-std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions);
+std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions,
+                                       const std::function<bool(const Vec3&)>& can_take_off);
 
 }  // namespace backwash::study

@@ -30,21 +30,24 @@ struct DefaultFlight {
 };
 const DefaultFlight kDefaultFlights[] = {
     {"builtin:apartment", {3.0, 4.2, 1.2}, {7.4, 3.0, 1.2}},  // living room to bedroom through the doorway at x = 5.9 m
-    {"geb079.bt", {13.08, 0.68, 1.16}, {26.52, -0.52, 0.76}},        // along the corridor
+    {"geb079.bt", {13.08, 0.68, 1.16}, {26.52, -0.52, 0.76}},  // along the corridor
 };
 
-study::HoverPair choose_ends(const Options& options, const plan::World& world) {
+study::HoverPair choose_ends(const Options& options, const plan::World& world, sim::FlightOptions flight) {
   if (options.start) return {*options.start, *options.goal};
   for (const auto& known : kDefaultFlights) {
     if (options.map == known.map || std::filesystem::path(options.map).filename() == known.map) {
       return {known.start_W, known.goal_W};
     }
   }
-  const auto pair = study::farthest_pair(world, study::hover_regions(world));
+  const auto pair = study::farthest_pair(world, study::hover_regions(world), [&](const Vec3& start_W) {
+    flight.start_W = start_W;
+    return sim::take_off(world, flight).has_value();
+  });
   if (!pair) {
-    throw Failure(
-        kUnavailable,
-        options.map + ":1: no hover-safe place above a known floor; give --start and --goal, or a smaller vehicle");
+    throw Failure(kUnavailable, options.map +
+                                    ":1: no hover-safe place to take off to from a known floor; give --start "
+                                    "and --goal, or a smaller vehicle");
   }
   return *pair;
 }
@@ -145,14 +148,15 @@ int run(const Options& options) {
   auto grid = read_map(options.map);
   progress("building the world");
   const auto world = plan::build_world(std::move(grid), model, vehicle, reach::Method::tight, -1, run_parallel);
-  const auto ends = choose_ends(options, *world);
+  sim::FlightOptions flight_options{.start_W = Vec3::Zero(),
+                                    .goal_W = Vec3::Zero(),
+                                    .seed = options.seed,
+                                    .sigma_scale = options.sigma_scale,
+                                    .limits = {.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max}};
+  const auto ends = choose_ends(options, *world, flight_options);
+  flight_options.start_W = ends.start_W, flight_options.goal_W = ends.goal_W;
   progress("flying");
-  const auto flight = sim::fly(*world, vehicle, model.bound,
-                               {.start_W = ends.start_W,
-                                .goal_W = ends.goal_W,
-                                .seed = options.seed,
-                                .sigma_scale = options.sigma_scale,
-                                .limits = {.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max}});
+  const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
   const auto summary = sim::summarise(*flight, *world, ends.goal_W);
   if (!options.log.empty()) write_log(options, *flight);

@@ -24,7 +24,7 @@ assert flight["ok"] and flight["goal_reached"] and not flight["touched"]
 assert flight["samples"] == flight["samples_inside"] > 500
 assert 0 < flight["planned_clearance_m"] and 0 < flight["min_clearance_m"]
 ratio = max(flight["largest_error_over_bound"].values())
-assert 0.1 < ratio < 1, f"largest |e|/h is {ratio}: a bound that is never approached proves nothing"
+assert 0.2 < ratio < 1, f"largest |e|/h is {ratio}: a bound that is never approached proves nothing"
 assert not mutant["ok"] and mutant["samples_inside"] < mutant["samples"]
 rows = list(csv.DictReader(open("flight.csv")))
 assert len(rows) == flight["samples"] - 1
