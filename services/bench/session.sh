@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Sourced by scripts that need the daemon as it flies: backwash-bench (flight controller on a pty, VIO and mapper on DDS)
+# and backwashd as processes of their own, in a DDS domain of their own. Whatever is started is stopped when the script ends.
+
+bench_pid='' daemon_pid='' work=$(mktemp -d)
+# Domains above 200 would use port numbers that the system hands out itself.
+domain=${BACKWASH_DOMAIN:-$((1 + $$ % 200))}
+
+stop() {
+  local pid
+  for pid in $daemon_pid $bench_pid; do kill -TERM "$pid" 2>/dev/null || true; done
+  for pid in $daemon_pid $bench_pid; do wait "$pid" 2>/dev/null || true; done
+  daemon_pid='' bench_pid=''
+}
+trap 'stop; rm -rf "$work"' EXIT
+die() {
+  echo "flight: $*; see $log" >&2
+  exit 70
+}
+
+# start_bench BIN LOG MAP START VEHICLE [OPTION …]
+start_bench() {
+  bin=$1 log=$2
+  local map=$3 start=$4 vehicle=$5
+  shift 5
+  "$bin/backwash-bench" --map "$map" --vehicle "$vehicle" --start "$start" --link "$work/autopilot" --domain "$domain" \
+    "$@" >>"$log" 2>&1 &
+  bench_pid=$!
+  for _ in $(seq 200); do [[ -e $work/autopilot ]] && return; sleep 0.05; done
+  die "the bench did not start"
+}
+
+# start_daemon VEHICLE RAW_LOG: returns once it has built its world from the map.
+start_daemon() {
+  local from=$(wc -l <"$log")
+  cat >"$work/backwashd.toml" <<TOML
+vehicle = "$1"
+model = "$1"
+[dds]
+domain = $domain
+interface = "lo"
+namespace = "backwash"
+odometry_topic = "rt/backwash/odometry"
+[link]
+device = "$work/autopilot"
+baud = 921600
+system = 1
+[control]
+priority = 80
+[log]
+file = "$2"
+TOML
+  "$bin/backwashd" --config "$work/backwashd.toml" >>"$log" 2>&1 &
+  daemon_pid=$!
+  for _ in $(seq 1200); do
+    tail -n +"$((from + 1))" "$log" | grep -q 'map accepted' && return
+    kill -0 "$daemon_pid" 2>/dev/null || die "the daemon stopped"
+    sleep 0.1
+  done
+  die "the daemon accepted no map"
+}
+
+# ctl VERB …: one command of the ground station; its failure ends the script.
+ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1 || die "backwashctl $1 failed: $(tail -n 1 "$log")"; }

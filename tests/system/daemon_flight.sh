@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# A flight through the real processes, judged from the raw log and from the bytes that reached the flight controller.
+#   daemon_flight.sh SOURCE_DIR BUILD_DIR NAME MAP START GOAL
+set -euo pipefail
+source_dir=$1 build=$2 name=$3 map=$4
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+if [[ $map != builtin:* && ! -e $map ]]; then
+  echo "SKIPPED: $map is not there"
+  exit 77
+fi
+"$source_dir/services/bench/flight.sh" "$build" "$out" "$name" "$map" "$5" "$6" || { cat "$out/$name.log"; exit 1; }
+pgrep -f "$out" && { echo "something was left running"; exit 1; }
+
+PYTHONPATH=$source_dir/tests/system python3 - "$out/$name" <<'PYTHON'
+import json, sys
+import raw_log
+base = sys.argv[1]
+status = json.load(open(base + ".status.json"))
+assert status["state"] == "tracking" and status["samples_outside"] == 0 and status["records_lost"] == 0, status
+assert status["frames_bad"] == 0 and status["odometry_rejected"] == 0 and status["maps_rejected"] == 0, status
+assert status["frame_residual_m"] < 0.05 and status["frame_residual_rad"] < 0.0524, status
+assert status["samples_inside"] > 400, status
+
+ticks = list(raw_log.ticks(base + ".bwlog"))
+flying = [t for t in ticks if t.mode == "tracking"]
+assert all(a.number + 1 == b.number for a, b in zip(ticks, ticks[1:])), "a tick is missing from the raw log"
+# What was sent, as the flight controller saw it: every field used but the yaw rate, 50 Hz, no gap beyond 2 ticks more
+# than the daemon itself knows to have missed.
+setpoints = [(t, mask) for t, i, mask in raw_log.wire(base + ".wire.csv") if i == raw_log.SETPOINT]
+assert {mask for _, mask in setpoints} == {0x800}, {mask for _, mask in setpoints}
+gaps = sorted(b[0] - a[0] for a, b in zip(setpoints, setpoints[1:]))
+rate = (len(setpoints) - 1) / (setpoints[-1][0] - setpoints[0][0])
+missed = max(t.missed for t in flying)
+late = [t.lateness_us for t in flying]
+print(f"set-points {len(setpoints)}, {rate:.2f} Hz, largest gap {gaps[-1] * 1e3:.1f} ms, missed periods {missed}")
+compute = sorted(t.compute_us for t in flying)
+print(f"tick compute p50 {compute[len(compute) // 2]:.0f} p99 {compute[len(compute) * 99 // 100]:.0f} max {compute[-1]:.0f} us; "
+      f"lateness max {max(late):.0f} us")
+assert 49 < rate <= 50.5, rate
+assert gaps[-1] <= 0.040 + 0.020 * missed + 1e-3 * 10, f"gap of {gaps[-1] * 1e3:.1f} ms"
+heartbeats = [t for t, i, _ in raw_log.wire(base + ".wire.csv") if i == raw_log.HEARTBEAT]
+assert max(b - a for a, b in zip(heartbeats, heartbeats[1:])) < 1.1 + 0.02 * missed
+PYTHON
