@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
 #include <filesystem>
 
 #include "core/sim/flight.hpp"
@@ -18,7 +19,7 @@ struct Options {
   std::optional<Vec3> start, goal;
   std::uint64_t seed = 1;
   double sigma_scale = 1;
-  bool json = false, force = false;
+  bool json = false, force = false, ends = false;
 };
 
 /// Flights of maps that everybody has, chosen with `backwash feasibility`.
@@ -31,13 +32,18 @@ const DefaultFlight kDefaultFlights[] = {
     {"geb079.bt", {13.08, 0.68, 1.16}, {26.52, -0.52, 0.76}},  // along the corridor
 };
 
-study::HoverPair choose_ends(const Options& options, const plan::World& world, sim::FlightOptions flight) {
-  if (options.start) return {*options.start, *options.goal};
+/// Start and goal that need no search: those given, or the map's own.
+std::optional<study::HoverPair> known_ends(const Options& options) {
+  if (options.start) return study::HoverPair{*options.start, *options.goal};
   for (const auto& known : kDefaultFlights) {
-    if (options.map == known.map || std::filesystem::path(options.map).filename() == known.map) {
-      return {known.start_W, known.goal_W};
-    }
+    if (options.map == known.map || std::filesystem::path(options.map).filename() == known.map)
+      return study::HoverPair{known.start_W, known.goal_W};
   }
+  return std::nullopt;
+}
+
+study::HoverPair choose_ends(const Options& options, const plan::World& world, sim::FlightOptions flight) {
+  if (const auto known = known_ends(options)) return *known;
   const auto pair = study::farthest_pair(world, study::hover_regions(world), [&](const Vec3& start_W) {
     flight.start_W = start_W;
     return sim::take_off(world, flight).has_value();
@@ -58,6 +64,11 @@ void write_log(const Options& options, const sim::Flight& flight) {
   if (!written) throw Failure(kCannotCreate, written.error().message);
 }
 
+int print_ends(const study::HoverPair& ends) {
+  for (const Vec3& p : {ends.start_W, ends.goal_W}) std::printf("%.3f,%.3f,%.3f\n", p.x(), p.y(), p.z());
+  return kOk;
+}
+
 int run(const Options& options) {
   if (options.start.has_value() != options.goal.has_value())
     throw Failure(kUsage, "give both --start and --goal, or neither");
@@ -68,6 +79,7 @@ int run(const Options& options) {
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle,
                     options.vehicle);  // names an unstable loop first
   auto grid = read_map(options.map);
+  if (const auto known = known_ends(options); options.ends && known) return print_ends(*known);
   progress("building the world");
   const auto world = plan::build_world(std::move(grid), model, vehicle, reach::Method::tight, -1, run_parallel);
   sim::FlightOptions flight_options{.start_W = Vec3::Zero(),
@@ -77,6 +89,7 @@ int run(const Options& options) {
                                     .limits = {.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max}};
   const auto ends = choose_ends(options, *world, flight_options);
   flight_options.start_W = ends.start_W, flight_options.goal_W = ends.goal_W;
+  if (options.ends) return print_ends(ends);
   progress("flying");
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
@@ -105,6 +118,7 @@ Verb fly_verb(CLI::App& app) {
   command->add_option("--report", options->report, "HTML page to write");
   command->add_option("--log", options->log, "flight log to write, CSV");
   command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->add_flag("--ends", options->ends, "only print the start and the goal that would be flown");
   command->add_flag("--force", options->force, "overwrite --report and --log");
   command->footer(
       "Exit code 0 if the goal was reached, nothing was touched and every measured position lay inside the set "

@@ -5,12 +5,14 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <thread>
 
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/planner_worker.hpp"
+#include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -51,7 +53,9 @@ int run(const Settings& settings) {
   }
   firmware_bridge::AutopilotLink link(std::move(*port), static_cast<std::uint8_t>(settings.daemon.link.system),
                                       std::chrono::steady_clock::now());
-  DdsFront front(settings.daemon, *channels, recorder);
+  // What carries odometry to the control thread comes right below it, before the middleware starts its threads.
+  const int control = settings.daemon.control.priority;
+  DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), *channels, recorder);
   Mission mission(*channels);
   ControlLoop loop(*channels, link, settings.vehicle);
   {

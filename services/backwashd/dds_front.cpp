@@ -10,6 +10,8 @@
 #include <cstring>
 #include <thread>
 
+#include "services/parallel/real_time.hpp"
+
 namespace backwash::daemon {
 namespace {
 
@@ -31,10 +33,11 @@ dds::Timing timing(const TimingHistogram& h) {
 
 }  // namespace
 
-DdsFront::DdsFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
+DdsFront::DdsFront(const config::Daemon& config, int priority, Channels& channels, Recorder& recorder)
     : channels_(channels),
       recorder_(recorder),
-      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface),
+      priority_(priority),
+      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, priority),
       odometry_(participant_, dds::TopicOf<dds::Odometry>::type(), config.dds.odometry_topic,
                 dds::TopicOf<dds::Odometry>::kDelivery),
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
@@ -96,6 +99,7 @@ void DdsFront::take_commands() {
 }
 
 void DdsFront::run_readers() {
+  if (priority_ > 0) set_fifo(priority_);
   while (!channels_.stop) {
     waitset_.wait(0.1);
     take_odometry();

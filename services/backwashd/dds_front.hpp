@@ -12,7 +12,8 @@ namespace backwash::daemon {
 /// The daemon's side of the DDS topics (interfaces.md).
 class DdsFront {
  public:
-  DdsFront(const config::Daemon& config, Channels& channels, Recorder& recorder);
+  /// `priority`: SCHED_FIFO priority of the threads between the network and the control thread; 0: ordinary.
+  DdsFront(const config::Daemon& config, int priority, Channels& channels, Recorder& recorder);
 
   /// Thread body: odometry, maps and commands in.
   void run_readers();
@@ -30,6 +31,7 @@ class DdsFront {
 
   Channels& channels_;
   Recorder& recorder_;
+  int priority_;
   dds::Participant participant_;
   dds::Reader<dds::Odometry> odometry_;
   dds::Reader<dds::Octomap> maps_;

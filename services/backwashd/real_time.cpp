@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <pthread.h>
-#include <sched.h>
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
 #include <time.h>
@@ -9,6 +7,7 @@
 #include <cstring>
 
 #include "services/backwashd/control_loop.hpp"
+#include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -31,11 +30,9 @@ void make_real_time(int priority) {
                  std::strerror(errno));
   prefault_stack();
   if (priority == 0) return;
-  sched_param parameters{};
-  parameters.sched_priority = priority;
-  if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters); error != 0)
+  if (!set_fifo(priority))
     spdlog::warn("SCHED_FIFO {} is not allowed ({}): ticks may be late; grant CAP_SYS_NICE or LimitRTPRIO", priority,
-                 std::strerror(error));
+                 std::strerror(errno));
 }
 
 void run_control(Channels& channels, ControlLoop& loop) {

@@ -13,12 +13,14 @@
 #include "core/sim/vio.hpp"
 #include "services/bench/pty.hpp"
 #include "services/dds/topics.hpp"
+#include "services/parallel/real_time.hpp"
 
 namespace backwash::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kOdometryEvery = 10;  // steps of 1 ms
+constexpr int kPriority = 60;       // SCHED_FIFO
 constexpr double kVioShare = 0.75;  // of the vehicle's estimation.position
 
 volatile std::sig_atomic_t stopped = 0;
@@ -95,7 +97,10 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   if (!options.wire.empty()) autopilot.log_wire(options.wire);
   TruthLog log(options.log);
   const sim::EmulatedVio vio(kVioShare * vehicle.estimation.position, options.seed + 1);
-  dds::Participant participant(static_cast<std::uint32_t>(options.domain), options.interface);
+  // The bench stands in for hardware: where it may, it runs before everything but the daemon's own real-time threads.
+  const int priority = allowed_fifo(kPriority);
+  dds::Participant participant(static_cast<std::uint32_t>(options.domain), options.interface, priority);
+  if (priority > 0) set_fifo(priority);
   auto odometry_writer = dds::make_writer<dds::Odometry>(participant, options.name_space);
   auto map_writer = dds::make_writer<dds::Octomap>(participant, options.name_space);
   std::vector<std::int8_t> map_data;

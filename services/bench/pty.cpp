@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -33,7 +34,10 @@ Pty::~Pty() {
 }
 
 std::vector<std::uint8_t> Pty::read() {
-  std::vector<std::uint8_t> bytes(4096);
+  // A read from an empty terminal would wait for a kernel worker of ordinary priority (see SerialPort::read).
+  int at_hand = 0;
+  if (ioctl(fd_, FIONREAD, &at_hand) != 0 || at_hand <= 0) return {};
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(at_hand));
   const ssize_t n = ::read(fd_, bytes.data(), bytes.size());
   bytes.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
   return bytes;

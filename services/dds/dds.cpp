@@ -16,7 +16,17 @@ Entity checked(dds_return_t code, const std::string& what) {
   return code;
 }
 
-std::string configuration(const std::string& interface, std::size_t max_sample_bytes) {
+/// Scheduling of the middleware's receiving threads.
+std::string threads(int priority) {
+  if (priority == 0) return "";
+  std::string xml = "<Threads>";
+  for (const char* name : {"recv", "dq.user", "dq.builtins", "tev"})
+    xml += std::string("<Thread name=\"") + name + "\"><Scheduling><Class>Realtime</Class><Priority>" +
+           std::to_string(priority) + "</Priority></Scheduling></Thread>";
+  return xml + "</Threads>";
+}
+
+std::string configuration(const std::string& interface, int priority, std::size_t max_sample_bytes) {
   // The loopback interface has no multicast: participants find each other by asking the first thirty ports in turn.
   const bool loopback = interface == "lo";
   return "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"" + interface +
@@ -24,8 +34,10 @@ std::string configuration(const std::string& interface, std::size_t max_sample_b
          (loopback ? "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>30"
                      "</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>"
                    : "") +
-         "<Internal><MaxSampleSize>" + std::to_string(max_sample_bytes) +
-         "B</MaxSampleSize></Internal></Domain></CycloneDDS>";
+         threads(priority) + "<Internal><MaxSampleSize>" + std::to_string(max_sample_bytes) + "B</MaxSampleSize>" +
+         // One receiving thread: the others' scheduling cannot be configured.
+         (priority > 0 ? "<MultipleReceiveThreads>false</MultipleReceiveThreads>" : "") +
+         "</Internal></Domain></CycloneDDS>";
 }
 
 // The topic and its delivery; the caller owns both through `participant` and dds_delete_qos.
@@ -44,9 +56,10 @@ dds_qos_t* make_qos(Delivery delivery) {
 
 }  // namespace
 
-Participant::Participant(std::uint32_t domain, const std::string& interface, std::size_t max_sample_bytes) {
+Participant::Participant(std::uint32_t domain, const std::string& interface, int priority,
+                         std::size_t max_sample_bytes) {
   if (!std::getenv("CYCLONEDDS_URI"))
-    domain_ = checked(dds_create_domain(domain, configuration(interface, max_sample_bytes).c_str()),
+    domain_ = checked(dds_create_domain(domain, configuration(interface, priority, max_sample_bytes).c_str()),
                       "domain " + std::to_string(domain) + " on interface " + interface);
   participant_ = checked(dds_create_participant(domain, nullptr, nullptr),
                          "participant in domain " + std::to_string(domain) + " on interface " + interface);
