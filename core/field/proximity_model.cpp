@@ -46,27 +46,38 @@ Variance ProximityModel::ground(const Element& element, const Vec3& p_W) const n
 }
 
 Variance ProximityModel::corner(const Element& element, const Vec3& p_W) const noexcept {
-  if (!element.corner_W) return {};
-  const auto& k = model_.corner;
-  if ((element.c_W - p_W).norm() > model_.wall.l_max + kTolerance) return {};
+  if (!element.corner_W || !in_wall_range((element.c_W - p_W).squaredNorm())) return {};
   const Vec3 above = p_W - *element.corner_W;
-  if (above.norm() > k.l_max + kTolerance) return {};
-  const double d2 = above.head<2>().squaredNorm(), h = above.z(), phi = std::atan2(std::sqrt(d2), h);
-  if (phi >= k.phi_max) return {};  // at φ̄_c itself the term is zero
-  const auto sixth = [](double x) { return x * x * x * x * x * x; };
-  const double s = element.area * (k.phi_max - phi) / std::max(d2 + sixth(h), sixth(least_l_));
-  return Variance::about_normal(element.normal, s * k.lambda.normal, s * k.lambda.tangential, s * k.lambda.vertical);
+  const double s = element.area * corner_factor(above.head<2>().squaredNorm(), above.z());
+  const auto& lambda = model_.corner.lambda;
+  return Variance::about_normal(element.normal, s * lambda.normal, s * lambda.tangential, s * lambda.vertical);
 }
 
 Variance ProximityModel::wall(const Element& element, const Vec3& p_W) const noexcept {
   if (element.kind != Element::Kind::lateral) return {};
-  const auto& k = model_.wall;
   const Vec3 r = element.c_W - p_W;
-  const double distance = r.norm(), l = std::max(distance, least_l_);
-  const double cos_theta = distance > 0 ? -r.z() / distance : 1;
-  if (l > k.l_max + kTolerance || cos_theta > cos_wall_min_ || cos_theta < cos_level_) return {};
-  const double s = element.area * std::exp(-k.k2 * l * l);
-  return Variance::about_normal(element.normal, s * k.k1.normal, s * k.k1.tangential, s * k.k1.vertical);
+  const double s = element.area * wall_factor(r.squaredNorm(), r.z());
+  const auto& k1 = model_.wall.k1;
+  return Variance::about_normal(element.normal, s * k1.normal, s * k1.tangential, s * k1.vertical);
 }
+
+double ProximityModel::corner_factor(double d2, double h) const noexcept {
+  const auto& k = model_.corner;
+  if (std::sqrt(d2 + h * h) > k.l_max + kTolerance) return 0;
+  const double phi = std::atan2(std::sqrt(d2), h);
+  if (phi >= k.phi_max) return 0;  // at φ̄_c itself the term is zero
+  const auto sixth = [](double x) { return x * x * x * x * x * x; };
+  return (k.phi_max - phi) / std::max(d2 + sixth(h), sixth(least_l_));
+}
+
+double ProximityModel::wall_factor(double r2, double r_z) const noexcept {
+  const auto& k = model_.wall;
+  const double distance = std::sqrt(r2), l = std::max(distance, least_l_);
+  const double cos_theta = distance > 0 ? -r_z / distance : 1;
+  if (l > k.l_max + kTolerance || cos_theta > cos_wall_min_ || cos_theta < cos_level_) return 0;
+  return std::exp(-k.k2 * l * l);
+}
+
+bool ProximityModel::in_wall_range(double r2) const noexcept { return std::sqrt(r2) <= model_.wall.l_max + kTolerance; }
 
 }  // namespace backwash::field
