@@ -26,6 +26,8 @@ double cos_lower(double limit) {
 ProximityModel::ProximityModel(const Model& model, double voxel_edge) noexcept
     : model_(model),
       least_l_(0.5 * voxel_edge),
+      corner_l2_max_((model.corner.l_max + kTolerance) * (model.corner.l_max + kTolerance)),
+      tan_phi_max_(std::tan(model.corner.phi_max)),
       cos_ground_max_(cos_upper(model.ground.theta_max)),
       cos_wall_min_(cos_lower(model.wall.theta_min)),
       cos_level_(cos_upper(std::numbers::pi / 2)) {}
@@ -63,7 +65,9 @@ Variance ProximityModel::wall(const Element& element, const Vec3& p_W) const noe
 
 double ProximityModel::corner_factor(double d2, double h) const noexcept {
   const auto& k = model_.corner;
-  if (std::sqrt(d2 + h * h) > k.l_max + kTolerance) return 0;
+  if (d2 + h * h > corner_l2_max_) return 0;
+  // Most points are outside the cone: spare them the arc tangent.
+  if (k.phi_max < std::numbers::pi / 2 && (h <= 0 || d2 > 1.0001 * (h * tan_phi_max_) * (h * tan_phi_max_))) return 0;
   const double phi = std::atan2(std::sqrt(d2), h);
   if (phi >= k.phi_max) return 0;  // at φ̄_c itself the term is zero
   const auto sixth = [](double x) { return x * x * x * x * x * x; };
@@ -78,6 +82,23 @@ double ProximityModel::wall_factor(double r2, double r_z) const noexcept {
   return std::exp(-k.k2 * l * l);
 }
 
-bool ProximityModel::in_wall_range(double r2) const noexcept { return std::sqrt(r2) <= model_.wall.l_max + kTolerance; }
+ProximityModel::Gate ProximityModel::wall_gate(double r_z) const noexcept {
+  // θ_w ≤ θ: −r_z/|r| ≤ cos θ_w; θ ≤ π/2: −r_z/|r| ≥ cos π/2 (with the tolerances).
+  constexpr Gate kNever{1, 0};
+  Gate gate{0, (model_.wall.l_max + kTolerance) * (model_.wall.l_max + kTolerance)};
+  const double down = -r_z;
+  if (down > 0 && cos_wall_min_ <= 0) return kNever;
+  if (down > 0) gate.low = down * down / (cos_wall_min_ * cos_wall_min_);
+  if (down == 0 && cos_wall_min_ < 0) return kNever;
+  if (down < 0) {
+    gate.low = down * down / (cos_level_ * cos_level_);
+    if (cos_wall_min_ < 0) gate.high = std::min(gate.high, down * down / (cos_wall_min_ * cos_wall_min_));
+  }
+  return gate;
+}
+
+bool ProximityModel::in_wall_range(double r2) const noexcept {
+  return r2 <= (model_.wall.l_max + kTolerance) * (model_.wall.l_max + kTolerance);
+}
 
 }  // namespace backwash::field

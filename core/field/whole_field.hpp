@@ -16,13 +16,13 @@ namespace backwash::field {
 /// Σ of model.md section 2 at many voxel centres at once: the same elements, gates, terms and lines of sight as
 /// ProximityField::at, reordered. Nothing is quantised; what differs is the rounding.
 ///
-/// The vehicle's voxels are taken in tiles of 8 × 8 voxels of one layer, one bit each of a 64-bit word. Elements are
-/// sorted into six classes: up, the four axis normals, and any other normal ("turned"). Seen from a voxel's centre, an
-/// element of one of the first five classes at the lattice offset o lies at a constant place, so one list of voxels per
-/// class and o says what its line of sight meets, and
+/// The vehicle's voxels are taken in tiles of 8 × 8 × 8, one bit each: eight words of 64 bits, one per layer. Elements
+/// are sorted into six classes: up, the four axis normals, and any other normal ("turned"). Seen from a voxel's centre,
+/// an element of one of the first five classes at the lattice offset o lies at a constant place, so one list of voxels
+/// per class and o says what its line of sight meets, and
 ///   visible = elements(q + o) & ~OR of occupied(q + d) over the list's offsets d
-/// decides for 64 voxels q at once. For turned elements the list holds what the line may meet for any normal that faces
-/// the vehicle; where one of these voxels is occupied, it is tested against the element's own line.
+/// decides for all voxels q of the tile at once. For turned elements the list holds what the line may meet for any
+/// normal that faces the vehicle; where one of these voxels is occupied, it is tested against the element's own line.
 class WholeField {
  public:
   /// Prepares Σ at the centres of the listed free voxels (linear indices of the grid, which must outlive this).
@@ -51,9 +51,11 @@ class WholeField {
   };
   static Term term(const Variance& v) noexcept { return {v.xx, v.xy, v.yy, v.zz}; }
 
+  /// One bit per voxel of 8 × 8 × 8: voxel (x, y, z) is bit x + 8 y of word z.
+  using Lanes = std::array<std::uint64_t, kEdge>;
   struct Tile {
-    int x, y, z;          // its first voxel
-    std::uint64_t lanes;  // bit x' + 8 y': voxel (x + x', y + y', z) is listed
+    Index3 first;  // its lowest voxel
+    Lanes lanes;   // the listed voxels
   };
   /// Voxels with an element of one class, row by row (z, then y, then x).
   struct Board {
@@ -64,12 +66,13 @@ class WholeField {
   struct Stencil {
     struct Offset {
       Index3 o;
-      std::uint32_t first, last;  // of steps and cells
-      Term constant;              // ground, or wall of an axis normal
-      std::size_t corner_row;     // of corners_, for an axis normal
+      std::uint32_t first, last;                // of steps and cells
+      Term constant;                            // ground, or wall of an axis normal
+      std::size_t corner_row;                   // of corners_, for an axis normal
+      double wall_low, wall_high, wall_factor;  // turned: limits of o·m within the wall's gates, factor at o·m = 0
     };
     int low_z = 0, high_z = -1;
-    std::vector<std::int32_t> number;  // of the offset (x, y, z − low_z) in a window's layer, −1: none
+    std::vector<std::int32_t> number;  // of the offset at a window's position and z − low_z, −1: none
     std::vector<Offset> offsets;
     std::vector<std::int32_t> steps;  // on the path, from the vehicle's word in a window
     std::vector<Index3> cells;        // the same as offsets; turned elements only
@@ -85,21 +88,30 @@ class WholeField {
   void add_tiles(std::span<const std::size_t> voxels);
   void add_stencils();
   void add_offset(Stencil& stencil, std::size_t kind, const Index3& o);
-  void add_corners();
+  void add_tables();
+  /// Place of a voxel in arrays in which z runs fastest.
+  std::size_t column_major(const Index3& v) const noexcept {
+    const Index3& size = grid_->size();
+    return (static_cast<std::size_t>(v.y()) * static_cast<std::size_t>(size.x()) + static_cast<std::size_t>(v.x())) *
+               static_cast<std::size_t>(size.z()) +
+           static_cast<std::size_t>(v.z());
+  }
 
   const map::OccupancyGrid* grid_;
   Model model_;
   ProximityModel terms_;
-  int radius_;      // of the stencils along x and y
-  int width_;       // of a window: 2 radius_ + 1 words along x and y
-  int height_ = 0;  // heights of corners: −height_ … height_
+  int radius_;  // of the stencils along x and y
+  int width_;   // of a window: 2 radius_ + 1 positions along x and y
+  int height_;  // heights of corners: −height_ … height_
   std::vector<Tile> tiles_;
   std::array<Board, kClasses> boards_;
   std::array<Stencil, kClasses> stencils_;
   std::vector<Turned> turned_;
-  std::vector<std::int32_t> turned_at_;  // per cell, −1: none
-  std::vector<std::int16_t> floor_;      // per cell: the first voxel below that is not free, if it is occupied
+  std::vector<std::int32_t> turned_at_;  // column_major: −1: none
+  std::vector<std::int16_t> floor_;      // column_major: the first voxel below that is not free, if it is occupied
   std::vector<double> corners_;          // corner factor of axis normals per 4 d²/a² and height
+  double decay_steps_ = 0;               // of decay_, per unit
+  std::vector<double> decay_;            // exp(k_w2 a² x), x ≥ 0
 };
 
 }  // namespace backwash::field
