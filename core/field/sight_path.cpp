@@ -39,17 +39,24 @@ bool meets(const Beam& beam, const Index3& v) {
 
 }  // namespace
 
-NormalRange facing_normals(const Index3& o) noexcept {
+std::optional<NormalRange> facing_normals(const Index3& o, const Index3& face) noexcept {
+  constexpr double kSlack = 1e-9, kPi = std::numbers::pi;
   const double distance = std::hypot(o.x(), o.y());
-  const double middle = std::atan2(-o.y(), -o.x()), half = std::acos(0.5 / distance) + 1e-9;
+  if (distance <= 0.5) return std::nullopt;
+  // As angles about the middle of the facing arc, which is shorter than a half circle.
+  const double middle = std::atan2(-o.y(), -o.x()), half = std::acos(0.5 / distance) + kSlack;
+  const double of_face = std::remainder(std::atan2(face.y(), face.x()) - middle, 2 * kPi);
+  const double first = middle + std::max(-half, of_face - kPi / 4 - kSlack);
+  const double last = middle + std::min(half, of_face + kPi / 4 + kSlack);
+  if (first > last) return std::nullopt;
   NormalRange range{Vec3(1, 1, 0), Vec3(-1, -1, 0)};
   const auto take = [&](double angle) {
     const Vec3 m(std::cos(angle), std::sin(angle), 0);
     range.low = range.low.cwiseMin(m), range.high = range.high.cwiseMax(m);
   };
-  take(middle - half), take(middle + half);
+  take(first), take(last);
   for (int quarter = -4; quarter <= 4; ++quarter)  // the arc's extremes along x and y
-    if (const double angle = quarter * std::numbers::pi / 2; std::abs(angle - middle) <= half) take(angle);
+    if (const double angle = quarter * kPi / 2; first <= angle && angle <= last) take(angle);
   return range;
 }
 

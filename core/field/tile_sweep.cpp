@@ -22,14 +22,16 @@ class TileSweep {
         grid_(*whole.grid_),
         layers_(static_cast<std::size_t>(grid_.size().z())),
         positions_(static_cast<std::size_t>(whole.width_) * static_cast<std::size_t>(whole.width_)),
-        occupied_(layers_ * positions_ + 2 * kPadding),
+        occupied_(layers_ * positions_),
         scratch_(layers_ * positions_),
+        scratch_floors_(layers_ * positions_, kNoFloors),
         touched_(positions_) {}
 
   void run(const Tile& tile) {
     if (tile.first.head<2>() != corner_) open_window(tile.first);
     tile_ = tile;
-    sum_.fill({}), uniform_.fill({});
+    std::fill(sum_.begin() + 64 * tile.low, sum_.begin() + 64 * (tile.high + 1), Term{});
+    uniform_.fill({});
     for (std::size_t kind = 0; kind < WholeField::kClasses; ++kind)
       for (const Column& column : columns_[kind]) evaluate(kind, column);
   }
@@ -42,12 +44,23 @@ class TileSweep {
   }
 
  private:
-  static constexpr std::size_t kPadding = WholeField::kEdge;  // words read before and after those of a column
+  /// Lowest and highest of the floors under some elements' corners.
+  struct Floors {
+    std::int16_t low, high;
+    void take(std::int16_t floor) noexcept { low = std::min(low, floor), high = std::max(high, floor); }
+  };
+  static constexpr Floors kNoFloors{INT16_MAX, INT16_MIN};
   /// The elements of one class at one position: words of the layers low … high.
   struct Column {
     std::uint32_t position;
     int low, high;
-    std::size_t first;  // of words_
+    Floors floors;
+    std::size_t first;  // of words_ and floors_: that of layer `low`
+  };
+  /// What one offset sees: elements seen from each layer of the tile; none outside low … high.
+  struct View {
+    const Floors* floors;   // of the elements seen from layer `low`; others follow
+    std::size_t low, high;  // layers of the tile
   };
 
   template <typename Visit>
@@ -63,36 +76,40 @@ class TileSweep {
   void open_columns(std::size_t kind);
   void scatter(std::size_t kind, int y, int z);
   void evaluate(std::size_t kind, const Column& column);
-  void fixed(std::size_t kind, const Offset& offset, Lanes lanes, int low, int high);
-  void turned(const Offset& offset, const Lanes& lanes, int low, int high);
-  bool hidden(const Offset& offset, const WholeField::Turned& element, std::size_t z, unsigned lane) const;
-  Lanes corners_seen(std::size_t kind, const Offset& offset, const Lanes& lanes, int low, int high);
+  /// Whether an element with a floor within limits may have a corner term in the layers low … high.
+  static bool may_have_corner(const Offset& offset, const Floors& floors, int low, int high) noexcept {
+    return floors.high != WholeField::kNoFloor && low - floors.high <= offset.corner_high &&
+           high - std::max<int>(floors.low, 0) >= offset.corner_low;
+  }
+  void ground(const Offset& offset, const View& view);
+  void axis(std::size_t kind, const Offset& offset, const View& view);
+  void turned(std::size_t kind, const Offset& offset, const View& view);
+  bool hidden(std::size_t kind, const Offset& offset, const WholeField::Turned& element, std::size_t z,
+              unsigned lane) const;
 
   /// The words of the tile in occupied_.
   const std::uint64_t* here() const noexcept {
-    return occupied_.data() + kPadding + positions_ / 2 * layers_ + static_cast<std::size_t>(tile_.first.z());
+    return occupied_.data() + positions_ / 2 * layers_ + static_cast<std::size_t>(tile_.first.z());
   }
-  /// Lanes whose path meets no occupied voxel; only words low … high are not zero.
-  Lanes clear_lanes(const Offset& offset, const std::vector<std::int32_t>& steps, Lanes lanes, int low,
-                    int high) const {
+  /// Takes the lanes whose path meets an occupied voxel out of clear_.
+  void clear(const Offset& offset, const std::vector<std::int32_t>& steps, const View& view) noexcept {
     const std::uint64_t* words = here();
     const std::int32_t* step = steps.data() + offset.first;
     const std::int32_t* const end = steps.data() + offset.last;
-    if (low == high) {
-      std::uint64_t left = lanes[static_cast<std::size_t>(low)];
-      words += low;
+    std::copy(lanes_.begin() + view.low, lanes_.begin() + view.high + 1, clear_.begin() + view.low);
+    if (view.low == view.high) {
+      std::uint64_t left = lanes_[view.low];
+      words += view.low;
       for (; end - step >= 4 && left; step += 4)
         left &= ~(words[step[0]] | words[step[1]] | words[step[2]] | words[step[3]]);
       for (; step != end; ++step) left &= ~words[*step];
-      lanes[static_cast<std::size_t>(low)] = left;
-      return lanes;
+      clear_[view.low] = left;
+      return;
     }
-    for (int n = 0; step != end; ++step, ++n) {
+    for (; step != end; ++step) {
       const std::uint64_t* word = words + *step;
-      for (std::size_t z = 0; z < lanes.size(); ++z) lanes[z] &= ~word[z];
-      if (n % 4 == 3 && lanes == Lanes{}) break;
+      for (std::size_t z = view.low; z <= view.high; ++z) clear_[z] &= ~word[z];
     }
-    return lanes;
   }
   std::size_t place(const Index3& o, std::size_t z, unsigned lane) const noexcept {
     const int l = static_cast<int>(lane);
@@ -106,18 +123,20 @@ class TileSweep {
   std::vector<std::uint64_t> occupied_;
   std::array<std::vector<Column>, WholeField::kClasses> columns_;
   std::vector<std::uint64_t> words_;    // of the columns
+  std::vector<Floors> floors_;          // the same
   std::vector<std::uint64_t> scratch_;  // of the columns while they are made; zero between
+  std::vector<Floors> scratch_floors_;  // the same
   std::vector<std::uint32_t> touched_;  // per position: 1 + its column, 0: none yet
   Tile tile_{};
-  std::array<Term, 512> sum_;
-  std::array<Term, WholeField::kEdge> uniform_;  // what all voxels of a layer have in common
-  std::array<double, 512> wall_, corner_factor_;
+  Lanes lanes_, clear_;  // of the offset in hand: elements, and those whose path is clear; between the view's limits
+  std::array<Term, 64 * WholeField::kLayers> sum_;
+  std::array<Term, WholeField::kLayers> uniform_;  // what all voxels of a layer have in common
 };
 
 void TileSweep::open_window(const Index3& first) {
   corner_ = first.head<2>();
   open_occupied();
-  words_.clear();
+  words_.clear(), floors_.clear();
   for (std::size_t kind = 0; kind < WholeField::kClasses; ++kind) open_columns(kind);
 }
 
@@ -139,7 +158,7 @@ void TileSweep::open_occupied() {
         byte = byte >> 1 | bit(x0 + column + 7);
         if (!byte) continue;
         for (int wy = first; wy <= last; ++wy)
-          occupied_[kPadding + static_cast<std::size_t>(wy * width + column) * layers_ + static_cast<std::size_t>(z)] |=
+          occupied_[static_cast<std::size_t>(wy * width + column) * layers_ + static_cast<std::size_t>(z)] |=
               byte << 8 * (row - wy);
       }
     }
@@ -152,8 +171,11 @@ void TileSweep::open_columns(std::size_t kind) {
     for (int y = std::max(0, y0); y < std::min(grid_.size().y(), y0 + whole_.width_ + 7); ++y) scatter(kind, y, z);
   for (Column& column : columns_[kind]) {
     column.first = words_.size();
-    for (int z = column.low; z <= column.high; ++z)
-      words_.push_back(std::exchange(scratch_[column.position * layers_ + static_cast<std::size_t>(z)], 0));
+    for (int z = column.low; z <= column.high; ++z) {
+      const std::size_t n = column.position * layers_ + static_cast<std::size_t>(z);
+      words_.push_back(std::exchange(scratch_[n], 0));
+      floors_.push_back(std::exchange(scratch_floors_[n], kNoFloors));
+    }
     touched_[column.position] = 0;
   }
 }
@@ -171,117 +193,120 @@ void TileSweep::scatter(std::size_t kind, int y, int z) {
       for (int lx = std::max(0, *x - x0 - width + 1); lx <= std::min(7, *x - x0); ++lx) {
         const auto position = static_cast<std::uint32_t>((row - ly) * width + *x - x0 - lx);
         if (!touched_[position]) {
-          columns_[kind].push_back({position, z, z, 0});
+          columns_[kind].push_back({position, z, z, kNoFloors, 0});
           touched_[position] = static_cast<std::uint32_t>(columns_[kind].size());
         }
-        columns_[kind][touched_[position] - 1].high = z;
-        scratch_[position * layers_ + static_cast<std::size_t>(z)] |= std::uint64_t{1} << (lx + 8 * ly);
+        const std::int16_t floor = board.floor[static_cast<std::size_t>(x - board.x.begin())];
+        Column& column = columns_[kind][touched_[position] - 1];
+        column.high = z, column.floors.take(floor);
+        const std::size_t n = position * layers_ + static_cast<std::size_t>(z);
+        scratch_[n] |= std::uint64_t{1} << (lx + 8 * ly);
+        scratch_floors_[n].take(floor);
       }
 }
 
 void TileSweep::evaluate(std::size_t kind, const Column& column) {
   const auto& stencil = whole_.stencils_[kind];
-  const int depth = stencil.high_z - stencil.low_z + 1, z0 = tile_.first.z();
-  const std::int32_t* number = stencil.number.data() + static_cast<std::ptrdiff_t>(column.position) * depth;
-  const std::uint64_t* words = words_.data() + column.first;
-  const int from = std::max(stencil.low_z, column.low - z0 - 7), to = std::min(stencil.high_z, column.high - z0);
-  for (int dz = from; dz <= to; ++dz) {
-    const std::int32_t offset = number[dz - stencil.low_z];
-    if (offset < 0) continue;
-    int low = std::max(0, column.low - z0 - dz), high = std::min(7, column.high - z0 - dz);
-    Lanes lanes{};
-    for (int z = low; z <= high; ++z)
-      lanes[static_cast<std::size_t>(z)] = words[z0 + dz + z - column.low] & tile_.lanes[static_cast<std::size_t>(z)];
-    while (low <= high && !lanes[static_cast<std::size_t>(low)]) ++low;
-    while (low <= high && !lanes[static_cast<std::size_t>(high)]) --high;
+  const int z0 = tile_.first.z();
+  for (std::uint32_t n = stencil.first[column.position]; n < stencil.first[column.position + 1]; ++n) {
+    const Offset& offset = stencil.offsets[n];
+    const int shift = z0 + offset.o.z() - column.low;  // from a layer of the tile to a word of the column
+    int low = std::max(tile_.low, -shift), high = std::min(tile_.high, column.high - column.low - shift);
     if (low > high) continue;
-    const Offset& of = stencil.offsets[static_cast<std::size_t>(offset)];
-    if (kind == WholeField::kTurned)
-      turned(of, lanes, low, high);
+    if (kind != WholeField::kUp && !offset.wall && !may_have_corner(offset, column.floors, z0 + low, z0 + high))
+      continue;
+    const std::uint64_t* words = words_.data() + column.first + shift;
+    std::uint64_t any = 0;
+    for (int z = low; z <= high; ++z) {
+      const auto layer = static_cast<std::size_t>(z);
+      any |= lanes_[layer] = words[z] & tile_.lanes[layer];
+    }
+    if (!any) continue;
+    while (!lanes_[static_cast<std::size_t>(low)]) ++low;
+    while (!lanes_[static_cast<std::size_t>(high)]) --high;
+    const View view{floors_.data() + column.first + shift + low, static_cast<std::size_t>(low),
+                    static_cast<std::size_t>(high)};
+    clear(offset, stencil.steps, view);
+    if (kind == WholeField::kUp)
+      ground(offset, view);
+    else if (kind < WholeField::kTurned)
+      axis(kind, offset, view);
     else
-      fixed(kind, of, lanes, low, high);
+      turned(kind, offset, view);
   }
 }
 
-/// Lanes whose element has a corner within its gates; their factors go to corner_factor_.
-TileSweep::Lanes TileSweep::corners_seen(std::size_t kind, const Offset& offset, const Lanes& lanes, int low,
-                                         int high) {
-  const int height = whole_.height_;
-  const double* row = whole_.corners_.data() + offset.corner_row * static_cast<std::size_t>(2 * height + 1) + height;
-  const Index3 outside = offset.o + WholeField::kNormals[kind];
-  Lanes seen{};
-  for (auto z = static_cast<std::size_t>(low); z <= static_cast<std::size_t>(high); ++z)
-    for_each_lane(lanes[z], [&](unsigned lane) {
-      const int floor = whole_.floor_[place(outside, z, lane)], up = tile_.first.z() + static_cast<int>(z) - floor;
-      if (floor == WholeField::kNoFloor || up < -height || up > height || row[up] == 0) return;
-      corner_factor_[64 * z + lane] = row[up], seen[z] |= std::uint64_t{1} << lane;
-    });
-  return seen;
-}
-
-void TileSweep::fixed(std::size_t kind, const Offset& offset, Lanes lanes, int low, int high) {
-  Lanes cornered{};
-  if (kind != WholeField::kUp) cornered = corners_seen(kind, offset, lanes, low, high);
-  const bool constant = offset.constant.xx != 0 || offset.constant.yy != 0 || offset.constant.zz != 0;
-  if (!constant) lanes = cornered;
-  if (lanes == Lanes{}) return;
-  lanes = clear_lanes(offset, whole_.stencils_[kind].steps, lanes, low, high);
-  const auto& lambda = whole_.model_.corner.lambda;
-  const double area = grid_.resolution() * grid_.resolution();
-  const Term corner =
-      WholeField::term(Variance::about_normal(WholeField::kNormals[kind].cast<double>(), area * lambda.normal,
-                                              area * lambda.tangential, area * lambda.vertical));
-  for (auto z = static_cast<std::size_t>(low); z <= static_cast<std::size_t>(high); ++z) {
+void TileSweep::ground(const Offset& offset, const View& view) {
+  for (std::size_t z = view.low; z <= view.high; ++z) {
     Term* sum = sum_.data() + 64 * z;
-    if (constant && lanes[z] == tile_.lanes[z])
+    if (clear_[z] == tile_.lanes[z])
       add(uniform_[z], offset.constant, 1);
-    else if (constant)
-      for_each_lane(lanes[z], [&](unsigned lane) { add(sum[lane], offset.constant, 1); });
-    for_each_lane(lanes[z] & cornered[z],
-                  [&](unsigned lane) { add(sum[lane], corner, corner_factor_[64 * z + lane]); });
+    else
+      for_each_lane(clear_[z], [&](unsigned lane) { add(sum[lane], offset.constant, 1); });
   }
 }
 
-void TileSweep::turned(const Offset& offset, const Lanes& lanes, int low, int high) {
+void TileSweep::axis(std::size_t kind, const Offset& offset, const View& view) {
+  const int height = whole_.height_;
+  const double* factors =
+      whole_.corners_.data() + offset.corner_row * static_cast<std::size_t>(2 * height + 1) + height;
+  for (std::size_t z = view.low; z <= view.high; ++z) {
+    if (!clear_[z]) continue;
+    const Floors& floors = view.floors[z - view.low];
+    const int layer = tile_.first.z() + static_cast<int>(z);
+    Term* sum = sum_.data() + 64 * z;
+    const auto factor = [&](int floor) {
+      const int up = layer - floor;
+      return floor == WholeField::kNoFloor || up < -height || up > height ? 0 : factors[up];
+    };
+    if (floors.low == floors.high || !may_have_corner(offset, floors, layer, layer)) {
+      Term both = offset.constant;
+      add(both, whole_.axis_corner_[kind], factor(floors.low == floors.high ? floors.low : WholeField::kNoFloor));
+      if (clear_[z] == tile_.lanes[z])
+        add(uniform_[z], both, 1);
+      else
+        for_each_lane(clear_[z], [&](unsigned lane) { add(sum[lane], both, 1); });
+    } else {
+      const Index3 outside = offset.o + WholeField::kNormals[kind];
+      for_each_lane(clear_[z], [&](unsigned lane) {
+        if (offset.wall) add(sum[lane], offset.constant, 1);
+        const double f = factor(whole_.floor_[place(outside, z, lane)]);
+        if (f != 0) add(sum[lane], whole_.axis_corner_[kind], f);
+      });
+    }
+  }
+}
+
+void TileSweep::turned(std::size_t kind, const Offset& offset, const View& view) {
   constexpr double kInPlane = 1e-9;  // m
   const double a = grid_.resolution(), a2 = a * a;
   const Index3& o = offset.o;
   const double flat2 = o.head<2>().squaredNorm() + 0.25;
-  const auto element = [&](std::size_t z, unsigned lane) -> const WholeField::Turned& {
-    return whole_.turned_[static_cast<std::size_t>(whole_.turned_at_[place(o, z, lane)])];
-  };
-  Lanes wanted{};
-  for (auto z = static_cast<std::size_t>(low); z <= static_cast<std::size_t>(high); ++z)
-    for_each_lane(lanes[z], [&](unsigned lane) {
-      const auto& e = element(z, lane);
+  for (std::size_t z = view.low; z <= view.high; ++z) {
+    const int layer = tile_.first.z() + static_cast<int>(z);
+    if (!lanes_[z]) continue;
+    const bool with_corner = may_have_corner(offset, view.floors[z - view.low], layer, layer);
+    if (!offset.wall && !with_corner) continue;
+    for_each_lane(lanes_[z], [&](unsigned lane) {
+      const auto& e = whole_.turned_[static_cast<std::size_t>(whole_.turned_at_[place(o, z, lane)])];
       const double along = o.x() * e.m_x + o.y() * e.m_y, d2 = a2 * (flat2 + along);
       if (-a * (along + 0.5) <= kInPlane) return;
       double wall = 0, corner = 0;
-      if (along >= offset.wall_low && along <= offset.wall_high) {
-        const double x = -along * whole_.decay_steps_;
-        const auto n = static_cast<std::size_t>(x);
-        const double t = x - static_cast<double>(n);
-        wall = offset.wall_factor * ((1 - t) * whole_.decay_[n] + t * whole_.decay_[n + 1]);
-      }
-      if (e.floor != WholeField::kNoFloor && whole_.terms_.in_wall_range(d2 + a2 * o.z() * o.z()))
-        corner = whole_.terms_.corner_factor(d2, a * (tile_.first.z() + static_cast<int>(z) - e.floor - 0.5));
+      if (along >= offset.wall_low && along <= offset.wall_high) wall = offset.wall_factor * whole_.decay(-along);
+      if (with_corner && e.floor != WholeField::kNoFloor && whole_.terms_.in_wall_range(d2 + a2 * o.z() * o.z()))
+        corner = whole_.terms_.corner_factor(d2, a * (layer - e.floor - 0.5));
       if (wall == 0 && corner == 0) return;
-      wanted[z] |= std::uint64_t{1} << lane;
-      wall_[64 * z + lane] = wall, corner_factor_[64 * z + lane] = corner;
+      if (!(clear_[z] >> lane & 1) && hidden(kind, offset, e, z, lane)) return;
+      Term& sum = sum_[64 * z + lane];
+      if (wall != 0) add(sum, e.wall, wall);
+      if (corner != 0) add(sum, e.corner, corner);
     });
-  if (wanted == Lanes{}) return;
-  const Lanes clear = clear_lanes(offset, whole_.stencils_[WholeField::kTurned].steps, wanted, low, high);
-  for (auto z = static_cast<std::size_t>(low); z <= static_cast<std::size_t>(high); ++z)
-    for_each_lane(wanted[z], [&](unsigned lane) {
-      const auto& e = element(z, lane);
-      if (!(clear[z] >> lane & 1) && hidden(offset, e, z, lane)) return;
-      add(sum_[64 * z + lane], e.wall, wall_[64 * z + lane]);
-      if (corner_factor_[64 * z + lane] != 0) add(sum_[64 * z + lane], e.corner, corner_factor_[64 * z + lane]);
-    });
+  }
 }
 
-bool TileSweep::hidden(const Offset& offset, const WholeField::Turned& element, std::size_t z, unsigned lane) const {
-  const auto& stencil = whole_.stencils_[WholeField::kTurned];
+bool TileSweep::hidden(std::size_t kind, const Offset& offset, const WholeField::Turned& element, std::size_t z,
+                       unsigned lane) const {
+  const auto& stencil = whole_.stencils_[kind];
   const Vec3 c = offset.o.cast<double>() + 0.5 * Vec3(element.m_x, element.m_y, 0);
   const auto segment = open_part(Vec3::Constant(-0.5), 1, Vec3::Zero(), c);
   if (!segment) return false;

@@ -13,8 +13,9 @@ constexpr double kInPlane = 1e-9;  // m: a point in an element's own plane does 
 
 }  // namespace
 
-const std::array<Index3, WholeField::kClasses> WholeField::kNormals{Index3(0, 0, 1), Index3(1, 0, 0),  Index3(-1, 0, 0),
-                                                                    Index3(0, 1, 0), Index3(0, -1, 0), Index3(0, 0, 0)};
+const std::array<Index3, WholeField::kClasses> WholeField::kNormals{
+    Index3(0, 0, 1), Index3(1, 0, 0),  Index3(-1, 0, 0), Index3(0, 1, 0), Index3(0, -1, 0),
+    Index3(1, 0, 0), Index3(-1, 0, 0), Index3(0, 1, 0),  Index3(0, -1, 0)};
 
 WholeField::WholeField(const map::OccupancyGrid& grid, const Model& model, std::span<const std::size_t> voxels)
     : grid_(&grid), model_(model), terms_(model, grid.resolution()) {
@@ -31,18 +32,19 @@ WholeField::WholeField(const map::OccupancyGrid& grid, const Model& model, std::
 }
 
 void WholeField::add_tiles(std::span<const std::size_t> voxels) {
-  const Index3 count = (grid_->size().array() + (kEdge - 1)) / kEdge;
-  std::vector<Lanes> lanes(static_cast<std::size_t>(count.prod()), Lanes{});
-  for (const std::size_t n : voxels) {  // tiles of one column are neighbours: they share a window
-    const Index3 q = grid_->voxel(n), tile = q / kEdge, in = q - kEdge * tile;
-    const int place = (tile.y() * count.x() + tile.x()) * count.z() + tile.z();
-    lanes[static_cast<std::size_t>(place)][static_cast<std::size_t>(in.z())] |= std::uint64_t{1}
-                                                                                << (in.x() + kEdge * in.y());
-  }
-  for (int n = 0; n < count.prod(); ++n) {
-    const Index3 tile(n / count.z() % count.x(), n / count.z() / count.x(), n % count.z());
-    if (const Lanes& of_tile = lanes[static_cast<std::size_t>(n)]; of_tile != Lanes{})
-      tiles_.push_back({kEdge * tile, of_tile});
+  const Index3 edge(kEdge, kEdge, kLayers);
+  const Index3 count = (grid_->size() + edge - Index3::Ones()).array() / edge.array();
+  std::vector<int> number(static_cast<std::size_t>(count.prod()), -1);
+  for (const std::size_t n : voxels) {
+    const Index3 q = grid_->voxel(n), tile = q.array() / edge.array(), in = q - tile.cwiseProduct(edge);
+    int& of_tile = number[static_cast<std::size_t>((tile.z() * count.y() + tile.y()) * count.x() + tile.x())];
+    if (of_tile < 0) {
+      of_tile = static_cast<int>(tiles_.size());
+      tiles_.push_back({tile.cwiseProduct(edge), in.z(), in.z(), {}});
+    }
+    Tile& t = tiles_[static_cast<std::size_t>(of_tile)];
+    t.low = std::min(t.low, in.z()), t.high = std::max(t.high, in.z());
+    t.lanes[static_cast<std::size_t>(in.z())] |= std::uint64_t{1} << (in.x() + kEdge * in.y());
   }
 }
 
@@ -62,15 +64,22 @@ void WholeField::add_elements() {
     const Index3 v = grid_->index(e.c_W - 0.5 * a * e.normal);
     std::size_t kind = 0;
     while (kind < kTurned && kNormals[kind].cast<double>() != e.normal) ++kind;
+    if (kind == kTurned) {
+      while (kNormals[kind].cast<double>().dot(e.normal) < e.normal.cwiseAbs().maxCoeff()) ++kind;
+      const auto about = [&](const auto& k) {
+        return term(Variance::about_normal(e.normal, e.area * k.normal, e.area * k.tangential, e.area * k.vertical));
+      };
+      turned_at_[column_major(v)] = static_cast<std::int32_t>(turned_.size());
+      turned_.push_back({e.normal.x(), e.normal.y(), about(model_.wall.k1), about(model_.corner.lambda), kNoFloor});
+      if (e.corner_W)
+        turned_.back().floor = static_cast<int>(std::lround((e.corner_W->z() - grid_->origin().z()) / a)) - 1;
+    }
     boards_[kind].x.push_back(v.x());
+    const bool axis = kind != kUp && kind < kTurned;
+    boards_[kind].floor.push_back(axis              ? floor_[column_major(v + kNormals[kind])]
+                                  : kind >= kTurned ? static_cast<std::int16_t>(turned_.back().floor)
+                                                    : static_cast<std::int16_t>(kNoFloor));
     ++boards_[kind].row_first[static_cast<std::size_t>(v.z() * grid_->size().y() + v.y()) + 1];
-    if (kind != kTurned) continue;
-    const auto about = [&](const auto& k) {
-      return term(Variance::about_normal(e.normal, e.area * k.normal, e.area * k.tangential, e.area * k.vertical));
-    };
-    const int floor = e.corner_W ? static_cast<int>(std::lround((e.corner_W->z() - grid_->origin().z()) / a)) - 1 : -1;
-    turned_at_[column_major(v)] = static_cast<std::int32_t>(turned_.size());
-    turned_.push_back({e.normal.x(), e.normal.y(), about(model_.wall.k1), about(model_.corner.lambda), floor});
   }
   for (Board& board : boards_)
     for (std::size_t row = 0; row < rows; ++row) board.row_first[row + 1] += board.row_first[row];
@@ -80,54 +89,68 @@ void WholeField::add_stencils() {
   const double a = grid_->resolution();
   const int wall = static_cast<int>(model_.wall.l_max / a + 0.5) + 1, highest = grid_->size().z() - 1;
   const int ground = static_cast<int>(std::max(model_.ground.l_max, model_.ground.l_footprint_max) / a) + 1;
-  const auto layer = static_cast<std::size_t>(width_) * static_cast<std::size_t>(width_);
   for (std::size_t kind = 0; kind < kClasses; ++kind) {
     Stencil& stencil = stencils_[kind];
     if (boards_[kind].x.empty()) continue;
-    const int reach_z = std::min(kind == kUp ? ground : wall, highest), reach = kind == kUp ? radius_ : wall;
-    stencil.low_z = -reach_z, stencil.high_z = kind == kUp ? -1 : reach_z;
-    stencil.number.assign(layer * static_cast<std::size_t>(std::max(0, stencil.high_z - stencil.low_z + 1)), -1);
-    for (int z = stencil.low_z; z <= stencil.high_z; ++z)
-      for (int y = -std::min(reach, radius_); y <= std::min(reach, radius_); ++y)
-        for (int x = -std::min(reach, radius_); x <= std::min(reach, radius_); ++x)
-          add_offset(stencil, kind, Index3(x, y, z));
+    const int low = -std::min(kind == kUp ? ground : wall, highest), high = kind == kUp ? -1 : -low;
+    for (int y = -radius_; y <= radius_; ++y)
+      for (int x = -radius_; x <= radius_; ++x) {
+        stencil.first.push_back(static_cast<std::uint32_t>(stencil.offsets.size()));
+        for (int z = low; z <= high; ++z) add_offset(stencil, kind, Index3(x, y, z));
+      }
+    stencil.first.push_back(static_cast<std::uint32_t>(stencil.offsets.size()));
   }
 }
 
-void WholeField::add_offset(Stencil& stencil, std::size_t kind, const Index3& o) {
+/// The terms that an element at an offset may have; false: none.
+bool WholeField::set_gates(Stencil::Offset& offset, std::size_t kind) const {
   const double a = grid_->resolution();
-  const Vec3 m = kNormals[kind].cast<double>(), c = a * (o.cast<double>() + 0.5 * m);  // the vehicle is at 0
-  Stencil::Offset offset{o, 0, 0, {}, 0, 0, 0, 0};
-  NormalRange normals{m, m};
-  if (kind == kTurned) {
-    const double nearest = a * std::max(0.0, o.cast<double>().norm() - 0.5);
-    if (o.head<2>().isZero() || !terms_.in_wall_range(nearest * nearest)) return;
-    normals = facing_normals(o);
+  const Vec3 m = kNormals[kind].cast<double>(), o = offset.o.cast<double>(), c = a * (o + 0.5 * m);
+  const double flat = o.head<2>().norm();
+  if (kind < kTurned && m.dot(c) >= -kInPlane) return false;  // the vehicle is at 0
+  if (kind == kUp) {
+    offset.constant = term(terms_.ground({Element::Kind::up, c, m, a * a, {}}, Vec3::Zero()));
+    return offset.constant.xx != 0 || offset.constant.zz != 0;
+  }
+  double nearest2 = c.squaredNorm(), corner2 = c.head<2>().squaredNorm();
+  if (kind < kTurned) {
+    const double wall = terms_.wall_factor(c.squaredNorm(), c.z());
+    offset.wall = wall != 0;
+    const auto& k1 = model_.wall.k1;
+    offset.constant = term(wall * a * a * Variance::about_normal(m, k1.normal, k1.tangential, k1.vertical));
+    const Index3 doubled = 2 * offset.o + kNormals[kind];
+    offset.corner_row = static_cast<std::size_t>(doubled.head<2>().squaredNorm());
+  } else {
     const double r2_at_0 = o.squaredNorm() + 0.25;  // |r|² = a² (|o|² + o·m + 1/4)
-    const auto gate = terms_.wall_gate(a * o.z());
+    const auto gate = terms_.wall_gate(c.z());
     offset.wall_low = gate.low / (a * a) - r2_at_0, offset.wall_high = gate.high / (a * a) - r2_at_0;
     offset.wall_factor = std::exp(-model_.wall.k2 * a * a * r2_at_0);
-  } else {
-    if (m.dot(c) >= -kInPlane) return;
-    if (kind == kUp) {
-      offset.constant = term(terms_.ground({Element::Kind::up, c, m, a * a, {}}, Vec3::Zero()));
-      if (offset.constant.xx == 0 && offset.constant.zz == 0) return;
-    } else {
-      if (!terms_.in_wall_range(c.squaredNorm())) return;
-      offset.constant = term(terms_.wall({Element::Kind::lateral, c, m, a * a, {}}, Vec3::Zero()));
-      const Index3 doubled = 2 * o + kNormals[kind];
-      offset.corner_row = static_cast<std::size_t>(doubled.head<2>().squaredNorm());
-    }
+    offset.wall = offset.wall_low <= -0.5 && offset.wall_high >= -flat - 1e-9;
+    corner2 = std::pow(a * (flat - 0.5), 2), nearest2 = corner2 + c.z() * c.z();
   }
+  if (!terms_.in_wall_range(nearest2 * (1 - 1e-12))) return false;
+  // A corner at the horizontal distance d or farther: l_c and φ bound its height.
+  const double l2 = std::pow(model_.corner.l_max + 1e-6, 2) - corner2;
+  offset.corner_high = l2 < 0 ? -height_ - 1 : std::min(height_, static_cast<int>(std::sqrt(l2) / a + 1.5));
+  offset.corner_low = -height_;
+  if (model_.corner.phi_max < 1.57)
+    offset.corner_low =
+        static_cast<int>(std::min(1e6, 0.999 * std::sqrt(corner2) / std::tan(model_.corner.phi_max) / a + 0.5));
+  return offset.wall || offset.corner_low <= offset.corner_high;
+}
+
+void WholeField::add_offset(Stencil& stencil, std::size_t kind, const Index3& o) {
+  Stencil::Offset offset{};
+  offset.o = o;
+  const Vec3 m = kNormals[kind].cast<double>();
+  const auto normals = kind < kTurned ? NormalRange{m, m} : facing_normals(o, kNormals[kind]);
+  if (!normals || !set_gates(offset, kind)) return;
   offset.first = static_cast<std::uint32_t>(stencil.steps.size());
-  for (const Index3& cell : cells_on_path(o, normals)) {
+  for (const Index3& cell : cells_on_path(o, *normals)) {
     stencil.steps.push_back((cell.y() * width_ + cell.x()) * grid_->size().z() + cell.z());
-    if (kind == kTurned) stencil.cells.push_back(cell);
+    if (kind >= kTurned) stencil.cells.push_back(cell);
   }
   offset.last = static_cast<std::uint32_t>(stencil.steps.size());
-  const int depth = stencil.high_z - stencil.low_z + 1;
-  const int place = ((o.y() + radius_) * width_ + o.x() + radius_) * depth + o.z() - stencil.low_z;
-  stencil.number[static_cast<std::size_t>(place)] = static_cast<std::int32_t>(stencil.offsets.size());
   stencil.offsets.push_back(offset);
 }
 
@@ -137,6 +160,11 @@ void WholeField::add_tables() {
   for (int d2 = 0; d2 < rows; ++d2)
     for (int up = -height_; up <= height_; ++up)
       corners_.push_back(terms_.corner_factor(0.25 * a * a * d2, a * (up - 0.5)));
+  const auto& lambda = model_.corner.lambda;
+  for (std::size_t kind = 1; kind < kTurned; ++kind)
+    axis_corner_[kind] =
+        term(a * a *
+             Variance::about_normal(kNormals[kind].cast<double>(), lambda.normal, lambda.tangential, lambda.vertical));
   // Linear interpolation with steps of k_w2 a² x = 0.001 errs by 0.001²/8.
   const double rate = model_.wall.k2 * a * a;
   decay_steps_ = std::ceil(rate / 0.001) + 1;

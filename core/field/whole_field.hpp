@@ -41,9 +41,9 @@ class WholeField {
  private:
   friend class TileSweep;
 
-  static constexpr int kEdge = 8;  // of a tile, voxels
-  enum Class : std::size_t { kUp, kXPlus, kXMinus, kYPlus, kYMinus, kTurned, kClasses };
-  static const std::array<Index3, kClasses> kNormals;  // of the first five classes
+  static constexpr int kEdge = 8;                                   // of a tile, voxels
+  static constexpr std::size_t kUp = 0, kTurned = 5, kClasses = 9;  // 1 … 4: axis normals, 5 … 8: turned
+  static const std::array<Index3, kClasses> kNormals;               // for turned elements the nearest axis
 
   /// A term's components that are not always zero, (m/s²)².
   struct Term {
@@ -51,28 +51,32 @@ class WholeField {
   };
   static Term term(const Variance& v) noexcept { return {v.xx, v.xy, v.yy, v.zz}; }
 
-  /// One bit per voxel of 8 × 8 × 8: voxel (x, y, z) is bit x + 8 y of word z.
-  using Lanes = std::array<std::uint64_t, kEdge>;
+  static constexpr int kLayers = 64;
+  /// One bit per voxel of a tile: voxel (x, y, z) is bit x + 8 y of word z.
+  using Lanes = std::array<std::uint64_t, kLayers>;
   struct Tile {
-    Index3 first;  // its lowest voxel
-    Lanes lanes;   // the listed voxels
+    Index3 first;   // its lowest voxel
+    int low, high;  // layers that hold listed voxels, from its lowest
+    Lanes lanes;    // the listed voxels
   };
   /// Voxels with an element of one class, row by row (z, then y, then x).
   struct Board {
     std::vector<int> x;
+    std::vector<std::int16_t> floor;  // voxel under the corner; kNoFloor: no corner
     std::vector<std::uint32_t> row_first;
   };
   /// Offsets of one class within the gates.
   struct Stencil {
     struct Offset {
       Index3 o;
-      std::uint32_t first, last;                // of steps and cells
-      Term constant;                            // ground, or wall of an axis normal
-      std::size_t corner_row;                   // of corners_, for an axis normal
+      std::uint32_t first, last;    // of steps and cells
+      Term constant;                // ground, or wall of an axis normal
+      std::size_t corner_row;       // of corners_, for an axis normal
+      int corner_low, corner_high;  // heights (vehicle's layer - floor) between which there may be a corner term
+      bool wall;                    // whether there may be a wall term
       double wall_low, wall_high, wall_factor;  // turned: limits of o·m within the wall's gates, factor at o·m = 0
     };
-    int low_z = 0, high_z = -1;
-    std::vector<std::int32_t> number;  // of the offset at a window's position and z − low_z, −1: none
+    std::vector<std::uint32_t> first;  // offsets at a window's position, with rising z
     std::vector<Offset> offsets;
     std::vector<std::int32_t> steps;  // on the path, from the vehicle's word in a window
     std::vector<Index3> cells;        // the same as offsets; turned elements only
@@ -80,7 +84,7 @@ class WholeField {
   struct Turned {
     double m_x, m_y;
     Term wall, corner;  // per unit of the factors of ProximityModel
-    int floor;          // voxel under the corner; kNoFloor: no corner
+    int floor;          // as in Board
   };
   static constexpr int kNoFloor = -1;
 
@@ -88,7 +92,15 @@ class WholeField {
   void add_tiles(std::span<const std::size_t> voxels);
   void add_stencils();
   void add_offset(Stencil& stencil, std::size_t kind, const Index3& o);
+  bool set_gates(Stencil::Offset& offset, std::size_t kind) const;
   void add_tables();
+  /// exp(k_w2 a² x), 0 ≤ x ≤ radius_ + 1.
+  double decay(double x) const noexcept {
+    x *= decay_steps_;
+    const auto n = static_cast<int>(x);
+    const double t = x - n, *at = decay_.data() + n;
+    return at[0] + t * (at[1] - at[0]);
+  }
   /// Place of a voxel in arrays in which z runs fastest.
   std::size_t column_major(const Index3& v) const noexcept {
     const Index3& size = grid_->size();
@@ -107,11 +119,12 @@ class WholeField {
   std::array<Board, kClasses> boards_;
   std::array<Stencil, kClasses> stencils_;
   std::vector<Turned> turned_;
-  std::vector<std::int32_t> turned_at_;  // column_major: −1: none
-  std::vector<std::int16_t> floor_;      // column_major: the first voxel below that is not free, if it is occupied
-  std::vector<double> corners_;          // corner factor of axis normals per 4 d²/a² and height
-  double decay_steps_ = 0;               // of decay_, per unit
-  std::vector<double> decay_;            // exp(k_w2 a² x), x ≥ 0
+  std::vector<std::int32_t> turned_at_;       // column_major: −1: none
+  std::vector<std::int16_t> floor_;           // column_major: the first voxel below that is not free, if it is occupied
+  std::vector<double> corners_;               // corner factor of axis normals per 4 d²/a² and height
+  std::array<Term, kClasses> axis_corner_{};  // corner term of an axis normal per unit of its factor
+  double decay_steps_ = 0;                    // of decay_, per unit
+  std::vector<double> decay_;                 // exp(k_w2 a² x), x ≥ 0
 };
 
 }  // namespace backwash::field
