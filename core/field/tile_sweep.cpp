@@ -15,6 +15,7 @@ class TileSweep {
   using Lanes = WholeField::Lanes;
   using Term = WholeField::Term;
   using Offset = WholeField::Stencil::Offset;
+  using Gates = WholeField::Stencil::Gates;
 
  public:
   explicit TileSweep(const WholeField& whole)
@@ -22,10 +23,16 @@ class TileSweep {
         grid_(*whole.grid_),
         layers_(static_cast<std::size_t>(grid_.size().z())),
         positions_(static_cast<std::size_t>(whole.width_) * static_cast<std::size_t>(whole.width_)),
-        occupied_(layers_ * positions_),
+        occupied_(layers_ * positions_ + kBlock),
         scratch_(layers_ * positions_),
         scratch_floors_(layers_ * positions_, kNoFloors),
-        touched_(positions_) {}
+        row_bytes_(static_cast<std::size_t>(whole.width_)),
+        row_floors_(static_cast<std::size_t>(whole.width_), kNoFloors),
+        touched_(positions_) {
+    for (int lane = 0; lane < 64; ++lane)
+      lane_step_[static_cast<std::size_t>(lane)] =
+          whole.column_place(Index3(lane % 8, lane / 8, 0)) - whole.column_place(Index3::Zero());
+  }
 
   void run(const Tile& tile) {
     if (tile.first.head<2>() != corner_) open_window(tile.first);
@@ -44,10 +51,12 @@ class TileSweep {
   }
 
  private:
+  static constexpr std::size_t kBlock = 4;  // layers; words past a view's last layer are read, and must be empty
   /// Lowest and highest of the floors under some elements' corners.
   struct Floors {
     std::int16_t low, high;
-    void take(std::int16_t floor) noexcept { low = std::min(low, floor), high = std::max(high, floor); }
+    void take(std::int16_t floor) noexcept { take({floor, floor}); }
+    void take(const Floors& o) noexcept { low = std::min(low, o.low), high = std::max(high, o.high); }
   };
   static constexpr Floors kNoFloors{INT16_MAX, INT16_MIN};
   /// The elements of one class at one position: words of the layers low … high.
@@ -59,6 +68,7 @@ class TileSweep {
   };
   /// What one offset sees: elements seen from each layer of the tile; none outside low … high.
   struct View {
+    const Gates* gates;
     const Floors* floors;   // of the elements seen from layer `low`; others follow
     std::size_t low, high;  // layers of the tile
   };
@@ -76,10 +86,10 @@ class TileSweep {
   void open_columns(std::size_t kind);
   void scatter(std::size_t kind, int y, int z);
   void evaluate(std::size_t kind, const Column& column);
-  /// Whether an element with a floor within limits may have a corner term in the layers low … high.
-  static bool may_have_corner(const Offset& offset, const Floors& floors, int low, int high) noexcept {
-    return floors.high != WholeField::kNoFloor && low - floors.high <= offset.corner_high &&
-           high - std::max<int>(floors.low, 0) >= offset.corner_low;
+  /// Whether an element with a floor within limits may have a corner term in a layer of the map.
+  static bool may_have_corner(const Gates& gates, const Floors& floors, int z) noexcept {
+    return floors.high != WholeField::kNoFloor && z - floors.high <= gates.corner_high &&
+           z - std::max<int>(floors.low, 0) >= gates.corner_low;
   }
   void ground(const Offset& offset, const View& view);
   void axis(std::size_t kind, const Offset& offset, const View& view);
@@ -91,44 +101,49 @@ class TileSweep {
   const std::uint64_t* here() const noexcept {
     return occupied_.data() + positions_ / 2 * layers_ + static_cast<std::size_t>(tile_.first.z());
   }
-  /// Takes the lanes whose path meets an occupied voxel out of clear_.
+  /// Puts the lanes whose path meets no occupied voxel into clear_: the layers of a block together, in registers.
   void clear(const Offset& offset, const std::vector<std::int32_t>& steps, const View& view) noexcept {
-    const std::uint64_t* words = here();
-    const std::int32_t* step = steps.data() + offset.first;
+    const std::int32_t* const begin = steps.data() + offset.first;
     const std::int32_t* const end = steps.data() + offset.last;
-    std::copy(lanes_.begin() + view.low, lanes_.begin() + view.high + 1, clear_.begin() + view.low);
-    if (view.low == view.high) {
-      std::uint64_t left = lanes_[view.low];
-      words += view.low;
-      for (; end - step >= 4 && left; step += 4)
-        left &= ~(words[step[0]] | words[step[1]] | words[step[2]] | words[step[3]]);
-      for (; step != end; ++step) left &= ~words[*step];
-      clear_[view.low] = left;
-      return;
-    }
-    for (; step != end; ++step) {
-      const std::uint64_t* word = words + *step;
-      for (std::size_t z = view.low; z <= view.high; ++z) clear_[z] &= ~word[z];
-    }
+    std::size_t z = view.low;
+    for (; z + 1 <= view.high; z += kBlock) clear_block<kBlock>(begin, end, z);
+    if (z == view.high) clear_block<1>(begin, end, z);
   }
-  std::size_t place(const Index3& o, std::size_t z, unsigned lane) const noexcept {
-    const int l = static_cast<int>(lane);
-    return whole_.column_major(tile_.first + o + Index3(l % 8, l / 8, static_cast<int>(z)));
+  template <std::size_t count>
+  void clear_block(const std::int32_t* step, const std::int32_t* end, std::size_t z) noexcept {
+    const std::uint64_t* words = here() + z;
+    std::array<std::uint64_t, count> left;
+    std::copy_n(lanes_.begin() + static_cast<std::ptrdiff_t>(z), count, left.begin());
+    const auto meet = [&](const std::uint64_t* word) {
+      for (std::size_t n = 0; n < count; ++n) left[n] &= ~word[n];
+    };
+    for (; end - step >= 4; step += 4) {
+      for (int n = 0; n < 4; ++n) meet(words + step[n]);
+      std::uint64_t any = 0;
+      for (const std::uint64_t word : left) any |= word;
+      if (!any) break;
+    }
+    if (end - step < 4)
+      for (; step != end; ++step) meet(words + *step);
+    std::copy_n(left.begin(), count, clear_.begin() + static_cast<std::ptrdiff_t>(z));
   }
-
   const WholeField& whole_;
   const map::OccupancyGrid& grid_;
   std::size_t layers_, positions_;
   Eigen::Vector2i corner_{-1, -1};  // of the window's middle, voxels
   std::vector<std::uint64_t> occupied_;
   std::array<std::vector<Column>, WholeField::kClasses> columns_;
-  std::vector<std::uint64_t> words_;    // of the columns
-  std::vector<Floors> floors_;          // the same
-  std::vector<std::uint64_t> scratch_;  // of the columns while they are made; zero between
-  std::vector<Floors> scratch_floors_;  // the same
-  std::vector<std::uint32_t> touched_;  // per position: 1 + its column, 0: none yet
+  std::vector<std::uint64_t> words_;          // of the columns
+  std::vector<Floors> floors_;                // the same
+  std::vector<std::uint64_t> scratch_;        // of the columns while they are made; zero between
+  std::vector<Floors> scratch_floors_;        // the same
+  std::vector<std::uint64_t> row_bytes_;      // the same
+  std::vector<Floors> row_floors_;            // the same
+  std::array<std::ptrdiff_t, 64> lane_step_;  // in column_place
+  std::vector<std::uint32_t> touched_;        // per position: 1 + its column, 0: none yet
   Tile tile_{};
-  Lanes lanes_, clear_;  // of the offset in hand: elements, and those whose path is clear; between the view's limits
+  std::array<std::uint64_t, WholeField::kLayers + kBlock> lanes_{},
+      clear_{};  // of the offset in hand: elements, and those whose path is clear; between the view's limits
   std::array<Term, 64 * WholeField::kLayers> sum_;
   std::array<Term, WholeField::kLayers> uniform_;  // what all voxels of a layer have in common
 };
@@ -169,6 +184,7 @@ void TileSweep::open_columns(std::size_t kind) {
   const int y0 = corner_.y() - whole_.radius_;
   for (int z = 0; z < grid_.size().z(); ++z)
     for (int y = std::max(0, y0); y < std::min(grid_.size().y(), y0 + whole_.width_ + 7); ++y) scatter(kind, y, z);
+  std::ranges::sort(columns_[kind], {}, &Column::position);
   for (Column& column : columns_[kind]) {
     column.first = words_.size();
     for (int z = column.low; z <= column.high; ++z) {
@@ -180,41 +196,58 @@ void TileSweep::open_columns(std::size_t kind) {
   }
 }
 
-/// Puts the elements of one row into all the words that hold them.
+/// Slides a byte along the elements of one row and puts it into the words of the eight positions along y that hold it.
 void TileSweep::scatter(std::size_t kind, int y, int z) {
   const auto& board = whole_.boards_[kind];
   if (board.x.empty()) return;
+  const auto& stencil = whole_.stencils_[kind];
   const int width = whole_.width_, x0 = corner_.x() - whole_.radius_, row = y - corner_.y() + whole_.radius_;
   const auto line = static_cast<std::size_t>(z * grid_.size().y() + y);
   const auto end = board.x.begin() + board.row_first[line + 1];
+  int low = width, high = -1;
   for (auto x = std::lower_bound(board.x.begin() + board.row_first[line], end, x0); x != end && *x < x0 + width + 7;
-       ++x)
-    for (int ly = std::max(0, row - width + 1); ly <= std::min(7, row); ++ly)
-      for (int lx = std::max(0, *x - x0 - width + 1); lx <= std::min(7, *x - x0); ++lx) {
-        const auto position = static_cast<std::uint32_t>((row - ly) * width + *x - x0 - lx);
-        if (!touched_[position]) {
-          columns_[kind].push_back({position, z, z, kNoFloors, 0});
-          touched_[position] = static_cast<std::uint32_t>(columns_[kind].size());
-        }
-        const std::int16_t floor = board.floor[static_cast<std::size_t>(x - board.x.begin())];
-        Column& column = columns_[kind][touched_[position] - 1];
-        column.high = z, column.floors.take(floor);
-        const std::size_t n = position * layers_ + static_cast<std::size_t>(z);
-        scratch_[n] |= std::uint64_t{1} << (lx + 8 * ly);
-        scratch_floors_[n].take(floor);
+       ++x) {
+    const std::int16_t floor = board.floor[static_cast<std::size_t>(x - board.x.begin())];
+    const int first = std::max(0, *x - x0 - 7), last = std::min(width - 1, *x - x0);
+    low = std::min(low, first), high = std::max(high, last);
+    for (int wx = first; wx <= last; ++wx) {
+      row_bytes_[static_cast<std::size_t>(wx)] |= std::uint64_t{1} << (*x - x0 - wx);
+      row_floors_[static_cast<std::size_t>(wx)].take(floor);
+    }
+  }
+  for (int wx = low; wx <= high; ++wx) {
+    const std::uint64_t byte = std::exchange(row_bytes_[static_cast<std::size_t>(wx)], 0);
+    const Floors floors = std::exchange(row_floors_[static_cast<std::size_t>(wx)], kNoFloors);
+    if (!byte) continue;
+    for (int ly = std::max(0, row - width + 1); ly <= std::min(7, row); ++ly) {
+      const auto position = static_cast<std::uint32_t>((row - ly) * width + wx);
+      if (stencil.first[position] == stencil.first[position + 1]) continue;
+      if (!touched_[position]) {
+        columns_[kind].push_back({position, z, z, kNoFloors, 0});
+        touched_[position] = static_cast<std::uint32_t>(columns_[kind].size());
       }
+      Column& column = columns_[kind][touched_[position] - 1];
+      const std::size_t n = position * layers_ + static_cast<std::size_t>(z);
+      column.high = z, column.floors.take(floors);
+      scratch_[n] |= byte << 8 * ly;
+      scratch_floors_[n].take(floors);
+    }
+  }
 }
 
 void TileSweep::evaluate(std::size_t kind, const Column& column) {
   const auto& stencil = whole_.stencils_[kind];
   const int z0 = tile_.first.z();
   for (std::uint32_t n = stencil.first[column.position]; n < stencil.first[column.position + 1]; ++n) {
-    const Offset& offset = stencil.offsets[n];
-    const int shift = z0 + offset.o.z() - column.low;  // from a layer of the tile to a word of the column
+    const Gates& gates = stencil.gates[n];
+    const int shift = z0 + gates.z - column.low;  // from a layer of the tile to a word of the column
     int low = std::max(tile_.low, -shift), high = std::min(tile_.high, column.high - column.low - shift);
+    if (!gates.wall) {
+      if (column.floors.high == WholeField::kNoFloor) continue;
+      low = std::max(low, gates.corner_low + std::max<int>(column.floors.low, 0) - z0);
+      high = std::min(high, gates.corner_high + column.floors.high - z0);
+    }
     if (low > high) continue;
-    if (kind != WholeField::kUp && !offset.wall && !may_have_corner(offset, column.floors, z0 + low, z0 + high))
-      continue;
     const std::uint64_t* words = words_.data() + column.first + shift;
     std::uint64_t any = 0;
     for (int z = low; z <= high; ++z) {
@@ -224,8 +257,10 @@ void TileSweep::evaluate(std::size_t kind, const Column& column) {
     if (!any) continue;
     while (!lanes_[static_cast<std::size_t>(low)]) ++low;
     while (!lanes_[static_cast<std::size_t>(high)]) --high;
-    const View view{floors_.data() + column.first + shift + low, static_cast<std::size_t>(low),
+    const View view{&gates, floors_.data() + column.first + shift + low, static_cast<std::size_t>(low),
                     static_cast<std::size_t>(high)};
+    std::fill_n(lanes_.begin() + high + 1, kBlock - 1, 0);
+    const Offset& offset = stencil.offsets[n];
     clear(offset, stencil.steps, view);
     if (kind == WholeField::kUp)
       ground(offset, view);
@@ -259,7 +294,7 @@ void TileSweep::axis(std::size_t kind, const Offset& offset, const View& view) {
       const int up = layer - floor;
       return floor == WholeField::kNoFloor || up < -height || up > height ? 0 : factors[up];
     };
-    if (floors.low == floors.high || !may_have_corner(offset, floors, layer, layer)) {
+    if (floors.low == floors.high || !may_have_corner(*view.gates, floors, layer)) {
       Term both = offset.constant;
       add(both, whole_.axis_corner_[kind], factor(floors.low == floors.high ? floors.low : WholeField::kNoFloor));
       if (clear_[z] == tile_.lanes[z])
@@ -267,10 +302,11 @@ void TileSweep::axis(std::size_t kind, const Offset& offset, const View& view) {
       else
         for_each_lane(clear_[z], [&](unsigned lane) { add(sum[lane], both, 1); });
     } else {
-      const Index3 outside = offset.o + WholeField::kNormals[kind];
+      const auto from =
+          static_cast<std::ptrdiff_t>(z) + whole_.column_place(tile_.first + offset.o + WholeField::kNormals[kind]);
       for_each_lane(clear_[z], [&](unsigned lane) {
-        if (offset.wall) add(sum[lane], offset.constant, 1);
-        const double f = factor(whole_.floor_[place(outside, z, lane)]);
+        if (view.gates->wall) add(sum[lane], offset.constant, 1);
+        const double f = factor(whole_.floor_[static_cast<std::size_t>(from + lane_step_[lane])]);
         if (f != 0) add(sum[lane], whole_.axis_corner_[kind], f);
       });
     }
@@ -282,13 +318,17 @@ void TileSweep::turned(std::size_t kind, const Offset& offset, const View& view)
   const double a = grid_.resolution(), a2 = a * a;
   const Index3& o = offset.o;
   const double flat2 = o.head<2>().squaredNorm() + 0.25;
+  const std::ptrdiff_t first = whole_.column_place(tile_.first + o);
   for (std::size_t z = view.low; z <= view.high; ++z) {
     const int layer = tile_.first.z() + static_cast<int>(z);
     if (!lanes_[z]) continue;
-    const bool with_corner = may_have_corner(offset, view.floors[z - view.low], layer, layer);
-    if (!offset.wall && !with_corner) continue;
+    const bool with_corner = may_have_corner(*view.gates, view.floors[z - view.low], layer);
+    if (!view.gates->wall && !with_corner) continue;
+    const std::ptrdiff_t from = first + static_cast<std::ptrdiff_t>(z);
     for_each_lane(lanes_[z], [&](unsigned lane) {
-      const auto& e = whole_.turned_[static_cast<std::size_t>(whole_.turned_at_[place(o, z, lane)])];
+      const auto& e =
+          whole_
+              .turned_[static_cast<std::size_t>(whole_.turned_at_[static_cast<std::size_t>(from + lane_step_[lane])])];
       const double along = o.x() * e.m_x + o.y() * e.m_y, d2 = a2 * (flat2 + along);
       if (-a * (along + 0.5) <= kInPlane) return;
       double wall = 0, corner = 0;

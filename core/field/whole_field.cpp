@@ -102,20 +102,22 @@ void WholeField::add_stencils() {
   }
 }
 
-/// The terms that an element at an offset may have; false: none.
-bool WholeField::set_gates(Stencil::Offset& offset, std::size_t kind) const {
+/// Sets the terms that an element at an offset may have; nothing if none.
+std::optional<WholeField::Stencil::Gates> WholeField::set_terms(Stencil::Offset& offset, std::size_t kind) const {
   const double a = grid_->resolution();
   const Vec3 m = kNormals[kind].cast<double>(), o = offset.o.cast<double>(), c = a * (o + 0.5 * m);
   const double flat = o.head<2>().norm();
-  if (kind < kTurned && m.dot(c) >= -kInPlane) return false;  // the vehicle is at 0
+  Stencil::Gates gates{static_cast<std::int16_t>(offset.o.z()), 1, 0, true};
+  if (kind < kTurned && m.dot(c) >= -kInPlane) return std::nullopt;  // the vehicle is at 0
   if (kind == kUp) {
     offset.constant = term(terms_.ground({Element::Kind::up, c, m, a * a, {}}, Vec3::Zero()));
-    return offset.constant.xx != 0 || offset.constant.zz != 0;
+    if (offset.constant.xx == 0 && offset.constant.zz == 0) return std::nullopt;
+    return gates;
   }
   double nearest2 = c.squaredNorm(), corner2 = c.head<2>().squaredNorm();
   if (kind < kTurned) {
     const double wall = terms_.wall_factor(c.squaredNorm(), c.z());
-    offset.wall = wall != 0;
+    gates.wall = wall != 0;
     const auto& k1 = model_.wall.k1;
     offset.constant = term(wall * a * a * Variance::about_normal(m, k1.normal, k1.tangential, k1.vertical));
     const Index3 doubled = 2 * offset.o + kNormals[kind];
@@ -125,18 +127,19 @@ bool WholeField::set_gates(Stencil::Offset& offset, std::size_t kind) const {
     const auto gate = terms_.wall_gate(c.z());
     offset.wall_low = gate.low / (a * a) - r2_at_0, offset.wall_high = gate.high / (a * a) - r2_at_0;
     offset.wall_factor = std::exp(-model_.wall.k2 * a * a * r2_at_0);
-    offset.wall = offset.wall_low <= -0.5 && offset.wall_high >= -flat - 1e-9;
+    gates.wall = offset.wall_low <= -0.5 && offset.wall_high >= -flat - 1e-9;
     corner2 = std::pow(a * (flat - 0.5), 2), nearest2 = corner2 + c.z() * c.z();
   }
-  if (!terms_.in_wall_range(nearest2 * (1 - 1e-12))) return false;
+  if (!terms_.in_wall_range(nearest2 * (1 - 1e-12))) return std::nullopt;
   // A corner at the horizontal distance d or farther: l_c and φ bound its height.
   const double l2 = std::pow(model_.corner.l_max + 1e-6, 2) - corner2;
-  offset.corner_high = l2 < 0 ? -height_ - 1 : std::min(height_, static_cast<int>(std::sqrt(l2) / a + 1.5));
-  offset.corner_low = -height_;
-  if (model_.corner.phi_max < 1.57)
-    offset.corner_low =
-        static_cast<int>(std::min(1e6, 0.999 * std::sqrt(corner2) / std::tan(model_.corner.phi_max) / a + 0.5));
-  return offset.wall || offset.corner_low <= offset.corner_high;
+  const int highest = l2 < 0 ? -height_ - 1 : std::min(height_, static_cast<int>(std::sqrt(l2) / a + 1.5));
+  int lowest = -height_;
+  if (const double phi = model_.corner.phi_max; phi < 1.57)
+    lowest = static_cast<int>(std::min(height_ + 1.0, 0.999 * std::sqrt(corner2) / std::tan(phi) / a + 0.5));
+  gates.corner_low = static_cast<std::int16_t>(lowest), gates.corner_high = static_cast<std::int16_t>(highest);
+  if (!gates.wall && lowest > highest) return std::nullopt;
+  return gates;
 }
 
 void WholeField::add_offset(Stencil& stencil, std::size_t kind, const Index3& o) {
@@ -144,13 +147,16 @@ void WholeField::add_offset(Stencil& stencil, std::size_t kind, const Index3& o)
   offset.o = o;
   const Vec3 m = kNormals[kind].cast<double>();
   const auto normals = kind < kTurned ? NormalRange{m, m} : facing_normals(o, kNormals[kind]);
-  if (!normals || !set_gates(offset, kind)) return;
+  if (!normals) return;
+  const auto gates = set_terms(offset, kind);
+  if (!gates) return;
   offset.first = static_cast<std::uint32_t>(stencil.steps.size());
   for (const Index3& cell : cells_on_path(o, *normals)) {
     stencil.steps.push_back((cell.y() * width_ + cell.x()) * grid_->size().z() + cell.z());
     if (kind >= kTurned) stencil.cells.push_back(cell);
   }
   offset.last = static_cast<std::uint32_t>(stencil.steps.size());
+  stencil.gates.push_back(*gates);
   stencil.offsets.push_back(offset);
 }
 

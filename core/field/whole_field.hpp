@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -69,14 +70,19 @@ class WholeField {
   struct Stencil {
     struct Offset {
       Index3 o;
-      std::uint32_t first, last;    // of steps and cells
-      Term constant;                // ground, or wall of an axis normal
-      std::size_t corner_row;       // of corners_, for an axis normal
-      int corner_low, corner_high;  // heights (vehicle's layer - floor) between which there may be a corner term
-      bool wall;                    // whether there may be a wall term
+      std::uint32_t first, last;                // of steps and cells
+      Term constant;                            // ground, or wall of an axis normal
+      std::size_t corner_row;                   // of corners_, for an axis normal
       double wall_low, wall_high, wall_factor;  // turned: limits of o·m within the wall's gates, factor at o·m = 0
     };
+    /// What decides whether an offset is looked at: apart, so that passing over it is cheap.
+    struct Gates {
+      std::int16_t z;                        // of the offset
+      std::int16_t corner_low, corner_high;  // heights (vehicle's layer − floor) with a corner term
+      bool wall;                             // whether there is a term at other heights
+    };
     std::vector<std::uint32_t> first;  // offsets at a window's position, with rising z
+    std::vector<Gates> gates;
     std::vector<Offset> offsets;
     std::vector<std::int32_t> steps;  // on the path, from the vehicle's word in a window
     std::vector<Index3> cells;        // the same as offsets; turned elements only
@@ -92,7 +98,7 @@ class WholeField {
   void add_tiles(std::span<const std::size_t> voxels);
   void add_stencils();
   void add_offset(Stencil& stencil, std::size_t kind, const Index3& o);
-  bool set_gates(Stencil::Offset& offset, std::size_t kind) const;
+  std::optional<Stencil::Gates> set_terms(Stencil::Offset& offset, std::size_t kind) const;
   void add_tables();
   /// exp(k_w2 a² x), 0 ≤ x ≤ radius_ + 1.
   double decay(double x) const noexcept {
@@ -101,13 +107,12 @@ class WholeField {
     const double t = x - n, *at = decay_.data() + n;
     return at[0] + t * (at[1] - at[0]);
   }
-  /// Place of a voxel in arrays in which z runs fastest.
-  std::size_t column_major(const Index3& v) const noexcept {
+  /// Place of a voxel in arrays in which z runs fastest; also of voxels outside the map, to count from.
+  std::ptrdiff_t column_place(const Index3& v) const noexcept {
     const Index3& size = grid_->size();
-    return (static_cast<std::size_t>(v.y()) * static_cast<std::size_t>(size.x()) + static_cast<std::size_t>(v.x())) *
-               static_cast<std::size_t>(size.z()) +
-           static_cast<std::size_t>(v.z());
+    return (static_cast<std::ptrdiff_t>(v.y()) * size.x() + v.x()) * size.z() + v.z();
   }
+  std::size_t column_major(const Index3& v) const noexcept { return static_cast<std::size_t>(column_place(v)); }
 
   const map::OccupancyGrid* grid_;
   Model model_;
