@@ -13,13 +13,14 @@ namespace {
 /// The points t·(o + m/2), 0 ≤ t ≤ t_end, for all m of a range: per axis, t·low ≤ x ≤ t·high.
 struct Beam {
   Vec3 low, high;
+  Vec3 per_low, per_high;  // reciprocals
   double t_end;
 };
 
 Beam beam_to(const Index3& o, const NormalRange& normals) {
   const Vec3 low = o.cast<double>() + 0.5 * normals.low, high = o.cast<double>() + 0.5 * normals.high;
   const double longest = low.cwiseAbs().cwiseMax(high.cwiseAbs()).norm();
-  return {low, high, longest > 2 + kTouch ? 1 - 2 / longest : -1};
+  return {low, high, low.cwiseInverse(), high.cwiseInverse(), longest > 2 + kTouch ? 1 - 2 / longest : -1};
 }
 
 /// Whether some point of the beam lies in the closed box of voxel v: slabs whose sides move with t.
@@ -28,10 +29,11 @@ bool meets(const Beam& beam, const Index3& v) {
   for (int axis = 0; axis < 3; ++axis) {
     const double low = v[axis] - 0.5 - kTouch, high = v[axis] + 0.5 + kTouch;
     const double fast = beam.high[axis], slow = beam.low[axis];
-    if (fast > 0) enter = std::max(enter, low / fast);  // t·fast ≥ low
-    if (fast < 0) leave = std::min(leave, low / fast);
-    if (slow > 0) leave = std::min(leave, high / slow);  // t·slow ≤ high
-    if (slow < 0) enter = std::max(enter, high / slow);
+    const double low_fast = low * beam.per_high[axis], high_slow = high * beam.per_low[axis];
+    if (fast > 0) enter = std::max(enter, low_fast);  // t·fast ≥ low
+    if (fast < 0) leave = std::min(leave, low_fast);
+    if (slow > 0) leave = std::min(leave, high_slow);  // t·slow ≤ high
+    if (slow < 0) enter = std::max(enter, high_slow);
     if ((fast == 0 && low > 0) || (slow == 0 && high < 0)) return false;
   }
   return enter <= leave;
@@ -69,7 +71,7 @@ std::vector<Index3> cells_on_path(const Index3& o, const NormalRange& normals) {
   const int v = (u + 1) % 3, w = (u + 2) % 3, along = o[u] < 0 ? -1 : 1, slabs = std::abs(o[u]);
   const double slow = std::min(std::abs(beam.low[u]), std::abs(beam.high[u]));
   const double fast = std::max(std::abs(beam.low[u]), std::abs(beam.high[u]));
-  const auto cell = [](double x) { return static_cast<int>(std::floor(x + 0.5)); };
+  const auto cell = [](double x) { return floor_to_int(x + 0.5); };
   for (int s = slabs; s >= 0; --s) {
     const double t0 = std::max(0.0, (s - 0.5 - 2 * kTouch) / fast);
     const double t1 = slow > 0 ? std::min(beam.t_end, (s + 0.5 + 2 * kTouch) / slow) : beam.t_end;

@@ -81,6 +81,10 @@ class TileSweep {
     sum.xx += factor * t.xx, sum.xy += factor * t.xy, sum.yy += factor * t.yy, sum.zz += factor * t.zz;
   }
 
+  static void add(Term& sum, const std::array<float, 4>& t, double factor) noexcept {
+    sum.xx += factor * t[0], sum.xy += factor * t[1], sum.yy += factor * t[2], sum.zz += factor * t[3];
+  }
+
   void open_window(const Index3& first);
   void open_occupied();
   void open_columns(std::size_t kind);
@@ -94,17 +98,17 @@ class TileSweep {
   void ground(const Offset& offset, const View& view);
   void axis(std::size_t kind, const Offset& offset, const View& view);
   void turned(std::size_t kind, const Offset& offset, const View& view);
-  bool hidden(std::size_t kind, const Offset& offset, const WholeField::Turned& element, std::size_t z,
-              unsigned lane) const;
+  bool hidden(std::size_t kind, const Offset& offset, const Gates& gates, const WholeField::Turned& element,
+              std::size_t z, unsigned lane) const;
 
   /// The words of the tile in occupied_.
   const std::uint64_t* here() const noexcept {
     return occupied_.data() + positions_ / 2 * layers_ + static_cast<std::size_t>(tile_.first.z());
   }
   /// Puts the lanes whose path meets no occupied voxel into clear_: the layers of a block together, in registers.
-  void clear(const Offset& offset, const std::vector<std::int32_t>& steps, const View& view) noexcept {
-    const std::int32_t* const begin = steps.data() + offset.first;
-    const std::int32_t* const end = steps.data() + offset.last;
+  void clear(const std::vector<std::int32_t>& steps, const View& view) noexcept {
+    const std::int32_t* const begin = steps.data() + view.gates->first;
+    const std::int32_t* const end = steps.data() + view.gates->last;
     std::size_t z = view.low;
     for (; z + 1 <= view.high; z += kBlock) clear_block<kBlock>(begin, end, z);
     if (z == view.high) clear_block<1>(begin, end, z);
@@ -260,8 +264,8 @@ void TileSweep::evaluate(std::size_t kind, const Column& column) {
     const View view{&gates, floors_.data() + column.first + shift + low, static_cast<std::size_t>(low),
                     static_cast<std::size_t>(high)};
     std::fill_n(lanes_.begin() + high + 1, kBlock - 1, 0);
+    clear(stencil.steps, view);
     const Offset& offset = stencil.offsets[n];
-    clear(offset, stencil.steps, view);
     if (kind == WholeField::kUp)
       ground(offset, view);
     else if (kind < WholeField::kTurned)
@@ -336,7 +340,7 @@ void TileSweep::turned(std::size_t kind, const Offset& offset, const View& view)
       if (with_corner && e.floor != WholeField::kNoFloor && whole_.terms_.in_wall_range(d2 + a2 * o.z() * o.z()))
         corner = whole_.terms_.corner_factor(d2, a * (layer - e.floor - 0.5));
       if (wall == 0 && corner == 0) return;
-      if (!(clear_[z] >> lane & 1) && hidden(kind, offset, e, z, lane)) return;
+      if (!(clear_[z] >> lane & 1) && hidden(kind, offset, *view.gates, e, z, lane)) return;
       Term& sum = sum_[64 * z + lane];
       if (wall != 0) add(sum, e.wall, wall);
       if (corner != 0) add(sum, e.corner, corner);
@@ -344,14 +348,14 @@ void TileSweep::turned(std::size_t kind, const Offset& offset, const View& view)
   }
 }
 
-bool TileSweep::hidden(std::size_t kind, const Offset& offset, const WholeField::Turned& element, std::size_t z,
-                       unsigned lane) const {
+bool TileSweep::hidden(std::size_t kind, const Offset& offset, const Gates& gates, const WholeField::Turned& element,
+                       std::size_t z, unsigned lane) const {
   const auto& stencil = whole_.stencils_[kind];
   const Vec3 c = offset.o.cast<double>() + 0.5 * Vec3(element.m_x, element.m_y, 0);
   const auto segment = open_part(Vec3::Constant(-0.5), 1, Vec3::Zero(), c);
   if (!segment) return false;
   const std::uint64_t* words = here() + z;
-  for (std::size_t n = offset.first; n < offset.last; ++n)
+  for (std::size_t n = gates.first; n < gates.last; ++n)
     if (words[stencil.steps[n]] >> lane & 1 && meets(*segment, stencil.cells[n])) return true;
   return false;
 }

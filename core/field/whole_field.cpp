@@ -67,12 +67,14 @@ void WholeField::add_elements() {
     if (kind == kTurned) {
       while (kNormals[kind].cast<double>().dot(e.normal) < e.normal.cwiseAbs().maxCoeff()) ++kind;
       const auto about = [&](const auto& k) {
-        return term(Variance::about_normal(e.normal, e.area * k.normal, e.area * k.tangential, e.area * k.vertical));
+        const Variance t = e.area * Variance::about_normal(e.normal, k.normal, k.tangential, k.vertical);
+        return std::array{static_cast<float>(t.xx), static_cast<float>(t.xy), static_cast<float>(t.yy),
+                          static_cast<float>(t.zz)};
       };
       turned_at_[column_major(v)] = static_cast<std::int32_t>(turned_.size());
       turned_.push_back({e.normal.x(), e.normal.y(), about(model_.wall.k1), about(model_.corner.lambda), kNoFloor});
       if (e.corner_W)
-        turned_.back().floor = static_cast<int>(std::lround((e.corner_W->z() - grid_->origin().z()) / a)) - 1;
+        turned_.back().floor = static_cast<std::int16_t>(std::lround((e.corner_W->z() - grid_->origin().z()) / a) - 1);
     }
     boards_[kind].x.push_back(v.x());
     const bool axis = kind != kUp && kind < kTurned;
@@ -81,6 +83,13 @@ void WholeField::add_elements() {
                                                     : static_cast<std::int16_t>(kNoFloor));
     ++boards_[kind].row_first[static_cast<std::size_t>(v.z() * grid_->size().y() + v.y()) + 1];
   }
+  std::vector<Turned> in_columns;
+  for (std::int32_t& n : turned_at_) {
+    if (n < 0) continue;
+    in_columns.push_back(turned_[static_cast<std::size_t>(n)]);
+    n = static_cast<std::int32_t>(in_columns.size()) - 1;
+  }
+  turned_ = std::move(in_columns);
   for (Board& board : boards_)
     for (std::size_t row = 0; row < rows; ++row) board.row_first[row + 1] += board.row_first[row];
 }
@@ -107,7 +116,7 @@ std::optional<WholeField::Stencil::Gates> WholeField::set_terms(Stencil::Offset&
   const double a = grid_->resolution();
   const Vec3 m = kNormals[kind].cast<double>(), o = offset.o.cast<double>(), c = a * (o + 0.5 * m);
   const double flat = o.head<2>().norm();
-  Stencil::Gates gates{static_cast<std::int16_t>(offset.o.z()), 1, 0, true};
+  Stencil::Gates gates{static_cast<std::int16_t>(offset.o.z()), 1, 0, true, 0, 0};
   if (kind < kTurned && m.dot(c) >= -kInPlane) return std::nullopt;  // the vehicle is at 0
   if (kind == kUp) {
     offset.constant = term(terms_.ground({Element::Kind::up, c, m, a * a, {}}, Vec3::Zero()));
@@ -148,14 +157,14 @@ void WholeField::add_offset(Stencil& stencil, std::size_t kind, const Index3& o)
   const Vec3 m = kNormals[kind].cast<double>();
   const auto normals = kind < kTurned ? NormalRange{m, m} : facing_normals(o, kNormals[kind]);
   if (!normals) return;
-  const auto gates = set_terms(offset, kind);
+  auto gates = set_terms(offset, kind);
   if (!gates) return;
-  offset.first = static_cast<std::uint32_t>(stencil.steps.size());
+  gates->first = static_cast<std::uint32_t>(stencil.steps.size());
   for (const Index3& cell : cells_on_path(o, *normals)) {
     stencil.steps.push_back((cell.y() * width_ + cell.x()) * grid_->size().z() + cell.z());
     if (kind >= kTurned) stencil.cells.push_back(cell);
   }
-  offset.last = static_cast<std::uint32_t>(stencil.steps.size());
+  gates->last = static_cast<std::uint32_t>(stencil.steps.size());
   stencil.gates.push_back(*gates);
   stencil.offsets.push_back(offset);
 }

@@ -70,7 +70,6 @@ class WholeField {
   struct Stencil {
     struct Offset {
       Index3 o;
-      std::uint32_t first, last;                // of steps and cells
       Term constant;                            // ground, or wall of an axis normal
       std::size_t corner_row;                   // of corners_, for an axis normal
       double wall_low, wall_high, wall_factor;  // turned: limits of o·m within the wall's gates, factor at o·m = 0
@@ -80,6 +79,7 @@ class WholeField {
       std::int16_t z;                        // of the offset
       std::int16_t corner_low, corner_high;  // heights (vehicle's layer − floor) with a corner term
       bool wall;                             // whether there is a term at other heights
+      std::uint32_t first, last;             // of steps and cells
     };
     std::vector<std::uint32_t> first;  // offsets at a window's position, with rising z
     std::vector<Gates> gates;
@@ -89,8 +89,8 @@ class WholeField {
   };
   struct Turned {
     double m_x, m_y;
-    Term wall, corner;  // per unit of the factors of ProximityModel
-    int floor;          // as in Board
+    std::array<float, 4> wall, corner;  // xx, xy, yy, zz per unit of the factors of ProximityModel
+    std::int16_t floor;                 // as in Board
   };
   static constexpr int kNoFloor = -1;
 
@@ -123,7 +123,7 @@ class WholeField {
   std::vector<Tile> tiles_;
   std::array<Board, kClasses> boards_;
   std::array<Stencil, kClasses> stencils_;
-  std::vector<Turned> turned_;
+  std::vector<Turned> turned_;                // in the order of column_major, so that those of a column are neighbours
   std::vector<std::int32_t> turned_at_;       // column_major: −1: none
   std::vector<std::int16_t> floor_;           // column_major: the first voxel below that is not free, if it is occupied
   std::vector<double> corners_;               // corner factor of axis normals per 4 d²/a² and height
