@@ -17,17 +17,18 @@ namespace backwash::field {
 /// Σ of model.md section 2 at many voxel centres at once: the same elements, gates, terms and lines of sight as
 /// ProximityField::at, reordered. Nothing is quantised; what differs is the rounding.
 ///
-/// The vehicle's voxels are taken in tiles of 8 × 8 × 8, one bit each: eight words of 64 bits, one per layer. Elements
-/// are sorted into six classes: up, the four axis normals, and any other normal ("turned"). Seen from a voxel's centre,
-/// an element of one of the first five classes at the lattice offset o lies at a constant place, so one list of voxels
-/// per class and o says what its line of sight meets, and
+/// The vehicle's voxels are taken in tiles of 8 × 8 voxels and up to 64 layers, one bit each, a 64-bit word per layer.
+/// Elements are sorted into nine classes: up, the four axis normals, and any other normal ("turned") by its nearest
+/// axis. Seen from a voxel's centre, an element of one of the first five classes at the lattice offset o lies at a
+/// constant place, so one list of voxels per class and o says what its line of sight meets, and
 ///   visible = elements(q + o) & ~OR of occupied(q + d) over the list's offsets d
-/// decides for all voxels q of the tile at once. For turned elements the list holds what the line may meet for any
-/// normal that faces the vehicle; where one of these voxels is occupied, it is tested against the element's own line.
+/// decides for all voxels q of a layer at once. For turned elements the list holds what the line may meet for any
+/// normal of the class that faces the vehicle; where such a voxel is occupied, it is tested against the element's own
+/// line.
 class WholeField {
  public:
   /// Prepares Σ at the centres of the listed free voxels (linear indices of the grid, which must outlive this).
-  /// O(cells + listed voxels + a⁻⁴).
+  /// O(cells + listed voxels + a⁻⁴). The lists of voxels on the paths take 0.3 GB at a = 0.05 m and grow as a⁻⁴.
   WholeField(const map::OccupancyGrid& grid, const Model& model, std::span<const std::size_t> voxels);
   WholeField(map::OccupancyGrid&&, const Model&, std::span<const std::size_t>) = delete;
 
@@ -35,7 +36,8 @@ class WholeField {
   std::size_t tile_count() const noexcept { return tiles_.size(); }
 
   /// Calls store(linear index, Σ) for each listed voxel of the tiles [begin, end). Thread-safe; the values do not
-  /// depend on how the tiles are divided among calls. About 6 µs per voxel at 0.08 m in a building.
+  /// depend on how the tiles are divided among calls. Measured: 25 µs per voxel in a recorded building at 0.08 m
+  /// (ProximityField::at: 200), 0.6 µs in an almost empty room at 0.1 m.
   void evaluate(std::size_t begin, std::size_t end,
                 const std::function<void(std::size_t, const Variance&)>& store) const;
 
