@@ -53,11 +53,16 @@ DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid)
       sigma_(grid.cell_count(), {-1, 0, 0, 0, 0, 0}) {}
 
 void DisturbanceField::fill(const ProximityField& exact, std::span<const std::size_t> voxels) {
-  for (const std::size_t n : voxels) {
-    const Variance s = exact.at(exact.grid().center(exact.grid().voxel(n))).sigma();
-    sigma_[n] = {static_cast<float>(s.xx), static_cast<float>(s.xy), static_cast<float>(s.xz),
-                 static_cast<float>(s.yy), static_cast<float>(s.yz), static_cast<float>(s.zz)};
-  }
+  for (const std::size_t n : voxels) set(n, exact.at(exact.grid().center(exact.grid().voxel(n))).sigma());
+}
+
+void DisturbanceField::fill(const WholeField& whole, std::size_t begin, std::size_t end) {
+  whole.evaluate(begin, end, [this](std::size_t n, const Variance& s) { set(n, s); });
+}
+
+void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
+  sigma_[n] = {static_cast<float>(s.xx), static_cast<float>(s.xy), static_cast<float>(s.xz),
+               static_cast<float>(s.yy), static_cast<float>(s.yz), static_cast<float>(s.zz)};
 }
 
 std::size_t DisturbanceField::linear(const Index3& v) const noexcept {

@@ -8,6 +8,7 @@
 #include "core/field/element_buckets.hpp"
 #include "core/field/proximity_model.hpp"
 #include "core/field/sight.hpp"
+#include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/model.hpp"
 
@@ -48,6 +49,8 @@ class DisturbanceField {
   /// Evaluates Σ at the centres of the listed free voxels (linear indices of the grid). Distinct voxels may be filled
   /// from several threads at once.
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
+  /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
+  void fill(const WholeField& whole, std::size_t begin, std::size_t end);
 
   /// Whether Σ is stored at a voxel; false outside the grid.
   bool has(const Index3& v) const noexcept;
@@ -58,6 +61,7 @@ class DisturbanceField {
   Variance interpolated(const Vec3& p_W, const Variance& fallback) const noexcept;
 
  private:
+  void set(std::size_t n, const Variance& s) noexcept;
   std::size_t linear(const Index3& v) const noexcept;
 
   Vec3 origin_W_;

@@ -26,6 +26,8 @@ double cos_lower(double limit) {
 ProximityModel::ProximityModel(const Model& model, double voxel_edge) noexcept
     : model_(model),
       least_l_(0.5 * voxel_edge),
+      corner_l2_max_((model.corner.l_max + kTolerance) * (model.corner.l_max + kTolerance)),
+      tan_phi_max_(std::tan(model.corner.phi_max)),
       cos_ground_max_(cos_upper(model.ground.theta_max)),
       cos_wall_min_(cos_lower(model.wall.theta_min)),
       cos_level_(cos_upper(std::numbers::pi / 2)) {}
@@ -46,30 +48,57 @@ Variance ProximityModel::ground(const Element& element, const Vec3& p_W) const n
 }
 
 Variance ProximityModel::corner(const Element& element, const Vec3& p_W) const noexcept {
-  if (!element.corner_W) return {};
-  const auto& k = model_.corner;
-  const auto beyond = [](const Vec3& r, double limit) {
-    return r.squaredNorm() > (limit + kTolerance) * (limit + kTolerance);
-  };
-  if (beyond(element.c_W - p_W, model_.wall.l_max)) return {};
+  if (!element.corner_W || !in_wall_range((element.c_W - p_W).squaredNorm())) return {};
   const Vec3 above = p_W - *element.corner_W;
-  if (beyond(above, k.l_max)) return {};
-  const double d2 = above.head<2>().squaredNorm(), h = above.z(), phi = std::atan2(std::sqrt(d2), h);
-  if (phi >= k.phi_max) return {};  // at φ̄_c itself the term is zero
-  const auto sixth = [](double x) { return x * x * x * x * x * x; };
-  const double s = element.area * (k.phi_max - phi) / std::max(d2 + sixth(h), sixth(least_l_));
-  return Variance::about_normal(element.normal, s * k.lambda.normal, s * k.lambda.tangential, s * k.lambda.vertical);
+  const double s = element.area * corner_factor(above.head<2>().squaredNorm(), above.z());
+  const auto& lambda = model_.corner.lambda;
+  return Variance::about_normal(element.normal, s * lambda.normal, s * lambda.tangential, s * lambda.vertical);
 }
 
 Variance ProximityModel::wall(const Element& element, const Vec3& p_W) const noexcept {
   if (element.kind != Element::Kind::lateral) return {};
-  const auto& k = model_.wall;
   const Vec3 r = element.c_W - p_W;
-  const double distance = r.norm(), l = std::max(distance, least_l_);
-  const double cos_theta = distance > 0 ? -r.z() / distance : 1;
-  if (l > k.l_max + kTolerance || cos_theta > cos_wall_min_ || cos_theta < cos_level_) return {};
-  const double s = element.area * std::exp(-k.k2 * l * l);
-  return Variance::about_normal(element.normal, s * k.k1.normal, s * k.k1.tangential, s * k.k1.vertical);
+  const double s = element.area * wall_factor(r.squaredNorm(), r.z());
+  const auto& k1 = model_.wall.k1;
+  return Variance::about_normal(element.normal, s * k1.normal, s * k1.tangential, s * k1.vertical);
+}
+
+double ProximityModel::corner_factor(double d2, double h) const noexcept {
+  const auto& k = model_.corner;
+  if (d2 + h * h > corner_l2_max_) return 0;
+  // Most points are outside the cone: spare them the arc tangent.
+  if (k.phi_max < std::numbers::pi / 2 && (h <= 0 || d2 > 1.0001 * (h * tan_phi_max_) * (h * tan_phi_max_))) return 0;
+  const double phi = std::atan2(std::sqrt(d2), h);
+  if (phi >= k.phi_max) return 0;  // at φ̄_c itself the term is zero
+  const auto sixth = [](double x) { return x * x * x * x * x * x; };
+  return (k.phi_max - phi) / std::max(d2 + sixth(h), sixth(least_l_));
+}
+
+double ProximityModel::wall_factor(double r2, double r_z) const noexcept {
+  const auto& k = model_.wall;
+  const double distance = std::sqrt(r2), l = std::max(distance, least_l_);
+  const double cos_theta = distance > 0 ? -r_z / distance : 1;
+  if (l > k.l_max + kTolerance || cos_theta > cos_wall_min_ || cos_theta < cos_level_) return 0;
+  return std::exp(-k.k2 * l * l);
+}
+
+ProximityModel::Gate ProximityModel::wall_gate(double r_z) const noexcept {
+  // θ_w ≤ θ: −r_z/|r| ≤ cos θ_w; θ ≤ π/2: −r_z/|r| ≥ cos π/2 (with the tolerances).
+  constexpr Gate kNever{1, 0};
+  Gate gate{0, (model_.wall.l_max + kTolerance) * (model_.wall.l_max + kTolerance)};
+  const double down = -r_z;
+  if (down > 0 && cos_wall_min_ <= 0) return kNever;
+  if (down > 0) gate.low = down * down / (cos_wall_min_ * cos_wall_min_);
+  if (down == 0 && cos_wall_min_ < 0) return kNever;
+  if (down < 0) {
+    gate.low = down * down / (cos_level_ * cos_level_);
+    if (cos_wall_min_ < 0) gate.high = std::min(gate.high, down * down / (cos_wall_min_ * cos_wall_min_));
+  }
+  return gate;
+}
+
+bool ProximityModel::in_wall_range(double r2) const noexcept {
+  return r2 <= (model_.wall.l_max + kTolerance) * (model_.wall.l_max + kTolerance);
 }
 
 }  // namespace backwash::field

@@ -25,9 +25,23 @@ class ProximityModel {
   /// Lateral elements: s = A k_w1 exp(−k_w2 l²) per component if θ_w ≤ θ ≤ π/2 and l ≤ l̄_w.
   Variance wall(const Element& element, const Vec3& p_W) const noexcept;
 
+  /// (φ̄_c − φ)/(d_c² + h_c⁶), with the gates φ̄_c and l̄_c, the denominator as in corner(): `d2` = d_c², m²; `h` = h_c,
+  /// m.
+  double corner_factor(double d2, double h) const noexcept;
+  /// exp(−k_w2 l²) with the gates of wall(): `r2` = |r|², m²; `r_z`: vertical component of r, m.
+  double wall_factor(double r2, double r_z) const noexcept;
+  /// The gates of wall() as limits of |r|², m² (high < low: never), for the vertical component r_z of r, m.
+  struct Gate {
+    double low, high;
+  };
+  Gate wall_gate(double r_z) const noexcept;
+  /// Whether |r| ≤ l̄_w, the gate of an element in corner(): `r2` = |r|², m².
+  bool in_wall_range(double r2) const noexcept;
+
  private:
   Model model_;
   double least_l_;  ///< a/2, m
+  double corner_l2_max_, tan_phi_max_;
   // Angles are compared by their cosines: θ̄ ≤ θ' exactly where cos θ̄ ≥ cos θ'.
   double cos_ground_max_, cos_wall_min_, cos_level_;
 };

@@ -36,10 +36,8 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
 
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
   field::DisturbanceField field(grid);
-  const field::ProximityField exact(grid, vehicle_model);
-  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
-    field.fill(exact, std::span(voxels).subspan(begin, end - begin));
-  });
+  const field::WholeField whole(grid, vehicle_model, voxels);
+  parallel(whole.tile_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
 
   reach::BoundField bounds(grid, field, model.bound);
   reach::HoverMap hover(grid);

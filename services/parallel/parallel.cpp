@@ -11,13 +11,13 @@
 namespace backwash {
 
 void run_parallel(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
-  constexpr std::size_t kChunk = 1024;  // small enough to balance rooms against walls
+  const std::size_t chunk = std::clamp<std::size_t>(count / 64, 1, 1024);  // balances rooms against walls
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex failure_mutex;
   const auto loop = [&] {
     try {
-      for (std::size_t begin; (begin = next.fetch_add(kChunk)) < count;) work(begin, std::min(begin + kChunk, count));
+      for (std::size_t begin; (begin = next.fetch_add(chunk)) < count;) work(begin, std::min(begin + chunk, count));
     } catch (...) {
       const std::lock_guard lock(failure_mutex);
       failure = std::current_exception();

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <random>
+
+#include "core/field/disturbance_field.hpp"
+#include "core/map/load_map.hpp"
+#include "tests/field/brute_force.hpp"
+#include "tests/field/scenes.hpp"
+
+namespace backwash::field {
+namespace {
+
+using map::Cell;
+using map::OccupancyGrid;
+
+std::vector<std::size_t> free_voxels(const OccupancyGrid& grid) {
+  std::vector<std::size_t> voxels;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n)
+    if (grid.at(n) == Cell::free) voxels.push_back(n);
+  return voxels;
+}
+
+double difference(const Mat3& actual, const Mat3& expected) {
+  return (actual - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
+}
+
+/// Models that reach every branch of the gates: the default; angles beyond a right angle, a footprint wider than the
+/// cone, a steep decay; and walls seen from above only.
+std::vector<Model> models() {
+  Model wide, steep;
+  wide.ground.theta_max = 2.5, wide.ground.r0 = 0.8, wide.ground.l_max = 0.6;
+  wide.corner.phi_max = 2.2, wide.corner.l_max = 2.0, wide.wall.theta_min = 0, wide.wall.k2 = 40;
+  steep.wall.theta_min = 1.5, steep.wall.l_max = 0.8, steep.corner.phi_max = 0.5, steep.ground.theta_max = 0.2;
+  return {Model{}, wide, steep};
+}
+
+TEST(StoredField, EqualsBruteForceOnRandomMaps) {
+  Mat3 seen = Mat3::Zero();
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    const OccupancyGrid grid = scene::random_map(seed, seed % 2 ? 0.1 : 0.17);
+    const Model model = models()[seed % 3];
+    const auto voxels = free_voxels(grid);
+    const WholeField whole(grid, model, voxels);
+    DisturbanceField field(grid);
+    field.fill(whole, 0, whole.tile_count());
+    const auto pieces = oracle::pieces(grid);
+    const auto occupied = oracle::occupied_centers(grid);
+    const Mat3 base = Vec3(model.base.horizontal, model.base.horizontal, model.base.vertical).asDiagonal();
+    for (std::size_t n = seed; n < voxels.size(); n += 41) {
+      const Index3 q = grid.voxel(voxels[n]);
+      const auto parts = oracle::evaluate(grid, pieces, occupied, model, grid.center(q));
+      ASSERT_LE(difference(oracle::matrix(field.at(q)), base + parts.ground + parts.corner + parts.wall), 1e-5)
+          << "seed " << seed << ", voxel " << q.transpose();
+      seen += Vec3(!parts.ground.isZero(0), !parts.corner.isZero(0), !parts.wall.isZero(0)).asDiagonal();
+    }
+  }
+  EXPECT_GT(seen.diagonal().minCoeff(), 50);
+}
+
+TEST(StoredField, EqualsTheExactFieldAtEveryFreeVoxelOfRandomMaps) {
+  for (unsigned seed = 20; seed < 29; ++seed) {
+    const OccupancyGrid grid = scene::random_map(seed, seed % 2 ? 0.08 : 0.15);
+    const Model model = models()[seed % 3];
+    const ProximityField exact(grid, model);
+    const auto voxels = free_voxels(grid);
+    const WholeField whole(grid, model, voxels);
+    std::size_t count = 0;
+    whole.evaluate(0, whole.tile_count(), [&](std::size_t n, const Variance& sigma) {
+      ++count;
+      const Index3 q = grid.voxel(n);
+      EXPECT_LE(difference(oracle::matrix(sigma), oracle::matrix(exact.at(grid.center(q)).sigma())), 1e-6)
+          << "seed " << seed << ", voxel " << q.transpose();
+    });
+    EXPECT_EQ(count, voxels.size());
+  }
+}
+
+void expect_exact_at_samples(const OccupancyGrid& grid, std::size_t samples) {
+  auto voxels = free_voxels(grid);
+  const Model model;
+  const ProximityField exact(grid, model);
+  std::shuffle(voxels.begin(), voxels.end(), std::mt19937(7));
+  voxels.resize(samples);
+  const WholeField whole(grid, model, voxels);
+  DisturbanceField field(grid);
+  field.fill(whole, 0, whole.tile_count());
+  for (const std::size_t n : voxels) {
+    const Index3 q = grid.voxel(n);
+    ASSERT_TRUE(field.has(q));
+    EXPECT_LE(difference(oracle::matrix(field.at(q)), oracle::matrix(exact.at(grid.center(q)).sigma())), 1e-6)
+        << "voxel " << q.transpose();
+  }
+}
+
+TEST(StoredField, EqualsTheExactFieldInTheApartment) {
+  expect_exact_at_samples(*map::builtin_scene("apartment", 0.1), 2000);
+}
+
+TEST(StoredField, EqualsTheExactFieldInARecordedBuilding) {
+  const std::string file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "geb079.bt is absent";
+  expect_exact_at_samples(*map::load_map(file), 2000);
+}
+
+TEST(StoredField, HasTheSameBitsHoweverTheTilesAreDivided) {
+  const OccupancyGrid grid = scene::small_room();
+  const auto voxels = free_voxels(grid);
+  const WholeField whole(grid, Model{}, voxels);
+  const auto evaluate = [&](std::size_t step, bool backwards) {
+    std::vector<Variance> sigma(grid.cell_count());
+    for (std::size_t k = 0; k * step < whole.tile_count(); ++k) {
+      const std::size_t parts = (whole.tile_count() + step - 1) / step, part = backwards ? parts - 1 - k : k;
+      whole.evaluate(part * step, std::min((part + 1) * step, whole.tile_count()),
+                     [&](std::size_t n, const Variance& s) { sigma[n] = s; });
+    }
+    return sigma;
+  };
+  const auto at_once = evaluate(whole.tile_count(), false);
+  ASSERT_GT(whole.tile_count(), 10u);
+  for (const auto& [step, backwards] : {std::pair<std::size_t, bool>{1, false}, {1, true}, {3, true}, {7, false}}) {
+    const auto divided = evaluate(step, backwards);
+    for (const std::size_t n : voxels) {
+      const Variance &s = divided[n], &t = at_once[n];
+      ASSERT_TRUE(s.xx == t.xx && s.xy == t.xy && s.yy == t.yy && s.zz == t.zz) << "step " << step << ", voxel " << n;
+    }
+  }
+}
+
+TEST(StoredField, StoresNothingForAnEmptyList) {
+  const OccupancyGrid grid = scene::small_room();
+  EXPECT_EQ(WholeField(grid, Model{}, {}).tile_count(), 0u);
+}
+
+}  // namespace
+}  // namespace backwash::field
