@@ -75,9 +75,8 @@ void append(std::vector<Setpoint>& commands, const std::vector<Setpoint>& more) 
   commands.insert(commands.end(), more.begin(), more.end());
 }
 
-/// Why a take-off tube may not be flown; empty if it may.
-std::string obstacle_to_take_off(const plan::World& world, const reach::ReachTube& tube, double z_safe) {
-  const double clearance = plan::takeoff_clearance(world, tube, z_safe);
+/// Why a take-off tube with this clearance may not be flown; empty if it may.
+std::string obstacle_to_take_off(const reach::ReachTube& tube, double clearance) {
   if (clearance > 0) return {};
   return "the take-off column under " + text(tube.back().center.p_W) + " is not clear (" + metres(clearance) +
          "); choose a start with more room below and beside it";
@@ -113,7 +112,7 @@ tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const Fl
   if (!column) {
     return refuse("start " + text(options.start_W) + " has no known floor to take off from; choose a start above one");
   }
-  TakeOff rise{*column, {}, {}, 0};
+  TakeOff rise{*column, {}, {}, 0, 0};
   rise.ground.p_W = options.start_W;
   rise.ground.p_W.z() = column->z_floor + world.reach.vehicle.body.radius;
   rise.commands = plan::vertical_commands(rise.ground.p_W, options.start_W, options.limits.v_max, options.limits.a_max);
@@ -121,7 +120,8 @@ tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const Fl
   append(rise.commands, hold_commands(options.start_W, options.settle_s));
   const auto tube =
       reach::tube_over_field(world.reach, {rise.ground.p_W, Vec3::Zero()}, rise.ground, rise.commands, world.bounds);
-  if (auto why = obstacle_to_take_off(world, tube, column->z_safe); !why.empty()) return refuse(why);
+  rise.clearance_m = plan::takeoff_clearance(world, tube, column->z_safe);
+  if (auto why = obstacle_to_take_off(tube, rise.clearance_m); !why.empty()) return refuse(why);
   return rise;
 }
 
@@ -136,7 +136,8 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   ClosedLoop loop(world.grid, vehicle, {rise->ground.p_W, Vec3::Zero()}, options.seed);
   auto commands = rise->commands;
   auto tube = reach::tube_over_field(world.reach, loop.estimated(), rise->ground, commands, world.bounds);
-  if (auto why = obstacle_to_take_off(world, tube, z_safe); !why.empty()) return refuse(why);
+  if (auto why = obstacle_to_take_off(tube, plan::takeoff_clearance(world, tube, z_safe)); !why.empty())
+    return refuse(why);
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, rise->ground, commands, bounds, options.sigma_scale);
   Flight flight{};
   flight.column = rise->column;

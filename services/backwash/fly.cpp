@@ -46,7 +46,9 @@ study::HoverPair choose_ends(const Options& options, const plan::World& world, s
   if (const auto known = known_ends(options)) return *known;
   const auto pair = study::farthest_pair(world, study::hover_regions(world), [&](const Vec3& start_W) {
     flight.start_W = start_W;
-    return sim::take_off(world, flight).has_value();
+    // The vehicle will not believe itself exactly there: the estimate may be off by this much.
+    const auto rise = sim::take_off(world, flight);
+    return rise && rise->clearance_m > world.reach.vehicle.estimation.position;
   });
   if (!pair) {
     throw Failure(kUnavailable, options.map +
