@@ -254,6 +254,7 @@ TEST(SupportRecursion, IntervalIsTheLargestSupportWithinHalfAPerCent) {
 
 TEST(SupportRecursion, BeyondTheTableTheTailKeepsTheSumCovered) {
   Case c{{}, Loop::vehicle, {}};
+  c.vehicle.controller.attitude_lag = 0.05;  // a loop that the FIR serves
   c.vehicle.controller.kp = {20, 20};
   c.vehicle.controller.kd = {4, 4};
   c.response = axis_response(c.axis(), c.loop);
