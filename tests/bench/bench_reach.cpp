@@ -204,6 +204,7 @@ BENCHMARK(centre_steps);
 /// Adds a table of costs per step, and what a step of the baseline costs in it.
 class Ratios : public benchmark::ConsoleReporter {
  public:
+  Ratios() : ConsoleReporter(OO_None) {}
   void ReportRuns(const std::vector<Run>& runs) override {
     ConsoleReporter::ReportRuns(runs);
     for (const Run& run : runs) {
