@@ -9,20 +9,30 @@ namespace backwash::reach {
 template <std::size_t Lanes>
 SupportGroup<Lanes>::SupportGroup(const AxisResponse& response, double position, double velocity)
     : response_(&response), position_(position), velocity_(velocity), filter_(response) {
-  look_up_initial();
+  initial_[kPhases] = position_;
+  look_up_initial(1);
 }
 
 template <std::size_t Lanes>
-void SupportGroup<Lanes>::look_up_initial() noexcept {
-  const auto& from_position = response_->from_position;
-  const auto& from_velocity = response_->from_velocity;
-  for (std::size_t phase = 0; phase <= kPhases; ++phase) {
-    const std::size_t m = steps_ * kPhases + phase;
-    const bool known = m < from_position.size();
-    const double p = position_ * (known ? from_position[m] : response_->from_position_tail);
-    const double v = velocity_ * (known ? from_velocity[m] : response_->from_velocity_tail);
-    initial_[phase] = std::sqrt(p * p + v * v);
+void SupportGroup<Lanes>::look_up_initial(std::size_t first) noexcept {
+  using Phases = Eigen::Array<double, kPhases, 1>;
+  const auto& r_p = response_->from_position;
+  const auto& r_v = response_->from_velocity;
+  if (first >= r_p.size() + 2 * kPhases) return;  // all of them are the tails already
+  Phases p, v;
+  if (first + kPhases <= r_p.size()) {
+    p = Eigen::Map<const Phases>(r_p.data() + first);
+    v = Eigen::Map<const Phases>(r_v.data() + first);
+  } else {
+    for (std::size_t i = 0; i < kPhases; ++i) {
+      const bool known = first + i < r_p.size();
+      const auto row = static_cast<Eigen::Index>(i);
+      p[row] = known ? r_p[first + i] : response_->from_position_tail;
+      v[row] = known ? r_v[first + i] : response_->from_velocity_tail;
+    }
   }
+  initial_[0] = initial_[kPhases];
+  Eigen::Map<Phases>(initial_.data() + 1) = ((position_ * p).square() + (velocity_ * v).square()).sqrt();
 }
 
 template <std::size_t Lanes>
@@ -34,8 +44,7 @@ void SupportGroup<Lanes>::step(const Row& w_bar) noexcept {
     bulge_[lane] = response_->chord_decay * bulge_[lane] + response_->chord_excess * w_bar[lane];
     largest_[lane] = std::max(largest_[lane], w_bar[lane]);
   }
-  ++steps_;
-  look_up_initial();
+  look_up_initial(++steps_ * kPhases + 1);
 }
 
 template <std::size_t Lanes>

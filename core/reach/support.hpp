@@ -27,7 +27,8 @@ class SupportGroup {
 
  private:
   static constexpr int kPhases = AxisResponse::kPhases;
-  void look_up_initial() noexcept;
+  /// The first set's part at the eight phases from `first` on.
+  void look_up_initial(std::size_t first) noexcept;
 
   const AxisResponse* response_;
   double position_, velocity_;
