@@ -39,10 +39,10 @@ set output "figure.svg"
 set size ratio -1
 set samples 40
 set xlabel "x, m"; set ylabel "y, m"; set key top right; set grid lc rgb "#e0e0e0"
-plot "< tr , ' ' <track.csv | awk 'NR > 1 && (NR - 2) % 5 == 0'" using 2:3 with points pt 7 ps 0.25 lc rgb "#404040" title "commands", \
-     "paper.txt" using 2:3:(2*$5):(2*$6) with ellipses fill solid 0.12 noborder fc rgb "#d95f02" notitle, \
+plot "paper.txt" using 2:3:(2*$5):(2*$6) with ellipses fill solid 0.12 noborder fc rgb "#d95f02" notitle, \
      "" using 2:3:(2*$5):(2*$6) with ellipses fill empty lc rgb "#d95f02" title "paper", \
      "octagons.txt" using 1:2 with lines lw 1.5 lc rgb "#1b6ca8" title "tight (exact)", \
-     "tight.txt" using 2:3 with points pt 1 ps 0.6 lc rgb "#1b6ca8" title "predicted centres"
+     "tight.txt" using 2:3 with points pt 1 ps 0.6 lc rgb "#1b6ca8" title "predicted centres", \
+     "< tr , ' ' <track.csv | awk 'NR > 1 && (NR - 2) % 5 == 0'" using 2:3 with points pt 7 ps 0.35 lc rgb "#404040" title "commands"
 PLOT
 mv figure.svg "$here/figure.svg"
