@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/reach/error_dynamics.hpp"
 
+#include <algorithm>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -30,6 +32,30 @@ void refuse(const AxisLoop& axis, const char* why) {
   throw std::invalid_argument(text.str());
 }
 
+namespace {
+
+// The geometric bound c_j ≤ A ρ^{j−1} of least sum on the excess of the shares over their chords.
+void bound_chord_excess(AxisResponse& response) {
+  std::vector<double> excess;  // age 1, 2, …
+  for (std::size_t j = 1; j < response.S.size(); ++j) {
+    double largest = 0;
+    for (std::size_t m = 1; m < AxisResponse::kPhases; ++m) {
+      const double phi = static_cast<double>(m) / AxisResponse::kPhases;
+      const double chord = (1 - phi) * response.G[j - 1] + phi * response.G[j];
+      largest = std::max(largest, (response.S[j][m - 1] - chord) / (4 * phi * (1 - phi)));
+    }
+    excess.push_back(largest);
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (double rho = 0.5; rho < 0.9995; rho += 0.0005) {
+    double A = 0, power = 1;
+    for (const double c : excess) A = std::max(A, c / power), power *= rho;
+    if (A / (1 - rho) < least) least = A / (1 - rho), response.chord_excess = A, response.chord_decay = rho;
+  }
+}
+
+}  // namespace
+
 AxisResponse axis_response(const AxisLoop& axis, Loop loop) {
   if (!(axis.kp > 0) || !(axis.kd > 0)) refuse(axis, "the gains must be positive, the loop is unstable");
   if (!(axis.feedback_delay >= 0) || !(axis.attitude_lag >= 0)) refuse(axis, "delay and lag must not be negative");
@@ -47,6 +73,9 @@ AxisResponse axis_response(const AxisLoop& axis, Loop loop) {
       response.P[m] = response.S[j][phase - 1] + (j > 0 ? response.P[m - AxisResponse::kPhases] : 0.0);
     }
   }
+  bound_chord_excess(response);
+  if (loop != Loop::sampled && axis.feedback_delay == 0 && axis.attitude_lag == 0)
+    response.delay = delay_recursion(axis.kp, axis.kd);
   return response;
 }
 

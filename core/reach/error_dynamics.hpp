@@ -3,10 +3,12 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/reach/axis_step.hpp"
+#include "core/reach/delay_recursion.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -45,6 +47,11 @@ struct AxisResponse {
   /// Bounds on |ë| per unit of w̄ (m/s²), of initial position error (m) and of initial velocity error (m/s): they limit
   /// how far the position leaves the chord between two phases, δ²/8·|ë|.
   double acceleration_inf, acceleration_from_position, acceleration_from_velocity;
+  /// How far the shares of past steps pass the chord over a step, s²: at phase φ = m/kPhases, for every age j ≥ 1,
+  ///   S_j(φ) ≤ (1 − φ) G_{j−1} + φ G_j + 4 φ (1 − φ) chord_excess·chord_decay^{j−1}.
+  double chord_excess = 0, chord_decay = 0;
+  /// The same supports by the delay recursion, where the loop has it: second order and continuous.
+  std::optional<DelayRecursion> delay;
 };
 
 inline constexpr double kMinFeedbackDelay = 1e-4;  ///< s

@@ -6,77 +6,115 @@
 
 namespace backwash::reach {
 
-namespace {
-constexpr int kPhases = AxisResponse::kPhases;
+template <std::size_t Lanes>
+SupportGroup<Lanes>::SupportGroup(const AxisResponse& response, double position, double velocity)
+    : response_(&response), position_(position), velocity_(velocity), filter_(response) {
+  initial_[kPhases] = position_;
+  look_up_initial(1);
 }
+
+template <std::size_t Lanes>
+void SupportGroup<Lanes>::look_up_initial(std::size_t first) noexcept {
+  using Phases = Eigen::Array<double, kPhases, 1>;
+  const auto& r_p = response_->from_position;
+  const auto& r_v = response_->from_velocity;
+  if (first >= r_p.size() + 2 * kPhases) return;  // all of them are the tails already
+  Phases p, v;
+  if (first + kPhases <= r_p.size()) {
+    p = Eigen::Map<const Phases>(r_p.data() + first);
+    v = Eigen::Map<const Phases>(r_v.data() + first);
+  } else {
+    for (std::size_t i = 0; i < kPhases; ++i) {
+      const bool known = first + i < r_p.size();
+      const auto row = static_cast<Eigen::Index>(i);
+      p[row] = known ? r_p[first + i] : response_->from_position_tail;
+      v[row] = known ? r_v[first + i] : response_->from_velocity_tail;
+    }
+  }
+  initial_[0] = initial_[kPhases];
+  Eigen::Map<Phases>(initial_.data() + 1) = ((position_ * p).square() + (velocity_ * v).square()).sqrt();
+}
+
+template <std::size_t Lanes>
+void SupportGroup<Lanes>::step(const Row& w_bar) noexcept {
+  const Row past = filter_.push(w_bar), tail = filter_.tail();
+  for (std::size_t lane = 0; lane < Lanes; ++lane) {
+    now_[lane] = later_[lane] + w_bar[lane] * response_->G[0];
+    later_[lane] = past[lane] + tail[lane];
+    bulge_[lane] = response_->chord_decay * bulge_[lane] + response_->chord_excess * w_bar[lane];
+    largest_[lane] = std::max(largest_[lane], w_bar[lane]);
+  }
+  look_up_initial(++steps_ * kPhases + 1);
+}
+
+template <std::size_t Lanes>
+typename SupportGroup<Lanes>::Row SupportGroup<Lanes>::half_widths() const noexcept {
+  Row h;
+  for (std::size_t lane = 0; lane < Lanes; ++lane) h[lane] = initial_[0] + now_[lane];
+  return h;
+}
+
+template <std::size_t Lanes>
+typename SupportGroup<Lanes>::Row SupportGroup<Lanes>::half_widths_until_next(const Row& next) const noexcept {
+  Row h = half_widths();
+  for (std::size_t phase = 1; phase <= kPhases; ++phase) {
+    const double phi = static_cast<double>(phase) / kPhases, bow = 4 * phi * (1 - phi);
+    for (std::size_t lane = 0; lane < Lanes; ++lane)
+      h[lane] = std::max(h[lane], initial_[phase] + (1 - phi) * now_[lane] + phi * later_[lane] + bow * bulge_[lane] +
+                                      next[lane] * response_->S[0][phase - 1]);
+  }
+  constexpr double kPhaseLength = kControlPeriod / kPhases;
+  const double of_initial =
+      response_->acceleration_from_position * position_ + response_->acceleration_from_velocity * velocity_;
+  for (std::size_t lane = 0; lane < Lanes; ++lane)
+    h[lane] += kPhaseLength * kPhaseLength / 8 *
+               (response_->acceleration_inf * std::max(largest_[lane], next[lane]) + of_initial);
+  return h;
+}
+
+template class SupportGroup<1>;
+template class SupportGroup<4>;
+
+namespace {
+
+std::array<double, 4> horizontal(const DisturbanceBound& b) noexcept {
+  return {b.w[kX], b.w[kY], b.w[kXyPlus], b.w[kXyMinus]};
+}
+
+PerDirection together(const std::array<double, 4>& h, const std::array<double, 1>& v) noexcept {
+  PerDirection all;
+  all[kX] = h[0], all[kY] = h[1], all[kXyPlus] = h[2], all[kXyMinus] = h[3], all[kZ] = v[0];
+  return all;
+}
+
+}  // namespace
 
 SupportRecursion::SupportRecursion(const AxisResponse& horizontal, const AxisResponse& vertical, const Vehicle& vehicle)
-    : horizontal_(&horizontal),
-      vertical_(&vertical),
-      position_(vehicle.initial_error.position),
-      velocity_(vehicle.initial_error.velocity) {
-  for (std::size_t d = 0; d < kDirections; ++d) history_[d].reserve(2 * response(d).S.size());
-}
+    : horizontal_(horizontal, vehicle.initial_error.position, vehicle.initial_error.velocity),
+      vertical_(vertical, vehicle.initial_error.position, vehicle.initial_error.velocity) {}
 
 void SupportRecursion::step(const DisturbanceBound& w_bar) noexcept {
-  for (std::size_t d = 0; d < kDirections; ++d) {
-    const AxisResponse& axis = response(d);
-    const double w = w_bar.w[d];
-    now_[d] = later_[d][kPhases - 1] + w * axis.S[0][kPhases - 1];
-    largest_[d] = std::max(largest_[d], w);
-
-    std::vector<double>& history = history_[d];
-    const std::size_t kept = axis.S.size() - 1;  // the step in progress is the N-th
-    if (history.size() >= 2 * kept) {
-      std::move(history.end() - static_cast<std::ptrdiff_t>(kept), history.end(), history.begin());
-      history.resize(kept);
-    }
-    history.push_back(w);
-    if (history.size() > kept) largest_dropped_[d] = std::max(largest_dropped_[d], history[history.size() - 1 - kept]);
-    sum_history(d);
-  }
-  ++steps_;
-}
-
-void SupportRecursion::sum_history(std::size_t direction) noexcept {
-  const AxisResponse& axis = response(direction);
-  const std::vector<double>& history = history_[direction];
-  const std::size_t used = std::min(history.size(), axis.S.size() - 1);
-  std::array<double, kPhases> sum{};
-  for (std::size_t age = 1; age <= used; ++age) {
-    const double w = history[history.size() - age];
-    for (int phase = 0; phase < kPhases; ++phase) sum[phase] += w * axis.S[age][phase];
-  }
-  for (double& s : sum) s += axis.tail * largest_dropped_[direction];
-  later_[direction] = sum;
-}
-
-double SupportRecursion::initial(const AxisResponse& axis, int phase) const noexcept {
-  const std::size_t m = steps_ * kPhases + static_cast<std::size_t>(phase);
-  const bool known = m < axis.from_position.size();
-  return std::hypot(position_ * (known ? axis.from_position[m] : axis.from_position_tail),
-                    velocity_ * (known ? axis.from_velocity[m] : axis.from_velocity_tail));
+  horizontal_.step(horizontal(w_bar));
+  vertical_.step({w_bar.w[kZ]});
 }
 
 PerDirection SupportRecursion::half_widths() const noexcept {
-  PerDirection h;
-  for (std::size_t d = 0; d < kDirections; ++d) h[d] = initial(response(d), 0) + now_[d];
-  return h;
+  return together(horizontal_.half_widths(), vertical_.half_widths());
 }
 
 PerDirection SupportRecursion::half_widths_until_next(const DisturbanceBound& next) const noexcept {
-  constexpr double kPhaseLength = kControlPeriod / kPhases;
-  PerDirection h = half_widths();
-  for (std::size_t d = 0; d < kDirections; ++d) {
-    const AxisResponse& axis = response(d);
-    for (int phase = 1; phase <= kPhases; ++phase)
-      h[d] = std::max(h[d], initial(axis, phase) + later_[d][phase - 1] + next.w[d] * axis.S[0][phase - 1]);
-    const double acceleration = axis.acceleration_inf * std::max(largest_[d], next.w[d]) +
-                                axis.acceleration_from_position * position_ +
-                                axis.acceleration_from_velocity * velocity_;
-    h[d] += kPhaseLength * kPhaseLength / 8 * acceleration;
+  return together(horizontal_.half_widths_until_next(horizontal(next)), vertical_.half_widths_until_next({next.w[kZ]}));
+}
+
+std::vector<double> support_gradient(const AxisResponse& response, std::span<const double> weights) {
+  SupportFilter<1> filter(response);
+  std::vector<double> gradient(weights.size());
+  double later = 0;
+  for (std::size_t k = weights.size(); k-- > 0;) {
+    gradient[k] = later + weights[k] * response.G[0];
+    later = filter.push({weights[k]})[0];
   }
-  return h;
+  return gradient;
 }
 
 }  // namespace backwash::reach

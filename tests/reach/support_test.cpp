@@ -54,19 +54,28 @@ std::string name(const Case& c) {
          std::to_string(axis.attitude_lag);
 }
 
-// Bounds that vary as along a flight: smooth, with jumps and quiet stretches.
-std::vector<DisturbanceBound> varying_bounds(std::mt19937& random, std::size_t steps) {
+// Variances that vary as along a flight: smooth, with jumps and quiet stretches.
+std::vector<Variance> varying_variances(std::mt19937& random, std::size_t steps) {
   std::uniform_real_distribution<double> uniform(0, 1);
-  std::vector<DisturbanceBound> bounds(steps);
+  std::vector<Variance> variances(steps);
   double level = 1;
-  for (DisturbanceBound& b : bounds) {
+  for (Variance& sigma : variances) {
     if (uniform(random) < 0.05) level = uniform(random) < 0.3 ? 0 : 2.5 * uniform(random);
     const double x = level * (0.8 + 0.4 * uniform(random)), y = level * (0.5 + uniform(random));
     const double correlation = 0.6 * (2 * uniform(random) - 1);
-    const Variance sigma{x * x, correlation * x * y, 0, y * y, 0, level * level};
-    b = bound(sigma, BoundModel{1, 0, 0, 0.15});
+    sigma = {x * x, correlation * x * y, 0, y * y, 0, level * level};
   }
+  return variances;
+}
+
+// One standard deviation: the slabs around the ellipsoid {w : wᵀ Σ⁻¹ w ≤ 1}.
+std::vector<DisturbanceBound> bounds_of(const std::vector<Variance>& variances) {
+  std::vector<DisturbanceBound> bounds;
+  for (const Variance& sigma : variances) bounds.push_back(bound(sigma, BoundModel{1, 0, 0, 0.15}));
   return bounds;
+}
+std::vector<DisturbanceBound> varying_bounds(std::mt19937& random, std::size_t steps) {
+  return bounds_of(varying_variances(random, steps));
 }
 
 struct Tube {
@@ -86,7 +95,7 @@ Tube propagate(const Case& c, const std::vector<DisturbanceBound>& bounds) {
 
 TEST(SupportRecursion, ContainsRandomRolloutsInEveryDirection) {
   constexpr std::size_t kSteps = 60;
-  constexpr Eigen::Index kRollouts = 2000;
+  constexpr Eigen::Index kRollouts = 3400;  // over the six loops: 20,400 per gain set
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -188,44 +197,63 @@ WorstCase worst_case(const Case& c, const PushResponse& response, std::size_t to
   return worst;
 }
 
-TEST(SupportRecursion, IsReachedByTheWorstDisturbanceAndNeverLeft) {
+// Along a direction n the farthest push of the ellipsoid is Σn/√(nᵀΣn), which lies in every slab.
+Vec3 farthest_push(const Variance& sigma, Direction d) {
+  const Vec3 n = unit(d);
+  const Vec3 push(sigma.xx * n.x() + sigma.xy * n.y(), sigma.xy * n.x() + sigma.yy * n.y(), sigma.zz * n.z());
+  const double along = n.dot(push);
+  return along > 0 ? Vec3(push / std::sqrt(along)) : Vec3::Zero();
+}
+
+TEST(SupportRecursion, IsReachedByTheWorstDisturbanceOfEachDirectionAndNeverLeft) {
   constexpr std::size_t kSteps = 100;
-  constexpr Eigen::Index kTimes = 200;
+  constexpr Eigen::Index kTimes = 340;  // over the six loops: 2,040 per gain set
   std::mt19937 random(11);
   std::uniform_int_distribution<std::size_t> any_step(3, kSteps), any_instant(30, kSteps * kPerStep - 1);
   for (const Case& c : cases()) {
-    const auto bounds = varying_bounds(random, kSteps);
-    const Tube tube = propagate(c, bounds);
+    const auto variances = varying_variances(random, kSteps);
+    const Tube tube = propagate(c, bounds_of(variances));
     const PushResponse response(c, kSteps);
     std::vector<std::size_t> times;  // half of them at samples
     std::vector<WorstCase> worst;
-    Batch p0(kTimes), v0(kTimes);
-    for (Eigen::Index i = 0; i < kTimes; ++i) {
-      times.push_back(i % 2 == 0 ? any_step(random) * kPerStep : any_instant(random));
+    const auto direction_of = [](Eigen::Index n) { return static_cast<Direction>(n / 2 % kDirections); };
+    std::array<Batch, 3> p0, v0;
+    for (std::size_t axis = 0; axis < 3; ++axis) p0[axis] = v0[axis] = Batch::Zero(kTimes);
+    for (Eigen::Index n = 0; n < kTimes; ++n) {
+      times.push_back(n % 2 == 0 ? any_step(random) * kPerStep : any_instant(random));
       worst.push_back(worst_case(c, response, times.back()));
-      p0[i] = worst.back().p0;
-      v0[i] = worst.back().v0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        p0[axis][n] = worst.back().p0 * unit(direction_of(n))[static_cast<Eigen::Index>(axis)];
+        v0[axis][n] = worst.back().v0 * unit(direction_of(n))[static_cast<Eigen::Index>(axis)];
+      }
     }
-    AxisRollouts e(c.axis(), c.sampled(), kH, p0, v0);
+    std::array<AxisRollouts, 3> e{AxisRollouts(c.axis(), c.sampled(), kH, p0[0], v0[0]),
+                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[1], v0[1]),
+                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[2], v0[2])};
     for (std::size_t i = 0; i <= kSteps * kPerStep; ++i) {
       const std::size_t k = std::min(i / kPerStep, kSteps - 1);
-      for (Eigen::Index n = 0; n < kTimes; ++n) {
-        const double reached = e.p()[n];
-        ASSERT_LE(std::abs(reached), tube.until_next[k][kX] * (1 + 1e-7)) << name(c) << " at " << i;
-        if (i % kPerStep == 0) {
-          ASSERT_LE(std::abs(reached), tube.at[i / kPerStep][kX] * (1 + 1e-7)) << name(c) << " at " << i;
-          if (i == times[static_cast<std::size_t>(n)]) {
-            ASSERT_GE(reached, 0.999 * tube.at[i / kPerStep][kX]) << name(c) << " at " << i;
+      for (std::size_t d = 0; d < kDirections; ++d) {
+        const Vec3 m = unit(static_cast<Direction>(d));
+        const Batch along = m.x() * e[0].p() + m.y() * e[1].p() + m.z() * e[2].p();
+        const double largest = along.abs().maxCoeff();
+        ASSERT_LE(largest, tube.until_next[k][d] * (1 + 1e-7)) << name(c) << " at " << i;
+        if (i % kPerStep != 0) continue;
+        ASSERT_LE(largest, tube.at[i / kPerStep][d] * (1 + 1e-7)) << name(c) << " at " << i;
+        for (Eigen::Index n = 0; n < kTimes; ++n)
+          if (direction_of(n) == d && i == times[static_cast<std::size_t>(n)]) {
+            ASSERT_GE(along[n], 0.999 * tube.at[i / kPerStep][d]) << name(c) << " at " << i << " direction " << d;
           }
-        }
       }
       if (i == kSteps * kPerStep) break;
-      Batch w(kTimes);
+      std::array<Batch, 3> w{Batch(kTimes), Batch(kTimes), Batch(kTimes)};
+      std::array<Vec3, kDirections> push;
+      for (std::size_t d = 0; d < kDirections; ++d) push[d] = farthest_push(variances[k], static_cast<Direction>(d));
       for (Eigen::Index n = 0; n < kTimes; ++n) {
         const auto& sign = worst[static_cast<std::size_t>(n)].sign;
-        w[n] = (i < sign.size() ? sign[i] : 1) * bounds[k].w[kX];
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          w[axis][n] = (i < sign.size() ? sign[i] : 1) * push[direction_of(n)][static_cast<Eigen::Index>(axis)];
       }
-      e.step(w);
+      for (std::size_t axis = 0; axis < 3; ++axis) e[axis].step(w[axis]);
     }
   }
 }
@@ -254,6 +282,7 @@ TEST(SupportRecursion, IntervalIsTheLargestSupportWithinHalfAPerCent) {
 
 TEST(SupportRecursion, BeyondTheTableTheTailKeepsTheSumCovered) {
   Case c{{}, Loop::vehicle, {}};
+  c.vehicle.controller.attitude_lag = 0.05;  // a loop that the FIR serves
   c.vehicle.controller.kp = {20, 20};
   c.vehicle.controller.kd = {4, 4};
   c.response = axis_response(c.axis(), c.loop);
