@@ -80,13 +80,18 @@ const BoundField::Entry& BoundField::entry(const Index3& v) const noexcept {
 }
 
 DisturbanceBound BoundField::max_over(const Vec3& low_W, const Vec3& high_W) const noexcept {
-  // Closed voxels: one that only touches the box counts. Clamped before the cast, so that any finite box is in range.
-  const Vec3 last = size_.cast<double>() - Vec3::Ones();
-  const Vec3 from = (((low_W - origin_W_) / resolution_).array().ceil() - 1).max(0.0);
-  const Vec3 to = ((high_W - origin_W_) / resolution_).array().floor().min(last.array());
+  // Closed voxels: one that only touches the box counts. Compared before the casts, so that any box is in range.
   DisturbanceBound result;
-  if (!(from.array() <= to.array()).all()) return result;
-  const Index3 low = from.cast<int>(), high = to.cast<int>();
+  Index3 low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double from = (low_W[axis] - origin_W_[axis]) / resolution_;
+    const double to = (high_W[axis] - origin_W_[axis]) / resolution_;
+    if (!(from <= size_[axis]) || !(to >= 0)) return result;
+    low[axis] = from > 0 ? static_cast<int>(from) : 0;
+    low[axis] -= from > 0 && low[axis] == from;
+    high[axis] = to < size_[axis] ? static_cast<int>(to) : size_[axis] - 1;
+    if (low[axis] > high[axis]) return result;
+  }
 
   const int narrowest = (high - low).minCoeff() + 1;
   int level = 0;

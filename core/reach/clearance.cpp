@@ -77,6 +77,15 @@ const map::Cell* first_obstacle(const map::Cell* from, const map::Cell* to) noex
   return from;
 }
 
+/// Whether all of [from, to) are free; the last word may overlap the one before.
+bool all_free(const map::Cell* from, const map::Cell* to) noexcept {
+  if (to - from < 8) return first_obstacle(from, to) == to;
+  for (; to - from > 8; from += 8) {
+    if (!eight_free(from)) return false;
+  }
+  return eight_free(to - 8);
+}
+
 /// Last cell of [from, to) that is not free, or `to`.
 const map::Cell* last_obstacle(const map::Cell* from, const map::Cell* to) noexcept {
   const map::Cell* c = to;
@@ -140,12 +149,17 @@ class Scan {
       if (separation * separation + gap2_z >= nearest2_) return;
       nearest2_ = std::min(nearest2_, octagon_.squared_distance(p) + gap2_z);
     };
+    const auto range_from = [&](double reach) { return cells + std::max(0, static_cast<int>(center_.x() - reach)); };
+    const auto range_to = [&](double reach) {
+      return cells + std::min(grid_.size().x(), static_cast<int>(center_.x() + reach) + 1);
+    };
+    const double widest = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
+    if (all_free(range_from(widest), range_to(widest))) return;  // most rows
     const map::Cell *const under = cells + under_from_, *const right = cells + under_to_;
     for (const map::Cell* c = first_obstacle(under, right); c != right; c = first_obstacle(c + 1, right)) consider(c);
     if (nearest2_ <= gap2_y + gap2_z) return;
     const double reach = half_.x() + std::sqrt(nearest2_ - gap2_y - gap2_z);
-    const map::Cell* const from = cells + std::max(0, static_cast<int>(center_.x() - reach));
-    const map::Cell* const to = cells + std::min(grid_.size().x(), static_cast<int>(center_.x() + reach) + 1);
+    const map::Cell *const from = range_from(reach), *const to = range_to(reach);
     if (const map::Cell* c = first_obstacle(right, to); c != to) consider(c);
     if (const map::Cell* c = last_obstacle(from, under); c != under) consider(c);
   }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/reach/ellipsoid.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <unsupported/Eigen/MatrixFunctions>
 
@@ -123,6 +125,41 @@ Mat3 hover_ellipsoid(const Vehicle& vehicle, const Vec3& w_bar) {
   const Blocks Q = solution(low);
   constexpr double kRoundUp = 1 + 1e-6;  // covers the root's width
   return kRoundUp * Mat3(Vec3(Q[0](0, 0), Q[1](0, 0), Q[2](0, 0)).asDiagonal());
+}
+
+HoverEllipsoid::HoverEllipsoid(const Vehicle& vehicle) : vehicle_(vehicle) {
+  const auto& c = vehicle.controller;
+  const double slowest =
+      std::max(slowest_root(c.kp.horizontal, c.kd.horizontal), slowest_root(c.kp.vertical, c.kd.vertical));
+  if (!(slowest < 0)) throw std::invalid_argument("HoverEllipsoid: the gains k_p and k_d must be positive");
+  const Axis h = axis_of(c.kp.horizontal, c.kd.horizontal), v = axis_of(c.kp.vertical, c.kd.vertical);
+  const double root_h = std::sqrt(kControlPeriod * h.X.trace()), root_v = std::sqrt(kControlPeriod * v.X.trace());
+  root_trace_ = {root_h, root_h, root_v};
+  // Solution for an axis with tr Q_i = 1.
+  const auto solution = [](const Axis& axis, double r) {
+    const Matrix2d& E = axis.transition;
+    return discrete_lyapunov(E, 1 + r, (1 + 1 / r) / axis.X.trace() * E * axis.X * E.transpose());
+  };
+  for (int n = 0; n <= kShares; ++n) {
+    const double share = std::pow(std::sin(std::numbers::pi / 2 * n / kShares), 2);
+    double low = 0, high = std::expm1(-2 * slowest * kControlPeriod);
+    for (int i = 0; i < 50; ++i) {
+      const double r = (low + high) / 2;
+      const double trace = (1 - share) * solution(h, r).trace() + share * solution(v, r).trace();
+      (r * r * trace < 1 ? low : high) = r;
+    }
+    square_.emplace_back(solution(h, low)(0, 0), solution(v, low)(0, 0));
+  }
+}
+
+Vec3 HoverEllipsoid::half_axes(const Vec3& w_bar) const {
+  if (!(w_bar.minCoeff() >= kLeastBound)) return hover_ellipsoid(vehicle_, w_bar).diagonal().cwiseSqrt();
+  const Vec3 root = root_trace_.cwiseProduct(w_bar);
+  const double sum = root.sum(), at = std::asin(std::sqrt(root.z() / sum)) * 2 / std::numbers::pi * kShares;
+  const auto n = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(kShares - 1));
+  const Eigen::Vector2d u = square_[n] + (at - static_cast<double>(n)) * (square_[n + 1] - square_[n]);
+  constexpr double kRoundUp = 1 + 2e-5;  // covers the roots' width and ε
+  return (kRoundUp * sum * root.cwiseProduct(Vec3(u[0], u[0], u[1]))).cwiseSqrt();
 }
 
 }  // namespace backwash::reach

@@ -34,9 +34,10 @@ class HoverMap {
             const BoundField& bounds, std::span<const std::size_t> voxels, double constant_margin = -1);
   /// False outside the grid and where nothing was computed.
   bool safe(const Index3& v) const noexcept;
-  /// Clearance of the hover set, m; ≤ 0 where not safe, −1 where not computed and outside the grid.
+  /// Clearance of the hover set where safe, m; elsewhere ≤ 0 and no less than it, −1 where not computed and outside the
+  /// grid. What no set needs is not computed: where the body alone does not fit, or a tip of the set is too near.
   double clearance(const Index3& v) const noexcept;
-  /// Half widths x, y, z, m; zero where not computed or unbounded.
+  /// Half widths x, y, z, m; zero where not computed, unbounded, or too near for the body alone.
   Vec3 half_widths(const Index3& v) const noexcept;
 
  private:

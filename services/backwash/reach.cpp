@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/chance.hpp"
 #include "core/reach/reach_tube.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -15,6 +16,7 @@ namespace {
 
 struct Options {
   std::string vehicle, track, map, model, method = "tight", loop;
+  std::optional<double> probability;
   std::optional<Vec3> direction;
   bool json = false;
 };
@@ -68,9 +70,8 @@ bool has_variances(const std::string& path, const study::FlightLog& track) {
   return present == 6;
 }
 
-std::vector<DisturbanceBound> read_bounds(const std::string& path, const study::FlightLog& track,
-                                          const BoundModel& model) {
-  std::vector<DisturbanceBound> bounds;
+std::vector<Variance> read_variances(const std::string& path, const study::FlightLog& track) {
+  std::vector<Variance> variances;
   for (std::size_t i = 0; i < track.t_s.size(); ++i) {
     double s[6];
     for (std::size_t n = 0; n < 6; ++n) s[n] = track.column(kSigmaColumns[n])[i];
@@ -81,9 +82,9 @@ std::vector<DisturbanceBound> read_bounds(const std::string& path, const study::
       throw Failure(kBadData, at_row(path, i) + "the variance has the eigenvalue " + to_text(smallest, 6) +
                                   "; it must be positive semidefinite");
     }
-    bounds.push_back(bound(Variance{s[0], s[1], s[2], s[3], s[4], s[5]}, model));
+    variances.push_back(Variance{s[0], s[1], s[2], s[3], s[4], s[5]});
   }
-  return bounds;
+  return variances;
 }
 
 reach::Loop read_loop(const Options& options) {
@@ -93,31 +94,65 @@ reach::Loop read_loop(const Options& options) {
     }
     return reach::Loop::continuous;
   }
+  if (options.method == "chance" && options.loop == "sampled") {
+    throw Failure(kUsage,
+                  "--method chance knows --loop vehicle and continuous; sampled feedback has no covariance yet");
+  }
   if (options.loop == "continuous") return reach::Loop::continuous;
   return options.loop == "sampled" ? reach::Loop::sampled : reach::Loop::vehicle;
 }
 
-reach::ReachTube tube(const Options& options, const reach::Reachability& reach) {
+void check_probability(const Options& options) {
+  if (options.method != "chance") {
+    if (options.probability)
+      throw Failure(kUsage, "--probability belongs to --method chance; the others bound the worst case");
+    return;
+  }
+  if (!options.probability || !(*options.probability > 0) || !(*options.probability < 1)) {
+    throw Failure(kUsage,
+                  "--method chance needs --probability, of leaving the sets per second of flight, above 0 and below 1, "
+                  "such as 1e-3");
+  }
+}
+
+/// A tube, and the levels of its seconds where the method is chance.
+reach::ChanceTube tube(const Options& options, const reach::Reachability& reach) {
   const auto track = read_table(options.track, "t_s");
   check_times(options.track, track);
   const auto commands = read_commands(options.track, track);
   const State start{commands[0].p_W, commands[0].v_W};
+  const bool chance = options.method == "chance";
   if (has_variances(options.track, track)) {
     if (!options.map.empty()) throw Failure(kUsage, "the track has sigma columns; give either those or --map");
-    const BoundModel bounds = options.model.empty() ? BoundModel{} : read_model(options.model).bound;
-    return reach::tube_with_bounds(reach, start, commands[0], commands, read_bounds(options.track, track, bounds));
+    const BoundModel model = options.model.empty() ? BoundModel{} : read_model(options.model).bound;
+    const auto sigma = read_variances(options.track, track);
+    if (chance)
+      return chance_tube_with_variances(reach, start, commands[0], commands, sigma, model, *options.probability);
+    std::vector<DisturbanceBound> bounds;
+    for (const Variance& s : sigma) bounds.push_back(bound(s, model));
+    return {tube_with_bounds(reach, start, commands[0], commands, bounds), {}};
   }
   if (options.map.empty() || options.model.empty()) {
     throw Failure(kUsage, "the track has no sigma columns; add them or give --map and --model");
   }
+  const Model model = read_model(options.model);
+  if (chance && model.bound.kappa == 0)
+    throw Failure(kConfiguration, options.model + ":1: --method chance over a map needs bound.kappa above 0");
   progress("building the world");
-  const auto world = plan::build_world(read_map(options.map), read_model(options.model), reach.vehicle, reach.method,
-                                       -1, run_parallel);
-  return reach::tube_over_field(reach, start, commands[0], commands, world->bounds);
+  const auto world = plan::build_world(read_map(options.map), model, reach.vehicle, reach.method, -1, run_parallel);
+  if (chance) {
+    return chance_tube_over_field(reach, start, commands[0], commands, world->bounds, model.bound,
+                                  *options.probability);
+  }
+  return {tube_over_field(reach, start, commands[0], commands, world->bounds), {}};
 }
 
 void print_table(const reach::ReachTube& tube, const Options& options) {
   const auto method = read_method(options.method);
+  if (options.probability) {
+    std::printf("left with at most %g per second of flight, for Gaussian disturbances: no worst case\n",
+                *options.probability);
+  }
   std::printf("%8s %9s %9s %9s   %8s %8s %8s %8s %8s %8s   half widths in m\n", "t_s", "x_m", "y_m", "z_m", "x", "y",
               "z", "xy_plus", "xy_minus", "r_max");
   for (const auto& step : tube) {
@@ -135,14 +170,22 @@ int run(Options options) {
     if (options.direction->norm() == 0) throw Failure(kUsage, "--direction: 0,0,0 has no direction; give another");
     options.direction->normalize();
   }
+  check_probability(options);
   const auto method = read_method(options.method);
   const auto reach = read_reachability(read_vehicle(options.vehicle), method, read_loop(options), options.vehicle);
-  const auto steps = tube(options, reach);
+  const auto [steps, levels] = tube(options, reach);
   if (!options.json) {
     print_table(steps, options);
     return kOk;
   }
-  print(Json{{"method", options.method}, {"steps", to_json(steps, method, options.direction)}});
+  Json json = {{"method", options.method}};
+  if (options.probability) {
+    json["probability"] = *options.probability;
+    json["levels"] = Json::array();
+    for (const PerDirection& level : levels) json["levels"].push_back(to_json(level));
+  }
+  json["steps"] = to_json(steps, method, options.direction);
+  print(json);
   return kOk;
 }
 
@@ -154,8 +197,11 @@ Verb reach_verb(CLI::App& app) {
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
   command->add_option("--track", options->track, "CSV: t_s, cmd_x_m … cmd_az_mps2, and sigma_xx … sigma_zz or --map")
       ->required();
-  command->add_option("--method", options->method, "tight: exact supports; paper: ellipsoids")
-      ->check(CLI::IsMember({"tight", "paper"}));
+  command
+      ->add_option("--method", options->method,
+                   "tight: exact supports; paper: ellipsoids; chance: left with --probability, no worst case")
+      ->check(CLI::IsMember({"tight", "paper", "chance"}));
+  command->add_option("--probability", options->probability, "chance only: of leaving the sets, per second of flight");
   command->add_option("--loop", options->loop, "vehicle (default), continuous (always with paper) or sampled")
       ->check(CLI::IsMember({"vehicle", "continuous", "sampled"}));
   command->add_option("--map", options->map, "OctoMap file or builtin:NAME, for tracks without sigma columns");

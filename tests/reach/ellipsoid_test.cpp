@@ -214,5 +214,28 @@ TEST(HoverEllipsoid, RefusesGainsWithoutAFixedPoint) {
   EXPECT_THROW(hover_ellipsoid(vehicle_with(6, 4, -6, 4, 0, 0), Vec3(1, 1, 1)), std::invalid_argument);
 }
 
+TEST(HoverEllipsoid, FromTheTableIsTheSolvedOneRoundedUp) {
+  for (const auto& [horizontal, vertical] :
+       {std::pair(std::pair(6.0, 4.0), std::pair(6.0, 4.0)), std::pair(std::pair(1.71, 1.8), std::pair(4.0, 4.0)),
+        std::pair(std::pair(16.0, 8.0), std::pair(20.0, 4.0))}) {
+    Vehicle vehicle;
+    vehicle.controller.kp = {horizontal.first, vertical.first};
+    vehicle.controller.kd = {horizontal.second, vertical.second};
+    const HoverEllipsoid table(vehicle);
+    for (const double x : {0.0, 0.1, 0.13, 1.0, 5.0}) {
+      for (const double y : {0.1, 0.9, 4.0}) {
+        for (const double z : {0.05, 0.1, 0.37, 1.4, 6.0}) {
+          const Vec3 w(x, y, z);
+          const Vec3 solved = hover_ellipsoid(vehicle, w).diagonal().cwiseSqrt(), fast = table.half_axes(w);
+          for (int axis = 0; axis < 3; ++axis) {
+            EXPECT_GE(fast[axis], solved[axis] * (1 - 1e-9)) << w.transpose();
+            EXPECT_LE(fast[axis], solved[axis] * (1 + 1e-3)) << w.transpose();
+          }
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace backwash::reach
