@@ -13,7 +13,7 @@ out=$(cd "$2" && pwd)
 start_bench "$build/services" "$out/$name.log" "$map" "$start" "$vehicle" --seed "$seed" --log "$out/$name.truth.csv" \
   --wire "$out/$name.wire.csv"
 start_daemon "$vehicle" "$out/$name.bwlog"
-ctl enable --wait
+enable
 ctl takeoff --height "${start##*,}" --wait
 ctl goto "$goal" --wait
 sleep 3 # hold at the goal

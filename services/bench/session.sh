@@ -62,3 +62,13 @@ TOML
 
 # ctl VERB …: one command of the ground station; its failure ends the script.
 ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1 || die "backwashctl $1 failed: $(tail -n 1 "$log")"; }
+
+# Enables control; a daemon that has just started may not have heard its autopilot yet.
+enable() {
+  for _ in $(seq 20); do
+    "$bin/backwashctl" --domain "$domain" enable --wait >>"$log" 2>&1 && return
+    tail -n 1 "$log" | grep -q 'refused: no ' || break
+    sleep 0.25
+  done
+  die "enabling failed: $(tail -n 1 "$log")"
+}

@@ -15,7 +15,7 @@ options=(--log "$work/truth.csv" --wire "$work/wire.csv")
 [[ $fault == heartbeat ]] && options+=(--stop-heartbeat 6.5)
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in "${options[@]}"
 start_daemon builtin:quad-5in "$work/flight.bwlog"
-ctl enable --wait
+enable
 ctl takeoff --height 1.2 --wait
 ctl goto 2,0,1.2
 if [[ $fault == kill ]]; then
