@@ -125,8 +125,8 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
   page += std::string(kStyle) +
           "</style>\n</head>\n<body>\n<main>\n<h1>One flight, and the sets it was planned with</h1>\n";
   page += "<p class=\"context\">Map " + escaped(context.map) + ", vehicle " + escaped(context.vehicle) + ", model " +
-          escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) + "; seed " +
-          std::to_string(context.seed);
+          escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) +
+          (context.seed ? "; seed " + std::to_string(*context.seed) : "; recorded");
   if (context.sigma_scale != 1) page += "; judged with sets of \u03a3 \u00d7 " + number(context.sigma_scale, 3, "");
   page += "; backwash " + escaped(context.version) + "</p>\n" + verdict(summary);
   for (const auto& section : sections) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <optional>
+
 #include "core/study/figures.hpp"
 
 namespace backwash::study {
@@ -10,7 +13,7 @@ struct ReportContext {
   std::string map, model, vehicle;  ///< as given on the command line
   std::string version;
   Vec3 start_W, goal_W;  ///< m
-  std::uint64_t seed;
+  std::optional<std::uint64_t> seed;  ///< of a simulated flight; a recorded one has none
   double sigma_scale;
 };
 

@@ -39,7 +39,7 @@ Json to_json(const sim::Flight& flight, const sim::FlightSummary& s, const study
           {"map", context.map},
           {"start", services::to_json(context.start_W)},
           {"goal", services::to_json(context.goal_W)},
-          {"seed", context.seed},
+          {"seed", context.seed ? Json(*context.seed) : Json()},
           {"sigma_scale", context.sigma_scale},
           {"length_m", s.length_m},
           {"time_s", s.time_s},
@@ -57,8 +57,9 @@ Json to_json(const sim::Flight& flight, const sim::FlightSummary& s, const study
 
 void print_text(const sim::Flight& flight, const sim::FlightSummary& s, const study::ReportContext& context) {
   const auto& m = flight.plan.metrics;
-  std::printf("flight               %s, %s to %s, seed %llu\n", context.map.c_str(), to_text(context.start_W).c_str(),
-              to_text(context.goal_W).c_str(), static_cast<unsigned long long>(context.seed));
+  std::printf("flight               %s, %s to %s, %s\n", context.map.c_str(), to_text(context.start_W).c_str(),
+              to_text(context.goal_W).c_str(),
+              context.seed ? ("seed " + std::to_string(*context.seed)).c_str() : "recorded");
   std::printf("goal                 %s, %.3f m off at the end\n", s.goal_reached ? "reached" : "MISSED",
               s.goal_error_m);
   std::printf("path, time           %.2f m, %.2f s\n", s.length_m, s.time_s);

@@ -32,7 +32,7 @@ int run(const Options& options) {
                                        run_parallel);
   const auto flight = take(study::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
-  const study::ReportContext context{options.log, options.model, options.vehicle, kVersion, start, goal, 0, 1};
+  const study::ReportContext context{options.log, options.model, options.vehicle, kVersion, start, goal, {}, 1};
   return conclude({flight, *world, context, sim::summarise(flight, *world, goal)}, options.out, options.json,
                   options.force);
 }
