@@ -10,23 +10,23 @@ namespace backwash::config {
 
 /// The daemon's one configuration file (an example with comments: files/backwashd.daemon.toml).
 struct Daemon {
-  std::string vehicle, model;      ///< files, or builtin:NAME
+  std::string vehicle, model;  ///< files, or builtin:NAME
   struct {
     int domain = 0;
-    std::string interface;         ///< network interface by name
-    std::string name_space;        ///< topics are rt/NAMESPACE/…: several vehicles share a domain
-    std::string odometry_topic;    ///< whole name on the wire, for any VIO
+    std::string interface;       ///< network interface by name
+    std::string name_space;      ///< topics are rt/NAMESPACE/…: several vehicles share a domain
+    std::string odometry_topic;  ///< whole name on the wire, for any VIO
   } dds;
   struct {
-    std::string device;            ///< serial port or pty
+    std::string device;  ///< serial port or pty
     int baud = 0;
-    int system = 1;                ///< MAVLink system id of the vehicle
+    int system = 1;  ///< MAVLink system id of the vehicle
   } link;
   struct {
-    int priority = 0;              ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
+    int priority = 0;  ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
   } control;
   struct {
-    std::string file;              ///< raw log, made anew at each start
+    std::string file;  ///< raw log, made anew at each start
   } log;
 };
 

@@ -103,7 +103,7 @@ struct TakeOff {
   plan::Column column;
   Setpoint ground;  ///< at rest on the floor
   std::vector<Setpoint> commands;
-  std::size_t risen;  ///< commands before the hover
+  std::size_t risen;   ///< commands before the hover
   double clearance_m;  ///< of the tube from exactly the ground point
 };
 /// Refused where there is no known floor, or where the tube of a vehicle that knows its position exactly is not clear:

@@ -23,8 +23,8 @@ tl::expected<std::vector<RawRecord>, LogError> read_raw_log(const std::string& p
   while (in.read(reinterpret_cast<char*>(&header), sizeof header)) {
     const auto kind = static_cast<std::uint32_t>(header.kind);
     if (kind < 1 || kind > 9 || header.size > kLargest)
-      return tl::unexpected(LogError{LogError::Kind::bad_data, path + ": byte " + std::to_string(offset) +
-                                                                   ": is not the head of a record"});
+      return tl::unexpected(LogError{LogError::Kind::bad_data,
+                                     path + ": byte " + std::to_string(offset) + ": is not the head of a record"});
     if (header.size > file_size - offset - sizeof header) break;  // cut short by a crash
     RawRecord record{header, std::vector<std::uint8_t>(header.size)};
     if (!in.read(reinterpret_cast<char*>(record.bytes.data()), header.size)) break;

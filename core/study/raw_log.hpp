@@ -25,13 +25,13 @@ enum class RecordKind : std::uint32_t {
   frame_in = 6,       ///< one MAVLink frame received
   frame_out = 7,      ///< one MAVLink frame handed to the port
   tick = 8,           ///< TickRecord
-  segment = 9,        ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
+  segment = 9,  ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
 };
 
 struct RecordHeader {
-  std::int64_t t_ns;    ///< CLOCK_MONOTONIC when the daemon saw it
+  std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
   RecordKind kind;
-  std::uint32_t size;   ///< bytes that follow
+  std::uint32_t size;  ///< bytes that follow
 };
 static_assert(sizeof(RecordHeader) == 16);
 
@@ -42,8 +42,8 @@ struct OdometryRecord {
 };
 
 struct MapRecord {
-  double resolution;      ///< m
-  std::uint32_t binary;   ///< octomap_msgs/Octomap.binary
+  double resolution;     ///< m
+  std::uint32_t binary;  ///< octomap_msgs/Octomap.binary
   std::uint32_t accepted;
 };
 
@@ -56,16 +56,16 @@ struct SegmentRecord {
 /// One control tick.
 struct TickRecord {
   std::uint64_t tick;
-  std::uint64_t segment, index;     ///< accepted segment and the command of it that this tick sent; 0 before the first
-  std::uint32_t mode, reason;       ///< track::Mode, track::Reason
-  std::uint32_t sent;               ///< bit 0: set-point, bit 1: heartbeat, bit 2: odometry forwarded
-  std::uint32_t judged, inside;     ///< whether the error was judged this tick, and the verdict
+  std::uint64_t segment, index;  ///< accepted segment and the command of it that this tick sent; 0 before the first
+  std::uint32_t mode, reason;    ///< track::Mode, track::Reason
+  std::uint32_t sent;            ///< bit 0: set-point, bit 1: heartbeat, bit 2: odometry forwarded
+  std::uint32_t judged, inside;  ///< whether the error was judged this tick, and the verdict
   std::uint32_t missed_periods;
-  float compute_us, lateness_us;    ///< of the tick before this one
-  float odometry_to_wire_us;        ///< from the reception of a sample to the set-point that first used it; < 0: none new
+  float compute_us, lateness_us;  ///< of the tick before this one
+  float odometry_to_wire_us;      ///< from the reception of a sample to the set-point that first used it; < 0: none new
   float frame_residual_m, frame_residual_rad;
-  std::uint32_t page_faults;        ///< of the control thread since start
-  double p[3], v[3];                ///< newest odometry, map frame
+  std::uint32_t page_faults;                     ///< of the control thread since start
+  double p[3], v[3];                             ///< newest odometry, map frame
   double cmd_p[3], cmd_v[3], cmd_a[3], cmd_yaw;  ///< command in the map frame
   double center[3], half_widths[kDirections];    ///< set predicted for this tick, m
 };

@@ -15,8 +15,8 @@ tl::expected<map::OccupancyGrid, LogError> recorded_map(std::span<const RawRecor
 
 /// A flight of the daemon (take-off, then one route), put together from its raw log and the bench's log of the truth
 /// (columns of backwash-bench --log; same monotonic clock). The tubes are propagated again from the logged states and
-/// commands; what the daemon logged of them at each tick must agree, and the error against them is judged again at every
-/// tick of a segment. Errors: bad_data naming what is missing or disagrees.
+/// commands; what the daemon logged of them at each tick must agree, and the error against them is judged again at
+/// every tick of a segment. Errors: bad_data naming what is missing or disagrees.
 tl::expected<sim::Flight, LogError> recorded_flight(std::span<const RawRecord> log, const FlightLog& truth,
                                                     const plan::World& world);
 

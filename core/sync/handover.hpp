@@ -8,9 +8,9 @@
 
 namespace backwash::sync {
 
-/// Newest immutable object from one writer to one real-time reader, for objects that own memory. The writer allocates and
-/// frees; the reader only moves pointers: what it has finished with goes back through a ring and is freed by the writer.
-/// Exactly one thread may write and exactly one may read.
+/// Newest immutable object from one writer to one real-time reader, for objects that own memory. The writer allocates
+/// and frees; the reader only moves pointers: what it has finished with goes back through a ring and is freed by the
+/// writer. Exactly one thread may write and exactly one may read.
 template <typename T>
 class Handover {
  public:
@@ -33,14 +33,14 @@ class Handover {
     while (const auto returned = returned_.pop()) delete *returned;
   }
 
-  /// The newest object not yet taken, or null (also while there is no room to give one back). The reader keeps it, however
-  /// many are offered later, and gives it back exactly once. Real-time: wait-free, no allocation.
+  /// The newest object not yet taken, or null (also while there is no room to give one back). The reader keeps it,
+  /// however many are offered later, and gives it back exactly once. Real-time: wait-free, no allocation.
   const T* take() noexcept {
     if (!offered_.load(std::memory_order_relaxed) || returned_.full()) return nullptr;
     return offered_.exchange(nullptr, std::memory_order_acq_rel);
   }
-  /// Hands an object back to be freed. Null is allowed. Precondition: at most one object is held beyond the one taken last,
-  /// as when a new one takes an old one's place. Real-time: wait-free, no allocation.
+  /// Hands an object back to be freed. Null is allowed. Precondition: at most one object is held beyond the one taken
+  /// last, as when a new one takes an old one's place. Real-time: wait-free, no allocation.
   void give_back(const T* object) noexcept {
     if (object) returned_.push(object);
   }

@@ -12,13 +12,13 @@ struct YawPose {
 };
 
 /// Estimates local ← map, p_local = R_z(yaw) p_map + t, from the vehicle's pose in both frames at the same moments
-/// (interfaces.md, "Frames between map, odometry and controller"). While learning it follows the newest samples; frozen,
-/// it only watches how well they still agree.
+/// (interfaces.md, "Frames between map, odometry and controller"). While learning it follows the newest samples;
+/// frozen, it only watches how well they still agree.
 class FrameAlignment {
  public:
-  static constexpr double kMaxPosition = 0.05;                 ///< m: aligned below this residual
+  static constexpr double kMaxPosition = 0.05;                     ///< m: aligned below this residual
   static constexpr double kMaxYaw = 3.0 * 3.14159265358979 / 180;  ///< rad
-  static constexpr int kMinSamples = 25;                       ///< half a second at 50 Hz
+  static constexpr int kMinSamples = 25;                           ///< half a second at 50 Hz
 
   /// One pair of poses, 20 ms after the last. Real-time: wait-free, no allocation.
   void update(const YawPose& in_map, const YawPose& in_local, bool learn) noexcept;

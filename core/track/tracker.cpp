@@ -38,7 +38,8 @@ void Tracker::hold_at(const Setpoint& setpoint) noexcept {
 Inside Tracker::judge(const Vec3& measured_W) const noexcept {
   Inside result;
   if (!segment_) return result;
-  // Entry k is the set at the tick of command k. The last one is exact at its instant only: later its interval is meant.
+  // Entry k is the set at the tick of command k. The last one is exact at its instant only: later its interval is
+  // meant.
   const std::size_t last = segment_->tube.size() - 1;
   const reach::TubeStep& set = segment_->tube[std::min(next_, last)];
   result.judged = true;

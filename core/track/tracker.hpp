@@ -18,7 +18,7 @@ struct AcceptedSegment {
   std::uint64_t continues = 0;  ///< id of the segment it continues; 0: starts at its first command
   std::size_t branch = 0;       ///< first command that differs from the continued segment's
   std::vector<Setpoint> commands;
-  reach::ReachTube tube;        ///< commands.size() + 1 entries; past its end the last entry holds
+  reach::ReachTube tube;  ///< commands.size() + 1 entries; past its end the last entry holds
 };
 
 /// What one tick says about the measured position (model.md section 5.4).
@@ -34,11 +34,12 @@ struct Inside {
 /// accept if there is something new, judge the measurement taken now, then step.
 class Tracker {
  public:
-  /// `initial`: half axes of the first set (model.md section 5): how far the state may have moved since the tube's start.
+  /// `initial`: half axes of the first set (model.md section 5): how far the state may have moved since the tube's
+  /// start.
   Tracker(const Setpoint& hold, const Vehicle& vehicle);
   /// Takes a segment over, or refuses it: a new one must start where the vehicle is now (its state within the ellipsoid
-  /// Q_0 around the tube's start), a continued one must be of the current segment and not yet past its branch. The segment
-  /// must outlive its use. Real-time: wait-free, no allocation.
+  /// Q_0 around the tube's start), a continued one must be of the current segment and not yet past its branch. The
+  /// segment must outlive its use. Real-time: wait-free, no allocation.
   bool accept(const AcceptedSegment& segment, const State& measured) noexcept;
   /// Holds this command's position from now on; the set of the last segment is no longer judged. Real-time: wait-free,
   /// no allocation.

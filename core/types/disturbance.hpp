@@ -24,7 +24,8 @@ struct Variance {
     return xx * n.x() * n.x() + yy * n.y() * n.y() + zz * n.z() * n.z() +
            2 * (xy * n.x() * n.y() + xz * n.x() * n.z() + yz * n.y() * n.z());
   }
-  /// s_n m mᵀ + s_t t tᵀ + s_z z zᵀ with t = z × m, for a horizontal unit normal m (model.md section 2, wall and corner).
+  /// s_n m mᵀ + s_t t tᵀ + s_z z zᵀ with t = z × m, for a horizontal unit normal m (model.md section 2, wall and
+  /// corner).
   static Variance about_normal(const Vec3& m, double s_n, double s_t, double s_z) noexcept {
     const double x = m.x(), y = m.y();
     return {s_n * x * x + s_t * y * y, (s_n - s_t) * x * y, 0, s_n * y * y + s_t * x * x, 0, s_z};

@@ -28,11 +28,16 @@ using PerDirection = std::array<double, kDirections>;
 inline Vec3 unit(Direction d) noexcept {
   constexpr double s = 0.70710678118654752440;
   switch (d) {
-    case kX: return {1, 0, 0};
-    case kY: return {0, 1, 0};
-    case kZ: return {0, 0, 1};
-    case kXyPlus: return {s, s, 0};
-    default: return {s, -s, 0};
+    case kX:
+      return {1, 0, 0};
+    case kY:
+      return {0, 1, 0};
+    case kZ:
+      return {0, 0, 1};
+    case kXyPlus:
+      return {s, s, 0};
+    default:
+      return {s, -s, 0};
   }
 }
 

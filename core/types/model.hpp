@@ -16,20 +16,28 @@ struct Model {
     double l_max = 2.0;            ///< l̄_g, m
     double l_footprint_max = 4.0;  ///< l̄_u, m
     double r0 = 0.18;              ///< diagonal radius of the vehicle, m; a vehicle file's value takes its place
-    struct { double horizontal = 0.010, vertical = 0.020; } lambda;  ///< λ_g, (m/s²)²
-    struct { double horizontal = 0.05, vertical = 0.12; } k1;        ///< k_g1, (m/s²)²/m²
-    double k2 = 3.0;                                                 ///< k_g2, 1/m²
+    struct {
+      double horizontal = 0.010, vertical = 0.020;
+    } lambda;  ///< λ_g, (m/s²)²
+    struct {
+      double horizontal = 0.05, vertical = 0.12;
+    } k1;             ///< k_g1, (m/s²)²/m²
+    double k2 = 3.0;  ///< k_g2, 1/m²
   } ground;
   struct {
     double phi_max = 1.2;  ///< φ̄_c, rad
     double l_max = 1.5;    ///< l̄_c, m
-    struct { double normal = 0.02, tangential = 0.012, vertical = 0.02; } lambda;  ///< λ_c
+    struct {
+      double normal = 0.02, tangential = 0.012, vertical = 0.02;
+    } lambda;  ///< λ_c
   } corner;
   struct {
     double theta_min = 0.9;  ///< θ_w, rad
     double l_max = 1.5;      ///< l̄_w, m
-    struct { double normal = 0.25, tangential = 0.10, vertical = 0.12; } k1;  ///< k_w1, (m/s²)²/m²
-    double k2 = 2.5;                                                          ///< k_w2, 1/m²
+    struct {
+      double normal = 0.25, tangential = 0.10, vertical = 0.12;
+    } k1;             ///< k_w1, (m/s²)²/m²
+    double k2 = 2.5;  ///< k_w2, 1/m²
   } wall;
   BoundModel bound;
 };

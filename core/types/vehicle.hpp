@@ -18,11 +18,11 @@ struct Vehicle {
     double mass = 0;             ///< kg
   } body;
   struct {
-    HorizontalVertical kp;        ///< position gain, 1/s²
-    HorizontalVertical kd;        ///< velocity gain, 1/s
-    double latency = 0;           ///< set-point to controller, s
-    double feedback_delay = 0;    ///< measurement to action, s
-    double attitude_lag = 0;      ///< first-order lag of the acceleration, s
+    HorizontalVertical kp;      ///< position gain, 1/s²
+    HorizontalVertical kd;      ///< velocity gain, 1/s
+    double latency = 0;         ///< set-point to controller, s
+    double feedback_delay = 0;  ///< measurement to action, s
+    double attitude_lag = 0;    ///< first-order lag of the acceleration, s
   } controller;
   struct {
     double position = 0;  ///< VIO and map error, m

@@ -29,7 +29,7 @@ class Station {
   explicit Station(const Options& options);
 
   struct Result {
-    int result;          ///< ACK_… code
+    int result;  ///< ACK_… code
     std::string reason;
   };
   /// Sends a command and repeats it, with the same sequence number, until it is acknowledged; nothing if it never is.

@@ -91,16 +91,23 @@ Verbs::Verbs(CLI::App& app) {
     return sub;
   };
   waiting(verb("enable", "take control: stream set-points until the autopilot follows", "enable --wait"), 10)
-      ->callback([this] { chosen_ = [this] { return command("enable", backwash_msgs_msg_dds__COMMAND_ENABLE, Vec3::Zero(), tracking, patience_s_); }; });
+      ->callback([this] {
+        chosen_ = [this] {
+          return command("enable", backwash_msgs_msg_dds__COMMAND_ENABLE, Vec3::Zero(), tracking, patience_s_);
+        };
+      });
   verb("disable", "give control back, on the ground", "disable")->callback([this] {
     chosen_ = [this] { return command("disable", backwash_msgs_msg_dds__COMMAND_DISABLE, Vec3::Zero(), {}, 0); };
   });
-  auto* takeoff = waiting(verb("takeoff", "rise vertically to the lowest clear hover height, or higher", "takeoff --height 1.2 --wait"), 60);
+  auto* takeoff = waiting(
+      verb("takeoff", "rise vertically to the lowest clear hover height, or higher", "takeoff --height 1.2 --wait"),
+      60);
   takeoff->add_option("--height", height_, "z in the map, m; 0: the lowest clear height")->capture_default_str();
   takeoff->callback([this] {
     chosen_ = [this] {
-      return command("takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF, {0, 0, height_},
-                     [](const StatusCopy& s) { return tracking(s) && !s.numbers.landed && !s.numbers.moving; }, patience_s_);
+      return command(
+          "takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF, {0, 0, height_},
+          [](const StatusCopy& s) { return tracking(s) && !s.numbers.landed && !s.numbers.moving; }, patience_s_);
     };
   });
   auto* go = waiting(verb("goto", "plan to a point of the map and fly there", "goto 7.5,2.0,1.2 --wait"), 300);
@@ -108,24 +115,27 @@ Verbs::Verbs(CLI::App& app) {
   go->callback([this] {
     chosen_ = [this] {
       const Vec3 goal(goal_[0], goal_[1], goal_[2]);
-      return command("goto", backwash_msgs_msg_dds__COMMAND_GOTO, goal,
-                     [goal](const StatusCopy& s) {
-                       const auto& p = s.numbers.setpoint;
-                       return tracking(s) && !s.numbers.moving && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
-                     },
-                     patience_s_);
+      return command(
+          "goto", backwash_msgs_msg_dds__COMMAND_GOTO, goal,
+          [goal](const StatusCopy& s) {
+            const auto& p = s.numbers.setpoint;
+            return tracking(s) && !s.numbers.moving && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
+          },
+          patience_s_);
     };
   });
   waiting(verb("hold", "slow down on the path and hover", "hold --wait"), 20)->callback([this] {
     chosen_ = [this] {
-      return command("hold", backwash_msgs_msg_dds__COMMAND_HOLD, Vec3::Zero(),
-                     [](const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }, patience_s_);
+      return command(
+          "hold", backwash_msgs_msg_dds__COMMAND_HOLD, Vec3::Zero(),
+          [](const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }, patience_s_);
     };
   });
   waiting(verb("land", "land below, with the autopilot's own landing", "land --wait"), 60)->callback([this] {
     chosen_ = [this] {
-      return command("land", backwash_msgs_msg_dds__COMMAND_LAND, Vec3::Zero(),
-                     [](const StatusCopy& s) { return s.state == "passive" && !s.numbers.armed; }, patience_s_);
+      return command(
+          "land", backwash_msgs_msg_dds__COMMAND_LAND, Vec3::Zero(),
+          [](const StatusCopy& s) { return s.state == "passive" && !s.numbers.armed; }, patience_s_);
     };
   });
   verb("release", "end this station's session", "release")->callback([this] {
@@ -134,7 +144,9 @@ Verbs::Verbs(CLI::App& app) {
   auto* now = verb("status", "print the daemon's status once", "status --json");
   now->add_flag("--json", json_, "one JSON object");
   now->callback([this] { chosen_ = [this] { return status(); }; });
-  verb("watch", "print the status until interrupted", "watch")->callback([this] { chosen_ = [this] { return watch(); }; });
+  verb("watch", "print the status until interrupted", "watch")->callback([this] {
+    chosen_ = [this] { return watch(); };
+  });
 }
 
 int Verbs::run() { return chosen_(); }
@@ -169,8 +181,8 @@ int Verbs::status() {
   Station station(options_);
   const auto now = station.status(options_.timeout_s);
   if (!now) {
-    std::cerr << "backwashctl status: no daemon in domain " << options_.domain << " on interface " << options_.interface
-              << ", namespace " << options_.name_space << "; is backwashd running?\n";
+    std::cerr << "backwashctl status: no daemon in domain " << options_.domain << " on interface "
+              << options_.interface << ", namespace " << options_.name_space << "; is backwashd running?\n";
     return kUnavailable;
   }
   if (json_)

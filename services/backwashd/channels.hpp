@@ -61,12 +61,12 @@ struct ControlView {
   track::Reason reason = track::Reason::started;
   bool armed = false, offboard = false, landed = true, aligned = false;
   double odometry_age = 1e9, heartbeat_age = 1e9;  ///< s
-  State state;                      ///< newest good odometry
-  Setpoint command;                 ///< sent or held this tick, map frame
-  std::uint64_t segment = 0;        ///< accepted segment, 0 before the first
-  std::uint64_t index = 0;          ///< of its next command
-  bool finished = true;             ///< the segment's commands are all sent
-  std::uint64_t refused_segment = 0;  ///< the last one refused
+  State state;                                     ///< newest good odometry
+  Setpoint command;                                ///< sent or held this tick, map frame
+  std::uint64_t segment = 0;                       ///< accepted segment, 0 before the first
+  std::uint64_t index = 0;                         ///< of its next command
+  bool finished = true;                            ///< the segment's commands are all sent
+  std::uint64_t refused_segment = 0;               ///< the last one refused
   std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
   double residual_m = 0, residual_rad = 0;
@@ -102,18 +102,18 @@ struct PlanOutcome {
 };
 
 struct Channels {
-  sync::LatestValue<OdometrySample> odometry;                  // DDS reader → control
-  sync::RecordRing<CommandMessage, 64> commands;               // DDS reader → mission
-  sync::Handover<MapMessage> maps;                             // DDS reader → map worker
-  sync::Handover<std::shared_ptr<const plan::World>> worlds;   // map worker → mission
-  sync::RecordRing<track::Request, 16> requests;               // mission → control
-  std::atomic<bool> arm{false};                                // mission → control: arm once
-  sync::Handover<PlanJob> jobs;                                // mission → planner
-  sync::RecordRing<PlanOutcome, 16> outcomes;                  // planner → mission
-  sync::Handover<track::AcceptedSegment> segments;             // planner → control
+  sync::LatestValue<OdometrySample> odometry;                              // DDS reader → control
+  sync::RecordRing<CommandMessage, 64> commands;                           // DDS reader → mission
+  sync::Handover<MapMessage> maps;                                         // DDS reader → map worker
+  sync::Handover<std::shared_ptr<const plan::World>> worlds;               // map worker → mission
+  sync::RecordRing<track::Request, 16> requests;                           // mission → control
+  std::atomic<bool> arm{false};                                            // mission → control: arm once
+  sync::Handover<PlanJob> jobs;                                            // mission → planner
+  sync::RecordRing<PlanOutcome, 16> outcomes;                              // planner → mission
+  sync::Handover<track::AcceptedSegment> segments;                         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
-  sync::RecordRing<ControlRecord, 2048> control_log;           // control → recorder
-  sync::LatestValue<std::array<char, 192>> task;               // mission → status: of the last command
+  sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
+  sync::LatestValue<std::array<char, 192>> task;                           // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<bool> stop{false};
 };

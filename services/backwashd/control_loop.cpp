@@ -15,9 +15,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t kTicksPerSecond = 50;
 constexpr std::uint32_t kLocalPositionNed = 32, kAttitudeQuaternion = 31, kExtendedSysState = 245;
 
-firmware_bridge::Time time_of(std::int64_t ns) noexcept {
-  return firmware_bridge::Time(std::chrono::nanoseconds(ns));
-}
+firmware_bridge::Time time_of(std::int64_t ns) noexcept { return firmware_bridge::Time(std::chrono::nanoseconds(ns)); }
 
 double yaw_of(const Eigen::Quaterniond& q) noexcept {
   return std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()));
@@ -151,7 +149,8 @@ void ControlLoop::send(const track::SupervisorOutput& out, const Setpoint& comma
   }
   if (out.request_offboard) link_.send_follow_setpoints();
   if (out.request_land) link_.send_land();
-  if (out.mode == track::Mode::tracking && channels_.arm.exchange(false, std::memory_order_relaxed)) link_.send_arm(true);
+  if (out.mode == track::Mode::tracking && channels_.arm.exchange(false, std::memory_order_relaxed))
+    link_.send_arm(true);
   // What the tick needs is asked for again every 2 s: an autopilot may have restarted.
   if (out.send_heartbeat && view_.ticks % (2 * kTicksPerSecond) == 1) {
     link_.send_message_interval(kLocalPositionNed, 50);

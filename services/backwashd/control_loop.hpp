@@ -10,13 +10,14 @@
 
 namespace backwash::daemon {
 
-/// The 50 Hz tick: newest odometry and telemetry in, supervisor, set-point and heartbeat out. The one owner of the link.
+/// The 50 Hz tick: newest odometry and telemetry in, supervisor, set-point and heartbeat out. The one owner of the
+/// link.
 class ControlLoop {
  public:
   ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle);
 
-  /// One tick at `now_ns` (CLOCK_MONOTONIC), `missed` whole periods after it was due, `lateness_us` after its own period
-  /// began. Real-time: wait-free, no allocation; system calls: non-blocking reads and writes of the port only.
+  /// One tick at `now_ns` (CLOCK_MONOTONIC), `missed` whole periods after it was due, `lateness_us` after its own
+  /// period began. Real-time: wait-free, no allocation; system calls: non-blocking reads and writes of the port only.
   void tick(std::int64_t now_ns, int missed, double lateness_us) noexcept;
   /// How long the last tick took, µs; recorded by the next one.
   void took(double compute_us) noexcept { compute_us_ = compute_us; }
@@ -48,8 +49,8 @@ class ControlLoop {
   double compute_us_ = 0;
 };
 
-/// Thread body: ticks every 20 ms on the monotonic clock. Periods that an overrun has passed are skipped whole and counted;
-/// the phase is kept. SCHED_FIFO with `priority` (0: ordinary) where the rights allow it.
+/// Thread body: ticks every 20 ms on the monotonic clock. Periods that an overrun has passed are skipped whole and
+/// counted; the phase is kept. SCHED_FIFO with `priority` (0: ordinary) where the rights allow it.
 void run_control(Channels& channels, ControlLoop& loop);
 
 /// Asks for SCHED_FIFO and locked memory for the calling thread; says in one warning what was not allowed.

@@ -45,8 +45,8 @@ int run(const Settings& settings) {
   const sigset_t signals = block_signals();
   auto channels = std::make_unique<Channels>();
   Recorder recorder(settings.daemon.log.file);
-  auto port = firmware_bridge::SerialPort::open(settings.daemon.link.device,
-                                                static_cast<unsigned>(settings.daemon.link.baud));
+  auto port =
+      firmware_bridge::SerialPort::open(settings.daemon.link.device, static_cast<unsigned>(settings.daemon.link.baud));
   if (!port) {
     spdlog::error("{}: {}", settings.daemon.link.device, describe(port.error()));
     return kInputOutput;
@@ -62,12 +62,10 @@ int run(const Settings& settings) {
     std::vector<std::jthread> threads;
     threads.emplace_back([&] { recorder.run(*channels); });
     threads.emplace_back([&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle); });
-    threads.emplace_back([&] {
-      run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); });
-    });
-    threads.emplace_back([&] {
-      run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); });
-    });
+    threads.emplace_back(
+        [&] { run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); }); });
+    threads.emplace_back(
+        [&] { run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); }); });
     threads.emplace_back([&] { front.run_status(settings.vehicle); });
     threads.emplace_back([&] {
       make_real_time(settings.daemon.control.priority);

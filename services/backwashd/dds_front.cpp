@@ -130,11 +130,13 @@ void DdsFront::send(const track::AcceptedSegment& segment) {
     poses.push_back({header, {point(c.p_W), {0, 0, std::sin(c.yaw / 2), std::cos(c.yaw / 2)}}});
   dds::Tube tube{};
   tube.header = header;
-  tube.steps = {static_cast<std::uint32_t>(steps.size()), static_cast<std::uint32_t>(steps.size()), steps.data(), false};
+  tube.steps = {static_cast<std::uint32_t>(steps.size()), static_cast<std::uint32_t>(steps.size()), steps.data(),
+                false};
   tube_.write(tube);
   dds::Path path{};
   path.header = header;
-  path.poses = {static_cast<std::uint32_t>(poses.size()), static_cast<std::uint32_t>(poses.size()), poses.data(), false};
+  path.poses = {static_cast<std::uint32_t>(poses.size()), static_cast<std::uint32_t>(poses.size()), poses.data(),
+                false};
   trajectory_.write(path);
 }
 

@@ -20,8 +20,9 @@ int failed(int code, const std::string& message) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"backwashd: the onboard daemon. Odometry, maps and commands over DDS, set-points over MAVLink.\n"
-               "Example: backwashd --config /etc/backwash/backwashd.toml"};
+  CLI::App app{
+      "backwashd: the onboard daemon. Odometry, maps and commands over DDS, set-points over MAVLink.\n"
+      "Example: backwashd --config /etc/backwash/backwashd.toml"};
   std::string path;
   bool check = false;
   app.add_option("--config", path, "configuration file, or builtin:backwashd")->required();

@@ -75,13 +75,16 @@ Answer Mission::handle(const CommandMessage& command, double now_s) {
 Answer Mission::decide(const CommandMessage& command) {
   const bool commanding = view_.mode == track::Mode::tracking || view_.mode == track::Mode::hold;
   switch (command.verb) {
-    case backwash_msgs_msg_dds__COMMAND_ENABLE: return enable();
+    case backwash_msgs_msg_dds__COMMAND_ENABLE:
+      return enable();
     case backwash_msgs_msg_dds__COMMAND_DISABLE:
       if (view_.armed) return refused("the vehicle is armed: land first");
       channels_.requests.push(track::Request::disable);
       return accepted("disabling");
-    case backwash_msgs_msg_dds__COMMAND_TAKEOFF: return take_off(command);
-    case backwash_msgs_msg_dds__COMMAND_GOTO: return go_to(command);
+    case backwash_msgs_msg_dds__COMMAND_TAKEOFF:
+      return take_off(command);
+    case backwash_msgs_msg_dds__COMMAND_GOTO:
+      return go_to(command);
     case backwash_msgs_msg_dds__COMMAND_HOLD:
       if (!commanding) return refused("not enabled");
       return start(PlanJob::Kind::brake, command);
@@ -89,8 +92,10 @@ Answer Mission::decide(const CommandMessage& command) {
       if (!commanding) return refused("not enabled");
       channels_.requests.push(track::Request::land);
       return accepted("landing");
-    case backwash_msgs_msg_dds__COMMAND_RELEASE: return accepted("session released");
-    default: return {kInvalid, "unknown command " + std::to_string(command.verb)};
+    case backwash_msgs_msg_dds__COMMAND_RELEASE:
+      return accepted("session released");
+    default:
+      return {kInvalid, "unknown command " + std::to_string(command.verb)};
   }
 }
 
@@ -124,8 +129,7 @@ Answer Mission::start(PlanJob::Kind kind, const CommandMessage& command) {
   if (!world_) return refused("no map was received yet");
   if (job_ && kind != PlanJob::Kind::brake) return refused("still planning the last command");
   job_ = ++last_job_;
-  channels_.jobs.offer(
-      std::make_unique<const PlanJob>(PlanJob{kind, *job_, command.position, command.yaw, world_}));
+  channels_.jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, *job_, command.position, command.yaw, world_}));
   report("planning");
   return accepted("planning");
 }

@@ -16,8 +16,8 @@ struct Answer {
   std::string reason;
 };
 
-/// Decides on the ground stations' commands: who may command (one session lease at a time), what is possible now, and what
-/// the control and planner threads are asked for.
+/// Decides on the ground stations' commands: who may command (one session lease at a time), what is possible now, and
+/// what the control and planner threads are asked for.
 class Mission {
  public:
   static constexpr double kLease = 10.0;  ///< s after a station's last command until another may take over
@@ -26,8 +26,8 @@ class Mission {
 
   /// Takes what the other threads have said since the last call.
   void refresh();
-  /// Answers one command and starts what it asks for. A repeated sequence number of a session is answered again, not done
-  /// again (faults.md row 28 and the session rules of the IDL).
+  /// Answers one command and starts what it asks for. A repeated sequence number of a session is answered again, not
+  /// done again (faults.md row 28 and the session rules of the IDL).
   Answer handle(const CommandMessage& command, double now_s);
   /// Holder of the lease, empty if none.
   std::string station(double now_s) const;

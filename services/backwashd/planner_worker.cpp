@@ -18,9 +18,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kAttempts = 25;            // offers of one segment, each from a fresh state
-constexpr int kBranchAfter = 15;         // commands (0.3 s) that a continued segment leaves untouched
-constexpr double kHoldAfter = 2.0;       // s of hover at the end, so that the last set is the hover set's
+constexpr int kAttempts = 25;       // offers of one segment, each from a fresh state
+constexpr int kPlans = 5;           // of one route, while the state moves on
+constexpr int kBranchAfter = 15;    // commands (0.3 s) that a continued segment leaves untouched
+constexpr double kHoldAfter = 2.0;  // s of hover at the end, so that the last set is the hover set's
 
 /// The segment that flies now, with what is needed to continue it.
 struct Flying {
@@ -38,9 +39,12 @@ class Planner {
   /// Why the job could not be done; nothing when it is flying.
   std::optional<std::string> perform(const PlanJob& job) {
     switch (job.kind) {
-      case PlanJob::Kind::takeoff: return take_off(job);
-      case PlanJob::Kind::go_to: return go_to(job);
-      default: return brake(job);
+      case PlanJob::Kind::takeoff:
+        return take_off(job);
+      case PlanJob::Kind::go_to:
+        return go_to(job);
+      default:
+        return brake(job);
     }
   }
   void refresh() {
@@ -60,23 +64,30 @@ class Planner {
       return "hovering at the height asked for is not safe";
     const auto& limits = job.world->reach.vehicle.limits;
     const auto commands = plan::vertical_commands(here, target, limits.v_max, limits.a_max);
-    return fly(job, commands, {}, [&](const reach::ReachTube& tube) { return plan::takeoff_clearance(*job.world, tube, column->z_safe); });
+    return fly(job, commands, {},
+               [&](const reach::ReachTube& tube) { return plan::takeoff_clearance(*job.world, tube, column->z_safe); });
   }
 
+  /// Plans again from the newest state when the tube of the one planned from no longer holds.
   std::optional<std::string> go_to(const PlanJob& job) {
-    refresh();
     const auto& limits = job.world->reach.vehicle.limits;
     plan::PlanOptions options{};
     options.v_max = limits.v_max;
     options.a_max = limits.a_max;
-    const auto planned = plan::plan(*job.world, {view_.state, view_.command}, job.position, options);
-    spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
-                 plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
-                 planned.metrics.verify_ms, planned.metrics.min_clearance_m);
-    if (planned.status != plan::PlanStatus::ok)
-      return std::string(plan::to_string(planned.status)) + ": " + planned.message;
-    return fly(job, planned.commands, planned.metrics,
-               [&](const reach::ReachTube& tube) { return plan::tube_clearance(*job.world, tube); });
+    std::optional<std::string> why;
+    for (int attempt = 0; attempt < kPlans; ++attempt) {
+      refresh();
+      const auto planned = plan::plan(*job.world, {view_.state, view_.command}, job.position, options);
+      spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
+                   plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
+                   planned.metrics.verify_ms, planned.metrics.min_clearance_m);
+      if (planned.status != plan::PlanStatus::ok)
+        return std::string(plan::to_string(planned.status)) + ": " + planned.message;
+      why = fly(job, planned.commands, planned.metrics,
+                [&](const reach::ReachTube& tube) { return plan::tube_clearance(*job.world, tube); });
+      if (!why) return why;
+    }
+    return why;
   }
 
   /// The current segment, slowed to rest on its own path from a little ahead of now.
@@ -88,9 +99,11 @@ class Planner {
     if (commands.empty()) return std::nullopt;  // it ends by itself before that
     append_hold(commands);
     Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}},
-                flying_->start, flying_->previous, flying_->metrics};
-    next.segment.tube = reach::tube_over_field(job.world->reach, next.start, next.previous, next.segment.commands,
-                                               job.world->bounds);
+                flying_->start,
+                flying_->previous,
+                flying_->metrics};
+    next.segment.tube =
+        reach::tube_over_field(job.world->reach, next.start, next.previous, next.segment.commands, job.world->bounds);
     if (const double clearance = plan::tube_clearance(*job.world, next.segment.tube); !(clearance > 0))
       return "braking here is not clear: " + std::to_string(clearance) + " m";
     return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
@@ -102,8 +115,8 @@ class Planner {
     commands.insert(commands.end(), static_cast<std::size_t>(kHoldAfter / kControlPeriod), hold);
   }
 
-  /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may have
-  /// moved further than the first set allows.
+  /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may
+  /// have moved further than the first set allows.
   template <typename Clearance>
   std::optional<std::string> fly(const PlanJob& job, std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
                                  Clearance clearance_of) {

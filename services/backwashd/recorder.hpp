@@ -13,8 +13,8 @@
 
 namespace backwash::daemon {
 
-/// Writes the raw log from its own thread: the control thread's ring, and what the other threads append. A full disk or a
-/// vanished directory costs records, which are counted, and nothing else (faults.md row 35).
+/// Writes the raw log from its own thread: the control thread's ring, and what the other threads append. A full disk or
+/// a vanished directory costs records, which are counted, and nothing else (faults.md row 35).
 class Recorder {
  public:
   /// Makes the file anew. Throws std::runtime_error naming it if that fails: at start it is a configuration error.

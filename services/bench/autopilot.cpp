@@ -67,8 +67,7 @@ void Autopilot::on(const mavlink::Odometry& m, double) {
   const auto then = std::find_if(history_.begin(), history_.end(), [&](const auto& h) { return h.first >= stamp; });
   if (then == history_.end()) return;
   const Vec3 p = mavlink::swap_ned({m.x, m.y, m.z});
-  const Eigen::Quaterniond q = mavlink::swap_ned_frd(
-      Eigen::Quaterniond(m.q[0], m.q[1], m.q[2], m.q[3]));
+  const Eigen::Quaterniond q = mavlink::swap_ned_frd(Eigen::Quaterniond(m.q[0], m.q[1], m.q[2], m.q[3]));
   const Vec3 v = q * mavlink::swap_frd({m.vx, m.vy, m.vz});
   error_ = {p - then->second.p_W, v - then->second.v_W};
   local_position_ = true;

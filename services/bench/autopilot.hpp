@@ -18,13 +18,13 @@ namespace backwash::bench {
 
 /// Where the controller's own local frame lies: p_local = R_z(yaw) p_map + origin.
 struct LocalFrame {
-  double yaw = 0;                ///< rad
-  Vec3 origin = Vec3::Zero();    ///< m
+  double yaw = 0;              ///< rad
+  Vec3 origin = Vec3::Zero();  ///< m
 };
 
-/// An emulated PX4-like flight controller: MAVLink on one side, the simulated vehicle in the airflow truth on the other.
-/// It flies on the odometry it is sent (its own inertial sensors bridge the time since the sample's stamp), answers
-/// commands, follows offboard set-points only while they stream, and lands by itself when they stop for 0.5 s.
+/// An emulated PX4-like flight controller: MAVLink on one side, the simulated vehicle in the airflow truth on the
+/// other. It flies on the odometry it is sent (its own inertial sensors bridge the time since the sample's stamp),
+/// answers commands, follows offboard set-points only while they stream, and lands by itself when they stop for 0.5 s.
 class Autopilot {
  public:
   static constexpr double kOffboardTimeout = 0.5;  ///< s without a set-point until the failsafe lands

@@ -12,7 +12,7 @@ namespace backwash::bench {
 
 struct Options {
   std::string map, vehicle, link, log, wire;
-  Vec3 start = Vec3::Zero();         ///< above the place where the vehicle stands, m
+  Vec3 start = Vec3::Zero();  ///< above the place where the vehicle stands, m
   LocalFrame frame;
   std::uint64_t seed = 1;
   int domain = 0;

@@ -17,8 +17,9 @@ int failed(int code, const std::string& message) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"backwash-bench: emulated flight controller on a pty, emulated VIO and mapper on DDS, in real time.\n"
-               "Example: backwash-bench --map builtin:apartment --start 2,2,1.2 --link /tmp/autopilot"};
+  CLI::App app{
+      "backwash-bench: emulated flight controller on a pty, emulated VIO and mapper on DDS, in real time.\n"
+      "Example: backwash-bench --map builtin:apartment --start 2,2,1.2 --link /tmp/autopilot"};
   app.set_version_flag("--version", std::string("backwash-bench ") + backwash::kVersion);
   backwash::bench::Options o;
   std::vector<double> start, origin{12.0, -7.0, 0.3};
@@ -26,11 +27,16 @@ int main(int argc, char** argv) {
   o.vehicle = "builtin:quad-5in";
   app.add_option("--map", o.map, "OctoMap file or builtin:NAME")->required();
   app.add_option("--vehicle", o.vehicle, "vehicle file or builtin:NAME")->capture_default_str();
-  app.add_option("--start", start, "x,y,z above the place where the vehicle stands, m")->required()->delimiter(',')->expected(3);
+  app.add_option("--start", start, "x,y,z above the place where the vehicle stands, m")
+      ->required()
+      ->delimiter(',')
+      ->expected(3);
   app.add_option("--link", o.link, "symbolic link to make to the controller's serial port")->required();
   app.add_option("--seed", o.seed, "of the airflow and of the VIO's drift")->capture_default_str();
   app.add_option("--local-yaw", o.frame.yaw, "yaw of the controller's own frame, rad")->capture_default_str();
-  app.add_option("--local-origin", origin, "the map's origin in the controller's own frame, m")->delimiter(',')->expected(3);
+  app.add_option("--local-origin", origin, "the map's origin in the controller's own frame, m")
+      ->delimiter(',')
+      ->expected(3);
   app.add_option("--domain", o.domain, "DDS domain")->capture_default_str();
   app.add_option("--interface", o.interface, "network interface")->capture_default_str();
   app.add_option("--namespace", o.name_space, "the daemon's name space")->capture_default_str();
@@ -49,7 +55,8 @@ int main(int argc, char** argv) {
   o.start = {start[0], start[1], start[2]};
   o.frame.origin = {origin[0], origin[1], origin[2]};
   const auto grid = backwash::map::load_map(o.map);
-  if (!grid) return failed(grid.error().kind == backwash::map::MapError::Kind::not_found ? 66 : 65, grid.error().message);
+  if (!grid)
+    return failed(grid.error().kind == backwash::map::MapError::Kind::not_found ? 66 : 65, grid.error().message);
   const auto vehicle = backwash::config::load_vehicle(o.vehicle);
   if (!vehicle) return failed(78, vehicle.error().message);
   try {

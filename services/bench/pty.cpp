@@ -20,7 +20,8 @@ Pty::Pty(const std::string& link) : fd_(posix_openpt(O_RDWR | O_NOCTTY | O_NONBL
   // The other end stays open here too: then a companion that closes it does not look like a hang-up.
   other_ = open(name, O_RDWR | O_NOCTTY);
   termios raw{};
-  if (other_ < 0 || tcgetattr(other_, &raw) != 0) throw std::runtime_error(std::string(name) + ": " + std::strerror(errno));
+  if (other_ < 0 || tcgetattr(other_, &raw) != 0)
+    throw std::runtime_error(std::string(name) + ": " + std::strerror(errno));
   cfmakeraw(&raw);
   tcsetattr(other_, TCSANOW, &raw);
   unlink(link.c_str());

@@ -109,9 +109,8 @@ WriterBase::WriterBase(const Participant& participant, const dds_topic_descripto
 
 int WriterBase::matched() const {
   dds_publication_matched_status_t status;
-  return dds_get_publication_matched_status(writer_, &status) == DDS_RETCODE_OK
-             ? static_cast<int>(status.current_count)
-             : 0;
+  return dds_get_publication_matched_status(writer_, &status) == DDS_RETCODE_OK ? static_cast<int>(status.current_count)
+                                                                                : 0;
 }
 
 bool WriterBase::write(const void* sample) { return dds_write(writer_, sample) == DDS_RETCODE_OK; }
@@ -122,8 +121,7 @@ WaitSet::WaitSet(const Participant& participant)
     : participant_(participant.handle()), waitset_(checked(dds_create_waitset(participant.handle()), "wait set")) {}
 
 void WaitSet::add(const detail::ReaderBase& reader) {
-  const Entity condition =
-      checked(dds_create_readcondition(reader.handle(), DDS_ANY_STATE), "read condition");
+  const Entity condition = checked(dds_create_readcondition(reader.handle(), DDS_ANY_STATE), "read condition");
   checked(dds_waitset_attach(waitset_, condition, condition), "wait set");
 }
 

@@ -30,9 +30,10 @@ enum class Delivery {
 /// One participant in a domain. Topic names get the prefix `rt` and the name space: rt/backwash/…
 class Participant {
  public:
-  /// `interface`: network interface by name; ignored if the environment's CYCLONEDDS_URI already configures the middleware.
-  /// `priority` > 0: SCHED_FIFO priority of the threads that receive, so that a busy machine does not delay samples; the
-  /// caller must have the right. `max_sample_bytes`: larger samples are dropped by the middleware. Throws Error.
+  /// `interface`: network interface by name; ignored if the environment's CYCLONEDDS_URI already configures the
+  /// middleware. `priority` > 0: SCHED_FIFO priority of the threads that receive, so that a busy machine does not delay
+  /// samples; the caller must have the right. `max_sample_bytes`: larger samples are dropped by the middleware. Throws
+  /// Error.
   Participant(std::uint32_t domain, const std::string& interface, int priority = 0,
               std::size_t max_sample_bytes = 64u << 20);
   ~Participant();
