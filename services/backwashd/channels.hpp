@@ -107,7 +107,7 @@ struct Channels {
   sync::Handover<MapMessage> maps;                                         // DDS reader → map worker
   sync::Handover<std::shared_ptr<const plan::World>> worlds;               // map worker → mission
   sync::RecordRing<track::Request, 16> requests;                           // mission → control
-  std::atomic<bool> arm{false};                                            // mission → control: arm once
+  std::atomic<bool> arm{false};                                            // planner → control: arm once
   sync::Handover<PlanJob> jobs;                                            // mission → planner
   sync::RecordRing<PlanOutcome, 16> outcomes;                              // planner → mission
   sync::Handover<track::AcceptedSegment> segments;                         // planner → control

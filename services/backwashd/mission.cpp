@@ -114,7 +114,6 @@ Answer Mission::enable() {
 Answer Mission::take_off(const CommandMessage& command) {
   if (view_.mode != track::Mode::tracking) return refused("not enabled");
   if (!view_.landed) return refused("already in the air");
-  channels_.arm.store(true);
   return start(PlanJob::Kind::takeoff, command);
 }
 

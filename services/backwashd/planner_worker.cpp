@@ -64,8 +64,14 @@ class Planner {
       return "hovering at the height asked for is not safe";
     const auto& limits = job.world->reach.vehicle.limits;
     const auto commands = plan::vertical_commands(here, target, limits.v_max, limits.a_max);
-    return fly(job, commands, {},
-               [&](const reach::ReachTube& tube) { return plan::takeoff_clearance(*job.world, tube, column->z_safe); });
+    const auto clearance_of = [&](const reach::ReachTube& tube) {
+      return plan::takeoff_clearance(*job.world, tube, column->z_safe);
+    };
+    // The motors start only for a take-off that is known to be clear.
+    const auto tube = reach::tube_over_field(job.world->reach, view_.state, view_.command, commands, job.world->bounds);
+    if (!(clearance_of(tube) > 0)) return "the take-off column is not clear";
+    channels_.arm.store(true);
+    return fly(job, commands, {}, clearance_of);
   }
 
   /// Plans again from the newest state when the tube of the one planned from no longer holds.
