@@ -2,7 +2,6 @@
 #include "core/map/occupancy_sums.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 
 namespace backwash::map {
 
@@ -12,7 +11,6 @@ OccupancySums::OccupancySums(const OccupancyGrid& grid)
       size_(grid.size()),
       stride_y_(static_cast<std::size_t>(size_.x()) + 1),
       stride_z_(stride_y_ * (static_cast<std::size_t>(size_.y()) + 1)) {
-  if (grid.cell_count() >= std::size_t{1} << 31) throw std::length_error("the grid is too large for its sums");
   sums_.assign(stride_z_ * (static_cast<std::size_t>(size_.z()) + 1), 0);
   add_up(grid, Index3::Zero());
 }
@@ -23,21 +21,23 @@ void OccupancySums::update(const OccupancyGrid& grid, const Index3& low, const I
   add_up(grid, from);
 }
 
-// Row by row: the sum of the row so far, on top of what the layers below and before hold.
-void OccupancySums::add_up(const OccupancyGrid& grid, const Index3& from) noexcept {
-  const auto width = static_cast<std::size_t>(size_.x());
+// Layer by layer: the sum over the layer's rows so far, on top of what the layer below holds.
+void OccupancySums::add_up(const OccupancyGrid& grid, const Index3& from) {
+  const auto first = static_cast<std::size_t>(from.x()), width = static_cast<std::size_t>(size_.x());
+  std::vector<Sum> rows(width + 1);  // of this layer, over the rows so far
   for (int k = from.z(); k < size_.z(); ++k) {
+    const Sum* below = sums_.data() + linear(0, from.y(), k);
+    Sum* sums = sums_.data() + linear(0, from.y(), k + 1);
+    for (std::size_t i = first; i <= width; ++i) rows[i] = static_cast<Sum>(sums[i] - below[i]);
     for (int j = from.y(); j < size_.y(); ++j) {
       const Cell* const cells = grid.cells().data() + grid.linear(Index3(0, j, k));
-      std::uint32_t* const sums = sums_.data() + linear(1, j + 1, k + 1);
-      const auto first = static_cast<std::size_t>(from.x());
-      const auto rest = [&](std::size_t i) {  // all but this row, with unsigned wrap-around
-        return sums[i - stride_y_] + sums[i - stride_z_] - sums[i - stride_y_ - stride_z_];
-      };
-      std::uint32_t row = first == 0 ? 0 : sums[first - 1] - rest(first - 1);
+      below += stride_y_, sums += stride_y_;
+      auto row = static_cast<Sum>(sums[first] - below[first] - rows[first]);  // before `first`: as it was
+      rows[first] = static_cast<Sum>(rows[first] + row);
       for (std::size_t i = first; i < width; ++i) {
-        row += cells[i] != Cell::free;
-        sums[i] = row + rest(i);
+        row = static_cast<Sum>(row + (cells[i] != Cell::free));
+        rows[i + 1] = static_cast<Sum>(rows[i + 1] + row);
+        sums[i + 1] = static_cast<Sum>(below[i + 1] + rows[i + 1]);
       }
     }
   }
@@ -48,16 +48,28 @@ bool OccupancySums::voxels_free(const Index3& low, const Index3& high) const noe
   return (low.array() >= 0).all() && (high.array() < size_.array()).all() && all_free(low, high);
 }
 
+bool OccupancySums::halves_free(const Index3& low, const Index3& high) const noexcept {
+  int axis = 0;
+  (high - low).maxCoeff(&axis);
+  Index3 middle = high;
+  middle[axis] = low[axis] + (high[axis] - low[axis]) / 2;
+  Index3 after = low;
+  after[axis] = middle[axis] + 1;
+  return all_free(low, middle) && all_free(after, high);
+}
+
 bool OccupancySums::all_free(const Index3& low, const Index3& high) const noexcept {
-  const std::uint32_t* const below = sums_.data() + static_cast<std::size_t>(low.z()) * stride_z_;
-  const std::uint32_t* const above = sums_.data() + static_cast<std::size_t>(high.z() + 1) * stride_z_;
+  const auto edge = [&](int axis) { return static_cast<std::uint64_t>(high[axis] - low[axis] + 1); };
+  if (edge(0) * edge(1) * edge(2) > UINT16_MAX) return halves_free(low, high);
+  const Sum* const below = sums_.data() + static_cast<std::size_t>(low.z()) * stride_z_;
+  const Sum* const above = sums_.data() + static_cast<std::size_t>(high.z() + 1) * stride_z_;
   const std::size_t front = static_cast<std::size_t>(low.y()) * stride_y_;
   const std::size_t back = static_cast<std::size_t>(high.y() + 1) * stride_y_;
   const auto left = static_cast<std::size_t>(low.x()), right = static_cast<std::size_t>(high.x()) + 1;
-  const auto layer = [&](const std::uint32_t* sums) {
+  const auto layer = [&](const Sum* sums) {
     return sums[back + right] - sums[back + left] - sums[front + right] + sums[front + left];
   };
-  return layer(above) == layer(below);
+  return static_cast<Sum>(layer(above) - layer(below)) == 0;
 }
 
 bool OccupancySums::box_free(const Vec3& low_W, const Vec3& high_W) const noexcept {

@@ -42,10 +42,10 @@ struct Open {
 class Search {
  public:
   Search(const SafeSpace& space, const State& start, const Vec3& goal_W, const SearchOptions& options)
-      : space_(space), goal_W_(goal_W), options_(options), hops_(space.hops_to(space.index(goal_W))) {
+      : space_(space), goal_W_(goal_W), options_(options), hops_(space.hops_to(space.grid().index(goal_W))) {
     // The short duration covers 1.5 voxels at full speed and changes the speed by v_max/4 at the full input: slow
     // flight gets gentler inputs instead of primitives that stay inside their voxel.
-    tau_ = std::max(options.v_max / (4 * options.a_max), 1.5 * space.resolution() / options.v_max);
+    tau_ = std::max(options.v_max / (4 * options.a_max), 1.5 * space.grid().resolution() / options.v_max);
     a_ = std::min(options.a_max, options.v_max / (4 * tau_));
     rho_ = kTimeWeight * a_ * a_;
     start_h_ = heuristic(start).value_or(0);
@@ -81,11 +81,11 @@ class Search {
 
   /// Lower bound of the cost from a state to the goal at rest; nothing where no way exists.
   std::optional<double> heuristic(const State& s) const {
-    const Index3 v = space_.index(s.p_W);
+    const Index3 v = space_.grid().index(s.p_W);
     if (!space_.passable(v)) return std::nullopt;
-    const std::uint32_t hops = hops_[space_.linear(v)];
+    const std::uint32_t hops = hops_[space_.grid().linear(v)];
     if (hops == SafeSpace::kUnreached) return std::nullopt;
-    const double way = std::max((goal_W_ - s.p_W).cwiseAbs().maxCoeff(), (hops - 1.0) * space_.resolution());
+    const double way = std::max((goal_W_ - s.p_W).cwiseAbs().maxCoeff(), (hops - 1.0) * space_.grid().resolution());
     const double least = least_stopping_time(way, s.v_W.cwiseAbs().maxCoeff(), options_.v_max, options_.a_max);
     return cost_to_go(s, goal_W_, rho_, least).cost;
   }
@@ -97,7 +97,7 @@ class Search {
     };
     std::uint64_t key = 0;
     for (int axis = 0; axis < 3; ++axis)
-      key = key << 14 | pack((s.p_W - space_.origin())[axis] / (kVoxelsPerKey * space_.resolution()), 0, 14);
+      key = key << 14 | pack((s.p_W - space_.grid().origin())[axis] / (kVoxelsPerKey * space_.grid().resolution()), 0, 14);
     for (int axis = 0; axis < 3; ++axis)
       key = key << 7 | pack(s.v_W[axis] / (options_.v_max / kSpeedsPerKey) + 0.5, 64, 7);
     return key;

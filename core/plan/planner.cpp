@@ -55,13 +55,9 @@ std::optional<std::string> why_blocked(const World& world, const Vec3& p_W) {
 
 /// Hover-safe voxels; start and goal were checked at their exact points, so their voxels count as safe.
 SafeSpace hover_safe_space(const World& world, const Vec3& start_W, const Vec3& goal_W) {
-  std::vector<std::uint8_t> passable(world.grid.cell_count());
-  std::size_t cell = 0;
-  for (int k = 0; k < world.grid.size().z(); ++k)
-    for (int j = 0; j < world.grid.size().y(); ++j)
-      for (int i = 0; i < world.grid.size().x(); ++i) passable[cell++] = world.hover.safe({i, j, k});
-  for (const Vec3& p : {start_W, goal_W}) passable[world.grid.linear(world.grid.index(p))] = 1;
-  return SafeSpace(world.grid, std::move(passable));
+  map::OccupancyGrid passable = world.hover.safe_voxels();
+  for (const Vec3& p : {start_W, goal_W}) passable.set(passable.index(p), map::Cell::free);
+  return SafeSpace(std::move(passable));
 }
 
 /// Time between control points: 0.3 m of flight at full speed.

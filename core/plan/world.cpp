@@ -33,6 +33,7 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   const reach::Loop loop = method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle;
   reach::Reachability reach(vehicle, method, loop);
   map::DistanceField distance(grid);
+  map::OccupancySums sums(grid);
 
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
   field::DisturbanceField field(grid);
@@ -42,9 +43,9 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   reach::BoundField bounds(grid, field, model.bound);
   reach::HoverMap hover(grid);
   parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
-    hover.fill(reach, grid, distance, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
+    hover.fill(reach, grid, distance, sums, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
   });
-  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(field), std::move(bounds),
+  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field), std::move(bounds),
                                              std::move(hover), std::move(reach), constant_margin});
 }
 

@@ -7,6 +7,7 @@
 #include "core/field/disturbance_field.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/map/occupancy_sums.hpp"
 #include "core/reach/hover_set.hpp"
 #include "core/reach/reach_tube.hpp"
 
@@ -21,6 +22,7 @@ void run_serial(std::size_t count, const std::function<void(std::size_t, std::si
 struct World {
   map::OccupancyGrid grid;
   map::DistanceField distance;
+  map::OccupancySums sums;
   field::DisturbanceField field;
   reach::BoundField bounds;
   reach::HoverMap hover;

@@ -81,30 +81,37 @@ const BoundField::Entry& BoundField::entry(const Index3& v) const noexcept {
 
 DisturbanceBound BoundField::max_over(const Vec3& low_W, const Vec3& high_W) const noexcept {
   // Closed voxels: one that only touches the box counts. Compared before the casts, so that any box is in range.
-  DisturbanceBound result;
   Index3 low, high;
   for (int axis = 0; axis < 3; ++axis) {
     const double from = (low_W[axis] - origin_W_[axis]) / resolution_;
     const double to = (high_W[axis] - origin_W_[axis]) / resolution_;
-    if (!(from <= size_[axis]) || !(to >= 0)) return result;
+    if (!(from <= size_[axis]) || !(to >= 0)) return {};
     low[axis] = from > 0 ? static_cast<int>(from) : 0;
     low[axis] -= from > 0 && low[axis] == from;
     high[axis] = to < size_[axis] ? static_cast<int>(to) : size_[axis] - 1;
-    if (low[axis] > high[axis]) return result;
   }
+  return max_over_voxels(low, high);
+}
 
+DisturbanceBound BoundField::max_over_voxels(Index3 low, Index3 high) const noexcept {
+  DisturbanceBound result;
+  low = low.cwiseMax(0);
+  high = high.cwiseMin(size_ - Index3::Ones());
+  if ((low.array() > high.array()).any()) return result;
   const int narrowest = (high - low).minCoeff() + 1;
   int level = 0;
   while (level + 1 < kLevels && narrowest >= 2 << level) ++level;
   const int edge = 1 << level;
   // Cubes side by side; the last one of each row is moved back to end with the box.
   const Index3 end = high - Index3::Constant(edge - 1);
+  const auto sx = static_cast<std::size_t>(size_.x()), sy = static_cast<std::size_t>(size_.y());
+  const auto at_level = static_cast<std::size_t>(level);
   Maximum maximum{};
-  for (int k = low.z(); k < high.z() + 1; k += edge) {
-    for (int j = low.y(); j < high.y() + 1; j += edge) {
-      for (int i = low.x(); i < high.x() + 1; i += edge) {
-        raise(maximum, entry(Index3(i, j, k).cwiseMin(end)).level[static_cast<std::size_t>(level)]);
-      }
+  for (int k = low.z(); k <= high.z(); k += edge) {
+    for (int j = low.y(); j <= high.y(); j += edge) {
+      const std::uint32_t* const row = entry_of_.data() + sx * (static_cast<std::size_t>(std::min(j, end.y())) +
+                                                                sy * static_cast<std::size_t>(std::min(k, end.z())));
+      for (int i = low.x(); i <= high.x(); i += edge) raise(maximum, entries_[row[std::min(i, end.x())]].level[at_level]);
     }
   }
   std::copy(maximum.begin(), maximum.end(), result.w.begin());

@@ -22,6 +22,8 @@ class BoundField {
   /// does. Exact. 1 look-up for boxes over 1, 2 or 4 voxels per axis, 8 up to 8 per axis, then O(voxels/64).
   /// Real-time: wait-free, no allocation.
   DisturbanceBound max_over(const Vec3& low_W, const Vec3& high_W) const noexcept;
+  /// The same over the voxels from low to high, both included; what lies outside the grid counts as 0.
+  DisturbanceBound max_over_voxels(Index3 low, Index3 high) const noexcept;
   /// w̄ at a voxel's centre, m/s²; 0 outside the grid.
   DisturbanceBound at(const Index3& v) const noexcept;
 

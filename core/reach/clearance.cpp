@@ -98,18 +98,24 @@ const map::Cell* last_obstacle(const map::Cell* from, const map::Cell* to) noexc
 /// the rest. Lengths are in voxels, from the grid's origin. Precondition: the prism lies inside the grid.
 class Scan {
  public:
-  Scan(const map::OccupancyGrid& grid, const Vec3& center, const Supports& s, double limit)
+  /// Nothing beyond `limit` matters, and nothing else once an obstacle is found that is no farther than `enough`.
+  /// With `sums`, layers without obstacles are skipped.
+  Scan(const map::OccupancyGrid& grid, const map::OccupancySums* sums, const Vec3& center, const Supports& s,
+       double limit, double enough)
       : grid_(grid),
+        sums_(sums),
         center_(center),
         half_(s.x, s.y, s.z),
         under_from_(std::max(0, static_cast<int>(center.x() - s.x))),
         under_to_(std::min(grid.size().x(), static_cast<int>(center.x() + s.x) + 1)),
         octagon_(s),
-        nearest2_(limit * limit) {}
+        nearest2_(limit * limit),
+        enough2_(enough * enough) {}
 
-  /// Squared distance; the squared limit if nothing is nearer.
+  /// Squared distance; the squared limit if nothing is nearer; 0 if enough was found.
   double nearest2() {
     outwards(2, 0, [&](int k, double gap2_z) {
+      if (layer_free(k)) return;
       outwards(1, gap2_z, [&](int j, double gap2_y) { row(j, k, gap2_y, gap2_z); });
     });
     return nearest2_;
@@ -139,6 +145,16 @@ class Scan {
       layer(down);
     }
   }
+  bool layer_free(int k) const noexcept {
+    if (!sums_) return false;
+    const double reach = std::sqrt(nearest2_);
+    Index3 low(0, 0, k), high(0, 0, k);
+    for (int axis = 0; axis < 2; ++axis) {
+      low[axis] = std::max(0, static_cast<int>(center_[axis] - half_[axis] - reach));
+      high[axis] = std::min(grid_.size()[axis] - 1, static_cast<int>(center_[axis] + half_[axis] + reach));
+    }
+    return sums_->voxels_free(low, high);
+  }
   /// A row of voxels along x. Distance is convex in x: it only grows beyond the prism's bounding box, so that on either
   /// side of it the first obstacle is enough.
   void row(int j, int k, double gap2_y, double gap2_z) {
@@ -148,6 +164,7 @@ class Scan {
       const double separation = octagon_.separation(p);
       if (separation * separation + gap2_z >= nearest2_) return;
       nearest2_ = std::min(nearest2_, octagon_.squared_distance(p) + gap2_z);
+      if (nearest2_ <= enough2_) nearest2_ = 0;  // ends all loops
     };
     const auto range_from = [&](double reach) { return cells + std::max(0, static_cast<int>(center_.x() - reach)); };
     const auto range_to = [&](double reach) {
@@ -165,13 +182,15 @@ class Scan {
   }
 
   const map::OccupancyGrid& grid_;
+  const map::OccupancySums* sums_;
   Vec3 center_, half_;
   int under_from_, under_to_;  // columns that the prism's bounding box meets
   FatOctagon octagon_;
-  double nearest2_;
+  double nearest2_, enough2_;
 };
 
-double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit) {
+double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit,
+                const map::OccupancySums* sums = nullptr, double enough = 0) {
   const double a = grid.resolution();
   const Vec3 center = (center_W - grid.origin()) / a;
   const Supports in_voxels{s.x / a, s.y / a, s.z / a, s.sum / a, s.difference / a};
@@ -179,8 +198,8 @@ double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supp
   const Vec3 to_side =
       center.cwiseMin(grid.size().cast<double>() - center) - Vec3(in_voxels.x, in_voxels.y, in_voxels.z);
   const double outside = to_side.minCoeff();
-  if (!(outside > 0)) return 0;
-  const double nearest2 = Scan(grid, center, in_voxels, std::min(limit / a, outside)).nearest2();
+  if (!(a * outside > enough)) return 0;
+  const double nearest2 = Scan(grid, sums, center, in_voxels, std::min(limit / a, outside), enough / a).nearest2();
   return std::min(limit, a * std::sqrt(nearest2));
 }
 
@@ -190,6 +209,11 @@ double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supp
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
                       double limit) {
   return distance(grid, center_W, tight_supports(half_widths), limit);
+}
+
+bool prism_clear(const map::OccupancyGrid& grid, const map::OccupancySums& sums, const Vec3& center_W,
+                 const PerDirection& half_widths, double least) {
+  return distance(grid, center_W, tight_supports(half_widths), least + 1e-9, &sums, least) > least;
 }
 
 double swept_prism_distance(const map::OccupancyGrid& grid, const Vec3& from_W, const Vec3& to_W,

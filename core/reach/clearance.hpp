@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/map/occupancy_sums.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::reach {
@@ -14,7 +14,12 @@ namespace backwash::reach {
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
                       double limit);
 
-/// The same for a prism that moves from one centre to another: the convex hull of both, enclosed by the prism at their
+/// Whether nothing comes as near to the prism as `least`, m: prism_distance > least. Skips the layers that `sums`, those
+/// of `grid`, show to be free, and ends at the first voxel that is too near.
+bool prism_clear(const map::OccupancyGrid& grid, const map::OccupancySums& sums, const Vec3& center_W,
+                 const PerDirection& half_widths, double least);
+
+/// Distance of a prism that moves from one centre to another: the convex hull of both, enclosed by the prism at their
 /// midpoint whose half widths grow by half the motion in each direction.
 double swept_prism_distance(const map::OccupancyGrid& grid, const Vec3& from_W, const Vec3& to_W,
                             const PerDirection& half_widths, double limit);

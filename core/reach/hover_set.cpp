@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
@@ -40,59 +41,115 @@ Vec3 box(const PerDirection& half_widths) { return {half_widths[kX], half_widths
 double body_and_estimation(const Vehicle& vehicle) { return vehicle.body.radius + vehicle.estimation.position; }
 
 /// Clearance of a set, exact up to the cap. The distance field brackets the answer: the set holds p, so it is no
-/// farther from obstacles than p, and no nearer than p less the set's circumradius. `at_most`: known to be no less than
-/// the distance, or the cap of it.
+/// farther from obstacles than p, and no nearer than p less the set's circumradius.
 double set_clearance(const Vehicle& vehicle, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                     const Vec3& p_W, const PerDirection& half_widths, double at_most) {
+                     const Vec3& p_W, const PerDirection& half_widths) {
   const Index3 v = grid.index(p_W);
   const double off_center = (p_W - grid.center(v)).norm() + 1e-6;  // the field is stored in single precision
   const double taken = body_and_estimation(vehicle);
   if (distance.at(v) - off_center - box(half_widths).norm() >= kClearanceCap + taken) return kClearanceCap;
-  const double limit = std::min({kClearanceCap + taken, at_most, distance.at(v) + off_center});
+  const double limit = std::min(kClearanceCap + taken, distance.at(v) + off_center);
   return prism_distance(grid, p_W, half_widths, limit) - taken;
 }
 
-/// Monotone iteration from below ends at the smallest fixed point: the maxima only grow, through finitely many values.
-/// Leaves the clearance of a bounded set open. `v`: voxel of p, free.
-template <typename HalfWidths>
-HoverSet fixed_point(const Vehicle& vehicle, const HalfWidths& half_widths, const map::OccupancyGrid& grid,
-                     const map::DistanceField& distance, const BoundField& bounds, const Vec3& p_W, const Index3& v) {
-  HoverSet set;
-  set.clearance = -body_and_estimation(vehicle);
-  const double free_distance = distance.at(v) + grid.resolution();
-  // A box that stays this far inside the voxel of p meets no other.
-  const double inside = grid.resolution() / 2 - (p_W - grid.center(v)).cwiseAbs().maxCoeff();
-  DisturbanceBound w_bar = inside > 0 ? bounds.at(v) : bounds.max_over(p_W, p_W);
-  for (;;) {
-    set.half_widths = half_widths(w_bar);
-    const Vec3 h = box(set.half_widths);
-    if (h.maxCoeff() > free_distance) return set;
-    if (h.maxCoeff() < inside * (1 - 1e-9)) break;
-    DisturbanceBound over_set = bounds.max_over(p_W - h, p_W + h);
-    // Holds by itself but for rounding in the ellipsoid's scalar root, which must not make the iteration cycle.
-    for (std::size_t d = 0; d < kDirections; ++d) over_set.w[d] = std::max(over_set.w[d], w_bar.w[d]);
-    if (over_set.w == w_bar.w) break;
-    w_bar = over_set;
+/// Boxes of voxels around a point of voxel v.
+class Surroundings {
+ public:
+  Surroundings(const map::OccupancyGrid& grid, const Index3& v, const Vec3& p_W)
+      : v_(v), resolution_(grid.resolution()), per_voxel_(1 / grid.resolution()), over_low_((p_W - grid.center(v)) * per_voxel_ + Vec3::Constant(0.5)) {}
+
+  double resolution() const noexcept { return resolution_; }
+  struct Voxels {
+    bool operator==(const Voxels&) const = default;
+    Index3 low, high;
+  };
+  /// Those, closed cubes, that the box p ± h meets.
+  Voxels meeting(const Vec3& h) const noexcept {
+    Voxels voxels;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double reach = h[axis] * per_voxel_;
+      voxels.low[axis] = v_[axis] - static_cast<int>(reach + 1 - over_low_[axis]);
+      voxels.high[axis] = v_[axis] + static_cast<int>(reach + over_low_[axis]);
+    }
+    return voxels;
   }
-  set.bounded = true;
-  return set;
+
+ private:
+  Index3 v_;
+  double resolution_, per_voxel_;
+  Vec3 over_low_;  // p less the low corner of v, in voxels
+};
+
+/// Half widths of the smallest fixed point, m; nothing if they exceed the free distance. Monotone iteration from below
+/// ends there: the maxima only grow, through finitely many boxes of voxels. `v`: the centre's voxel, free.
+template <typename HalfWidths>
+std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, const map::DistanceField& distance,
+                                        const BoundField& bounds, const Surroundings& around, const Index3& v) {
+  const double free_distance = distance.at(v) + around.resolution();
+  auto over = around.meeting(Vec3::Zero());
+  DisturbanceBound w_bar{};
+  for (;;) {
+    const DisturbanceBound found =
+        over.low == over.high ? bounds.at(v) : bounds.max_over_voxels(over.low, over.high);
+    // Holds by itself but for rounding in the ellipsoid's scalar root, which must not make the iteration cycle.
+    for (std::size_t d = 0; d < kDirections; ++d) w_bar.w[d] = std::max(found.w[d], w_bar.w[d]);
+    const PerDirection h = half_widths(w_bar);
+    if (box(h).maxCoeff() > free_distance) return std::nullopt;
+    const auto wider = around.meeting(box(h));
+    if (wider == over) return h;
+    over = wider;
+  }
 }
 
-/// At least the distance of a set around the centre of v to obstacles: that of its tips along the axes. A tip may lie
-/// up to a voxel before the next centre.
-double distance_of_tips(const map::OccupancyGrid& grid, const map::DistanceField& distance, const Index3& v,
-                        const PerDirection& h) {
-  const double diagonal = std::sqrt(2.0) * std::min(h[kXyPlus], h[kXyMinus]);  // cuts the tips of x and y off
-  const Vec3 tip(std::min(h[kX], diagonal), std::min(h[kY], diagonal), h[kZ]);
-  double least = distance.at(v);
-  for (int axis = 0; axis < 3; ++axis) {
-    const int steps = static_cast<int>(tip[axis] / grid.resolution()) + 1;
-    const double beyond = steps * grid.resolution() - tip[axis];
-    const Index3 step = steps * Index3::Unit(axis);
-    least = std::min(least, beyond + std::min(distance.at(v + step), distance.at(v - step)));
+/// Whether sets around voxel centres are clear of obstacles by body and estimation. Box queries bracket the answer and
+/// decide most; no rounding can make them wrong, since boxes within the fat set are a little smaller than that.
+class ClearTest {
+ public:
+  ClearTest(const Vehicle& vehicle, const map::OccupancyGrid& grid, const map::DistanceField& distance,
+            const map::OccupancySums& sums)
+      : grid_(grid), distance_(distance), sums_(sums), taken_(body_and_estimation(vehicle)) {}
+
+  /// True only where a set that holds this one is not clear.
+  bool blocked(const Surroundings& around, const PerDirection& half_widths) const noexcept {
+    const Octagon o(half_widths);
+    const double t = taken_ * (1 - 1e-9);
+    return !box_free(around, o.middle + Vec3(0, 0, t)) || !box_free(around, o.along_x + Vec3(t, 0, 0)) ||
+           !box_free(around, o.along_y + Vec3(0, t, 0));
   }
-  return least + 1e-6;  // the field is stored in single precision
-}
+  /// Exact. `v`: voxel of the set's centre.
+  bool clear(const Surroundings& around, const Index3& v, const PerDirection& half_widths) const {
+    const Vec3 h = box(half_widths);
+    if (distance_.at(v) - h.norm() - 1e-6 > taken_ || box_free(around, h + Vec3::Constant(taken_))) return true;
+    if (blocked(around, half_widths)) return false;
+    const Octagon o(half_widths);
+    const double t = taken_ * (1 - 1e-9) / std::sqrt(2.0);
+    if (!box_free(around, o.middle + Vec3(t, t, 0)) || !box_free(around, o.along_x + Vec3(t, 0, t)) ||
+        !box_free(around, o.along_y + Vec3(0, t, t)))
+      return false;
+    return prism_clear(grid_, sums_, grid_.center(v), half_widths, taken_);
+  }
+
+ private:
+  /// Half extents of boxes that an octagonal prism holds: two that reach its sides in x and y, one in between.
+  struct Octagon {
+    explicit Octagon(const PerDirection& h) {
+      const double sum = std::sqrt(2.0) * std::min(h[kXyPlus], h[kXyMinus]);
+      const double x = std::min(h[kX], sum), y = std::min(h[kY], sum), part = std::min(1.0, sum / (x + y));
+      along_x = {x, std::min(y, sum - x), h[kZ]};
+      along_y = {std::min(x, sum - y), y, h[kZ]};
+      middle = {part * x, part * y, h[kZ]};
+    }
+    Vec3 along_x, along_y, middle;
+  };
+  bool box_free(const Surroundings& around, const Vec3& half) const noexcept {
+    const auto voxels = around.meeting(half);
+    return sums_.voxels_free(voxels.low, voxels.high);
+  }
+  const map::OccupancyGrid& grid_;
+  const map::DistanceField& distance_;
+  const map::OccupancySums& sums_;
+  double taken_;
+};
 
 }  // namespace
 
@@ -112,72 +169,47 @@ HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, co
   const auto paper = [&](const DisturbanceBound& w_bar) {
     return supports(hover_ellipsoid(reach.vehicle, channels(w_bar)).diagonal().cwiseSqrt());
   };
-  set = reach.method == Method::tight
-            ? fixed_point(reach.vehicle, ExactHalfWidths(reach), grid, distance, bounds, p_W, v)
-            : fixed_point(reach.vehicle, paper, grid, distance, bounds, p_W, v);
-  if (set.bounded) {
-    set.clearance = set_clearance(reach.vehicle, grid, distance, p_W, set.half_widths, kClearanceCap + taken);
-  }
+  const Surroundings around(grid, v, p_W);
+  const auto h = reach.method == Method::tight ? fixed_point(ExactHalfWidths(reach), distance, bounds, around, v)
+                                               : fixed_point(paper, distance, bounds, around, v);
+  if (!h) return set;
+  set.bounded = true;
+  set.half_widths = *h;
+  set.clearance = set_clearance(reach.vehicle, grid, distance, p_W, *h);
   return set;
 }
 
-HoverMap::HoverMap(const map::OccupancyGrid& grid) : size_(grid.size()), cells_(grid.cell_count(), kNotComputed) {}
+HoverMap::HoverMap(const map::OccupancyGrid& grid)
+    : safe_(grid.origin(), grid.resolution(), grid.size(), map::Cell::unknown) {}
 
 void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                    const BoundField& bounds, std::span<const std::size_t> voxels, double constant_margin) {
-  const auto store = [&](std::size_t n, const HoverSet& set) {
-    const Vec3 h = set.bounded ? box(set.half_widths) : Vec3::Zero();
-    cells_[n] = {static_cast<float>(set.clearance), static_cast<float>(h.x()), static_cast<float>(h.y()),
-                 static_cast<float>(h.z())};
-  };
-  if (constant_margin >= 0) {
-    for (const std::size_t n : voxels) {
-      store(n, hover_set(reach, grid, distance, bounds, grid.center(grid.voxel(n)), constant_margin));
-    }
-    return;
-  }
+                    const map::OccupancySums& sums, const BoundField& bounds, std::span<const std::size_t> voxels,
+                    double constant_margin) {
   const double taken = body_and_estimation(reach.vehicle);
-  const auto fill_with = [&](const auto& half_widths) {
+  const auto fill_where = [&](const auto& safe) {
     for (const std::size_t n : voxels) {
       const Index3 v = grid.voxel(n);
-      const double free_distance = distance.at(v);
-      if (free_distance <= taken) {  // not even a point fits
-        cells_[n] = {static_cast<float>(std::min(free_distance, taken * (1 - 1e-6)) - taken), 0, 0, 0};
-        continue;
-      }
-      const Vec3 p_W = grid.center(v);
-      HoverSet set = fixed_point(reach.vehicle, half_widths, grid, distance, bounds, p_W, v);
-      if (set.bounded) {
-        const double at_most = distance_of_tips(grid, distance, v, set.half_widths);
-        set.clearance = at_most <= taken ? at_most - taken
-                                         : set_clearance(reach.vehicle, grid, distance, p_W, set.half_widths, at_most);
-      }
-      store(n, set);
+      // Else not even a point fits.
+      if (distance.at(v) > taken && safe(v)) safe_.set(v, map::Cell::free);
     }
   };
-  if (reach.method == Method::tight) return fill_with(ExactHalfWidths(reach));
+  if (constant_margin >= 0) {
+    return fill_where([&](const Index3& v) {
+      return hover_set(reach, grid, distance, bounds, grid.center(v), constant_margin).safe();
+    });
+  }
+  const ClearTest test(reach.vehicle, grid, distance, sums);
+  const auto safe_with = [&](const auto& half_widths) {
+    return [&](const Index3& v) {
+      const Surroundings around(grid, v, grid.center(v));
+      if (test.blocked(around, half_widths(bounds.at(v)))) return false;  // part of the set, and cheap
+      const auto h = fixed_point(half_widths, distance, bounds, around, v);
+      return h && test.clear(around, v, *h);
+    };
+  };
+  if (reach.method == Method::tight) return fill_where(safe_with(ExactHalfWidths(reach)));
   const HoverEllipsoid ellipsoid(reach.vehicle);
-  fill_with([&](const DisturbanceBound& w_bar) { return supports(ellipsoid.half_axes(channels(w_bar))); });
-}
-
-bool HoverMap::inside(const Index3& v) const noexcept {
-  return (v.array() >= 0).all() && (v.array() < size_.array()).all();
-}
-
-const std::array<float, 4>& HoverMap::cell(const Index3& v) const noexcept {
-  const auto row =
-      static_cast<std::size_t>(v.y()) + static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z());
-  return cells_[static_cast<std::size_t>(v.x()) + static_cast<std::size_t>(size_.x()) * row];
-}
-
-bool HoverMap::safe(const Index3& v) const noexcept { return clearance(v) > 0; }
-
-double HoverMap::clearance(const Index3& v) const noexcept { return inside(v) ? cell(v)[0] : kNotComputed[0]; }
-
-Vec3 HoverMap::half_widths(const Index3& v) const noexcept {
-  if (!inside(v)) return Vec3::Zero();
-  const auto& c = cell(v);
-  return {c[1], c[2], c[3]};
+  fill_where(safe_with([&](const DisturbanceBound& w_bar) { return supports(ellipsoid.half_axes(channels(w_bar))); }));
 }
 
 }  // namespace backwash::reach

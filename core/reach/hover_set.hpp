@@ -2,9 +2,9 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "core/map/distance_field.hpp"
+#include "core/map/occupancy_sums.hpp"
 #include "core/reach/bound_field.hpp"
 #include "core/reach/reach_tube.hpp"
 
@@ -25,28 +25,24 @@ struct HoverSet {
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
                    const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);
 
-/// Whether hovering at each voxel's centre is safe, and how wide the set is.
+/// Whether hovering at each voxel's centre is safe: hover_set(…).safe(), without the sets' clearances (hover_set gives
+/// them where they are asked for). For method paper the sets come from a table that is rounded up by up to 3e-5.
 class HoverMap {
  public:
+  /// Nothing is safe yet.
   explicit HoverMap(const map::OccupancyGrid& grid);
   /// Computes the listed voxels (linear indices); distinct voxels may be computed from several threads at once.
+  /// `distance` and `sums` are those of `grid`.
   void fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-            const BoundField& bounds, std::span<const std::size_t> voxels, double constant_margin = -1);
+            const map::OccupancySums& sums, const BoundField& bounds, std::span<const std::size_t> voxels,
+            double constant_margin = -1);
   /// False outside the grid and where nothing was computed.
-  bool safe(const Index3& v) const noexcept;
-  /// Clearance of the hover set where safe, m; elsewhere ≤ 0 and no less than it, −1 where not computed and outside the
-  /// grid. What no set needs is not computed: where the body alone does not fit, or a tip of the set is too near.
-  double clearance(const Index3& v) const noexcept;
-  /// Half widths x, y, z, m; zero where not computed, unbounded, or too near for the body alone.
-  Vec3 half_widths(const Index3& v) const noexcept;
+  bool safe(const Index3& v) const noexcept { return safe_.free(v); }
+  /// The same voxels with the safe ones free and all others unknown.
+  const map::OccupancyGrid& safe_voxels() const noexcept { return safe_; }
 
  private:
-  static constexpr std::array<float, 4> kNotComputed{-1, 0, 0, 0};
-  bool inside(const Index3& v) const noexcept;
-  const std::array<float, 4>& cell(const Index3& v) const noexcept;
-
-  Index3 size_;
-  std::vector<std::array<float, 4>> cells_;  // clearance, half widths x, y, z
+  map::OccupancyGrid safe_;
 };
 
 }  // namespace backwash::reach

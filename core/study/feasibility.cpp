@@ -9,6 +9,12 @@
 namespace backwash::study {
 namespace {
 
+/// Clearance of the hover set at a voxel's centre, m.
+double clearance(const plan::World& world, const Index3& v) {
+  const Vec3 p_W = world.grid.center(v);
+  return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin).clearance;
+}
+
 const std::array<Index3, 6> kNeighbours = {Index3{1, 0, 0},  Index3{-1, 0, 0}, Index3{0, 1, 0},
                                            Index3{0, -1, 0}, Index3{0, 0, 1},  Index3{0, 0, -1}};
 
@@ -27,8 +33,8 @@ Region flood(const plan::World& world, std::size_t seed, int number, std::vector
     const Vec3 p = grid.center(v);
     region.voxels += 1;
     region.low_W = region.low_W.cwiseMin(p - half), region.high_W = region.high_W.cwiseMax(p + half);
-    if (world.hover.clearance(v) > region.widest_clearance_m) {
-      region.widest_clearance_m = world.hover.clearance(v);
+    if (const double c = clearance(world, v); c > region.widest_clearance_m) {
+      region.widest_clearance_m = c;
       region.widest_W = p;
     }
     for (const auto& step : kNeighbours) {
@@ -50,7 +56,7 @@ struct Width {
 };
 
 Width width(const plan::World& world, const Index3& v) {
-  if (world.hover.safe(v)) return {true, world.hover.clearance(v)};
+  if (world.hover.safe(v)) return {true, clearance(world, v)};
   return {false, world.distance.at(v)};
 }
 
@@ -113,9 +119,8 @@ std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_
     length += grid.resolution();
   }
   const Vec3 place = grid.center(grid.voxel(tightest));
-  const auto set = reach::hover_set(world.reach, grid, world.distance, world.bounds, place, world.constant_margin);
-  return Bottleneck{world.hover.safe(grid.voxel(tightest)), place, set.clearance, world.distance.exact(grid, place),
-                    length};
+  return Bottleneck{world.hover.safe(grid.voxel(tightest)), place, clearance(world, grid.voxel(tightest)),
+                    world.distance.exact(grid, place), length};
 }
 
 std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions,
@@ -125,13 +130,15 @@ std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& 
   std::vector<Vec3> candidates;
   for (int j = 0; j < grid.size().y(); ++j) {
     for (int i = 0; i < grid.size().x(); ++i) {
-      std::optional<Index3> best;
+      double widest = 0;
+      std::optional<Vec3> best;
       for (int k = 0; k < grid.size().z(); ++k) {
         const Index3 v(i, j, k);
         if (regions.of_voxel[grid.linear(v)] != 0) continue;
-        if (!best || world.hover.clearance(v) > world.hover.clearance(*best)) best = v;
+        const double c = clearance(world, v);
+        if (!best || c > widest) widest = c, best = grid.center(v);
       }
-      if (best) candidates.push_back(grid.center(*best));
+      if (best) candidates.push_back(*best);
     }
   }
   const auto farthest_first = [&candidates](const Vec3& from) {

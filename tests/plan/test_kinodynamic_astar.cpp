@@ -11,12 +11,6 @@ namespace {
 using map::Cell;
 using map::OccupancyGrid;
 
-SafeSpace free_cells(const OccupancyGrid& grid) {
-  std::vector<std::uint8_t> passable;
-  for (const Cell c : grid.cells()) passable.push_back(c == Cell::free);
-  return SafeSpace(grid, passable);
-}
-
 SearchOptions options(double v_max, double a_max) {
   return {v_max, a_max, 400'000, Clock::now() + std::chrono::seconds(10)};
 }
@@ -56,7 +50,7 @@ TEST(SafeSpace, BoxQueryEqualsCountingVoxels) {
   OccupancyGrid grid({-1, 0, 2}, 0.2, {12, 9, 7}, Cell::free);
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (random() % 40 == 0) grid.set(grid.voxel(n), Cell::occupied);
-  const SafeSpace space = free_cells(grid);
+  const SafeSpace space(grid);
   std::uniform_real_distribution<double> u(-0.1, 1.1);
   for (int i = 0; i < 3000; ++i) {
     const Vec3 extent = grid.size().cast<double>() * 0.2;
@@ -76,7 +70,7 @@ TEST(SafeSpace, SweptSetNeverMissesAThinWall) {
   OccupancyGrid grid({0, 0, 0}, 0.05, {80, 80, 40}, Cell::free);
   for (int j = 0; j < 80; ++j)
     for (int k = 0; k < 40; ++k) grid.set({40, j, k}, Cell::occupied);
-  const SafeSpace space = free_cells(grid);
+  const SafeSpace space(grid);
   std::mt19937 random(2);
   std::uniform_real_distribution<double> u(-1, 1);
   int crossing = 0, clear = 0;
@@ -103,9 +97,9 @@ TEST(SafeSpace, SweptSetNeverMissesAThinWall) {
 
 TEST(SafeSpace, MotionsNeedAtLeastTheTimeThatHopsSay) {
   const OccupancyGrid grid = room_with_wall(2, 3.0);
-  const SafeSpace space = free_cells(grid);
+  const SafeSpace space(grid);
   const Vec3 goal(6, 1, 1);
-  const auto hops = space.hops_to(space.index(goal));
+  const auto hops = space.hops_to(grid.index(goal));
   const auto found = search(space, {{2, 1, 1}, Vec3::Zero()}, goal, options(1.5, 2));
   ASSERT_TRUE(found);
   // Along a motion that ends at the goal: what is left of ∫ max|v| dt is at least (hops − 1) voxels.
@@ -114,14 +108,14 @@ TEST(SafeSpace, MotionsNeedAtLeastTheTimeThatHopsSay) {
     for (int k = 1000; k > 0; --k) {
       left += m->velocity(m->duration * (k - 0.5) / 1000).cwiseAbs().maxCoeff() * m->duration / 1000;
       const Vec3 p = m->position(m->duration * (k - 1) / 1000);
-      EXPECT_GE(left + 1e-4, (static_cast<double>(hops[space.linear(space.index(p))]) - 1) * 0.1);
+      EXPECT_GE(left + 1e-4, (static_cast<double>(hops[grid.linear(grid.index(p))]) - 1) * 0.1);
     }
 }
 
 TEST(Search, GoesRoundAThinWallToItsFarGapAtEverySpeed) {
   for (const int thickness : {1, 3}) {
     const OccupancyGrid grid = room_with_wall(thickness, 3.0);
-    const SafeSpace space = free_cells(grid);
+    const SafeSpace space(grid);
     for (const double v_max : {0.3, 0.5, 1.0, 2.0, 3.0}) {
       const State start{{2.05, 1.05, 1.05}, Vec3::Zero()};
       const Vec3 goal(6.02, 1.01, 1.03);
@@ -134,7 +128,7 @@ TEST(Search, GoesRoundAThinWallToItsFarGapAtEverySpeed) {
 
 TEST(Search, CostsLessThanTwiceTheLowerBoundInFreeSpace) {
   const OccupancyGrid grid({0, 0, 0}, 0.1, {60, 60, 30}, Cell::free);
-  const SafeSpace space = free_cells(grid);
+  const SafeSpace space(grid);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> u(-1, 1);
   for (int i = 0; i < 10; ++i) {
@@ -185,7 +179,7 @@ TEST(Search, KeepsItsDeadline) {
 
 TEST(Search, IsDeterministic) {
   const OccupancyGrid grid = room_with_wall(1, 3.0);
-  const SafeSpace space = free_cells(grid);
+  const SafeSpace space(grid);
   const auto a = search(space, {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, options(1, 2));
   const auto b = search(space, {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, options(1, 2));
   ASSERT_TRUE(a && b);
