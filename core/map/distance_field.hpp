@@ -17,6 +17,8 @@ class DistanceField {
 
   /// At a voxel's centre, m; 0 outside the grid.
   double at(const Index3& v) const noexcept;
+  /// The same by the voxel's position in the cell array; precondition: inside the grid.
+  double at(std::size_t linear) const noexcept { return static_cast<double>(distance_[linear]); }
   /// Trilinear interpolation between voxel centres, m; 0 outside the grid. Off exact() by at most √3/2·a, and too large
   /// near faces (a/4 on a flat one, 0.56a on a convex corner): for gradients and search; exact() for what must hold.
   /// Real-time: wait-free, no allocation.

@@ -97,7 +97,8 @@ class Search {
     };
     std::uint64_t key = 0;
     for (int axis = 0; axis < 3; ++axis)
-      key = key << 14 | pack((s.p_W - space_.grid().origin())[axis] / (kVoxelsPerKey * space_.grid().resolution()), 0, 14);
+      key = key << 14 |
+            pack((s.p_W - space_.grid().origin())[axis] / (kVoxelsPerKey * space_.grid().resolution()), 0, 14);
     for (int axis = 0; axis < 3; ++axis)
       key = key << 7 | pack(s.v_W[axis] / (options_.v_max / kSpeedsPerKey) + 0.5, 64, 7);
     return key;

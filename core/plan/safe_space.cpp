@@ -14,7 +14,9 @@ bool SafeSpace::clear(const Motion& motion) const noexcept {
     const Box box = bounds(motion, from, to);
     if (clear(box)) return true;
     const double middle = (from + to) / 2;
-    if ((box.high - box.low).maxCoeff() < passable_.resolution() / 4 || !passable(passable_.index(motion.position(middle)))) return false;
+    if ((box.high - box.low).maxCoeff() < passable_.resolution() / 4 ||
+        !passable(passable_.index(motion.position(middle))))
+      return false;
     return self(self, from, middle) && self(self, middle, to);
   };
   return piece_clear(piece_clear, 0, motion.duration);

@@ -45,8 +45,8 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
     hover.fill(reach, grid, distance, sums, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
   });
-  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field), std::move(bounds),
-                                             std::move(hover), std::move(reach), constant_margin});
+  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field),
+                                             std::move(bounds), std::move(hover), std::move(reach), constant_margin});
 }
 
 }  // namespace backwash::plan

@@ -111,7 +111,8 @@ DisturbanceBound BoundField::max_over_voxels(Index3 low, Index3 high) const noex
     for (int j = low.y(); j <= high.y(); j += edge) {
       const std::uint32_t* const row = entry_of_.data() + sx * (static_cast<std::size_t>(std::min(j, end.y())) +
                                                                 sy * static_cast<std::size_t>(std::min(k, end.z())));
-      for (int i = low.x(); i <= high.x(); i += edge) raise(maximum, entries_[row[std::min(i, end.x())]].level[at_level]);
+      for (int i = low.x(); i <= high.x(); i += edge)
+        raise(maximum, entries_[row[std::min(i, end.x())]].level[at_level]);
     }
   }
   std::copy(maximum.begin(), maximum.end(), result.w.begin());

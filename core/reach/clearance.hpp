@@ -14,8 +14,8 @@ namespace backwash::reach {
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
                       double limit);
 
-/// Whether nothing comes as near to the prism as `least`, m: prism_distance > least. Skips the layers that `sums`, those
-/// of `grid`, show to be free, and ends at the first voxel that is too near.
+/// Whether nothing comes as near to the prism as `least`, m: prism_distance > least. Skips the layers that `sums`,
+/// those of `grid`, show to be free, and ends at the first voxel that is too near.
 bool prism_clear(const map::OccupancyGrid& grid, const map::OccupancySums& sums, const Vec3& center_W,
                  const PerDirection& half_widths, double least);
 

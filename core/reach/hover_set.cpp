@@ -56,7 +56,10 @@ double set_clearance(const Vehicle& vehicle, const map::OccupancyGrid& grid, con
 class Surroundings {
  public:
   Surroundings(const map::OccupancyGrid& grid, const Index3& v, const Vec3& p_W)
-      : v_(v), resolution_(grid.resolution()), per_voxel_(1 / grid.resolution()), over_low_((p_W - grid.center(v)) * per_voxel_ + Vec3::Constant(0.5)) {}
+      : v_(v),
+        resolution_(grid.resolution()),
+        per_voxel_(1 / grid.resolution()),
+        over_low_((p_W - grid.center(v)) * per_voxel_ + Vec3::Constant(0.5)) {}
 
   double resolution() const noexcept { return resolution_; }
   struct Voxels {
@@ -81,20 +84,19 @@ class Surroundings {
 };
 
 /// Half widths of the smallest fixed point, m; nothing if they exceed the free distance. Monotone iteration from below
-/// ends there: the maxima only grow, through finitely many boxes of voxels. `v`: the centre's voxel, free.
+/// ends there: the maxima only grow, through finitely many boxes of voxels. `v`: the
+/// centre's voxel, free; `free_distance`: there.
 template <typename HalfWidths>
-std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, const map::DistanceField& distance,
-                                        const BoundField& bounds, const Surroundings& around, const Index3& v) {
-  const double free_distance = distance.at(v) + around.resolution();
+std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, double free_distance, const BoundField& bounds,
+                                        const Surroundings& around, const Index3& v) {
   auto over = around.meeting(Vec3::Zero());
   DisturbanceBound w_bar{};
   for (;;) {
-    const DisturbanceBound found =
-        over.low == over.high ? bounds.at(v) : bounds.max_over_voxels(over.low, over.high);
+    const DisturbanceBound found = over.low == over.high ? bounds.at(v) : bounds.max_over_voxels(over.low, over.high);
     // Holds by itself but for rounding in the ellipsoid's scalar root, which must not make the iteration cycle.
     for (std::size_t d = 0; d < kDirections; ++d) w_bar.w[d] = std::max(found.w[d], w_bar.w[d]);
     const PerDirection h = half_widths(w_bar);
-    if (box(h).maxCoeff() > free_distance) return std::nullopt;
+    if (box(h).maxCoeff() > free_distance + around.resolution()) return std::nullopt;
     const auto wider = around.meeting(box(h));
     if (wider == over) return h;
     over = wider;
@@ -105,28 +107,27 @@ std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, const map
 /// decide most; no rounding can make them wrong, since boxes within the fat set are a little smaller than that.
 class ClearTest {
  public:
-  ClearTest(const Vehicle& vehicle, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-            const map::OccupancySums& sums)
-      : grid_(grid), distance_(distance), sums_(sums), taken_(body_and_estimation(vehicle)) {}
+  ClearTest(const Vehicle& vehicle, const map::OccupancyGrid& grid, const map::OccupancySums& sums)
+      : grid_(grid), sums_(sums), taken_(body_and_estimation(vehicle)) {}
 
-  /// True only where a set that holds this one is not clear.
-  bool blocked(const Surroundings& around, const PerDirection& half_widths) const noexcept {
+  /// True only where a set that holds this one is not clear. `free_distance`: of the set's centre.
+  bool blocked(const Surroundings& around, double free_distance, const PerDirection& half_widths) const noexcept {
+    if (far(free_distance, half_widths)) return false;
     const Octagon o(half_widths);
     const double t = taken_ * (1 - 1e-9);
     return !box_free(around, o.middle + Vec3(0, 0, t)) || !box_free(around, o.along_x + Vec3(t, 0, 0)) ||
            !box_free(around, o.along_y + Vec3(0, t, 0));
   }
-  /// Exact. `v`: voxel of the set's centre.
-  bool clear(const Surroundings& around, const Index3& v, const PerDirection& half_widths) const {
-    const Vec3 h = box(half_widths);
-    if (distance_.at(v) - h.norm() - 1e-6 > taken_ || box_free(around, h + Vec3::Constant(taken_))) return true;
-    if (blocked(around, half_widths)) return false;
+  /// Exact. `p_W`: the set's centre.
+  bool clear(const Surroundings& around, const Vec3& p_W, double free_distance, const PerDirection& half_widths) const {
+    if (far(free_distance, half_widths) || box_free(around, box(half_widths) + Vec3::Constant(taken_))) return true;
+    if (blocked(around, free_distance, half_widths)) return false;
     const Octagon o(half_widths);
     const double t = taken_ * (1 - 1e-9) / std::sqrt(2.0);
     if (!box_free(around, o.middle + Vec3(t, t, 0)) || !box_free(around, o.along_x + Vec3(t, 0, t)) ||
         !box_free(around, o.along_y + Vec3(0, t, t)))
       return false;
-    return prism_clear(grid_, sums_, grid_.center(v), half_widths, taken_);
+    return prism_clear(grid_, sums_, p_W, half_widths, taken_);
   }
 
  private:
@@ -141,12 +142,14 @@ class ClearTest {
     }
     Vec3 along_x, along_y, middle;
   };
+  bool far(double free_distance, const PerDirection& half_widths) const noexcept {
+    return free_distance - box(half_widths).norm() - 1e-6 > taken_;  // the field is stored in single precision
+  }
   bool box_free(const Surroundings& around, const Vec3& half) const noexcept {
     const auto voxels = around.meeting(half);
     return sums_.voxels_free(voxels.low, voxels.high);
   }
   const map::OccupancyGrid& grid_;
-  const map::DistanceField& distance_;
   const map::OccupancySums& sums_;
   double taken_;
 };
@@ -170,8 +173,8 @@ HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, co
     return supports(hover_ellipsoid(reach.vehicle, channels(w_bar)).diagonal().cwiseSqrt());
   };
   const Surroundings around(grid, v, p_W);
-  const auto h = reach.method == Method::tight ? fixed_point(ExactHalfWidths(reach), distance, bounds, around, v)
-                                               : fixed_point(paper, distance, bounds, around, v);
+  const auto h = reach.method == Method::tight ? fixed_point(ExactHalfWidths(reach), distance.at(v), bounds, around, v)
+                                               : fixed_point(paper, distance.at(v), bounds, around, v);
   if (!h) return set;
   set.bounded = true;
   set.half_widths = *h;
@@ -188,23 +191,26 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
   const double taken = body_and_estimation(reach.vehicle);
   const auto fill_where = [&](const auto& safe) {
     for (const std::size_t n : voxels) {
+      const double free_distance = distance.at(n);
+      if (free_distance <= taken) continue;  // not even a point fits
       const Index3 v = grid.voxel(n);
-      // Else not even a point fits.
-      if (distance.at(v) > taken && safe(v)) safe_.set(v, map::Cell::free);
+      if (safe(v, free_distance)) safe_.set(v, map::Cell::free);
     }
   };
   if (constant_margin >= 0) {
-    return fill_where([&](const Index3& v) {
+    return fill_where([&](const Index3& v, double) {
       return hover_set(reach, grid, distance, bounds, grid.center(v), constant_margin).safe();
     });
   }
-  const ClearTest test(reach.vehicle, grid, distance, sums);
+  const ClearTest test(reach.vehicle, grid, sums);
   const auto safe_with = [&](const auto& half_widths) {
-    return [&](const Index3& v) {
-      const Surroundings around(grid, v, grid.center(v));
-      if (test.blocked(around, half_widths(bounds.at(v)))) return false;  // part of the set, and cheap
-      const auto h = fixed_point(half_widths, distance, bounds, around, v);
-      return h && test.clear(around, v, *h);
+    return [&](const Index3& v, double free_distance) {
+      const Vec3 p_W = grid.center(v);
+      const Surroundings around(grid, v, p_W);
+      // A part of the set, and cheap.
+      if (test.blocked(around, free_distance, half_widths(bounds.at(v)))) return false;
+      const auto h = fixed_point(half_widths, free_distance, bounds, around, v);
+      return h && test.clear(around, p_W, free_distance, *h);
     };
   };
   if (reach.method == Method::tight) return fill_where(safe_with(ExactHalfWidths(reach)));

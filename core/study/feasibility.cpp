@@ -5,6 +5,9 @@
 #include <array>
 #include <limits>
 #include <queue>
+#include <tuple>
+
+#include "core/reach/clearance.hpp"
 
 namespace backwash::study {
 namespace {
@@ -121,6 +124,33 @@ std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_
   const Vec3 place = grid.center(grid.voxel(tightest));
   return Bottleneck{world.hover.safe(grid.voxel(tightest)), place, clearance(world, grid.voxel(tightest)),
                     world.distance.exact(grid, place), length};
+}
+
+SetCost cost_of_set(const plan::World& world) {
+  const auto& [grid, reach] = std::tie(world.grid, world.reach);
+  const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
+  constexpr double kCap = 1.0;  // m, as hover_set's
+  SetCost cost;
+  std::vector<double> given_up;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    if (grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
+    const Index3 v = grid.voxel(n);
+    PerDirection h = world.bounds.at(v).w;
+    for (std::size_t d = 0; d < kDirections; ++d) h[d] *= d == kZ ? reach.vertical.h_inf : reach.horizontal.h_inf;
+    const double at_centre = reach::prism_distance(grid, grid.center(v), h, kCap + taken) - taken;
+    if (!(at_centre > 0)) continue;
+    ++cost.safe_at_centre;
+    if (!world.hover.safe(v)) {
+      ++cost.lost;
+    } else if (at_centre < kCap) {
+      given_up.push_back(at_centre - clearance(world, v));
+    }
+  }
+  if (given_up.empty()) return cost;
+  std::sort(given_up.begin(), given_up.end());
+  cost.median_m = given_up[given_up.size() / 2];
+  cost.quantile95_m = given_up[given_up.size() * 95 / 100];
+  return cost;
 }
 
 std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions,

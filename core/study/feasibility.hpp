@@ -41,6 +41,15 @@ struct Bottleneck {
 /// the set does not fit. Nothing if the points are not joined by free voxels. O(cells log cells).
 std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_W, const Vec3& to_W);
 
+/// What taking Σ over the set instead of at its centre costs (model.md section 3).
+struct SetCost {
+  std::size_t safe_at_centre = 0;         ///< voxels that would be hover-safe with Σ of their centre
+  std::size_t lost = 0;                   ///< of these, not hover-safe with Σ over the set
+  double median_m = 0, quantile95_m = 0;  ///< clearance given up at the others with less than the cap, m
+};
+/// Precondition: method tight, no constant margin. O(voxels · prism_distance): offline.
+SetCost cost_of_set(const plan::World& world);
+
 /// Two hover points far apart in the largest region, one a column where its clearance is largest; the first one passes
 /// `can_take_off`. Deterministic for a world.
 struct HoverPair {

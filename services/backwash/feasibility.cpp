@@ -37,7 +37,8 @@ Json to_json(const study::Region& r, const plan::World&) {
           {"widest", {{"p", services::to_json(r.widest_W)}, {"clearance_m", r.widest_clearance_m}}}};
 }
 
-void print_json(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way) {
+void print_json(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way,
+                const std::optional<study::SetCost>& cost) {
   Json list = Json::array();
   std::size_t voxels = 0;
   for (const auto& region : regions.regions) {
@@ -60,10 +61,17 @@ void print_json(const plan::World& world, const study::Regions& regions, const s
     }
     json["way"] = std::move(entry);
   }
+  if (cost) {
+    json["sigma_over_set"] = {{"safe_voxels_at_centre", cost->safe_at_centre},
+                              {"lost_voxels", cost->lost},
+                              {"margin_median_m", cost->median_m},
+                              {"margin_95_m", cost->quantile95_m}};
+  }
   print(json);
 }
 
-void print_text(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way) {
+void print_text(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way,
+                const std::optional<study::SetCost>& cost) {
   std::printf("%zu hover-safe regions, voxels of %.3f m\n", regions.regions.size(), world.grid.resolution());
   constexpr std::size_t kShown = 10;
   for (std::size_t n = 0; n < std::min(kShown, regions.regions.size()); ++n) {
@@ -72,6 +80,12 @@ void print_text(const plan::World& world, const study::Regions& regions, const s
                 to_text(r.low_W).c_str(), to_text(r.high_W).c_str(), to_text(r.widest_W).c_str(), r.widest_clearance_m);
   }
   if (regions.regions.size() > kShown) std::printf("     and %zu smaller ones\n", regions.regions.size() - kShown);
+  if (cost) {
+    std::printf(
+        "the disturbance over the set, not at its centre, costs %.1f mm of clearance (95 %%: %.1f mm) and %zu of "
+        "%zu voxels\n",
+        1e3 * cost->median_m, 1e3 * cost->quantile95_m, cost->lost, cost->safe_at_centre);
+  }
   if (!way) return;
   const auto name = [](int region) {
     return region < 0 ? std::string("no region") : "region " + std::to_string(region);
@@ -103,7 +117,9 @@ int run(const Options& options) {
     way = Way{region_of(*world, regions, *options.start), region_of(*world, regions, *options.goal),
               study::widest_way(*world, *options.start, *options.goal)};
   }
-  options.json ? print_json(*world, regions, way) : print_text(*world, regions, way);
+  std::optional<study::SetCost> cost;
+  if (options.method == "tight" && !options.margin) cost = study::cost_of_set(*world);
+  options.json ? print_json(*world, regions, way, cost) : print_text(*world, regions, way, cost);
   return kOk;
 }
 

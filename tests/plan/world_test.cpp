@@ -61,8 +61,7 @@ TEST(World, DoesNotDependOnHowTheWorkIsDivided) {
   for (std::size_t n = 0; n < whole->grid.cell_count(); ++n) {
     const Index3 v = whole->grid.voxel(n);
     EXPECT_EQ(whole->bounds.at(v).w, parts->bounds.at(v).w);
-    EXPECT_EQ(whole->hover.clearance(v), parts->hover.clearance(v));
-    EXPECT_EQ(whole->hover.half_widths(v), parts->hover.half_widths(v));
+    EXPECT_EQ(whole->hover.safe(v), parts->hover.safe(v));
     safe += whole->hover.safe(v);
   }
   EXPECT_GT(safe, 10u);
@@ -76,12 +75,17 @@ TEST(World, UsesThePapersLoopForThePapersMethodOnly) {
 TEST(World, KeepsTheConstantMargin) {
   const auto world = build_world(corridor(), Model{}, vehicle_5in(), reach::Method::tight, 0.1);
   EXPECT_EQ(world->constant_margin, 0.1);
+  int safe = 0, unsafe = 0;
   for (std::size_t n = 0; n < world->grid.cell_count(); ++n) {
     const Index3 v = world->grid.voxel(n);
-    if (world->field.has(v)) {
-      EXPECT_NEAR(world->hover.half_widths(v).x(), 0.1, 1e-6);
-    }
+    const auto& vehicle = vehicle_5in();
+    const double left = world->distance.at(v) - 0.1 - vehicle.body.radius - vehicle.estimation.position;
+    if (std::abs(left) < 1e-6) continue;
+    EXPECT_EQ(world->hover.safe(v), left > 0);
+    (left > 0 ? safe : unsafe) += 1;
   }
+  EXPECT_GT(safe, 10);
+  EXPECT_GT(unsafe, 10);
 }
 
 }  // namespace

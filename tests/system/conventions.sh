@@ -20,6 +20,9 @@ for k in 0 1 2 3 4; do printf '%s,1,2,3,0.09,0.01,0,0.04,0,0.01\n' "0.0$((2 * k)
 for method in tight paper; do
   "$backwash" reach --vehicle $quad --track track.csv --method $method --direction 1,1,0 --json >$method.json
 done
+for probability in 1e-3 1e-6; do
+  "$backwash" reach --vehicle $quad --track track.csv --method chance --probability $probability --json >chance-$probability.json
+done
 "$backwash" field --map builtin:parallel-walls-1m --model $quad --vehicle $quad --at 0,0,1 --json >exact.json
 "$backwash" field --map builtin:parallel-walls-1m --model $quad --vehicle $quad --at 0,0,1 --interpolated --json >stored.json
 "$backwash" field --map builtin:parallel-walls-1m --model $quad --slice z=1 --out slice.svg --json >slice.json
@@ -49,6 +52,10 @@ for method in ("tight", "paper"):
     if q:  # the ellipsoid's own support and largest axis follow from its shape
         h = reach["steps"][-1]["half_widths"]
         assert abs(h["x"] - math.sqrt(q[0])) < 1e-12 and abs(h["xy_plus"] - math.sqrt((q[0] + 2 * q[1] + q[3]) / 2)) < 1e-12
+likely, rare = (json.load(open(f"chance-{p}.json")) for p in ("1e-3", "1e-6"))
+assert likely["method"] == "chance" and len(likely["steps"]) == 6
+a, b = likely["steps"][-1]["half_widths"], rare["steps"][-1]["half_widths"]
+assert all(0 < a[d] < b[d] for d in a), "a rarer excursion needs a wider set"
 exact = json.load(open("exact.json"))["points"][0]
 parts = [sum(exact[part][n] for part in ("ground", "corner", "wall", "base")) for n in range(6)]
 assert all(abs(a - b) < 1e-12 for a, b in zip(parts, exact["sigma"])), "parts do not sum to sigma"
