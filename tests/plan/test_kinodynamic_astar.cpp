@@ -144,7 +144,7 @@ TEST(Search, CostsLessThanTwiceTheLowerBoundInFreeSpace) {
 
 TEST(Search, SaysThatNoWayExistsBehindAClosedWall) {
   const OccupancyGrid grid = room_with_wall(1, 4.0);
-  const auto found = search(free_cells(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, options(1, 2));
+  const auto found = search(SafeSpace(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, options(1, 2));
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().kind, SearchFailure::Kind::no_path);
 }
@@ -155,7 +155,7 @@ TEST(Search, NeverLeavesTheMap) {
   for (int j = 0; j < 9; ++j)
     for (int k = 0; k < 9; ++k) grid.set({20, j, k}, Cell::occupied);
   const State start{{0.55, 0.45, 0.45}, Vec3::Zero()};
-  const auto found = search(free_cells(grid), start, {3.5, 0.5, 0.5}, options(1, 2));
+  const auto found = search(SafeSpace(grid), start, {3.5, 0.5, 0.5}, options(1, 2));
   ASSERT_TRUE(found);
   expect_flyable(*found, grid, start, {3.5, 0.5, 0.5}, 1, 2);
 }
@@ -163,7 +163,7 @@ TEST(Search, NeverLeavesTheMap) {
 TEST(Search, SlowsDownFromAStartAboveTheLimit) {
   const OccupancyGrid grid({0, 0, 0}, 0.1, {100, 40, 20}, Cell::free);
   const State start{{1, 2, 1}, {2.5, 0, 0}};
-  const auto found = search(free_cells(grid), start, {8, 2, 1}, options(1, 2));
+  const auto found = search(SafeSpace(grid), start, {8, 2, 1}, options(1, 2));
   ASSERT_TRUE(found) << found.error().message;
   expect_flyable(*found, grid, start, {8, 2, 1}, 1, 2);
 }
@@ -172,7 +172,7 @@ TEST(Search, KeepsItsDeadline) {
   const OccupancyGrid grid = room_with_wall(1, 3.0);
   auto o = options(0.3, 2);
   o.deadline = Clock::now();
-  const auto found = search(free_cells(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, o);
+  const auto found = search(SafeSpace(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, o);
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().kind, SearchFailure::Kind::deadline);
 }
