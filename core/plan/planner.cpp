@@ -41,6 +41,18 @@ Plan refused(Plan plan, PlanStatus status, std::string message) {
   return plan;
 }
 
+/// A cap on states is a budget like the deadline: it says nothing about whether a path exists.
+PlanStatus status_of(SearchFailure::Kind kind) {
+  switch (kind) {
+    case SearchFailure::Kind::no_path:
+      return PlanStatus::no_path;
+    case SearchFailure::Kind::infeasible:
+      return PlanStatus::infeasible;
+    default:
+      return PlanStatus::deadline;
+  }
+}
+
 /// Why hovering at p is not safe; nothing where it is.
 std::optional<std::string> why_blocked(const World& world, const Vec3& p_W) {
   const Index3 v = world.grid.index(p_W);
@@ -51,17 +63,6 @@ std::optional<std::string> why_blocked(const World& world, const Vec3& p_W) {
   if (!set.bounded) return text(p_W) + " is too near to obstacles: the hover set there has no bound in free space";
   if (!set.safe()) return text(p_W) + " is not clear: the hover set's clearance is " + metres(set.clearance);
   return std::nullopt;
-}
-
-/// Hover-safe voxels; start and goal were checked at their exact points, so their voxels count as safe.
-SafeSpace hover_safe_space(const World& world, const Vec3& start_W, const Vec3& goal_W) {
-  std::vector<std::uint8_t> passable(world.grid.cell_count());
-  std::size_t cell = 0;
-  for (int k = 0; k < world.grid.size().z(); ++k)
-    for (int j = 0; j < world.grid.size().y(); ++j)
-      for (int i = 0; i < world.grid.size().x(); ++i) passable[cell++] = world.hover.safe({i, j, k});
-  for (const Vec3& p : {start_W, goal_W}) passable[world.grid.linear(world.grid.index(p))] = 1;
-  return SafeSpace(world.grid, std::move(passable));
 }
 
 /// Time between control points: 0.3 m of flight at full speed.
@@ -169,13 +170,12 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
   if (const auto why = why_blocked(world, goal_W)) return refused(result, PlanStatus::goal_blocked, "goal " + *why);
 
   const auto path =
-      search(hover_safe_space(world, start.command.p_W, goal_W), {start.command.p_W, start.command.v_W}, goal_W,
+      search(SafeView(world.safe, {world.grid.index(start.command.p_W), world.grid.index(goal_W)}),
+             {start.command.p_W, start.command.v_W}, goal_W,
              {kSearchShare * options.v_max, kSearchShare * options.a_max, options.max_nodes, deadline});
   result.metrics.search_ms = ms_since(begun);
   if (!path)
-    return refused(result,
-                   path.error().kind == SearchFailure::Kind::deadline ? PlanStatus::deadline : PlanStatus::no_path,
-                   path.error().message);
+    return refused(result, status_of(path.error().kind), path.error().message);
   result.metrics.expanded = path->expanded;
 
   const Vec3 v_limit = start.command.v_W.cwiseAbs().cwiseMax(options.v_max);

@@ -21,6 +21,15 @@ std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const
   return voxels;
 }
 
+std::vector<std::uint8_t> hover_safe(const map::OccupancyGrid& grid, const reach::HoverMap& hover) {
+  std::vector<std::uint8_t> safe(grid.cell_count());
+  std::size_t n = 0;
+  for (int k = 0; k < grid.size().z(); ++k)
+    for (int j = 0; j < grid.size().y(); ++j)
+      for (int i = 0; i < grid.size().x(); ++i) safe[n++] = hover.safe({i, j, k});
+  return safe;
+}
+
 }  // namespace
 
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) { work(0, count); }
@@ -44,8 +53,9 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
     hover.fill(reach, grid, distance, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
   });
+  SafeSpace safe(grid, hover_safe(grid, hover));
   return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(field), std::move(bounds),
-                                             std::move(hover), std::move(reach), constant_margin});
+                                             std::move(hover), std::move(safe), std::move(reach), constant_margin});
 }
 
 }  // namespace backwash::plan

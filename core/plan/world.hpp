@@ -7,6 +7,7 @@
 #include "core/field/disturbance_field.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/plan/safe_space.hpp"
 #include "core/reach/hover_set.hpp"
 #include "core/reach/reach_tube.hpp"
 
@@ -24,6 +25,7 @@ struct World {
   field::DisturbanceField field;
   reach::BoundField bounds;
   reach::HoverMap hover;
+  SafeSpace safe;  ///< where hover.safe()
   reach::Reachability reach;
   double constant_margin;  ///< < 0: reachable sets; ≥ 0: constant margin, m
 };
