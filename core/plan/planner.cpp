@@ -114,23 +114,6 @@ Flight fly(const World& world, const PlanStart& start, const BSpline& spline) {
   return flight;
 }
 
-/// Distance that each step of the predicted motion must keep from obstacles: body, estimation, margin and the set's
-/// support towards the nearest obstacle (model.md section 5b).
-std::vector<double> keep_away(const World& world, const reach::ReachTube& tube, double margin) {
-  const auto& vehicle = world.reach.vehicle;
-  std::vector<double> r;
-  for (const auto& step : tube) {
-    const auto& h = step.half_widths_interval;
-    double extent = world.constant_margin;
-    if (extent < 0) {
-      const Vec3 g = world.distance.gradient(step.center.p_W), half(h[kX], h[kY], h[kZ]);
-      extent = g.norm() > 0 ? g.cwiseAbs().dot(half) / g.norm() : half.norm();
-    }
-    r.push_back(vehicle.body.radius + vehicle.estimation.position + extent + margin);
-  }
-  return r;
-}
-
 PlanMetrics measured(PlanMetrics metrics, const BSpline& spline, double clearance) {
   metrics.time_s = spline.duration();
   metrics.jerk2 = spline.jerk2();
@@ -188,8 +171,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
     for (std::size_t round = 0; round < kRounds; ++round) {
       if (Clock::now() > deadline) return refused(result, PlanStatus::deadline, "optimisation ran out of time");
       const auto optimising = Clock::now();
-      const SplineCost cost(world.distance, world.reach.vehicle, world.reach.loop, start, spline,
-                            keep_away(world, tube, margin), kOptimiseShare * v_limit, kOptimiseShare * a_limit, {});
+      const SplineCost cost(world, spline, tube, margin, kOptimiseShare * v_limit, kOptimiseShare * a_limit, {});
       const auto optimum = optimise(cost, kEvaluations, deadline);
       spline = retimed(optimum.spline, start, v_limit, a_limit);
       result.metrics.optimise_ms += ms_since(optimising);

@@ -14,6 +14,12 @@ enum class PlanStatus { ok, no_path, infeasible, start_blocked, goal_blocked, de
 /// "ok", "no_path", … as in the JSON of `plan` (interfaces.md).
 const char* to_string(PlanStatus status) noexcept;
 
+/// Where the predicted motion starts: the estimated state, and the command active now, which the plan continues.
+struct PlanStart {
+  State estimated;
+  Setpoint command;
+};
+
 struct PlanOptions {
   double v_max;              ///< m/s per axis; a start that is faster may not speed up
   double a_max;              ///< m/s² per axis

@@ -54,8 +54,10 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
     hover.fill(reach, grid, distance, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
   });
   SafeSpace safe(grid, hover_safe(grid, hover));
+  CentreResponse response(vehicle, loop);
   return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(field), std::move(bounds),
-                                             std::move(hover), std::move(safe), std::move(reach), constant_margin});
+                                             std::move(hover), std::move(safe), std::move(reach), std::move(response),
+                                             constant_margin});
 }
 
 }  // namespace backwash::plan

@@ -7,6 +7,7 @@
 #include "core/field/disturbance_field.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/plan/centre_response.hpp"
 #include "core/plan/safe_space.hpp"
 #include "core/reach/hover_set.hpp"
 #include "core/reach/reach_tube.hpp"
@@ -27,6 +28,7 @@ struct World {
   reach::HoverMap hover;
   SafeSpace safe;  ///< where hover.safe()
   reach::Reachability reach;
+  CentreResponse response;  ///< of the predicted motion, for the optimiser
   double constant_margin;  ///< < 0: reachable sets; ≥ 0: constant margin, m
 };
 
