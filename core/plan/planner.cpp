@@ -189,6 +189,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
         result.tube = std::move(flight.tube);
         return result;
       }
+      if (getenv("DBG")) fprintf(stderr, "pace %.2f round %zu margin %.2f eval %zu cost %.4g clearance %.4f at t %.2f of %.2f p %.2f %.2f %.2f dist %.3f limits %d\n", pace, round, margin, optimum.evaluations, optimum.cost, nearest.clearance, nearest.t, spline.duration(), nearest.center.p_W.x(), nearest.center.p_W.y(), nearest.center.p_W.z(), world.distance.exact(world.grid, nearest.center.p_W), keeps_limits(spline, v_limit, a_limit));
       why = nearest.clearance > 0
                 ? "no timing keeps the limits from this start"
                 : "the tube touches at " + text(nearest.center.p_W) + ": clearance " + metres(nearest.clearance);
@@ -209,14 +210,16 @@ Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
   // that bounds each step from below and leaves few exact queries.
   const double slack = world.grid.resolution() * std::sqrt(3.0);
   std::vector<std::pair<double, std::size_t>> order;
+  double least = kClearanceCap + taken;
   for (std::size_t k = 0; k < tube.size(); ++k) {
     const PerDirection h = half_widths(k);
     const double extent = Vec3(h[kX], h[kY], h[kZ]).norm();
     const double motion = (tube[next(k)].center.p_W - tube[k].center.p_W).norm();
-    order.emplace_back(world.distance.interpolated(tube[k].center.p_W) - slack - extent - 2 * motion, k);
+    const double distance = world.distance.interpolated(tube[k].center.p_W);
+    order.emplace_back(distance - slack - extent - 2 * motion, k);
+    least = std::min(least, distance + slack + 1e-6);  // the set holds its centre
   }
   std::ranges::sort(order);
-  double least = kClearanceCap + taken;
   std::size_t where = order.front().second;
   for (const auto& [bound, k] : order) {
     if (bound >= least) break;

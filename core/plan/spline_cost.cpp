@@ -73,13 +73,14 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
     slope += ds;
     for (std::size_t d = 0; d < kDirections; ++d) {
       sum.w[d] += s * b.w[d];
-      sum.gradient[d] += ds * b.w[d];
+      sum.gradient.col(static_cast<Eigen::Index>(d)) += ds * b.w[d];
     }
   }
   if (!(weight > 0)) return {};
   for (std::size_t d = 0; d < kDirections; ++d) {
     sum.w[d] /= weight;
-    sum.gradient[d] = (sum.gradient[d] - sum.w[d] * slope) / (weight * grid.resolution());
+    auto gradient = sum.gradient.col(static_cast<Eigen::Index>(d));
+    gradient = (gradient - sum.w[d] * slope).eval() / (weight * grid.resolution());
   }
   return sum;
 }
@@ -113,8 +114,7 @@ SplineCost::Sample SplineCost::sample(const reach::ReachTube& tube, std::size_t 
   s.clearance = s.distance - combined(s.k, h) - taken;
   if (s.clearance < kExact) {
     const State& next = tube[std::min(k + 1, tube.size() - 1)].center;
-    const double limit = std::max(s.distance, world_.grid.resolution());
-    const double distance = reach::swept_prism_distance(world_.grid, s.p, next.p_W, h, limit);
+    const double distance = reach::swept_prism_distance(world_.grid, s.p, next.p_W, h, taken + kExact);
     // A set that meets an obstacle does so by an unknown depth: the support says more then.
     if (distance > 0) s.clearance = distance - taken;
   }
@@ -245,7 +245,7 @@ double SplineCost::collision(const Points& moved, Points& gradient) const {
       const auto& G = d == kZ ? G_vertical_ : G_horizontal_;
       if (k == 0) continue;
       for (std::size_t age = 0; age < std::min(G.size(), m); ++age)
-        p.row(row - 1 - static_cast<Eigen::Index>(age)) += k * G[age] * local[m - 1 - age].gradient[d].transpose();
+        p.row(row - 1 - static_cast<Eigen::Index>(age)) += k * G[age] * local[m - 1 - age].gradient.col(static_cast<Eigen::Index>(d)).transpose();
     }
   }
   if (f == 0) return 0;

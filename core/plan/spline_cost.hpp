@@ -21,7 +21,7 @@ struct CostWeights {
 /// renormalised; zero where none is stored.
 struct LocalBound {
   PerDirection w{};
-  std::array<Vec3, kDirections> gradient{};
+  Eigen::Matrix<double, 3, kDirections> gradient = Eigen::Matrix<double, 3, kDirections>::Zero();  ///< 1/s²
 };
 LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField& bounds, const Vec3& p_W) noexcept;
 
