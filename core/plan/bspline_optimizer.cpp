@@ -14,7 +14,7 @@ using Points = SplineCost::Points;
 
 constexpr double kStiffness = 1e-3;         ///< of single control points, beside that of the third differences
 constexpr double kFirstGradient = 0.1;      ///< |g_0|_∞ that the solver sees
-constexpr double kRelativeDecrease = 1e-4;  ///< of f in a step, below which it has converged
+constexpr double kRelativeDecrease = 1e-3;  ///< of f in a step, below which it has converged
 
 /// Variables in which f_s is well conditioned: with the Hessian of f_s, DᵀD + μI = LLᵀ over the interior control
 /// points, the solver sees y = Lᵀq of each axis. A step then bends the curve smoothly instead of moving single control

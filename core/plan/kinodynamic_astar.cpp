@@ -187,8 +187,7 @@ class Search {
                      zs = axis_ends(state, 2, a, duration);
       for (std::size_t i = 0; i < xs.count; ++i)
         for (std::size_t j = 0; j < ys.count; ++j)
-          for (std::size_t k = 0; k < zs.count; ++k)
-            consider(from, xs.end[i], ys.end[j], zs.end[k], duration);
+          for (std::size_t k = 0; k < zs.count; ++k) consider(from, xs.end[i], ys.end[j], zs.end[k], duration);
     }
   }
 
@@ -208,8 +207,7 @@ class Search {
     for (int node = last; nodes_[at(node)].parent >= 0; node = nodes_[at(node)].parent) {
       const Node& n = nodes_[at(node)];
       const State& from = nodes_[at(n.parent)].state;
-      result.motions.push_back(n.at_goal ? optimal_cubic(from, goal_W_, n.duration)
-                                         : primitive(from, n.u, n.duration));
+      result.motions.push_back(n.at_goal ? optimal_cubic(from, goal_W_, n.duration) : primitive(from, n.u, n.duration));
     }
     std::ranges::reverse(result.motions);
     return result;

@@ -90,8 +90,7 @@ bool SafeView::clear(const Motion& motion) const noexcept {
     const Box box = bounds(motion, from, to);
     if (clear(box)) return true;
     const double middle = (from + to) / 2;
-    if ((box.high - box.low).maxCoeff() < space_->resolution() / 4 ||
-        !passable(space_->index(motion.position(middle))))
+    if ((box.high - box.low).maxCoeff() < space_->resolution() / 4 || !passable(space_->index(motion.position(middle))))
       return false;
     return self(self, from, middle) && self(self, middle, to);
   };

@@ -10,10 +10,10 @@ namespace backwash::plan {
 
 namespace {
 
-constexpr double kExact = 0.3;          ///< m: nearer than this the tube's clearance is measured with its prism
-constexpr double kNear = 0.25;          ///< m: farther than this beyond the margin a sample costs nothing
-constexpr double kForgotten = 0.02;     ///< share of the hover set whose oldest causes are left out of Δe
-constexpr std::size_t kSettling = 20;   ///< periods of the hold that count
+constexpr double kExact = 0.3;         ///< m: nearer than this the tube's clearance is measured with its prism
+constexpr double kNear = 0.25;         ///< m: farther than this beyond the margin a sample costs nothing
+constexpr double kForgotten = 0.1;     ///< share of the hover set whose oldest causes are left out of Δe
+constexpr std::size_t kSettling = 20;  ///< periods of the hold that count
 constexpr std::size_t kLongestStride = 5;
 
 /// Periods between samples: a voxel of flight at full speed.
@@ -245,7 +245,8 @@ double SplineCost::collision(const Points& moved, Points& gradient) const {
       const auto& G = d == kZ ? G_vertical_ : G_horizontal_;
       if (k == 0) continue;
       for (std::size_t age = 0; age < std::min(G.size(), m); ++age)
-        p.row(row - 1 - static_cast<Eigen::Index>(age)) += k * G[age] * local[m - 1 - age].gradient.col(static_cast<Eigen::Index>(d)).transpose();
+        p.row(row - 1 - static_cast<Eigen::Index>(age)) +=
+            k * G[age] * local[m - 1 - age].gradient.col(static_cast<Eigen::Index>(d)).transpose();
     }
   }
   if (f == 0) return 0;

@@ -33,9 +33,9 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 ///   lack_m = margin − (c_m + d(p_p) − d(p_p⁰) − Δe_m),
 /// c_m the exact clearance of that tube's swept prism (its own ten faces, not ‖h‖₂), d the interpolated distance, and
 ///   Δe_m = Σ_n k_n Σ_{j<m} G_{m−1−j} (w̄_n(p_p(τ_j)) − w̄_n(p_p⁰(τ_j)))
-/// what the set's support towards the nearest obstacle grows by as the motion moves through the disturbance field: k the
-/// weights of the directions that enclose the obstacle's, held while optimising. Samples are about a voxel of flight
-/// apart; what lies between is for the verification.
+/// what the set's support towards the nearest obstacle grows by as the motion moves through the disturbance field: k
+/// the weights of the directions that enclose the obstacle's, held while optimising. Samples are about a voxel of
+/// flight apart; what lies between is for the verification.
 class SplineCost {
  public:
   /// `tube`: of `spline`'s commands in the world, with at least those followed by the hold. `margin`: clearance to

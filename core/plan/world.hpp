@@ -14,8 +14,8 @@
 
 namespace backwash::plan {
 
-/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when all
-/// are done. core itself knows no threads: services pass their own.
+/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when
+/// all are done. core itself knows no threads: services pass their own.
 using Parallel = std::function<void(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work)>;
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
 
@@ -29,7 +29,7 @@ struct World {
   SafeSpace safe;  ///< where hover.safe()
   reach::Reachability reach;
   CentreResponse response;  ///< of the predicted motion, for the optimiser
-  double constant_margin;  ///< < 0: reachable sets; ≥ 0: constant margin, m
+  double constant_margin;   ///< < 0: reachable sets; ≥ 0: constant margin, m
 };
 
 /// Builds all of it. Σ is stored at every free voxel where the vehicle's centre can be (distance ≥ body radius less one

@@ -9,8 +9,9 @@
 // Each query is planned three times and counts with its median; all times are CPU time of the thread but the parts
 // (search, verify), which are the planner's own. kernel: 10⁶ look-ups of the distance field at random points, same run.
 //
-// Judged here and not by the planner: a trajectory collides if a point of it, every millisecond, is nearer to an obstacle
-// than the body's radius (exact distance); it breaks a limit if velocity or acceleration of an axis pass theirs.
+// Judged here and not by the planner: a trajectory collides if a point of it, every millisecond, is nearer to an
+// obstacle than the body's radius (exact distance); it breaks a limit if velocity or acceleration of an axis pass
+// theirs.
 #include <benchmark/benchmark.h>
 #include <time.h>
 
@@ -42,8 +43,7 @@ map::OccupancyGrid forests(int count) {
   map::OccupancyGrid all(first.origin(), 0.1, {count * nx, first.size().y(), first.size().z()}, map::Cell::free);
   for (int n = 0; n < count; ++n) {
     const auto forest = map::builtin_scene("forest-" + std::to_string(n + 1), 0.1).value();
-    for (std::size_t i = 0; i < forest.cell_count(); ++i)
-      all.set(forest.voxel(i) + Index3(n * nx, 0, 0), forest.at(i));
+    for (std::size_t i = 0; i < forest.cell_count(); ++i) all.set(forest.voxel(i) + Index3(n * nx, 0, 0), forest.at(i));
   }
   return all;
 }
@@ -161,9 +161,7 @@ void run(benchmark::State& state, const plan::World& world, const std::vector<Qu
   }
 }
 
-void local(benchmark::State& state) {
-  run(state, world(1), queries(world(1), 200, 5.5, 7), INFINITY);
-}
+void local(benchmark::State& state) { run(state, world(1), queries(world(1), 200, 5.5, 7), INFINITY); }
 BENCHMARK(local)->Unit(benchmark::kMillisecond)->Iterations(1);
 
 }  // namespace

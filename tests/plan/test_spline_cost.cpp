@@ -40,7 +40,8 @@ TEST(CentreResponse, BasisEqualsThePredictionOfAMovedControlPoint) {
     const auto predicted = [&](const BSpline& s) {
       reach::CentrePredictor centre(vehicle, reach::Loop::vehicle, {Vec3(1, 2, 3), Vec3(0.1, 0, 0)}, {0, 0.5, 0}, {});
       std::vector<State> states;
-      for (std::size_t k = 0; k < samples * stride; ++k) states.push_back(centre.step(s.at(static_cast<double>(k) * 0.02)));
+      for (std::size_t k = 0; k < samples * stride; ++k)
+        states.push_back(centre.step(s.at(static_cast<double>(k) * 0.02)));
       return states;
     };
     const auto before = predicted(spline);
