@@ -45,8 +45,11 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
     hover.fill(reach, grid, distance, sums, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
   });
+  SafeSpace safe(hover.safe_voxels());
+  CentreResponse response(vehicle, loop);
   return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field),
-                                             std::move(bounds), std::move(hover), std::move(reach), constant_margin});
+                                             std::move(bounds), std::move(hover), std::move(safe), std::move(reach),
+                                             std::move(response), constant_margin});
 }
 
 }  // namespace backwash::plan

@@ -50,7 +50,8 @@ TEST(SafeSpace, BoxQueryEqualsCountingVoxels) {
   OccupancyGrid grid({-1, 0, 2}, 0.2, {12, 9, 7}, Cell::free);
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (random() % 40 == 0) grid.set(grid.voxel(n), Cell::occupied);
-  const SafeSpace space(grid);
+  const SafeSpace cells(grid);
+  const SafeView space(cells);
   std::uniform_real_distribution<double> u(-0.1, 1.1);
   for (int i = 0; i < 3000; ++i) {
     const Vec3 extent = grid.size().cast<double>() * 0.2;
@@ -70,7 +71,8 @@ TEST(SafeSpace, SweptSetNeverMissesAThinWall) {
   OccupancyGrid grid({0, 0, 0}, 0.05, {80, 80, 40}, Cell::free);
   for (int j = 0; j < 80; ++j)
     for (int k = 0; k < 40; ++k) grid.set({40, j, k}, Cell::occupied);
-  const SafeSpace space(grid);
+  const SafeSpace cells(grid);
+  const SafeView space(cells);
   std::mt19937 random(2);
   std::uniform_real_distribution<double> u(-1, 1);
   int crossing = 0, clear = 0;
@@ -99,7 +101,7 @@ TEST(SafeSpace, MotionsNeedAtLeastTheTimeThatHopsSay) {
   const OccupancyGrid grid = room_with_wall(2, 3.0);
   const SafeSpace space(grid);
   const Vec3 goal(6, 1, 1);
-  const auto hops = space.hops_to(grid.index(goal));
+  const auto hops = SafeView(space).hops_to(space.index(goal), space.index({2, 1, 1}));
   const auto found = search(space, {{2, 1, 1}, Vec3::Zero()}, goal, options(1.5, 2));
   ASSERT_TRUE(found);
   // Along a motion that ends at the goal: what is left of ∫ max|v| dt is at least (hops − 1) voxels.
@@ -108,7 +110,7 @@ TEST(SafeSpace, MotionsNeedAtLeastTheTimeThatHopsSay) {
     for (int k = 1000; k > 0; --k) {
       left += m->velocity(m->duration * (k - 0.5) / 1000).cwiseAbs().maxCoeff() * m->duration / 1000;
       const Vec3 p = m->position(m->duration * (k - 1) / 1000);
-      EXPECT_GE(left + 1e-4, (static_cast<double>(hops[grid.linear(grid.index(p))]) - 1) * 0.1);
+      EXPECT_GE(left + 1e-4, (static_cast<double>(hops.at(space.linear(space.index(p)))) - 1) * 0.1);
     }
 }
 
@@ -144,7 +146,7 @@ TEST(Search, CostsLessThanTwiceTheLowerBoundInFreeSpace) {
 
 TEST(Search, SaysThatNoWayExistsBehindAClosedWall) {
   const OccupancyGrid grid = room_with_wall(1, 4.0);
-  const auto found = search(SafeSpace(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, options(1, 2));
+  const auto found = search(free_cells(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, options(1, 2));
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().kind, SearchFailure::Kind::no_path);
 }
@@ -155,7 +157,7 @@ TEST(Search, NeverLeavesTheMap) {
   for (int j = 0; j < 9; ++j)
     for (int k = 0; k < 9; ++k) grid.set({20, j, k}, Cell::occupied);
   const State start{{0.55, 0.45, 0.45}, Vec3::Zero()};
-  const auto found = search(SafeSpace(grid), start, {3.5, 0.5, 0.5}, options(1, 2));
+  const auto found = search(free_cells(grid), start, {3.5, 0.5, 0.5}, options(1, 2));
   ASSERT_TRUE(found);
   expect_flyable(*found, grid, start, {3.5, 0.5, 0.5}, 1, 2);
 }
@@ -163,7 +165,7 @@ TEST(Search, NeverLeavesTheMap) {
 TEST(Search, SlowsDownFromAStartAboveTheLimit) {
   const OccupancyGrid grid({0, 0, 0}, 0.1, {100, 40, 20}, Cell::free);
   const State start{{1, 2, 1}, {2.5, 0, 0}};
-  const auto found = search(SafeSpace(grid), start, {8, 2, 1}, options(1, 2));
+  const auto found = search(free_cells(grid), start, {8, 2, 1}, options(1, 2));
   ASSERT_TRUE(found) << found.error().message;
   expect_flyable(*found, grid, start, {8, 2, 1}, 1, 2);
 }
@@ -172,7 +174,7 @@ TEST(Search, KeepsItsDeadline) {
   const OccupancyGrid grid = room_with_wall(1, 3.0);
   auto o = options(0.3, 2);
   o.deadline = Clock::now();
-  const auto found = search(SafeSpace(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, o);
+  const auto found = search(free_cells(grid), {{2, 1, 1}, Vec3::Zero()}, {6, 1, 1}, o);
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().kind, SearchFailure::Kind::deadline);
 }
