@@ -21,6 +21,18 @@ std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const
   return voxels;
 }
 
+/// The paper's sets exist for its second-order loop only.
+reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
+  return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
+}
+
+void fill_hover_map(World& world, const std::vector<std::size_t>& voxels, const Parallel& parallel) {
+  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
+    world.hover.fill(world.reach, world.grid, world.distance, world.bounds,
+                     std::span(voxels).subspan(begin, end - begin), world.constant_margin);
+  });
+}
+
 }  // namespace
 
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) { work(0, count); }
@@ -29,9 +41,7 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
                                          reach::Method method, double constant_margin, const Parallel& parallel) {
   Model vehicle_model = model;
   vehicle_model.ground.r0 = vehicle.body.diagonal_radius;
-  // The paper's sets exist for its second-order loop only.
-  const reach::Loop loop = method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle;
-  reach::Reachability reach(vehicle, method, loop);
+  reach::Reachability reach = sets_of(vehicle, method);
   map::DistanceField distance(grid);
 
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
@@ -41,11 +51,18 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
 
   reach::BoundField bounds(grid, field, model.bound);
   reach::HoverMap hover(grid);
-  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
-    hover.fill(reach, grid, distance, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
-  });
-  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(field), std::move(bounds),
+  auto world = std::make_shared<World>(World{std::move(grid), std::move(distance), std::move(field), std::move(bounds),
                                              std::move(hover), std::move(reach), constant_margin});
+  fill_hover_map(*world, voxels, parallel);
+  return world;
+}
+
+World with_clearance_by(World world, reach::Method method, double constant_margin, const Parallel& parallel) {
+  world.reach = sets_of(world.reach.vehicle, method);
+  world.constant_margin = constant_margin;
+  world.hover = reach::HoverMap(world.grid);
+  fill_hover_map(world, voxels_for_centre(world.grid, world.distance, world.reach.vehicle), parallel);
+  return world;
 }
 
 }  // namespace backwash::plan

@@ -12,8 +12,8 @@
 
 namespace backwash::plan {
 
-/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when all
-/// are done. core itself knows no threads: services pass their own.
+/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when
+/// all are done. core itself knows no threads: services pass their own.
 using Parallel = std::function<void(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work)>;
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
 
@@ -33,5 +33,10 @@ struct World {
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
                                          reach::Method method = reach::Method::tight, double constant_margin = -1,
                                          const Parallel& parallel = run_serial);
+
+/// The same surroundings kept clear of in another way: Σ and its bounds, the expensive part, are taken over; loop and
+/// hover map are made anew. Equal to building with that method and margin.
+World with_clearance_by(World world, reach::Method method, double constant_margin,
+                        const Parallel& parallel = run_serial);
 
 }  // namespace backwash::plan

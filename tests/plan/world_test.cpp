@@ -84,5 +84,28 @@ TEST(World, KeepsTheConstantMargin) {
   }
 }
 
+TEST(World, WithAnotherClearanceIsTheWorldBuiltForIt) {
+  const auto tight = build_world(corridor(), Model{}, vehicle_5in());
+  const struct {
+    reach::Method method;
+    double margin;
+  } others[] = {{reach::Method::paper, -1}, {reach::Method::tight, 0.3}};
+  for (const auto& [method, margin] : others) {
+    const auto built = build_world(corridor(), Model{}, vehicle_5in(), method, margin);
+    const World changed = with_clearance_by(*tight, method, margin);
+    EXPECT_EQ(changed.reach.method, built->reach.method);
+    EXPECT_EQ(changed.reach.loop, built->reach.loop);
+    EXPECT_EQ(changed.constant_margin, margin);
+    std::size_t different = 0;
+    for (std::size_t n = 0; n < built->grid.cell_count(); ++n) {
+      const Index3 v = built->grid.voxel(n);
+      ASSERT_EQ(changed.hover.half_widths(v), built->hover.half_widths(v));
+      ASSERT_EQ(changed.hover.clearance(v), built->hover.clearance(v));
+      different += changed.hover.clearance(v) != tight->hover.clearance(v);
+    }
+    EXPECT_GT(different, 100u);
+  }
+}
+
 }  // namespace
 }  // namespace backwash::plan
