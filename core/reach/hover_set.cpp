@@ -130,13 +130,18 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
     cells_[n] = {static_cast<float>(set.clearance), static_cast<float>(h.x()), static_cast<float>(h.y()),
                  static_cast<float>(h.z())};
   };
+  const double taken = body_and_estimation(reach.vehicle);
   if (constant_margin >= 0) {
-    for (const std::size_t n : voxels) {
-      store(n, hover_set(reach, grid, distance, bounds, grid.center(grid.voxel(n)), constant_margin));
+    HoverSet ball;
+    ball.half_widths.fill(constant_margin);
+    ball.bounded = true;
+    for (const std::size_t n : voxels) {  // stored distances are exact at centres, in single precision
+      const double free_distance = distance.at(grid.voxel(n)) - 1e-6;
+      ball.clearance = std::min(kClearanceCap, free_distance - constant_margin - taken);
+      store(n, ball);
     }
     return;
   }
-  const double taken = body_and_estimation(reach.vehicle);
   const auto fill_with = [&](const auto& half_widths) {
     for (const std::size_t n : voxels) {
       const Index3 v = grid.voxel(n);

@@ -173,4 +173,22 @@ SceneComparison compare_scene(const std::string& scene, plan::World world, const
   return comparison;
 }
 
+GapCampaign fly_narrow_gap(const plan::World& world, std::size_t flights, std::uint64_t seed) {
+  const Vehicle& vehicle = world.reach.vehicle;
+  GapCampaign campaign;
+  campaign.vehicle = vehicle.name;
+  for (std::size_t n = 0; n < flights; ++n) {  // a flight uses two consecutive seeds
+    const auto route = fly_route(world, vehicle, {{1, 0, 1.2}, {5, 0, 1.2}, seed + 2 * n});
+    const auto outcome = measure(route, world, vehicle);
+    if (outcome.status != plan::PlanStatus::ok) continue;
+    campaign.flights += 1;
+    campaign.samples += outcome.samples;
+    campaign.outside += outcome.outside;
+    campaign.contacts += outcome.contacts > 0 ? 1 : 0;
+    campaign.largest_ratio = campaign.largest_ratio.cwiseMax(outcome.largest_ratio);
+    if (campaign.shown.empty()) campaign.shown = route.piece.judged;
+  }
+  return campaign;
+}
+
 }  // namespace backwash::sim

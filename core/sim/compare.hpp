@@ -70,4 +70,15 @@ SceneComparison compare_scene(const std::string& scene, plan::World world, const
                               const std::vector<CompareMethod>& methods,
                               const plan::Parallel& parallel = plan::run_serial);
 
+/// The narrow gap of the paper's figures, flown again and again in other air.
+struct GapCampaign {
+  std::string vehicle;
+  std::size_t flights = 0;  ///< flown; a plan that failed is none
+  std::size_t samples = 0, outside = 0, contacts = 0;
+  Vec3 largest_ratio = Vec3::Zero();  ///< largest |e|/h per axis of all flights
+  std::vector<track::Inside> shown;   ///< of the first flight, every 20 ms
+};
+/// Plans and flies (1, 0, 1.2) → (5, 0, 1.2) with seeds seed, seed + 2 … `world`: builtin:narrow-gap with sets.
+GapCampaign fly_narrow_gap(const plan::World& world, std::size_t flights, std::uint64_t seed);
+
 }  // namespace backwash::sim

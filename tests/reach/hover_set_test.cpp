@@ -241,6 +241,27 @@ TEST(HoverSet, OfThePaperContainsTheTightOneAlongTheAxes) {
 }
 
 // The paper’s sets come from a table there, rounded up; gains so near each other cost 3e-5.
+TEST(HoverMap, OfAConstantMarginAgreesWithTheSetAtEachVoxelAndIsNeverWider) {
+  const Scene& scene = default_scene();
+  const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
+  std::vector<std::size_t> voxels;
+  for (std::size_t n = 0; n < scene.grid.cell_count(); ++n)
+    if (scene.grid.at(n) == map::Cell::free) voxels.push_back(n);
+  HoverMap hover(scene.grid);
+  hover.fill(reach, scene.grid, scene.distance, scene.bounds, voxels, 0.25);
+  std::size_t safe = 0;
+  for (const std::size_t n : voxels) {
+    const Index3 v = scene.grid.voxel(n);
+    const HoverSet set = hover_set(reach, scene.grid, scene.distance, scene.bounds, scene.grid.center(v), 0.25);
+    EXPECT_NEAR(hover.clearance(v), set.clearance, 3e-6);
+    EXPECT_LE(hover.clearance(v), set.clearance);
+    EXPECT_NEAR(hover.half_widths(v).x(), 0.25, 1e-7);
+    safe += hover.safe(v);
+  }
+  EXPECT_GT(safe, 100u);
+  EXPECT_LT(safe, voxels.size());
+}
+
 TEST(HoverMap, OfThePaperAgreesWithTheSolvedEllipsoids) {
   const Scene scene = make_scene(with_kappa(1.5));
   const Reachability reach(test_vehicle(), Method::paper, Loop::continuous);
