@@ -76,7 +76,7 @@ double induced_power(const Vehicle& vehicle, double thrust_N) {
 
 bool outside_set(const plan::World& world, const FlightPiece& piece, std::size_t k) {
   const auto& judged = piece.judged[k];
-  if (world.constant_margin < 0) return !judged.inside;
+  if (world.constant_margin < 0) return !judged.judged || !judged.inside;
   return (piece.samples[k].estimated.p_W - judged.center).norm() > world.constant_margin;
 }
 

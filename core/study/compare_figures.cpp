@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <sstream>
 
@@ -9,12 +10,19 @@
 namespace backwash::study {
 namespace {
 
+std::string short_metres(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f m", value);
+  return text;
+}
+
 std::string ratio_block(const Comparison& c, sim::Measure measure) {
   std::ostringstream block;
   block << '$' << sim::name(measure) << " << EOD\n";
   for (std::size_t m = 1; m < c.methods.size(); ++m) {
     const auto& r = c.table.rows[m].on_common.total[measure];
-    block << m << ' ' << r.value << ' ' << r.low << ' ' << r.high << " \"" << c.methods[m].name << "\"\n";
+    block << m << ' ' << r.value << ' ' << r.low << ' ' << r.high << " \""
+          << (c.methods[m].margin < 0 ? c.methods[m].name : short_metres(c.methods[m].margin)) << "\"\n";
   }
   block << "EOD\n";
   return block.str();
@@ -42,16 +50,14 @@ tl::expected<std::string, PlotError> ratio_figure(const Comparison& c) {
   script << "EOD\n";
   for (const auto& panel : panels) script << ratio_block(c, panel.first);
   script << kAxes << "set xrange [0.5:" << static_cast<double>(c.methods.size()) - 0.5
-         << "]\nset xtics rotate by -35 nomirror\nset key top left\nset multiplot layout 1,4\n";
+         << "]\nset xtics rotate by -35 nomirror\nunset key\nset multiplot layout 1,4\n";
   for (const auto& [measure, title] : panels) {
     script << "set title '" << title << ", proposed over'\n"
            << "set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead linecolor '#888888' dashtype 3\n"
            << "set yrange [" << (measure == sim::kJerk2 ? "0:*" : "*:*") << "]\nplot $" << sim::name(measure)
-           << " using 1:2:3:4:xtic(5) with yerrorbars pointtype 7 pointsize 0.8 linewidth 2 linecolor '#0b3d91' title '"
-           << (measure == sim::kJerk2 ? "ours" : "") << '\'';
+           << " using 1:2:3:4:xtic(5) with yerrorbars pointtype 7 pointsize 0.8 linewidth 2 linecolor '#0b3d91'";
     if (measure == sim::kJerk2)
-      script << ", $paper using 1:2 with points pointtype 4 pointsize 1.2 linewidth 2 linecolor '#d1495b' title "
-                "'the paper'";
+      script << ", $paper using 1:2 with points pointtype 4 pointsize 1.2 linewidth 2 linecolor '#d1495b'";
     script << '\n';
   }
   script << "unset multiplot\n";

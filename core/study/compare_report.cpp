@@ -100,12 +100,15 @@ std::string by_scene(const Comparison& c) {
   return section("Pairs solved, by scene", "A pair that a method does not solve counts as no path.", table(head, rows));
 }
 
-std::string verdict(const Comparison& c) {
-  std::string html;
+std::string demanded(const Comparison& c) {
+  std::string html = "<table class=\"wide\">\n";
   for (const auto& demand : c.demands)
-    html += std::string("<p class=\"verdict ") + (demand.met ? "passed" : "failed") + "\">" +
-            (demand.met ? "Met: " : "Missed: ") + escaped(demand.text) + "</p>\n";
-  return html;
+    html += std::string("<tr><td class=\"") + (demand.met ? "passed\">met" : "failed\">missed") + "</td><td>" +
+            escaped(demand.text) + "</td></tr>\n";
+  return section(
+      "Demanded of the proposed method",
+      "Jerk² counts as below when its whole interval is; margins with more contacts are not held against it.",
+      html + "</table>\n");
 }
 
 }  // namespace
@@ -114,8 +117,7 @@ tl::expected<std::string, PlotError> comparison_report(const Comparison& c) {
   std::string body = "<h1>The same routes with other clearances</h1>\n<p class=\"context\">" +
                      text("%zu start–goal pairs a scene and vehicle, seed %llu; backwash ", c.flights,
                           static_cast<unsigned long long>(c.seed)) +
-                     escaped(c.version) + "</p>\n<section><h2>Demanded of the proposed method</h2>\n" + verdict(c) +
-                     "</section>\n" + table_one(c);
+                     escaped(c.version) + "</p>\n" + demanded(c) + table_one(c);
   if (c.table.common_pairs > 0) {
     const auto figure = ratio_figure(c);
     if (!figure) return tl::make_unexpected(figure.error());
