@@ -45,22 +45,30 @@ std::uint64_t seed_for(std::uint64_t seed, const std::string& scene, const std::
   return hash + seed;
 }
 
-/// The model that belongs to a vehicle: the one given in its place, else the built-in one of the same name.
-std::string model_for(const Options& options, std::size_t n) {
-  if (!options.models.empty()) return options.models[n];
-  if (options.vehicles[n].starts_with("builtin:")) return options.vehicles[n];
-  throw Failure(kUsage, "--vehicle " + options.vehicles[n] + " has no model of its own; give one --model a vehicle");
+/// The models of the vehicles: those given, else the built-in ones of the same names.
+std::vector<std::string> models_of(const Options& options) {
+  if (options.models.empty()) {
+    for (const auto& vehicle : options.vehicles) {
+      if (!vehicle.starts_with("builtin:"))
+        throw Failure(kUsage, "--vehicle " + vehicle + " has no model of its own; give one --model a vehicle");
+    }
+    return options.vehicles;
+  }
+  if (options.models.size() != options.vehicles.size())
+    throw Failure(kUsage, "give one --model a --vehicle, in the same order, or none");
+  return options.models;
 }
 
-study::Comparison compare(const Options& options, const std::vector<std::string>& maps) {
+study::Comparison compare(const Options& options, const std::vector<std::string>& maps,
+                          const std::vector<std::string>& models) {
   study::Comparison c{sim::compare_methods(), {}, {}, {}, {}, options.seed, options.flights, kVersion};
   for (const auto& map : maps) {
     const std::string scene = map.starts_with("builtin:") ? map : std::filesystem::path(map).filename().string();
     for (std::size_t n = 0; n < options.vehicles.size(); ++n) {
       const auto vehicle = read_vehicle(options.vehicles[n]);
       progress(scene + ", " + vehicle.name + ": building the world");
-      const auto world = plan::build_world(read_map(map), read_model(model_for(options, n)), vehicle,
-                                           reach::Method::tight, -1, run_parallel);
+      const auto world =
+          plan::build_world(read_map(map), read_model(models[n]), vehicle, reach::Method::tight, -1, run_parallel);
       const auto pairs = sim::draw_pairs(world->grid, world->distance, vehicle, options.flights,
                                          seed_for(options.seed, scene, vehicle.name));
       if (!pairs)
@@ -76,8 +84,7 @@ study::Comparison compare(const Options& options, const std::vector<std::string>
 }
 
 int run(const Options& options) {
-  if (!options.models.empty() && options.models.size() != options.vehicles.size())
-    throw Failure(kUsage, "give one --model a --vehicle, in the same order, or none");
+  const auto models = models_of(options);
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
   std::vector<std::string> maps;
@@ -87,9 +94,9 @@ int run(const Options& options) {
   for (std::size_t n = 0; n < options.vehicles.size(); ++n) {
     read_reachability(read_vehicle(options.vehicles[n]), reach::Method::tight, reach::Loop::vehicle,
                       options.vehicles[n]);
-    read_model(model_for(options, n));
+    read_model(models[n]);
   }
-  const auto comparison = compare(options, maps);
+  const auto comparison = compare(options, maps, models);
   if (!options.out.empty()) write_file(options.out, to_csv(comparison), options.force);
   if (!options.report.empty()) {
     progress("drawing the report");
