@@ -20,26 +20,30 @@ struct SearchOptions {
 };
 
 struct SearchFailure {
-  enum class Kind { no_path, deadline } kind;
+  /// no_path: nothing joins start and goal. infeasible: something does, but no motion within the limits from this
+  /// start. exhausted: the cap of states was reached before an answer. deadline: the time was.
+  enum class Kind { no_path, infeasible, exhausted, deadline } kind;
   std::string message;  ///< one line
 };
 
 /// A found path: motions that join with equal position and velocity; the last ends at rest exactly at the goal.
 struct SearchResult {
   std::vector<Motion> motions;
-  double cost;         ///< G = ∫‖u‖² dt + ρT, m²/s³
-  double lower_bound;  ///< of the cost of any path, by the heuristic at the start
-  std::size_t expanded;
+  double cost;           ///< G = ∫‖u‖² dt + ρT, m²/s³
+  double lower_bound;    ///< of the cost of any path, by the heuristic at the start
+  std::size_t expanded;  ///< states expanded by all attempts
 };
 
 /// Hybrid-state A* (paper Sec. V-A, model.md section 5b) over (p, v): acceleration grid × two durations, cost
 /// G = ∫‖u‖² dt + ρT, each motion checked as a swept set and against the limits per axis, closed by the optimal cubic
-/// to the goal. The heuristic is cost_to_go over durations that the way through passable voxels needs at least
-/// (SafeSpace::hops_to, least_stopping_time): admissible. The open set is taken by bands of f = G + H as wide as
-/// H(start), so the cost is below twice the best of the discretisation; inside a band by G + 2H. A start faster than
-/// v_max may only slow down. Deterministic. Errors: no_path (none exists, or the node cap was reached: the message says
-/// which), deadline.
-tl::expected<SearchResult, SearchFailure> search(const SafeSpace& space, const State& start, const Vec3& goal_W,
+/// to the goal. The open set is taken by bands of f = G + H as wide as H(start), so the cost is below twice the best of
+/// the discretisation; inside a band greedily. A start faster than v_max may only slow down. Deterministic.
+///
+/// Three attempts, each with more to spend: H = cost_to_go over the durations that the straight way needs at least;
+/// then over those that the way through passable voxels needs (SafeView::hops_to, least_stopping_time), which sees
+/// around walls; then stop_and_go(), which finds a way wherever passable voxels join start and goal. Both H are
+/// admissible; the third is not bounded in cost.
+tl::expected<SearchResult, SearchFailure> search(const SafeView& space, const State& start, const Vec3& goal_W,
                                                  const SearchOptions& options);
 
 /// Positions every `step` along the motions, both ends included: the step is shortened to divide the duration, and the

@@ -88,14 +88,14 @@ double polished(double x, double p, double q, double r) noexcept {
 
 }  // namespace
 
-std::vector<double> depressed_quartic_roots(double p, double q, double r) {
-  std::vector<double> roots;
+Roots depressed_quartic_roots(double p, double q, double r) noexcept {
+  Roots roots;
   const auto quadratic = [&](double b, double c) {  // x² + b x + c; a slightly negative discriminant is a double root
     const double discriminant = b * b / 4 - c;
     if (discriminant < -1e-9 * (b * b / 4 + std::abs(c))) return;
     const double root = std::sqrt(std::max(discriminant, 0.0));
-    roots.push_back(polished(-b / 2 - root, p, q, r));
-    roots.push_back(polished(-b / 2 + root, p, q, r));
+    roots.add(polished(-b / 2 - root, p, q, r));
+    roots.add(polished(-b / 2 + root, p, q, r));
   };
   // (x² + p/2 + m)² = 2m (x − q/(4m))² for a root m of the resolvent cubic.
   const double m = largest_cubic_root(p, p * p / 4 - r, -q * q / 8);
@@ -109,8 +109,8 @@ std::vector<double> depressed_quartic_roots(double p, double q, double r) {
     for (const double sign : {-1.0, 1.0}) {
       const double square = -p / 2 + sign * std::sqrt(discriminant);
       if (square < 0) continue;
-      roots.push_back(polished(std::sqrt(square), p, q, r));
-      roots.push_back(polished(-std::sqrt(square), p, q, r));
+      roots.add(polished(std::sqrt(square), p, q, r));
+      roots.add(polished(-std::sqrt(square), p, q, r));
     }
   }
   return roots;

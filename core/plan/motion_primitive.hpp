@@ -2,7 +2,7 @@
 #pragma once
 
 #include <array>
-#include <vector>
+#include <cstddef>
 
 #include "core/types/state.hpp"
 
@@ -49,7 +49,19 @@ CostToGo cost_to_go(const State& from, const Vec3& goal_W, double rho, double le
 /// max(v_max, speed) and acceleration at most a_max, s.
 double least_stopping_time(double distance, double speed, double v_max, double a_max) noexcept;
 
+/// Up to four numbers.
+class Roots {
+ public:
+  void add(double x) noexcept { x_[count_++] = x; }
+  const double* begin() const noexcept { return x_.data(); }
+  const double* end() const noexcept { return x_.data() + count_; }
+  std::size_t size() const noexcept { return count_; }
+
+ private:
+  std::array<double, 4> x_;
+  std::size_t count_ = 0;
+};
 /// Real roots of x⁴ + p x² + q x + r (Ferrari, polished by Newton); multiple roots may appear once.
-std::vector<double> depressed_quartic_roots(double p, double q, double r);
+Roots depressed_quartic_roots(double p, double q, double r) noexcept;
 
 }  // namespace backwash::plan

@@ -10,15 +10,25 @@
 
 namespace backwash::plan {
 
+/// infeasible: start and goal are joined by hover-safe space, but no verified trajectory within the limits was found.
+/// deadline: time or the cap of states ran out before an answer.
 enum class PlanStatus { ok, no_path, infeasible, start_blocked, goal_blocked, deadline };
 /// "ok", "no_path", … as in the JSON of `plan` (interfaces.md).
 const char* to_string(PlanStatus status) noexcept;
 
+/// Where the predicted motion starts: the estimated state, and the command active now, which the plan continues.
+struct PlanStart {
+  State estimated;
+  Setpoint command;
+};
+
 struct PlanOptions {
-  double v_max;              ///< m/s per axis; a start that is faster may not speed up
-  double a_max;              ///< m/s² per axis
-  double deadline_s = 10.0;  ///< whole plan, monotonic clock
-  std::size_t max_nodes = 400'000;
+  double v_max;                     ///< m/s per axis; a start that is faster may not speed up
+  double a_max;                     ///< m/s² per axis
+  double deadline_s = 10.0;         ///< whole plan, monotonic clock; what is found when it passes is still verified
+  std::size_t max_nodes = 400'000;  ///< states that an attempt of the search may keep
+  std::size_t evaluations = 50;     ///< of the cost, per round of the optimiser
+  double least_clearance_m = 0;     ///< that the verified tube, and hovering at start and goal, must pass, m
 };
 
 struct PlanMetrics {
@@ -66,8 +76,8 @@ std::optional<Column> takeoff_column(const World& world, const Vec3& p_W);
 /// Vertical commands from `from` to `to` (same column), rest to rest, minimum-jerk profile within the limits.
 std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
 
-/// Clearance that a take-off tube must have (model.md section 4): beside it only while its centre is below z_safe (m, W), all
-/// around from there on, m.
+/// Clearance that a take-off tube must have (model.md section 4): beside it only while its centre is below z_safe (m,
+/// W), all around from there on, m.
 double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe);
 
 /// Smallest lateral clearance of a vertical tube: obstacles beside it, not the floor below (model.md section 4), m.

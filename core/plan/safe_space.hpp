@@ -9,7 +9,8 @@
 
 namespace backwash::plan {
 
-/// The voxels a search may pass, with O(1) box queries by a summed-area table. Outside the grid nothing may be passed.
+/// The voxels that may be passed, with O(1) box queries by a summed-area table and the regions they form. Outside the
+/// grid nothing may be passed. Built once per map; what a single search adds is a SafeView.
 class SafeSpace {
  public:
   /// `passable`: one entry per voxel of the grid (linear order), 0: may not be passed. O(voxels).
@@ -17,33 +18,74 @@ class SafeSpace {
 
   double resolution() const noexcept { return resolution_; }
   const Vec3& origin() const noexcept { return origin_W_; }
+  const Index3& size() const noexcept { return size_; }
   /// Voxel that contains p; may lie outside.
   Index3 index(const Vec3& p_W) const noexcept { return ((p_W - origin_W_) / resolution_).array().floor().cast<int>(); }
-  bool passable(const Index3& v) const noexcept;
-  /// Whether every voxel that meets the closed box may be passed.
-  bool clear(const Box& box) const noexcept;
-  /// Whether every voxel the motion meets may be passed: pieces with exact bounds, halved until their box is clear or
-  /// smaller than a quarter of a voxel. Never true for a motion that touches a voxel that may not be passed.
-  bool clear(const Motion& motion) const noexcept;
-
-  /// Number of king's moves (26 neighbours) through passable voxels from each voxel to `goal`; kUnreached where there
-  /// is no way. Any motion through passable voxels whose fastest axis covers S metres in total makes fewer than
-  /// S/resolution + 1 of them: |Δp| ≤ a on each axis changes each index by at most 1.
-  static constexpr std::uint32_t kUnreached = 0xffffffffu;
-  std::vector<std::uint32_t> hops_to(const Index3& goal) const;
+  Vec3 center(const Index3& v) const noexcept {
+    return origin_W_ + resolution_ * (v.cast<double>() + Vec3::Constant(0.5));
+  }
+  bool inside(const Index3& v) const noexcept { return (v.array() >= 0).all() && (v.array() < size_.array()).all(); }
+  /// Precondition: inside(v).
   std::size_t linear(const Index3& v) const noexcept {
     return static_cast<std::size_t>(v.x() + size_.x() * (v.y() + size_.y() * v.z()));
   }
+  bool passable(const Index3& v) const noexcept { return inside(v) && region_[linear(v)] != kNoRegion; }
+  /// Voxels with low ≤ v ≤ high that may not be passed. Precondition: both inside, low ≤ high.
+  std::uint32_t blocked(const Index3& low, const Index3& high) const noexcept;
+  /// The region of a voxel: two passable voxels have the same one exactly if passable voxels that share faces join
+  /// them. 0: may not be passed. A motion whose closed swept set is passable never leaves its region.
+  static constexpr std::uint32_t kNoRegion = 0;
+  std::uint32_t region(const Index3& v) const noexcept { return inside(v) ? region_[linear(v)] : kNoRegion; }
 
  private:
+  void add_up(const std::vector<std::uint8_t>& passable);
+  void number_regions();
   std::uint32_t blocked_below(int i, int j, int k) const noexcept {
     return blocked_[static_cast<std::size_t>(i + (size_.x() + 1) * (j + (size_.y() + 1) * k))];
   }
   Vec3 origin_W_;
   double resolution_;
   Index3 size_;
-  std::vector<std::uint8_t> passable_;
+  std::vector<std::uint32_t> region_;
   std::vector<std::uint32_t> blocked_;  // blocked voxels in [0, i) × [0, j) × [0, k)
+};
+
+/// Number of moves to a goal from the voxels that a flood reached.
+struct Hops {
+  static constexpr std::uint32_t kUnreached = 0xffffffffu;
+  std::vector<std::uint32_t> of_voxel;  ///< linear order
+  std::uint32_t beyond;                 ///< at least this many where unreached; kUnreached: there is no way
+  std::uint32_t at(std::size_t voxel) const noexcept {
+    return of_voxel[voxel] == kUnreached ? beyond : of_voxel[voxel];
+  }
+};
+
+/// A safe space for one search: a start and a goal that were found clear at their exact points count as passable voxels
+/// whatever their centres say. The space must outlive it.
+class SafeView {
+ public:
+  SafeView(const SafeSpace& space, const std::vector<Index3>& also = {});  // NOLINT: a space is a view without extras
+
+  const SafeSpace& space() const noexcept { return *space_; }
+  bool passable(const Index3& v) const noexcept;
+  /// Whether every voxel that meets the closed box may be passed.
+  bool clear(const Box& box) const noexcept;
+  /// Whether every voxel the motion meets may be passed: pieces with exact bounds, halved until their box is clear or
+  /// smaller than a quarter of a voxel. Never true for a motion that touches a voxel that may not be passed.
+  bool clear(const Motion& motion) const noexcept;
+  /// False only if no motion that clear() accepts can join the two voxels. O(1).
+  bool may_join(const Index3& a, const Index3& b) const noexcept;
+
+  /// Number of king's moves (26 neighbours) through passable voxels from each voxel to `goal`. Any motion through
+  /// passable voxels whose fastest axis covers S metres in total makes fewer than S/resolution + 1 of them: |Δp| ≤ a on
+  /// each axis changes each index by at most 1. The flood ends a quarter beyond `enough`'s number of moves.
+  Hops hops_to(const Index3& goal, const Index3& enough) const;
+  /// Shortest way over shared faces, both ends included; empty if there is none. Breadth first.
+  std::vector<Index3> chain(const Index3& from, const Index3& to) const;
+
+ private:
+  const SafeSpace* space_;
+  std::vector<Index3> also_;  // not passable in the space itself, distinct
 };
 
 }  // namespace backwash::plan

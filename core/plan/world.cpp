@@ -26,11 +26,13 @@ reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
   return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
 }
 
-void fill_hover_map(World& world, const std::vector<std::size_t>& voxels, const Parallel& parallel) {
-  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
-    world.hover.fill(world.reach, world.grid, world.distance, world.bounds,
-                     std::span(voxels).subspan(begin, end - begin), world.constant_margin);
-  });
+std::vector<std::uint8_t> hover_safe(const map::OccupancyGrid& grid, const reach::HoverMap& hover) {
+  std::vector<std::uint8_t> safe(grid.cell_count());
+  std::size_t n = 0;
+  for (int k = 0; k < grid.size().z(); ++k)
+    for (int j = 0; j < grid.size().y(); ++j)
+      for (int i = 0; i < grid.size().x(); ++i) safe[n++] = hover.safe({i, j, k});
+  return safe;
 }
 
 }  // namespace
@@ -51,17 +53,28 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
 
   reach::BoundField bounds(grid, field, model.bound);
   reach::HoverMap hover(grid);
-  auto world = std::make_shared<World>(World{std::move(grid), std::move(distance), std::move(field), std::move(bounds),
-                                             std::move(hover), std::move(reach), constant_margin});
-  fill_hover_map(*world, voxels, parallel);
-  return world;
+  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
+    hover.fill(reach, grid, distance, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
+  });
+  SafeSpace safe(grid, hover_safe(grid, hover));
+  CentreResponse response(vehicle, reach.loop);
+  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(field), std::move(bounds),
+                                             std::move(hover), std::move(safe), std::move(reach), std::move(response),
+                                             constant_margin});
 }
 
 World with_clearance_by(World world, reach::Method method, double constant_margin, const Parallel& parallel) {
-  world.reach = sets_of(world.reach.vehicle, method);
+  const Vehicle vehicle = world.reach.vehicle;
+  world.reach = sets_of(vehicle, method);
+  world.response = CentreResponse(vehicle, world.reach.loop);
   world.constant_margin = constant_margin;
+  const std::vector<std::size_t> voxels = voxels_for_centre(world.grid, world.distance, vehicle);
   world.hover = reach::HoverMap(world.grid);
-  fill_hover_map(world, voxels_for_centre(world.grid, world.distance, world.reach.vehicle), parallel);
+  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
+    world.hover.fill(world.reach, world.grid, world.distance, world.bounds,
+                     std::span(voxels).subspan(begin, end - begin), constant_margin);
+  });
+  world.safe = SafeSpace(world.grid, hover_safe(world.grid, world.hover));
   return world;
 }
 

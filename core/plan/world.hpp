@@ -7,6 +7,8 @@
 #include "core/field/disturbance_field.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/plan/centre_response.hpp"
+#include "core/plan/safe_space.hpp"
 #include "core/reach/hover_set.hpp"
 #include "core/reach/reach_tube.hpp"
 
@@ -24,8 +26,10 @@ struct World {
   field::DisturbanceField field;
   reach::BoundField bounds;
   reach::HoverMap hover;
+  SafeSpace safe;  ///< where hover.safe()
   reach::Reachability reach;
-  double constant_margin;  ///< < 0: reachable sets; ≥ 0: constant margin, m
+  CentreResponse response;  ///< of the predicted motion, for the optimiser
+  double constant_margin;   ///< < 0: reachable sets; ≥ 0: constant margin, m
 };
 
 /// Builds all of it. Σ is stored at every free voxel where the vehicle's centre can be (distance ≥ body radius less one

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/plan/spline_cost.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/reach/clearance.hpp"
+
+namespace backwash::plan {
+
+namespace {
+
+constexpr double kExact = 0.3;         ///< m: nearer than this the tube's clearance is measured with its prism
+constexpr double kNear = 0.25;         ///< m: farther than this beyond the margin a sample costs nothing
+constexpr double kForgotten = 0.1;     ///< share of the hover set whose oldest causes are left out of Δe
+constexpr std::size_t kSettling = 20;  ///< periods of the hold that count
+constexpr std::size_t kLongestStride = 5;
+
+/// Periods between samples: a voxel of flight at full speed.
+std::size_t stride(double resolution, double v_max) {
+  const double periods = std::round(1.2 * resolution / (v_max * kControlPeriod));
+  return static_cast<std::size_t>(std::clamp(periods, 1.0, static_cast<double>(kLongestStride)));
+}
+
+/// G_j of model.md section 5.2 summed over intervals of `stride` steps, until what is left is forgotten.
+std::vector<double> coarse(const reach::AxisResponse& response, std::size_t stride) {
+  std::vector<double> sums;
+  double covered = 0;
+  for (std::size_t j = 0; j < response.G.size() && covered < (1 - kForgotten) * response.h_inf; j += stride) {
+    double sum = 0;
+    for (std::size_t n = j; n < std::min(j + stride, response.G.size()); ++n) sum += response.G[n];
+    sums.push_back(sum);
+    covered += sum;
+  }
+  return sums;
+}
+
+/// The support of the octagonal prism along a unit direction as a combination Σ k_d h_d of the two horizontal faces
+/// next to it and z.
+PerDirection support_weights(const Vec3& n) {
+  PerDirection k{};
+  const double x = std::abs(n.x()), y = std::abs(n.y());
+  k[x >= y ? kX : kY] = std::abs(x - y);
+  k[n.x() * n.y() >= 0 ? kXyPlus : kXyMinus] = std::sqrt(2.0) * std::min(x, y);
+  k[kZ] = std::abs(n.z());
+  return k;
+}
+
+double combined(const PerDirection& k, const PerDirection& h) {
+  double sum = 0;
+  for (std::size_t d = 0; d < kDirections; ++d) sum += k[d] * h[d];
+  return sum;
+}
+
+}  // namespace
+
+LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField& bounds, const Vec3& p_W) noexcept {
+  const Vec3 q = (p_W - grid.origin()) / grid.resolution() - Vec3::Constant(0.5);
+  const Vec3 floor = q.array().floor(), t = q - floor;
+  const Index3 base = floor.cast<int>();
+  LocalBound sum;
+  double weight = 0;
+  Vec3 slope = Vec3::Zero();  // of the weight, per voxel
+  for (int corner = 0; corner < 8; ++corner) {
+    const Index3 step(corner & 1, corner >> 1 & 1, corner >> 2);
+    const DisturbanceBound b = bounds.at(base + step);
+    if (!(b.w[kZ] > 0)) continue;  // not stored
+    const Vec3 share = step.cast<double>().cwiseProduct(2 * t - Vec3::Ones()) + Vec3::Ones() - t;
+    const Vec3 sign = 2 * step.cast<double>() - Vec3::Ones();
+    const double s = share.prod();
+    const Vec3 ds(sign.x() * share.y() * share.z(), share.x() * sign.y() * share.z(), share.x() * share.y() * sign.z());
+    weight += s;
+    slope += ds;
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      sum.w[d] += s * b.w[d];
+      sum.gradient.col(static_cast<Eigen::Index>(d)) += ds * b.w[d];
+    }
+  }
+  if (!(weight > 0)) return {};
+  for (std::size_t d = 0; d < kDirections; ++d) {
+    sum.w[d] /= weight;
+    auto gradient = sum.gradient.col(static_cast<Eigen::Index>(d));
+    gradient = (gradient - sum.w[d] * slope).eval() / (weight * grid.resolution());
+  }
+  return sum;
+}
+
+SplineCost::SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
+                       const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights)
+    : world_(world),
+      initial_(spline),
+      v_limit_(v_limit),
+      a_limit_(a_limit),
+      weights_(weights),
+      stride_(stride(world.grid.resolution(), v_limit.maxCoeff())) {
+  const auto commands = static_cast<std::size_t>(std::ceil(spline.duration() / kControlPeriod));
+  const std::size_t last = std::min(commands + kSettling, tube.size() - 1);
+  basis_ = world.response.basis(spline.control_points.size(), spline.knot_span, last / stride_, stride_);
+  for (std::size_t k = stride_; k <= last; k += stride_) samples_.push_back(sample(tube, k, margin));
+  if (world.constant_margin >= 0) return;
+  G_horizontal_ = coarse(world.reach.horizontal, stride_);
+  G_vertical_ = coarse(world.reach.vertical, stride_);
+}
+
+SplineCost::Sample SplineCost::sample(const reach::ReachTube& tube, std::size_t k, double margin) const {
+  const auto& vehicle = world_.reach.vehicle;
+  const double constant = world_.constant_margin;
+  const double taken = vehicle.body.radius + vehicle.estimation.position + std::max(constant, 0.0);
+  const reach::TubeStep& step = tube[k];
+  const PerDirection h = constant >= 0 ? PerDirection{} : step.half_widths_interval;
+  Sample s{step.center.p_W, step.center.v_W, 0, world_.distance.interpolated(step.center.p_W), {}, {}};
+  const Vec3 gradient = world_.distance.gradient(s.p), box(h[kX], h[kY], h[kZ]);
+  s.k = support_weights(gradient.norm() > 0 ? gradient.normalized() : box.normalized());
+  s.clearance = s.distance - combined(s.k, h) - taken;
+  if (s.clearance < kExact) {
+    const State& next = tube[std::min(k + 1, tube.size() - 1)].center;
+    const double distance = reach::swept_prism_distance(world_.grid, s.p, next.p_W, h, taken + kExact);
+    // A set that meets an obstacle does so by an unknown depth: the support says more then.
+    if (distance > 0) s.clearance = distance - taken;
+  }
+  s.clearance -= margin;
+  if (constant < 0) s.w = interpolated(world_.grid, world_.bounds, s.p).w;
+  return s;
+}
+
+SplineCost::Points SplineCost::start_point() const {
+  Points points(static_cast<Eigen::Index>(initial_.control_points.size()) - 6, 3);
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    points.row(i) = initial_.control_points[static_cast<std::size_t>(i) + 3].transpose();
+  return points;
+}
+
+BSpline SplineCost::spline_at(const Points& points) const {
+  BSpline spline = initial_;
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    spline.control_points[static_cast<std::size_t>(i) + 3] = points.row(i).transpose();
+  return spline;
+}
+
+SplineCost::Value SplineCost::operator()(const Points& points) const {
+  const Eigen::Index n = points.rows();
+  const auto& fixed = initial_.control_points;
+  Points q(n + 6, 3), gradient = Points::Zero(n + 6, 3);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    q.row(i) = fixed[static_cast<std::size_t>(i)].transpose();
+    q.row(n + 3 + i) = fixed[fixed.size() - 3 + static_cast<std::size_t>(i)].transpose();
+  }
+  q.middleRows(3, n) = points;
+  Value value{smoothness(q, gradient) + limits(q, gradient), {}};
+  value.gradient = gradient.middleRows(3, n);
+  value.f += collision(points - start_point(), value.gradient);
+  return value;
+}
+
+double SplineCost::smoothness(const Points& q, Points& gradient) const {
+  const Eigen::Index n = q.rows() - 3;
+  const Points third = q.bottomRows(n) - q.topRows(n) + 3 * (q.middleRows(1, n) - q.middleRows(2, n));
+  const double scale = 2 * weights_.smooth;
+  gradient.topRows(n) -= scale * third;
+  gradient.middleRows(1, n) += 3 * scale * third;
+  gradient.middleRows(2, n) -= 3 * scale * third;
+  gradient.bottomRows(n) += scale * third;
+  return weights_.smooth * third.squaredNorm();
+}
+
+double SplineCost::limits(const Points& q, Points& gradient) const {
+  const Eigen::Index n = q.rows();
+  const double d = 1 / initial_.knot_span;
+  // (x² − limit²)² of each axis beyond its limit, and half its derivative by x.
+  const auto beyond = [](const Points& x, const Vec3& limit) {
+    return (x.array().square().rowwise() - limit.transpose().array().square()).max(0.0).eval();
+  };
+  const Points v = d * (q.bottomRows(n - 1) - q.topRows(n - 1));
+  const Points a = d * (v.bottomRows(n - 2) - v.topRows(n - 2));
+  const auto v_excess = beyond(v, v_limit_), a_excess = beyond(a, a_limit_);
+  const double f = v_excess.square().sum() + a_excess.square().sum();
+  if (f == 0) return 0;
+  const Points v_slope = 4 * weights_.physical * d * (v_excess * v.array()).matrix();
+  const Points a_slope = 4 * weights_.physical * d * d * (a_excess * a.array()).matrix();
+  gradient.bottomRows(n - 1) += v_slope;
+  gradient.topRows(n - 1) -= v_slope;
+  gradient.topRows(n - 2) += a_slope;
+  gradient.middleRows(1, n - 2) -= 2 * a_slope;
+  gradient.bottomRows(n - 2) += a_slope;
+  return weights_.physical * f;
+}
+
+// What the sets grow by at the near samples, and the field along the motion as far as they need it.
+void SplineCost::grow(const std::vector<Vec3>& p, const std::vector<std::size_t>& near, std::vector<double>& lack,
+                      std::vector<LocalBound>& local) const {
+  if (G_horizontal_.empty()) return;
+  const std::size_t longest = std::max(G_horizontal_.size(), G_vertical_.size());
+  const std::size_t begin = near.front() > longest ? near.front() - longest : 0;
+  local.resize(near.back());
+  for (std::size_t j = begin; j < near.back(); ++j) local[j] = interpolated(world_.grid, world_.bounds, p[j]);
+  for (std::size_t n = 0; n < near.size(); ++n)
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      const double k = samples_[near[n]].k[d];
+      const auto& G = d == kZ ? G_vertical_ : G_horizontal_;
+      if (k == 0) continue;
+      for (std::size_t age = 0; age < std::min(G.size(), near[n]); ++age) {
+        const std::size_t j = near[n] - 1 - age;
+        lack[n] += k * G[age] * (local[j].w[d] - samples_[j].w[d]);
+      }
+    }
+}
+
+double SplineCost::collision(const Points& moved, Points& gradient) const {
+  const std::size_t count = samples_.size();
+  Points p(static_cast<Eigen::Index>(count), 3);
+  p.leftCols<2>().noalias() = basis_.P_horizontal * moved.leftCols<2>();
+  p.col(2).noalias() = basis_.P_vertical * moved.col(2);
+  std::vector<Vec3> at(count);
+  std::vector<std::size_t> near;
+  std::vector<double> lack;
+  for (std::size_t m = 0; m < count; ++m) {
+    const Sample& s = samples_[m];
+    at[m] = s.p + p.row(static_cast<Eigen::Index>(m)).transpose();
+    const double left = s.clearance - s.distance + world_.distance.interpolated(at[m]);
+    if (left > kNear) continue;
+    near.push_back(m);
+    lack.push_back(-left);
+  }
+  if (near.empty()) return 0;
+  std::vector<LocalBound> local;
+  grow(at, near, lack, local);
+
+  double f = 0;
+  const double scale = weights_.collision * static_cast<double>(stride_) * kControlPeriod;
+  p.setZero();  // from here on: ∂f/∂position
+  Points v = Points::Zero(p.rows(), 3);
+  for (std::size_t n = 0; n < near.size(); ++n) {
+    if (lack[n] <= 0) continue;
+    const std::size_t m = near[n];
+    const auto row = static_cast<Eigen::Index>(m);
+    Vec3 velocity = samples_[m].v;
+    velocity.head<2>() += (basis_.V_horizontal.row(row) * moved.leftCols<2>()).transpose();
+    velocity.z() += basis_.V_vertical.row(row).dot(moved.col(2));
+    const double speed = velocity.norm(), by_lack = 2 * scale * lack[n] * speed;
+    f += scale * lack[n] * lack[n] * speed;
+    if (speed > 0) v.row(row) = scale * lack[n] * lack[n] / speed * velocity.transpose();
+    p.row(row) -= by_lack * world_.distance.gradient(at[m]).transpose();
+    for (std::size_t d = 0; d < kDirections && !local.empty(); ++d) {
+      const double k = by_lack * samples_[m].k[d];
+      const auto& G = d == kZ ? G_vertical_ : G_horizontal_;
+      if (k == 0) continue;
+      for (std::size_t age = 0; age < std::min(G.size(), m); ++age)
+        p.row(row - 1 - static_cast<Eigen::Index>(age)) +=
+            k * G[age] * local[m - 1 - age].gradient.col(static_cast<Eigen::Index>(d)).transpose();
+    }
+  }
+  if (f == 0) return 0;
+  gradient.leftCols<2>() += basis_.P_horizontal.transpose() * p.leftCols<2>();
+  gradient.leftCols<2>() += basis_.V_horizontal.transpose() * v.leftCols<2>();
+  gradient.col(2) += basis_.P_vertical.transpose() * p.col(2);
+  gradient.col(2) += basis_.V_vertical.transpose() * v.col(2);
+  return f;
+}
+
+}  // namespace backwash::plan
