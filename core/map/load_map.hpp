@@ -25,7 +25,7 @@ tl::expected<OccupancyGrid, MapError> load_octomap(const std::string& path, std:
 /// cannot_write (the file, or a grid whose corner is no multiple of its resolution: see encode_octomap).
 tl::expected<void, MapError> write_octomap(const OccupancyGrid& grid, const std::string& path);
 
-/// One of the built-in worlds of interfaces.md: parallel-walls-4m, -2m, -1m, narrow-gap, apartment, thin-wall,
+/// One of the built-in worlds: parallel-walls-4m, -2m, -1m, narrow-gap, corridors, apartment, thin-wall,
 /// forest-SEED, at `resolution` (m). Every cell is known; what each looks like, with routes to fly: README.md here.
 /// The faces lie exactly on the grid for 0.1 and 0.05 m, else to the nearest voxel. Same result on every platform.
 /// Errors: unknown_name (lists the names), bad_resolution (outside 0.02 … 0.2 m).

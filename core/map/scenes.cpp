@@ -88,6 +88,14 @@ OccupancyGrid thin_wall(double a) {
   return scene.grid();
 }
 
+/// Two long corridors joined by three across, in solid walls: ways of 1.0 to 1.6 m with right-angled corners.
+OccupancyGrid corridors(double a) {
+  Scene scene = room({0, 0, 0}, {14, 8, 2.5}, a);
+  scene.fill({1.6, 1.2, 0}, {6, 6.6, 2.5});
+  scene.fill({7, 1.2, 0}, {12.6, 6.6, 2.5});
+  return scene.grid();
+}
+
 void furnish_living_room(Scene& scene) {
   scene.fill({0, 1, 0}, {0.9, 3.2, 0.4});     // sofa: seat
   scene.fill({0, 1, 0.4}, {0.2, 3.2, 0.8});   // and back
@@ -221,7 +229,7 @@ std::optional<std::uint64_t> forest_seed(const std::string& name) {
 
 std::vector<std::string> builtin_scene_names() {
   return {"parallel-walls-4m", "parallel-walls-2m", "parallel-walls-1m", "narrow-gap",
-          "apartment",         "thin-wall",         "forest-SEED"};
+          "corridors",         "apartment",         "thin-wall",         "forest-SEED"};
 }
 
 tl::expected<OccupancyGrid, MapError> builtin_scene(const std::string& name, double resolution) {
@@ -234,6 +242,7 @@ tl::expected<OccupancyGrid, MapError> builtin_scene(const std::string& name, dou
   if (name == "parallel-walls-2m") return parallel_walls(2, resolution);
   if (name == "parallel-walls-1m") return parallel_walls(1, resolution);
   if (name == "narrow-gap") return narrow_gap(resolution);
+  if (name == "corridors") return corridors(resolution);
   if (name == "apartment") return apartment(resolution);
   if (name == "thin-wall") return thin_wall(resolution);
   if (const auto seed = forest_seed(name)) return forest(*seed, resolution);

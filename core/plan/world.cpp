@@ -21,6 +21,11 @@ std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const
   return voxels;
 }
 
+/// The paper's sets exist for its second-order loop only.
+reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
+  return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
+}
+
 }  // namespace
 
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) { work(0, count); }
@@ -29,9 +34,7 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
                                          reach::Method method, double constant_margin, const Parallel& parallel) {
   Model vehicle_model = model;
   vehicle_model.ground.r0 = vehicle.body.diagonal_radius;
-  // The paper's sets exist for its second-order loop only.
-  const reach::Loop loop = method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle;
-  reach::Reachability reach(vehicle, method, loop);
+  reach::Reachability reach = sets_of(vehicle, method);
   map::DistanceField distance(grid);
   map::OccupancySums sums(grid);
 
@@ -46,10 +49,25 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
     hover.fill(reach, grid, distance, sums, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
   });
   SafeSpace safe(hover.safe_voxels());
-  CentreResponse response(vehicle, loop);
+  CentreResponse response(vehicle, reach.loop);
   return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field),
                                              std::move(bounds), std::move(hover), std::move(safe), std::move(reach),
                                              std::move(response), constant_margin});
+}
+
+World with_clearance_by(World world, reach::Method method, double constant_margin, const Parallel& parallel) {
+  const Vehicle vehicle = world.reach.vehicle;
+  world.reach = sets_of(vehicle, method);
+  world.response = CentreResponse(vehicle, world.reach.loop);
+  world.constant_margin = constant_margin;
+  const std::vector<std::size_t> voxels = voxels_for_centre(world.grid, world.distance, vehicle);
+  world.hover = reach::HoverMap(world.grid);
+  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
+    world.hover.fill(world.reach, world.grid, world.distance, world.sums, world.bounds,
+                     std::span(voxels).subspan(begin, end - begin), constant_margin);
+  });
+  world.safe = SafeSpace(world.hover.safe_voxels());
+  return world;
 }
 
 }  // namespace backwash::plan

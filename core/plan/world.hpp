@@ -40,4 +40,9 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
                                          reach::Method method = reach::Method::tight, double constant_margin = -1,
                                          const Parallel& parallel = run_serial);
 
+/// The same surroundings kept clear of in another way: Σ and its bounds, the expensive part, are taken over; loop and
+/// hover map are made anew. Equal to building with that method and margin.
+World with_clearance_by(World world, reach::Method method, double constant_margin,
+                        const Parallel& parallel = run_serial);
+
 }  // namespace backwash::plan

@@ -198,9 +198,9 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
     }
   };
   if (constant_margin >= 0) {
-    return fill_where([&](const Index3& v, double) {
-      return hover_set(reach, grid, distance, bounds, grid.center(v), constant_margin).safe();
-    });
+    // Stored distances are exact at centres, in single precision.
+    return fill_where(
+        [&](const Index3&, double free_distance) { return free_distance - 1e-6 > constant_margin + taken; });
   }
   const ClearTest test(reach.vehicle, grid, sums);
   const auto safe_with = [&](const auto& half_widths) {

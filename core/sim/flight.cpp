@@ -53,7 +53,19 @@ reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& t
   return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled);
 }
 
-/// Flies a piece whose tube was propagated at its acceptance, and judges every measured position against it.
+void append(std::vector<Setpoint>& commands, const std::vector<Setpoint>& more) {
+  commands.insert(commands.end(), more.begin(), more.end());
+}
+
+/// Why a take-off tube with this clearance may not be flown; empty if it may.
+std::string obstacle_to_take_off(const reach::ReachTube& tube, double clearance) {
+  if (clearance > 0) return {};
+  return "the take-off column under " + text(tube.back().center.p_W) + " is not clear (" + metres(clearance) +
+         "); choose a start with more room below and beside it";
+}
+
+}  // namespace
+
 FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
                       double z_safe, std::size_t hover_from, int hover_number) {
   FlightPiece piece{std::move(accepted), {}, {}, {}};
@@ -70,19 +82,6 @@ FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::Accepte
   }
   return piece;
 }
-
-void append(std::vector<Setpoint>& commands, const std::vector<Setpoint>& more) {
-  commands.insert(commands.end(), more.begin(), more.end());
-}
-
-/// Why a take-off tube with this clearance may not be flown; empty if it may.
-std::string obstacle_to_take_off(const reach::ReachTube& tube, double clearance) {
-  if (clearance > 0) return {};
-  return "the take-off column under " + text(tube.back().center.p_W) + " is not clear (" + metres(clearance) +
-         "); choose a start with more room below and beside it";
-}
-
-}  // namespace
 
 double true_clearance(const plan::World& world, const Vec3& p_W, double z_safe) {
   const auto& vehicle = world.reach.vehicle;

@@ -70,6 +70,12 @@ struct FlightPiece {
   std::vector<double> clearance_m;    ///< truth to the obstacles that count − body radius, one per sample
 };
 
+/// Flies a piece whose tube was propagated from the loop's estimate at its acceptance, and judges every measured
+/// position against it. `t_start`: of its first sample, s; `z_safe`: see true_clearance; samples from `hover_from` on
+/// carry the segment `hover_number`, those before −1.
+FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
+                      double z_safe, std::size_t hover_from, int hover_number);
+
 /// What one method says about the route, from the state estimated when it was accepted.
 struct MethodTube {
   reach::ReachTube tube;

@@ -7,6 +7,10 @@
 
 namespace backwash::study {
 
+/// Axes, tics and grid of every figure.
+inline constexpr const char* kAxes =
+    "set tics out nomirror\nset border 3 linecolor '#444444'\nset grid linecolor '#e4e4e4' linetype 1\n";
+
 /// gnuplot data blocks $occupied and $unknown with the cells between two voxels (inclusive) seen from above: a column
 /// is occupied if it is so anywhere between the heights z_low and z_high (m), else unknown if it is so anywhere. Runs
 /// along x are merged into one rectangle (x, y, x_low, x_high, y_low, y_high).

@@ -10,8 +10,6 @@
 namespace backwash::study {
 namespace {
 
-const char* const kAxes =
-    "set tics out nomirror\nset border 3 linecolor '#444444'\nset grid linecolor '#e4e4e4' linetype 1\n";
 const char* const kFlown = "linewidth 2 linecolor '#0b3d91'";
 const char* const kCommanded = "linewidth 1.5 dashtype 2 linecolor '#d1495b'";
 

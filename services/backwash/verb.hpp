@@ -44,6 +44,7 @@ Verb reach_verb(CLI::App& app);
 Verb plan_verb(CLI::App& app);
 Verb simulate_verb(CLI::App& app);
 Verb feasibility_verb(CLI::App& app);
+Verb compare_verb(CLI::App& app);
 Verb report_verb(CLI::App& app);
 
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.

@@ -64,17 +64,13 @@ struct Route {
   std::string name;
   Vec3 start, goal;
 };
-const std::vector<Route> kRoutes = {{"parallel-walls-4m", {-2, 0, 1.2}, {2, 0, 1.2}},
-                                    {"parallel-walls-2m", {-2, 0, 1.2}, {2, 0, 1.2}},
-                                    {"parallel-walls-1m", {-2, 0, 1.2}, {2, 0, 1.2}},
-                                    {"narrow-gap", {1, 0, 1.2}, {5, 0, 1.2}},
-                                    {"apartment", {3, 4, 1.2}, {7.2, 1.8, 1.2}},
-                                    {"apartment", {3, 4, 1.2}, {7.6, 5.6, 1.2}},
-                                    {"apartment", {7.2, 1.8, 1.2}, {7.6, 5.6, 1.2}},
-                                    {"thin-wall", {2, -2, 1.2}, {8, -2, 1.2}},
-                                    {"forest-1", {-19, 0, 1.2}, {19, 0, 1.2}},
-                                    {"forest-2", {-19, 0, 1.2}, {19, 0, 1.2}},
-                                    {"forest-18446744073709551615", {-19, 0, 1.2}, {19, 0, 1.2}}};
+const std::vector<Route> kRoutes = {
+    {"parallel-walls-4m", {-2, 0, 1.2}, {2, 0, 1.2}}, {"parallel-walls-2m", {-2, 0, 1.2}, {2, 0, 1.2}},
+    {"parallel-walls-1m", {-2, 0, 1.2}, {2, 0, 1.2}}, {"narrow-gap", {1, 0, 1.2}, {5, 0, 1.2}},
+    {"corridors", {0.8, 4, 1.2}, {6.5, 4, 1.2}},      {"apartment", {3, 4, 1.2}, {7.2, 1.8, 1.2}},
+    {"apartment", {3, 4, 1.2}, {7.6, 5.6, 1.2}},      {"apartment", {7.2, 1.8, 1.2}, {7.6, 5.6, 1.2}},
+    {"thin-wall", {2, -2, 1.2}, {8, -2, 1.2}},        {"forest-1", {-19, 0, 1.2}, {19, 0, 1.2}},
+    {"forest-2", {-19, 0, 1.2}, {19, 0, 1.2}},        {"forest-18446744073709551615", {-19, 0, 1.2}, {19, 0, 1.2}}};
 
 TEST(Scenes, AreKnownThroughout) {
   for (const auto& route : kRoutes) {
@@ -99,6 +95,20 @@ TEST(Scenes, AreTheSameWorldAtBothResolutions) {
       const Vec3 c = fine.center(fine.voxel(i));
       ASSERT_EQ(fine.at(i), coarse.at(coarse.index(c))) << route.name << " at " << c.transpose();
     }
+  }
+}
+
+TEST(Scenes, CorridorsHaveTheirWidthsAndNothingElseIsOpen) {
+  for (const double a : {0.05, 0.1}) {
+    const auto grid = scene("corridors", a);
+    EXPECT_NEAR(free_width(grid, {0.81, 4.02, 1.21}, 0), 1.6, 1e-9);
+    EXPECT_NEAR(free_width(grid, {6.51, 4.02, 1.21}, 0), 1.0, 1e-9);
+    EXPECT_NEAR(free_width(grid, {13.31, 4.02, 1.21}, 0), 1.4, 1e-9);
+    EXPECT_NEAR(free_width(grid, {3.01, 0.62, 1.21}, 1), 1.2, 1e-9);
+    EXPECT_NEAR(free_width(grid, {3.01, 7.32, 1.21}, 1), 1.4, 1e-9);
+    EXPECT_NEAR(free_width(grid, {3.01, 0.62, 1.21}, 2), 2.5, 1e-9);
+    const auto free = static_cast<double>(std::ranges::count(grid.cells(), Cell::free)) * a * a * a;
+    EXPECT_NEAR(free, (14 * 8 - (4.4 + 5.6) * 5.4) * 2.5, 1e-6);
   }
 }
 

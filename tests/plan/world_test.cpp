@@ -88,5 +88,27 @@ TEST(World, KeepsTheConstantMargin) {
   EXPECT_GT(unsafe, 10);
 }
 
+TEST(World, WithAnotherClearanceIsTheWorldBuiltForIt) {
+  const auto tight = build_world(corridor(), Model{}, vehicle_5in());
+  const struct {
+    reach::Method method;
+    double margin;
+  } others[] = {{reach::Method::paper, -1}, {reach::Method::tight, 0.3}};
+  for (const auto& [method, margin] : others) {
+    const auto built = build_world(corridor(), Model{}, vehicle_5in(), method, margin);
+    const World changed = with_clearance_by(*tight, method, margin);
+    EXPECT_EQ(changed.reach.method, built->reach.method);
+    EXPECT_EQ(changed.reach.loop, built->reach.loop);
+    EXPECT_EQ(changed.constant_margin, margin);
+    std::size_t different = 0;
+    for (std::size_t n = 0; n < built->grid.cell_count(); ++n) {
+      const Index3 v = built->grid.voxel(n);
+      ASSERT_EQ(changed.hover.safe(v), built->hover.safe(v));
+      different += changed.hover.safe(v) != tight->hover.safe(v);
+    }
+    EXPECT_GT(different, 20u);
+  }
+}
+
 }  // namespace
 }  // namespace backwash::plan

@@ -83,6 +83,23 @@ TEST(HoverMap, SaysOfEveryVoxelOfRandomRoomsWhatTheExactSetSays) {
   }
 }
 
+TEST(HoverMap, OfAConstantMarginSaysWhatTheSetSays) {
+  Count count;
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    const auto w = plan::build_world(random_room(seed), Model{}, with_unequal_gains(), Method::tight, 0.15);
+    for (std::size_t n = 0; n < w->grid.cell_count(); ++n) {
+      const Index3 v = w->grid.voxel(n);
+      if (!w->grid.free(v)) continue;
+      const HoverSet set = hover_set(w->reach, w->grid, w->distance, w->bounds, w->grid.center(v), 0.15);
+      if (std::abs(set.clearance) < 1e-5) continue;  // stored distances are single precision
+      EXPECT_EQ(w->hover.safe(v), set.safe());
+      set.safe() ? ++count.safe : ++count.unsafe;
+    }
+  }
+  EXPECT_GT(count.safe, 1000);
+  EXPECT_GT(count.unsafe, 1000);
+}
+
 void expect_agreement_on(const map::OccupancyGrid& grid, std::size_t stride) {
   const Vehicle vehicle = *config::load_vehicle("builtin:quad-5in");
   const auto w = plan::build_world(grid, *config::load_model("builtin:quad-5in"), vehicle);

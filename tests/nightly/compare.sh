@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# The paper's Table I in full: at least 2,000 m of flight per method, both vehicles, built-in scenes and geb079 where the
+# shared data is there. Fails if the proposed method touches anything or leaves a set; everything else is reported.
+# usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]
+set -euo pipefail
+backwash=$(realpath "${1:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}")
+out=${2:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}
+seed=${3:-1}
+flights=60
+mkdir -p "$out"
+scenes=(builtin)
+geb079=$(dirname "${BASH_SOURCE[0]}")/../../../shared/data/maps/geb079.bt
+if [[ -f $geb079 ]]; then scenes+=("$geb079"); else echo "geb079.bt is not there: built-in scenes only" >&2; fi
+
+"$backwash" compare --scenes "${scenes[@]}" --flights $flights --seed "$seed" --json --force \
+  --report "$out/compare.html" --out "$out/compare.csv" >"$out/compare.json"
+
+python3 - "$out/compare.json" <<'PYTHON'
+import json, sys
+found = json.load(open(sys.argv[1]))
+first = found["methods"][0]
+print(f"{found['common_pairs']} pairs that all methods solve")
+for m in found["methods"]:
+    c = m["common"]
+    print(f"{m['method']:11s} length {c['length_m']:8.1f} m  time {c['time_s']:8.1f} s  jerk2 {c['jerk2']:8.1f}  energy {c['energy_J']/1000:7.2f} kJ"
+          f"  contacts {m['contacts']}  no path {m['no_path']} of {m['pairs']}  outside {m['samples_outside']} of {m['samples']}"
+          f"  flown {m['flown_m']:.0f} m  planning {m['planning_ms']['median']:.0f} ms")
+for d in found["demands"]:
+    print("met   " if d["met"] else "MISSED", d["text"])
+failures = []
+if first["contacts"]: failures.append("the proposed method touched something")
+if first["samples_outside"]: failures.append("the proposed method left a set")
+for m in found["methods"]:
+    if m["flown_m"] < 2000: failures.append(f"{m['method']} flew {m['flown_m']:.0f} m, less than 2,000")
+for gap in found["narrow_gap"]:
+    ratio = max(gap["largest_error_over_bound"].values())
+    print(f"narrow gap, {gap['vehicle']}: largest error over bound {ratio:.2f} in {gap['flights']} flights")
+    if gap["contacts"] or gap["samples_outside"] or not 0.25 <= ratio <= 1: failures.append(f"narrow gap, {gap['vehicle']}")
+sys.exit("; ".join(failures) if failures else 0)
+PYTHON

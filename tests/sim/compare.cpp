@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/sim/compare.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+
+namespace backwash::sim {
+namespace {
+
+Vehicle vehicle_5in() { return config::load_vehicle("builtin:quad-5in").value(); }
+map::OccupancyGrid scene(const std::string& name) { return map::builtin_scene(name).value(); }
+
+plan::World world_of(const std::string& name, const Vehicle& vehicle, const Model& model = {}) {
+  return *plan::build_world(scene(name), model, vehicle);
+}
+
+/// Distance from p to the nearest voxel that is not free, by looking at all of them within 0.4 m, m; 0.3 if farther.
+double brute_distance(const map::OccupancyGrid& grid, const Vec3& p) {
+  double least = 0.3;
+  const Index3 low = grid.index(p - Vec3::Constant(0.4)), high = grid.index(p + Vec3::Constant(0.4));
+  for (int k = low.z(); k <= high.z(); ++k)
+    for (int j = low.y(); j <= high.y(); ++j)
+      for (int i = low.x(); i <= high.x(); ++i) {
+        if (grid.free({i, j, k})) continue;
+        const Vec3 gap = (p - grid.center({i, j, k})).cwiseAbs() - Vec3::Constant(grid.resolution() / 2);
+        least = std::min(least, gap.cwiseMax(0.0).norm());
+      }
+  return least;
+}
+
+std::vector<RoutePair> pairs_in(const plan::World& world, std::size_t count, std::uint64_t seed) {
+  return draw_pairs(world.grid, world.distance, world.reach.vehicle, count, seed).value();
+}
+
+void expect_same(const RouteOutcome& a, const RouteOutcome& b) {
+  EXPECT_EQ(a.status, b.status);
+  EXPECT_EQ(a.planned.length_m, b.planned.length_m);
+  EXPECT_EQ(a.planned.jerk2, b.planned.jerk2);
+  EXPECT_EQ(a.flown_m, b.flown_m);
+  EXPECT_EQ(a.flown_jerk2, b.flown_jerk2);
+  EXPECT_EQ(a.energy_J, b.energy_J);
+  EXPECT_EQ(a.clearance_m, b.clearance_m);
+  EXPECT_EQ(a.samples, b.samples);
+  EXPECT_EQ(a.outside, b.outside);
+}
+
+TEST(DrawPairs, GivesPointsThatFitTheBodyAtFlightHeightAndFarApart) {
+  const auto grid = scene("apartment");
+  const map::DistanceField distance(grid);
+  const Vehicle vehicle = vehicle_5in();
+  const auto pairs = draw_pairs(grid, distance, vehicle, 40, 7).value();
+  ASSERT_EQ(pairs.size(), 40u);
+  std::set<std::uint64_t> seeds;
+  for (const auto& pair : pairs) {
+    EXPECT_GE((pair.goal_W - pair.start_W).norm(), 3.0);
+    seeds.insert(pair.seed);
+    for (const Vec3& p : {pair.start_W, pair.goal_W}) {
+      EXPECT_GT(brute_distance(grid, p), 0.16 + 0.02);
+      double under = p.z();
+      while (grid.free(grid.index({p.x(), p.y(), under}))) under -= 0.01;
+      EXPECT_GE(p.z() - under, 0.45);
+      EXPECT_LE(p.z() - under, 2.05);
+    }
+  }
+  EXPECT_EQ(seeds.size(), 40u) << "each pair has air of its own";
+}
+
+TEST(DrawPairs, DependsOnTheSeedAlone) {
+  const auto grid = scene("apartment");
+  const map::DistanceField distance(grid);
+  const auto draw = [&](std::size_t count, std::uint64_t seed) {
+    return draw_pairs(grid, distance, vehicle_5in(), count, seed).value();
+  };
+  const auto a = draw(5, 1), b = draw(8, 1), c = draw(5, 2);
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    EXPECT_EQ(a[n].start_W, b[n].start_W);
+    EXPECT_EQ(a[n].goal_W, b[n].goal_W);
+    EXPECT_EQ(a[n].seed, b[n].seed);
+  }
+  EXPECT_NE(a[0].seed, c[0].seed);
+}
+
+TEST(DrawPairs, StaysInOneRoomIfNoDoorLetsTheBodyThrough) {
+  auto grid = scene("narrow-gap");
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {  // what is left of the gap is 0.3 m wide
+    const Vec3 c = grid.center(grid.voxel(n));
+    if (c.x() > 2.9 && c.x() < 3.2 && std::abs(c.y()) > 0.15) grid.set(grid.voxel(n), map::Cell::occupied);
+  }
+  const auto pairs = draw_pairs(grid, map::DistanceField(grid), vehicle_5in(), 30, 1).value();
+  for (const auto& pair : pairs) EXPECT_EQ(pair.start_W.x() < 3, pair.goal_W.x() < 3);
+}
+
+TEST(DrawPairs, FindsNothingWhereNothingFits) {
+  Vehicle huge = vehicle_5in();
+  huge.body.radius = 3;
+  const auto grid = scene("narrow-gap");
+  EXPECT_FALSE(draw_pairs(grid, map::DistanceField(grid), huge, 1, 1));
+}
+
+/// A route whose samples are made up: two at rest, then the thrust tilts.
+TEST(Measure, IntegratesInducedPowerAndTheJerkOfTheThrust) {
+  const Vehicle vehicle = vehicle_5in();
+  const auto world = world_of("narrow-gap", vehicle);
+  Route route;
+  route.plan.status = plan::PlanStatus::ok;
+  FlightSample sample{};
+  sample.truth.p_W = {1, 0, 1.2};
+  sample.acceleration.setZero();
+  sample.attitude.setIdentity();
+  sample.thrust = 0.5;  // 18 N · (0.3 · 0.25 + 0.7 · 0.5) = 7.65 N
+  for (const double tilt : {0.0, 0.0, 0.1}) {
+    sample.attitude = Eigen::AngleAxisd(tilt, Vec3::UnitX());
+    route.piece.samples.push_back(sample);
+    route.piece.judged.push_back({.judged = true, .inside = true, .half_widths = {1, 1, 1, 1, 1}});
+    route.piece.clearance_m.push_back(1);
+  }
+  const auto outcome = measure(route, world, vehicle);
+  const double disc = 4 * std::numbers::pi * 0.0635 * 0.0635;
+  EXPECT_NEAR(outcome.energy_J, 0.04 * std::pow(7.65, 1.5) / std::sqrt(2 * 1.225 * disc), 1e-9);
+  const double change = 2 * std::sin(0.05) * 7.65 / 0.9;  // chord between the two accelerations, m/s²
+  EXPECT_NEAR(outcome.flown_jerk2, change * change / 0.02, 1e-9);
+  EXPECT_EQ(outcome.flown_m, 0);
+}
+
+// The planted crash: the planner believes in a body of 2 cm, what flies has 16 cm. Contacts are counted against all
+// voxels, one by one.
+TEST(FlyRoute, CountsTheContactsOfAVehicleThatIsLargerThanPlanned) {
+  const Vehicle real = vehicle_5in();
+  Vehicle believed = real;
+  believed.body.radius = 0.02;
+  const auto wrong = plan::with_clearance_by(world_of("corridors", believed), reach::Method::tight, 0.0);
+  std::size_t contacts = 0, flights = 0;
+  for (const auto& pair : pairs_in(world_of("corridors", real), 12, 3)) {
+    const auto route = fly_route(wrong, real, pair);
+    if (route.plan.status != plan::PlanStatus::ok) continue;
+    const auto outcome = measure(route, wrong, real);
+    std::size_t expected = 0;
+    for (const auto& sample : route.piece.samples)
+      if (brute_distance(wrong.grid, sample.truth.p_W) < 0.16) ++expected;
+    EXPECT_EQ(outcome.contacts, expected);
+    EXPECT_EQ(outcome.contacts > 0, outcome.clearance_m < 0);
+    contacts += expected > 0;
+    flights += 1;
+  }
+  EXPECT_GT(flights, 5u);
+  EXPECT_GT(contacts, 0u) << "a crash must be seen";
+}
+
+TEST(Measure, CountsASampleThatWasNotJudgedAsOutside) {
+  const Vehicle vehicle = vehicle_5in();
+  const auto world = world_of("narrow-gap", vehicle);
+  Route route;
+  FlightSample sample{};
+  sample.acceleration.setZero();
+  sample.attitude.setIdentity();
+  route.piece.samples = {sample};
+  route.piece.judged = {track::Inside{}};
+  route.piece.clearance_m = {1};
+  EXPECT_EQ(measure(route, world, vehicle).outside, 1u);
+}
+
+TEST(FlyRoute, StaysInsideItsSetsAndIsCaughtOutsideSetsOfATwentyFifthOfTheVariance) {
+  const Vehicle vehicle = vehicle_5in();
+  Model small;
+  small.bound.kappa /= 5;
+  small.bound.mean_horizontal = small.bound.mean_vertical = 0;
+  Vehicle sure = vehicle;
+  sure.initial_error = {0.001, 0.002};
+  const auto honest = world_of("apartment", vehicle), mutant = world_of("apartment", sure, small);
+  std::size_t outside = 0, samples = 0, mutant_outside = 0;
+  for (const auto& pair : pairs_in(honest, 6, 5)) {
+    const auto a = measure(fly_route(honest, vehicle, pair), honest, vehicle);
+    outside += a.outside, samples += a.samples;
+    EXPECT_EQ(a.contacts, 0u);
+    mutant_outside += measure(fly_route(mutant, vehicle, pair), mutant, vehicle).outside;
+  }
+  EXPECT_GT(samples, 1000u);
+  EXPECT_EQ(outside, 0u);
+  EXPECT_GT(mutant_outside, 100u);
+}
+
+TEST(CompareScene, FliesTheSamePairsInTheSameAirWhateverTheOrderAndTheWork) {
+  const auto world = world_of("apartment", vehicle_5in());
+  const auto pairs = pairs_in(world, 6, 2);
+  const std::vector<CompareMethod> twice = {{"tight"}, {"margin", reach::Method::tight, 0.1}, {"again"}};
+  const plan::Parallel backwards = [](std::size_t count, const auto& work) {
+    for (std::size_t end = count; end > 0; --end) work(end - 1, end);
+  };
+  const auto one = compare_scene("apartment", world, pairs, twice);
+  const auto two = compare_scene("apartment", world, pairs, twice, backwards);
+  ASSERT_EQ(one.outcomes.size(), 3u);
+  std::size_t solved = 0, differ = 0;
+  for (std::size_t n = 0; n < pairs.size(); ++n) {
+    for (std::size_t m = 0; m < 3; ++m) expect_same(one.outcomes[m][n], two.outcomes[m][n]);
+    expect_same(one.outcomes[0][n], one.outcomes[2][n]);  // the method between leaves no trace
+    solved += one.outcomes[0][n].status == plan::PlanStatus::ok;
+    differ += one.outcomes[0][n].planned.jerk2 != one.outcomes[1][n].planned.jerk2;
+  }
+  EXPECT_GT(solved, 2u);
+  EXPECT_GT(differ, 0u);
+}
+
+TEST(CompareMethods, AreTheTwoKindsOfSetsAndFourMargins) {
+  const auto methods = compare_methods();
+  ASSERT_EQ(methods.size(), 6u);
+  EXPECT_LT(methods[0].margin, 0);
+  EXPECT_EQ(methods[1].sets, reach::Method::paper);
+  for (std::size_t m = 2; m < 6; ++m) EXPECT_NEAR(methods[m].margin, 0.1 * static_cast<double>(m - 1), 1e-12);
+}
+
+}  // namespace
+}  // namespace backwash::sim
