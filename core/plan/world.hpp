@@ -8,6 +8,7 @@
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/occupancy_sums.hpp"
+#include "core/map/scan.hpp"
 #include "core/plan/centre_response.hpp"
 #include "core/plan/safe_space.hpp"
 #include "core/reach/hover_set.hpp"
@@ -44,5 +45,11 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
 /// hover map are made anew. Equal to building with that method and margin.
 World with_clearance_by(World world, reach::Method method, double constant_margin,
                         const Parallel& parallel = run_serial);
+
+/// The same as build_world(grid, …), from a world of which only the voxels in `changed` differ: Σ and the hover map are
+/// computed anew where a change can reach them and copied elsewhere. `old` must have been built with this model;
+/// precondition: grids of the same place and size. Measured (bench_world): see core/plan/README.md.
+std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
+                                          const Model& model, const Parallel& parallel = run_serial);
 
 }  // namespace backwash::plan

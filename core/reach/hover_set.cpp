@@ -218,4 +218,10 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
   fill_where(safe_with([&](const DisturbanceBound& w_bar) { return supports(ellipsoid.half_axes(channels(w_bar))); }));
 }
 
+void HoverMap::clear(const map::VoxelBox& box) noexcept {
+  for (int k = box.low.z(); k <= box.high.z(); ++k)
+    for (int j = box.low.y(); j <= box.high.y(); ++j)
+      for (int i = box.low.x(); i <= box.high.x(); ++i) safe_.set({i, j, k}, map::Cell::unknown);
+}
+
 }  // namespace backwash::reach

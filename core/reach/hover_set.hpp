@@ -5,6 +5,7 @@
 
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_sums.hpp"
+#include "core/map/scan.hpp"
 #include "core/reach/bound_field.hpp"
 #include "core/reach/reach_tube.hpp"
 
@@ -36,6 +37,8 @@ class HoverMap {
   void fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
             const map::OccupancySums& sums, const BoundField& bounds, std::span<const std::size_t> voxels,
             double constant_margin = -1);
+  /// As if the voxels of a box inside the grid had never been computed.
+  void clear(const map::VoxelBox& box) noexcept;
   /// False outside the grid and where nothing was computed.
   bool safe(const Index3& v) const noexcept { return safe_.free(v); }
   /// The same voxels with the safe ones free and all others unknown.

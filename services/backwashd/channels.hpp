@@ -14,6 +14,7 @@
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
 #include "core/sync/record_ring.hpp"
+#include "core/track/rebase.hpp"
 #include "core/track/supervisor.hpp"
 #include "core/track/tracker.hpp"
 #include "services/backwashd/timing.hpp"
@@ -34,6 +35,8 @@ struct OdometrySample {
   std::int64_t stamp_ns = 0;            ///< the sender's stamp
   State state;                          ///< m, m/s
   std::array<double, 4> q{1, 0, 0, 0};  ///< body to map: w, x, y, z
+  std::uint32_t closures = 0;           ///< loop closures so far: the map frame that the state is in
+  track::RigidShift map_from_odom;      ///< by which the VIO's own pose was brought there
 };
 
 /// One octomap_msgs/Octomap as received.
@@ -42,6 +45,35 @@ struct MapMessage {
   double resolution = 0;
   bool binary = true;
   std::string id;
+};
+
+/// One range scan in the map.
+struct Scan {
+  std::vector<Vec3> points_W;  ///< m
+  Vec3 sensor_W = Vec3::Zero();
+  std::int64_t received_ns = 0;
+};
+
+/// Cubes of the map's lattice that a scan found occupied and the newest snapshot does not.
+struct NewVoxels {
+  static constexpr std::size_t kMost = 256;
+  std::int64_t received_ns = 0;
+  double edge = 0;  ///< m
+  std::size_t count = 0;
+  std::array<std::array<double, 3>, kMost> centers{};  ///< m
+};
+
+/// The newest snapshot of the surroundings, to each thread that looks at it. Freed by the map worker alone.
+struct Worlds {
+  using Pointer = std::shared_ptr<const plan::World>;
+  sync::Handover<Pointer> mission, planner, reader, control;
+
+  void offer(const Pointer& world) {
+    for (auto* to : {&mission, &planner, &reader, &control}) to->offer(std::make_unique<const Pointer>(world));
+  }
+  void collect() {
+    for (auto* to : {&mission, &planner, &reader, &control}) to->collect();
+  }
 };
 
 /// One command as received; strings that do not fit are cut, which no valid station has.
@@ -102,19 +134,25 @@ struct PlanOutcome {
 };
 
 struct Channels {
-  sync::LatestValue<OdometrySample> odometry;                              // DDS reader → control
-  sync::RecordRing<CommandMessage, 64> commands;                           // DDS reader → mission
-  sync::Handover<MapMessage> maps;                                         // DDS reader → map worker
-  sync::Handover<std::shared_ptr<const plan::World>> worlds;               // map worker → mission
-  sync::RecordRing<track::Request, 16> requests;                           // mission → control
-  std::atomic<bool> arm{false};                                            // planner → control: arm once
-  sync::Handover<PlanJob> jobs;                                            // mission → planner
-  sync::RecordRing<PlanOutcome, 16> outcomes;                              // planner → mission
-  sync::Handover<track::AcceptedSegment> segments;                         // planner → control
+  sync::LatestValue<OdometrySample> odometry;              // DDS reader → control
+  sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
+  sync::Handover<MapMessage> maps;                         // DDS reader → map worker
+  sync::RecordRing<Scan*, 16> scans;                       // DDS reader → map worker, which frees them
+  Worlds worlds;                                           // map worker → each
+  sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // DDS reader, map worker → control
+  std::atomic<std::int64_t> map_ns{-1};                    // map worker: reception of the newest data in the snapshot
+  std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
+  sync::RecordRing<track::Request, 16> requests;           // mission → control
+  std::atomic<bool> arm{false};                            // planner → control: arm once
+  sync::Handover<PlanJob> jobs;                            // mission → planner
+  sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
+  sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
   sync::LatestValue<std::array<char, 192>> task;                           // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
+  std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
+      closures_refused{0}, foreign_writers{0};
   std::atomic<bool> stop{false};
 };
 

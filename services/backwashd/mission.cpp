@@ -25,9 +25,9 @@ double seconds_now() { return static_cast<double>(now_ns()) * 1e-9; }
 void Mission::refresh() {
   channels_.jobs.collect();
   if (const auto view = channels_.view_mission.read_new()) view_ = *view;
-  if (const auto* world = channels_.worlds.take()) {
+  if (const auto* world = channels_.worlds.mission.take()) {
     world_ = *world;
-    channels_.worlds.give_back(world);
+    channels_.worlds.mission.give_back(world);
   }
   while (const auto outcome = channels_.outcomes.pop()) {
     if (job_ != outcome->job) continue;  // a newer command took its place

@@ -23,6 +23,7 @@ using Entity = std::int32_t;
 /// Delivery of a topic.
 enum class Delivery {
   latest,    ///< best effort, keep last 1: odometry, status
+  scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data
   reliable,  ///< reliable, keep last 64: commands and acknowledgements
   state,     ///< reliable, transient local, keep last 1: late joiners get the newest: map, trajectory, tube
 };

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "services/backwashd/daemon.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+TEST(Start, TheConfigurationThatShipsIsGoodAndAMissingOneIsNamed) {
+  EXPECT_TRUE(load_settings("builtin:backwashd"));
+  const auto missing = load_settings("/nowhere.toml");
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().find("/nowhere.toml"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace backwash::daemon
