@@ -9,9 +9,9 @@
 namespace backwash::plan {
 namespace {
 
-constexpr double kAtGoal = 1e-6;      ///< m
-constexpr double kLeastAdvance = 0.2; ///< m: a nearer local goal is not worth a new path
-constexpr std::size_t kHold = 50;     ///< commands that a stop is held for
+constexpr double kAtGoal = 1e-6;       ///< m
+constexpr double kLeastAdvance = 0.2;  ///< m: a nearer local goal is not worth a new path
+constexpr std::size_t kHold = 50;      ///< commands that a stop is held for
 
 /// The grid with its unknown voxels free.
 map::OccupancyGrid hopeful(map::OccupancyGrid grid) {
@@ -71,7 +71,6 @@ std::vector<Index3> optimistic_way(const World& world, const Vec3& from_W, const
 
 Replan replan(const World& world, const Route& flying, std::size_t now, std::size_t branch, const Vec3& goal_W,
               const ReplanOptions& options) {
-  const Setpoint& from = flying.commands[branch];
   const auto ends_at_goal = [&](const Route& r) { return (r.commands.back().p_W - goal_W).norm() < kAtGoal; };
   Replan result{Replan::Kind::kept, {}, 0, false, {}, {}};
   const auto take = [&](Replan::Kind kind, Candidate c) {
@@ -82,7 +81,10 @@ Replan replan(const World& world, const Route& flying, std::size_t now, std::siz
     return result;
   };
   const double least = options.limits.least_clearance_m;
-  Candidate kept = verified(world, flying, flying.commands, now);
+  std::vector<Setpoint> held = flying.commands;
+  while (held.size() <= branch) held.push_back({held.back().p_W, Vec3::Zero(), Vec3::Zero(), held.back().yaw});
+  Candidate kept = verified(world, flying, std::move(held), now);
+  const Setpoint from = kept.route.commands[branch];
   if (ends_at_goal(flying) && kept.clearance > least) return take(Replan::Kind::kept, std::move(kept));
 
   const auto way = optimistic_way(world, from.p_W, goal_W);
@@ -90,14 +92,14 @@ Replan replan(const World& world, const Route& flying, std::size_t now, std::siz
   if (way.empty()) result.message = "no way to the goal is left";
   if (local && (world.grid.center(*local) - from.p_W).norm() > kLeastAdvance) {
     const Vec3 to_W = *local == way.back() ? goal_W : world.grid.center(*local);
-    const Plan planned = plan(world, {flying.tube[branch].center, from}, to_W, options.limits);
+    const Plan planned = plan(world, {kept.route.tube[branch].center, from}, to_W, options.limits);
     result.metrics = planned.metrics;
     result.message = planned.message;
     if (planned.status == PlanStatus::ok) {
-      std::vector<Setpoint> commands(flying.commands.begin(),
-                                     flying.commands.begin() + static_cast<std::ptrdiff_t>(branch));
+      const auto& before = kept.route.commands;
+      std::vector<Setpoint> commands(before.begin(), before.begin() + static_cast<std::ptrdiff_t>(branch));
       const double rate =
-          branch > 0 ? (from.yaw - flying.commands[branch - 1].yaw) / kControlPeriod : 0.0;  // of the command given
+          branch > 0 ? (from.yaw - before[branch - 1].yaw) / kControlPeriod : 0.0;  // of the command given
       const auto turned = facing_ahead(planned.commands, {from.yaw - rate * kControlPeriod, rate}, options.limits.yaw);
       commands.insert(commands.end(), turned.begin(), turned.end());
       Candidate extended = verified(world, flying, std::move(commands), now);
@@ -106,7 +108,7 @@ Replan replan(const World& world, const Route& flying, std::size_t now, std::siz
     }
   }
   if (kept.clearance > least) return take(Replan::Kind::kept, std::move(kept));
-  Candidate stopped = verified(world, flying, stop(flying, branch, options.limits.a_max), now);
+  Candidate stopped = verified(world, flying, stop(kept.route, branch, options.limits.a_max), now);
   if (stopped.clearance > least) return take(Replan::Kind::stopping, std::move(stopped));
   return take(Replan::Kind::unsafe, kept.clearance > stopped.clearance ? std::move(kept) : std::move(stopped));
 }

@@ -41,8 +41,8 @@ std::vector<Index3> optimistic_way(const World& world, const Vec3& from_W, const
 /// local goal is the farthest hover-safe voxel on the optimistic way within the horizon; the plan to it starts with the
 /// position, velocity and acceleration commanded at the branch, and the heading goes on at its rate. The tube of the
 /// whole is propagated in `world` from the route's own start: what the flight is judged with stays one tube. Every
-/// result ends at rest inside its tube, so a verified stop is always at hand. Preconditions: branch < commands, tube not
-/// empty.
+/// result ends at rest inside its tube, so a verified stop is always at hand. After its last
+/// command a route holds. Precondition: the route has a command.
 Replan replan(const World& world, const Route& flying, std::size_t now, std::size_t branch, const Vec3& goal_W,
               const ReplanOptions& options);
 

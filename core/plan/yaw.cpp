@@ -32,8 +32,8 @@ std::vector<Setpoint> facing_ahead(std::vector<Setpoint> commands, const YawStar
     }
     const double error = target - yaw, change = limits.acceleration * kControlPeriod;
     // Braking takes what is left of the commands, this one excluded.
-    const double fastest = std::min({limits.rate, braking_rate(std::abs(error), limits.acceleration),
-                                     change * static_cast<double>(count - 1 - k)});
+    const double fastest = std::min(
+        {limits.rate, braking_rate(std::abs(error), limits.acceleration), change * static_cast<double>(count - 1 - k)});
     rate += std::clamp(std::copysign(fastest, error) - rate, -change, change);
     yaw += rate * kControlPeriod;
     commands[k].yaw = yaw;
