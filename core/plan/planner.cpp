@@ -185,7 +185,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
         result.metrics = measured(result.metrics, spline, nearest.clearance);
         result.status = PlanStatus::ok;
         result.trajectory = std::move(spline);
-        result.commands = std::move(flight.commands);
+        result.commands = facing_ahead(std::move(flight.commands), {start.command.yaw, 0}, options.yaw);
         result.tube = std::move(flight.tube);
         return result;
       }

@@ -7,6 +7,7 @@
 #include "core/plan/bspline.hpp"
 #include "core/plan/bspline_optimizer.hpp"
 #include "core/plan/world.hpp"
+#include "core/plan/yaw.hpp"
 
 namespace backwash::plan {
 
@@ -28,6 +29,7 @@ struct PlanOptions {
   double deadline_s = 10.0;         ///< whole plan, monotonic clock; what is found when it passes is still verified
   std::size_t max_nodes = 400'000;  ///< states that an attempt of the search may keep
   std::size_t evaluations = 50;     ///< of the cost, per round of the optimiser
+  YawLimits yaw{};                  ///< the heading follows the path; rate 0: it is held
   double least_clearance_m = 0;     ///< that the verified tube, and hovering at start and goal, must pass, m
 };
 
