@@ -171,7 +171,8 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
     for (std::size_t round = 0; round < kRounds; ++round) {
       if (Clock::now() > deadline) return refused(result, PlanStatus::deadline, "optimisation ran out of time");
       const auto optimising = Clock::now();
-      const SplineCost cost(world, spline, tube, margin, kOptimiseShare * v_limit, kOptimiseShare * a_limit, {});
+      const SplineCost cost(world, spline, tube, margin, kOptimiseShare * v_limit, kOptimiseShare * a_limit, {},
+                            options.norm_cost);
       const auto optimum = optimise(cost, options.evaluations, deadline);
       spline = retimed(optimum.spline, start, v_limit, a_limit);
       result.metrics.optimise_ms += ms_since(optimising);

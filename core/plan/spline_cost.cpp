@@ -86,18 +86,19 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 }
 
 SplineCost::SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
-                       const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights)
+                       const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights, bool norm)
     : world_(world),
       initial_(spline),
       v_limit_(v_limit),
       a_limit_(a_limit),
       weights_(weights),
+      norm_(norm),
       stride_(stride(world.grid.resolution(), v_limit.maxCoeff())) {
   const auto commands = static_cast<std::size_t>(std::ceil(spline.duration() / kControlPeriod));
   const std::size_t last = std::min(commands + kSettling, tube.size() - 1);
   basis_ = world.response.basis(spline.control_points.size(), spline.knot_span, last / stride_, stride_);
   for (std::size_t k = stride_; k <= last; k += stride_) samples_.push_back(sample(tube, k, margin));
-  if (world.constant_margin >= 0) return;
+  if (world.constant_margin >= 0 || norm) return;
   G_horizontal_ = coarse(world.reach.horizontal, stride_);
   G_vertical_ = coarse(world.reach.vertical, stride_);
 }
@@ -112,7 +113,9 @@ SplineCost::Sample SplineCost::sample(const reach::ReachTube& tube, std::size_t 
   const Vec3 gradient = world_.distance.gradient(s.p), box(h[kX], h[kY], h[kZ]);
   s.k = support_weights(gradient.norm() > 0 ? gradient.normalized() : box.normalized());
   s.clearance = s.distance - combined(s.k, h) - taken;
-  if (s.clearance < kExact) {
+  if (norm_) {
+    s.clearance = s.distance - box.norm() - taken;
+  } else if (s.clearance < kExact) {
     const State& next = tube[std::min(k + 1, tube.size() - 1)].center;
     const double distance = reach::swept_prism_distance(world_.grid, s.p, next.p_W, h, taken + kExact);
     // A set that meets an obstacle does so by an unknown depth: the support says more then.

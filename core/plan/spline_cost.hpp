@@ -39,9 +39,10 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 class SplineCost {
  public:
   /// `tube`: of `spline`'s commands in the world, with at least those followed by the hold. `margin`: clearance to
-  /// keep, m. `v_limit`, `a_limit` per axis. Precondition: at least 6 control points (then none is free).
+  /// keep, m. `norm`: c_m = d(p_p⁰) − ‖h‖₂ and Δe_m = 0 instead, the paper's r. `v_limit`, `a_limit` per axis.
+  /// Precondition: at least 6 control points (then none is free).
   SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
-             const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights);
+             const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights, bool norm = false);
 
   /// Free control points, one row each.
   using Points = Eigen::Matrix<double, Eigen::Dynamic, 3>;
@@ -73,6 +74,7 @@ class SplineCost {
   BSpline initial_;
   Vec3 v_limit_, a_limit_;
   CostWeights weights_;
+  bool norm_;
   std::size_t stride_;
   MotionBasis basis_;
   std::vector<Sample> samples_;

@@ -84,6 +84,7 @@ bool outside_set(const plan::World& world, const FlightPiece& piece, std::size_t
 
 std::vector<CompareMethod> compare_methods() {
   return {{"tight"},
+          {"tight-norm", reach::Method::tight, -1, true},
           {"paper", reach::Method::paper},
           {"margin-0.1", reach::Method::tight, 0.1},
           {"margin-0.2", reach::Method::tight, 0.2},
@@ -111,15 +112,16 @@ std::optional<std::vector<RoutePair>> draw_pairs(const map::OccupancyGrid& grid,
   return pairs;
 }
 
-Route fly_route(const plan::World& world, const Vehicle& vehicle, const RoutePair& pair) {
+Route fly_route(const plan::World& world, const Vehicle& vehicle, const RoutePair& pair, bool norm_cost) {
   Setpoint hover;
   hover.p_W = pair.start_W;
   ClosedLoop loop(world.grid, vehicle, {pair.start_W, Vec3::Zero()}, pair.seed);
   for (const auto& command : hold_commands(pair.start_W, kSettle)) loop.fly(command);
   const auto& limits = world.reach.vehicle.limits;
-  Route route{plan::plan(world, {loop.estimated(), hover}, pair.goal_W,
-                         {.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kNoDeadline}),
-              {}};
+  Route route{
+      plan::plan(world, {loop.estimated(), hover}, pair.goal_W,
+                 {.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kNoDeadline, .norm_cost = norm_cost}),
+      {}};
   if (route.plan.status != plan::PlanStatus::ok) return route;
   const std::size_t count = route.plan.commands.size();
   route.piece = fly_piece(loop, world, {1, 0, 0, route.plan.commands, route.plan.tube}, 0, kEverywhere, count, 0);
@@ -167,7 +169,7 @@ SceneComparison compare_scene(const std::string& scene, plan::World world, const
     auto& outcomes = comparison.outcomes.emplace_back(pairs.size());
     parallel(pairs.size(), [&](std::size_t begin, std::size_t end) {
       for (std::size_t n = begin; n < end; ++n)
-        outcomes[n] = measure(fly_route(world, vehicle, pairs[n]), world, vehicle);
+        outcomes[n] = measure(fly_route(world, vehicle, pairs[n], method.norm_cost), world, vehicle);
     });
   }
   return comparison;

@@ -15,9 +15,11 @@ namespace backwash::sim {
 struct CompareMethod {
   std::string name;
   reach::Method sets = reach::Method::tight;
-  double margin = -1;  ///< m; < 0: the sets
+  double margin = -1;      ///< m; < 0: the sets
+  bool norm_cost = false;  ///< plan::PlanOptions::norm_cost
 };
-/// The proposed method ("tight"), the same with the paper's ellipsoids, and margins of 0.1, 0.2, 0.3 and 0.4 m.
+/// The proposed method ("tight"), the same with ‖h‖₂ in the cost ("tight-norm"), with the paper's ellipsoids ("paper"),
+/// and margins of 0.1, 0.2, 0.3 and 0.4 m.
 std::vector<CompareMethod> compare_methods();
 
 /// Two hover points and the air between them, the same for every method.
@@ -40,7 +42,7 @@ struct Route {
 /// Hovers one second at the start, plans from the state estimated then, follows and holds one second at the goal.
 /// `vehicle` is what flies and what touches; the world's own vehicle is what the planner believes. No wall clock:
 /// planning ends by its caps, so the route is deterministic for the pair.
-Route fly_route(const plan::World& world, const Vehicle& vehicle, const RoutePair& pair);
+Route fly_route(const plan::World& world, const Vehicle& vehicle, const RoutePair& pair, bool norm_cost = false);
 
 /// A route in figures.
 struct RouteOutcome {

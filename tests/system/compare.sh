@@ -25,7 +25,7 @@ assert repeatable(rows["a"]) == repeatable(rows["b"]), "the same seed gives othe
 assert {r["seed"] for r in rows["a"]}.isdisjoint(r["seed"] for r in rows["c"]), "another seed gives the same air"
 found = json.load(open("a.json"))
 methods = [m["method"] for m in found["methods"]]
-assert methods == ["tight", "paper", "margin-0.1", "margin-0.2", "margin-0.3", "margin-0.4"]
+assert methods == ["tight", "tight-norm", "paper", "margin-0.1", "margin-0.2", "margin-0.3", "margin-0.4"]
 ends = {}  # paired: the same ends and air whatever the method
 for r in rows["a"]:
     place = tuple(r[c] for c in ("seed", "start_x_m", "start_y_m", "start_z_m", "goal_x_m", "goal_y_m", "goal_z_m"))
