@@ -65,7 +65,7 @@ Variance ProximityModel::wall(const Element& element, const Vec3& p_W) const noe
 
 double ProximityModel::corner_factor(double d2, double h) const noexcept {
   const auto& k = model_.corner;
-  if (d2 + h * h > corner_l2_max_) return 0;
+  if (!in_corner_range(d2 + h * h)) return 0;
   // Most points are outside the cone: spare them the arc tangent.
   if (k.phi_max < std::numbers::pi / 2 && (h <= 0 || d2 > 1.0001 * (h * tan_phi_max_) * (h * tan_phi_max_))) return 0;
   const double phi = std::atan2(std::sqrt(d2), h);

@@ -37,7 +37,7 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
   field::DisturbanceField field(grid);
   const field::WholeField whole(grid, vehicle_model, voxels);
-  parallel(whole.tile_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
+  parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
 
   reach::BoundField bounds(grid, field, model.bound);
   reach::HoverMap hover(grid);

@@ -101,7 +101,7 @@ void stored_lookup(benchmark::State& state) {
   const auto voxels = bench::free_voxels(grid);
   const field::WholeField whole(grid, {}, voxels);
   field::DisturbanceField stored(grid);
-  stored.fill(whole, 0, whole.tile_count());
+  stored.fill(whole, 0, whole.block_count());
   const auto points = bench::free_points(grid, 4096);
   std::size_t n = 0;
   const auto begun = std::clock();
@@ -128,7 +128,7 @@ void whole_field(benchmark::State& state) {
     field::DisturbanceField stored(grid);
     const field::WholeField whole(grid, {}, voxels);
     const auto fill = [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); };
-    state.range(1) > 1 ? backwash::run_parallel(whole.tile_count(), fill) : fill(0, whole.tile_count());
+    state.range(1) > 1 ? backwash::run_parallel(whole.block_count(), fill) : fill(0, whole.block_count());
     benchmark::DoNotOptimize(stored.has(Index3::Zero()));
   }
   add_naive_ratio(state, naive_us, begun, static_cast<double>(voxels.size()));
