@@ -21,6 +21,7 @@ LateralColumns::LateralColumns(const map::OccupancyGrid& grid, const Model& mode
     : grid_(&grid),
       model_(model),
       terms_(model, grid.resolution()),
+      range2_(std::pow(model.wall.l_max / grid.resolution() + 1e-6, 2)),
       radius_(static_cast<int>(model.wall.l_max / grid.resolution() + 0.5 + 1e-6) + 1),
       words_((static_cast<std::size_t>(grid.size().z()) + 63) / 64 + 3) {
   add_segments();
@@ -85,26 +86,24 @@ void LateralColumns::number_normals() {
 
 void LateralColumns::add_columns() {
   const Index3& size = grid_->size();
+  const auto columns = static_cast<std::size_t>(size.x()) * static_cast<std::size_t>(size.y());
   const auto layers = static_cast<std::size_t>(size.z());
-  stretches_.resize(grid_->cell_count());
-  bits_.assign(static_cast<std::size_t>(size.x()) * static_cast<std::size_t>(size.y()) * words_, 0);
-  for (int y = 0; y < size.y(); ++y)
-    for (int x = 0; x < size.x(); ++x) {
-      Stretch* stretch = stretches_.data() + column(x, y) * layers;
-      std::uint64_t* words = bits_.data() + column(x, y) * words_;
-      std::int16_t below = INT16_MIN, above = INT16_MAX;
-      for (int z = 0; z < size.z(); ++z) {
-        if (grid_->at(grid_->linear(Index3(x, y, z))) == map::Cell::occupied) {
-          below = static_cast<std::int16_t>(z);
-          words[(z + 64) / 64] |= std::uint64_t{1} << (z % 64);
-        }
-        stretch[z].below = below;
+  stretches_.assign(grid_->cell_count(), {INT16_MIN, INT16_MAX});
+  bits_.assign(columns * words_, 0);
+  for (std::size_t z = 0; z < layers; ++z)
+    for (std::size_t column = 0, n = z * columns; column < columns; ++column, ++n)
+      if (grid_->at(n) == map::Cell::occupied) {
+        stretches_[n].below = static_cast<std::int16_t>(z);
+        bits_[column * words_ + (z + 64) / 64] |= std::uint64_t{1} << z % 64;
+      } else if (z > 0) {
+        stretches_[n].below = stretches_[n - columns].below;
       }
-      for (int z = size.z() - 1; z >= 0; --z) {
-        if (stretch[z].below == z) above = static_cast<std::int16_t>(z);
-        stretch[z].above = above;
-      }
-    }
+  for (std::size_t z = layers; z-- > 0;)
+    for (std::size_t column = 0, n = z * columns; column < columns; ++column, ++n)
+      if (stretches_[n].below == static_cast<int>(z))
+        stretches_[n].above = static_cast<std::int16_t>(z);
+      else if (z + 1 < layers)
+        stretches_[n].above = stretches_[n + columns].above;
 }
 
 void LateralColumns::add_tables() {

@@ -67,10 +67,11 @@ class LateralColumns {
   const map::OccupancyGrid* grid_;
   Model model_;
   ProximityModel terms_;
+  double range2_;                        ///< (l̄_w/a)² and a little, voxel edges²
   int radius_;                     ///< of the columns' surroundings, voxels
   std::vector<Segment> segments_;  ///< row by row, then by x, then by normal, then by height
   std::vector<std::uint32_t> row_first_;
-  std::vector<Stretch> stretches_;            ///< per voxel, z running fastest
+  std::vector<Stretch> stretches_;            ///< per voxel of the grid
   std::size_t words_;                         ///< of bits_ per column, 64 empty layers before the first
   std::vector<std::uint64_t> bits_;           ///< occupied voxels
   std::vector<double> decay_;                 ///< [n]: Σ exp(−k_w2 a² i²) over i < n

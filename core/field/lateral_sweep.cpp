@@ -129,19 +129,23 @@ void LateralSweep::add_crossings(Line& line, double c_x, double c_y, int dx, int
 LateralColumns::Stretch LateralSweep::common_stretch(const View& view, const Line& line, int z) const noexcept {
   const Index3& size = columns_.grid_->size();
   const auto home = static_cast<std::ptrdiff_t>(columns_.column(view.x, view.y));
+  const auto* layer = columns_.stretches_.data() + columns_.grid_->linear(Index3(0, 0, z));
   LateralColumns::Stretch common{INT16_MIN, INT16_MAX};
   for (const Crossing& c : line.crossings) {
     if (static_cast<unsigned>(view.x + c.dx) >= static_cast<unsigned>(size.x()) ||
         static_cast<unsigned>(view.y + c.dy) >= static_cast<unsigned>(size.y()))
       continue;
-    const auto& here = columns_.stretches_[static_cast<std::size_t>((home + c.column) * size.z() + z)];
+    const auto& here = layer[home + c.column];
     common.below = std::max(common.below, here.below), common.above = std::min(common.above, here.above);
   }
   return common;
 }
 
 void LateralSweep::add(const View& view, const Segment& segment, int dy, LateralColumns::Sums& sums) {
-  const Line& l = line(segment, segment.x - view.x, dy);
+  const int dx = segment.x - view.x;
+  const double along = dx * segment.m_x + dy * segment.m_y;
+  if (along >= -0.5 || dx * dx + dy * dy + 0.25 + along > columns_.range2_) return;  // behind it, or too far away
+  const Line& l = line(segment, dx, dy);
   if (!l.in_range) return;
   const int corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(l.corner.size());
   const int corner_low = segment.floor + l.corner_low, corner_high = corner_low + corners - 1;
@@ -172,11 +176,12 @@ void LateralSweep::add(const View& view, const Segment& segment, int dy, Lateral
   if (stretch.below >= lowest || stretch.above <= highest) add_uncertain(part, segment, l, stretch);
 
   const auto &w = segment.wall, &c = segment.corner;
-  for (int n = begin; n <= end; ++n) {
-    const auto at = static_cast<std::size_t>(n);
-    const int up = n + z0 - corner_low;
-    seen_[at] *= up >= 0 && up < corners ? l.corner[static_cast<std::size_t>(up)] : 0;
-  }
+  const int corner_begin = std::clamp(corner_low - z0, begin, end + 1);
+  const int corner_end = std::clamp(corner_high - z0 + 1, corner_begin, end + 1);
+  std::fill(seen_.begin() + begin, seen_.begin() + corner_begin, 0);
+  std::fill(seen_.begin() + corner_end, seen_.begin() + end + 1, 0);
+  const double* factor = l.corner.data() - (corner_low - z0);
+  for (int n = corner_begin; n < corner_end; ++n) seen_[static_cast<std::size_t>(n)] *= factor[n];
   add_terms({l.decay * w.xx, l.decay * w.xy, l.decay * w.yy, l.decay * w.zz}, {c.xx, c.xy, c.yy, c.zz}, wall_.data(),
             seen_.data(), begin, end, sums.xx.data(), sums.xy.data(), sums.yy.data(), sums.zz.data());
 }
@@ -188,13 +193,13 @@ void LateralSweep::add_uncertain(const View& view, const Segment& segment, const
   const auto home = static_cast<std::ptrdiff_t>(columns_.column(view.x, view.y));
   const int low = std::min(view.low, std::max(segment.low, view.low - line.range));
   const int high = std::max(view.high, std::min(segment.high, view.high + line.range));
+  const auto* layer = columns_.stretches_.data() + columns_.grid_->linear(Index3(0, 0, low));
   active_.clear();
   for (const Crossing& c : line.crossings) {
     if (static_cast<unsigned>(view.x + c.dx) >= static_cast<unsigned>(size.x()) ||
         static_cast<unsigned>(view.y + c.dy) >= static_cast<unsigned>(size.y()))
       continue;
-    const auto place = static_cast<std::size_t>((home + c.column) * size.z() + low);
-    if (columns_.stretches_[place].above <= high) active_.push_back(c);
+    if (layer[home + c.column].above <= high) active_.push_back(c);
   }
   const int z0 = view.first_z,
             corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(line.corner.size());
