@@ -99,6 +99,12 @@ void DisturbanceField::fill(const WholeField& whole, std::size_t begin, std::siz
   whole.evaluate(begin, end, [this](std::size_t n, const Variance& s) { set(n, s); });
 }
 
+void DisturbanceField::forget(const VoxelBox& box) noexcept {
+  for (int z = box.low.z(); z <= box.high.z(); ++z)
+    for (int y = box.low.y(); y <= box.high.y(); ++y)
+      for (int x = box.low.x(); x <= box.high.x(); ++x) sigma_[linear(Index3(x, y, z))][0] = -1;
+}
+
 void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
   sigma_[n] = {static_cast<float>(s.xx), static_cast<float>(s.xy), static_cast<float>(s.xz),
                static_cast<float>(s.yy), static_cast<float>(s.yz), static_cast<float>(s.zz)};

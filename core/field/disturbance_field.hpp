@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/field/element_buckets.hpp"
+#include "core/field/field_update.hpp"
 #include "core/field/proximity_model.hpp"
 #include "core/field/sight.hpp"
 #include "core/field/whole_field.hpp"
@@ -51,6 +52,10 @@ class DisturbanceField {
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
+
+  /// Unsets Σ in a box of voxels inside the grid. With affected_columns() and fill(), a field follows its map, bit for
+  /// bit as if it were made anew.
+  void forget(const VoxelBox& box) noexcept;
 
   /// Whether Σ is stored at a voxel; false outside the grid.
   bool has(const Index3& v) const noexcept;

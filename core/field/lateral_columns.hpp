@@ -67,7 +67,7 @@ class LateralColumns {
   const map::OccupancyGrid* grid_;
   Model model_;
   ProximityModel terms_;
-  double range2_;                        ///< (l̄_w/a)² and a little, voxel edges²
+  double range2_;                  ///< (l̄_w/a)² and a little, voxel edges²
   int radius_;                     ///< of the columns' surroundings, voxels
   std::vector<Segment> segments_;  ///< row by row, then by x, then by normal, then by height
   std::vector<std::uint32_t> row_first_;

@@ -21,12 +21,37 @@ std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const
   return voxels;
 }
 
+/// Σ at the listed voxels, that of `previous` where it holds still.
+field::DisturbanceField store_field(const map::OccupancyGrid& grid, const Model& model,
+                                    const std::vector<std::size_t>& voxels, const Parallel& parallel,
+                                    const World* previous) {
+  const auto fill = [&](field::DisturbanceField& field, std::span<const std::size_t> part) {
+    const field::WholeField whole(grid, model, part);
+    parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
+  };
+  const bool same_frame = previous && previous->grid.origin() == grid.origin() &&
+                          previous->grid.resolution() == grid.resolution() && previous->grid.size() == grid.size();
+  if (!same_frame) {
+    field::DisturbanceField field(grid);
+    fill(field, voxels);
+    return field;
+  }
+  field::DisturbanceField field = previous->field;
+  if (const auto changed = field::changed_box(previous->grid, grid)) {
+    const auto columns = field::affected_columns(grid, model, *changed);
+    field.forget(columns);
+    fill(field, field::voxels_within(grid, voxels, columns));
+  }
+  return field;
+}
+
 }  // namespace
 
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) { work(0, count); }
 
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
-                                         reach::Method method, double constant_margin, const Parallel& parallel) {
+                                         reach::Method method, double constant_margin, const Parallel& parallel,
+                                         const World* previous) {
   Model vehicle_model = model;
   vehicle_model.ground.r0 = vehicle.body.diagonal_radius;
   // The paper's sets exist for its second-order loop only.
@@ -35,9 +60,7 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   map::DistanceField distance(grid);
 
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
-  field::DisturbanceField field(grid);
-  const field::WholeField whole(grid, vehicle_model, voxels);
-  parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
+  field::DisturbanceField field = store_field(grid, vehicle_model, voxels, parallel, previous);
 
   reach::BoundField bounds(grid, field, model.bound);
   reach::HoverMap hover(grid);

@@ -12,8 +12,8 @@
 
 namespace backwash::plan {
 
-/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when all
-/// are done. core itself knows no threads: services pass their own.
+/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when
+/// all are done. core itself knows no threads: services pass their own.
 using Parallel = std::function<void(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work)>;
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
 
@@ -29,9 +29,10 @@ struct World {
 };
 
 /// Builds all of it. Σ is stored at every free voxel where the vehicle's centre can be (distance ≥ body radius less one
-/// voxel diagonal). The model's r0 is taken from the vehicle.
+/// voxel diagonal). The model's r0 is taken from the vehicle. `previous`: a world of the same model and vehicle whose
+/// field is taken over where the map has not changed; the result is the same in every bit.
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
                                          reach::Method method = reach::Method::tight, double constant_margin = -1,
-                                         const Parallel& parallel = run_serial);
+                                         const Parallel& parallel = run_serial, const World* previous = nullptr);
 
 }  // namespace backwash::plan

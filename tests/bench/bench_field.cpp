@@ -144,6 +144,34 @@ BENCHMARK(whole_field)
     ->UseRealTime()
     ->MeasureProcessCPUTime();
 
+/// A box of 1 m³ appears in the middle of the room: finding it, preparing and evaluating what it affects.
+/// `of_rebuild`: CPU time over that of the whole field made anew.
+void region_update(benchmark::State& state) {
+  const OccupancyGrid before = bench::furnished_room(edge_of(state));
+  OccupancyGrid after = before;
+  for (std::size_t n = 0; n < after.cell_count(); ++n) {
+    const Vec3 in = after.center(after.voxel(n)) - Vec3(4.5, 4.5, 0.5);
+    if ((in.array() > 0).all() && (in.array() < 1).all()) after.set(after.voxel(n), Cell::occupied);
+  }
+  const auto fill = [&](field::DisturbanceField& stored, const OccupancyGrid& grid, std::span<const std::size_t> part) {
+    const field::WholeField whole(grid, {}, part);
+    stored.fill(whole, 0, whole.block_count());
+  };
+  field::DisturbanceField stored(before);
+  const auto rebuild = std::clock();
+  fill(stored, before, bench::free_voxels(before));
+  const auto rebuild_clocks = static_cast<double>(std::clock() - rebuild);
+  const auto begun = std::clock();
+  for (auto _ : state) {
+    const auto columns = field::affected_columns(after, {}, *field::changed_box(before, after));
+    stored.forget(columns);
+    fill(stored, after, field::voxels_within(after, bench::free_voxels(after), columns));
+  }
+  state.counters["of_rebuild"] =
+      static_cast<double>(std::clock() - begun) / static_cast<double>(state.iterations()) / rebuild_clocks;
+}
+BENCHMARK(region_update)->Arg(200)->Arg(100)->Unit(benchmark::kMillisecond);
+
 }  // namespace
 
 BENCHMARK_MAIN();

@@ -130,6 +130,58 @@ TEST(StoredField, HasTheSameBitsHoweverTheBlocksAreDivided) {
   }
 }
 
+/// Σ of `before` made to follow the map to `after`, and Σ of `after` made anew, agree in every bit and in where they
+/// are.
+void expect_update_equals_rebuild(const OccupancyGrid& before, const OccupancyGrid& after) {
+  const auto store = [](DisturbanceField& field, const OccupancyGrid& grid, std::span<const std::size_t> voxels) {
+    const WholeField whole(grid, Model{}, voxels);
+    field.fill(whole, 0, whole.block_count());
+  };
+  DisturbanceField updated(before), rebuilt(after);
+  store(updated, before, free_voxels(before)), store(rebuilt, after, free_voxels(after));
+  const DisturbanceField old = updated;
+  const auto changed = changed_box(before, after);
+  ASSERT_TRUE(changed);
+  const VoxelBox columns = affected_columns(after, Model{}, *changed);
+  updated.forget(columns);
+  store(updated, after, voxels_within(after, free_voxels(after), columns));
+  std::size_t stored = 0, differ = 0;
+  for (std::size_t n = 0; n < after.cell_count(); ++n) {
+    const Index3 v = after.voxel(n);
+    ASSERT_EQ(updated.has(v), rebuilt.has(v)) << v.transpose();
+    if (!updated.has(v)) continue;
+    const Variance s = updated.at(v), t = rebuilt.at(v);
+    ASSERT_TRUE(s.xx == t.xx && s.xy == t.xy && s.yy == t.yy && s.zz == t.zz) << v.transpose();
+    ++stored;
+    if (old.has(v)) differ += old.at(v).zz != t.zz;
+  }
+  EXPECT_GT(differ, 1000u);
+  EXPECT_GT(stored, 10 * static_cast<std::size_t>(columns.high.z()));
+}
+
+TEST(StoredField, FollowsAChangeOfOneCubicMetreBitForBit) {
+  const OccupancyGrid before = *map::builtin_scene("apartment", 0.1);
+  for (const Vec3& corner : {Vec3(2.5, 3, 0), Vec3(0, 0, 0.5), Vec3(5.2, 5.1, 1.4)}) {
+    OccupancyGrid after = before;
+    for (std::size_t n = 0; n < after.cell_count(); ++n) {
+      const Index3 v = after.voxel(n);
+      const Vec3 in = after.center(v) - corner;
+      if ((in.array() < 0).any() || (in.array() > 1).any()) continue;
+      after.set(v, after.at(n) == Cell::free ? Cell::occupied : v.x() % 2 ? Cell::free : Cell::unknown);
+    }
+    expect_update_equals_rebuild(before, after);
+  }
+}
+
+TEST(StoredField, FindsNoChangeBetweenEqualMapsAndAllOfItBetweenMapsOfOtherFrames) {
+  const OccupancyGrid room = scene::small_room(), moved(room.origin() + Vec3(0.1, 0, 0), 0.1, room.size(), Cell::free);
+  EXPECT_FALSE(changed_box(room, room));
+  const auto all = changed_box(room, moved);
+  ASSERT_TRUE(all);
+  EXPECT_EQ(all->low, Index3::Zero());
+  EXPECT_EQ(all->high, Index3(room.size() - Index3::Ones()));
+}
+
 TEST(StoredField, StoresNothingForAnEmptyList) {
   const OccupancyGrid grid = scene::small_room();
   EXPECT_EQ(WholeField(grid, Model{}, {}).block_count(), 0u);
