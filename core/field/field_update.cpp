@@ -12,8 +12,9 @@ std::optional<VoxelBox> changed_box(const map::OccupancyGrid& before, const map:
       before.origin() == after.origin() && before.resolution() == after.resolution() && before.size() == after.size();
   if (!same_frame) return VoxelBox{Index3::Zero(), after.size() - Index3::Ones()};
   std::optional<VoxelBox> box;
-  for (std::size_t n = 0; n < after.cell_count(); ++n) {
-    if (before.at(n) == after.at(n)) continue;
+  const auto old = before.cells(), now = after.cells();
+  for (std::size_t n = 0; n < now.size(); ++n) {
+    if (old[n] == now[n]) continue;
     const Index3 v = after.voxel(n);
     if (!box) box = VoxelBox{v, v};
     box->low = box->low.cwiseMin(v), box->high = box->high.cwiseMax(v);

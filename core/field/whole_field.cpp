@@ -20,7 +20,7 @@ WholeField::WholeField(const map::OccupancyGrid& grid, const Model& model, std::
   width_ = 2 * radius_ + 1;
   add_rows(voxels);
   if (voxels.empty()) return;
-  add_blocks();
+  add_blocks(voxels);
   add_stencil();
   add_paths();
 }
@@ -42,22 +42,22 @@ void WholeField::add_rows(std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) set(listed_, n / nx, n % nx);
 }
 
-/// Parts of equal width, so that threads get equal shares.
-void WholeField::add_blocks() {
-  const Index3& size = grid_->size();
-  const int across = (size.x() + 63) / 64, width = (size.x() + across - 1) / across;
-  const auto rows = static_cast<int>(kRows);
-  const auto holds_listed = [&](int y) {
-    for (int z = 0; z < size.z(); ++z) {
-      const auto begin = listed_.begin() + static_cast<std::ptrdiff_t>(row_words_) * (z * size.y() + y);
-      const auto end = begin + static_cast<std::ptrdiff_t>(row_words_) * std::min(rows, size.y() - y);
-      if (std::any_of(begin, end, [](std::uint64_t word) { return word != 0; })) return true;
-    }
-    return false;
-  };
-  for (int y = 0; y < size.y(); y += rows)
-    for (int x = 0; x < size.x() && holds_listed(y); x += width)
-      blocks_.push_back({x, y, std::min(width, size.x() - x)});
+/// Covers the columns that hold listed voxels: parts of equal width, so that threads get equal shares.
+void WholeField::add_blocks(std::span<const std::size_t> voxels) {
+  const auto nx = static_cast<std::size_t>(grid_->size().x()), ny = static_cast<std::size_t>(grid_->size().y());
+  std::vector<char> rows(ny);
+  std::size_t low = nx, high = 0;
+  for (const std::size_t n : voxels) {
+    const std::size_t x = n % nx;
+    rows[n / nx % ny] = 1, low = std::min(low, x), high = std::max(high, x);
+  }
+  const int first = static_cast<int>(low), end = static_cast<int>(high) + 1;
+  const int across = (end - first + 63) / 64, width = (end - first + across - 1) / across;
+  for (std::size_t y = 0; y < ny; ++y) {
+    if (!rows[y]) continue;
+    for (int x = first; x < end; x += width) blocks_.push_back({x, static_cast<int>(y), std::min(width, end - x)});
+    y += kRows - 1;
+  }
 }
 
 void WholeField::add_stencil() {

@@ -59,7 +59,7 @@ class WholeField {
   };
 
   void add_rows(std::span<const std::size_t> voxels);
-  void add_blocks();
+  void add_blocks(std::span<const std::size_t> voxels);
   void add_stencil();
   void add_paths();
   /// What is on the path of an offset, kept or made in `scratch`.
