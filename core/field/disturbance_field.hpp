@@ -10,7 +10,7 @@
 #include "core/field/sight.hpp"
 #include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
-#include "core/map/scan.hpp"
+#include "core/map/voxel_box.hpp"
 #include "core/types/model.hpp"
 
 namespace backwash::field {
@@ -53,7 +53,8 @@ class DisturbanceField {
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
 
-  /// Unsets Σ at all voxels of a box inside the grid.
+  /// Unsets Σ in a box of voxels inside the grid. With affected_columns() and fill(), a field follows its map, bit for
+  /// bit as if it were made anew.
   void clear(const map::VoxelBox& box) noexcept;
 
   /// Whether Σ is stored at a voxel; false outside the grid.

@@ -16,8 +16,8 @@ ElementBuckets::ElementBuckets(const map::OccupancyGrid& grid, std::vector<Eleme
   for (std::size_t n = 1; n < first_.size(); ++n) first_[n] += first_[n - 1];
   std::ranges::stable_sort(elements, {}, bucket);
   elements_ = std::move(elements);
-  positions_.reserve(elements_.size());
-  for (const Element& e : elements_) positions_.push_back(e.c_W);
+  places_.reserve(elements_.size());
+  for (const Element& e : elements_) places_.push_back({e.c_W, e.normal});
 }
 
 }  // namespace backwash::field

@@ -11,10 +11,13 @@ namespace backwash::field {
 
 /// Where the elements that may act on a vehicle at p lie: in a ball about p, or in a vertical column through p cut by a
 /// larger ball.
+/// The ball's part outside the column may be cut to a cone that opens downwards from p.
 struct Reach {
-  double ball = 0;           ///< radius, m
-  double column_radius = 0;  ///< m
-  double column_length = 0;  ///< radius of the larger ball, m
+  double ball = 0;              ///< radius, m
+  double column_radius = 0;     ///< m
+  double column_length = 0;     ///< radius of the larger ball, m
+  double cone_slope = kNoCone;  ///< horizontal over vertical extent of the cone
+  static constexpr double kNoCone = 1e9;
 };
 
 /// Elements sorted into cubes so that those near a point are found without looking at the others.
@@ -22,8 +25,8 @@ class ElementBuckets {
  public:
   ElementBuckets(const map::OccupancyGrid& grid, std::vector<Element> elements);
 
-  /// Calls visit(element) for every element within the reach of p (and none further than 2 µm outside), in a fixed
-  /// order.
+  /// Calls visit(element) for every element within the reach of p (and few beyond) that p is in front of,
+  /// m·(p − c) > 0, in a fixed order.
   template <typename Visit>
   void for_each_near(const Vec3& p_W, const Reach& reach, const Visit& visit) const {
     const double horizontal = std::max(reach.ball, reach.column_radius) + kSlack;
@@ -31,6 +34,8 @@ class ElementBuckets {
     const auto squared = [](double x) { return (x + kSlack) * (x + kSlack); };
     const double ball2 = squared(reach.ball), column2 = squared(reach.column_radius),
                  length2 = squared(reach.column_length);
+    const bool cone = reach.cone_slope < Reach::kNoCone;
+    const double slope2 = cone ? reach.cone_slope * reach.cone_slope : 0;
     const Vec3 extent(horizontal, horizontal, vertical);
     const Index3 low = bucket_of(p_W - extent), high = bucket_of(p_W + extent);
     for (int j = low.y(); j <= high.y(); ++j)
@@ -46,9 +51,12 @@ class ElementBuckets {
         const std::size_t begin = first_[column(i, j) + static_cast<std::size_t>(k0)];
         const std::size_t end = first_[column(i, j) + static_cast<std::size_t>(k1) + 1];
         for (std::size_t n = begin; n < end; ++n) {
-          const Vec3 r = positions_[n] - p_W;
+          const auto& [c_W, normal] = places_[n];
+          const Vec3 r = c_W - p_W;
+          if (r.dot(normal) >= -kInPlane) continue;
           const double flat2 = r.x() * r.x() + r.y() * r.y(), r2 = flat2 + r.z() * r.z();
-          if (r2 <= ball2 || (flat2 <= column2 && r2 <= length2)) visit(elements_[n]);
+          const bool in_ball = r2 <= ball2 && (!cone || (r.z() < kSlack && flat2 <= slope2 * r.z() * r.z() + kSlack));
+          if (in_ball || (flat2 <= column2 && r2 <= length2)) visit(elements_[n]);
         }
       }
   }
@@ -56,6 +64,11 @@ class ElementBuckets {
  private:
   static constexpr double kEdge = 0.5;    // m
   static constexpr double kSlack = 1e-6;  // m, more than the tolerance of the gates
+  static constexpr double kInPlane =
+      1e-9;  // m: a point in an element's own plane does not see it, whatever the rounding
+  struct Place {
+    Vec3 c_W, normal;
+  };
 
   /// Nearest bucket that holds elements' positions; clamped, so that it exists for any finite p.
   Index3 bucket_of(const Vec3& p_W) const noexcept {
@@ -75,7 +88,7 @@ class ElementBuckets {
   Vec3 origin_W_;
   Index3 count_;
   std::vector<Element> elements_;
-  std::vector<Vec3> positions_;     ///< of the elements: all that most of them are asked for, a quarter of the memory
+  std::vector<Place> places_;       ///< of the elements: all that most of them are asked for, half of the memory
   std::vector<std::size_t> first_;  ///< bucket n holds elements first_[n] … first_[n + 1] − 1
 };
 

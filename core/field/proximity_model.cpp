@@ -65,7 +65,7 @@ Variance ProximityModel::wall(const Element& element, const Vec3& p_W) const noe
 
 double ProximityModel::corner_factor(double d2, double h) const noexcept {
   const auto& k = model_.corner;
-  if (d2 + h * h > corner_l2_max_) return 0;
+  if (!in_corner_range(d2 + h * h)) return 0;
   // Most points are outside the cone: spare them the arc tangent.
   if (k.phi_max < std::numbers::pi / 2 && (h <= 0 || d2 > 1.0001 * (h * tan_phi_max_) * (h * tan_phi_max_))) return 0;
   const double phi = std::atan2(std::sqrt(d2), h);
@@ -76,6 +76,7 @@ double ProximityModel::corner_factor(double d2, double h) const noexcept {
 
 double ProximityModel::wall_factor(double r2, double r_z) const noexcept {
   const auto& k = model_.wall;
+  if (r_z > 1e-6 * (1 + k.l_max)) return 0;  // far above level: spare it the root
   const double distance = std::sqrt(r2), l = std::max(distance, least_l_);
   const double cos_theta = distance > 0 ? -r_z / distance : 1;
   if (l > k.l_max + kTolerance || cos_theta > cos_wall_min_ || cos_theta < cos_level_) return 0;

@@ -37,6 +37,8 @@ class ProximityModel {
   Gate wall_gate(double r_z) const noexcept;
   /// Whether |r| ≤ l̄_w, the gate of an element in corner(): `r2` = |r|², m².
   bool in_wall_range(double r2) const noexcept;
+  /// Whether l_c ≤ l̄_c: `l2` = l_c², m².
+  bool in_corner_range(double l2) const noexcept { return l2 <= corner_l2_max_; }
 
  private:
   Model model_;

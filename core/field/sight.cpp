@@ -41,9 +41,28 @@ SightMap::Viewpoint SightMap::viewpoint(const Vec3& p_W) const noexcept {
 }
 
 bool SightMap::line_of_sight(const Viewpoint& from, const Vec3& c_W) const noexcept {
-  const auto segment = open_part(origin_W_, resolution_, from.p_W, c_W);
-  return !segment || clear(
-                         *segment, [this](const Index3& v) { return empty_radius(v); }, from.empty_radius);
+  const auto line = open_part(from, c_W);
+  return !line || clear(from, *line);
+}
+
+bool SightMap::clear(const Viewpoint& from, const Segment& line) const noexcept {
+  const Vec3 to = line.from + line.delta;
+  return empty(line.from.cwiseMin(to), line.from.cwiseMax(to)) ||
+         field::clear(
+             line, [this](const Index3& v) { return empty_radius(v); }, from.empty_radius);
+}
+
+bool SightMap::empty(const Vec3& low, const Vec3& high) const noexcept {
+  constexpr double kReach = 2 * kTouch;
+  const auto bound = [](double x, unsigned n) {
+    return x <= 0 ? std::size_t{0} : x >= n ? std::size_t{n} : static_cast<std::size_t>(x);
+  };
+  const std::size_t row = nx_ + 1, layer = row * (ny_ + 1);
+  const std::size_t x0 = bound(low.x() - kReach, nx_), x1 = bound(high.x() + kReach + 1, nx_);
+  const std::size_t y0 = row * bound(low.y() - kReach, ny_), y1 = row * bound(high.y() + kReach + 1, ny_);
+  const std::size_t z0 = layer * bound(low.z() - kReach, nz_), z1 = layer * bound(high.z() + kReach + 1, nz_);
+  const auto column = [&](std::size_t y, std::size_t z) { return sums_[x1 + y + z] - sums_[x0 + y + z]; };
+  return column(y1, z1) + column(y0, z0) == column(y0, z1) + column(y1, z0);
 }
 
 namespace {
@@ -93,6 +112,23 @@ SightMap::SightMap(const map::OccupancyGrid& grid)
                          [](map::Cell c) { return c == map::Cell::occupied ? std::uint8_t{0} : std::uint8_t{255}; });
   sweep(radius_, nx_, ny_, nz_, true);
   sweep(radius_, nx_, ny_, nz_, false);
+  add_up();
+}
+
+void SightMap::add_up() {
+  const std::size_t row = nx_ + 1, layer = row * (ny_ + 1);
+  sums_.assign(layer * (nz_ + 1), 0);
+  const std::uint8_t* radius = radius_.data();
+  for (std::size_t z = 1; z <= nz_; ++z)
+    for (std::size_t y = 1; y <= ny_; ++y) {
+      std::uint32_t* sums = sums_.data() + z * layer + y * row;
+      const std::uint32_t *before = sums - row, *below = sums - layer, *both = below - row;
+      std::uint32_t in_row = 0;
+      for (std::size_t x = 1; x <= nx_; ++x) {
+        in_row += *radius++ == 0 ? 1 : 0;
+        sums[x] = in_row + before[x] + below[x] - both[x];
+      }
+    }
 }
 
 }  // namespace backwash::field

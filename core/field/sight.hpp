@@ -89,7 +89,8 @@ bool clear(const Segment& segment, const EmptyRadius& empty_radius, int empty_st
 bool line_of_sight(const map::OccupancyGrid& grid, const Vec3& p_W, const Vec3& c_W) noexcept;
 
 /// A copy of a grid's occupied voxels made for fast lines of sight: the Chebyshev distance from each voxel to the
-/// nearest occupied one, one byte each. Gives exactly the answers of line_of_sight(). Thread-safe.
+/// nearest occupied one, one byte each, and summed-area counts, four bytes each. Gives exactly the answers of
+/// line_of_sight(). Thread-safe.
 class SightMap {
  public:
   /// O(cells).
@@ -104,6 +105,16 @@ class SightMap {
   /// As field::line_of_sight(grid, p, c). Three or four jumps for a line across a room.
   bool line_of_sight(const Viewpoint& from, const Vec3& c_W) const noexcept;
 
+  /// The line from a viewpoint to c without its end, in voxel units; nothing when it is all end.
+  std::optional<Segment> open_part(const Viewpoint& from, const Vec3& c_W) const noexcept {
+    return field::open_part(origin_W_, resolution_, from.p_W, c_W);
+  }
+  /// As line_of_sight(), for a line that open_part() gave. A look at the box about it settles most.
+  bool clear(const Viewpoint& from, const Segment& line) const noexcept;
+  /// Whether the closed box [low, high], voxel units, meets no occupied voxel, with the tolerance kTouch and more:
+  /// nothing in it hides anything. Eight look-ups. Precondition: low ≤ high.
+  bool empty(const Vec3& low, const Vec3& high) const noexcept;
+
  private:
   int empty_radius(const Index3& v) const noexcept {
     const auto x = static_cast<unsigned>(v.x()), y = static_cast<unsigned>(v.y()), z = static_cast<unsigned>(v.z());
@@ -111,10 +122,13 @@ class SightMap {
     return radius_[x + nx_ * (y + static_cast<std::size_t>(ny_) * z)];
   }
 
+  void add_up();
+
   Vec3 origin_W_;
   double resolution_;
   unsigned nx_, ny_, nz_;
   std::vector<std::uint8_t> radius_;
+  std::vector<std::uint32_t> sums_;  // (x, y, z), one more than voxels per axis: occupied voxels below x, y and z
 };
 
 }  // namespace backwash::field

@@ -2,6 +2,7 @@
 #include "core/field/surface.hpp"
 
 #include <array>
+#include <numeric>
 
 namespace backwash::field {
 namespace {
@@ -50,7 +51,9 @@ void add_lateral_elements(const OccupancyGrid& grid, const Index3& v, std::vecto
     if (const int along = g.dot(kFaces[f].head<2>()); exposed[f] && along > best) best = along, best_face = f;
 
   if (!one_voxel_wall && best > 0) {
-    const Eigen::Vector2d m = g.cast<double>().normalized();
+    // Without the common divisor, so that normals of one direction are equal in every bit.
+    const Eigen::Vector2i shortest = g / std::gcd(g.x(), g.y());
+    const Eigen::Vector2d m = shortest.cast<double>().normalized();
     elements.push_back(lateral_element(grid, v, Vec3(m.x(), m.y(), 0), kFaces[best_face]));
     return;
   }

@@ -2,25 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
+#include "core/map/voxel_box.hpp"
 
 namespace backwash::map {
-
-/// Voxels from low to high, both included; starts empty.
-struct VoxelBox {
-  Index3 low = Index3::Constant(std::numeric_limits<int>::max());
-  Index3 high = Index3::Constant(std::numeric_limits<int>::min());
-
-  bool empty() const noexcept { return (low.array() > high.array()).any(); }
-  void add(const Index3& v) noexcept {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
-};
 
 /// What a scan changed in the grid.
 struct ScanChange {

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/field/field_update.hpp"
+
 namespace backwash::plan {
 namespace {
 
@@ -27,26 +29,15 @@ reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
   return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
 }
 
-/// The voxels of `voxels` within a box.
-std::vector<std::size_t> within(const map::OccupancyGrid& grid, std::vector<std::size_t> voxels,
-                                const map::VoxelBox& box) {
-  std::erase_if(voxels, [&](std::size_t n) {
-    const Index3 v = grid.voxel(n);
-    return (v.array() < box.low.array()).any() || (v.array() > box.high.array()).any();
-  });
-  return voxels;
-}
-
 map::VoxelBox grown(const map::VoxelBox& box, const Index3& by, const Index3& size) {
   return {(box.low - by).cwiseMax(0), (box.high + by).cwiseMin(size - Index3::Ones())};
 }
 
-/// Where Σ can change: within every term's range and the elements' own neighbourhood (normals look two voxels around)
-/// of the change, along z everywhere, since a corner lies as deep as its column is free.
-map::VoxelBox reached_by_field(const map::OccupancyGrid& grid, const Model& model, const map::VoxelBox& changed) {
-  const double range = std::max({model.ground.l_max, model.corner.l_max, model.wall.l_max, model.ground.r0});
-  const int voxels = static_cast<int>(std::ceil(range / grid.resolution())) + 4;
-  return grown(changed, {voxels, voxels, grid.size().z()}, grid.size());
+/// Stores Σ at the listed voxels.
+void fill_field(field::DisturbanceField& field, const map::OccupancyGrid& grid, const Model& model,
+                std::span<const std::size_t> voxels, const Parallel& parallel) {
+  const field::WholeField whole(grid, model, voxels);
+  parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
 }
 
 /// Where the hover map can change: a set reads w̄ over itself, and obstacles up to 1 m (the cap of its clearance) and
@@ -90,8 +81,7 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
 
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
   field::DisturbanceField field(grid);
-  const field::WholeField whole(grid, vehicle_model, voxels);
-  parallel(whole.tile_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
+  fill_field(field, grid, vehicle_model, voxels, parallel);
 
   reach::BoundField bounds(grid, field, model.bound);
   reach::HoverMap hover(grid);
@@ -129,16 +119,14 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
   sums.update(grid, changed.low, changed.high);
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, old.reach.vehicle);
 
-  const map::VoxelBox field_box = reached_by_field(grid, vehicle_model, changed);
-  const std::vector<std::size_t> field_voxels = within(grid, voxels, field_box);
+  const map::VoxelBox columns = field::affected_columns(grid, vehicle_model, changed);
   field::DisturbanceField field = old.field;
-  field.clear(field_box);
-  const field::WholeField whole(grid, vehicle_model, field_voxels);
-  parallel(whole.tile_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
+  field.clear(columns);
+  fill_field(field, grid, vehicle_model, field::voxels_within(grid, voxels, columns), parallel);
 
   reach::BoundField bounds(grid, field, model.bound);
-  const map::VoxelBox hover_box = reached_by_hover(old, bounds, field_box, changed);
-  const std::vector<std::size_t> hover_voxels = within(grid, voxels, hover_box);
+  const map::VoxelBox hover_box = reached_by_hover(old, bounds, columns, changed);
+  const std::vector<std::size_t> hover_voxels = field::voxels_within(grid, voxels, hover_box);
   reach::HoverMap hover = old.hover;
   hover.clear(hover_box);
   parallel(hover_voxels.size(), [&](std::size_t begin, std::size_t end) {

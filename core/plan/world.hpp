@@ -8,7 +8,7 @@
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/occupancy_sums.hpp"
-#include "core/map/scan.hpp"
+#include "core/map/voxel_box.hpp"
 #include "core/plan/centre_response.hpp"
 #include "core/plan/safe_space.hpp"
 #include "core/reach/hover_set.hpp"

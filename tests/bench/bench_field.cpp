@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Exact query time of the disturbance field beside the naive scan, in a furnished room of 10 × 10 × 3 m at 0.1 m.
+// The disturbance field in a furnished room of 10 × 10 × 3 m with the default model, edges of 0.2, 0.1 and 0.05 m.
+// `naive_us` and `naive_ratio`: a query by scanning the whole box in range, timed in the same run, and how many times
+// longer it takes per point. `query_ratio`: the same for ProximityField::at, per voxel of the whole field.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <random>
+#include <chrono>
+#include <map>
 
 #include "core/field/disturbance_field.hpp"
+#include "services/parallel/parallel.hpp"
+#include "tests/bench/furnished_room.hpp"
 
 namespace {
 
@@ -14,85 +19,158 @@ using backwash::Vec3;
 using backwash::map::Cell;
 using backwash::map::OccupancyGrid;
 namespace field = backwash::field;
+namespace bench = backwash::bench;
 
-/// Closed room with 25 random boxes standing on the floor.
-OccupancyGrid furnished_room() {
-  OccupancyGrid grid(Vec3(0, 0, 0), 0.1, Index3(100, 100, 30), Cell::free);
-  const auto box = [&](const Index3& from, const Index3& to) {
-    for (int k = std::max(0, from.z()); k < std::min(30, to.z()); ++k)
-      for (int j = std::max(0, from.y()); j < std::min(100, to.y()); ++j)
-        for (int i = std::max(0, from.x()); i < std::min(100, to.x()); ++i) grid.set(Index3(i, j, k), Cell::occupied);
-  };
-  box({0, 0, 0}, {100, 100, 1}), box({0, 0, 29}, {100, 100, 30});
-  box({0, 0, 0}, {1, 100, 30}), box({99, 0, 0}, {100, 100, 30});
-  box({0, 0, 0}, {100, 1, 30}), box({0, 99, 0}, {100, 100, 30});
-  std::mt19937 random(1);
-  const auto draw = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
-  for (int n = 0; n < 25; ++n) {
-    const Index3 from(draw(0, 95), draw(0, 95), 0);
-    box(from, from + Index3(draw(3, 12), draw(3, 12), draw(4, 20)));
-  }
-  return grid;
-}
+double edge_of(const benchmark::State& state) { return 1e-3 * static_cast<double>(state.range(0)); }
 
-std::vector<Vec3> free_points(const OccupancyGrid& grid) {
-  std::mt19937 random(2);
-  std::uniform_real_distribution<double> unit(0, 1);
-  std::vector<Vec3> points;
-  while (points.size() < 256) {
-    const Vec3 p(10 * unit(random), 10 * unit(random), 3 * unit(random));
-    if (grid.free(grid.index(p))) points.push_back(p);
-  }
-  return points;
-}
-
-void exact_query(benchmark::State& state) {
-  const OccupancyGrid grid = furnished_room();
-  const field::ProximityField exact(grid, {});
-  const auto points = free_points(grid);
-  std::size_t n = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(exact.at(points[n++ % points.size()]));
-}
-BENCHMARK(exact_query)->Unit(benchmark::kMicrosecond);
-
-/// What the query replaces: every voxel of the box in range, its elements known, one line of sight through the grid for
+/// What a query replaces: every voxel of the box in range, its elements known, one line of sight through the grid for
 /// each element with a term.
-void naive_box_scan(benchmark::State& state) {
-  const OccupancyGrid grid = furnished_room();
-  const backwash::Model model;
-  const field::ProximityModel terms(model, grid.resolution());
-  std::vector<std::vector<field::Element>> of_voxel(grid.cell_count());
-  for (const field::Element& e : field::surface_elements(grid)) {
-    const Vec3 inside = e.c_W - 0.5 * grid.resolution() * e.normal;
-    of_voxel[grid.linear(grid.index(inside))].push_back(e);
+class NaiveBoxScan {
+ public:
+  explicit NaiveBoxScan(const OccupancyGrid& grid)
+      : grid_(grid), terms_(model_, grid.resolution()), of_voxel_(grid.cell_count()) {
+    for (const field::Element& e : field::surface_elements(grid)) {
+      const Vec3 inside = e.c_W - 0.5 * grid.resolution() * e.normal;
+      of_voxel_[grid.linear(grid.index(inside))].push_back(e);
+    }
   }
-  const auto points = free_points(grid);
-  const double wide = std::max(model.ground.l_max, model.wall.l_max);
-  const Vec3 below(wide, wide, std::max(wide, model.ground.l_footprint_max)), above(wide, wide, model.wall.l_max);
-  std::size_t n = 0;
-  for (auto _ : state) {
-    const Vec3& p = points[n++ % points.size()];
-    const Index3 low = grid.index(p - below).cwiseMax(0);
-    const Index3 high = grid.index(p + above).cwiseMin(grid.size() - Index3::Ones());
+  backwash::Variance at(const Vec3& p) const {
+    const double wide = std::max(model_.ground.l_max, model_.wall.l_max);
+    const Vec3 below(wide, wide, std::max(wide, model_.ground.l_footprint_max)), above(wide, wide, model_.wall.l_max);
+    const Index3 low = grid_.index(p - below).cwiseMax(0);
+    const Index3 high = grid_.index(p + above).cwiseMin(grid_.size() - Index3::Ones());
     backwash::Variance sum;
     for (int k = low.z(); k <= high.z(); ++k)
       for (int j = low.y(); j <= high.y(); ++j)
         for (int i = low.x(); i <= high.x(); ++i)
-          for (const field::Element& e : of_voxel[grid.linear(Index3(i, j, k))]) {
+          for (const field::Element& e : of_voxel_[grid_.linear(Index3(i, j, k))]) {
             if (e.normal.dot(p - e.c_W) <= 0) continue;
-            const backwash::Variance term = terms.ground(e, p) + terms.corner(e, p) + terms.wall(e, p);
-            if (term.zz > 0 && field::line_of_sight(grid, p, e.c_W)) sum += term;
+            const backwash::Variance term = terms_.ground(e, p) + terms_.corner(e, p) + terms_.wall(e, p);
+            if (term.zz > 0 && field::line_of_sight(grid_, p, e.c_W)) sum += term;
           }
-    benchmark::DoNotOptimize(sum);
+    return sum;
   }
-}
-BENCHMARK(naive_box_scan)->Unit(benchmark::kMicrosecond);
 
-void build(benchmark::State& state) {
-  const OccupancyGrid grid = furnished_room();
+ private:
+  const OccupancyGrid& grid_;
+  backwash::Model model_;
+  field::ProximityModel terms_;
+  std::vector<std::vector<field::Element>> of_voxel_;
+};
+
+/// CPU time of one call of query(p) in the mean over the points, µs; every tenth of a second a look at the clock.
+template <typename Query>
+double microseconds(const std::vector<Vec3>& points, const Query& query) {
+  const auto begun = std::clock();
+  std::size_t count = 0;
+  double seconds = 0;
+  while (seconds < 0.3) {
+    for (const Vec3& p : points) benchmark::DoNotOptimize(query(p));
+    count += points.size();
+    seconds = static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC;
+  }
+  return 1e6 * seconds / static_cast<double>(count);
+}
+
+double naive_microseconds(const OccupancyGrid& grid) {
+  const NaiveBoxScan naive(grid);
+  return microseconds(bench::free_points(grid, 64), [&](const Vec3& p) { return naive.at(p); });
+}
+
+void add_naive_ratio(benchmark::State& state, double naive_us, std::clock_t begun, double points_per_iteration) {
+  const double us = 1e6 * static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC;
+  state.counters["naive_us"] = naive_us;
+  state.counters["naive_ratio"] = naive_us * points_per_iteration * static_cast<double>(state.iterations()) / us;
+}
+
+void exact_query(benchmark::State& state) {
+  const OccupancyGrid grid = bench::furnished_room(edge_of(state));
+  const double naive_us = naive_microseconds(grid);
+  const field::ProximityField exact(grid, {});
+  const auto points = bench::free_points(grid, 256);
+  std::size_t n = 0;
+  const auto begun = std::clock();
+  for (auto _ : state) benchmark::DoNotOptimize(exact.at(points[n++ % points.size()]));
+  add_naive_ratio(state, naive_us, begun, 1);
+}
+BENCHMARK(exact_query)->Arg(200)->Arg(100)->Arg(50)->Unit(benchmark::kMicrosecond);
+
+void stored_lookup(benchmark::State& state) {
+  const OccupancyGrid grid = bench::furnished_room(edge_of(state));
+  const double naive_us = naive_microseconds(grid);
+  const auto voxels = bench::free_voxels(grid);
+  const field::WholeField whole(grid, {}, voxels);
+  field::DisturbanceField stored(grid);
+  stored.fill(whole, 0, whole.block_count());
+  const auto points = bench::free_points(grid, 4096);
+  std::size_t n = 0;
+  const auto begun = std::clock();
+  for (auto _ : state) benchmark::DoNotOptimize(stored.interpolated(points[n++ % points.size()], {}));
+  add_naive_ratio(state, naive_us, begun, 1);
+}
+BENCHMARK(stored_lookup)->Arg(100)->Unit(benchmark::kNanosecond);
+
+void prepare(benchmark::State& state) {
+  const OccupancyGrid grid = bench::furnished_room(edge_of(state));
   for (auto _ : state) benchmark::DoNotOptimize(field::ProximityField(grid, {}));
 }
-BENCHMARK(build)->Unit(benchmark::kMillisecond);
+BENCHMARK(prepare)->Arg(100)->Unit(benchmark::kMillisecond);
+
+/// The whole field, preparation included. Argument 2: 1 for one thread, 2 for run_parallel's.
+void whole_field(benchmark::State& state) {
+  const OccupancyGrid grid = bench::furnished_room(edge_of(state));
+  const double naive_us = naive_microseconds(grid);
+  const field::ProximityField exact(grid, {});
+  const double query_us = microseconds(bench::free_points(grid, 256), [&](const Vec3& p) { return exact.at(p); });
+  const auto voxels = bench::free_voxels(grid);
+  const auto begun = std::clock();
+  for (auto _ : state) {
+    field::DisturbanceField stored(grid);
+    const field::WholeField whole(grid, {}, voxels);
+    const auto fill = [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); };
+    state.range(1) > 1 ? backwash::run_parallel(whole.block_count(), fill) : fill(0, whole.block_count());
+    benchmark::DoNotOptimize(stored.has(Index3::Zero()));
+  }
+  add_naive_ratio(state, naive_us, begun, static_cast<double>(voxels.size()));
+  state.counters["query_ratio"] = state.counters["naive_ratio"] * query_us / naive_us;
+  state.counters["voxels"] = static_cast<double>(voxels.size());
+}
+BENCHMARK(whole_field)
+    ->Args({200, 1})
+    ->Args({100, 1})
+    ->Args({100, 2})
+    ->Args({50, 1})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+
+/// A box of 1 m³ appears in the middle of the room: finding it, preparing and evaluating what it affects.
+/// `of_rebuild`: CPU time over that of the whole field made anew.
+void region_update(benchmark::State& state) {
+  const OccupancyGrid before = bench::furnished_room(edge_of(state));
+  OccupancyGrid after = before;
+  for (std::size_t n = 0; n < after.cell_count(); ++n) {
+    const Vec3 in = after.center(after.voxel(n)) - Vec3(4.5, 4.5, 0.5);
+    if ((in.array() > 0).all() && (in.array() < 1).all()) after.set(after.voxel(n), Cell::occupied);
+  }
+  const auto fill = [&](field::DisturbanceField& stored, const OccupancyGrid& grid, std::span<const std::size_t> part) {
+    const field::WholeField whole(grid, {}, part);
+    stored.fill(whole, 0, whole.block_count());
+  };
+  field::DisturbanceField stored(before);
+  const auto rebuild = std::clock();
+  fill(stored, before, bench::free_voxels(before));
+  const auto rebuild_clocks = static_cast<double>(std::clock() - rebuild);
+  const auto begun = std::clock();
+  for (auto _ : state) {
+    const auto columns = field::affected_columns(after, {}, *field::changed_box(before, after));
+    stored.forget(columns);
+    fill(stored, after, field::voxels_within(after, bench::free_voxels(after), columns));
+  }
+  state.counters["of_rebuild"] =
+      static_cast<double>(std::clock() - begun) / static_cast<double>(state.iterations()) / rebuild_clocks;
+}
+BENCHMARK(region_update)->Arg(200)->Arg(100)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "core/field/disturbance_field.hpp"
+#include "core/field/field_update.hpp"
 #include "core/map/load_map.hpp"
 #include "tests/field/brute_force.hpp"
 #include "tests/field/scenes.hpp"
@@ -45,7 +46,7 @@ TEST(StoredField, EqualsBruteForceOnRandomMaps) {
     const auto voxels = free_voxels(grid);
     const WholeField whole(grid, model, voxels);
     DisturbanceField field(grid);
-    field.fill(whole, 0, whole.tile_count());
+    field.fill(whole, 0, whole.block_count());
     const auto pieces = oracle::pieces(grid);
     const auto occupied = oracle::occupied_centers(grid);
     const Mat3 base = Vec3(model.base.horizontal, model.base.horizontal, model.base.vertical).asDiagonal();
@@ -68,7 +69,7 @@ TEST(StoredField, EqualsTheExactFieldAtEveryFreeVoxelOfRandomMaps) {
     const auto voxels = free_voxels(grid);
     const WholeField whole(grid, model, voxels);
     std::size_t count = 0;
-    whole.evaluate(0, whole.tile_count(), [&](std::size_t n, const Variance& sigma) {
+    whole.evaluate(0, whole.block_count(), [&](std::size_t n, const Variance& sigma) {
       ++count;
       const Index3 q = grid.voxel(n);
       EXPECT_LE(difference(oracle::matrix(sigma), oracle::matrix(exact.at(grid.center(q)).sigma())), 1e-6)
@@ -86,7 +87,7 @@ void expect_exact_at_samples(const OccupancyGrid& grid, std::size_t samples) {
   voxels.resize(samples);
   const WholeField whole(grid, model, voxels);
   DisturbanceField field(grid);
-  field.fill(whole, 0, whole.tile_count());
+  field.fill(whole, 0, whole.block_count());
   for (const std::size_t n : voxels) {
     const Index3 q = grid.voxel(n);
     ASSERT_TRUE(field.has(q));
@@ -105,21 +106,22 @@ TEST(StoredField, EqualsTheExactFieldInARecordedBuilding) {
   expect_exact_at_samples(*map::load_map(file), 2000);
 }
 
-TEST(StoredField, HasTheSameBitsHoweverTheTilesAreDivided) {
-  const OccupancyGrid grid = scene::small_room();
-  const auto voxels = free_voxels(grid);
+TEST(StoredField, HasTheSameBitsHoweverTheBlocksAreDivided) {
+  const OccupancyGrid grid = *map::builtin_scene("apartment", 0.1);
+  auto voxels = free_voxels(grid);
+  std::erase_if(voxels, [&](std::size_t n) { return grid.voxel(n).z() % 7 != 5; });
   const WholeField whole(grid, Model{}, voxels);
   const auto evaluate = [&](std::size_t step, bool backwards) {
     std::vector<Variance> sigma(grid.cell_count());
-    for (std::size_t k = 0; k * step < whole.tile_count(); ++k) {
-      const std::size_t parts = (whole.tile_count() + step - 1) / step, part = backwards ? parts - 1 - k : k;
-      whole.evaluate(part * step, std::min((part + 1) * step, whole.tile_count()),
+    for (std::size_t k = 0; k * step < whole.block_count(); ++k) {
+      const std::size_t parts = (whole.block_count() + step - 1) / step, part = backwards ? parts - 1 - k : k;
+      whole.evaluate(part * step, std::min((part + 1) * step, whole.block_count()),
                      [&](std::size_t n, const Variance& s) { sigma[n] = s; });
     }
     return sigma;
   };
-  const auto at_once = evaluate(whole.tile_count(), false);
-  ASSERT_GT(whole.tile_count(), 10u);
+  const auto at_once = evaluate(whole.block_count(), false);
+  ASSERT_GT(whole.block_count(), 6u);
   for (const auto& [step, backwards] : {std::pair<std::size_t, bool>{1, false}, {1, true}, {3, true}, {7, false}}) {
     const auto divided = evaluate(step, backwards);
     for (const std::size_t n : voxels) {
@@ -129,9 +131,61 @@ TEST(StoredField, HasTheSameBitsHoweverTheTilesAreDivided) {
   }
 }
 
+/// Σ of `before` made to follow the map to `after`, and Σ of `after` made anew, agree in every bit and in where they
+/// are.
+void expect_update_equals_rebuild(const OccupancyGrid& before, const OccupancyGrid& after) {
+  const auto store = [](DisturbanceField& field, const OccupancyGrid& grid, std::span<const std::size_t> voxels) {
+    const WholeField whole(grid, Model{}, voxels);
+    field.fill(whole, 0, whole.block_count());
+  };
+  DisturbanceField updated(before), rebuilt(after);
+  store(updated, before, free_voxels(before)), store(rebuilt, after, free_voxels(after));
+  const DisturbanceField old = updated;
+  const auto changed = changed_box(before, after);
+  ASSERT_FALSE(changed.empty());
+  const map::VoxelBox columns = affected_columns(after, Model{}, changed);
+  updated.clear(columns);
+  store(updated, after, voxels_within(after, free_voxels(after), columns));
+  std::size_t stored = 0, differ = 0;
+  for (std::size_t n = 0; n < after.cell_count(); ++n) {
+    const Index3 v = after.voxel(n);
+    ASSERT_EQ(updated.has(v), rebuilt.has(v)) << v.transpose();
+    if (!updated.has(v)) continue;
+    const Variance s = updated.at(v), t = rebuilt.at(v);
+    ASSERT_TRUE(s.xx == t.xx && s.xy == t.xy && s.yy == t.yy && s.zz == t.zz) << v.transpose();
+    ++stored;
+    if (old.has(v)) differ += old.at(v).zz != t.zz;
+  }
+  EXPECT_GT(differ, 1000u);
+  EXPECT_GT(stored, 10 * static_cast<std::size_t>(columns.high.z()));
+}
+
+TEST(StoredField, FollowsAChangeOfOneCubicMetreBitForBit) {
+  const OccupancyGrid before = *map::builtin_scene("apartment", 0.1);
+  for (const Vec3& corner : {Vec3(2.5, 3, 0), Vec3(0, 0, 0.5), Vec3(5.2, 5.1, 1.4)}) {
+    OccupancyGrid after = before;
+    for (std::size_t n = 0; n < after.cell_count(); ++n) {
+      const Index3 v = after.voxel(n);
+      const Vec3 in = after.center(v) - corner;
+      if ((in.array() < 0).any() || (in.array() > 1).any()) continue;
+      after.set(v, after.at(n) == Cell::free ? Cell::occupied : v.x() % 2 ? Cell::free : Cell::unknown);
+    }
+    expect_update_equals_rebuild(before, after);
+  }
+}
+
+TEST(StoredField, FindsNoChangeBetweenEqualMapsAndAllOfItBetweenMapsOfOtherFrames) {
+  const OccupancyGrid room = scene::small_room(), moved(room.origin() + Vec3(0.1, 0, 0), 0.1, room.size(), Cell::free);
+  EXPECT_FALSE(changed_box(room, room));
+  const auto all = changed_box(room, moved);
+  ASSERT_TRUE(all);
+  EXPECT_EQ(all->low, Index3::Zero());
+  EXPECT_EQ(all->high, Index3(room.size() - Index3::Ones()));
+}
+
 TEST(StoredField, StoresNothingForAnEmptyList) {
   const OccupancyGrid grid = scene::small_room();
-  EXPECT_EQ(WholeField(grid, Model{}, {}).tile_count(), 0u);
+  EXPECT_EQ(WholeField(grid, Model{}, {}).block_count(), 0u);
 }
 
 }  // namespace

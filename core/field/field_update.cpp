@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/field/field_update.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace backwash::field {
+
+map::VoxelBox changed_box(const map::OccupancyGrid& before, const map::OccupancyGrid& after) {
+  const bool same_frame =
+      before.origin() == after.origin() && before.resolution() == after.resolution() && before.size() == after.size();
+  if (!same_frame) return {Index3::Zero(), after.size() - Index3::Ones()};
+  map::VoxelBox box;
+  const auto old = before.cells(), now = after.cells();
+  for (std::size_t n = 0; n < now.size(); ++n)
+    if (old[n] != now[n]) box.add(after.voxel(n));
+  return box;
+}
+
+map::VoxelBox affected_columns(const map::OccupancyGrid& grid, const Model& model, const map::VoxelBox& changed) {
+  const auto& g = model.ground;
+  const double a = grid.resolution(), cone = g.l_max * (g.theta_max < 1.5 ? std::sin(g.theta_max) : 1.0);
+  const double ground = std::max(cone, std::min(g.r0, g.l_footprint_max)) / a + 1;
+  const double lateral = model.wall.l_max / a + 0.5 + 3;
+  const int reach = static_cast<int>(std::ceil(std::max(ground, lateral) + 1e-6));
+  map::VoxelBox box{changed.low - Index3(reach, reach, 0), changed.high + Index3(reach, reach, 0)};
+  box.low = box.low.cwiseMax(0), box.high = box.high.cwiseMin(grid.size() - Index3::Ones());
+  box.low.z() = 0, box.high.z() = grid.size().z() - 1;
+  return box;
+}
+
+std::vector<std::size_t> voxels_within(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels,
+                                       const map::VoxelBox& box) {
+  std::vector<std::size_t> within;
+  std::ranges::copy_if(voxels, std::back_inserter(within), [&](std::size_t n) { return box.contains(grid.voxel(n)); });
+  return within;
+}
+
+}  // namespace backwash::field

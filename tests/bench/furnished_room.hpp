@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "core/map/occupancy_grid.hpp"
+
+namespace backwash::bench {
+
+/// Closed room of 10 × 10 × 3 m with 25 random boxes standing on the floor, their faces on a lattice of 0.1 m; floor,
+/// ceiling and walls one voxel thick.
+inline map::OccupancyGrid furnished_room(double a) {
+  const Vec3 extent(10, 10, 3);
+  map::OccupancyGrid grid(Vec3::Zero(), a, (extent / a).array().round().cast<int>(), map::Cell::free);
+  const auto box = [&](const Vec3& from, const Vec3& to) {
+    const Index3 low = (from / a - Vec3::Constant(0.499)).array().ceil().cast<int>().max(0);
+    const Index3 high = (to / a - Vec3::Constant(0.501)).array().floor().cast<int>().min(grid.size().array() - 1);
+    for (int k = low.z(); k <= high.z(); ++k)
+      for (int j = low.y(); j <= high.y(); ++j)
+        for (int i = low.x(); i <= high.x(); ++i) grid.set(Index3(i, j, k), map::Cell::occupied);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3 thick = extent;
+    thick[axis] = a;
+    box(Vec3::Zero(), thick), box(extent - thick, extent);
+  }
+  std::mt19937 random(1);
+  const auto draw = [&](int low, int high) { return 0.1 * std::uniform_int_distribution(low, high)(random); };
+  for (int n = 0; n < 25; ++n) {
+    const double x = draw(0, 95), y = draw(0, 95), dx = draw(3, 12), dy = draw(3, 12), dz = draw(4, 20);
+    box(Vec3(x, y, 0), Vec3(x + dx, y + dy, dz));
+  }
+  return grid;
+}
+
+inline std::vector<Vec3> free_points(const map::OccupancyGrid& grid, std::size_t count) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> unit(0, 1);
+  const Vec3 extent = grid.resolution() * grid.size().cast<double>();
+  std::vector<Vec3> points;
+  while (points.size() < count) {
+    const double x = unit(random), y = unit(random), z = unit(random);
+    const Vec3 p = grid.origin() + extent.cwiseProduct(Vec3(x, y, z));
+    if (grid.free(grid.index(p))) points.push_back(p);
+  }
+  return points;
+}
+
+inline std::vector<std::size_t> free_voxels(const map::OccupancyGrid& grid) {
+  std::vector<std::size_t> voxels;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n)
+    if (grid.at(n) == map::Cell::free) voxels.push_back(n);
+  return voxels;
+}
+
+}  // namespace backwash::bench
