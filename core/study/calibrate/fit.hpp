@@ -15,7 +15,10 @@ namespace backwash::study::calibrate {
 struct Hover {
   std::size_t flight;  ///< number of the flight, from 0
   Features features;
-  std::vector<Vec3> ln_variance;  ///< per window: of the disturbance along the world axes, ln (m/s²)²
+  std::vector<Vec3> ln_variance;   ///< per window: of the disturbance along the world axes, ln (m/s²)²
+  Vec3 push = Vec3::Zero();        ///< mean disturbance over the hover, m/s²
+  Vec3 push_noise = Vec3::Zero();  ///< variance of that mean as an estimate of the steady push, (m/s²)²
+  Vec3 tau_w = Vec3::Zero();       ///< correlation time, s
 };
 
 /// Hovers of several flights.
