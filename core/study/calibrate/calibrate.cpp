@@ -103,7 +103,7 @@ Calibration calibrate(const Data& data, const Model& gates, std::span<const Refu
   c.pushes = pushes;
 
   FitOptions again = first;
-  again.rounds = getenv("RD") ? atoi(getenv("RD")) : 1;
+  again.rounds = 1;
   std::array<std::vector<double>, kParameters> samples;
   std::vector<double> horizontal, vertical, times;
   std::mt19937_64 random(options.seed);
@@ -143,7 +143,7 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
   for (const auto& w : flight.windows) {
     if ((w.variance.array() <= 0).any()) continue;
     if (segment.empty() || segment.back() != w.segment || (w.p_W - at.back()).norm() > 0.1) {
-      hovers.push_back({number, {}, {}, Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
+      hovers.push_back({number, Vec3::Zero(), {}, {}, Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
       at.push_back(Vec3::Zero()), segment.push_back(w.segment);
     }
     Hover& h = hovers.back();
@@ -155,7 +155,7 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
   }
   const auto found = features(grid, gates, at);
   for (std::size_t i = 0; i < hovers.size(); ++i) {
-    hovers[i].features = found[i];
+    hovers[i].p_W = at[i], hovers[i].features = found[i];
     hovers[i].push_noise /= 2.0 * static_cast<double>(hovers[i].ln_variance.size());  // over the seconds of 2 s windows
   }
   return hovers;

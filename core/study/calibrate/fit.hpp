@@ -14,6 +14,7 @@ namespace backwash::study::calibrate {
 /// The windows of one hover: where (as features) and what was measured.
 struct Hover {
   std::size_t flight;  ///< number of the flight, from 0
+  Vec3 p_W;            ///< mean position, m
   Features features;
   std::vector<Vec3> ln_variance;   ///< per window: of the disturbance along the world axes, ln (m/s²)²
   Vec3 push = Vec3::Zero();        ///< mean disturbance over the hover, m/s²
