@@ -22,7 +22,7 @@ struct Options {
   double quantile = 0.9;
   std::uint64_t seed = 1;
   int bootstraps = 200;
-  bool keep_base = false, json = false, force = false;
+  bool keep_base = false, judge = false, json = false, force = false;
 };
 
 Json to_json(const Interval& i) { return {i.low, i.high}; }
@@ -146,7 +146,21 @@ std::string refusal_line(const std::vector<Refusal>& refused) {
   return line;
 }
 
-int run(Options options) {
+/// The base model against the logs, nothing fitted.
+int judge(const Campaign& campaign, const Model& model, const Options& options, Json json) {
+  const auto judged = assess(campaign.data, ln_bounds(campaign.data, parameters_of(model)), options.quantile);
+  if (options.json) {
+    json["judged"] = to_json(judged, campaign.logs);
+    print(json);
+  } else {
+    const Vec3& c = judged.coverage;
+    std::printf("%zu windows, share below %s: x %.3f y %.3f z %.3f\n", judged.windows, options.base_model.c_str(),
+                c.x(), c.y(), c.z());
+  }
+  return kOk;
+}
+
+int run(const Options& options) {
   refuse_to_overwrite(options.out, options.force);
   refuse_to_overwrite(options.report, options.force);
   std::optional<Vehicle> vehicle;
@@ -154,8 +168,9 @@ int run(Options options) {
   auto gates = read_model(options.base_model);
   if (vehicle) gates.ground.r0 = vehicle->body.diagonal_radius;
   const auto campaign = read_campaign(options.files, vehicle, gates, options.seed);
-  const auto refused = refusals(campaign.data, gates);
   Json json = to_json(campaign, options);
+  if (options.judge) return judge(campaign, gates, options, std::move(json));
+  const auto refused = refusals(campaign.data, gates);
   json["refused"] = to_json(refused);
   const bool nothing = !refused.empty() && refused.front().what == "all";
   if (nothing || (!refused.empty() && !options.keep_base)) {
@@ -204,6 +219,7 @@ Verb calibrate_verb(CLI::App& app) {
   command->add_option("--seed", options->seed, "of the bootstrap")->capture_default_str();
   command->add_flag("--keep-base", options->keep_base,
                     "constants that the flights cannot determine stay the base model's, named in [provenance]");
+  command->add_flag("--judge", options->judge, "fit nothing: how the base model does on these logs");
   command->add_flag("--json", options->json, "one JSON object on stdout");
   command->add_flag("--force", options->force, "overwrite --out and --report");
   command->footer(
