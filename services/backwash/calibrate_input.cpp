@@ -12,6 +12,8 @@ namespace {
 
 using namespace study::calibrate;
 
+constexpr double kReturnLength = 0.05;  // m, about two rotor radii of the small vehicles recorded without a map
+
 /// A floor at z = 0 with free space above, 0.04 m voxels.
 map::OccupancyGrid flat_floor() {
   constexpr double kEdge = 0.04, kHalf = 2.4, kTop = 2.0;
@@ -26,12 +28,12 @@ double value_of(const study::FlightLog& log, const std::string& column, double o
   return log.has(column) && !log.column(column).empty() ? log.column(column).front() : otherwise;
 }
 
-/// Rows of the height effect; windows nearer the ground than 3 mm above where the flight began are its take-off.
+/// Rows of the height effect; windows less than 5 mm above where it stood may touch the ground.
 void add_rows(std::vector<HeightRow>& rows, const study::FlightWindows& flight, const study::FlightLog& log,
               std::size_t number) {
   const double ceiling = value_of(log, "ceiling", 0), surface = value_of(log, "surface_z_m", 0);
   if (ceiling < 0) return;
-  constexpr double kMarker = 0.027, kLeast = 0.003;
+  constexpr double kMarker = 0.027, kLeast = 0.005;
   for (const auto& w : flight.windows) {
     const double height = w.p_W.z() - surface - kMarker;
     if (height < kLeast || !(w.variance.z() > 0) || !(w.speed_mps > 0)) continue;
@@ -102,7 +104,7 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
     campaign.data.place.push_back(place), campaign.logs.push_back(file.path);
   }
   campaign.signal = study::to_string(*signal), campaign.pushes = signal == study::Signal::commanded;
-  if (rows.size() >= 10) campaign.height = height_effect(rows, 0.01, 0.8, 500, seed);
+  if (rows.size() >= 10) campaign.height = height_effect(rows, 0.01, 0.8, kReturnLength, 500, seed);
   return campaign;
 }
 

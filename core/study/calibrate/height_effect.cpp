@@ -10,11 +10,14 @@
 namespace backwash::study::calibrate {
 namespace {
 
+/// Share of the wash that comes back from the ground.
+double returned(double height, double length) { return 1 / (1 + height * height / (length * length)); }
+
 /// (β_h, β_c) by least squares within days: every column less its day's weighted mean.
-Eigen::Vector2d slopes(const std::vector<HeightRow>& rows, const std::vector<double>& flight_weights) {
+Eigen::Vector2d slopes(const std::vector<HeightRow>& rows, const std::vector<double>& flight_weights, double length_m) {
   std::map<int, std::pair<Eigen::Vector4d, double>> days;  // sums and weight
-  const auto columns = [](const HeightRow& r) {
-    return Eigen::Vector4d(std::log(r.height), r.ceiling ? 1 : 0, r.ln_speed, r.ln_variance_z);
+  const auto columns = [length_m](const HeightRow& r) {
+    return Eigen::Vector4d(returned(r.height, length_m), r.ceiling ? 1 : 0, r.ln_speed, r.ln_variance_z);
   };
   for (const auto& r : rows) {
     auto& [sum, weight] = days.try_emplace(r.day, Eigen::Vector4d::Zero(), 0.0).first->second;
@@ -34,16 +37,16 @@ Eigen::Vector2d slopes(const std::vector<HeightRow>& rows, const std::vector<dou
 
 }  // namespace
 
-HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, double high_m, int bootstraps,
-                           std::uint64_t seed) {
+HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, double high_m, double length_m,
+                           int bootstraps, std::uint64_t seed) {
   std::map<std::size_t, std::size_t> flights;
   std::map<int, int> days;
   std::size_t last = 0;
   bool plate = false;
   for (const auto& r : rows)
     flights[r.flight] += 1, days[r.day] += 1, last = std::max(last, r.flight), plate |= r.ceiling;
-  const double span = std::log(low_m / high_m);
-  const Eigen::Vector2d beta = slopes(rows, std::vector<double>(last + 1, 1.0));
+  const double span = returned(low_m, length_m) - returned(high_m, length_m);
+  const Eigen::Vector2d beta = slopes(rows, std::vector<double>(last + 1, 1.0), length_m);
   std::vector<std::size_t> numbers;
   for (const auto& [flight, count] : flights) numbers.push_back(flight);
   std::vector<double> height, ceiling;
@@ -53,7 +56,7 @@ HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, dou
     for (std::size_t i = 0; i < numbers.size(); ++i)
       weights[numbers[static_cast<std::size_t>(static_cast<double>(random() >> 11) * 0x1p-53 *
                                                static_cast<double>(numbers.size()))]] += 1;
-    const Eigen::Vector2d refit = slopes(rows, weights);
+    const Eigen::Vector2d refit = slopes(rows, weights, length_m);
     height.push_back(std::exp(span * refit[0])), ceiling.push_back(std::exp(refit[1]));
   }
   const auto interval = [](std::vector<double>& x) {

@@ -26,9 +26,10 @@ struct HeightEffect {
   std::size_t windows, flights, days;
 };
 
-/// Least squares of ln v = level(day) + β_s ln speed + β_h ln(height) + β_c ceiling, intervals by resampling flights.
-/// What the raw ratio would show is mostly the day. Precondition: at least 10 rows and two heights.
-HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, double high_m, int bootstraps,
-                           std::uint64_t seed);
+/// Least squares of ln v = level(day) + β_s ln speed + β_h/(1 + (height/length)²) + β_c ceiling, intervals by
+/// resampling flights. What the raw ratio would show is mostly the day. `length_m`: where the wash's return has fallen
+/// to half. Precondition: at least 10 rows and two heights.
+HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, double high_m, double length_m,
+                           int bootstraps, std::uint64_t seed);
 
 }  // namespace backwash::study::calibrate
