@@ -163,8 +163,8 @@ void region_update(benchmark::State& state) {
   const auto rebuild_clocks = static_cast<double>(std::clock() - rebuild);
   const auto begun = std::clock();
   for (auto _ : state) {
-    const auto columns = field::affected_columns(after, {}, *field::changed_box(before, after));
-    stored.forget(columns);
+    const auto columns = field::affected_columns(after, {}, field::changed_box(before, after));
+    stored.clear(columns);
     fill(stored, after, field::voxels_within(after, bench::free_voxels(after), columns));
   }
   state.counters["of_rebuild"] =
