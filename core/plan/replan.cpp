@@ -58,13 +58,13 @@ std::vector<Index3> optimistic_way(const World& world, const Vec3& from_W, const
   const map::DistanceField known(grid);  // to occupied voxels and the grid's sides
   const auto& vehicle = world.reach.vehicle;
   const double taken = vehicle.body.radius + vehicle.estimation.position + std::max(world.constant_margin, 0.0);
-  std::vector<std::uint8_t> passable(grid.cell_count());
-  for (std::size_t n = 0; n < passable.size(); ++n) {
+  map::OccupancyGrid passable = world.hover.safe_voxels();
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const Index3 v = grid.voxel(n);
     const bool unknown_is_nearer = known.at(v) > world.distance.at(v) + 1e-6;
-    passable[n] = world.hover.safe(v) || (unknown_is_nearer && known.at(v) > taken);
+    if (unknown_is_nearer && known.at(v) > taken) passable.set(v, map::Cell::free);
   }
-  const SafeSpace space(grid, std::move(passable));
+  const SafeSpace space(passable);
   const Index3 from = grid.index(from_W), to = grid.index(goal_W);
   return SafeView(space, {from, to}).chain(from, to);
 }
