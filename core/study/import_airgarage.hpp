@@ -13,8 +13,8 @@ namespace backwash::study {
 ///
 /// Stamps: frames lie on a 10 ms grid; a frame that arrived late in a burst is put back before the next one. Velocity
 /// and acceleration: a cubic is fitted to the positions within ± 0.12 s of each row by least squares and differentiated
-/// in its middle; second derivatives are passed to half their amplitude at 6.5 Hz and hardly at all above 12 Hz, so
-/// variances of these accelerations mean the band 0.2–6.5 Hz. Rows with fewer than six frames around them are left out:
+/// in its middle; its second derivative passes half the amplitude at 4.0 Hz and less than a tenth above 6.5 Hz, so
+/// variances of these accelerations mean the band 0.2–4 Hz. Rows with fewer than six frames around them are left out:
 /// a gap.
 ///
 /// Three columns are added: `surface_z_m` (what it stood on at first, from the marker's height then, the marker 27 mm

@@ -8,7 +8,7 @@ trap 'rm -rf "$work"' EXIT
 cd "$work"
 die() { echo "$*"; exit 1; }
 
-for verb in fly plan reach field simulate feasibility compare; do
+for verb in fly plan reach field simulate feasibility compare calibrate import; do
   "$backwash" "$verb" --help >help || die "$verb --help fails"
   grep -q "backwash $verb " help || die "$verb --help has no example"
 done
