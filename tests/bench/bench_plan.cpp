@@ -3,15 +3,20 @@
 // model, v_max 3 m/s, a_max 2 m/s²: what Fast-Planner's launch defaults fly (there: 200 queries, horizon 7 m, search
 // 0.44 ms mean and 0.84 ms p95, optimisation 3.2 ms mean, 3 of 200 in collision, 105 of 200 beyond a limit).
 //
-// Queries: hover-safe start and goal drawn at random, at rest. local: the goal 5.5 to 7 m from the start, flown to the
-// end. horizon: start and goal anywhere, planned up to the horizon and to a stop there. The 60 m horizon flies in two
-// forests end to end (80 × 20 × 5 m, 300 pillars, 20 rings). World (distance, field, hover map) is built before timing.
-// Each query is planned three times and counts with its median; all times are CPU time of the thread but the parts
-// (search, verify), which are the planner's own. kernel: 10⁶ look-ups of the distance field at random points, same run.
+// forest/N: 200 queries whose hover-safe start and goal are drawn at random, at rest, N m apart at most and 80 % of
+// that at least, flown to a stop exactly at the goal. N is the ancestor's horizon of 7 m, where it may end moving
+// anywhere beyond, and 20 and 60 m for the growth of the cost (60 m in two forests end to end, 300 pillars, 20 rings).
+// World (distance, field, hover map) is built before timing. Each query is planned three times and counts with its
+// median; times are CPU time of the thread in ms (search: the same search called alone; verify: the planner's own wall
+// clock). kernel: 10⁶ look-ups of the distance field at random points, in the same run. Judged here and not by the
+// planner: a trajectory collides if a point of it, every millisecond, is nearer to an obstacle than the body's radius
+// (exact distance); it breaks a limit if velocity or acceleration of an axis pass theirs.
 //
-// Judged here and not by the planner: a trajectory collides if a point of it, every millisecond, is nearer to an
-// obstacle than the body's radius (exact distance); it breaks a limit if velocity or acceleration of an axis pass
-// theirs.
+// success/SCENE: pairs drawn anywhere; exists counts those that an exhaustive search over hover-safe voxels joins,
+// found the plans, wrong the pairs it cannot join whose status is anything but no_path.
+//
+// set_extent: what the collision cost takes off the distance, ‖h‖₂ of a set (the scalar way) over what its own prism
+// takes (exact distance of the centre less that of the prism), over the steps of the forest's plans nearer than 0.5 m.
 #include <benchmark/benchmark.h>
 #include <time.h>
 
@@ -23,6 +28,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
+#include "core/reach/clearance.hpp"
 
 namespace {
 
@@ -129,40 +135,125 @@ void report(benchmark::State& state, const Tally& t, double kernel) {
   c["collisions"] = t.collisions, c["violations"] = t.violations;
 }
 
-void run(benchmark::State& state, const plan::World& world, const std::vector<Query>& queries, double horizon) {
-  plan::PlanOptions options{.v_max = kVMax, .a_max = kAMax};
-  (void)horizon;
-  for (auto _ : state) {
-    const double kernel = kernel_ms(world);
-    Tally tally;
-    for (const Query& q : queries) {
-      std::vector<double> search, total, verify;
-      plan::Plan p;
-      for (int repeat = 0; repeat < 3; ++repeat) {
-        const double begun = cpu_ms();
-        p = plan::plan(world, {{q.start, Vec3::Zero()}, {q.start, Vec3::Zero(), Vec3::Zero(), 0}}, q.goal, options);
-        total.push_back(cpu_ms() - begun);
-        search.push_back(p.metrics.search_ms), verify.push_back(p.metrics.verify_ms);
-      }
-      tally.search.push_back(quantile(search, 0.5)), tally.total.push_back(quantile(total, 0.5));
-      tally.verify.push_back(quantile(verify, 0.5));
-      tally.expanded.push_back(static_cast<double>(p.metrics.expanded));
-      tally.evaluations.push_back(static_cast<double>(p.metrics.evaluations));
-      tally.length.push_back(p.metrics.length_m);
-      if (p.status != plan::PlanStatus::ok) {
-        state.SetLabel("last refusal: " + p.message);
-        continue;
-      }
-      tally.ok += 1;
-      tally.collisions += collides(world, p.trajectory);
-      tally.violations += breaks_limits(p.trajectory);
-    }
-    report(state, tally, kernel);
-  }
+plan::PlanStart at_rest(const Vec3& p_W) { return {{p_W, Vec3::Zero()}, {p_W, Vec3::Zero(), Vec3::Zero(), 0}}; }
+
+const plan::PlanOptions kLimits{.v_max = kVMax, .a_max = kAMax};
+
+double search_ms(const plan::World& world, const Query& q) {
+  const double begun = cpu_ms();
+  const plan::SafeView space(world.safe, {world.grid.index(q.start), world.grid.index(q.goal)});
+  benchmark::DoNotOptimize(
+      plan::search(space, {q.start, Vec3::Zero()}, q.goal,
+                   {0.9 * kVMax, 0.9 * kAMax, kLimits.max_nodes, plan::Clock::now() + std::chrono::seconds(10)}));
+  return cpu_ms() - begun;
 }
 
-void local(benchmark::State& state) { run(state, world(1), queries(world(1), 200, 5.5, 7), INFINITY); }
-BENCHMARK(local)->Unit(benchmark::kMillisecond)->Iterations(1);
+Tally planned(const plan::World& world, const std::vector<Query>& queries, std::string& refusal) {
+  Tally tally;
+  for (const Query& q : queries) {
+    std::vector<double> search, total, verify;
+    plan::Plan p;
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      const double begun = cpu_ms();
+      p = plan::plan(world, at_rest(q.start), q.goal, kLimits);
+      total.push_back(cpu_ms() - begun);
+      search.push_back(search_ms(world, q)), verify.push_back(p.metrics.verify_ms);
+    }
+    tally.search.push_back(quantile(search, 0.5)), tally.total.push_back(quantile(total, 0.5));
+    tally.verify.push_back(quantile(verify, 0.5));
+    tally.expanded.push_back(static_cast<double>(p.metrics.expanded));
+    tally.evaluations.push_back(static_cast<double>(p.metrics.evaluations));
+    tally.length.push_back(p.metrics.length_m);
+    if (p.status != plan::PlanStatus::ok) {
+      refusal = "last refusal: " + p.message;
+      continue;
+    }
+    tally.ok += 1;
+    tally.collisions += collides(world, p.trajectory);
+    tally.violations += breaks_limits(p.trajectory);
+  }
+  return tally;
+}
+
+void forest(benchmark::State& state) {
+  const auto horizon = static_cast<double>(state.range(0));
+  const auto& w = world(horizon > 30 ? 2 : 1);
+  std::string refusal;
+  for (auto _ : state) {
+    const double kernel = kernel_ms(w);
+    report(state, planned(w, queries(w, 200, 0.8 * horizon, horizon), refusal), kernel);
+  }
+  state.SetLabel(refusal);
+}
+BENCHMARK(forest)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
+
+/// Regions of hover-safe voxels that share faces, flooded apart from the planner's own.
+std::vector<int> regions(const plan::World& world) {
+  std::vector<int> region(world.grid.cell_count(), 0);
+  int count = 0;
+  for (std::size_t seed = 0; seed < region.size(); ++seed) {
+    if (region[seed] != 0 || !world.hover.safe(world.grid.voxel(seed))) continue;
+    std::vector<Index3> open{world.grid.voxel(seed)};
+    region[seed] = ++count;
+    while (!open.empty()) {
+      const Index3 v = open.back();
+      open.pop_back();
+      for (int axis = 0; axis < 3; ++axis)
+        for (const int step : {-1, 1}) {
+          const Index3 u = v + step * Index3::Unit(axis);
+          if (!world.hover.safe(u) || region[world.grid.linear(u)] != 0) continue;
+          region[world.grid.linear(u)] = count;
+          open.push_back(u);
+        }
+    }
+  }
+  return region;
+}
+
+void success(benchmark::State& state, const std::string& scene) {
+  const auto vehicle = config::load_vehicle("builtin:quad-5in").value();
+  const auto w =
+      plan::build_world(map::builtin_scene(scene).value(), config::load_model("builtin:quad-5in").value(), vehicle);
+  const plan::PlanOptions options{.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max};
+  double exists = 0, found = 0, wrong = 0;
+  for (auto _ : state) {
+    const auto region = regions(*w);
+    for (const Query& q : queries(*w, static_cast<std::size_t>(state.range(0)), 0, INFINITY)) {
+      const auto p = plan::plan(*w, at_rest(q.start), q.goal, options);
+      const auto at = [&](const Vec3& x) { return region[w->grid.linear(w->grid.index(x))]; };
+      if (at(q.start) != at(q.goal)) {
+        wrong += p.status != plan::PlanStatus::no_path;
+        continue;
+      }
+      exists += 1, found += p.status == plan::PlanStatus::ok;
+      if (p.status != plan::PlanStatus::ok) state.SetLabel(std::string(plan::to_string(p.status)) + ": " + p.message);
+    }
+  }
+  state.counters["exists"] = exists, state.counters["found"] = found, state.counters["wrong"] = wrong;
+  state.counters["share"] = found / exists;
+}
+BENCHMARK_CAPTURE(success, apartment, "apartment")->Arg(1000)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK_CAPTURE(success, narrow_gap, "narrow-gap")->Arg(500)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK_CAPTURE(success, thin_wall, "thin-wall")->Arg(500)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK_CAPTURE(success, forest, "forest-2")->Arg(500)->Unit(benchmark::kMillisecond)->Iterations(1);
+
+void set_extent(benchmark::State& state) {
+  const auto& w = world(1);
+  std::vector<double> ratio;
+  for (auto _ : state)
+    for (const Query& q : queries(w, 50, 5.6, 7)) {
+      const auto p = plan::plan(w, at_rest(q.start), q.goal, kLimits);
+      for (const auto& step : p.tube) {
+        const auto& h = step.half_widths;
+        const double prism = reach::prism_distance(w.grid, step.center.p_W, h, 0.5);
+        if (prism <= 0 || prism >= 0.5) continue;
+        ratio.push_back(Vec3(h[kX], h[kY], h[kZ]).norm() / (w.distance.exact(w.grid, step.center.p_W) - prism));
+      }
+    }
+  state.counters["norm/prism_p5"] = quantile(ratio, 0.05), state.counters["norm/prism_p50"] = quantile(ratio, 0.5);
+  state.counters["norm/prism_p95"] = quantile(ratio, 0.95);
+}
+BENCHMARK(set_extent)->Unit(benchmark::kMillisecond)->Iterations(1);
 
 }  // namespace
 
