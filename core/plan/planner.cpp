@@ -77,30 +77,27 @@ BSpline fit_path(const std::vector<Motion>& motions, const PlanStart& start, con
   return fit(samples.positions, samples.step / pace, start.command.v_W, start.command.a_W, Vec3::Zero(), Vec3::Zero());
 }
 
-/// Lengthens the knot span until the control points of velocity and acceleration keep the limits; what the start fixes
-/// (its velocity and acceleration) is kept and not judged.
-BSpline retimed(BSpline spline, const PlanStart& start, const Vec3& v_limit, const Vec3& a_limit) {
+/// By what the knot span must grow for the control points of velocity and acceleration to keep the limits; at most 1 if
+/// they do. What the start fixes (its velocity and acceleration) is kept and not judged.
+double stretch_needed(const BSpline& spline, const MotionLimits& limits) {
+  const auto velocity = spline.velocity_points(), acceleration = spline.acceleration_points();
+  double stretch = 0;
+  for (std::size_t n = 2; n < velocity.size(); ++n)
+    stretch = std::max(stretch, (velocity[n].array().abs() / limits.velocity(n, spline.knot_span).array()).maxCoeff());
+  for (std::size_t n = 1; n < acceleration.size(); ++n)
+    stretch = std::max(stretch, std::sqrt((acceleration[n].array().abs() / limits.a.array()).maxCoeff()));
+  return stretch;
+}
+
+BSpline retimed(BSpline spline, const PlanStart& start, const MotionLimits& limits) {
   for (int i = 0; i < 30; ++i) {
-    const auto velocity = spline.velocity_points(), acceleration = spline.acceleration_points();
-    double stretch = 1;
-    for (std::size_t n = 2; n < velocity.size(); ++n)
-      stretch = std::max(stretch, (velocity[n].array().abs() / v_limit.array()).maxCoeff());
-    for (std::size_t n = 1; n < acceleration.size(); ++n)
-      stretch = std::max(stretch, std::sqrt((acceleration[n].array().abs() / a_limit.array()).maxCoeff()));
+    const double stretch = stretch_needed(spline, limits);
     if (stretch <= 1) break;
     spline.knot_span *= 1.0001 * std::min(stretch, 1.5);
     std::ranges::copy(end_control_points(start.command.p_W, start.command.v_W, start.command.a_W, spline.knot_span),
                       spline.control_points.begin());
   }
   return spline;
-}
-
-bool keeps_limits(const BSpline& spline, const Vec3& v_limit, const Vec3& a_limit) {
-  const auto within = [](const std::vector<Vec3>& points, std::size_t first, const Vec3& limit) {
-    return std::all_of(points.begin() + static_cast<std::ptrdiff_t>(first), points.end(),
-                       [&](const Vec3& p) { return (p.array().abs() <= limit.array()).all(); });
-  };
-  return within(spline.velocity_points(), 2, v_limit) && within(spline.acceleration_points(), 1, a_limit);
 }
 
 struct Flight {
@@ -161,8 +158,8 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
   if (!path) return refused(result, status_of(path.error().kind), path.error().message);
   result.metrics.expanded = path->expanded;
 
-  const Vec3 v_limit = start.command.v_W.cwiseAbs().cwiseMax(options.v_max);
-  const Vec3 a_limit = start.command.a_W.cwiseAbs().cwiseMax(options.a_max);
+  const MotionLimits limits{Vec3::Constant(options.v_max), start.command.a_W.cwiseAbs().cwiseMax(options.a_max),
+                            start.command.v_W};
   std::string why;
   for (const double pace : kPaces) {
     BSpline spline = fit_path(path->motions, start, goal_W, options.v_max, pace);
@@ -171,10 +168,14 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
     for (std::size_t round = 0; round < kRounds; ++round) {
       if (Clock::now() > deadline) return refused(result, PlanStatus::deadline, "optimisation ran out of time");
       const auto optimising = Clock::now();
+<<<<<<< HEAD
       const SplineCost cost(world, spline, tube, margin, kOptimiseShare * v_limit, kOptimiseShare * a_limit, {},
                             options.norm_cost);
+=======
+      const SplineCost cost(world, spline, tube, margin, limits.scaled(kOptimiseShare), {});
+>>>>>>> plan6
       const auto optimum = optimise(cost, options.evaluations, deadline);
-      spline = retimed(optimum.spline, start, v_limit, a_limit);
+      spline = retimed(optimum.spline, start, limits);
       result.metrics.optimise_ms += ms_since(optimising);
       result.metrics.evaluations += optimum.evaluations;
 
@@ -182,7 +183,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
       Flight flight = fly(world, start, spline);
       const Approach nearest = nearest_approach(world, flight.tube);
       result.metrics.verify_ms += ms_since(verifying);
-      if (nearest.clearance > options.least_clearance_m && keeps_limits(spline, v_limit, a_limit)) {
+      if (nearest.clearance > options.least_clearance_m && stretch_needed(spline, limits) <= 1) {
         result.metrics = measured(result.metrics, spline, nearest.clearance);
         result.status = PlanStatus::ok;
         result.trajectory = std::move(spline);

@@ -86,14 +86,24 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 }
 
 SplineCost::SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
+<<<<<<< HEAD
                        const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights, bool norm)
+=======
+                       const MotionLimits& limits, const CostWeights& weights)
+>>>>>>> plan6
     : world_(world),
       initial_(spline),
-      v_limit_(v_limit),
-      a_limit_(a_limit),
+      v_limits_(spline.control_points.size() - 1, 3),
+      a_limit_(limits.a),
       weights_(weights),
+<<<<<<< HEAD
       norm_(norm),
       stride_(stride(world.grid.resolution(), v_limit.maxCoeff())) {
+=======
+      stride_(stride(world.grid.resolution(), limits.v.maxCoeff())) {
+  for (Eigen::Index i = 0; i < v_limits_.rows(); ++i)
+    v_limits_.row(i) = limits.velocity(static_cast<std::size_t>(i), spline.knot_span).transpose();
+>>>>>>> plan6
   const auto commands = static_cast<std::size_t>(std::ceil(spline.duration() / kControlPeriod));
   const std::size_t last = std::min(commands + kSettling, tube.size() - 1);
   basis_ = world.response.basis(spline.control_points.size(), spline.knot_span, last / stride_, stride_);
@@ -169,13 +179,11 @@ double SplineCost::smoothness(const Points& q, Points& gradient) const {
 double SplineCost::limits(const Points& q, Points& gradient) const {
   const Eigen::Index n = q.rows();
   const double d = 1 / initial_.knot_span;
-  // (x² − limit²)² of each axis beyond its limit, and half its derivative by x.
-  const auto beyond = [](const Points& x, const Vec3& limit) {
-    return (x.array().square().rowwise() - limit.transpose().array().square()).max(0.0).eval();
-  };
   const Points v = d * (q.bottomRows(n - 1) - q.topRows(n - 1));
   const Points a = d * (v.bottomRows(n - 2) - v.topRows(n - 2));
-  const auto v_excess = beyond(v, v_limit_), a_excess = beyond(a, a_limit_);
+  // (x² − limit²)² of each axis beyond its limit.
+  const Eigen::ArrayX3d v_excess = (v.array().square() - v_limits_.array().square()).max(0.0);
+  const Eigen::ArrayX3d a_excess = (a.array().square().rowwise() - a_limit_.transpose().array().square()).max(0.0);
   const double f = v_excess.square().sum() + a_excess.square().sum();
   if (f == 0) return 0;
   const Points v_slope = 4 * weights_.physical * d * (v_excess * v.array()).matrix();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "core/plan/bspline.hpp"
@@ -15,6 +16,19 @@ struct CostWeights {
   double smooth = 10;       ///< λ_s, 1/m²
   double collision = 2000;  ///< λ_c, 1/m³
   double physical = 0.2;    ///< λ_p, s⁴/m⁴ and s⁸/m⁴
+};
+
+/// Limits per axis of a trajectory. A start above them must slow down: what it may have falls by a quarter of the
+/// largest acceleration, and the cost asks for it from the first free control point on.
+struct MotionLimits {
+  Vec3 v, a;                    ///< m/s, m/s²
+  Vec3 v_start = Vec3::Zero();  ///< of the command continued, m/s
+  /// Of velocity control point i, which speaks for t = (i − ½)·Δ, m/s.
+  Vec3 velocity(std::size_t point, double knot_span) const noexcept {
+    const double t = std::max(0.0, static_cast<double>(point) - 0.5) * knot_span;
+    return v.cwiseMax(v_start.cwiseAbs() - t / 4 * a);
+  }
+  MotionLimits scaled(double share) const noexcept { return {share * v, share * a, share * v_start}; }
 };
 
 /// Bound w̄ between voxel centres, m/s², and its gradient by position: trilinear, the weights of the stored voxels
@@ -39,10 +53,16 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 class SplineCost {
  public:
   /// `tube`: of `spline`'s commands in the world, with at least those followed by the hold. `margin`: clearance to
+<<<<<<< HEAD
   /// keep, m. `norm`: c_m = d(p_p⁰) − ‖h‖₂ and Δe_m = 0 instead, the paper's r. `v_limit`, `a_limit` per axis.
   /// Precondition: at least 6 control points (then none is free).
   SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
              const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights, bool norm = false);
+=======
+  /// keep, m. Precondition: at least 6 control points (then none is free).
+  SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
+             const MotionLimits& limits, const CostWeights& weights);
+>>>>>>> plan6
 
   /// Free control points, one row each.
   using Points = Eigen::Matrix<double, Eigen::Dynamic, 3>;
@@ -72,7 +92,8 @@ class SplineCost {
 
   const World& world_;
   BSpline initial_;
-  Vec3 v_limit_, a_limit_;
+  Points v_limits_;  // of the velocity control points
+  Vec3 a_limit_;
   CostWeights weights_;
   bool norm_;
   std::size_t stride_;

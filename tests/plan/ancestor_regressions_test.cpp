@@ -71,10 +71,10 @@ class Draw {
   std::mt19937_64 random_;
 };
 
-/// Every millisecond: body clear of obstacles, limits kept; at rest at the goal in the end.
+/// Every 2.5 mm: body clear of obstacles, limits kept; at rest at the goal in the end.
 void expect_flyable(const World& world, const Plan& p, const Vec3& goal, const PlanOptions& o) {
   const BSpline& s = p.trajectory;
-  for (double t = 0; t <= s.duration(); t += 1e-3) {
+  for (double t = 0; t <= s.duration(); t += 0.0025 / o.v_max) {
     ASSERT_GT(world.distance.exact(world.grid, s.derivative(t, 0)), world.reach.vehicle.body.radius) << t;
     ASSERT_LE(s.derivative(t, 1).cwiseAbs().maxCoeff(), o.v_max * (1 + 1e-9)) << t;
     ASSERT_LE(s.derivative(t, 2).cwiseAbs().maxCoeff(), o.a_max * (1 + 1e-9)) << t;

@@ -70,7 +70,7 @@ TEST(Replan, FliesThroughAnUnknownRoomToAGoalBehindAWallWithoutContact) {
   reveal(known, room, start_W, 2.2);
   ASSERT_FALSE(known.free(known.index(goal_W)));
   auto world = world_of(known);
-  const Vehicle& vehicle = world->reach.vehicle;
+  const Vehicle vehicle = world->reach.vehicle;  // the world is rebuilt under way
   const map::DistanceField distance(room);
   const ReplanOptions options{{1.0, 1.5}, 3.0};
   sim::ClosedLoop loop(room, vehicle, {start_W, Vec3::Zero()}, 1);

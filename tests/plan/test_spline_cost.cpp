@@ -96,7 +96,7 @@ struct Scene {
     return reach::tube_over_field(world.reach, start.estimated, start.command, commands, world.bounds);
   }
   SplineCost cost(const BSpline& s, double margin, const CostWeights& weights) const {
-    return {world, s, tube(s), margin, Vec3::Constant(0.9), Vec3::Constant(1.2), weights};
+    return {world, s, tube(s), margin, {Vec3::Constant(0.9), Vec3::Constant(1.2)}, weights};
   }
 };
 
