@@ -168,12 +168,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
     for (std::size_t round = 0; round < kRounds; ++round) {
       if (Clock::now() > deadline) return refused(result, PlanStatus::deadline, "optimisation ran out of time");
       const auto optimising = Clock::now();
-<<<<<<< HEAD
-      const SplineCost cost(world, spline, tube, margin, kOptimiseShare * v_limit, kOptimiseShare * a_limit, {},
-                            options.norm_cost);
-=======
-      const SplineCost cost(world, spline, tube, margin, limits.scaled(kOptimiseShare), {});
->>>>>>> plan6
+      const SplineCost cost(world, spline, tube, margin, limits.scaled(kOptimiseShare), {}, options.norm_cost);
       const auto optimum = optimise(cost, options.evaluations, deadline);
       spline = retimed(optimum.spline, start, limits);
       result.metrics.optimise_ms += ms_since(optimising);

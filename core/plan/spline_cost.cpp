@@ -86,24 +86,16 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 }
 
 SplineCost::SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
-<<<<<<< HEAD
-                       const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights, bool norm)
-=======
-                       const MotionLimits& limits, const CostWeights& weights)
->>>>>>> plan6
+                       const MotionLimits& limits, const CostWeights& weights, bool norm)
     : world_(world),
       initial_(spline),
       v_limits_(spline.control_points.size() - 1, 3),
       a_limit_(limits.a),
       weights_(weights),
-<<<<<<< HEAD
       norm_(norm),
-      stride_(stride(world.grid.resolution(), v_limit.maxCoeff())) {
-=======
       stride_(stride(world.grid.resolution(), limits.v.maxCoeff())) {
   for (Eigen::Index i = 0; i < v_limits_.rows(); ++i)
     v_limits_.row(i) = limits.velocity(static_cast<std::size_t>(i), spline.knot_span).transpose();
->>>>>>> plan6
   const auto commands = static_cast<std::size_t>(std::ceil(spline.duration() / kControlPeriod));
   const std::size_t last = std::min(commands + kSettling, tube.size() - 1);
   basis_ = world.response.basis(spline.control_points.size(), spline.knot_span, last / stride_, stride_);

@@ -53,16 +53,10 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 class SplineCost {
  public:
   /// `tube`: of `spline`'s commands in the world, with at least those followed by the hold. `margin`: clearance to
-<<<<<<< HEAD
-  /// keep, m. `norm`: c_m = d(p_p⁰) − ‖h‖₂ and Δe_m = 0 instead, the paper's r. `v_limit`, `a_limit` per axis.
-  /// Precondition: at least 6 control points (then none is free).
+  /// keep, m. `norm`: c_m = d(p_p⁰) − ‖h‖₂ and Δe_m = 0 instead, the paper's r. Precondition: at least 6 control points
+  /// (then none is free).
   SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
-             const Vec3& v_limit, const Vec3& a_limit, const CostWeights& weights, bool norm = false);
-=======
-  /// keep, m. Precondition: at least 6 control points (then none is free).
-  SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
-             const MotionLimits& limits, const CostWeights& weights);
->>>>>>> plan6
+             const MotionLimits& limits, const CostWeights& weights, bool norm = false);
 
   /// Free control points, one row each.
   using Points = Eigen::Matrix<double, Eigen::Dynamic, 3>;
