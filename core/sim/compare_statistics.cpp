@@ -117,7 +117,8 @@ Interval mean_ratio(std::span<const double> a, std::span<const double> b, std::u
 }
 
 const char* name(Measure measure) {
-  const char* const names[kMeasures] = {"length_m", "time_s", "jerk2", "flown_jerk2", "energy_J"};
+  const char* const names[kMeasures] = {"length_m",    "time_s",  "jerk2", "jerk2_time5_per_length2",
+                                        "flown_jerk2", "energy_J"};
   return names[measure];
 }
 
@@ -129,6 +130,8 @@ double value(const RouteOutcome& outcome, Measure measure) {
       return outcome.planned.time_s;
     case kJerk2:
       return outcome.planned.jerk2;
+    case kShape:
+      return outcome.planned.jerk2 * std::pow(outcome.planned.time_s, 5) / std::pow(outcome.planned.length_m, 2);
     case kFlownJerk2:
       return outcome.flown_jerk2;
     default:

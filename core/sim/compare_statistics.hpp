@@ -24,8 +24,11 @@ Interval ratio_of_totals(std::span<const double> a, std::span<const double> b, s
 Interval mean_ratio(std::span<const double> a, std::span<const double> b, std::uint64_t seed);
 
 /// What Table I compares on pairs that several methods solve.
-enum Measure : std::size_t { kLength, kTime, kJerk2, kFlownJerk2, kEnergy, kMeasures };
-const char* name(Measure measure);  ///< "length_m", "time_s", "jerk2", "flown_jerk2", "energy_J"
+/// kShape is jerk²·time⁵/length², which neither speed nor scale changes: 720 on a straight line at least jerk, rest to
+/// rest. Twice the time makes jerk² 32 times less, so that jerk² alone rewards slow plans.
+enum Measure : std::size_t { kLength, kTime, kJerk2, kShape, kFlownJerk2, kEnergy, kMeasures };
+const char* name(
+    Measure measure);  ///< "length_m", "time_s", "jerk2", "jerk2_time5_per_length2", "flown_jerk2", "energy_J"
 double value(const RouteOutcome& outcome, Measure measure);
 
 /// The first method over another on the pairs that count for both.

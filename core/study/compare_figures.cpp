@@ -50,7 +50,7 @@ tl::expected<std::string, PlotError> ratio_figure(const Comparison& c) {
   script << "EOD\n";
   for (const auto& panel : panels) script << ratio_block(c, panel.first);
   script << kAxes << "set xrange [0.5:" << static_cast<double>(c.methods.size()) - 0.5
-         << "]\nset xtics rotate by -35 nomirror\nunset key\nset multiplot layout 1,4\n";
+         << "]\nset xtics rotate by -35 nomirror\nset bmargin 5\nunset key\nset multiplot layout 1,4\n";
   for (const auto& [measure, title] : panels) {
     script << "set title '" << title << ", proposed over'\n"
            << "set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead linecolor '#888888' dashtype 3\n"
@@ -72,7 +72,9 @@ tl::expected<std::string, PlotError> gap_figure(const sim::GapCampaign& gap) {
     for (const auto d : {kX, kY, kZ}) script << ' ' << gap.shown[k].error[d] << ' ' << gap.shown[k].half_widths[d];
     script << '\n';
   }
-  script << "EOD\n" << kAxes << "set lmargin 10\nset key outside top center horizontal\nset multiplot layout 3,1\n";
+  script << "EOD\n"
+         << kAxes << "set lmargin 10\nset ytics font ',10'\nset key outside top center horizontal\n"
+         << "set multiplot layout 3,1\n";
   const char* const axes[] = {"x", "y", "z"};
   for (int a = 0; a < 3; ++a) {
     const int e = 2 + 2 * a, h = 3 + 2 * a;
@@ -85,7 +87,7 @@ tl::expected<std::string, PlotError> gap_figure(const sim::GapCampaign& gap) {
            << " with lines linewidth 2 linecolor '#0b3d91' title 'measured − predicted centre'\n";
   }
   script << "unset multiplot\n";
-  return draw(script.str(), Format::svg, 1000, 640);
+  return draw(script.str(), Format::svg, 1000, 720);
 }
 
 }  // namespace backwash::study

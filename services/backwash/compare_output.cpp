@@ -106,11 +106,12 @@ void print_text(const study::Comparison& c) {
     const auto paper = study::paper_jerk2_ratio(c.methods[m]);
     for (const auto& [name, ratio] : {std::pair{"all", &row.on_common}, {"both", &row.pairwise}}) {
       if (ratio->pairs == 0) continue;
-      std::printf(
-          "%s over %s, %zu pairs that %s solve: jerk2 %s%s, length %s, time %s, energy %s\n", c.methods[0].name.c_str(),
-          row.method.c_str(), ratio->pairs, name, interval(ratio->total[sim::kJerk2]).c_str(),
-          paper ? (" [paper " + to_text(*paper, 2) + "]").c_str() : "", interval(ratio->total[sim::kLength]).c_str(),
-          interval(ratio->total[sim::kTime]).c_str(), interval(ratio->total[sim::kEnergy]).c_str());
+      std::printf("%s over %s, %zu pairs that %s solve: jerk2 %s%s, at equal time %s, length %s, time %s, energy %s\n",
+                  c.methods[0].name.c_str(), row.method.c_str(), ratio->pairs, name,
+                  interval(ratio->total[sim::kJerk2]).c_str(),
+                  paper ? (" [paper " + to_text(*paper, 2) + "]").c_str() : "",
+                  interval(ratio->mean[sim::kShape]).c_str(), interval(ratio->total[sim::kLength]).c_str(),
+                  interval(ratio->total[sim::kTime]).c_str(), interval(ratio->total[sim::kEnergy]).c_str());
     }
   }
   for (const auto& gap : c.gaps) {

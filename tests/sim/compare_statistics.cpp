@@ -100,6 +100,16 @@ TEST(Table, ComparesOnThePairsThatAllSolveAndCountsTheRestApart) {
   EXPECT_DOUBLE_EQ(table.rows[1].pairwise.total[kJerk2].value, 1);
 }
 
+TEST(Measures, ShapeIsUnchangedByPaceAndScaleAnd720OnALineAtLeastJerk) {
+  auto o = flown(720 * 4.0 * 4.0 / std::pow(5.0, 5));  // ∫ (60 L/T³ (1 − 6u + 6u²))² dt = 720 L²/T⁵
+  o.planned.length_m = 4, o.planned.time_s = 5;
+  EXPECT_NEAR(value(o, kShape), 720, 1e-9);
+  o.planned.time_s *= 2, o.planned.jerk2 /= 32;
+  EXPECT_NEAR(value(o, kShape), 720, 1e-9);
+  o.planned.length_m *= 3, o.planned.jerk2 *= 9;
+  EXPECT_NEAR(value(o, kShape), 720, 1e-9);
+}
+
 TEST(Table, JoinsScenes) {
   const std::vector<SceneComparison> scenes = {small_scene(), small_scene()};
   const auto table = tabulate(scenes, kMethods, 1);
