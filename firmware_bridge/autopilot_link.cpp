@@ -74,8 +74,8 @@ std::string_view name(LinkFault fault) noexcept {
 AutopilotLink::AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now)
     : port_(std::move(port)), configured_vehicle_(vehicle), opened_at_(now) {}
 
-void AutopilotLink::reconnect(Port port, Time now) noexcept {
-  port_ = std::move(port);
+Port AutopilotLink::reconnect(Port port, Time now) noexcept {
+  std::swap(port_, port);
   opened_at_ = now;
   lost_.reset();
   parser_ = {};
@@ -84,6 +84,7 @@ void AutopilotLink::reconnect(Port port, Time now) noexcept {
   heard_.reset();
   clock_.reset();
   timesync_asked_ns_ = 0;
+  return port;
 }
 
 tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {

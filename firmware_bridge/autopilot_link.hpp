@@ -64,8 +64,9 @@ class AutopilotLink {
   /// `vehicle`: its system id; absent: that of the first flight controller heard.
   AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now);
 
-  /// Takes a newly opened port after a loss. All that was known of the vehicle is forgotten; nothing waits to be sent.
-  void reconnect(Port port, Time now) noexcept;
+  /// Takes a newly opened port after a loss and returns the lost one (closing it may wait for the line). All that was
+  /// known of the vehicle is forgotten; nothing waits to be sent.
+  Port reconnect(Port port, Time now) noexcept;
 
   /// Reads what has arrived (at most 8 KiB), then sends what waits. Error: kLost, also on every later call.
   tl::expected<void, PortError> poll(Time now) noexcept;

@@ -9,12 +9,14 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (!file) return tl::unexpected(file.error());
 
   Daemon d;
-  double domain = 0, baud = 0, system = 0, priority = 0;
+  double domain = 0, baud = 0, system = 0, priority = 0, cpu = 0;
   const NumberKey numbers[] = {
       {"dds.domain", &domain, {0, 230}},
       {"link.baud", &baud, {9600, 4'000'000}},
       {"link.system", &system, {1, 250}},
       {"control.priority", &priority, {0, 98}},
+      {"control.cpu", &cpu, {-1, 1023}},
+      {"control.battery_land", &d.control.battery_land, {0, 1}},
   };
   const std::pair<std::string_view, std::string*> texts[] = {
       {"vehicle", &d.vehicle},
@@ -34,12 +36,14 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
     *target = std::move(*text);
   }
   for (const auto& [key, value] : {std::pair{"dds.domain", domain}, std::pair{"link.baud", baud},
-                                   std::pair{"link.system", system}, std::pair{"control.priority", priority}})
+                                   std::pair{"link.system", system}, std::pair{"control.priority", priority},
+                                   std::pair{"control.cpu", cpu}})
     if (value != static_cast<int>(value)) return tl::unexpected(file->error(key, "needs a whole number"));
   d.dds.domain = static_cast<int>(domain);
   d.link.baud = static_cast<int>(baud);
   d.link.system = static_cast<int>(system);
   d.control.priority = static_cast<int>(priority);
+  d.control.cpu = static_cast<int>(cpu);
   return d;
 }
 

@@ -14,8 +14,8 @@
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
 #include "core/sync/record_ring.hpp"
-#include "core/track/supervisor.hpp"
-#include "core/track/tracker.hpp"
+#include "core/track/flight_tick.hpp"
+#include "firmware_bridge/autopilot_link.hpp"
 #include "services/backwashd/timing.hpp"
 
 /// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is
@@ -28,13 +28,7 @@ inline std::int64_t now_ns() noexcept {
       .count();
 }
 
-/// One odometry message, in the map frame.
-struct OdometrySample {
-  std::int64_t received_ns = 0;
-  std::int64_t stamp_ns = 0;            ///< the sender's stamp
-  State state;                          ///< m, m/s
-  std::array<double, 4> q{1, 0, 0, 0};  ///< body to map: w, x, y, z
-};
+using track::OdometrySample;
 
 /// One octomap_msgs/Octomap as received.
 struct MapMessage {
@@ -70,6 +64,8 @@ struct ControlView {
   std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
   double residual_m = 0, residual_rad = 0;
+  track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
+  std::uint64_t log_lost = 0;                        ///< records that the raw log had no room for
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 
@@ -77,6 +73,20 @@ struct ControlView {
 struct ControlRecord {
   study::RecordHeader header{};
   std::array<std::uint8_t, 512> bytes{};
+};
+
+/// What the control thread has to tell the operator; rarer than ticks, and none is skipped while the ring has room.
+struct ControlEvent {
+  enum class Kind : std::uint8_t { transition, missed_deadline, page_fault } kind = Kind::transition;
+  std::int64_t t_ns = 0;
+  track::Mode mode = track::Mode::passive;
+  track::Reason reason = track::Reason::started;
+  std::uint64_t count = 0;  ///< periods missed, pages faulted
+};
+
+/// A port that was opened again. The control thread swaps its lost one in, so that closing it is not its work.
+struct FreshPort {
+  mutable firmware_bridge::Port port;
 };
 
 /// Anything else for the raw log.
@@ -113,7 +123,10 @@ struct Channels {
   sync::Handover<track::AcceptedSegment> segments;                         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
-  sync::LatestValue<std::array<char, 192>> task;                           // mission → status: of the last command
+  sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
+  sync::Handover<FreshPort> ports;                                         // link watch → control
+  std::atomic<std::uint8_t> link_fault{0};        // control → link watch: 1 + LinkFault, 0: none
+  sync::LatestValue<std::array<char, 192>> task;  // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<bool> stop{false};
 };

@@ -143,16 +143,12 @@ void DdsFront::send(const track::AcceptedSegment& segment) {
 void DdsFront::run_status(const Vehicle& vehicle) {
   ControlView view;
   std::array<char, 192> task{};
-  track::Mode last_mode = track::Mode::passive;
-  track::Reason last_reason = track::Reason::started;
   auto next = std::chrono::steady_clock::now();
   while (!channels_.stop) {
     next += std::chrono::milliseconds(100);
     std::this_thread::sleep_until(next);
     if (const auto newest = channels_.task.read_new()) task = *newest;
     if (const auto newest = channels_.view_status.read_new()) view = *newest;
-    if (view.mode != last_mode || view.reason != last_reason)
-      spdlog::info("{}: {}", to_string(last_mode = view.mode), to_string(last_reason = view.reason));
     const std::string mode = to_string(view.mode), reason = to_string(view.reason);
     dds::Status s{};
     s.stamp = wall_clock();

@@ -12,16 +12,18 @@
 
 #include "core/plan/planner.hpp"
 #include "core/plan/stop.hpp"
+#include "core/study/tick_log.hpp"
 
 namespace backwash::daemon {
 namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kAttempts = 25;       // offers of one segment, each from a fresh state
-constexpr int kPlans = 5;           // of one route, while the state moves on
-constexpr int kBranchAfter = 15;    // commands (0.3 s) that a continued segment leaves untouched
-constexpr double kHoldAfter = 2.0;  // s of hover at the end, so that the last set is the hover set's
+constexpr int kAttempts = 25;           // offers of one segment, each from a fresh state
+constexpr int kPlans = 5;               // of one route, while the state moves on
+constexpr int kBranchAfter = 15;        // commands (0.3 s) that a continued segment leaves untouched
+constexpr std::size_t kStopEvery = 10;  // commands (0.2 s) between verified stops
+constexpr double kHoldAfter = 2.0;      // s of hover at the end, so that the last set is the hover set's
 
 /// The segment that flies now, with what is needed to continue it.
 struct Flying {
@@ -104,7 +106,7 @@ class Planner {
     auto commands = plan::stop_along(flying_->segment.commands, branch, job.world->reach.vehicle.limits.a_max);
     if (commands.empty()) return std::nullopt;  // it ends by itself before that
     append_hold(commands);
-    Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}},
+    Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}, {}},
                 flying_->start,
                 flying_->previous,
                 flying_->metrics};
@@ -131,7 +133,7 @@ class Planner {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       refresh();
       if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
-      Flying next{{++last_id_, 0, 0, commands, {}}, view_.state, view_.command, metrics};
+      Flying next{{++last_id_, 0, 0, commands, {}, {}}, view_.state, view_.command, metrics};
       next.segment.tube =
           reach::tube_over_field(job.world->reach, next.start, next.previous, commands, job.world->bounds);
       if (const double clearance = clearance_of(next.segment.tube); !(clearance > 0)) {
@@ -139,6 +141,8 @@ class Planner {
         std::snprintf(line, sizeof line, "the tube from the state estimated now is not clear: %.3f m", clearance);
         return line;
       }
+      next.segment.stops =
+          plan::verified_stops(*job.world, next.start, next.previous, commands, kStopEvery, clearance_of);
       if (offer(std::move(next))) return std::nullopt;
     }
     return "the vehicle is not still enough to start: its state left the first set each time";
@@ -146,6 +150,7 @@ class Planner {
 
   bool offer(Flying next) {
     const std::uint64_t id = next.segment.id;
+    recorder_.append(study::RecordKind::offer, study::encode(next.segment));
     channels_.segments.offer(std::make_unique<const track::AcceptedSegment>(next.segment));
     for (int wait = 0; wait < 100 && !channels_.stop; ++wait) {
       std::this_thread::sleep_for(1ms);
