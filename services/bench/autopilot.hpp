@@ -50,6 +50,14 @@ class Autopilot {
 
   /// While true no telemetry is sent (heartbeat lost, faults.md row 21).
   bool mute = false;
+  /// Remaining share, sent once a second as BATTERY_STATUS while set.
+  std::optional<double> battery;
+  /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
+  void take_over() noexcept;
+  /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
+  void disarm() noexcept;
+  /// The estimator is reset: from now on its local frame lies elsewhere.
+  void reset_estimator(const LocalFrame& frame) noexcept { frame_ = frame; }
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position.
   void log_wire(const std::string& path);
 
@@ -72,7 +80,7 @@ class Autopilot {
   LocalFrame frame_;
   std::uint8_t system_, sequence_ = 0;
   mavlink::Parser parser_;
-  bool armed_ = false, landed_ = true, local_position_ = false;
+  bool armed_ = false, landed_ = true, local_position_ = false, heartbeat_due_ = false;
   Mode mode_ = Mode::manual;
   double t_ = 0, last_setpoint_ = -1e9, landed_since_ = 0;
   long steps_ = 0;
