@@ -47,6 +47,8 @@ baud = 921600
 system = 1
 [control]
 priority = 80
+cpu = -1
+battery_land = 0.15
 [log]
 file = "$2"
 TOML

@@ -4,7 +4,7 @@ import collections
 import csv
 import struct
 
-MAGIC = b"backwash raw log 1\n"
+MAGIC = b"backwash raw log 2\n"
 ODOMETRY, FRAME_IN, FRAME_OUT, TICK = 2, 6, 7, 8
 MODES = ["passive", "enabling", "tracking", "hold", "land", "quiet"]
 SETPOINT, HEARTBEAT, COMMAND = 84, 0, 76

@@ -150,7 +150,7 @@ TEST(Supervisor, GoesQuietWhenTheLinkOrTheClockFails) {
   expect_quiet(Reason::port_lost, [](auto& in, int) { in.port_open = false; });
   expect_quiet(Reason::transmit_full, [](auto& in, int) { in.transmit_failed = true; });
   expect_quiet(Reason::autopilot_silent, [](auto& in, int) { in.heartbeat_age = 1.51; });
-  expect_quiet(Reason::deadline_missed, [](auto& in, int) { in.missed_periods = 25; });
+  expect_quiet(Reason::clock_stopped, [](auto& in, int) { in.missed_periods = 25; });
 }
 
 TEST(Supervisor, NeverFightsAPilotWhoLeavesOffboard) {
