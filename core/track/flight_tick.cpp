@@ -50,6 +50,12 @@ void FlightTick::take_closure(const TickInput& in) noexcept {
 
 void FlightTick::take_odometry(const TickInput& in, TickOutput& out) noexcept {
   if (!in.odometry) return;
+  // After a jump or a gap a sample that looks good again may still be in another place: it is not believed, and not
+  // forwarded, until the vehicle is in other hands.
+  if (odometry_distrusted_) {
+    out.verdict = OdometryGate::Verdict::rejected;
+    return;
+  }
   const bool moving = command_.v_W.norm() > 0.05;
   out.verdict = gate_.take(*in.odometry, moving);
   disorder_ = out.verdict == OdometryGate::Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
@@ -72,7 +78,8 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   const FramePose in_local = pose_of(in.autopilot.pose->state, in.autopilot.pose->q);
   const bool counted = reset_counter_ && in.autopilot.reset_counter && *reset_counter_ != *in.autopilot.reset_counter;
   if (in.autopilot.reset_counter) reset_counter_ = in.autopilot.reset_counter;
-  if (counted || alignment_.reset_between(in_map, in_local)) {
+  const bool may_move = mode() != Mode::land && !(mode() == Mode::hold && !supervisor_.pose_trusted());
+  if (may_move && (counted || alignment_.reset_between(in_map, in_local))) {
     alignment_.rebase(in_map, in_local);
     reset_ = was_commanding_;
   }
@@ -161,6 +168,9 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   out.supervisor = supervisor_.step(facts(in, out));
   follow(in, before, out);
   was_commanding_ = commanding(out.supervisor.mode);
+  odometry_distrusted_ =
+      was_commanding_ &&
+      (odometry_distrusted_ || (out.supervisor.freeze && out.supervisor.reason != Reason::frames_disagree));
   command_ = was_commanding_ ? tracker_.step() : tracker_.held();
   out.command = command_;
   out.command_local = alignment_.to_local(command_);

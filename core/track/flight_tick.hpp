@@ -98,7 +98,8 @@ class FlightTick {
   RigidShift map_from_odom_;                  ///< of the last
   Setpoint command_;                          ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
-  int disorder_ = 0;  ///< samples in a row whose stamp did not rise
+  bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
+  int disorder_ = 0;                  ///< samples in a row whose stamp did not rise
   std::int64_t last_good_ns_ = -1, last_pose_ns_ = -1;
   std::optional<std::uint8_t> reset_counter_;
   double odometry_age_ = std::numeric_limits<double>::infinity();

@@ -144,13 +144,14 @@ class Supervisor {
   SupervisorOutput step(const SupervisorInput& in) noexcept;
   Mode mode() const noexcept { return mode_; }
   Reason reason() const noexcept { return reason_; }
+  /// False in a hold whose cause speaks against the pose.
+  bool pose_trusted() const noexcept;
 
  private:
   void enter(Mode mode, Reason reason) noexcept;
   void count(const SupervisorInput& in) noexcept;
   bool occurs(Reason reason, const SupervisorInput& in) const noexcept;
   bool refused(Reason reason, const SupervisorInput& in) const noexcept;
-  bool pose_trusted() const noexcept;
   double seconds_in_mode() const noexcept;
   SupervisorOutput output(const SupervisorInput& in) noexcept;
 

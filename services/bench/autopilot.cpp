@@ -41,6 +41,17 @@ const char* Autopilot::mode() const noexcept {
   return mode_ == Mode::offboard ? "offboard" : mode_ == Mode::land ? "land" : "manual";
 }
 
+void Autopilot::take_over() noexcept {
+  mode_ = Mode::manual;
+  heartbeat_due_ = true;
+}
+
+void Autopilot::disarm() noexcept {
+  armed_ = false;
+  vehicle_.set_motors(false);
+  heartbeat_due_ = true;
+}
+
 Setpoint Autopilot::to_map(const Setpoint& local) const {
   const Eigen::Matrix3d R = yaw_matrix(-frame_.yaw);
   return {R * (local.p_W - frame_.origin), R * local.v_W, R * local.a_W, local.yaw - frame_.yaw};
@@ -158,7 +169,13 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
   for (const auto& value : values_) send(value, out);
   values_.clear();
   if (mute) return out.clear();
-  if (steps_ % 1000 == 0) {
+  if (battery && steps_ % 1000 == 500) {
+    mavlink::BatteryStatus status{.battery_remaining = static_cast<std::int8_t>(std::lround(100 * *battery))};
+    status.voltages.fill(65535);
+    send(status, out);
+  }
+  if (steps_ % 1000 == 0 || heartbeat_due_) {
+    heartbeat_due_ = false;
     const std::uint32_t custom = mode_ == Mode::offboard ? kOffboard : mode_ == Mode::land ? kAutoLand : kManual;
     send(mavlink::Heartbeat{.custom_mode = custom,
                             .type = kQuadrotor,

@@ -57,6 +57,14 @@ class Autopilot {
                                            {"COM_RC_OVERRIDE", 3},
                                            {"NAV_DLL_ACT", 3},
                                            {"COM_LOW_BAT_ACT", 2}};
+  /// Remaining share, sent once a second as BATTERY_STATUS while set.
+  std::optional<double> battery;
+  /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
+  void take_over() noexcept;
+  /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
+  void disarm() noexcept;
+  /// The estimator is reset: from now on its local frame lies elsewhere.
+  void reset_estimator(const LocalFrame& frame) noexcept { frame_ = frame; }
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position.
   void log_wire(const std::string& path);
 
@@ -80,7 +88,7 @@ class Autopilot {
   LocalFrame frame_;
   std::uint8_t system_, sequence_ = 0;
   mavlink::Parser parser_;
-  bool armed_ = false, landed_ = true, local_position_ = false;
+  bool armed_ = false, landed_ = true, local_position_ = false, heartbeat_due_ = false;
   Mode mode_ = Mode::manual;
   double t_ = 0, last_setpoint_ = -1e9, landed_since_ = 0;
   long steps_ = 0;
