@@ -15,6 +15,9 @@ class DdsFront {
  public:
   /// `priority`: SCHED_FIFO priority of the threads between the network and the control thread; 0: ordinary.
   DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels, Recorder& recorder);
+  ~DdsFront() { channels_.worlds.reader.give_back(world_); }
+  DdsFront(const DdsFront&) = delete;
+  DdsFront& operator=(const DdsFront&) = delete;
 
   /// Thread body: odometry, loop closures, scans, maps and commands in. New voxels of a scan go straight to the control
   /// thread, the scan to the map worker. What is refused is counted, and said at most once a second.

@@ -17,6 +17,10 @@ class Lookout {
   Lookout(Channels& channels, const Vehicle& vehicle, const MapSettings& map)
       : channels_(channels), map_(map), taken_(vehicle.body.radius + vehicle.estimation.position) {}
 
+  ~Lookout() { channels_.worlds.control.give_back(world_); }
+  Lookout(const Lookout&) = delete;
+  Lookout& operator=(const Lookout&) = delete;
+
   /// `flight` as of the last tick. New voxels are held against the sets still to be flown and against the next verified
   /// stop; the newest ones again when a segment was accepted since. Real-time: wait-free, no allocation; 3 to 5 ns per
   /// voxel and set, at most 3 × NewVoxels::kMost voxels.
