@@ -14,6 +14,8 @@ namespace {
 
 using Quaternion = Eigen::Quaterniond;
 
+const Vec3 kZero = Vec3::Zero();
+
 dds::Odometry odometry(const std::string& frame, const Vec3& p, const Quaternion& q = Quaternion::Identity(),
                        const Vec3& v_B = Vec3::Zero(), double t = 1) {
   static const std::string child = "base_link";
@@ -56,16 +58,16 @@ TEST(Localization, TakesOdometryOfTheMapAsItIs) {
 
 TEST(Localization, RefusesFramesThatItDoesNotKnowAndNamesThem) {
   auto l = localization();
-  const auto other = l.odometry(odometry(kOther, {}), 0);
+  const auto other = l.odometry(odometry(kOther, kZero), 0);
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().find("'camera'"), std::string::npos);
-  auto child = odometry(kMap, {});
+  auto child = odometry(kMap, kZero);
   child.child_frame_id = dds::c_string(kOther);
   EXPECT_FALSE(l.odometry(child, 0));
   child.child_frame_id = nullptr;
   EXPECT_FALSE(l.odometry(child, 0));
-  EXPECT_FALSE(l.odometry(odometry(kOdom, {}), 0)) << "before the first loop closure it has no place in the map";
-  EXPECT_FALSE(l.loop_closure(closure(Quaternion::Identity(), {}, kOdom, kMap)));
+  EXPECT_FALSE(l.odometry(odometry(kOdom, kZero), 0)) << "before the first loop closure it has no place in the map";
+  EXPECT_FALSE(l.loop_closure(closure(Quaternion::Identity(), kZero, kOdom, kMap)));
 }
 
 TEST(Localization, APositionTheVioItselfDoesNotTrustIsRefused) {
@@ -103,8 +105,8 @@ TEST(Localization, ALoopClosureCarriesOdometryIntoTheMap) {
 
 TEST(Localization, ALoopClosureThatTiltsOrIsNoTransformIsRefused) {
   auto l = localization();
-  EXPECT_FALSE(l.loop_closure(closure(Quaternion(Eigen::AngleAxisd(0.05, Vec3::UnitX())), {})));
-  EXPECT_FALSE(l.loop_closure(closure(Quaternion(2, 0, 0, 0), {})));
+  EXPECT_FALSE(l.loop_closure(closure(Quaternion(Eigen::AngleAxisd(0.05, Vec3::UnitX())), kZero)));
+  EXPECT_FALSE(l.loop_closure(closure(Quaternion(2, 0, 0, 0), kZero)));
   EXPECT_FALSE(l.loop_closure(closure(Quaternion::Identity(), {std::nan(""), 0, 0})));
   EXPECT_EQ(l.closures(), 0u);
 }
@@ -132,8 +134,8 @@ struct PointMessage {
 TEST(Localization, PlacesAScanOfTheBodyByThePoseAtItsStamp) {
   auto l = localization();
   EXPECT_FALSE(l.scan(PointMessage(kBody, {1, 0, 0}, 1).m, 0)) << "without odometry it has no place";
-  ASSERT_TRUE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), {}, 1.0), 0));
-  ASSERT_TRUE(l.odometry(odometry(kMap, {2, 0, 1}, about_z(0.4), {}, 1.1), 0));
+  ASSERT_TRUE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), kZero, 1.0), 0));
+  ASSERT_TRUE(l.odometry(odometry(kMap, {2, 0, 1}, about_z(0.4), kZero, 1.1), 0));
   const auto scan = l.scan(PointMessage(kBody, {1, 0, 0}, 1.05).m, 3);
   ASSERT_TRUE(scan) << scan.error();
   EXPECT_LT((scan->sensor_W - Vec3(1, 0, 1)).norm(), 1e-6);

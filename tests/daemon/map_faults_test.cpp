@@ -24,6 +24,7 @@ reach::ReachTube tube_of(const std::vector<Setpoint>& commands, const Vec3& befo
   reach::ReachTube tube;
   for (std::size_t k = 0; k <= commands.size(); ++k) {
     reach::TubeStep set{};
+    set.shape = Mat3::Zero();
     set.center.p_W = k == 0 ? before : commands[k - 1].p_W;
     set.half_widths.fill(kHalf);
     set.half_widths_interval.fill(kHalf);

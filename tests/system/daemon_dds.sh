@@ -16,7 +16,7 @@ expect() { # expect NAMESPACE 'PYTHON EXPRESSION OVER s'
   python3 -c 'import json, sys; s = json.load(open(sys.argv[1])); assert eval(sys.argv[2]), (sys.argv[2], s)' "$work/$1.json" "$2"
 }
 
-start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --parameter NAV_DLL_ACT 2
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --parameter NAV_DLL_ACT=2
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 
 # A second vehicle in the same domain: its own bench and daemon, elsewhere in the same map.
