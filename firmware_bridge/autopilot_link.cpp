@@ -244,6 +244,13 @@ bool AutopilotLink::send_statustext(std::uint8_t severity, std::string_view text
   return send(m);
 }
 
+bool AutopilotLink::send_parameter_request(std::string_view name) noexcept {
+  mavlink::ParamRequestRead m{
+      .param_index = -1, .target_system = heard_.value_or(0), .target_component = kFlightController, .param_id = {}};
+  std::ranges::copy(name.substr(0, m.param_id.size()), m.param_id.begin());
+  return send(m);
+}
+
 bool AutopilotLink::send_timesync(Time now) noexcept {
   timesync_asked_ns_ = nanoseconds_of(now);
   return send(mavlink::Timesync{0, timesync_asked_ns_, heard_.value_or(0), kFlightController});

@@ -18,6 +18,17 @@ struct Daemon {
     std::string odometry_topic;  ///< whole name on the wire, for any VIO
   } dds;
   struct {
+    std::string map = "map";         ///< of maps, clouds, odometry and what the daemon sends
+    std::string odometry = "odom";   ///< of odometry and clouds of a VIO whose loop closures come as map ← odom
+    std::string body = "base_link";  ///< child frame of odometry; clouds
+  } frames;
+  struct {
+    bool live = false;           ///< a mapper is declared: a late map is a fault (faults.md row 13)
+    double closing_speed = 0.2;  ///< by which the age of a live map shrinks the trusted clearance, m/s
+    double sensor_range = 8;     ///< points farther away only free the way up to there, m
+    double max_mib = 512;        ///< largest snapshot made of a map, MiB
+  } map;
+  struct {
     std::string device;  ///< serial port or pty
     int baud = 0;
     int system = 1;  ///< MAVLink system id of the vehicle
@@ -33,6 +44,7 @@ struct Daemon {
 };
 
 /// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
+/// The tables frames and map may be left out, whole or in part: their defaults are above.
 /// `builtin:backwashd` is the shipped example.
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
 

@@ -15,6 +15,9 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"link.baud", &baud, {9600, 4'000'000}},
       {"link.system", &system, {1, 250}},
       {"control.priority", &priority, {0, 98}},
+      {"map.closing_speed", &d.map.closing_speed, {0, 5}, NumberKey::Presence::optional},
+      {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, NumberKey::Presence::optional},
+      {"map.max_mib", &d.map.max_mib, {1, 65536}, NumberKey::Presence::optional},
       {"control.cpu", &cpu, {-1, 1023}},
       {"control.battery_land", &d.control.battery_land, {0, 1}},
   };
@@ -27,13 +30,29 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"link.device", &d.link.device},
       {"log.file", &d.log.file},
   };
-  std::vector<std::string_view> text_keys;
+  const std::pair<std::string_view, std::string*> frames[] = {
+      {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
+  std::vector<std::string_view> text_keys{"map.live"};
   for (const auto& [key, target] : texts) text_keys.push_back(key);
+  for (const auto& [key, target] : frames) text_keys.push_back(key);
   if (auto read = file->read(numbers, text_keys); !read) return tl::unexpected(read.error());
   for (const auto& [key, target] : texts) {
     auto text = file->text(key);
     if (!text) return tl::unexpected(text.error());
     *target = std::move(*text);
+  }
+  for (const auto& [key, target] : frames) {
+    if (!file->has(key)) continue;
+    auto text = file->text(key);
+    if (!text) return tl::unexpected(text.error());
+    *target = std::move(*text);
+  }
+  if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
+    return tl::unexpected(file->error("frames", "needs three different names"));
+  if (file->has("map.live")) {
+    const auto live = file->flag("map.live");
+    if (!live) return tl::unexpected(live.error());
+    d.map.live = *live;
   }
   for (const auto& [key, value] : {std::pair{"dds.domain", domain}, std::pair{"link.baud", baud},
                                    std::pair{"link.system", system}, std::pair{"control.priority", priority},

@@ -158,4 +158,10 @@ tl::expected<std::string, ConfigError> StrictTable::text(std::string_view path) 
   return *value;
 }
 
+tl::expected<bool, ConfigError> StrictTable::flag(std::string_view path) const {
+  const auto value = root_.at_path(path).value_exact<bool>();
+  if (!value) return tl::unexpected(error(path, "needs true or false"));
+  return *value;
+}
+
 }  // namespace backwash::config

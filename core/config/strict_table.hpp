@@ -42,6 +42,8 @@ class StrictTable {
   tl::expected<void, ConfigError> read(std::span<const NumberKey> keys, std::span<const std::string_view> others) const;
   /// A string that is not empty.
   tl::expected<std::string, ConfigError> text(std::string_view path) const;
+  /// true or false.
+  tl::expected<bool, ConfigError> flag(std::string_view path) const;
   bool has(std::string_view path) const { return static_cast<bool>(root_.at_path(path)); }
   /// Error about a key that is in the file or missing from it: names its line (the parent's, if missing) and value.
   ConfigError error(std::string_view path, const std::string& what_would_be_right) const;

@@ -71,6 +71,12 @@ std::size_t DisturbanceField::linear(const Index3& v) const noexcept {
          nx * (static_cast<std::size_t>(v.y()) + ny * static_cast<std::size_t>(v.z()));
 }
 
+void DisturbanceField::clear(const map::VoxelBox& box) noexcept {
+  for (int k = box.low.z(); k <= box.high.z(); ++k)
+    for (int j = box.low.y(); j <= box.high.y(); ++j)
+      for (int i = box.low.x(); i <= box.high.x(); ++i) sigma_[linear({i, j, k})] = {-1, 0, 0, 0, 0, 0};
+}
+
 bool DisturbanceField::has(const Index3& v) const noexcept {
   const bool inside = (v.array() >= 0).all() && (v.array() < size_.array()).all();
   return inside && sigma_[linear(v)][0] >= 0;

@@ -10,6 +10,7 @@
 #include "core/field/sight.hpp"
 #include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/map/scan.hpp"
 #include "core/types/model.hpp"
 
 namespace backwash::field {
@@ -51,6 +52,9 @@ class DisturbanceField {
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
+
+  /// Unsets Σ at all voxels of a box inside the grid.
+  void clear(const map::VoxelBox& box) noexcept;
 
   /// Whether Σ is stored at a voxel; false outside the grid.
   bool has(const Index3& v) const noexcept;

@@ -7,13 +7,14 @@
 #include "core/field/disturbance_field.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/map/scan.hpp"
 #include "core/reach/hover_set.hpp"
 #include "core/reach/reach_tube.hpp"
 
 namespace backwash::plan {
 
-/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when all
-/// are done. core itself knows no threads: services pass their own.
+/// Runs `work(begin, end)` over disjoint ranges that cover [0, count), possibly from several threads, and returns when
+/// all are done. core itself knows no threads: services pass their own.
 using Parallel = std::function<void(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work)>;
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
 
@@ -33,5 +34,11 @@ struct World {
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
                                          reach::Method method = reach::Method::tight, double constant_margin = -1,
                                          const Parallel& parallel = run_serial);
+
+/// The same as build_world(grid, …), from a world of which only the voxels in `changed` differ: Σ and the hover map are
+/// computed anew where a change can reach them and copied elsewhere. `old` must have been built with this model;
+/// precondition: grids of the same place and size. Measured (bench_world): see core/plan/README.md.
+std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
+                                          const Model& model, const Parallel& parallel = run_serial);
 
 }  // namespace backwash::plan

@@ -20,7 +20,7 @@ struct Supports {
 };
 
 /// Duality: the largest value in a direction is the least combination of two slabs whose normals enclose it.
-Supports tight_supports(const PerDirection& h) {
+Supports tight_supports(const PerDirection& h) noexcept {
   const double sqrt2 = std::sqrt(2.0);
   const double x = h[kX], y = h[kY], s = sqrt2 * h[kXyPlus], d = sqrt2 * h[kXyMinus];
   return {std::min({x, s + y, d + y, (s + d) / 2}), std::min({y, s + x, d + x, (s + d) / 2}), h[kZ],
@@ -30,7 +30,7 @@ Supports tight_supports(const PerDirection& h) {
 /// The octagon ⊕ a voxel's square, around the origin. Lengths in voxels.
 class FatOctagon {
  public:
-  explicit FatOctagon(const Supports& s)
+  explicit FatOctagon(const Supports& s) noexcept
       : x_(s.x + 0.5), y_(s.y + 0.5), sum_(s.sum + 1), difference_(s.difference + 1) {
     // Half of the corners, counter-clockwise from the right edge's lower end; the others are their mirror images.
     corners_ = {Vec2{x_, x_ - difference_}, Vec2{x_, sum_ - x_}, Vec2{sum_ - y_, y_}, Vec2{y_ - difference_, y_},
@@ -171,6 +171,17 @@ class Scan {
   double nearest2_;
 };
 
+/// Supports of the prism around the middle of a motion that holds the prism all along it; `half`: half the motion.
+Supports swept_supports(const PerDirection& half_widths, const Vec3& half) noexcept {
+  Supports s = tight_supports(half_widths);
+  s.x += std::abs(half.x());
+  s.y += std::abs(half.y());
+  s.z += std::abs(half.z());
+  s.sum += std::abs(half.x() + half.y());
+  s.difference += std::abs(half.x() - half.y());
+  return s;
+}
+
 double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supports& s, double limit) {
   const double a = grid.resolution();
   const Vec3 center = (center_W - grid.origin()) / a;
@@ -195,13 +206,28 @@ double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, cons
 double swept_prism_distance(const map::OccupancyGrid& grid, const Vec3& from_W, const Vec3& to_W,
                             const PerDirection& half_widths, double limit) {
   const Vec3 half = (to_W - from_W) / 2;
-  Supports s = tight_supports(half_widths);
-  s.x += std::abs(half.x());
-  s.y += std::abs(half.y());
-  s.z += std::abs(half.z());
-  s.sum += std::abs(half.x() + half.y());
-  s.difference += std::abs(half.x() - half.y());
-  return distance(grid, from_W + half, s, limit);
+  return distance(grid, from_W + half, swept_supports(half_widths, half), limit);
+}
+
+std::size_t first_blocked(std::span<const TubeStep> tube, std::size_t from, const Cube& cube, double taken) noexcept {
+  if (tube.empty()) return 0;
+  for (std::size_t n = std::min(from, tube.size() - 1); n < tube.size(); ++n) {
+    const TubeStep& step = tube[n];
+    const Vec3& to = tube[std::min(n + 1, tube.size() - 1)].center.p_W;
+    const Vec3 half = (to - step.center.p_W) / 2;
+    const Vec3 off = (cube.center - step.center.p_W - half).cwiseAbs();
+    const Vec3 box(step.half_widths_interval[kX], step.half_widths_interval[kY], step.half_widths_interval[kZ]);
+    // Farther away along an axis than counts: most entries.
+    const Vec3 gap = off - half.cwiseAbs() - box - Vec3::Constant(cube.edge / 2);
+    if (gap.maxCoeff() > taken) continue;
+    const Supports s = swept_supports(step.half_widths_interval, half);
+    const double a = cube.edge, above = std::max(0.0, off.z() - s.z - a / 2);
+    const FatOctagon octagon({s.x / a, s.y / a, 0, s.sum / a, s.difference / a});
+    const Vec3 p = cube.center - step.center.p_W - half;
+    const double beside2 = a * a * octagon.squared_distance(p.head<2>() / a);
+    if (beside2 + above * above <= taken * taken) return n;
+  }
+  return tube.size();
 }
 
 }  // namespace backwash::reach

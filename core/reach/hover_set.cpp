@@ -164,10 +164,18 @@ bool HoverMap::inside(const Index3& v) const noexcept {
   return (v.array() >= 0).all() && (v.array() < size_.array()).all();
 }
 
-const std::array<float, 4>& HoverMap::cell(const Index3& v) const noexcept {
+std::size_t HoverMap::linear(const Index3& v) const noexcept {
   const auto row =
       static_cast<std::size_t>(v.y()) + static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z());
-  return cells_[static_cast<std::size_t>(v.x()) + static_cast<std::size_t>(size_.x()) * row];
+  return static_cast<std::size_t>(v.x()) + static_cast<std::size_t>(size_.x()) * row;
+}
+
+const std::array<float, 4>& HoverMap::cell(const Index3& v) const noexcept { return cells_[linear(v)]; }
+
+void HoverMap::clear(const map::VoxelBox& box) noexcept {
+  for (int k = box.low.z(); k <= box.high.z(); ++k)
+    for (int j = box.low.y(); j <= box.high.y(); ++j)
+      for (int i = box.low.x(); i <= box.high.x(); ++i) cells_[linear({i, j, k})] = kNotComputed;
 }
 
 bool HoverMap::safe(const Index3& v) const noexcept { return clearance(v) > 0; }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/map/distance_field.hpp"
+#include "core/map/scan.hpp"
 #include "core/reach/bound_field.hpp"
 #include "core/reach/reach_tube.hpp"
 
@@ -32,6 +33,8 @@ class HoverMap {
   /// Computes the listed voxels (linear indices); distinct voxels may be computed from several threads at once.
   void fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
             const BoundField& bounds, std::span<const std::size_t> voxels, double constant_margin = -1);
+  /// As if the voxels of a box inside the grid had never been computed.
+  void clear(const map::VoxelBox& box) noexcept;
   /// False outside the grid and where nothing was computed.
   bool safe(const Index3& v) const noexcept;
   /// Clearance of the hover set where safe, m; elsewhere ≤ 0 and no less than it, −1 where not computed and outside the
@@ -43,6 +46,7 @@ class HoverMap {
  private:
   static constexpr std::array<float, 4> kNotComputed{-1, 0, 0, 0};
   bool inside(const Index3& v) const noexcept;
+  std::size_t linear(const Index3& v) const noexcept;
   const std::array<float, 4>& cell(const Index3& v) const noexcept;
 
   Index3 size_;

@@ -31,8 +31,10 @@ enum class RecordKind : std::uint32_t {
   tick_input = 11,  ///< TickInputRecord: what the next tick record was decided from
   offer = 12,       ///< OfferRecord …: a segment as it was offered to the control thread (core/study/tick_log.hpp)
   lost = 13,        ///< LostRecord: the disk did not take what came before
+  scan = 14,        ///< text, one line: a scan was handed to the control thread and to the map worker
+  world = 15,       ///< text, one line: a new snapshot was handed out
 };
-inline constexpr auto kLastKind = RecordKind::lost;
+inline constexpr auto kLastKind = RecordKind::world;
 
 struct RecordHeader {
   std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
@@ -96,10 +98,12 @@ struct TickInputRecord {
   double p[3], v[3], q[4];                 ///< odometry
   double pose_p[3], pose_v[3], pose_q[4];  ///< the autopilot's
   double heartbeat_age, battery;
+  double map_from_odom[4];  ///< yaw and translation of the newest loop closure
   std::int32_t missed_periods;
   std::uint32_t request, flags, reset_counter;  ///< flags: core/study/tick_log.cpp
+  std::uint32_t closures, padding;
 };
-static_assert(sizeof(TickInputRecord) == 232);
+static_assert(sizeof(TickInputRecord) == 272);
 
 /// A record as read back.
 struct RawRecord {

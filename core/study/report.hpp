@@ -12,7 +12,7 @@ namespace backwash::study {
 struct ReportContext {
   std::string map, model, vehicle;  ///< as given on the command line
   std::string version;
-  Vec3 start_W, goal_W;  ///< m
+  Vec3 start_W, goal_W;               ///< m
   std::optional<std::uint64_t> seed;  ///< of a simulated flight; a recorded one has none
   double sigma_scale;
 };

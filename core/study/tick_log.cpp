@@ -52,6 +52,9 @@ TickInputRecord encode(const track::TickInput& in) noexcept {
     put(in.odometry->state.p_W, r.p);
     put(in.odometry->state.v_W, r.v);
     std::ranges::copy(in.odometry->q, r.q);
+    r.closures = in.odometry->closures;
+    r.map_from_odom[0] = in.odometry->map_from_odom.yaw;
+    put(in.odometry->map_from_odom.t, r.map_from_odom + 1);
   }
   if (a.pose) {
     r.pose_at_ns = a.pose->at_ns;
@@ -76,7 +79,9 @@ track::TickInput decode(const TickInputRecord& r, const track::AcceptedSegment* 
   in.autopilot.offboard = has(kOffboard);
   in.autopilot.heartbeat_age = r.heartbeat_age;
   if (has(kOdometry))
-    in.odometry = {r.odometry_received_ns, r.odometry_stamp_ns, {vec(r.p), vec(r.v)}, {r.q[0], r.q[1], r.q[2], r.q[3]}};
+    in.odometry = {
+        r.odometry_received_ns,           r.odometry_stamp_ns, {vec(r.p), vec(r.v)},
+        {r.q[0], r.q[1], r.q[2], r.q[3]}, r.closures,          {r.map_from_odom[0], vec(r.map_from_odom + 1)}};
   if (has(kPose))
     in.autopilot.pose = {
         r.pose_at_ns, {vec(r.pose_p), vec(r.pose_v)}, {r.pose_q[0], r.pose_q[1], r.pose_q[2], r.pose_q[3]}};

@@ -32,6 +32,22 @@ bool finite(const Setpoint& s) noexcept {
 FlightTick::FlightTick(const Vehicle& vehicle, double battery_land)
     : battery_land_(battery_land), gate_(vehicle), tracker_(Setpoint{}, vehicle) {}
 
+// A loop closure (faults.md row 4) moves the map frame under the vehicle. Everything that is in it moves along within
+// this tick, so that in the controller's frame, and physically, nothing has moved; the planner then brings the flight
+// back to its place in the map (rectified()).
+void FlightTick::take_closure(const TickInput& in) noexcept {
+  if (!in.odometry || in.odometry->closures == closures_) return;
+  const RigidShift D = in.odometry->map_from_odom * map_from_odom_.inverse();
+  const bool first = closures_ == 0;
+  closures_ = in.odometry->closures;
+  map_from_odom_ = in.odometry->map_from_odom;
+  if (first) return tracker_.rebase({}, closures_);  // until now nothing was in the map by way of it
+  gate_.rebase(D);
+  alignment_.rebase(D);
+  tracker_.rebase(D, closures_);
+  command_ = D.setpoint(command_);
+}
+
 void FlightTick::take_odometry(const TickInput& in, TickOutput& out) noexcept {
   if (!in.odometry) return;
   // After a jump or a gap a sample that looks good again may still be in another place: it is not believed, and not
@@ -142,6 +158,7 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
 
 TickOutput FlightTick::step(const TickInput& in) noexcept {
   TickOutput out;
+  take_closure(in);
   take_odometry(in, out);
   align(in, out.fresh);
   take_segment(in, out);

@@ -79,6 +79,7 @@ class FlightTick {
   double odometry_age() const noexcept { return odometry_age_; }  ///< s, at the last tick
 
  private:
+  void take_closure(const TickInput& in) noexcept;
   void take_odometry(const TickInput& in, TickOutput& out) noexcept;
   void align(const TickInput& in, bool fresh) noexcept;
   void take_segment(const TickInput& in, TickOutput& out) noexcept;
@@ -93,6 +94,8 @@ class FlightTick {
   Supervisor supervisor_;
   Tracker tracker_;
   const AcceptedSegment* segment_ = nullptr;  ///< the tracker's
+  std::uint32_t closures_ = 0;                ///< loop closures seen
+  RigidShift map_from_odom_;                  ///< of the last
   Setpoint command_;                          ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more

@@ -68,6 +68,12 @@ void FrameAlignment::rebase(const FramePose& in_map, const FramePose& in_local) 
   position_residual_ = yaw_residual_ = 0;
 }
 
+void FrameAlignment::rebase(const RigidShift& D) noexcept {
+  const RigidShift local_from_new = RigidShift{yaw_, translation_} * D.inverse();
+  yaw_ = local_from_new.yaw;
+  translation_ = local_from_new.t;
+}
+
 bool FrameAlignment::reset_between(const FramePose& in_map, const FramePose& in_local) const noexcept {
   return samples_ >= kMinSamples && ((in_local.p - rotate(in_map.p) - translation_).norm() > kResetPosition ||
                                      std::abs(wrap_angle(in_local.yaw - in_map.yaw - yaw_)) > kResetYaw);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/track/rebase.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::track {
@@ -40,6 +41,9 @@ class FrameAlignment {
   void update(const FramePose& in_map, const FramePose& in_local, bool learn) noexcept;
   /// Takes local ← map anew from this one pair. Real-time: wait-free, no allocation.
   void rebase(const FramePose& in_map, const FramePose& in_local) noexcept;
+  /// The map moved under the vehicle (loop closure), the controller's frame did not: local ← map_new, for
+  /// D = map_new ← map_old. Real-time: wait-free, no allocation.
+  void rebase(const RigidShift& D) noexcept;
   /// This pair lies further from the transform than any noise (faults.md row 8). Real-time: wait-free, no allocation.
   bool reset_between(const FramePose& in_map, const FramePose& in_local) const noexcept;
   /// Enough samples, and their residuals (low-passed over 0.2 s) are small.

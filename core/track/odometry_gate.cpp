@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/track/odometry_gate.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -31,6 +32,14 @@ OdometryGate::Verdict OdometryGate::take(const OdometrySample& sample, bool movi
   if (!((sample.state.p_W - predicted).norm() <= v_max_ * dt + 3 * sigma_)) return Verdict::jump;
   last_ = sample;
   return Verdict::good;
+}
+
+void OdometryGate::rebase(const RigidShift& D) noexcept {
+  if (!last_) return;
+  last_->state = D.state(last_->state);
+  const Eigen::Quaterniond turned = Eigen::Quaterniond(Eigen::AngleAxisd(D.yaw, Vec3::UnitZ())) *
+                                    Eigen::Quaterniond(last_->q[0], last_->q[1], last_->q[2], last_->q[3]);
+  last_->q = {turned.w(), turned.x(), turned.y(), turned.z()};
 }
 
 }  // namespace backwash::track

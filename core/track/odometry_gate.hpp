@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/track/rebase.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -16,6 +17,8 @@ struct OdometrySample {
   std::int64_t stamp_ns = 0;            ///< the sender's stamp, by the sender's clock
   State state;                          ///< m, m/s
   std::array<double, 4> q{1, 0, 0, 0};  ///< body to map: w, x, y, z
+  std::uint32_t closures = 0;           ///< loop closures so far: which map frame this is in
+  RigidShift map_from_odom;             ///< by which the VIO's own pose was brought there
 };
 
 /// Lets only credible odometry through (faults.md rows 2, 3, 5, 6). It sees the newest sample of each tick. Real-time:
@@ -40,6 +43,8 @@ class OdometryGate {
   Verdict take(const OdometrySample& sample, bool moving) noexcept;
   /// The last good sample.
   const std::optional<OdometrySample>& last() const noexcept { return last_; }
+  /// The map moved under the vehicle (loop closure): the last sample is what it would have said. map_new ← map_old.
+  void rebase(const RigidShift& D) noexcept;
   /// After a jump: the next sample is believed whatever it says. Only while nothing is commanded.
   void forget() noexcept { last_.reset(); }
 

@@ -44,6 +44,7 @@ constexpr Transition kTransitions[] = {
     {kFollowed, Reason::frames_disagree, Mode::hold},
     {kFollowed, Reason::battery_low, Mode::land},
     {kFollowed, Reason::autopilot_reset, Mode::hold},
+    {kTracking, Reason::stop_requested, Mode::hold},
     {kTracking, Reason::obstacle_ahead, Mode::hold},
     {kTracking, Reason::outside_map, Mode::hold},
     {kTracking, Reason::map_late, Mode::hold},
@@ -104,6 +105,7 @@ constexpr const char* kReasonNames[kReasons] = {
     "map and autopilot disagree in yaw",
     "map and autopilot disagree in roll",
     "map and autopilot disagree in pitch",
+    "operator asks to stop",
 };
 
 }  // namespace
@@ -160,6 +162,8 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
       return in.missed_periods >= kMissedQuiet;  // row 32
     case Reason::operator_request:
       return in.request == Request::disable && (mode_ == Mode::enabling || !in.armed);
+    case Reason::stop_requested:
+      return in.request == Request::stop;
     case Reason::land_requested:
       return in.request == Request::land;
     case Reason::autopilot_follows:

@@ -59,12 +59,13 @@ enum class Reason : std::uint8_t {
   frame_mismatch_yaw,
   frame_mismatch_roll,
   frame_mismatch_pitch,
+  stop_requested,
 };
-inline constexpr int kReasons = 35;
+inline constexpr int kReasons = 36;
 const char* to_string(Reason reason) noexcept;
 
 /// What an operator asked for since the last tick.
-enum class Request : std::uint8_t { none, enable, disable, land };
+enum class Request : std::uint8_t { none, enable, disable, land, stop };
 
 /// Facts of this tick. Ages in s; a thing never received has an infinite age.
 struct SupervisorInput {

@@ -16,6 +16,7 @@ Tracker::Tracker(const Setpoint& hold, const Vehicle& vehicle)
 
 bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noexcept {
   if (segment.commands.empty() || segment.tube.size() != segment.commands.size() + 1) return false;
+  if (segment.closures != closures_) return false;
   if (segment.continues != 0) {
     if (!segment_ || stop_ || segment.continues != segment_->id || next_ > segment.branch) return false;
   } else {
@@ -27,6 +28,7 @@ bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noex
   }
   segment_ = &segment;
   stop_ = nullptr;
+  shift_ = {};
   return true;
 }
 
@@ -35,6 +37,13 @@ void Tracker::hold_at(const Setpoint& setpoint) noexcept {
   stop_ = nullptr;
   next_ = 0;
   hold_ = at_rest(setpoint);
+  shift_ = {};
+}
+
+void Tracker::rebase(const RigidShift& D, std::uint32_t closures) noexcept {
+  closures_ = closures;
+  shift_ = segment_ ? D * shift_ : RigidShift{};
+  hold_ = D.setpoint(hold_);
 }
 
 const plan::Stop* Tracker::next_stop() const noexcept {
@@ -77,8 +86,9 @@ Inside Tracker::judge(const Vec3& measured_W) const noexcept {
   const reach::TubeStep& predicted = set(next_);
   result.judged = true;
   result.half_widths = next_ > end() ? predicted.half_widths_interval : predicted.half_widths;
-  result.center = predicted.center.p_W;
-  const Vec3 e = measured_W - result.center;
+  // A loop closure moves the map and not the vehicle: the error is judged in the frame that the sets are in.
+  result.center = shift_.point(predicted.center.p_W);
+  const Vec3 e = shift_.inverse().rotate(measured_W - result.center);
   for (std::size_t d = 0; d < kDirections; ++d) {
     result.error[d] = unit(static_cast<Direction>(d)).dot(e);
     // Written so that an error that is not a number is not inside.
@@ -93,7 +103,8 @@ Setpoint Tracker::step() noexcept {
     return hold_;
   }
   const std::size_t k = next_++;
-  const Setpoint& command = stop_ && k >= stop_->branch ? stop_->commands[k - stop_->branch] : segment_->commands[k];
+  const Setpoint command =
+      shift_.setpoint(stop_ && k >= stop_->branch ? stop_->commands[k - stop_->branch] : segment_->commands[k]);
   hold_ = at_rest(command);
   return command;
 }

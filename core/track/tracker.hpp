@@ -8,6 +8,7 @@
 
 #include "core/plan/verified_stops.hpp"
 #include "core/reach/reach_tube.hpp"
+#include "core/track/rebase.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -23,6 +24,8 @@ struct AcceptedSegment {
   std::vector<Setpoint> commands;
   reach::ReachTube tube;          ///< commands.size() + 1 entries; past its end the last entry holds
   std::vector<plan::Stop> stops;  ///< ascending by branch; may be empty
+  std::uint32_t closures = 0;     ///< loop closures that the map frame it is in has seen
+  double clearance = 0;           ///< smallest of its swept tube in the map it was verified in, m
 };
 
 /// What one tick says about the measured position (model.md section 5.4).
@@ -56,6 +59,14 @@ class Tracker {
   /// The sets still to be flown, in order: those of the segment, then those of the stop it is braking on. Past the end
   /// the last one. Real-time: wait-free, no allocation.
   std::array<std::span<const reach::TubeStep>, 2> ahead() const noexcept;
+  /// The map moved under the vehicle (loop closure number `closures`): what was accepted goes on where it physically
+  /// is. D = map_new ← map_old. Segments of an older map frame are refused from now on. Real-time: wait-free, no
+  /// allocation.
+  void rebase(const RigidShift& D, std::uint32_t closures) noexcept;
+  /// From the frame of the segment, its stops and ahead() into the map's present one: not the identity only between a
+  /// loop closure and the next segment.
+  const RigidShift& shift() const noexcept { return shift_; }
+  std::uint32_t closures() const noexcept { return closures_; }
   /// Judges the measured position at this tick against the set predicted for it. Real-time: wait-free, no allocation.
   Inside judge(const Vec3& measured_W) const noexcept;
   /// Command of this tick, then moves on. Real-time: wait-free, no allocation.
@@ -64,6 +75,7 @@ class Tracker {
   bool braking() const noexcept { return stop_ != nullptr; }
   std::uint64_t segment() const noexcept { return segment_ ? segment_->id : 0; }
   std::size_t index() const noexcept { return next_; }  ///< of the command that the next step() gives
+  double clearance() const noexcept { return segment_ ? segment_->clearance : 0; }  ///< of the accepted tube, m
   const Setpoint& held() const noexcept { return hold_; }
 
  private:
@@ -74,6 +86,8 @@ class Tracker {
   const plan::Stop* stop_ = nullptr;  ///< of segment_: what is flown from its branch on
   std::size_t next_ = 0;
   Setpoint hold_;
+  RigidShift shift_;  ///< map ← the segment's frame
+  std::uint32_t closures_ = 0;
   double position_, velocity_;
 };
 

@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/plan/world.hpp"
@@ -36,6 +38,36 @@ struct MapMessage {
   double resolution = 0;
   bool binary = true;
   std::string id;
+  std::int64_t received_ns = 0;
+};
+
+/// One range scan in the map.
+struct Scan {
+  std::vector<Vec3> points_W;  ///< m
+  Vec3 sensor_W = Vec3::Zero();
+  std::int64_t received_ns = 0;
+};
+
+/// Cubes of the map's lattice that a scan found occupied and the newest snapshot does not.
+struct NewVoxels {
+  static constexpr std::size_t kMost = 256;
+  std::int64_t received_ns = 0;
+  double edge = 0;  ///< m
+  std::size_t count = 0;
+  std::array<std::array<double, 3>, kMost> centers{};  ///< m
+};
+
+/// The newest snapshot of the surroundings, to each thread that looks at it. Freed by the map worker alone.
+struct Worlds {
+  using Pointer = std::shared_ptr<const plan::World>;
+  sync::Handover<Pointer> mission, planner, reader, control;
+
+  void offer(const Pointer& world) {
+    for (auto* to : {&mission, &planner, &reader, &control}) to->offer(std::make_unique<const Pointer>(world));
+  }
+  void collect() {
+    for (auto* to : {&mission, &planner, &reader, &control}) to->collect();
+  }
 };
 
 /// One command as received; strings that do not fit are cut, which no valid station has.
@@ -46,7 +78,14 @@ struct CommandMessage {
   std::uint8_t verb = 0;
   Vec3 position = Vec3::Zero();
   double yaw = 0;
+  static constexpr std::size_t kMostWaypoints = 64;
+  std::size_t waypoints = 0;  ///< of follow; more than kMostWaypoints: as many were sent, and none is kept
+  std::array<std::array<double, 3>, kMostWaypoints> waypoint{};
 };
+
+/// Parameters of PX4 that decide what a failsafe does, which matters indoors; `backwashctl check` judges them.
+inline constexpr std::array<std::string_view, 5> kParameters{"COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_OVERRIDE",
+                                                             "NAV_DLL_ACT", "COM_LOW_BAT_ACT"};
 
 /// What the control thread shows to the others, once a tick.
 struct ControlView {
@@ -60,12 +99,16 @@ struct ControlView {
   std::uint64_t segment = 0;                       ///< accepted segment, 0 before the first
   std::uint64_t index = 0;                         ///< of its next command
   bool finished = true;                            ///< the segment's commands are all sent
+  bool braking = false;                            ///< on a verified stop of the segment
+  std::uint32_t closures = 0;                      ///< loop closures seen: the map frame of state and command
+  track::RigidShift shift;                         ///< from the segment's frame into that one
   std::uint64_t refused_segment = 0;               ///< the last one refused
   std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
   double residual_m = 0, residual_rad = 0;
   track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
-  std::uint64_t log_lost = 0;                        ///< records that the raw log had no room for
+  std::array<std::optional<double>, kParameters.size()> parameters{};
+  std::uint64_t log_lost = 0;  ///< records that the raw log had no room for
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 
@@ -112,22 +155,29 @@ struct PlanOutcome {
 };
 
 struct Channels {
-  sync::LatestValue<OdometrySample> odometry;                              // DDS reader → control
-  sync::RecordRing<CommandMessage, 64> commands;                           // DDS reader → mission
-  sync::Handover<MapMessage> maps;                                         // DDS reader → map worker
-  sync::Handover<std::shared_ptr<const plan::World>> worlds;               // map worker → mission
-  sync::RecordRing<track::Request, 16> requests;                           // mission → control
-  std::atomic<bool> arm{false};                                            // planner → control: arm once
-  sync::Handover<PlanJob> jobs;                                            // mission → planner
-  sync::RecordRing<PlanOutcome, 16> outcomes;                              // planner → mission
-  sync::Handover<track::AcceptedSegment> segments;                         // planner → control
+  sync::LatestValue<OdometrySample> odometry;              // DDS reader → control
+  sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
+  sync::Handover<MapMessage> maps;                         // DDS reader → map worker
+  sync::RecordRing<Scan*, 16> scans;                       // DDS reader → map worker, which frees them
+  Worlds worlds;                                           // map worker → each
+  sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // DDS reader, map worker → control
+  std::atomic<std::int64_t> map_ns{-1};                    // map worker: reception of the newest data in the snapshot
+  std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
+  sync::RecordRing<track::Request, 16> requests;           // mission → control
+  std::atomic<bool> arm{false};                            // planner → control: arm once
+  sync::Handover<PlanJob> jobs;                            // mission → planner
+  sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
+  sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
   sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
   sync::Handover<FreshPort> ports;                                         // link watch → control
-  std::atomic<std::uint8_t> link_fault{0};        // control → link watch: 1 + LinkFault, 0: none
-  sync::LatestValue<std::array<char, 192>> task;  // mission → status: of the last command
+  std::atomic<std::uint8_t> link_fault{0};         // control → link watch: 1 + LinkFault, 0: none
+  sync::LatestValue<std::array<char, 192>> place;  // mission → status: what keeps it from flying from here
+  sync::LatestValue<std::array<char, 192>> task;   // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
+  std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
+      closures_refused{0}, foreign_writers{0};
   std::atomic<bool> stop{false};
 };
 

@@ -3,6 +3,7 @@
 
 #include <sys/resource.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -31,8 +32,8 @@ std::uint64_t page_faults() noexcept {
 }  // namespace
 
 ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle,
-                         double battery_land)
-    : channels_(channels), link_(link), flight_(vehicle, battery_land) {
+                         double battery_land, const MapSettings& map)
+    : channels_(channels), link_(link), flight_(vehicle, battery_land), lookout_(channels, vehicle, map) {
   link_.tap(&ControlLoop::on_frame, this);
   const auto constants = study::constants(vehicle, battery_land);
   record(study::RecordKind::constants, now_ns(), &constants, sizeof constants);
@@ -82,10 +83,6 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   return facts;
 }
 
-// The place for what the map worker hands to the control thread: a map at all, the pose within it, its age, and what
-// newly arrived voxels say of flight_.tracker().ahead() and of its next_stop().
-track::Surroundings ControlLoop::look_around() noexcept { return {}; }
-
 track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
   track::TickInput in;
   in.now_ns = now_ns;
@@ -95,17 +92,20 @@ track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
   in.segment = channels_.segments.take();
   in.arm = channels_.arm.load(std::memory_order_relaxed);
   in.autopilot = autopilot(now_ns);
-  in.surroundings = look_around();
+  in.surroundings = lookout_.look(flight_, now_ns);
   return in;
 }
 
 void ControlLoop::forward_odometry() noexcept {
+  // As the VIO said it: a loop closure moves the map and must not move the controller's frame.
   const OdometrySample& s = *flight_.odometry();
+  const track::RigidShift odom_from_map = s.map_from_odom.inverse();
+  const Eigen::Quaterniond attitude(s.q[0], s.q[1], s.q[2], s.q[3]);
   firmware_bridge::VioSample vio{};
   vio.time_us = static_cast<std::uint64_t>(s.stamp_ns / 1000);
-  vio.p_O = s.state.p_W;
-  vio.q_OB = {s.q[0], s.q[1], s.q[2], s.q[3]};
-  vio.v_B = vio.q_OB.conjugate() * s.state.v_W;
+  vio.p_O = odom_from_map.point(s.state.p_W);
+  vio.q_OB = Eigen::Quaterniond(Eigen::AngleAxisd(odom_from_map.yaw, Vec3::UnitZ())) * attitude;
+  vio.v_B = attitude.conjugate() * s.state.v_W;
   vio.omega_B = Vec3::Zero();
   if (link_.send_odometry(vio)) row_.sent |= 4;
 }
@@ -130,6 +130,9 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
     link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
                           to_string(s.reason));
+  // Five parameters, one a second, while nothing depends on the line's time.
+  if (s.mode == track::Mode::passive && s.send_heartbeat && view_.ticks % kTicksPerSecond == 25)
+    link_.send_parameter_request(kParameters[view_.ticks / kTicksPerSecond % kParameters.size()]);
   // What the tick needs is asked for again every 2 s: an autopilot may have restarted.
   if (s.send_heartbeat && view_.ticks % (2 * kTicksPerSecond) == 1) {
     link_.send_message_interval(kLocalPositionNed, 50);
@@ -158,12 +161,17 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.segment = tracker.segment();
   view_.index = tracker.index();
   view_.finished = tracker.finished();
+  view_.braking = tracker.braking();
+  view_.closures = tracker.closures();
+  view_.shift = tracker.shift();
   if (out.refused) view_.refused_segment = in.segment->id;
   view_.odometry_received += in.odometry.has_value();
   view_.odometry_rejected += in.odometry && !out.fresh;
   if (out.inside.judged) ++(out.inside.inside ? view_.inside : view_.outside);
   view_.missed += static_cast<std::uint64_t>(in.missed_periods);
   view_.frames_bad = link_.received().bad_crc;
+  for (std::size_t n = 0; n < kParameters.size(); ++n)
+    if (const auto p = telemetry.parameter(kParameters[n])) view_.parameters[n] = p->value.value;
   view_.residual_m = flight_.alignment().position_residual();
   view_.residual_rad = flight_.alignment().yaw_residual();
   view_.log_lost = channels_.control_log.lost();

@@ -4,6 +4,7 @@
 #include "core/track/flight_tick.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/backwashd/lookout.hpp"
 
 namespace backwash::daemon {
 
@@ -11,7 +12,8 @@ namespace backwash::daemon {
 /// decided, and records both. The one owner of the link.
 class ControlLoop {
  public:
-  ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle, double battery_land);
+  ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle, double battery_land,
+              const MapSettings& map = {});
 
   /// One tick at `now_ns` (CLOCK_MONOTONIC), `missed` whole periods after it was due, `lateness_us` after its own
   /// period began. Real-time: wait-free, no allocation; system calls: non-blocking reads and writes of the port,
@@ -26,7 +28,6 @@ class ControlLoop {
   void poll(std::int64_t now_ns) noexcept;
   track::TickInput gather(std::int64_t now_ns, int missed) noexcept;
   track::AutopilotFacts autopilot(std::int64_t now_ns) const noexcept;
-  track::Surroundings look_around() noexcept;
   void send(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void forward_odometry() noexcept;
   void publish(const track::TickInput& in, const track::TickOutput& out) noexcept;
@@ -37,6 +38,7 @@ class ControlLoop {
   Channels& channels_;
   firmware_bridge::AutopilotLink& link_;
   track::FlightTick flight_;
+  Lookout lookout_;
   bool port_open_ = true;
   std::int64_t now_ns_ = 0;
   ControlView view_;

@@ -56,13 +56,15 @@ int run(const Settings& settings) {
                                       std::chrono::steady_clock::now());
   // What carries odometry to the control thread comes right below it, before the middleware starts its threads.
   const int control = settings.daemon.control.priority;
-  DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), *channels, recorder);
+  DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), settings.vehicle,
+                 *channels, recorder);
   Mission mission(*channels);
-  ControlLoop loop(*channels, link, settings.vehicle, settings.daemon.control.battery_land);
+  ControlLoop loop(*channels, link, settings.vehicle, settings.daemon.control.battery_land, settings.daemon.map);
   {
     std::vector<std::jthread> threads;
     threads.emplace_back([&] { recorder.run(*channels); });
-    threads.emplace_back([&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle); });
+    threads.emplace_back(
+        [&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle, settings.daemon.map); });
     threads.emplace_back(
         [&] { run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); }); });
     threads.emplace_back(

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <iomanip>
 
 #include "firmware_bridge/mavlink/frames.hpp"
@@ -105,6 +106,19 @@ void Autopilot::on(const mavlink::CommandLong& m, double t) {
   acks_.push_back({.command = m.command, .result = result});
 }
 
+// As PX4 answers: integers bytewise in the float.
+void Autopilot::on(const mavlink::ParamRequestRead& m, double) {
+  constexpr std::uint8_t kInt32 = 6, kReal32 = 9;
+  const std::string name(m.param_id.begin(), std::ranges::find(m.param_id, char{0}));
+  const auto found = parameters.find(name);
+  if (found == parameters.end()) return;
+  const bool real = name.ends_with("_T");
+  mavlink::ParamValue answer{.param_count = 1, .param_id = m.param_id, .param_type = real ? kReal32 : kInt32};
+  answer.param_value =
+      real ? static_cast<float>(found->second) : std::bit_cast<float>(static_cast<std::int32_t>(found->second));
+  values_.push_back(answer);
+}
+
 void Autopilot::receive(std::span<const std::uint8_t> bytes, double t) {
   parser_.feed(bytes, [&](const mavlink::Frame& frame) {
     mavlink::decode_and_visit(frame.id, frame.payload, [&](const auto& message) {
@@ -152,6 +166,8 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
   const auto boot_ms = static_cast<std::uint32_t>(steps_);
   for (const auto& ack : acks_) send(ack, out);
   acks_.clear();
+  for (const auto& value : values_) send(value, out);
+  values_.clear();
   if (mute) return out.clear();
   if (battery && steps_ % 1000 == 500) {
     mavlink::BatteryStatus status{.battery_remaining = static_cast<std::int8_t>(std::lround(100 * *battery))};

@@ -30,7 +30,7 @@ start_bench() {
   die "the bench did not start"
 }
 
-# start_daemon VEHICLE RAW_LOG: returns once it has built its world from the map.
+# start_daemon VEHICLE RAW_LOG [ODOMETRY_TOPIC]: returns once it has built its world from the map.
 start_daemon() {
   local from=$(wc -l <"$log")
   cat >"$work/backwashd.toml" <<TOML
@@ -40,7 +40,7 @@ model = "$1"
 domain = $domain
 interface = "lo"
 namespace = "backwash"
-odometry_topic = "rt/backwash/odometry"
+odometry_topic = "${3:-rt/backwash/odometry}"
 [link]
 device = "$work/autopilot"
 baud = 921600

@@ -13,10 +13,14 @@ namespace backwash::dds {
 using Odometry = nav_msgs_msg_dds__Odometry_;
 using Path = nav_msgs_msg_dds__Path_;
 using PoseStamped = geometry_msgs_msg_dds__PoseStamped_;
+using PointCloud = sensor_msgs_msg_dds__PointCloud2_;
+using PointField = sensor_msgs_msg_dds__PointField_;
+using TransformStamped = geometry_msgs_msg_dds__TransformStamped_;
 using Octomap = octomap_msgs_msg_dds__Octomap_;
 using Command = backwash_msgs_msg_dds__Command_;
 using Ack = backwash_msgs_msg_dds__Ack_;
 using Status = backwash_msgs_msg_dds__Status_;
+using Parameter = backwash_msgs_msg_dds__Parameter_;
 using Timing = backwash_msgs_msg_dds__Timing_;
 using Tube = backwash_msgs_msg_dds__ReachTube_;
 using TubeStep = backwash_msgs_msg_dds__ReachStep_;
@@ -38,6 +42,18 @@ template <>
 struct TopicOf<Octomap> {
   static const dds_topic_descriptor& type() { return octomap_msgs_msg_dds__Octomap__desc; }
   static constexpr const char* kName = "map";
+  static constexpr Delivery kDelivery = Delivery::state;
+};
+template <>
+struct TopicOf<PointCloud> {
+  static const dds_topic_descriptor& type() { return sensor_msgs_msg_dds__PointCloud2__desc; }
+  static constexpr const char* kName = "points";
+  static constexpr Delivery kDelivery = Delivery::scans;
+};
+template <>
+struct TopicOf<TransformStamped> {
+  static const dds_topic_descriptor& type() { return geometry_msgs_msg_dds__TransformStamped__desc; }
+  static constexpr const char* kName = "loop_closure";
   static constexpr Delivery kDelivery = Delivery::state;
 };
 template <>

@@ -39,6 +39,18 @@ TEST(DaemonFile, ReadsTheShippedExample) {
   EXPECT_DOUBLE_EQ(d->control.battery_land, 0.15);
 }
 
+TEST(DaemonFile, FramesAndMapMayBeLeftOut) {
+  std::string text = shipped();
+  text.resize(text.find("\n[frames]"));
+  const auto path = std::filesystem::temp_directory_path() / "backwash_daemon_file_short_test.toml";
+  std::ofstream(path) << text;
+  const auto d = load_daemon(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(d) << d.error().message;
+  EXPECT_EQ(d->frames.map, "map");
+  EXPECT_FALSE(d->map.live);
+}
+
 TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
   const auto names = [](const std::string& message, int line, const std::string& key) {
     return message.find(".toml:" + std::to_string(line) + ": key '" + key + "'") != std::string::npos;
@@ -52,6 +64,9 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
   EXPECT_TRUE(names(error_after("cpu = -1", "cpu = 0.5"), 19, "control.cpu"));
   EXPECT_TRUE(names(error_after("battery_land = 0.15", "battery_land = 15"), 20, "control.battery_land"));
   EXPECT_TRUE(names(error_after("[control]", "[controls]"), 17, "controls"));
+  EXPECT_TRUE(names(error_after("live = false", "live = 0"), 29, "map.live"));
+  EXPECT_TRUE(names(error_after("max_mib = 512", "max_mib = 0"), 32, "map.max_mib"));
+  EXPECT_TRUE(names(error_after("body = \"base_link\"", "body = \"map\""), 23, "frames"));
 }
 
 }  // namespace

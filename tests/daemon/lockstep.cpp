@@ -81,6 +81,7 @@ void Lockstep::restart() {
   link_ = std::make_unique<firmware_bridge::AutopilotLink>(line_->open(), std::uint8_t{1},
                                                            firmware_bridge::Time(std::chrono::nanoseconds(now_ns_)));
   loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand);
+  channels->worlds.offer(world_);
   log.clear();
 }
 

@@ -160,6 +160,7 @@ Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond
   commanded = false;
   for (int n = 0; n < 300; ++n) {
     const double t = 0.02 * n;
+    // About a place that the two frames name differently.
     const State truth{{std::sin(t), 0.7 * std::cos(1.3 * t), 0.5 * std::sin(0.9 * t)},
                       {std::cos(t), -0.91 * std::sin(1.3 * t), 0.45 * std::cos(0.9 * t)}};
     if (n % 50 == 0)
@@ -180,7 +181,7 @@ Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond
       State seen = truth;
       Eigen::Quaterniond attitude_seen = q;
       wrong(seen, attitude_seen);
-      s.state = seen;
+      s.state = {seen.p_W + Vec3(-1, 0, 1.2), seen.v_W};  // within the map, however it is mirrored
       s.q = {attitude_seen.w(), attitude_seen.x(), attitude_seen.y(), attitude_seen.z()};
     };
     if (n == 280) rig.channels->requests.push(track::Request::enable);

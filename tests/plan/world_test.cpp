@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
@@ -82,6 +83,40 @@ TEST(World, KeepsTheConstantMargin) {
       EXPECT_NEAR(world->hover.half_widths(v).x(), 0.1, 1e-6);
     }
   }
+}
+
+// The oracle is the world built from scratch.
+TEST(World, UpdatedByRegionIsTheWorldBuiltAnew) {
+  std::mt19937 random(1);
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  map::OccupancyGrid grid = map::builtin_scene("apartment", 0.2).value();
+  auto world = build_world(grid, Model{}, vehicle_5in());
+  std::size_t differ = 0;
+  for (int round = 0; round < 6; ++round) {
+    map::VoxelBox changed;
+    const Index3 low(below(grid.size().x()), below(grid.size().y()), below(grid.size().z()));
+    const auto cell = static_cast<map::Cell>(below(3));
+    for (int n = 0; n < 60; ++n) {
+      const Index3 v = low + Index3(below(5), below(5), below(5));
+      if (!grid.inside(v) || grid.at(v) == cell) continue;
+      grid.set(v, cell);
+      changed.add(v);
+    }
+    const auto before = world;
+    world = update_world(*before, grid, changed, Model{});
+    const auto anew = build_world(grid, Model{}, vehicle_5in());
+    for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+      const Index3 v = grid.voxel(n);
+      ASSERT_EQ(world->grid.at(n), anew->grid.at(n));
+      ASSERT_EQ(world->distance.at(v), anew->distance.at(v));
+      ASSERT_EQ(world->field.has(v), anew->field.has(v)) << "round " << round;
+      ASSERT_EQ(world->bounds.at(v).w, anew->bounds.at(v).w) << "round " << round;
+      ASSERT_EQ(world->hover.clearance(v), anew->hover.clearance(v)) << "round " << round;
+      ASSERT_EQ(world->hover.half_widths(v), anew->hover.half_widths(v)) << "round " << round;
+      differ += before->hover.clearance(v) != anew->hover.clearance(v);
+    }
+  }
+  EXPECT_GT(differ, 100u);  // the changes did change something
 }
 
 }  // namespace

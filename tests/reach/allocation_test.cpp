@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
 #include "core/reach/support.hpp"
 
@@ -48,6 +49,13 @@ TEST(RealTime, StepsOfCentreAndSetsDoNotAllocate) {
     sampled.step(Setpoint{});
     support.half_widths_until_next(bound);
   }
+  EXPECT_EQ(allocations, before);
+}
+
+TEST(RealTime, TestingATubeAgainstANewVoxelDoesNotAllocate) {
+  const ReachTube tube(20);
+  const std::size_t before = allocations;
+  for (int n = 0; n < 10; ++n) EXPECT_EQ(first_blocked(tube, 0, {Vec3::Constant(0.1 * n), 0.1}, 0.2) == 0, n < 2);
   EXPECT_EQ(allocations, before);
 }
 

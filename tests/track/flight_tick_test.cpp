@@ -57,7 +57,7 @@ class Flight {
   const TickOutput& step() {
     in.now_ns += 20'000'000;
     if (in.odometry) in.odometry->state = {out.command.p_W, out.command.v_W};
-    if (!in.odometry) in.odometry = OdometrySample{0, 0, {{0, 0, 1}, Vec3::Zero()}, {1, 0, 0, 0}};
+    if (!in.odometry) in.odometry = OdometrySample{};
     in.odometry->received_ns = in.odometry->stamp_ns = in.now_ns;
     in.autopilot.heartbeat_age = 0.1;
     if (tick_.mode() == Mode::passive) in.odometry->state = {{0, 0, 1}, Vec3::Zero()};

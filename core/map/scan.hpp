@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "core/map/occupancy_grid.hpp"
+
+namespace backwash::map {
+
+/// Voxels from low to high, both included; starts empty.
+struct VoxelBox {
+  Index3 low = Index3::Constant(std::numeric_limits<int>::max());
+  Index3 high = Index3::Constant(std::numeric_limits<int>::min());
+
+  bool empty() const noexcept { return (low.array() > high.array()).any(); }
+  void add(const Index3& v) noexcept {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+  }
+};
+
+/// What a scan changed in the grid.
+struct ScanChange {
+  VoxelBox box;                     ///< around all voxels whose content changed; empty: none did
+  std::vector<Index3> occupied;     ///< voxels that were not occupied before
+  std::size_t freed = 0;            ///< voxels that were not free before
+  std::size_t points_left_out = 0;  ///< not finite
+};
+
+/// A grid that takes in range scans while flying. Within one scan occupied wins over free. A voxel that a point lies in
+/// is occupied from that scan on; an unknown one that rays pass is free; an occupied one is free again after
+/// kMissesToFree scans in a row whose rays pass it and in which no point lies in it, so that a single grazing ray opens
+/// no wall. What lies outside the grid stays unknown.
+class LiveMap {
+ public:
+  static constexpr int kMissesToFree = 5;
+
+  explicit LiveMap(OccupancyGrid grid);
+
+  const OccupancyGrid& grid() const noexcept { return grid_; }
+  /// Casts a ray from the sensor to each point (m in W); the last voxel of a ray is not passed. Points farther than
+  /// `max_range` (m) only free the way up to there. Precondition: the sensor is inside the grid and max_range < 1 km.
+  /// O(points · range/a).
+  ScanChange insert(std::span<const Vec3> points_W, const Vec3& sensor_W, double max_range);
+
+ private:
+  enum class Seen : std::uint8_t { nothing, passed, hit };
+  void see(const Index3& v, Seen what);
+  void pass(const Vec3& from, const Vec3& to);  // in voxels from the origin
+
+  OccupancyGrid grid_;
+  std::vector<std::uint8_t> misses_;  // per voxel: scans in a row that passed it while it was occupied
+  std::vector<Seen> seen_;            // by the scan under way
+  std::vector<std::size_t> touched_;  // the voxels of seen_ that are not nothing
+};
+
+}  // namespace backwash::map
