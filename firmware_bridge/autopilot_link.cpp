@@ -74,8 +74,8 @@ std::string_view name(LinkFault fault) noexcept {
 AutopilotLink::AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now)
     : port_(std::move(port)), configured_vehicle_(vehicle), opened_at_(now) {}
 
-void AutopilotLink::reconnect(Port port, Time now) noexcept {
-  port_ = std::move(port);
+Port AutopilotLink::reconnect(Port port, Time now) noexcept {
+  std::swap(port_, port);
   opened_at_ = now;
   lost_.reset();
   parser_ = {};
@@ -84,6 +84,7 @@ void AutopilotLink::reconnect(Port port, Time now) noexcept {
   heard_.reset();
   clock_.reset();
   timesync_asked_ns_ = 0;
+  return port;
 }
 
 tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {
@@ -240,6 +241,13 @@ bool AutopilotLink::send_odometry(const VioSample& s) noexcept {
 bool AutopilotLink::send_statustext(std::uint8_t severity, std::string_view text) noexcept {
   mavlink::Statustext m{.severity = severity};
   std::ranges::copy(text.substr(0, m.text.size()), m.text.begin());
+  return send(m);
+}
+
+bool AutopilotLink::send_parameter_request(std::string_view name) noexcept {
+  mavlink::ParamRequestRead m{
+      .param_index = -1, .target_system = heard_.value_or(0), .target_component = kFlightController, .param_id = {}};
+  std::ranges::copy(name.substr(0, m.param_id.size()), m.param_id.begin());
   return send(m);
 }
 

@@ -64,8 +64,9 @@ class AutopilotLink {
   /// `vehicle`: its system id; absent: that of the first flight controller heard.
   AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now);
 
-  /// Takes a newly opened port after a loss. All that was known of the vehicle is forgotten; nothing waits to be sent.
-  void reconnect(Port port, Time now) noexcept;
+  /// Takes a newly opened port after a loss and returns the lost one (closing it may wait for the line). All that was
+  /// known of the vehicle is forgotten; nothing waits to be sent.
+  Port reconnect(Port port, Time now) noexcept;
 
   /// Reads what has arrived (at most 8 KiB), then sends what waits. Error: kLost, also on every later call.
   tl::expected<void, PortError> poll(Time now) noexcept;
@@ -78,8 +79,8 @@ class AutopilotLink {
   std::optional<Time::duration> heartbeat_age(Time now) const noexcept;
   /// The gravest fault now; absent: none, or still within the first two seconds.
   std::optional<LinkFault> fault(Time now) const noexcept;
-  /// Called with each frame that was accepted from the line, and each that was handed to the port's queue: for a raw log.
-  /// Must itself be real-time. Null: none.
+  /// Called with each frame that was accepted from the line, and each that was handed to the port's queue: for a raw
+  /// log. Must itself be real-time. Null: none.
   using Tap = void (*)(void* context, bool outgoing, std::span<const std::uint8_t> frame) noexcept;
   void tap(Tap each, void* context) noexcept { tap_ = each, tap_context_ = context; }
   const mavlink::ParserCounters& received() const noexcept { return parser_.counters(); }
@@ -105,6 +106,9 @@ class AutopilotLink {
   bool send_land() noexcept;
   /// Asks for a message at `rate_hz` > 0.
   bool send_message_interval(std::uint32_t message_id, double rate_hz) noexcept;
+
+  /// Asks for a parameter by name; Telemetry::parameter() has the answer.
+  bool send_parameter_request(std::string_view name) noexcept;
 
   /// Forgets what waits to be sent, here and in the kernel: QUIET means that not even an old set-point follows.
   void discard_unsent() noexcept;

@@ -154,4 +154,33 @@ void Telemetry::take(const mavlink::Statustext& m, Time now) noexcept {
   text = {line, now};
 }
 
+// PX4 puts an integer's bytes where the float is; others convert.
+void Telemetry::take(const mavlink::ParamValue& m, Time now) noexcept {
+  constexpr std::uint8_t kInt32 = 6;
+  Parameter p{m.param_id, static_cast<double>(m.param_value)};
+  const bool px4 = status && status->value.autopilot == Autopilot::kPx4;
+  if (px4 && m.param_type == kInt32) p.value = std::bit_cast<std::int32_t>(m.param_value);
+  if (!std::isfinite(p.value)) {
+    ++broken;
+    return;
+  }
+  for (auto& known : parameters_) {
+    if (known && known->value.name == p.name) {
+      known = {p, now};
+      return;
+    }
+  }
+  parameters_[next_parameter_] = {p, now};
+  next_parameter_ = (next_parameter_ + 1) % parameters_.size();
+}
+
+Latest<Parameter> Telemetry::parameter(std::string_view name) const noexcept {
+  std::array<char, 16> wanted{};
+  std::ranges::copy(name.substr(0, wanted.size()), wanted.begin());
+  for (const auto& p : parameters_) {
+    if (p && p->value.name == wanted) return p;
+  }
+  return std::nullopt;
+}
+
 }  // namespace backwash::firmware_bridge

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <chrono>
 #include <optional>
+#include <string_view>
 
 #include "core/types/state.hpp"
 #include "firmware_bridge/mavlink/messages.hpp"
@@ -60,6 +61,12 @@ struct CommandResult {
   std::uint8_t result = 0;    ///< MAV_RESULT, 0 = accepted
 };
 
+/// From PARAM_VALUE.
+struct Parameter {
+  std::array<char, 16> name{};  ///< zero-filled; all 16 may be used
+  double value = 0;
+};
+
 /// From STATUSTEXT.
 struct StatusLine {
   std::uint8_t severity = 0;    ///< 0 emergency … 7 debug
@@ -85,6 +92,9 @@ class Telemetry {
   /// Newest answer to this command, if any came since the start.
   Latest<CommandResult> result_of(std::uint16_t command) const noexcept;
 
+  /// The autopilot's value of a parameter that was asked for, if it came; the last eight names are kept.
+  Latest<Parameter> parameter(std::string_view name) const noexcept;
+
   void take(const mavlink::Heartbeat& m, Time now) noexcept;
   void take(const mavlink::LocalPositionNed& m, Time now) noexcept;
   void take(const mavlink::AttitudeQuaternion& m, Time now) noexcept;
@@ -97,6 +107,7 @@ class Telemetry {
   void take(const mavlink::ExtendedSysState& m, Time now) noexcept;
   void take(const mavlink::CommandAck& m, Time now) noexcept;
   void take(const mavlink::Statustext& m, Time now) noexcept;
+  void take(const mavlink::ParamValue& m, Time now) noexcept;
 
  private:
   void take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
@@ -108,6 +119,8 @@ class Telemetry {
   bool battery_status_seen_ = false;
   std::array<Latest<CommandResult>, 8> results_;
   std::size_t next_result_ = 0;
+  std::array<Latest<Parameter>, 8> parameters_;
+  std::size_t next_parameter_ = 0;
 };
 
 }  // namespace backwash::firmware_bridge

@@ -34,7 +34,9 @@ struct Daemon {
     int system = 1;  ///< MAVLink system id of the vehicle
   } link;
   struct {
-    int priority = 0;  ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
+    int priority = 0;         ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
+    int cpu = -1;             ///< processor that the control thread is bound to; −1: any
+    double battery_land = 0;  ///< remaining share below which LAND is asked for, once; 0: never
   } control;
   struct {
     std::string file;  ///< raw log, made anew at each start

@@ -9,7 +9,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (!file) return tl::unexpected(file.error());
 
   Daemon d;
-  double domain = 0, baud = 0, system = 0, priority = 0;
+  double domain = 0, baud = 0, system = 0, priority = 0, cpu = 0;
   const NumberKey numbers[] = {
       {"dds.domain", &domain, {0, 230}},
       {"link.baud", &baud, {9600, 4'000'000}},
@@ -18,6 +18,8 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"map.closing_speed", &d.map.closing_speed, {0, 5}, NumberKey::Presence::optional},
       {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, NumberKey::Presence::optional},
       {"map.max_mib", &d.map.max_mib, {1, 65536}, NumberKey::Presence::optional},
+      {"control.cpu", &cpu, {-1, 1023}},
+      {"control.battery_land", &d.control.battery_land, {0, 1}},
   };
   const std::pair<std::string_view, std::string*> texts[] = {
       {"vehicle", &d.vehicle},
@@ -53,12 +55,14 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
     d.map.live = *live;
   }
   for (const auto& [key, value] : {std::pair{"dds.domain", domain}, std::pair{"link.baud", baud},
-                                   std::pair{"link.system", system}, std::pair{"control.priority", priority}})
+                                   std::pair{"link.system", system}, std::pair{"control.priority", priority},
+                                   std::pair{"control.cpu", cpu}})
     if (value != static_cast<int>(value)) return tl::unexpected(file->error(key, "needs a whole number"));
   d.dds.domain = static_cast<int>(domain);
   d.link.baud = static_cast<int>(baud);
   d.link.system = static_cast<int>(system);
   d.control.priority = static_cast<int>(priority);
+  d.control.cpu = static_cast<int>(cpu);
   return d;
 }
 

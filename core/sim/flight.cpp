@@ -140,7 +140,7 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, rise->ground, commands, bounds, options.sigma_scale);
   Flight flight{};
   flight.column = rise->column;
-  flight.take_off = fly_piece(loop, world, {1, 0, 0, commands, tube}, 0, z_safe, rise->risen, 0);
+  flight.take_off = fly_piece(loop, world, {1, 0, 0, commands, tube, {}}, 0, z_safe, rise->risen, 0);
 
   // Route: planned from the state estimated now, with the hold at the goal; its tube is propagated once, here.
   Setpoint hover;
@@ -160,7 +160,7 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, hover, commands, bounds, options.sigma_scale);
   constexpr double kEverywhere = -std::numeric_limits<double>::infinity();  // the take-off's exception ends with it
   flight.route =
-      fly_piece(loop, world, {2, 0, 0, commands, tube}, flight.take_off.samples.back().t, kEverywhere, arrived, 1);
+      fly_piece(loop, world, {2, 0, 0, commands, tube, {}}, flight.take_off.samples.back().t, kEverywhere, arrived, 1);
   return flight;
 }
 

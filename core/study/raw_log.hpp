@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
@@ -14,7 +15,7 @@ namespace backwash::study {
 
 /// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is the line
 /// kRawLogMagic, then records: RecordHeader and `size` bytes, little-endian, no padding between records.
-inline constexpr char kRawLogMagic[] = "backwash raw log 1\n";
+inline constexpr char kRawLogMagic[] = "backwash raw log 2\n";
 
 enum class RecordKind : std::uint32_t {
   configuration = 1,  ///< text: the vehicle, model and daemon files as given
@@ -25,8 +26,15 @@ enum class RecordKind : std::uint32_t {
   frame_in = 6,       ///< one MAVLink frame received
   frame_out = 7,      ///< one MAVLink frame handed to the port
   tick = 8,           ///< TickRecord
-  segment = 9,  ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
+  segment = 9,      ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
+  constants = 10,   ///< ConstantsRecord
+  tick_input = 11,  ///< TickInputRecord: what the next tick record was decided from
+  offer = 12,       ///< OfferRecord …: a segment as it was offered to the control thread (core/study/tick_log.hpp)
+  lost = 13,        ///< LostRecord: the disk did not take what came before
+  scan = 14,        ///< text, one line: a scan was handed to the control thread and to the map worker
+  world = 15,       ///< text, one line: a new snapshot was handed out
 };
+inline constexpr auto kLastKind = RecordKind::world;
 
 struct RecordHeader {
   std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
@@ -64,21 +72,53 @@ struct TickRecord {
   float compute_us, lateness_us;  ///< of the tick before this one
   float odometry_to_wire_us;      ///< from the reception of a sample to the set-point that first used it; < 0: none new
   float frame_residual_m, frame_residual_rad;
-  std::uint32_t page_faults;                     ///< of the control thread since start
-  double p[3], v[3];                             ///< newest odometry, map frame
-  double cmd_p[3], cmd_v[3], cmd_a[3], cmd_yaw;  ///< command in the map frame
-  double center[3], half_widths[kDirections];    ///< set predicted for this tick, m
+  std::uint32_t page_faults;                             ///< of the control thread since start
+  double p[3], v[3];                                     ///< newest odometry, map frame
+  double cmd_p[3], cmd_v[3], cmd_a[3], cmd_yaw;          ///< command in the map frame
+  double center[3], half_widths[kDirections];            ///< set predicted for this tick, m
+  double local_p[3], local_v[3], local_a[3], local_yaw;  ///< command in the controller's frame
+  std::uint32_t asked;                                   ///< what was to be sent, bits as in study::Asked
+  std::uint32_t padding;
 };
-static_assert(sizeof(TickRecord) % 8 == 0);
+static_assert(sizeof(TickRecord) == 352);
+
+/// What the decisions of a flight depend on beside their inputs (core/track/flight_tick.hpp).
+struct ConstantsRecord {
+  double v_max, estimation_position, initial_position, initial_velocity, battery_land;
+};
+
+struct LostRecord {
+  std::uint64_t records;  ///< lost since the start of the log
+};
+
+/// track::TickInput, flat.
+struct TickInputRecord {
+  std::int64_t now_ns, odometry_received_ns, odometry_stamp_ns, pose_at_ns;
+  std::uint64_t segment;                   ///< id of the segment offered, 0: none
+  double p[3], v[3], q[4];                 ///< odometry
+  double pose_p[3], pose_v[3], pose_q[4];  ///< the autopilot's
+  double heartbeat_age, battery;
+  double map_from_odom[4];  ///< yaw and translation of the newest loop closure
+  std::int32_t missed_periods;
+  std::uint32_t request, flags, reset_counter;  ///< flags: core/study/tick_log.cpp
+  std::uint32_t closures, padding;
+};
+static_assert(sizeof(TickInputRecord) == 272);
 
 /// A record as read back.
 struct RawRecord {
   RecordHeader header;
   std::vector<std::uint8_t> bytes;
+  std::uint64_t offset = 0;  ///< of its header in the file
 };
 
-/// Reads a raw log; a last record cut short by a crash is dropped. Errors: not_found; bad_data with the byte offset.
-tl::expected<std::vector<RawRecord>, LogError> read_raw_log(const std::string& path);
+struct RawLog {
+  std::vector<RawRecord> records;
+  std::optional<std::uint64_t> cut_at;  ///< offset of a last record that a crash cut short; it is not in `records`
+};
+
+/// Reads a raw log. Errors: not_found; bad_data with the byte offset.
+tl::expected<RawLog, LogError> read_raw_log(const std::string& path);
 
 /// The payload as T, or nothing if it is shorter.
 template <typename T>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/track/frame_alignment.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,28 +9,51 @@
 namespace backwash::track {
 namespace {
 
-// Low-pass weights at 50 Hz: the transform averages over 1 s, the residuals over 0.2 s.
-constexpr double kLearn = 0.02, kWatch = 0.1;
+// Low-pass weights at 50 Hz: the transform averages over 1 s, the residuals over 0.2 s; velocities fade over 5 s.
+constexpr double kLearn = 0.02, kWatch = 0.1, kFade = 0.996;
+
+Vec3 turned(double yaw, const Vec3& v) noexcept {
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  return {c * v.x() - s * v.y(), s * v.x() + c * v.y(), v.z()};
+}
 
 }  // namespace
+
+const char* to_string(Mismatch mismatch) noexcept {
+  switch (mismatch) {
+    case Mismatch::none:
+      return "none";
+    case Mismatch::x:
+      return "x";
+    case Mismatch::y:
+      return "y";
+    case Mismatch::z:
+      return "z";
+    case Mismatch::yaw:
+      return "yaw";
+    case Mismatch::roll:
+      return "roll";
+    case Mismatch::pitch:
+      return "pitch";
+  }
+  return "?";
+}
 
 double wrap_angle(double angle) noexcept {
   angle = std::remainder(angle, 2 * std::numbers::pi);
   return angle <= -std::numbers::pi ? std::numbers::pi : angle;
 }
 
-Vec3 FrameAlignment::rotate(const Vec3& v) const noexcept {
-  const double c = std::cos(yaw_), s = std::sin(yaw_);
-  return {c * v.x() - s * v.y(), s * v.x() + c * v.y(), v.z()};
-}
+Vec3 FrameAlignment::rotate(const Vec3& v) const noexcept { return turned(yaw_, v); }
 
-void FrameAlignment::update(const YawPose& in_map, const YawPose& in_local, bool learn) noexcept {
+void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, bool learn) noexcept {
   const double yaw = wrap_angle(in_local.yaw - in_map.yaw);
   if (learn) {
     // A running mean first, then a low-pass: the first samples count as much as later ones.
     const double weight = std::max(kLearn, 1.0 / (samples_ + 1));
     yaw_ = wrap_angle(yaw_ + weight * wrap_angle(yaw - yaw_));
     translation_ += weight * (in_local.p - rotate(in_map.p) - translation_);
+    correlate(in_map, in_local);
   }
   const double position_error = (in_local.p - rotate(in_map.p) - translation_).norm();
   const double yaw_error = std::abs(wrap_angle(yaw - yaw_));
@@ -38,8 +62,56 @@ void FrameAlignment::update(const YawPose& in_map, const YawPose& in_local, bool
   samples_ = std::min(samples_ + 1, 1'000'000);
 }
 
+void FrameAlignment::rebase(const FramePose& in_map, const FramePose& in_local) noexcept {
+  yaw_ = wrap_angle(in_local.yaw - in_map.yaw);
+  translation_ = in_local.p - rotate(in_map.p);
+  position_residual_ = yaw_residual_ = 0;
+}
+
+void FrameAlignment::rebase(const RigidShift& D) noexcept {
+  const RigidShift local_from_new = RigidShift{yaw_, translation_} * D.inverse();
+  yaw_ = local_from_new.yaw;
+  translation_ = local_from_new.t;
+}
+
+bool FrameAlignment::reset_between(const FramePose& in_map, const FramePose& in_local) const noexcept {
+  return samples_ >= kMinSamples && ((in_local.p - rotate(in_map.p) - translation_).norm() > kResetPosition ||
+                                     std::abs(wrap_angle(in_local.yaw - in_map.yaw - yaw_)) > kResetYaw);
+}
+
 bool FrameAlignment::aligned() const noexcept {
   return samples_ >= kMinSamples && position_residual_ < kMaxPosition && yaw_residual_ < kMaxYaw;
+}
+
+void FrameAlignment::correlate(const FramePose& in_map, const FramePose& in_local) noexcept {
+  cross_ = kFade * cross_ + turned(-yaw_, in_local.v) * in_map.v.transpose();
+  energy_ = kFade * energy_ + in_map.v.cwiseProduct(in_map.v);
+  // The rotation from one up to the other, as an angle about the body's x and y axes; past 90° it is as wrong.
+  const Vec3 axis = in_map.up_B.cross(in_local.up_B);
+  const bool upside_down = in_map.up_B.dot(in_local.up_B) < 0;
+  roll_ += kWatch * ((upside_down ? std::numbers::pi : std::asin(std::clamp(axis.x(), -1.0, 1.0))) - roll_);
+  pitch_ += kWatch * (std::asin(std::clamp(axis.y(), -1.0, 1.0)) - pitch_);
+}
+
+Mismatch FrameAlignment::mismatch() const noexcept {
+  if (std::max(std::abs(roll_), std::abs(pitch_)) > kMaxTilt)
+    return std::abs(roll_) >= std::abs(pitch_) ? Mismatch::roll : Mismatch::pitch;
+  if (energy_.z() > kExcited && cross_(2, 2) < kLeastGain * energy_.z()) return Mismatch::z;
+  return horizontal_mismatch();
+}
+
+Mismatch FrameAlignment::horizontal_mismatch() const noexcept {
+  const double energy = energy_.x() + energy_.y();
+  if (energy <= kExcited) return Mismatch::none;
+  // If the local velocity is the map's turned by θ, cross = R(θ) Σ v vᵀ, whose rotational part is exactly the energy.
+  const double sine = cross_(1, 0) - cross_(0, 1), cosine = cross_(0, 0) + cross_(1, 1);
+  if (std::hypot(sine, cosine) > kLeastRotation * energy)
+    return std::abs(std::atan2(sine, cosine)) > kMaxTurn ? Mismatch::yaw : Mismatch::none;
+  // No rotation explains it: an axis is mirrored, dead or scaled. The one with the lower gain is named.
+  const double least = kExcited / 2;
+  const double gain_x = energy_.x() > least ? cross_(0, 0) / energy_.x() : 1;
+  const double gain_y = energy_.y() > least ? cross_(1, 1) / energy_.y() : 1;
+  return gain_x <= gain_y ? Mismatch::x : Mismatch::y;
 }
 
 Setpoint FrameAlignment::to_local(const Setpoint& in_map) const noexcept {

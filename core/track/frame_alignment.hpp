@@ -1,15 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <optional>
+
+#include "core/track/rebase.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::track {
 
-/// Pose of one body in one frame at one moment; both frames are z-up, so they differ by a yaw and a translation.
-struct YawPose {
-  Vec3 p = Vec3::Zero();  ///< m
-  double yaw = 0;         ///< rad
+/// Motion of one body in one frame at one moment; both frames are z-up, so they differ by a yaw and a translation.
+struct FramePose {
+  Vec3 p = Vec3::Zero();      ///< m
+  double yaw = 0;             ///< rad
+  Vec3 v = Vec3::Zero();      ///< m/s
+  Vec3 up_B = Vec3::UnitZ();  ///< the frame's z axis in the body's, x forward, y left
 };
+
+/// In what two descriptions of the same motion contradict each other: an axis of the map, or an angle.
+enum class Mismatch : std::uint8_t { none, x, y, z, yaw, roll, pitch };
+const char* to_string(Mismatch mismatch) noexcept;
 
 /// Estimates local ← map, p_local = R_z(yaw) p_map + t, from the vehicle's pose in both frames at the same moments
 /// (interfaces.md, "Frames between map, odometry and controller"). While learning it follows the newest samples;
@@ -19,26 +29,49 @@ class FrameAlignment {
   static constexpr double kMaxPosition = 0.05;                     ///< m: aligned below this residual
   static constexpr double kMaxYaw = 3.0 * 3.14159265358979 / 180;  ///< rad
   static constexpr int kMinSamples = 25;                           ///< half a second at 50 Hz
+  /// A single pair further apart than three times the above means that the controller's estimator was reset: odometry
+  /// that jumps so far does not pass its gate.
+  static constexpr double kResetPosition = 3 * kMaxPosition, kResetYaw = 3 * kMaxYaw;
+  static constexpr double kMaxTilt = 5.0 * 3.14159265358979 / 180;   ///< rad
+  static constexpr double kMaxTurn = 10.0 * 3.14159265358979 / 180;  ///< rad, between the velocities' directions
+  static constexpr double kExcited = 25 * 0.15 * 0.15;               ///< (m/s)²: half a second at 0.15 m/s
+  static constexpr double kLeastGain = 0.5, kLeastRotation = 0.8;    ///< of velocity, both 1 in a perfect match
 
   /// One pair of poses, 20 ms after the last. Real-time: wait-free, no allocation.
-  void update(const YawPose& in_map, const YawPose& in_local, bool learn) noexcept;
-  /// Forgets everything: the next samples define the transform anew.
-  void reset() noexcept { *this = FrameAlignment{}; }
+  void update(const FramePose& in_map, const FramePose& in_local, bool learn) noexcept;
+  /// Takes local ← map anew from this one pair. Real-time: wait-free, no allocation.
+  void rebase(const FramePose& in_map, const FramePose& in_local) noexcept;
+  /// The map moved under the vehicle (loop closure), the controller's frame did not: local ← map_new, for
+  /// D = map_new ← map_old. Real-time: wait-free, no allocation.
+  void rebase(const RigidShift& D) noexcept;
+  /// This pair lies further from the transform than any noise (faults.md row 8). Real-time: wait-free, no allocation.
+  bool reset_between(const FramePose& in_map, const FramePose& in_local) const noexcept;
   /// Enough samples, and their residuals (low-passed over 0.2 s) are small.
   bool aligned() const noexcept;
   double position_residual() const noexcept { return position_residual_; }  ///< m
   double yaw_residual() const noexcept { return yaw_residual_; }            ///< rad
+
+  /// What is wrong with the frames, from the correlation of the two velocities (over the last 5 s of motion while
+  /// learning) and from the two attitudes' tilt (faults.md row 7). Velocity is judged along directions in which the
+  /// vehicle has moved; a vehicle that stood still shows its tilt only. Real-time: wait-free, no allocation.
+  Mismatch mismatch() const noexcept;
 
   /// A command of the map frame in the controller's local frame. Real-time: wait-free, no allocation.
   Setpoint to_local(const Setpoint& in_map) const noexcept;
 
  private:
   Vec3 rotate(const Vec3& v) const noexcept;
+  void correlate(const FramePose& in_map, const FramePose& in_local) noexcept;
+  Mismatch horizontal_mismatch() const noexcept;
 
   int samples_ = 0;
   double yaw_ = 0;
   Vec3 translation_ = Vec3::Zero();
   double position_residual_ = 0, yaw_residual_ = 0;
+  /// Forgetting sums over pairs of velocities, the local one turned into the map: local·mapᵀ, and map² per axis.
+  Mat3 cross_ = Mat3::Zero();
+  Vec3 energy_ = Vec3::Zero();
+  double roll_ = 0, pitch_ = 0;  ///< tilt between the two, low-passed, rad
 };
 
 /// Angle wrapped to (−π, π], rad.

@@ -1,177 +1,268 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/track/supervisor.hpp"
 
+#include <algorithm>
+
 #include "core/types/geometry.hpp"
 
 namespace backwash::track {
 namespace {
 
-// LAND is repeated for this many ticks (one command may be lost), then the daemon goes quiet.
-constexpr int kLandTicks = 10;
+constexpr ModeSet kCommanding = set_of({Mode::enabling, Mode::tracking, Mode::hold, Mode::land});
+constexpr ModeSet kFollowed = set_of({Mode::tracking, Mode::hold});
+constexpr ModeSet kEnabling = set_of({Mode::enabling}), kTracking = set_of({Mode::tracking});
+constexpr ModeSet kHold = set_of({Mode::hold}), kLand = set_of({Mode::land});
 
-double seconds(int ticks) noexcept { return ticks * kControlPeriod; }
+// core/track/README.md shows this table; a test compares the two.
+constexpr Transition kTransitions[] = {
+    // Without a working link or a working clock nothing may be streamed.
+    {kCommanding, Reason::port_lost, Mode::quiet},
+    {kCommanding, Reason::transmit_full, Mode::quiet},
+    {kCommanding, Reason::autopilot_silent, Mode::quiet},
+    {kCommanding, Reason::clock_stopped, Mode::quiet},
+    {kEnabling, Reason::operator_request, Mode::passive},
+    {kEnabling, Reason::odometry_lost, Mode::passive},
+    {kEnabling, Reason::odometry_jump, Mode::passive},
+    {kEnabling, Reason::frame_mismatch_x, Mode::passive},
+    {kEnabling, Reason::frame_mismatch_y, Mode::passive},
+    {kEnabling, Reason::frame_mismatch_z, Mode::passive},
+    {kEnabling, Reason::frame_mismatch_yaw, Mode::passive},
+    {kEnabling, Reason::frame_mismatch_roll, Mode::passive},
+    {kEnabling, Reason::frame_mismatch_pitch, Mode::passive},
+    {kEnabling, Reason::autopilot_follows, Mode::tracking},
+    {kEnabling, Reason::enable_timeout, Mode::passive},
+    // The autopilot, its pilot and the operator come before everything that we notice.
+    {kFollowed, Reason::offboard_left, Mode::passive},
+    {kFollowed, Reason::disarmed, Mode::passive},
+    {kFollowed, Reason::land_requested, Mode::land},
+    {kFollowed, Reason::operator_request, Mode::passive},
+    {kHold, Reason::pose_untrusted, Mode::land},
+    {kFollowed, Reason::odometry_jump, Mode::hold},
+    {kFollowed, Reason::odometry_frozen, Mode::hold},
+    {kFollowed, Reason::odometry_disorder, Mode::hold},
+    {kFollowed, Reason::odometry_lost, Mode::hold},
+    {kFollowed, Reason::frames_disagree, Mode::hold},
+    {kFollowed, Reason::battery_low, Mode::land},
+    {kFollowed, Reason::autopilot_reset, Mode::hold},
+    {kTracking, Reason::stop_requested, Mode::hold},
+    {kTracking, Reason::obstacle_ahead, Mode::hold},
+    {kTracking, Reason::outside_map, Mode::hold},
+    {kTracking, Reason::map_late, Mode::hold},
+    {kTracking, Reason::outside_set, Mode::hold},
+    {kTracking, Reason::deadline_missed, Mode::hold},
+    {kHold, Reason::segment_accepted, Mode::tracking},
+    {kLand, Reason::landed, Mode::passive},
+    {kLand, Reason::land_sent, Mode::quiet},
+};
+
+constexpr Reason kRefusals[] = {
+    Reason::port_lost,          Reason::autopilot_silent,    Reason::odometry_lost,        Reason::map_missing,
+    Reason::outside_map,        Reason::frame_mismatch_x,    Reason::frame_mismatch_y,     Reason::frame_mismatch_z,
+    Reason::frame_mismatch_yaw, Reason::frame_mismatch_roll, Reason::frame_mismatch_pitch,
+};
+
+// A pose that these speak of is not to be flown by.
+constexpr bool distrusts(Reason reason) noexcept {
+  return reason == Reason::odometry_jump || reason == Reason::odometry_lost || reason == Reason::odometry_frozen ||
+         reason == Reason::odometry_disorder || reason == Reason::frames_disagree;
+}
+
+constexpr const char* kModeNames[kModes] = {"passive", "enabling", "tracking", "hold", "land", "quiet"};
+
+constexpr const char* kReasonNames[kReasons] = {
+    "started",
+    "enable requested",
+    "operator request",
+    "autopilot follows our set-points",
+    "new trajectory accepted",
+    "autopilot did not follow within 5 s",
+    "odometry lost",
+    "odometry jumped",
+    "map and autopilot frames disagree",
+    "error outside its reachable set for 3 ticks",
+    "3 control deadlines missed within a second",
+    "port to the autopilot lost",
+    "port to the autopilot does not take set-points",
+    "no heartbeat from the autopilot for 1.5 s",
+    "autopilot left offboard",
+    "disarmed",
+    "landed",
+    "land requested of the autopilot",
+    "operator asks to land",
+    "odometry stamps do not rise",
+    "odometry frozen while moving",
+    "no trusted pose for 0.3 s",
+    "autopilot's position estimate was reset",
+    "obstacle in the way",
+    "vehicle outside the map",
+    "live map older than 1 s",
+    "no map was received",
+    "battery low",
+    "25 control periods missed in a row",
+    "map and autopilot disagree along x",
+    "map and autopilot disagree along y",
+    "map and autopilot disagree along z",
+    "map and autopilot disagree in yaw",
+    "map and autopilot disagree in roll",
+    "map and autopilot disagree in pitch",
+    "operator asks to stop",
+};
 
 }  // namespace
 
 const char* to_string(Mode mode) noexcept {
-  switch (mode) {
-    case Mode::passive:
-      return "passive";
-    case Mode::enabling:
-      return "enabling";
-    case Mode::tracking:
-      return "tracking";
-    case Mode::hold:
-      return "hold";
-    case Mode::land:
-      return "land";
-    case Mode::quiet:
-      return "quiet";
-  }
-  return "?";
+  const auto n = static_cast<std::size_t>(mode);
+  return n < kModes ? kModeNames[n] : "?";
 }
 
 const char* to_string(Reason reason) noexcept {
-  switch (reason) {
-    case Reason::started:
-      return "started";
-    case Reason::enabled:
-      return "enable requested";
-    case Reason::operator_request:
-      return "operator request";
-    case Reason::autopilot_follows:
-      return "autopilot follows our set-points";
-    case Reason::segment_accepted:
-      return "new trajectory accepted";
-    case Reason::enable_timeout:
-      return "autopilot did not follow within 5 s";
-    case Reason::odometry_lost:
-      return "odometry lost";
-    case Reason::odometry_jump:
-      return "odometry jumped";
-    case Reason::frames_disagree:
-      return "map and autopilot frames disagree";
-    case Reason::outside_set:
-      return "error outside its reachable set for 3 ticks";
-    case Reason::deadline_missed:
-      return "control deadline missed";
-    case Reason::port_lost:
-      return "port to the autopilot lost";
-    case Reason::transmit_full:
-      return "port to the autopilot does not take set-points";
-    case Reason::autopilot_silent:
-      return "no heartbeat from the autopilot for 1.5 s";
-    case Reason::offboard_left:
-      return "autopilot left offboard";
-    case Reason::disarmed:
-      return "disarmed";
-    case Reason::landed:
-      return "landed";
-    case Reason::land_sent:
-      return "land requested of the autopilot";
-  }
-  return "?";
+  const auto n = static_cast<std::size_t>(reason);
+  return n < kReasons ? kReasonNames[n] : "?";
 }
+
+std::span<const Transition> transitions() noexcept { return kTransitions; }
+std::span<const Reason> refusals() noexcept { return kRefusals; }
+
+bool Supervisor::pose_trusted() const noexcept { return !distrusts(reason_); }
+double Supervisor::seconds_in_mode() const noexcept { return ticks_in_mode_ * kControlPeriod; }
 
 void Supervisor::enter(Mode mode, Reason reason) noexcept {
   if (mode == mode_ && reason == reason_) return;
-  if (mode != mode_) ticks_in_mode_ = 0, outside_ = 0;
+  // A hold that comes to distrust the pose begins anew: its time is limited.
+  if (mode != mode_ || (mode == Mode::hold && distrusts(reason) && pose_trusted())) ticks_in_mode_ = 0, outside_ = 0;
   mode_ = mode;
   reason_ = reason;
   changed_ = true;
 }
 
-// Rows 17, 20, 21 and 32: without a working link or a working clock nothing may be streamed.
-bool Supervisor::link_faults(const SupervisorInput& in) noexcept {
-  if (!in.port_open) return enter(Mode::quiet, Reason::port_lost), true;
-  if (in.transmit_failed) return enter(Mode::quiet, Reason::transmit_full), true;
-  if (in.heartbeat_age > kHeartbeatLost) return enter(Mode::quiet, Reason::autopilot_silent), true;
-  if (in.missed_periods >= kMissedQuiet) return enter(Mode::quiet, Reason::deadline_missed), true;
-  return false;
-}
-
-void Supervisor::enabling(const SupervisorInput& in) noexcept {
-  if (in.request == Request::disable) return enter(Mode::passive, Reason::operator_request);
-  if (in.odometry_age > kHoldAfter) return enter(Mode::passive, Reason::odometry_lost);
-  if (in.offboard && in.frames_aligned) {
-    was_armed_ = in.armed;
-    return enter(Mode::tracking, Reason::autopilot_follows);
+void Supervisor::count(const SupervisorInput& in) noexcept {
+  ++ticks_in_mode_;
+  for (int missed = 0; missed < std::min(in.missed_periods, 3); ++missed) {
+    std::rotate(missed_.begin(), missed_.begin() + 1, missed_.end());
+    missed_.back() = period_ + in.missed_periods;
   }
-  if (seconds(ticks_in_mode_) > kEnableTimeout)
-    enter(Mode::passive, in.frames_aligned ? Reason::enable_timeout : Reason::frames_disagree);
+  period_ += 1 + in.missed_periods;
+  outside_ = mode_ != Mode::tracking || in.inside ? 0 : outside_ + 1;
+  if (!in.battery_low) battery_landed_ = false;
 }
 
-void Supervisor::tracking(const SupervisorInput& in) noexcept {
-  if (!in.offboard) return enter(Mode::passive, Reason::offboard_left);        // row 22
-  if (was_armed_ && !in.armed) return enter(Mode::passive, Reason::disarmed);  // row 23
-  was_armed_ = in.armed;
-  if (in.request == Request::land) return enter(Mode::land, Reason::operator_request);
-  if (in.request == Request::disable && !in.armed) return enter(Mode::passive, Reason::operator_request);
-  if (in.odometry_jump) return enter(Mode::hold, Reason::odometry_jump);              // row 3
-  if (in.odometry_age > kHoldAfter) return enter(Mode::hold, Reason::odometry_lost);  // rows 1, 2, 5
-  if (!in.frames_aligned) return enter(Mode::hold, Reason::frames_disagree);          // row 8
-  outside_ = in.inside ? 0 : outside_ + 1;
-  if (outside_ >= kOutsideTicks) enter(Mode::hold, Reason::outside_set);  // row 16
+bool Supervisor::refused(Reason reason, const SupervisorInput& in) const noexcept {
+  return reason == Reason::map_missing ? in.map_missing : occurs(reason, in);
 }
 
-void Supervisor::holding(const SupervisorInput& in) noexcept {
-  if (!in.offboard) return enter(Mode::passive, Reason::offboard_left);
-  if (was_armed_ && !in.armed) return enter(Mode::passive, Reason::disarmed);
-  if (in.request == Request::land) return enter(Mode::land, Reason::operator_request);
-  if (in.request == Request::disable && !in.armed) return enter(Mode::passive, Reason::operator_request);
-  if (in.odometry_age > kLandAfter) return enter(Mode::land, Reason::odometry_lost);
-  // A pose that is not trusted may be held for 400 ms at most, however the samples look.
-  const bool untrusted =
-      reason_ == Reason::odometry_jump || reason_ == Reason::odometry_lost || reason_ == Reason::frames_disagree;
-  if (untrusted && seconds(ticks_in_mode_) > kLandAfter - kHoldAfter) return enter(Mode::land, reason_);
-  if (in.new_segment && !untrusted) enter(Mode::tracking, Reason::segment_accepted);
-}
-
-void Supervisor::landing(const SupervisorInput& in) noexcept {
-  if (was_armed_ && !in.armed) return enter(Mode::passive, Reason::landed);
-  const bool pose_lost = reason_ != Reason::operator_request;
-  if (pose_lost && ticks_in_mode_ >= kLandTicks) enter(Mode::quiet, Reason::land_sent);
+bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept {
+  switch (reason) {
+    case Reason::port_lost:
+      return !in.port_open;  // row 17
+    case Reason::transmit_full:
+      return in.transmit_failed;  // row 20
+    case Reason::autopilot_silent:
+      return in.heartbeat_age > kHeartbeatLost;  // row 21
+    case Reason::clock_stopped:
+      return in.missed_periods >= kMissedQuiet;  // row 32
+    case Reason::operator_request:
+      return in.request == Request::disable && (mode_ == Mode::enabling || !in.armed);
+    case Reason::stop_requested:
+      return in.request == Request::stop;
+    case Reason::land_requested:
+      return in.request == Request::land;
+    case Reason::autopilot_follows:
+      return in.offboard && in.frames_aligned;
+    case Reason::enable_timeout:
+      return seconds_in_mode() > kEnableTimeout;
+    case Reason::offboard_left:
+      return !in.offboard;  // rows 22, 25
+    case Reason::disarmed:
+      return was_armed_ && !in.armed;  // row 23
+    case Reason::odometry_jump:
+      return in.odometry_jump;  // row 3
+    case Reason::odometry_frozen:
+      return in.odometry_frozen;  // row 6
+    case Reason::odometry_disorder:
+      return in.odometry_disorder;  // row 5
+    case Reason::odometry_lost:
+      return in.odometry_age > kHoldAfter;  // rows 1, 2
+    case Reason::pose_untrusted:
+      return in.odometry_age > kLandAfter || (!pose_trusted() && seconds_in_mode() > kUntrusted);
+    case Reason::frames_disagree:
+      return !in.frames_aligned;
+    case Reason::battery_low:
+      return in.battery_low && !battery_landed_;  // row 24
+    case Reason::autopilot_reset:
+      return in.autopilot_reset;  // row 8
+    case Reason::obstacle_ahead:
+      return in.obstacle_ahead;  // row 14
+    case Reason::outside_map:
+      return in.outside_map;  // row 9
+    case Reason::map_late:
+      return in.map_late;  // row 13
+    case Reason::outside_set:
+      return outside_ >= kOutsideTicks;  // row 16
+    case Reason::deadline_missed:
+      return in.missed_periods > 0 && missed_.front() >= period_ - 1 - kMissedWithin;  // row 32
+    case Reason::segment_accepted:
+      return in.new_segment && pose_trusted();
+    case Reason::landed:
+      return !in.armed;
+    case Reason::land_sent:
+      return reason_ == Reason::pose_untrusted && ticks_in_mode_ >= kLandTicks;
+    case Reason::frame_mismatch_x:
+      return in.mismatch == Mismatch::x;  // row 7
+    case Reason::frame_mismatch_y:
+      return in.mismatch == Mismatch::y;
+    case Reason::frame_mismatch_z:
+      return in.mismatch == Mismatch::z;
+    case Reason::frame_mismatch_yaw:
+      return in.mismatch == Mismatch::yaw;
+    case Reason::frame_mismatch_roll:
+      return in.mismatch == Mismatch::roll;
+    case Reason::frame_mismatch_pitch:
+      return in.mismatch == Mismatch::pitch;
+    default:
+      return false;
+  }
 }
 
 SupervisorOutput Supervisor::step(const SupervisorInput& in) noexcept {
-  ++ticks_in_mode_;
-  const bool commanding =
-      mode_ == Mode::enabling || mode_ == Mode::tracking || mode_ == Mode::hold || mode_ == Mode::land;
-  if (!commanding) {
-    if (in.request == Request::enable && in.port_open && in.heartbeat_age <= kHeartbeatLost &&
-        in.odometry_age <= kHoldAfter)
-      enter(Mode::enabling, Reason::enabled);
-  } else if (!link_faults(in)) {
-    switch (mode_) {
-      case Mode::enabling:
-        enabling(in);
-        break;
-      case Mode::tracking:
-        tracking(in);
-        break;
-      case Mode::hold:
-        holding(in);
-        break;
-      default:
-        landing(in);
-        break;
+  count(in);
+  const Mode before = mode_;
+  if (!contains(kCommanding, mode_)) {
+    if (in.request == Request::enable) {
+      const auto* why = std::ranges::find_if(kRefusals, [&](Reason r) { return refused(r, in); });
+      if (why == std::ranges::end(kRefusals))
+        enter(Mode::enabling, Reason::enabled);
+      else
+        enter(mode_, *why);
+    }
+  } else {
+    for (const Transition& t : kTransitions) {
+      if (!contains(t.from, mode_) || !occurs(t.when, in)) continue;
+      // A hold on a pose that is not trusted keeps its first cause; a trusted one does not begin anew.
+      if (t.to == mode_ && (!pose_trusted() || t.when == reason_)) continue;
+      enter(t.to, t.when);
+      break;
     }
   }
+  if (mode_ == Mode::land && before != Mode::land && in.battery_low) battery_landed_ = true;
+  was_armed_ = in.armed;
+  return output(in);
+}
+
+SupervisorOutput Supervisor::output(const SupervisorInput& in) noexcept {
   SupervisorOutput out;
   out.mode = mode_;
   out.reason = reason_;
   out.changed = changed_;
   changed_ = false;
-  out.freeze = mode_ == Mode::hold;
-  out.send_setpoint = mode_ == Mode::tracking || mode_ == Mode::hold || (mode_ == Mode::enabling && in.frames_aligned);
+  out.freeze = mode_ == Mode::hold && !pose_trusted();
+  out.send_setpoint = contains(kFollowed, mode_) || (mode_ == Mode::enabling && in.frames_aligned);
   // A vehicle found armed belongs to somebody else until an operator enables us: then nothing at all is sent (row 36).
-  const bool bystander = mode_ == Mode::passive && !in.armed;
-  out.send_heartbeat =
-      mode_ == Mode::enabling || mode_ == Mode::tracking || mode_ == Mode::hold || mode_ == Mode::land || bystander;
+  out.send_heartbeat = contains(kCommanding, mode_) || (mode_ == Mode::passive && !in.armed);
   out.forward_odometry = out.send_heartbeat;
   out.request_offboard = mode_ == Mode::enabling && in.frames_aligned && !in.offboard &&
-                         seconds(ticks_in_mode_) > kStreamBefore && ticks_in_mode_ % 25 == 0;
-  out.request_land = mode_ == Mode::land && ticks_in_mode_ < kLandTicks && ticks_in_mode_ % 5 == 0;
+                         seconds_in_mode() > kStreamBefore && ticks_in_mode_ % 25 == 0;
+  // Never again once the autopilot has left offboard: it lands, or a pilot has taken over.
+  out.request_land = mode_ == Mode::land && ticks_in_mode_ < kLandTicks && ticks_in_mode_ % 5 == 0 && in.offboard;
   return out;
 }
 

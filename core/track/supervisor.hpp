@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <limits>
+#include <span>
+
+#include "core/track/frame_alignment.hpp"
 
 namespace backwash::track {
 
@@ -10,10 +15,11 @@ enum class Mode : std::uint8_t {
   passive,   ///< nothing is commanded; an operator has to enable
   enabling,  ///< set-points of the present place are streamed until the autopilot follows them
   tracking,  ///< set-points come from the tracker: accepted segments, then their end
-  hold,      ///< the last good set-point, frozen with zero velocity and acceleration
+  hold,      ///< a verified stop to rest, or the last good set-point frozen with zero velocity and acceleration
   land,      ///< the autopilot's own land mode was asked for; no set-points
   quiet,     ///< neither set-points nor heartbeat: the autopilot's failsafe acts
 };
+inline constexpr int kModes = 6;
 const char* to_string(Mode mode) noexcept;
 
 /// Why the mode is what it is; faults.md has the rows.
@@ -36,24 +42,51 @@ enum class Reason : std::uint8_t {
   disarmed,
   landed,
   land_sent,
+  land_requested,
+  odometry_disorder,
+  odometry_frozen,
+  pose_untrusted,
+  autopilot_reset,
+  obstacle_ahead,
+  outside_map,
+  map_late,
+  map_missing,
+  battery_low,
+  clock_stopped,
+  frame_mismatch_x,
+  frame_mismatch_y,
+  frame_mismatch_z,
+  frame_mismatch_yaw,
+  frame_mismatch_roll,
+  frame_mismatch_pitch,
+  stop_requested,
 };
+inline constexpr int kReasons = 36;
 const char* to_string(Reason reason) noexcept;
 
 /// What an operator asked for since the last tick.
-enum class Request : std::uint8_t { none, enable, disable, land };
+enum class Request : std::uint8_t { none, enable, disable, land, stop };
 
 /// Facts of this tick. Ages in s; a thing never received has an infinite age.
 struct SupervisorInput {
   Request request = Request::none;
-  double odometry_age = 0;     ///< since the last good sample
-  bool odometry_jump = false;  ///< the newest sample failed the innovation gate
-  double heartbeat_age = 0;    ///< since the autopilot's last heartbeat
+  double odometry_age = 0;         ///< since the last good sample
+  bool odometry_jump = false;      ///< the newest sample failed the innovation gate
+  bool odometry_frozen = false;    ///< five identical samples under commanded motion
+  bool odometry_disorder = false;  ///< more than three stamps in a row did not rise
+  double heartbeat_age = 0;        ///< since the autopilot's last heartbeat
   bool armed = false;
-  bool offboard = false;        ///< the autopilot follows our set-points
-  bool landed = false;          ///< the autopilot says it is on the ground
-  bool frames_aligned = false;  ///< residual of local ← map below 5 cm and 3°
+  bool offboard = false;         ///< the autopilot follows our set-points
+  bool frames_aligned = false;   ///< residual of local ← map below 5 cm and 3°
+  bool autopilot_reset = false;  ///< its estimator was reset this tick; local ← map was taken anew
+  Mismatch mismatch = Mismatch::none;
   bool inside = true;           ///< measured error inside the set predicted for it
   bool new_segment = false;     ///< the tracker was given a segment
+  bool obstacle_ahead = false;  ///< something new reaches into the sets still to be flown
+  bool outside_map = false;     ///< the newest pose is outside the map
+  bool map_late = false;        ///< a live map is older than 1 s
+  bool map_missing = false;     ///< there is no map
+  bool battery_low = false;     ///< below the configured share
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row could not be sent
   int missed_periods = 0;        ///< whole periods skipped before this tick
@@ -65,36 +98,62 @@ struct SupervisorOutput {
   Reason reason = Reason::started;
   bool changed = false;  ///< mode or reason differ from the last tick
   bool send_setpoint = false;
-  bool freeze = false;  ///< the set-point is the last good one with zero velocity and acceleration
+  bool freeze = false;  ///< hold with an untrusted pose: the last good set-point, no new positions
   bool send_heartbeat = false;
   bool forward_odometry = false;
   bool request_offboard = false;
   bool request_land = false;
 };
 
+using ModeSet = std::uint8_t;  ///< bit n: Mode n
+constexpr ModeSet set_of(std::initializer_list<Mode> modes) noexcept {
+  unsigned set = 0;
+  for (const Mode m : modes) set |= 1u << static_cast<unsigned>(m);
+  return static_cast<ModeSet>(set);
+}
+constexpr bool contains(ModeSet set, Mode m) noexcept { return set >> static_cast<unsigned>(m) & 1; }
+
+/// In one of the modes `from`, when the fact that `when` names occurs: to mode `to`. The first row that applies is
+/// taken, one a tick.
+struct Transition {
+  ModeSet from;
+  Reason when;
+  Mode to;
+};
+/// All transitions but that of an enable request, in the order in which they are tried.
+std::span<const Transition> transitions() noexcept;
+/// Why a request to enable (in passive or quiet) is refused, in the order in which they are tried: the mode stays and
+/// the reason says so. If none occurs: → enabling.
+std::span<const Reason> refusals() noexcept;
+
 /// The daemon's explicit states and reactions: a pure function of the facts of each tick (faults.md).
 class Supervisor {
  public:
   static constexpr double kHoldAfter = 0.08;     ///< s without odometry until HOLD (faults.md row 1: 100 ms)
   static constexpr double kLandAfter = 0.38;     ///< s without odometry until LAND (row 1: 400 ms)
+  static constexpr double kUntrusted = 0.30;     ///< s of hold with an untrusted pose until LAND
   static constexpr double kHeartbeatLost = 1.5;  ///< s (row 21)
   static constexpr double kEnableTimeout = 5.0;  ///< s from the request until the autopilot must follow
   static constexpr double kStreamBefore = 1.0;   ///< s of set-points before offboard is asked for (PX4 wants a stream)
   static constexpr int kOutsideTicks = 3;        ///< row 16
-  static constexpr int kMissedQuiet = 25;        ///< missed periods in a row until QUIET (row 32)
+  static constexpr std::int64_t kMissedWithin = 50;  ///< periods in which three missed ones lead to hold (row 32)
+  static constexpr int kMissedQuiet = 25;            ///< missed periods in a row until QUIET (row 32)
+  static constexpr int kLandTicks = 10;              ///< LAND is asked for twice in these, one command may be lost
 
   /// Real-time: wait-free, no allocation.
   SupervisorOutput step(const SupervisorInput& in) noexcept;
   Mode mode() const noexcept { return mode_; }
   Reason reason() const noexcept { return reason_; }
+  /// False in a hold whose cause speaks against the pose.
+  bool pose_trusted() const noexcept;
 
  private:
   void enter(Mode mode, Reason reason) noexcept;
-  bool link_faults(const SupervisorInput& in) noexcept;
-  void enabling(const SupervisorInput& in) noexcept;
-  void tracking(const SupervisorInput& in) noexcept;
-  void holding(const SupervisorInput& in) noexcept;
-  void landing(const SupervisorInput& in) noexcept;
+  void count(const SupervisorInput& in) noexcept;
+  bool occurs(Reason reason, const SupervisorInput& in) const noexcept;
+  bool refused(Reason reason, const SupervisorInput& in) const noexcept;
+  double seconds_in_mode() const noexcept;
+  SupervisorOutput output(const SupervisorInput& in) noexcept;
 
   Mode mode_ = Mode::passive;
   Reason reason_ = Reason::started;
@@ -102,6 +161,10 @@ class Supervisor {
   int ticks_in_mode_ = 0;
   int outside_ = 0;
   bool was_armed_ = false;
+  bool battery_landed_ = false;  ///< once (row 24)
+  std::int64_t period_ = 0;      ///< number of this tick's period
+  /// The three newest missed periods, oldest first.
+  std::array<std::int64_t, 3> missed_{-2 * kMissedWithin, -2 * kMissedWithin, -2 * kMissedWithin};
 };
 
 }  // namespace backwash::track

@@ -16,8 +16,9 @@ Tracker::Tracker(const Setpoint& hold, const Vehicle& vehicle)
 
 bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noexcept {
   if (segment.commands.empty() || segment.tube.size() != segment.commands.size() + 1) return false;
+  if (segment.closures != closures_) return false;
   if (segment.continues != 0) {
-    if (!segment_ || segment.continues != segment_->id || next_ > segment.branch) return false;
+    if (!segment_ || stop_ || segment.continues != segment_->id || next_ > segment.branch) return false;
   } else {
     const State& start = segment.tube.front().center;
     const double p = (measured.p_W - start.p_W).norm(), v = (measured.v_W - start.v_W).norm();
@@ -26,13 +27,55 @@ bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noex
     next_ = 0;
   }
   segment_ = &segment;
+  stop_ = nullptr;
+  shift_ = {};
   return true;
 }
 
 void Tracker::hold_at(const Setpoint& setpoint) noexcept {
   segment_ = nullptr;
+  stop_ = nullptr;
   next_ = 0;
   hold_ = at_rest(setpoint);
+  shift_ = {};
+}
+
+void Tracker::rebase(const RigidShift& D, std::uint32_t closures) noexcept {
+  closures_ = closures;
+  shift_ = segment_ ? D * shift_ : RigidShift{};
+  hold_ = D.setpoint(hold_);
+}
+
+const plan::Stop* Tracker::next_stop() const noexcept {
+  if (!segment_ || stop_) return nullptr;
+  for (const plan::Stop& stop : segment_->stops)
+    if (stop.branch >= next_) return &stop;
+  return nullptr;
+}
+
+bool Tracker::brake() noexcept {
+  const plan::Stop* stop = next_stop();
+  if (stop) stop_ = stop;
+  return stop != nullptr;
+}
+
+std::size_t Tracker::end() const noexcept {
+  return stop_ ? stop_->branch + stop_->commands.size() : segment_->commands.size();
+}
+
+const reach::TubeStep& Tracker::set(std::size_t k) const noexcept {
+  k = std::min(k, end());
+  return stop_ && k >= stop_->branch ? stop_->tube[k - stop_->branch] : segment_->tube[k];
+}
+
+std::array<std::span<const reach::TubeStep>, 2> Tracker::ahead() const noexcept {
+  if (!segment_) return {};
+  const std::size_t from = std::min(next_, end());
+  const std::span tube(segment_->tube);
+  if (!stop_) return {tube.subspan(from), {}};
+  const std::span tail(stop_->tube);
+  if (from >= stop_->branch) return {std::span<const reach::TubeStep>{}, tail.subspan(from - stop_->branch)};
+  return {tube.subspan(from, stop_->branch - from), tail};
 }
 
 Inside Tracker::judge(const Vec3& measured_W) const noexcept {
@@ -40,12 +83,12 @@ Inside Tracker::judge(const Vec3& measured_W) const noexcept {
   if (!segment_) return result;
   // Entry k is the set at the tick of command k. The last one is exact at its instant only: later its interval is
   // meant.
-  const std::size_t last = segment_->tube.size() - 1;
-  const reach::TubeStep& set = segment_->tube[std::min(next_, last)];
+  const reach::TubeStep& predicted = set(next_);
   result.judged = true;
-  result.half_widths = next_ > last ? set.half_widths_interval : set.half_widths;
-  result.center = set.center.p_W;
-  const Vec3 e = measured_W - set.center.p_W;
+  result.half_widths = next_ > end() ? predicted.half_widths_interval : predicted.half_widths;
+  // A loop closure moves the map and not the vehicle: the error is judged in the frame that the sets are in.
+  result.center = shift_.point(predicted.center.p_W);
+  const Vec3 e = shift_.inverse().rotate(measured_W - result.center);
   for (std::size_t d = 0; d < kDirections; ++d) {
     result.error[d] = unit(static_cast<Direction>(d)).dot(e);
     // Written so that an error that is not a number is not inside.
@@ -55,12 +98,13 @@ Inside Tracker::judge(const Vec3& measured_W) const noexcept {
 }
 
 Setpoint Tracker::step() noexcept {
-  const std::size_t count = segment_ ? segment_->commands.size() : 0;
-  if (next_ >= count) {
-    next_ = count + 1;  // past the tube's last entry
+  if (!segment_ || next_ >= end()) {
+    next_ = segment_ ? end() + 1 : 1;  // past the tube's last entry
     return hold_;
   }
-  const Setpoint command = segment_->commands[next_++];
+  const std::size_t k = next_++;
+  const Setpoint command =
+      shift_.setpoint(stop_ && k >= stop_->branch ? stop_->commands[k - stop_->branch] : segment_->commands[k]);
   hold_ = at_rest(command);
   return command;
 }

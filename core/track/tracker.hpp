@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "core/plan/verified_stops.hpp"
 #include "core/reach/reach_tube.hpp"
+#include "core/track/rebase.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -18,7 +22,10 @@ struct AcceptedSegment {
   std::uint64_t continues = 0;  ///< id of the segment it continues; 0: starts at its first command
   std::size_t branch = 0;       ///< first command that differs from the continued segment's
   std::vector<Setpoint> commands;
-  reach::ReachTube tube;  ///< commands.size() + 1 entries; past its end the last entry holds
+  reach::ReachTube tube;          ///< commands.size() + 1 entries; past its end the last entry holds
+  std::vector<plan::Stop> stops;  ///< ascending by branch; may be empty
+  std::uint32_t closures = 0;     ///< loop closures that the map frame it is in has seen
+  double clearance = 0;           ///< smallest of its swept tube in the map it was verified in, m
 };
 
 /// What one tick says about the measured position (model.md section 5.4).
@@ -38,25 +45,49 @@ class Tracker {
   /// start.
   Tracker(const Setpoint& hold, const Vehicle& vehicle);
   /// Takes a segment over, or refuses it: a new one must start where the vehicle is now (its state within the ellipsoid
-  /// Q_0 around the tube's start), a continued one must be of the current segment and not yet past its branch. The
-  /// segment must outlive its use. Real-time: wait-free, no allocation.
+  /// Q_0 around the tube's start), a continued one must be of the current segment, not yet past its branch and not
+  /// braking. The segment must outlive its use. Real-time: wait-free, no allocation.
   bool accept(const AcceptedSegment& segment, const State& measured) noexcept;
   /// Holds this command's position from now on; the set of the last segment is no longer judged. Real-time: wait-free,
   /// no allocation.
   void hold_at(const Setpoint& setpoint) noexcept;
+  /// The first verified stop that has not been passed, or null. Real-time: wait-free, no allocation.
+  const plan::Stop* next_stop() const noexcept;
+  /// Flies next_stop() instead of the rest; false, and nothing changes, if there is none. Real-time: wait-free, no
+  /// allocation.
+  bool brake() noexcept;
+  /// The sets still to be flown, in order: those of the segment, then those of the stop it is braking on. Past the end
+  /// the last one. Real-time: wait-free, no allocation.
+  std::array<std::span<const reach::TubeStep>, 2> ahead() const noexcept;
+  /// The map moved under the vehicle (loop closure number `closures`): what was accepted goes on where it physically
+  /// is. D = map_new ← map_old. Segments of an older map frame are refused from now on. Real-time: wait-free, no
+  /// allocation.
+  void rebase(const RigidShift& D, std::uint32_t closures) noexcept;
+  /// From the frame of the segment, its stops and ahead() into the map's present one: not the identity only between a
+  /// loop closure and the next segment.
+  const RigidShift& shift() const noexcept { return shift_; }
+  std::uint32_t closures() const noexcept { return closures_; }
   /// Judges the measured position at this tick against the set predicted for it. Real-time: wait-free, no allocation.
   Inside judge(const Vec3& measured_W) const noexcept;
   /// Command of this tick, then moves on. Real-time: wait-free, no allocation.
   Setpoint step() noexcept;
-  bool finished() const noexcept { return !segment_ || next_ >= segment_->commands.size(); }
+  bool finished() const noexcept { return !segment_ || next_ >= end(); }
+  bool braking() const noexcept { return stop_ != nullptr; }
   std::uint64_t segment() const noexcept { return segment_ ? segment_->id : 0; }
   std::size_t index() const noexcept { return next_; }  ///< of the command that the next step() gives
+  double clearance() const noexcept { return segment_ ? segment_->clearance : 0; }  ///< of the accepted tube, m
   const Setpoint& held() const noexcept { return hold_; }
 
  private:
+  std::size_t end() const noexcept;
+  const reach::TubeStep& set(std::size_t k) const noexcept;
+
   const AcceptedSegment* segment_ = nullptr;
+  const plan::Stop* stop_ = nullptr;  ///< of segment_: what is flown from its branch on
   std::size_t next_ = 0;
   Setpoint hold_;
+  RigidShift shift_;  ///< map ← the segment's frame
+  std::uint32_t closures_ = 0;
   double position_, velocity_;
 };
 

@@ -25,7 +25,7 @@ int run(const Options& options) {
   refuse_to_overwrite(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
-  const auto log = take(study::read_raw_log(options.log));
+  const auto log = take(study::read_raw_log(options.log)).records;
   const auto truth = take(study::read_csv(options.truth));
   progress("building the world");
   const auto world =

@@ -28,7 +28,8 @@ Station::Station(const Options& options)
   waitset_.add(statuses_);
 }
 
-std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& position, double yaw) {
+std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& position, double yaw,
+                                             const std::vector<Vec3>& waypoints) {
   constexpr double kRepeat = 0.5;  // s
   const auto begun = Clock::now();
   while (commands_.matched() == 0 && since(begun) < options_.timeout_s)
@@ -40,6 +41,10 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
   command.verb = verb;
   command.position = {position.x(), position.y(), position.z()};
   command.yaw = yaw;
+  std::vector<geometry_msgs_msg_dds__Point_> points;
+  for (const Vec3& p : waypoints) points.push_back({p.x(), p.y(), p.z()});
+  const auto count = static_cast<std::uint32_t>(points.size());
+  command.waypoints = {count, count, points.data(), false};
   std::optional<Result> result;
   auto sent = Clock::time_point{};
   while (!result && since(begun) < options_.timeout_s) {
@@ -62,8 +67,13 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
     waitset_.wait(0.05);
     acks_.take([](const dds::Ack&) {});
     statuses_.take([&](const dds::Status& s) {
-      newest = StatusCopy{s, text(s.vehicle), text(s.state), text(s.reason), text(s.task)};
-      newest->numbers.vehicle = newest->numbers.state = newest->numbers.reason = newest->numbers.task = nullptr;
+      newest = StatusCopy{
+          s, text(s.vehicle), text(s.state), text(s.reason), text(s.task), text(s.mismatch), text(s.place), {}};
+      for (std::uint32_t n = 0; n < s.parameters._length; ++n)
+        newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
+      auto& own = newest->numbers;
+      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = nullptr;
+      own.parameters = {};
     });
   }
   return newest;

@@ -4,6 +4,8 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/types/geometry.hpp"
 #include "services/dds/topics.hpp"
@@ -19,8 +21,9 @@ struct Options {
 
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
-  dds::Status numbers{};  ///< its string members are null
-  std::string vehicle, state, reason, task;
+  dds::Status numbers{};  ///< its members that own memory are null
+  std::string vehicle, state, reason, task, mismatch, place;
+  std::vector<std::pair<std::string, double>> parameters;
 };
 
 /// One ground station: sends commands, waits for their acknowledgement and watches the status.
@@ -33,7 +36,8 @@ class Station {
     std::string reason;
   };
   /// Sends a command and repeats it, with the same sequence number, until it is acknowledged; nothing if it never is.
-  std::optional<Result> send(std::uint8_t verb, const Vec3& position = Vec3::Zero(), double yaw = 0);
+  std::optional<Result> send(std::uint8_t verb, const Vec3& position = Vec3::Zero(), double yaw = 0,
+                             const std::vector<Vec3>& waypoints = {});
   /// The next status; nothing after the timeout.
   std::optional<StatusCopy> status(double timeout_s);
   /// Waits until `done` holds for a status; false after `timeout_s`. `failed` ends the wait early with false.

@@ -3,14 +3,19 @@
 
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
+
+#include "services/backwashctl/preflight.hpp"
 
 namespace backwash::ctl {
 namespace {
 
 constexpr int kUnavailable = 69;
+constexpr std::size_t kMostWaypoints = 64;  // of the IDL's sequence
 
 std::string default_station() {
   char host[64] = "station";
@@ -44,12 +49,23 @@ nlohmann::json json_of(const StatusCopy& s) {
           {"odometry_age_s", n.odometry_age},
           {"maps_accepted", n.maps_accepted},
           {"maps_rejected", n.maps_rejected},
+          {"scans_accepted", n.scans_accepted},
+          {"scans_rejected", n.scans_rejected},
+          {"odometry_refused", n.odometry_refused},
+          {"loop_closures", n.loop_closures},
+          {"closures_refused", n.closures_refused},
+          {"foreign_writers", n.foreign_writers},
+          {"map_age_s", n.map_age},
           {"commands_refused", n.commands_refused},
           {"frames_bad", n.frames_bad},
           {"records_lost", n.records_lost},
           {"page_faults", n.page_faults},
           {"frame_residual_m", n.frame_residual_m},
           {"frame_residual_rad", n.frame_residual_rad},
+          {"frame_mismatch", s.mismatch},
+          {"heartbeat_age_s", n.heartbeat_age},
+          {"place", s.place},
+          {"parameters", s.parameters},
           {"tick_us", timing(n.tick)},
           {"lateness_us", timing(n.lateness)},
           {"odometry_to_wire_us", timing(n.odometry_to_wire)}};
@@ -131,6 +147,25 @@ Verbs::Verbs(CLI::App& app) {
           [](const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }, patience_s_);
     };
   });
+  auto* follow_verb = waiting(
+      verb(
+          "follow",
+          "fly to each point of a CSV in turn (columns x_m,y_m,z_m), at rest at each; each leg is planned and verified",
+          "follow route.csv --wait"),
+      900);
+  follow_verb->add_option("file", route_, "points CSV: x_m,y_m,z_m, at most 64 rows")->required();
+  follow_verb->callback([this] { chosen_ = [this] { return follow(); }; });
+  waiting(verb("stop", "brake at once on the next verified stop and stay; on the ground, disarmed, the same as disable",
+               "stop --wait"),
+          20)
+      ->callback([this] {
+        chosen_ = [this] {
+          return command(
+              "stop", backwash_msgs_msg_dds__COMMAND_STOP, Vec3::Zero(),
+              [](const StatusCopy& s) { return s.state == "passive" || (s.state == "hold" && !s.numbers.moving); },
+              patience_s_);
+        };
+      });
   waiting(verb("land", "land below, with the autopilot's own landing", "land --wait"), 60)->callback([this] {
     chosen_ = [this] {
       return command(
@@ -141,6 +176,10 @@ Verbs::Verbs(CLI::App& app) {
   verb("release", "end this station's session", "release")->callback([this] {
     chosen_ = [this] { return command("release", backwash_msgs_msg_dds__COMMAND_RELEASE, Vec3::Zero(), {}, 0); };
   });
+  auto* check_verb =
+      verb("check", "preflight: 0 when all is good, 69 otherwise; each failing line says what to do", "check");
+  check_verb->add_flag("--json", json_, "one JSON object");
+  check_verb->callback([this] { chosen_ = [this] { return check(); }; });
   auto* now = verb("status", "print the daemon's status once", "status --json");
   now->add_flag("--json", json_, "one JSON object");
   now->callback([this] { chosen_ = [this] { return status(); }; });
@@ -158,7 +197,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     std::cerr << "backwashctl " << name << ": " << why << "\n";
     return kUnavailable;
   };
-  const auto answer = station.send(verb, position, yaw_);
+  const auto answer = station.send(verb, position, yaw_, waypoints_);
   if (!answer)
     return fail("no daemon answered in domain " + std::to_string(options_.domain) + " on interface " +
                 options_.interface + ", namespace " + options_.name_space + "; is backwashd running?");
@@ -172,7 +211,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task);
     if (s.task.starts_with("refused")) return true;
     const bool lost = s.state == "quiet" || s.state == "hold" || (s.state == "passive" && name != "land");
-    return lost && name != "hold";
+    return lost && name != "hold" && name != "stop";
   });
   return reached ? 0 : fail("not reached; the daemon is " + last);
 }
@@ -190,6 +229,61 @@ int Verbs::status() {
   else
     print(*now);
   return 0;
+}
+
+// The file is the points CSV of the other programs.
+int Verbs::follow() {
+  std::ifstream file(route_);
+  std::string line;
+  const auto fail = [&](int code, const std::string& where, const std::string& why) {
+    std::cerr << "backwashctl follow: " << where << ": " << why << "\n";
+    return code;
+  };
+  if (!std::getline(file, line)) return fail(66, route_, "cannot be read");
+  if (line != "x_m,y_m,z_m") return fail(65, route_ + ":1", "the first line is '" + line + "', expected x_m,y_m,z_m");
+  for (int number = 2; std::getline(file, line); ++number) {
+    Vec3 p;
+    char rest;
+    if (std::sscanf(line.c_str(), "%lf,%lf,%lf %c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
+      return fail(65, route_ + ":" + std::to_string(number), "'" + line + "' is not three numbers");
+    waypoints_.push_back(p);
+  }
+  if (waypoints_.empty() || waypoints_.size() > kMostWaypoints)
+    return fail(65, route_, std::to_string(waypoints_.size()) + " points, expected 1 to 64");
+  const Vec3 goal = waypoints_.back();
+  return command(
+      "follow", backwash_msgs_msg_dds__COMMAND_FOLLOW, Vec3::Zero(),
+      [goal](const StatusCopy& s) {
+        const auto& p = s.numbers.setpoint;
+        return tracking(s) && !s.numbers.moving && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
+      },
+      patience_s_);
+}
+
+int Verbs::check() {
+  constexpr double kWatch = 2.0;  // s
+  Station station(options_);
+  const auto before = station.status(options_.timeout_s);
+  auto after = before;
+  const auto begun = std::chrono::steady_clock::now();
+  const auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
+  while (after && since() < kWatch) after = station.status(1.0);
+  if (!after) {
+    std::cerr << "backwashctl check: no daemon in domain " << options_.domain << " on interface "
+              << options_.interface << ", namespace " << options_.name_space << "; is backwashd running?\n";
+    return kUnavailable;
+  }
+  bool all = true;
+  nlohmann::json lines = nlohmann::json::array();
+  for (const Finding& f : preflight(*before, *after, since())) {
+    all = all && f.good;
+    lines.push_back({{"name", f.name}, {"good", f.good}, {"found", f.found}, {"advice", f.advice}});
+    if (!json_)
+      std::cout << (f.good ? "good  " : "FAIL  ") << f.name << ": " << f.found << (f.good ? "" : " -> " + f.advice)
+                << "\n";
+  }
+  if (json_) std::cout << nlohmann::json{{"good", all}, {"findings", lines}}.dump(2) << "\n";
+  return all ? 0 : kUnavailable;
 }
 
 int Verbs::watch() {

@@ -10,7 +10,7 @@
 
 namespace backwash::ctl {
 
-/// The verbs of backwashctl: enable, disable, takeoff, goto, hold, land, release, status, watch.
+/// The verbs of backwashctl: enable, disable, takeoff, goto, follow, hold, stop, land, release, status, watch, check.
 class Verbs {
  public:
   explicit Verbs(CLI::App& app);
@@ -20,11 +20,15 @@ class Verbs {
  private:
   int command(const std::string& name, std::uint8_t verb, const Vec3& position,
               const std::function<bool(const StatusCopy&)>& done, double patience_s);
+  int follow();
   int status();
+  int check();
   int watch();
 
   Options options_;
   std::vector<double> goal_;
+  std::vector<Vec3> waypoints_;
+  std::string route_;
   double height_ = 0, yaw_ = 0, patience_s_ = 0;
   bool wait_ = false, json_ = false;
   std::function<int()> chosen_;

@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/plan/world.hpp"
@@ -14,9 +16,8 @@
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
 #include "core/sync/record_ring.hpp"
-#include "core/track/rebase.hpp"
-#include "core/track/supervisor.hpp"
-#include "core/track/tracker.hpp"
+#include "core/track/flight_tick.hpp"
+#include "firmware_bridge/autopilot_link.hpp"
 #include "services/backwashd/timing.hpp"
 
 /// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is
@@ -29,15 +30,7 @@ inline std::int64_t now_ns() noexcept {
       .count();
 }
 
-/// One odometry message, in the map frame.
-struct OdometrySample {
-  std::int64_t received_ns = 0;
-  std::int64_t stamp_ns = 0;            ///< the sender's stamp
-  State state;                          ///< m, m/s
-  std::array<double, 4> q{1, 0, 0, 0};  ///< body to map: w, x, y, z
-  std::uint32_t closures = 0;           ///< loop closures so far: the map frame that the state is in
-  track::RigidShift map_from_odom;      ///< by which the VIO's own pose was brought there
-};
+using track::OdometrySample;
 
 /// One octomap_msgs/Octomap as received.
 struct MapMessage {
@@ -45,6 +38,7 @@ struct MapMessage {
   double resolution = 0;
   bool binary = true;
   std::string id;
+  std::int64_t received_ns = 0;
 };
 
 /// One range scan in the map.
@@ -84,7 +78,14 @@ struct CommandMessage {
   std::uint8_t verb = 0;
   Vec3 position = Vec3::Zero();
   double yaw = 0;
+  static constexpr std::size_t kMostWaypoints = 64;
+  std::size_t waypoints = 0;  ///< of follow; more than kMostWaypoints: as many were sent, and none is kept
+  std::array<std::array<double, 3>, kMostWaypoints> waypoint{};
 };
+
+/// Parameters of PX4 that decide what a failsafe does, which matters indoors; `backwashctl check` judges them.
+inline constexpr std::array<std::string_view, 5> kParameters{"COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_OVERRIDE",
+                                                             "NAV_DLL_ACT", "COM_LOW_BAT_ACT"};
 
 /// What the control thread shows to the others, once a tick.
 struct ControlView {
@@ -98,10 +99,16 @@ struct ControlView {
   std::uint64_t segment = 0;                       ///< accepted segment, 0 before the first
   std::uint64_t index = 0;                         ///< of its next command
   bool finished = true;                            ///< the segment's commands are all sent
+  bool braking = false;                            ///< on a verified stop of the segment
+  std::uint32_t closures = 0;                      ///< loop closures seen: the map frame of state and command
+  track::RigidShift shift;                         ///< from the segment's frame into that one
   std::uint64_t refused_segment = 0;               ///< the last one refused
   std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
   double residual_m = 0, residual_rad = 0;
+  track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
+  std::array<std::optional<double>, kParameters.size()> parameters{};
+  std::uint64_t log_lost = 0;  ///< records that the raw log had no room for
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 
@@ -109,6 +116,20 @@ struct ControlView {
 struct ControlRecord {
   study::RecordHeader header{};
   std::array<std::uint8_t, 512> bytes{};
+};
+
+/// What the control thread has to tell the operator; rarer than ticks, and none is skipped while the ring has room.
+struct ControlEvent {
+  enum class Kind : std::uint8_t { transition, missed_deadline, page_fault } kind = Kind::transition;
+  std::int64_t t_ns = 0;
+  track::Mode mode = track::Mode::passive;
+  track::Reason reason = track::Reason::started;
+  std::uint64_t count = 0;  ///< periods missed, pages faulted
+};
+
+/// A port that was opened again. The control thread swaps its lost one in, so that closing it is not its work.
+struct FreshPort {
+  mutable firmware_bridge::Port port;
 };
 
 /// Anything else for the raw log.
@@ -149,7 +170,11 @@ struct Channels {
   sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
-  sync::LatestValue<std::array<char, 192>> task;                           // mission → status: of the last command
+  sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
+  sync::Handover<FreshPort> ports;                                         // link watch → control
+  std::atomic<std::uint8_t> link_fault{0};         // control → link watch: 1 + LinkFault, 0: none
+  sync::LatestValue<std::array<char, 192>> place;  // mission → status: what keeps it from flying from here
+  sync::LatestValue<std::array<char, 192>> task;   // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
       closures_refused{0}, foreign_writers{0};

@@ -50,7 +50,7 @@ std::optional<Coordinates> find_three(const dds::PointCloud& m, const std::strin
 }  // namespace
 
 tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& m) {
-  const auto wrong = [](const std::string& what) { return tl::unexpected("point cloud: " + what); };
+  const auto wrong = [](const std::string& what) { return tl::unexpected<std::string>("point cloud: " + what); };
   if (m.is_bigendian) return wrong("big-endian data, expected little-endian");
   const auto xyz = find_three(m, "");
   if (!xyz) return wrong("fields x, y, z of type float32 or float64 within a point are needed");

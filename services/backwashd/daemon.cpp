@@ -10,6 +10,7 @@
 
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
+#include "services/backwashd/link_watch.hpp"
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/planner_worker.hpp"
 #include "services/parallel/real_time.hpp"
@@ -55,29 +56,34 @@ int run(const Settings& settings) {
                                       std::chrono::steady_clock::now());
   // What carries odometry to the control thread comes right below it, before the middleware starts its threads.
   const int control = settings.daemon.control.priority;
-  DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), *channels, recorder);
+  DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), settings.vehicle,
+                 *channels, recorder);
   Mission mission(*channels);
-  ControlLoop loop(*channels, link, settings.vehicle);
+  ControlLoop loop(*channels, link, settings.vehicle, settings.daemon.control.battery_land, settings.daemon.map);
   {
     std::vector<std::jthread> threads;
     threads.emplace_back([&] { recorder.run(*channels); });
-    threads.emplace_back([&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle); });
+    threads.emplace_back(
+        [&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle, settings.daemon.map); });
     threads.emplace_back(
         [&] { run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); }); });
     threads.emplace_back(
         [&] { run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); }); });
     threads.emplace_back([&] { front.run_status(settings.vehicle); });
     threads.emplace_back([&] {
-      make_real_time(settings.daemon.control.priority);
+      make_real_time({settings.daemon.control.priority, settings.daemon.control.cpu});
       run_control(*channels, loop);
     });
     threads.emplace_back([&] { front.run_readers(); });
+    threads.emplace_back([&] { run_link_watch(*channels, settings.daemon.link); });
     spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}", settings.vehicle.name,
                  settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space);
     int signal = 0;
     sigwait(&signals, &signal);
     channels->stop = true;
   }
+  if (const auto lost = recorder.lost() + channels->control_log.lost())
+    spdlog::warn("{}: {} records were lost", settings.daemon.log.file, lost);
   spdlog::info("stopped");
   return 0;
 }

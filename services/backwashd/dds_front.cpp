@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <thread>
+#include <utility>
 
 #include "services/parallel/real_time.hpp"
 
@@ -33,15 +34,21 @@ dds::Timing timing(const TimingHistogram& h) {
 
 }  // namespace
 
-DdsFront::DdsFront(const config::Daemon& config, int priority, Channels& channels, Recorder& recorder)
+DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels,
+                   Recorder& recorder)
     : channels_(channels),
       recorder_(recorder),
       priority_(priority),
+      sensor_range_(config.map.sensor_range),
+      localization_(config, vehicle.estimation.position),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, priority),
       odometry_(participant_, dds::TopicOf<dds::Odometry>::type(), config.dds.odometry_topic,
                 dds::TopicOf<dds::Odometry>::kDelivery),
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
+      scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
+      closures_(dds::make_reader<dds::TransformStamped>(participant_, config.dds.name_space)),
       commands_(dds::make_reader<dds::Command>(participant_, config.dds.name_space)),
+      foreign_(participant_),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
       tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
@@ -49,22 +56,54 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, Channels& channel
       waitset_(participant_) {
   waitset_.add(odometry_);
   waitset_.add(maps_);
+  waitset_.add(scans_);
+  waitset_.add(closures_);
   waitset_.add(commands_);
+}
+
+void DdsFront::refuse(std::atomic<std::uint64_t>& counter, const std::string& why) {
+  constexpr std::int64_t kPause_ns = 1'000'000'000;
+  ++counter;
+  if (now_ns() - said_ns_ < kPause_ns) return;
+  said_ns_ = now_ns();
+  spdlog::warn("refused: {}", why);
 }
 
 void DdsFront::take_odometry() {
   odometry_.take([&](const dds::Odometry& m) {
-    const auto& p = m.pose.pose.position;
-    const auto& q = m.pose.pose.orientation;
-    const auto& v = m.twist.twist.linear;
-    OdometrySample s;
-    s.received_ns = now_ns();
-    s.stamp_ns = std::int64_t{m.header.stamp.sec} * 1'000'000'000 + m.header.stamp.nanosec;
-    s.q = {q.w, q.x, q.y, q.z};
-    s.state.p_W = {p.x, p.y, p.z};
-    // nav_msgs/Odometry: the twist is in the child (body) frame.
-    s.state.v_W = Eigen::Quaterniond(q.w, q.x, q.y, q.z) * Vec3(v.x, v.y, v.z);
-    channels_.odometry.write(s);
+    if (const auto sample = localization_.odometry(m, now_ns()))
+      channels_.odometry.write(*sample);
+    else
+      refuse(channels_.odometry_refused, sample.error());
+  });
+}
+
+void DdsFront::take_closures() {
+  closures_.take([&](const dds::TransformStamped& m) {
+    if (const auto taken = localization_.loop_closure(m); !taken) refuse(channels_.closures_refused, taken.error());
+    channels_.loop_closures = localization_.closures();
+  });
+}
+
+void DdsFront::take_scans() {
+  if (const auto* newest = channels_.worlds.reader.take())
+    channels_.worlds.reader.give_back(std::exchange(world_, newest));
+  scans_.take([&](const dds::PointCloud& m) {
+    auto scan = localization_.scan(m, now_ns());
+    if (!scan) return refuse(channels_.scans_rejected, scan.error());
+    std::size_t fresh = 0;
+    if (world_) {
+      const NewVoxels voxels = new_voxels((*world_)->grid, *scan, sensor_range_);
+      fresh = voxels.count;
+      if (fresh > 0) channels_.scan_voxels.push(voxels);
+    }
+    recorder_.append(study::RecordKind::scan, "scan of " + std::to_string(scan->points_W.size()) + " points, " +
+                                                  std::to_string(fresh) + " new voxels");
+    auto owned = std::make_unique<Scan>(std::move(*scan));
+    if (channels_.scans.push(owned.get()))
+      owned.release();
+    else
+      refuse(channels_.scans_rejected, "a scan: the map worker has 16 waiting");
   });
 }
 
@@ -76,6 +115,7 @@ void DdsFront::take_maps() {
     message.resolution = m.resolution;
     message.binary = m.binary;
     message.id = m.id ? m.id : "";
+    message.received_ns = now_ns();
     channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
   });
 }
@@ -89,6 +129,9 @@ void DdsFront::take_commands() {
     c.verb = m.verb;
     c.position = {m.position.x, m.position.y, m.position.z};
     c.yaw = m.yaw;
+    c.waypoints = m.waypoints._length;
+    for (std::size_t n = 0; n < std::min(c.waypoints, c.kMostWaypoints); ++n)
+      c.waypoint[n] = {m.waypoints._buffer[n].x, m.waypoints._buffer[n].y, m.waypoints._buffer[n].z};
     char line[256];
     std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f", c.station.data(),
                   static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
@@ -102,9 +145,15 @@ void DdsFront::run_readers() {
   if (priority_ > 0) set_fifo(priority_);
   while (!channels_.stop) {
     waitset_.wait(0.1);
+    take_closures();  // before the odometry that it is about
     take_odometry();
+    take_scans();
     take_commands();
     take_maps();
+    if (const auto writers = foreign_.count(); writers != channels_.foreign_writers) {
+      channels_.foreign_writers = writers;
+      spdlog::warn("a writer on one of our topics has another type: it is not listened to ({} so far)", writers);
+    }
   }
 }
 
@@ -142,18 +191,17 @@ void DdsFront::send(const track::AcceptedSegment& segment) {
 
 void DdsFront::run_status(const Vehicle& vehicle) {
   ControlView view;
-  std::array<char, 192> task{};
-  track::Mode last_mode = track::Mode::passive;
-  track::Reason last_reason = track::Reason::started;
+  std::array<char, 192> task{}, place{};
+  const std::vector<std::string> names(kParameters.begin(), kParameters.end());
   auto next = std::chrono::steady_clock::now();
   while (!channels_.stop) {
     next += std::chrono::milliseconds(100);
     std::this_thread::sleep_until(next);
     if (const auto newest = channels_.task.read_new()) task = *newest;
     if (const auto newest = channels_.view_status.read_new()) view = *newest;
-    if (view.mode != last_mode || view.reason != last_reason)
-      spdlog::info("{}: {}", to_string(last_mode = view.mode), to_string(last_reason = view.reason));
+    if (const auto newest = channels_.place.read_new()) place = *newest;
     const std::string mode = to_string(view.mode), reason = to_string(view.reason);
+    const std::string mismatch = to_string(view.mismatch);
     dds::Status s{};
     s.stamp = wall_clock();
     s.vehicle = dds::c_string(vehicle.name);
@@ -176,6 +224,14 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.odometry_rejected = view.odometry_rejected;
     s.maps_accepted = channels_.maps_accepted;
     s.maps_rejected = channels_.maps_rejected;
+    s.scans_accepted = channels_.scans_accepted;
+    s.scans_rejected = channels_.scans_rejected;
+    s.odometry_refused = channels_.odometry_refused;
+    s.loop_closures = channels_.loop_closures;
+    s.closures_refused = channels_.closures_refused;
+    s.foreign_writers = channels_.foreign_writers;
+    const std::int64_t map_ns = channels_.map_ns;
+    s.map_age = map_ns < 0 ? -1 : static_cast<double>(now_ns() - map_ns) * 1e-9;
     s.commands_refused = channels_.commands_refused;
     s.frames_bad = view.frames_bad;
     s.records_lost = channels_.control_log.lost() + recorder_.lost();
@@ -183,6 +239,14 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.frame_residual_m = view.residual_m;
     s.frame_residual_rad = view.residual_rad;
     s.odometry_age = view.odometry_age;
+    s.heartbeat_age = view.heartbeat_age;
+    s.mismatch = dds::c_string(mismatch);
+    s.place = place.data();
+    std::array<dds::Parameter, kParameters.size()> parameters{};
+    std::uint32_t known = 0;
+    for (std::size_t n = 0; n < kParameters.size(); ++n)
+      if (view.parameters[n]) parameters[known++] = {dds::c_string(names[n]), *view.parameters[n]};
+    s.parameters = {known, known, parameters.data(), false};
     s.tick = timing(view.tick);
     s.lateness = timing(view.lateness);
     s.odometry_to_wire = timing(view.odometry_to_wire);

@@ -3,6 +3,7 @@
 
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/backwashd/localization.hpp"
 #include "services/backwashd/mission.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/dds/topics.hpp"
@@ -13,9 +14,13 @@ namespace backwash::daemon {
 class DdsFront {
  public:
   /// `priority`: SCHED_FIFO priority of the threads between the network and the control thread; 0: ordinary.
-  DdsFront(const config::Daemon& config, int priority, Channels& channels, Recorder& recorder);
+  DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels, Recorder& recorder);
+  ~DdsFront() { channels_.worlds.reader.give_back(world_); }
+  DdsFront(const DdsFront&) = delete;
+  DdsFront& operator=(const DdsFront&) = delete;
 
-  /// Thread body: odometry, maps and commands in.
+  /// Thread body: odometry, loop closures, scans, maps and commands in. New voxels of a scan go straight to the control
+  /// thread, the scan to the map worker. What is refused is counted, and said at most once a second.
   void run_readers();
   /// Thread body: status out at 10 Hz.
   void run_status(const Vehicle& vehicle);
@@ -27,15 +32,25 @@ class DdsFront {
  private:
   void take_odometry();
   void take_maps();
+  void take_scans();
+  void take_closures();
   void take_commands();
+  void refuse(std::atomic<std::uint64_t>& counter, const std::string& why);
 
   Channels& channels_;
   Recorder& recorder_;
   int priority_;
+  double sensor_range_;
+  Localization localization_;
+  const Worlds::Pointer* world_ = nullptr;  // the reader's
+  std::int64_t said_ns_ = 0;
   dds::Participant participant_;
   dds::Reader<dds::Odometry> odometry_;
   dds::Reader<dds::Octomap> maps_;
+  dds::Reader<dds::PointCloud> scans_;
+  dds::Reader<dds::TransformStamped> closures_;
   dds::Reader<dds::Command> commands_;
+  dds::ForeignWriters foreign_;
   dds::Writer<dds::Ack> acks_;
   dds::Writer<dds::Status> status_;
   dds::Writer<dds::Tube> tube_;

@@ -33,14 +33,15 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
   if (frame != frames_.map && frame != frames_.odometry)
     return wrong_frame("the odometry", frame, "'" + frames_.map + "' or '" + frames_.odometry + "'");
   if (frame == frames_.odometry && !map_from_odom_)
-    return tl::unexpected("odometry in frame '" + frame + "' before the first loop_closure from it to '" + frames_.map +
-                          "'");
+    return tl::unexpected<std::string>("odometry in frame '" + frame + "' before the first loop_closure from it to '" +
+                                       frames_.map + "'");
   const double* covariance = m.pose.covariance;
   if (covariance[0] != 0 && covariance[0] != -1) {
     const double worst = std::max({covariance[0], covariance[7], covariance[14]});
     if (!(covariance[0] >= 0 && covariance[7] >= 0 && covariance[14] >= 0 && worst <= max_sigma_ * max_sigma_))
-      return tl::unexpected("the odometry's own position error is above the vehicle's estimation.position of " +
-                            std::to_string(max_sigma_) + " m");
+      return tl::unexpected<std::string>(
+          "the odometry's own position error is above the vehicle's estimation.position of " +
+          std::to_string(max_sigma_) + " m");
   }
   const auto& p = m.pose.pose.position;
   const auto& q = m.pose.pose.orientation;
@@ -74,9 +75,10 @@ tl::expected<void, std::string> Localization::loop_closure(const dds::TransformS
   const Eigen::Quaterniond q(r.w, r.x, r.y, r.z);
   const Vec3 translation(t.x, t.y, t.z);
   if (!translation.allFinite() || !(std::abs(q.norm() - 1) < 1e-2))
-    return tl::unexpected("the loop closure is not a finite transform with a unit quaternion");
+    return tl::unexpected<std::string>("the loop closure is not a finite transform with a unit quaternion");
   if (!((q * Vec3::UnitZ()).z() >= std::cos(kMaxTilt)))
-    return tl::unexpected("the loop closure tilts the vertical by more than 1 degree; both frames must be z-up");
+    return tl::unexpected<std::string>(
+        "the loop closure tilts the vertical by more than 1 degree; both frames must be z-up");
   const track::RigidShift newest{
       std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z())), translation};
   if (map_from_odom_ && map_from_odom_->yaw == newest.yaw && map_from_odom_->t == newest.t) return {};
@@ -116,7 +118,7 @@ tl::expected<Scan, std::string> Localization::scan(const dds::PointCloud& m, std
   const auto pose = pose_at(nanoseconds(m.header.stamp));
   if (!pose) return tl::unexpected(std::string("a point cloud whose stamp is not within that of the odometry"));
   if (frame == frames_.odometry && !map_from_odom_)
-    return tl::unexpected("a point cloud in frame '" + frame + "' before the first loop closure");
+    return tl::unexpected<std::string>("a point cloud in frame '" + frame + "' before the first loop closure");
   Eigen::Isometry3d place = Eigen::Isometry3d::Identity();
   if (frame == frames_.body) {
     place = Eigen::Translation3d(pose->p) * quaternion(pose->q).normalized();

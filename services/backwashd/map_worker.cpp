@@ -6,14 +6,22 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <thread>
 
 #include "core/map/octomap_message.hpp"
+#include "services/backwashd/localization.hpp"
 #include "services/parallel/parallel.hpp"
 
 namespace backwash::daemon {
 namespace {
+
+// Of a snapshot and of the live grid behind it, at most: grid 1, misses and marks 2, distance 4, Σ 24, bounds 4 + 64,
+// hover map 16.
+constexpr std::size_t kBytesPerVoxel = 115;
+// Resolutions for which the field is known to hold (tests/field, test_resolution_and_yaw), m.
+constexpr double kFinest = 0.02, kCoarsest = 0.2;
 
 void record(Recorder& recorder, const MapMessage& message, bool accepted) {
   const study::MapRecord head{message.resolution, message.binary, accepted};
@@ -23,35 +31,140 @@ void record(Recorder& recorder, const MapMessage& message, bool accepted) {
   recorder.append(study::RecordKind::map, bytes);
 }
 
+bool same_place(const map::OccupancyGrid& a, const map::OccupancyGrid& b) {
+  return a.size() == b.size() && a.resolution() == b.resolution() &&
+         (a.origin() - b.origin()).cwiseAbs().maxCoeff() < 1e-6 * a.resolution();
+}
+
+/// What differs between two grids of the same place.
+map::ScanChange difference(const map::OccupancyGrid& before, const map::OccupancyGrid& after) {
+  map::ScanChange change;
+  for (std::size_t n = 0; n < after.cell_count(); ++n) {
+    if (before.at(n) == after.at(n)) continue;
+    change.box.add(after.voxel(n));
+    if (after.at(n) == map::Cell::occupied)
+      change.occupied.push_back(after.voxel(n));
+    else
+      change.freed += after.at(n) == map::Cell::free;
+  }
+  return change;
+}
+
+/// As if a scan had found the newly occupied voxels of a whole map.
+NewVoxels as_new_voxels(const map::OccupancyGrid& before, const map::ScanChange& change, std::int64_t received_ns) {
+  Scan scan;
+  scan.received_ns = received_ns;
+  for (const Index3& v : change.occupied) scan.points_W.push_back(before.center(v));
+  return new_voxels(before, scan, std::numeric_limits<double>::infinity());
+}
+
 }  // namespace
 
-void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle) {
+MapWorker::~MapWorker() {
+  while (const auto scan = channels_.scans.pop()) delete *scan;
+}
+
+void MapWorker::reject(const std::string& why) {
+  ++channels_.maps_rejected;
+  spdlog::warn("map rejected: {}", why);
+}
+
+void MapWorker::publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns) {
+  world_ = std::move(world);
+  channels_.map_ns.store(received_ns, std::memory_order_relaxed);
+  channels_.worlds.offer(world_);
+  const double age = static_cast<double>(now_ns() - received_ns) * 1e-6;
+  recorder_.append(study::RecordKind::world, "snapshot " + std::to_string(age) + " ms after its newest data");
+}
+
+void MapWorker::take_map(const MapMessage& message) {
+  const auto begun = now_ns();
+  const double cap = settings_.max_mib * (1 << 20);
+  auto grid = map::decode_octomap(message.data, message.resolution, message.binary, message.id,
+                                  static_cast<std::size_t>(cap / kBytesPerVoxel));
+  std::string wrong;
+  if (!grid && grid.error().kind == map::MapError::Kind::too_large) {
+    wrong = "too large: its snapshot would need more than " + std::to_string(static_cast<long>(settings_.max_mib)) +
+            " MiB (map.max_mib)";
+  } else if (!grid) {
+    wrong = grid.error().message;
+  } else if (!(message.resolution >= kFinest * (1 - 1e-9) && message.resolution <= kCoarsest * (1 + 1e-9))) {
+    wrong = "resolution " + std::to_string(message.resolution) + " m, expected 0.02 to 0.2 m";
+  } else if (world_ && std::abs(world_->grid.resolution() - message.resolution) > 1e-9) {
+    wrong = "resolution " + std::to_string(message.resolution) + " m, the map in use has " +
+            std::to_string(world_->grid.resolution()) + " m; restart the daemon to change it";
+  } else if (std::ranges::find(grid->cells(), map::Cell::free) == grid->cells().end()) {
+    wrong = "it has no free voxel";
+  }
+  record(recorder_, message, wrong.empty());
+  if (!wrong.empty()) return reject(wrong);
+
+  const Index3 size = grid->size();
+  const bool update = world_ && same_place(world_->grid, *grid);
+  if (update) {
+    const auto change = difference(world_->grid, *grid);
+    if (!change.occupied.empty()) channels_.map_voxels.push(as_new_voxels(world_->grid, change, message.received_ns));
+    live_.emplace(*grid);
+    publish(plan::update_world(*world_, std::move(*grid), change.box, model_, run_parallel), message.received_ns);
+  } else {
+    live_.emplace(*grid);
+    publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, -1, run_parallel),
+            message.received_ns);
+  }
+  ++channels_.maps_accepted;
+  spdlog::info("map accepted: {} x {} x {} voxels, world {} in {} ms", size.x(), size.y(), size.z(),
+               update ? "updated" : "built", (now_ns() - begun) / 1'000'000);
+}
+
+bool MapWorker::take_scans() {
+  const auto begun = now_ns();
+  map::VoxelBox box;
+  std::int64_t received_ns = -1;
+  while (const auto next = channels_.scans.pop()) {
+    const std::unique_ptr<Scan> scan(*next);
+    if (!live_ || !live_->grid().inside(live_->grid().index(scan->sensor_W))) {
+      ++channels_.scans_rejected;  // no map yet, or the sensor is outside of it
+      continue;
+    }
+    const auto change = live_->insert(scan->points_W, scan->sensor_W, settings_.sensor_range);
+    if (!change.box.empty()) {
+      box.add(change.box.low);
+      box.add(change.box.high);
+    }
+    received_ns = scan->received_ns;
+    ++channels_.scans_accepted;
+  }
+  if (received_ns < 0) return false;
+  if (box.empty()) {
+    channels_.map_ns.store(received_ns, std::memory_order_relaxed);  // the snapshot says what the scan says
+    return true;
+  }
+  publish(plan::update_world(*world_, live_->grid(), box, model_, run_parallel), received_ns);
+  const Index3 extent = box.high - box.low + Index3::Ones();
+  spdlog::debug("map updated in {} x {} x {} voxels in {} ms", extent.x(), extent.y(), extent.z(),
+                (now_ns() - begun) / 1'000'000);
+  return true;
+}
+
+bool MapWorker::step() {
+  const MapMessage* message = channels_.maps.take();
+  if (message) {
+    take_map(*message);
+    channels_.maps.give_back(message);
+  }
+  const bool scanned = take_scans();
+  channels_.worlds.collect();
+  return message || scanned;
+}
+
+void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
+                    const MapSettings& settings) {
   // Below everything else in the process, and below the kernel's workers that carry the serial line; inherited by the
   // threads that build the world.
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
-  while (!channels.stop) {
-    const MapMessage* message = channels.maps.take();
-    if (!message) {
-      channels.worlds.collect();
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-      continue;
-    }
-    const auto begun = now_ns();
-    auto grid = map::decode_octomap(message->data, message->resolution, message->binary, message->id);
-    record(recorder, *message, grid.has_value());
-    channels.maps.give_back(message);
-    if (!grid) {
-      ++channels.maps_rejected;
-      spdlog::warn("map rejected: {}", grid.error().message);
-      continue;
-    }
-    const Index3 size = grid->size();
-    auto world = plan::build_world(std::move(*grid), model, vehicle, reach::Method::tight, -1, run_parallel);
-    channels.worlds.offer(std::make_unique<const std::shared_ptr<const plan::World>>(std::move(world)));
-    ++channels.maps_accepted;
-    spdlog::info("map accepted: {} x {} x {} voxels, world built in {} ms", size.x(), size.y(), size.z(),
-                 (now_ns() - begun) / 1'000'000);
-  }
+  MapWorker worker(channels, recorder, model, vehicle, settings);
+  while (!channels.stop)
+    if (!worker.step()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
 }  // namespace backwash::daemon

@@ -1,15 +1,50 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
+#include "core/map/scan.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/backwashd/lookout.hpp"
 #include "services/backwashd/recorder.hpp"
 
 namespace backwash::daemon {
 
-/// Thread body: turns each map message into one immutable world (grid, distance, field, bounds, hover map). A map that
-/// cannot be read is rejected whole, counted, and the old world stays (faults.md rows 11, 12).
-void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle);
+/// Turns maps and scans into immutable worlds (grid, distance, field, bounds, hover map). A map that cannot be read,
+/// that has nothing free, another resolution than the one in use, or a snapshot above map.max_mib, is rejected whole
+/// and counted, and the old world stays (faults.md rows 10 to 12). Scans that came meanwhile are taken in together, and
+/// the world is updated where they changed something.
+class MapWorker {
+ public:
+  MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
+            const MapSettings& settings)
+      : channels_(channels), recorder_(recorder), model_(model), vehicle_(vehicle), settings_(settings) {}
+  ~MapWorker();
+  MapWorker(const MapWorker&) = delete;
+  MapWorker& operator=(const MapWorker&) = delete;
+
+  /// Takes what has arrived; false if nothing had.
+  bool step();
+
+ private:
+  void take_map(const MapMessage& message);
+  bool take_scans();
+  void reject(const std::string& why);
+  void publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns);
+
+  Channels& channels_;
+  Recorder& recorder_;
+  Model model_;
+  Vehicle vehicle_;
+  MapSettings settings_;
+  std::optional<map::LiveMap> live_;
+  std::shared_ptr<const plan::World> world_;
+};
+
+/// Thread body.
+void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
+                    const MapSettings& settings);
 
 }  // namespace backwash::daemon

@@ -5,6 +5,7 @@
 
 #include <thread>
 
+#include "core/plan/planner.hpp"
 #include "services/dds/topics.hpp"
 
 namespace backwash::daemon {
@@ -33,7 +34,48 @@ void Mission::refresh() {
     if (job_ != outcome->job) continue;  // a newer command took its place
     job_.reset();
     report(outcome->ok ? "" : std::string("refused: ") + outcome->reason.data());
-    if (!outcome->ok) spdlog::warn("refused: {}", outcome->reason.data());
+    if (outcome->ok) continue;
+    spdlog::warn("refused: {}", outcome->reason.data());
+    if (view_.reason != track::Reason::obstacle_ahead) route_.clear();
+  }
+  continue_route();
+  judge_place(seconds_now());
+}
+
+// Whether map and vehicle overlap such that it could take off: for `backwashctl check`.
+void Mission::judge_place(double now_s) {
+  constexpr double kEvery = 1.0;  // s
+  if (now_s < judge_at_s_) return;
+  judge_at_s_ = now_s + kEvery;
+  std::string why;
+  if (!world_) {
+    why = "no map was received yet";
+  } else if (const Index3 v = world_->grid.index(view_.state.p_W); !world_->grid.inside(v)) {
+    why = "the vehicle is outside the map";
+  } else if (!world_->grid.free(v)) {
+    why = "the vehicle is in a voxel that is not free";
+  } else if (view_.landed && !plan::takeoff_column(*world_, view_.state.p_W)) {
+    why = "there is no clear hover height above a known floor here";
+  }
+  std::array<char, 192> line{};
+  std::snprintf(line.data(), line.size(), "%s", why.c_str());
+  channels_.place.write(line);
+}
+
+// To the next goal of a route at rest at the last one; and to the same goal again once something that stood in the way
+// is in the map.
+void Mission::continue_route() {
+  constexpr double kAtGoal = 0.01, kRest = 0.1, kRetry = 1.0;  // m, m/s, s
+  const bool commanding = view_.mode == track::Mode::tracking || view_.mode == track::Mode::hold;
+  if (!commanding) route_.clear();
+  if (route_.empty() || job_ || !view_.finished) return;
+  if ((view_.command.p_W - route_.front()).norm() < kAtGoal && view_.mode == track::Mode::tracking) {
+    route_.pop_front();
+    if (!route_.empty()) start(PlanJob::Kind::go_to, route_.front());
+  } else if (view_.mode == track::Mode::hold && view_.reason == track::Reason::obstacle_ahead &&
+             view_.state.v_W.norm() < kRest && seconds_now() > retry_at_s_) {
+    retry_at_s_ = seconds_now() + kRetry;
+    start(PlanJob::Kind::go_to, route_.front());
   }
 }
 
@@ -85,11 +127,17 @@ Answer Mission::decide(const CommandMessage& command) {
       return take_off(command);
     case backwash_msgs_msg_dds__COMMAND_GOTO:
       return go_to(command);
+    case backwash_msgs_msg_dds__COMMAND_FOLLOW:
+      return follow(command);
     case backwash_msgs_msg_dds__COMMAND_HOLD:
       if (!commanding) return refused("not enabled");
-      return start(PlanJob::Kind::brake, command);
+      route_.clear();
+      return start(PlanJob::Kind::brake);
+    case backwash_msgs_msg_dds__COMMAND_STOP:
+      return stop();
     case backwash_msgs_msg_dds__COMMAND_LAND:
       if (!commanding) return refused("not enabled");
+      route_.clear();
       channels_.requests.push(track::Request::land);
       return accepted("landing");
     case backwash_msgs_msg_dds__COMMAND_RELEASE:
@@ -104,6 +152,8 @@ Answer Mission::enable() {
   if (view_.mode != track::Mode::passive && view_.mode != track::Mode::quiet)
     return refused(std::string("already ") + to_string(view_.mode));
   if (!world_) return refused("no map was received yet");
+  if (view_.mismatch != track::Mismatch::none)
+    return refused(std::string("map and autopilot disagree: ") + to_string(view_.mismatch));
   if (view_.odometry_age > track::Supervisor::kHoldAfter) return refused("no odometry");
   if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
@@ -114,21 +164,48 @@ Answer Mission::enable() {
 Answer Mission::take_off(const CommandMessage& command) {
   if (view_.mode != track::Mode::tracking) return refused("not enabled");
   if (!view_.landed) return refused("already in the air");
-  return start(PlanJob::Kind::takeoff, command);
+  return start(PlanJob::Kind::takeoff, command.position);
 }
 
 Answer Mission::go_to(const CommandMessage& command) {
   if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return refused("not enabled");
   if (view_.landed) return refused("on the ground: take off first");
   if (!view_.finished) return refused("flying: hold first");
-  return start(PlanJob::Kind::go_to, command);
+  const Answer answer = start(PlanJob::Kind::go_to, command.position, command.yaw);
+  if (answer.result == kAccepted) route_ = {command.position};
+  return answer;
 }
 
-Answer Mission::start(PlanJob::Kind kind, const CommandMessage& command) {
+Answer Mission::follow(const CommandMessage& command) {
+  if (command.waypoints == 0 || command.waypoints > command.kMostWaypoints)
+    return {kInvalid, "follow needs 1 to " + std::to_string(command.kMostWaypoints) + " waypoints"};
+  CommandMessage first = command;
+  std::deque<Vec3> route;
+  for (std::size_t n = 0; n < command.waypoints; ++n) {
+    const auto& p = command.waypoint[n];
+    route.emplace_back(p[0], p[1], p[2]);
+    if (!route.back().allFinite()) return {kInvalid, "a waypoint is not finite"};
+  }
+  first.position = route.front();
+  const Answer answer = go_to(first);
+  if (answer.result == kAccepted) route_ = std::move(route);
+  return answer;
+}
+
+Answer Mission::stop() {
+  if (view_.mode == track::Mode::passive || view_.mode == track::Mode::quiet) return refused("not enabled");
+  route_.clear();
+  job_.reset();
+  const bool standing = view_.landed && !view_.armed;
+  channels_.requests.push(standing ? track::Request::disable : track::Request::stop);
+  return accepted(standing ? "disabling" : "stopping");
+}
+
+Answer Mission::start(PlanJob::Kind kind, const Vec3& position, double yaw) {
   if (!world_) return refused("no map was received yet");
   if (job_ && kind != PlanJob::Kind::brake) return refused("still planning the last command");
   job_ = ++last_job_;
-  channels_.jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, *job_, command.position, command.yaw, world_}));
+  channels_.jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, *job_, position, yaw, world_}));
   report("planning");
   return accepted("planning");
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -39,12 +40,19 @@ class Mission {
   Answer take_off(const CommandMessage& command);
   Answer go_to(const CommandMessage& command);
   void report(const std::string& task);
-  Answer start(PlanJob::Kind kind, const CommandMessage& command);
+  Answer start(PlanJob::Kind kind, const Vec3& position = Vec3::Zero(), double yaw = 0);
+  Answer follow(const CommandMessage& command);
+  Answer stop();
+  void continue_route();
+  void judge_place(double now_s);
 
   Channels& channels_;
   ControlView view_;
   std::shared_ptr<const plan::World> world_;
   std::optional<std::uint64_t> job_;  // under way
+  std::deque<Vec3> route_;            // goals still to be reached; the first is the one flown to
+  double judge_at_s_ = 0;
+  double retry_at_s_ = 0;  // after something stood in the way
   std::uint64_t last_job_ = 0;
   struct Lease {
     std::string station;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <sched.h>
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
 #include <time.h>
@@ -24,15 +25,25 @@ void prefault_stack() {
 
 }  // namespace
 
-void make_real_time(int priority) {
+void make_real_time(const Scheduling& scheduling) {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
     spdlog::warn("memory is not locked ({}): page faults may delay ticks; grant CAP_IPC_LOCK or LimitMEMLOCK",
                  std::strerror(errno));
   prefault_stack();
-  if (priority == 0) return;
-  if (!set_fifo(priority))
-    spdlog::warn("SCHED_FIFO {} is not allowed ({}): ticks may be late; grant CAP_SYS_NICE or LimitRTPRIO", priority,
-                 std::strerror(errno));
+  if (scheduling.cpu >= 0) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET(static_cast<std::size_t>(scheduling.cpu), &set);
+    if (sched_setaffinity(0, sizeof set, &set) != 0)
+      spdlog::warn("the control thread is not bound to processor {} ({}): set control.cpu to one that exists",
+                   scheduling.cpu, std::strerror(errno));
+  }
+  if (scheduling.priority == 0) {
+    spdlog::warn("control.priority is 0: the control thread has ordinary scheduling, ticks may be late");
+  } else if (!set_fifo(scheduling.priority)) {
+    spdlog::warn("SCHED_FIFO {} is not allowed ({}): ticks may be late; grant CAP_SYS_NICE or LimitRTPRIO",
+                 scheduling.priority, std::strerror(errno));
+  }
 }
 
 void run_control(Channels& channels, ControlLoop& loop) {

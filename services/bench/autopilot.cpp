@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <iomanip>
 
 #include "firmware_bridge/mavlink/frames.hpp"
@@ -38,6 +39,17 @@ void Autopilot::log_wire(const std::string& path) {
 
 const char* Autopilot::mode() const noexcept {
   return mode_ == Mode::offboard ? "offboard" : mode_ == Mode::land ? "land" : "manual";
+}
+
+void Autopilot::take_over() noexcept {
+  mode_ = Mode::manual;
+  heartbeat_due_ = true;
+}
+
+void Autopilot::disarm() noexcept {
+  armed_ = false;
+  vehicle_.set_motors(false);
+  heartbeat_due_ = true;
 }
 
 Setpoint Autopilot::to_map(const Setpoint& local) const {
@@ -94,6 +106,19 @@ void Autopilot::on(const mavlink::CommandLong& m, double t) {
   acks_.push_back({.command = m.command, .result = result});
 }
 
+// As PX4 answers: integers bytewise in the float.
+void Autopilot::on(const mavlink::ParamRequestRead& m, double) {
+  constexpr std::uint8_t kInt32 = 6, kReal32 = 9;
+  const std::string name(m.param_id.begin(), std::ranges::find(m.param_id, char{0}));
+  const auto found = parameters.find(name);
+  if (found == parameters.end()) return;
+  const bool real = name.ends_with("_T");
+  mavlink::ParamValue answer{.param_count = 1, .param_id = m.param_id, .param_type = real ? kReal32 : kInt32};
+  answer.param_value =
+      real ? static_cast<float>(found->second) : std::bit_cast<float>(static_cast<std::int32_t>(found->second));
+  values_.push_back(answer);
+}
+
 void Autopilot::receive(std::span<const std::uint8_t> bytes, double t) {
   parser_.feed(bytes, [&](const mavlink::Frame& frame) {
     mavlink::decode_and_visit(frame.id, frame.payload, [&](const auto& message) {
@@ -141,8 +166,16 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
   const auto boot_ms = static_cast<std::uint32_t>(steps_);
   for (const auto& ack : acks_) send(ack, out);
   acks_.clear();
+  for (const auto& value : values_) send(value, out);
+  values_.clear();
   if (mute) return out.clear();
-  if (steps_ % 1000 == 0) {
+  if (battery && steps_ % 1000 == 500) {
+    mavlink::BatteryStatus status{.battery_remaining = static_cast<std::int8_t>(std::lround(100 * *battery))};
+    status.voltages.fill(65535);
+    send(status, out);
+  }
+  if (steps_ % 1000 == 0 || heartbeat_due_) {
+    heartbeat_due_ = false;
     const std::uint32_t custom = mode_ == Mode::offboard ? kOffboard : mode_ == Mode::land ? kAutoLand : kManual;
     send(mavlink::Heartbeat{.custom_mode = custom,
                             .type = kQuadrotor,

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <random>
 #include <span>
@@ -50,6 +51,20 @@ class Autopilot {
 
   /// While true no telemetry is sent (heartbeat lost, faults.md row 21).
   bool mute = false;
+  /// What PARAM_REQUEST_READ is answered from: safe indoors until changed. Those whose name ends in _T are floats.
+  std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5},
+                                           {"COM_OBL_RC_ACT", 4},
+                                           {"COM_RC_OVERRIDE", 3},
+                                           {"NAV_DLL_ACT", 3},
+                                           {"COM_LOW_BAT_ACT", 2}};
+  /// Remaining share, sent once a second as BATTERY_STATUS while set.
+  std::optional<double> battery;
+  /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
+  void take_over() noexcept;
+  /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
+  void disarm() noexcept;
+  /// The estimator is reset: from now on its local frame lies elsewhere.
+  void reset_estimator(const LocalFrame& frame) noexcept { frame_ = frame; }
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position.
   void log_wire(const std::string& path);
 
@@ -58,6 +73,7 @@ class Autopilot {
   void on(const mavlink::SetPositionTargetLocalNed& m, double t);
   void on(const mavlink::Odometry& m, double t);
   void on(const mavlink::CommandLong& m, double t);
+  void on(const mavlink::ParamRequestRead& m, double t);
   template <typename Other>
   void on(const Other&, double) {}
   Setpoint to_map(const Setpoint& local) const;
@@ -72,7 +88,7 @@ class Autopilot {
   LocalFrame frame_;
   std::uint8_t system_, sequence_ = 0;
   mavlink::Parser parser_;
-  bool armed_ = false, landed_ = true, local_position_ = false;
+  bool armed_ = false, landed_ = true, local_position_ = false, heartbeat_due_ = false;
   Mode mode_ = Mode::manual;
   double t_ = 0, last_setpoint_ = -1e9, landed_since_ = 0;
   long steps_ = 0;
@@ -81,6 +97,7 @@ class Autopilot {
   std::deque<std::pair<double, State>> history_;  // truth of the last second
   State error_;                                   // what the newest odometry said, less the truth at its stamp
   std::vector<mavlink::CommandAck> acks_;
+  std::vector<mavlink::ParamValue> values_;  // asked for and not yet sent
   std::ofstream wire_;
 };
 

@@ -3,7 +3,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <iomanip>
 #include <stdexcept>
@@ -49,11 +51,73 @@ dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& d
   return m;
 }
 
-dds::Odometry odometry(const State& estimate, const Eigen::Quaterniond& q, double t) {
-  static const std::string frame = "map", child = "base_link";
-  dds::Odometry m{};
+builtin_interfaces_msg_dds__Time_ stamp(double t) {
   const auto ns = static_cast<std::int64_t>(t * 1e9);
-  m.header.stamp = {static_cast<std::int32_t>(ns / 1'000'000'000), static_cast<std::uint32_t>(ns % 1'000'000'000)};
+  return {static_cast<std::int32_t>(ns / 1'000'000'000), static_cast<std::uint32_t>(ns % 1'000'000'000)};
+}
+
+/// A depth camera that looks at the crate: what it sees of it, every 4 cm, as a cloud in the body's frame.
+class CrateScans {
+ public:
+  CrateScans(const dds::Participant& participant, const Options& options)
+      : writer_(dds::make_writer<dds::PointCloud>(participant, options.name_space)),
+        center_(options.crate),
+        edge_(options.crate_edge) {}
+
+  void send(const State& truth, const Eigen::Quaterniond& q, double t) {
+    static const std::string frame = "base_link";
+    static const std::array<std::string, 3> names{"x", "y", "z"};
+    constexpr std::uint8_t kFloat32 = 7;
+    std::vector<float> data;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double side = truth.p_W[axis] > center_[axis] ? 1 : -1;
+      if (std::abs(truth.p_W[axis] - center_[axis]) <= edge_ / 2) continue;  // looks at this face from neither side
+      for (double u = 0.02; u < edge_; u += 0.04)
+        for (double v = 0.02; v < edge_; v += 0.04) {
+          Vec3 p = center_ - Vec3::Constant(edge_ / 2);
+          p[axis] = center_[axis] + side * (edge_ / 2 - 0.01);
+          p[(axis + 1) % 3] += u;
+          p[(axis + 2) % 3] += v;
+          const Vec3 seen = q.conjugate() * (p - truth.p_W);
+          for (const double x : seen) data.push_back(static_cast<float>(x));
+        }
+    }
+    std::array<dds::PointField, 3> fields{};
+    for (std::uint32_t n = 0; n < 3; ++n) fields[n] = {dds::c_string(names[n]), 4 * n, kFloat32, 1};
+    dds::PointCloud m{};
+    m.header = {stamp(t), dds::c_string(frame)};
+    m.height = 1;
+    m.width = static_cast<std::uint32_t>(data.size() / 3);
+    m.fields = {3, 3, fields.data(), false};
+    m.point_step = 12;
+    m.row_step = m.width * m.point_step;
+    m.data = {m.row_step, m.row_step, reinterpret_cast<std::uint8_t*>(data.data()), false};
+    m.is_dense = true;
+    writer_.write(m);
+  }
+
+ private:
+  dds::Writer<dds::PointCloud> writer_;
+  Vec3 center_;
+  double edge_;
+};
+
+/// map <- odom, a translation.
+dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t) {
+  static const std::string frame = "map", child = "odom";
+  dds::TransformStamped m{};
+  m.header = {stamp(t), dds::c_string(frame)};
+  m.child_frame_id = dds::c_string(child);
+  m.transform.translation = {t_map_odom.x(), t_map_odom.y(), t_map_odom.z()};
+  m.transform.rotation = {0, 0, 0, 1};
+  return m;
+}
+
+dds::Odometry odometry(const State& estimate, const Eigen::Quaterniond& q, double t, bool drifting) {
+  static const std::string map_frame = "map", odom_frame = "odom", child = "base_link";
+  const std::string& frame = drifting ? odom_frame : map_frame;
+  dds::Odometry m{};
+  m.header.stamp = stamp(t);
   m.header.frame_id = dds::c_string(frame);
   m.child_frame_id = dds::c_string(child);
   m.pose.pose.position = {estimate.p_W.x(), estimate.p_W.y(), estimate.p_W.z()};
@@ -94,6 +158,7 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });
   Autopilot autopilot(grid, vehicle, ground_below(grid, vehicle, options.start), options.frame, options.seed, 1);
+  for (const auto& [name, value] : options.parameters) autopilot.parameters[name] = value;
   if (!options.wire.empty()) autopilot.log_wire(options.wire);
   TruthLog log(options.log);
   const sim::EmulatedVio vio(kVioShare * vehicle.estimation.position, options.seed + 1);
@@ -103,6 +168,10 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   if (priority > 0) set_fifo(priority);
   auto odometry_writer = dds::make_writer<dds::Odometry>(participant, options.name_space);
   auto map_writer = dds::make_writer<dds::Octomap>(participant, options.name_space);
+  auto closure_writer = dds::make_writer<dds::TransformStamped>(participant, options.name_space);
+  CrateScans scans(participant, options);
+  if (options.closure_s) closure_writer.write(loop_closure(Vec3::Zero(), 0));
+  bool closed = false;
   std::vector<std::int8_t> map_data;
   map_writer.write(octomap(grid, map_data));
   Pty pty(options.link);
@@ -123,9 +192,15 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
     if (!armed_at && autopilot.armed()) armed_at = t;
     const auto passed = [&](const std::optional<double>& s) { return s && armed_at && t - *armed_at > *s; };
     autopilot.mute = passed(options.stop_heartbeat_s);
-    const State estimate = vio.estimate(autopilot.truth(), t - seconds(begun));
+    State estimate = vio.estimate(autopilot.truth(), t - seconds(begun));
+    if (options.closure_s) estimate.p_W -= options.drift;
+    if (!closed && passed(options.closure_s)) {
+      closure_writer.write(loop_closure(options.drift, t));
+      closed = true;
+    }
+    if (step % 100 == 0 && passed(options.crate_s)) scans.send(autopilot.truth(), autopilot.attitude(), t);
     if (step % kOdometryEvery == 0 && !passed(options.stop_odometry_s))
-      odometry_writer.write(odometry(estimate, autopilot.attitude(), t));
+      odometry_writer.write(odometry(estimate, autopilot.attitude(), t, options.closure_s.has_value()));
     if (step % 20 == 0) log.row(t, autopilot, estimate);
   }
   spdlog::info("bench stopped: {}, {}, {} set-points received", autopilot.mode(),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -19,6 +20,15 @@ struct Options {
   std::string interface = "lo", name_space = "backwash";
   double duration_s = 600;
   std::optional<double> stop_odometry_s, stop_heartbeat_s;  ///< s after arming
+  std::map<std::string, double> parameters;                 ///< of the autopilot, in place of its own
+  /// A crate of which an emulated depth camera sends scans (10 Hz, body frame) from then on.
+  std::optional<double> crate_s;  ///< s after arming
+  Vec3 crate = Vec3::Zero();      ///< its centre in the map, m
+  double crate_edge = 0.6;        ///< m
+  /// The VIO drifts by −drift before the flight: odometry comes in the frame odom, and a loop closure, map ← odom,
+  /// brings the drift to light.
+  std::optional<double> closure_s;  ///< s after arming
+  Vec3 drift = Vec3::Zero();        ///< m
 };
 
 /// Runs the emulated flight controller, VIO (100 Hz) and mapper in real time until the duration has passed or SIGINT or

@@ -45,6 +45,16 @@ int main(int argc, char** argv) {
   app.add_option("--wire", o.wire, "what arrived from the daemon, frame by frame, CSV");
   app.add_option("--stop-odometry", o.stop_odometry_s, "fault: VIO stops this long after arming, s");
   app.add_option("--stop-heartbeat", o.stop_heartbeat_s, "fault: the controller goes silent this long after arming, s");
+  std::vector<std::string> parameters;
+  app.add_option("--parameter", parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
+  std::vector<double> crate, drift;
+  app.add_option("--crate", crate, "x,y,z of a crate's centre in the map, m, which the map does not have")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--crate-edge", o.crate_edge, "m")->capture_default_str();
+  app.add_option("--crate-after", o.crate_s, "fault: scans of it come from this long after arming, s");
+  app.add_option("--drift", drift, "x,y,z by which a loop closure corrects the VIO, m")->delimiter(',')->expected(3);
+  app.add_option("--closure-after", o.closure_s, "fault: the loop closure comes this long after arming, s");
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {
@@ -53,6 +63,16 @@ int main(int argc, char** argv) {
     return failed(64, std::string(wrong.what()) + "; see backwash-bench --help");
   }
   o.start = {start[0], start[1], start[2]};
+  for (const std::string& p : parameters) {
+    const auto equals = p.find('=');
+    char* end = nullptr;
+    const double value = equals == p.npos ? 0 : std::strtod(p.c_str() + equals + 1, &end);
+    if (!end || *end != 0 || end == p.c_str() + equals + 1)
+      return failed(64, "--parameter " + p + ": expected NAME=NUMBER");
+    o.parameters[p.substr(0, equals)] = value;
+  }
+  if (!crate.empty()) o.crate = {crate[0], crate[1], crate[2]};
+  if (!drift.empty()) o.drift = {drift[0], drift[1], drift[2]};
   o.frame.origin = {origin[0], origin[1], origin[2]};
   const auto grid = backwash::map::load_map(o.map);
   if (!grid)

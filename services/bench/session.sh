@@ -30,7 +30,7 @@ start_bench() {
   die "the bench did not start"
 }
 
-# start_daemon VEHICLE RAW_LOG: returns once it has built its world from the map.
+# start_daemon VEHICLE RAW_LOG [ODOMETRY_TOPIC]: returns once it has built its world from the map.
 start_daemon() {
   local from=$(wc -l <"$log")
   cat >"$work/backwashd.toml" <<TOML
@@ -40,13 +40,15 @@ model = "$1"
 domain = $domain
 interface = "lo"
 namespace = "backwash"
-odometry_topic = "rt/backwash/odometry"
+odometry_topic = "${3:-rt/backwash/odometry}"
 [link]
 device = "$work/autopilot"
 baud = 921600
 system = 1
 [control]
 priority = 80
+cpu = -1
+battery_land = 0.15
 [log]
 file = "$2"
 TOML

@@ -3,8 +3,10 @@
 
 #include <dds/dds.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <string_view>
 
 namespace backwash::dds {
 namespace {
@@ -119,6 +121,34 @@ int WriterBase::matched() const {
 bool WriterBase::write(const void* sample) { return dds_write(writer_, sample) == DDS_RETCODE_OK; }
 
 }  // namespace detail
+
+ForeignWriters::ForeignWriters(const Participant& participant)
+    : participant_(participant.handle()),
+      publications_(
+          checked(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr),
+                  "reader of the participants' writers")) {}
+
+std::size_t ForeignWriters::count() {
+  void* sample = nullptr;
+  dds_sample_info_t info;
+  while (dds_take(publications_, &sample, &info, 1, 1) == 1) {
+    if (info.valid_data) {
+      const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
+      const Entity ours = dds_find_topic(DDS_FIND_SCOPE_PARTICIPANT, participant_, writer.topic_name, nullptr, 0);
+      std::array<char, 256> type{};
+      if (ours > 0 && dds_get_type_name(ours, type.data(), type.size()) > 0 &&
+          std::string_view(type.data()) != writer.type_name) {
+        std::array<std::uint8_t, 16> key{};
+        std::copy_n(writer.key.v, key.size(), key.begin());
+        seen_.insert(key);
+      }
+      if (ours > 0) dds_delete(ours);
+    }
+    dds_return_loan(publications_, &sample, 1);
+    sample = nullptr;
+  }
+  return seen_.size();
+}
 
 WaitSet::WaitSet(const Participant& participant)
     : participant_(participant.handle()), waitset_(checked(dds_create_waitset(participant.handle()), "wait set")) {}

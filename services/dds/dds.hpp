@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -96,6 +98,19 @@ class Writer : public detail::WriterBase {
  public:
   using WriterBase::WriterBase;
   bool write(const T& sample) { return WriterBase::write(&sample); }
+};
+
+/// Counts the writers of other participants that use the name of one of this participant's topics with another type:
+/// the middleware does not connect them and tells nobody (faults.md row 27).
+class ForeignWriters {
+ public:
+  explicit ForeignWriters(const Participant& participant);
+  /// All that were seen so far. Call from one thread.
+  std::size_t count();
+
+ private:
+  Entity participant_, publications_;
+  std::set<std::array<std::uint8_t, 16>> seen_;
 };
 
 /// Sleeps until one of its readers has data.

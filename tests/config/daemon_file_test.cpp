@@ -35,6 +35,8 @@ TEST(DaemonFile, ReadsTheShippedExample) {
   EXPECT_EQ(d->dds.name_space, "backwash");
   EXPECT_EQ(d->link.baud, 921600);
   EXPECT_EQ(d->control.priority, 80);
+  EXPECT_EQ(d->control.cpu, -1);
+  EXPECT_DOUBLE_EQ(d->control.battery_land, 0.15);
 }
 
 TEST(DaemonFile, FramesAndMapMayBeLeftOut) {
@@ -58,7 +60,9 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
   EXPECT_TRUE(names(error_after("baud = 921600", "baud = \"fast\""), 14, "link.baud"));
   EXPECT_TRUE(names(error_after("baud = 921600", "bauds = 921600"), 14, "link.bauds"));
   EXPECT_TRUE(names(error_after("device = \"/dev/ttyAMA0\"", "device = \"\""), 13, "link.device"));
-  EXPECT_TRUE(names(error_after("file = ", "path = "), 21, "log.path"));
+  EXPECT_TRUE(names(error_after("file = ", "path = "), 23, "log.path"));
+  EXPECT_TRUE(names(error_after("cpu = -1", "cpu = 0.5"), 19, "control.cpu"));
+  EXPECT_TRUE(names(error_after("battery_land = 0.15", "battery_land = 15"), 20, "control.battery_land"));
   EXPECT_TRUE(names(error_after("[control]", "[controls]"), 17, "controls"));
   EXPECT_TRUE(names(error_after("live = false", "live = 0"), 29, "map.live"));
   EXPECT_TRUE(names(error_after("max_mib = 512", "max_mib = 0"), 32, "map.max_mib"));

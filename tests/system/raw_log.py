@@ -4,8 +4,8 @@ import collections
 import csv
 import struct
 
-MAGIC = b"backwash raw log 1\n"
-ODOMETRY, FRAME_IN, FRAME_OUT, TICK = 2, 6, 7, 8
+MAGIC = b"backwash raw log 2\n"
+ODOMETRY, FRAME_IN, FRAME_OUT, TICK, SCAN, WORLD = 2, 6, 7, 8, 14, 15
 MODES = ["passive", "enabling", "tracking", "hold", "land", "quiet"]
 SETPOINT, HEARTBEAT, COMMAND = 84, 0, 76
 
@@ -36,6 +36,10 @@ def message_id(frame):
 
 def times(path, kind, wanted=None):
     return [t for t, k, body in records(path) if k == kind and (wanted is None or message_id(body) == wanted)]
+
+
+def lines(path, kind):
+    return [(t, body.decode()) for t, k, body in records(path) if k == kind]
 
 
 def wire(path):

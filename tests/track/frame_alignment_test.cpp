@@ -18,7 +18,7 @@ struct Frames {
   Frames(double yaw_offset, const Vec3& t) : local_from_map(Eigen::Isometry3d::Identity()), yaw(yaw_offset) {
     local_from_map.rotate(Eigen::AngleAxisd(yaw_offset, Vec3::UnitZ())).pretranslate(t);
   }
-  YawPose local(const YawPose& map) const { return {local_from_map * map.p, map.yaw + yaw}; }
+  FramePose local(const FramePose& map) const { return {local_from_map * map.p, map.yaw + yaw}; }
 };
 
 TEST(FrameAlignment, FindsYawAndTranslationAcrossTheWrap) {
@@ -29,8 +29,8 @@ TEST(FrameAlignment, FindsYawAndTranslationAcrossTheWrap) {
     FrameAlignment alignment;
     EXPECT_FALSE(alignment.aligned());
     for (int i = 0; i < 200; ++i) {
-      const YawPose map{{2 + noise(rng), 3 + noise(rng), 1 + noise(rng)}, 3.0 + noise(rng)};
-      YawPose local = truth.local(map);
+      const FramePose map{{2 + noise(rng), 3 + noise(rng), 1 + noise(rng)}, 3.0 + noise(rng)};
+      FramePose local = truth.local(map);
       local.p += Vec3(noise(rng), noise(rng), noise(rng));
       alignment.update(map, local, true);
     }
@@ -45,10 +45,10 @@ TEST(FrameAlignment, FindsYawAndTranslationAcrossTheWrap) {
 TEST(FrameAlignment, NoticesWithinAFewTicksThatTheControllerReset) {
   const Frames truth(0.5, {1, 2, 3});
   FrameAlignment alignment;
-  const YawPose map{{1, 1, 1}, 0};
+  const FramePose map{{1, 1, 1}, 0};
   for (int i = 0; i < 100; ++i) alignment.update(map, truth.local(map), true);
   ASSERT_TRUE(alignment.aligned());
-  YawPose jumped = truth.local(map);
+  FramePose jumped = truth.local(map);
   jumped.p.x() += 0.8;
   int ticks = 0;
   while (alignment.aligned() && ticks < 50) alignment.update(map, jumped, false), ++ticks;

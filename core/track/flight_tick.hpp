@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/track/frame_alignment.hpp"
+#include "core/track/odometry_gate.hpp"
+#include "core/track/supervisor.hpp"
+#include "core/track/tracker.hpp"
+
+namespace backwash::track {
+
+/// What the autopilot said last, as far as a tick decides by it.
+struct AutopilotFacts {
+  bool port_open = true;
+  bool transmit_failed = false;  ///< two set-points in a row did not get out
+  bool armed = false, offboard = false;
+  double heartbeat_age = std::numeric_limits<double>::infinity();  ///< s
+  struct Pose {
+    std::int64_t at_ns = 0;               ///< when the position arrived
+    State state;                          ///< in the controller's local frame, z-up
+    std::array<double, 4> q{1, 0, 0, 0};  ///< body to local: w, x, y, z
+  };
+  std::optional<Pose> pose;
+  std::optional<std::uint8_t> reset_counter;  ///< of its estimator
+  std::optional<double> battery;              ///< remaining share, 0…1
+};
+
+/// What the map says about this tick.
+struct Surroundings {
+  bool missing = false;       ///< no map was received yet
+  bool outside = false;       ///< the newest pose is outside the map (outside counts as occupied)
+  bool late = false;          ///< a live map is older than it may be
+  bool tube_blocked = false;  ///< new occupied voxels reach into Tracker::ahead()
+  bool stop_blocked = false;  ///< and into Tracker::next_stop()
+};
+
+/// Everything that a tick decides from. Two ticks with equal inputs in equal states decide bit for bit alike.
+struct TickInput {
+  std::int64_t now_ns = 0;                   ///< CLOCK_MONOTONIC
+  int missed_periods = 0;                    ///< whole periods skipped before this tick
+  std::optional<OdometrySample> odometry;    ///< newest since the last tick
+  Request request = Request::none;           ///< of the operator
+  const AcceptedSegment* segment = nullptr;  ///< offered since the last tick
+  bool arm = false;                          ///< a take-off was found clear: the vehicle may be armed
+  AutopilotFacts autopilot;
+  Surroundings surroundings;
+};
+
+/// What a tick decided.
+struct TickOutput {
+  SupervisorOutput supervisor;
+  Setpoint command;        ///< sent or held, map frame
+  Setpoint command_local;  ///< the same in the controller's frame
+  bool finite = true;      ///< command_local is all numbers; else it must not be sent
+  OdometryGate::Verdict verdict = OdometryGate::Verdict::good;  ///< of the tick's sample, if there was one
+  bool fresh = false;                                           ///< there was a good sample
+  bool arm = false;                                             ///< ask the autopilot to arm
+  Inside inside;
+  std::uint64_t judged_segment = 0, judged_index = 0;  ///< the set that `inside` is about
+  bool accepted = false, refused = false;              ///< the offered segment
+  /// Segments that are not used any more, to be given back to their owner; null where there are fewer.
+  std::array<const AcceptedSegment*, 2> released{};
+};
+
+/// The decisions of the 50 Hz tick: odometry gate, frames, tracker, supervisor and set-point, without any input or
+/// output of its own. The daemon's control thread and `backwash replay` run the same object.
+class FlightTick {
+ public:
+  /// `battery_land`: remaining share below which LAND is asked for once; 0: never.
+  FlightTick(const Vehicle& vehicle, double battery_land);
+
+  /// One tick. Real-time: wait-free, no allocation.
+  TickOutput step(const TickInput& in) noexcept;
+
+  Mode mode() const noexcept { return supervisor_.mode(); }
+  /// The last good odometry.
+  const std::optional<OdometrySample>& odometry() const noexcept { return gate_.last(); }
+  const FrameAlignment& alignment() const noexcept { return alignment_; }
+  const Tracker& tracker() const noexcept { return tracker_; }
+  double odometry_age() const noexcept { return odometry_age_; }  ///< s, at the last tick
+
+ private:
+  void take_closure(const TickInput& in) noexcept;
+  void take_odometry(const TickInput& in, TickOutput& out) noexcept;
+  void align(const TickInput& in, bool fresh) noexcept;
+  void take_segment(const TickInput& in, TickOutput& out) noexcept;
+  void judge(TickOutput& out) noexcept;
+  SupervisorInput facts(const TickInput& in, const TickOutput& out) const noexcept;
+  void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
+  void drop_segment(TickOutput& out) noexcept;
+
+  double battery_land_;
+  OdometryGate gate_;
+  FrameAlignment alignment_;
+  Supervisor supervisor_;
+  Tracker tracker_;
+  const AcceptedSegment* segment_ = nullptr;  ///< the tracker's
+  std::uint32_t closures_ = 0;                ///< loop closures seen
+  RigidShift map_from_odom_;                  ///< of the last
+  Setpoint command_;                          ///< of the last tick
+  bool was_commanding_ = false, reset_ = false;
+  bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
+  int disorder_ = 0;                  ///< samples in a row whose stamp did not rise
+  std::int64_t last_good_ns_ = -1, last_pose_ns_ = -1;
+  std::optional<std::uint8_t> reset_counter_;
+  double odometry_age_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace backwash::track

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cinttypes>
+#include <cstdio>
+
+#include "core/study/tick_log.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+constexpr int kDiffers = 1;
+
+struct Options {
+  std::string log;
+  bool json = false;
+};
+
+std::string hex(std::uint64_t value) {
+  char text[20];
+  std::snprintf(text, sizeof text, "%016" PRIx64, value);
+  return text;
+}
+
+Json to_json(const study::Replay& r, bool equal) {
+  Json json = {{"equal", equal},
+               {"ticks", r.ticks},
+               {"ticks_missing", r.ticks_missing},
+               {"segments", r.segments},
+               {"setpoints", r.setpoints},
+               {"differing_ticks", r.differing},
+               {"decisions_hash", hex(r.state_hash)}};
+  if (r.first)
+    json["first_difference"] = {{"tick", r.first->tick},
+                                {"byte", r.first->offset},
+                                {"field", r.first->field},
+                                {"logged", r.first->logged},
+                                {"replayed", r.first->replayed}};
+  return json;
+}
+
+int run(const Options& options) {
+  const auto log = study::read_raw_log(options.log);
+  if (!log)
+    throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  if (log->cut_at)
+    throw Failure(kBadData, options.log + ": byte " + std::to_string(*log->cut_at) +
+                                ": the last record is cut short; cut the file there to replay what is before it");
+  const auto replay = study::replay(*log, options.log);
+  if (!replay) throw Failure(kBadData, replay.error().message);
+  const study::Replay& r = *replay;
+  const bool equal = r.differing == 0 && r.ticks_missing == 0;
+  if (options.json) {
+    print(to_json(r, equal));
+    return equal ? kOk : kDiffers;
+  }
+  std::printf("%" PRIu64 " ticks, %" PRIu64 " set-points, %" PRIu64 " segments replayed; decisions %s\n", r.ticks,
+              r.setpoints, r.segments, hex(r.state_hash).c_str());
+  if (r.ticks_missing > 0) std::printf("%" PRIu64 " ticks are missing from the log\n", r.ticks_missing);
+  if (r.first)
+    std::printf(
+        "%" PRIu64 " ticks differ; first: tick %" PRIu64 " (byte %" PRIu64 "), %s: logged %.17g, replayed %.17g\n",
+        r.differing, r.first->tick, r.first->offset, r.first->field.c_str(), r.first->logged, r.first->replayed);
+  else
+    std::printf("every decision is the same, bit for bit\n");
+  return equal ? kOk : kDiffers;
+}
+
+}  // namespace
+
+Verb replay_verb(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand("replay", "Runs a raw log's inputs through the flight pipeline's tick again");
+  command->add_option("--log", options->log, "raw log of backwashd")->required();
+  command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->footer(
+      "Every tick is decided again from its logged inputs (odometry, telemetry, segments, requests, map verdicts) and\n"
+      "compared bit for bit: mode, reason, set-point in both frames, what was asked to be sent, the set and the "
+      "verdict.\n"
+      "Exit code 0: all equal; 1: something differs or is missing; 65: the log is damaged.\nExample:\n"
+      "  backwash replay --log flight.bwlog --json");
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

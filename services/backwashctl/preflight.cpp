@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashctl/preflight.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace backwash::ctl {
+namespace {
+
+std::string number(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+/// A parameter that is unsafe indoors unless it has one of these values. Actions that return climb first; those that
+/// stop the motors or hand over to nobody fall.
+struct Rule {
+  const char* name;
+  bool (*good)(double);
+  const char* advice;
+};
+bool any_of(double value, std::initializer_list<int> allowed) {
+  return std::ranges::any_of(allowed, [&](int v) { return value == v; });
+}
+constexpr int kOffboardBit = 2;
+const Rule kRules[] = {
+    {"COM_OF_LOSS_T", [](double v) { return v > 0 && v <= 1; },
+     "set COM_OF_LOSS_T to 1 s or less: for so long the vehicle flies on when the set-points stop"},
+    {"COM_OBL_RC_ACT",
+     [](double v) {
+       return any_of(v, {4, 5});
+     },
+     "set COM_OBL_RC_ACT to 4 (land) or 5 (hold): 3 climbs and returns, 6 and 7 drop the vehicle"},
+    {"COM_RC_OVERRIDE", [](double v) { return (static_cast<int>(v) & kOffboardBit) != 0; },
+     "add 2 to COM_RC_OVERRIDE: without it the pilot's sticks do not take over in offboard"},
+    {"NAV_DLL_ACT",
+     [](double v) {
+       return any_of(v, {0, 1, 3});
+     },
+     "set NAV_DLL_ACT to 0 (none), 1 (hold) or 3 (land): 2 climbs and returns, 5 and 6 drop the vehicle"},
+    {"COM_LOW_BAT_ACT",
+     [](double v) {
+       return any_of(v, {0, 2});
+     },
+     "set COM_LOW_BAT_ACT to 2 (land): 1 and 3 climb and return"},
+};
+
+std::vector<Finding> parameters(const StatusCopy& s) {
+  std::vector<Finding> findings;
+  for (const Rule& rule : kRules) {
+    const auto known = std::ranges::find(s.parameters, rule.name, &std::pair<std::string, double>::first);
+    if (known == s.parameters.end()) {
+      findings.push_back({rule.name, false, "not known",
+                          "check the link: the autopilot has not answered; on ArduPilot look at FS_OPTIONS instead"});
+      continue;
+    }
+    const bool good = rule.good(known->second);
+    findings.push_back({rule.name, good, number("%g", known->second), good ? "" : rule.advice});
+  }
+  return findings;
+}
+
+}  // namespace
+
+std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after, double seconds) {
+  const auto& n = after.numbers;
+  const auto rate = [&](std::uint64_t from, std::uint64_t to) { return static_cast<double>(to - from) / seconds; };
+  std::vector<Finding> findings;
+  const auto add = [&](const std::string& name, bool good, const std::string& found, const std::string& advice) {
+    findings.push_back({name, good, found, good ? "" : advice});
+  };
+  const double odometry = rate(before.numbers.odometry_received, n.odometry_received);
+  add("odometry rate", odometry >= 30, number("%.1f Hz used", odometry),
+      "send nav_msgs/Odometry at 30 Hz or more on dds.odometry_topic");
+  const double rejected = rate(before.numbers.odometry_rejected + before.numbers.odometry_refused,
+                               n.odometry_rejected + n.odometry_refused);
+  add("odometry good", rejected == 0, number("%.1f rejected a second", rejected),
+      "see the daemon's warnings: frames, covariance, stamps or jumps are wrong");
+  add("odometry age", n.odometry_age < 0.08, number("%.3f s", n.odometry_age),
+      "the VIO or the network is late: 80 ms without odometry is HOLD");
+  add("heartbeat", n.heartbeat_age < 1.5, number("%.1f s old", std::min(n.heartbeat_age, 1e6)),
+      "check link.device, link.baud and link.system, and that the autopilot is on");
+  add("frames, position", n.frames_aligned != 0, number("residual %.3f m", n.frame_residual_m),
+      "the autopilot must follow the VIO (EKF2_EV_CTRL): the residual has to fall below 0.05 m and 3 degrees");
+  add("frames, motion", after.mismatch == "none", after.mismatch,
+      "move the vehicle by hand along x, y and z: the axis named is mirrored, turned or dead in VIO or autopilot");
+  const double missed = rate(before.numbers.ticks_missed, n.ticks_missed);
+  add("control clock", missed == 0, number("%.1f periods missed a second", missed),
+      "grant SCHED_FIFO (LimitRTPRIO) and keep the processors free");
+  add("tick time", n.tick.p99 < 5000, number("p99 %.0f us", static_cast<double>(n.tick.p99)),
+      "the control thread takes a quarter of its period and more: look for what else runs");
+  add("map overlap", after.place.empty(), after.place.empty() ? "the vehicle stands in known free space" : after.place,
+      "send the map of this place, or align the VIO with it, and put the vehicle where there is room to rise");
+  add("map age", n.map_age >= 0, n.map_age < 0 ? "no map" : number("%.1f s", n.map_age), "send a map");
+  for (Finding& finding : parameters(after)) findings.push_back(std::move(finding));
+  return findings;
+}
+
+}  // namespace backwash::ctl

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "services/backwashctl/station.hpp"
+
+namespace backwash::ctl {
+
+/// One line of `backwashctl check`.
+struct Finding {
+  std::string name;
+  bool good = false;
+  std::string found;
+  std::string advice;  ///< what to do; empty when good
+};
+
+/// Preflight from two statuses `seconds` apart: frames, rates, ages, clock, map, and those of PX4's parameters that are
+/// unsafe indoors. A parameter that the autopilot has not told is not judged as good.
+std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after, double seconds);
+
+}  // namespace backwash::ctl

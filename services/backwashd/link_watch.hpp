@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/config/daemon_config.hpp"
+#include "services/backwashd/channels.hpp"
+
+namespace backwash::daemon {
+
+/// What the operator is told of the control thread, and the work on its port that must not be done in a tick.
+class LinkWatch {
+ public:
+  LinkWatch(Channels& channels, std::string device, unsigned baud)
+      : channels_(channels), device_(std::move(device)), baud_(baud) {}
+  /// Logs what the control thread reported and a link fault that is new, and opens a lost port again (faults.md rows 17
+  /// and 19). To be called a few times a second.
+  void step();
+
+ private:
+  Channels& channels_;
+  std::string device_;
+  unsigned baud_;
+  std::uint8_t fault_ = 0;
+  bool offered_ = false;  ///< a fresh port that the control thread has not yet said to be good
+};
+
+/// Thread body: step() every 50 ms.
+void run_link_watch(Channels& channels, const decltype(config::Daemon::link)& link);
+
+}  // namespace backwash::daemon

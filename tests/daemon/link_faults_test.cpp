@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Rows 17 to 25, 32, 33, 35 and 36 of faults.md in lockstep: the line, the controller, the pilot, the clock and the
+// disk.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "services/backwashd/link_watch.hpp"
+#include "tests/bridge/pseudo_terminal.hpp"
+#include "tests/daemon/lockstep.hpp"
+
+namespace backwash::daemon::test {
+namespace {
+
+using track::Mode;
+using track::Reason;
+
+mavlink::Heartbeat heartbeat(bool armed, std::uint32_t custom_mode) {
+  return {.custom_mode = custom_mode,
+          .type = 2,
+          .autopilot = 12,
+          .base_mode = static_cast<std::uint8_t>(1 | (armed ? 128 : 0)),
+          .system_status = 4,
+          .mavlink_version = 3};
+}
+constexpr std::uint32_t kOffboard = 6u << 16, kReturn = 4u << 16 | 5u << 24;
+
+struct Flying : Lockstep {
+  explicit Flying(double seconds = 2) {
+    take_off();
+    start_route(seconds);
+  }
+};
+
+int frames_out(const Lockstep& rig, std::size_t from) {
+  int count = 0;
+  for (std::size_t i = from; i < rig.log.size(); ++i) count += rig.log[i].header.kind == study::RecordKind::frame_out;
+  return count;
+}
+
+TEST(Row17, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
+  Flying rig;
+  rig.hang_up();
+  rig.tick();
+  EXPECT_EQ(rig.mode(), Mode::quiet);
+  EXPECT_EQ(rig.reason(), Reason::port_lost);
+  EXPECT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  const std::size_t from = rig.log.size();
+  rig.ticks(10);
+  EXPECT_EQ(frames_out(rig, from), 0);
+  rig.plug_in();
+  for (int n = 0; n < 150; ++n) EXPECT_EQ(rig.tick().bytes, 0u);
+  EXPECT_EQ(rig.mode(), Mode::quiet);
+  EXPECT_EQ(rig.channels->link_fault, 0);
+  // The line works again: an operator can take control anew.
+  rig.channels->requests.push(track::Request::enable);
+  EXPECT_EQ(rig.ticks_until(Mode::enabling, 3), 1) << to_string(rig.reason());
+}
+
+TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
+  firmware_bridge::test::PseudoTerminal line;
+  Channels channels;
+  LinkWatch watch(channels, line.path(), 921600);
+  watch.step();
+  EXPECT_EQ(channels.ports.take(), nullptr);
+  channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
+  watch.step();
+  const auto* port = channels.ports.take();
+  ASSERT_NE(port, nullptr);
+  watch.step();
+  EXPECT_EQ(channels.ports.take(), nullptr) << "opened twice";
+  channels.ports.give_back(port);
+  channels.ports.collect();
+}
+
+TEST(Row18, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
+  Flying rig(0.5);
+  std::mt19937 rng(3);
+  std::size_t good = 0;
+  rig.noise = [&](std::vector<std::uint8_t>& out) {
+    // Whole frames of the controller, each behind noise that is full of start bytes and false headers.
+    std::vector<std::uint8_t> dirty;
+    mavlink::Parser parser;
+    parser.feed(out, [&](const mavlink::Frame& f) {
+      for (unsigned n = rng() % 40; n > 0; --n) dirty.push_back(rng() % 4 ? static_cast<std::uint8_t>(rng()) : 0xFD);
+      dirty.insert(dirty.end(), f.bytes.begin(), f.bytes.end());
+      ++good;
+    });
+    out = dirty;
+  };
+  const auto accepted = [&](std::size_t from) {
+    std::size_t n = 0;
+    for (; from < rig.log.size(); ++from) n += rig.log[from].header.kind == study::RecordKind::frame_in;
+    return n;
+  };
+  const std::size_t from = rig.log.size();
+  rig.ticks(150);
+  EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
+  EXPECT_EQ(rig.view().outside, 0u);
+  rig.noise = nullptr;
+  const std::size_t dirty = good;
+  const std::size_t until = rig.log.size();
+  rig.ticks(20);
+  // What a false header held back came with the next bytes: none is lost, none was invented.
+  EXPECT_GE(accepted(from), dirty + 20);
+  EXPECT_LE(dirty - std::min(dirty, accepted(from) - accepted(until)), 3u);
+  EXPECT_GT(rig.view().frames_bad, 0u);
+}
+
+TEST(Row18, AFrameWithABitFlippedIsNeverActedOn) {
+  Flying rig(0.5);
+  std::mt19937 rng(4);
+  rig.noise = [&](std::vector<std::uint8_t>& out) {
+    // Every tick a heartbeat that says "disarmed, manual", damaged in one bit, and a good half of one.
+    const auto frame = mavlink::encode_frame({1, 1, 0}, heartbeat(false, 1u << 16));
+    std::vector<std::uint8_t> damaged(frame.view().begin(), frame.view().end());
+    damaged[1 + rng() % (damaged.size() - 1)] ^= static_cast<std::uint8_t>(1u << rng() % 8);
+    out.insert(out.begin(), damaged.begin(), damaged.end());
+    out.insert(out.begin(), frame.view().begin(), frame.view().begin() + 12);
+  };
+  rig.ticks(200);
+  EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
+  EXPECT_GE(rig.view().frames_bad, 150u);
+}
+
+TEST(Row19, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
+  Lockstep rig;
+  std::mt19937 rng(5);
+  rig.noise = [&](std::vector<std::uint8_t>& out) {
+    for (auto& byte : out) byte = static_cast<std::uint8_t>(rng());
+  };
+  rig.ticks(99);
+  EXPECT_EQ(rig.channels->link_fault, 0);
+  rig.ticks(2);
+  ASSERT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kNoValidFrame));
+  EXPECT_EQ(name(firmware_bridge::LinkFault::kNoValidFrame), "no valid frame (wrong baud rate?)");
+  rig.channels->requests.push(track::Request::enable);
+  rig.tick();
+  EXPECT_EQ(rig.mode(), Mode::passive);
+  EXPECT_EQ(rig.reason(), Reason::autopilot_silent);
+}
+
+TEST(Row20, ALineThatTakesNothingIsQuietAtTheSecondMissedSetpointAndTheTickNeverWaits) {
+  Flying rig;
+  rig.autopilot->mute = true;  // its own failsafe would answer first
+  rig.unread = true;
+  int missed_since = 0, ticks = 0;
+  while (rig.mode() != Mode::quiet && ticks < 3000) {
+    if (ticks++ % 50 == 0) rig.say(heartbeat(true, kOffboard));
+    rig.tick();
+    if (rig.mode() != Mode::quiet && rig.link().transmit().missed_setpoints() >= 1) ++missed_since;
+  }
+  ASSERT_EQ(rig.mode(), Mode::quiet) << to_string(rig.reason());
+  EXPECT_EQ(rig.reason(), Reason::transmit_full);
+  EXPECT_EQ(missed_since, 2) << "ticks between the first missed set-point and QUIET";
+  EXPECT_GT(rig.link().transmit().dropped(), 0u);
+  EXPECT_EQ(rig.link().transmit().waiting(), 0u) << "an old set-point could still follow";
+  const std::size_t from = rig.log.size();
+  rig.ticks(50);
+  EXPECT_EQ(frames_out(rig, from), 0);
+}
+
+TEST(Row21, WithoutAHeartbeatOfTheControllerItIsQuietAfterOneAndAHalfSeconds) {
+  Flying rig;
+  rig.autopilot->mute = true;
+  rig.say(heartbeat(true, kOffboard));
+  rig.tick();
+  EXPECT_EQ(rig.ticks_until(Mode::quiet, 100), 76);  // the first tick later than 75 periods
+  EXPECT_EQ(rig.reason(), Reason::autopilot_silent);
+  for (int n = 0; n < 100; ++n) EXPECT_EQ(rig.tick().bytes, 0u);
+}
+
+TEST(Row22, WhenTheControllerLeavesOffboardItStopsInTheSameTickAndNeverAsksAgain) {
+  Flying rig;
+  rig.autopilot->take_over();
+  EXPECT_EQ(rig.tick().bytes, 0u);
+  EXPECT_EQ(rig.mode(), Mode::passive);
+  EXPECT_EQ(rig.reason(), Reason::offboard_left);
+  EXPECT_EQ(rig.view().segment, 0u) << "the trajectory is dropped";
+  // The vehicle is armed and somebody else's: not a byte.
+  for (int n = 0; n < 500; ++n) EXPECT_EQ(rig.tick().bytes, 0u);
+}
+
+TEST(Row25, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
+  for (const Mode from : {Mode::tracking, Mode::hold, Mode::land}) {
+    Flying rig;
+    if (from == Mode::hold) {
+      rig.tick(3);
+    } else if (from == Mode::land) {
+      rig.channels->requests.push(track::Request::land);
+      rig.tick();
+    }
+    ASSERT_EQ(rig.mode(), from);
+    rig.autopilot->mute = true;
+    for (int n = 0; n < 250; ++n) {
+      if (n % 50 == 0) rig.say(heartbeat(true, kReturn));
+      const Wire& wire = rig.tick();
+      EXPECT_TRUE(wire.setpoints.empty());
+      EXPECT_FALSE(wire.commanded(kCommandMode) || wire.commanded(kCommandLand) || wire.commanded(kCommandArm));
+    }
+  }
+}
+
+TEST(Row23, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
+  Flying rig;
+  rig.autopilot->disarm();
+  rig.tick();
+  EXPECT_EQ(rig.mode(), Mode::passive);
+  EXPECT_EQ(rig.reason(), Reason::disarmed);
+  EXPECT_EQ(rig.view().segment, 0u);
+  for (int n = 0; n < 100; ++n) EXPECT_TRUE(rig.tick().setpoints.empty());
+  rig.channels->requests.push(track::Request::enable);
+  ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
+  // Enabled anew it holds where it is; the old trajectory is not resumed.
+  const Vec3 here = rig.autopilot->truth().p_W;
+  for (int n = 0; n < 50; ++n) EXPECT_LT((rig.in_map(rig.tick().setpoints.at(0)).p_W - here).norm(), 0.1);
+}
+
+TEST(Row24, ALowBatteryAsksToLandOnce) {
+  Flying rig;
+  rig.autopilot->battery = 0.5;
+  rig.ticks(60);
+  EXPECT_EQ(rig.mode(), Mode::tracking);
+  rig.autopilot->battery = 0.14;
+  ASSERT_GT(rig.ticks_until(Mode::land, 51), 0);
+  EXPECT_EQ(rig.reason(), Reason::battery_low);
+  int asked = rig.wire().commanded(kCommandLand);
+  while (rig.mode() == Mode::land) {
+    EXPECT_TRUE(rig.wire().setpoints.empty());
+    asked += rig.tick().commanded(kCommandLand);
+    ASSERT_LT(asked, 3);
+  }
+  EXPECT_GE(asked, 1);
+  EXPECT_EQ(rig.reason(), Reason::landed);
+  // An operator who takes control again with the same battery is not landed a second time.
+  rig.channels->requests.push(track::Request::enable);
+  ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
+  rig.ticks(200);
+  EXPECT_EQ(rig.mode(), Mode::tracking);
+}
+
+std::vector<ControlEvent> events(Lockstep& rig) {
+  std::vector<ControlEvent> all;
+  while (const auto event = rig.channels->events.pop()) all.push_back(*event);
+  return all;
+}
+
+TEST(Row32, OneMissedDeadlineIsLoggedThreeInASecondHoldTwentyFiveInARowAreQuiet) {
+  const auto missed_events = [](Lockstep& rig) {
+    std::uint64_t periods = 0;
+    for (const auto& e : events(rig)) periods += e.kind == ControlEvent::Kind::missed_deadline ? e.count : 0;
+    return periods;
+  };
+  {
+    Flying rig(0.5);
+    events(rig);
+    for (int n = 0; n < 6; ++n) {  // a third of a second apart at least: never three within one
+      rig.tick(1);
+      rig.ticks(26);
+    }
+    EXPECT_EQ(rig.mode(), Mode::tracking);
+    EXPECT_EQ(missed_events(rig), 6u);
+    EXPECT_EQ(rig.view().missed, 6u);
+  }
+  {
+    Flying rig;
+    rig.tick(1);
+    rig.ticks(10);
+    rig.tick(1);
+    rig.ticks(10);
+    EXPECT_EQ(rig.mode(), Mode::tracking);
+    rig.tick(1);
+    EXPECT_EQ(rig.mode(), Mode::hold);
+    EXPECT_EQ(rig.reason(), Reason::deadline_missed);
+  }
+  {
+    Flying rig;
+    rig.tick(25);
+    EXPECT_EQ(rig.mode(), Mode::quiet);
+    EXPECT_EQ(rig.reason(), Reason::clock_stopped);
+    EXPECT_EQ(rig.wire().bytes, 0u);
+  }
+}
+
+// With a trusted pose HOLD is reached on the next verified stop of the trajectory, not by a step to zero velocity.
+TEST(Hold, WithATrustedPoseRestsOnTheVerifiedStopWithinTheLimits) {
+  Flying rig;
+  const double speed = rig.in_map(rig.wire().setpoints.at(0)).v_W.norm();
+  EXPECT_GT(speed, 0.5);
+  rig.say(mavlink::Odometry{.q = {1, 0, 0, 0}, .reset_counter = 1});
+  rig.tick();
+  rig.say(mavlink::Odometry{.q = {1, 0, 0, 0}, .reset_counter = 2});
+  rig.tick();
+  ASSERT_EQ(rig.mode(), Mode::hold);
+  Setpoint last = rig.in_map(rig.wire().setpoints.at(0));
+  const Vec3 from = last.p_W;
+  int moving = 0;
+  for (int n = 0; n < 150; ++n) {
+    const Setpoint now = rig.in_map(rig.tick().setpoints.at(0));
+    EXPECT_LE((now.v_W - last.v_W).cwiseAbs().maxCoeff() / kControlPeriod, 4.1);
+    EXPECT_LT((now.p_W - last.p_W).norm(), 0.04);
+    moving += now.v_W.norm() > 1e-6;
+    last = now;
+  }
+  EXPECT_EQ(last.v_W, Vec3::Zero());
+  EXPECT_LT(moving, 100);
+  EXPECT_LT((last.p_W - from).norm(), 1.6);
+  EXPECT_EQ(rig.view().outside, 0u) << "braking left its verified sets";
+  EXPECT_LT((rig.autopilot->truth().p_W - last.p_W).norm(), 0.15);
+}
+
+TEST(Row33, APageFaultInATickIsAnEvent) {
+  Lockstep rig;
+  rig.ticks(20);
+  events(rig);
+  const std::uint64_t before = rig.view().page_faults;
+  rig.ticks(20);
+  EXPECT_EQ(rig.view().page_faults, before);
+  EXPECT_TRUE(events(rig).empty());
+  rig.forget_pages();
+  rig.tick();
+  rig.tick();
+  const auto seen = events(rig);
+  ASSERT_FALSE(seen.empty());
+  EXPECT_EQ(seen[0].kind, ControlEvent::Kind::page_fault);
+  EXPECT_GT(seen[0].count, 0u);
+}
+
+TEST(Row35, WhenNobodyTakesTheRecordsTheFlightIsUnaffectedAndTheLossIsCounted) {
+  Flying rig(0.2);
+  rig.recorded = false;
+  for (int n = 0; n < 300; ++n) EXPECT_EQ(rig.tick().setpoints.size(), 1u);
+  EXPECT_EQ(rig.mode(), Mode::tracking);
+  EXPECT_GT(rig.channels->control_log.lost(), 100u);
+}
+
+TEST(Row36, ADaemonThatRestartsInFlightSendsNothingToTheArmedVehicleAndStaysPassive) {
+  Flying rig;
+  rig.restart();
+  int armed = 0;
+  for (int n = 0; n < 250 && rig.autopilot->armed(); ++n, ++armed) {
+    EXPECT_EQ(rig.tick().bytes, 0u);
+    EXPECT_EQ(rig.mode(), Mode::passive);
+  }
+  EXPECT_GT(armed, 60) << "the vehicle was not in the air";
+  for (int n = 0; n < 100; ++n) EXPECT_TRUE(rig.tick().setpoints.empty());
+  EXPECT_EQ(rig.mode(), Mode::passive);
+}
+
+TEST(Operator, HearsTheReasonOfEveryTransitionOnTheLinkAndInTheEvents) {
+  Lockstep rig;
+  rig.take_off();
+  rig.start_route(1);
+  events(rig);
+  rig.tick(3);
+  ASSERT_EQ(rig.mode(), Mode::hold);
+  ASSERT_EQ(rig.wire().texts.size(), 1u);
+  EXPECT_EQ(rig.wire().texts[0], to_string(Reason::deadline_missed));
+  const auto seen = events(rig);
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_EQ(seen[0].kind, ControlEvent::Kind::transition);
+  EXPECT_EQ(seen[0].mode, Mode::hold);
+  EXPECT_EQ(seen[0].reason, Reason::deadline_missed);
+}
+
+}  // namespace
+}  // namespace backwash::daemon::test

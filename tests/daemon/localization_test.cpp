@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/localization.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cstring>
+#include <random>
+
+#include "core/map/load_map.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+using Quaternion = Eigen::Quaterniond;
+
+const Vec3 kZero = Vec3::Zero();
+
+dds::Odometry odometry(const std::string& frame, const Vec3& p, const Quaternion& q = Quaternion::Identity(),
+                       const Vec3& v_B = Vec3::Zero(), double t = 1) {
+  static const std::string child = "base_link";
+  dds::Odometry m{};
+  m.header.stamp = {static_cast<std::int32_t>(t), static_cast<std::uint32_t>(std::lround((t - std::floor(t)) * 1e9))};
+  m.header.frame_id = dds::c_string(frame);
+  m.child_frame_id = dds::c_string(child);
+  m.pose.pose.position = {p.x(), p.y(), p.z()};
+  m.pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
+  m.twist.twist.linear = {v_B.x(), v_B.y(), v_B.z()};
+  return m;
+}
+
+const std::string kMap = "map", kOdom = "odom", kBody = "base_link", kOther = "camera";
+
+dds::TransformStamped closure(const Quaternion& q, const Vec3& t, const std::string& frame = kMap,
+                              const std::string& child = kOdom) {
+  dds::TransformStamped m{};
+  m.header.frame_id = dds::c_string(frame);
+  m.child_frame_id = dds::c_string(child);
+  m.transform.translation = {t.x(), t.y(), t.z()};
+  m.transform.rotation = {q.x(), q.y(), q.z(), q.w()};
+  return m;
+}
+
+Quaternion about_z(double yaw) { return Quaternion(Eigen::AngleAxisd(yaw, Vec3::UnitZ())); }
+
+Localization localization() { return Localization(config::Daemon{}, 0.02); }
+
+TEST(Localization, TakesOdometryOfTheMapAsItIs) {
+  auto l = localization();
+  const Quaternion q = about_z(0.5);
+  const auto s = l.odometry(odometry(kMap, {1, 2, 3}, q, {1, 0, 0}), 7);
+  ASSERT_TRUE(s) << s.error();
+  EXPECT_EQ(s->state.p_W, Vec3(1, 2, 3));
+  EXPECT_LT((s->state.v_W - q * Vec3(1, 0, 0)).norm(), 1e-12);
+  EXPECT_EQ(s->closures, 0u);
+  EXPECT_EQ(s->received_ns, 7);
+}
+
+TEST(Localization, RefusesFramesThatItDoesNotKnowAndNamesThem) {
+  auto l = localization();
+  const auto other = l.odometry(odometry(kOther, kZero), 0);
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().find("'camera'"), std::string::npos);
+  auto child = odometry(kMap, kZero);
+  child.child_frame_id = dds::c_string(kOther);
+  EXPECT_FALSE(l.odometry(child, 0));
+  child.child_frame_id = nullptr;
+  EXPECT_FALSE(l.odometry(child, 0));
+  EXPECT_FALSE(l.odometry(odometry(kOdom, kZero), 0)) << "before the first loop closure it has no place in the map";
+  EXPECT_FALSE(l.loop_closure(closure(Quaternion::Identity(), kZero, kOdom, kMap)));
+}
+
+TEST(Localization, APositionTheVioItselfDoesNotTrustIsRefused) {
+  auto l = localization();
+  auto m = odometry(kMap, {1, 0, 0});
+  const auto with = [&](double xx, double zz) {
+    m.pose.covariance[0] = xx;
+    m.pose.covariance[7] = std::abs(xx);
+    m.pose.covariance[14] = zz;
+    return l.odometry(m, 0).has_value();
+  };
+  EXPECT_TRUE(with(0.019 * 0.019, 0.019 * 0.019));
+  EXPECT_FALSE(with(0.019 * 0.019, 0.021 * 0.021));
+  EXPECT_FALSE(with(std::nan(""), 0));
+  EXPECT_FALSE(with(-2, 0));
+  EXPECT_TRUE(with(0, 0));   // not known
+  EXPECT_TRUE(with(-1, 0));  // not known
+}
+
+TEST(Localization, ALoopClosureCarriesOdometryIntoTheMap) {
+  auto l = localization();
+  const Quaternion q = about_z(0.3), body = about_z(-0.2);
+  ASSERT_TRUE(l.loop_closure(closure(q, {5, 6, 7})));
+  const auto s = l.odometry(odometry(kOdom, {1, 2, 3}, body, {0, 1, 0}), 0);
+  ASSERT_TRUE(s) << s.error();
+  EXPECT_LT((s->state.p_W - (q * Vec3(1, 2, 3) + Vec3(5, 6, 7))).norm(), 1e-12);
+  EXPECT_LT((s->state.v_W - q * body * Vec3(0, 1, 0)).norm(), 1e-12);
+  EXPECT_LT(Quaternion(s->q[0], s->q[1], s->q[2], s->q[3]).angularDistance(q * body), 1e-9);
+  EXPECT_EQ(s->closures, 1u);
+  ASSERT_TRUE(l.loop_closure(closure(q, {5, 6, 7})));
+  EXPECT_EQ(l.closures(), 1u) << "a repeated transform is no loop closure";
+  ASSERT_TRUE(l.loop_closure(closure(q, {5.1, 6, 7})));
+  EXPECT_EQ(l.closures(), 2u);
+}
+
+TEST(Localization, ALoopClosureThatTiltsOrIsNoTransformIsRefused) {
+  auto l = localization();
+  EXPECT_FALSE(l.loop_closure(closure(Quaternion(Eigen::AngleAxisd(0.05, Vec3::UnitX())), kZero)));
+  EXPECT_FALSE(l.loop_closure(closure(Quaternion(2, 0, 0, 0), kZero)));
+  EXPECT_FALSE(l.loop_closure(closure(Quaternion::Identity(), {std::nan(""), 0, 0})));
+  EXPECT_EQ(l.closures(), 0u);
+}
+
+/// Cloud of single points in `frame`, stamped t.
+struct PointMessage {
+  std::array<std::string, 3> names{"x", "y", "z"};
+  std::array<dds::PointField, 3> fields{};
+  std::array<float, 3> data{};
+  dds::PointCloud m{};
+  PointMessage(const std::string& frame, const Vec3& p, double t) {
+    for (std::uint32_t n = 0; n < 3; ++n) {
+      fields[n] = {dds::c_string(names[n]), 4 * n, 7, 1};
+      data[n] = static_cast<float>(p[n]);
+    }
+    m.header.stamp = {static_cast<std::int32_t>(t), static_cast<std::uint32_t>(std::lround((t - std::floor(t)) * 1e9))};
+    m.header.frame_id = dds::c_string(frame);
+    m.height = m.width = 1;
+    m.point_step = m.row_step = 12;
+    m.fields = {3, 3, fields.data(), false};
+    m.data = {12, 12, reinterpret_cast<std::uint8_t*>(data.data()), false};
+  }
+};
+
+TEST(Localization, PlacesAScanOfTheBodyByThePoseAtItsStamp) {
+  auto l = localization();
+  EXPECT_FALSE(l.scan(PointMessage(kBody, {1, 0, 0}, 1).m, 0)) << "without odometry it has no place";
+  ASSERT_TRUE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), kZero, 1.0), 0));
+  ASSERT_TRUE(l.odometry(odometry(kMap, {2, 0, 1}, about_z(0.4), kZero, 1.1), 0));
+  const auto scan = l.scan(PointMessage(kBody, {1, 0, 0}, 1.05).m, 3);
+  ASSERT_TRUE(scan) << scan.error();
+  EXPECT_LT((scan->sensor_W - Vec3(1, 0, 1)).norm(), 1e-6);
+  EXPECT_LT((scan->points_W[0] - Vec3(1 + std::cos(0.2), std::sin(0.2), 1)).norm(), 1e-6);
+  EXPECT_EQ(scan->received_ns, 3);
+  EXPECT_FALSE(l.scan(PointMessage(kBody, {1, 0, 0}, 1.3).m, 0)) << "too far from the newest odometry";
+  EXPECT_FALSE(l.scan(PointMessage(kOther, {1, 0, 0}, 1.05).m, 0));
+  EXPECT_EQ(l.scan(PointMessage(kMap, {1, 0, 0}, 1.05).m, 0)->points_W[0], Vec3(1, 0, 0));
+}
+
+TEST(NewVoxels, CoverEveryNewPointAndNoKnownOneInAtMost256Cubes) {
+  std::mt19937_64 random(1);
+  for (const int points : {3, 200, 5000}) {
+    map::OccupancyGrid grid({-1, -2, 0}, 0.1, {60, 50, 30}, map::Cell::free);
+    for (int n = 0; n < 2000; ++n) grid.set(grid.voxel(random() % grid.cell_count()), map::Cell::occupied);
+    std::uniform_real_distribution<double> x(-1.2, 5.2), y(-2.2, 3.2), z(-0.2, 3.2);
+    Scan scan;
+    scan.sensor_W = {2, 0, 1};
+    for (int n = 0; n < points; ++n) scan.points_W.emplace_back(x(random), y(random), z(random));
+    const NewVoxels found = new_voxels(grid, scan, 2.5);
+    EXPECT_LE(found.count, NewVoxels::kMost);
+    EXPECT_GT(found.count, 0u);
+    if (points == 3) {
+      EXPECT_DOUBLE_EQ(found.edge, 0.1);
+    }
+    for (const Vec3& p : scan.points_W) {
+      if ((p - scan.sensor_W).norm() > 2.5 || !grid.free(grid.index(p))) continue;
+      const bool covered = std::any_of(found.centers.begin(), found.centers.begin() + static_cast<long>(found.count),
+                                       [&](const auto& c) {
+                                         const Vec3 off = p - Vec3(c[0], c[1], c[2]);
+                                         return off.cwiseAbs().maxCoeff() <= found.edge / 2 + 1e-9;
+                                       });
+      ASSERT_TRUE(covered) << p.transpose();
+    }
+  }
+  map::OccupancyGrid full({0, 0, 0}, 0.1, {10, 10, 10}, map::Cell::occupied);
+  EXPECT_EQ(new_voxels(full, Scan{{{0.5, 0.5, 0.5}}, {0.1, 0.1, 0.1}, 0}, 5).count, 0u);
+}
+
+}  // namespace
+}  // namespace backwash::daemon

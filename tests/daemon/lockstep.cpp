@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tests/daemon/lockstep.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <termios.h>
+
+#include <Eigen/Geometry>
+#include <fstream>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+#include "core/plan/planner.hpp"
+#include "core/sim/flight.hpp"
+#include "core/study/tick_log.hpp"
+#include "firmware_bridge/mavlink/frames.hpp"
+#include "tests/bridge/pseudo_terminal.hpp"
+#include "tests/daemon/traps.hpp"
+
+namespace backwash::daemon::test {
+namespace {
+
+constexpr std::int64_t kTick_ns = 20'000'000, kStep_ns = 1'000'000;
+constexpr double kBatteryLand = 0.15;
+const Vec3 kStart(-2, 0, 1.2), kGoal(2, 0, 1.2);
+
+}  // namespace
+
+Vehicle vehicle_5in() { return config::load_vehicle("builtin:quad-5in").value(); }
+
+std::shared_ptr<const plan::World> corridor() {
+  static const auto world = plan::build_world(map::builtin_scene("parallel-walls-4m").value(), Model{}, vehicle_5in());
+  return world;
+}
+
+bool Wire::commanded(std::uint16_t command) const {
+  for (const auto& c : commands)
+    if (c.command == command) return true;
+  return false;
+}
+
+/// A pseudo-terminal and an own look at the daemon's end of it: the kernel moves bytes in its own time.
+struct Lockstep::Line {
+  firmware_bridge::test::PseudoTerminal master;
+  firmware_bridge::FileDescriptor own{::open(master.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK)};
+  std::vector<std::uint8_t> received;
+
+  Line() {
+    termios raw{};
+    EXPECT_EQ(::tcgetattr(own.get(), &raw), 0);
+    ::cfmakeraw(&raw);
+    ::tcsetattr(own.get(), TCSANOW, &raw);
+  }
+  firmware_bridge::Port open() const {
+    auto port = firmware_bridge::SerialPort::open(master.path(), 921600);
+    if (!port) throw std::runtime_error(describe(port.error()));
+    return std::move(*port);
+  }
+};
+
+Lockstep::Lockstep(const bench::LocalFrame& local)
+    : local_frame(local), world_(corridor()), vehicle_(vehicle_5in()), vio_(0.75 * vehicle_.estimation.position, 2) {
+  const Vec3 ground(kStart.x(), kStart.y(), vehicle_.body.radius);
+  autopilot = std::make_unique<bench::Autopilot>(world_->grid, vehicle_, ground, local_frame, 1, 1);
+  restart();
+}
+
+Lockstep::~Lockstep() {
+  loop_.reset();
+  channels->ports.collect();
+}
+
+void Lockstep::restart() {
+  loop_.reset();
+  link_.reset();
+  line_ = std::make_unique<Line>();
+  void* memory = ::mmap(nullptr, sizeof(Channels), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc();
+  channels.reset(new (memory) Channels);
+  link_ = std::make_unique<firmware_bridge::AutopilotLink>(line_->open(), std::uint8_t{1},
+                                                           firmware_bridge::Time(std::chrono::nanoseconds(now_ns_)));
+  loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand);
+  channels->worlds.offer(world_);
+  log.clear();
+}
+
+void Lockstep::Unmap::operator()(Channels* c) const {
+  c->~Channels();
+  ::munmap(c, sizeof(Channels));
+}
+
+void Lockstep::forget_pages() { ASSERT_EQ(::madvise(channels.get(), sizeof(Channels), MADV_DONTNEED), 0); }
+
+void Lockstep::hang_up() { line_.reset(); }
+
+void Lockstep::plug_in() {
+  line_ = std::make_unique<Line>();
+  channels->ports.offer(std::make_unique<const FreshPort>(line_->open()));
+}
+
+void Lockstep::hand_over(const std::vector<std::uint8_t>& bytes) {
+  if (!line_ || bytes.empty()) return;
+  int before = 0, now = 0;
+  ::ioctl(line_->own.get(), FIONREAD, &before);
+  line_->master.write(bytes);
+  for (int i = 0; i < 5000 && now < before + static_cast<int>(bytes.size()); ++i) {
+    ::ioctl(line_->own.get(), FIONREAD, &now);
+    if (i > 20) ::usleep(200);
+  }
+  ASSERT_EQ(now, before + static_cast<int>(bytes.size())) << "the pseudo-terminal did not deliver";
+}
+
+void Lockstep::drain_log() {
+  channels->segments.collect();
+  channels->ports.collect();
+  while (const auto r = recorded ? channels->control_log.pop() : std::nullopt)
+    log.push_back({r->header, {r->bytes.begin(), r->bytes.begin() + r->header.size}});
+}
+
+void Lockstep::read_wire(std::size_t expected) {
+  wire_ = {};
+  if (!line_ || unread) return;
+  std::vector<std::uint8_t> bytes;
+  for (int i = 0; i < 5000 && bytes.size() < expected; ++i) {
+    const auto more = line_->master.read();
+    bytes.insert(bytes.end(), more.begin(), more.end());
+    if (i > 20) ::usleep(200);
+  }
+  const auto surplus = line_->master.read();
+  bytes.insert(bytes.end(), surplus.begin(), surplus.end());
+  if (recorded) {
+    ASSERT_EQ(bytes.size(), expected) << "what is on the wire is not what was logged";
+  }
+  wire_.bytes = bytes.size();
+  parser_.feed(bytes, [&](const mavlink::Frame& f) {
+    mavlink::decode_and_visit(f.id, f.payload, [&](const auto& message) {
+      using M = std::decay_t<decltype(message)>;
+      if constexpr (std::is_same_v<M, SetPositionTargetLocalNed>) wire_.setpoints.push_back(message);
+      if constexpr (std::is_same_v<M, CommandLong>) wire_.commands.push_back(message);
+      if constexpr (std::is_same_v<M, mavlink::Heartbeat>) ++wire_.heartbeats;
+      if constexpr (std::is_same_v<M, mavlink::Odometry>) ++wire_.odometry;
+      if constexpr (std::is_same_v<M, mavlink::Statustext>)
+        wire_.texts.emplace_back(message.text.data(), ::strnlen(message.text.data(), message.text.size()));
+    });
+  });
+  for (const auto& s : wire_.setpoints)
+    for (const float v : {s.x, s.y, s.z, s.vx, s.vy, s.vz, s.afx, s.afy, s.afz, s.yaw})
+      ASSERT_TRUE(std::isfinite(v)) << "a set-point that is not finite was sent";
+  autopilot->receive(bytes, static_cast<double>(now_ns_) * 1e-9);
+}
+
+const Wire& Lockstep::tick(int missed) {
+  std::vector<std::uint8_t> out;
+  const int steps = 20 * (1 + missed);
+  for (int step = 1; step <= steps; ++step) {
+    now_ns_ += kStep_ns;
+    const double t = static_cast<double>(now_ns_) * 1e-9;
+    autopilot->step(t, out);
+    if (!vio_on || step != steps - vio_age_steps) continue;
+    OdometrySample sample;
+    sample.received_ns = sample.stamp_ns = now_ns_;
+    sample.state = vio_.estimate(autopilot->truth(), t);
+    const auto q = autopilot->attitude();
+    sample.q = {q.w(), q.x(), q.y(), q.z()};
+    if (spoil) spoil(sample);
+    channels->odometry.write(sample);
+  }
+  out.insert(out.end(), inject_.begin(), inject_.end());
+  inject_.clear();
+  if (noise) noise(out);
+  hand_over(out);
+
+  const auto before = backwash::test::trapped();
+  const std::uint64_t faults = view().page_faults;
+  {
+    const backwash::test::Watched watched;
+    loop_->tick(now_ns_, missed, 0);
+  }
+  loop_->took(0);
+  const auto after = backwash::test::trapped();
+  EXPECT_EQ(after.allocations - before.allocations, 0) << "the tick allocated";
+  EXPECT_EQ(after.locks - before.locks, 0) << "the tick took a lock";
+  EXPECT_EQ(after.wall_clock - before.wall_clock, 0) << "the tick read the wall clock";
+  if (view().ticks > 3) page_faults_in_flight += static_cast<long>(view().page_faults - faults);
+
+  std::size_t sent = 0;
+  const std::size_t from = log.size();
+  drain_log();
+  for (std::size_t i = from; i < log.size(); ++i)
+    if (log[i].header.kind == study::RecordKind::frame_out) sent += log[i].header.size;
+  read_wire(sent);
+  return wire_;
+}
+
+void Lockstep::ticks(int count) {
+  for (int n = 0; n < count; ++n) tick();
+}
+
+int Lockstep::ticks_until(track::Mode wanted, int most) {
+  for (int n = 1; n <= most; ++n) {
+    tick();
+    if (mode() == wanted) return n;
+  }
+  return -1;
+}
+
+std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops) {
+  auto segment = std::make_unique<track::AcceptedSegment>();
+  segment->id = ++last_segment_;
+  for (auto& c : commands) c.yaw = view().command.yaw;
+  const State start = view().state;
+  segment->tube = reach::tube_over_field(world_->reach, start, view().command, commands, world_->bounds);
+  if (with_stops)
+    segment->stops = plan::verified_stops(*world_, start, view().command, commands, 10,
+                                          [&](const auto& tube) { return plan::lateral_clearance(*world_, tube); });
+  segment->commands = std::move(commands);
+  const auto bytes = study::encode(*segment);
+  log.push_back({{now_ns_, study::RecordKind::offer, static_cast<std::uint32_t>(bytes.size())}, bytes});
+  channels->segments.offer(std::move(segment));
+  return last_segment_;
+}
+
+void Lockstep::take_off() {
+  ticks(60);
+  channels->requests.push(track::Request::enable);
+  ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
+  const auto& limits = vehicle_.limits;
+  auto commands = plan::vertical_commands(view().state.p_W, kStart, limits.v_max, limits.a_max);
+  const auto hold = sim::hold_commands(kStart, 2.0);
+  commands.insert(commands.end(), hold.begin(), hold.end());
+  channels->arm = true;
+  const auto count = static_cast<int>(commands.size());
+  offer(std::move(commands));
+  ticks(count + 5);
+  ASSERT_EQ(mode(), track::Mode::tracking) << to_string(reason());
+  ASSERT_TRUE(view().finished);
+  ASSERT_LT((autopilot->truth().p_W - kStart).norm(), 0.2);
+}
+
+void Lockstep::start_route(double seconds) {
+  plan::PlanOptions options{};
+  options.v_max = vehicle_.limits.v_max;
+  options.a_max = vehicle_.limits.a_max;
+  const auto planned = plan::plan(*world_, {view().state, view().command}, kGoal, options);
+  ASSERT_EQ(planned.status, plan::PlanStatus::ok) << planned.message;
+  route_ = planned.commands;
+  const auto hold = sim::hold_commands(kGoal, 2.0);
+  route_.insert(route_.end(), hold.begin(), hold.end());
+  const auto id = offer(route_);
+  ticks(static_cast<int>(seconds / kControlPeriod));
+  ASSERT_EQ(view().segment, id);
+  ASSERT_EQ(mode(), track::Mode::tracking) << to_string(reason());
+}
+
+Setpoint Lockstep::in_map(const SetPositionTargetLocalNed& m) const {
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(-local_frame.yaw, Vec3::UnitZ()).toRotationMatrix();
+  return {R * (mavlink::swap_ned({m.x, m.y, m.z}) - local_frame.origin), R * mavlink::swap_ned({m.vx, m.vy, m.vz}),
+          R * mavlink::swap_ned({m.afx, m.afy, m.afz}), mavlink::swap_yaw(m.yaw) - local_frame.yaw};
+}
+
+void Lockstep::save(const std::string& path) const {
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  out << study::kRawLogMagic;
+  for (const auto& r : log) {
+    out.write(reinterpret_cast<const char*>(&r.header), sizeof r.header);
+    out.write(reinterpret_cast<const char*>(r.bytes.data()), static_cast<std::streamsize>(r.bytes.size()));
+  }
+}
+
+}  // namespace backwash::daemon::test

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/sim/vio.hpp"
+#include "core/study/raw_log.hpp"
+#include "firmware_bridge/mavlink/messages.hpp"
+#include "services/backwashd/control_loop.hpp"
+#include "services/bench/autopilot.hpp"
+
+namespace backwash::daemon::test {
+
+using mavlink::CommandLong;
+using mavlink::SetPositionTargetLocalNed;
+
+/// What the flight controller received in one tick, decoded from the bytes on its end of the line.
+struct Wire {
+  std::vector<SetPositionTargetLocalNed> setpoints;
+  std::vector<CommandLong> commands;
+  std::vector<std::string> texts;
+  int heartbeats = 0, odometry = 0;
+  std::size_t bytes = 0;
+  bool commanded(std::uint16_t command) const;
+};
+
+inline constexpr std::uint16_t kCommandLand = 21, kCommandMode = 176, kCommandArm = 400;
+
+/// The daemon's control loop and link on a real pseudo-terminal, the bench's emulated autopilot with its simulated
+/// vehicle at the other end, and time that moves by 20 ms a tick: nothing depends on the machine's speed. Each tick is
+/// watched: it must not allocate, lock, read the wall clock, or send anything that is not finite.
+class Lockstep {
+ public:
+  explicit Lockstep(const bench::LocalFrame& frame = {0.7, Vec3(5, -3, 0.2)});
+  ~Lockstep();
+
+  /// One control period: 20 steps of physics, then one tick of the daemon.
+  const Wire& tick(int missed = 0);
+  void ticks(int count);
+  /// Ticks until the daemon is in this mode; how many it took, or −1 after `most`.
+  int ticks_until(track::Mode mode, int most);
+
+  /// Enable, follow, arm, take off to 1.2 m. Ends in tracking, the take-off's commands all sent.
+  void take_off();
+  /// Plans to the goal, offers it with its stops, and flies `seconds` of it.
+  void start_route(double seconds);
+  /// Offers these commands from where the vehicle is now; returns the id.
+  std::uint64_t offer(std::vector<Setpoint> commands, bool with_stops = true);
+  /// Commands of the planned route.
+  const std::vector<Setpoint>& route() const { return route_; }
+
+  const ControlView& view() const { return loop_->view(); }
+  track::Mode mode() const { return loop_->view().mode; }
+  track::Reason reason() const { return loop_->view().reason; }
+  const Wire& wire() const { return wire_; }
+  const plan::World& world() const { return *world_; }
+  const firmware_bridge::AutopilotLink& link() const { return *link_; }
+  std::int64_t now_ns() const { return now_ns_; }
+  /// A set-point in the map frame, by the controller's true frame.
+  Setpoint in_map(const SetPositionTargetLocalNed& m) const;
+
+  /// Bytes that the flight controller sends beside its own telemetry in the next tick.
+  template <typename Message>
+  void say(const Message& message) {
+    const auto frame = mavlink::encode_frame({1, 1, sequence_++}, message);
+    inject_.insert(inject_.end(), frame.view().begin(), frame.view().end());
+  }
+
+  bool vio_on = true;
+  int vio_age_steps = 0;                                  ///< ms between a sample's reception and the tick that sees it
+  std::function<void(OdometrySample&)> spoil;             ///< changes each sample
+  std::function<void(std::vector<std::uint8_t>&)> noise;  ///< changes what the flight controller sends
+  bool recorded = true;                                   ///< the control thread's records are taken out of their ring
+  bool unread = false;                                    ///< the flight controller does not read
+  void hang_up();                                         ///< the line is unplugged
+  void plug_in();                                         ///< a new line, handed over as the link watch does
+  void restart();                                         ///< the daemon is killed and started anew
+
+  std::vector<std::uint8_t> inject_;
+  bench::LocalFrame local_frame;  ///< the controller's true one
+  std::shared_ptr<const plan::World> world_;
+  std::unique_ptr<bench::Autopilot> autopilot;
+  /// In shared memory, so that forget_pages() loses nothing.
+  struct Unmap {
+    void operator()(Channels* c) const;
+  };
+  std::unique_ptr<Channels, Unmap> channels;
+  /// The next touch of the channels' memory takes a page fault.
+  void forget_pages();
+  std::vector<study::RawRecord> log;  ///< everything recorded so far
+  long page_faults_in_flight = 0;
+
+  /// Writes `log` as a raw log.
+  void save(const std::string& path) const;
+
+ private:
+  struct Line;
+  void connect();
+  void hand_over(const std::vector<std::uint8_t>& bytes);
+  void drain_log();
+  void read_wire(std::size_t expected);
+
+  Vehicle vehicle_;
+  sim::EmulatedVio vio_;
+  std::unique_ptr<Line> line_;
+  std::unique_ptr<firmware_bridge::AutopilotLink> link_;
+  std::unique_ptr<ControlLoop> loop_;
+  std::int64_t now_ns_ = 1'000'000'000'000;
+  std::uint8_t sequence_ = 0;
+  std::uint64_t last_segment_ = 0;
+  std::vector<Setpoint> route_;
+  Wire wire_;
+  mavlink::Parser parser_;
+};
+
+/// Shared by the tests of one program.
+std::shared_ptr<const plan::World> corridor();
+Vehicle vehicle_5in();
+
+}  // namespace backwash::daemon::test

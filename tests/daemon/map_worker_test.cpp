@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/map_worker.hpp"
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+#include "core/map/octomap_message.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+class MapWorkerTest : public testing::Test {
+ protected:
+  std::string log_ = std::filesystem::temp_directory_path() / ("backwash_map_worker." + std::to_string(getpid()));
+  std::unique_ptr<Channels> channels_ = std::make_unique<Channels>();
+  Recorder recorder_{log_};
+  MapSettings settings_;
+  MapWorker worker_{*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_};
+  map::OccupancyGrid grid_ = map::builtin_scene("parallel-walls-2m", 0.2).value();
+  const Worlds::Pointer* held_ = nullptr;
+
+  ~MapWorkerTest() override {
+    channels_->worlds.control.give_back(held_);
+    channels_->worlds.collect();
+    std::filesystem::remove(log_);
+  }
+  void send(std::vector<std::int8_t> data, double resolution, std::int64_t received_ns = 1) {
+    channels_->maps.offer(
+        std::make_unique<const MapMessage>(MapMessage{std::move(data), resolution, true, "OcTree", received_ns}));
+    EXPECT_TRUE(worker_.step());
+  }
+  void send(const map::OccupancyGrid& grid, std::int64_t received_ns = 1) {
+    send(map::encode_octomap(grid), grid.resolution(), received_ns);
+  }
+  /// The newest world that the control thread was handed, or the one from before.
+  const plan::World* world() {
+    if (const auto* newest = channels_->worlds.control.take())
+      channels_->worlds.control.give_back(std::exchange(held_, newest));
+    return held_ ? held_->get() : nullptr;
+  }
+  void scan(const std::vector<Vec3>& points, const Vec3& sensor, std::int64_t received_ns) {
+    channels_->scans.push(new Scan{points, sensor, received_ns});
+    EXPECT_TRUE(worker_.step() || channels_->scans_rejected > 0);
+  }
+};
+
+TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {
+  EXPECT_FALSE(worker_.step());
+  send(grid_);
+  ASSERT_TRUE(world());
+  EXPECT_EQ(world()->grid.size(), grid_.size());
+  EXPECT_EQ(channels_->maps_accepted, 1u);
+  EXPECT_EQ(channels_->map_ns, 1);
+  for (auto* to : {&channels_->worlds.mission, &channels_->worlds.planner, &channels_->worlds.reader}) {
+    const auto* taken = to->take();
+    ASSERT_TRUE(taken);
+    EXPECT_EQ(taken->get(), world());
+    to->give_back(taken);
+  }
+}
+
+// faults.md rows 10 and 12.
+TEST_F(MapWorkerTest, ACorruptEmptyOrForeignMapIsRejectedWholeAndTheOldWorldStays) {
+  send(grid_);
+  const auto* before = world();
+  auto cut = map::encode_octomap(grid_);
+  cut.resize(cut.size() / 2);
+  send(cut, 0.2);
+  send(std::vector<std::int8_t>{}, 0.2);
+  send(map::encode_octomap(grid_), 0.1);   // another resolution than the map in use
+  send(map::encode_octomap(grid_), 0.21);  // and one that no field is known for
+  send(map::OccupancyGrid({0, 0, 0}, 0.2, {8, 8, 8}, map::Cell::occupied));
+  EXPECT_EQ(channels_->maps_rejected, 5u);
+  EXPECT_EQ(world(), before);
+  EXPECT_EQ(channels_->map_ns, 1);
+}
+
+TEST_F(MapWorkerTest, AnEmptyMapIsNoMap) {
+  send(std::vector<std::int8_t>{}, 0.2);
+  EXPECT_EQ(world(), nullptr);
+  EXPECT_EQ(channels_->map_ns, -1);
+}
+
+long resident_kib() {
+  std::ifstream statm("/proc/self/statm");
+  long total = 0, resident = 0;
+  statm >> total >> resident;
+  return resident * sysconf(_SC_PAGESIZE) / 1024;
+}
+
+// faults.md row 11: a few bytes that claim 2⁴⁸ voxels.
+TEST_F(MapWorkerTest, AHugeMapIsRefusedAndMemoryGrowsByNothing) {
+  send(grid_);
+  const auto* before = world();
+  malloc_trim(0);
+  const long resident = resident_kib();
+  // Two octants of the root, at opposite corners, each a leaf: 01 at child 0 and child 7.
+  send(std::vector<std::int8_t>{0x01, 0x40}, 0.2);
+  EXPECT_EQ(channels_->maps_rejected, 1u);
+  EXPECT_EQ(world(), before);
+  EXPECT_LT(resident_kib() - resident, 1024);
+}
+
+TEST_F(MapWorkerTest, AScanChangesTheWorldWhereItSaysSomethingNew) {
+  const Vec3 sensor(0.1, 0.1, 1.1), point(1.1, 0.1, 1.1);
+  scan({point}, sensor, 5);
+  EXPECT_EQ(channels_->scans_rejected, 1u) << "there is no map to put it in";
+  send(grid_);
+  ASSERT_TRUE(world());
+  ASSERT_TRUE(world()->grid.free(world()->grid.index(point)));
+  ASSERT_TRUE(world()->hover.safe(world()->grid.index({0.7, 0.1, 1.1})));
+  scan({point}, sensor, 9);
+  EXPECT_TRUE(world()->grid.occupied(world()->grid.index(point)));
+  EXPECT_FALSE(world()->hover.safe(world()->grid.index({1.0, 0.1, 1.1})));
+  EXPECT_EQ(channels_->map_ns, 9);
+  const auto* before = world();
+  scan({point}, sensor, 12);
+  EXPECT_EQ(world(), before) << "nothing new";
+  EXPECT_EQ(channels_->map_ns, 12) << "but the map is as old as that";
+  scan({point}, {90, 0, 1}, 13);
+  EXPECT_EQ(channels_->scans_rejected, 2u) << "the sensor is outside the map";
+}
+
+TEST_F(MapWorkerTest, ANewMapOfTheSamePlaceHandsItsNewVoxelsToTheControlThread) {
+  send(grid_);
+  EXPECT_FALSE(channels_->map_voxels.pop());
+  const Index3 v = grid_.index({1.1, 0.1, 1.1});
+  grid_.set(v, map::Cell::occupied);
+  send(grid_, 4);
+  const auto voxels = channels_->map_voxels.pop();
+  ASSERT_TRUE(voxels);
+  ASSERT_EQ(voxels->count, 1u);
+  EXPECT_LT((Vec3(voxels->centers[0][0], voxels->centers[0][1], voxels->centers[0][2]) - grid_.center(v)).norm(), 1e-9);
+  EXPECT_TRUE(world()->grid.occupied(v));
+}
+
+}  // namespace
+}  // namespace backwash::daemon

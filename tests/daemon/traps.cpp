@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tests/daemon/traps.hpp"
+
+#include <dlfcn.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <sys/time.h>
+#include <time.h>
+
+#include <cerrno>
+#include <cstddef>
+
+#if defined(__has_feature)
+#if __has_feature(realtime_sanitizer)
+#define BACKWASH_RTSAN 1
+// What the compiler itself calls around a [[clang::nonblocking]] function.
+extern "C" void __rtsan_realtime_enter();
+extern "C" void __rtsan_realtime_exit();
+#endif
+#endif
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define BACKWASH_TRAPS 0
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(realtime_sanitizer)
+#define BACKWASH_TRAPS 0
+#endif
+#endif
+#ifndef BACKWASH_TRAPS
+#define BACKWASH_TRAPS 1
+#endif
+
+namespace backwash::test {
+namespace {
+
+thread_local int depth = 0;
+thread_local Trapped counted;
+
+#if BACKWASH_TRAPS
+void note(long Trapped::*kind) {
+  if (depth > 0) ++(counted.*kind);
+}
+
+// The C library's own function; looked up outside of any watched scope, at the program's start.
+template <typename F>
+F* next(const char* name) {
+  return reinterpret_cast<F*>(dlsym(RTLD_NEXT, name));
+}
+#endif
+
+}  // namespace
+
+// Where clang's RealtimeSanitizer is built in, it watches the same scopes with its own traps, system calls included.
+Watched::Watched() {
+  ++depth;
+#ifdef BACKWASH_RTSAN
+  __rtsan_realtime_enter();
+#endif
+}
+Watched::~Watched() {
+#ifdef BACKWASH_RTSAN
+  __rtsan_realtime_exit();
+#endif
+  --depth;
+}
+Trapped trapped() { return counted; }
+bool traps_work() { return BACKWASH_TRAPS != 0; }
+
+}  // namespace backwash::test
+
+#if BACKWASH_TRAPS
+using backwash::test::next;
+using backwash::test::note;
+using backwash::test::Trapped;
+
+extern "C" {
+
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+void __libc_free(void*);
+
+void* malloc(std::size_t size) { return note(&Trapped::allocations), __libc_malloc(size); }
+void* calloc(std::size_t n, std::size_t size) { return note(&Trapped::allocations), __libc_calloc(n, size); }
+void* realloc(void* p, std::size_t size) { return note(&Trapped::allocations), __libc_realloc(p, size); }
+void* memalign(std::size_t a, std::size_t size) { return note(&Trapped::allocations), __libc_memalign(a, size); }
+void* aligned_alloc(std::size_t a, std::size_t size) { return note(&Trapped::allocations), __libc_memalign(a, size); }
+int posix_memalign(void** p, std::size_t a, std::size_t size) {
+  note(&Trapped::allocations);
+  *p = __libc_memalign(a, size);
+  return *p ? 0 : ENOMEM;
+}
+void free(void* p) {
+  if (p) note(&Trapped::allocations);
+  __libc_free(p);
+}
+
+int pthread_mutex_lock(pthread_mutex_t* m) noexcept {
+  static auto* const real = next<int(pthread_mutex_t*)>("pthread_mutex_lock");
+  return note(&Trapped::locks), real(m);
+}
+int pthread_mutex_timedlock(pthread_mutex_t* m, const timespec* t) noexcept {
+  static auto* const real = next<int(pthread_mutex_t*, const timespec*)>("pthread_mutex_timedlock");
+  return note(&Trapped::locks), real(m, t);
+}
+int pthread_rwlock_rdlock(pthread_rwlock_t* l) noexcept {
+  static auto* const real = next<int(pthread_rwlock_t*)>("pthread_rwlock_rdlock");
+  return note(&Trapped::locks), real(l);
+}
+int pthread_rwlock_wrlock(pthread_rwlock_t* l) noexcept {
+  static auto* const real = next<int(pthread_rwlock_t*)>("pthread_rwlock_wrlock");
+  return note(&Trapped::locks), real(l);
+}
+int pthread_cond_wait(pthread_cond_t* c, pthread_mutex_t* m) {
+  static auto* const real = next<int(pthread_cond_t*, pthread_mutex_t*)>("pthread_cond_wait");
+  return note(&Trapped::locks), real(c, m);
+}
+int pthread_cond_timedwait(pthread_cond_t* c, pthread_mutex_t* m, const timespec* t) {
+  static auto* const real = next<int(pthread_cond_t*, pthread_mutex_t*, const timespec*)>("pthread_cond_timedwait");
+  return note(&Trapped::locks), real(c, m, t);
+}
+int sem_wait(sem_t* s) {
+  static auto* const real = next<int(sem_t*)>("sem_wait");
+  return note(&Trapped::locks), real(s);
+}
+
+int clock_gettime(clockid_t id, timespec* t) noexcept {
+  static auto* const real = next<int(clockid_t, timespec*)>("clock_gettime");
+  if (id == CLOCK_REALTIME || id == CLOCK_REALTIME_COARSE) note(&Trapped::wall_clock);
+  return real(id, t);
+}
+int gettimeofday(timeval* t, void* zone) noexcept {
+  static auto* const real = next<int(timeval*, void*)>("gettimeofday");
+  return note(&Trapped::wall_clock), real(t, zone);
+}
+time_t time(time_t* t) noexcept {
+  static auto* const real = next<time_t(time_t*)>("time");
+  return note(&Trapped::wall_clock), real(t);
+}
+
+}  // extern "C"
+#endif

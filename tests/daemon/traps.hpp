@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace backwash::test {
+
+/// What a real-time function must not do, counted while the calling thread is inside a Watched scope. The program's own
+/// malloc family, pthread locks and clocks take the C library's place (traps.cpp), so that libraries are seen too.
+struct Trapped {
+  long allocations = 0;  ///< malloc, calloc, realloc, free and the aligned ones
+  long locks = 0;        ///< mutex, read-write lock, condition variable, semaphore
+  long wall_clock = 0;   ///< CLOCK_REALTIME, gettimeofday, time
+  long total() const { return allocations + locks + wall_clock; }
+};
+
+/// While one lives, this thread is watched.
+class Watched {
+ public:
+  Watched();
+  ~Watched();
+  Watched(const Watched&) = delete;
+  Watched& operator=(const Watched&) = delete;
+};
+
+/// All that was counted on this thread.
+Trapped trapped();
+/// False in builds whose sanitizer owns these functions.
+bool traps_work();
+
+}  // namespace backwash::test

@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# What other participants may do to a daemon, with real processes (../../shared/faults.md rows 7, 10 to 12, 27, 28): two
+# vehicles in one domain, a foreign type, unknown frames, oversized clouds, corrupt and huge maps; and the preflight.
+#   daemon_dds.sh SOURCE_DIR BUILD_DIR
+set -euo pipefail
+source_dir=$1 build=$2
+source "$source_dir/services/bench/session.sh"
+log=$work/log
+: >"$log"
+second_pids=()
+trap 'status=$?; kill "${second_pids[@]}" 2>/dev/null || true; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
+status() { "$bin/backwashctl" --domain "$domain" --namespace "$1" status --json >"$work/$1.json"; }
+expect() { # expect NAMESPACE 'PYTHON EXPRESSION OVER s'
+  status "$1"
+  python3 -c 'import json, sys; s = json.load(open(sys.argv[1])); assert eval(sys.argv[2]), (sys.argv[2], s)' "$work/$1.json" "$2"
+}
+
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --parameter NAV_DLL_ACT=2
+start_daemon builtin:quad-5in "$work/flight.bwlog"
+
+# A second vehicle in the same domain: its own bench and daemon, elsewhere in the same map.
+"$bin/backwash-bench" --map builtin:parallel-walls-4m --start 1,0,1.2 --link "$work/second" --domain "$domain" \
+  --namespace second >>"$log" 2>&1 &
+second_pids+=($!)
+sed -e 's/namespace = .*/namespace = "second"/' -e 's#rt/backwash/odometry#rt/second/odometry#' \
+  -e "s#^device = .*#device = \"$work/second\"#" -e "s#^file = .*#file = \"$work/second.bwlog\"#" \
+  "$work/backwashd.toml" >"$work/second.toml"
+for _ in $(seq 100); do [[ -e $work/second ]] && break; sleep 0.05; done
+"$bin/backwashd" --config "$work/second.toml" >>"$log" 2>&1 &
+second_pids+=($!)
+
+# The preflight finds the one parameter that is unsafe, and says what to do about it.
+sleep 6
+if "$bin/backwashctl" --domain "$domain" check >"$work/check" 2>&1; then cat "$work/check"; die "check passed"; fi
+cat "$work/check"
+[[ $(grep -c ^FAIL "$work/check") == 1 ]] && grep -q '^FAIL  NAV_DLL_ACT: 2 -> set NAV_DLL_ACT' "$work/check" ||
+  die "check did not name NAV_DLL_ACT alone"
+
+enable
+expect backwash 's["state"] == "tracking" and abs(s["position"][0] + 2) < 0.1'
+expect second 's["state"] == "passive" and abs(s["position"][0] - 1) < 0.1 and s["maps_accepted"] == 1'
+
+probe() { "$build/tests/dds_probe" "$domain" backwash "$1" || die "dds_probe $1 failed"; }
+probe foreign
+expect backwash 's["foreign_writers"] == 1 and s["state"] == "tracking"'
+probe frame
+expect backwash 's["odometry_refused"] > 0 and s["odometry_rejected"] == 0 and s["state"] == "tracking"'
+probe oversized
+expect backwash 's["scans_rejected"] == 2 and s["scans_accepted"] == 0'
+probe corrupt
+expect backwash 's["maps_rejected"] == 2 and s["maps_accepted"] == 1 and s["state"] == "tracking"'
+expect second 's["foreign_writers"] == 0 and s["odometry_refused"] == 0 and s["maps_rejected"] == 0'
+ctl stop --wait

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# A foreign middleware as ROS 2 brings it: a Fast DDS process is the daemon's only odometry and reads its status.
+#   daemon_fastdds.sh SOURCE_DIR BUILD_DIR
+set -euo pipefail
+source_dir=$1 build=$2
+source "$source_dir/services/bench/session.sh"
+log=$work/log
+: >"$log"
+trap 'status=$?; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
+# The bench's own odometry goes where nobody listens.
+start_daemon builtin:quad-5in "$work/flight.bwlog" rt/foreign/odometry
+"$build/tests/fastdds_peer" "$domain" rt/foreign/odometry rt/backwash/status -2 0 0.16 8 >"$work/peer" &
+peer=$!
+sleep 6
+"$bin/backwashctl" --domain "$domain" status --json >"$work/status.json"
+wait "$peer" || die "the peer read no status"
+cat "$work/peer"
+grep -q '^quad-5in passive$' "$work/peer" || die "the peer read another status"
+python3 - "$work/status.json" <<'PYTHON'
+import json, sys
+s = json.load(open(sys.argv[1]))
+print(f"{s['odometry_received']} samples received, age {s['odometry_age_s']:.3f} s, at {s['position']}")
+assert s["odometry_received"] > 100 and s["odometry_rejected"] == s["odometry_refused"] == 0, s
+assert s["position"] == [-2, 0, 0.16] and s["odometry_age_s"] < 0.1, s
+PYTHON

@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# The map changes in flight, with real processes (../../shared/faults.md rows 4 and 14): a crate appears on the path, or a
+# loop closure corrects the VIO by a quarter of a metre. Judged from the raw log, the truth and the bytes on the wire.
+#   daemon_map.sh SOURCE_DIR BUILD_DIR obstacle|closure
+set -euo pipefail
+source_dir=$1 build=$2 fault=$3
+source "$source_dir/services/bench/session.sh"
+log=$work/log
+: >"$log"
+trap 'status=$?; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
+options=(--log "$work/truth.csv" --wire "$work/wire.csv")
+[[ $fault == obstacle ]] && options+=(--crate 0.8,0,1.2 --crate-edge 0.6 --crate-after 6.5)
+[[ $fault == closure ]] && options+=(--drift 0,0.25,0 --closure-after 6.5)
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in "${options[@]}"
+start_daemon builtin:quad-5in "$work/flight.bwlog"
+enable
+ctl takeoff --height 1.2 --wait
+ctl goto 2,0,1.2
+for _ in $(seq 60); do
+  sleep 0.5
+  "$bin/backwashctl" --domain "$domain" status --json >"$work/status.json"
+  python3 - "$work/status.json" <<'PYTHON' && break
+import json, math, sys
+s = json.load(open(sys.argv[1]))
+sys.exit(0 if s["state"] == "tracking" and not s["moving"] and math.dist(s["setpoint"], [2, 0, 1.2]) < 0.01 else 1)
+PYTHON
+done
+sleep 1
+"$bin/backwashctl" --domain "$domain" status --json >"$work/status.json"
+stop
+
+PYTHONPATH=$source_dir/tests/system python3 - "$work" "$fault" <<'PYTHON'
+import csv, json, math, sys
+import raw_log
+work, fault = sys.argv[1], sys.argv[2]
+status = json.load(open(work + "/status.json"))
+truth = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(open(work + "/truth.csv"))]
+flight = work + "/flight.bwlog"
+ticks = list(raw_log.ticks(flight))
+assert math.dist(status["setpoint"], [2, 0, 1.2]) < 0.01 and status["state"] == "tracking", status
+assert status["samples_outside"] == 0 and status["samples_inside"] > 400, status
+flying = [t for t in ticks if t.mode in ("tracking", "hold")]
+missed = max(t.missed for t in flying) * 0.020
+if fault == "obstacle":
+    scans = raw_log.lines(flight, raw_log.SCAN)
+    first = next(t for t, line in scans if not line.endswith(" 0 new voxels"))
+    hold = next(t for t in ticks if t.mode == "hold")
+    world = next(t for t, _ in raw_log.lines(flight, raw_log.WORLD) if t > first)
+    print(f"scan +{(hold.t - first) * 1e3:.1f} ms hold, +{(world - first) * 1e3:.0f} ms new snapshot; {len(scans)} scans")
+    assert 0 <= hold.t - first <= 0.040 + missed, hold.t - first
+    assert hold.t < world, "the decision waited for the field"
+    nearest = min(math.dist([max(abs(r[c] - m) - 0.3, 0) for c, m in zip(("x_m", "y_m", "z_m"), (0.8, 0, 1.2))], [0] * 3)
+                  for r in truth if r["t_s"] > first)
+    print(f"nearest to the crate: {nearest:.3f} m")
+    assert nearest > 0.16, "it touched the crate"
+    assert any(t.mode == "tracking" and t.t > hold.t for t in ticks), "it did not go on"
+else:
+    assert status["loop_closures"] == 2 and status["closures_refused"] == 0, status
+    assert not [t for t in flying if t.mode == "hold"], "a flagged loop closure is no fault"
+    points = [(float(r["t_s"]), [float(r[c]) for c in "xyz"]) for r in csv.DictReader(open(work + "/wire.csv"))
+              if r["id"] == str(raw_log.SETPOINT)]
+    steps = [math.dist(a[1], b[1]) for a, b in zip(points, points[1:])]
+    end = truth[-1]
+    before = [r for r in truth if r["armed"] == 1 and abs(r["x_m"]) < 1.5]
+    print(f"largest set-point step {max(steps) * 1e3:.1f} mm; on the way y {before[0]['y_m']:.2f} m, "
+          f"at the goal ({end['x_m']:.2f}, {end['y_m']:.2f}, {end['z_m']:.2f}) m")
+    assert max(steps) <= 1.5 * 0.02 * (1 + missed / 0.02) + 1e-4, max(steps)
+    assert abs(before[0]["y_m"] - 0.25) < 0.12, "there was no drift to correct"
+    assert math.dist([end["x_m"], end["y_m"], end["z_m"]], [2, 0, 1.2]) < 0.12, "not at the goal of the map"
+PYTHON

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a confused or hostile participant sends, for tests/system/daemon_dds.sh (faults.md rows 12, 26, 27).
+//   dds_probe DOMAIN NAMESPACE foreign|frame|oversized|corrupt|flood
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include "services/dds/topics.hpp"
+
+namespace dds = backwash::dds;
+using namespace std::chrono_literals;
+
+namespace {
+
+template <typename Writer>
+void until_matched(const Writer& writer) {
+  for (int n = 0; n < 500 && writer.matched() == 0; ++n) std::this_thread::sleep_for(10ms);
+}
+
+// A command where odometry is expected.
+int foreign(const dds::Participant& participant, const std::string& name_space) {
+  dds::Writer<dds::Command> writer(participant, dds::TopicOf<dds::Command>::type(), dds::topic(name_space, "odometry"),
+                                   dds::Delivery::latest);
+  for (int n = 0; n < 20; ++n) {
+    dds::Command command{};
+    char station[] = "nobody";
+    command.station = station;
+    writer.write(command);
+    std::this_thread::sleep_for(50ms);
+  }
+  return writer.matched() == 0 ? 0 : 1;
+}
+
+int odometry(const dds::Participant& participant, const std::string& name_space, int count,
+             std::chrono::microseconds pause) {
+  auto writer = dds::make_writer<dds::Odometry>(participant, name_space);
+  until_matched(writer);
+  char frame[] = "somewhere", child[] = "base_link";
+  dds::Odometry m{};
+  m.header.frame_id = frame;
+  m.child_frame_id = child;
+  m.pose.pose.orientation.w = 1;
+  auto due = std::chrono::steady_clock::now();
+  for (int n = 0; n < count; ++n) {
+    writer.write(m);
+    due += pause;
+    std::this_thread::sleep_until(due);
+  }
+  return 0;
+}
+
+// More points than anything that flies sends, and one whose sizes are a lie.
+int oversized(const dds::Participant& participant, const std::string& name_space) {
+  auto writer = dds::make_writer<dds::PointCloud>(participant, name_space);
+  until_matched(writer);
+  char frame[] = "map", x[] = "x", y[] = "y", z[] = "z";
+  dds::PointField fields[3] = {{x, 0, 7, 1}, {y, 4, 7, 1}, {z, 8, 7, 1}};
+  std::vector<std::uint8_t> data(400'000 * 12);
+  dds::PointCloud m{};
+  m.header.frame_id = frame;
+  m.fields = {3, 3, fields, false};
+  m.height = 1;
+  m.width = 400'000;
+  m.point_step = 12;
+  m.row_step = m.width * 12;
+  m.data = {m.row_step, m.row_step, data.data(), false};
+  writer.write(m);
+  m.width = 0xffffffff;
+  m.data._length = 12;
+  writer.write(m);
+  std::this_thread::sleep_for(500ms);
+  return 0;
+}
+
+int corrupt(const dds::Participant& participant, const std::string& name_space) {
+  auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
+  until_matched(writer);
+  char frame[] = "map", id[] = "OcTree";
+  // Half a tree, then two leaves at opposite corners of 2^48 voxels.
+  for (const auto& bytes : {std::vector<std::uint8_t>{0x03, 0x00, 0x03}, std::vector<std::uint8_t>{0x01, 0x40}}) {
+    auto data = bytes;
+    dds::Octomap m{};
+    m.header.frame_id = frame;
+    m.id = id;
+    m.binary = true;
+    m.resolution = 0.1;
+    const auto size = static_cast<std::uint32_t>(data.size());
+    m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(data.data()), false};
+    writer.write(m);
+    std::this_thread::sleep_for(500ms);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 4) return 64;
+  const dds::Participant participant(static_cast<std::uint32_t>(std::atoi(argv[1])), "lo");
+  const std::string name_space = argv[2], what = argv[3];
+  if (what == "foreign") return foreign(participant, name_space);
+  if (what == "frame") return odometry(participant, name_space, 50, 20ms);
+  if (what == "flood") return odometry(participant, name_space, 100'000, 100us);
+  if (what == "oversized") return oversized(participant, name_space);
+  if (what == "corrupt") return corrupt(participant, name_space);
+  return 64;
+}
