@@ -105,9 +105,9 @@ TEST_F(Replay, NamesTheByteOfWhatIsDamaged) {
   flip(record.offset + 8);
 
   const auto& offer = nth(log, RecordKind::offer, 1);
-  flip(offer.offset + sizeof(study::RecordHeader) + 3 * 8 + 6);  // the number of its commands
+  flip(offer.offset + sizeof(study::RecordHeader) + 4 * 8 + 6);  // the number of its commands
   expect_named(study::replay(read(), path_), offer.offset);
-  flip(offer.offset + sizeof(study::RecordHeader) + 3 * 8 + 6);
+  flip(offer.offset + sizeof(study::RecordHeader) + 4 * 8 + 6);
 
   const std::uint64_t last = log.records.back().offset;
   std::filesystem::resize_file(path_, std::filesystem::file_size(path_) - 5);
