@@ -23,9 +23,11 @@ OdometryGate::Verdict OdometryGate::take(const OdometrySample& sample, bool movi
   const bool clock_was_set = std::abs(by_stamp - by_reception) > kClockStep;
   const double dt = clock_was_set ? std::max(0.0, by_reception) : by_stamp;
   if (!clock_was_set && by_stamp <= 0) return Verdict::disorder;
-  // `identical_` counts the samples that repeat the last good pose; the pose itself is the first of the row.
-  identical_ = sample.state.p_W == last_->state.p_W && q == last_->q ? std::min(identical_ + 1, kFrozen) : 0;
-  if (moving && identical_ >= kFrozen - 1) return Verdict::frozen;
+  // Counts the samples that repeat the last good pose, which is the first of the row. At rest an estimator may well
+  // stand still.
+  const bool repeats = sample.state.p_W == last_->state.p_W && q == last_->q;
+  identical_ = moving && repeats ? std::min(identical_ + 1, kFrozen) : 0;
+  if (identical_ >= kFrozen - 1) return Verdict::frozen;
   const Vec3 predicted = last_->state.p_W + dt * last_->state.v_W;
   if (!((sample.state.p_W - predicted).norm() <= v_max_ * dt + 3 * sigma_)) return Verdict::jump;
   last_ = sample;

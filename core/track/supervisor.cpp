@@ -75,7 +75,7 @@ constexpr const char* kReasonNames[kReasons] = {
     "operator request",
     "autopilot follows our set-points",
     "new trajectory accepted",
-    "autopilot did not follow in aligned frames within 5 s",
+    "autopilot did not follow within 5 s",
     "odometry lost",
     "odometry jumped",
     "map and autopilot frames disagree",
@@ -199,7 +199,7 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::outside_set:
       return outside_ >= kOutsideTicks;  // row 16
     case Reason::deadline_missed:
-      return in.missed_periods > 0 && missed_.front() > period_ - 1 - kMissedWithin;  // row 32
+      return in.missed_periods > 0 && missed_.front() >= period_ - 1 - kMissedWithin;  // row 32
     case Reason::segment_accepted:
       return in.new_segment && pose_trusted();
     case Reason::landed:

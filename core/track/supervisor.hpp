@@ -164,7 +164,7 @@ class Supervisor {
   bool battery_landed_ = false;  ///< once (row 24)
   std::int64_t period_ = 0;      ///< number of this tick's period
   /// The three newest missed periods, oldest first.
-  std::array<std::int64_t, 3> missed_{-kMissedWithin, -kMissedWithin, -kMissedWithin};
+  std::array<std::int64_t, 3> missed_{-2 * kMissedWithin, -2 * kMissedWithin, -2 * kMissedWithin};
 };
 
 }  // namespace backwash::track

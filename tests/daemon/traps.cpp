@@ -10,6 +10,15 @@
 #include <cerrno>
 #include <cstddef>
 
+#if defined(__has_feature)
+#if __has_feature(realtime_sanitizer)
+#define BACKWASH_RTSAN 1
+// What the compiler itself calls around a [[clang::nonblocking]] function.
+extern "C" void __rtsan_realtime_enter();
+extern "C" void __rtsan_realtime_exit();
+#endif
+#endif
+
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define BACKWASH_TRAPS 0
 #elif defined(__has_feature)
@@ -41,8 +50,19 @@ F* next(const char* name) {
 
 }  // namespace
 
-Watched::Watched() { ++depth; }
-Watched::~Watched() { --depth; }
+// Where clang's RealtimeSanitizer is built in, it watches the same scopes with its own traps, system calls included.
+Watched::Watched() {
+  ++depth;
+#ifdef BACKWASH_RTSAN
+  __rtsan_realtime_enter();
+#endif
+}
+Watched::~Watched() {
+#ifdef BACKWASH_RTSAN
+  __rtsan_realtime_exit();
+#endif
+  --depth;
+}
 Trapped trapped() { return counted; }
 bool traps_work() { return BACKWASH_TRAPS != 0; }
 

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
 #include <limits>
+#include <string>
 
 #include "core/types/geometry.hpp"
 
@@ -172,6 +175,73 @@ TEST(Supervisor, LandsOnRequestAndIsPassiveOnceDisarmed) {
   EXPECT_EQ(ticks_until(s, Mode::quiet, 100, [](auto& i, int) { i.offboard = false; }), -1);
   EXPECT_EQ(ticks_until(s, Mode::passive, 2, [](auto& i, int) { i.armed = i.offboard = false; }), 1);
   EXPECT_EQ(s.reason(), Reason::landed);
+}
+
+// The table of core/track/README.md, as the code would write it.
+std::string table() {
+  std::string text = "| in | when | to |\n| --- | --- | --- |\n";
+  for (const Transition& t : transitions()) {
+    std::string from;
+    for (int m = 0; m < kModes; ++m)
+      if (contains(t.from, static_cast<Mode>(m)))
+        from += (from.empty() ? "" : ", ") + std::string(to_string(static_cast<Mode>(m)));
+    text += "| " + from + " | " + to_string(t.when) + " | " + to_string(t.to) + " |\n";
+  }
+  return text;
+}
+
+TEST(Supervisor, IsDocumentedAsItIs) {
+  std::ifstream in(BACKWASH_SOURCE_DIR "/core/track/README.md");
+  const std::string readme{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_NE(readme.find(table()), std::string::npos) << "core/track/README.md should hold:\n" << table();
+  for (const Reason reason : refusals())
+    EXPECT_NE(readme.find(std::string("- ") + to_string(reason) + "\n"), std::string::npos) << to_string(reason);
+}
+
+TEST(Supervisor, EveryModeAndReasonHasANameOfItsOwn) {
+  for (int a = 0; a < kReasons; ++a) {
+    EXPECT_LE(std::string(to_string(static_cast<Reason>(a))).size(), 50u);  // a STATUSTEXT holds it whole
+    for (int b = 0; b < a; ++b) EXPECT_STRNE(to_string(static_cast<Reason>(a)), to_string(static_cast<Reason>(b)));
+  }
+  EXPECT_STREQ(to_string(static_cast<Reason>(kReasons - 1)), "map and autopilot disagree in pitch");
+  EXPECT_STREQ(to_string(static_cast<Reason>(kReasons)), "?");
+}
+
+TEST(Supervisor, ThreeMissedDeadlinesHoldOnlyWithinOneSecond) {
+  for (const int apart : {24, 25, 26}) {  // the first and the third are 2·apart periods from each other
+    Supervisor s = flying();
+    SupervisorInput late = healthy();
+    late.missed_periods = 1;
+    for (int miss = 0; miss < 3; ++miss) {
+      s.step(late);
+      for (int tick = 0; tick < apart - 2; ++tick) s.step(healthy());
+    }
+    EXPECT_EQ(s.mode(), 2 * apart <= 50 ? Mode::hold : Mode::tracking) << apart;
+  }
+  Supervisor s = flying();
+  SupervisorInput late = healthy();
+  late.missed_periods = 3;
+  s.step(late);
+  EXPECT_EQ(s.mode(), Mode::hold);
+  EXPECT_EQ(s.reason(), Reason::deadline_missed);
+}
+
+TEST(Supervisor, AHoldThatComesToDistrustThePoseLandsOnlyAfterItsOwnTime) {
+  Supervisor s = flying();
+  SupervisorInput in = healthy();
+  in.outside_map = true;
+  EXPECT_EQ(s.step(in).mode, Mode::hold);
+  for (int tick = 0; tick < 200; ++tick) EXPECT_EQ(s.step(healthy()).mode, Mode::hold);
+  in = healthy();
+  in.odometry_jump = true;
+  auto out = s.step(in);
+  EXPECT_EQ(out.mode, Mode::hold);
+  EXPECT_TRUE(out.freeze);
+  int ticks = 1;
+  while (s.step(healthy()).mode == Mode::hold && ticks < 50) ++ticks;
+  EXPECT_EQ(s.mode(), Mode::land);
+  EXPECT_GE(ticks, 10);
+  EXPECT_LE(ticks * kControlPeriod, 0.4);
 }
 
 }  // namespace

@@ -1,0 +1,93 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# The real-time proofs that need minutes, the wall clock or another compiler. CI calls it nightly.
+#   realtime.sh [rtsan] [tsan] [stress] [soak] [wall]      no argument: all of them
+# rtsan   every lockstep test with clang's RealtimeSanitizer around each tick
+# tsan    a whole flight of the daemon with ThreadSanitizer
+# stress  a flight with stress-ng on all processors: tick p99 <= 1 ms, wake-up p99 <= 500 us (SCHED_FIFO), histograms
+# soak    SOAK_SECONDS (600) of hovering: resident memory flat
+# wall    the fault rows and flights through the real processes, on the wall clock
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+source ./setup.sh
+install_packages packages.txt
+install_packages tests/nightly/packages.txt
+out=$PWD/build/nightly
+mkdir -p "$out"
+
+# build DIR TARGET… -- CMAKE_OPTION…
+build() {
+  local dir=$1 targets=()
+  shift
+  while [[ $1 != -- ]]; do targets+=("$1"); shift; done
+  shift
+  cmake -S . -B "$dir" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
+    -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' "$@" >"$out/build.log" 2>&1 &&
+    cmake --build "$dir" --target "${targets[@]}" >>"$out/build.log" 2>&1 ||
+    { tail -n 40 "$out/build.log" >&2; exit 70; }
+}
+
+rtsan() {
+  build build/rtsan test_daemon -- -DCMAKE_C_COMPILER=clang-22 -DCMAKE_CXX_COMPILER=clang++-22 \
+    -DCMAKE_C_FLAGS='-fsanitize=realtime -w' -DCMAKE_CXX_FLAGS='-fsanitize=realtime -w'
+  RTSAN_SYMBOLIZER_PATH=/usr/lib/llvm-22/bin/llvm-symbolizer \
+    RTSAN_OPTIONS="suppressions=$PWD/tests/nightly/rtsan.supp:halt_on_error=true" build/rtsan/tests/test_daemon
+}
+
+tsan() {
+  build build/tsan backwashd backwashctl bench backwash test_sync -- -DCMAKE_CXX_FLAGS='-fsanitize=thread -w'
+  export TSAN_OPTIONS="suppressions=$PWD/tests/nightly/tsan.supp:exitcode=66:log_path=$out/tsan"
+  rm -f "$out"/tsan.*
+  build/tsan/tests/test_sync --gtest_brief=1
+  services/bench/flight.sh build/tsan "$out" tsan builtin:parallel-walls-4m -2,0,1.2 2,0,1.2 || echo "flight: exit $?"
+  unset TSAN_OPTIONS
+  if compgen -G "$out/tsan.*" >/dev/null; then
+    cat "$out"/tsan.* >&2
+    echo "tsan: reports above" >&2
+    return 1
+  fi
+  echo "tsan: no report"
+}
+
+stress() {
+  build_preset release
+  stress-ng --cpu "$(nproc)" --timeout 120 >/dev/null 2>&1 &
+  local load=$! status=0
+  services/bench/flight.sh build/release "$out" stress builtin:parallel-walls-4m -2,0,1.2 2,0,1.2 || status=$?
+  kill "$load" 2>/dev/null || true
+  wait "$load" 2>/dev/null || true
+  tests/nightly/histograms.py "$out/stress.bwlog" --tick-p99 1000 --lateness-p99 500
+  return "$status"
+}
+
+soak() {
+  build_preset release
+  (
+    source services/bench/session.sh
+    log=$out/soak.log
+    : >"$log"
+    start_bench build/release/services "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in \
+      --duration "$((${SOAK_SECONDS:-600} + 60))"
+    start_daemon builtin:quad-5in "$out/soak.bwlog"
+    enable
+    ctl takeoff --height 1.2 --wait
+    : >"$out/soak.rss"
+    for _ in $(seq "${SOAK_SECONDS:-600}"); do
+      awk '/^VmRSS/ { print $2 }' "/proc/$daemon_pid/status" >>"$out/soak.rss"
+      sleep 1
+    done
+    stop
+  )
+  tests/nightly/flat.py "$out/soak.rss"
+}
+
+wall() {
+  build_preset release
+  ctest --preset release -R '^daemon_'
+}
+
+[[ $# -gt 0 ]] || set -- rtsan tsan stress soak wall
+for part; do
+  echo "== $part"
+  "$part"
+done

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/track/flight_tick.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/plan/stop.hpp"
+
+namespace backwash::track {
+namespace {
+
+Vehicle vehicle() {
+  Vehicle v;
+  v.limits = {1.5, 2};
+  v.estimation = {0.02};
+  v.initial_error = {0.1, 0.5};
+  return v;
+}
+
+/// Along x at 1 m/s for five seconds; half widths of 0.2 m around the commands; a verified stop every ten commands.
+AcceptedSegment straight() {
+  AcceptedSegment s;
+  s.id = 1;
+  const auto tube_of = [](const std::vector<Setpoint>& commands) {
+    reach::ReachTube tube(commands.size() + 1);
+    for (std::size_t k = 0; k < tube.size(); ++k) {
+      tube[k].center.p_W = commands[std::min(k, commands.size() - 1)].p_W;
+      tube[k].half_widths.fill(0.2), tube[k].half_widths_interval.fill(0.2);
+    }
+    return tube;
+  };
+  for (int k = 0; k < 250; ++k) s.commands.push_back({{0.02 * k, 0, 1}, {1, 0, 0}, Vec3::Zero(), 0});
+  s.tube = tube_of(s.commands);
+  for (std::size_t branch = 0; branch < 250; branch += 10) {
+    const auto stopped = plan::stop_along(s.commands, branch, 4);
+    const auto tube = tube_of(stopped);
+    const auto from = static_cast<std::ptrdiff_t>(branch);
+    s.stops.push_back({branch, {stopped.begin() + from, stopped.end()}, {tube.begin() + from, tube.end()}});
+  }
+  return s;
+}
+
+/// A perfect vehicle that follows set-points: its pose is the last command, in both frames.
+class Flight {
+ public:
+  Flight() : tick_(vehicle(), 0.15) {
+    for (int n = 0; n < 30; ++n) step();
+    in.request = Request::enable;
+    step();
+    in.autopilot.offboard = in.autopilot.armed = true;
+    step();
+    EXPECT_EQ(out.supervisor.mode, Mode::tracking);
+    in.segment = &segment;
+    step();
+    EXPECT_TRUE(out.accepted);
+    for (int n = 0; n < 100; ++n) step();
+  }
+  const TickOutput& step() {
+    in.now_ns += 20'000'000;
+    if (in.odometry) in.odometry->state = {out.command.p_W, out.command.v_W};
+    if (!in.odometry) in.odometry = OdometrySample{0, 0, {{0, 0, 1}, Vec3::Zero()}, {1, 0, 0, 0}};
+    in.odometry->received_ns = in.odometry->stamp_ns = in.now_ns;
+    in.autopilot.heartbeat_age = 0.1;
+    if (tick_.mode() == Mode::passive) in.odometry->state = {{0, 0, 1}, Vec3::Zero()};
+    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, in.odometry->state, {1, 0, 0, 0}};
+    out = tick_.step(in);
+    in.request = Request::none;
+    in.segment = nullptr;
+    return out;
+  }
+  AcceptedSegment segment = straight();
+  TickInput in;
+  TickOutput out;
+  const Tracker& tracker() const { return tick_.tracker(); }
+
+ private:
+  FlightTick tick_;
+};
+
+// Row 14: at command 101 the next stop leaves at 110.
+TEST(FlightTick, AnObstacleInTheSetsAheadStopsTheVehicleOnTheNextVerifiedStopFromTheSameTick) {
+  Flight flight;
+  ASSERT_EQ(flight.tracker().index(), 101u);
+  flight.in.surroundings.tube_blocked = true;
+  flight.step();
+  EXPECT_EQ(flight.out.supervisor.mode, Mode::hold);
+  EXPECT_EQ(flight.out.supervisor.reason, Reason::obstacle_ahead);
+  flight.in.surroundings.tube_blocked = false;  // what is ahead now is the stop, and it is clear
+  const auto& stop = flight.segment.stops[11];
+  ASSERT_EQ(stop.branch, 110u);
+  for (std::size_t k = 102; k < 110; ++k) EXPECT_EQ(flight.step().command.p_W, flight.segment.commands[k].p_W) << k;
+  for (const Setpoint& c : stop.commands) EXPECT_EQ(flight.step().command.p_W, c.p_W);
+  for (int n = 0; n < 50; ++n) {
+    EXPECT_EQ(flight.step().command.p_W, stop.commands.back().p_W);
+    EXPECT_EQ(flight.out.command.v_W, Vec3::Zero());
+  }
+}
+
+TEST(FlightTick, WhatIsAheadWhileItBrakesIsTheStop) {
+  Flight flight;
+  flight.in.surroundings.tube_blocked = true;
+  flight.step();
+  const auto ahead = flight.tracker().ahead();
+  EXPECT_EQ(ahead[0].size(), 8u);  // entries 102 to 109 of the segment
+  EXPECT_EQ(ahead[1].size(), flight.segment.stops[11].tube.size());
+  EXPECT_EQ(flight.tracker().next_stop(), nullptr);
+}
+
+TEST(FlightTick, IfTheStopIsBlockedTooTheSetpointIsFrozenAtOnce) {
+  Flight flight;
+  const Vec3 last = flight.out.command.p_W;
+  flight.in.surroundings.tube_blocked = flight.in.surroundings.stop_blocked = true;
+  for (int n = 0; n < 50; ++n) {
+    flight.step();
+    EXPECT_EQ(flight.out.supervisor.mode, Mode::hold);
+    EXPECT_EQ(flight.out.command.p_W, last);
+    EXPECT_EQ(flight.out.command.v_W, Vec3::Zero());
+  }
+}
+
+TEST(FlightTick, AnObstacleInTheStopItBrakesOnFreezesTheSetpoint) {
+  Flight flight;
+  flight.in.surroundings.tube_blocked = true;
+  flight.step();
+  flight.in.surroundings.tube_blocked = false;
+  for (int n = 0; n < 15; ++n) flight.step();
+  const Vec3 last = flight.out.command.p_W;
+  flight.in.surroundings.tube_blocked = true;
+  EXPECT_EQ(flight.step().command.p_W, last);
+  EXPECT_EQ(flight.out.command.v_W, Vec3::Zero());
+}
+
+// Rows 9, 10 and 13, as far as the tick decides them.
+TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
+  for (const bool outside : {true, false}) {
+    Flight flight;
+    (outside ? flight.in.surroundings.outside : flight.in.surroundings.late) = true;
+    flight.step();
+    EXPECT_EQ(flight.out.supervisor.mode, Mode::hold);
+    EXPECT_EQ(flight.out.supervisor.reason, outside ? Reason::outside_map : Reason::map_late);
+  }
+  FlightTick tick(vehicle(), 0);
+  TickInput in;
+  in.autopilot.heartbeat_age = 0;
+  in.odometry = OdometrySample{};
+  in.request = Request::enable;
+  in.surroundings.missing = true;
+  EXPECT_EQ(tick.step(in).supervisor.mode, Mode::passive);
+  EXPECT_EQ(tick.step(in).supervisor.reason, Reason::map_missing);
+  in.surroundings = {};
+  in.odometry->received_ns = in.odometry->stamp_ns = in.now_ns = 20'000'000;
+  EXPECT_EQ(tick.step(in).supervisor.mode, Mode::enabling);
+}
+
+TEST(FlightTick, GivesEverySegmentBackExactlyOnce) {
+  Flight flight;
+  const AcceptedSegment elsewhere = [] {
+    auto s = straight();
+    s.id = 2;
+    for (auto& set : s.tube) set.center.p_W.y() += 5;
+    return s;
+  }();
+  flight.in.segment = &elsewhere;
+  flight.step();
+  EXPECT_TRUE(flight.out.refused);
+  EXPECT_EQ(flight.out.released[0], &elsewhere);
+  EXPECT_EQ(flight.out.released[1], nullptr);
+  flight.in.autopilot.offboard = false;
+  flight.step();
+  EXPECT_EQ(flight.out.supervisor.mode, Mode::passive);
+  EXPECT_EQ(flight.out.released[0], &flight.segment);
+  EXPECT_EQ(flight.tracker().segment(), 0u);
+}
+
+}  // namespace
+}  // namespace backwash::track
