@@ -18,7 +18,7 @@ struct OdometrySample {
   State state;                          ///< m, m/s
   std::array<double, 4> q{1, 0, 0, 0};  ///< body to map: w, x, y, z
   std::uint32_t closures = 0;           ///< loop closures so far: which map frame this is in
-  RigidShift map_from_odom;             ///< by which the VIO's own pose was brought there
+  RigidShift map_from_odom{};           ///< by which the VIO's own pose was brought there
 };
 
 /// Lets only credible odometry through (faults.md rows 2, 3, 5, 6). It sees the newest sample of each tick. Real-time:

@@ -61,7 +61,7 @@ class CrateScans {
  public:
   CrateScans(const dds::Participant& participant, const Options& options)
       : writer_(dds::make_writer<dds::PointCloud>(participant, options.name_space)),
-        center_(options.crate),
+        center_(options.crate.value_or(Vec3::Zero())),
         edge_(options.crate_edge) {}
 
   void send(const State& truth, const Eigen::Quaterniond& q, double t) {
@@ -170,8 +170,8 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   auto map_writer = dds::make_writer<dds::Octomap>(participant, options.name_space);
   auto closure_writer = dds::make_writer<dds::TransformStamped>(participant, options.name_space);
   CrateScans scans(participant, options);
-  if (options.closure_s) closure_writer.write(loop_closure(Vec3::Zero(), 0));
-  bool closed = false;
+  if (options.drift) closure_writer.write(loop_closure(Vec3::Zero(), 0));
+  bool closed = false, event = false;
   std::vector<std::int8_t> map_data;
   map_writer.write(octomap(grid, map_data));
   Pty pty(options.link);
@@ -193,14 +193,15 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
     const auto passed = [&](const std::optional<double>& s) { return s && armed_at && t - *armed_at > *s; };
     autopilot.mute = passed(options.stop_heartbeat_s);
     State estimate = vio.estimate(autopilot.truth(), t - seconds(begun));
-    if (options.closure_s) estimate.p_W -= options.drift;
-    if (!closed && passed(options.closure_s)) {
-      closure_writer.write(loop_closure(options.drift, t));
+    event = event || (autopilot.armed() && autopilot.truth().p_W.x() > options.event_x);
+    if (options.drift) estimate.p_W -= *options.drift;
+    if (options.drift && event && !closed) {
+      closure_writer.write(loop_closure(*options.drift, t));
       closed = true;
     }
-    if (step % 100 == 0 && passed(options.crate_s)) scans.send(autopilot.truth(), autopilot.attitude(), t);
+    if (step % 100 == 0 && options.crate && event) scans.send(autopilot.truth(), autopilot.attitude(), t);
     if (step % kOdometryEvery == 0 && !passed(options.stop_odometry_s))
-      odometry_writer.write(odometry(estimate, autopilot.attitude(), t, options.closure_s.has_value()));
+      odometry_writer.write(odometry(estimate, autopilot.attitude(), t, options.drift.has_value()));
     if (step % 20 == 0) log.row(t, autopilot, estimate);
   }
   spdlog::info("bench stopped: {}, {}, {} set-points received", autopilot.mode(),

@@ -21,14 +21,13 @@ struct Options {
   double duration_s = 600;
   std::optional<double> stop_odometry_s, stop_heartbeat_s;  ///< s after arming
   std::map<std::string, double> parameters;                 ///< of the autopilot, in place of its own
-  /// A crate of which an emulated depth camera sends scans (10 Hz, body frame) from then on.
-  std::optional<double> crate_s;  ///< s after arming
-  Vec3 crate = Vec3::Zero();      ///< its centre in the map, m
-  double crate_edge = 0.6;        ///< m
-  /// The VIO drifts by −drift before the flight: odometry comes in the frame odom, and a loop closure, map ← odom,
-  /// brings the drift to light.
-  std::optional<double> closure_s;  ///< s after arming
-  Vec3 drift = Vec3::Zero();        ///< m
+  /// A crate's centre, m: an emulated depth camera sends scans of it (10 Hz, body frame) from the event on.
+  std::optional<Vec3> crate;
+  double crate_edge = 0.4;  ///< m
+  /// The VIO has drifted by −drift before the flight: odometry comes in the frame odom, and a loop closure, map ← odom,
+  /// brings it to light at the event, m.
+  std::optional<Vec3> drift;
+  double event_x = 0;  ///< the event: the armed vehicle has passed this x of the map, m
 };
 
 /// Runs the emulated flight controller, VIO (100 Hz) and mapper in real time until the duration has passed or SIGINT or

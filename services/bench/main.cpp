@@ -48,13 +48,16 @@ int main(int argc, char** argv) {
   std::vector<std::string> parameters;
   app.add_option("--parameter", parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
   std::vector<double> crate, drift;
-  app.add_option("--crate", crate, "x,y,z of a crate's centre in the map, m, which the map does not have")
+  app.add_option("--crate", crate,
+                 "fault: x,y,z of the centre of a crate that the map does not have, m; it is scanned from the event on")
       ->delimiter(',')
       ->expected(3);
   app.add_option("--crate-edge", o.crate_edge, "m")->capture_default_str();
-  app.add_option("--crate-after", o.crate_s, "fault: scans of it come from this long after arming, s");
-  app.add_option("--drift", drift, "x,y,z by which a loop closure corrects the VIO, m")->delimiter(',')->expected(3);
-  app.add_option("--closure-after", o.closure_s, "fault: the loop closure comes this long after arming, s");
+  app.add_option("--drift", drift, "fault: x,y,z by which a loop closure corrects the VIO at the event, m")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--event-x", o.event_x, "the event: the vehicle has passed this x of the map, m")
+      ->capture_default_str();
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {
@@ -71,8 +74,8 @@ int main(int argc, char** argv) {
       return failed(64, "--parameter " + p + ": expected NAME=NUMBER");
     o.parameters[p.substr(0, equals)] = value;
   }
-  if (!crate.empty()) o.crate = {crate[0], crate[1], crate[2]};
-  if (!drift.empty()) o.drift = {drift[0], drift[1], drift[2]};
+  if (!crate.empty()) o.crate = backwash::Vec3(crate[0], crate[1], crate[2]);
+  if (!drift.empty()) o.drift = backwash::Vec3(drift[0], drift[1], drift[2]);
   o.frame.origin = {origin[0], origin[1], origin[2]};
   const auto grid = backwash::map::load_map(o.map);
   if (!grid)

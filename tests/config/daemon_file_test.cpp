@@ -64,9 +64,9 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
   EXPECT_TRUE(names(error_after("cpu = -1", "cpu = 0.5"), 19, "control.cpu"));
   EXPECT_TRUE(names(error_after("battery_land = 0.15", "battery_land = 15"), 20, "control.battery_land"));
   EXPECT_TRUE(names(error_after("[control]", "[controls]"), 17, "controls"));
-  EXPECT_TRUE(names(error_after("live = false", "live = 0"), 29, "map.live"));
-  EXPECT_TRUE(names(error_after("max_mib = 512", "max_mib = 0"), 32, "map.max_mib"));
-  EXPECT_TRUE(names(error_after("body = \"base_link\"", "body = \"map\""), 23, "frames"));
+  EXPECT_TRUE(names(error_after("live = false", "live = 0"), 31, "map.live"));
+  EXPECT_TRUE(names(error_after("max_mib = 512", "max_mib = 0"), 34, "map.max_mib"));
+  EXPECT_TRUE(names(error_after("body = \"base_link\"", "body = \"map\""), 25, "frames"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/config/config.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
 #include "tests/daemon/lockstep.hpp"
 
@@ -155,6 +156,10 @@ TEST(Row6, IdenticalPosesAtRestAreNoFault) {
 Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond&)>& wrong, bool& commanded) {
   Lockstep rig;
   rig.autopilot->mute = true;
+  // Room for wherever the carried vehicle is seen: outside its map it would be refused for that.
+  map::OccupancyGrid room({-20, -20, -10}, 1.0, {40, 40, 20}, map::Cell::free);
+  rig.channels->worlds.offer(
+      plan::build_world(std::move(room), Model{}, config::load_vehicle("builtin:quad-5in").value()));
   const double yaw = 0.4;
   const Eigen::Quaterniond q(Eigen::AngleAxisd(yaw, Vec3::UnitZ()));
   commanded = false;
