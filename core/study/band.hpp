@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/types/vehicle.hpp"
+
+namespace backwash::study {
+
+/// Frequencies that a variance counts, Hz (model.md section 3).
+struct Band {
+  double low_hz = 0.2, high_hz = 20;
+  /// The band that a signal of this rate can carry: the top is lowered to 0.4·rate, below the Nyquist frequency.
+  Band within(double rate_hz) const noexcept;
+};
+
+/// Zero-phase band-pass of an evenly sampled signal: second-order Butterworth high- and low-pass, each forwards and
+/// backwards, −3 dB at the band's ends; both ends of the signal are continued by its mirror image (point
+/// reflection would add a step of the mean). Below the Nyquist
+/// frequency nothing folds back: the low-pass runs at the signal's own rate and nothing is thinned out. O(n).
+/// Precondition: rate_hz > 2·high_hz, n ≥ 2.
+std::vector<double> band_passed(std::span<const double> signal, double rate_hz, const Band& band);
+
+/// What a signal's autocorrelation ρ says, summed up to its first zero crossing.
+struct Correlation {
+  double time_s;           ///< correlation time ∫ρ dt from 0, s
+  double variance_time_s;  ///< ∫ρ² dt over all lags, both signs, s: T/this is the effective sample size of a variance
+};
+/// Autocorrelation of a signal about its mean, lags up to `longest_s`. Both times are at least half a sample (white
+/// noise). O(n·lags). A constant signal counts as white.
+Correlation correlation(std::span<const double> signal, double rate_hz, double longest_s = 2.0);
+
+/// var(a)/var(w) of a closed position loop held at rest, for a disturbance w of correlation time tau_w (s; spectrum
+/// 1/(1 + (2πfτ)²)): ∫|H|²S / ∫S with H(s) = 1/(1 + (k_p + k_d s) e^(−s·delay)/(s² (1 + lag s))) (model.md section 3;
+/// 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both integrals run over it; without, over all
+/// frequencies. Numerical, relative error below 1e-4.
+double loop_attenuation(double k_p, double k_d, double delay_s, double lag_s, double tau_w,
+                        const std::optional<Band>& band);
+
+}  // namespace backwash::study
