@@ -182,10 +182,14 @@ void write_flight(const Table& table, Rng& rng, const std::filesystem::path& pat
 
 }  // namespace
 
-std::vector<std::filesystem::path> write_world(const World& world, const std::filesystem::path& folder) {
+void write_world_files(const World& world, const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   write_map(world, folder / "map.bt");
   write_vehicle(world.craft, folder / "vehicle.toml");
+}
+
+std::vector<std::filesystem::path> write_world(const World& world, const std::filesystem::path& folder) {
+  write_world_files(world, folder);
   Rng rng(world.request.seed ^ 0x9e3779b97f4a7c15u);
   std::vector<std::filesystem::path> paths;
   for (const auto& flight : fly_all(world)) {

@@ -67,7 +67,9 @@ struct Table {
 };
 std::vector<Table> fly_all(const World& world);
 
-/// Writes map.bt, vehicle.toml, model.toml and flights with shuffled names and columns; returns the flights' paths.
+/// Writes map.bt and vehicle.toml.
+void write_world_files(const World& world, const std::filesystem::path& folder);
+/// Writes those and the flights with shuffled names and columns; returns the flights' paths.
 std::vector<std::filesystem::path> write_world(const World& world, const std::filesystem::path& folder);
 /// The answer, one line of JSON; never written beside the flights.
 std::string truth_line(const World& world);

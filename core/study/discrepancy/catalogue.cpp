@@ -404,7 +404,7 @@ std::optional<std::string> why_not_tested(const Form& form, const Observations& 
     if (auto why = need("thrust")) return why;
   if (c == "thrust_slope" || c == "actuator_lag" || c == "command_latency")
     if (auto why = need("setpoints")) return why;
-  if (c == "vibration" || c == "rotor_sensor_fault" || form.parameters.size() == 2 && c == "propeller_damage")
+  if (c == "vibration" || c == "rotor_sensor_fault" || (form.parameters.size() == 2 && c == "propeller_damage"))
     if (auto why = need("rpm")) return why;
   if (c == "propeller_damage")
     if (auto why = need("motors")) return why;

@@ -60,13 +60,15 @@ void Evidence::anova(Channel c, const std::vector<double>& r) {
   // A channel that is exact in every window (no dropout at all) keeps a least scatter.
   const double least = c >= kMotor1 ? 1e-6 : 1e-8;
   within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
-  between_[c] = 0;
+  // Vehicles are built with rotors and sensors that differ by this much (README.md, "scatter"): no flight averages it out.
+  const double built = c >= kDropout1 ? 0.003 : c >= kMotor1 ? 0.01 : 0;
+  between_[c] = built * built;
   if (groups < 2) return;
   grand /= total;
   double ssb = 0, squares = 0;
   for (const auto& [weight, mean] : flights)
     ssb += weight * (mean - grand) * (mean - grand), squares += weight * weight;
-  between_[c] = std::max(0.0, (ssb - (groups - 1) * within_[c]) / (total - squares / total));
+  between_[c] = std::max(between_[c], (ssb - (groups - 1) * within_[c]) / (total - squares / total));
 }
 
 std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const Column*>& columns) const {

@@ -206,7 +206,8 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
-    put(kMeanX + a, mean(w, 0.0, residual), duration / kWindow);
+    // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
+    put(kMeanX + a, mean(w, 0.0, residual), duration / kWindow * 0.01 / (row.sigma[axis] + 0.002));
     const auto x = detrended_values(w, residual);
     const auto [variance, samples] = spread(x);
     row.measured_variance[axis] = variance;
