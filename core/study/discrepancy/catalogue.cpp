@@ -48,232 +48,207 @@ Vec3 pull(const WindowRow& w, double length) {
   return sum;
 }
 
-std::vector<Form> means() {
-  const std::vector<double> lengths = {0.08, 0.15, 0.3, 0.6};
-  std::vector<Form> forms;
-  forms.push_back({"ground_thrust",
-                   "z push A exp(-(h - 0.4 m)/L), h the height over the surface below",
-                   {"A_mps2"},
-                   "L_m",
-                   lengths,
-                   false,
-                   false,
-                   0.02,
-                   [](const Windows& ws, double length) {
-                     return std::vector{in(kMeanZ, ws, [&](auto& w) { return near(w.around.height, 0.4, length); })};
-                   }});
-  forms.push_back({"ceiling",
-                   "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
-                   {"A_mps2"},
-                   "L_m",
-                   lengths,
-                   false,
-                   false,
-                   0.02,
-                   [](const Windows& ws, double length) {
-                     return std::vector{
-                         in(kMeanZ, ws, [&](auto& w) { return near(w.around.ceiling_gap, 0.3, length); })};
-                   }});
-  forms.push_back({"wall_attraction",
-                   "push A exp(-(d - 0.4 m)/L) towards each wall at distance d",
-                   {"A_mps2"},
-                   "L_m",
-                   lengths,
-                   false,
-                   false,
-                   0.02,
-                   [](const Windows& ws, double length) {
-                     return std::vector{level(ws, [&](auto& w) { return pull(w, length); })};
-                   }});
-  forms.push_back(
-      {"forward_speed", "z push C (v/1 m/s)^2", {"C_mps2"}, "", {0}, false, false, 0.02, [](const Windows& ws, double) {
-         return std::vector{in(kMeanZ, ws, [](auto& w) { return w.speed * w.speed; })};
-       }});
-  forms.push_back({"battery_sag",
-                   "z push -s T/m (V0 - V)/V0, V0 the highest voltage seen",
-                   {"s"},
-                   "",
-                   {0},
-                   false,
-                   false,
-                   0.02,
-                   [](const Windows& ws, double) {
-                     double highest = 1e-6;
-                     for (const auto& w : ws) highest = std::max(highest, w.voltage);
-                     return std::vector{
-                         in(kMeanZ, ws, [&](auto& w) { return -w.thrust_acc * (highest - w.voltage) / highest; })};
-                   }});
-  forms.push_back(
-      {"payload",
-       "z push -T/m times the relative excess of mass",
-       {"relative_mass"},
-       "",
-       {0},
-       false,
-       true,
-       0.02,
-       [](const Windows& ws, double) { return std::vector{in(kMeanZ, ws, [](auto& w) { return -w.thrust_acc; })}; }});
-  forms.push_back({"trim",
-                   "constant push fixed to the body",
-                   {"body_x_mps2", "body_y_mps2"},
-                   "",
-                   {0},
-                   false,
-                   true,
-                   0.02,
-                   [](const Windows& ws, double) {
-                     return std::vector{level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
-                                        level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); })};
-                   }});
-  forms.push_back({"draft",
-                   "constant level push fixed to the world",
-                   {"x_mps2", "y_mps2"},
-                   "",
-                   {0},
-                   false,
-                   true,
-                   0.02,
-                   [](const Windows& ws, double) {
-                     return std::vector{level(ws, [](auto&) -> Vec3 { return Vec3::UnitX(); }),
-                                        level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); })};
-                   }});
-  forms.push_back(
-      {"rotor_drag", "push -k v, level", {"k_per_s"}, "", {0}, false, false, 0.01, [](const Windows& ws, double) {
-         return std::vector{level(ws, [](auto& w) -> Vec3 { return -w.v_W; })};
-       }});
-  const auto drift = [](auto amount) {
-    return [amount](const Windows& ws, double) {
-      std::vector<Column> columns;
-      for (int i = 0; i < 3; ++i) {
-        Column c = level(ws, [&](auto& w) -> Vec3 { return amount(w) * w.R_WB.col(i); });
-        c.parts.push_back({kMeanZ, values(ws, [&](auto& w) { return amount(w) * w.R_WB(2, i); })});
-        columns.push_back(std::move(c));
-      }
-      return columns;
-    };
-  };
-  forms.push_back({"imu_drift",
-                   "accelerometer bias b t/100 s, fixed to the body",
-                   {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
-                   "",
-                   {0},
-                   false,
-                   false,
-                   0.02,
-                   drift([](const WindowRow& w) { return w.t / 100; })});
-  forms.push_back({"imu_drift",
-                   "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
-                   {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
-                   "",
-                   {0},
-                   false,
-                   false,
-                   0.02,
-                   drift([](const WindowRow& w) { return (w.temperature - 25) / 10; })});
-  return forms;
+const std::vector<double> kLengths = {0.08, 0.15, 0.3, 0.6};
+
+std::vector<Form> near_surfaces() {
+  return {{.cause = "ground_thrust",
+           .formula = "z push A exp(-(h - 0.4 m)/L), h the height over the surface below",
+           .parameters = {"A_mps2"},
+           .scale_name = "L_m",
+           .scales = kLengths,
+           .floor = 0.02,
+           .columns =
+               [](const Windows& ws, double length) {
+                 return std::vector{in(kMeanZ, ws, [&](auto& w) { return near(w.around.height, 0.4, length); })};
+               }},
+          {.cause = "ceiling",
+           .formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
+           .parameters = {"A_mps2"},
+           .scale_name = "L_m",
+           .scales = kLengths,
+           .floor = 0.02,
+           .columns =
+               [](const Windows& ws, double length) {
+                 return std::vector{in(kMeanZ, ws, [&](auto& w) { return near(w.around.ceiling_gap, 0.3, length); })};
+               }},
+          {.cause = "ceiling",
+           .formula = "ln variance + B exp(-(d - 0.3 m)/L), d the gap to the surface above",
+           .parameters = {"B_ln"},
+           .scale_name = "L_m",
+           .scales = {0.15, 0.3, 0.6},
+           .floor = 0.12,
+           .columns =
+               [](const Windows& ws, double length) {
+                 return std::vector{in_variance(ws, [&](auto& w) { return near(w.around.ceiling_gap, 0.3, length); })};
+               }},
+          {.cause = "wall_attraction",
+           .formula = "push A exp(-(d - 0.4 m)/L) towards each wall at distance d",
+           .parameters = {"A_mps2"},
+           .scale_name = "L_m",
+           .scales = kLengths,
+           .floor = 0.02,
+           .columns = [](const Windows& ws, double length) {
+             return std::vector{level(ws, [&](auto& w) { return pull(w, length); })};
+           }}};
+}
+
+/// −x T/m: a share of the thrust that is missing, seen in the mean and in what a change of the command is worth.
+Column missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
+  return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * w.thrust_acc; })},
+           {kThrustDelay, values(ws, [&](auto& w) { return -share(w) * w.delay_gain[1]; })},
+           {kThrustSlope, values(ws, [&](auto& w) { return -share(w) * w.slope_gain[1]; })}}};
+}
+
+std::vector<Form> vehicle() {
+  return {
+      {.cause = "battery_sag",
+       .formula = "thrust (1 - s (V0 - V)/V0), V0 the highest voltage seen",
+       .parameters = {"s"},
+       .floor = 0.01,
+       .columns =
+           [](const Windows& ws, double) {
+             double highest = 1e-6;
+             for (const auto& w : ws) highest = std::max(highest, w.voltage);
+             return std::vector{missing_thrust(ws, [&](auto& w) { return (highest - w.voltage) / highest; })};
+           }},
+      {.cause = "payload",
+       .formula = "thrust per mass (1 - m), m the relative excess of mass",
+       .parameters = {"m"},
+       .constant = true,
+       .floor = 0.01,
+       .columns = [](const Windows& ws, double) { return std::vector{missing_thrust(ws, [](auto&) { return 1.0; })}; }},
+      {.cause = "thrust_slope",
+       .formula = "a change of the thrust command is worth (1 + s) of the modelled",
+       .parameters = {"s"},
+       .constant = true,
+       .least = 0.03,
+       .columns =
+           [](const Windows& ws, double) {
+             return std::vector{Column{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[1]; })},
+                                        {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[1]; })}}}};
+           }},
+      {.cause = "actuator_lag",
+       .formula = "thrust follows its command tau later",
+       .parameters = {"tau_s"},
+       .constant = true,
+       .least = 0.01,
+       .one_sided = true,
+       .columns =
+           [](const Windows& ws, double) {
+             return std::vector{Column{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[0]; })},
+                                        {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[0]; })}}}};
+           }},
+      {.cause = "command_latency",
+       .formula = "set-points act later by this, level axes",
+       .parameters = {"latency_s"},
+       .constant = true,
+       .least = 0.015,
+       .columns =
+           [](const Windows& ws, double) {
+             return std::vector{in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; })};
+           }},
+      {.cause = "rotor_drag",
+       .formula = "push -k v, level",
+       .parameters = {"k_per_s"},
+       .floor = 0.01,
+       .columns = [](const Windows& ws,
+                     double) { return std::vector{level(ws, [](auto& w) -> Vec3 { return -w.v_W; })}; }},
+      {.cause = "forward_speed",
+       .formula = "z push C (v/1 m/s)^2",
+       .parameters = {"C_mps2"},
+       .floor = 0.02,
+       .columns = [](const Windows& ws,
+                     double) { return std::vector{in(kMeanZ, ws, [](auto& w) { return w.speed * w.speed; })}; }},
+      {.cause = "forward_speed",
+       .formula = "ln variance + B (v/1 m/s)^n",
+       .parameters = {"B_ln"},
+       .scale_name = "n",
+       .scales = {1, 2},
+       .floor = 0.12,
+       .columns = [](const Windows& ws, double power) {
+         return std::vector{in_variance(ws, [&](auto& w) { return std::pow(w.speed, power); })};
+       }}};
+}
+
+/// A vector of the body, growing with `amount`, in all mean channels.
+std::vector<Column> body_drift(const Windows& ws, const std::function<double(const WindowRow&)>& amount) {
+  std::vector<Column> columns;
+  for (int i = 0; i < 3; ++i) {
+    Column c = level(ws, [&](auto& w) -> Vec3 { return amount(w) * w.R_WB.col(i); });
+    c.parts.push_back({kMeanZ, values(ws, [&](auto& w) { return amount(w) * w.R_WB(2, i); })});
+    columns.push_back(std::move(c));
+  }
+  return columns;
+}
+
+std::vector<Form> pushes() {
+  return {{.cause = "trim",
+           .formula = "constant push fixed to the body",
+           .parameters = {"body_x_mps2", "body_y_mps2"},
+           .constant = true,
+           .floor = 0.02,
+           .columns =
+               [](const Windows& ws, double) {
+                 return std::vector{level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
+                                    level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); })};
+               }},
+          {.cause = "draft",
+           .formula = "constant level push fixed to the world",
+           .parameters = {"x_mps2", "y_mps2"},
+           .constant = true,
+           .floor = 0.02,
+           .columns =
+               [](const Windows& ws, double) {
+                 return std::vector{level(ws, [](auto&) -> Vec3 { return Vec3::UnitX(); }),
+                                    level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); })};
+               }},
+          {.cause = "imu_drift",
+           .formula = "accelerometer bias b t/100 s, fixed to the body",
+           .parameters = {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
+           .floor = 0.015,
+           .columns = [](const Windows& ws, double) { return body_drift(ws, [](auto& w) { return w.t / 100; }); }},
+          {.cause = "imu_drift",
+           .formula = "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
+           .parameters = {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
+           .floor = 0.015,
+           .columns = [](const Windows& ws, double) {
+             return body_drift(ws, [](auto& w) { return (w.temperature - 25) / 10; });
+           }}};
 }
 
 std::vector<Form> variances() {
-  std::vector<Form> forms;
-  forms.push_back({"ceiling",
-                   "ln variance + B exp(-(d - 0.3 m)/L), d the gap to the surface above",
-                   {"B_ln"},
-                   "L_m",
-                   {0.15, 0.3, 0.6},
-                   false,
-                   false,
-                   0.08,
-                   [](const Windows& ws, double length) {
-                     return std::vector{
-                         in_variance(ws, [&](auto& w) { return near(w.around.ceiling_gap, 0.3, length); })};
-                   }});
-  forms.push_back({"recirculation",
-                   "ln variance + B (1 - exp(-t/tau)), t since the flight's start",
-                   {"B_ln"},
-                   "tau_s",
-                   {8, 20, 50},
-                   false,
-                   false,
-                   0.08,
-                   [](const Windows& ws, double tau) {
-                     return std::vector{in_variance(ws, [&](auto& w) { return 1 - std::exp(-w.t / tau); })};
-                   }});
-  forms.push_back({"forward_speed",
-                   "ln variance + B (v/1 m/s)^n",
-                   {"B_ln"},
-                   "n",
-                   {1, 2},
-                   false,
-                   false,
-                   0.08,
-                   [](const Windows& ws, double power) {
-                     return std::vector{in_variance(ws, [&](auto& w) { return std::pow(w.speed, power); })};
-                   }});
-  forms.push_back({"map_offset",
-                   "ln variance + offset times the slope of ln of the modelled variance",
-                   {"x_m", "y_m", "z_m"},
-                   "",
-                   {0},
-                   false,
-                   false,
-                   0.08,
-                   [](const Windows& ws, double) {
-                     std::vector<Column> columns(3);
-                     for (int i = 0; i < 3; ++i)
-                       for (const Channel c : kVariances)
-                         columns[static_cast<std::size_t>(i)].parts.push_back(
-                             {c, values(ws, [&](auto& w) {
-                                return -std::clamp(w.ln_sigma_slope(static_cast<int>(c - kVarX), i), -8.0, 8.0);
-                              })});
-                     return columns;
-                   }});
-  forms.push_back(
-      {"heavy_tails", "ln kurtosis + K", {"K_ln"}, "", {0}, false, true, 0.15, [](const Windows& ws, double) {
-         return std::vector{in(kTail, ws, [](auto&) { return 1.0; })};
-       }});
-  return forms;
-}
-
-std::vector<Form> dynamics() {
-  std::vector<Form> forms;
-  forms.push_back({"thrust_slope",
-                   "thrust command's change is worth (1 + s) of the modelled",
-                   {"s"},
-                   "",
-                   {0},
-                   false,
-                   true,
-                   0,
-                   [](const Windows& ws, double) {
-                     return std::vector{Column{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[1]; })},
-                                                {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[1]; })}}}};
-                   }});
-  forms.push_back({"actuator_lag",
-                   "thrust follows its command tau later",
-                   {"tau_s"},
-                   "",
-                   {0},
-                   false,
-                   true,
-                   0,
-                   [](const Windows& ws, double) {
-                     return std::vector{Column{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[0]; })},
-                                                {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[0]; })}}}};
-                   }});
-  forms.push_back({"command_latency",
-                   "set-points act later by this",
-                   {"latency_s"},
-                   "",
-                   {0},
-                   false,
-                   true,
-                   0,
-                   [](const Windows& ws, double) {
-                     return std::vector{
-                         Column{{{kCommandDelayH, values(ws, [](auto& w) { return w.command_gain[0]; })},
-                                 {kCommandDelayZ, values(ws, [](auto& w) { return w.command_gain[1]; })}}}};
-                   }});
-  return forms;
+  return {{.cause = "recirculation",
+           .formula = "ln variance + B (1 - exp(-t/tau)), t since the flight's start",
+           .parameters = {"B_ln"},
+           .scale_name = "tau_s",
+           .scales = {8, 20, 50},
+           .floor = 0.12,
+           .columns =
+               [](const Windows& ws, double tau) {
+                 return std::vector{in_variance(ws, [&](auto& w) { return 1 - std::exp(-w.t / tau); })};
+               }},
+          {.cause = "map_offset",
+           .formula = "ln variance as modelled at the position less the offset, first order",
+           .parameters = {"x_m", "y_m", "z_m"},
+           .floor = 0.12,
+           .columns =
+               [](const Windows& ws, double) {
+                 std::vector<Column> columns(3);
+                 for (int i = 0; i < 3; ++i)
+                   for (const Channel c : kVariances)
+                     columns[static_cast<std::size_t>(i)].parts.push_back(
+                         {c, values(ws, [&](auto& w) {
+                            return -std::clamp(w.ln_sigma_slope(static_cast<int>(c - kVarX), i), -8.0, 8.0);
+                          })});
+                 return columns;
+               }},
+          {.cause = "heavy_tails",
+           .formula = "ln kurtosis + K",
+           .parameters = {"K_ln"},
+           .constant = true,
+           .floor = 0.15,
+           .one_sided = true,
+           .columns = [](const Windows& ws, double) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; }}};
 }
 
 Column one_rotor(Channel first, const Windows& ws, double rotor, bool contrast) {
@@ -285,63 +260,66 @@ Column one_rotor(Channel first, const Windows& ws, double rotor, bool contrast) 
   return column;
 }
 
+const std::vector<double> kRotors = {0, 1, 2, 3};
+
 std::vector<Form> rotors() {
-  const std::vector<double> all = {0, 1, 2, 3};
-  std::vector<Form> forms;
-  forms.push_back({"vibration",
-                   "ln power at all rotors' rates + P",
-                   {"P_ln"},
-                   "",
-                   {0},
-                   false,
-                   true,
-                   0.1,
-                   [](const Windows& ws, double) {
-                     Column c;
-                     for (std::size_t i = 0; i < 4; ++i)
-                       c.parts.push_back({static_cast<Channel>(kLine1 + i), std::vector<double>(ws.size(), 1.0)});
-                     return std::vector{c};
-                   }});
-  forms.push_back({"propeller_damage",
-                   "one rotor needs (1 + d) of the others' thrust command",
-                   {"d"},
-                   "rotor",
-                   all,
-                   true,
-                   true,
-                   0.012,
-                   [](const Windows& ws, double rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; }});
-  forms.push_back({"propeller_damage",
-                   "one rotor needs (1 + d) of the others' thrust command and shakes at its rate",
-                   {"d", "P_ln"},
-                   "rotor",
-                   all,
-                   true,
-                   true,
-                   0.012,
-                   [](const Windows& ws, double rotor) {
-                     return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
-                   }});
-  forms.push_back({"rotor_sensor_fault",
-                   "one rotor's rpm^2 reads (1 + e) of what its command gives",
-                   {"e"},
-                   "rotor",
-                   all,
-                   true,
-                   true,
-                   0.012,
-                   [](const Windows& ws, double rotor) { return std::vector{one_rotor(kRpm1, ws, rotor, true)}; }});
-  forms.push_back(
-      {"rotor_sensor_fault",
-       "a share of one rotor's rpm readings is stuck or missing",
-       {"share"},
-       "rotor",
-       all,
-       true,
-       true,
-       0.005,
-       [](const Windows& ws, double rotor) { return std::vector{one_rotor(kDropout1, ws, rotor, false)}; }});
-  return forms;
+  return {
+      {.cause = "vibration",
+       .formula = "ln power at all rotors' rates + P",
+       .parameters = {"P_ln"},
+       .constant = true,
+       .floor = 0.25,
+       .one_sided = true,
+       .columns =
+           [](const Windows& ws, double) {
+             Column c;
+             for (const double rotor : kRotors)
+               c.parts.push_back({static_cast<Channel>(kLine1 + static_cast<std::size_t>(rotor)),
+                                  std::vector<double>(ws.size(), 1.0)});
+             return std::vector{c};
+           }},
+      {.cause = "propeller_damage",
+       .formula = "one rotor needs (1 + d) of the others' thrust command",
+       .parameters = {"d"},
+       .scale_name = "rotor",
+       .scales = kRotors,
+       .integer_scale = true,
+       .constant = true,
+       .least = 0.03,
+       .one_sided = true,
+       .columns = [](const Windows& ws, double rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; }},
+      {.cause = "propeller_damage",
+       .formula = "one rotor needs (1 + d) of the others' thrust command and shakes at its rate",
+       .parameters = {"d", "P_ln"},
+       .scale_name = "rotor",
+       .scales = kRotors,
+       .integer_scale = true,
+       .constant = true,
+       .least = 0.03,
+       .one_sided = true,
+       .columns =
+           [](const Windows& ws, double rotor) {
+             return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
+           }},
+      {.cause = "rotor_sensor_fault",
+       .formula = "one rotor's rpm^2 reads (1 + e) of what its command gives",
+       .parameters = {"e"},
+       .scale_name = "rotor",
+       .scales = kRotors,
+       .integer_scale = true,
+       .constant = true,
+       .least = 0.03,
+       .columns = [](const Windows& ws, double rotor) { return std::vector{one_rotor(kRpm1, ws, rotor, true)}; }},
+      {.cause = "rotor_sensor_fault",
+       .formula = "a share of one rotor's rpm readings is stuck or missing",
+       .parameters = {"share"},
+       .scale_name = "rotor",
+       .scales = kRotors,
+       .integer_scale = true,
+       .constant = true,
+       .least = 0.01,
+       .one_sided = true,
+       .columns = [](const Windows& ws, double rotor) { return std::vector{one_rotor(kDropout1, ws, rotor, false)}; }}};
 }
 
 }  // namespace
@@ -372,7 +350,8 @@ const std::vector<std::string>& cause_names() {
 const std::vector<Form>& catalogue() {
   static const std::vector<Form> all = [] {
     std::vector<Form> forms;
-    for (auto part : {means(), variances(), dynamics(), rotors()}) forms.insert(forms.end(), part.begin(), part.end());
+    for (auto part : {near_surfaces(), vehicle(), pushes(), variances(), rotors()})
+      forms.insert(forms.end(), part.begin(), part.end());
     return forms;
   }();
   return all;
@@ -458,6 +437,13 @@ std::vector<Column> smooth_columns(const Regressor& along, const Windows& window
     columns.push_back(std::move(column));
   }
   return columns;
+}
+
+std::vector<Column> companions(const Form& form, const Observations& seen) {
+  const Windows& ws = seen.windows;
+  if (form.cause == "battery_sag") return {missing_thrust(ws, [](auto&) { return 1.0; })};
+  if (form.cause == "imu_drift") return body_drift(ws, [](auto&) { return 1.0; });
+  return {};
 }
 
 std::vector<Column> offsets(const std::vector<Column>& columns, const Observations& seen) {

@@ -60,7 +60,8 @@ void Evidence::anova(Channel c, const std::vector<double>& r) {
   // A channel that is exact in every window (no dropout at all) keeps a least scatter.
   const double least = c >= kMotor1 ? 1e-6 : 1e-8;
   within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
-  // Vehicles are built with rotors and sensors that differ by this much (README.md, "scatter"): no flight averages it out.
+  // Vehicles are built with rotors and sensors that differ by this much (README.md, "scatter"): no flight averages it
+  // out.
   const double built = c >= kDropout1 ? 0.003 : c >= kMotor1 ? 0.01 : 0;
   between_[c] = built * built;
   if (groups < 2) return;
@@ -174,22 +175,28 @@ void Evidence::whiten(const std::vector<Column>& accepted) {
   }
 }
 
-double Evidence::rms(const std::vector<Column>& columns, const SmallVector& theta) const {
-  double square = 0, n = 0;
+SmallMatrix Evidence::size(const std::vector<Column>& columns) const {
+  const auto p = static_cast<Eigen::Index>(columns.size());
+  SmallMatrix sum = SmallMatrix::Zero(p, p);
+  double n = 0;
+  SmallVector x(p);
   for (std::size_t c = 0; c < kChannels; ++c) {
-    std::vector<double> sum(seen_->windows.size(), 0);
+    std::vector<const std::vector<double>*> active(columns.size(), nullptr);
     bool moved = false;
     for (std::size_t k = 0; k < columns.size(); ++k)
       for (const auto& part : columns[k].parts)
-        if (part.channel == c) {
-          moved = true;
-          for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
-        }
+        if (part.channel == c) active[k] = &part.x, moved = true;
     if (!moved) continue;
-    for (std::size_t i = 0; i < sum.size(); ++i)
-      if (seen_->weight[c][i] > 0) square += sum[i] * sum[i], n += 1;
+    for (std::size_t i = 0; i < seen_->windows.size(); ++i) {
+      if (!(seen_->weight[c][i] > 0)) continue;
+      for (Eigen::Index k = 0; k < p; ++k) {
+        const auto* column = active[static_cast<std::size_t>(k)];
+        x[k] = column ? (*column)[i] : 0.0;
+      }
+      sum += x * x.transpose(), n += 1;
+    }
   }
-  return n > 0 ? std::sqrt(square / n) : 0;
+  return n > 0 ? SmallMatrix(sum / n) : sum;
 }
 
 }  // namespace backwash::study::discrepancy

@@ -10,7 +10,7 @@
 
 namespace backwash::study::discrepancy {
 
-inline constexpr int kMostColumns = 8;
+inline constexpr int kMostColumns = 16;
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
 
@@ -44,8 +44,9 @@ class Evidence {
 
   /// Normal equations of `columns`, `nuisance` projected out (columns of it that others span are ignored).
   Normal normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const;
-  /// Root mean square of Σ θ x over the measured windows of the channels that the columns move.
-  double rms(const std::vector<Column>& columns, const SmallVector& theta) const;
+  /// Mean of x xᵀ over the measured windows of the channels that the columns move: √(θᵀ size θ) is the root mean square
+  /// of Σ θ x.
+  SmallMatrix size(const std::vector<Column>& columns) const;
   double within(Channel c) const { return within_[c]; }
   double between(Channel c) const { return between_[c]; }
 

@@ -22,11 +22,16 @@ const std::vector<std::pair<std::string, std::vector<Channel>>>& groups() {
   return all;
 }
 
-/// Everything accepted but one, as columns.
-std::vector<Column> columns_of(const std::vector<Accepted>& accepted, std::size_t but = SIZE_MAX) {
+/// Everything accepted but one, with what it leaves open, as columns.
+std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen,
+                               std::size_t but = SIZE_MAX) {
   std::vector<Column> all;
-  for (std::size_t i = 0; i < accepted.size(); ++i)
-    if (i != but) all.insert(all.end(), accepted[i].columns.begin(), accepted[i].columns.end());
+  for (std::size_t i = 0; i < accepted.size(); ++i) {
+    if (i == but) continue;
+    all.insert(all.end(), accepted[i].columns.begin(), accepted[i].columns.end());
+    const auto open = companions(*accepted[i].form, seen);
+    all.insert(all.end(), open.begin(), open.end());
+  }
   return all;
 }
 
@@ -40,8 +45,11 @@ std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& col
 std::vector<double> null_maxima(const std::vector<Candidate>& all, const std::vector<std::vector<int>>& draws) {
   std::vector<double> maxima;
   for (const auto& signs : draws) {
-    double most = -1e9;
-    for (const auto& candidate : all) most = std::max(most, candidate.normal.gain(signs));
+    double most = 0;
+    for (const auto& candidate : all) {
+      const double gain = candidate.normal.gain(signs);
+      if (gain > most && candidate.effect(candidate.normal.fit(signs))) most = gain;
+    }
     maxima.push_back(most);
   }
   std::sort(maxima.begin(), maxima.end());
@@ -51,12 +59,6 @@ std::vector<double> null_maxima(const std::vector<Candidate>& all, const std::ve
 double p_value(const std::vector<double>& sorted_null, double gain) {
   const auto above = sorted_null.end() - std::lower_bound(sorted_null.begin(), sorted_null.end(), gain);
   return (1.0 + static_cast<double>(above)) / (1.0 + static_cast<double>(sorted_null.size()));
-}
-
-bool big_enough(const Evidence& evidence, const Candidate& c) {
-  const SmallVector theta = c.normal.fit();
-  if (c.form->integer_scale) return evidence.rms({c.columns.front()}, theta) >= c.form->floor;
-  return evidence.rms(c.columns, theta) >= c.form->floor;
 }
 
 /// Σ and standard error of the sum of per-flight differences.
@@ -70,7 +72,7 @@ std::pair<double, double> difference(const Normal& a, const Normal& b) {
 
 void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std::size_t which, double threshold) {
   Accepted& own = accepted[which];
-  const auto others = columns_of(accepted, which);
+  const auto others = columns_of(accepted, evidence.seen(), which);
   std::vector<Rival> found;
   for (const Form& form : catalogue()) {
     if (form.cause == own.form->cause || why_not_tested(form, evidence.seen())) continue;
@@ -87,7 +89,13 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       }
       const Normal theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);
       if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, 0.5 * ours.gain())) continue;
-      if (evidence.rms(columns, theirs.fit()) < form.floor) continue;
+      const Candidate rival{&form, form.cause, scale, {}, {}, 0, evidence.size(columns)};
+      if (!rival.effect(theirs.fit())) continue;
+      // Two causes that explain different data are two causes, not rivals: a rival gains less once ours is known.
+      std::vector<Column> with_ours = nuisance;
+      with_ours.insert(with_ours.end(), own.columns.begin(), own.columns.end());
+      const Normal rest = evidence.normal(columns, with_ours);
+      if (rest.solvable && rest.gain() > 0.5 * theirs.gain()) continue;
       const auto [lead, error] = difference(ours, theirs);
       if (lead > kRivalNats && lead > kRivalErrors * error) continue;
       if (lead > 4 * kRivalNats) continue;
@@ -108,8 +116,8 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
     double least = threshold;
     for (std::size_t i = 0; i < accepted.size(); ++i) {
       const auto& a = accepted[i];
-      const Normal n =
-          evidence.normal(a.columns, nuisance_of(*a.form, a.columns, columns_of(accepted, i), evidence.seen()));
+      const Normal n = evidence.normal(
+          a.columns, nuisance_of(*a.form, a.columns, columns_of(accepted, evidence.seen(), i), evidence.seen()));
       const double gain = n.solvable ? n.gain() : 0;
       if (gain < least) least = gain, weakest = i;
     }
@@ -118,10 +126,20 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
       dropped = true;
     }
   }
-  for (std::size_t i = 0; i < accepted.size(); ++i) refine(evidence, accepted[i], columns_of(accepted, i));
+  for (std::size_t i = 0; i < accepted.size(); ++i)
+    refine(evidence, accepted[i], columns_of(accepted, evidence.seen(), i));
 }
 
 }  // namespace
+
+bool Candidate::effect(const SmallVector& theta) const {
+  // Least root mean square of a smooth: as in the catalogue, m/s² and ln variance.
+  if (!form)
+    return theta.dot(size * theta) >= std::pow(columns.front().parts.front().channel == kVarX ? 0.2 : 0.025, 2);
+  if (std::abs(theta[0]) < form->least || (form->one_sided && theta[0] < 0)) return false;
+  const double square = form->integer_scale ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
+  return square >= form->floor * form->floor;
+}
 
 std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigned seed) {
   std::mt19937_64 rng(seed);
@@ -138,12 +156,13 @@ std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Co
     c.normal = evidence.normal(c.columns, nuisance);
     if (!c.normal.solvable) return;
     c.gain = c.normal.gain();
+    c.size = evidence.size(c.columns);
     all.push_back(std::move(c));
   };
   for (const Form& form : catalogue()) {
     if (why_not_tested(form, seen)) continue;
     for (const double scale : form.scales) {
-      Candidate c{&form, form.cause, scale, form.columns(seen.windows, scale), {}, 0};
+      Candidate c{&form, form.cause, scale, form.columns(seen.windows, scale), {}, 0, {}};
       const auto nuisance = nuisance_of(form, c.columns, accepted, seen);
       add(std::move(c), nuisance);
     }
@@ -151,7 +170,7 @@ std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Co
   if (!smooths) return all;
   for (const auto& along : regressors(seen)) {
     for (const auto& [name, channels] : groups()) {
-      Candidate c{nullptr, along.name, 0, smooth_columns(along, seen.windows, channels), {}, 0};
+      Candidate c{nullptr, along.name, 0, smooth_columns(along, seen.windows, channels), {}, 0, {}};
       auto nuisance = offsets(c.columns, seen);
       nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
       add(std::move(c), nuisance);
@@ -166,7 +185,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
   const auto draws = sign_draws(evidence.seen().first.size() - 1, options.flips, options.seed);
   double first_gain = 0;
   while (result.accepted.size() < options.most_causes) {
-    const auto accepted = columns_of(result.accepted);
+    const auto accepted = columns_of(result.accepted, evidence.seen());
     evidence.whiten(accepted);
     options.progress("looking at every cause, step " + std::to_string(result.accepted.size() + 1));
     auto all = candidates(evidence, accepted, true);
@@ -177,9 +196,9 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
 
     const Candidate *cause = nullptr, *smooth = nullptr;
     for (const auto& c : all) {
-      if (c.gain < result.threshold) continue;
+      if (c.gain < result.threshold || !c.effect(c.normal.fit())) continue;
       if (!c.form && (!smooth || c.gain > smooth->gain)) smooth = &c;
-      if (c.form && (!cause || c.gain > cause->gain) && big_enough(evidence, c)) cause = &c;
+      if (c.form && (!cause || c.gain > cause->gain)) cause = &c;
     }
     const double needed = std::max(result.threshold, kLeastShare * first_gain);
     if (smooth && smooth->gain >= needed &&
@@ -198,7 +217,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     if (!excludes_zero(a)) break;
     result.accepted.push_back(std::move(a));
   }
-  evidence.whiten(columns_of(result.accepted));
+  evidence.whiten(columns_of(result.accepted, evidence.seen()));
   settle(evidence, result.accepted, result.threshold);
   for (std::size_t i = 0; i < result.accepted.size(); ++i) find_rivals(evidence, result.accepted, i, result.threshold);
   return result;

@@ -24,7 +24,11 @@ struct Candidate {
   double scale = 0;
   std::vector<Column> columns;
   Normal normal;
-  double gain = 0;  ///< held out, nats
+  double gain = 0;   ///< held out, nats
+  SmallMatrix size;  ///< θᵀ size θ: mean square of what the columns add
+
+  /// Whether parameters are an effect at all: at least the stated floor, and of a possible sign.
+  bool effect(const SmallVector& theta) const;
 };
 
 /// A parameter with its interval at 95 %, by leaving flights out one at a time (Student's t).

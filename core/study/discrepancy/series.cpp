@@ -55,16 +55,25 @@ std::vector<Vec3> loop_acceleration(const Series& s, const Commands& cmd, const 
   std::vector<Vec3> out(s.size(), Vec3::Zero());
   Vec3 p = cmd.p.front(), v = Vec3::Zero(), produced = Vec3::Zero();
   std::size_t heard = 0, felt = 0;
+  // A command acts from some time in the period before its row on (held) or all along it (streamed): a quarter between.
+  const double period = s.t.back() / static_cast<double>(s.size() - 1), age = c.latency + period / 4;
+  const auto at_time = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
+    if (heard + 1 >= s.size() || s.t[heard + 1] - s.t[heard] > 0.1) return x[heard];
+    const double share = std::clamp((t - s.t[heard]) / (s.t[heard + 1] - s.t[heard]), 0.0, 1.0);
+    return x[heard] + share * (x[heard + 1] - x[heard]);
+  };
   for (std::size_t i = 0; i < s.size(); ++i) {
     const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
     if (dt > 0.2) p = s.p[i], v = s.v[i];  // a gap: start again where the vehicle is
     const int steps = std::max(1, static_cast<int>(std::ceil(dt / 0.005)));
     for (int k = 0; k < steps; ++k) {
       const double h = dt > 0.2 ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
-      while (heard + 1 < s.size() && s.t[heard + 1] <= now - c.latency + 1e-9) ++heard;
+      while (heard + 1 < s.size() && s.t[heard + 1] <= now - age + 1e-9) ++heard;
       while (felt + 1 < s.size() && s.t[felt + 1] <= now - c.feedback_delay + 1e-9) ++felt;
       const Vec3 at = closed ? p : s.p[felt], moving = closed ? v : s.v[felt];
-      const Vec3 wanted = cmd.a[heard] + kp.cwiseProduct(cmd.p[heard] - at) + kd.cwiseProduct(cmd.v[heard] - moving);
+      const double sent = now - age;
+      const Vec3 wanted = at_time(cmd.a, sent) + kp.cwiseProduct(at_time(cmd.p, sent) - at) +
+                          kd.cwiseProduct(at_time(cmd.v, sent) - moving);
       const double rate = c.attitude_lag > 0 ? 1 - std::exp(-h / c.attitude_lag) : 1;
       produced += rate * (wanted - produced);
       v += h * produced;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <unsupported/Eigen/FFT>
@@ -95,13 +96,20 @@ double line_excess(std::span<const double> x, std::span<const double> t, std::sp
     }
     return re * re + im * im;
   };
-  double line = 0, beside = 0;
+  const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
+  const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
+  double line = 0, beside = 0, count = 0;
   for (const double harmonic : {1.0, 2.0}) {
+    // Folded next to 0 or to half the rate, the line and its neighbours lie on a curved spectrum.
+    const double folded = std::abs(std::remainder(harmonic * hz_of_rotor, rate));
+    if (folded < 6 || folded > rate / 2 - 1) continue;
+    count += 1;
     line += power(harmonic, 0);
     for (const double hz : {-4.5, -3.5, -2.5, -1.5, 1.5, 2.5, 3.5, 4.5}) beside += power(harmonic, hz) / 8;
   }
   // Each power is exponential: a sum of m has E ln = ln mean + ψ(m) − ln m, ln_bias of 2m samples.
-  return std::log(line / beside) - (ln_bias(4) - ln_bias(32));
+  if (count == 0) return std::numeric_limits<double>::quiet_NaN();
+  return std::log(line / beside) - (ln_bias(2 * count) - ln_bias(16 * count));
 }
 
 }  // namespace backwash::study::discrepancy

@@ -26,7 +26,8 @@ double ln_variance(double n);
 double excess_tail(std::span<const double> detrended, int surrogates);
 
 /// ln of the power at a rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz, less
-/// its expectation for noise; twice the rotor's rate (two blades) is summed in. `phase`: rad at each sample, `t`: s.
+/// its expectation for noise; twice the rotor's rate (two blades) is summed in; NaN where sampling folds both
+/// next to 0 or half the rate. `phase`: rad at each sample, `t`: s.
 double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
 
 }  // namespace backwash::study::discrepancy
