@@ -109,7 +109,10 @@ class Flight {
     ambient_ = u(18, 28);
     accelerometer_noise_ = u(0.03, 0.08);
     tail_nu_ = world.effects.of("heavy_tails") != 0 ? 1 : 0;
-    burst_share_ = 0.05;
+    for (int i = 0; i < 8; ++i) {
+      Rng own(world.request.seed * 31 + static_cast<std::uint64_t>(i));
+      offset_[i] = std::normal_distribution()(own);
+    }
   }
 
   Table fly() {
@@ -221,17 +224,11 @@ class Flight {
     for (int i = 0; i < 4; ++i) {
       const bool hurt = damage != 0 && i == damaged;
       const double need = produced_.norm() / kG / (hurt ? 1 - damage : 1.0);
-      spin_[i] = (world_.craft.model == "quad-7in" ? 7200 : 11000) * std::sqrt(need) * (1 + 0.004 * offset(i));
-      motor_[i] = command_of(world_.craft, world_.craft.mass * kG * need) * (1 + 0.006 * offset(i + 4));
+      spin_[i] = (world_.craft.model == "quad-7in" ? 7200 : 11000) * std::sqrt(need) * (1 + 0.004 * offset_[i]);
+      motor_[i] = command_of(world_.craft, world_.craft.mass * kG * need) * (1 + 0.006 * offset_[i + 4]);
       phase_[i] += 2 * M_PI * spin_[i] / 60 * kStep;
     }
   }
-  /// The craft's own small asymmetry, the same in each of its flights.
-  double offset(int i) const {
-    Rng own(world_.request.seed * 31 + static_cast<std::uint64_t>(i));
-    return std::normal_distribution()(own);
-  }
-
   Vec3 measured_acceleration(double t) {
     Vec3 a = a_ + accelerometer_bias_ + accelerometer_noise_ * Vec3(normal(), normal(), normal());
     const double drift = world_.effects.of("imu_drift");
@@ -285,8 +282,9 @@ class Flight {
   std::optional<Vec3> cast_at_;
   backwash::Variance sigma_;
   double yaw_ = 0, u_ = 0, lagged_ = kG, charge_, voltage_ = 16, temperature_ = 25, ambient_, ln_var_, ln_wander_ = 0,
-         thrust_scale_, accelerometer_noise_, burst_left_ = 0, burst_share_;
+         thrust_scale_, accelerometer_noise_, burst_left_ = 0;
   int tail_nu_;
+  double offset_[8];  // the craft's own small asymmetry, the same in each of its flights
   double spin_[4] = {}, motor_[4] = {}, phase_[4] = {0.3, 1.9, 4.0, 5.5};
 };
 

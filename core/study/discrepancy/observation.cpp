@@ -223,10 +223,11 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
   if (!s.a_nominal.empty()) {
     const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
     if (s.simulated_by_thrust) {
-      const auto thrust = [&](std::size_t i) { return s.thrust_acc[i]; };
+      // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
+      // design that shares their noise with the residual would be biased.
       const auto r = detrended_values(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
-      const auto rate = rates(s, w, thrust), level = detrended_values(w, thrust);
-      const Moment delay(rates(s, w, nominal(2))), slope(detrended_values(w, nominal(2)));
+      const auto rate = rates(s, w, nominal(2)), level = detrended_values(w, nominal(2));
+      const Moment delay(rate), slope(level);
       if (delay.excited(0.05)) {
         row.delay_gain = {-delay.with(rate), delay.with(level)};
         put(kThrustDelay, delay.with(r), 1);
