@@ -75,8 +75,8 @@ FloorShares floor_shares(const map::OccupancyGrid& grid, const Vec3& p_W) {
 
 }  // namespace
 
-AirflowTruth::AirflowTruth(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::uint64_t seed)
-    : grid_(&grid), strength_(std::pow(vehicle.body.rotor_radius / 0.0635, 1.4)), rng_(seed) {
+AirflowTruth::AirflowTruth(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::uint64_t seed, double strength)
+    : grid_(&grid), strength_(strength * std::pow(vehicle.body.rotor_radius / 0.0635, 1.4)), rng_(seed) {
   for (int i = 0; i < 3; ++i) {
     gust_[i] = normal_(rng_);
     gust_rate_[i] = normal_(rng_) / kGustTime;

@@ -19,8 +19,9 @@ class AirflowTruth {
   /// limits the gust's norm, so it holds in every direction.
   static constexpr double kLargestGust = 3.2;
 
-  /// The grid must outlive it. Only the vehicle's rotor radius matters: it sets the strength of the wash.
-  AirflowTruth(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::uint64_t seed);
+  /// The grid must outlive it. Only the vehicle's rotor radius matters: it sets the strength of the wash. `strength`: a
+  /// further factor on all variances, for days that differ.
+  AirflowTruth(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::uint64_t seed, double strength = 1);
   /// Disturbance acceleration over the next dt (s) at p, m/s² in W. Deterministic for a seed and a call sequence; its
   /// statistics do not depend on dt.
   Vec3 step(const Vec3& p_W, double dt);

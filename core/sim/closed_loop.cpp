@@ -6,9 +6,10 @@
 
 namespace backwash::sim {
 
-ClosedLoop::ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, const State& start, std::uint64_t seed)
+ClosedLoop::ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, const State& start, std::uint64_t seed,
+                       double strength)
     : quadrotor_(vehicle, start),
-      airflow_(grid, vehicle, seed),
+      airflow_(grid, vehicle, seed, strength),
       // The sets reserve estimation.position; an estimate that used all of it would leave nothing for the map's share.
       vio_(0.75 * vehicle.estimation.position, seed + 1),
       estimated_(vio_.estimate(start, 0)) {}

@@ -30,7 +30,9 @@ struct FlightSample {
 /// Vehicle, real airflow and emulated VIO in one closed loop: commands at 50 Hz, physics at 1 kHz.
 class ClosedLoop {
  public:
-  ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, const State& start, std::uint64_t seed);
+  /// `strength`: factor on the variance of the airflow.
+  ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, const State& start, std::uint64_t seed,
+             double strength = 1);
   const State& estimated() const noexcept { return estimated_; }
   /// The vehicle now; `command` and `segment` are what the caller is about to fly.
   FlightSample sample(const Setpoint& command, int segment) const;

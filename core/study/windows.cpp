@@ -139,7 +139,8 @@ tl::expected<FlightWindows, LogError> flight_windows(const FlightLog& log, const
   }
   const auto& t = log.t_s;
   for (std::size_t i = 1; i < t.size(); ++i) {
-    if (!(t[i] > t[i - 1])) return bad(std::string(":").append(std::to_string(i + 2)).append(": t_s does not rise; sort the rows by time"));
+    if (!(t[i] > t[i - 1]))
+      return bad(std::string(":").append(std::to_string(i + 2)).append(": t_s does not rise; sort the rows by time"));
   }
   if (t.size() < 2 || t.back() - t.front() < options.length_s)
     return bad(":1: shorter than one window; give a longer flight");

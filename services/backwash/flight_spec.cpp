@@ -39,9 +39,47 @@ Vec3 point(const std::string& path, const toml::table& table, const char* key) {
   return p;
 }
 
+double number(const std::string& path, const toml::table& table, const char* key, double low, double high,
+              std::optional<double> otherwise) {
+  if (!table.contains(key) && otherwise) return *otherwise;
+  const auto value = table[key].value<double>();
+  if (!value || !(*value >= low && *value <= high)) {
+    const auto* node = table.get(key);
+    wrong(path, node ? node->source() : table.source(),
+          std::string(key) + " must be a number from " + to_text(low, 0) + " to " + to_text(high, 0));
+  }
+  return *value;
+}
+
+std::vector<sim::HoverFlight::Hover> listed_hovers(const std::string& path, const toml::array& hovers) {
+  std::vector<sim::HoverFlight::Hover> list;
+  for (const auto& node : hovers) {
+    const auto* hover = node.as_table();
+    if (hover == nullptr) wrong(path, node.source(), "hover must be written as tables, [[hover]]");
+    only(path, *hover, {"p", "dwell"});
+    const auto dwell = (*hover)["dwell"].value<double>();
+    if (!dwell || !(*dwell > 0 && *dwell <= 3600))
+      wrong(path, hover->source(), "dwell must be a time from 0 to 3600 s");
+    list.push_back({point(path, *hover, "p"), *dwell});
+  }
+  return list;
+}
+
+sim::HoverGrid hover_grid(const std::string& path, const toml::table& table) {
+  only(path, table, {"low", "high", "count", "jitter", "dwell"});
+  sim::HoverGrid grid{point(path, table, "low"), point(path, table, "high"), {}, 0, 0};
+  const Vec3 count = point(path, table, "count");
+  if ((count.array() < 1).any() || (count.array() > 100).any() || count != count.array().round().matrix())
+    wrong(path, table.get("count")->source(), "count must be three integers from 1 to 100");
+  grid.count = count.cast<int>();
+  grid.jitter = number(path, table, "jitter", 0, 1, 0.0);
+  grid.dwell_s = number(path, table, "dwell", 1, 3600, std::nullopt);
+  return grid;
+}
+
 }  // namespace
 
-FlightSpec read_flight_spec(const std::string& path) {
+sim::HoverFlight read_flight_spec(const std::string& path, std::optional<std::uint64_t> given_seed) {
   if (!std::filesystem::is_regular_file(path))
     throw Failure(kNoInput, path + ":1: cannot be opened; give a flight specification");
   toml::table file;
@@ -50,24 +88,19 @@ FlightSpec read_flight_spec(const std::string& path) {
   } catch (const toml::parse_error& error) {
     wrong(path, error.source(), std::string(error.description()) + "; the file must be TOML");
   }
-  only(path, file, {"start", "seed", "hover"});
-  FlightSpec spec{point(path, file, "start"), 1, {}};
+  only(path, file, {"start", "seed", "strength_sd", "hover", "grid"});
+  sim::HoverFlight spec{point(path, file, "start"), 1, number(path, file, "strength_sd", 0, 2, 0.0), {}};
   if (file.contains("seed")) {
     const auto seed = file["seed"].value<std::int64_t>();
     if (!seed || *seed < 0) wrong(path, file["seed"].node()->source(), "seed must be an integer from 0");
     spec.seed = static_cast<std::uint64_t>(*seed);
   }
+  spec.seed = given_seed.value_or(spec.seed);
   const auto* hovers = file["hover"].as_array();
-  if (hovers == nullptr || hovers->empty()) wrong(path, file.source(), "no [[hover]]; give at least one");
-  for (const auto& node : *hovers) {
-    const auto* hover = node.as_table();
-    if (hover == nullptr) wrong(path, node.source(), "hover must be written as tables, [[hover]]");
-    only(path, *hover, {"p", "dwell"});
-    const auto dwell = (*hover)["dwell"].value<double>();
-    if (!dwell || !(*dwell > 0 && *dwell <= 3600))
-      wrong(path, hover->source(), "dwell must be a time from 0 to 3600 s");
-    spec.hovers.push_back({point(path, *hover, "p"), *dwell});
-  }
+  const auto* grid = file["grid"].as_table();
+  if ((hovers == nullptr || hovers->empty()) == (grid == nullptr))
+    wrong(path, file.source(), "give either [[hover]], at least one, or [grid]");
+  spec.hovers = grid ? sim::hover_points(hover_grid(path, *grid), spec.seed) : listed_hovers(path, *hovers);
   return spec;
 }
 

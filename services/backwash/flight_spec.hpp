@@ -2,25 +2,16 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
-#include <vector>
 
-#include "core/types/geometry.hpp"
+#include "core/sim/hover_flight.hpp"
 
 namespace backwash::services {
 
-/// What `simulate` flies (README.md, "Flight specification"): straight lines between hover points.
-struct FlightSpec {
-  struct Hover {
-    Vec3 p_W;        ///< m
-    double dwell_s;  ///< s
-  };
-  Vec3 start_W;        ///< where the vehicle hovers at first, m
-  std::uint64_t seed;  ///< of airflow and VIO error
-  std::vector<Hover> hovers;
-};
-
-/// Reads a specification; throws Failure 66 if there is none, 78 with FILE:LINE for an unknown, missing or wrong key.
-FlightSpec read_flight_spec(const std::string& path);
+/// Reads what `simulate` flies (README.md, "Flight specification"); throws Failure 66 if there is none, 78 with
+/// FILE:LINE for an unknown, missing or wrong key. `seed` takes the place of the file's: the jitter of a grid is drawn
+/// from it too.
+sim::HoverFlight read_flight_spec(const std::string& path, std::optional<std::uint64_t> seed);
 
 }  // namespace backwash::services

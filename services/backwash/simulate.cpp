@@ -31,29 +31,9 @@ void check_line(const Options& options, const map::OccupancyGrid& grid, const ma
   }
 }
 
-std::vector<sim::FlightSample> fly(const FlightSpec& spec, const map::OccupancyGrid& grid, const Vehicle& vehicle,
-                                   std::uint64_t seed) {
-  sim::ClosedLoop loop(grid, vehicle, {spec.start_W, Vec3::Zero()}, seed);
-  std::vector<sim::FlightSample> samples;
-  const auto follow = [&](const std::vector<Setpoint>& commands, int segment) {
-    for (const auto& command : commands) {
-      samples.push_back(loop.sample(command, segment));
-      loop.fly(command);
-    }
-  };
-  Vec3 at = spec.start_W;
-  int number = 0;
-  for (const auto& hover : spec.hovers) {
-    follow(sim::straight_commands(at, hover.p_W, vehicle.limits.v_max, vehicle.limits.a_max), -1);
-    follow(sim::hold_commands(hover.p_W, hover.dwell_s), number++);
-    at = hover.p_W;
-  }
-  return samples;
-}
-
 int run(const Options& options) {
   refuse_to_overwrite(options.out, options.force);
-  const auto spec = read_flight_spec(options.flight);
+  const auto spec = read_flight_spec(options.flight, options.seed);
   const auto vehicle = read_vehicle(options.vehicle);
   if (!options.model.empty()) read_model(options.model);
   const auto grid = read_map(options.map);
@@ -64,14 +44,11 @@ int run(const Options& options) {
     at = hover.p_W;
   }
   progress("flying");
-  const auto samples = fly(spec, grid, vehicle, options.seed.value_or(spec.seed));
+  const auto samples = sim::fly_hovers(grid, vehicle, spec);
   const auto written = study::write_csv(options.out, sim::to_log(samples), options.force);
   if (!written) throw Failure(kCannotCreate, written.error().message);
   if (options.json) {
-    print(Json{{"log", options.out},
-               {"rows", samples.size()},
-               {"time_s", samples.back().t},
-               {"seed", options.seed.value_or(spec.seed)}});
+    print(Json{{"log", options.out}, {"rows", samples.size()}, {"time_s", samples.back().t}, {"seed", spec.seed}});
   } else {
     std::printf("%zu rows, %.2f s, written to %s\n", samples.size(), samples.back().t, options.out.c_str());
   }

@@ -45,6 +45,8 @@ Verb plan_verb(CLI::App& app);
 Verb simulate_verb(CLI::App& app);
 Verb feasibility_verb(CLI::App& app);
 Verb report_verb(CLI::App& app);
+Verb calibrate_verb(CLI::App& app);
+Verb import_verb(CLI::App& app);
 Verb study_verb(CLI::App& app);
 
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.

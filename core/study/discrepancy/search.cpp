@@ -14,6 +14,8 @@ namespace {
 constexpr double kSmoothLead = 3, kSmoothShare = 0.6;
 /// A further cause explains at least this share of the first one's gain: less repairs the first one's form.
 constexpr double kLeastShare = 0.08;
+/// And a smooth left over after a cause at least this share: less is the cause's form.
+constexpr double kLeftShare = 0.3;
 constexpr double kRivalNats = 3, kRivalErrors = 2;
 
 const std::vector<std::pair<std::string, std::vector<Channel>>>& groups() {
@@ -201,7 +203,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
       if (c.form && (!cause || c.gain > cause->gain)) cause = &c;
     }
     const double needed = std::max(result.threshold, kLeastShare * first_gain);
-    if (smooth && smooth->gain >= needed &&
+    if (smooth && smooth->gain >= std::max(result.threshold, kLeftShare * first_gain) &&
         (!cause || smooth->gain - cause->gain > std::max(kSmoothLead, kSmoothShare * cause->gain))) {
       const auto group = std::find_if(groups().begin(), groups().end(), [&](auto& g) {
         return g.second.front() == smooth->columns.front().parts.front().channel;

@@ -63,14 +63,17 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
   for (std::size_t c = 0; c < kChannels; ++c) {
     const auto x = held_out(cause, normal, seen, static_cast<Channel>(c));
     if (std::none_of(x.begin(), x.end(), [](double v) { return v != 0; })) continue;
-    // A free offset of the channel is no error of the simulation in ln variance, where the vehicle sets the level.
-    double offset = 0, weight = 0;
-    for (std::size_t i = 0; i < x.size(); ++i)
-      if (c >= kVarX && c <= kVarZ) offset += seen.weight[c][i] * (seen.y[c][i] - x[i]), weight += seen.weight[c][i];
-    if (weight > 0) offset /= weight;
+    // Offsets that the cause does not claim are taken out of both.
+    double offset_before = 0, offset_after = 0, weight = 0;
+    for (std::size_t i = 0; i < x.size() && !cause.form->constant; ++i) {
+      const double w = seen.weight[c][i];
+      offset_before += w * seen.y[c][i], offset_after += w * (seen.y[c][i] - x[i]), weight += w;
+    }
+    if (weight > 0) offset_before /= weight, offset_after /= weight;
     for (std::size_t i = 0; i < x.size(); ++i) {
-      if (!(seen.weight[c][i] > 0)) continue;
-      before += std::pow(seen.y[c][i] - offset, 2), after += std::pow(seen.y[c][i] - offset - x[i], 2), count += 1;
+      const double w = seen.weight[c][i];
+      before += w * std::pow(seen.y[c][i] - offset_before, 2);
+      after += w * std::pow(seen.y[c][i] - offset_after - x[i], 2), count += w;
     }
     moved[c] = x;
   }

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/study/calibrate/assess.hpp"
+#include "core/study/windows.hpp"
+
+namespace backwash::study::calibrate {
+
+/// Constants that the flights cannot determine, why, and the flight that would.
+struct Refusal {
+  std::string what;  ///< table of the model file, as in "wall", or "all"
+  std::vector<Parameter> parameters;
+  std::string why, flight;
+};
+
+/// What the geometry of the flights leaves undetermined, before anything is fitted: gates as in the base model. Empty
+/// if every parameter can be had. The rules are in README.md.
+std::vector<Refusal> refusals(const Data& data, const Model& gates);
+
+struct Interval {
+  double low, high;
+};
+
+/// A number with its 95 % interval from the bootstrap by flight.
+struct Estimate {
+  double value;
+  Interval ci95;
+};
+
+struct Options {
+  FitOptions fit;
+  int bootstraps = 200;
+  int folds = 5;
+  std::uint64_t seed = 1;
+};
+
+struct Calibration {
+  Fit fitted;
+  Model model;      ///< the gates' model with what was determined
+  Free determined;  ///< parameters that the flights determine; the others are the gates' model's
+  std::array<Interval, kParameters> ci95;
+  Estimate push_horizontal, push_vertical;  ///< [bound] mean, m/s²; value 0 and interval 0 … 0 if `pushes` is false
+  Estimate tau_w;                           ///< s
+  bool pushes;                              ///< whether the logs hold the steady push (set-points)
+  Assessment on_fitted;                     ///< on the flights fitted
+  Assessment held_out;                      ///< every flight against a fit without it (`folds`)
+};
+
+/// Fits the model's bound at a quantile (fit.hpp), with intervals by resampling whole flights within each place
+/// (percentiles of `bootstraps` refits, each started from the estimate, widened for few flights), held-out coverage,
+/// steady push and correlation time. `undetermined` parameters are left at the gates' values. Deterministic for its
+/// seed. 10 ms per bootstrap and thousand hovers.
+Calibration calibrate(const Data& data, const Model& gates, std::span<const Refusal> undetermined, bool pushes,
+                      const Options& options);
+
+/// Hovers of one flight's windows in a map: windows of the same segment that follow each other, at their mean position.
+/// Features of every hover: 16 field evaluations.
+std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, const map::OccupancyGrid& grid,
+                             const Model& gates);
+
+}  // namespace backwash::study::calibrate

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/calibrate_input.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/backwash/files.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+using namespace study::calibrate;
+
+/// A floor at z = 0 with free space above, 0.04 m voxels.
+map::OccupancyGrid flat_floor() {
+  constexpr double kEdge = 0.04, kHalf = 2.4, kTop = 2.0;
+  const int side = static_cast<int>(std::lround(2 * kHalf / kEdge)), top = static_cast<int>(std::lround(kTop / kEdge));
+  map::OccupancyGrid grid({-kHalf, -kHalf, -kEdge}, kEdge, {side, side, top + 1}, map::Cell::free);
+  for (int j = 0; j < side; ++j)
+    for (int i = 0; i < side; ++i) grid.set({i, j, 0}, map::Cell::occupied);
+  return grid;
+}
+
+double value_of(const study::FlightLog& log, const std::string& column, double otherwise) {
+  return log.has(column) && !log.column(column).empty() ? log.column(column).front() : otherwise;
+}
+
+/// Rows of the height effect; windows nearer the ground than 3 mm above where the flight began are its take-off.
+void add_rows(std::vector<HeightRow>& rows, const study::FlightWindows& flight, const study::FlightLog& log,
+              std::size_t number) {
+  const double ceiling = value_of(log, "ceiling", 0), surface = value_of(log, "surface_z_m", 0);
+  if (ceiling < 0) return;
+  constexpr double kMarker = 0.027, kLeast = 0.003;
+  for (const auto& w : flight.windows) {
+    const double height = w.p_W.z() - surface - kMarker;
+    if (height < kLeast || !(w.variance.z() > 0) || !(w.speed_mps > 0)) continue;
+    rows.push_back({number, static_cast<int>(value_of(log, "day", 0)), std::log(w.variance.z()), std::log(w.speed_mps),
+                    height, ceiling > 0});
+  }
+}
+
+std::size_t place_of(const CampaignFiles& files, const CampaignFiles::Log& log) {
+  if (files.maps.size() <= 1) return 0;
+  if (!log.map)
+    throw Failure(kUsage, "--log " + log.path + " stands before the first of several --map; put it after its own");
+  return *log.map;
+}
+
+}  // namespace
+
+void add_campaign_options(CLI::App& command, CampaignFiles& files) {
+  command
+      .add_option_function<std::string>(
+          "--map", [&files](const std::string& map) { files.maps.push_back(map); },
+          "OctoMap file or builtin:NAME of the logs that follow; optional")
+      ->trigger_on_parse();
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--log",
+          [&files](const std::vector<std::string>& logs) {
+            const auto map = files.maps.empty() ? std::nullopt : std::optional(files.maps.size() - 1);
+            for (const auto& log : logs) files.logs.push_back({log, map});
+          },
+          "flight logs, CSV")
+      ->trigger_on_parse()
+      ->required();
+}
+
+Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>& vehicle, const Model& gates,
+                       std::uint64_t seed) {
+  Campaign campaign{};
+  const bool mapless = files.maps.empty();
+  for (const auto& name : files.maps) campaign.maps.push_back(read_map(name)), campaign.map_names.push_back(name);
+  if (mapless) campaign.maps.push_back(flat_floor());
+  study::WindowOptions options;
+  options.tau_w = gates.bound.tau_w;
+  if (mapless) options.still_mps = 10;  // passes too
+  std::vector<HeightRow> rows;
+  std::optional<study::Signal> signal;
+  for (const auto& file : files.logs) {
+    const std::size_t place = place_of(files, file), number = campaign.data.place.size();
+    const auto log = read_table(file.path, "t_s");
+    auto flight = study::flight_windows(log, vehicle, options, file.path);
+    if (!flight) throw Failure(kBadData, flight.error().message);
+    if (signal && *signal != flight->signal)
+      throw Failure(kBadData, file.path + ":1: has " + (flight->signal == study::Signal::commanded ? "" : "no ") +
+                                  "set-points, unlike the logs before it; calibrate them apart");
+    signal = flight->signal;
+    for (std::size_t g = 0; g < study::kGates; ++g) campaign.gated[g] += flight->gated[g];
+    for (const auto& what : flight->not_tested) {
+      if (std::find(campaign.not_tested.begin(), campaign.not_tested.end(), what) == campaign.not_tested.end())
+        campaign.not_tested.push_back(what);
+    }
+    if (mapless) add_rows(rows, *flight, log, number);
+    for (auto& w : flight->windows) {
+      if (mapless) w.p_W = {0, 0, std::max(0.02, w.p_W.z() - value_of(log, "surface_z_m", 0))};
+    }
+    campaign.windows += flight->windows.size();
+    auto hovers = hovers_of(*flight, number, campaign.maps[place], gates);
+    std::move(hovers.begin(), hovers.end(), std::back_inserter(campaign.data.hovers));
+    campaign.data.place.push_back(place), campaign.logs.push_back(file.path);
+  }
+  campaign.signal = study::to_string(*signal), campaign.pushes = signal == study::Signal::commanded;
+  if (rows.size() >= 10) campaign.height = height_effect(rows, 0.01, 0.8, 500, seed);
+  return campaign;
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/study/calibrate/height_effect.hpp"
+#include "core/types/model.hpp"
+
+namespace backwash::services {
+
+/// Logs and the maps that they were flown in, as on the command line.
+struct CampaignFiles {
+  std::vector<std::string> maps;
+  struct Log {
+    std::string path;
+    std::optional<std::size_t> map;  ///< the --map before it
+  };
+  std::vector<Log> logs;
+};
+/// --map and --log, both as often as wanted.
+void add_campaign_options(CLI::App& command, CampaignFiles& files);
+
+/// Flight logs, cut into windows.
+struct Campaign {
+  study::calibrate::Data data;
+  std::vector<map::OccupancyGrid> maps;  ///< by place; a flat floor if none was given
+  std::vector<std::string> map_names, logs;
+  std::string signal;  ///< of all flights
+  bool pushes;         ///< all flights have set-points
+  std::array<std::size_t, study::kGates> gated{};
+  std::vector<std::string> not_tested;
+  std::size_t windows = 0;
+  std::optional<study::calibrate::HeightEffect> height;  ///< without a map: what the logs say of height and ceiling
+};
+
+/// Reads all of it. Without a map the floor is flat, at the log's `surface_z_m` or z = 0, and passes count as hovers:
+/// the height effect holds the speed fixed. Throws Failure with the file that is at fault.
+Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>& vehicle, const Model& gates,
+                       std::uint64_t seed);
+
+}  // namespace backwash::services
