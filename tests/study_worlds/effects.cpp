@@ -9,7 +9,7 @@ namespace {
 /// 1/(1 − (R/4d)²) − 1, the source doublet's image, scaled to 1 at d_ref.
 double image_doublet(double radius, double d, double d_ref) {
   const auto gain = [&](double x) {
-    const double q = radius / (4 * std::max(x, 0.3 * radius));
+    const double q = radius / (4 * std::max({x, 0.3 * radius, 0.22}));  // no closer: the hull touches
     return 1 / (1 - q * q) - 1;
   };
   return gain(d) / gain(d_ref);

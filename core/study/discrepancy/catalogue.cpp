@@ -94,7 +94,8 @@ std::vector<Form> near_surfaces() {
 
 /// −x T/m: a share of the thrust that is missing, seen in the mean and in what a change of the command is worth.
 Column missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
-  return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * w.thrust_acc; })},
+  // g for T/m: the measured thrust answers the mean gust, so it would explain the residual by itself.
+  return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * kGravity; })},
            {kThrustDelay, values(ws, [&](auto& w) { return -share(w) * w.delay_gain[1]; })},
            {kThrustSlope, values(ws, [&](auto& w) { return -share(w) * w.slope_gain[1]; })}}};
 }
@@ -228,19 +229,27 @@ std::vector<Form> variances() {
                  return std::vector{in_variance(ws, [&](auto& w) { return 1 - std::exp(-w.t / tau); })};
                }},
           {.cause = "map_offset",
-           .formula = "ln variance as modelled at the position less the offset, first order",
-           .parameters = {"x_m", "y_m", "z_m"},
+           .formula = "ln variance as modelled at the position plus a level offset",
+           .parameters = {"share"},
+           .scale_name = "offset",
+           .scales =
+               [] {
+                 std::vector<double> all(kMapOffsets);
+                 for (std::size_t k = 0; k < kMapOffsets; ++k) all[k] = static_cast<double>(k);
+                 return all;
+               }(),
+           .integer_scale = true,
            .floor = 0.12,
+           .one_sided = true,
            .columns =
-               [](const Windows& ws, double) {
-                 std::vector<Column> columns(3);
-                 for (int i = 0; i < 3; ++i)
-                   for (const Channel c : kVariances)
-                     columns[static_cast<std::size_t>(i)].parts.push_back(
-                         {c, values(ws, [&](auto& w) {
-                            return -std::clamp(w.ln_sigma_slope(static_cast<int>(c - kVarX), i), -8.0, 8.0);
-                          })});
-                 return columns;
+               [](const Windows& ws, double offset) {
+                 Column column;
+                 for (const Channel c : kVariances)
+                   column.parts.push_back(
+                       {c, values(ws, [&](auto& w) {
+                          return w.ln_sigma_moved[static_cast<std::size_t>(offset)][static_cast<int>(c - kVarX)];
+                        })});
+                 return std::vector{column};
                }},
           {.cause = "heavy_tails",
            .formula = "ln kurtosis + K",
@@ -363,8 +372,10 @@ std::optional<std::string> why_not_tested(const Form& form, const Observations& 
   };
   const std::string& c = form.cause;
   const auto any = [&](auto test) { return std::any_of(seen.windows.begin(), seen.windows.end(), test); };
-  if (c == "ceiling" || c == "wall_attraction" || c == "map_offset")
+  if (c == "wall_attraction" || c == "map_offset")
     if (auto why = need("map")) return why;
+  if (c == "ceiling")
+    if (auto why = need("ceiling")) return why;
   if (c == "ceiling" && !any([](auto& w) { return w.around.ceiling_gap < 1.5; }))
     return "no ceiling within 1.5 m of the flights";
   if (c == "wall_attraction" && !any([](auto& w) { return !w.around.walls.empty(); }))

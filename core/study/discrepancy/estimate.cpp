@@ -92,7 +92,15 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
     cause.parameters.push_back(
         {form.parameters[static_cast<std::size_t>(k)], value, value - t * error[k], value + t * error[k]});
   }
-  if (scaled) {
+  if (form.cause == "map_offset") {  // one share of one offset: told as the offset itself
+    const Estimate share = cause.parameters.front();
+    const Vec3 offset = map_offset(static_cast<std::size_t>(cause.scale));
+    cause.parameters.clear();
+    for (int i = 0; i < 2; ++i) {
+      const auto [low, high] = std::minmax(share.low * offset[i], share.high * offset[i]);
+      cause.parameters.push_back({i == 0 ? "x_m" : "y_m", share.value * offset[i], low, high});
+    }
+  } else if (scaled) {
     const double ln = best[p];
     cause.parameters.push_back(
         {form.scale_name, std::exp(ln), std::exp(ln - t * error[p]), std::exp(ln + t * error[p])});

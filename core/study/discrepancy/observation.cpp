@@ -138,6 +138,11 @@ const char* channel_name(Channel c) {
   return kNames[c];
 }
 
+Vec3 map_offset(std::size_t k) {
+  const double angle = 2 * M_PI * static_cast<double>(k % 8) / 8, length = k < 8 ? 0.15 : 0.3;
+  return {length * std::cos(angle), length * std::sin(angle), 0};
+}
+
 bool Observations::measured(Channel c) const {
   return std::any_of(weight[c].begin(), weight[c].end(), [](double w) { return w > 0; });
 }
@@ -190,15 +195,18 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
   row.thrust_acc = s.thrust_acc.empty() ? kGravity : mean(w, 0.0, [&](std::size_t i) { return s.thrust_acc[i]; });
   row.voltage = column_mean("battery_v"), row.temperature = column_mean("temperature_c");
   row.around = surroundings_.around(row.p_W);
-  row.sigma = Vec3::Zero();
-  for (const std::size_t i : {begin + w.size() / 6, begin + w.size() / 2, begin + 5 * w.size() / 6})
-    row.sigma += surroundings_.sigma(s.p[i]) / 3;
-  for (int i = 0; i < 3; ++i) {
-    const double h = 0.15;
-    const Vec3 up = surroundings_.sigma(row.p_W + h * Vec3::Unit(i)),
-               down = surroundings_.sigma(row.p_W - h * Vec3::Unit(i));
-    row.ln_sigma_slope.col(i) = (up.array() / down.array()).log() / (2 * h);
+  if (!surroundings_.has_map()) {  // imported recordings say what stood below and above (backwash import)
+    if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
+    if (log.has("ceiling") && column_mean("ceiling") > 0.5) row.around.ceiling_gap = 0.3;
   }
+  constexpr std::size_t kPoints = 7;  // along the window: a moving vehicle crosses different air
+  row.sigma = Vec3::Zero();
+  for (std::size_t k = 0; k < kPoints; ++k)
+    row.sigma += surroundings_.sigma(s.p[begin + (2 * k + 1) * w.size() / (2 * kPoints)]) / kPoints;
+  const Vec3 here = surroundings_.sigma(row.p_W);
+  for (std::size_t k = 0; k < kMapOffsets; ++k)
+    row.ln_sigma_moved[k] =
+        (surroundings_.sigma(row.p_W + map_offset(k)).array() / here.array()).log().max(-2.0).min(2.0);
 
   const double duration = s.t[end - 1] - s.t[begin];
   double tail = 0;
@@ -265,6 +273,7 @@ Observations Observer::finish() {
   need("setpoints", {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
   need("rpm", {"rpm1", "rpm2", "rpm3", "rpm4"});
   need("motors", {"motor1", "motor2", "motor3", "motor4"});
+  if (!surroundings_.has_map() && !ever_.contains("ceiling")) seen_.missing.emplace("ceiling", "no map given");
   if (!surroundings_.has_map()) seen_.missing.emplace("map", "no map given");
   return std::move(seen_);
 }

@@ -50,6 +50,10 @@ enum Channel : std::size_t {
 };
 const char* channel_name(Channel c);
 
+/// Level offsets of the map that are tried: eight directions, 0.15 and 0.3 m.
+inline constexpr std::size_t kMapOffsets = 16;
+Vec3 map_offset(std::size_t k);  ///< m
+
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {
   std::size_t flight;
@@ -63,7 +67,7 @@ struct WindowRow {
   double voltage, temperature;
   Around around;
   Vec3 sigma;                                        ///< modelled variance per axis, (m/s²)²
-  Mat3 ln_sigma_slope;                               ///< (axis, direction): ∂ ln Σ_axis/∂p, 1/m
+  std::array<Vec3, kMapOffsets> ln_sigma_moved;      ///< ln of Σ per axis at p + map_offset(k), less that at p
   std::array<double, 2> delay_gain{}, slope_gain{};  ///< design of kThrustDelay and kThrustSlope: of (delay, slope)
   std::array<double, 2> command_gain{};              ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                            ///< (m/s²)²

@@ -14,6 +14,7 @@ namespace {
 constexpr double kSmoothLead = 3, kSmoothShare = 0.6;
 /// A further cause explains at least this share of the first one's gain: less repairs the first one's form.
 constexpr double kLeastShare = 0.08;
+constexpr double kRepairShare = 0.25;
 /// And a smooth left over after a cause at least this share: less is the cause's form.
 constexpr double kLeftShare = 0.3;
 constexpr double kRivalNats = 3, kRivalErrors = 2;
@@ -42,6 +43,21 @@ std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& col
   std::vector<Column> nuisance = form.constant ? std::vector<Column>{} : offsets(columns, seen);
   nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
   return nuisance;
+}
+
+/// Gain that a further cause needs: a share of the first one's, a larger one where it repairs the form of an accepted
+/// cause in the same moments of the thrust's or the commands' delay.
+double needed_gain(const Candidate& candidate, const std::vector<Accepted>& accepted, double threshold) {
+  double needed = threshold;
+  for (const auto& a : accepted) {
+    const auto dynamic = [](const std::vector<Column>& columns) {
+      const Channel c = columns.front().parts.front().channel;
+      return c >= kThrustDelay && c <= kCommandDelayZ;
+    };
+    const double share = dynamic(a.columns) && dynamic(candidate.columns) ? kRepairShare : kLeastShare;
+    needed = std::max(needed, share * a.gain);
+  }
+  return needed;
 }
 
 std::vector<double> null_maxima(const std::vector<Candidate>& all, const std::vector<std::vector<int>>& draws) {
@@ -198,11 +214,10 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
 
     const Candidate *cause = nullptr, *smooth = nullptr;
     for (const auto& c : all) {
-      if (c.gain < result.threshold || !c.effect(c.normal.fit())) continue;
+      if (c.gain < needed_gain(c, result.accepted, result.threshold) || !c.effect(c.normal.fit())) continue;
       if (!c.form && (!smooth || c.gain > smooth->gain)) smooth = &c;
       if (c.form && (!cause || c.gain > cause->gain)) cause = &c;
     }
-    const double needed = std::max(result.threshold, kLeastShare * first_gain);
     if (smooth && smooth->gain >= std::max(result.threshold, kLeftShare * first_gain) &&
         (!cause || smooth->gain - cause->gain > std::max(kSmoothLead, kSmoothShare * cause->gain))) {
       const auto group = std::find_if(groups().begin(), groups().end(), [&](auto& g) {
@@ -211,7 +226,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
       result.unknown.push_back({smooth->name, group->first, p_value(result.null_gain, smooth->gain), smooth->gain});
       break;
     }
-    if (!cause || cause->gain < needed) break;
+    if (!cause) break;
     first_gain = std::max(first_gain, cause->gain);
     Accepted a{cause->form, cause->scale, cause->columns, {}, p_value(result.null_gain, cause->gain), cause->gain, {},
                {}};
