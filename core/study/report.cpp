@@ -3,42 +3,10 @@
 
 #include <cstdio>
 
+#include "core/study/html.hpp"
+
 namespace backwash::study {
 namespace {
-
-const char* const kStyle = R"(
-:root { color-scheme: light; }
-body { font: 16px/1.5 "DejaVu Sans", system-ui, sans-serif; color: #1d2430; background: #f4f6f8; margin: 0; }
-main { max-width: 1060px; margin: 0 auto; padding: 32px 24px 64px; }
-h1 { font-size: 1.7em; margin: 0 0 4px; } h2 { font-size: 1.15em; margin: 0 0 4px; }
-.context { color: #5a6675; margin: 0 0 20px; font-size: 0.9em; }
-.verdict { padding: 14px 20px; border-radius: 8px; font-weight: 600; margin: 0 0 24px; }
-.passed { background: #e2f3e6; color: #17602c; border: 1px solid #a9d8b6; }
-.failed { background: #fbe6e4; color: #8c1c13; border: 1px solid #e8b2ac; }
-section { background: #fff; border: 1px solid #dfe4ea; border-radius: 8px; padding: 18px 22px; margin: 0 0 20px; }
-section p { color: #4b5766; margin: 0 0 10px; font-size: 0.9em; }
-svg { width: 100%; height: auto; display: block; } svg image { image-rendering: pixelated; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: 6px 10px; border-bottom: 1px solid #e8ecf0; font-weight: normal; }
-th { color: #4b5766; width: 55%; } thead th { font-weight: 600; color: #1d2430; }
-)";
-
-std::string escaped(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    if (c == '<')
-      safe += "&lt;";
-    else if (c == '>')
-      safe += "&gt;";
-    else if (c == '&')
-      safe += "&amp;";
-    else if (c == '"')
-      safe += "&quot;";
-    else
-      safe += c;
-  }
-  return safe;
-}
 
 std::string number(double value, int decimals, const char* unit) {
   char text[64];
@@ -120,10 +88,7 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
        error_figure(flight)},
       {"Clearance", "During take-off only what stands beside the vehicle counts.", clearance_figure(flight, world)},
   };
-  std::string page =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>backwash flight</title>\n<style>";
-  page += std::string(kStyle) +
-          "</style>\n</head>\n<body>\n<main>\n<h1>One flight, and the sets it was planned with</h1>\n";
+  std::string page = page_begin("backwash flight", "One flight, and the sets it was planned with");
   page += "<p class=\"context\">Map " + escaped(context.map) + ", vehicle " + escaped(context.vehicle) + ", model " +
           escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) +
           (context.seed ? "; seed " + std::to_string(*context.seed) : "; recorded");
@@ -134,7 +99,7 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
     page += std::string("<section><h2>") + section.title + "</h2>\n<p>" + section.text + "</p>\n" + *section.figure +
             "</section>\n";
   }
-  return page + table(flight, summary) + "</main>\n</body>\n</html>\n";
+  return page + table(flight, summary) + page_end();
 }
 
 }  // namespace backwash::study

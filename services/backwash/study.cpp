@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <toml++/toml.h>
 #include <cstdio>
 #include <optional>
 
-#include "core/study/discrepancy/study.hpp"
+#include "core/study/discrepancy/extend.hpp"
+#include "core/study/discrepancy/page.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -84,6 +86,27 @@ void print_text(const discrepancy::StudyResult& result, const discrepancy::Obser
   for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
 }
 
+/// The study's own terms of a model file that it has extended before; none in others.
+std::vector<discrepancy::Term> read_terms(const std::string& path) {
+  std::vector<discrepancy::Term> terms;
+  if (path.starts_with("builtin:")) return terms;
+  const auto file = toml::parse_file(path);  // load_model has accepted it
+  const auto* list = file.at_path("extension.term").as_array();
+  if (!list) return terms;
+  for (const auto& entry : *list) {
+    const auto* table = entry.as_table();
+    if (!table) continue;
+    discrepancy::Term term{(*table)["cause"].value_or(std::string()),
+                           (*table)["form"].value_or(std::string()),
+                           (*table)["scale"].value_or(0.0),
+                           {}};
+    if (const auto* theta = (*table)["theta"].as_array())
+      for (const auto& value : *theta) term.theta.push_back(value.value_or(0.0));
+    terms.push_back(std::move(term));
+  }
+  return terms;
+}
+
 int run(const Options& options) {
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
@@ -101,13 +124,27 @@ int run(const Options& options) {
         throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
     observer.add(log);
   }
-  const auto seen = observer.finish();
+  auto seen = observer.finish();
+  const auto left = discrepancy::apply(read_terms(options.model), seen);
   discrepancy::StudyOptions study_options;
   study_options.search.seed = options.seed;
   study_options.search.progress = [](const std::string& line) { progress(line); };
   study_options.minimum_detectable = !options.quick;
   const auto result = discrepancy::study(seen, study_options);
   Json json = to_json(result, seen);
+  if (!left.empty())
+    for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  if (!options.out.empty()) {
+    write_file(options.out, discrepancy::extended_model_text(model, result, seen, options.model, kVersion),
+               options.force);
+    json["extended_model"] = options.out;
+  }
+  if (!options.report.empty()) {
+    progress("drawing");
+    const auto page = discrepancy::study_page(result, seen, {options.map, options.model, options.vehicle, kVersion});
+    if (!page) throw Failure(kUnavailable, page.error().message);
+    write_file(options.report, *page, options.force);
+  }
   if (options.json)
     print(json);
   else
