@@ -39,7 +39,7 @@ Column in_variance(const Windows& windows, F value) {
 }
 
 double near(double distance, double reference, double length) {
-  return std::isfinite(distance) ? std::exp(-(std::max(distance, 0.05) - reference) / length) : 0.0;
+  return std::isfinite(distance) ? std::exp(-(std::max(distance, 0.15) - reference) / length) : 0.0;
 }
 
 Vec3 pull(const WindowRow& w, double length) {
@@ -453,7 +453,10 @@ std::vector<Column> smooth_columns(const Regressor& along, const Windows& window
 std::vector<Column> companions(const Form& form, const Observations& seen) {
   const Windows& ws = seen.windows;
   if (form.cause == "battery_sag") return {missing_thrust(ws, [](auto&) { return 1.0; })};
-  if (form.cause == "imu_drift") return body_drift(ws, [](auto&) { return 1.0; });
+  if (form.cause == "imu_drift") {
+    return {level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
+            level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
+  }
   return {};
 }
 

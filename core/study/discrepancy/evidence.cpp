@@ -193,7 +193,7 @@ SmallMatrix Evidence::size(const std::vector<Column>& columns) const {
         const auto* column = active[static_cast<std::size_t>(k)];
         x[k] = column ? (*column)[i] : 0.0;
       }
-      sum += x * x.transpose(), n += 1;
+      sum += seen_->weight[c][i] * x * x.transpose(), n += seen_->weight[c][i];
     }
   }
   return n > 0 ? SmallMatrix(sum / n) : sum;

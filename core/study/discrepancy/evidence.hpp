@@ -44,8 +44,8 @@ class Evidence {
 
   /// Normal equations of `columns`, `nuisance` projected out (columns of it that others span are ignored).
   Normal normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const;
-  /// Mean of x xᵀ over the measured windows of the channels that the columns move: √(θᵀ size θ) is the root mean square
-  /// of Σ θ x.
+  /// Mean of x xᵀ, by weight, over the measured windows of the channels that the columns move: √(θᵀ size θ) is the root
+  /// mean square of Σ θ x.
   SmallMatrix size(const std::vector<Column>& columns) const;
   double within(Channel c) const { return within_[c]; }
   double between(Channel c) const { return between_[c]; }

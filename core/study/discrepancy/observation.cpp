@@ -163,6 +163,10 @@ void Observer::add(const FlightLog& log) {
         ++seen_.gated_out[why];
         continue;
       }
+      if (surroundings_.inside_solid(s.p[(w.begin + w.end) / 2])) {  // the map and the log contradict each other
+        ++seen_.gated_out["inconsistent"];
+        continue;
+      }
       add_window(log, s, rotors, flight, w.begin, w.end);
     }
   }

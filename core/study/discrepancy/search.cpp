@@ -152,8 +152,7 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
 
 bool Candidate::effect(const SmallVector& theta) const {
   // Least root mean square of a smooth: as in the catalogue, m/s² and ln variance.
-  if (!form)
-    return theta.dot(size * theta) >= std::pow(columns.front().parts.front().channel == kVarX ? 0.2 : 0.025, 2);
+  if (!form) return theta.dot(size * theta) >= std::pow(columns.front().parts.front().channel == kVarX ? 0.2 : 0.03, 2);
   if (std::abs(theta[0]) < form->least || (form->one_sided && theta[0] < 0)) return false;
   const double square = form->integer_scale ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
   return square >= form->floor * form->floor;
@@ -214,6 +213,9 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
 
     const Candidate *cause = nullptr, *smooth = nullptr;
     for (const auto& c : all) {
+      const bool known = std::any_of(result.accepted.begin(), result.accepted.end(),
+                                     [&](auto& a) { return c.form && a.form->cause == c.name; });
+      if (known) continue;
       if (c.gain < needed_gain(c, result.accepted, result.threshold) || !c.effect(c.normal.fit())) continue;
       if (!c.form && (!smooth || c.gain > smooth->gain)) smooth = &c;
       if (c.form && (!cause || c.gain > cause->gain)) cause = &c;

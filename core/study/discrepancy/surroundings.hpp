@@ -26,6 +26,7 @@ class Surroundings {
   Around around(const Vec3& p_W) const;
   /// Diagonal of Σ at p, (m/s²)²: trilinear between points on a lattice of kLattice, evaluated exactly once each.
   Vec3 sigma(const Vec3& p_W);
+  bool inside_solid(const Vec3& p_W) const { return grid_ && grid_->occupied(grid_->index(p_W)); }
   bool has_map() const noexcept { return grid_ != nullptr; }
 
  private:
