@@ -44,7 +44,7 @@ std::vector<NumberKey> model_keys(Model& m) {
 }  // namespace
 
 tl::expected<Model, ConfigError> load_model(const std::string& path) {
-  constexpr std::string_view kNotRead[] = {"confidence", "provenance"};
+  constexpr std::string_view kNotRead[] = {"confidence", "provenance", "extension"};
   const auto file = StrictTable::open(path, ".model.toml");
   if (!file) return tl::unexpected(file.error());
   Model model;

@@ -49,6 +49,7 @@ Verb report_verb(CLI::App& app);
 Verb calibrate_verb(CLI::App& app);
 Verb import_verb(CLI::App& app);
 Verb replay_verb(CLI::App& app);
+Verb study_verb(CLI::App& app);
 
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.
 CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional<Vec3>& target,

@@ -113,4 +113,11 @@ std::string model_text(const Calibration& c, const Provenance& p) {
   return text.str();
 }
 
+std::string model_tables(const Model& model) {
+  std::ostringstream text;
+  write_model(text, model);
+  write_bound(text, model);
+  return text.str();
+}
+
 }  // namespace backwash::study::calibrate

@@ -25,4 +25,7 @@ struct Provenance {
 /// provenance.kept_from_base, and have no interval.
 std::string model_text(const Calibration& calibration, const Provenance& provenance);
 
+/// The tables of a model file that hold the model itself, [base] to [bound].
+std::string model_tables(const Model& model);
+
 }  // namespace backwash::study::calibrate

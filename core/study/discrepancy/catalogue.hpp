@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/study/discrepancy/observation.hpp"
+
+namespace backwash::study::discrepancy {
+
+/// One regressor: its value on each window, in the channels that it moves.
+struct Column {
+  struct Part {
+    Channel channel;
+    std::vector<double> x;
+  };
+  std::vector<Part> parts;
+};
+
+using Windows = std::vector<WindowRow>;
+
+/// One physical form of a cause, linear in its parameters at a given scale. README.md lists them with units.
+struct Form {
+  std::string cause;                    ///< name of interfaces.md
+  std::string formula;                  ///< what is added to which channel
+  std::vector<std::string> parameters;  ///< one per column, unit in the name
+  std::string scale_name = "";          ///< "L_m" …; empty without a scale
+  std::vector<double> scales = {0};     ///< grid
+  bool integer_scale = false;           ///< a rotor number: not polished
+  bool constant = false;                ///< is itself what a free offset would be: tested without one
+  double floor = 0;                     ///< least root mean square over the flown windows that is called an effect
+  double least = 0;                     ///< least magnitude of the first parameter that is called an effect
+  bool one_sided = false;               ///< the first parameter cannot be negative
+  std::function<std::vector<Column>(const Windows&, double scale)> columns = {};
+};
+
+/// Whole catalogue.
+const std::vector<Form>& catalogue();
+/// Every cause name of interfaces.md.
+const std::vector<std::string>& cause_names();
+/// Why these observations cannot test a form; nothing if they can.
+std::optional<std::string> why_not_tested(const Form& form, const Observations& seen);
+
+/// Regressors of which any smooth function competes with the catalogue.
+struct Regressor {
+  std::string name;
+  bool circular = false;
+  std::function<double(const WindowRow&)> value;
+};
+std::vector<Regressor> regressors(const Observations& seen);
+/// cos(π k q), k = 1 … 4, of the regressor's rank q in [0, 1] (circular: sin and cos of one and two turns), in the
+/// channels of one group.
+std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group);
+
+/// What an accepted form leaves open and no other cause may claim: the reference voltage of a sagging battery, the
+/// bias at which a drift begins.
+std::vector<Column> companions(const Form& form, const Observations& seen);
+
+/// Free offsets of the channels that columns move: constants, and for level means those fixed to the body too; in
+/// variance channels also the noise of the accelerometer, a constant over Σ.
+std::vector<Column> offsets(const std::vector<Column>& columns, const Observations& seen);
+
+}  // namespace backwash::study::discrepancy

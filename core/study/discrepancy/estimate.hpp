@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/study/discrepancy/search.hpp"
+
+namespace backwash::study::discrepancy {
+
+/// Fits an accepted cause given the others' columns: the scale between the grid's points (parabola of the likelihood
+/// over a finer grid), the parameters, and their intervals with the scale refitted without each flight. Sets scale,
+/// columns, theta, gain and parameters.
+void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others);
+
+/// Whether some parameter's interval excludes 0.
+bool excludes_zero(const Accepted& cause);
+
+/// Quantile 0.975 of Student's t.
+double student_975(double degrees);
+
+}  // namespace backwash::study::discrepancy

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "core/study/discrepancy/catalogue.hpp"
+
+namespace backwash::study::discrepancy {
+
+inline constexpr int kMostColumns = 16;
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
+
+/// Normal equations of some columns per flight, with nuisance columns projected out of them and of the data:
+/// A_f = X̃ᵀV⁻¹X̃, b_f = X̃ᵀV⁻¹ỹ over the windows of flight f.
+struct Normal {
+  std::vector<SmallMatrix> A;
+  std::vector<SmallVector> b;
+  std::vector<SmallMatrix> left_out;  ///< (ΣA − A_f)⁻¹
+  SmallMatrix total;                  ///< ΣA
+  bool solvable = false;              ///< every flight may be left out
+
+  /// θ = (ΣA)⁻¹ Σ s_f b_f.
+  SmallVector fit(const std::vector<int>& signs = {}) const;
+  /// θ₋f.
+  SmallVector fit_without(std::size_t flight) const;
+  /// Held-out gain in nats: Σ_f θ₋fᵀ s_f b_f − ½ θ₋fᵀ A_f θ₋f, flights' residuals multiplied by signs ±1.
+  double gain(const std::vector<int>& signs = {}) const;
+  std::vector<double> gain_per_flight() const;
+};
+
+/// Observations with the scatter of each channel: within flights (σ_w²) and between them (σ_b², a random intercept),
+/// by analysis of variance of what is left after `explained`. V = diag(σ_w²/weight) + σ_b² 11ᵀ per flight and channel.
+class Evidence {
+ public:
+  explicit Evidence(const Observations& seen);
+  const Observations& seen() const noexcept { return *seen_; }
+
+  /// Takes the accepted columns (with the offsets of their channels) out and estimates the scatter of what is left.
+  void whiten(const std::vector<Column>& accepted);
+
+  /// Normal equations of `columns`, `nuisance` projected out (columns of it that others span are ignored).
+  Normal normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const;
+  /// Mean of x xᵀ, by weight, over the measured windows of the channels that the columns move: √(θᵀ size θ) is the root
+  /// mean square of Σ θ x.
+  SmallMatrix size(const std::vector<Column>& columns) const;
+  double within(Channel c) const { return within_[c]; }
+  double between(Channel c) const { return between_[c]; }
+
+ private:
+  std::vector<Eigen::MatrixXd> grams(const std::vector<const Column*>& columns) const;
+  void anova(Channel c, const std::vector<double>& residual);
+
+  const Observations* seen_;
+  std::array<double, kChannels> within_{}, between_{};
+};
+
+}  // namespace backwash::study::discrepancy

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "core/study/discrepancy/study.hpp"
+
+namespace backwash::study::discrepancy {
+namespace {
+
+/// A flight that could be flown next: the windows it would give, made from a median window of the flights at hand.
+struct Manoeuvre {
+  const char* name;
+  void (*set)(WindowRow&, double s);  ///< s: 0 … 1 along the flight
+};
+
+const Manoeuvre kManoeuvres[] = {
+    {"hover at three heights, 0.3, 0.8 and 1.3 m over the floor, away from walls and ceiling",
+     [](WindowRow& w, double s) {
+       w.around = {0.3 + 0.5 * std::floor(2.999 * s), 2.0, {}};
+       w.p_W.z() = w.around.height;
+     }},
+    {"hover 0.25, 0.5 and 1 m below the ceiling, high above the floor",
+     [](WindowRow& w, double s) {
+       w.around = {2.0, 0.25 * std::pow(2, std::floor(2.999 * s)), {}};
+     }},
+    {"a spot without ceiling, then the same height under one",
+     [](WindowRow& w, double s) { w.around.ceiling_gap = s < 0.5 ? kNoSurface : 0.3; }},
+    {"turn a full yaw turn on the spot, far from walls",
+     [](WindowRow& w, double s) {
+       w.yaw = 2 * M_PI * s;
+       w.R_WB = Eigen::AngleAxisd(w.yaw, Vec3::UnitZ()).toRotationMatrix();
+       w.around.walls.clear();
+     }},
+    {"approach a wall to 0.35 m from both sides",
+     [](WindowRow& w, double s) {
+       const double d = 0.35 + 1.2 * std::abs(std::fmod(2 * s, 1.0) - 0.5) * 2;
+       w.around.walls = {{d, s < 0.5 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX())}};
+     }},
+    {"hover on a fresh battery and on a used one, the same spot and time of flight",
+     [](WindowRow& w, double s) {
+       w.voltage *= s < 0.5 ? 1.0 : 0.9;
+       w.t = 30;
+     }},
+    {"hover for five minutes in one spot, motors never stopped", [](WindowRow& w, double s) { w.t = 300 * s; }},
+    {"start warm and start cold, the same spot and battery",
+     [](WindowRow& w, double s) {
+       w.temperature += s < 0.5 ? 0.0 : 12.0;
+       w.t = 30;
+     }},
+    {"fly fast and slow on one line at one height",
+     [](WindowRow& w, double s) {
+       w.speed = 1.5 * s;
+       w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
+     }},
+    {"thrust pulses: climb and sink with 2 m/s² in turn",
+     [](WindowRow& w, double) {
+       w.delay_gain = {-60, 0}, w.slope_gain = {0, 14};
+     }},
+    {"sideways steps of the set-point, hard", [](WindowRow& w, double) {
+       w.command_gain = {60, -10};
+     }}};
+
+}  // namespace
+
+std::vector<Separation> separations(const Evidence& evidence, const Accepted& cause, const Rival& rival) {
+  const auto& flown = evidence.seen().windows;
+  constexpr std::size_t kWindows = 45, kFlights = 12;
+  std::vector<Separation> all;
+  for (const Manoeuvre& m : kManoeuvres) {
+    Windows windows;
+    for (std::size_t i = 0; i < kWindows; ++i) {
+      WindowRow w = flown[flown.size() / 2];
+      w.v_W.setZero(), w.speed = 0, w.delay_gain = {}, w.slope_gain = {}, w.command_gain = {};
+      m.set(w, (static_cast<double>(i) + 0.5) / kWindows);
+      windows.push_back(std::move(w));
+    }
+    const auto ours = cause.form->columns(windows, cause.scale), theirs = rival.form->columns(windows, rival.scale);
+    // What of our prediction the rival and free offsets cannot copy, in nats: least squares over all rows.
+    Observations imagined;
+    imagined.windows = windows;
+    imagined.missing = evidence.seen().missing;
+    std::vector<Column> copies = theirs;
+    if (!cause.form->constant && !rival.form->constant) {
+      std::vector<Column> both = ours;
+      both.insert(both.end(), theirs.begin(), theirs.end());
+      const auto free = offsets(both, imagined);
+      copies.insert(copies.end(), free.begin(), free.end());
+    }
+    const auto p = static_cast<Eigen::Index>(copies.size());
+    const auto rows = static_cast<Eigen::Index>(kWindows * kChannels);
+    Eigen::MatrixXd X = Eigen::MatrixXd::Zero(rows, p);
+    Eigen::VectorXd target = Eigen::VectorXd::Zero(rows);
+    const auto put = [&](const Column& column, auto&& add) {
+      for (const auto& part : column.parts) {
+        const double weight = 1 / std::sqrt(evidence.within(part.channel) + kWindows * evidence.between(part.channel));
+        for (std::size_t i = 0; i < kWindows; ++i)
+          add(static_cast<Eigen::Index>(part.channel * kWindows + i), weight * part.x[i]);
+      }
+    };
+    for (std::size_t k = 0; k < copies.size(); ++k)
+      put(copies[k], [&](Eigen::Index row, double x) { X(row, static_cast<Eigen::Index>(k)) += x; });
+    for (std::size_t k = 0; k < ours.size(); ++k)
+      put(ours[k], [&](Eigen::Index row, double x) { target[row] += cause.theta[static_cast<Eigen::Index>(k)] * x; });
+    const Eigen::VectorXd left = target - X * X.completeOrthogonalDecomposition().solve(target);
+    all.push_back({rival.name, m.name, 0.5 * kFlights * left.squaredNorm()});
+  }
+  std::sort(all.begin(), all.end(), [](auto& a, auto& b) { return a.expected_nats > b.expected_nats; });
+  return all;
+}
+
+}  // namespace backwash::study::discrepancy

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/map/occupancy_grid.hpp"
+#include "core/study/discrepancy/rotor_channels.hpp"
+#include "core/study/discrepancy/series.hpp"
+#include "core/study/discrepancy/surroundings.hpp"
+#include "core/study/flight_log.hpp"
+#include "core/types/model.hpp"
+#include "core/types/vehicle.hpp"
+
+namespace backwash::study::discrepancy {
+
+/// What is measured on every 2 s window: each channel has one number per window and a weight (0: not measured).
+enum Channel : std::size_t {
+  kMeanX,  ///< mean of a − a_sim along W, m/s²
+  kMeanY,
+  kMeanZ,
+  kVarX,  ///< ln of measured over modelled variance of a − a_sim, bias of the logarithm removed
+  kVarY,
+  kVarZ,
+  kTail,           ///< ln kurtosis of a − a_sim less that of Gaussian surrogates with the same spectrum
+  kThrustDelay,    ///< Σ z (a − a_sim)·b_z/√Σz², z the set-points' own thrust rate: how late the thrust comes
+  kThrustSlope,    ///< the same with the set-points' own vertical acceleration: how steep the thrust curve is
+  kCommandDelayH,  ///< Σ x (a − a_nominal)/√Σx², x = −ȧ_nominal of the closed loop that hears set-points alone
+  kCommandDelayZ,
+  kLine1,  ///< ln power of the rotors' line over that of its neighbours, expectation without a line removed
+  kLine2,
+  kLine3,
+  kLine4,
+  kMotor1,  ///< ln thrust commanded of a rotor, less the mean of the four
+  kMotor2,
+  kMotor3,
+  kMotor4,
+  kRpm1,  ///< ln rpm² over commanded thrust of a rotor, less the mean of the four
+  kRpm2,
+  kRpm3,
+  kRpm4,
+  kDropout1,  ///< share of samples whose rpm reading is stuck or below 0.3 of its median
+  kDropout2,
+  kDropout3,
+  kDropout4,
+  kChannels
+};
+const char* channel_name(Channel c);
+
+/// Level offsets of the map that are tried: eight directions, 0.15 and 0.3 m.
+inline constexpr std::size_t kMapOffsets = 16;
+Vec3 map_offset(std::size_t k);  ///< m
+
+/// One window: where and how it was flown, and what the catalogue's columns are made of.
+struct WindowRow {
+  std::size_t flight;
+  int segment;        ///< −1 in transit or unknown
+  double t;           ///< s since the flight's first row
+  Vec3 p_W, v_W;      ///< m, m/s, means
+  double speed;       ///< m/s, mean of the norm
+  Mat3 R_WB;          ///< mean of the rotation matrices (not orthonormal); zero without attitude
+  double yaw;         ///< rad
+  double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
+  double voltage, temperature;
+  Around around;
+  Vec3 sigma;                                        ///< modelled variance per axis, (m/s²)²
+  std::array<Vec3, kMapOffsets> ln_sigma_moved;      ///< ln of Σ per axis at p + map_offset(k), less that at p
+  std::array<double, 2> delay_gain{}, slope_gain{};  ///< design of kThrustDelay and kThrustSlope: of (delay, slope)
+  std::array<double, 2> command_gain{};              ///< design of kCommandDelayH, kCommandDelayZ
+  Vec3 measured_variance;                            ///< (m/s²)²
+};
+
+/// All flights of a study as rows of windows, in flight order.
+struct Observations {
+  std::size_t flights = 0;
+  std::vector<WindowRow> windows;
+  std::vector<std::size_t> first;                        ///< window at which each flight begins; one more at the end
+  std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
+  std::map<std::string, std::size_t> gated_out;          ///< frozen, gap, perched, saturated, inconsistent: windows
+  std::map<std::string, std::string> missing;            ///< what no flight had: "battery_v" → "no battery_v column"
+  bool has(const std::string& what) const { return !missing.contains(what); }
+  bool measured(Channel c) const;
+};
+
+/// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
+/// known but the floor at z = 0, and Σ = Σ_0. Real-time status: offline.
+class Observer {
+ public:
+  Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);
+  void add(const FlightLog& log);
+  Observations finish();
+
+ private:
+  void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
+                  std::size_t begin, std::size_t end);
+
+  const Vehicle vehicle_;
+  Observations seen_;
+  std::set<std::string> ever_;  // columns that some flight had
+  Surroundings surroundings_;
+};
+
+}  // namespace backwash::study::discrepancy

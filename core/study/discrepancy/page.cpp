@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/discrepancy/page.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "core/study/page.hpp"
+
+namespace backwash::study::discrepancy {
+namespace {
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+/// The variable that a cause is drawn over.
+Regressor named_variable(const std::string& cause) {
+  if (cause == "ground_thrust") return {"height over the surface, m", false, [](auto& w) { return w.around.height; }};
+  if (cause == "ceiling") return {"gap to the ceiling, m", false, [](auto& w) { return w.around.ceiling_gap; }};
+  if (cause == "wall_attraction")
+    return {"distance to the nearest wall, m", false, [](auto& w) {
+              double least = kNoSurface;
+              for (const auto& [distance, direction] : w.around.walls) least = std::min(least, distance);
+              return least;
+            }};
+  if (cause == "forward_speed") return {"speed, m/s", false, [](auto& w) { return w.speed; }};
+  if (cause == "rotor_drag") return {"velocity along x, m/s", false, [](auto& w) { return w.v_W.x(); }};
+  if (cause == "battery_sag") return {"battery, V", false, [](auto& w) { return w.voltage; }};
+  if (cause == "trim" || cause == "draft") return {"yaw, rad", false, [](auto& w) { return w.yaw; }};
+  return {"time since the flight began, s", false, [](auto& w) { return w.t; }};
+}
+
+std::string verdict_sentence(const StudyResult& result, const Observations& seen) {
+  std::string names;
+  for (const auto& cause : result.causes) {
+    names += (names.empty() ? "" : ", ") + cause.found.form->cause;
+    for (const auto& rival : cause.found.rivals) names += " or " + rival.name;
+  }
+  const std::string of =
+      " (" + std::to_string(seen.flights) + " flights, " + std::to_string(seen.windows.size()) + " windows of 2 s)";
+  switch (result.verdict) {
+    case Verdict::cause_found:
+      return "The simulation misses: " + names + of + ".";
+    case Verdict::cannot_distinguish:
+      return "The simulation misses something that these flights cannot tell apart: " + names + of + ".";
+    case Verdict::unknown_structure:
+      return "The simulation is wrong along " + result.unknown.front().along + ", and no known cause fits" + of + ".";
+    case Verdict::insufficient:
+      return "Fewer than 10 flights do not warrant a name" + of + ".";
+    default:
+      return "Nothing found that the simulation gets wrong" + of + ".";
+  }
+}
+
+/// Residual of the cause's first channel against its variable, before and after, with means of twelve groups.
+tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Observations& seen) {
+  const auto& found = cause.found;
+  const Channel channel = found.columns.front().parts.front().channel;
+  const auto along = named_variable(found.form->cause);
+  struct Point {
+    double x, before, after;
+  };
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    const double x = along.value(seen.windows[i]);
+    if (!(seen.weight[channel][i] > 0) || !std::isfinite(x)) continue;
+    double added = 0;
+    for (std::size_t k = 0; k < found.columns.size(); ++k)
+      for (const auto& part : found.columns[k].parts)
+        if (part.channel == channel) added += found.theta[static_cast<Eigen::Index>(k)] * part.x[i];
+    points.push_back({x, seen.y[channel][i], seen.y[channel][i] - added});
+  }
+  std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
+  std::ostringstream script, dots, lines;
+  for (const auto& p : points) dots << p.x << ' ' << p.before << ' ' << p.after << '\n';
+  const std::size_t groups = std::min<std::size_t>(12, points.size());
+  for (std::size_t g = 0; g < groups; ++g) {
+    const std::size_t a = g * points.size() / groups, b = (g + 1) * points.size() / groups;
+    Point mean{0, 0, 0};
+    for (std::size_t i = a; i < b; ++i) {
+      const double n = static_cast<double>(b - a);
+      mean.x += points[i].x / n, mean.before += points[i].before / n, mean.after += points[i].after / n;
+    }
+    lines << mean.x << ' ' << mean.before << ' ' << mean.after << '\n';
+  }
+  script << "$dots << EOD\n"
+         << dots.str() << "EOD\n$lines << EOD\n"
+         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel '" << channel_name(channel)
+         << " of what the simulation misses'\nset key top right\nset grid\n"
+         << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
+         << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
+         << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
+         << "$lines using 1:3 with linespoints lw 3 pt 7 lc rgb '#1f6f9f' title 'after'\n";
+  return draw(script.str(), Format::svg, 860, 380);
+}
+
+std::string row(const std::string& name, const std::string& value) {
+  return "<tr><th>" + escaped(name) + "</th><td>" + escaped(value) + "</td></tr>\n";
+}
+
+std::string figures(const NamedCause& cause) {
+  const auto& g = cause.gain;
+  std::string text = "<table>\n";
+  for (const auto& e : cause.found.parameters)
+    text += row(e.name, number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
+  text += row("Probability of as much by chance, over everything tried", number(cause.found.p));
+  text += row("Gain on flights not fitted",
+              number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " + number(g.high_nats) + "]");
+  text += row("Error of the windows, before and after", number(g.rmse_before) + " → " + number(g.rmse_after));
+  text += row("Samples in the model's central 90 %, before and after",
+              number(g.coverage_before) + " → " + number(g.coverage_after));
+  for (const auto& s : cause.separate_by)
+    text += row("Not told from " + s.rival,
+                "fly next: " + s.manoeuvre + " (" + number(s.expected_nats) + " nats expected from 12 flights)");
+  return text + "</table>\n";
+}
+
+}  // namespace
+
+tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
+                                                const PageContext& context) {
+  std::string page = "<h1>What the simulation gets wrong</h1>\n";
+  page += "<p class=\"context\">Map " + escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
+          escaped(context.vehicle) + ", model " + escaped(context.model) + "; backwash " + escaped(context.version) +
+          "</p>\n<p class=\"verdict " +
+          (result.verdict == Verdict::nothing_found || result.verdict == Verdict::cause_found ? "passed" : "failed") +
+          "\">" + escaped(verdict_sentence(result, seen)) + "</p>\n";
+  for (const auto& cause : result.causes) {
+    const auto drawn = picture(cause, seen);
+    if (!drawn) return tl::make_unexpected(drawn.error());
+    page += "<section><h2>" + escaped(cause.found.form->cause) + "</h2>\n<p>" + escaped(cause.found.form->formula) +
+            "</p>\n" + *drawn + figures(cause) + "</section>\n";
+  }
+  if (!result.unknown.empty()) {
+    page += "<section><h2>Without a name</h2>\n<table>\n";
+    for (const auto& u : result.unknown)
+      page += row(u.group + " along " + u.along, "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
+    page += "</table>\n</section>\n";
+  }
+  page += "<section><h2>What was not tested, and why</h2>\n<table>\n";
+  for (const auto& [name, why] : result.not_tested) page += row(name, why);
+  if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
+  page +=
+      "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
+      "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
+  for (const auto& [cause, sizes] : result.minimum_detectable)
+    for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
+  page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
+  for (const auto& [gate, count] : seen.gated_out) page += row(gate, std::to_string(count) + " windows");
+  page +=
+      "</table>\n<p>How often the method names the right cause, and what it confuses: table in "
+      "core/study/discrepancy/README.md.</p>\n</section>\n";
+  return html_page("backwash study", page);
+}
+
+}  // namespace backwash::study::discrepancy

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/study/discrepancy/study.hpp"
+#include "core/study/plot.hpp"
+
+namespace backwash::study::discrepancy {
+
+/// What the page says beside the result.
+struct PageContext {
+  std::string map, model, vehicle;  ///< as given on the command line
+  std::string version;
+};
+
+/// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,
+/// gain, rivals and the flight to fly next, what was not tested, smallest effects that would have been found. Error: a
+/// figure that could not be drawn.
+tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
+                                                const PageContext& context);
+
+}  // namespace backwash::study::discrepancy

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/discrepancy/signals.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <unsupported/Eigen/FFT>
+
+namespace backwash::study::discrepancy {
+namespace {
+
+double digamma(double x) {
+  double sum = 0;
+  for (; x < 6; x += 1) sum -= 1 / x;
+  const double q = 1 / (x * x);
+  return sum + std::log(x) - 0.5 / x - q * (1.0 / 12 - q * (1.0 / 120 - q / 252));
+}
+
+double trigamma(double x) {
+  double sum = 0;
+  for (; x < 6; x += 1) sum += 1 / (x * x);
+  const double q = 1 / (x * x);
+  return sum + 1 / x + q / 2 + q / x * (1.0 / 6 - q * (1.0 / 30 - q / 42));
+}
+
+double ln_kurtosis(std::span<const double> x) {
+  double m2 = 0, m4 = 0;
+  for (const double v : x) m2 += v * v, m4 += v * v * v * v;
+  const double n = static_cast<double>(x.size());
+  return m2 > 0 ? std::log(n * m4 / (m2 * m2)) : 0;
+}
+
+}  // namespace
+
+std::vector<double> detrended(std::span<const double> x) {
+  const double n = static_cast<double>(x.size()), middle = (n - 1) / 2;
+  double mean = 0, slope = 0, square = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double s = static_cast<double>(i) - middle;
+    mean += x[i] / n, slope += s * x[i], square += s * s;
+  }
+  slope = square > 0 ? slope / square : 0;
+  std::vector<double> out(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) out[i] = x[i] - mean - slope * (static_cast<double>(i) - middle);
+  return out;
+}
+
+Spread spread(std::span<const double> x) {
+  double square = 0, product = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    square += x[i] * x[i];
+    if (i > 0) product += x[i] * x[i - 1];
+  }
+  const double n = static_cast<double>(x.size());
+  if (!(square > 0) || n < 4) return {0, 0};
+  const double rho = std::clamp(product / square, 0.0, 0.98);
+  const double samples = std::max(2.0, (n - 2) * (1 - rho * rho) / (1 + rho * rho));
+  return {square / (n - 2), samples};
+}
+
+double ln_bias(double n) { return digamma(n / 2) - std::log(n / 2); }
+double ln_variance(double n) { return trigamma(n / 2); }
+
+double excess_tail(std::span<const double> x, int surrogates) {
+  using Complex = std::complex<double>;
+  Eigen::FFT<double> fft;
+  std::vector<double> signal(x.begin(), x.end());
+  std::vector<Complex> spectrum, turned;
+  fft.fwd(spectrum, signal);
+  std::mt19937_64 rng(12345);
+  double expected = 0;
+  const std::size_t n = signal.size();
+  for (int draw = 0; draw < surrogates; ++draw) {
+    turned = spectrum;
+    for (std::size_t k = 1; 2 * k < n; ++k) {
+      const double phase = 2 * std::numbers::pi * static_cast<double>(rng() >> 11) * 0x1p-53;
+      turned[k] = std::polar(std::abs(spectrum[k]), phase);
+      turned[n - k] = std::conj(turned[k]);
+    }
+    fft.inv(signal, turned);
+    expected += ln_kurtosis(signal) / surrogates;
+  }
+  return ln_kurtosis(x) - expected;
+}
+
+double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
+  const auto power = [&](double harmonic, double detuned_hz) {
+    double re = 0, im = 0;
+    for (std::size_t i = 1; i < x.size(); ++i) {
+      const double angle = harmonic * phase[i] + 2 * std::numbers::pi * detuned_hz * t[i];
+      const double d = x[i] - x[i - 1];  // the difference flattens the slow part of the spectrum
+      re += d * std::cos(angle), im += d * std::sin(angle);
+    }
+    return re * re + im * im;
+  };
+  const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
+  const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
+  double line = 0, beside = 0, count = 0;
+  for (const double harmonic : {1.0, 2.0}) {
+    // Folded next to 0 or to half the rate, the line and its neighbours lie on a curved spectrum.
+    const double folded = std::abs(std::remainder(harmonic * hz_of_rotor, rate));
+    if (folded < 6 || folded > rate / 2 - 1) continue;
+    count += 1;
+    line += power(harmonic, 0);
+    for (const double hz : {-4.5, -3.5, -2.5, -1.5, 1.5, 2.5, 3.5, 4.5}) beside += power(harmonic, hz) / 8;
+  }
+  // Each power is exponential: a sum of m has E ln = ln mean + ψ(m) − ln m, ln_bias of 2m samples.
+  if (count == 0) return std::numeric_limits<double>::quiet_NaN();
+  return std::log(line / beside) - (ln_bias(2 * count) - ln_bias(16 * count));
+}
+
+}  // namespace backwash::study::discrepancy

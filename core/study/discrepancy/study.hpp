@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/study/discrepancy/search.hpp"
+
+namespace backwash::study::discrepancy {
+
+enum class Verdict { cause_found, cannot_distinguish, unknown_structure, nothing_found, insufficient };
+const char* to_string(Verdict verdict);
+
+/// What a cause is worth on flights that its parameters were not fitted to.
+struct Gain {
+  double held_out_nats = 0;
+  double rmse_before = 0, rmse_after = 0;          ///< of the window values in the cause's channels, m/s² or ln
+  double low_nats = 0, high_nats = 0;              ///< 95 %, over flights
+  double coverage_before = 0, coverage_after = 0;  ///< share of samples in the model's central 90 % interval
+};
+
+struct Separation {
+  std::string rival, manoeuvre;
+  double expected_nats;
+};
+
+struct NamedCause {
+  Accepted found;
+  Gain gain;
+  std::vector<Separation> separate_by;
+};
+
+struct StudyOptions {
+  SearchOptions search;
+  bool minimum_detectable = true;
+  std::size_t fewest_flights = 10;  ///< fewer do not warrant a name (README.md)
+};
+
+struct StudyResult {
+  Verdict verdict = Verdict::nothing_found;
+  std::vector<NamedCause> causes;
+  std::vector<UnknownStructure> unknown;
+  std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
+  /// Per cause and parameter: least size found with 80 % power.
+  std::map<std::string, std::map<std::string, double>> minimum_detectable;
+  double threshold = 0;  ///< nats
+};
+
+/// The whole procedure on observed flights. About 0.2 s for 12 flights of 100 s, more with the minimum detectable
+/// effects.
+StudyResult study(const Observations& seen, const StudyOptions& options);
+
+/// Expected nats by which 12 further flights of a manoeuvre would separate a cause from its rival, for each manoeuvre
+/// of the list; best first.
+std::vector<Separation> separations(const Evidence& evidence, const Accepted& cause, const Rival& rival);
+
+/// Least first parameter of each testable cause that is found with 80 % power, by injection into sign-flipped
+/// residuals.
+std::map<std::string, std::map<std::string, double>> minimum_detectable(const Evidence& evidence,
+                                                                        const SearchOptions& options, double threshold);
+
+}  // namespace backwash::study::discrepancy

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/field/disturbance_field.hpp"
+
+namespace backwash::study::discrepancy {
+
+inline constexpr double kNoSurface = std::numeric_limits<double>::infinity();  ///< m
+
+/// What stands around a point, by the map.
+struct Around {
+  double height, ceiling_gap;                  ///< to the first occupied voxel straight down and up, m, or kNoSurface
+  std::vector<std::pair<double, Vec3>> walls;  ///< distance, m, and unit direction of each local minimum around, level
+};
+
+/// Surfaces and modelled Σ about a point. Without a map: a floor at z = 0, nothing else, and Σ = Σ_0.
+class Surroundings {
+ public:
+  static constexpr double kSight = 3;  ///< m: walls farther than this are none
+  Surroundings(const map::OccupancyGrid* grid, const Model& model);
+  Around around(const Vec3& p_W) const;
+  /// Diagonal of Σ at p, (m/s²)²: trilinear between points on a lattice of kLattice, evaluated exactly once each.
+  Vec3 sigma(const Vec3& p_W);
+  bool inside_solid(const Vec3& p_W) const { return grid_ && grid_->occupied(grid_->index(p_W)); }
+  bool has_map() const noexcept { return grid_ != nullptr; }
+
+ private:
+  static constexpr double kLattice = 0.15;  ///< m
+  double ray(const Vec3& from, const Vec3& direction, double range) const;
+  const Vec3& lattice_sigma(const Index3& at);
+
+  const map::OccupancyGrid* grid_;
+  Vec3 base_;
+  std::optional<field::ProximityField> field_;
+  Vec3 low_;
+  Index3 size_;
+  std::vector<std::optional<Vec3>> lattice_;
+};
+
+}  // namespace backwash::study::discrepancy

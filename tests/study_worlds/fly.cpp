@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <deque>
+#include <memory>
+
+#include "core/config/config.hpp"
+#include "core/field/disturbance_field.hpp"
+#include "tests/study_worlds/effects.hpp"
+#include "tests/study_worlds/world.hpp"
+
+namespace study_worlds {
+namespace {
+
+using Rng = std::mt19937_64;
+constexpr double kG = 9.80665, kStep = 0.005;
+
+struct Command {
+  Vec3 p, v, a;
+  double yaw;
+  int segment;
+};
+
+/// Minimum-jerk line, sampled at kStep.
+void append_line(std::vector<Command>& plan, const Vec3& from, const Vec3& to, double yaw_from, double yaw_to,
+                 double a_max) {
+  const double length = (to - from).norm();
+  const double time = std::max({std::sqrt(5.78 * length / a_max), 1.875 * length / 1.3, 1.0});
+  const int n = static_cast<int>(time / kStep);
+  const double turn = std::remainder(yaw_to - yaw_from, 2 * M_PI);
+  for (int i = 0; i < n; ++i) {
+    const double s = (i + 0.5) / n;
+    const double q = s * s * s * (10 + s * (6 * s - 15)), dq = 30 * s * s * (1 - s) * (1 - s) / time,
+                 ddq = 60 * s * (1 - s) * (1 - 2 * s) / (time * time);
+    plan.push_back({from + q * (to - from), dq * (to - from), ddq * (to - from), yaw_from + q * turn, -1});
+  }
+}
+
+/// Hover points: near the floor, a ceiling, a wall, and anywhere; at least 0.35 m from everything but by intent.
+Vec3 draw_spot(const Room& room, Rng& rng, int kind) {
+  const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
+  const Box& in = room.inside;
+  for (;;) {
+    Vec3 p(u(0.5, in.high.x() - 0.5), u(0.5, in.high.y() - 0.5), u(0.5, in.high.z() - 0.5));
+    if (kind == 0) p.z() = u(0.3, 0.45);
+    if (kind == 2) (u(0, 1) < 0.5 ? p.x() : p.y()) = u(0.3, 0.45);
+    if (kind == 3) p.y() = in.high.y() - u(0.3, 0.45);
+    bool inside_solid = false;
+    for (const Box& b : room.solids)
+      inside_solid = inside_solid || Box{b.low - Vec3::Constant(0.25), b.high + Vec3::Constant(0.25)}.contains(p);
+    const double gap = room.gap_to_ceiling(p), height = room.height_above_solid(p);
+    if (kind == 1 && std::isfinite(gap)) p.z() += gap - u(0.22, 0.4), inside_solid = p.z() < 0.9;
+    if (!inside_solid && height > 0.25) return p;
+  }
+}
+
+std::vector<Command> draw_plan(const World& world, Rng& rng) {
+  const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
+  const bool turns = world.request.confound != "yaw";
+  const int dwells = static_cast<int>(u(9, 13));
+  std::vector<int> kinds;
+  for (int i = 0; i < dwells; ++i) kinds.push_back(i % 5);
+  std::shuffle(kinds.begin(), kinds.end(), rng);
+  std::vector<Command> plan;
+  Vec3 at = draw_spot(world.room, rng, 4);
+  double yaw = turns ? u(-M_PI, M_PI) : 0;
+  for (int i = 0; i < dwells; ++i) {
+    const int n = static_cast<int>(u(4, 7) / kStep);
+    for (int k = 0; k < n; ++k) plan.push_back({at, Vec3::Zero(), Vec3::Zero(), yaw, i});
+    const Vec3 next = draw_spot(world.room, rng, kinds[static_cast<std::size_t>(i)]);
+    const double turned = turns ? u(-M_PI, M_PI) : 0;
+    const double a_max = u(0.8, 2.0), z = 1.2;
+    append_line(plan, at, {at.x(), at.y(), z}, yaw, yaw, a_max);
+    append_line(plan, {at.x(), at.y(), z}, {next.x(), next.y(), z}, yaw, turned, a_max);
+    append_line(plan, {next.x(), next.y(), z}, next, turned, turned, a_max);
+    at = next, yaw = turned;
+  }
+  return plan;
+}
+
+double thrust_of(const Craft& c, double u, double slope) {
+  const double f = c.thr_mdl_fac, u0 = [&] {
+    const double share = c.mass * kG / c.max_thrust;
+    return (std::sqrt((1 - f) * (1 - f) + 4 * f * share) - (1 - f)) / (2 * f);
+  }();
+  const double nominal = c.max_thrust * (f * u * u + (1 - f) * u);
+  const double steeper = c.max_thrust * (2 * f * u0 + 1 - f) * (u - u0);
+  return nominal + slope * steeper;
+}
+
+double command_of(const Craft& c, double thrust) {
+  const double f = c.thr_mdl_fac, share = std::clamp(thrust / c.max_thrust, 0.02, 1.0);
+  return (std::sqrt((1 - f) * (1 - f) + 4 * f * share) - (1 - f)) / (2 * f);
+}
+
+/// One craft in one flight, integrated with the midpoint rule at 5 ms.
+class Flight {
+ public:
+  Flight(const World& world, const backwash::field::ProximityField& field, int number)
+      : world_(world),
+        field_(field),
+        rng_(world.request.seed * 1000003 + static_cast<std::uint64_t>(number) * 7717 + 5) {
+    const auto n = [&] { return normal_(rng_); };
+    const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng_); };
+    ln_var_ = world.ln_var_vehicle + 0.36 * n();
+    accelerometer_bias_ = 0.02 * Vec3(n(), n(), n());
+    thrust_scale_ = 1 + 0.003 * n();
+    tilt_ = 0.002 * Vec3(n(), n(), 0);
+    charge_ = world.request.confound == "battery" ? 1.0 : u(0.55, 1.0);
+    ambient_ = u(18, 28);
+    accelerometer_noise_ = u(0.03, 0.08);
+    tail_nu_ = world.effects.of("heavy_tails") != 0 ? 1 : 0;
+    for (int i = 0; i < 8; ++i) {
+      Rng own(world.request.seed * 31 + static_cast<std::uint64_t>(i));
+      offset_[i] = std::normal_distribution()(own);
+    }
+  }
+
+  Table fly() {
+    const auto plan = draw_plan(world_, rng_);
+    p_ = plan.front().p;
+    thrust_ = produced_ = kG * Vec3::UnitZ();
+    Table table;
+    table.names = {"t_s",        "x_m",        "y_m",         "z_m",           "vx_mps",      "vy_mps",
+                   "vz_mps",     "ax_mps2",    "ay_mps2",     "az_mps2",       "qw",          "qx",
+                   "qy",         "qz",         "cmd_x_m",     "cmd_y_m",       "cmd_z_m",     "cmd_vx_mps",
+                   "cmd_vy_mps", "cmd_vz_mps", "cmd_ax_mps2", "cmd_ay_mps2",   "cmd_az_mps2", "thrust",
+                   "battery_v",  "rpm1",       "rpm2",        "rpm3",          "rpm4",        "motor1",
+                   "motor2",     "motor3",     "motor4",      "temperature_c", "segment"};
+    double next_row = 0;
+    const double frozen_from = std::uniform_real_distribution(0.0, 4.0)(rng_) * 60;  // often after the end
+    const double dropout_at = std::uniform_real_distribution(0.0, 3.0)(rng_) * 60;
+    for (std::size_t k = 0; k < plan.size(); ++k) {
+      const double t = static_cast<double>(k) * kStep;
+      step(plan, k, t);
+      if (t < next_row) continue;
+      next_row += (1 + world_.jitter * std::uniform_real_distribution(-0.5, 0.5)(rng_)) / world_.rate_hz;
+      if (next_row < t) next_row = t;
+      if (t > dropout_at && t < dropout_at + 0.7) continue;
+      auto row = record(plan[k], t);
+      if (t > frozen_from && t < frozen_from + 1.5 && !table.rows.empty()) {
+        row = table.rows.back();
+        row[0] = t;
+      }
+      table.rows.push_back(std::move(row));
+    }
+    return table;
+  }
+
+ private:
+  double normal() { return normal_(rng_); }
+  Instant instant(double t) const {
+    return {t, p_, v_, yaw_, produced_.norm(), (16.8 - voltage_) / 16.8, temperature_};
+  }
+
+  void step(const std::vector<Command>& plan, std::size_t k, double t) {
+    const Craft& c = world_.craft;
+    const double late = c.latency + world_.effects.of("command_latency");
+    const std::size_t back = static_cast<std::size_t>(late / kStep + 0.5);
+    const Command& cmd = plan[k > back ? k - back : 0];
+    const Vec3 kp(c.kp_h, c.kp_h, c.kp_z), kd(c.kd_h, c.kd_h, c.kd_z);
+    const Vec3 believed_p = p_ + vio_, believed_v = v_;
+    const Vec3 wanted =
+        cmd.a + kp.cwiseProduct(cmd.p - believed_p) + kd.cwiseProduct(cmd.v - believed_v) + kG * Vec3::UnitZ();
+    thrust_ += (wanted - thrust_) * (1 - std::exp(-kStep / c.attitude_lag));  // attitude and thrust follow
+    yaw_ = plan[k].yaw;
+    u_ = command_of(c, c.mass * thrust_.norm());
+    const double believed = thrust_of(c, u_, 0) / c.mass;
+    double real = thrust_of(c, u_, world_.effects.of("thrust_slope")) / c.mass;
+    if (const double tau = world_.effects.of("actuator_lag"); tau > 0) {
+      lagged_ += (real - lagged_) * (1 - std::exp(-kStep / tau));
+      real = lagged_;
+    } else {
+      lagged_ = real;
+    }
+    produced_ = believed * thrust_.normalized();
+    battery(believed);
+    const Instant now = instant(t);
+    const Vec3 force = real * thrust_scale_ * thrust_.normalized() - kG * Vec3::UnitZ() + heading() * tilt_ * kG;
+    const auto acceleration = [&](const Instant& at) -> Vec3 { return force + wind_ + hidden_push(world_, at); };
+    airflow(now);
+    Instant half = now;
+    const Vec3 a0 = acceleration(now);
+    half.p += 0.5 * kStep * v_, half.v += 0.5 * kStep * a0;
+    a_ = acceleration(half);
+    p_ += kStep * half.v;
+    v_ += kStep * a_;
+    vio_ += -vio_ * kStep / 4 + 0.004 * std::sqrt(kStep) * Vec3(normal(), normal(), normal());
+    spin(t);
+  }
+
+  Eigen::Matrix3d heading() const { return Eigen::AngleAxisd(yaw_, Vec3::UnitZ()).toRotationMatrix(); }
+
+  void battery(double believed) {
+    const double current = 14 * std::pow(believed / kG, 1.5);
+    charge_ -= current * kStep / 3600 / 1.6;
+    voltage_ = 14.2 + 2.6 * charge_ - 0.3 * std::exp(-charge_ * 9) - 0.022 * current;
+    temperature_ = ambient_ + 14 * (1 - charge_) * 0.8;
+  }
+
+  /// Gusts: Ornstein–Uhlenbeck of the modelled variance, whose logarithm wanders by the measured scatter.
+  void airflow(const Instant& now) {
+    if (!cast_at_ || (now.p - *cast_at_).norm() > 0.07) {
+      cast_at_ = now.p;
+      sigma_ = field_.at(now.p).sigma();
+    }
+    const double tau = 0.17, decay = std::exp(-kStep / tau), kick = std::sqrt(1 - decay * decay);
+    ln_wander_ += -ln_wander_ * kStep / 1.5 + 0.4 * std::sqrt(2 * kStep / 1.5) * normal();
+    double ln = ln_var_ + ln_wander_ - 0.08 + hidden_ln_variance(world_, now);
+    const Vec3 sd(std::sqrt(sigma_.xx), std::sqrt(sigma_.yy), std::sqrt(sigma_.zz));
+    for (int i = 0; i < 3; ++i) gust_[i] = decay * gust_[i] + kick * normal();
+    wind_ = std::exp(0.5 * ln) * sd.cwiseProduct(gust_);
+    if (tail_nu_ > 0) {  // short bursts: kurtosis 3 exp(size), the same variance
+      burst_left_ -= kStep;
+      if (burst_left_ < -0.7 * std::exponential_distribution(1.0)(rng_) - 0.4) burst_left_ = 0.08;
+      const double k = std::exp(world_.effects.of("heavy_tails")) - 1;
+      const double inside = std::sqrt(1 + k * 4), outside = std::sqrt(std::max(0.1, 1 - k * 0.25));
+      wind_ *= burst_left_ > 0 ? inside : outside;
+    }
+  }
+
+  void spin(double) {
+    const double damage = world_.effects.of("propeller_damage");
+    const int damaged = static_cast<int>(world_.effects.shape_of("propeller_damage"));
+    for (int i = 0; i < 4; ++i) {
+      const bool hurt = damage != 0 && i == damaged;
+      const double need = produced_.norm() / kG / (hurt ? 1 - damage : 1.0);
+      spin_[i] = (world_.craft.model == "quad-7in" ? 7200 : 11000) * std::sqrt(need) * (1 + 0.004 * offset_[i]);
+      motor_[i] = command_of(world_.craft, world_.craft.mass * kG * need) * (1 + 0.006 * offset_[i + 4]);
+      phase_[i] += 2 * M_PI * spin_[i] / 60 * kStep;
+    }
+  }
+  Vec3 measured_acceleration(double t) {
+    Vec3 a = a_ + accelerometer_bias_ + accelerometer_noise_ * Vec3(normal(), normal(), normal());
+    const double drift = world_.effects.of("imu_drift");
+    const double direction = world_.effects.shape_of("imu_drift");
+    if (drift != 0)
+      a += drift * (1.6 * (1 - std::exp(-t / 100))) * (heading() * Vec3(std::cos(direction), std::sin(direction), 0.3));
+    const double line = world_.effects.of("vibration") / 2, hurt = world_.effects.of("propeller_damage") * 3;
+    for (int i = 0; i < 4; ++i) {
+      const bool damaged = hurt > 0 && i == static_cast<int>(world_.effects.shape_of("propeller_damage"));
+      const double amplitude = line + (damaged ? hurt : 0);
+      if (amplitude > 0)
+        a += amplitude * Vec3(0.6 * std::cos(phase_[i]), 0.6 * std::sin(phase_[i]), std::sin(phase_[i] + i));
+    }
+    return a;
+  }
+
+  double rpm_reading(int i) {
+    const double fault = world_.effects.of("rotor_sensor_fault");
+    if (fault != 0 && i == static_cast<int>(world_.effects.shape_of("rotor_sensor_fault"))) {
+      if (fault > 0) return spin_[i] * (1 + fault) * (1 + 0.004 * normal());
+      if (std::uniform_real_distribution(0.0, 1.0)(rng_) < -fault) return 0;
+    }
+    return spin_[i] * (1 + 0.004 * normal());
+  }
+
+  std::vector<double> record(const Command& cmd, double t) {
+    const Vec3 z = thrust_.normalized();
+    const Vec3 x = Vec3(-std::sin(yaw_), std::cos(yaw_), 0).cross(z).normalized();
+    Eigen::Matrix3d R;
+    R << x, z.cross(x), z;
+    const Eigen::Quaterniond q(R);
+    const Vec3 p = p_ + vio_, a = measured_acceleration(t);
+    std::vector<double> row = {t,         p.x(),     p.y(),     p.z(),     v_.x(),
+                               v_.y(),    v_.z(),    a.x(),     a.y(),     a.z(),
+                               q.w(),     q.x(),     q.y(),     q.z(),     cmd.p.x(),
+                               cmd.p.y(), cmd.p.z(), cmd.v.x(), cmd.v.y(), cmd.v.z(),
+                               cmd.a.x(), cmd.a.y(), cmd.a.z(), u_,        voltage_ + 0.02 * normal()};
+    for (int i = 0; i < 4; ++i) row.push_back(rpm_reading(i));
+    for (int i = 0; i < 4; ++i) row.push_back(motor_[i] * (1 + 0.004 * normal()));
+    row.push_back(temperature_ + 0.1 * normal());
+    row.push_back(cmd.segment);
+    return row;
+  }
+
+  const World& world_;
+  const backwash::field::ProximityField& field_;
+  Rng rng_;
+  std::normal_distribution<double> normal_;
+  Vec3 p_, v_ = Vec3::Zero(), a_ = Vec3::Zero(), thrust_, produced_, wind_ = Vec3::Zero(), gust_ = Vec3::Zero(),
+           vio_ = Vec3::Zero(), accelerometer_bias_, tilt_;
+  std::optional<Vec3> cast_at_;
+  backwash::Variance sigma_;
+  double yaw_ = 0, u_ = 0, lagged_ = kG, charge_, voltage_ = 16, temperature_ = 25, ambient_, ln_var_, ln_wander_ = 0,
+         thrust_scale_, accelerometer_noise_, burst_left_ = 0;
+  int tail_nu_;
+  double offset_[8];  // the craft's own small asymmetry, the same in each of its flights
+  double spin_[4] = {}, motor_[4] = {}, phase_[4] = {0.3, 1.9, 4.0, 5.5};
+};
+
+backwash::map::OccupancyGrid true_grid(const Room& room) {
+  const double a = 0.1;
+  const Vec3 low = room.inside.low - Vec3::Constant(0.4), high = room.inside.high + Vec3::Constant(0.4);
+  const Eigen::Vector3i size = ((high - low) / a).array().round().cast<int>();
+  backwash::map::OccupancyGrid grid(low, a, size);
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const auto v = grid.voxel(n);
+    const Vec3 p = grid.center(v);
+    bool solid = !room.inside.contains(p);
+    for (const Box& b : room.solids) solid = solid || b.contains(p);
+    grid.set(v, solid ? backwash::map::Cell::occupied : backwash::map::Cell::free);
+  }
+  return grid;
+}
+
+}  // namespace
+
+std::vector<Table> fly_all(const World& world) {
+  auto model = *backwash::config::load_model("builtin:" + world.craft.model);
+  model.ground.r0 = world.craft.diagonal_radius;
+  const auto grid = true_grid(world.room);
+  const backwash::field::ProximityField field(grid, model);
+  std::vector<Table> flights;
+  for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, field, i).fly());
+  return flights;
+}
+
+}  // namespace study_worlds

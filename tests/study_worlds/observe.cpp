@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tests/study_worlds/observe.hpp"
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+
+namespace study_worlds {
+
+namespace discrepancy = backwash::study::discrepancy;
+
+discrepancy::Observations observe(const World& world, const std::filesystem::path& folder) {
+  write_world_files(world, folder);
+  const auto vehicle = backwash::config::load_vehicle((folder / "vehicle.toml").string()).value();
+  auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
+  model.ground.r0 = vehicle.body.diagonal_radius;
+  const auto grid = backwash::map::load_map((folder / "map.bt").string()).value();
+  discrepancy::Observer observer(vehicle, model, &grid);
+  for (const Table& table : fly_all(world)) {
+    backwash::study::FlightLog log;
+    for (std::size_t c = 0; c < table.names.size(); ++c) {
+      std::vector<double> column;
+      for (const auto& row : table.rows) column.push_back(row[c]);
+      (table.names[c] == "t_s" ? log.t_s : log.columns[table.names[c]]) = std::move(column);
+    }
+    observer.add(log);
+  }
+  return observer.finish();
+}
+
+std::string told(const discrepancy::StudyResult& result) {
+  std::string text;
+  for (const auto& cause : result.causes) {
+    text += (text.empty() ? "" : " + ") + cause.found.form->cause;
+    for (const auto& rival : cause.found.rivals) text += "|" + rival.name;
+  }
+  if (result.causes.empty())
+    for (const auto& u : result.unknown) text += "?" + u.along;
+  return text.empty() ? "nothing" : text;
+}
+
+}  // namespace study_worlds

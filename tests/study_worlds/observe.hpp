@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+
+#include "core/study/discrepancy/study.hpp"
+#include "tests/study_worlds/world.hpp"
+
+namespace study_worlds {
+
+/// What the study sees of a world: its logs (never written), its map and vehicle files (in `folder`), the model's name.
+backwash::study::discrepancy::Observations observe(const World& world, const std::filesystem::path& folder);
+
+/// "ceiling", "trim|draft" for a set, "a + b" for two causes, "?z_m" for unknown structure, "nothing".
+std::string told(const backwash::study::discrepancy::StudyResult& result);
+
+}  // namespace study_worlds

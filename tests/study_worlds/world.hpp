@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+/// Worlds with a hidden effect for the study. Nothing of the study's code is used here: own integrator, own forms of
+/// every effect, own queries of the room. Only the null model's Σ (what the simulation claims) comes from core/field.
+namespace study_worlds {
+
+using Vec3 = Eigen::Vector3d;
+
+/// What to make. Unset names are drawn from the seed.
+struct Request {
+  std::uint64_t seed = 1;
+  std::vector<std::string> causes;  ///< names of interfaces.md, or "unknown"; empty: none
+  double size = 1;                  ///< in units of the effect-size table (core/study/discrepancy/README.md)
+  int flights = 12;
+  std::string confound;  ///< "yaw": never turns; "battery": all flights start full and equal; empty: none
+};
+
+/// Axis-aligned room: the inside of a box, less solid boxes. Distances are closed forms.
+struct Box {
+  Vec3 low, high;
+  bool contains(const Vec3& p) const { return (p.array() >= low.array()).all() && (p.array() <= high.array()).all(); }
+};
+struct Room {
+  Box inside;
+  std::vector<Box> solids;
+  bool open_top = false;
+  double height_above_solid(const Vec3& p) const;  ///< m
+  double gap_to_ceiling(const Vec3& p) const;      ///< m; infinite where there is none
+};
+
+struct Craft {
+  double mass, max_thrust, thr_mdl_fac, rotor_radius, radius, diagonal_radius;
+  double kp_h, kd_h, kp_z, kd_z, latency, attitude_lag;
+  std::string model;  ///< builtin model's name
+};
+
+/// One number per cause, signed, in the table's units; what is absent is zero.
+struct Effects {
+  std::map<std::string, double> size;
+  std::map<std::string, double> shape;  ///< a second, drawn number: length, time or direction
+  double of(const std::string& name) const { return size.contains(name) ? size.at(name) : 0.0; }
+  double shape_of(const std::string& name) const { return shape.contains(name) ? shape.at(name) : 0.0; }
+};
+
+struct World {
+  Request request;
+  Room room;
+  Craft craft;
+  Effects effects;
+  double rate_hz, jitter, ln_var_vehicle;
+};
+
+World draw_world(const Request& request);
+/// One flight as a table: column names and rows. Deterministic in (world, number).
+struct Table {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> rows;
+};
+std::vector<Table> fly_all(const World& world);
+
+/// Writes map.bt and vehicle.toml.
+void write_world_files(const World& world, const std::filesystem::path& folder);
+/// Writes those and the flights with shuffled names and columns; returns the flights' paths.
+std::vector<std::filesystem::path> write_world(const World& world, const std::filesystem::path& folder);
+/// The answer, one line of JSON; never written beside the flights.
+std::string truth_line(const World& world);
+
+const std::vector<std::string>& cause_names();
+
+}  // namespace study_worlds
