@@ -22,10 +22,10 @@ struct AcceptedSegment {
   std::uint64_t continues = 0;  ///< id of the segment it continues; 0: starts at its first command
   std::size_t branch = 0;       ///< first command that differs from the continued segment's
   std::vector<Setpoint> commands;
-  reach::ReachTube tube;          ///< commands.size() + 1 entries; past its end the last entry holds
-  std::vector<plan::Stop> stops;  ///< ascending by branch; may be empty
-  std::uint32_t closures = 0;     ///< loop closures that the map frame it is in has seen
-  double clearance = 0;           ///< smallest of its swept tube in the map it was verified in, m
+  reach::ReachTube tube;            ///< commands.size() + 1 entries; past its end the last entry holds
+  std::vector<plan::Stop> stops{};  ///< ascending by branch; may be empty
+  std::uint32_t closures = 0;       ///< loop closures that the map frame it is in has seen
+  double clearance = 0;             ///< smallest of its swept tube in the map it was verified in, m
 };
 
 /// What one tick says about the measured position (model.md section 5.4).
