@@ -83,8 +83,8 @@ FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
     FlightLog q;
     Rows turned(position, q);
     for (int i = 0; i < 4; ++i) {
-      const std::string index = index;
-      turned.join(attitude, index, index, 1);
+      const std::string name = std::string("q[").append(std::to_string(i)).append("]");
+      turned.join(attitude, name, name, 1);
     }
     if (q.columns.size() == 4) {
       for (std::size_t row = 0; row < position.t_s.size(); ++row) {
