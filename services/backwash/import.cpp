@@ -3,6 +3,8 @@
 #include <filesystem>
 
 #include "core/study/import_airgarage.hpp"
+#include "core/study/import_crazypad.hpp"
+#include "core/study/ulog.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -18,6 +20,8 @@ constexpr struct {
   Importer import;
 } kImporters[] = {
     {"airgarage", study::import_airgarage},
+    {"crazypad", study::import_crazypad},
+    {"ulog", study::read_ulog},
 };
 
 struct Options {
@@ -74,7 +78,7 @@ int run(const Options& options) {
 Verb import_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   auto* command = app.add_subcommand("import", "Recordings of others as flight logs");
-  command->add_option("kind", options->kind, "airgarage")->required();
+  command->add_option("kind", options->kind, "airgarage, crazypad or ulog")->required();
   command->add_option("files", options->files, "recordings")->required();
   command->add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each")->required();
   command->add_flag("--json", options->json, "one JSON object on stdout");

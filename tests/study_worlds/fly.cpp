@@ -194,7 +194,8 @@ class Flight {
     const double current = 14 * std::pow(believed / kG, 1.5);
     charge_ -= current * kStep / 3600 / 1.6;
     voltage_ = 14.2 + 2.6 * charge_ - 0.3 * std::exp(-charge_ * 9) - 0.022 * current;
-    temperature_ = ambient_ + 14 * (1 - charge_) * 0.8;
+    warmth_ += (8 - warmth_) * kStep / 90;
+    temperature_ = ambient_ + warmth_;
   }
 
   /// Gusts: Ornstein–Uhlenbeck of the modelled variance, whose logarithm wanders by the measured scatter.
@@ -281,8 +282,8 @@ class Flight {
            vio_ = Vec3::Zero(), accelerometer_bias_, tilt_;
   std::optional<Vec3> cast_at_;
   backwash::Variance sigma_;
-  double yaw_ = 0, u_ = 0, lagged_ = kG, charge_, voltage_ = 16, temperature_ = 25, ambient_, ln_var_, ln_wander_ = 0,
-         thrust_scale_, accelerometer_noise_, burst_left_ = 0;
+  double yaw_ = 0, u_ = 0, lagged_ = kG, charge_, voltage_ = 16, temperature_ = 25, ambient_, warmth_ = 0, ln_var_,
+         ln_wander_ = 0, thrust_scale_, accelerometer_noise_, burst_left_ = 0;
   int tail_nu_;
   double offset_[8];  // the craft's own small asymmetry, the same in each of its flights
   double spin_[4] = {}, motor_[4] = {}, phase_[4] = {0.3, 1.9, 4.0, 5.5};

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The study against worlds of the independent generator. Few worlds: they show that it works; the rates are the nightly
+// matrix's (tests/nightly/study.sh). The seed is fixed by default and printed; BACKWASH_STUDY_SEED changes it.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "core/config/config.hpp"
+#include "core/study/discrepancy/extend.hpp"
+#include "core/study/import_crazypad.hpp"
+#include "tests/study_worlds/observe.hpp"
+
+namespace {
+
+using namespace backwash::study;
+using namespace backwash::study::discrepancy;
+
+std::uint64_t seed() {
+  const char* set = std::getenv("BACKWASH_STUDY_SEED");
+  const std::uint64_t value = set ? std::strtoull(set, nullptr, 10) : 4711;
+  ::testing::Test::RecordProperty("seed", std::to_string(value));
+  return value;
+}
+
+std::filesystem::path folder() {
+  return std::filesystem::temp_directory_path() / ("study-test-" + std::to_string(::getpid()));
+}
+
+Observations world_with(const std::vector<std::string>& causes, double size, int flights = 12, int number = 0) {
+  const study_worlds::Request request{seed() + static_cast<std::uint64_t>(number), causes, size, flights, ""};
+  return study_worlds::observe(study_worlds::draw_world(request), folder());
+}
+
+StudyResult studied(const Observations& seen, bool detectable = false) {
+  StudyOptions options;
+  options.minimum_detectable = detectable;
+  return study(seen, options);
+}
+
+class NamesTheHiddenCause : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(NamesTheHiddenCause, AtOneAndAHalfTimesTheTablesSize) {
+  const auto result = studied(world_with({GetParam()}, 1.5));
+  ASSERT_FALSE(result.causes.empty()) << "seed " << seed() << ": " << study_worlds::told(result);
+  const auto& found = result.causes.front().found;
+  bool in_set = found.form->cause == GetParam();
+  for (const auto& rival : found.rivals) in_set = in_set || rival.name == GetParam();
+  EXPECT_TRUE(in_set) << "seed " << seed() << ": " << study_worlds::told(result);
+  EXPECT_LE(found.p, 0.03);
+  EXPECT_GT(result.causes.front().gain.held_out_nats, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(OfTheCatalogue, NamesTheHiddenCause, ::testing::ValuesIn(study_worlds::cause_names()),
+                         [](const auto& instance) { return instance.param; });
+
+TEST(Study, FindsNothingInMostWorldsWithoutAnEffect) {
+  int alarms = 0;
+  std::string told;
+  for (int k = 0; k < 4; ++k) {
+    const auto result = studied(world_with({}, 1, 12, k));
+    alarms += result.verdict == Verdict::nothing_found ? 0 : 1;
+    told += study_worlds::told(result) + "; ";
+  }
+  EXPECT_LE(alarms, 1) << "seed " << seed() << ": " << told;
+}
+
+TEST(Study, SaysUnknownStructureForACauseOutsideTheCatalogue) {
+  const auto result = studied(world_with({"unknown"}, 1.5));
+  EXPECT_EQ(result.verdict, Verdict::unknown_structure) << "seed " << seed() << ": " << study_worlds::told(result);
+}
+
+TEST(Study, NamesNothingFromFewerThanTenFlights) {
+  const auto result = studied(world_with({"ceiling"}, 3, 6));
+  EXPECT_EQ(result.verdict, Verdict::insufficient);
+  EXPECT_TRUE(result.causes.empty());
+}
+
+TEST(Study, FindsTheInjectedMassWithinItsInterval) {
+  const study_worlds::Request request{seed(), {"payload"}, 2, 12, ""};
+  const auto world = study_worlds::draw_world(request);
+  const auto result = studied(study_worlds::observe(world, folder()));
+  ASSERT_EQ(result.causes.size(), 1u) << study_worlds::told(result);
+  const double relative = world.effects.of("payload"), truth = 1 - 1 / (1 + relative);
+  EXPECT_NEAR(result.causes[0].found.parameters[0].value, truth, 0.2 * std::abs(truth));
+}
+
+TEST(Study, FindsNoMoreOfACauseThatItsExtendedModelHolds) {
+  auto seen = world_with({"ceiling"}, 2);
+  const auto before = studied(seen);
+  ASSERT_EQ(study_worlds::told(before).substr(0, 7), "ceiling");
+  EXPECT_TRUE(discrepancy::apply(terms_of(before), seen).empty());
+  for (const auto& cause : studied(seen).causes) EXPECT_NE(cause.found.form->cause, "ceiling");
+}
+
+TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
+  const auto seen = world_with({"ceiling"}, 2);
+  const auto path = (folder() / "extended.toml").string();
+  const auto model = backwash::config::load_model("builtin:quad-5in").value();
+  const auto result = studied(seen);
+  {
+    std::FILE* file = std::fopen(path.c_str(), "w");
+    std::fputs(extended_model_text(model, result, seen, "builtin:quad-5in", "test").c_str(), file);
+    std::fclose(file);
+  }
+  const auto read = backwash::config::load_model(path);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_GT(read->bound.mean_vertical, model.bound.mean_vertical);
+}
+
+TEST(ImportCrazyPad, ConvertsUnitsAndNamesWhatIsMissing) {
+  const std::string path = std::string(BACKWASH_SHARED_DATA) + "/crazypad/normal__e8_log00.csv";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
+  const auto log = import_crazypad(path);
+  ASSERT_TRUE(log) << log.error().message;
+  for (const double u : log->column("motor3")) EXPECT_LE(u, 1.0);
+  for (const double v : log->column("battery_v")) EXPECT_LT(std::abs(v - 3.8), 1.0);
+}
+
+}  // namespace
