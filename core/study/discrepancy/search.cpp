@@ -115,8 +115,12 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       const Normal rest = evidence.normal(columns, with_ours);
       if (rest.solvable && rest.gain() > 0.5 * theirs.gain()) continue;
       const auto [lead, error] = difference(ours, theirs);
-      // Motor commands alone do not tell a damaged rotor from a weight near it: only the line of its rate does.
-      if (own.form->cause == "propeller_damage" && own.theta.size() == 1 && form.cause == "payload") {
+      // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
+      // its rate does.
+      const auto motors_alone = [](const Form& f) {
+        return (f.cause == "propeller_damage" && f.parameters.size() == 1) || (f.cause == "payload" && f.integer_scale);
+      };
+      if (motors_alone(*own.form) && motors_alone(form)) {
         found.push_back({form.cause, &form, scale, lead});
         continue;
       }
