@@ -294,7 +294,7 @@ std::vector<Form> rotors() {
        .scales = kRotors,
        .integer_scale = true,
        .constant = true,
-       .least = 0.03,
+       .least = 0.04,
        .one_sided = true,
        .columns = [](const Windows& ws, double rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; }},
       {.cause = "propeller_damage",
@@ -304,7 +304,7 @@ std::vector<Form> rotors() {
        .scales = kRotors,
        .integer_scale = true,
        .constant = true,
-       .least = 0.03,
+       .least = 0.04,
        .one_sided = true,
        .columns =
            [](const Windows& ws, double rotor) {
@@ -339,7 +339,7 @@ std::vector<Form> rotors() {
        .scales = kRotors,
        .integer_scale = true,
        .constant = true,
-       .least = 0.03,
+       .least = 0.06,
        .columns = [](const Windows& ws, double rotor) { return std::vector{one_rotor(kRpm1, ws, rotor, true)}; }},
       {.cause = "rotor_sensor_fault",
        .formula = "a share of one rotor's rpm readings is stuck or missing",
