@@ -105,6 +105,8 @@ class Decoder {
         log_.dropouts += 1, log_.dropped_s += 1e-3 * little<std::uint16_t>(body.data());
         return std::nullopt;
       default:
+        // Later versions may add messages, but all types are capital letters: anything else is damage.
+        if (type < 'A' || type > 'Z') return bad("a message type that is no letter; the file is damaged here");
         return std::nullopt;
     }
   }

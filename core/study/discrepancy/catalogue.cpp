@@ -294,7 +294,7 @@ std::vector<Form> rotors() {
        .scales = kRotors,
        .integer_scale = true,
        .constant = true,
-       .least = 0.03,
+       .least = 0.04,
        .one_sided = true,
        .columns = [](const Windows& ws, double rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; }},
       {.cause = "propeller_damage",
@@ -304,11 +304,33 @@ std::vector<Form> rotors() {
        .scales = kRotors,
        .integer_scale = true,
        .constant = true,
-       .least = 0.03,
+       .least = 0.04,
        .one_sided = true,
        .columns =
            [](const Windows& ws, double rotor) {
              return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
+           }},
+      {.cause = "payload",
+       .formula = "an off-centre weight: rotors that face each other need (1 + m) and (1 - m) of the mean",
+       .parameters = {"m_first", "m_second"},
+       .scale_name = "pairing",
+       .scales = {0, 1, 2},
+       .integer_scale = true,
+       .constant = true,
+       .floor = 0.02,
+       .columns =
+           [](const Windows& ws, double pairing) {
+             // Which rotors face each other depends on the autopilot: 1-2 and 3-4, 1-3 and 2-4, or 1-4 and 2-3.
+             constexpr std::size_t kFacing[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
+             const auto& pair = kFacing[static_cast<std::size_t>(pairing)];
+             std::vector<Column> columns;
+             for (const std::size_t k : {std::size_t{0}, std::size_t{2}}) {
+               const auto first = static_cast<Channel>(kMotor1 + pair[k]);
+               const auto second = static_cast<Channel>(kMotor1 + pair[k + 1]);
+               columns.push_back(
+                   {{{first, std::vector<double>(ws.size(), 1.0)}, {second, std::vector<double>(ws.size(), -1.0)}}});
+             }
+             return columns;
            }},
       {.cause = "rotor_sensor_fault",
        .formula = "one rotor's rpm^2 reads (1 + e) of what its command gives",
@@ -317,7 +339,7 @@ std::vector<Form> rotors() {
        .scales = kRotors,
        .integer_scale = true,
        .constant = true,
-       .least = 0.03,
+       .least = 0.06,
        .columns = [](const Windows& ws, double rotor) { return std::vector{one_rotor(kRpm1, ws, rotor, true)}; }},
       {.cause = "rotor_sensor_fault",
        .formula = "a share of one rotor's rpm readings is stuck or missing",
@@ -390,7 +412,10 @@ std::optional<std::string> why_not_tested(const Form& form, const Observations& 
     if (auto why = need("temperature")) return why;
   if (c == "trim" || c == "imu_drift" || c == "thrust_slope" || c == "actuator_lag")
     if (auto why = need("attitude")) return why;
-  if (c == "thrust_slope" || c == "actuator_lag" || c == "payload")
+  const bool off_centre = c == "payload" && form.integer_scale;
+  if (off_centre)
+    if (auto why = need("motors")) return why;
+  if (c == "thrust_slope" || c == "actuator_lag" || (c == "payload" && !off_centre))
     if (auto why = need("thrust")) return why;
   if (c == "thrust_slope" || c == "actuator_lag" || c == "command_latency")
     if (auto why = need("setpoints")) return why;

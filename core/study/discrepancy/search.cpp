@@ -115,6 +115,15 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       const Normal rest = evidence.normal(columns, with_ours);
       if (rest.solvable && rest.gain() > 0.5 * theirs.gain()) continue;
       const auto [lead, error] = difference(ours, theirs);
+      // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
+      // its rate does.
+      const auto motors_alone = [](const Form& f) {
+        return (f.cause == "propeller_damage" && f.parameters.size() == 1) || (f.cause == "payload" && f.integer_scale);
+      };
+      if (motors_alone(*own.form) && motors_alone(form)) {
+        found.push_back({form.cause, &form, scale, lead});
+        continue;
+      }
       if (lead > kRivalNats && lead > kRivalErrors * error) continue;
       if (lead > 4 * kRivalNats) continue;
       found.push_back({form.cause, &form, scale, lead});
@@ -154,7 +163,8 @@ bool Candidate::effect(const SmallVector& theta) const {
   // Least root mean square of a smooth: as in the catalogue, m/s² and ln variance.
   if (!form) return theta.dot(size * theta) >= std::pow(columns.front().parts.front().channel == kVarX ? 0.2 : 0.03, 2);
   if (std::abs(theta[0]) < form->least || (form->one_sided && theta[0] < 0)) return false;
-  const double square = form->integer_scale ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
+  const double square =
+      form->integer_scale && form->one_sided ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
   return square >= form->floor * form->floor;
 }
 
