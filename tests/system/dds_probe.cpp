@@ -66,7 +66,11 @@ int oversized(const dds::Participant& participant, const std::string& name_space
   m.point_step = 12;
   m.row_step = m.width * 12;
   m.data = {m.row_step, m.row_step, data.data(), false};
-  writer.write(m);
+  // Several times: best effort may lose a fragment of 4.8 MB.
+  for (int n = 0; n < 5; ++n) {
+    writer.write(m);
+    std::this_thread::sleep_for(200ms);
+  }
   m.width = 0xffffffff;
   m.data._length = 12;
   writer.write(m);
