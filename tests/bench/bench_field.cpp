@@ -197,8 +197,8 @@ void two_threads(benchmark::State& state) {
 }
 BENCHMARK(two_threads)->Arg(100)->Unit(benchmark::kMillisecond);
 
-/// The interpolated field beside the exact one at random free points of geb079, distance to obstacles (of voxel
-/// centres) at least the argument, mm. `largest`: largest deviation of an entry over the largest entry, at x, y, z, m.
+/// The interpolated field beside the exact one at random free points of geb079, distance to obstacles (of the voxel's
+/// centre) at least the argument, mm. `largest`: largest deviation of an entry over the largest entry, at x, y, z, m.
 void interpolation(benchmark::State& state) {
   const auto grid = backwash::map::load_map(kBuilding);
   if (!grid) return state.SkipWithError("geb079.bt is absent");
