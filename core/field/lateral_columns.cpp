@@ -21,6 +21,7 @@ LateralColumns::LateralColumns(const map::OccupancyGrid& grid, const Model& mode
     : grid_(&grid),
       model_(model),
       terms_(model, grid.resolution()),
+      sight_(grid),
       range2_(std::pow(model.wall.l_max / grid.resolution() + 1e-6, 2)),
       radius_(static_cast<int>(model.wall.l_max / grid.resolution() + 0.5 + 1e-6) + 1),
       words_((static_cast<std::size_t>(grid.size().z()) + 63) / 64 + 3) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/field/proximity_model.hpp"
+#include "core/field/sight.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/model.hpp"
 
@@ -67,6 +68,7 @@ class LateralColumns {
   const map::OccupancyGrid* grid_;
   Model model_;
   ProximityModel terms_;
+  SightMap sight_;                 ///< for boxes of empty voxels
   double range2_;                  ///< (l̄_w/a)² and a little, voxel edges²
   int radius_;                     ///< of the columns' surroundings, voxels
   std::vector<Segment> segments_;  ///< row by row, then by x, then by normal, then by height
@@ -97,15 +99,15 @@ class LateralSweep {
   };
   /// What all pairs of a voxel in the column at 0 and an element at the offset (dx, dy) have in common.
   struct Line {
-    double d2;                        ///< d_c², m²
-    double flat2;                     ///< the same, voxel edges²
-    int range;                        ///< |z_e − z_q| at most, voxels: the gate |r| ≤ l̄_w
-    int wall_range;                   ///< z_q − z_e at most for the wall term; −1: none
-    double decay;                     ///< exp(−k_w2 d_c²)
-    int corner_low;                   ///< height above the floor voxel of corner[0] …
-    std::vector<double> corner;       ///< … (φ̄_c − φ)/(d_c² + h_c⁶)
-    std::vector<Crossing> crossings;  ///< with rising t_in
-    bool made = false, in_range = false;
+    double d2;                                             ///< d_c², m²
+    double flat2;                                          ///< the same, voxel edges²
+    int range;                                             ///< |z_e − z_q| at most, voxels: the gate |r| ≤ l̄_w
+    int wall_range;                                        ///< z_q − z_e at most for the wall term; −1: none
+    double decay;                                          ///< exp(−k_w2 d_c²)
+    int corner_low;                                        ///< height above the floor voxel of corner[0] …
+    std::vector<double> corner;                            ///< … (φ̄_c − φ)/(d_c² + h_c⁶)
+    std::vector<Crossing> crossings;                       ///< with rising t_in
+    bool made = false, in_range = false, crossed = false;  ///< crossed: `crossings` made
   };
   /// The column in hand.
   struct View {
@@ -114,11 +116,12 @@ class LateralSweep {
     int low, high;  ///< layers of the map that hold targets
   };
 
-  const Line& line(const Segment& segment, int dx, int dy);
+  Line& line(const Segment& segment, int dx, int dy);
   void make(Line& line, const Segment& segment, int dx, int dy) const;
   void add_corner(Line& line) const;
   void add_crossings(Line& line, double c_x, double c_y, int dx, int dy) const;
   void add(const View& view, const Segment& segment, int dy, LateralColumns::Sums& sums);
+  bool surely_clear(const View& view, const Segment& segment, const Line& line, int dx, int dy) const noexcept;
   LateralColumns::Stretch common_stretch(const View& view, const Line& line, int z) const noexcept;
   void add_uncertain(const View& view, const Segment& segment, const Line& line,
                      const LateralColumns::Stretch& stretch);

@@ -44,7 +44,7 @@ void LateralSweep::add(int x, int y, int first_z, std::uint64_t targets, Lateral
   }
 }
 
-const LateralSweep::Line& LateralSweep::line(const Segment& segment, int dx, int dy) {
+LateralSweep::Line& LateralSweep::line(const Segment& segment, int dx, int dy) {
   if (segment.normal < 0) {
     make(other_, segment, dx, dy);
     return other_;
@@ -71,15 +71,15 @@ void LateralSweep::make(Line& line, const Segment& segment, int dx, int dy) cons
     line.wall_range = static_cast<int>(n);
   }
   line.decay = std::exp(-columns_.model_.wall.k2 * line.d2);
-  add_corner(line);
-  add_crossings(line, dx + 0.5 * segment.m_x, dy + 0.5 * segment.m_y, dx, dy);
+  line.corner.clear();
+  if (segment.normal >= 0 || segment.floor != LateralColumns::kNoFloor) add_corner(line);
+  line.crossed = false;
 }
 
 /// The factors of ProximityModel::corner_factor(d_c², h_c) at the heights where they are not zero.
 void LateralSweep::add_corner(Line& line) const {
   const auto& k = columns_.model_.corner;
   const double a = columns_.grid_->resolution(), d = std::sqrt(line.d2);
-  line.corner.clear();
   const double h2 = (k.l_max + 1e-6) * (k.l_max + 1e-6) - line.d2;
   if (h2 < 0) return;
   const double highest = std::sqrt(h2), pi = std::numbers::pi;
@@ -107,16 +107,16 @@ void LateralSweep::add_crossings(Line& line, double c_x, double c_y, int dx, int
   const bool x_leads = std::abs(dx) >= std::abs(dy);
   const double lead = x_leads ? c_x : c_y, side = x_leads ? c_y : c_x;
   const int slabs = std::abs(x_leads ? dx : dy), along = lead < 0 ? -1 : 1;
-  const double size = std::abs(lead), half = 0.5 + kTouch;
+  const double per_size = 1 / std::abs(lead), per_side = side != 0 ? 1 / side : 0, half = 0.5 + kTouch;
   for (int s = 0; s <= slabs; ++s) {
-    const double t0 = std::max(0.0, (s - half) / size), t1 = std::min(end, (s + half) / size);
+    const double t0 = std::max(0.0, (s - half) * per_size), t1 = std::min(end, (s + half) * per_size);
     if (t0 > t1) break;
     const int low = ceil_to_int(std::min(t0 * side, t1 * side) - half);
     const int high = floor_to_int(std::max(t0 * side, t1 * side) + half);
     for (int w = low; w <= high; ++w) {
       double in = t0, out = t1;
       if (side != 0) {
-        const double first = (w - half) / side, second = (w + half) / side;
+        const double first = (w - half) * per_side, second = (w + half) * per_side;
         in = std::max(in, std::min(first, second)), out = std::min(out, std::max(first, second));
       }
       if (in > out) continue;
@@ -124,6 +124,20 @@ void LateralSweep::add_crossings(Line& line, double c_x, double c_y, int dx, int
       line.crossings.push_back({x, y, static_cast<std::ptrdiff_t>(y) * columns_.grid_->size().x() + x, in, out});
     }
   }
+}
+
+/// Whether the box about all lines of sight from the view to the segment is empty.
+bool LateralSweep::surely_clear(const View& view, const Segment& segment, const Line& line, int dx,
+                                int dy) const noexcept {
+  const int corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(line.corner.size());
+  const int down = corners ? line.range : line.wall_range, up = corners ? line.range : 0;
+  const double share = std::max(0.0, 1 - 2 / std::sqrt(line.flat2 + line.range * line.range));
+  const double x = view.x + 0.5, y = view.y + 0.5;
+  const double to_x = x + share * (dx + 0.5 * segment.m_x), to_y = y + share * (dy + 0.5 * segment.m_y);
+  const int low = std::min(view.low, std::max(segment.low, view.low - down));
+  const int high = std::max(view.high, std::min(segment.high, view.high + up));
+  return columns_.sight_.empty(Vec3(std::min(x, to_x), std::min(y, to_y), low + 0.5),
+                               Vec3(std::max(x, to_x), std::max(y, to_y), high + 0.5));
 }
 
 LateralColumns::Stretch LateralSweep::common_stretch(const View& view, const Line& line, int z) const noexcept {
@@ -145,7 +159,7 @@ void LateralSweep::add(const View& view, const Segment& segment, int dy, Lateral
   const int dx = segment.x - view.x;
   const double along = dx * segment.m_x + dy * segment.m_y;
   if (along >= -0.5 || dx * dx + dy * dy + 0.25 + along > columns_.range2_) return;  // behind it, or too far away
-  const Line& l = line(segment, dx, dy);
+  Line& l = line(segment, dx, dy);
   if (!l.in_range) return;
   const int corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(l.corner.size());
   const int corner_low = segment.floor + l.corner_low, corner_high = corner_low + corners - 1;
@@ -160,8 +174,13 @@ void LateralSweep::add(const View& view, const Segment& segment, int dy, Lateral
   part.low = view.first_z + std::countr_zero(part.targets),
   part.high = view.first_z + 63 - std::countl_zero(part.targets);
 
+  const bool clear = surely_clear(part, segment, l, dx, dy);
+  if (!clear && !l.crossed) {
+    add_crossings(l, dx + 0.5 * segment.m_x, dy + 0.5 * segment.m_y, dx, dy);
+    l.crossed = true;
+  }
   const int middle = std::clamp((part.low + part.high) / 2, segment.low, segment.high);
-  const auto stretch = common_stretch(part, l, middle);
+  const auto stretch = clear ? LateralColumns::Stretch{INT16_MIN, INT16_MAX} : common_stretch(part, l, middle);
   const int from = std::max<int>(segment.low, stretch.below + 1), to = std::min<int>(segment.high, stretch.above - 1);
   const int first = std::max<int>(part.low, stretch.below + 1), last = std::min<int>(part.high, stretch.above - 1);
   const int z0 = view.first_z;
@@ -171,8 +190,9 @@ void LateralSweep::add(const View& view, const Segment& segment, int dy, Lateral
   if (from <= to)
     see_stack({from - z0, to - z0, l.wall_range, l.range, columns_.decay_.data()}, first - z0, last - z0, wall_.data(),
               seen_.data());
-  const int lowest = std::min(part.low, std::max(segment.low, part.low - l.range));
-  const int highest = std::max(part.high, std::min(segment.high, part.high + l.range));
+  const int down = corners ? l.range : l.wall_range, up = corners ? l.range : 0;  // to the elements
+  const int lowest = std::min(part.low, std::max(segment.low, part.low - down));
+  const int highest = std::max(part.high, std::min(segment.high, part.high + up));
   if (stretch.below >= lowest || stretch.above <= highest) add_uncertain(part, segment, l, stretch);
 
   const auto &w = segment.wall, &c = segment.corner;
@@ -191,8 +211,10 @@ void LateralSweep::add_uncertain(const View& view, const Segment& segment, const
                                  const LateralColumns::Stretch& stretch) {
   const Index3& size = columns_.grid_->size();
   const auto home = static_cast<std::ptrdiff_t>(columns_.column(view.x, view.y));
-  const int low = std::min(view.low, std::max(segment.low, view.low - line.range));
-  const int high = std::max(view.high, std::min(segment.high, view.high + line.range));
+  const int corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(line.corner.size());
+  const int down = corners ? line.range : line.wall_range, up = corners ? line.range : 0;  // to the elements
+  const int low = std::min(view.low, std::max(segment.low, view.low - down));
+  const int high = std::max(view.high, std::min(segment.high, view.high + up));
   const auto* layer = columns_.stretches_.data() + columns_.grid_->linear(Index3(0, 0, low));
   active_.clear();
   for (const Crossing& c : line.crossings) {
@@ -201,12 +223,12 @@ void LateralSweep::add_uncertain(const View& view, const Segment& segment, const
       continue;
     if (layer[home + c.column].above <= high) active_.push_back(c);
   }
-  const int z0 = view.first_z,
-            corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(line.corner.size());
+  const int z0 = view.first_z;
   const int corner_low = segment.floor + line.corner_low - z0;
   const std::uint64_t with_corner = corners ? bits(corner_low, corner_low + corners - 1) : 0;
   const auto free = [&](int dz) { return bits(stretch.below + 1 - dz - z0, stretch.above - 1 - dz - z0); };
-  for (int dz = -line.range; dz <= line.range; ++dz) {
+  const int dz_end = std::min(up, segment.high - view.low);
+  for (int dz = std::max(-down, segment.low - view.high); dz <= dz_end; ++dz) {
     std::uint64_t lanes = view.targets & bits(segment.low - dz - z0, segment.high - dz - z0) & ~(free(0) & free(dz));
     const bool has_wall = dz <= 0 && -dz <= line.wall_range;
     if (!has_wall) lanes &= with_corner;
@@ -230,7 +252,8 @@ std::uint64_t LateralSweep::blocked(const View& view, const Line& line, int dz, 
   const auto home = static_cast<std::ptrdiff_t>(columns_.column(view.x, view.y));
   const int lowest = -64, highest = columns_.grid_->size().z();
   std::uint64_t met = 0;
-  for (const Crossing& c : active_) {
+  for (std::size_t n = active_.size(); n-- > 0;) {  // what hides an element is most often near it
+    const Crossing& c = active_[n];
     if (c.t_in > end) continue;
     const double in = dz * c.t_in, out = dz * std::min(c.t_out, end);
     const int first = ceil_to_int(std::min(in, out) - half), last = floor_to_int(std::max(in, out) + half);

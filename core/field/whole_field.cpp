@@ -8,7 +8,8 @@
 
 namespace backwash::field {
 
-WholeField::WholeField(const map::OccupancyGrid& grid, const Model& model, std::span<const std::size_t> voxels)
+WholeField::WholeField(const map::OccupancyGrid& grid, const Model& model, std::span<const std::size_t> voxels,
+                       std::size_t most_steps)
     : grid_(&grid),
       model_(model),
       terms_(model, grid.resolution()),
@@ -22,7 +23,7 @@ WholeField::WholeField(const map::OccupancyGrid& grid, const Model& model, std::
   if (voxels.empty()) return;
   add_blocks(voxels);
   add_stencil();
-  add_paths();
+  add_paths(most_steps);
 }
 
 void WholeField::add_rows(std::span<const std::size_t> voxels) {
@@ -77,14 +78,14 @@ void WholeField::add_stencil() {
     }
 }
 
-void WholeField::add_paths() {
+void WholeField::add_paths(std::size_t most_steps) {
   std::vector<std::int32_t> scratch;
   std::vector<std::uint32_t> step_first{0};
   for (std::uint32_t n = 0; n < stencil_.offsets.size(); ++n) {
     const auto steps = path(n, scratch);
     stencil_.steps.insert(stencil_.steps.end(), steps.begin(), steps.end());
     step_first.push_back(static_cast<std::uint32_t>(stencil_.steps.size()));
-    if (stencil_.steps.size() > kMostSteps) {
+    if (stencil_.steps.size() > most_steps) {
       stencil_.steps = {};
       return;
     }

@@ -22,11 +22,14 @@ namespace backwash::field {
 /// decides for 64 voxels q, and for eight such rows with wide vectors, at once. Corner and wall: LateralColumns.
 class WholeField {
  public:
+  static constexpr std::size_t kMostSteps = 16'000'000;  ///< 64 MB
+
   /// Prepares Σ at the centres of the listed free voxels (linear indices of the grid, which must outlive this).
   /// O(cells + listed voxels + a⁻⁴). The lists of voxels on the paths are kept up to 64 MB (a ≥ 0.05 m with the default
-  /// model) and made anew for each block beyond.
-  WholeField(const map::OccupancyGrid& grid, const Model& model, std::span<const std::size_t> voxels);
-  WholeField(map::OccupancyGrid&&, const Model&, std::span<const std::size_t>) = delete;
+  /// model) and made anew for each block beyond; `most_steps`: that limit in entries of 4 bytes.
+  WholeField(const map::OccupancyGrid& grid, const Model& model, std::span<const std::size_t> voxels,
+             std::size_t most_steps = kMostSteps);
+  WholeField(map::OccupancyGrid&&, const Model&, std::span<const std::size_t>, std::size_t = kMostSteps) = delete;
 
   /// The listed voxels in parts: every block of columns that holds one of them.
   std::size_t block_count() const noexcept { return blocks_.size(); }
@@ -39,8 +42,7 @@ class WholeField {
  private:
   friend class BlockSweep;
 
-  static constexpr std::size_t kRows = 16;               // of a block
-  static constexpr std::size_t kMostSteps = 16'000'000;  // kept, 64 MB
+  static constexpr std::size_t kRows = 16;  // of a block
 
   /// Columns x … x + width − 1, y … y + kRows − 1.
   struct Block {
@@ -61,7 +63,7 @@ class WholeField {
   void add_rows(std::span<const std::size_t> voxels);
   void add_blocks(std::span<const std::size_t> voxels);
   void add_stencil();
-  void add_paths();
+  void add_paths(std::size_t most_steps);
   /// What is on the path of an offset, kept or made in `scratch`.
   std::span<const std::int32_t> path(std::uint32_t offset, std::vector<std::int32_t>& scratch) const;
 

@@ -5,10 +5,14 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
-#include <map>
+#include <string>
 
 #include "core/field/disturbance_field.hpp"
+#include "core/field/field_update.hpp"
+#include "core/map/distance_field.hpp"
+#include "core/map/load_map.hpp"
 #include "services/parallel/parallel.hpp"
 #include "tests/bench/furnished_room.hpp"
 
@@ -116,9 +120,8 @@ void prepare(benchmark::State& state) {
 }
 BENCHMARK(prepare)->Arg(100)->Unit(benchmark::kMillisecond);
 
-/// The whole field, preparation included. Argument 2: 1 for one thread, 2 for run_parallel's.
-void whole_field(benchmark::State& state) {
-  const OccupancyGrid grid = bench::furnished_room(edge_of(state));
+/// The whole field, preparation included, on one thread or on run_parallel's.
+void whole_field_of(benchmark::State& state, const OccupancyGrid& grid, bool parallel) {
   const double naive_us = naive_microseconds(grid);
   const field::ProximityField exact(grid, {});
   const double query_us = microseconds(bench::free_points(grid, 256), [&](const Vec3& p) { return exact.at(p); });
@@ -128,12 +131,17 @@ void whole_field(benchmark::State& state) {
     field::DisturbanceField stored(grid);
     const field::WholeField whole(grid, {}, voxels);
     const auto fill = [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); };
-    state.range(1) > 1 ? backwash::run_parallel(whole.block_count(), fill) : fill(0, whole.block_count());
+    parallel ? backwash::run_parallel(whole.block_count(), fill) : fill(0, whole.block_count());
     benchmark::DoNotOptimize(stored.has(Index3::Zero()));
   }
   add_naive_ratio(state, naive_us, begun, static_cast<double>(voxels.size()));
   state.counters["query_ratio"] = state.counters["naive_ratio"] * query_us / naive_us;
   state.counters["voxels"] = static_cast<double>(voxels.size());
+}
+
+/// Argument 2: 1 for one thread, 2 for run_parallel's.
+void whole_field(benchmark::State& state) {
+  whole_field_of(state, bench::furnished_room(edge_of(state)), state.range(1) > 1);
 }
 BENCHMARK(whole_field)
     ->Args({200, 1})
@@ -143,6 +151,86 @@ BENCHMARK(whole_field)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime()
     ->MeasureProcessCPUTime();
+
+void whole_field_plain(benchmark::State& state) { whole_field_of(state, bench::plain_room(edge_of(state)), false); }
+BENCHMARK(whole_field_plain)->Arg(100)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+
+const std::string kBuilding = BACKWASH_SHARED_DATA "/maps/geb079.bt";
+
+void whole_field_building(benchmark::State& state) {
+  const auto grid = backwash::map::load_map(kBuilding);
+  if (!grid) return state.SkipWithError("geb079.bt is absent");
+  whole_field_of(state, *grid, false);
+}
+BENCHMARK(whole_field_building)->Iterations(1)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+
+/// What two threads can give, from CPU time alone, so that other load does not enter: every block evaluated by itself,
+/// as run_parallel does, and dealt in order to whichever of two threads is free. `factor`: the whole field on one
+/// thread over preparation and the longer share. `work`: CPU time of the blocks one by one over that of all at once.
+/// `longest`: the longest block's share of it.
+void two_threads(benchmark::State& state) {
+  const OccupancyGrid grid = bench::furnished_room(edge_of(state));
+  const auto voxels = bench::free_voxels(grid);
+  const auto clock = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
+  double prepared = 0, at_once = 0, one_by_one = 0, longer = 0, longest = 0;
+  for (auto _ : state) {
+    field::DisturbanceField stored(grid);
+    const double begun = clock();
+    const field::WholeField whole(grid, {}, voxels);
+    const double filling = clock();
+    prepared += filling - begun;
+    stored.fill(whole, 0, whole.block_count());
+    at_once += clock() - filling;
+    std::array<double, 2> busy{};
+    double most = 0;
+    for (std::size_t n = 0; n < whole.block_count(); ++n) {
+      const double start = clock();
+      stored.fill(whole, n, n + 1);
+      const double took = clock() - start;
+      *std::ranges::min_element(busy) += took, most = std::max(most, took);
+    }
+    one_by_one += busy[0] + busy[1], longer += std::max(busy[0], busy[1]), longest += most;
+  }
+  state.counters["factor"] = (prepared + at_once) / (prepared + longer);
+  state.counters["work"] = one_by_one / at_once;
+  state.counters["longest"] = longest / one_by_one;
+}
+BENCHMARK(two_threads)->Arg(100)->Unit(benchmark::kMillisecond);
+
+/// The interpolated field beside the exact one at random free points of geb079, distance to obstacles (of the voxel's
+/// centre) at least the argument, mm. `largest`: largest deviation of an entry over the largest entry, at x, y, z, m.
+void interpolation(benchmark::State& state) {
+  const auto grid = backwash::map::load_map(kBuilding);
+  if (!grid) return state.SkipWithError("geb079.bt is absent");
+  const backwash::map::DistanceField distance(*grid);
+  const field::ProximityField exact(*grid, {});
+  field::DisturbanceField stored(*grid);
+  std::vector<double> deviations;
+  double largest = -1;
+  Vec3 where = Vec3::Zero();
+  for (auto _ : state)
+    for (const Vec3& p : bench::free_points(*grid, 20000)) {
+      if (distance.at(grid->index(p)) < edge_of(state)) continue;
+      std::vector<std::size_t> around;
+      const Index3 low = grid->index(p - Vec3::Constant(0.5 * grid->resolution()));
+      for (int n = 0; n < 8; ++n)
+        if (const Index3 v = low + Index3(n & 1, n >> 1 & 1, n >> 2); grid->free(v)) around.push_back(grid->linear(v));
+      stored.fill(exact, around);
+      const auto s = stored.interpolated(p, {}), t = exact.at(p).sigma();
+      const double scale = std::max({t.xx, t.yy, t.zz});
+      const double off =
+          std::max({std::abs(s.xx - t.xx), std::abs(s.xy - t.xy), std::abs(s.yy - t.yy), std::abs(s.zz - t.zz)});
+      if (off / scale > largest) largest = off / scale, where = p;
+      deviations.push_back(off / scale);
+    }
+  std::ranges::sort(deviations);
+  state.counters["points"] = static_cast<double>(deviations.size());
+  state.counters["median"] = deviations[deviations.size() / 2];
+  state.counters["p99"] = deviations[deviations.size() * 99 / 100];
+  state.counters["largest"] = largest;
+  state.counters["x"] = where.x(), state.counters["y"] = where.y(), state.counters["z"] = where.z();
+}
+BENCHMARK(interpolation)->Arg(0)->Arg(180)->Iterations(1)->Unit(benchmark::kMillisecond);
 
 /// A box of 1 m³ appears in the middle of the room: finding it, preparing and evaluating what it affects.
 /// `of_rebuild`: CPU time over that of the whole field made anew.

@@ -8,28 +8,47 @@
 
 namespace backwash::bench {
 
-/// Closed room of 10 × 10 × 3 m with 25 random boxes standing on the floor, their faces on a lattice of 0.1 m; floor,
-/// ceiling and walls one voxel thick.
-inline map::OccupancyGrid furnished_room(double a) {
-  const Vec3 extent(10, 10, 3);
-  map::OccupancyGrid grid(Vec3::Zero(), a, (extent / a).array().round().cast<int>(), map::Cell::free);
-  const auto box = [&](const Vec3& from, const Vec3& to) {
-    const Index3 low = (from / a - Vec3::Constant(0.499)).array().ceil().cast<int>().max(0);
-    const Index3 high = (to / a - Vec3::Constant(0.501)).array().floor().cast<int>().min(grid.size().array() - 1);
-    for (int k = low.z(); k <= high.z(); ++k)
-      for (int j = low.y(); j <= high.y(); ++j)
-        for (int i = low.x(); i <= high.x(); ++i) grid.set(Index3(i, j, k), map::Cell::occupied);
-  };
+inline const Vec3 kRoom(10, 10, 3);  ///< m
+
+/// Occupies the voxels whose centres lie in the box, m.
+inline void add_box(map::OccupancyGrid& grid, const Vec3& from, const Vec3& to) {
+  const double a = grid.resolution();
+  const Index3 low = (from / a - Vec3::Constant(0.499)).array().ceil().cast<int>().max(0);
+  const Index3 high = (to / a - Vec3::Constant(0.501)).array().floor().cast<int>().min(grid.size().array() - 1);
+  for (int k = low.z(); k <= high.z(); ++k)
+    for (int j = low.y(); j <= high.y(); ++j)
+      for (int i = low.x(); i <= high.x(); ++i) grid.set(Index3(i, j, k), map::Cell::occupied);
+}
+
+/// Room of 10 × 10 × 3 m; floor, walls and, if wanted, ceiling one voxel thick.
+inline map::OccupancyGrid empty_room(double a, bool ceiling) {
+  map::OccupancyGrid grid(Vec3::Zero(), a, (kRoom / a).array().round().cast<int>(), map::Cell::free);
   for (int axis = 0; axis < 3; ++axis) {
-    Vec3 thick = extent;
+    Vec3 thick = kRoom;
     thick[axis] = a;
-    box(Vec3::Zero(), thick), box(extent - thick, extent);
+    add_box(grid, Vec3::Zero(), thick);
+    if (axis < 2 || ceiling) add_box(grid, kRoom - thick, kRoom);
   }
+  return grid;
+}
+
+/// Floor, four walls, a table-high box, a cupboard and a pillar.
+inline map::OccupancyGrid plain_room(double a) {
+  map::OccupancyGrid grid = empty_room(a, false);
+  add_box(grid, {2, 2, 0}, {3.6, 2.8, 0.7});
+  add_box(grid, {8.5, 4, 0}, {9.9, 5, 2});
+  add_box(grid, {5, 7, 0}, {5.3, 7.3, 3});
+  return grid;
+}
+
+/// Closed room with 25 random boxes standing on the floor, their faces on a lattice of 0.1 m.
+inline map::OccupancyGrid furnished_room(double a) {
+  map::OccupancyGrid grid = empty_room(a, true);
   std::mt19937 random(1);
   const auto draw = [&](int low, int high) { return 0.1 * std::uniform_int_distribution(low, high)(random); };
   for (int n = 0; n < 25; ++n) {
     const double x = draw(0, 95), y = draw(0, 95), dx = draw(3, 12), dy = draw(3, 12), dz = draw(4, 20);
-    box(Vec3(x, y, 0), Vec3(x + dx, y + dy, dz));
+    add_box(grid, Vec3(x, y, 0), Vec3(x + dx, y + dy, dz));
   }
   return grid;
 }

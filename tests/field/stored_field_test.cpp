@@ -96,8 +96,30 @@ void expect_exact_at_samples(const OccupancyGrid& grid, std::size_t samples) {
   }
 }
 
-TEST(StoredField, EqualsTheExactFieldInTheApartment) {
-  expect_exact_at_samples(*map::builtin_scene("apartment", 0.1), 2000);
+TEST(StoredField, EqualsTheExactFieldInEveryBuiltInScene) {
+  auto names = map::builtin_scene_names();
+  std::erase_if(names, [](const std::string& name) { return name.starts_with("forest"); });
+  names.push_back("forest-1");
+  ASSERT_GT(names.size(), 6u);
+  for (const std::string& name : names) {
+    SCOPED_TRACE(name);
+    expect_exact_at_samples(*map::builtin_scene(name, 0.1), 500);
+  }
+}
+
+TEST(StoredField, HasTheSameBitsWithThePathsMadeAnewForEachBlock) {
+  const OccupancyGrid grid = scene::small_room();
+  const auto voxels = free_voxels(grid);
+  std::vector<Variance> kept(grid.cell_count());
+  const WholeField whole(grid, Model{}, voxels), anew(grid, Model{}, voxels, 0);
+  whole.evaluate(0, whole.block_count(), [&](std::size_t n, const Variance& s) { kept[n] = s; });
+  std::size_t count = 0;
+  anew.evaluate(0, anew.block_count(), [&](std::size_t n, const Variance& s) {
+    const Variance& t = kept[n];
+    EXPECT_TRUE(s.xx == t.xx && s.xy == t.xy && s.yy == t.yy && s.zz == t.zz) << "voxel " << n;
+    ++count;
+  });
+  EXPECT_EQ(count, voxels.size());
 }
 
 TEST(StoredField, EqualsTheExactFieldInARecordedBuilding) {
