@@ -110,6 +110,33 @@ TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
   EXPECT_GT(read->bound.mean_vertical, model.bound.mean_vertical);
 }
 
+/// What would separate two causes of the catalogue, by the first form of each that is, or is not, about rotors.
+std::vector<Separation> between(const Observations& seen, const std::string& ours, const std::string& theirs,
+                                bool rotor_forms) {
+  const auto form = [&](const std::string& name) {
+    for (const Form& f : catalogue())
+      if (f.cause == name && f.integer_scale == rotor_forms) return &f;
+    throw std::logic_error(name);
+  };
+  const Form *own = form(ours), *rival = form(theirs);
+  const auto columns = own->columns(seen.windows, own->scales.front());
+  const SmallVector theta = SmallVector::Constant(static_cast<Eigen::Index>(columns.size()), 0.1);
+  const Accepted accepted{own, own->scales.front(), columns, theta, 0, 0, {}, {}};
+  return separations(Evidence(seen), accepted, {theirs, rival, rival->scales.front(), 0});
+}
+
+TEST(Separations, TurnOnTheSpotForTrimAndDraftAndNothingForDamageAndWeight) {
+  const auto seen = world_with({}, 1);
+  const auto turn = between(seen, "trim", "draft", false);
+  EXPECT_NE(turn.front().manoeuvre.find("yaw turn"), std::string::npos) << turn.front().manoeuvre;
+  EXPECT_GT(turn.front().expected_nats.value_or(0), 3);
+  for (const auto& [ours, theirs] : {std::pair("propeller_damage", "payload"), {"payload", "propeller_damage"}}) {
+    const auto none = between(seen, ours, theirs, true);
+    ASSERT_EQ(none.size(), 1u);
+    EXPECT_FALSE(none.front().expected_nats.has_value());
+  }
+}
+
 std::string crazypad(const std::string& name) { return std::string(BACKWASH_SHARED_DATA) + "/crazypad/" + name; }
 
 TEST(ImportCrazyPad, ConvertsUnitsAndNamesWhatIsMissing) {

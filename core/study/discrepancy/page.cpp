@@ -114,7 +114,8 @@ std::string figures(const NamedCause& cause) {
               number(g.coverage_before) + " → " + number(g.coverage_after));
   for (const auto& s : cause.separate_by)
     text += row("Not told from " + s.rival,
-                "fly next: " + s.manoeuvre + " (" + number(s.expected_nats) + " nats expected from 12 flights)");
+                "fly next: " + s.manoeuvre +
+                    (s.expected_nats ? " (" + number(*s.expected_nats) + " nats expected from 12 flights)" : ""));
   return text + "</table>\n";
 }
 
