@@ -47,7 +47,8 @@ void append(std::string& text, double value) {
 
 }  // namespace
 
-tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column) {
+tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column,
+                                           const std::set<std::string>& unread) {
   std::ifstream file(path);
   if (!file || std::filesystem::is_directory(path)) {
     return tl::make_unexpected(
@@ -81,6 +82,7 @@ tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::s
                      " columns; give one number per column");
     }
     for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (unread.contains(names[i])) continue;
       const auto value = finite_number(cells[i]);
       if (!value)
         return bad(
@@ -94,7 +96,7 @@ tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::s
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == time_column) {
       log.t_s = std::move(values[i]);
-    } else {
+    } else if (!unread.contains(names[i])) {
       log.columns.emplace(names[i], std::move(values[i]));
     }
   }

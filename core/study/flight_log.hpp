@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
@@ -25,8 +26,9 @@ struct LogError {
 
 /// Reads comma-separated numbers under a line of column names. Errors: missing file, no t_s column (unless
 /// `time_column` names another or is empty), a duplicated name, a row with too few or too many cells, a cell that is
-/// not a finite number.
-tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column = "t_s");
+/// not a finite number. Columns named in `unread` are left out, whatever their cells hold.
+tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column = "t_s",
+                                           const std::set<std::string>& unread = {});
 
 /// Writes t_s first, then the columns in name order, with enough digits to read back bit for bit.
 tl::expected<void, LogError> write_csv(const std::string& path, const FlightLog& log, bool overwrite);

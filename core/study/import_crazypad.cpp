@@ -24,10 +24,13 @@ constexpr struct {
                 {"motor4", "motor4", 1 / 65535.0},
                 {"battery_mV", "battery_v", 1e-3}};
 
+/// Without the pitch they make no attitude, and in some recordings they are nan throughout.
+const std::set<std::string> kUnread = {"roll_deg", "yaw_deg"};
+
 }  // namespace
 
 tl::expected<FlightLog, LogError> import_crazypad(const std::string& path) {
-  auto table = read_csv(path);
+  auto table = read_csv(path, "t_s", kUnread);
   if (!table) return table;
   FlightLog log;
   for (const auto& column : kColumns) {

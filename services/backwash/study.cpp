@@ -30,7 +30,9 @@ Json to_json(const discrepancy::NamedCause& cause) {
   for (const auto& rival : found.rivals) set.push_back(rival.name);
   Json separate = Json::array();
   for (const auto& s : cause.separate_by)
-    separate.push_back({{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats}});
+    separate.push_back({{"rival", s.rival},
+                        {"manoeuvre", s.manoeuvre},
+                        {"expected_nats", s.expected_nats ? Json(*s.expected_nats) : Json(nullptr)}});
   const auto& g = cause.gain;
   return {{"name", found.form->cause},
           {"set", set},
@@ -77,9 +79,10 @@ void print_text(const discrepancy::StudyResult& result, const discrepancy::Obser
                 cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
     for (const auto& e : cause.found.parameters)
       std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
-    for (const auto& s : cause.separate_by)
-      std::printf("  not told from %s; fly: %s (%.1f nats expected)\n", s.rival.c_str(), s.manoeuvre.c_str(),
-                  s.expected_nats);
+    for (const auto& s : cause.separate_by) {
+      std::printf("  not told from %s; fly: %s", s.rival.c_str(), s.manoeuvre.c_str());
+      std::printf(s.expected_nats ? " (%.1f nats expected)\n" : "\n", s.expected_nats.value_or(0));
+    }
   }
   for (const auto& u : result.unknown)
     std::printf("unknown structure in %s along %s, p %.4f\n", u.group.c_str(), u.along.c_str(), u.p);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 
 #include "core/config/config.hpp"
 #include "core/study/discrepancy/extend.hpp"
@@ -109,13 +110,65 @@ TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
   EXPECT_GT(read->bound.mean_vertical, model.bound.mean_vertical);
 }
 
+/// What would separate two causes of the catalogue, by the first form of each that is, or is not, about rotors.
+std::vector<Separation> between(const Observations& seen, const std::string& ours, const std::string& theirs,
+                                bool rotor_forms) {
+  const auto form = [&](const std::string& name) {
+    for (const Form& f : catalogue())
+      if (f.cause == name && f.integer_scale == rotor_forms) return &f;
+    throw std::logic_error(name);
+  };
+  const Form *own = form(ours), *rival = form(theirs);
+  const auto columns = own->columns(seen.windows, own->scales.front());
+  const SmallVector theta = SmallVector::Constant(static_cast<Eigen::Index>(columns.size()), 0.1);
+  const Accepted accepted{own, own->scales.front(), columns, theta, 0, 0, {}, {}};
+  return separations(Evidence(seen), accepted, {theirs, rival, rival->scales.front(), 0});
+}
+
+TEST(Separations, TurnOnTheSpotForTrimAndDraftAndNothingForDamageAndWeight) {
+  const auto seen = world_with({}, 1);
+  const auto turn = between(seen, "trim", "draft", false);
+  EXPECT_NE(turn.front().manoeuvre.find("yaw turn"), std::string::npos) << turn.front().manoeuvre;
+  EXPECT_GT(turn.front().expected_nats.value_or(0), 3);
+  for (const auto& [ours, theirs] : {std::pair("propeller_damage", "payload"), {"payload", "propeller_damage"}}) {
+    const auto none = between(seen, ours, theirs, true);
+    ASSERT_EQ(none.size(), 1u);
+    EXPECT_FALSE(none.front().expected_nats.has_value());
+  }
+}
+
+std::string crazypad(const std::string& name) { return std::string(BACKWASH_SHARED_DATA) + "/crazypad/" + name; }
+
 TEST(ImportCrazyPad, ConvertsUnitsAndNamesWhatIsMissing) {
-  const std::string path = std::string(BACKWASH_SHARED_DATA) + "/crazypad/normal__e8_log00.csv";
+  const std::string path = crazypad("normal__e8_log00.csv");
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
   const auto log = import_crazypad(path);
   ASSERT_TRUE(log) << log.error().message;
   for (const double u : log->column("motor3")) EXPECT_LE(u, 1.0);
   for (const double v : log->column("battery_v")) EXPECT_LT(std::abs(v - 3.8), 1.0);
+}
+
+TEST(ImportCrazyPad, TakesRecordingsWhoseYawIsNanAndInventsNoAttitude) {
+  if (!std::filesystem::exists(crazypad(""))) GTEST_SKIP() << "no " << crazypad("");
+  int without_yaw = 0;
+  for (const auto& file : std::filesystem::directory_iterator(crazypad(""))) {
+    if (file.path().extension() != ".csv") continue;
+    without_yaw += read_csv(file.path()) ? 0 : 1;
+    const auto log = import_crazypad(file.path());
+    ASSERT_TRUE(log) << log.error().message;
+    for (const char* absent : {"qw", "yaw_deg", "roll_deg"}) EXPECT_FALSE(log->has(absent)) << absent;
+  }
+  EXPECT_GT(without_yaw, 0);
+}
+
+TEST(ImportCrazyPad, RefusesAColumnThatItNeedsAndThatIsNan) {
+  std::filesystem::create_directories(folder());
+  const std::string path = (folder() / "nan.csv").string();
+  std::ofstream(path) << "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_g,ay_g,az_g,roll_deg,yaw_deg,motor1,motor2,motor3,"
+                         "motor4,battery_mV\n0,0,0,nan,0,0,0,0,0,0,0,nan,1,1,1,1,3800\n";
+  const auto log = import_crazypad(path);
+  ASSERT_FALSE(log);
+  EXPECT_NE(log.error().message.find(":2: column 'z_m'"), std::string::npos) << log.error().message;
 }
 
 }  // namespace

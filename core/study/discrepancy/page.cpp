@@ -89,7 +89,7 @@ tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Obse
   script << "$dots << EOD\n"
          << dots.str() << "EOD\n$lines << EOD\n"
          << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel '" << channel_name(channel)
-         << " of what the simulation misses'\nset key top right\nset grid\n"
+         << (channel <= kMeanZ ? ", m/s²," : "") << " of what the simulation misses'\nset key top right\nset grid\n"
          << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
          << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
          << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
@@ -114,7 +114,8 @@ std::string figures(const NamedCause& cause) {
               number(g.coverage_before) + " → " + number(g.coverage_after));
   for (const auto& s : cause.separate_by)
     text += row("Not told from " + s.rival,
-                "fly next: " + s.manoeuvre + " (" + number(s.expected_nats) + " nats expected from 12 flights)");
+                "fly next: " + s.manoeuvre +
+                    (s.expected_nats ? " (" + number(*s.expected_nats) + " nats expected from 12 flights)" : ""));
   return text + "</table>\n";
 }
 
@@ -146,6 +147,7 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
   page +=
       "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
       "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
+  if (result.minimum_detectable.empty()) page += row("Not computed, or none would show", "");
   for (const auto& [cause, sizes] : result.minimum_detectable)
     for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
   page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";

@@ -137,10 +137,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   bool ambiguous = false;
   for (std::size_t i = 0; i < found.accepted.size(); ++i) {
     NamedCause cause{found.accepted[i], gain_of(evidence, found.accepted, i), {}};
-    for (const Rival& rival : cause.found.rivals) {
-      const auto best = separations(evidence, cause.found, rival);
-      if (!best.empty()) cause.separate_by.push_back(best.front());
-    }
+    for (const Rival& rival : cause.found.rivals)
+      cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
     ambiguous = ambiguous || !cause.found.rivals.empty();
     result.causes.push_back(std::move(cause));
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,7 @@ struct Gain {
 
 struct Separation {
   std::string rival, manoeuvre;
-  double expected_nats;
+  std::optional<double> expected_nats;  ///< none: no manoeuvre of the list separates the two
 };
 
 struct NamedCause {
@@ -51,8 +52,9 @@ struct StudyResult {
 /// effects.
 StudyResult study(const Observations& seen, const StudyOptions& options);
 
-/// Expected nats by which 12 further flights of a manoeuvre would separate a cause from its rival, for each manoeuvre
-/// of the list; best first.
+/// Expected nats by which 12 further flights of a manoeuvre would separate a cause from its rival beyond what as many
+/// hovers on one spot would, for each manoeuvre of the list that brings 0.5 nats; best first. Never empty: where none
+/// does, one entry without a number says so.
 std::vector<Separation> separations(const Evidence& evidence, const Accepted& cause, const Rival& rival);
 
 /// Least first parameter of each testable cause that is found with 80 % power, by injection into sign-flipped
