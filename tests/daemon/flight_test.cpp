@@ -46,7 +46,7 @@ TEST(Tick, NeitherAllocatesNorLocksNorReadsTheWallClockNorFaultsAPageInAWholeFli
   EXPECT_GT(rig.view().inside, 400u);
   EXPECT_EQ(rig.view().outside, 0u);
   EXPECT_EQ(rig.channels->control_log.lost(), 0u);
-  if (locked) {
+  if (locked && backwash::test::traps_work()) {  // a sanitizer's own bookkeeping touches new pages
     EXPECT_EQ(rig.page_faults_in_flight, 0);
   }
   ::munlockall();

@@ -7,6 +7,7 @@
 #include <sys/time.h>
 #include <time.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstddef>
 
@@ -34,6 +35,7 @@ namespace backwash::test {
 namespace {
 
 thread_local int depth = 0;
+std::atomic<long> scopes{0};
 thread_local Trapped counted;
 
 #if BACKWASH_TRAPS
@@ -53,6 +55,7 @@ F* next(const char* name) {
 // Where clang's RealtimeSanitizer is built in, it watches the same scopes with its own traps, system calls included.
 Watched::Watched() {
   ++depth;
+  ++scopes;
 #ifdef BACKWASH_RTSAN
   __rtsan_realtime_enter();
 #endif
@@ -63,6 +66,7 @@ Watched::~Watched() {
 #endif
   --depth;
 }
+long watched_scopes() { return scopes; }
 Trapped trapped() { return counted; }
 bool traps_work() { return BACKWASH_TRAPS != 0; }
 

@@ -21,6 +21,8 @@ class Watched {
   Watched& operator=(const Watched&) = delete;
 };
 
+/// How many scopes were opened so far, by any thread.
+long watched_scopes();
 /// All that was counted on this thread.
 Trapped trapped();
 /// False in builds whose sanitizer owns these functions.

@@ -50,7 +50,7 @@ tsan() {
 }
 
 stress() {
-  build_preset release
+  build_preset release --target backwashd backwashctl bench backwash
   stress-ng --cpu "$(nproc)" --timeout 120 >/dev/null 2>&1 &
   local load=$! status=0
   services/bench/flight.sh build/release "$out" stress builtin:parallel-walls-4m -2,0,1.2 2,0,1.2 || status=$?
@@ -61,7 +61,7 @@ stress() {
 }
 
 soak() {
-  build_preset release
+  build_preset release --target backwashd backwashctl bench backwash
   (
     source services/bench/session.sh
     log=$out/soak.log
