@@ -145,6 +145,10 @@ tl::expected<sim::Flight, LogError> recorded_flight(std::span<const RawRecord> l
     if (record.header.kind == RecordKind::segment && record.bytes.size() >= sizeof(SegmentRecord))
       segments.push_back(segment_of(record));
   if (segments.size() != 2) return bad("needs one take-off and one route, has " + std::to_string(segments.size()));
+  for (const Segment& s : segments)
+    if (s.commands.empty() || s.commands.size() != s.head.commands)
+      return bad("segment " + std::to_string(s.head.id) + " holds " + std::to_string(s.commands.size()) +
+                 " commands, its head says " + std::to_string(s.head.commands));
   const Segment &up = segments[0], &route = segments[1];
 
   const auto column = plan::takeoff_column(world, up.commands.back().p_W);

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Sourced by scripts that need the daemon as it flies: backwash-bench (flight controller on a pty, VIO and mapper on DDS)
 # and backwashd as processes of their own, in a DDS domain of their own. Whatever is started is stopped when the script ends.
+# BACKWASHD: another build of the daemon than the bench's. BENCH_NICE: the bench's niceness (it stands for hardware that
+# does not wait for this machine's processors; below 0 needs the right).
 
 bench_pid='' daemon_pid='' work=$(mktemp -d)
 # Domains above 200 would use port numbers that the system hands out itself.
@@ -23,7 +25,7 @@ start_bench() {
   bin=$1 log=$2
   local map=$3 start=$4 vehicle=$5
   shift 5
-  "$bin/backwash-bench" --map "$map" --vehicle "$vehicle" --start "$start" --link "$work/autopilot" --domain "$domain" \
+  nice -n "${BENCH_NICE:-0}" "$bin/backwash-bench" --map "$map" --vehicle "$vehicle" --start "$start" --link "$work/autopilot" --domain "$domain" \
     "$@" >>"$log" 2>&1 &
   bench_pid=$!
   for _ in $(seq 200); do [[ -e $work/autopilot ]] && return; sleep 0.05; done
@@ -52,7 +54,7 @@ battery_land = 0.15
 [log]
 file = "$2"
 TOML
-  "$bin/backwashd" --config "$work/backwashd.toml" >>"$log" 2>&1 &
+  "${BACKWASHD:-$bin/backwashd}" --config "$work/backwashd.toml" >>"$log" 2>&1 &
   daemon_pid=$!
   for _ in $(seq 1200); do
     tail -n +"$((from + 1))" "$log" | grep -q 'map accepted' && return

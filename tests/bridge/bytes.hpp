@@ -30,6 +30,20 @@ inline std::uint16_t crc_by_bits(std::span<const std::uint8_t> bytes, std::uint1
   return crc;
 }
 
+/// Judges an accepted frame from the bytes alone: layout, known id, bitwise checksum, no flags to be respected.
+inline bool frame_is_good(std::span<const std::uint8_t> b) {
+  if (b.size() < 8) return false;
+  const bool v2 = b[0] == 0xFD;
+  const std::size_t header = v2 ? 10 : 6;
+  const std::uint32_t id = v2 ? b[7] | b[8] << 8 | b[9] << 16 : b[5];
+  if (b.size() != header + b[1] + 2 || (v2 && (b[2] & 0xFE) != 0)) return false;
+  const MessageInfo* m = find_message(id);
+  if (m == nullptr) return false;
+  Bytes summed(b.begin() + 1, b.end() - 2);
+  summed.push_back(m->crc_extra);
+  return crc_by_bits(summed) == (b[b.size() - 2] | b[b.size() - 1] << 8);
+}
+
 /// A received frame that owns its bytes.
 struct Received {
   Frame frame;

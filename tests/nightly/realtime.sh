@@ -5,7 +5,7 @@
 # rtsan   every lockstep test with clang's RealtimeSanitizer around each tick
 # tsan    a whole flight of the daemon with ThreadSanitizer
 # stress  a flight with stress-ng on all processors: tick p99 <= 1 ms, wake-up p99 <= 500 us (SCHED_FIFO), histograms
-# soak    SOAK_SECONDS (600) of hovering: resident memory flat
+# soak    SOAK_SECONDS (600) of flying to and fro, each leg planned anew: resident memory flat
 # wall    the fault rows and flights through the real processes, on the wall clock
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -62,22 +62,8 @@ stress() {
 
 soak() {
   build_preset release --target backwashd backwashctl bench backwash
-  (
-    source services/bench/session.sh
-    log=$out/soak.log
-    : >"$log"
-    start_bench build/release/services "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in \
-      --duration "$((${SOAK_SECONDS:-600} + 60))"
-    start_daemon builtin:quad-5in "$out/soak.bwlog"
-    enable
-    ctl takeoff --height 1.2 --wait
-    : >"$out/soak.rss"
-    for _ in $(seq "${SOAK_SECONDS:-600}"); do
-      awk '/^VmRSS/ { print $2 }' "/proc/$daemon_pid/status" >>"$out/soak.rss"
-      sleep 1
-    done
-    stop
-  )
+  rm -f "$out"/soak.*
+  BENCH_NICE=-10 tests/nightly/soak.sh build/release "$out" "${SOAK_SECONDS:-600}"
   tests/nightly/flat.py "$out/soak.rss"
 }
 
