@@ -5,7 +5,7 @@
 #include <cstring>
 
 // Loaders that call a resolver before a sanitizer has started would crash.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define BACKWASH_CLONES [[gnu::target_clones("avx512f", "avx2", "default")]]
 #else
 #define BACKWASH_CLONES

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <atomic>
+#include <barrier>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -28,6 +30,27 @@ bool whole(const Wide& w) {
   return true;
 }
 constexpr std::uint64_t kRounds = 300'000;
+
+#if defined(__SANITIZE_THREAD__)
+// That the runs with ThreadSanitizer can fail: a hand-over with two writers, which none of them may have.
+void write_from_two_threads() {
+  LatestValue<Wide> value;
+  std::barrier both(2);
+  const auto write = [&] {
+    both.arrive_and_wait();
+    for (std::uint64_t n = 0; n < 20'000; ++n) value.write(wide(n));
+  };
+  std::thread other(write);
+  write();
+  other.join();
+  std::exit(0);
+}
+
+TEST(ThreadSanitizerDeathTest, ReportsAHandOverWithTwoWriters) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(write_from_two_threads(), testing::ExitedWithCode(66), "data race");
+}
+#endif
 
 TEST(LatestValue, IsEmptyUntilWrittenAndReadOnce) {
   LatestValue<int> value;
