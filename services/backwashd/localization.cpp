@@ -10,6 +10,7 @@ namespace backwash::daemon {
 namespace {
 
 constexpr std::int64_t kHistory_ns = 1'000'000'000, kSlack_ns = 50'000'000;
+constexpr double kUnit = 1e-2;                             // of a quaternion's norm
 constexpr double kMaxTilt = 1.0 * 3.14159265358979 / 180;  // rad
 
 std::int64_t nanoseconds(const builtin_interfaces_msg_dds__Time_& t) {
@@ -52,6 +53,9 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
   // nav_msgs/Odometry: the twist is in the child (body) frame.
   Eigen::Quaterniond attitude(q.w, q.x, q.y, q.z);
   s.state = {{p.x, p.y, p.z}, attitude * Vec3(v.x, v.y, v.z)};
+  // The gate would reject it too, but here it takes no good sample's place, and places no scan.
+  if (!s.state.p_W.allFinite() || !s.state.v_W.allFinite() || !(std::abs(attitude.norm() - 1) < kUnit))
+    return tl::unexpected<std::string>("the odometry is not finite or its quaternion not of unit length");
   if (frame == frames_.odometry) {
     s.map_from_odom = *map_from_odom_;
     s.closures = closures_;
@@ -74,7 +78,7 @@ tl::expected<void, std::string> Localization::loop_closure(const dds::TransformS
   const auto& r = m.transform.rotation;
   const Eigen::Quaterniond q(r.w, r.x, r.y, r.z);
   const Vec3 translation(t.x, t.y, t.z);
-  if (!translation.allFinite() || !(std::abs(q.norm() - 1) < 1e-2))
+  if (!translation.allFinite() || !(std::abs(q.norm() - 1) < kUnit))
     return tl::unexpected<std::string>("the loop closure is not a finite transform with a unit quaternion");
   if (!((q * Vec3::UnitZ()).z() >= std::cos(kMaxTilt)))
     return tl::unexpected<std::string>(

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cstring>
+#include <limits>
 #include <random>
 
 #include "core/map/load_map.hpp"
@@ -144,6 +145,20 @@ TEST(Localization, PlacesAScanOfTheBodyByThePoseAtItsStamp) {
   EXPECT_FALSE(l.scan(PointMessage(kBody, {1, 0, 0}, 1.3).m, 0)) << "too far from the newest odometry";
   EXPECT_FALSE(l.scan(PointMessage(kOther, {1, 0, 0}, 1.05).m, 0));
   EXPECT_EQ(l.scan(PointMessage(kMap, {1, 0, 0}, 1.05).m, 0)->points_W[0], Vec3(1, 0, 0));
+}
+
+// faults.md row 2: it takes no good sample's place, and places no scan.
+TEST(Localization, RefusesABrokenPose) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  auto l = localization();
+  ASSERT_TRUE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), kZero, 1.0), 0));
+  EXPECT_FALSE(l.odometry(odometry(kMap, {nan, 0, 1}, about_z(0), kZero, 1.05), 0));
+  EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), {0, nan, 0}, 1.05), 0));
+  EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(nan, 0, 0, 0), kZero, 1.05), 0));
+  EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(2, 0, 0, 0), kZero, 1.05), 0));
+  const auto scan = l.scan(PointMessage(kBody, {1, 0, 0}, 1.02).m, 0);
+  ASSERT_TRUE(scan) << scan.error();
+  EXPECT_EQ(scan->points_W[0], Vec3(1, 0, 1));
 }
 
 TEST(NewVoxels, CoverEveryNewPointAndNoKnownOneInAtMost256Cubes) {

@@ -1,19 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The real-time proofs that need minutes, the wall clock or another compiler. CI calls it nightly.
-#   realtime.sh [rtsan] [tsan] [stress] [soak] [wall]      no argument: all of them
-# rtsan   every lockstep test with clang's RealtimeSanitizer around each tick
-# tsan    the hand-overs, and a whole flight of the daemon under a 10 kHz flood, with ThreadSanitizer
-# stress  a flight with stress-ng on all processors: tick p99 <= 1 ms, wake-up p99 <= 500 us (SCHED_FIFO), histograms
-# soak    SOAK_SECONDS (600) of flying to and fro, each leg planned anew: resident memory flat
-# wall    the fault rows and flights through the real processes, on the wall clock
+#   realtime.sh [rtsan] [tsan] [asan] [fuzz] [stress] [flood] [soak] [wall]      no argument: all of them
+# What each part proves, how long it takes and what it last measured: README.md here.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+script=$(realpath "${BASH_SOURCE[0]}")
+cd "$(dirname "$script")/../.."
 source ./setup.sh
-install_packages packages.txt
-install_packages tests/nightly/packages.txt
 out=$PWD/build/nightly
 mkdir -p "$out"
+install_packages packages.txt
+install_packages tests/nightly/packages.txt
 
 # build DIR TARGET… -- CMAKE_OPTION…
 build() {
@@ -41,6 +38,23 @@ rtsan() {
   return "$status"
 }
 
+# The asan preset, but with assertions and without -O2, which compiles in half the time.
+asan_build() {
+  build build/asan "$@" -- -DCMAKE_CXX_FLAGS='-fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=all -w'
+}
+
+asan() {
+  local programs=(sync map field reach plan track sim study config bridge daemon) status=0
+  asan_build "${programs[@]/#/test_}"
+  for program in "${programs[@]}"; do build/asan/tests/test_"$program" --gtest_brief=1 || status=$?; done
+  return "$status"
+}
+
+fuzz() {
+  asan_build test_fuzz
+  BACKWASH_FUZZ_BYTES=${FUZZ_BYTES:-1e8} build/asan/tests/test_fuzz
+}
+
 stress() {
   build_preset release --target backwashd backwashctl bench backwash
   stress-ng --cpu "$(nproc)" --timeout 120 >/dev/null 2>&1 &
@@ -59,13 +73,28 @@ soak() {
   tests/nightly/flat.py "$out/soak.rss"
 }
 
-wall() {
-  build_preset release
-  ctest --preset release -R '^daemon_'
+flood() {
+  build_preset release --target backwashd backwashctl bench dds_probe
+  tests/system/daemon_flood.sh "$PWD" build/release
 }
 
-[[ $# -gt 0 ]] || set -- rtsan tsan stress soak wall
+wall() {
+  build_preset release
+  local status=0
+  ctest --preset release -R '^daemon_' || status=$?
+  tests/nightly/wall_faults.sh "$PWD" build/release || status=$?
+  return "$status"
+}
+
+if [[ ${1:-} == --part ]]; then
+  "$2"
+  exit
+fi
+[[ $# -gt 0 ]] || set -- rtsan tsan asan fuzz stress flood soak wall
+failed=()
 for part; do
   echo "== $part"
-  "$part"
+  # In a shell of its own: what fails ends the part, not the night.
+  "$script" --part "$part" || failed+=("$part")
 done
+[[ ${#failed[@]} -eq 0 ]] || { echo "failed: ${failed[*]}" >&2; exit 1; }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a confused or hostile participant sends, for tests/system/daemon_dds.sh (faults.md rows 12, 26, 27).
-//   dds_probe DOMAIN NAMESPACE foreign|frame|oversized|corrupt|flood
+// What a confused or hostile participant sends, for tests/system/daemon_dds.sh (faults.md rows 2, 3, 12, 26, 27).
+//   dds_probe DOMAIN NAMESPACE foreign|frame|oversized|corrupt|flood|nan|jump
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <thread>
@@ -33,14 +34,16 @@ int foreign(const dds::Participant& participant, const std::string& name_space) 
   return writer.matched() == 0 ? 0 : 1;
 }
 
+// The pose at `x` of this frame, again and again.
 int odometry(const dds::Participant& participant, const std::string& name_space, int count,
-             std::chrono::microseconds pause) {
+             std::chrono::microseconds pause, std::string frame = "somewhere", double x = 0) {
   auto writer = dds::make_writer<dds::Odometry>(participant, name_space);
   until_matched(writer);
-  char frame[] = "somewhere", child[] = "base_link";
+  char child[] = "base_link";
   dds::Odometry m{};
-  m.header.frame_id = frame;
+  m.header.frame_id = frame.data();
   m.child_frame_id = child;
+  m.pose.pose.position.x = x;
   m.pose.pose.orientation.w = 1;
   auto due = std::chrono::steady_clock::now();
   for (int n = 0; n < count; ++n) {
@@ -107,6 +110,9 @@ int main(int argc, char** argv) {
   if (what == "foreign") return foreign(participant, name_space);
   if (what == "frame") return odometry(participant, name_space, 50, 20ms);
   if (what == "flood") return odometry(participant, name_space, 100'000, 100us);
+  // Not at the rate of the true odometry: of two samples in one tick the daemon sees the newer.
+  if (what == "nan") return odometry(participant, name_space, 700, 17ms, "map", std::nan(""));
+  if (what == "jump") return odometry(participant, name_space, 60, 17ms, "map", 50);
   if (what == "oversized") return oversized(participant, name_space);
   if (what == "corrupt") return corrupt(participant, name_space);
   return 64;
