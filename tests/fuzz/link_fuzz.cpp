@@ -137,7 +137,7 @@ TEST(Fuzz, TheParserTakesNoBadFrameAndLosesHardlyAWholeOne) {
   EXPECT_EQ(judge.decoded, seen.frames);
   EXPECT_GT(judge.arrived, judge.whole * 99 / 100);
   // A damaged unknown message may swallow the frame behind it (firmware_bridge/README.md); so may a chance checksum.
-  EXPECT_LE(judge.lost, judge.damaged / 200 + 5);
+  EXPECT_LE(judge.lost, judge.damaged / 500 + 5);
   // A wrong frame passes a 16-bit checksum once in 65,536: any more, and something else lets them through.
   EXPECT_LE(judge.foreign, seen.bad_crc / 65'536 * 3 + 20);
   EXPECT_GT(seen.bad_crc, judge.damaged / 4);
@@ -209,7 +209,10 @@ TEST(Fuzz, TheLinkKeepsNothingBrokenAndSendsNothingButAnswersToTimesync) {
               static_cast<unsigned long long>(link.received().frames), static_cast<unsigned long long>(t.broken),
               static_cast<unsigned long long>(t.out_of_order), static_cast<unsigned long long>(answered));
   EXPECT_EQ(link.vehicle(), 1);
-  EXPECT_TRUE(t.local_state && t.attitude && t.imu && t.battery && t.landed_state && t.text);
+  EXPECT_TRUE(t.local_state && t.attitude && t.imu && t.text);
+  if (link.received().frames > 100'000) {  // rarer: a state out of five of 256, battery 0
+    EXPECT_TRUE(t.landed_state && t.battery);
+  }
   EXPECT_GT(t.broken, 0u);
   EXPECT_GT(answered, 0u);
   EXPECT_EQ(other, 0u) << "something was sent that nobody asked for";
