@@ -94,11 +94,13 @@ Replan replan(const World& world, const Route& flying, std::size_t now, std::siz
   if (ends_at_goal(flying) && kept.clearance > least) return take(Replan::Kind::kept, std::move(kept));
 
   const auto way = optimistic_way(world, from.p_W, goal_W);
-  const auto local = local_goal(world, way, from.p_W, options.horizon_m, least);
+  const auto local = local_goal(world, way, from.p_W, options.horizon_m, least + options.reserve_m);
   if (way.empty()) result.message = "no way to the goal is left";
   if (local && (world.grid.center(*local) - from.p_W).norm() > kLeastAdvance) {
     const Vec3 to_W = *local == way.back() ? goal_W : world.grid.center(*local);
-    const Plan planned = plan(world, {kept.route.tube[branch].center, from}, to_W, options.limits);
+    PlanOptions limits = options.limits;
+    limits.least_clearance_m += options.reserve_m;
+    const Plan planned = plan(world, {kept.route.tube[branch].center, from}, to_W, limits);
     result.metrics = planned.metrics;
     result.message = planned.message;
     if (planned.status == PlanStatus::ok) {

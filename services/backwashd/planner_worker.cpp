@@ -21,7 +21,8 @@ constexpr std::size_t kBrakeAfter = 15;     // commands (0.3 s) that a stop on r
 constexpr double kPatience = 2.0;           // s at rest in which more of the way may become known
 constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a segment or not
 
-constexpr double kReserve = 0.1;  // m of clearance towards what may turn out to be a wall
+constexpr double kReserve = 0.1;        // m of clearance towards what may turn out to be a wall
+constexpr double kLeastReserve = 0.02;  // m, where there is no room for that: for the set, larger since the start
 
 plan::PlanOptions limits_of(const plan::World& world) {
   plan::PlanOptions options{};
@@ -84,10 +85,10 @@ void PlannerWorker::refresh() {
 plan::Replan PlannerWorker::onward(const plan::World& world, const plan::Route& route, std::size_t now,
                                    std::size_t branch, const Vec3& goal_W) const {
   plan::ReplanOptions options{limits_of(world)};
-  options.limits.least_clearance_m = kReserve;
+  options.reserve_m = kReserve;
   auto next = plan::replan(world, route, now, branch, goal_W, options);
   if (next.kind == plan::Replan::Kind::extended) return next;
-  options.limits.least_clearance_m = 0;
+  options.reserve_m = kLeastReserve;
   return plan::replan(world, route, now, branch, goal_W, options);
 }
 
