@@ -20,14 +20,20 @@ map::OccupancyGrid hopeful(map::OccupancyGrid grid) {
   return grid;
 }
 
-/// The farthest voxel of the way within the horizon that is safe to hover at and joined with the start.
-std::optional<Index3> local_goal(const World& world, const std::vector<Index3>& way, const Vec3& from_W,
-                                 double horizon) {
+/// The farthest voxel of the way within the horizon that is safe to hover at, with the least clearance asked for, and
+/// joined with the start.
+std::optional<Index3> local_goal(const World& world, const std::vector<Index3>& way, const Vec3& from_W, double horizon,
+                                 double least_clearance) {
+  const auto clear = [&](const Index3& v) {
+    return least_clearance <= 0 || reach::hover_set(world.reach, world.grid, world.distance, world.bounds,
+                                                    world.grid.center(v), world.constant_margin)
+                                           .clearance > least_clearance;
+  };
   const SafeView safe(world.safe, {world.grid.index(from_W)});
   std::optional<Index3> farthest;
   for (const Index3& v : way) {
     if ((world.grid.center(v) - from_W).norm() > horizon) break;
-    if (world.safe.passable(v) && safe.may_join(way.front(), v)) farthest = v;
+    if (world.safe.passable(v) && safe.may_join(way.front(), v) && clear(v)) farthest = v;
   }
   return farthest;
 }
@@ -88,11 +94,13 @@ Replan replan(const World& world, const Route& flying, std::size_t now, std::siz
   if (ends_at_goal(flying) && kept.clearance > least) return take(Replan::Kind::kept, std::move(kept));
 
   const auto way = optimistic_way(world, from.p_W, goal_W);
-  const auto local = local_goal(world, way, from.p_W, options.horizon_m);
+  const auto local = local_goal(world, way, from.p_W, options.horizon_m, least + options.reserve_m);
   if (way.empty()) result.message = "no way to the goal is left";
   if (local && (world.grid.center(*local) - from.p_W).norm() > kLeastAdvance) {
     const Vec3 to_W = *local == way.back() ? goal_W : world.grid.center(*local);
-    const Plan planned = plan(world, {kept.route.tube[branch].center, from}, to_W, options.limits);
+    PlanOptions limits = options.limits;
+    limits.least_clearance_m += options.reserve_m;
+    const Plan planned = plan(world, {kept.route.tube[branch].center, from}, to_W, limits);
     result.metrics = planned.metrics;
     result.message = planned.message;
     if (planned.status == PlanStatus::ok) {

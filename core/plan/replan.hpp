@@ -18,6 +18,7 @@ struct Route {
 struct ReplanOptions {
   PlanOptions limits;
   double horizon_m = 7;  ///< how far along the way the local goal may lie
+  double reserve_m = 0;  ///< clearance asked of a new path, and of hovering at its end, beyond limits.least_clearance_m
 };
 
 struct Replan {

@@ -14,7 +14,8 @@ Setpoint at_path_time(const std::vector<Setpoint>& commands, double sigma) {
   if (k + 1 >= commands.size()) return {commands.back().p_W, Vec3::Zero(), Vec3::Zero(), commands.back().yaw};
   const double f = sigma - static_cast<double>(k);
   const Setpoint &a = commands[k], &b = commands[k + 1];
-  return {(1 - f) * a.p_W + f * b.p_W, (1 - f) * a.v_W + f * b.v_W, (1 - f) * a.a_W + f * b.a_W, a.yaw};
+  const double turn = std::remainder(b.yaw - a.yaw, 2 * std::numbers::pi);
+  return {(1 - f) * a.p_W + f * b.p_W, (1 - f) * a.v_W + f * b.v_W, (1 - f) * a.a_W + f * b.a_W, a.yaw + f * turn};
 }
 
 }  // namespace

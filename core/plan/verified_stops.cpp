@@ -6,20 +6,20 @@
 namespace backwash::plan {
 
 std::vector<Stop> verified_stops(const World& world, const State& start, const Setpoint& previous,
-                                 const std::vector<Setpoint>& commands, std::size_t every,
+                                 const std::vector<Setpoint>& commands, std::size_t from, std::size_t every,
                                  const std::function<double(const reach::ReachTube&)>& clearance) {
   constexpr double kRest = 2.0;  // s: then the last set is as wide as the hover set
   std::size_t moving = commands.size();
   while (moving > 0 && commands[moving - 1].v_W.isZero()) --moving;
   std::vector<Stop> stops;
-  for (std::size_t branch = 0; branch < moving; branch += every) {
+  for (std::size_t branch = from; branch < moving; branch += every) {
     // stop_along() uses half of the limit it is given.
     auto stopped = stop_along(commands, branch, 2 * world.reach.vehicle.limits.a_max);
     stopped.insert(stopped.end(), static_cast<std::size_t>(kRest / kControlPeriod), Setpoint(stopped.back()));
     const auto tube = reach::tube_over_field(world.reach, start, previous, stopped, world.bounds);
     if (!(clearance(tube) > 0)) continue;
-    const auto from = static_cast<std::ptrdiff_t>(branch);
-    stops.push_back({branch, {stopped.begin() + from, stopped.end()}, {tube.begin() + from, tube.end()}});
+    const auto own = static_cast<std::ptrdiff_t>(branch);
+    stops.push_back({branch, {stopped.begin() + own, stopped.end()}, {tube.begin() + own, tube.end()}});
   }
   return stops;
 }

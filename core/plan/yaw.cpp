@@ -41,4 +41,20 @@ std::vector<Setpoint> facing_ahead(std::vector<Setpoint> commands, const YawStar
   return commands;
 }
 
+std::vector<Setpoint> turned_to(const Setpoint& at, double yaw, const YawLimits& limits) {
+  constexpr double kReached = 1e-3;  // rad
+  const double angle = std::remainder(yaw - at.yaw, 2 * std::numbers::pi);
+  if (std::abs(angle) < kReached || !(limits.rate > 0 && limits.acceleration > 0)) return {};
+  // Minimum-jerk: peaks 15/8 of the mean rate, 10/√3 of angle/T² of acceleration; a tenth to spare for the steps.
+  const double T = 1.1 * std::max(15.0 / 8 * std::abs(angle) / limits.rate,
+                                  std::sqrt(10 / std::numbers::sqrt3 * std::abs(angle) / limits.acceleration));
+  const double steps = std::ceil(T / kControlPeriod) + 1;
+  std::vector<Setpoint> commands;
+  for (double k = 1; k <= steps; ++k) {
+    const double s = k / steps;
+    commands.push_back({at.p_W, Vec3::Zero(), Vec3::Zero(), at.yaw + s * s * s * (10 - 15 * s + 6 * s * s) * angle});
+  }
+  return commands;
+}
+
 }  // namespace backwash::plan

@@ -22,4 +22,8 @@ struct YawStart {
 /// it. Continuous: it may pass ±π. Commands are 20 ms apart.
 std::vector<Setpoint> facing_ahead(std::vector<Setpoint> commands, const YawStart& start, const YawLimits& limits);
 
+/// Commands that stay where `at` is and turn from its heading, at rest, to `yaw` (rad, the short way) within the
+/// limits; the last one is at rest there. Empty if the heading is reached already or the limits let nothing turn.
+std::vector<Setpoint> turned_to(const Setpoint& at, double yaw, const YawLimits& limits);
+
 }  // namespace backwash::plan

@@ -88,7 +88,10 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
 
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
-  const bool following = mode() == Mode::tracking || mode() == Mode::hold;
+  // A flight that is being stopped goes on by itself after an obstacle only: any other hold is an operator's to end.
+  const bool goes_on = tracker_.braking() && in.segment->continues != 0;
+  const bool following = mode() == Mode::tracking ||
+                         (mode() == Mode::hold && (!goes_on || supervisor_.reason() == Reason::obstacle_ahead));
   out.accepted = following && gate_.last() && tracker_.accept(*in.segment, gate_.last()->state);
   out.refused = !out.accepted;
   out.released[0] = out.accepted ? std::exchange(segment_, in.segment) : in.segment;
@@ -145,8 +148,9 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
     // With a trusted pose to rest on a verified stop, unless something stands in its way or there is none.
     const bool starts = before != Mode::hold;
     const bool blocked = tracker_.braking() ? in.surroundings.tube_blocked : in.surroundings.stop_blocked;
-    const bool rolls = !out.supervisor.freeze && !blocked && (starts ? tracker_.brake() : tracker_.braking());
-    if (!rolls && (starts || tracker_.braking() || out.supervisor.changed)) {
+    const bool brakes = starts || out.accepted;  // a segment that was taken in the tick of its end
+    const bool rolls = !out.supervisor.freeze && !blocked && (brakes ? tracker_.brake() : tracker_.braking());
+    if (!rolls && (brakes || tracker_.braking() || out.supervisor.changed)) {
       tracker_.hold_at(command_);
       drop_segment(out);
     }

@@ -44,7 +44,7 @@ constexpr Transition kTransitions[] = {
     {kFollowed, Reason::frames_disagree, Mode::hold},
     {kFollowed, Reason::battery_low, Mode::land},
     {kFollowed, Reason::autopilot_reset, Mode::hold},
-    {kTracking, Reason::stop_requested, Mode::hold},
+    {kFollowed, Reason::stop_requested, Mode::hold},
     {kTracking, Reason::obstacle_ahead, Mode::hold},
     {kTracking, Reason::outside_map, Mode::hold},
     {kTracking, Reason::map_late, Mode::hold},

@@ -18,7 +18,8 @@ bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noex
   if (segment.commands.empty() || segment.tube.size() != segment.commands.size() + 1) return false;
   if (segment.closures != closures_) return false;
   if (segment.continues != 0) {
-    if (!segment_ || stop_ || segment.continues != segment_->id || next_ > segment.branch) return false;
+    if (!segment_ || segment.continues != segment_->id || next_ > segment.branch) return false;
+    if (stop_ && !leaves_stop(segment)) return false;
   } else {
     const State& start = segment.tube.front().center;
     const double p = (measured.p_W - start.p_W).norm(), v = (measured.v_W - start.v_W).norm();
@@ -29,6 +30,14 @@ bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noex
   segment_ = &segment;
   stop_ = nullptr;
   shift_ = {};
+  return true;
+}
+
+// The stop's second command is the first that differs from the segment's: whoever has it knew of the stop.
+bool Tracker::leaves_stop(const AcceptedSegment& segment) const noexcept {
+  if (segment.branch < stop_->branch + 2 || segment.commands.size() < segment.branch) return false;
+  for (std::size_t k = std::min(next_, stop_->branch + 1); k < segment.branch; ++k)
+    if (segment.commands[k].p_W != command(k).p_W || segment.commands[k].yaw != command(k).yaw) return false;
   return true;
 }
 
@@ -97,16 +106,19 @@ Inside Tracker::judge(const Vec3& measured_W) const noexcept {
   return result;
 }
 
+Setpoint Tracker::command(std::size_t k) const noexcept {
+  if (k >= end()) return at_rest(command(end() - 1));
+  return stop_ && k >= stop_->branch ? stop_->commands[k - stop_->branch] : segment_->commands[k];
+}
+
 Setpoint Tracker::step() noexcept {
   if (!segment_ || next_ >= end()) {
     next_ = segment_ ? end() + 1 : 1;  // past the tube's last entry
     return hold_;
   }
-  const std::size_t k = next_++;
-  const Setpoint command =
-      shift_.setpoint(stop_ && k >= stop_->branch ? stop_->commands[k - stop_->branch] : segment_->commands[k]);
-  hold_ = at_rest(command);
-  return command;
+  const Setpoint now = shift_.setpoint(command(next_++));
+  hold_ = at_rest(now);
+  return now;
 }
 
 }  // namespace backwash::track

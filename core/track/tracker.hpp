@@ -45,8 +45,9 @@ class Tracker {
   /// start.
   Tracker(const Setpoint& hold, const Vehicle& vehicle);
   /// Takes a segment over, or refuses it: a new one must start where the vehicle is now (its state within the ellipsoid
-  /// Q_0 around the tube's start), a continued one must be of the current segment, not yet past its branch and not
-  /// braking. The segment must outlive its use. Real-time: wait-free, no allocation.
+  /// Q_0 around the tube's start), a continued one must be of the current segment and not yet past its branch. While
+  /// braking it must leave the stop on its way, with the commands that are flown until then: one that was made before
+  /// the stop began is refused. The segment must outlive its use. Real-time: wait-free, no allocation.
   bool accept(const AcceptedSegment& segment, const State& measured) noexcept;
   /// Holds this command's position from now on; the set of the last segment is no longer judged. Real-time: wait-free,
   /// no allocation.
@@ -73,6 +74,7 @@ class Tracker {
   Setpoint step() noexcept;
   bool finished() const noexcept { return !segment_ || next_ >= end(); }
   bool braking() const noexcept { return stop_ != nullptr; }
+  std::size_t stop_branch() const noexcept { return stop_ ? stop_->branch : 0; }  ///< of the stop it is braking on
   std::uint64_t segment() const noexcept { return segment_ ? segment_->id : 0; }
   std::size_t index() const noexcept { return next_; }  ///< of the command that the next step() gives
   double clearance() const noexcept { return segment_ ? segment_->clearance : 0; }  ///< of the accepted tube, m
@@ -80,6 +82,8 @@ class Tracker {
 
  private:
   std::size_t end() const noexcept;
+  Setpoint command(std::size_t k) const noexcept;  // in the segment's frame, at rest past the end
+  bool leaves_stop(const AcceptedSegment& segment) const noexcept;
   const reach::TubeStep& set(std::size_t k) const noexcept;
 
   const AcceptedSegment* segment_ = nullptr;

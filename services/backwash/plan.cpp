@@ -24,7 +24,8 @@ void print_json(const plan::Plan& plan, reach::Method method) {
     trajectory.push_back({{"t", static_cast<double>(k) * kControlPeriod},
                           {"p", to_json(c.p_W)},
                           {"v", to_json(c.v_W)},
-                          {"a", to_json(c.a_W)}});
+                          {"a", to_json(c.a_W)},
+                          {"yaw", c.yaw}});
   }
   print(Json{{"status", plan::to_string(plan.status)},
              {"message", plan.message},

@@ -128,11 +128,14 @@ Verbs::Verbs(CLI::App& app) {
   });
   auto* go = waiting(verb("goto", "plan to a point of the map and fly there", "goto 7.5,2.0,1.2 --wait"), 300);
   go->add_option("goal", goal_, "x,y,z in the map, m")->required()->delimiter(',')->expected(3);
+  go->add_option(
+      "--yaw", yaw_,
+      "heading to turn to at the goal, counter-clockwise from the map's x axis, rad; without: as the path leads there");
   go->callback([this] {
     chosen_ = [this] {
       const Vec3 goal(goal_[0], goal_[1], goal_[2]);
       return command(
-          "goto", backwash_msgs_msg_dds__COMMAND_GOTO, goal,
+          "goto", yaw_ ? backwash_msgs_msg_dds__COMMAND_GOTO_FACING : backwash_msgs_msg_dds__COMMAND_GOTO, goal,
           [goal](const StatusCopy& s) {
             const auto& p = s.numbers.setpoint;
             return tracking(s) && !s.numbers.moving && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
@@ -197,7 +200,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     std::cerr << "backwashctl " << name << ": " << why << "\n";
     return kUnavailable;
   };
-  const auto answer = station.send(verb, position, yaw_, waypoints_);
+  const auto answer = station.send(verb, position, yaw_.value_or(0), waypoints_);
   if (!answer)
     return fail("no daemon answered in domain " + std::to_string(options_.domain) + " on interface " +
                 options_.interface + ", namespace " + options_.name_space + "; is backwashd running?");

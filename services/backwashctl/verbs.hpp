@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,9 +28,10 @@ class Verbs {
 
   Options options_;
   std::vector<double> goal_;
+  std::optional<double> yaw_;
   std::vector<Vec3> waypoints_;
   std::string route_;
-  double height_ = 0, yaw_ = 0, patience_s_ = 0;
+  double height_ = 0, patience_s_ = 0;
   bool wait_ = false, json_ = false;
   std::function<int()> chosen_;
 };

@@ -100,6 +100,7 @@ struct ControlView {
   std::uint64_t index = 0;                         ///< of its next command
   bool finished = true;                            ///< the segment's commands are all sent
   bool braking = false;                            ///< on a verified stop of the segment
+  std::uint64_t stop_branch = 0;                   ///< of that stop
   std::uint32_t closures = 0;                      ///< loop closures seen: the map frame of state and command
   track::RigidShift shift;                         ///< from the segment's frame into that one
   std::uint64_t refused_segment = 0;               ///< the last one refused
@@ -143,7 +144,7 @@ struct PlanJob {
   enum class Kind { takeoff, go_to, brake } kind = Kind::takeoff;
   std::uint64_t id = 0;
   Vec3 position = Vec3::Zero();  ///< goal; take-off: z counts
-  double yaw = 0;
+  std::optional<double> yaw;     ///< heading at the goal, rad; none: as the path leads there
   std::shared_ptr<const plan::World> world;
 };
 

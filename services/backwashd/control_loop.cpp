@@ -162,6 +162,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.index = tracker.index();
   view_.finished = tracker.finished();
   view_.braking = tracker.braking();
+  view_.stop_branch = tracker.stop_branch();
   view_.closures = tracker.closures();
   view_.shift = tracker.shift();
   if (out.refused) view_.refused_segment = in.segment->id;

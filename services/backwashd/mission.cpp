@@ -16,6 +16,8 @@ constexpr std::uint8_t kRefused = backwash_msgs_msg_dds__ACK_REFUSED;
 constexpr std::uint8_t kNotYours = backwash_msgs_msg_dds__ACK_NOT_YOURS;
 constexpr std::uint8_t kInvalid = backwash_msgs_msg_dds__ACK_INVALID;
 
+constexpr double kRetry = 1.0;  // s from the end of one job to the next try
+
 Answer accepted(std::string what) { return {kAccepted, std::move(what)}; }
 Answer refused(std::string why) { return {kRefused, std::move(why)}; }
 
@@ -34,6 +36,7 @@ void Mission::refresh() {
     if (job_ != outcome->job) continue;  // a newer command took its place
     job_.reset();
     report(outcome->ok ? "" : std::string("refused: ") + outcome->reason.data());
+    retry_at_s_ = seconds_now() + kRetry;
     if (outcome->ok) continue;
     spdlog::warn("refused: {}", outcome->reason.data());
     if (view_.reason != track::Reason::obstacle_ahead) route_.clear();
@@ -62,19 +65,18 @@ void Mission::judge_place(double now_s) {
   channels_.place.write(line);
 }
 
-// To the next goal of a route at rest at the last one; and to the same goal again once something that stood in the way
-// is in the map.
+// To the next goal of a route at rest at the last one; and to the same goal again where the flight came to rest on the
+// way: something stood in it, or the map did not show more of it yet.
 void Mission::continue_route() {
-  constexpr double kAtGoal = 0.01, kRest = 0.1, kRetry = 1.0;  // m, m/s, s
-  const bool commanding = view_.mode == track::Mode::tracking || view_.mode == track::Mode::hold;
-  if (!commanding) route_.clear();
+  constexpr double kAtGoal = 0.01, kRest = 0.1;  // m, m/s
+  const bool tracking = view_.mode == track::Mode::tracking;
+  if (!tracking && view_.mode != track::Mode::hold) route_.clear();
   if (route_.empty() || job_ || !view_.finished) return;
-  if ((view_.command.p_W - route_.front()).norm() < kAtGoal && view_.mode == track::Mode::tracking) {
+  if (tracking && (view_.command.p_W - route_.front().position).norm() < kAtGoal) {
     route_.pop_front();
     if (!route_.empty()) start(PlanJob::Kind::go_to, route_.front());
-  } else if (view_.mode == track::Mode::hold && view_.reason == track::Reason::obstacle_ahead &&
-             view_.state.v_W.norm() < kRest && seconds_now() > retry_at_s_) {
-    retry_at_s_ = seconds_now() + kRetry;
+  } else if ((tracking || view_.reason == track::Reason::obstacle_ahead) && view_.state.v_W.norm() < kRest &&
+             seconds_now() > retry_at_s_) {
     start(PlanJob::Kind::go_to, route_.front());
   }
 }
@@ -126,6 +128,7 @@ Answer Mission::decide(const CommandMessage& command) {
     case backwash_msgs_msg_dds__COMMAND_TAKEOFF:
       return take_off(command);
     case backwash_msgs_msg_dds__COMMAND_GOTO:
+    case backwash_msgs_msg_dds__COMMAND_GOTO_FACING:
       return go_to(command);
     case backwash_msgs_msg_dds__COMMAND_FOLLOW:
       return follow(command);
@@ -164,15 +167,17 @@ Answer Mission::enable() {
 Answer Mission::take_off(const CommandMessage& command) {
   if (view_.mode != track::Mode::tracking) return refused("not enabled");
   if (!view_.landed) return refused("already in the air");
-  return start(PlanJob::Kind::takeoff, command.position);
+  return start(PlanJob::Kind::takeoff, {command.position, {}});
 }
 
 Answer Mission::go_to(const CommandMessage& command) {
   if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return refused("not enabled");
   if (view_.landed) return refused("on the ground: take off first");
   if (!view_.finished) return refused("flying: hold first");
-  const Answer answer = start(PlanJob::Kind::go_to, command.position, command.yaw);
-  if (answer.result == kAccepted) route_ = {command.position};
+  Goal goal{command.position, {}};
+  if (command.verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING) goal.yaw = command.yaw;
+  const Answer answer = start(PlanJob::Kind::go_to, goal);
+  if (answer.result == kAccepted) route_ = {goal};
   return answer;
 }
 
@@ -180,13 +185,13 @@ Answer Mission::follow(const CommandMessage& command) {
   if (command.waypoints == 0 || command.waypoints > command.kMostWaypoints)
     return {kInvalid, "follow needs 1 to " + std::to_string(command.kMostWaypoints) + " waypoints"};
   CommandMessage first = command;
-  std::deque<Vec3> route;
+  std::deque<Goal> route;
   for (std::size_t n = 0; n < command.waypoints; ++n) {
     const auto& p = command.waypoint[n];
-    route.emplace_back(p[0], p[1], p[2]);
-    if (!route.back().allFinite()) return {kInvalid, "a waypoint is not finite"};
+    route.push_back({{p[0], p[1], p[2]}, {}});
+    if (!route.back().position.allFinite()) return {kInvalid, "a waypoint is not finite"};
   }
-  first.position = route.front();
+  first.position = route.front().position;
   const Answer answer = go_to(first);
   if (answer.result == kAccepted) route_ = std::move(route);
   return answer;
@@ -201,11 +206,11 @@ Answer Mission::stop() {
   return accepted(standing ? "disabling" : "stopping");
 }
 
-Answer Mission::start(PlanJob::Kind kind, const Vec3& position, double yaw) {
+Answer Mission::start(PlanJob::Kind kind, const Goal& goal) {
   if (!world_) return refused("no map was received yet");
   if (job_ && kind != PlanJob::Kind::brake) return refused("still planning the last command");
   job_ = ++last_job_;
-  channels_.jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, *job_, position, yaw, world_}));
+  channels_.jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, *job_, goal.position, goal.yaw, world_}));
   report("planning");
   return accepted("planning");
 }

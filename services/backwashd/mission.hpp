@@ -40,7 +40,12 @@ class Mission {
   Answer take_off(const CommandMessage& command);
   Answer go_to(const CommandMessage& command);
   void report(const std::string& task);
-  Answer start(PlanJob::Kind kind, const Vec3& position = Vec3::Zero(), double yaw = 0);
+  /// A place to fly to, and the heading there if one was asked for.
+  struct Goal {
+    Vec3 position;
+    std::optional<double> yaw;
+  };
+  Answer start(PlanJob::Kind kind, const Goal& goal = {});
   Answer follow(const CommandMessage& command);
   Answer stop();
   void continue_route();
@@ -50,9 +55,9 @@ class Mission {
   ControlView view_;
   std::shared_ptr<const plan::World> world_;
   std::optional<std::uint64_t> job_;  // under way
-  std::deque<Vec3> route_;            // goals still to be reached; the first is the one flown to
+  std::deque<Goal> route_;            // still to be reached; the first is the one flown to
   double judge_at_s_ = 0;
-  double retry_at_s_ = 0;  // after something stood in the way
+  double retry_at_s_ = 0;  // from rest on the way
   std::uint64_t last_job_ = 0;
   struct Lease {
     std::string station;

@@ -1,295 +1,252 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// What the mission asks for: take-off, go to, brake. planner_watch.cpp has what happens in flight.
 #include "services/backwashd/planner_worker.hpp"
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <optional>
 #include <thread>
 #include <utility>
 
-#include "core/plan/planner.hpp"
 #include "core/plan/stop.hpp"
 #include "core/study/tick_log.hpp"
-#include "core/track/rebase.hpp"
 
 namespace backwash::daemon {
 namespace {
 
-using namespace std::chrono_literals;
+constexpr int kAttempts = 25;               // offers of one segment, each from a fresh state
+constexpr int kPlans = 5;                   // of one route, while the state moves on
+constexpr std::size_t kBrakeAfter = 15;     // commands (0.3 s) that a stop on request leaves untouched
+constexpr double kPatience = 2.0;           // s at rest in which more of the way may become known
+constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a segment or not
 
-constexpr int kAttempts = 25;           // offers of one segment, each from a fresh state
-constexpr int kPlans = 5;               // of one route, while the state moves on
-constexpr int kBranchAfter = 15;        // commands (0.3 s) that a continued segment leaves untouched
-constexpr std::size_t kStopEvery = 10;  // commands (0.2 s) between verified stops
-constexpr double kHoldAfter = 2.0;      // s of hover at the end, so that the last set is the hover set's
+constexpr double kReserve = 0.1;        // m of clearance towards what may turn out to be a wall
+constexpr double kLeastReserve = 0.02;  // m, where there is no room for that: for the set, larger since the start
 
-/// The segment that flies now, with what is needed to continue it.
-struct Flying {
-  track::AcceptedSegment segment;
-  State start;
-  Setpoint previous;
-  plan::PlanMetrics metrics;
-  std::optional<double> z_safe;  // of a take-off: below it only what is beside counts, m
-};
-
-double clearance_of(const Flying& flying, const plan::World& world, const reach::ReachTube& tube) {
-  return flying.z_safe ? plan::takeoff_clearance(world, tube, *flying.z_safe) : plan::tube_clearance(world, tube);
+plan::PlanOptions limits_of(const plan::World& world) {
+  plan::PlanOptions options{};
+  options.v_max = world.reach.vehicle.limits.v_max;
+  options.a_max = world.reach.vehicle.limits.a_max;
+  return options;
 }
 
-class Planner {
- public:
-  Planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted)
-      : channels_(channels), recorder_(recorder), accepted_(accepted) {}
+std::string not_clear(const std::string& what, double clearance) {
+  char line[128];
+  std::snprintf(line, sizeof line, "%s is not clear: %.3f m", what.c_str(), clearance);
+  return line;
+}
 
-  /// Why the job could not be done; nothing when it is flying.
-  std::optional<std::string> perform(const PlanJob& job) {
-    switch (job.kind) {
-      case PlanJob::Kind::takeoff:
-        return take_off(job);
-      case PlanJob::Kind::go_to:
-        return go_to(job);
-      default:
-        return brake(job);
-    }
-  }
-  void refresh() {
-    channels_.segments.collect();
-    if (const auto view = channels_.view_planner.read_new()) view_ = *view;
-    if (const auto* world = channels_.worlds.planner.take()) {
-      world_ = *world;
-      channels_.worlds.planner.give_back(world);
-      new_world_ = true;
-    }
-  }
-  /// Between jobs: is what flies still right, after a loop closure or in a new world?
-  void watch() {
-    refresh();
-    if (!flying_ || view_.segment != flying_->segment.id || view_.braking || blocked_ == view_.segment) return;
-    if (view_.closures != flying_->segment.closures) {
-      if (const auto why = rectify()) block("after a loop closure: " + *why);
-    } else if (std::exchange(new_world_, false)) {
-      verify_again();
-    }
-  }
-
- private:
-  std::optional<std::string> take_off(const PlanJob& job) {
-    refresh();
-    const Vec3 here = view_.state.p_W;
-    const auto column = plan::takeoff_column(*job.world, here);
-    if (!column) return "there is no clear hover height above a known floor here";
-    Vec3 target = here;
-    target.z() = std::max(job.position.z(), column->z_safe);
-    if (target.z() > here.z() && !job.world->hover.safe(job.world->grid.index(target)))
-      return "hovering at the height asked for is not safe";
-    const auto& limits = job.world->reach.vehicle.limits;
-    const auto commands = plan::vertical_commands(here, target, limits.v_max, limits.a_max);
-    // The motors start only for a take-off that is known to be clear.
-    const auto tube = reach::tube_over_field(job.world->reach, view_.state, view_.command, commands, job.world->bounds);
-    if (!(plan::takeoff_clearance(*job.world, tube, column->z_safe) > 0)) return "the take-off column is not clear";
-    channels_.arm.store(true);
-    return fly(job, commands, {}, column->z_safe, view_.closures);
-  }
-
-  /// Plans again from the newest state when the tube of the one planned from no longer holds.
-  std::optional<std::string> go_to(const PlanJob& job) {
-    const auto& limits = job.world->reach.vehicle.limits;
-    plan::PlanOptions options{};
-    options.v_max = limits.v_max;
-    options.a_max = limits.a_max;
-    std::optional<std::string> why;
-    for (int attempt = 0; attempt < kPlans; ++attempt) {
-      refresh();
-      const std::uint32_t closures = view_.closures;
-      const auto planned = plan::plan(*job.world, {view_.state, view_.command}, job.position, options);
-      spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
-                   plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
-                   planned.metrics.verify_ms, planned.metrics.min_clearance_m);
-      if (planned.status != plan::PlanStatus::ok)
-        return std::string(plan::to_string(planned.status)) + ": " + planned.message;
-      why = fly(job, planned.commands, planned.metrics, std::nullopt, closures);
-      if (!why) return why;
-    }
-    return why;
-  }
-
-  /// The current segment, slowed to rest on its own path from a little ahead of now.
-  std::optional<std::string> brake(const PlanJob& job) {
-    refresh();
-    if (view_.finished || !flying_ || view_.segment != flying_->segment.id) return std::nullopt;  // already at rest
-    if (view_.closures != flying_->segment.closures) return "a loop closure is being worked in: ask again";
-    const std::size_t branch = view_.index + kBranchAfter;
-    auto commands = plan::stop_along(flying_->segment.commands, branch, job.world->reach.vehicle.limits.a_max);
-    if (commands.empty()) return std::nullopt;  // it ends by itself before that
-    append_hold(commands);
-    Flying next = *flying_;
-    next.segment = {++last_id_, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures};
-    next.segment.tube =
-        reach::tube_over_field(job.world->reach, next.start, next.previous, next.segment.commands, job.world->bounds);
-    next.segment.clearance = clearance_of(next, *job.world, next.segment.tube);
-    if (!(next.segment.clearance > 0))
-      return "braking here is not clear: " + std::to_string(next.segment.clearance) + " m";
-    return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
-  }
-
-  static void append_hold(std::vector<Setpoint>& commands) {
-    Setpoint hold = commands.back();
-    hold.v_W = hold.a_W = Vec3::Zero();
-    commands.insert(commands.end(), static_cast<std::size_t>(kHoldAfter / kControlPeriod), hold);
-  }
-
-  /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may
-  /// have moved further than the first set allows.
-  std::optional<std::string> fly(const PlanJob& job, std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
-                                 std::optional<double> z_safe, std::uint32_t closures) {
-    append_hold(commands);
-    for (Setpoint& command : commands) command.yaw = view_.command.yaw;
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
-      refresh();
-      if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
-      if (view_.closures != closures) return "a loop closure moved the map meanwhile";
-      Flying next{{++last_id_, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
-      next.segment.tube =
-          reach::tube_over_field(job.world->reach, next.start, next.previous, commands, job.world->bounds);
-      next.segment.clearance = clearance_of(next, *job.world, next.segment.tube);
-      if (!(next.segment.clearance > 0)) {
-        char line[96];
-        std::snprintf(line, sizeof line, "the tube from the state estimated now is not clear: %.3f m",
-                      next.segment.clearance);
-        return line;
+/// Whether more of the map may make hovering at p safe: it is unknown there, or unknown voxels are nearer than any
+/// obstacle within a metre.
+bool may_become_clear(const map::OccupancyGrid& grid, const Vec3& p_W) {
+  const Index3 at = grid.index(p_W);
+  if (!grid.inside(at) || grid.occupied(at)) return false;
+  const int reach = static_cast<int>(std::ceil(1.0 / grid.resolution()));
+  double unknown = INFINITY, occupied = INFINITY;
+  for (int k = -reach; k <= reach; ++k)
+    for (int j = -reach; j <= reach; ++j)
+      for (int i = -reach; i <= reach; ++i) {
+        const Index3 v = at + Index3(i, j, k);
+        if (!grid.inside(v) || grid.free(v)) continue;
+        double& nearest = grid.occupied(v) ? occupied : unknown;
+        nearest = std::min(nearest, (grid.center(v) - p_W).norm());
       }
-      next.segment.stops = stops_of(next, *job.world);
-      if (offer(std::move(next))) return std::nullopt;
-    }
-    return "the vehicle is not still enough to start: its state left the first set each time";
-  }
-
-  static std::vector<plan::Stop> stops_of(const Flying& flying, const plan::World& world) {
-    return plan::verified_stops(world, flying.start, flying.previous, flying.segment.commands, kStopEvery,
-                                [&](const reach::ReachTube& tube) { return clearance_of(flying, world, tube); });
-  }
-
-  /// The flight does not go on as it was accepted: the control thread brakes it on its next verified stop.
-  void block(const std::string& why) {
-    blocked_ = flying_->segment.id;
-    channels_.blocked_segment.store(blocked_, std::memory_order_relaxed);
-    spdlog::warn("the flight is stopped: {}", why);
-  }
-
-  /// The sets still to be flown, in the newest world: what is in it now, and with the bounds it has now.
-  void verify_again() {
-    const auto& s = flying_->segment;
-    const auto tube =
-        reach::tube_over_field(world_->reach, flying_->start, flying_->previous, s.commands, world_->bounds);
-    const auto from = static_cast<std::ptrdiff_t>(std::min<std::size_t>(view_.index, tube.size() - 1));
-    const double clearance = clearance_of(*flying_, *world_, {tube.begin() + from, tube.end()});
-    if (!(clearance > 0)) block("the rest of it is not clear in the new map: " + std::to_string(clearance) + " m");
-  }
-
-  /// After a loop closure: the same flight, back to its place in the map from a little ahead of now.
-  std::optional<std::string> rectify() {
-    constexpr int kTries = 3;
-    for (int attempt = 0; attempt < kTries; ++attempt) {
-      const auto& limits = world_->reach.vehicle.limits;
-      const track::RigidShift D = view_.shift;
-      const std::size_t branch = view_.index + kBranchAfter;
-      auto commands = track::rectified(flying_->segment.commands, branch, D, limits.v_max, limits.a_max);
-      if (commands.size() > flying_->segment.commands.size()) append_hold(commands);
-      Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
-                  D.state(flying_->start),
-                  D.setpoint(flying_->previous),
-                  flying_->metrics,
-                  flying_->z_safe};
-      next.segment.tube =
-          reach::tube_over_field(world_->reach, next.start, next.previous, next.segment.commands, world_->bounds);
-      const auto& tube = next.segment.tube;
-      const auto from = static_cast<std::ptrdiff_t>(std::min<std::size_t>(view_.index, tube.size() - 1));
-      next.segment.clearance = clearance_of(next, *world_, {tube.begin() + from, tube.end()});
-      if (!(next.segment.clearance > 0))
-        return "the way back is not clear: " + std::to_string(next.segment.clearance) + " m";
-      next.segment.stops = stops_of(next, *world_);
-      spdlog::info("loop closure {}: {:.3f} m and {:.2f} degrees, rectified from command {} on", view_.closures,
-                   (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw * 180 / 3.14159265358979, branch);
-      if (offer(std::move(next))) return std::nullopt;
-      refresh();
-      if (view_.closures == flying_->segment.closures || view_.braking) return std::nullopt;
-    }
-    return "the flight was past the branch each time";
-  }
-
-  bool offer(Flying next) {
-    const std::uint64_t id = next.segment.id;
-    recorder_.append(study::RecordKind::offer, study::encode(next.segment));
-    channels_.segments.offer(std::make_unique<const track::AcceptedSegment>(next.segment));
-    for (int wait = 0; wait < 100 && !channels_.stop; ++wait) {
-      std::this_thread::sleep_for(1ms);
-      refresh();
-      if (view_.segment == id) {
-        record(next);
-        accepted_(next.segment);
-        flying_ = std::move(next);
-        return true;
-      }
-      if (view_.refused_segment == id) return false;
-    }
-    return false;
-  }
-
-  void record(const Flying& flying) {
-    const auto& s = flying.segment;
-    study::SegmentRecord head{};
-    head.id = s.id;
-    head.continues = s.continues;
-    head.commands = s.commands.size();
-    head.search_ms = flying.metrics.search_ms;
-    head.optimise_ms = flying.metrics.optimise_ms;
-    head.verify_ms = flying.metrics.verify_ms;
-    std::copy_n(flying.start.p_W.data(), 3, head.start_p);
-    std::copy_n(flying.start.v_W.data(), 3, head.start_v);
-    std::vector<double> rows;
-    const auto add = [&rows](const Setpoint& c) {
-      for (const Vec3& v : {c.p_W, c.v_W, c.a_W}) rows.insert(rows.end(), v.data(), v.data() + 3);
-      rows.push_back(c.yaw);
-    };
-    add(flying.previous);
-    for (const Setpoint& c : s.commands) add(c);
-    std::vector<std::uint8_t> bytes(sizeof head + rows.size() * sizeof(double));
-    std::memcpy(bytes.data(), &head, sizeof head);
-    std::memcpy(bytes.data() + sizeof head, rows.data(), rows.size() * sizeof(double));
-    recorder_.append(study::RecordKind::segment, bytes);
-  }
-
-  Channels& channels_;
-  Recorder& recorder_;
-  const SegmentAccepted& accepted_;
-  ControlView view_;
-  std::shared_ptr<const plan::World> world_;
-  bool new_world_ = false;
-  std::uint64_t last_id_ = 0, blocked_ = 0;
-  std::optional<Flying> flying_;
-};
+  return unknown < occupied;
+}
 
 }  // namespace
 
-void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted) {
-  Planner planner(channels, recorder, accepted);
-  while (!channels.stop) {
-    const PlanJob* job = channels.jobs.take();
-    if (!job) {
-      std::this_thread::sleep_for(2ms);
-      planner.watch();
-      continue;
-    }
-    const auto refused = planner.perform(*job);
-    PlanOutcome outcome{job->id, !refused, {}};
-    if (refused) std::snprintf(outcome.reason.data(), outcome.reason.size(), "%s", refused->c_str());
-    channels.jobs.give_back(job);
-    channels.outcomes.push(outcome);
+bool PlannerWorker::step() {
+  const PlanJob* job = channels_.jobs.take();
+  if (!job) {
+    watch();
+    return false;
   }
+  const auto refused = perform(*job);
+  PlanOutcome outcome{job->id, !refused, {}};
+  if (refused) std::snprintf(outcome.reason.data(), outcome.reason.size(), "%s", refused->c_str());
+  channels_.jobs.give_back(job);
+  channels_.outcomes.push(outcome);
+  return true;
+}
+
+void PlannerWorker::refresh() {
+  channels_.segments.collect();
+  if (const auto view = channels_.view_planner.read_new()) view_ = *view;
+  if (const auto* world = channels_.worlds.planner.take()) {
+    world_ = *world;
+    channels_.worlds.planner.give_back(world);
+    new_world_ = true;
+  }
+}
+
+/// Where the map ends the airflow of what is behind is not known: a way with something to spare comes first.
+plan::Replan PlannerWorker::onward(const plan::World& world, const plan::Route& route, std::size_t now,
+                                   std::size_t branch, const Vec3& goal_W) const {
+  plan::ReplanOptions options{limits_of(world)};
+  options.reserve_m = kReserve;
+  auto next = plan::replan(world, route, now, branch, goal_W, options);
+  if (next.kind == plan::Replan::Kind::extended) return next;
+  options.reserve_m = kLeastReserve;
+  return plan::replan(world, route, now, branch, goal_W, options);
+}
+
+/// Why the job could not be done; nothing when it is flying.
+std::optional<std::string> PlannerWorker::perform(const PlanJob& job) {
+  pursuit_.reset();
+  switch (job.kind) {
+    case PlanJob::Kind::takeoff:
+      return take_off(job);
+    case PlanJob::Kind::go_to:
+      return go_to(job);
+    default:
+      return brake(job);
+  }
+}
+
+std::optional<std::string> PlannerWorker::take_off(const PlanJob& job) {
+  refresh();
+  const Vec3 here = view_.state.p_W;
+  const auto column = plan::takeoff_column(*job.world, here);
+  if (!column) return "there is no clear hover height above a known floor here";
+  Vec3 target = here;
+  target.z() = std::max(job.position.z(), column->z_safe);
+  if (target.z() > here.z() && !job.world->hover.safe(job.world->grid.index(target)))
+    return "hovering at the height asked for is not safe";
+  const auto& limits = job.world->reach.vehicle.limits;
+  auto commands = plan::vertical_commands(here, target, limits.v_max, limits.a_max);
+  for (Setpoint& command : commands) command.yaw = view_.command.yaw;
+  // The motors start only for a take-off that is known to be clear.
+  const auto tube = reach::tube_over_field(job.world->reach, view_.state, view_.command, commands, job.world->bounds);
+  if (!(plan::takeoff_clearance(*job.world, tube, column->z_safe) > 0)) return "the take-off column is not clear";
+  channels_.arm.store(true);
+  return fly(job, std::move(commands), {}, column->z_safe, view_.closures);
+}
+
+/// Plans again from the newest state when the tube of the one planned from no longer holds.
+std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
+  std::optional<std::string> why;
+  for (int attempt = 0; attempt < kPlans; ++attempt) {
+    refresh();
+    const std::uint32_t closures = view_.closures;
+    const auto options = limits_of(*job.world);
+    auto planned = plan::plan(*job.world, {view_.state, view_.command}, job.position, options);
+    spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
+                 plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
+                 planned.metrics.verify_ms, planned.metrics.min_clearance_m);
+    const bool hidden =
+        planned.status == plan::PlanStatus::no_path ||
+        (planned.status == plan::PlanStatus::goal_blocked && may_become_clear(job.world->grid, job.position));
+    if (hidden && !plan::optimistic_way(*job.world, view_.command.p_W, job.position).empty()) return explore(job);
+    if (planned.status != plan::PlanStatus::ok)
+      return std::string(plan::to_string(planned.status)) + ": " + planned.message;
+    if (job.yaw) {
+      const auto turn = plan::turned_to(planned.commands.back(), *job.yaw, options.yaw);
+      planned.commands.insert(planned.commands.end(), turn.begin(), turn.end());
+    }
+    why = fly(job, std::move(planned.commands), planned.metrics, std::nullopt, closures);
+    if (why) continue;
+    pursuit_ = Pursuit{job.position, job.yaw};
+    return why;
+  }
+  return why;
+}
+
+/// From rest, the first segment of a flight whose way is not known yet; waits a little for scans that show more of it.
+std::optional<std::string> PlannerWorker::explore(const PlanJob& job) {
+  refresh();
+  const std::int64_t until_ns = view_.t_ns + static_cast<std::int64_t>(kPatience * 1e9);
+  PlanJob now = job;
+  std::string why;
+  while (!channels_.stop) {
+    if (world_) now.world = world_;
+    new_world_ = false;
+    const std::uint32_t closures = view_.closures;
+    plan::Route here{view_.state, view_.command, {}, {}};
+    here.commands.assign(1, {view_.command.p_W, Vec3::Zero(), Vec3::Zero(), view_.command.yaw});
+    auto next = onward(*now.world, here, 0, 0, job.position);
+    why = next.message;
+    if (next.kind == plan::Replan::Kind::extended) {
+      spdlog::info("towards a goal that is not known to be clear yet: {} commands", next.route.commands.size());
+      const auto refused = fly(now, std::move(next.route.commands), next.metrics, std::nullopt, closures);
+      if (!refused) pursuit_ = Pursuit{job.position, job.yaw};
+      return refused;
+    }
+    while (!new_world_ && view_.t_ns < until_ns && !channels_.stop) pause_(), refresh();
+    if (view_.t_ns >= until_ns) break;
+  }
+  return "nothing more of the way became known" + (why.empty() ? "" : ": " + why);
+}
+
+/// The current segment, slowed to rest on its own path from a little ahead of now.
+std::optional<std::string> PlannerWorker::brake(const PlanJob& job) {
+  refresh();
+  if (view_.finished || !flying_ || view_.segment != flying_->segment.id) return std::nullopt;  // already at rest
+  if (view_.closures != flying_->segment.closures) return "a loop closure is being worked in: ask again";
+  const std::size_t branch = view_.index + kBrakeAfter;
+  auto commands = plan::stop_along(flying_->segment.commands, branch, job.world->reach.vehicle.limits.a_max);
+  if (commands.empty()) return std::nullopt;  // it ends by itself before that
+  Flying next = continued(branch, std::move(commands));
+  verify(next, *job.world, view_.index);
+  if (!(next.segment.clearance > 0)) return not_clear("braking here", next.segment.clearance);
+  return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
+}
+
+/// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may
+/// have moved further than the first set allows.
+std::optional<std::string> PlannerWorker::fly(const PlanJob& job, std::vector<Setpoint> commands,
+                                              const plan::PlanMetrics& metrics, std::optional<double> z_safe,
+                                              std::uint32_t closures) {
+  append_hold(commands);
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    refresh();
+    if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
+    if (view_.closures != closures) return "a loop closure moved the map meanwhile";
+    Flying next{{++last_id_, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
+    verify(next, *job.world);
+    if (!(next.segment.clearance > 0))
+      return not_clear("the tube from the state estimated now", next.segment.clearance);
+    add_stops(next, *job.world);
+    if (offer(std::move(next))) return std::nullopt;
+  }
+  return "the vehicle is not still enough to start: its state left the first set each time";
+}
+
+/// A segment that shares its start and its first commands with what flies.
+Flying PlannerWorker::continued(std::size_t branch, std::vector<Setpoint> commands) {
+  append_hold(commands);
+  Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
+              flying_->start,
+              flying_->previous,
+              flying_->metrics,
+              flying_->z_safe};
+  return next;
+}
+
+bool PlannerWorker::offer(Flying next) {
+  const std::uint64_t id = next.segment.id;
+  recorder_.append(study::RecordKind::offer, study::encode(next.segment));
+  channels_.segments.offer(std::make_unique<const track::AcceptedSegment>(next.segment));
+  for (std::size_t wait = 0; wait < kAnswerPauses && !channels_.stop; ++wait) {
+    pause_();
+    refresh();
+    if (view_.segment == id) {
+      recorder_.append(study::RecordKind::segment, segment_record(next));
+      accepted_(next.segment);
+      flying_ = std::move(next);
+      return true;
+    }
+    if (view_.refused_segment == id) return false;
+  }
+  return false;
+}
+
+void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted) {
+  using namespace std::chrono_literals;
+  PlannerWorker planner(channels, recorder, accepted, [] { std::this_thread::sleep_for(1ms); });
+  while (!channels.stop)
+    if (!planner.step()) std::this_thread::sleep_for(2ms);
 }
 
 }  // namespace backwash::daemon

@@ -2,8 +2,13 @@
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <optional>
+#include <string>
 
+#include "core/plan/replan.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/backwashd/flying.hpp"
 #include "services/backwashd/recorder.hpp"
 
 namespace backwash::daemon {
@@ -11,8 +16,67 @@ namespace backwash::daemon {
 /// Called with each segment that the control thread accepted.
 using SegmentAccepted = std::function<void(const track::AcceptedSegment&)>;
 
-/// Thread body: plans what the mission asks for, verifies the whole swept tube from the state estimated now, and offers
-/// the segment to the control thread, again from a fresh state if that has moved on meanwhile.
+/// Plans what the mission asks for, verifies the whole swept tube from the state estimated now, and offers the segment
+/// to the control thread, again from a fresh state if that has moved on meanwhile. Between jobs it keeps what flies
+/// right in each new world and after loop closures.
+///
+/// A goal that is clear in the map is flown to by one whole plan. One that the map does not know yet, or to which it
+/// does not know the way, is flown to with a receding horizon (plan::replan): each new world extends the flight from a
+/// command a little ahead of now, and every segment ends at rest in what is known. In the same way a flight whose way
+/// is closed by something new goes on around it, also while it already brakes for it.
+class PlannerWorker {
+ public:
+  /// `pause`: lets some time pass while the control thread works, 1 ms or so.
+  PlannerWorker(Channels& channels, Recorder& recorder, SegmentAccepted accepted, std::function<void()> pause)
+      : channels_(channels), recorder_(recorder), accepted_(std::move(accepted)), pause_(std::move(pause)) {}
+
+  /// One job of the mission, or, if there is none, watch(). False: there was none.
+  bool step();
+
+ private:
+  /// The goal of what flies: followed as the map changes.
+  struct Pursuit {
+    Vec3 goal_W;
+    std::optional<double> yaw;      ///< heading at the goal, rad
+    std::int64_t again_ns = 0;      ///< when it is looked at again without a new world
+    std::size_t lead = kLeastLead;  ///< commands between now and the branch of what continues the flight
+  };
+  static constexpr std::size_t kLeastLead = 20, kMostLead = 100;
+
+  std::optional<std::string> perform(const PlanJob& job);
+  std::optional<std::string> take_off(const PlanJob& job);
+  std::optional<std::string> go_to(const PlanJob& job);
+  std::optional<std::string> explore(const PlanJob& job);
+  std::optional<std::string> brake(const PlanJob& job);
+  std::optional<std::string> fly(const PlanJob& job, std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
+                                 std::optional<double> z_safe, std::uint32_t closures);
+  plan::Replan onward(const plan::World& world, const plan::Route& route, std::size_t now, std::size_t branch,
+                      const Vec3& goal_W) const;
+
+  void watch();
+  bool pursues();
+  void pursue();
+  void block(const std::string& why);
+  void verify_again();
+  std::optional<std::string> rectify();
+
+  void refresh();
+  Flying continued(std::size_t branch, std::vector<Setpoint> commands);
+  bool offer(Flying next);
+
+  Channels& channels_;
+  Recorder& recorder_;
+  SegmentAccepted accepted_;
+  std::function<void()> pause_;
+  ControlView view_;
+  std::shared_ptr<const plan::World> world_;
+  bool new_world_ = false;
+  std::uint64_t last_id_ = 0, blocked_ = 0;
+  std::optional<Flying> flying_;
+  std::optional<Pursuit> pursuit_;
+};
+
+/// Thread body.
 void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted);
 
 }  // namespace backwash::daemon

@@ -215,11 +215,10 @@ int Lockstep::ticks_until(track::Mode wanted, int most) {
 std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops) {
   auto segment = std::make_unique<track::AcceptedSegment>();
   segment->id = ++last_segment_;
-  for (auto& c : commands) c.yaw = view().command.yaw;
   const State start = view().state;
   segment->tube = reach::tube_over_field(world_->reach, start, view().command, commands, world_->bounds);
   if (with_stops)
-    segment->stops = plan::verified_stops(*world_, start, view().command, commands, 10,
+    segment->stops = plan::verified_stops(*world_, start, view().command, commands, 0, 10,
                                           [&](const auto& tube) { return plan::lateral_clearance(*world_, tube); });
   segment->commands = std::move(commands);
   const auto bytes = study::encode(*segment);
@@ -236,6 +235,7 @@ void Lockstep::take_off() {
   auto commands = plan::vertical_commands(view().state.p_W, kStart, limits.v_max, limits.a_max);
   const auto hold = sim::hold_commands(kStart, 2.0);
   commands.insert(commands.end(), hold.begin(), hold.end());
+  for (auto& c : commands) c.yaw = view().command.yaw;
   channels->arm = true;
   const auto count = static_cast<int>(commands.size());
   offer(std::move(commands));
@@ -252,8 +252,7 @@ void Lockstep::start_route(double seconds) {
   const auto planned = plan::plan(*world_, {view().state, view().command}, kGoal, options);
   ASSERT_EQ(planned.status, plan::PlanStatus::ok) << planned.message;
   route_ = planned.commands;
-  const auto hold = sim::hold_commands(kGoal, 2.0);
-  route_.insert(route_.end(), hold.begin(), hold.end());
+  route_.insert(route_.end(), 100, Setpoint(route_.back()));  // 2 s
   const auto id = offer(route_);
   ticks(static_cast<int>(seconds / kControlPeriod));
   ASSERT_EQ(view().segment, id);

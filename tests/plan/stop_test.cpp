@@ -43,6 +43,22 @@ TEST(StopAlong, StaysOnThePathAndMovesAsItsVelocitySays) {
   }
 }
 
+// Turning at 0.6 rad/s along the circle: the heading belongs to the place, so it turns no faster and ends its turn
+// without steps when the path ends.
+TEST(StopAlong, TurnsWithThePathAndComesToRestInHeadingToo) {
+  auto flown = circle(400);
+  for (std::size_t k = 0; k < flown.size(); ++k) flown[k].yaw = 0.6 * static_cast<double>(k) * kControlPeriod;
+  const auto stopped = stop_along(flown, 50, 2.0);
+  double rate = 0.6;
+  for (std::size_t k = 50; k < stopped.size(); ++k) {
+    EXPECT_NEAR(stopped[k].yaw, std::atan2(stopped[k].p_W.y(), stopped[k].p_W.x()), 1e-4) << k;
+    const double next = (stopped[k].yaw - stopped[k - 1].yaw) / kControlPeriod;
+    EXPECT_LT(std::abs(next - rate) / kControlPeriod, 0.6) << k;  // 1.2 m/s stops at 1 m/s² at most, on a radius of 2 m
+    rate = next;
+  }
+  EXPECT_LT(rate, 1e-3);
+}
+
 TEST(StopAlong, HasNothingToSayPastTheEnd) { EXPECT_TRUE(stop_along(circle(30), 30, 2.0).empty()); }
 
 }  // namespace

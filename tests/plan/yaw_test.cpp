@@ -67,5 +67,19 @@ TEST(FacingAhead, HoldsTheHeadingInHoverAndAtRateZero) {
   for (const Setpoint& c : facing_ahead(bend(1, 2, 200), {1.2, 0}, {0, 2})) EXPECT_EQ(c.yaw, 1.2);
 }
 
+TEST(TurnedTo, ReachesTheHeadingTheShortWayWithinTheLimitsFromRestToRest) {
+  const YawLimits limits{1.0, 2.0};
+  for (const auto& [from, to] : {std::pair{0.0, 2.5}, {0.3, 0.32}, {3.0, -3.0}, {9.0, 0.0}}) {
+    const Setpoint at{Vec3(1, 2, 3), Vec3::Zero(), Vec3::Zero(), from};
+    const auto turned = turned_to(at, to, limits);
+    expect_limited(turned, {from, 0}, limits);
+    EXPECT_NEAR(std::remainder(turned.back().yaw - to, 2 * std::numbers::pi), 0, 1e-9);
+    EXPECT_LE(std::abs(turned.back().yaw - from), std::numbers::pi);
+    for (const Setpoint& c : turned) EXPECT_EQ(c.p_W, at.p_W);
+  }
+  EXPECT_TRUE(turned_to({Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 1}, 1 + 2 * std::numbers::pi, limits).empty());
+  EXPECT_TRUE(turned_to({}, 1, {0, 2}).empty());
+}
+
 }  // namespace
 }  // namespace backwash::plan

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/flying.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "core/study/raw_log.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+constexpr std::size_t kStopEvery = 10;  // commands (0.2 s) between verified stops
+constexpr double kHoldAfter = 2.0;      // s of hover at the end, so that the last set is the hover set's
+
+}  // namespace
+
+void append_hold(std::vector<Setpoint>& commands) {
+  Setpoint hold = commands.back();
+  hold.v_W = hold.a_W = Vec3::Zero();
+  commands.insert(commands.end(), static_cast<std::size_t>(kHoldAfter / kControlPeriod), hold);
+}
+
+double clearance_from(const Flying& flying, const plan::World& world, const reach::ReachTube& tube, std::size_t from) {
+  const reach::ReachTube ahead(tube.begin() + static_cast<std::ptrdiff_t>(std::min(from, tube.size() - 1)), tube.end());
+  return flying.z_safe ? plan::takeoff_clearance(world, ahead, *flying.z_safe) : plan::tube_clearance(world, ahead);
+}
+
+void verify(Flying& flying, const plan::World& world, std::size_t now) {
+  auto& s = flying.segment;
+  s.tube = reach::tube_over_field(world.reach, flying.start, flying.previous, s.commands, world.bounds);
+  s.clearance = clearance_from(flying, world, s.tube, now);
+}
+
+void add_stops(Flying& flying, const plan::World& world, std::size_t now) {
+  flying.segment.stops =
+      plan::verified_stops(world, flying.start, flying.previous, flying.segment.commands, now, kStopEvery,
+                           [&](const reach::ReachTube& tube) { return clearance_from(flying, world, tube, now); });
+}
+
+std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch) {
+  const auto& s = flying.segment;
+  const auto stop = std::ranges::find(s.stops, stop_branch, &plan::Stop::branch);
+  if (!braking || stop == s.stops.end()) return s.commands;
+  std::vector<Setpoint> commands(s.commands.begin(), s.commands.begin() + static_cast<std::ptrdiff_t>(stop->branch));
+  commands.insert(commands.end(), stop->commands.begin(), stop->commands.end());
+  return commands;
+}
+
+std::vector<std::uint8_t> segment_record(const Flying& flying) {
+  const auto& s = flying.segment;
+  study::SegmentRecord head{};
+  head.id = s.id;
+  head.continues = s.continues;
+  head.commands = s.commands.size();
+  head.search_ms = flying.metrics.search_ms;
+  head.optimise_ms = flying.metrics.optimise_ms;
+  head.verify_ms = flying.metrics.verify_ms;
+  std::copy_n(flying.start.p_W.data(), 3, head.start_p);
+  std::copy_n(flying.start.v_W.data(), 3, head.start_v);
+  std::vector<double> rows;
+  const auto add = [&rows](const Setpoint& c) {
+    for (const Vec3& v : {c.p_W, c.v_W, c.a_W}) rows.insert(rows.end(), v.data(), v.data() + 3);
+    rows.push_back(c.yaw);
+  };
+  add(flying.previous);
+  for (const Setpoint& c : s.commands) add(c);
+  std::vector<std::uint8_t> bytes(sizeof head + rows.size() * sizeof(double));
+  std::memcpy(bytes.data(), &head, sizeof head);
+  std::memcpy(bytes.data() + sizeof head, rows.data(), rows.size() * sizeof(double));
+  return bytes;
+}
+
+}  // namespace backwash::daemon

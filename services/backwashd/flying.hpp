@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/plan/planner.hpp"
+#include "core/track/tracker.hpp"
+
+namespace backwash::daemon {
+
+/// A segment with what is needed to verify it again and to continue it.
+struct Flying {
+  track::AcceptedSegment segment;
+  State start;        ///< estimated when its first command was given
+  Setpoint previous;  ///< command active before that
+  plan::PlanMetrics metrics;
+  std::optional<double> z_safe;  ///< of a take-off: below it only what is beside counts, m
+};
+
+/// Lets the last command be held at rest for as long as the last set takes to become the hover set's.
+void append_hold(std::vector<Setpoint>& commands);
+
+/// Smallest clearance (m) of the sets from number `from` on, swept through the world.
+double clearance_from(const Flying& flying, const plan::World& world, const reach::ReachTube& tube, std::size_t from);
+
+/// Propagates the segment's tube from its start through the world and takes its clearance from command `now` on; > 0:
+/// it may fly. One propagation: milliseconds.
+void verify(Flying& flying, const plan::World& world, std::size_t now = 0);
+
+/// Adds the verified stops that leave the segment at command `now` or later, every 0.2 s. One propagation each.
+void add_stops(Flying& flying, const plan::World& world, std::size_t now = 0);
+
+/// The commands as they are flown: those of the segment, or, braking, of its stop that leaves at `stop_branch`.
+std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch);
+
+/// The segment as the raw log's record (study::SegmentRecord, then the commands).
+std::vector<std::uint8_t> segment_record(const Flying& flying);
+
+}  // namespace backwash::daemon

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// In flight, between jobs: is what flies still right, in a new world or after a loop closure, and where does it go on?
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/track/rebase.hpp"
+#include "services/backwashd/planner_worker.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+constexpr std::size_t kRectifyAfter = 15;       // commands (0.3 s) that a rectified segment leaves untouched
+constexpr std::size_t kRunsOut = 300;           // commands: 3 s of motion and as much of hold
+constexpr std::int64_t kLook_ns = 500'000'000;  // between looks at a flight that runs out, without a new world
+
+std::string metres(double d) { return std::to_string(d) + " m"; }
+
+}  // namespace
+
+void PlannerWorker::watch() {
+  refresh();
+  if (!flying_ || view_.segment != flying_->segment.id) return pursuit_.reset();
+  if (view_.closures != flying_->segment.closures) {
+    if (view_.braking || blocked_ == view_.segment) return;
+    if (const auto why = rectify()) block("after a loop closure: " + *why);
+  } else if (pursues()) {
+    pursue();
+  } else if (!pursuit_ && !view_.braking && blocked_ != view_.segment && std::exchange(new_world_, false)) {
+    verify_again();
+  }
+}
+
+/// Whether the flight to a goal is to be looked at now. It ends with any hold but the one for an obstacle.
+bool PlannerWorker::pursues() {
+  if (!pursuit_) return false;
+  const bool braking_for_obstacle =
+      view_.mode == track::Mode::hold && view_.reason == track::Reason::obstacle_ahead && view_.braking;
+  if (view_.mode != track::Mode::tracking && !braking_for_obstacle) {
+    pursuit_.reset();
+    return false;
+  }
+  if (view_.finished) return false;  // the mission goes on from there
+  const std::size_t ahead = flying_->segment.commands.size() - std::min(flying_->segment.commands.size(), view_.index);
+  return new_world_ || (ahead < kRunsOut && view_.t_ns >= pursuit_->again_ns);
+}
+
+/// Extends the flight towards its goal in the newest world, around what has come to stand in its way; or finds that it
+/// is still clear; or stops it.
+void PlannerWorker::pursue() {
+  new_world_ = false;
+  Pursuit& p = *pursuit_;
+  p.again_ns = view_.t_ns + kLook_ns;
+  const bool braking = view_.braking;
+  const plan::Route route{flying_->start, flying_->previous, flown_commands(*flying_, braking, view_.stop_branch), {}};
+  const std::size_t now = view_.index, branch = now + p.lead;
+  auto next = onward(*world_, route, now, branch, p.goal_W);
+  using Kind = plan::Replan::Kind;
+  if (next.kind == Kind::kept || (braking && next.kind != Kind::extended)) return;
+  if (next.kind == Kind::unsafe) return block("no way on is clear in the new map: " + metres(next.clearance_m));
+  auto commands = std::move(next.route.commands);
+  if (next.reaches_goal && p.yaw) {
+    const auto turn = plan::turned_to(commands.back(), *p.yaw, plan::YawLimits{});
+    commands.insert(commands.end(), turn.begin(), turn.end());
+  }
+  Flying on = continued(branch, std::move(commands));
+  on.metrics = next.metrics;
+  verify(on, *world_, now);
+  if (!(on.segment.clearance > 0)) return braking ? void() : verify_again();
+  add_stops(on, *world_, now);
+  const bool taken = offer(std::move(on));
+  spdlog::info("{} from command {} on: {}{}", next.kind == Kind::extended ? "extended" : "stopping", branch,
+               next.reaches_goal ? "to the goal" : next.message, taken ? "" : " (too late)");
+  p.lead = taken ? kLeastLead : std::min(2 * p.lead, kMostLead);
+  if (!taken) p.again_ns = 0;
+}
+
+/// The flight does not go on as it was accepted: the control thread brakes it on its next verified stop.
+void PlannerWorker::block(const std::string& why) {
+  if (blocked_ == flying_->segment.id) return;
+  blocked_ = flying_->segment.id;
+  channels_.blocked_segment.store(blocked_, std::memory_order_relaxed);
+  spdlog::warn("the flight is stopped: {}", why);
+}
+
+/// The sets still to be flown, in the newest world: what is in it now, and with the bounds it has now.
+void PlannerWorker::verify_again() {
+  Flying again = *flying_;
+  verify(again, *world_, view_.index);
+  if (!(again.segment.clearance > 0))
+    block("the rest of it is not clear in the new map: " + metres(again.segment.clearance));
+}
+
+/// After a loop closure: the same flight, back to its place in the map from a little ahead of now.
+std::optional<std::string> PlannerWorker::rectify() {
+  constexpr int kTries = 3;
+  for (int attempt = 0; attempt < kTries; ++attempt) {
+    const auto& limits = world_->reach.vehicle.limits;
+    const track::RigidShift D = view_.shift;
+    const std::size_t branch = view_.index + kRectifyAfter;
+    auto commands = track::rectified(flying_->segment.commands, branch, D, limits.v_max, limits.a_max);
+    if (commands.size() > flying_->segment.commands.size()) append_hold(commands);
+    Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
+                D.state(flying_->start),
+                D.setpoint(flying_->previous),
+                flying_->metrics,
+                flying_->z_safe};
+    verify(next, *world_, view_.index);
+    if (!(next.segment.clearance > 0)) return "the way back is not clear: " + metres(next.segment.clearance);
+    add_stops(next, *world_, view_.index);
+    spdlog::info("loop closure {}: {:.3f} m and {:.2f} degrees, rectified from command {} on", view_.closures,
+                 (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw * 180 / 3.14159265358979, branch);
+    if (offer(std::move(next))) return std::nullopt;
+    refresh();
+    if (view_.closures == flying_->segment.closures || view_.braking) return std::nullopt;
+  }
+  return "the flight was past the branch each time";
+}
+
+}  // namespace backwash::daemon
