@@ -12,9 +12,11 @@ namespace {
 
 using Points = SplineCost::Points;
 
-constexpr double kStiffness = 1e-3;         ///< of single control points, beside that of the third differences
-constexpr double kFirstGradient = 0.1;      ///< |g_0|_∞ that the solver sees
-constexpr double kRelativeDecrease = 1e-3;  ///< of f in a step, below which it has converged
+constexpr double kStiffness = 1e-3;     ///< of single control points, beside that of the third differences
+constexpr double kFirstGradient = 0.1;  ///< |g_0|_∞ that the solver sees
+// At 1e-3 a short step early on passes for convergence, with up to 500 times the smoothness cost that is left in the
+// end.
+constexpr double kRelativeDecrease = 1e-4;  ///< of f in a step, below which it has converged
 
 /// Variables in which f_s is well conditioned: with the Hessian of f_s, DᵀD + μI = LLᵀ over the interior control
 /// points, the solver sees y = Lᵀq of each axis. A step then bends the curve smoothly instead of moving single control
@@ -66,11 +68,12 @@ double evaluate(const std::vector<double>& y, std::vector<double>& gradient, voi
 OptimizerResult optimise(const SplineCost& cost, std::size_t max_evaluations, Clock::time_point deadline) {
   const Points start = cost.start_point();
   const auto first = cost(start);
-  if (start.rows() == 0) return {cost.spline_at(start), first.f, 1};
+  if (start.rows() == 0) return {cost.spline_at(start), first.f, 1, true};
   const SmoothVariables variables(start.rows());
   const double steepest = variables.gradient(first.gradient).cwiseAbs().maxCoeff();
   Run run{cost, variables, deadline, steepest > 0 ? kFirstGradient / steepest : 1, first.f, start};
-  if (steepest > 0) {
+  bool converged = steepest == 0;
+  if (!converged) {
     nlopt::opt solver(nlopt::LD_LBFGS, static_cast<unsigned>(start.size()));
     solver.set_min_objective(evaluate, &run);
     solver.set_maxeval(static_cast<int>(max_evaluations));
@@ -79,12 +82,12 @@ OptimizerResult optimise(const SplineCost& cost, std::size_t max_evaluations, Cl
     std::vector<double> best(y.data(), y.data() + y.size());
     try {
       double f = 0;
-      solver.optimize(best, f);
+      converged = solver.optimize(best, f) == nlopt::FTOL_REACHED;
     } catch (const std::exception&) {
       // Deadline or "nlopt failure" of a line search: the best point seen stands.
     }
   }
-  return {cost.spline_at(run.best), run.best_f, run.evaluations};
+  return {cost.spline_at(run.best), run.best_f, run.evaluations, converged};
 }
 
 }  // namespace backwash::plan

@@ -10,6 +10,7 @@ struct OptimizerResult {
   BSpline spline;
   double cost;  ///< f of the best point seen
   std::size_t evaluations;
+  bool converged;  ///< false: evaluations or time ran out, or a line search failed; more may be gained from here
 };
 /// Minimises by NLopt's L-BFGS from the initial spline, in variables that make f_s well conditioned (five to fifteen
 /// times less jerk for the same evaluations), f scaled so that |g_0|_∞ = 0.1, until it converges, `max_evaluations` or

@@ -4,22 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <span>
 #include <utility>
 
+#include "core/plan/refinement.hpp"
 #include "core/reach/clearance.hpp"
 
 namespace backwash::plan {
 
 namespace {
 
-// Search and optimisation aim below the limits so that re-timing has little left to do.
-constexpr double kSearchShare = 0.9;
-constexpr double kOptimiseShare = 0.97;
-constexpr double kFirstMargin = 0.02;          ///< m beyond the tube, in the collision cost of the first round
-constexpr std::size_t kRounds = 4;             ///< per pace, the tube recomputed in between
-constexpr std::size_t kHoldCommands = 50;      ///< verified hover at the goal: one second
-constexpr double kClearanceCap = 2.0;          ///< m
-constexpr double kPaces[] = {1.0, 0.7, 0.45};  ///< share of the searched path's speed
+constexpr double kSearchShare = 0.9;   ///< of the limits: re-timing has little left to do
+constexpr double kClearanceCap = 2.0;  ///< m
 
 double ms_since(Clock::time_point t) { return std::chrono::duration<double, std::milli>(Clock::now() - t).count(); }
 
@@ -66,50 +62,14 @@ std::optional<std::string> why_blocked(const World& world, const Vec3& p_W, doub
   return std::nullopt;
 }
 
-/// Time between control points: 0.6 m of flight at full speed. Half of it costs 0.7 times more and smooths no better.
-double knot_span(double v_max) { return std::clamp(0.6 / v_max, 0.15, 0.6); }
-
-BSpline fit_path(const std::vector<Motion>& motions, const PlanStart& start, const Vec3& goal_W, double v_max,
-                 double pace) {
-  PathSamples samples = sample(motions, pace * knot_span(v_max * pace));
-  samples.positions.front() = start.command.p_W;
-  samples.positions.back() = goal_W;
-  return fit(samples.positions, samples.step / pace, start.command.v_W, start.command.a_W, Vec3::Zero(), Vec3::Zero());
-}
-
-/// By what the knot span must grow for the control points of velocity and acceleration to keep the limits; at most 1 if
-/// they do. What the start fixes (its velocity and acceleration) is kept and not judged.
-double stretch_needed(const BSpline& spline, const MotionLimits& limits) {
-  const auto velocity = spline.velocity_points(), acceleration = spline.acceleration_points();
-  double stretch = 0;
-  for (std::size_t n = 2; n < velocity.size(); ++n)
-    stretch = std::max(stretch, (velocity[n].array().abs() / limits.velocity(n, spline.knot_span).array()).maxCoeff());
-  for (std::size_t n = 1; n < acceleration.size(); ++n)
-    stretch = std::max(stretch, std::sqrt((acceleration[n].array().abs() / limits.a.array()).maxCoeff()));
-  return stretch;
-}
-
-BSpline retimed(BSpline spline, const PlanStart& start, const MotionLimits& limits) {
-  for (int i = 0; i < 30; ++i) {
-    const double stretch = stretch_needed(spline, limits);
-    if (stretch <= 1) break;
-    spline.knot_span *= 1.0001 * std::min(stretch, 1.5);
-    std::ranges::copy(end_control_points(start.command.p_W, start.command.v_W, start.command.a_W, spline.knot_span),
-                      spline.control_points.begin());
-  }
-  return spline;
-}
-
-struct Flight {
-  std::vector<Setpoint> commands;
-  reach::ReachTube tube;
-};
-Flight fly(const World& world, const PlanStart& start, const BSpline& spline) {
-  Flight flight{spline.commands(), {}};
-  const Setpoint hold = flight.commands.back();
-  flight.commands.insert(flight.commands.end(), kHoldCommands, hold);
-  flight.tube = reach::tube_over_field(world.reach, start.estimated, start.command, flight.commands, world.bounds);
-  return flight;
+/// Why the first set, of the vehicle where it is now, is not clear: whatever is commanded changes nothing there.
+std::optional<std::string> why_blocked_now(const World& world, const PlanStart& start, double least_clearance) {
+  auto tube =
+      reach::tube_over_field(world.reach, start.estimated, start.command, std::span(&start.command, 1), world.bounds);
+  tube.pop_back();
+  const double clearance = tube_clearance(world, tube);
+  if (clearance > least_clearance) return std::nullopt;
+  return text(start.estimated.p_W) + ", where the vehicle is now, is not clear: the clearance is " + metres(clearance);
 }
 
 PlanMetrics measured(PlanMetrics metrics, const BSpline& spline, double clearance) {
@@ -148,6 +108,8 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
   Plan result;
   if (const auto why = why_blocked(world, start.command.p_W, options.least_clearance_m))
     return refused(result, PlanStatus::start_blocked, "start " + *why);
+  if (const auto why = why_blocked_now(world, start, options.least_clearance_m))
+    return refused(result, PlanStatus::start_blocked, "start " + *why);
   if (const auto why = why_blocked(world, goal_W, options.least_clearance_m))
     return refused(result, PlanStatus::goal_blocked, "goal " + *why);
 
@@ -158,42 +120,20 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
   if (!path) return refused(result, status_of(path.error().kind), path.error().message);
   result.metrics.expanded = path->expanded;
 
-  const MotionLimits limits{Vec3::Constant(options.v_max), start.command.a_W.cwiseAbs().cwiseMax(options.a_max),
-                            start.command.v_W};
-  std::string why;
-  for (const double pace : kPaces) {
-    BSpline spline = fit_path(path->motions, start, goal_W, options.v_max, pace);
-    reach::ReachTube tube = fly(world, start, spline).tube;
-    double margin = kFirstMargin;
-    for (std::size_t round = 0; round < kRounds; ++round) {
-      if (Clock::now() > deadline) return refused(result, PlanStatus::deadline, "optimisation ran out of time");
-      const auto optimising = Clock::now();
-      const SplineCost cost(world, spline, tube, margin, limits.scaled(kOptimiseShare), {}, options.norm_cost);
-      const auto optimum = optimise(cost, options.evaluations, deadline);
-      spline = retimed(optimum.spline, start, limits);
-      result.metrics.optimise_ms += ms_since(optimising);
-      result.metrics.evaluations += optimum.evaluations;
-
-      const auto verifying = Clock::now();
-      Flight flight = fly(world, start, spline);
-      const Approach nearest = nearest_approach(world, flight.tube);
-      result.metrics.verify_ms += ms_since(verifying);
-      if (nearest.clearance > options.least_clearance_m && stretch_needed(spline, limits) <= 1) {
-        result.metrics = measured(result.metrics, spline, nearest.clearance);
-        result.status = PlanStatus::ok;
-        result.trajectory = std::move(spline);
-        result.commands = facing_ahead(std::move(flight.commands), {start.command.yaw, 0}, options.yaw);
-        result.tube = std::move(flight.tube);
-        return result;
-      }
-      why = nearest.clearance > options.least_clearance_m
-                ? "no timing keeps the limits from this start"
-                : "the tube touches at " + text(nearest.center.p_W) + ": clearance " + metres(nearest.clearance);
-      margin += 0.02;
-      tube = std::move(flight.tube);
-    }
-  }
-  return refused(result, PlanStatus::infeasible, why);
+  Refinement refined = refine(world, path->motions, start, goal_W, options, deadline);
+  result.metrics.optimise_ms = refined.optimise_ms;
+  result.metrics.verify_ms = refined.verify_ms;
+  result.metrics.evaluations = refined.evaluations;
+  if (!refined.found && refined.out_of_time)
+    return refused(result, PlanStatus::deadline, "optimisation ran out of time");
+  if (!refined.found) return refused(result, PlanStatus::infeasible, refined.why);
+  Refined& found = *refined.found;
+  result.metrics = measured(result.metrics, found.trajectory, found.clearance_m);
+  result.status = PlanStatus::ok;
+  result.trajectory = std::move(found.trajectory);
+  result.commands = facing_ahead(std::move(found.commands), {start.command.yaw, 0}, options.yaw);
+  result.tube = std::move(found.tube);
+  return result;
 }
 
 Approach nearest_approach(const World& world, const reach::ReachTube& tube) {

@@ -46,6 +46,14 @@ PerDirection support_weights(const Vec3& n) {
   return k;
 }
 
+/// ‖h‖₂ of the half-widths along x, y, z as a combination Σ k_d h_d: its weights are its derivatives too.
+PerDirection norm_weights(const Vec3& h) {
+  PerDirection k{};
+  const double norm = h.norm();
+  if (norm > 0) k[kX] = h.x() / norm, k[kY] = h.y() / norm, k[kZ] = h.z() / norm;
+  return k;
+}
+
 double combined(const PerDirection& k, const PerDirection& h) {
   double sum = 0;
   for (std::size_t d = 0; d < kDirections; ++d) sum += k[d] * h[d];
@@ -100,7 +108,7 @@ SplineCost::SplineCost(const World& world, const BSpline& spline, const reach::R
   const std::size_t last = std::min(commands + kSettling, tube.size() - 1);
   basis_ = world.response.basis(spline.control_points.size(), spline.knot_span, last / stride_, stride_);
   for (std::size_t k = stride_; k <= last; k += stride_) samples_.push_back(sample(tube, k, margin));
-  if (world.constant_margin >= 0 || norm) return;
+  if (world.constant_margin >= 0) return;
   G_horizontal_ = coarse(world.reach.horizontal, stride_);
   G_vertical_ = coarse(world.reach.vertical, stride_);
 }
@@ -113,11 +121,9 @@ SplineCost::Sample SplineCost::sample(const reach::ReachTube& tube, std::size_t 
   const PerDirection h = constant >= 0 ? PerDirection{} : step.half_widths_interval;
   Sample s{step.center.p_W, step.center.v_W, 0, world_.distance.interpolated(step.center.p_W), {}, {}};
   const Vec3 gradient = world_.distance.gradient(s.p), box(h[kX], h[kY], h[kZ]);
-  s.k = support_weights(gradient.norm() > 0 ? gradient.normalized() : box.normalized());
+  s.k = norm_ ? norm_weights(box) : support_weights(gradient.norm() > 0 ? gradient.normalized() : box.normalized());
   s.clearance = s.distance - combined(s.k, h) - taken;
-  if (norm_) {
-    s.clearance = s.distance - box.norm() - taken;
-  } else if (s.clearance < kExact) {
+  if (!norm_ && s.clearance < kExact) {
     const State& next = tube[std::min(k + 1, tube.size() - 1)].center;
     const double distance = reach::swept_prism_distance(world_.grid, s.p, next.p_W, h, taken + kExact);
     // A set that meets an obstacle does so by an unknown depth: the support says more then.
@@ -219,6 +225,8 @@ double SplineCost::collision(const Points& moved, Points& gradient) const {
   for (std::size_t m = 0; m < count; ++m) {
     const Sample& s = samples_[m];
     at[m] = s.p + p.row(static_cast<Eigen::Index>(m)).transpose();
+    // Each slope of the interpolated distance is at most 1: what cannot have come near is not looked up.
+    if (s.clearance - std::sqrt(3.0) * p.row(static_cast<Eigen::Index>(m)).norm() > kNear) continue;
     const double left = s.clearance - s.distance + world_.distance.interpolated(at[m]);
     if (left > kNear) continue;
     near.push_back(m);

@@ -53,8 +53,8 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 class SplineCost {
  public:
   /// `tube`: of `spline`'s commands in the world, with at least those followed by the hold. `margin`: clearance to
-  /// keep, m. `norm`: c_m = d(p_p⁰) − ‖h‖₂ and Δe_m = 0 instead, the paper's r. Precondition: at least 6 control points
-  /// (then none is free).
+  /// keep, m. `norm`: ‖h‖₂ instead, the paper's r, in c_m = d(p_p⁰) − ‖h‖₂ as in Δe_m. Precondition: at least 6 control
+  /// points (then none is free).
   SplineCost(const World& world, const BSpline& spline, const reach::ReachTube& tube, double margin,
              const MotionLimits& limits, const CostWeights& weights, bool norm = false);
 

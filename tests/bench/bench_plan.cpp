@@ -137,7 +137,7 @@ void report(benchmark::State& state, const Tally& t, double kernel) {
 
 plan::PlanStart at_rest(const Vec3& p_W) { return {{p_W, Vec3::Zero()}, {p_W, Vec3::Zero(), Vec3::Zero(), 0}}; }
 
-const plan::PlanOptions kLimits{.v_max = kVMax, .a_max = kAMax};
+const plan::PlanOptions kLimits{.v_max = kVMax, .a_max = kAMax, .polish = getenv("POL") ? std::stoul(getenv("POL")) : 100};
 
 double search_ms(const plan::World& world, const Query& q) {
   const double begun = cpu_ms();
