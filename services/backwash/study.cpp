@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <toml++/toml.h>
+#include <algorithm>
 #include <cstdio>
+#include <numeric>
 #include <optional>
+#include <sstream>
 
 #include "core/study/discrepancy/extend.hpp"
 #include "core/study/discrepancy/page.hpp"
+#include "core/study/discrepancy/rotor_reference.hpp"
+#include "core/study/ulog.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/parallel/parallel.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -17,7 +23,8 @@ namespace discrepancy = study::discrepancy;
 
 struct Options {
   std::string map, model = "builtin:quad-5in", vehicle, report, out;
-  std::vector<std::string> logs;
+  std::vector<std::string> logs, reference;
+  std::string group;
   unsigned seed = 1;
   bool json = false, force = false, quick = false;
 };
@@ -30,9 +37,8 @@ Json to_json(const discrepancy::NamedCause& cause) {
   for (const auto& rival : found.rivals) set.push_back(rival.name);
   Json separate = Json::array();
   for (const auto& s : cause.separate_by)
-    separate.push_back({{"rival", s.rival},
-                        {"manoeuvre", s.manoeuvre},
-                        {"expected_nats", s.expected_nats ? Json(*s.expected_nats) : Json(nullptr)}});
+    separate.push_back(
+        {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
   const auto& g = cause.gain;
   return {{"name", found.form->cause},
           {"set", set},
@@ -110,6 +116,108 @@ std::vector<discrepancy::Term> read_terms(const std::string& path) {
   return terms;
 }
 
+/// The [[extension.term]] tables of a model file as they stand there; empty if it has none.
+std::string earlier_terms(const std::string& path) {
+  if (path.starts_with("builtin:")) return "";
+  const auto file = toml::parse_file(path);  // load_model has accepted it
+  const auto* list = file.at_path("extension.term").as_array();
+  if (!list) return "";
+  std::ostringstream text;
+  text << toml::toml_formatter{toml::table{{"extension", toml::table{{"term", *list}}}}};
+  return text.str();
+}
+
+Json to_json(const discrepancy::Outcome& o) {
+  Json json = {{"samples_inside_bound", o.inside},
+               {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
+               {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
+  if (!o.plan.empty()) {
+    json["hover_safe_share"] = o.safe;
+    json["plan"] = {{"status", o.plan}};
+    if (o.plan == "ok")
+      json["plan"].update({{"length_m", o.length_m}, {"time_s", o.time_s}, {"min_clearance_m", o.clearance_m}});
+  }
+  return json;
+}
+
+/// A flight log: ULog by its name, else CSV.
+study::FlightLog read_flight(const std::string& path) {
+  if (!path.ends_with(".ulg")) return read_table(path, "t_s");
+  auto log = study::read_ulog(path);
+  if (log) return std::move(*log);
+  throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+}
+
+/// Flights, and the value of the column that they are grouped by in each one's first row; empty: none.
+struct Flights {
+  std::vector<study::FlightLog> logs;
+  std::vector<double> group;
+};
+
+Flights read_flights(const Options& options) {
+  Flights flights;
+  const auto read = [&](const std::string& path) {
+    progress("reading " + path);
+    flights.logs.push_back(read_flight(path));
+    const auto& log = flights.logs.back();
+    for (const char* name : {"x_m", "y_m", "z_m"})
+      if (!log.has(name))
+        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
+    if (options.group.empty()) return;
+    if (!log.has(options.group) || log.column(options.group).empty())
+      throw Failure(kBadData, path + ":1: no column '" + options.group + "' to group flights by; name one that it has");
+    flights.group.push_back(log.column(options.group).front());
+  };
+  for (const auto& path : options.logs) read(path);
+  return flights;
+}
+
+discrepancy::Observations observe(const Options& options, const Vehicle& vehicle, const Model& model,
+                                  const map::OccupancyGrid* grid) {
+  const Flights flights = read_flights(options);
+  std::vector<std::size_t> order(flights.logs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (!flights.group.empty())
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return flights.group[a] < flights.group[b]; });
+  discrepancy::Observer observer(vehicle, model, grid);
+  for (const std::size_t k : order) observer.add(flights.logs[k]);
+  auto seen = observer.finish();
+  if (flights.group.empty()) return seen;
+  std::vector<std::size_t> first{0};
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const bool last = k + 1 == order.size() || flights.group[order[k + 1]] != flights.group[order[k]];
+    if (last) first.push_back(seen.first[k + 1]);
+  }
+  seen.first = std::move(first);
+  return seen;
+}
+
+/// Motor shares of the flights against those of the reference flights.
+std::optional<discrepancy::RotorVerdict> against_reference(const Options& options, const Vehicle& vehicle,
+                                                           const Model& model, const discrepancy::Observations& seen) {
+  discrepancy::Observer observer(vehicle, model, nullptr);
+  for (const auto& path : options.reference) observer.add(read_flight(path));
+  const auto sound = discrepancy::rotor_contrasts(observer.finish());
+  const auto group = discrepancy::rotor_contrasts(seen);
+  const auto verdict = discrepancy::judge_rotors(sound, group);
+  if (!verdict)
+    throw Failure(kBadData,
+                  options.reference.front() +
+                      ":1: --reference needs 4 flights or more with motor1 … motor4, and the logs need these too");
+  return verdict;
+}
+
+Json to_json(const discrepancy::RotorVerdict& v) {
+  using Kind = discrepancy::RotorVerdict::Kind;
+  Json json = {{"verdict", discrepancy::to_string(v.kind)},
+               {"t", {{"yaw", v.t_yaw}, {"pair_1_3", v.t_a}, {"pair_2_4", v.t_b}, {"damage", v.t_d}}},
+               {"needed", v.needed}};
+  if (v.kind == Kind::propeller_damage || v.kind == Kind::cannot_tell)
+    json.update({{"rotor", v.rotor}, {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}}});
+  return json;
+}
+
 int run(const Options& options) {
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
@@ -118,16 +226,7 @@ int run(const Options& options) {
   model.ground.r0 = vehicle.body.diagonal_radius;
   std::optional<map::OccupancyGrid> grid;
   if (!options.map.empty()) grid = read_map(options.map);
-  discrepancy::Observer observer(vehicle, model, grid ? &*grid : nullptr);
-  for (const auto& path : options.logs) {
-    progress("reading " + path);
-    const auto log = read_table(path, "t_s");
-    for (const char* name : {"x_m", "y_m", "z_m"})
-      if (!log.has(name))
-        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
-    observer.add(log);
-  }
-  auto seen = observer.finish();
+  auto seen = observe(options, vehicle, model, grid ? &*grid : nullptr);
   const auto left = discrepancy::apply(read_terms(options.model), seen);
   discrepancy::StudyOptions study_options;
   study_options.search.seed = options.seed;
@@ -137,14 +236,33 @@ int run(const Options& options) {
   Json json = to_json(result, seen);
   if (!left.empty())
     for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
+  std::optional<discrepancy::RotorVerdict> rotors;
+  if (!options.reference.empty()) {
+    rotors = against_reference(options, vehicle, model, seen);
+    json["rotors_against_reference"] = to_json(*rotors);
+  }
+  std::optional<discrepancy::Consequence> consequence;
+  if (!result.causes.empty()) {
+    progress("hover sets and a plan, before and after");
+    consequence = discrepancy::consequence(result, seen, model, vehicle, grid ? &*grid : nullptr, run_parallel);
+    json["consequence"] = {{"places", consequence->places},
+                           {"before", to_json(consequence->before)},
+                           {"after", to_json(consequence->after)}};
+    if (!consequence->before.plan.empty())
+      json["consequence"].update({{"start", to_json(consequence->start_W)}, {"goal", to_json(consequence->goal_W)}});
+  }
   if (!options.out.empty()) {
-    write_file(options.out, discrepancy::extended_model_text(model, result, seen, options.model, kVersion),
-               options.force);
+    write_file(
+        options.out,
+        discrepancy::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model)),
+        options.force);
     json["extended_model"] = options.out;
   }
   if (!options.report.empty()) {
     progress("drawing");
-    const auto page = discrepancy::study_page(result, seen, {options.map, options.model, options.vehicle, kVersion});
+    const auto page =
+        discrepancy::study_page(result, seen, {options.map, options.model, options.vehicle, kVersion, consequence});
     if (!page) throw Failure(kUnavailable, page.error().message);
     write_file(options.report, *page, options.force);
   }
@@ -152,6 +270,9 @@ int run(const Options& options) {
     print(json);
   else
     print_text(result, seen);
+  if (!options.json && rotors)
+    std::printf("rotors against the reference flights: %s (t of damage %.1f, needed %.1f; of yaw %.1f)\n",
+                discrepancy::to_string(rotors->kind), rotors->t_d, rotors->needed, rotors->t_yaw);
   return kOk;
 }
 
@@ -164,7 +285,13 @@ Verb study_verb(CLI::App& app) {
                       "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
   command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  command->add_option("--log", options->logs, "flight logs, one flight each")->required();
+  command->add_option("--log", options->logs, "flight logs, one flight each: CSV or ULog (.ulg)")->required();
+  command->add_option(
+      "--reference", options->reference,
+      "flights of the same vehicle known to be sound, 4 or more: the --log flights' motor shares are judged against "
+      "theirs, as one condition");
+  command->add_option("--group", options->group,
+                      "column, such as day: flights with one value of it are left out, flipped and scattered together");
   command->add_option("--report", options->report, "HTML page to write");
   command->add_option("--out", options->out, "extended model file to write");
   command->add_option("--seed", options->seed, "of the null's sign draws")->capture_default_str();

@@ -119,6 +119,36 @@ std::string figures(const NamedCause& cause) {
   return text + "</table>\n";
 }
 
+std::string share(double value) { return number(100 * value) + " %"; }
+
+std::string plan_text(const Outcome& o) {
+  if (o.plan != "ok") return o.plan;
+  return number(o.length_m) + " m in " + number(o.time_s) + " s, " + number(100 * o.clearance_m) + " cm clear";
+}
+
+/// What field, reach and plan make of the causes.
+std::string consequence_section(const Consequence& c) {
+  const Outcome &b = c.before, &a = c.after;
+  std::string text =
+      "<section><h2>What it changes for a flight</h2>\n<table>\n<tr><th></th><th>before</th><th>after</th></tr>\n";
+  const auto line = [&](const std::string& name, const std::string& before, const std::string& after) {
+    text += "<tr><th>" + escaped(name) + "</th><td>" + escaped(before) + "</td><td>" + escaped(after) + "</td></tr>\n";
+  };
+  line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
+  line("Hover sets: centre off its set-point, median (95 %)",
+       number(100 * b.shift_median) + " (" + number(100 * b.shift_95) + ") cm",
+       number(100 * a.shift_median) + " (" + number(100 * a.shift_95) + ") cm");
+  line("Hover sets: largest half width, median (95 %)",
+       number(100 * b.extent_median) + " (" + number(100 * b.extent_95) + ") cm",
+       number(100 * a.extent_median) + " (" + number(100 * a.extent_95) + ") cm");
+  if (b.safe + a.safe > 0) line("Flown places where hovering is safe", share(b.safe), share(a.safe));
+  if (!b.plan.empty()) {
+    const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
+    line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
+  }
+  return text + "</table>\n</section>\n";
+}
+
 }  // namespace
 
 tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
@@ -135,6 +165,7 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
     page += "<section><h2>" + escaped(cause.found.form->cause) + "</h2>\n<p>" + escaped(cause.found.form->formula) +
             "</p>\n" + *drawn + figures(cause) + "</section>\n";
   }
+  if (context.consequence) page += consequence_section(*context.consequence);
   if (!result.unknown.empty()) {
     page += "<section><h2>Without a name</h2>\n<table>\n";
     for (const auto& u : result.unknown)
