@@ -102,7 +102,9 @@ TEST(CrazyPad, CutsOfARotorAreNamedWhereTheyPassSoundFlightsAndNoWeightIsCalledD
       EXPECT_EQ(v->kind, Kind::propeller_damage) << name;
       EXPECT_EQ(v->rotor, 3u) << name;
     }
-    if (name.starts_with("weight")) EXPECT_NE(v->kind, Kind::propeller_damage) << name;
+    if (name.starts_with("weight")) {
+      EXPECT_NE(v->kind, Kind::propeller_damage) << name;
+    }
   }
   // Each undamaged flight against the others.
   for (std::size_t i = 0; i < sound.size(); ++i) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/discrepancy/rotor_reference.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -20,6 +21,12 @@ double student_of_four(double n) {
 
 /// Quantile 0.95 of F with 2 and n degrees: closed form.
 double f_of_two(double n) { return n / 2 * (std::pow(0.05, -2 / n) - 1); }
+
+double median(std::vector<double> x) {
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::nth_element(x.begin(), middle, x.end());
+  return *middle;
+}
 
 using Contrast = Eigen::Array3d;  // yaw, a, b
 
@@ -46,15 +53,12 @@ const char* to_string(RotorVerdict::Kind kind) {
 std::vector<RotorContrasts> rotor_contrasts(const Observations& seen) {
   std::vector<RotorContrasts> all;
   for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
-    std::array<double, 4> s{};
-    double windows = 0;
-    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i) {
-      if (!(seen.weight[kMotor1][i] > 0)) continue;
-      for (std::size_t r = 0; r < 4; ++r) s[r] += seen.y[kMotor1 + r][i];
-      ++windows;
-    }
-    if (windows == 0) continue;
-    for (double& share : s) share /= windows;
+    std::array<std::vector<double>, 4> shares;
+    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+      for (std::size_t r = 0; r < 4 && seen.weight[kMotor1][i] > 0; ++r) shares[r].push_back(seen.y[kMotor1 + r][i]);
+    if (shares[0].empty()) continue;
+    std::array<double, 4> s;
+    std::transform(shares.begin(), shares.end(), s.begin(), median);
     all.push_back({(s[0] - s[1] + s[2] - s[3]) / 4, (s[2] - s[0]) / 2, (s[3] - s[1]) / 2});
   }
   return all;
