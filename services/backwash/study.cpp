@@ -9,6 +9,7 @@
 #include "core/study/discrepancy/page.hpp"
 #include "core/study/discrepancy/rotor_reference.hpp"
 #include "core/study/ulog.hpp"
+#include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/study_output.hpp"
 #include "services/backwash/verb.hpp"
@@ -128,6 +129,16 @@ std::optional<discrepancy::RotorVerdict> against_reference(const Options& option
   return verdict;
 }
 
+/// Ratios of the vertical variance by height and plate, day and speed held fixed, of recordings that say what they
+/// stood on and under (`backwash import airgarage`).
+std::optional<study::calibrate::HeightEffect> height_effect(const Options& options, const Model& model,
+                                                            const discrepancy::Observations& seen) {
+  if (!options.map.empty() || !seen.has("ceiling")) return std::nullopt;
+  CampaignFiles files;
+  for (const auto& path : options.logs) files.logs.push_back({path, std::nullopt});
+  return read_campaign(files, std::nullopt, model, options.seed).height;
+}
+
 int run(const Options& options) {
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
@@ -147,6 +158,8 @@ int run(const Options& options) {
   if (!left.empty())
     for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
+  const auto height = height_effect(options, model, seen);
+  if (height) json["height_effect"] = to_json(*height);
   std::optional<discrepancy::RotorVerdict> rotors;
   if (!options.reference.empty()) {
     rotors = against_reference(options, vehicle, model, seen);
@@ -167,15 +180,15 @@ int run(const Options& options) {
   }
   if (!options.report.empty()) {
     progress("drawing");
-    const auto page =
-        discrepancy::study_page(result, seen, {options.map, options.model, options.vehicle, kVersion, consequence});
+    const auto page = discrepancy::study_page(
+        result, seen, {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height});
     if (!page) throw Failure(kUnavailable, page.error().message);
     write_file(options.report, *page, options.force);
   }
   if (options.json)
     print(json);
   else
-    print_text(result, seen, rotors);
+    print_text(result, seen, rotors, height);
   return kOk;
 }
 

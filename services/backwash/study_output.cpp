@@ -86,8 +86,19 @@ Json to_json(const discrepancy::RotorVerdict& v) {
   return json;
 }
 
+Json to_json(const study::calibrate::HeightEffect& h) {
+  const auto ratio = [](const study::calibrate::Estimate& e) {
+    return Json{{"value", e.value}, {"ci95", {e.ci95.low, e.ci95.high}}};
+  };
+  Json json = {{"low_m", h.low_m},     {"high_m", h.high_m},   {"variance_ratio_z", ratio(h.low_over_high)},
+               {"windows", h.windows}, {"flights", h.flights}, {"days", h.days}};
+  if (h.ceiling.value > 0) json["plate_variance_ratio_z"] = ratio(h.ceiling);
+  return json;
+}
+
 void print_text(const discrepancy::StudyResult& result, const discrepancy::Observations& seen,
-                const std::optional<discrepancy::RotorVerdict>& rotors) {
+                const std::optional<discrepancy::RotorVerdict>& rotors,
+                const std::optional<study::calibrate::HeightEffect>& height) {
   std::printf("%s: %zu flights, %zu windows\n", discrepancy::to_string(result.verdict), seen.flights,
               seen.windows.size());
   if (result.verdict == discrepancy::Verdict::insufficient)
@@ -105,6 +116,14 @@ void print_text(const discrepancy::StudyResult& result, const discrepancy::Obser
   for (const auto& u : result.unknown)
     std::printf("unknown structure in %s along %s, p %.4f\n", u.group.c_str(), u.along.c_str(), u.p);
   for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
+  const auto ratio = [](const char* name, const study::calibrate::Estimate& e) {
+    std::printf("vertical variance %s: x%.2f [%.2f, %.2f], day and speed held fixed\n", name, e.value, e.ci95.low,
+                e.ci95.high);
+  };
+  if (height) {
+    ratio("near the surface against far from it", height->low_over_high);
+    if (height->ceiling.value > 0) ratio("under a plate against without", height->ceiling);
+  }
   if (rotors)
     std::printf("rotors against the reference flights: %s (t of damage %.1f, needed %.1f; of yaw %.1f)\n",
                 discrepancy::to_string(rotors->kind), rotors->t_d, rotors->needed, rotors->t_yaw);

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/study/calibrate/height_effect.hpp"
 #include "core/study/discrepancy/consequence.hpp"
 #include "core/study/discrepancy/rotor_reference.hpp"
 #include "core/study/discrepancy/study.hpp"
@@ -14,8 +15,10 @@ namespace backwash::services {
 Json to_json(const study::discrepancy::StudyResult& result, const study::discrepancy::Observations& seen);
 Json to_json(const study::discrepancy::Consequence& consequence);
 Json to_json(const study::discrepancy::RotorVerdict& verdict);
+Json to_json(const study::calibrate::HeightEffect& height);
 /// The same for people, on stdout.
 void print_text(const study::discrepancy::StudyResult& result, const study::discrepancy::Observations& seen,
-                const std::optional<study::discrepancy::RotorVerdict>& rotors);
+                const std::optional<study::discrepancy::RotorVerdict>& rotors,
+                const std::optional<study::calibrate::HeightEffect>& height);
 
 }  // namespace backwash::services

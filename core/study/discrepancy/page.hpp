@@ -3,7 +3,9 @@
 
 #include <optional>
 
+#include "core/study/calibrate/height_effect.hpp"
 #include "core/study/discrepancy/consequence.hpp"
+#include "core/study/discrepancy/rotor_reference.hpp"
 #include "core/study/discrepancy/study.hpp"
 #include "core/study/plot.hpp"
 
@@ -14,6 +16,8 @@ struct PageContext {
   std::string map, model, vehicle;  ///< as given on the command line
   std::string version;
   std::optional<Consequence> consequence;  ///< of the accepted causes
+  std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
+  std::optional<calibrate::HeightEffect> height;
 };
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,
