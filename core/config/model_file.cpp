@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <optional>
+
 #include "core/config/strict_table.hpp"
 
 namespace backwash::config {
@@ -41,6 +44,68 @@ std::vector<NumberKey> model_keys(Model& m) {
   };
 }
 
+struct EffectKind {
+  const char* name;
+  ModelEffect::Kind kind;
+  std::size_t values;  // of `value` and `error`
+  bool scaled;
+};
+constexpr EffectKind kEffects[] = {
+    {"push", ModelEffect::Kind::push, 3, false},
+    {"push_over_surface", ModelEffect::Kind::push_over_surface, 1, true},
+    {"push_under_surface", ModelEffect::Kind::push_under_surface, 1, true},
+    {"push_to_walls", ModelEffect::Kind::push_to_walls, 1, true},
+    {"push_against_velocity", ModelEffect::Kind::push_against_velocity, 1, false},
+    {"push_with_speed", ModelEffect::Kind::push_with_speed, 1, false},
+    {"ln_variance", ModelEffect::Kind::ln_variance, 1, false},
+    {"ln_variance_under_surface", ModelEffect::Kind::ln_variance_under_surface, 1, true},
+    {"ln_variance_with_speed", ModelEffect::Kind::ln_variance_with_speed, 1, true},
+};
+
+std::string effect_names() {
+  std::string names;
+  for (const auto& e : kEffects) names += (names.empty() ? "" : ", ") + std::string(e.name);
+  return names;
+}
+
+/// `count` numbers of an effect's list, each of a magnitude that a vehicle may meet.
+std::optional<Vec3> numbers(const toml::table& table, const char* key, std::size_t count, double least) {
+  const auto* list = table[key].as_array();
+  if (!list || list->size() != count) return std::nullopt;
+  Vec3 v = Vec3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto number = list->get(i)->value<double>();
+    if (!number || !(*number >= least) || !(*number <= 10)) return std::nullopt;
+    v[static_cast<Eigen::Index>(i)] = *number;
+  }
+  return v;
+}
+
+/// An effect, or what is wrong with it.
+tl::expected<ModelEffect, std::string> read_effect(const toml::node& node) {
+  const auto wrong = [](std::string what) { return tl::unexpected(std::move(what)); };
+  const auto* table = node.as_table();
+  if (!table) return wrong("needs tables { kind, value, error }");
+  const auto name = (*table)["kind"].value_or(std::string());
+  const auto kind = std::ranges::find_if(kEffects, [&](const auto& e) { return e.name == name; });
+  if (kind == std::end(kEffects)) return wrong("kind needs one of " + effect_names());
+  for (const auto& [key, value] : *table)
+    if (key != "kind" && key != "value" && key != "error" && key != "scale")
+      return wrong("has an unknown key '" + std::string(key.str()) + "'; known are kind, value, error, scale");
+  ModelEffect effect{kind->kind, {}, {}, 0};
+  const std::string count = std::to_string(kind->values);
+  const auto value = numbers(*table, "value", kind->values, -10);
+  if (!value) return wrong(name + ": value needs a list of " + count + " in [-10, 10]");
+  effect.value = *value;
+  const auto error = numbers(*table, "error", kind->values, 0);
+  if (!error) return wrong(name + ": error needs a list of " + count + " in [0, 10]");
+  effect.error = *error;
+  if (kind->scaled) effect.scale = (*table)["scale"].value_or(0.0);
+  if (kind->scaled && !(effect.scale >= 0.01 && effect.scale <= 10))
+    return wrong(name + ": scale needs a number in [0.01, 10]");
+  return effect;
+}
+
 }  // namespace
 
 tl::expected<Model, ConfigError> load_model(const std::string& path) {
@@ -49,6 +114,11 @@ tl::expected<Model, ConfigError> load_model(const std::string& path) {
   if (!file) return tl::unexpected(file.error());
   Model model;
   if (auto read = file->read(model_keys(model), kNotRead); !read) return tl::unexpected(read.error());
+  for (const toml::node* effect : file->nodes("extension.term", "effect")) {
+    auto read = read_effect(*effect);
+    if (!read) return tl::unexpected(file->error_at(*effect, "extension.term.effect", read.error()));
+    model.extension.push_back(*read);
+  }
   return model;
 }
 

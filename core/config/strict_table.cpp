@@ -104,6 +104,28 @@ ConfigError StrictTable::error(std::string_view path, const std::string& what_wo
   return {ConfigError::Kind::invalid, message.str()};
 }
 
+std::vector<const toml::node*> StrictTable::nodes(std::string_view path, std::string_view key) const {
+  std::vector<const toml::node*> found;
+  const toml::array* tables = root_.at_path(path).as_array();
+  for (std::size_t i = 0; tables && i < tables->size(); ++i) {
+    const toml::table* table = tables->get(i)->as_table();
+    const toml::node* entry = table ? table->get(key) : nullptr;
+    if (const toml::array* list = entry ? entry->as_array() : nullptr)
+      for (const auto& node : *list) found.push_back(&node);
+    else if (entry)
+      found.push_back(entry);
+  }
+  return found;
+}
+
+ConfigError StrictTable::error_at(const toml::node& node, std::string_view path,
+                                  const std::string& what_would_be_right) const {
+  std::ostringstream message;
+  message << file_ << ":" << std::max<toml::source_index>(node.source().begin.line, 1) << ": key '" << path
+          << "': " << what_would_be_right;
+  return {ConfigError::Kind::invalid, message.str()};
+}
+
 tl::expected<void, ConfigError> StrictTable::reject_unknown(const toml::table& table, const std::string& prefix,
                                                             std::span<const NumberKey> keys,
                                                             std::span<const std::string_view> others) const {

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "core/config/config.hpp"
 
@@ -44,6 +45,11 @@ class StrictTable {
   tl::expected<std::string, ConfigError> text(std::string_view path) const;
   /// true or false.
   tl::expected<bool, ConfigError> flag(std::string_view path) const;
+  /// The entries of the lists `key` in every table of the list of tables at `path`; a `key` that is no list is returned
+  /// itself.
+  std::vector<const toml::node*> nodes(std::string_view path, std::string_view key) const;
+  /// Error about a node of the file.
+  ConfigError error_at(const toml::node& node, std::string_view path, const std::string& what_would_be_right) const;
   bool has(std::string_view path) const { return static_cast<bool>(root_.at_path(path)); }
   /// Error about a key that is in the file or missing from it: names its line (the parent's, if missing) and value.
   ConfigError error(std::string_view path, const std::string& what_would_be_right) const;

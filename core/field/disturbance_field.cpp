@@ -2,6 +2,7 @@
 #include "core/field/disturbance_field.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace backwash::field {
 namespace {
@@ -97,6 +98,16 @@ void DisturbanceField::fill(const ProximityField& exact, std::span<const std::si
 
 void DisturbanceField::fill(const WholeField& whole, std::size_t begin, std::size_t end) {
   whole.evaluate(begin, end, [this](std::size_t n, const Variance& s) { set(n, s); });
+}
+
+void DisturbanceField::scale(const Extension& extension, std::span<const std::size_t> voxels) {
+  for (const std::size_t n : voxels) {
+    if (sigma_[n][0] < 0) continue;
+    const auto x = static_cast<std::size_t>(size_.x()), y = static_cast<std::size_t>(size_.y());
+    const Index3 v(static_cast<int>(n % x), static_cast<int>(n / x % y), static_cast<int>(n / (x * y)));
+    const auto factor = static_cast<float>(std::exp(extension.at(v).ln_variance));
+    for (float& s : sigma_[n]) s *= factor;
+  }
 }
 
 void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {

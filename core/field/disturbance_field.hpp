@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/field/element_buckets.hpp"
+#include "core/field/extension.hpp"
 #include "core/field/proximity_model.hpp"
 #include "core/field/sight.hpp"
 #include "core/field/whole_field.hpp"
@@ -52,6 +53,9 @@ class DisturbanceField {
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
+
+  /// Multiplies Σ at the listed voxels, where it is stored, by the factor that an extended model has there.
+  void scale(const Extension& extension, std::span<const std::size_t> voxels);
 
   /// Unsets Σ in a box of voxels inside the grid. With affected_columns() and fill(), a field follows its map, bit for
   /// bit as if it were made anew.

@@ -40,6 +40,15 @@ void fill_field(field::DisturbanceField& field, const map::OccupancyGrid& grid, 
   parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
 }
 
+/// Stores a model's extension at voxels where it may have changed, and multiplies Σ where it was computed anew.
+void extend(field::Extension& air, field::DisturbanceField& field, const map::OccupancyGrid& grid,
+            std::span<const std::size_t> moved, std::span<const std::size_t> fresh, const Parallel& parallel) {
+  if (!air.by_place()) return;
+  parallel(moved.size(),
+           [&](std::size_t begin, std::size_t end) { air.fill(grid, moved.subspan(begin, end - begin)); });
+  field.scale(air, fresh);
+}
+
 /// Where the hover map can change: a set reads w̄ over itself, and obstacles up to 1 m (the cap of its clearance) and
 /// the body around it. No set is wider than the largest bound of all makes it.
 map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& bounds, const map::VoxelBox& field,
@@ -82,8 +91,10 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
   field::DisturbanceField field(grid);
   fill_field(field, grid, vehicle_model, voxels, parallel);
+  field::Extension air(grid, vehicle_model);
+  extend(air, field, grid, voxels, voxels, parallel);
 
-  reach::BoundField bounds(grid, field, model.bound);
+  reach::BoundField bounds(grid, field, model.bound, std::move(air));
   reach::HoverMap hover(grid);
   parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
     hover.fill(reach, grid, distance, sums, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
@@ -124,8 +135,17 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
   field.clear(columns);
   fill_field(field, grid, vehicle_model, field::voxels_within(grid, voxels, columns), parallel);
 
-  reach::BoundField bounds(grid, field, model.bound);
-  const map::VoxelBox hover_box = reached_by_hover(old, bounds, columns, changed);
+  field::Extension air = old.bounds.extension();
+  const auto sideways = static_cast<int>(std::ceil(air.level_range() / grid.resolution())) + 1;
+  map::VoxelBox moved = grown(changed, {sideways, sideways, grid.size().z()}, grid.size());
+  moved.add(columns.low), moved.add(columns.high);
+  extend(air, field, grid, field::voxels_within(grid, voxels, moved), field::voxels_within(grid, voxels, columns),
+         parallel);
+  const bool everywhere = air.by_place();  // pushes of anywhere widen the largest sets
+
+  reach::BoundField bounds(grid, field, model.bound, std::move(air));
+  const map::VoxelBox hover_box = everywhere ? map::VoxelBox{Index3::Zero(), grid.size() - Index3::Ones()}
+                                             : reached_by_hover(old, bounds, columns, changed);
   const std::vector<std::size_t> hover_voxels = field::voxels_within(grid, voxels, hover_box);
   reach::HoverMap hover = old.hover;
   hover.clear(hover_box);

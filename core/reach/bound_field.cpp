@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace backwash::reach {
 namespace {
@@ -23,14 +24,25 @@ void for_each_voxel(const Index3& size, const Visit& visit) {
 
 }  // namespace
 
-BoundField::BoundField(const map::OccupancyGrid& grid, const field::DisturbanceField& field, const BoundModel& model)
-    : origin_W_(grid.origin()), resolution_(grid.resolution()), size_(grid.size()) {
+BoundField::BoundField(const map::OccupancyGrid& grid, const field::DisturbanceField& field, const BoundModel& model,
+                       field::Extension extension)
+    : origin_W_(grid.origin()),
+      resolution_(grid.resolution()),
+      size_(grid.size()),
+      extension_(std::move(extension)),
+      model_(model) {
   std::vector<std::uint8_t> stored(grid.cell_count(), 0);
   for_each_voxel(size_, [&](const Index3& v) { stored[grid.linear(v)] = field.has(v); });
   number_entries(stored);
   for_each_voxel(size_, [&](const Index3& v) {
     if (!stored[grid.linear(v)]) return;
-    const DisturbanceBound w = bound(field.at(v), model);
+    DisturbanceBound w = bound(field.at(v), model);
+    if (extension_.by_place()) {
+      const field::Air air = extension_.at(v);
+      for (std::size_t d = 0; d < kDirections; ++d) w.w[d] += d == kZ ? air.vertical : air.level;
+      least_push_ = least_push_.cwiseMin(air.push_W);
+      largest_push_ = largest_push_.cwiseMax(air.push_W);
+    }
     std::copy(w.w.begin(), w.w.end(), entries_[entry_of_[grid.linear(v)]].level[0].begin());
   });
   for (int level = 1; level < kLevels; ++level) pool(level);
@@ -79,18 +91,86 @@ const BoundField::Entry& BoundField::entry(const Index3& v) const noexcept {
   return entries_[entry_of_[static_cast<std::size_t>(v.x()) + static_cast<std::size_t>(size_.x()) * row]];
 }
 
-DisturbanceBound BoundField::max_over(const Vec3& low_W, const Vec3& high_W) const noexcept {
-  // Closed voxels: one that only touches the box counts. Compared before the casts, so that any box is in range.
-  Index3 low, high;
+// Closed voxels: one that only touches the box counts. Compared before the casts, so that any box is in range.
+map::VoxelBox BoundField::meeting(const Vec3& low_W, const Vec3& high_W) const noexcept {
+  map::VoxelBox box;
+  Index3 &low = box.low, &high = box.high;
   for (int axis = 0; axis < 3; ++axis) {
     const double from = (low_W[axis] - origin_W_[axis]) / resolution_;
     const double to = (high_W[axis] - origin_W_[axis]) / resolution_;
-    if (!(from <= size_[axis]) || !(to >= 0)) return {};
+    if (!(from <= size_[axis]) || !(to >= 0)) return {Index3::Ones(), Index3::Zero()};
     low[axis] = from > 0 ? static_cast<int>(from) : 0;
     low[axis] -= from > 0 && low[axis] == from;
     high[axis] = to < size_[axis] ? static_cast<int>(to) : size_[axis] - 1;
   }
-  return max_over_voxels(low, high);
+  return box;
+}
+
+DisturbanceBound BoundField::max_over(const Vec3& low_W, const Vec3& high_W) const noexcept {
+  const map::VoxelBox box = meeting(low_W, high_W);
+  return max_over_voxels(box.low, box.high);
+}
+
+DisturbanceBound BoundField::max_about(const Vec3& push_W, const Vec3& v_W, const Vec3& low_W,
+                                       const Vec3& high_W) const noexcept {
+  const map::VoxelBox box = meeting(low_W, high_W);
+  return max_about_voxels(push_W, v_W, box.low, box.high);
+}
+
+DisturbanceBound BoundField::max_about_voxels(const Vec3& push_W, const Vec3& v_W, const Index3& low,
+                                              const Index3& high) const noexcept {
+  if (extension_.none()) return max_over_voxels(low, high);
+  if (!extension_.by_place()) return moving(max_over_voxels(low, high), v_W);
+  const Vec3 here = push_W - extension_.moving(v_W).push_W;  // of the place alone
+  const auto deviation = [](const Vec3& n, const Vec3& of) { return std::abs(n.dot(of)); };
+  DisturbanceBound result;
+  const map::VoxelBox box{low.cwiseMax(0), high.cwiseMin(size_ - Index3::Ones())};
+  if (box.empty()) return result;
+  if ((box.high - box.low + Index3::Ones()).prod() > kFew) {
+    result = moving(max_over_voxels(low, high), v_W);
+    const Vec3 most = (here - least_push_).cwiseAbs().cwiseMax((largest_push_ - here).cwiseAbs());
+    for (std::size_t d = 0; d < kDirections; ++d) result.w[d] += unit(static_cast<Direction>(d)).cwiseAbs().dot(most);
+    return result;
+  }
+  for (int k = box.low.z(); k <= box.high.z(); ++k)
+    for (int j = box.low.y(); j <= box.high.y(); ++j)
+      for (int i = box.low.x(); i <= box.high.x(); ++i) {
+        const DisturbanceBound found = at({i, j, k});
+        if (!(found.w[kZ] > 0)) continue;  // not stored
+        const DisturbanceBound w = moving(found, v_W);
+        const Vec3 off = extension_.at({i, j, k}).push_W - here;
+        for (std::size_t d = 0; d < kDirections; ++d)
+          result.w[d] = std::max(result.w[d], w.w[d] + deviation(unit(static_cast<Direction>(d)), off));
+      }
+  return result;
+}
+
+PerDirection BoundField::push_spread(const Vec3& push_W, const Vec3& v_W, const Vec3& low_W,
+                                     const Vec3& high_W) const noexcept {
+  PerDirection spread{};
+  const field::Air moving = extension_.moving(v_W);
+  const map::VoxelBox box = meeting(low_W, high_W);
+  for (int k = std::max(box.low.z(), 0); extension_.by_place() && k <= std::min(box.high.z(), size_.z() - 1); ++k)
+    for (int j = std::max(box.low.y(), 0); j <= std::min(box.high.y(), size_.y() - 1); ++j)
+      for (int i = std::max(box.low.x(), 0); i <= std::min(box.high.x(), size_.x() - 1); ++i) {
+        if (!(at({i, j, k}).w[kZ] > 0)) continue;  // not stored
+        const Vec3 off = extension_.at({i, j, k}).push_W + moving.push_W - push_W;
+        for (std::size_t d = 0; d < kDirections; ++d)
+          spread[d] = std::max(spread[d], std::abs(unit(static_cast<Direction>(d)).dot(off)));
+      }
+  for (std::size_t d = 0; d < kDirections; ++d) spread[d] += d == kZ ? moving.vertical : moving.level;
+  return spread;
+}
+
+// Σ's factor by speed, and what is not known of the pushes by velocity.
+DisturbanceBound BoundField::moving(DisturbanceBound w, const Vec3& v_W) const noexcept {
+  const field::Air air = extension_.moving(v_W);
+  const double factor = std::exp(air.ln_variance / 2);
+  for (std::size_t d = 0; d < kDirections; ++d) {
+    const double mean = d == kZ ? model_.mean_vertical : model_.mean_horizontal;
+    w.w[d] = mean + factor * (w.w[d] - mean) + (d == kZ ? air.vertical : air.level);
+  }
+  return w;
 }
 
 DisturbanceBound BoundField::max_over_voxels(Index3 low, Index3 high) const noexcept {

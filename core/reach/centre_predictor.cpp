@@ -158,14 +158,17 @@ void CentrePredictor::run(const Segment& segment, const Vec3& r) noexcept {
   }
 }
 
-State CentrePredictor::step(const Setpoint& command) noexcept {
+// With ã = a + d for a, lag·ã′ = (u + d) − ã: the push adds to the input, and ã jumps with it.
+State CentrePredictor::step(const Setpoint& command, const Vec3& push_W) noexcept {
+  x_.row(2) += (push_W - push_W_).transpose();
+  push_W_ = push_W;
   std::copy_backward(r_.begin(), r_.end() - 1, r_.end());
   r_[0] = kp_.cwiseProduct(command.p_W) + kd_.cwiseProduct(command.v_W) + command.a_W;
   const auto newer = static_cast<std::size_t>(command_delay_);
   if (kind_ == Feedback::held) std::copy_backward(held_.begin(), held_.end() - 1, held_.end());
   for (const Segment& segment : segments_) {
     if (segment.measure) held_[0] = feedback(x_);
-    run(segment, segment.new_command ? r_[newer] : r_[newer + 1]);
+    run(segment, (segment.new_command ? r_[newer] : r_[newer + 1]) + push_W);
   }
   state_ = {x_.row(0).transpose(), x_.row(1).transpose()};
   a_W_ = x_.row(2).transpose();

@@ -220,6 +220,26 @@ ReachTube mean_tube(const Reachability& reach, const State& start, const Setpoin
   return tube_with_bounds(reach, start, previous, commands, mean);
 }
 
+/// The same with the mean push of an extended model. What it varies by is taken over the worst case's sets, which are
+/// wider.
+ReachTube mean_tube_over_field(const Reachability& reach, const State& start, const Setpoint& previous,
+                               std::span<const Setpoint> commands, const BoundField& bounds, const BoundModel& model) {
+  if (bounds.extension().none()) return mean_tube(reach, start, previous, commands, model);
+  const ReachTube worst = tube_over_field(reach, start, previous, commands, bounds);
+  std::vector<DisturbanceBound> mean(commands.size(), bound(Variance{}, model));
+  std::vector<Vec3> pushes;
+  for (std::size_t k = 0; k < commands.size(); ++k) {
+    const State &from = worst[k].center, &to = worst[k + 1].center;
+    const auto& h = worst[k].half_widths_interval;
+    const Vec3 extent(h[kX], h[kY], h[kZ]);
+    pushes.push_back(bounds.push(from.p_W, from.v_W));
+    const PerDirection spread = bounds.push_spread(pushes.back(), from.v_W, from.p_W.cwiseMin(to.p_W) - extent,
+                                                   from.p_W.cwiseMax(to.p_W) + extent);
+    for (std::size_t d = 0; d < kDirections; ++d) mean[k].w[d] += spread[d];
+  }
+  return tube_with_bounds(reach, start, previous, commands, mean, pushes);
+}
+
 /// s of a step, given the level in force, the error at its start and its number.
 template <typename ScaleOf>
 ChanceTube propagate(const Reachability& reach, const BoundModel& model, ReachTube mean, double probability,
@@ -286,7 +306,8 @@ ChanceTube chance_tube_over_field(const Reachability& reach, const State& start,
       GaussianError trial = error;
       const PerDirection h = sum(mean[k].half_widths_interval, level, trial.step(s).largest);
       const Vec3 extent(h[kX], h[kY], h[kZ]);
-      const DisturbanceBound found = bounds.max_over(low - extent, high + extent);
+      const Vec3 push = bounds.push(mean[k].center.p_W, mean[k].center.v_W);
+      const DisturbanceBound found = bounds.max_about(push, mean[k].center.v_W, low - extent, high + extent);
       grown = false;
       for (std::size_t d = 0; d < kDirections; ++d) {
         const double scale = std::max(0.0, (found.w[d] - mean_push[d]) / model.kappa);
@@ -295,7 +316,8 @@ ChanceTube chance_tube_over_field(const Reachability& reach, const State& start,
     }
     return s;
   };
-  return propagate(reach, model, mean_tube(reach, start, previous, commands, model), probability, over_set);
+  return propagate(reach, model, mean_tube_over_field(reach, start, previous, commands, bounds, model), probability,
+                   over_set);
 }
 
 }  // namespace backwash::reach

@@ -84,10 +84,11 @@ class CentrePredictor {
   /// Starts at `start` with acceleration `a_W` (m/s²; commanded_acceleration() when it is not known). Errors: throws
   /// std::invalid_argument for a negative or too long latency or feedback delay.
   CentrePredictor(const Vehicle& vehicle, Loop loop, const State& start, const Vec3& a_W, const Setpoint& previous);
-  /// Issues the command of the next period and moves on by 20 ms. Real-time: wait-free, no allocation.
-  State step(const Setpoint& command) noexcept;
+  /// Issues the command of the next period and moves on by 20 ms. `push_W`: mean acceleration d by the air, held over
+  /// the period, m/s²: v̇ = a + d. Real-time: wait-free, no allocation.
+  State step(const Setpoint& command, const Vec3& push_W = Vec3::Zero()) noexcept;
   const State& state() const noexcept { return state_; }
-  const Vec3& acceleration() const noexcept { return a_W_; }
+  const Vec3& acceleration() const noexcept { return a_W_; }  ///< v̇, the push included
 
  private:
   enum class Feedback { immediate, held, delayed };
@@ -125,7 +126,8 @@ class CentrePredictor {
   std::array<Vec3, kMaxDelaySteps + 2> held_;  // held: measured feedback, newest first
   std::vector<FeedbackPiece> past_;            // delayed: ring of past segments
   std::size_t newest_ = 0;
-  Axes x_;
+  Axes x_;  // row a: v̇, the push included
+  Vec3 push_W_ = Vec3::Zero();
   State state_;
   Vec3 a_W_;
 };

@@ -37,6 +37,12 @@ Vec3 channels(const DisturbanceBound& w_bar) { return {w_bar.w[kX], w_bar.w[kY],
 
 Vec3 box(const PerDirection& half_widths) { return {half_widths[kX], half_widths[kY], half_widths[kZ]}; }
 
+/// Where a set hovering at p has its centre, from p: static answer of the loop to the mean push.
+Vec3 static_shift(const Vehicle& vehicle, const Vec3& push_W) {
+  const auto& kp = vehicle.controller.kp;
+  return push_W.cwiseQuotient(Vec3(kp.horizontal, kp.horizontal, kp.vertical));
+}
+
 /// What is left of the distance to obstacles for clearance.
 double body_and_estimation(const Vehicle& vehicle) { return vehicle.body.radius + vehicle.estimation.position; }
 
@@ -85,14 +91,17 @@ class Surroundings {
 
 /// Half widths of the smallest fixed point, m; nothing if they exceed the free distance. Monotone iteration from below
 /// ends there: the maxima only grow, through finitely many boxes of voxels. `v`: the
-/// centre's voxel, free; `free_distance`: there.
+/// centre's voxel, free; `free_distance`: there; `push_W`: that put the centre there.
 template <typename HalfWidths>
 std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, double free_distance, const BoundField& bounds,
-                                        const Surroundings& around, const Index3& v) {
+                                        const Surroundings& around, const Index3& v, const Vec3& push_W) {
+  const bool extended = !bounds.extension().none();
   auto over = around.meeting(Vec3::Zero());
   DisturbanceBound w_bar{};
   for (;;) {
-    const DisturbanceBound found = over.low == over.high ? bounds.at(v) : bounds.max_over_voxels(over.low, over.high);
+    const DisturbanceBound found = extended ? bounds.max_about_voxels(push_W, Vec3::Zero(), over.low, over.high)
+                                   : over.low == over.high ? bounds.at(v)
+                                                           : bounds.max_over_voxels(over.low, over.high);
     // Holds by itself but for rounding in the ellipsoid's scalar root, which must not make the iteration cycle.
     for (std::size_t d = 0; d < kDirections; ++d) w_bar.w[d] = std::max(found.w[d], w_bar.w[d]);
     const PerDirection h = half_widths(w_bar);
@@ -161,24 +170,29 @@ HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, co
   HoverSet set;
   const double taken = body_and_estimation(reach.vehicle);
   set.clearance = -taken;
-  const Index3 v = grid.index(p_W);
+  if (!grid.free(grid.index(p_W))) return set;
+  const Vec3 push_W = bounds.push(p_W, Vec3::Zero());
+  set.shift = static_shift(reach.vehicle, push_W);
+  const Vec3 c_W = p_W + set.shift;
+  const Index3 v = grid.index(c_W);
   if (!grid.free(v)) return set;
   if (constant_margin >= 0) {
     set.half_widths.fill(constant_margin);
-    set.clearance = std::min(kClearanceCap, distance.exact(grid, p_W) - constant_margin - taken);
+    set.clearance = std::min(kClearanceCap, distance.exact(grid, c_W) - constant_margin - taken);
     set.bounded = true;
     return set;
   }
   const auto paper = [&](const DisturbanceBound& w_bar) {
     return supports(hover_ellipsoid(reach.vehicle, channels(w_bar)).diagonal().cwiseSqrt());
   };
-  const Surroundings around(grid, v, p_W);
-  const auto h = reach.method == Method::tight ? fixed_point(ExactHalfWidths(reach), distance.at(v), bounds, around, v)
-                                               : fixed_point(paper, distance.at(v), bounds, around, v);
+  const Surroundings around(grid, v, c_W);
+  const auto h = reach.method == Method::tight
+                     ? fixed_point(ExactHalfWidths(reach), distance.at(v), bounds, around, v, push_W)
+                     : fixed_point(paper, distance.at(v), bounds, around, v, push_W);
   if (!h) return set;
   set.bounded = true;
   set.half_widths = *h;
-  set.clearance = set_clearance(reach.vehicle, grid, distance, p_W, *h);
+  set.clearance = set_clearance(reach.vehicle, grid, distance, c_W, *h);
   return set;
 }
 
@@ -189,28 +203,42 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
                     const map::OccupancySums& sums, const BoundField& bounds, std::span<const std::size_t> voxels,
                     double constant_margin) {
   const double taken = body_and_estimation(reach.vehicle);
+  const bool extended = !bounds.extension().none();
+  struct Centre {  // of a set
+    Index3 v;
+    Vec3 p_W, push_W;
+  };
   const auto fill_where = [&](const auto& safe) {
     for (const std::size_t n : voxels) {
-      const double free_distance = distance.at(n);
-      if (free_distance <= taken) continue;  // not even a point fits
+      if (distance.at(n) <= taken) continue;  // not even a point fits
       const Index3 v = grid.voxel(n);
-      if (safe(v, free_distance)) safe_.set(v, map::Cell::free);
+      Centre c{v, grid.center(v), Vec3::Zero()};
+      if (extended) {
+        c.push_W = bounds.push(c.p_W, Vec3::Zero());
+        c.p_W += static_shift(reach.vehicle, c.push_W);
+        c.v = grid.index(c.p_W);
+        if (!grid.free(c.v) || distance.at(c.v) <= 0) continue;
+      }
+      if (safe(c)) safe_.set(v, map::Cell::free);
     }
   };
   if (constant_margin >= 0) {
     // Stored distances are exact at centres, in single precision.
-    return fill_where(
-        [&](const Index3&, double free_distance) { return free_distance - 1e-6 > constant_margin + taken; });
+    return fill_where([&](const Centre& c) {
+      const double free_distance = extended ? distance.exact(grid, c.p_W) : distance.at(c.v);
+      return free_distance - 1e-6 > constant_margin + taken;
+    });
   }
   const ClearTest test(reach.vehicle, grid, sums);
   const auto safe_with = [&](const auto& half_widths) {
-    return [&](const Index3& v, double free_distance) {
-      const Vec3 p_W = grid.center(v);
-      const Surroundings around(grid, v, p_W);
+    return [&](const Centre& c) {
+      const Surroundings around(grid, c.v, c.p_W);
+      // A centre off its voxel's is nearer to obstacles by that much at most.
+      const double free_distance = distance.at(c.v), off = extended ? (c.p_W - grid.center(c.v)).norm() : 0;
       // A part of the set, and cheap.
-      if (test.blocked(around, free_distance, half_widths(bounds.at(v)))) return false;
-      const auto h = fixed_point(half_widths, free_distance, bounds, around, v);
-      return h && test.clear(around, p_W, free_distance, *h);
+      if (test.blocked(around, free_distance - off, half_widths(bounds.at(c.v)))) return false;
+      const auto h = fixed_point(half_widths, free_distance, bounds, around, c.v, c.push_W);
+      return h && test.clear(around, c.p_W, free_distance - off, *h);
     };
   };
   if (reach.method == Method::tight) return fill_where(safe_with(ExactHalfWidths(reach)));

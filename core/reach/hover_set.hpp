@@ -14,14 +14,17 @@ namespace backwash::reach {
 /// The infinite-time set of a vehicle hovering at a point (model.md sections 3 and 5).
 struct HoverSet {
   PerDirection half_widths{};  ///< m
+  Vec3 shift = Vec3::Zero();   ///< of its centre from the set-point, m: mean push of an extended model over k_p
   double clearance = 0;  ///< distance of the set to obstacles − body.radius − estimation.position, m, capped at 1 m
   bool bounded = false;  ///< false: the fixed point left the clear space before it converged
   bool safe() const noexcept { return bounded && clearance > 0; }
 };
 
-/// Smallest fixed point of h = h_∞ × max w̄(p ± h), then its clearance. For method paper h is the support of the
+/// Smallest fixed point of h = h_∞ × max w̄(c ± h), then its clearance; c = p + d(p)/k_p with d the mean push at p, and
+/// by how much the push differs over the set is in w̄. For method paper h is the support of the
 /// infinite-time ellipsoid instead. Unbounded, with the clearance of touching, when h exceeds the free distance and
-/// where p is not in a free voxel. `constant_margin` >= 0 replaces the set by a ball of that radius (the baseline of
+/// where p or c is not in a free voxel. `constant_margin` >= 0 replaces the set by a ball of that radius (the baseline
+/// of
 /// `--margin`). Cost: some look-ups of max_over and one prism_distance, which the distance field limits.
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
                    const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);

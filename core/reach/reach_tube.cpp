@@ -64,14 +64,16 @@ double largest_half_axis(const Mat3& shape, const PerDirection& h, Method method
   return method == Method::paper ? std::sqrt(shape.diagonal().maxCoeff()) : Vec3(h[kX], h[kY], h[kZ]).norm();
 }
 
-// Centres at t = 0, 20 ms, …: one more than commands.
+// Centres at t = 0, 20 ms, …: one more than commands; push_at(k, state) is the mean push of step k.
+template <typename PushAt>
 std::vector<State> centres(const Reachability& reach, const State& start, const Setpoint& previous,
-                           std::span<const Setpoint> commands) {
+                           std::span<const Setpoint> commands, PushAt push_at) {
   const Vec3 a_W = commanded_acceleration(reach.vehicle, start, previous);
   CentrePredictor predictor(reach.vehicle, reach.loop, start, a_W, previous);
   std::vector<State> states{start};
   states.reserve(commands.size() + 1);
-  for (const Setpoint& command : commands) states.push_back(predictor.step(command));
+  for (std::size_t k = 0; k < commands.size(); ++k)
+    states.push_back(predictor.step(commands[k], push_at(k, states.back())));
   return states;
 }
 
@@ -111,9 +113,10 @@ bool covers(const PerDirection& a, const PerDirection& b) {
 template <typename Sets>
 DisturbanceBound bound_over_set(const Sets& sets, const State& from, const State& to, const BoundField& bounds) {
   const Vec3 low = from.p_W.cwiseMin(to.p_W), high = from.p_W.cwiseMax(to.p_W);
+  const Vec3 push = bounds.push(from.p_W, from.v_W);
   const auto over = [&](const PerDirection& h) {
     const Vec3 reach(h[kX], h[kY], h[kZ]);
-    return bounds.max_over(low - reach, high + reach);
+    return bounds.max_about(push, from.v_W, low - reach, high + reach);
   };
   DisturbanceBound w = over(sets.half_widths());
   constexpr int kRounds = 4, kDoublings = 60;
@@ -143,10 +146,14 @@ Reachability::Reachability(const Vehicle& v, Method m, Loop l)
                              m == Method::paper ? Loop::continuous : l)) {}
 
 ReachTube tube_with_bounds(const Reachability& reach, const State& start, const Setpoint& previous,
-                           std::span<const Setpoint> commands, std::span<const DisturbanceBound> bounds) {
-  if (commands.size() != bounds.size())
-    throw std::invalid_argument("tube_with_bounds: one bound per command is needed");
-  const std::vector<State> centers = centres(reach, start, previous, commands);
+                           std::span<const Setpoint> commands, std::span<const DisturbanceBound> bounds,
+                           std::span<const Vec3> pushes) {
+  if (commands.size() != bounds.size() || (!pushes.empty() && pushes.size() != commands.size()))
+    throw std::invalid_argument("tube_with_bounds: one bound per command is needed, and one push if any");
+  const auto push_at = [pushes](std::size_t k, const State&) {
+    return pushes.empty() ? Vec3::Zero().eval() : pushes[k];
+  };
+  const std::vector<State> centers = centres(reach, start, previous, commands, push_at);
   const auto given = [bounds](std::size_t k, const auto&) { return bounds[k]; };
   return reach.method == Method::paper ? propagate<EllipsoidHalfWidths>(reach, centers, given)
                                        : propagate<ExactHalfWidths>(reach, centers, given);
@@ -154,7 +161,8 @@ ReachTube tube_with_bounds(const Reachability& reach, const State& start, const 
 
 ReachTube tube_over_field(const Reachability& reach, const State& start, const Setpoint& previous,
                           std::span<const Setpoint> commands, const BoundField& bounds) {
-  const std::vector<State> centers = centres(reach, start, previous, commands);
+  const auto push_at = [&](std::size_t, const State& s) { return bounds.push(s.p_W, s.v_W); };
+  const std::vector<State> centers = centres(reach, start, previous, commands, push_at);
   const auto from_field = [&](std::size_t k, const auto& sets) {
     return bound_over_set(sets, centers[k], centers[k + 1], bounds);
   };

@@ -38,12 +38,15 @@ struct Reachability {
 };
 
 /// Tube along held commands with the bound given for each step (command k and bound k hold during step k; sizes equal):
-/// N commands give N + 1 entries. The centre starts at `start`.
+/// N commands give N + 1 entries. The centre starts at `start`. `pushes`: mean push of each step, m/s²; none: 0.
 ReachTube tube_with_bounds(const Reachability& reach, const State& start, const Setpoint& previous,
-                           std::span<const Setpoint> commands, std::span<const DisturbanceBound> bounds);
+                           std::span<const Setpoint> commands, std::span<const DisturbanceBound> bounds,
+                           std::span<const Vec3> pushes = {});
 
 /// Tube along held commands through a map: the bound of each step is the maximum over the voxels that the set can reach
-/// in that step (hull of the step's two centres ± interval half widths).
+/// in that step (hull of the step's two centres ± interval half widths). The mean push of an extended model, at each
+/// predicted state, moves the centre, Δc_{k+1} = A Δc_k + B d(c_k, v_k); by how much the push differs over the set
+/// joins the bound.
 ReachTube tube_over_field(const Reachability& reach, const State& start, const Setpoint& previous,
                           std::span<const Setpoint> commands, const BoundField& bounds);
 

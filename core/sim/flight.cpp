@@ -42,6 +42,7 @@ std::string obstacle_to_hover(const plan::World& world, const std::string& name,
 reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& tube, const Setpoint& previous,
                              const std::vector<Setpoint>& commands, const BoundModel& bounds, double sigma_scale) {
   std::vector<DisturbanceBound> scaled;
+  std::vector<Vec3> pushes;
   for (std::size_t k = 0; k < commands.size(); ++k) {
     DisturbanceBound b = tube[k].w_bar;
     for (std::size_t d = 0; d < kDirections; ++d) {
@@ -49,8 +50,9 @@ reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& t
       b.w[d] = mean + std::sqrt(sigma_scale) * (b.w[d] - mean);
     }
     scaled.push_back(b);
+    pushes.push_back(world.bounds.push(tube[k].center.p_W, tube[k].center.v_W));
   }
-  return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled);
+  return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled, pushes);
 }
 
 void append(std::vector<Setpoint>& commands, const std::vector<Setpoint>& more) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
 #include <cstdio>
 
 #include "core/field/disturbance_field.hpp"
@@ -22,6 +23,7 @@ struct Value {
   Vec3 p_W;
   std::optional<Variance> sigma;
   std::optional<field::Breakdown> parts;
+  Vec3 push_W = Vec3::Zero();  ///< mean push of an extended model, with the parts, m/s²
 };
 
 std::vector<Vec3> read_points(const std::string& path) {
@@ -85,14 +87,29 @@ std::vector<Value> interpolated(const field::ProximityField& exact, const std::v
   run_parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
     stored.fill(exact, std::span(voxels).subspan(begin, end - begin));
   });
+  field::Extension extension(grid, exact.model());
+  extension.fill(grid, voxels);
+  if (extension.by_place()) stored.scale(extension, voxels);
+  const double everywhere = std::exp(extension.moving(Vec3::Zero()).ln_variance);
   std::vector<Value> values;
   for (const auto& p : points) {
-    values.push_back({p, std::nullopt, std::nullopt});
+    values.push_back({p, std::nullopt, std::nullopt, Vec3::Zero()});
     for (const auto& v : corners(grid, p)) {
-      if (stored.has(v)) values.back().sigma = stored.interpolated(p, Variance{});
+      if (stored.has(v)) values.back().sigma = everywhere * stored.interpolated(p, Variance{});
     }
   }
   return values;
+}
+
+/// What the model's extension says at a point, hovering.
+field::Air air_at(const field::ProximityField& exact, const Vec3& p_W) {
+  const auto& effects = exact.model().extension;
+  if (effects.empty()) return {};
+  field::Air air = field::air_around(effects, field::around(exact.grid(), p_W));
+  const field::Air everywhere = field::air_moving(effects, Vec3::Zero());
+  air.push_W += everywhere.push_W;
+  air.ln_variance += everywhere.ln_variance;
+  return air;
 }
 
 std::vector<Value> evaluated(const field::ProximityField& exact, const std::vector<Vec3>& points) {
@@ -100,13 +117,14 @@ std::vector<Value> evaluated(const field::ProximityField& exact, const std::vect
   run_parallel(points.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto parts = exact.at(points[i]);
-      values[i] = {points[i], parts.sigma(), parts};
+      const auto air = air_at(exact, points[i]);
+      values[i] = {points[i], std::exp(air.ln_variance) * parts.sigma(), parts, air.push_W};
     }
   });
   return values;
 }
 
-void print_json(const std::vector<Value>& values) {
+void print_json(const std::vector<Value>& values, bool extended) {
   Json points = Json::array();
   for (const auto& value : values) {
     Json entry = {{"p", to_json(value.p_W)}, {"sigma", value.sigma ? to_json(*value.sigma) : Json()}};
@@ -115,6 +133,7 @@ void print_json(const std::vector<Value>& values) {
       entry["corner"] = to_json(value.parts->corner);
       entry["wall"] = to_json(value.parts->wall);
       entry["base"] = to_json(value.parts->base);
+      if (extended) entry["push"] = to_json(value.push_W);
     }
     points.push_back(std::move(entry));
   }
@@ -170,7 +189,7 @@ int run(const Options& options) {
   const field::ProximityField exact(grid, model);
   const auto values = options.interpolated || slice ? interpolated(exact, points) : evaluated(exact, points);
   if (!options.out.empty()) write_picture(options, grid, *slice, values);
-  options.json ? print_json(values) : print_table(values);
+  options.json ? print_json(values, !model.extension.empty()) : print_table(values);
   return kOk;
 }
 

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <toml++/toml.h>
-#include <cstdio>
+#include <algorithm>
+#include <numeric>
 #include <optional>
+#include <sstream>
 
 #include "core/study/discrepancy/extend.hpp"
 #include "core/study/discrepancy/page.hpp"
+#include "core/study/discrepancy/rotor_reference.hpp"
+#include "core/study/ulog.hpp"
+#include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
-#include "services/backwash/json.hpp"
+#include "services/backwash/study_output.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/parallel/parallel.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -17,77 +23,11 @@ namespace discrepancy = study::discrepancy;
 
 struct Options {
   std::string map, model = "builtin:quad-5in", vehicle, report, out;
-  std::vector<std::string> logs;
+  std::vector<std::string> logs, reference;
+  std::string group;
   unsigned seed = 1;
   bool json = false, force = false, quick = false;
 };
-
-Json to_json(const discrepancy::NamedCause& cause) {
-  const auto& found = cause.found;
-  Json parameters = Json::object();
-  for (const auto& e : found.parameters) parameters[e.name] = {{"value", e.value}, {"ci95", {e.low, e.high}}};
-  Json set = Json::array({found.form->cause});
-  for (const auto& rival : found.rivals) set.push_back(rival.name);
-  Json separate = Json::array();
-  for (const auto& s : cause.separate_by)
-    separate.push_back({{"rival", s.rival},
-                        {"manoeuvre", s.manoeuvre},
-                        {"expected_nats", s.expected_nats ? Json(*s.expected_nats) : Json(nullptr)}});
-  const auto& g = cause.gain;
-  return {{"name", found.form->cause},
-          {"set", set},
-          {"p", found.p},
-          {"form", found.form->formula},
-          {"parameters", parameters},
-          {"gain",
-           {{"held_out_nats", g.held_out_nats},
-            {"ci95_nats", {g.low_nats, g.high_nats}},
-            {"rmse_before", g.rmse_before},
-            {"rmse_after", g.rmse_after},
-            {"variance_coverage_before", g.coverage_before},
-            {"variance_coverage_after", g.coverage_after}}},
-          {"separate_by", separate}};
-}
-
-Json to_json(const discrepancy::StudyResult& result, const discrepancy::Observations& seen) {
-  Json json = {{"verdict", discrepancy::to_string(result.verdict)},
-               {"flights", seen.flights},
-               {"windows", seen.windows.size()},
-               {"gated_out", Json::object()},
-               {"causes", Json::array()},
-               {"unknown", Json::array()},
-               {"not_tested", Json::array()},
-               {"minimum_detectable", Json::object()}};
-  for (const auto& [gate, count] : seen.gated_out) json["gated_out"][gate] = count;
-  for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause));
-  for (const auto& u : result.unknown)
-    json["unknown"].push_back({{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}});
-  for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
-  for (const auto& [cause, sizes] : result.minimum_detectable)
-    for (const auto& [parameter, size] : sizes) json["minimum_detectable"][cause][parameter] = size;
-  json["threshold_nats"] = result.threshold;
-  return json;
-}
-
-void print_text(const discrepancy::StudyResult& result, const discrepancy::Observations& seen) {
-  std::printf("%s: %zu flights, %zu windows\n", discrepancy::to_string(result.verdict), seen.flights,
-              seen.windows.size());
-  if (result.verdict == discrepancy::Verdict::insufficient)
-    std::printf("fewer than 10 flights with good windows do not warrant a name; fly more\n");
-  for (const auto& cause : result.causes) {
-    std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause.c_str(),
-                cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
-    for (const auto& e : cause.found.parameters)
-      std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
-    for (const auto& s : cause.separate_by) {
-      std::printf("  not told from %s; fly: %s", s.rival.c_str(), s.manoeuvre.c_str());
-      std::printf(s.expected_nats ? " (%.1f nats expected)\n" : "\n", s.expected_nats.value_or(0));
-    }
-  }
-  for (const auto& u : result.unknown)
-    std::printf("unknown structure in %s along %s, p %.4f\n", u.group.c_str(), u.along.c_str(), u.p);
-  for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
-}
 
 /// The study's own terms of a model file that it has extended before; none in others.
 std::vector<discrepancy::Term> read_terms(const std::string& path) {
@@ -110,6 +50,95 @@ std::vector<discrepancy::Term> read_terms(const std::string& path) {
   return terms;
 }
 
+/// The [[extension.term]] tables of a model file as they stand there; empty if it has none.
+std::string earlier_terms(const std::string& path) {
+  if (path.starts_with("builtin:")) return "";
+  const auto file = toml::parse_file(path);  // load_model has accepted it
+  const auto* list = file.at_path("extension.term").as_array();
+  if (!list) return "";
+  std::ostringstream text;
+  text << toml::toml_formatter{toml::table{{"extension", toml::table{{"term", *list}}}}};
+  return text.str();
+}
+
+/// A flight log: ULog by its name, else CSV.
+study::FlightLog read_flight(const std::string& path) {
+  if (!path.ends_with(".ulg")) return read_table(path, "t_s");
+  auto log = study::read_ulog(path);
+  if (log) return std::move(*log);
+  throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+}
+
+/// Flights, and the value of the column that they are grouped by in each one's first row; empty: none.
+struct Flights {
+  std::vector<study::FlightLog> logs;
+  std::vector<double> group;
+};
+
+Flights read_flights(const Options& options) {
+  Flights flights;
+  const auto read = [&](const std::string& path) {
+    progress("reading " + path);
+    flights.logs.push_back(read_flight(path));
+    const auto& log = flights.logs.back();
+    for (const char* name : {"x_m", "y_m", "z_m"})
+      if (!log.has(name))
+        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
+    if (options.group.empty()) return;
+    if (!log.has(options.group) || log.column(options.group).empty())
+      throw Failure(kBadData, path + ":1: no column '" + options.group + "' to group flights by; name one that it has");
+    flights.group.push_back(log.column(options.group).front());
+  };
+  for (const auto& path : options.logs) read(path);
+  return flights;
+}
+
+discrepancy::Observations observe(const Options& options, const Vehicle& vehicle, const Model& model,
+                                  const map::OccupancyGrid* grid) {
+  const Flights flights = read_flights(options);
+  std::vector<std::size_t> order(flights.logs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (!flights.group.empty())
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return flights.group[a] < flights.group[b]; });
+  discrepancy::Observer observer(vehicle, model, grid);
+  for (const std::size_t k : order) observer.add(flights.logs[k]);
+  auto seen = observer.finish();
+  if (flights.group.empty()) return seen;
+  std::vector<std::size_t> first{0};
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const bool last = k + 1 == order.size() || flights.group[order[k + 1]] != flights.group[order[k]];
+    if (last) first.push_back(seen.first[k + 1]);
+  }
+  seen.first = std::move(first);
+  return seen;
+}
+
+/// Motor shares of the flights against those of the reference flights.
+std::optional<discrepancy::RotorVerdict> against_reference(const Options& options, const Vehicle& vehicle,
+                                                           const Model& model, const discrepancy::Observations& seen) {
+  discrepancy::Observer observer(vehicle, model, nullptr);
+  for (const auto& path : options.reference) observer.add(read_flight(path));
+  const auto sound = discrepancy::rotor_contrasts(observer.finish());
+  const auto group = discrepancy::rotor_contrasts(seen);
+  const auto verdict = discrepancy::judge_rotors(sound, group);
+  if (!verdict)
+    throw Failure(kBadData,
+                  options.reference.front() +
+                      ":1: --reference needs 4 flights or more with motor1 … motor4, and the logs need these too");
+  return verdict;
+}
+
+/// Ratios of the vertical variance by height and plate, day and speed held fixed, of recordings that say what they
+/// stood on and under (`backwash import airgarage`).
+std::optional<study::calibrate::HeightEffect> height_effect(const Options& options, const Model& model,
+                                                            const discrepancy::Observations& seen) {
+  if (!options.map.empty() || !seen.has("ceiling")) return std::nullopt;
+  CampaignFiles files;
+  for (const auto& path : options.logs) files.logs.push_back({path, std::nullopt});
+  return read_campaign(files, std::nullopt, model, options.seed).height;
+}
+
 int run(const Options& options) {
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
@@ -118,16 +147,7 @@ int run(const Options& options) {
   model.ground.r0 = vehicle.body.diagonal_radius;
   std::optional<map::OccupancyGrid> grid;
   if (!options.map.empty()) grid = read_map(options.map);
-  discrepancy::Observer observer(vehicle, model, grid ? &*grid : nullptr);
-  for (const auto& path : options.logs) {
-    progress("reading " + path);
-    const auto log = read_table(path, "t_s");
-    for (const char* name : {"x_m", "y_m", "z_m"})
-      if (!log.has(name))
-        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
-    observer.add(log);
-  }
-  auto seen = observer.finish();
+  auto seen = observe(options, vehicle, model, grid ? &*grid : nullptr);
   const auto left = discrepancy::apply(read_terms(options.model), seen);
   discrepancy::StudyOptions study_options;
   study_options.search.seed = options.seed;
@@ -137,21 +157,38 @@ int run(const Options& options) {
   Json json = to_json(result, seen);
   if (!left.empty())
     for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
+  const auto height = height_effect(options, model, seen);
+  if (height) json["height_effect"] = to_json(*height);
+  std::optional<discrepancy::RotorVerdict> rotors;
+  if (!options.reference.empty()) {
+    rotors = against_reference(options, vehicle, model, seen);
+    json["rotors_against_reference"] = to_json(*rotors);
+  }
+  std::optional<discrepancy::Consequence> consequence;
+  if (!result.causes.empty()) {
+    progress("hover sets and a plan, before and after");
+    consequence = discrepancy::consequence(result, seen, model, vehicle, grid ? &*grid : nullptr, run_parallel);
+    json["consequence"] = to_json(*consequence);
+  }
   if (!options.out.empty()) {
-    write_file(options.out, discrepancy::extended_model_text(model, result, seen, options.model, kVersion),
-               options.force);
+    write_file(
+        options.out,
+        discrepancy::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model)),
+        options.force);
     json["extended_model"] = options.out;
   }
   if (!options.report.empty()) {
     progress("drawing");
-    const auto page = discrepancy::study_page(result, seen, {options.map, options.model, options.vehicle, kVersion});
+    const auto page = discrepancy::study_page(
+        result, seen, {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height});
     if (!page) throw Failure(kUnavailable, page.error().message);
     write_file(options.report, *page, options.force);
   }
   if (options.json)
     print(json);
   else
-    print_text(result, seen);
+    print_text(result, seen, rotors, height);
   return kOk;
 }
 
@@ -164,7 +201,13 @@ Verb study_verb(CLI::App& app) {
                       "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
   command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  command->add_option("--log", options->logs, "flight logs, one flight each")->required();
+  command->add_option("--log", options->logs, "flight logs, one flight each: CSV or ULog (.ulg)")->required();
+  command->add_option(
+      "--reference", options->reference,
+      "flights of the same vehicle known to be sound, 4 or more: the --log flights' motor shares are judged against "
+      "theirs, as one condition");
+  command->add_option("--group", options->group,
+                      "column, such as day: flights with one value of it are left out, flipped and scattered together");
   command->add_option("--report", options->report, "HTML page to write");
   command->add_option("--out", options->out, "extended model file to write");
   command->add_option("--seed", options->seed, "of the null's sign draws")->capture_default_str();

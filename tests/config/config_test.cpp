@@ -143,9 +143,10 @@ TEST_P(ShippedFile, RefusesAWrongType) {
 }
 
 TEST_P(ShippedFile, RefusesAMissingKeyUnlessItIsOptional) {
-  const std::vector<std::string> optional = {"controller.latency", "controller.feedback_delay",
-                                             "controller.attitude_lag", "ground.r0", "ground.l_footprint_max",
-                                             "bound.kappa", "bound.tau_w"};
+  const std::vector<std::string> optional = {
+      "controller.latency", "controller.feedback_delay", "controller.attitude_lag",
+      "ground.r0",          "ground.l_footprint_max",    "bound.kappa",
+      "bound.tau_w"};
   for (const Place& p : numbers(text)) {
     const std::string changed = std::string(text).erase(p.entry_begin, p.entry_end - p.entry_begin);
     if (std::find(optional.begin(), optional.end(), p.path) != optional.end())
@@ -222,6 +223,31 @@ TEST(LoadModel, AcceptsConfidenceAndProvenanceAndMissingMeans) {
   ASSERT_TRUE(model) << model.error().message;
   EXPECT_EQ(model->bound.mean_horizontal, 0);
   EXPECT_EQ(model->bound.mean_vertical, 0);
+}
+
+TEST(LoadModel, ReadsTheEffectsOfAnExtensionAndRefusesWhatIsNone) {
+  const auto with = [](const std::string& effect) {
+    return shipped("quad-5in.model.toml") + "\n[[extension.term]]\ncause = 'ceiling'\neffect = [" + effect + "]\n";
+  };
+  const TemporaryFile file(
+      with("{ kind = 'push_under_surface', value = [0.31], error = [0.05], scale = 0.22 }, "
+           "{ kind = 'push', value = [0.1, 0, -0.2], error = [0, 0, 0.01] }"));
+  const auto model = load_model(file.path);
+  ASSERT_TRUE(model) << model.error().message;
+  ASSERT_EQ(model->extension.size(), 2u);
+  EXPECT_EQ(model->extension[0].kind, ModelEffect::Kind::push_under_surface);
+  EXPECT_EQ(model->extension[0].value.x(), 0.31);
+  EXPECT_EQ(model->extension[0].error.x(), 0.05);
+  EXPECT_EQ(model->extension[0].scale, 0.22);
+  EXPECT_EQ(model->extension[1].value, Vec3(0.1, 0, -0.2));
+  EXPECT_THAT(message(false, with("{ kind = 'pull', value = [1], error = [0] }")), HasSubstr("kind needs one of push"));
+  EXPECT_THAT(message(false, with("{ kind = 'push', value = [1], error = [0] }")), HasSubstr("a list of 3"));
+  EXPECT_THAT(message(false, with("{ kind = 'push_to_walls', value = [1], error = [-1], scale = 1 }")),
+              HasSubstr("error needs a list of 1 in [0, 10]"));
+  EXPECT_THAT(message(false, with("{ kind = 'push_to_walls', value = [1], error = [0] }")), HasSubstr("scale needs"));
+  EXPECT_THAT(message(false, with("{ kind = 'push', value = [0, 0, 0], error = [0, 0, 0], size = 1 }")),
+              HasSubstr("unknown key 'size'"));
+  EXPECT_THAT(message(false, with("7")), HasSubstr("needs tables"));
 }
 
 TEST(LoadModel, TakesWholeNumbersToo) {

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <new>
 
+#include "core/field/disturbance_field.hpp"
+#include "core/reach/bound_field.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
 #include "core/reach/support.hpp"
@@ -50,6 +52,36 @@ TEST(RealTime, StepsOfCentreAndSetsDoNotAllocate) {
     support.half_widths_until_next(bound);
   }
   EXPECT_EQ(allocations, before);
+}
+
+TEST(RealTime, PushesAndBoundsOfAnExtendedModelDoNotAllocate) {
+  map::OccupancyGrid grid(Vec3::Zero(), 0.1, Index3(12, 12, 12), map::Cell::free);
+  for (int i = 0; i < 12; ++i)
+    for (int j = 0; j < 12; ++j) grid.set({i, j, 11}, map::Cell::occupied), grid.set({i, 0, j}, map::Cell::occupied);
+  std::vector<std::size_t> voxels;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n)
+    if (grid.at(n) == map::Cell::free) voxels.push_back(n);
+  Model model;
+  model.extension = {{ModelEffect::Kind::push_under_surface, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
+                     {ModelEffect::Kind::push_to_walls, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
+                     {ModelEffect::Kind::ln_variance_with_speed, Vec3(0.5, 0, 0), Vec3::Zero(), 2}};
+  field::DisturbanceField field(grid);
+  field.fill(field::ProximityField(grid, model), voxels);
+  field::Extension extension(grid, model);
+  extension.fill(grid, voxels);
+  const BoundField bounds(grid, field, model.bound, std::move(extension));
+  const std::size_t before = allocations;
+  Vec3 sum = Vec3::Zero();
+  double widest = 0;
+  for (int n = 0; n < 20; ++n) {
+    const Vec3 p = Vec3::Constant(0.06 * n), v(0.1 * n, 0, 0);
+    const Vec3 push = bounds.push(p, v);
+    sum += push;
+    widest = std::max(widest, bounds.max_about(push, v, p - Vec3::Constant(0.2), p + Vec3::Constant(0.2)).w[kZ]);
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(sum.z(), 0);
+  EXPECT_GT(widest, 0);
 }
 
 TEST(RealTime, TestingATubeAgainstANewVoxelDoesNotAllocate) {

@@ -5,8 +5,12 @@
 #include <array>
 #include <cmath>
 
+#include "core/field/extension.hpp"
+
 namespace backwash::study::discrepancy {
 namespace {
+
+using field::near_surface;
 
 constexpr std::array<Channel, 3> kVariances = {kVarX, kVarY, kVarZ};
 
@@ -38,13 +42,10 @@ Column in_variance(const Windows& windows, F value) {
   return column;
 }
 
-double near(double distance, double reference, double length) {
-  return std::isfinite(distance) ? std::exp(-(std::max(distance, 0.15) - reference) / length) : 0.0;
-}
-
 Vec3 pull(const WindowRow& w, double length) {
   Vec3 sum = Vec3::Zero();
-  for (const auto& [distance, direction] : w.around.walls) sum += near(distance, 0.4, length) * direction;
+  for (const auto& [distance, direction] : w.around.walls)
+    sum += near_surface(distance, field::kSurfaceReference, length) * direction;
   return sum;
 }
 
@@ -59,7 +60,9 @@ std::vector<Form> near_surfaces() {
            .floor = 0.02,
            .columns =
                [](const Windows& ws, double length) {
-                 return std::vector{in(kMeanZ, ws, [&](auto& w) { return near(w.around.height, 0.4, length); })};
+                 return std::vector{in(kMeanZ, ws, [&](auto& w) {
+                   return near_surface(w.around.height, field::kSurfaceReference, length);
+                 })};
                }},
           {.cause = "ceiling",
            .formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
@@ -69,7 +72,9 @@ std::vector<Form> near_surfaces() {
            .floor = 0.02,
            .columns =
                [](const Windows& ws, double length) {
-                 return std::vector{in(kMeanZ, ws, [&](auto& w) { return near(w.around.ceiling_gap, 0.3, length); })};
+                 return std::vector{in(kMeanZ, ws, [&](auto& w) {
+                   return near_surface(w.around.ceiling_gap, field::kCeilingReference, length);
+                 })};
                }},
           {.cause = "ceiling",
            .formula = "ln variance + B exp(-(d - 0.3 m)/L), d the gap to the surface above",
@@ -79,7 +84,9 @@ std::vector<Form> near_surfaces() {
            .floor = 0.12,
            .columns =
                [](const Windows& ws, double length) {
-                 return std::vector{in_variance(ws, [&](auto& w) { return near(w.around.ceiling_gap, 0.3, length); })};
+                 return std::vector{in_variance(ws, [&](auto& w) {
+                   return near_surface(w.around.ceiling_gap, field::kCeilingReference, length);
+                 })};
                }},
           {.cause = "wall_attraction",
            .formula = "push A exp(-(d - 0.4 m)/L) towards each wall at distance d",

@@ -21,13 +21,17 @@ std::vector<Term> terms_of(const StudyResult& result);
 /// are unknown here is returned.
 std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen);
 
-/// The model with the causes in it, as far as its own parameters can hold them (README.md, "Extension"): the largest
-/// flown push of the mean terms joins bound.mean; a variance term that does not depend on place scales every amplitude
-/// of Σ with its largest flown factor.
+/// What a cause adds to the model for field, reach and plan (README.md, "Extension"): pushes and factors of Σ by place
+/// and velocity; what depends on things that a plan does not know (battery, time, heading) by its range over the flown
+/// windows. Empty for causes that move neither.
+std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen);
+/// The model with the effects of all causes behind its own.
 Model extended(const Model& model, const StudyResult& result, const Observations& seen);
 
-/// Model file: extended() and the terms themselves.
+/// Model file: the model's own tables, then a [[extension.term]] per cause, with its effects. `earlier`: the text of
+/// the terms that the model has already.
 std::string extended_model_text(const Model& model, const StudyResult& result, const Observations& seen,
-                                const std::string& base_name, const std::string& version);
+                                const std::string& base_name, const std::string& version,
+                                const std::string& earlier = "");
 
 }  // namespace backwash::study::discrepancy

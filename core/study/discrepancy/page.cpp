@@ -2,7 +2,9 @@
 #include "core/study/discrepancy/page.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "core/study/page.hpp"
@@ -14,6 +16,30 @@ std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
+}
+
+/// A name of the catalogue as people write it: "wall attraction"; a parameter: "A, m/s²".
+std::string spoken(std::string name) {
+  constexpr std::pair<const char*, const char*> kUnits[] = {
+      {"_mps2", ", m/s²"}, {"_per_s", ", 1/s"}, {"_ln", ", ln"}, {"_m", ", m"}, {"_s", ", s"}};
+  for (const auto& [suffix, unit] : kUnits)
+    if (name.ends_with(suffix)) return name.substr(0, name.size() - std::string(suffix).size()) + unit;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+/// What the picture of a cause shows of a window: the residual of its first channel, or, for walls, its part towards
+/// the nearest one. Nothing where it was not measured.
+std::optional<double> shown(const std::string& cause, const WindowRow& w, const Observations& seen, std::size_t i,
+                            Channel channel, const std::array<double, 2>& taken) {
+  if (cause != "wall_attraction") {
+    if (!(seen.weight[channel][i] > 0)) return std::nullopt;
+    return seen.y[channel][i] - taken[channel == kMeanY ? 1 : 0];
+  }
+  if (w.around.walls.empty() || !(seen.weight[kMeanX][i] > 0)) return std::nullopt;
+  const auto nearest = std::min_element(w.around.walls.begin(), w.around.walls.end(),
+                                        [](auto& a, auto& b) { return a.first < b.first; });
+  return (seen.y[kMeanX][i] - taken[0]) * nearest->second.x() + (seen.y[kMeanY][i] - taken[1]) * nearest->second.y();
 }
 
 /// The variable that a cause is drawn over.
@@ -36,14 +62,15 @@ Regressor named_variable(const std::string& cause) {
 std::string verdict_sentence(const StudyResult& result, const Observations& seen) {
   std::string names;
   for (const auto& cause : result.causes) {
-    names += (names.empty() ? "" : ", ") + cause.found.form->cause;
-    for (const auto& rival : cause.found.rivals) names += " or " + rival.name;
+    names += (names.empty() ? "" : ", ") + spoken(cause.found.form->cause);
+    for (const auto& rival : cause.found.rivals) names += " or " + spoken(rival.name);
   }
   const std::string of =
       " (" + std::to_string(seen.flights) + " flights, " + std::to_string(seen.windows.size()) + " windows of 2 s)";
   switch (result.verdict) {
     case Verdict::cause_found:
-      return "The simulation misses: " + names + of + ".";
+      return "The simulation misses " + names + of + "; with it, flights that were not fitted are likelier by " +
+             number(result.causes.front().gain.held_out_nats) + " nats.";
     case Verdict::cannot_distinguish:
       return "The simulation misses something that these flights cannot tell apart: " + names + of + ".";
     case Verdict::unknown_structure:
@@ -66,12 +93,15 @@ tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Obse
   std::vector<Point> points;
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     const double x = along.value(seen.windows[i]);
-    if (!(seen.weight[channel][i] > 0) || !std::isfinite(x)) continue;
-    double added = 0;
+    if (!std::isfinite(x)) continue;
+    std::array<double, 2> added{};  // to the channel; of a level push to y too
     for (std::size_t k = 0; k < found.columns.size(); ++k)
       for (const auto& part : found.columns[k].parts)
-        if (part.channel == channel) added += found.theta[static_cast<Eigen::Index>(k)] * part.x[i];
-    points.push_back({x, seen.y[channel][i], seen.y[channel][i] - added});
+        if (part.channel == channel || (channel == kMeanX && part.channel == kMeanY))
+          added[part.channel == kMeanY ? 1 : 0] += found.theta[static_cast<Eigen::Index>(k)] * part.x[i];
+    const auto& w = seen.windows[i];
+    const auto before = shown(found.form->cause, w, seen, i, channel, {});
+    if (before) points.push_back({x, *before, *shown(found.form->cause, w, seen, i, channel, added)});
   }
   std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
   std::ostringstream script, dots, lines;
@@ -88,7 +118,8 @@ tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Obse
   }
   script << "$dots << EOD\n"
          << dots.str() << "EOD\n$lines << EOD\n"
-         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel '" << channel_name(channel)
+         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel '"
+         << (found.form->cause == "wall_attraction" ? "mean towards that wall" : channel_name(channel))
          << (channel <= kMeanZ ? ", m/s²," : "") << " of what the simulation misses'\nset key top right\nset grid\n"
          << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
          << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
@@ -105,7 +136,7 @@ std::string figures(const NamedCause& cause) {
   const auto& g = cause.gain;
   std::string text = "<table>\n";
   for (const auto& e : cause.found.parameters)
-    text += row(e.name, number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
+    text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
   text += row("Probability of as much by chance, over everything tried", number(cause.found.p));
   text += row("Gain on flights not fitted",
               number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " + number(g.high_nats) + "]");
@@ -113,10 +144,83 @@ std::string figures(const NamedCause& cause) {
   text += row("Samples in the model's central 90 %, before and after",
               number(g.coverage_before) + " → " + number(g.coverage_after));
   for (const auto& s : cause.separate_by)
-    text += row("Not told from " + s.rival,
+    text += row("Not told from " + spoken(s.rival),
                 "fly next: " + s.manoeuvre +
                     (s.expected_nats ? " (" + number(*s.expected_nats) + " nats expected from 12 flights)" : ""));
   return text + "</table>\n";
+}
+
+std::string share(double value) { return number(100 * value) + " %"; }
+
+std::string plan_text(const Outcome& o) {
+  if (o.plan != "ok") return o.plan;
+  return number(o.length_m) + " m in " + number(o.time_s) + " s, " + number(100 * o.clearance_m) + " cm clear";
+}
+
+/// What field, reach and plan make of the causes.
+std::string consequence_section(const Consequence& c) {
+  const Outcome &b = c.before, &a = c.after;
+  std::string text =
+      "<section><h2>What it changes for a flight</h2>\n<table>\n<tr><th></th><td style=\"width:22%\"><b>before</b></td>"
+      "<td><b>after</b></td></tr>\n";
+  const auto line = [&](const std::string& name, const std::string& before, const std::string& after) {
+    text += "<tr><th>" + escaped(name) + "</th><td>" + escaped(before) + "</td><td>" + escaped(after) + "</td></tr>\n";
+  };
+  line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
+  line("Hover sets: centre off its set-point, median (95 %)",
+       number(100 * b.shift_median) + " (" + number(100 * b.shift_95) + ") cm",
+       number(100 * a.shift_median) + " (" + number(100 * a.shift_95) + ") cm");
+  line("Hover sets: largest half width, median (95 %)",
+       number(100 * b.extent_median) + " (" + number(100 * b.extent_95) + ") cm",
+       number(100 * a.extent_median) + " (" + number(100 * a.extent_95) + ") cm");
+  if (b.safe + a.safe > 0) line("Flown places where hovering is safe", share(b.safe), share(a.safe));
+  if (!b.plan.empty()) {
+    const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
+    line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
+  }
+  return text + "</table>\n</section>\n";
+}
+
+std::string height_section(const calibrate::HeightEffect& h) {
+  const auto ratio = [](const calibrate::Estimate& e) {
+    return "×" + number(e.value) + "  [" + number(e.ci95.low) + ", " + number(e.ci95.high) + "] at 95 %";
+  };
+  std::string text =
+      "<section><h2>Vertical variance by height and plate, day and speed held fixed</h2>\n<table>\n" +
+      row(number(h.low_m) + " m over the surface against " + number(h.high_m) + " m", ratio(h.low_over_high));
+  if (h.ceiling.value > 0) text += row("Under a plate against without", ratio(h.ceiling));
+  return text +
+         row("From", std::to_string(h.windows) + " windows of " + std::to_string(h.flights) + " flights on " +
+                         std::to_string(h.days) + " days") +
+         "</table>\n</section>\n";
+}
+
+std::string rotor_section(const RotorVerdict& v) {
+  using Kind = RotorVerdict::Kind;
+  std::string says;
+  const std::string rotor = "rotor " + std::to_string(v.rotor);
+  switch (v.kind) {
+    case Kind::as_sound:
+      says = "Not told from the sound flights.";
+      break;
+    case Kind::propeller_damage:
+      says = "The propeller of " + rotor + " is damaged: it needs " + number(100 * v.d) + " % [" + number(100 * v.low) +
+             ", " + number(100 * v.high) + "] more of its command.";
+      break;
+    case Kind::payload:
+      says = "An off-centre weight, no damaged propeller.";
+      break;
+    case Kind::cannot_tell:
+      says = "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
+      break;
+    default:
+      says = "Differs from the sound flights as neither a damaged propeller nor a weight does.";
+  }
+  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(says) + "</p>\n<table>\n" +
+         row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
+         row("Twist, which a weight does not give, t", number(v.t_yaw)) +
+         row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
+         "</table>\n</section>\n";
 }
 
 }  // namespace
@@ -132,9 +236,12 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());
-    page += "<section><h2>" + escaped(cause.found.form->cause) + "</h2>\n<p>" + escaped(cause.found.form->formula) +
-            "</p>\n" + *drawn + figures(cause) + "</section>\n";
+    page += "<section><h2>" + escaped(spoken(cause.found.form->cause)) + "</h2>\n<p>" +
+            escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
   }
+  if (context.height) page += height_section(*context.height);
+  if (context.rotors) page += rotor_section(*context.rotors);
+  if (context.consequence) page += consequence_section(*context.consequence);
   if (!result.unknown.empty()) {
     page += "<section><h2>Without a name</h2>\n<table>\n";
     for (const auto& u : result.unknown)

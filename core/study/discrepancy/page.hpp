@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
+#include "core/study/calibrate/height_effect.hpp"
+#include "core/study/discrepancy/consequence.hpp"
+#include "core/study/discrepancy/rotor_reference.hpp"
 #include "core/study/discrepancy/study.hpp"
 #include "core/study/plot.hpp"
 
@@ -10,11 +15,14 @@ namespace backwash::study::discrepancy {
 struct PageContext {
   std::string map, model, vehicle;  ///< as given on the command line
   std::string version;
+  std::optional<Consequence> consequence;  ///< of the accepted causes
+  std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
+  std::optional<calibrate::HeightEffect> height;
 };
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,
-/// gain, rivals and the flight to fly next, what was not tested, smallest effects that would have been found. Error: a
-/// figure that could not be drawn.
+/// gain, what reach and plan make of it, rivals and the flight to fly next, what was not tested, smallest effects that
+/// would have been found. Error: a figure that could not be drawn.
 tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
                                                 const PageContext& context);
 

@@ -17,42 +17,9 @@ Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
   lattice_.resize(static_cast<std::size_t>(size_.prod()));
 }
 
-double Surroundings::ray(const Vec3& from, const Vec3& direction, double range) const {
-  const double a = grid_->resolution();
-  Index3 v = grid_->index(from), step;
-  Vec3 next, per;
-  for (int i = 0; i < 3; ++i) {
-    step[i] = direction[i] >= 0 ? 1 : -1;
-    per[i] = std::abs(direction[i]) > 1e-12 ? a / std::abs(direction[i]) : kNoSurface;
-    const double face = grid_->origin()[i] + a * (v[i] + (step[i] > 0 ? 1 : 0));
-    next[i] = std::isfinite(per[i]) ? (face - from[i]) / direction[i] : kNoSurface;
-  }
-  double at = 0;
-  while (at <= range) {
-    if (grid_->occupied(v)) return at;
-    int axis = 0;
-    at = next.minCoeff(&axis);
-    v[axis] += step[axis];
-    next[axis] += per[axis];
-  }
-  return kNoSurface;
-}
-
 Around Surroundings::around(const Vec3& p_W) const {
   if (!grid_) return {p_W.z(), kNoSurface, {}};
-  constexpr std::size_t kRays = 32;
-  Around found{ray(p_W, -Vec3::UnitZ(), 20), ray(p_W, Vec3::UnitZ(), 20), {}};
-  std::array<double, kRays> d;
-  const auto direction = [](std::size_t k) {
-    const double angle = 2 * std::numbers::pi * static_cast<double>(k) / kRays;
-    return Vec3(std::cos(angle), std::sin(angle), 0);
-  };
-  for (std::size_t k = 0; k < kRays; ++k) d[k] = ray(p_W, direction(k), kSight);
-  for (std::size_t k = 0; k < kRays; ++k) {
-    const double before = d[(k + kRays - 1) % kRays], after = d[(k + 1) % kRays];
-    if (std::isfinite(d[k]) && d[k] < before && d[k] <= after) found.walls.emplace_back(d[k], direction(k));
-  }
-  return found;
+  return field::around(*grid_, p_W, {20, 20, kSight});
 }
 
 const Vec3& Surroundings::lattice_sigma(const Index3& at) {

@@ -1,22 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <limits>
 #include <optional>
-#include <utility>
 #include <vector>
 
+#include "core/field/around.hpp"
 #include "core/field/disturbance_field.hpp"
 
 namespace backwash::study::discrepancy {
 
-inline constexpr double kNoSurface = std::numeric_limits<double>::infinity();  ///< m
-
-/// What stands around a point, by the map.
-struct Around {
-  double height, ceiling_gap;                  ///< to the first occupied voxel straight down and up, m, or kNoSurface
-  std::vector<std::pair<double, Vec3>> walls;  ///< distance, m, and unit direction of each local minimum around, level
-};
+using field::Around;
+using field::kNoSurface;
 
 /// Surfaces and modelled Σ about a point. Without a map: a floor at z = 0, nothing else, and Σ = Σ_0.
 class Surroundings {
@@ -31,7 +25,6 @@ class Surroundings {
 
  private:
   static constexpr double kLattice = 0.15;  ///< m
-  double ray(const Vec3& from, const Vec3& direction, double range) const;
   const Vec3& lattice_sigma(const Index3& at);
 
   const map::OccupancyGrid* grid_;

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/study_output.hpp"
+
+#include <cstdio>
+
+namespace backwash::services {
+
+namespace discrepancy = study::discrepancy;
+
+namespace {
+
+Json to_json(const discrepancy::NamedCause& cause) {
+  const auto& found = cause.found;
+  Json parameters = Json::object();
+  for (const auto& e : found.parameters) parameters[e.name] = {{"value", e.value}, {"ci95", {e.low, e.high}}};
+  Json set = Json::array({found.form->cause});
+  for (const auto& rival : found.rivals) set.push_back(rival.name);
+  Json separate = Json::array();
+  for (const auto& s : cause.separate_by)
+    separate.push_back(
+        {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
+  const auto& g = cause.gain;
+  return {{"name", found.form->cause},
+          {"set", set},
+          {"p", found.p},
+          {"form", found.form->formula},
+          {"parameters", parameters},
+          {"gain",
+           {{"held_out_nats", g.held_out_nats},
+            {"ci95_nats", {g.low_nats, g.high_nats}},
+            {"rmse_before", g.rmse_before},
+            {"rmse_after", g.rmse_after},
+            {"variance_coverage_before", g.coverage_before},
+            {"variance_coverage_after", g.coverage_after}}},
+          {"separate_by", separate}};
+}
+
+Json to_json(const discrepancy::Outcome& o) {
+  Json json = {{"samples_inside_bound", o.inside},
+               {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
+               {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
+  if (!o.plan.empty()) {
+    json["hover_safe_share"] = o.safe;
+    json["plan"] = {{"status", o.plan}};
+    if (o.plan == "ok")
+      json["plan"].update({{"length_m", o.length_m}, {"time_s", o.time_s}, {"min_clearance_m", o.clearance_m}});
+  }
+  return json;
+}
+
+}  // namespace
+
+Json to_json(const discrepancy::StudyResult& result, const discrepancy::Observations& seen) {
+  Json json = {{"verdict", discrepancy::to_string(result.verdict)},
+               {"flights", seen.flights},
+               {"windows", seen.windows.size()},
+               {"gated_out", Json::object()},
+               {"causes", Json::array()},
+               {"unknown", Json::array()},
+               {"not_tested", Json::array()},
+               {"minimum_detectable", Json::object()}};
+  for (const auto& [gate, count] : seen.gated_out) json["gated_out"][gate] = count;
+  for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause));
+  for (const auto& u : result.unknown)
+    json["unknown"].push_back({{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}});
+  for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
+  for (const auto& [cause, sizes] : result.minimum_detectable)
+    for (const auto& [parameter, size] : sizes) json["minimum_detectable"][cause][parameter] = size;
+  json["threshold_nats"] = result.threshold;
+  return json;
+}
+
+Json to_json(const discrepancy::Consequence& c) {
+  Json json = {{"places", c.places}, {"before", to_json(c.before)}, {"after", to_json(c.after)}};
+  if (!c.before.plan.empty()) json.update({{"start", to_json(c.start_W)}, {"goal", to_json(c.goal_W)}});
+  return json;
+}
+
+Json to_json(const discrepancy::RotorVerdict& v) {
+  using Kind = discrepancy::RotorVerdict::Kind;
+  Json json = {{"verdict", discrepancy::to_string(v.kind)},
+               {"t", {{"yaw", v.t_yaw}, {"pair_1_3", v.t_a}, {"pair_2_4", v.t_b}, {"damage", v.t_d}}},
+               {"needed", v.needed}};
+  if (v.kind == Kind::propeller_damage || v.kind == Kind::cannot_tell)
+    json.update({{"rotor", v.rotor}, {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}}});
+  return json;
+}
+
+Json to_json(const study::calibrate::HeightEffect& h) {
+  const auto ratio = [](const study::calibrate::Estimate& e) {
+    return Json{{"value", e.value}, {"ci95", {e.ci95.low, e.ci95.high}}};
+  };
+  Json json = {{"low_m", h.low_m},     {"high_m", h.high_m},   {"variance_ratio_z", ratio(h.low_over_high)},
+               {"windows", h.windows}, {"flights", h.flights}, {"days", h.days}};
+  if (h.ceiling.value > 0) json["plate_variance_ratio_z"] = ratio(h.ceiling);
+  return json;
+}
+
+void print_text(const discrepancy::StudyResult& result, const discrepancy::Observations& seen,
+                const std::optional<discrepancy::RotorVerdict>& rotors,
+                const std::optional<study::calibrate::HeightEffect>& height) {
+  std::printf("%s: %zu flights, %zu windows\n", discrepancy::to_string(result.verdict), seen.flights,
+              seen.windows.size());
+  if (result.verdict == discrepancy::Verdict::insufficient)
+    std::printf("fewer than 10 flights with good windows do not warrant a name; fly more\n");
+  for (const auto& cause : result.causes) {
+    std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause.c_str(),
+                cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
+    for (const auto& e : cause.found.parameters)
+      std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
+    for (const auto& s : cause.separate_by) {
+      std::printf("  not told from %s; fly: %s", s.rival.c_str(), s.manoeuvre.c_str());
+      std::printf(s.expected_nats ? " (%.1f nats expected)\n" : "\n", s.expected_nats.value_or(0));
+    }
+  }
+  for (const auto& u : result.unknown)
+    std::printf("unknown structure in %s along %s, p %.4f\n", u.group.c_str(), u.along.c_str(), u.p);
+  for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
+  const auto ratio = [](const char* name, const study::calibrate::Estimate& e) {
+    std::printf("vertical variance %s: x%.2f [%.2f, %.2f], day and speed held fixed\n", name, e.value, e.ci95.low,
+                e.ci95.high);
+  };
+  if (height) {
+    ratio("near the surface against far from it", height->low_over_high);
+    if (height->ceiling.value > 0) ratio("under a plate against without", height->ceiling);
+  }
+  if (rotors)
+    std::printf("rotors against the reference flights: %s (t of damage %.1f, needed %.1f; of yaw %.1f)\n",
+                discrepancy::to_string(rotors->kind), rotors->t_d, rotors->needed, rotors->t_yaw);
+}
+
+}  // namespace backwash::services
