@@ -468,9 +468,13 @@ std::vector<Column> smooth_columns(const Regressor& along, const Windows& window
       const int turns = (k + 1) / 2;
       x.push_back(!along.circular ? std::cos(M_PI * k * q) : k % 2 ? std::cos(turns * q) : std::sin(turns * q));
     }
-    Column column;
-    for (const Channel c : group) column.parts.push_back({c, x});
-    columns.push_back(std::move(column));
+    // A push may point anywhere in the plane: x and y have coefficients of their own. ln variance moves as one.
+    if (group.front() == kVarX) {
+      columns.emplace_back();
+      for (const Channel c : group) columns.back().parts.push_back({c, x});
+    } else {
+      for (const Channel c : group) columns.push_back({{{c, x}}});
+    }
   }
   return columns;
 }

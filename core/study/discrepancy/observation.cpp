@@ -12,7 +12,6 @@ namespace backwash::study::discrepancy {
 namespace {
 
 constexpr double kWindow = 2.0;      // s
-constexpr double kScatter2 = 0.16;   // variance of ln variance between windows beside its estimate's own
 constexpr std::size_t kFewest = 20;  // samples of a window
 
 struct Stretch {
@@ -219,7 +218,7 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
     // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
-    put(kMeanX + a, mean(w, 0.0, residual), duration / kWindow * 0.01 / (row.sigma[axis] + 0.002));
+    put(kMeanX + a, mean(w, 0.0, residual), duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
     const auto x = detrended_values(w, residual);
     const auto [variance, samples] = spread(x);
     row.measured_variance[axis] = variance;

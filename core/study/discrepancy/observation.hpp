@@ -17,6 +17,9 @@
 
 namespace backwash::study::discrepancy {
 
+/// Variance of ln variance between windows beside its estimate's own; and, (m/s²)², what a mean scatters by beside Σ.
+inline constexpr double kScatter2 = 0.16, kMeanNoise = 0.002;
+
 /// What is measured on every 2 s window: each channel has one number per window and a weight (0: not measured).
 enum Channel : std::size_t {
   kMeanX,  ///< mean of a − a_sim along W, m/s²

@@ -2,6 +2,7 @@
 #include "core/study/discrepancy/search.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -21,7 +22,7 @@ constexpr double kRivalNats = 3, kRivalErrors = 2;
 
 const std::vector<std::pair<std::string, std::vector<Channel>>>& groups() {
   static const std::vector<std::pair<std::string, std::vector<Channel>>> all = {
-      {"mean x", {kMeanX}}, {"mean y", {kMeanY}}, {"mean z", {kMeanZ}}, {"ln variance", {kVarX, kVarY, kVarZ}}};
+      {"mean x, y", {kMeanX, kMeanY}}, {"mean z", {kMeanZ}}, {"ln variance", {kVarX, kVarY, kVarZ}}};
   return all;
 }
 
@@ -135,6 +136,15 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       own.rivals.push_back(rival);
 }
 
+/// A constant of which the structure left over explains more than half as much again is the structure's mean.
+void drop_its_mean(std::vector<Accepted>& accepted, const Candidate& smooth) {
+  std::array<bool, kChannels> moved{};
+  for (const auto& column : smooth.columns) moved[column.parts.front().channel] = true;
+  std::erase_if(accepted, [&](const Accepted& a) {
+    return a.form->constant && moved[a.columns.front().parts.front().channel] && smooth.gain > 0.5 * a.gain;
+  });
+}
+
 /// Drops causes that the others make unnecessary, and estimates the rest given each other.
 void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double threshold) {
   for (bool dropped = true; dropped && accepted.size() > 1;) {
@@ -235,6 +245,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
       const auto group = std::find_if(groups().begin(), groups().end(), [&](auto& g) {
         return g.second.front() == smooth->columns.front().parts.front().channel;
       });
+      drop_its_mean(result.accepted, *smooth);
       result.unknown.push_back({smooth->name, group->first, p_value(result.null_gain, smooth->gain), smooth->gain});
       break;
     }
