@@ -38,8 +38,8 @@ Column decorrelated(const Column& column);
 
 /// Observations with the scatter of each channel (after `decorrelated`): within flights (σ_w²) and between them (σ_b²,
 /// a random intercept), by analysis of variance of what the accepted columns leave. V = diag(σ_w²/weight) + σ_b² 11ᵀ
-/// per flight and channel, and in the level means + σ_t² ZZᵀ, Z the body's two level axes: craft are trimmed anew before
-/// each flight. A window's mean weighs more where its own variance, shrunk towards its flight's, is small.
+/// per flight and channel, and in the level means + σ_t² ZZᵀ, Z the body's two level axes: craft are trimmed anew
+/// before each flight. A window's mean weighs more where its own variance, shrunk towards its flight's, is small.
 class Evidence {
  public:
   explicit Evidence(const Observations& seen);
@@ -65,9 +65,9 @@ class Evidence {
   double trim_scatter(const Column& residual) const;
 
   const Observations* seen_;
-  Column y_;                                         // every channel, decorrelated
+  Column y_;  // every channel, decorrelated
   std::array<std::vector<double>, kChannels> weight_;
-  std::vector<Column> tilts_;                        // Z; empty without attitude
+  std::vector<Column> tilts_;  // Z; empty without attitude
   std::array<double, kChannels> within_{}, between_{};
   double tilt_ = 0;  // σ_t²
 };

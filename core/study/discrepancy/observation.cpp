@@ -189,6 +189,7 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
   row.flight = flight;
   row.segment = s.segment[begin];
   row.t = 0.5 * (s.t[begin] + s.t[end - 1]);
+  row.duration = s.t[end - 1] - s.t[begin];
   row.p_W = mean(w, Vec3(Vec3::Zero()), [&](std::size_t i) -> Vec3 { return s.p[i]; });
   row.v_W = mean(w, Vec3(Vec3::Zero()), [&](std::size_t i) -> Vec3 { return s.v[i]; });
   row.speed = mean(w, 0.0, [&](std::size_t i) { return s.v[i].norm(); });
@@ -211,14 +212,13 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
     row.ln_sigma_moved[k] =
         (surroundings_.sigma(row.p_W + map_offset(k)).array() / here.array()).log().max(-2.0).min(2.0);
 
-  const double duration = s.t[end - 1] - s.t[begin];
   double tail = 0;
   std::vector<double> vertical;
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
     // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
-    put(kMeanX + a, mean(w, 0.0, residual), duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
+    put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
     const auto x = detrended_values(w, residual);
     const auto [variance, samples] = spread(x);
     row.measured_variance[axis] = variance;

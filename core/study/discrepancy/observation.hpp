@@ -61,7 +61,8 @@ Vec3 map_offset(std::size_t k);  ///< m
 struct WindowRow {
   std::size_t flight;
   int segment;        ///< −1 in transit or unknown
-  double t;           ///< s since the flight's first row
+  double t;           ///< s since the flight's first row, middle of the window
+  double duration;    ///< s
   Vec3 p_W, v_W;      ///< m, m/s, means
   double speed;       ///< m/s, mean of the norm
   Mat3 R_WB;          ///< mean of the rotation matrices (not orthonormal); zero without attitude

@@ -173,14 +173,15 @@ double Evidence::trim_scatter(const Column& residual) const {
   return std::max(0.0, (spread - 2 * (flights - 1)) / (sum.trace() - sum.ldlt().solve(square).trace()));
 }
 
-/// Weights of the means: of each window's ln variance ratio (mean over the axes), its flight's mean and the share of its
-/// own deviation that is not the estimate's error.
+/// Weights of the means: of each window's ln variance ratio (mean over the axes), its flight's mean and the share of
+/// its own deviation that is not the estimate's error.
 void Evidence::weigh_means(const std::vector<double>& ln_variance) {
   double error = 0, count = 0;
   for (const double w : weight_[kVarX])
     if (w > 0) error += 1 / w - kScatter2, count += 1;
   if (count == 0) return;
-  const double typical = static_cast<double>(count) / std::accumulate(weight_[kVarX].begin(), weight_[kVarX].end(), 0.0);
+  const double typical =
+      static_cast<double>(count) / std::accumulate(weight_[kVarX].begin(), weight_[kVarX].end(), 0.0);
   const double share = std::clamp(1 - error / count / (within_[kVarX] * typical), 0.0, 1.0);
   for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
     double mean = 0, weight = 0;
