@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 
 #include "core/config/config.hpp"
 #include "core/field/disturbance_field.hpp"
@@ -101,7 +102,8 @@ double command_of(const Craft& c, double thrust) {
 /// The modelled variances at the middle of each 0.1 m cube that a world's flights pass, computed once.
 class Gusts {
  public:
-  Gusts(const backwash::map::OccupancyGrid& grid, const backwash::Model& model) : field_(grid, model) {}
+  Gusts(backwash::map::OccupancyGrid grid, const backwash::Model& model)
+      : grid_(std::move(grid)), field_(grid_, model) {}
   const Vec3& deviations(const Vec3& p) {
     const std::array<int, 3> cube = {static_cast<int>(std::floor(10 * p.x())), static_cast<int>(std::floor(10 * p.y())),
                                      static_cast<int>(std::floor(10 * p.z()))};
@@ -114,6 +116,7 @@ class Gusts {
   }
 
  private:
+  backwash::map::OccupancyGrid grid_;
   backwash::field::ProximityField field_;
   std::map<std::array<int, 3>, Vec3> known_;
 };
@@ -332,10 +335,13 @@ backwash::map::OccupancyGrid true_grid(const Room& room) {
 std::vector<Table> fly_all(const World& world) {
   auto model = *backwash::config::load_model("builtin:" + world.craft.model);
   model.ground.r0 = world.craft.diagonal_radius;
-  const auto grid = true_grid(world.room);
-  Gusts gusts(grid, model);
+  // Worlds of one seed are pairs in one room: what was evaluated for the last one serves the next.
+  thread_local std::unique_ptr<Gusts> gusts;
+  thread_local std::pair<std::uint64_t, std::string> room;
+  if (const std::pair now(world.request.seed, world.request.confound); !gusts || room != now)
+    gusts = std::make_unique<Gusts>(true_grid(world.room), model), room = now;
   std::vector<Table> flights;
-  for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, gusts, i).fly());
+  for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, *gusts, i).fly());
   return flights;
 }
 

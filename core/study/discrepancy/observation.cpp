@@ -147,7 +147,12 @@ bool Observations::measured(Channel c) const {
 }
 
 Observer::Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid)
-    : vehicle_(vehicle), surroundings_(grid, model) {
+    : vehicle_(vehicle), own_(std::in_place, grid, model), surroundings_(*own_) {
+  seen_.first.push_back(0);
+}
+
+Observer::Observer(const Vehicle& vehicle, Surroundings& surroundings)
+    : vehicle_(vehicle), surroundings_(surroundings) {
   seen_.first.push_back(0);
 }
 

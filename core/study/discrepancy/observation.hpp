@@ -3,6 +3,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -94,6 +95,9 @@ struct Observations {
 class Observer {
  public:
   Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);
+  /// With surroundings that were looked at before, and are kept: studies of the same map share them.
+  Observer(const Vehicle& vehicle, Surroundings& surroundings);
+  Observer(const Observer&) = delete;
   void add(const FlightLog& log);
   Observations finish();
 
@@ -104,7 +108,8 @@ class Observer {
   const Vehicle vehicle_;
   Observations seen_;
   std::set<std::string> ever_;  // columns that some flight had
-  Surroundings surroundings_;
+  std::optional<Surroundings> own_;
+  Surroundings& surroundings_;
 };
 
 }  // namespace backwash::study::discrepancy
