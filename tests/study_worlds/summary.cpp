@@ -56,7 +56,8 @@ Gate over(const std::string& name, const std::vector<CellSummary>& cells, Chosen
     if (!holds(c)) missed.push_back(c.cell + " " + figure(c));
   }
   const std::string all = text("%d of %d cells", tested - static_cast<int>(missed.size()), tested);
-  return {name, missed.empty() ? all : all + "; missed: " + names_of(missed), missed.empty() && tested > 0};
+  if (tested == 0) return {name, "not run", false};
+  return {name, missed.empty() ? all : all + "; missed: " + names_of(missed), missed.empty()};
 }
 
 }  // namespace

@@ -32,6 +32,9 @@ struct Normal {
   std::vector<double> gain_per_flight() const;
 };
 
+/// Scatter between the rotors and sensors of a craft that is no effect and that no number of flights averages out.
+double built_scatter(Channel c);
+
 /// A column seen in axes of which the scatter is independent: ln variance along x, y and z wanders as one (gusts are
 /// strong or weak along all axes), so its three channels become √3 times their mean, (x − y)/√2 and (x + y − 2z)/√6.
 Column decorrelated(const Column& column);

@@ -64,7 +64,7 @@ struct WindowRow {
   int segment;        ///< −1 in transit or unknown
   double t;           ///< s since the flight's first row, middle of the window
   double duration;    ///< s
-  Vec3 p_W, v_W;      ///< m, m/s, means
+  Vec3 p_W, v_W;      ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
   double speed;       ///< m/s, mean of the norm
   Mat3 R_WB;          ///< mean of the rotation matrices (not orthonormal); zero without attitude
   double yaw;         ///< rad
@@ -104,6 +104,10 @@ class Observer {
  private:
   void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
                   std::size_t begin, std::size_t end);
+  WindowRow placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end);
+  void put(std::size_t channel, double y, double weight);
+  std::vector<double> put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
+  void put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
 
   const Vehicle vehicle_;
   Observations seen_;

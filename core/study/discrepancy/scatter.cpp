@@ -13,6 +13,8 @@ bool is_ln_variance(Channel c) { return c == kVarX || c == kVarY || c == kVarZ; 
 
 }  // namespace
 
+double built_scatter(Channel c) { return c >= kDropout1 ? 0.003 : c >= kMotor1 ? 0.01 : 0; }
+
 Column decorrelated(const Column& column) {
   Column turned;
   std::array<const std::vector<double>*, 3> axis{};
@@ -78,9 +80,7 @@ void Evidence::anova(Channel c, const std::vector<double>& r) {
   // A channel that is exact in every window (no dropout at all) keeps a least scatter.
   const double least = c >= kMotor1 ? 1e-6 : 1e-8;
   within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
-  // Vehicles are built with rotors and sensors that differ by this much (README.md, "scatter"): no flight averages it
-  // out.
-  const double built = c >= kDropout1 ? 0.003 : c >= kMotor1 ? 0.01 : 0;
+  const double built = built_scatter(c);
   between_[c] = built * built;
   if (groups < 2) return;
   grand /= total;
