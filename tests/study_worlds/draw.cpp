@@ -43,11 +43,12 @@ const std::map<std::string, double>& table() {
   return sizes;
 }
 
-Room draw_room(Rng& rng) {
+Room draw_room(Rng& rng, bool empty) {
   Room room;
   const double x = to_decimetre(between(rng, 3.2, 5.5)), y = to_decimetre(between(rng, 3.0, 4.5));
   const double z = to_decimetre(between(rng, 2.3, 2.8));
   room.inside = {Vec3::Zero(), {x, y, z}};
+  if (empty) return room;
   const double soffit = to_decimetre(between(rng, 1.7, 1.9)), edge = to_decimetre(between(rng, 0.3, 0.45) * x);
   room.solids.push_back({{0, 0, soffit}, {edge, y, z}});        // lowered ceiling at the low-x end
   room.solids.push_back({{x - 1.0, y - 1.2, 0}, {x, y, 0.7}});  // a table-high block in a corner
@@ -91,6 +92,8 @@ const std::vector<std::string>& cause_names() {
   return names;
 }
 
+double table_size(const std::string& cause) { return table().at(cause); }
+
 double Room::height_above_solid(const Vec3& p) const {
   double top = inside.low.z();
   for (const Box& b : solids) {
@@ -115,7 +118,7 @@ World draw_world(const Request& request) {
   Rng rng(request.seed * 7919 + 17);  // independent of the cause: worlds with the same seed are pairs
   World world;
   world.request = request;
-  world.room = draw_room(rng);
+  world.room = draw_room(rng, request.confound == "height");
   world.craft = draw_craft(rng);
   world.rate_hz = between(rng, 0, 1) < 0.7 ? 50 : between(rng, 0, 1) < 0.5 ? 100 : 40;
   world.jitter = between(rng, 0, 0.3);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
 #include <cmath>
-#include <deque>
+#include <map>
 #include <memory>
 
 #include "core/config/config.hpp"
@@ -36,9 +37,11 @@ void append_line(std::vector<Command>& plan, const Vec3& from, const Vec3& to, d
 }
 
 /// Hover points: near the floor, a ceiling, a wall, and anywhere; at least 0.35 m from everything but by intent.
-Vec3 draw_spot(const Room& room, Rng& rng, int kind) {
+Vec3 draw_spot(const Room& room, Rng& rng, int kind, bool two_heights) {
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
   const Box& in = room.inside;
+  if (two_heights)
+    return {u(0.5, in.high.x() - 0.5), u(0.5, in.high.y() - 0.5), u(0, 1) < 0.5 ? 0.4 : in.high.z() - 0.4};
   for (;;) {
     Vec3 p(u(0.5, in.high.x() - 0.5), u(0.5, in.high.y() - 0.5), u(0.5, in.high.z() - 0.5));
     if (kind == 0) p.z() = u(0.3, 0.45);
@@ -55,23 +58,27 @@ Vec3 draw_spot(const Room& room, Rng& rng, int kind) {
 
 std::vector<Command> draw_plan(const World& world, Rng& rng) {
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
-  const bool turns = world.request.confound != "yaw";
+  const bool turns = world.request.confound != "yaw", two_heights = world.request.confound == "height";
   const int dwells = static_cast<int>(u(9, 13));
   std::vector<int> kinds;
   for (int i = 0; i < dwells; ++i) kinds.push_back(i % 5);
   std::shuffle(kinds.begin(), kinds.end(), rng);
   std::vector<Command> plan;
-  Vec3 at = draw_spot(world.room, rng, 4);
+  Vec3 at = draw_spot(world.room, rng, 4, two_heights);
   double yaw = turns ? u(-M_PI, M_PI) : 0;
   for (int i = 0; i < dwells; ++i) {
     const int n = static_cast<int>(u(4, 7) / kStep);
     for (int k = 0; k < n; ++k) plan.push_back({at, Vec3::Zero(), Vec3::Zero(), yaw, i});
-    const Vec3 next = draw_spot(world.room, rng, kinds[static_cast<std::size_t>(i)]);
+    const Vec3 next = draw_spot(world.room, rng, kinds[static_cast<std::size_t>(i)], two_heights);
     const double turned = turns ? u(-M_PI, M_PI) : 0;
     const double a_max = u(0.8, 2.0), z = 1.2;
-    append_line(plan, at, {at.x(), at.y(), z}, yaw, yaw, a_max);
-    append_line(plan, {at.x(), at.y(), z}, {next.x(), next.y(), z}, yaw, turned, a_max);
-    append_line(plan, {next.x(), next.y(), z}, next, turned, turned, a_max);
+    if (two_heights) {
+      append_line(plan, at, next, yaw, turned, a_max);
+    } else {
+      append_line(plan, at, {at.x(), at.y(), z}, yaw, yaw, a_max);
+      append_line(plan, {at.x(), at.y(), z}, {next.x(), next.y(), z}, yaw, turned, a_max);
+      append_line(plan, {next.x(), next.y(), z}, next, turned, turned, a_max);
+    }
     at = next, yaw = turned;
   }
   return plan;
@@ -92,12 +99,34 @@ double command_of(const Craft& c, double thrust) {
   return (std::sqrt((1 - f) * (1 - f) + 4 * f * share) - (1 - f)) / (2 * f);
 }
 
+/// The modelled variances at the middle of each 0.1 m cube that a world's flights pass, computed once.
+class Gusts {
+ public:
+  Gusts(backwash::map::OccupancyGrid grid, const backwash::Model& model)
+      : grid_(std::move(grid)), field_(grid_, model) {}
+  const Vec3& deviations(const Vec3& p) {
+    const std::array<int, 3> cube = {static_cast<int>(std::floor(10 * p.x())), static_cast<int>(std::floor(10 * p.y())),
+                                     static_cast<int>(std::floor(10 * p.z()))};
+    const auto [at, fresh] = known_.try_emplace(cube);
+    if (fresh) {
+      const auto s = field_.at(0.1 * (Vec3(cube[0], cube[1], cube[2]) + Vec3::Constant(0.5))).sigma();
+      at->second = {std::sqrt(s.xx), std::sqrt(s.yy), std::sqrt(s.zz)};
+    }
+    return at->second;
+  }
+
+ private:
+  backwash::map::OccupancyGrid grid_;
+  backwash::field::ProximityField field_;
+  std::map<std::array<int, 3>, Vec3> known_;
+};
+
 /// One craft in one flight, integrated with the midpoint rule at 5 ms.
 class Flight {
  public:
-  Flight(const World& world, const backwash::field::ProximityField& field, int number)
+  Flight(const World& world, Gusts& gusts, int number)
       : world_(world),
-        field_(field),
+        gusts_(gusts),
         rng_(world.request.seed * 1000003 + static_cast<std::uint64_t>(number) * 7717 + 5) {
     const auto n = [&] { return normal_(rng_); };
     const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng_); };
@@ -137,6 +166,8 @@ class Flight {
       if (next_row < t) next_row = t;
       if (t > dropout_at && t < dropout_at + 0.7) continue;
       auto row = record(plan[k], t);
+      const Instant now = instant(t);
+      table.hidden.push_back({hidden_push(world_, now) + drift(t), hidden_ln_variance(world_, now)});
       if (t > frozen_from && t < frozen_from + 1.5 && !table.rows.empty()) {
         row = table.rows.back();
         row[0] = t;
@@ -200,14 +231,10 @@ class Flight {
 
   /// Gusts: Ornstein–Uhlenbeck of the modelled variance, whose logarithm wanders by the measured scatter.
   void airflow(const Instant& now) {
-    if (!cast_at_ || (now.p - *cast_at_).norm() > 0.07) {
-      cast_at_ = now.p;
-      sigma_ = field_.at(now.p).sigma();
-    }
     const double tau = 0.17, decay = std::exp(-kStep / tau), kick = std::sqrt(1 - decay * decay);
     ln_wander_ += -ln_wander_ * kStep / 1.5 + 0.4 * std::sqrt(2 * kStep / 1.5) * normal();
     double ln = ln_var_ + ln_wander_ - 0.08 + hidden_ln_variance(world_, now);
-    const Vec3 sd(std::sqrt(sigma_.xx), std::sqrt(sigma_.yy), std::sqrt(sigma_.zz));
+    const Vec3& sd = gusts_.deviations(now.p);
     for (int i = 0; i < 3; ++i) gust_[i] = decay * gust_[i] + kick * normal();
     wind_ = std::exp(0.5 * ln) * sd.cwiseProduct(gust_);
     if (tail_nu_ > 0) {  // short bursts: kurtosis 3 exp(size), the same variance
@@ -230,12 +257,13 @@ class Flight {
       phase_[i] += 2 * M_PI * spin_[i] / 60 * kStep;
     }
   }
+  Vec3 drift(double t) const {
+    const double size = world_.effects.of("imu_drift"), direction = world_.effects.shape_of("imu_drift");
+    return size * (1.6 * (1 - std::exp(-t / 100))) * (heading() * Vec3(std::cos(direction), std::sin(direction), 0.3));
+  }
+
   Vec3 measured_acceleration(double t) {
-    Vec3 a = a_ + accelerometer_bias_ + accelerometer_noise_ * Vec3(normal(), normal(), normal());
-    const double drift = world_.effects.of("imu_drift");
-    const double direction = world_.effects.shape_of("imu_drift");
-    if (drift != 0)
-      a += drift * (1.6 * (1 - std::exp(-t / 100))) * (heading() * Vec3(std::cos(direction), std::sin(direction), 0.3));
+    Vec3 a = a_ + accelerometer_bias_ + accelerometer_noise_ * Vec3(normal(), normal(), normal()) + drift(t);
     const double line = world_.effects.of("vibration") / 2, hurt = world_.effects.of("propeller_damage") * 3;
     for (int i = 0; i < 4; ++i) {
       const bool damaged = hurt > 0 && i == static_cast<int>(world_.effects.shape_of("propeller_damage"));
@@ -275,13 +303,11 @@ class Flight {
   }
 
   const World& world_;
-  const backwash::field::ProximityField& field_;
+  Gusts& gusts_;
   Rng rng_;
   std::normal_distribution<double> normal_;
   Vec3 p_, v_ = Vec3::Zero(), a_ = Vec3::Zero(), thrust_, produced_, wind_ = Vec3::Zero(), gust_ = Vec3::Zero(),
            vio_ = Vec3::Zero(), accelerometer_bias_, tilt_;
-  std::optional<Vec3> cast_at_;
-  backwash::Variance sigma_;
   double yaw_ = 0, u_ = 0, lagged_ = kG, charge_, voltage_ = 16, temperature_ = 25, ambient_, warmth_ = 0, ln_var_,
          ln_wander_ = 0, thrust_scale_, accelerometer_noise_, burst_left_ = 0;
   int tail_nu_;
@@ -309,10 +335,13 @@ backwash::map::OccupancyGrid true_grid(const Room& room) {
 std::vector<Table> fly_all(const World& world) {
   auto model = *backwash::config::load_model("builtin:" + world.craft.model);
   model.ground.r0 = world.craft.diagonal_radius;
-  const auto grid = true_grid(world.room);
-  const backwash::field::ProximityField field(grid, model);
+  // Worlds of one seed are pairs in one room: what was evaluated for the last one serves the next.
+  thread_local std::unique_ptr<Gusts> gusts;
+  thread_local std::pair<std::uint64_t, std::string> room;
+  if (const std::pair now(world.request.seed, world.request.confound); !gusts || room != now)
+    gusts = std::make_unique<Gusts>(true_grid(world.room), model), room = now;
   std::vector<Table> flights;
-  for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, field, i).fly());
+  for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, *gusts, i).fly());
   return flights;
 }
 

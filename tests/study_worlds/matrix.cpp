@@ -1,81 +1,131 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// study_matrix: how often the study names what was hidden. One line per hidden cause, one JSON line per world with
-// --each.
+// study_matrix: how often the study names what was hidden. Every world is one line of JSON in --out as soon as it is
+// done, so that a cut run counts; --from makes the tables of such files. --gate: exit 1 when a gate is missed.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <ctime>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
 
-#include "tests/study_worlds/observe.hpp"
+#include "tests/study_worlds/null_size.hpp"
+#include "tests/study_worlds/summary.hpp"
 
 namespace {
 
-/// Upper end of Wilson's 95 % interval.
-double wilson_upper(int hits, int n) {
-  const double z = 1.96, p = static_cast<double>(hits) / n, q = z * z / n;
-  return (p + q / 2 + z * std::sqrt(p * (1 - p) / n + q / (4 * n))) / (1 + q);
+using namespace study_worlds;
+
+struct Options {
+  int worlds = 20, flights = 12, jobs = 1;
+  std::uint64_t seed = static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
+  std::vector<double> sizes = {1};
+  std::vector<std::string> cells, from;
+  std::string out, markdown;
+  bool gate = false, null_size = false;
+};
+
+/// The one size, or log-uniform between the two by the world's seed.
+double size_of(const Options& options, std::uint64_t seed) {
+  if (options.sizes.size() < 2) return options.sizes.front();
+  std::mt19937_64 rng(seed + 99);
+  const double low = std::log(options.sizes[0]), high = std::log(options.sizes[1]);
+  return std::exp(std::uniform_real_distribution(low, high)(rng));
+}
+
+std::vector<Cell> chosen_cells(const Options& options) {
+  if (options.cells.empty()) return cells();
+  std::vector<Cell> chosen;
+  for (const auto& name : options.cells) {
+    const auto at = std::find_if(cells().begin(), cells().end(), [&](auto& c) { return c.name == name; });
+    if (at == cells().end()) throw CLI::ValidationError("--cell", "no cell '" + name + "'");
+    chosen.push_back(*at);
+  }
+  return chosen;
+}
+
+/// Runs `task(k, folder)` for k below `count` on `jobs` threads, each with a folder of its own.
+template <typename Task>
+void in_parallel(int jobs, std::size_t count, Task task) {
+  std::atomic<std::size_t> next = 0;
+  std::vector<std::jthread> threads;
+  for (int j = 0; j < jobs; ++j)
+    threads.emplace_back([&, j] {
+      const auto folder = std::filesystem::temp_directory_path() /
+                          ("study-matrix-" + std::to_string(::getpid()) + "-" + std::to_string(j));
+      for (std::size_t k = next++; k < count; k = next++) task(k, folder);
+      std::filesystem::remove_all(folder);
+    });
+}
+
+/// Worlds outside, cells inside: a cut run has as many worlds of each cell.
+std::vector<Outcome> run(const Options& options) {
+  const auto chosen = chosen_cells(options);
+  std::vector<Outcome> outcomes;
+  std::mutex writing;
+  std::ofstream out(options.out, std::ios::app);
+  in_parallel(options.jobs, chosen.size() * static_cast<std::size_t>(options.worlds), [&](std::size_t k, auto& folder) {
+    const std::uint64_t seed = options.seed + k / chosen.size();
+    auto outcome = score(chosen[k % chosen.size()], seed, size_of(options, seed), options.flights, folder);
+    const std::lock_guard lock(writing);
+    if (out) out << to_json(outcome).dump() << std::endl;
+    outcomes.push_back(std::move(outcome));
+  });
+  return outcomes;
+}
+
+std::vector<Outcome> read(const std::vector<std::string>& files) {
+  std::vector<Outcome> outcomes;
+  for (const auto& file : files) {
+    std::ifstream in(file);
+    for (std::string line; std::getline(in, line);) outcomes.push_back(from_json(nlohmann::json::parse(line)));
+  }
+  return outcomes;
+}
+
+int report(const Options& options) {
+  const auto outcomes = options.from.empty() ? run(options) : read(options.from);
+  const auto summary = summarise(outcomes);
+  const std::string page = markdown(summary, outcomes);
+  std::fputs(page.c_str(), stdout);
+  if (!options.markdown.empty()) std::ofstream(options.markdown) << page;
+  if (!options.gate) return 0;
+  const auto all = gates(summary);
+  return std::all_of(all.begin(), all.end(), [](auto& g) { return g.held; }) ? 0 : 1;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"Confusion matrix of the study over worlds with hidden effects"};
-  int worlds = 20, flights = 12;
-  std::uint64_t seed = static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
-  double size = 1;
-  std::vector<std::string> cells;
-  std::string confound;
-  app.add_option("--worlds", worlds, "per cell")->capture_default_str();
-  app.add_option("--seed", seed, "of the first world; default: the clock");
-  app.add_option("--sizes", size, "in units of the effect-size table")->capture_default_str();
-  app.add_option("--flights", flights)->capture_default_str();
-  app.add_option("--cause", cells, "cells; default: all, unknown and none");
-  app.add_option("--confound", confound);
+  Options options;
+  app.add_option("--worlds", options.worlds, "per cell")->capture_default_str();
+  app.add_option("--seed", options.seed, "of the first world; default: the clock");
+  app.add_option("--sizes", options.sizes, "in units of the effect-size table; two: log-uniform between")
+      ->expected(1, 2);
+  app.add_option("--flights", options.flights)->capture_default_str();
+  app.add_option("--cell", options.cells, "cells; default: all");
+  app.add_option("--jobs", options.jobs)->capture_default_str();
+  app.add_option("--out", options.out, "JSON lines, appended to");
+  app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
+  app.add_option("--markdown", options.markdown, "writes the tables there too");
+  app.add_flag("--gate", options.gate, "exit 1 when a gate is missed");
+  app.add_flag("--null-size", options.null_size, "instead: how often each channel rejects regressors without effect");
   CLI11_PARSE(app, argc, argv);
-  if (cells.empty()) {
-    cells = study_worlds::cause_names();
-    cells.insert(cells.end(), {"unknown", "none"});
-  }
-  const auto folder = std::filesystem::temp_directory_path() / ("study-matrix-" + std::to_string(::getpid()));
-  std::printf("seed %llu, %d worlds a cell, %d flights, size %g\n", static_cast<unsigned long long>(seed), worlds,
-              flights, size);
-  double seconds = 0;
-  int studies = 0;
-  for (const auto& cell : cells) {
-    std::map<std::string, int> counts;
-    int right = 0, single_wrong = 0, in_set = 0;
-    for (int k = 0; k < worlds; ++k) {
-      study_worlds::Request request{seed + static_cast<std::uint64_t>(k), {}, size, flights, confound};
-      if (cell != "none") request.causes = {cell};
-      const auto world = study_worlds::draw_world(request);
-      const auto seen = study_worlds::observe(world, folder);
-      const std::clock_t start = std::clock();
-      backwash::study::discrepancy::StudyOptions options;
-      options.minimum_detectable = false;
-      const auto result = backwash::study::discrepancy::study(seen, options);
-      seconds += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, ++studies;
-      const std::string told = study_worlds::told(result);
-      ++counts[told];
-      const bool named = cell == "none" ? told == "nothing" : cell == "unknown" ? told.starts_with("?") : told == cell;
-      right += named ? 1 : 0;
-      const bool contains = !result.causes.empty() && told.find(cell) != std::string::npos;
-      in_set += named || contains ? 1 : 0;
-      single_wrong += !named && !contains && told != "nothing" && !told.starts_with("?") ? 1 : 0;
-    }
-    std::printf("%-19s right %3d/%d  truth among what is told %3d  wrong name %2d (95 %% upper limit %.3f) ",
-                cell.c_str(), right, worlds, in_set, single_wrong, wilson_upper(single_wrong, worlds));
-    std::vector<std::pair<int, std::string>> order;
-    for (const auto& [told, count] : counts) order.emplace_back(-count, told);
-    std::sort(order.begin(), order.end());
-    for (const auto& [count, told] : order) std::printf(" %d [%s]", -count, told.c_str());
-    std::printf("\n");
-    std::fflush(stdout);
-  }
-  std::printf("search %.2f s CPU a study\n", seconds / studies);
-  std::filesystem::remove_all(folder);
+  if (options.from.empty())
+    std::printf("seed %llu, %d worlds a cell, %d flights\n\n", static_cast<unsigned long long>(options.seed),
+                options.worlds, options.flights);
+  if (!options.null_size) return report(options);
+  NullSize all;
+  std::mutex adding;
+  in_parallel(options.jobs, static_cast<std::size_t>(options.worlds), [&](std::size_t k, auto& folder) {
+    const NullSize one = null_size(options.seed + k, options.flights, folder);
+    const std::lock_guard lock(adding);
+    add(all, one);
+  });
+  std::fputs(markdown(all).c_str(), stdout);
   return 0;
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/study_worlds/observe.hpp"
 
+#include <optional>
+#include <tuple>
+
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 
@@ -8,14 +11,37 @@ namespace study_worlds {
 
 namespace discrepancy = backwash::study::discrepancy;
 
+namespace {
+
+using MapKey = std::tuple<std::uint64_t, bool, double>;  // seed, empty room, offset
+
+struct MapSeen {
+  MapKey key;
+  backwash::map::OccupancyGrid grid;
+  discrepancy::Surroundings surroundings;
+  MapSeen(const MapKey& of, const std::filesystem::path& file, const backwash::Model& model)
+      : key(of), grid(backwash::map::load_map(file.string()).value()), surroundings(&grid, model) {}
+  MapSeen(const MapSeen&) = delete;
+};
+
+}  // namespace
+
 discrepancy::Observations observe(const World& world, const std::filesystem::path& folder) {
+  return observe(world, fly_all(world), folder);
+}
+
+discrepancy::Observations observe(const World& world, const std::vector<Table>& flights,
+                                  const std::filesystem::path& folder) {
   write_world_files(world, folder);
   const auto vehicle = backwash::config::load_vehicle((folder / "vehicle.toml").string()).value();
   auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
   model.ground.r0 = vehicle.body.diagonal_radius;
-  const auto grid = backwash::map::load_map((folder / "map.bt").string()).value();
-  discrepancy::Observer observer(vehicle, model, &grid);
-  for (const Table& table : fly_all(world)) {
+  // Worlds of one seed and map are pairs: what was looked up for the last one serves the next.
+  thread_local std::optional<MapSeen> last;
+  const MapKey key{world.request.seed, world.request.confound == "height", world.effects.of("map_offset")};
+  if (!last || last->key != key) last.emplace(key, folder / "map.bt", model);
+  discrepancy::Observer observer(vehicle, last->surroundings);
+  for (const Table& table : flights) {
     backwash::study::FlightLog log;
     for (std::size_t c = 0; c < table.names.size(); ++c) {
       std::vector<double> column;
@@ -27,15 +53,29 @@ discrepancy::Observations observe(const World& world, const std::filesystem::pat
   return observer.finish();
 }
 
-std::string told(const discrepancy::StudyResult& result) {
-  std::string text;
+std::vector<std::vector<std::string>> sets_of(const discrepancy::StudyResult& result) {
+  std::vector<std::vector<std::string>> sets;
   for (const auto& cause : result.causes) {
-    text += (text.empty() ? "" : " + ") + cause.found.form->cause;
-    for (const auto& rival : cause.found.rivals) text += "|" + rival.name;
+    sets.push_back({cause.found.form->cause});
+    for (const auto& rival : cause.found.rivals) sets.back().push_back(rival.name);
   }
-  if (result.causes.empty())
-    for (const auto& u : result.unknown) text += "?" + u.along;
+  return sets;
+}
+
+std::string told(const std::vector<std::vector<std::string>>& sets, const std::vector<std::string>& unknown) {
+  std::string text;
+  for (const auto& set : sets) {
+    text += text.empty() ? "" : " + ";
+    for (const auto& name : set) text += (&name == &set.front() ? "" : "|") + name;
+  }
+  for (const auto& along : unknown) text += (text.empty() ? "?" : " + ?") + along;
   return text.empty() ? "nothing" : text;
+}
+
+std::string told(const discrepancy::StudyResult& result) {
+  std::vector<std::string> unknown;
+  for (const auto& u : result.unknown) unknown.push_back(u.along);
+  return told(sets_of(result), unknown);
 }
 
 }  // namespace study_worlds

@@ -21,7 +21,9 @@ struct Request {
   std::vector<std::string> causes;  ///< names of interfaces.md, or "unknown"; empty: none
   double size = 1;                  ///< in units of the effect-size table (core/study/discrepancy/README.md)
   int flights = 12;
-  std::string confound;  ///< "yaw": never turns; "battery": all flights start full and equal; empty: none
+  /// "yaw": never turns; "battery": all flights start full and equal; "height": an empty room, hovers at two heights
+  /// only, low and under the ceiling; empty: none.
+  std::string confound;
 };
 
 /// Axis-aligned room: the inside of a box, less solid boxes. Distances are closed forms.
@@ -60,10 +62,17 @@ struct World {
 };
 
 World draw_world(const Request& request);
+/// What is hidden at a row: push by the effects of the mean, m/s² in W as the accelerometer tells it; ln of the factor
+/// on the variance. Never written to a file: for the oracle fit alone.
+struct Hidden {
+  Vec3 push;
+  double ln_variance;
+};
 /// One flight as a table: column names and rows. Deterministic in (world, number).
 struct Table {
   std::vector<std::string> names;
   std::vector<std::vector<double>> rows;
+  std::vector<Hidden> hidden;  ///< one per row
 };
 std::vector<Table> fly_all(const World& world);
 
@@ -75,5 +84,7 @@ std::vector<std::filesystem::path> write_world(const World& world, const std::fi
 std::string truth_line(const World& world);
 
 const std::vector<std::string>& cause_names();
+/// The table of the docs: the size that must be found at 12 flights, in its unit (core/study/discrepancy/README.md).
+double table_size(const std::string& cause);
 
 }  // namespace study_worlds

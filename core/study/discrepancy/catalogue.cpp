@@ -211,10 +211,13 @@ std::vector<Form> pushes() {
                                     level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); })};
                }},
           {.cause = "imu_drift",
-           .formula = "accelerometer bias b t/100 s, fixed to the body",
+           .formula = "accelerometer bias b (t/100 s)^n, fixed to the body",
            .parameters = {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
+           .scale_name = "n",
+           .scales = {0.5, 1},
            .floor = 0.015,
-           .columns = [](const Windows& ws, double) { return body_drift(ws, [](auto& w) { return w.t / 100; }); }},
+           .columns = [](const Windows& ws,
+                         double power) { return body_drift(ws, [&](auto& w) { return std::pow(w.t / 100, power); }); }},
           {.cause = "imu_drift",
            .formula = "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
            .parameters = {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
@@ -475,9 +478,13 @@ std::vector<Column> smooth_columns(const Regressor& along, const Windows& window
       const int turns = (k + 1) / 2;
       x.push_back(!along.circular ? std::cos(M_PI * k * q) : k % 2 ? std::cos(turns * q) : std::sin(turns * q));
     }
-    Column column;
-    for (const Channel c : group) column.parts.push_back({c, x});
-    columns.push_back(std::move(column));
+    // A push may point anywhere in the plane: x and y have coefficients of their own. ln variance moves as one.
+    if (group.front() == kVarX) {
+      columns.emplace_back();
+      for (const Channel c : group) columns.back().parts.push_back({c, x});
+    } else {
+      for (const Channel c : group) columns.push_back({{{c, x}}});
+    }
   }
   return columns;
 }

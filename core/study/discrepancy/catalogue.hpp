@@ -51,7 +51,7 @@ struct Regressor {
 };
 std::vector<Regressor> regressors(const Observations& seen);
 /// cos(π k q), k = 1 … 4, of the regressor's rank q in [0, 1] (circular: sin and cos of one and two turns), in the
-/// channels of one group.
+/// channels of one group: level means each for themselves, ln variance along all axes as one.
 std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group);
 
 /// What an accepted form leaves open and no other cause may claim: the reference voltage of a sagging battery, the

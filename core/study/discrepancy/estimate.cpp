@@ -45,6 +45,15 @@ Eigen::VectorXd maximum(const std::vector<Normal>& normals, const std::vector<do
   return out;
 }
 
+/// What of a rotor's deviation is how the craft was built, the same in each of its flights: of θ = Σ x y / Σ x².
+double built_error(const Column& column) {
+  const Channel c = column.parts.front().channel;
+  double square = 0;
+  for (const auto& part : column.parts)
+    if (!part.x.empty() && built_scatter(part.channel) == built_scatter(c)) square += part.x.front() * part.x.front();
+  return square > 0 ? built_scatter(c) / std::sqrt(square) : 0;
+}
+
 }  // namespace
 
 double student_975(double n) {
@@ -84,7 +93,9 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
   Eigen::MatrixXd left(p + 1, static_cast<Eigen::Index>(flights));
   for (std::size_t f = 0; f < flights; ++f) left.col(static_cast<Eigen::Index>(f)) = maximum(normals, scales, f);
   const Eigen::VectorXd mean = left.rowwise().mean();
-  const Eigen::VectorXd error = ((count - 1) / count * (left.colwise() - mean).rowwise().squaredNorm()).cwiseSqrt();
+  Eigen::VectorXd error = ((count - 1) / count * (left.colwise() - mean).rowwise().squaredNorm()).cwiseSqrt();
+  for (Eigen::Index k = 0; k < p; ++k)
+    error[k] = std::hypot(error[k], built_error(cause.columns[static_cast<std::size_t>(k)]));
   const double t = student_975(count - 1);
   cause.parameters.clear();
   for (Eigen::Index k = 0; k < p; ++k) {

@@ -39,81 +39,6 @@ std::vector<double> Normal::gain_per_flight() const {
   return nats;
 }
 
-Evidence::Evidence(const Observations& seen) : seen_(&seen) { whiten({}); }
-
-void Evidence::anova(Channel c, const std::vector<double>& r) {
-  double sse = 0, n = 0, groups = 0, grand = 0, total = 0;
-  std::vector<std::pair<double, double>> flights;  // weight, mean
-  for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
-    double weight = 0, mean = 0, square = 0, count = 0;
-    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
-      const double w = seen_->weight[c][i];
-      if (!(w > 0)) continue;
-      weight += w, mean += w * r[i], square += w * r[i] * r[i], count += 1;
-    }
-    if (count == 0) continue;
-    mean /= weight;
-    sse += square - weight * mean * mean, n += count, groups += 1;
-    flights.emplace_back(weight, mean);
-    grand += weight * mean, total += weight;
-  }
-  // A channel that is exact in every window (no dropout at all) keeps a least scatter.
-  const double least = c >= kMotor1 ? 1e-6 : 1e-8;
-  within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
-  // Vehicles are built with rotors and sensors that differ by this much (README.md, "scatter"): no flight averages it
-  // out.
-  const double built = c >= kDropout1 ? 0.003 : c >= kMotor1 ? 0.01 : 0;
-  between_[c] = built * built;
-  if (groups < 2) return;
-  grand /= total;
-  double ssb = 0, squares = 0;
-  for (const auto& [weight, mean] : flights)
-    ssb += weight * (mean - grand) * (mean - grand), squares += weight * weight;
-  between_[c] = std::max(between_[c], (ssb - (groups - 1) * within_[c]) / (total - squares / total));
-}
-
-std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const Column*>& columns) const {
-  const auto p = static_cast<Eigen::Index>(columns.size());
-  const std::size_t flights = seen_->first.size() - 1;
-  std::vector<Eigen::MatrixXd> grams(flights, Eigen::MatrixXd::Zero(p + 1, p + 1));
-  std::vector<std::pair<Eigen::Index, const std::vector<double>*>> active;
-  Eigen::MatrixXd outer;
-  Eigen::VectorXd sum, x;
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    active.clear();
-    for (Eigen::Index k = 0; k < p; ++k)
-      for (const auto& part : columns[static_cast<std::size_t>(k)]->parts)
-        if (part.channel == c) active.emplace_back(k, &part.x);
-    if (active.empty()) continue;
-    active.emplace_back(p, &seen_->y[c]);
-    const auto n = static_cast<Eigen::Index>(active.size());
-    x.resize(n);
-    for (std::size_t f = 0; f < flights; ++f) {
-      outer.setZero(n, n), sum.setZero(n);
-      double weight = 0;
-      for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
-        const double w = seen_->weight[c][i] / within_[c];
-        if (!(w > 0)) continue;
-        for (Eigen::Index k = 0; k < n; ++k) x[k] = (*active[static_cast<std::size_t>(k)].second)[i];
-        for (Eigen::Index k = 0; k < n; ++k)
-          for (Eigen::Index l = 0; l <= k; ++l) outer(k, l) += w * x[k] * x[l];
-        sum += w * x, weight += w;
-      }
-      const double shrink = between_[c] / (1 + between_[c] * weight);
-      for (Eigen::Index k = 0; k < n; ++k) {
-        for (Eigen::Index l = 0; l <= k; ++l) {
-          const double value = outer(k, l) - shrink * sum[k] * sum[l];
-          const auto row = active[static_cast<std::size_t>(k)].first,
-                     column = active[static_cast<std::size_t>(l)].first;
-          grams[f](row, column) += value;
-          if (row != column) grams[f](column, row) += value;
-        }
-      }
-    }
-  }
-  return grams;
-}
-
 Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const {
   std::vector<const Column*> joint;
   for (const auto& c : nuisance) joint.push_back(&c);
@@ -150,29 +75,6 @@ Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Co
     if (!normal.left_out.back().allFinite()) normal.solvable = false;
   }
   return normal;
-}
-
-void Evidence::whiten(const std::vector<Column>& accepted) {
-  within_.fill(1), between_.fill(0);
-  std::vector<Column> columns = offsets(accepted, *seen_);
-  columns.insert(columns.end(), accepted.begin(), accepted.end());
-  Eigen::VectorXd theta;
-  if (!columns.empty()) {
-    std::vector<const Column*> pointers;
-    for (const auto& c : columns) pointers.push_back(&c);
-    const auto p = static_cast<Eigen::Index>(columns.size());
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p + 1, p + 1);
-    for (const auto& g : grams(pointers)) sum += g;
-    theta = sum.topLeftCorner(p, p).completeOrthogonalDecomposition().solve(sum.topRightCorner(p, 1));
-  }
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    std::vector<double> r = seen_->y[c];
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      for (const auto& part : columns[k].parts)
-        if (part.channel == c)
-          for (std::size_t i = 0; i < r.size(); ++i) r[i] -= theta[static_cast<Eigen::Index>(k)] * part.x[i];
-    anova(static_cast<Channel>(c), r);
-  }
 }
 
 SmallMatrix Evidence::size(const std::vector<Column>& columns) const {

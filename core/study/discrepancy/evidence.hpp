@@ -32,8 +32,17 @@ struct Normal {
   std::vector<double> gain_per_flight() const;
 };
 
-/// Observations with the scatter of each channel: within flights (σ_w²) and between them (σ_b², a random intercept),
-/// by analysis of variance of what is left after `explained`. V = diag(σ_w²/weight) + σ_b² 11ᵀ per flight and channel.
+/// Scatter between the rotors and sensors of a craft that is no effect and that no number of flights averages out.
+double built_scatter(Channel c);
+
+/// A column seen in axes of which the scatter is independent: ln variance along x, y and z wanders as one (gusts are
+/// strong or weak along all axes), so its three channels become √3 times their mean, (x − y)/√2 and (x + y − 2z)/√6.
+Column decorrelated(const Column& column);
+
+/// Observations with the scatter of each channel (after `decorrelated`): within flights (σ_w²) and between them (σ_b²,
+/// a random intercept), by analysis of variance of what the accepted columns leave. V = diag(σ_w²/weight) + σ_b² 11ᵀ
+/// per flight and channel, and in the level means + σ_t² ZZᵀ, Z the body's two level axes: craft are trimmed anew
+/// before each flight. A window's mean weighs more where its own variance, shrunk towards its flight's, is small.
 class Evidence {
  public:
   explicit Evidence(const Observations& seen);
@@ -51,11 +60,19 @@ class Evidence {
   double between(Channel c) const { return between_[c]; }
 
  private:
+  /// XᵀV⁻¹X of each flight, X the columns and last y.
   std::vector<Eigen::MatrixXd> grams(const std::vector<const Column*>& columns) const;
+  void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const;
   void anova(Channel c, const std::vector<double>& residual);
+  void weigh_means(const std::vector<double>& ln_variance);
+  double trim_scatter(const Column& residual) const;
 
   const Observations* seen_;
+  Column y_;  // every channel, decorrelated
+  std::array<std::vector<double>, kChannels> weight_;
+  std::vector<Column> tilts_;  // Z; empty without attitude
   std::array<double, kChannels> within_{}, between_{};
+  double tilt_ = 0;  // σ_t²
 };
 
 }  // namespace backwash::study::discrepancy

@@ -97,7 +97,7 @@ double nats_apart(const Evidence& evidence, const Accepted& cause, const Rival& 
   const auto rows = static_cast<Eigen::Index>(kWindows * kChannels);
   const auto weighted = [&](const Column& column) {
     Eigen::VectorXd all = Eigen::VectorXd::Zero(rows);
-    for (const auto& part : column.parts) {
+    for (const auto& part : decorrelated(column).parts) {
       const double weight = 1 / std::sqrt(evidence.within(part.channel) + kWindows * evidence.between(part.channel));
       for (std::size_t i = 0; i < kWindows; ++i)
         all[static_cast<Eigen::Index>(part.channel * kWindows + i)] += weight * part.x[i];

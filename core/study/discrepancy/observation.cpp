@@ -12,7 +12,7 @@ namespace backwash::study::discrepancy {
 namespace {
 
 constexpr double kWindow = 2.0;      // s
-constexpr double kScatter2 = 0.16;   // variance of ln variance between windows beside its estimate's own
+constexpr double kStray = 0.3;       // m: a craft farther from where its set-points lead does not follow them
 constexpr std::size_t kFewest = 20;  // samples of a window
 
 struct Stretch {
@@ -148,7 +148,12 @@ bool Observations::measured(Channel c) const {
 }
 
 Observer::Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid)
-    : vehicle_(vehicle), surroundings_(grid, model) {
+    : vehicle_(vehicle), own_(std::in_place, grid, model), surroundings_(*own_) {
+  seen_.first.push_back(0);
+}
+
+Observer::Observer(const Vehicle& vehicle, Surroundings& surroundings)
+    : vehicle_(vehicle), surroundings_(surroundings) {
   seen_.first.push_back(0);
 }
 
@@ -173,26 +178,31 @@ void Observer::add(const FlightLog& log) {
   seen_.first.push_back(seen_.windows.size());
 }
 
-void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
-                          std::size_t begin, std::size_t end) {
+void Observer::put(std::size_t channel, double y, double weight) {
+  if (!std::isfinite(y) || !(weight > 0)) return;
+  seen_.y[channel].back() = y, seen_.weight[channel].back() = weight;
+}
+
+WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end) {
   const Stretch w{begin, end};
   WindowRow row{};
-  for (std::size_t c = 0; c < kChannels; ++c) seen_.y[c].push_back(0), seen_.weight[c].push_back(0);
-  const auto put = [&](std::size_t c, double y, double weight) {
-    if (!std::isfinite(y) || !(weight > 0)) return;
-    seen_.y[c].back() = y, seen_.weight[c].back() = weight;
-  };
   const auto column_mean = [&](const char* name) {
     if (!log.has(name)) return 0.0;
     const auto& column = log.column(name);
     return mean(w, 0.0, [&](std::size_t i) { return column[s.row[i]]; });
   };
-  row.flight = flight;
+  const auto mean_of = [&](const std::vector<Vec3>& x) -> Vec3 {
+    return mean(w, Vec3(Vec3::Zero()), [&](std::size_t i) -> Vec3 { return x[i]; });
+  };
   row.segment = s.segment[begin];
   row.t = 0.5 * (s.t[begin] + s.t[end - 1]);
-  row.p_W = mean(w, Vec3(Vec3::Zero()), [&](std::size_t i) -> Vec3 { return s.p[i]; });
-  row.v_W = mean(w, Vec3(Vec3::Zero()), [&](std::size_t i) -> Vec3 { return s.v[i]; });
-  row.speed = mean(w, 0.0, [&](std::size_t i) { return s.v[i].norm(); });
+  row.duration = s.t[end - 1] - s.t[begin];
+  // A gust that pushes the craft up is in its mean residual and in its measured height: a place that answers the gusts
+  // would explain them. Where the set-points lead is known without them, unless the craft flies elsewhere.
+  const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kStray;
+  const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
+  row.p_W = mean_of(p), row.v_W = mean_of(v);
+  row.speed = mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); });
   row.R_WB = Mat3::Zero();
   if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) -> Mat3 { return s.R_WB[i]; });
   row.yaw = std::atan2(row.R_WB(1, 0), row.R_WB(0, 0));
@@ -206,20 +216,24 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
   constexpr std::size_t kPoints = 7;  // along the window: a moving vehicle crosses different air
   row.sigma = Vec3::Zero();
   for (std::size_t k = 0; k < kPoints; ++k)
-    row.sigma += surroundings_.sigma(s.p[begin + (2 * k + 1) * w.size() / (2 * kPoints)]) / kPoints;
+    row.sigma += surroundings_.sigma(p[begin + (2 * k + 1) * w.size() / (2 * kPoints)]) / kPoints;
   const Vec3 here = surroundings_.sigma(row.p_W);
   for (std::size_t k = 0; k < kMapOffsets; ++k)
     row.ln_sigma_moved[k] =
         (surroundings_.sigma(row.p_W + map_offset(k)).array() / here.array()).log().max(-2.0).min(2.0);
+  return row;
+}
 
-  const double duration = s.t[end - 1] - s.t[begin];
+/// Means, ln variances and the tail; returns the detrended vertical residual.
+std::vector<double> Observer::put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end) {
+  const Stretch w{begin, end};
   double tail = 0;
   std::vector<double> vertical;
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
     // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
-    put(kMeanX + a, mean(w, 0.0, residual), duration / kWindow * 0.01 / (row.sigma[axis] + 0.002));
+    put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
     const auto x = detrended_values(w, residual);
     const auto [variance, samples] = spread(x);
     row.measured_variance[axis] = variance;
@@ -231,35 +245,47 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
     if (axis == 2) vertical = x;
   }
   put(kTail, tail, 1);
+  return vertical;
+}
 
-  if (!s.a_nominal.empty()) {
-    const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
-    if (s.simulated_by_thrust) {
-      // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
-      // design that shares their noise with the residual would be biased.
-      const auto r = detrended_values(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
-      const auto rate = rates(s, w, nominal(2)), level = detrended_values(w, nominal(2));
-      const Moment delay(rate), slope(level);
-      if (delay.excited(0.05)) {
-        row.delay_gain = {-delay.with(rate), delay.with(level)};
-        put(kThrustDelay, delay.with(r), 1);
-      }
-      if (slope.excited(0.05)) {
-        row.slope_gain = {-slope.with(rate), slope.with(level)};
-        put(kThrustSlope, slope.with(r), 1);
-      }
+/// How late and how steeply thrust and commands act.
+void Observer::put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end) {
+  const Stretch w{begin, end};
+  const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
+  if (s.simulated_by_thrust) {
+    // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
+    // design that shares their noise with the residual would be biased.
+    const auto r = detrended_values(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
+    const auto rate = rates(s, w, nominal(2)), level = detrended_values(w, nominal(2));
+    const Moment delay(rate), slope(level);
+    if (delay.excited(0.05)) {
+      row.delay_gain = {-delay.with(rate), delay.with(level)};
+      put(kThrustDelay, delay.with(r), 1);
     }
-    double y_h = 0, g_h = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Moment m(rates(s, w, nominal(axis)));
-      if (!m.excited(0.05)) continue;
-      const auto late = detrended_values(w, [&](std::size_t i) { return s.a[i][axis] - s.a_nominal[i][axis]; });
-      const double y = m.with(late), gain = -std::sqrt(m.square);
-      if (axis < 2) y_h += y * gain, g_h += gain * gain;
-      if (axis == 2) put(kCommandDelayZ, y, 1), row.command_gain[1] = gain;
+    if (slope.excited(0.05)) {
+      row.slope_gain = {-slope.with(rate), slope.with(level)};
+      put(kThrustSlope, slope.with(r), 1);
     }
-    if (g_h > 0) put(kCommandDelayH, y_h / std::sqrt(g_h), 1), row.command_gain[0] = std::sqrt(g_h);
   }
+  double y_h = 0, g_h = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Moment m(rates(s, w, nominal(axis)));
+    if (!m.excited(0.05)) continue;
+    const auto late = detrended_values(w, [&](std::size_t i) { return s.a[i][axis] - s.a_nominal[i][axis]; });
+    const double y = m.with(late), gain = -std::sqrt(m.square);
+    if (axis < 2) y_h += y * gain, g_h += gain * gain;
+    if (axis == 2) put(kCommandDelayZ, y, 1), row.command_gain[1] = gain;
+  }
+  if (g_h > 0) put(kCommandDelayH, y_h / std::sqrt(g_h), 1), row.command_gain[0] = std::sqrt(g_h);
+}
+
+void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
+                          std::size_t begin, std::size_t end) {
+  for (std::size_t c = 0; c < kChannels; ++c) seen_.y[c].push_back(0), seen_.weight[c].push_back(0);
+  WindowRow row = placed(log, s, begin, end);
+  row.flight = flight;
+  const auto vertical = put_moments(row, s, begin, end);
+  if (!s.a_nominal.empty()) put_delays(row, s, begin, end);
   for (const auto& [channel, value, weight] : rotor_values(log, s, rotors, vehicle_, vertical, begin, end))
     put(channel, value, weight);
   seen_.windows.push_back(std::move(row));

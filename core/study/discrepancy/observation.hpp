@@ -3,6 +3,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -16,6 +17,9 @@
 #include "core/types/vehicle.hpp"
 
 namespace backwash::study::discrepancy {
+
+/// Variance of ln variance between windows beside its estimate's own; and, (m/s²)², what a mean scatters by beside Σ.
+inline constexpr double kScatter2 = 0.16, kMeanNoise = 0.002;
 
 /// What is measured on every 2 s window: each channel has one number per window and a weight (0: not measured).
 enum Channel : std::size_t {
@@ -58,8 +62,9 @@ Vec3 map_offset(std::size_t k);  ///< m
 struct WindowRow {
   std::size_t flight;
   int segment;        ///< −1 in transit or unknown
-  double t;           ///< s since the flight's first row
-  Vec3 p_W, v_W;      ///< m, m/s, means
+  double t;           ///< s since the flight's first row, middle of the window
+  double duration;    ///< s
+  Vec3 p_W, v_W;      ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
   double speed;       ///< m/s, mean of the norm
   Mat3 R_WB;          ///< mean of the rotation matrices (not orthonormal); zero without attitude
   double yaw;         ///< rad
@@ -90,17 +95,25 @@ struct Observations {
 class Observer {
  public:
   Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);
+  /// With surroundings that were looked at before, and are kept: studies of the same map share them.
+  Observer(const Vehicle& vehicle, Surroundings& surroundings);
+  Observer(const Observer&) = delete;
   void add(const FlightLog& log);
   Observations finish();
 
  private:
   void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
                   std::size_t begin, std::size_t end);
+  WindowRow placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end);
+  void put(std::size_t channel, double y, double weight);
+  std::vector<double> put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
+  void put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
 
   const Vehicle vehicle_;
   Observations seen_;
   std::set<std::string> ever_;  // columns that some flight had
-  Surroundings surroundings_;
+  std::optional<Surroundings> own_;
+  Surroundings& surroundings_;
 };
 
 }  // namespace backwash::study::discrepancy

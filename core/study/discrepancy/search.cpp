@@ -2,6 +2,7 @@
 #include "core/study/discrepancy/search.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -13,15 +14,17 @@ namespace {
 /// Nats by which a smooth must beat the best cause, and the share of the cause's own gain.
 constexpr double kSmoothLead = 3, kSmoothShare = 0.6;
 /// A further cause explains at least this share of the first one's gain: less repairs the first one's form.
-constexpr double kLeastShare = 0.08;
-constexpr double kRepairShare = 0.25;
-/// And a smooth left over after a cause at least this share: less is the cause's form.
-constexpr double kLeftShare = 0.3;
+constexpr double kLeastShare = 0.08, kRepairShare = 0.25;
+/// And a smooth left over in a cause's channels more than the cause itself, than half of it if the cause is a constant:
+/// less is the error of the cause's form.
+constexpr double kLeftShare = 1, kLeftOfConstant = 0.5;
+/// Level of a further cause over that of the first: a false name beside a true one is as wrong as one alone.
+constexpr double kFurtherLevel = 1.0 / 3;
 constexpr double kRivalNats = 3, kRivalErrors = 2;
 
 const std::vector<std::pair<std::string, std::vector<Channel>>>& groups() {
   static const std::vector<std::pair<std::string, std::vector<Channel>>> all = {
-      {"mean x", {kMeanX}}, {"mean y", {kMeanY}}, {"mean z", {kMeanZ}}, {"ln variance", {kVarX, kVarY, kVarZ}}};
+      {"mean x, y", {kMeanX, kMeanY}}, {"mean z", {kMeanZ}}, {"ln variance", {kVarX, kVarY, kVarZ}}};
   return all;
 }
 
@@ -57,6 +60,24 @@ double needed_gain(const Candidate& candidate, const std::vector<Accepted>& acce
     const double share = dynamic(a.columns) && dynamic(candidate.columns) ? kRepairShare : kLeastShare;
     needed = std::max(needed, share * a.gain);
   }
+  return needed;
+}
+
+bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b) {
+  std::array<bool, kChannels> moved{};
+  for (const auto& column : a)
+    for (const auto& part : column.parts) moved[part.channel] = true;
+  return std::any_of(b.begin(), b.end(), [&](const Column& column) {
+    return std::any_of(column.parts.begin(), column.parts.end(), [&](auto& part) { return moved[part.channel]; });
+  });
+}
+
+/// Gain that a smooth needs beside the accepted causes.
+double needed_structure(const Candidate& smooth, const std::vector<Accepted>& accepted) {
+  double needed = 0;
+  for (const auto& a : accepted)
+    if (share_a_channel(smooth.columns, a.columns))
+      needed = std::max(needed, (a.form->constant ? kLeftOfConstant : kLeftShare) * a.gain);
   return needed;
 }
 
@@ -210,7 +231,6 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
   SearchResult result;
   Evidence evidence = start;
   const auto draws = sign_draws(evidence.seen().first.size() - 1, options.flips, options.seed);
-  double first_gain = 0;
   while (result.accepted.size() < options.most_causes) {
     const auto accepted = columns_of(result.accepted, evidence.seen());
     evidence.whiten(accepted);
@@ -218,7 +238,8 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     auto all = candidates(evidence, accepted, true);
     if (all.empty()) break;
     result.null_gain = null_maxima(all, draws);
-    const auto index = static_cast<std::size_t>((1 - options.accept_p) * static_cast<double>(draws.size()));
+    const double level = options.accept_p * (result.accepted.empty() ? 1 : kFurtherLevel);
+    const auto index = static_cast<std::size_t>((1 - level) * static_cast<double>(draws.size()));
     result.threshold = std::max(0.5, result.null_gain[std::min(index, draws.size() - 1)]);
 
     const Candidate *cause = nullptr, *smooth = nullptr;
@@ -230,16 +251,18 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
       if (!c.form && (!smooth || c.gain > smooth->gain)) smooth = &c;
       if (c.form && (!cause || c.gain > cause->gain)) cause = &c;
     }
-    if (smooth && smooth->gain >= std::max(result.threshold, kLeftShare * first_gain) &&
+    if (smooth && smooth->gain >= needed_structure(*smooth, result.accepted) &&
         (!cause || smooth->gain - cause->gain > std::max(kSmoothLead, kSmoothShare * cause->gain))) {
       const auto group = std::find_if(groups().begin(), groups().end(), [&](auto& g) {
         return g.second.front() == smooth->columns.front().parts.front().channel;
       });
+      // A constant of which more than half as much again varies along a regressor is the structure's mean.
+      std::erase_if(result.accepted,
+                    [&](const Accepted& a) { return a.form->constant && share_a_channel(smooth->columns, a.columns); });
       result.unknown.push_back({smooth->name, group->first, p_value(result.null_gain, smooth->gain), smooth->gain});
       break;
     }
     if (!cause) break;
-    first_gain = std::max(first_gain, cause->gain);
     Accepted a{cause->form, cause->scale, cause->columns, {}, p_value(result.null_gain, cause->gain), cause->gain, {},
                {}};
     refine(evidence, a, accepted);

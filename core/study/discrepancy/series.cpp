@@ -48,11 +48,15 @@ Commands commands_of(const FlightLog& log, const Rows& rows) {
   return c;
 }
 
-/// Acceleration of the controller's loop at each row: fed with the logged state, or (`closed`) with its own.
-std::vector<Vec3> loop_acceleration(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed) {
+struct Loop {
+  std::vector<Vec3> p, v, a;
+};
+
+/// The controller's loop at each row: fed with the logged state, or (`closed`) with its own.
+Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed) {
   const auto& c = vehicle.controller;
   const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
-  std::vector<Vec3> out(s.size(), Vec3::Zero());
+  Loop out;
   Vec3 p = cmd.p.front(), v = Vec3::Zero(), produced = Vec3::Zero();
   std::size_t heard = 0, felt = 0;
   // A command acts from some time in the period before its row on (held) or all along it (streamed): a quarter between.
@@ -79,7 +83,7 @@ std::vector<Vec3> loop_acceleration(const Series& s, const Commands& cmd, const 
       v += h * produced;
       p += h * v;
     }
-    out[i] = produced;
+    out.p.push_back(p), out.v.push_back(v), out.a.push_back(produced);
   }
   return out;
 }
@@ -135,8 +139,9 @@ Series series_of(const FlightLog& log, const Vehicle& vehicle) {
   }
   if (commanded) {
     const Commands cmd = commands_of(log, rows);
-    if (!s.simulated_by_thrust) s.a_sim = loop_acceleration(s, cmd, vehicle, false);
-    s.a_nominal = loop_acceleration(s, cmd, vehicle, true);
+    if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
+    Loop nominal = loop_of(s, cmd, vehicle, true);
+    s.p_nominal = std::move(nominal.p), s.v_nominal = std::move(nominal.v), s.a_nominal = std::move(nominal.a);
   }
   if (s.a_sim.empty()) s.a_sim.assign(s.size(), Vec3::Zero());
   return s;

@@ -18,8 +18,9 @@ struct Series {
   std::vector<Vec3> a_sim;         ///< R_WB e_z T(thrust)/m − g e_z, or the closed loop's where thrust is missing
   std::vector<Mat3> R_WB;          ///< empty without attitude
   std::vector<double> thrust_acc;  ///< T/m, m/s²; empty without thrust
-  std::vector<Vec3> a_nominal;     ///< closed loop fed with the set-points alone; empty without set-points
-  std::vector<int> segment;        ///< −1 without the column
+  /// Closed loop fed with the set-points alone; empty without set-points.
+  std::vector<Vec3> p_nominal, v_nominal, a_nominal;
+  std::vector<int> segment;  ///< −1 without the column
   bool simulated_by_thrust = false, has_velocity = false, has_acceleration = false;
   std::size_t size() const { return t.size(); }
 };

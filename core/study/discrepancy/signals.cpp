@@ -2,6 +2,7 @@
 #include "core/study/discrepancy/signals.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <limits>
@@ -87,14 +88,23 @@ double excess_tail(std::span<const double> x, int surrogates) {
 }
 
 double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
-  const auto power = [&](double harmonic, double detuned_hz) {
-    double re = 0, im = 0;
+  constexpr int kBeside = 4;  // on each side, 1 Hz apart from 1.5 Hz on
+  using Complex = std::complex<double>;
+  /// Power at the harmonic, and the sum at its neighbours.
+  const auto powers = [&](double harmonic) {
+    Complex at = 0;
+    std::array<Complex, 2 * kBeside> beside{};
     for (std::size_t i = 1; i < x.size(); ++i) {
-      const double angle = harmonic * phase[i] + 2 * std::numbers::pi * detuned_hz * t[i];
       const double d = x[i] - x[i - 1];  // the difference flattens the slow part of the spectrum
-      re += d * std::cos(angle), im += d * std::sin(angle);
+      const Complex line = std::polar(d, harmonic * phase[i]), hz = std::polar(1.0, 2 * std::numbers::pi * t[i]);
+      at += line;
+      Complex detuned = std::polar(1.0, 3 * std::numbers::pi * t[i]);
+      for (std::size_t k = 0; k < kBeside; ++k, detuned *= hz)
+        beside[2 * k] += line * detuned, beside[2 * k + 1] += line * std::conj(detuned);
     }
-    return re * re + im * im;
+    double sum = 0;
+    for (const Complex& z : beside) sum += std::norm(z);
+    return std::pair(std::norm(at), sum / (2 * kBeside));
   };
   const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
   const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
@@ -104,8 +114,8 @@ double line_excess(std::span<const double> x, std::span<const double> t, std::sp
     const double folded = std::abs(std::remainder(harmonic * hz_of_rotor, rate));
     if (folded < 6 || folded > rate / 2 - 1) continue;
     count += 1;
-    line += power(harmonic, 0);
-    for (const double hz : {-4.5, -3.5, -2.5, -1.5, 1.5, 2.5, 3.5, 4.5}) beside += power(harmonic, hz) / 8;
+    const auto [at, around] = powers(harmonic);
+    line += at, beside += around;
   }
   // Each power is exponential: a sum of m has E ln = ln mean + ψ(m) − ln m, ln_bias of 2m samples.
   if (count == 0) return std::numeric_limits<double>::quiet_NaN();

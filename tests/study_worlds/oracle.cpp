@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tests/study_worlds/oracle.hpp"
+
+#include <cmath>
+#include <functional>
+
+namespace study_worlds {
+
+namespace discrepancy = backwash::study::discrepancy;
+
+namespace {
+
+/// The generator's own value of the study's parameter, by name of cause and parameter; `s` the size, `angle` the shape.
+std::optional<double> truth_of(const std::string& cause, const std::string& parameter, double s, double angle) {
+  const std::string key = cause + "." + parameter;
+  // Sizes that are defined at the same reference on both sides.
+  for (const char* same : {"ground_thrust.A_mps2", "ceiling.A_mps2", "wall_attraction.A_mps2", "forward_speed.B_ln",
+                           "recirculation.B_ln", "battery_sag.s", "thrust_slope.s", "rotor_drag.k_per_s",
+                           "actuator_lag.tau_s", "command_latency.latency_s", "heavy_tails.K_ln"})
+    if (key == same) return s;
+  if (key == "payload.m") return 1 - 1 / (1 + s);
+  if (key == "trim.body_x_mps2" || key == "draft.x_mps2" || key == "map_offset.x_m") return s * std::cos(angle);
+  if (key == "trim.body_y_mps2" || key == "draft.y_mps2" || key == "map_offset.y_m") return s * std::sin(angle);
+  const double after_100_s = 1.6 * (1 - std::exp(-1.0)) * s;
+  if (key == "imu_drift.x_mps2_per_100s") return after_100_s * std::cos(angle);
+  if (key == "imu_drift.y_mps2_per_100s") return after_100_s * std::sin(angle);
+  if (key == "imu_drift.z_mps2_per_100s") return after_100_s * 0.3;
+  if (key == "propeller_damage.d") return -std::log(1 - s);
+  if (key == "rotor_sensor_fault.e" && s > 0) return 2 * std::log(1 + s);
+  if (key == "rotor_sensor_fault.share" && s < 0) return -s;
+  return std::nullopt;
+}
+
+/// Mean over each window of what is hidden at its flight's rows.
+std::vector<double> window_means(const discrepancy::Observations& seen, const std::vector<Table>& flights,
+                                 const std::function<double(const Hidden&)>& value) {
+  std::vector<double> means;
+  for (const auto& w : seen.windows) {
+    const Table& flight = flights[w.flight];
+    double sum = 0, n = 0;
+    for (std::size_t i = 0; i < flight.rows.size(); ++i) {
+      const double t = flight.rows[i][0] - flight.rows[0][0];
+      if (std::abs(t - w.t) <= 0.5 * w.duration + 1e-9) sum += value(flight.hidden[i]), n += 1;
+    }
+    means.push_back(n > 0 ? sum / n : 0);
+  }
+  return means;
+}
+
+}  // namespace
+
+std::vector<Compared> compare(const World& world, const discrepancy::Accepted& found) {
+  const std::string& cause = found.form->cause;
+  std::vector<Compared> all;
+  for (const auto& p : found.parameters)
+    if (const auto truth = truth_of(cause, p.name, world.effects.of(cause), world.effects.shape_of(cause)))
+      all.push_back({p.name, p.value, p.low, p.high, *truth});
+  return all;
+}
+
+std::optional<double> parameter_error(const std::vector<Compared>& compared) {
+  double off = 0, size = 0;
+  for (const auto& c : compared) off += std::pow(c.value - c.truth, 2), size += c.truth * c.truth;
+  if (compared.empty()) return std::nullopt;
+  return std::sqrt(off / size);
+}
+
+std::optional<double> share_of_oracle(const discrepancy::Accepted& found, const discrepancy::Observations& seen,
+                                      const std::vector<Table>& flights) {
+  discrepancy::Column column;
+  const auto add = [&](discrepancy::Channel channel, const std::function<double(const Hidden&)>& value) {
+    auto x = window_means(seen, flights, value);
+    for (const double v : x)
+      if (std::abs(v) > 1e-9) return column.parts.push_back({channel, std::move(x)});
+  };
+  for (int i = 0; i < 3; ++i)
+    add(static_cast<discrepancy::Channel>(discrepancy::kMeanX + i), [i](const Hidden& h) { return h.push[i]; });
+  for (const auto c : {discrepancy::kVarX, discrepancy::kVarY, discrepancy::kVarZ})
+    add(c, [](const Hidden& h) { return h.ln_variance; });
+  if (column.parts.empty()) return std::nullopt;
+  discrepancy::Evidence evidence(seen);
+  evidence.whiten({column});
+  std::vector<discrepancy::Column> both = found.columns, free;
+  both.push_back(column);
+  if (!found.form->constant) free = discrepancy::offsets(both, seen);
+  const auto gain = [&](const std::vector<discrepancy::Column>& columns) {
+    const auto normal = evidence.normal(columns, free);
+    return normal.solvable ? normal.gain() : 0.0;
+  };
+  const double oracle = gain({column});
+  if (!(oracle > 0)) return std::nullopt;
+  return gain(found.columns) / oracle;
+}
+
+}  // namespace study_worlds

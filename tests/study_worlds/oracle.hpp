@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/study/discrepancy/search.hpp"
+#include "tests/study_worlds/score.hpp"
+
+namespace study_worlds {
+
+/// The estimated parameters of which the generator knows the value in the same unit (README.md of the study lists
+/// them); empty for a cause without one.
+std::vector<Compared> compare(const World& world, const backwash::study::discrepancy::Accepted& found);
+/// |value − truth|/|truth| over all of them as one vector.
+std::optional<double> parameter_error(const std::vector<Compared>& compared);
+
+/// Held-out gain of the found cause over that of an oracle: one column that is the hidden effect's own value, averaged
+/// over each window, one factor fitted. Nothing for effects that are neither a push nor a factor on the variance.
+std::optional<double> share_of_oracle(const backwash::study::discrepancy::Accepted& found,
+                                      const backwash::study::discrepancy::Observations& seen,
+                                      const std::vector<Table>& flights);
+
+}  // namespace study_worlds

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tests/study_worlds/summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <map>
+
+#include "tests/study_worlds/observe.hpp"
+
+namespace study_worlds {
+namespace {
+
+std::string text(const char* format, ...) {
+  char buffer[256];
+  va_list values;
+  va_start(values, format);
+  std::vsnprintf(buffer, sizeof buffer, format, values);
+  va_end(values);
+  return buffer;
+}
+
+std::string text(const Rate& r) { return r.n == 0 ? "–" : text("%d/%d (%.2f–%.2f)", r.hits, r.n, r.low(), r.high()); }
+
+/// Wilson's interval: centre and half width.
+std::pair<double, double> wilson(const Rate& r) {
+  const double z = 1.959964, n = r.n, p = r.hits / n, q = z * z / n;
+  return {(p + q / 2) / (1 + q), z * std::sqrt(p * (1 - p) / n + q / (4 * n)) / (1 + q)};
+}
+
+double median(const std::vector<double>& sorted) { return sorted[sorted.size() / 2]; }
+
+/// Cells with one hidden cause of the catalogue, flown so that it can be told.
+bool plain(const CellSummary& c) {
+  const auto& names = cause_names();
+  return std::find(names.begin(), names.end(), c.cell) != names.end();
+}
+
+bool confounded(const CellSummary& c) { return c.cell.find(", ") != std::string::npos; }
+
+std::string names_of(const std::vector<std::string>& names) {
+  std::string all;
+  for (const auto& n : names) all += (all.empty() ? "" : ", ") + n;
+  return all;
+}
+
+/// Gate over every cell that `chosen` picks: the figure of the worst, and the cells that miss.
+template <typename Chosen, typename Figure, typename Holds>
+Gate over(const std::string& name, const std::vector<CellSummary>& cells, Chosen chosen, Figure figure, Holds holds) {
+  std::vector<std::string> missed;
+  int tested = 0;
+  for (const auto& c : cells) {
+    if (!chosen(c)) continue;
+    ++tested;
+    if (!holds(c)) missed.push_back(c.cell + " " + figure(c));
+  }
+  const std::string all = text("%d of %d cells", tested - static_cast<int>(missed.size()), tested);
+  if (tested == 0) return {name, "not run", false};
+  return {name, missed.empty() ? all : all + "; missed: " + names_of(missed), missed.empty()};
+}
+
+}  // namespace
+
+double Rate::low() const { return std::max(0.0, wilson(*this).first - wilson(*this).second); }
+double Rate::high() const { return std::min(1.0, wilson(*this).first + wilson(*this).second); }
+
+std::vector<CellSummary> summarise(const std::vector<Outcome>& outcomes) {
+  std::vector<CellSummary> all;
+  for (const Cell& cell : cells()) {
+    CellSummary s{cell.name, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+    std::map<std::string, int> told_counts;
+    for (const Outcome& o : outcomes) {
+      if (o.cell != cell.name) continue;
+      s.right.count(o.right()), s.in_sets.count(o.in_sets()), s.wrong_name.count(o.wrong_name());
+      s.silent.count(o.silent());
+      s.ambiguous.count(std::any_of(o.sets.begin(), o.sets.end(), [](auto& set) { return set.size() > 1; }));
+      for (const auto& c : o.compared) s.covered.count(c.low <= c.truth && c.truth <= c.high);
+      if (o.error) s.errors.push_back(*o.error);
+      if (o.gain_share) s.gain_shares.push_back(*o.gain_share);
+      ++told_counts[told(o.sets, o.unknown)];
+    }
+    if (s.right.n == 0) continue;
+    std::sort(s.errors.begin(), s.errors.end()), std::sort(s.gain_shares.begin(), s.gain_shares.end());
+    for (const auto& [what, count] : told_counts) s.told.emplace_back(count, what);
+    std::sort(s.told.begin(), s.told.end(), [](auto& a, auto& b) { return a.first > b.first; });
+    all.push_back(std::move(s));
+  }
+  return all;
+}
+
+std::vector<Gate> gates(const std::vector<CellSummary>& cells) {
+  const auto is = [](const char* name) { return [name](const CellSummary& c) { return c.cell == name; }; };
+  const auto known = [](const CellSummary& c) { return plain(c) || c.cell == "unknown"; };
+  const auto error = [](const CellSummary& c) { return text("%.2f", median(c.errors)); };
+  const auto gain = [](const CellSummary& c) { return text("%.2f", median(c.gain_shares)); };
+  const auto alarms = [](const CellSummary& c) { return text(Rate{c.silent.n - c.silent.hits, c.silent.n}); };
+  Rate covered;
+  for (const auto& c : cells)
+    if (plain(c)) covered.hits += c.covered.hits, covered.n += c.covered.n;
+  std::vector<Gate> all = {
+      over("false alarms: 95 % upper limit ≤ 0.08", cells, is("none"), alarms,
+           [](auto& c) {
+             return Rate{c.silent.n - c.silent.hits, c.silent.n}.high() <= 0.08;
+           }),
+      over(
+          "wrong name ≤ 0.03, in each cell", cells, known, [](auto& c) { return text(c.wrong_name); },
+          [](auto& c) { return c.wrong_name.hits <= 0.03 * c.wrong_name.n; }),
+      over(
+          "power ≥ 0.8, the right name alone", cells, plain, [](auto& c) { return text(c.right); },
+          [](auto& c) { return c.right.hits >= 0.8 * c.right.n; }),
+      over(
+          "power ≥ 0.8, the right name in the set", cells, plain, [](auto& c) { return text(c.in_sets); },
+          [](auto& c) { return c.in_sets.hits >= 0.8 * c.in_sets.n; }),
+      over(
+          "unknown structure told ≥ 0.8", cells, is("unknown"), [](auto& c) { return text(c.right); },
+          [](auto& c) { return c.right.hits >= 0.8 * c.right.n; }),
+      over(
+          "confounded: truth in the set ≥ 0.9", cells, confounded, [](auto& c) { return text(c.in_sets); },
+          [](auto& c) { return c.in_sets.hits >= 0.9 * c.in_sets.n; }),
+      over(
+          "median parameter error ≤ 0.2", cells, [](auto& c) { return plain(c) && !c.errors.empty(); }, error,
+          [](auto& c) { return median(c.errors) <= 0.2; }),
+      over(
+          "median gain ≥ 0.8 of the oracle's", cells, [](auto& c) { return plain(c) && !c.gain_shares.empty(); }, gain,
+          [](auto& c) { return median(c.gain_shares) >= 0.8; })};
+  if (covered.n > 0)
+    all.push_back({"intervals cover 0.90 … 0.98", text(covered),
+                   covered.hits >= 0.9 * covered.n && covered.hits <= 0.98 * covered.n});
+  return all;
+}
+
+std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes) {
+  std::string page =
+      "| hidden | right name alone | truth in what is told | wrong name | parameter error | interval covers "
+      "| gain / oracle | told |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n";
+  for (const auto& c : cells) {
+    std::string told_list;
+    for (std::size_t i = 0; i < std::min<std::size_t>(4, c.told.size()); ++i) {
+      if (i > 0) told_list += ", ";
+      told_list += std::to_string(c.told[i].first) + " `";
+      for (const char letter : c.told[i].second)
+        told_list += letter == '|' ? std::string("\\|") : std::string(1, letter);
+      told_list += '`';
+    }
+    if (c.told.size() > 4) told_list += ", …";
+    page += "| " + c.cell + " | " + text(c.right) + " | " + text(c.in_sets) + " | " + text(c.wrong_name) + " | " +
+            (c.errors.empty() ? "–" : text("%.2f", median(c.errors))) + " | " + text(c.covered) + " | " +
+            (c.gain_shares.empty() ? "–" : text("%.2f", median(c.gain_shares))) + " | " + told_list + " |\n";
+  }
+  page += "\n| gate | figure | held |\n| --- | --- | --- |\n";
+  for (const auto& g : gates(cells))
+    page += "| " + g.name + " | " + g.figure + " | " + (g.held ? "yes" : "**no**") + " |\n";
+  std::vector<double> search, world;
+  for (const auto& o : outcomes) search.push_back(o.study_s), world.push_back(o.world_s);
+  if (search.empty()) return page;
+  std::sort(search.begin(), search.end()), std::sort(world.begin(), world.end());
+  return page + text("\nCPU a study, median and slowest: %.2f s and %.2f s; flying and observing its world %.2f s.\n",
+                     median(search), search.back(), median(world));
+}
+
+}  // namespace study_worlds

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/study_worlds/score.hpp"
+
+namespace study_worlds {
+
+/// Hits among trials with Wilson's 95 % interval.
+struct Rate {
+  int hits = 0, n = 0;
+  void count(bool hit) { hits += hit ? 1 : 0, ++n; }
+  double low() const;
+  double high() const;
+};
+
+/// What the outcomes of one cell add up to.
+struct CellSummary {
+  std::string cell;
+  Rate right, in_sets, wrong_name, silent, ambiguous;
+  Rate covered;                                   ///< parameters within their intervals
+  std::vector<double> errors, gain_shares;        ///< sorted
+  std::vector<std::pair<int, std::string>> told;  ///< most frequent first
+  std::vector<std::string> not_compared;          ///< parameters are not in a shared unit
+};
+std::vector<CellSummary> summarise(const std::vector<Outcome>& outcomes);
+
+/// One requirement over cells, its figure and whether it holds.
+struct Gate {
+  std::string name, figure;
+  bool held;
+};
+std::vector<Gate> gates(const std::vector<CellSummary>& cells);
+
+/// Tables of the README: confusion, figures, gates.
+std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes);
+
+}  // namespace study_worlds
