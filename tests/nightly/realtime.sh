@@ -30,10 +30,14 @@ rtsan() {
   [[ $(nm -C build/tsan/services/backwashd | grep -c '__tsan_read') -gt 0 ]] || { echo "not instrumented" >&2; return 70; }
   # Its first test is that a race in a hand-over is reported.
   TSAN_OPTIONS=exitcode=66 build/tsan/tests/test_sync --gtest_brief=1
-  local status=0
+  local status=70
   rm -f "$out"/tsan.*
-  TSAN_OPTIONS="suppressions=$PWD/tests/nightly/tsan.supp:print_suppressions=1:exitcode=66:log_path=$out/tsan.report" \
-    BENCH_NICE=-10 BACKWASHD=$PWD/build/tsan/services/backwashd tests/nightly/tsan_flight.sh build/release "$out" || status=$?
+  for _ in 1 2 3; do # 70: no report, but a busy machine ended the flight early
+    [[ $status == 70 ]] || break
+    status=0
+    TSAN_OPTIONS="suppressions=$PWD/tests/nightly/tsan.supp:print_suppressions=1:exitcode=66:log_path=$out/tsan.report" \
+      BENCH_NICE=-10 BACKWASHD=$PWD/build/tsan/services/backwashd tests/nightly/tsan_flight.sh build/release "$out" || status=$?
+  done
   cat "$out"/tsan.report.* 2>/dev/null || true
   return "$status"
 }
