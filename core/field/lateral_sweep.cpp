@@ -200,8 +200,8 @@ void LateralSweep::add(const View& view, const Segment& segment, int dy, Lateral
   const int corner_end = std::clamp(corner_high - z0 + 1, corner_begin, end + 1);
   std::fill(seen_.begin() + begin, seen_.begin() + corner_begin, 0);
   std::fill(seen_.begin() + corner_end, seen_.begin() + end + 1, 0);
-  const double* factor = l.corner.data() - (corner_low - z0);
-  for (int n = corner_begin; n < corner_end; ++n) seen_[static_cast<std::size_t>(n)] *= factor[n];
+  for (int n = corner_begin; n < corner_end; ++n)
+    seen_[static_cast<std::size_t>(n)] *= l.corner[static_cast<std::size_t>(n - (corner_low - z0))];
   add_terms({l.decay * w.xx, l.decay * w.xy, l.decay * w.yy, l.decay * w.zz}, {c.xx, c.xy, c.yy, c.zz}, wall_.data(),
             seen_.data(), begin, end, sums.xx.data(), sums.xy.data(), sums.yy.data(), sums.zz.data());
 }

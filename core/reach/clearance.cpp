@@ -130,7 +130,9 @@ class Scan {
   /// Visits the layers of an axis whose gap, with `others2` in the other axes, is less than the nearest so far.
   template <class Visit>
   void outwards(int axis, double others2, const Visit& visit) {
-    const int size = grid_.size()[axis], middle = static_cast<int>(center_[axis]);
+    // From a centre outside of the grid (or not finite: damaged logs) the nearest face's layer comes first.
+    const int size = grid_.size()[axis];
+    const int middle = static_cast<int>(std::max(-1.0, std::min(static_cast<double>(size), center_[axis])));
     bool nearer = true;
     const auto layer = [&](int n) {
       if (n < 0 || n >= size) return;

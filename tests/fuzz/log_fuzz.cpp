@@ -121,7 +121,7 @@ std::vector<study::RawRecord> flown(const plan::World& world) {
 }
 
 TEST(Fuzz, ADamagedFlightIsPutTogetherOrRefused) {
-  Mutator mutator("recorded flight", 0.1);
+  Mutator mutator("recorded flight", 0.02);
   const auto world = daemon::test::corridor();
   const auto whole = flown(*world);
   study::FlightLog truth;
