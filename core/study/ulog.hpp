@@ -35,9 +35,10 @@ tl::expected<ULog, std::string> decode_ulog(std::span<const std::uint8_t> bytes)
 
 /// Reads a file as a flight log (interfaces.md): vehicle_local_position, vehicle_attitude, sensor_combined or
 /// vehicle_acceleration for acceleration (else that of the local position), trajectory_setpoint, battery_status,
-/// actuator_outputs/actuator_motors, vehicle_thrust_setpoint; NED/FRD turned into z-up and x forward, y left, z up.
-/// Rows are those of the local position; other topics are joined by their latest value before it, and left out where
-/// they are missing. Errors: not_found; bad_data with the offset, or the topic that is missing.
+/// actuator_outputs/actuator_motors, vehicle_thrust_setpoint or the thrust of vehicle_attitude_setpoint; NED/FRD turned
+/// into z-up and x forward, y left, z up. Rows are those of the local position; other topics are joined by their latest
+/// value before it, and left out where they are missing. Errors: not_found; bad_data with the offset, or the topic that
+/// is missing.
 tl::expected<FlightLog, LogError> read_ulog(const std::string& path);
 
 }  // namespace backwash::study

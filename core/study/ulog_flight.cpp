@@ -58,16 +58,20 @@ FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
   rows.join(&position, "vz", "vz_mps", -1);
   rows.join(&position, "ay", "ax_mps2", 1), rows.join(&position, "ax", "ay_mps2", 1);
   rows.join(&position, "az", "az_mps2", -1);
-  const auto* setpoint = ulog.find("trajectory_setpoint");
-  if (!setpoint) setpoint = ulog.find("vehicle_local_position_setpoint");
-  for (const auto& [x, y, z] : {std::tuple{"position[0]", "position[1]", "position[2]"}, std::tuple{"x", "y", "z"}})
-    rows.join(setpoint, y, "cmd_x_m", 1), rows.join(setpoint, x, "cmd_y_m", 1), rows.join(setpoint, z, "cmd_z_m", -1);
-  keep_whole(log, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
+  // A trajectory_setpoint that another mode left empty says nothing; what the controller followed stands in the other.
+  for (const char* topic : {"trajectory_setpoint", "vehicle_local_position_setpoint"}) {
+    const auto* setpoint = ulog.find(topic);
+    for (const auto& [x, y, z] : {std::tuple{"position[0]", "position[1]", "position[2]"}, std::tuple{"x", "y", "z"}})
+      rows.join(setpoint, y, "cmd_x_m", 1), rows.join(setpoint, x, "cmd_y_m", 1), rows.join(setpoint, z, "cmd_z_m", -1);
+    keep_whole(log, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
+  }
   const auto* battery = ulog.find("battery_status");
   rows.join(battery, "voltage_v", "battery_v", 1);
   rows.join(battery, "temperature", "temperature_c", 1);
   const auto* motors = ulog.find("actuator_motors");
-  const auto* outputs = ulog.find("actuator_outputs");
+  const ULog::Topic* outputs = nullptr;
+  for (unsigned instance = 0; instance < 4 && !outputs; ++instance)  // of the output board that is there
+    outputs = ulog.find("actuator_outputs", instance);
   for (int i = 0; i < 4; ++i) {
     const std::string to = std::string("motor").append(std::to_string(i + 1));
     const std::string index = std::string("[").append(std::to_string(i)).append("]");
@@ -78,6 +82,7 @@ FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
       for (double& v : log.columns[to]) v -= 1;
   }
   rows.join(ulog.find("vehicle_thrust_setpoint"), "xyz[2]", "thrust", -1);
+  rows.join(ulog.find("vehicle_attitude_setpoint"), "thrust_body[2]", "thrust", -1);  // before PX4 1.14
   // Body FRD → NED into body FLU → ENU.
   if (const auto* attitude = ulog.find("vehicle_attitude")) {
     FlightLog q;

@@ -42,6 +42,18 @@ void add_rows(std::vector<HeightRow>& rows, const study::FlightWindows& flight, 
   }
 }
 
+std::optional<HeightEffect> effect_of(const std::vector<HeightRow>& rows, std::uint64_t seed) {
+  if (rows.size() < 10) return std::nullopt;
+  return height_effect(rows, 0.01, 0.8, kReturnLength, 500, seed);
+}
+
+study::WindowOptions mapless_windows(const Model& gates) {
+  study::WindowOptions options;
+  options.tau_w = gates.bound.tau_w;
+  options.still_mps = 10;  // passes too
+  return options;
+}
+
 std::size_t place_of(const CampaignFiles& files, const CampaignFiles::Log& log) {
   if (files.maps.size() <= 1) return 0;
   if (!log.map)
@@ -77,7 +89,7 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
   if (mapless) campaign.maps.push_back(flat_floor());
   study::WindowOptions options;
   options.tau_w = gates.bound.tau_w;
-  if (mapless) options.still_mps = 10;  // passes too
+  if (mapless) options = mapless_windows(gates);
   std::vector<HeightRow> rows;
   std::optional<study::Signal> signal;
   for (const auto& file : files.logs) {
@@ -104,8 +116,20 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
     campaign.data.place.push_back(place), campaign.logs.push_back(file.path);
   }
   campaign.signal = study::to_string(*signal), campaign.pushes = signal == study::Signal::commanded;
-  if (rows.size() >= 10) campaign.height = height_effect(rows, 0.01, 0.8, kReturnLength, 500, seed);
+  campaign.height = effect_of(rows, seed);
   return campaign;
+}
+
+std::optional<HeightEffect> read_height_effect(const std::vector<std::string>& logs, const Model& gates,
+                                               std::uint64_t seed) {
+  std::vector<HeightRow> rows;
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    const auto log = read_table(logs[k], "t_s");
+    const auto flight = study::flight_windows(log, std::nullopt, mapless_windows(gates), logs[k]);
+    if (!flight) throw Failure(kBadData, flight.error().message);
+    add_rows(rows, *flight, log, k);
+  }
+  return effect_of(rows, seed);
 }
 
 }  // namespace backwash::services

@@ -134,9 +134,7 @@ std::optional<discrepancy::RotorVerdict> against_reference(const Options& option
 std::optional<study::calibrate::HeightEffect> height_effect(const Options& options, const Model& model,
                                                             const discrepancy::Observations& seen) {
   if (!options.map.empty() || !seen.has("ceiling")) return std::nullopt;
-  CampaignFiles files;
-  for (const auto& path : options.logs) files.logs.push_back({path, std::nullopt});
-  return read_campaign(files, std::nullopt, model, options.seed).height;
+  return read_height_effect(options.logs, model, options.seed);
 }
 
 int run(const Options& options) {

@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <thread>
 
 #include "services/backwashd/control_loop.hpp"
@@ -61,21 +62,23 @@ int run(const Settings& settings) {
   Mission mission(*channels);
   ControlLoop loop(*channels, link, settings.vehicle, settings.daemon.control.battery_land, settings.daemon.map);
   {
-    std::vector<std::jthread> threads;
-    threads.emplace_back([&] { recorder.run(*channels); });
-    threads.emplace_back(
-        [&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle, settings.daemon.map); });
-    threads.emplace_back(
-        [&] { run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); }); });
-    threads.emplace_back(
-        [&] { run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); }); });
-    threads.emplace_back([&] { front.run_status(settings.vehicle); });
-    threads.emplace_back([&] {
-      make_real_time({settings.daemon.control.priority, settings.daemon.control.cpu});
-      run_control(*channels, loop);
-    });
-    threads.emplace_back([&] { front.run_readers(); });
-    threads.emplace_back([&] { run_link_watch(*channels, settings.daemon.link); });
+    const std::array threads = {
+        std::jthread([&] { recorder.run(*channels); }),
+        std::jthread(
+            [&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle, settings.daemon.map); }),
+        std::jthread([&] {
+          run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); });
+        }),
+        std::jthread([&] {
+          run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); });
+        }),
+        std::jthread([&] { front.run_status(settings.vehicle); }),
+        std::jthread([&] {
+          make_real_time({settings.daemon.control.priority, settings.daemon.control.cpu});
+          run_control(*channels, loop);
+        }),
+        std::jthread([&] { front.run_readers(); }),
+        std::jthread([&] { run_link_watch(*channels, settings.daemon.link); })};
     spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}", settings.vehicle.name,
                  settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space);
     int signal = 0;

@@ -8,6 +8,7 @@
 #include "core/config/config.hpp"
 #include "core/plan/planner.hpp"
 #include "core/plan/world.hpp"
+#include "core/reach/chance.hpp"
 #include "core/sim/quadrotor.hpp"
 
 namespace backwash {
@@ -119,6 +120,19 @@ TEST(ExtendedModel, TubesFollowDraftAndDragAlongTheWay) {
   const Fit f = fit(tube_of(*world, start, commands), states, tube_of(*plain, start, commands));
   EXPECT_GT(f.furthest_push, 0.04);
   EXPECT_LT(f.off, 0.04 * f.furthest_push);
+}
+
+TEST(ExtendedModel, ChanceConstrainedTubesFollowThePushToo) {
+  Model model;
+  model.extension = {kSuction, kPull};
+  const auto world = plan::build_world(room(), model, vehicle());
+  const State start{Vec3(1.5, 1, 1), Vec3::Zero()};
+  const auto commands = way(start.p_W, Vec3(1.5, 2.2, 1.8));
+  const auto tight = tube_of(*world, start, commands);
+  const auto chance = reach::chance_tube_over_field(world->reach, start, {.p_W = start.p_W}, commands, world->bounds,
+                                                    model.bound, 1e-3);
+  for (std::size_t k = 0; k < tight.size(); ++k)
+    ASSERT_LT((tight[k].center.p_W - chance.steps[k].center.p_W).norm(), 1e-12);
 }
 
 TEST(ExtendedModel, HoverSetsUnderACeilingAreWhereTheVehicleComesToRest) {

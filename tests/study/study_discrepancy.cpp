@@ -9,6 +9,8 @@
 #include <fstream>
 
 #include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+#include "core/study/discrepancy/consequence.hpp"
 #include "core/study/discrepancy/extend.hpp"
 #include "core/study/import_crazypad.hpp"
 #include "tests/study_worlds/observe.hpp"
@@ -107,7 +109,34 @@ TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
   }
   const auto read = backwash::config::load_model(path);
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_GT(read->bound.mean_vertical, model.bound.mean_vertical);
+  EXPECT_EQ(read->bound.mean_vertical, model.bound.mean_vertical);
+  ASSERT_FALSE(read->extension.empty());
+  const auto& effect = read->extension.front();
+  const auto& found = result.causes.front().found;
+  EXPECT_EQ(effect.kind, backwash::ModelEffect::Kind::push_under_surface);
+  EXPECT_NEAR(effect.value.x(), found.theta[0], 1e-6);
+  EXPECT_NEAR(effect.scale, found.scale, 1e-6);
+  EXPECT_GT(effect.error.x(), 0);
+}
+
+TEST(Study, AnExtendedModelMovesHoverSetsUnderTheCeilingAndKeepsMoreSamplesInside) {
+  const study_worlds::Request request{seed(), {"ceiling"}, 3, 12, ""};
+  const auto world = study_worlds::draw_world(request);
+  const auto seen = study_worlds::observe(world, folder());
+  const auto result = studied(seen);
+  ASSERT_FALSE(result.causes.empty()) << study_worlds::told(result);
+  const auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
+  const auto vehicle = backwash::config::load_vehicle((folder() / "vehicle.toml").string());
+  ASSERT_TRUE(vehicle) << vehicle.error().message;
+  const auto grid = backwash::map::load_map((folder() / "map.bt").string());
+  ASSERT_TRUE(grid);
+  const auto c = consequence(result, seen, model, *vehicle, &*grid);
+  EXPECT_EQ(c.before.shift_95, 0);
+  EXPECT_GT(c.after.shift_95, 0.01);
+  EXPECT_LT(c.after.shift_median, 0.3 * c.after.shift_95);  // by place: most were flown far below the ceiling
+  EXPECT_GT(c.after.inside, c.before.inside);
+  EXPECT_GE(c.after.extent_95, c.before.extent_95);
+  EXPECT_EQ(c.before.plan, "ok");
 }
 
 /// What would separate two causes of the catalogue, by the first form of each that is, or is not, about rotors.

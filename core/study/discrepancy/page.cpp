@@ -118,9 +118,9 @@ tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Obse
   }
   script << "$dots << EOD\n"
          << dots.str() << "EOD\n$lines << EOD\n"
-         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel '"
+         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel 'missed: "
          << (found.form->cause == "wall_attraction" ? "mean towards that wall" : channel_name(channel))
-         << (channel <= kMeanZ ? ", m/s²," : "") << " of what the simulation misses'\nset key top right\nset grid\n"
+         << (channel <= kMeanZ ? ", m/s²" : "") << "'\nset key top right\nset grid\n"
          << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
          << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
          << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
@@ -195,28 +195,27 @@ std::string height_section(const calibrate::HeightEffect& h) {
          "</table>\n</section>\n";
 }
 
-std::string rotor_section(const RotorVerdict& v) {
+/// What the motor shares say against those of sound flights.
+std::string rotor_sentence(const RotorVerdict& v) {
   using Kind = RotorVerdict::Kind;
-  std::string says;
   const std::string rotor = "rotor " + std::to_string(v.rotor);
   switch (v.kind) {
     case Kind::as_sound:
-      says = "Not told from the sound flights.";
-      break;
+      return "Not told from the sound flights.";
     case Kind::propeller_damage:
-      says = "The propeller of " + rotor + " is damaged: it needs " + number(100 * v.d) + " % [" + number(100 * v.low) +
+      return "The propeller of " + rotor + " is damaged: it needs " + number(100 * v.d) + " % [" + number(100 * v.low) +
              ", " + number(100 * v.high) + "] more of its command.";
-      break;
     case Kind::payload:
-      says = "An off-centre weight, no damaged propeller.";
-      break;
+      return "An off-centre weight, no damaged propeller.";
     case Kind::cannot_tell:
-      says = "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
-      break;
+      return "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
     default:
-      says = "Differs from the sound flights as neither a damaged propeller nor a weight does.";
+      return "Differs from the sound flights as neither a damaged propeller nor a weight does.";
   }
-  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(says) + "</p>\n<table>\n" +
+}
+
+std::string rotor_section(const RotorVerdict& v) {
+  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(rotor_sentence(v)) + "</p>\n<table>\n" +
          row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
          row("Twist, which a weight does not give, t", number(v.t_yaw)) +
          row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
@@ -232,7 +231,8 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
           escaped(context.vehicle) + ", model " + escaped(context.model) + "; backwash " + escaped(context.version) +
           "</p>\n<p class=\"verdict " +
           (result.verdict == Verdict::nothing_found || result.verdict == Verdict::cause_found ? "passed" : "failed") +
-          "\">" + escaped(verdict_sentence(result, seen)) + "</p>\n";
+          "\">" + escaped(verdict_sentence(result, seen)) +
+          (context.rotors ? " Motor shares: " + escaped(rotor_sentence(*context.rotors)) : "") + "</p>\n";
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());
@@ -249,7 +249,7 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
     page += "</table>\n</section>\n";
   }
   page += "<section><h2>What was not tested, and why</h2>\n<table>\n";
-  for (const auto& [name, why] : result.not_tested) page += row(name, why);
+  for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
   if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
   page +=
       "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
