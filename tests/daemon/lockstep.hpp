@@ -22,6 +22,7 @@ struct Wire {
   std::vector<CommandLong> commands;
   std::vector<std::string> texts;
   int heartbeats = 0, odometry = 0;
+  std::uint64_t odometry_us = 0;  ///< time of the last ODOMETRY
   std::size_t bytes = 0;
   bool commanded(std::uint16_t command) const;
 };
