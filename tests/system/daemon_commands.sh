@@ -54,6 +54,8 @@ printf 'x_m,y_m,z_m\n1.5,0.8,1.2\n1.5,-0.8,1.4\n-1,0,1.2\n' >"$work/route.csv"
 ctl follow "$work/route.csv" --wait
 sleep 0.5
 status
+ctl land --wait
+stop
 python3 - "$work/status.json" "$work/truth.csv" "$work/route.csv" <<'PYTHON'
 import csv, json, math, sys
 status = json.load(open(sys.argv[1]))
@@ -69,4 +71,3 @@ for point in route:  # in their order, at rest at each
     print(f"at {goal} at {truth[at]['t_s'] - truth[0]['t_s']:.1f} s")
 assert status["samples_outside"] == 0 and status["state"] == "tracking" and not status["moving"], status
 PYTHON
-ctl land --wait
