@@ -116,6 +116,14 @@ class Lockstep {
   mavlink::Parser parser_;
 };
 
+/// A rig that has flown `seconds` of its route.
+struct InFlight : Lockstep {
+  explicit InFlight(double seconds = 2) {
+    take_off();
+    start_route(seconds);
+  }
+};
+
 /// Shared by the tests of one program.
 std::shared_ptr<const plan::World> corridor();
 Vehicle vehicle_5in();
