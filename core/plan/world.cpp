@@ -19,7 +19,7 @@ std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const
   const double least = vehicle.body.radius - grid.resolution() * std::sqrt(3.0) / 2;
   std::vector<std::size_t> voxels;
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    if (grid.at(n) == map::Cell::free && distance.at(grid.voxel(n)) >= least) voxels.push_back(n);
+    if (grid.at(n) == map::Cell::free && distance.at(n) >= least) voxels.push_back(n);
   }
   return voxels;
 }

@@ -70,14 +70,21 @@ void BoundField::number_entries(std::vector<std::uint8_t> stored) {
 // The cube of level L is the union of the eight cubes of level L − 1 at its octants.
 void BoundField::pool(int level) noexcept {
   const int half = 1 << (level - 1);
+  const auto sx = static_cast<std::size_t>(size_.x()), sy = static_cast<std::size_t>(size_.y());
+  std::array<std::size_t, 8> ahead;  // of an octant, in cells
+  for (std::size_t octant = 0; octant < 8; ++octant)
+    ahead[octant] = static_cast<std::size_t>(half) * ((octant & 1) + sx * ((octant >> 1 & 1) + sy * (octant >> 2)));
   std::size_t n = 0;
   for_each_voxel(size_, [&](const Index3& v) {
-    const std::uint32_t e = entry_of_[n++];
+    const std::size_t here = n++;
+    const std::uint32_t e = entry_of_[here];
     if (e == 0) return;
-    for (int octant = 0; octant < 8; ++octant) {
-      const Index3 u = v + half * Index3(octant & 1, octant >> 1 & 1, octant >> 2);
-      if (inside(u)) raise(entries_[e].level[level], entry(u).level[level - 1]);
-    }
+    const std::size_t beyond = (v.x() + half < size_.x() ? 0u : 1u) | (v.y() + half < size_.y() ? 0u : 2u) |
+                               (v.z() + half < size_.z() ? 0u : 4u);  // axes along which the octant is outside
+    Maximum maximum{};
+    for (std::size_t octant = 0; octant < 8; ++octant)
+      if (!(octant & beyond)) raise(maximum, entries_[entry_of_[here + ahead[octant]]].level[level - 1]);
+    entries_[e].level[level] = maximum;
   });
 }
 

@@ -55,6 +55,13 @@ void Tracker::rebase(const RigidShift& D, std::uint32_t closures) noexcept {
   hold_ = D.setpoint(hold_);
 }
 
+double Tracker::clearance() const noexcept {
+  if (!segment_) return 0;
+  const auto& ahead = segment_->clearance_ahead;
+  if (ahead.empty()) return segment_->clearance;
+  return ahead[std::min(next_ / AcceptedSegment::kClearanceEvery, ahead.size() - 1)];
+}
+
 const plan::Stop* Tracker::next_stop() const noexcept {
   if (!segment_ || stop_) return nullptr;
   for (const plan::Stop& stop : segment_->stops)

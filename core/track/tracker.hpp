@@ -26,6 +26,9 @@ struct AcceptedSegment {
   std::vector<plan::Stop> stops{};  ///< ascending by branch; may be empty
   std::uint32_t closures = 0;       ///< loop closures that the map frame it is in has seen
   double clearance = 0;             ///< smallest of its swept tube in the map it was verified in, m
+  /// Entry n: the same of its sets from command kClearanceEvery · n on, rising; may be empty.
+  std::vector<double> clearance_ahead{};
+  static constexpr std::size_t kClearanceEvery = 50;
 };
 
 /// What one tick says about the measured position (model.md section 5.4).
@@ -77,7 +80,8 @@ class Tracker {
   std::size_t stop_branch() const noexcept { return stop_ ? stop_->branch : 0; }  ///< of the stop it is braking on
   std::uint64_t segment() const noexcept { return segment_ ? segment_->id : 0; }
   std::size_t index() const noexcept { return next_; }  ///< of the command that the next step() gives
-  double clearance() const noexcept { return segment_ ? segment_->clearance : 0; }  ///< of the accepted tube, m
+  /// Of the accepted tube from the next command on, to a second, m.
+  double clearance() const noexcept;
   const Setpoint& held() const noexcept { return hold_; }
 
  private:

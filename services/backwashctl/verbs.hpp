@@ -19,8 +19,16 @@ class Verbs {
   int run();
 
  private:
+  void add_control(CLI::App& app);
+  void add_ways(CLI::App& app);
+  void add_ends(CLI::App& app);
+  void add_views(CLI::App& app);
+  CLI::App* verb(CLI::App& app, const std::string& name, const std::string& what, const std::string& example,
+                 std::function<int()> run);
+  CLI::App* waiting(CLI::App* sub, double patience_s);
   int command(const std::string& name, std::uint8_t verb, const Vec3& position,
-              const std::function<bool(const StatusCopy&)>& done, double patience_s);
+              const std::function<bool(const StatusCopy&)>& done);
+  int go_to();
   int follow();
   int status();
   int check();

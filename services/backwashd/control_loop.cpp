@@ -102,7 +102,7 @@ void ControlLoop::forward_odometry() noexcept {
   const track::RigidShift odom_from_map = s.map_from_odom.inverse();
   const Eigen::Quaterniond attitude(s.q[0], s.q[1], s.q[2], s.q[3]);
   firmware_bridge::VioSample vio{};
-  vio.time_us = static_cast<std::uint64_t>(s.stamp_ns / 1000);
+  vio.time_us = static_cast<std::uint64_t>(sender_clock_.taken_ns(s.stamp_ns, s.received_ns) / 1000);
   vio.p_O = odom_from_map.point(s.state.p_W);
   vio.q_OB = Eigen::Quaterniond(Eigen::AngleAxisd(odom_from_map.yaw, Vec3::UnitZ())) * attitude;
   vio.v_B = attitude.conjugate() * s.state.v_W;

@@ -5,6 +5,7 @@
 #include "firmware_bridge/autopilot_link.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
+#include "services/backwashd/sender_clock.hpp"
 
 namespace backwash::daemon {
 
@@ -39,6 +40,7 @@ class ControlLoop {
   firmware_bridge::AutopilotLink& link_;
   track::FlightTick flight_;
   Lookout lookout_;
+  SenderClock sender_clock_;  // of the odometry's
   bool port_open_ = true;
   std::int64_t now_ns_ = 0;
   ControlView view_;

@@ -26,6 +26,11 @@ builtin_interfaces_msg_dds__Time_ wall_clock() {
           static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since - s).count())};
 }
 
+template <typename T>
+std::string topic_of(const config::Daemon& config) {
+  return dds::topic(config.dds.name_space, dds::TopicOf<T>::kName);
+}
+
 geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
 dds::Timing timing(const TimingHistogram& h) {
@@ -41,6 +46,11 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       priority_(priority),
       sensor_range_(config.map.sensor_range),
       localization_(config, vehicle.estimation.position),
+      malformed_({{config.dds.odometry_topic, &channels.odometry_refused},
+                  {topic_of<dds::Octomap>(config), &channels.maps_rejected},
+                  {topic_of<dds::PointCloud>(config), &channels.scans_rejected},
+                  {topic_of<dds::TransformStamped>(config), &channels.closures_refused},
+                  {topic_of<dds::Command>(config), &channels.commands_refused}}),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, priority),
       odometry_(participant_, dds::TopicOf<dds::Odometry>::type(), config.dds.odometry_topic,
                 dds::TopicOf<dds::Odometry>::kDelivery),

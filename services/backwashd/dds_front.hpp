@@ -44,6 +44,7 @@ class DdsFront {
   Localization localization_;
   const Worlds::Pointer* world_ = nullptr;  // the reader's
   std::int64_t said_ns_ = 0;
+  dds::Malformed malformed_;  // before the middleware's threads
   dds::Participant participant_;
   dds::Reader<dds::Odometry> odometry_;
   dds::Reader<dds::Octomap> maps_;

@@ -31,7 +31,11 @@ void verify(Flying& flying, const plan::World& world, std::size_t now) {
   s.clearance = clearance_from(flying, world, s.tube, now);
 }
 
-void add_stops(Flying& flying, const plan::World& world, std::size_t now) {
+void add_guards(Flying& flying, const plan::World& world, std::size_t now) {
+  auto& s = flying.segment;
+  s.clearance_ahead.clear();
+  for (std::size_t k = 0; k < s.commands.size(); k += track::AcceptedSegment::kClearanceEvery)
+    s.clearance_ahead.push_back(clearance_from(flying, world, s.tube, std::max(k, now)));
   flying.segment.stops =
       plan::verified_stops(world, flying.start, flying.previous, flying.segment.commands, now, kStopEvery,
                            [&](const reach::ReachTube& tube) { return clearance_from(flying, world, tube, now); });

@@ -29,8 +29,9 @@ double clearance_from(const Flying& flying, const plan::World& world, const reac
 /// it may fly. One propagation: milliseconds.
 void verify(Flying& flying, const plan::World& world, std::size_t now = 0);
 
-/// Adds the verified stops that leave the segment at command `now` or later, every 0.2 s. One propagation each.
-void add_stops(Flying& flying, const plan::World& world, std::size_t now = 0);
+/// Adds to a verified segment what guards it in flight: the stops that leave it at command `now` or later, every 0.2 s,
+/// one propagation each, and the clearance of what is ahead from each second on.
+void add_guards(Flying& flying, const plan::World& world, std::size_t now = 0);
 
 /// The commands as they are flown: those of the segment, or, braking, of its stop that leaves at `stop_branch`.
 std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch);

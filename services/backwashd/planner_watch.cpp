@@ -68,7 +68,7 @@ void PlannerWorker::pursue() {
   on.metrics = next.metrics;
   verify(on, *world_, now);
   if (!(on.segment.clearance > 0)) return braking ? void() : verify_again();
-  add_stops(on, *world_, now);
+  add_guards(on, *world_, now);
   const bool taken = offer(std::move(on));
   spdlog::info("{} from command {} on: {}{}", next.kind == Kind::extended ? "extended" : "stopping", branch,
                next.reaches_goal ? "to the goal" : next.message, taken ? "" : " (too late)");
@@ -108,7 +108,7 @@ std::optional<std::string> PlannerWorker::rectify() {
                 flying_->z_safe};
     verify(next, *world_, view_.index);
     if (!(next.segment.clearance > 0)) return "the way back is not clear: " + metres(next.segment.clearance);
-    add_stops(next, *world_, view_.index);
+    add_guards(next, *world_, view_.index);
     spdlog::info("loop closure {}: {:.3f} m and {:.2f} degrees, rectified from command {} on", view_.closures,
                  (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw * 180 / 3.14159265358979, branch);
     if (offer(std::move(next))) return std::nullopt;

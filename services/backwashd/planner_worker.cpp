@@ -207,7 +207,7 @@ std::optional<std::string> PlannerWorker::fly(const PlanJob& job, std::vector<Se
     verify(next, *job.world);
     if (!(next.segment.clearance > 0))
       return not_clear("the tube from the state estimated now", next.segment.clearance);
-    add_stops(next, *job.world);
+    add_guards(next, *job.world);
     if (offer(std::move(next))) return std::nullopt;
   }
   return "the vehicle is not still enough to start: its state left the first set each time";

@@ -14,6 +14,7 @@
 #include "core/map/octomap_message.hpp"
 #include "core/sim/vio.hpp"
 #include "services/bench/pty.hpp"
+#include "services/bench/scans.hpp"
 #include "services/dds/topics.hpp"
 #include "services/parallel/real_time.hpp"
 
@@ -51,56 +52,15 @@ dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& d
   return m;
 }
 
-builtin_interfaces_msg_dds__Time_ stamp(double t) {
-  const auto ns = static_cast<std::int64_t>(t * 1e9);
-  return {static_cast<std::int32_t>(ns / 1'000'000'000), static_cast<std::uint32_t>(ns % 1'000'000'000)};
-}
-
-/// A depth camera that looks at the crate: what it sees of it, every 4 cm, as a cloud in the body's frame.
-class CrateScans {
- public:
-  CrateScans(const dds::Participant& participant, const Options& options)
-      : writer_(dds::make_writer<dds::PointCloud>(participant, options.name_space)),
-        center_(options.crate.value_or(Vec3::Zero())),
-        edge_(options.crate_edge) {}
-
-  void send(const State& truth, const Eigen::Quaterniond& q, double t) {
-    static const std::string frame = "base_link";
-    static const std::array<std::string, 3> names{"x", "y", "z"};
-    constexpr std::uint8_t kFloat32 = 7;
-    std::vector<float> data;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double side = truth.p_W[axis] > center_[axis] ? 1 : -1;
-      if (std::abs(truth.p_W[axis] - center_[axis]) <= edge_ / 2) continue;  // looks at this face from neither side
-      for (double u = 0.02; u < edge_; u += 0.04)
-        for (double v = 0.02; v < edge_; v += 0.04) {
-          Vec3 p = center_ - Vec3::Constant(edge_ / 2);
-          p[axis] = center_[axis] + side * (edge_ / 2 - 0.01);
-          p[(axis + 1) % 3] += u;
-          p[(axis + 2) % 3] += v;
-          const Vec3 seen = q.conjugate() * (p - truth.p_W);
-          for (const double x : seen) data.push_back(static_cast<float>(x));
-        }
-    }
-    std::array<dds::PointField, 3> fields{};
-    for (std::uint32_t n = 0; n < 3; ++n) fields[n] = {dds::c_string(names[n]), 4 * n, kFloat32, 1};
-    dds::PointCloud m{};
-    m.header = {stamp(t), dds::c_string(frame)};
-    m.height = 1;
-    m.width = static_cast<std::uint32_t>(data.size() / 3);
-    m.fields = {3, 3, fields.data(), false};
-    m.point_step = 12;
-    m.row_step = m.width * m.point_step;
-    m.data = {m.row_step, m.row_step, reinterpret_cast<std::uint8_t*>(data.data()), false};
-    m.is_dense = true;
-    writer_.write(m);
+/// What the mapper knows before the flight: the room without what lies in the box.
+map::OccupancyGrid without(map::OccupancyGrid room, const std::array<Vec3, 2>& box) {
+  for (std::size_t n = 0; n < room.cell_count(); ++n) {
+    const Vec3 c = room.center(room.voxel(n));
+    if ((c.array() > box[0].array()).all() && (c.array() < box[1].array()).all())
+      room.set(room.voxel(n), map::Cell::unknown);
   }
-
- private:
-  dds::Writer<dds::PointCloud> writer_;
-  Vec3 center_;
-  double edge_;
-};
+  return room;
+}
 
 /// map <- odom, a translation.
 dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t) {
@@ -169,11 +129,11 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   auto odometry_writer = dds::make_writer<dds::Odometry>(participant, options.name_space);
   auto map_writer = dds::make_writer<dds::Octomap>(participant, options.name_space);
   auto closure_writer = dds::make_writer<dds::TransformStamped>(participant, options.name_space);
-  CrateScans scans(participant, options);
+  Scans scans(participant, options.name_space);
   if (options.drift) closure_writer.write(loop_closure(Vec3::Zero(), 0));
   bool closed = false, event = false;
   std::vector<std::int8_t> map_data;
-  map_writer.write(octomap(grid, map_data));
+  map_writer.write(octomap(options.hidden ? without(grid, *options.hidden) : grid, map_data));
   Pty pty(options.link);
   spdlog::info("bench runs: {} in {}, controller on {}", vehicle.name, options.map, options.link);
 
@@ -199,7 +159,10 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
       closure_writer.write(loop_closure(*options.drift, t));
       closed = true;
     }
-    if (step % 100 == 0 && options.crate && event) scans.send(autopilot.truth(), autopilot.attitude(), t);
+    const auto seen = [&](const std::vector<Vec3>& p) { scans.send(p, autopilot.truth(), autopilot.attitude(), t); };
+    if (step % 100 == 0 && options.crate && event)
+      seen(seen_of_crate(*options.crate, options.crate_edge, autopilot.truth().p_W));
+    if (step % 250 == 0 && options.hidden && autopilot.armed()) seen(seen_of_room(grid, autopilot.truth().p_W));
     if (step % kOdometryEvery == 0 && !passed(options.stop_odometry_s))
       odometry_writer.write(odometry(estimate, autopilot.attitude(), t, options.drift.has_value()));
     if (step % 20 == 0) log.row(t, autopilot, estimate);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -24,6 +25,9 @@ struct Options {
   /// A crate's centre, m: an emulated depth camera sends scans of it (10 Hz, body frame) from the event on.
   std::optional<Vec3> crate;
   double crate_edge = 0.4;  ///< m
+  /// Opposite corners of a box that the map which is sent leaves out, m: a range sensor on the vehicle finds what is in
+  /// it (4 Hz, body frame, once armed).
+  std::optional<std::array<Vec3, 2>> hidden;
   /// The VIO has drifted by −drift before the flight: odometry comes in the frame odom, and a loop closure, map ← odom,
   /// brings it to light at the event, m.
   std::optional<Vec3> drift;

@@ -47,7 +47,12 @@ int main(int argc, char** argv) {
   app.add_option("--stop-heartbeat", o.stop_heartbeat_s, "fault: the controller goes silent this long after arming, s");
   std::vector<std::string> parameters;
   app.add_option("--parameter", parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
-  std::vector<double> crate, drift;
+  std::vector<double> crate, drift, hidden;
+  app.add_option(
+         "--hide", hidden,
+         "x,y,z,x,y,z: corners of a box that the map leaves out, m; a range sensor on the vehicle finds what is in it")
+      ->delimiter(',')
+      ->expected(6);
   app.add_option("--crate", crate,
                  "fault: x,y,z of the centre of a crate that the map does not have, m; it is scanned from the event on")
       ->delimiter(',')
@@ -75,6 +80,8 @@ int main(int argc, char** argv) {
     o.parameters[p.substr(0, equals)] = value;
   }
   if (!crate.empty()) o.crate = backwash::Vec3(crate[0], crate[1], crate[2]);
+  if (!hidden.empty())
+    o.hidden = {backwash::Vec3(hidden[0], hidden[1], hidden[2]), backwash::Vec3(hidden[3], hidden[4], hidden[5])};
   if (!drift.empty()) o.drift = backwash::Vec3(drift[0], drift[1], drift[2]);
   o.frame.origin = {origin[0], origin[1], origin[2]};
   const auto grid = backwash::map::load_map(o.map);

@@ -2,9 +2,11 @@
 #include "services/dds/dds.hpp"
 
 #include <dds/dds.h>
+#include <dds/ddsrt/log.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <cstdlib>
 #include <string_view>
 
@@ -148,6 +150,30 @@ std::size_t ForeignWriters::count() {
     sample = nullptr;
   }
   return seen_.size();
+}
+
+Malformed::Malformed(Counters counters) : counters_(std::move(counters)) {
+  dds_set_log_sink(
+      [](void* self, const dds_log_data_t* data) {
+        if (!static_cast<Malformed*>(self)->take({data->message, data->size}))
+          std::fwrite(data->message - data->hdrsize, 1, data->hdrsize + data->size + 1, stderr);  // with its line end
+      },
+      this);
+}
+
+Malformed::~Malformed() { dds_set_log_sink(nullptr, nullptr); }
+
+bool Malformed::take(std::string_view line) noexcept {
+  constexpr std::string_view kBefore = ": deserialization ";
+  const auto at = line.find(kBefore);
+  if (at == line.npos || line.find(" failed") == line.npos) return false;
+  const std::string_view what = line.substr(at + kBefore.size());
+  for (const auto& [topic, counter] : counters_) {
+    if (!what.starts_with(topic) || !what.substr(topic.size()).starts_with('/')) continue;
+    ++*counter;
+    return true;
+  }
+  return false;
 }
 
 WaitSet::WaitSet(const Participant& participant)

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 struct dds_topic_descriptor;
@@ -111,6 +114,24 @@ class ForeignWriters {
  private:
   Entity participant_, publications_;
   std::set<std::array<std::uint8_t, 16>> seen_;
+};
+
+/// Counts samples that the middleware drops because their bytes are none of their topic's type (faults.md row 27). It
+/// says so nowhere but in its log, a line for each: while this lives it takes those lines out of that log, which is one
+/// for the whole process. Other lines go to stderr as before.
+class Malformed {
+ public:
+  /// Each topic by its whole name, with the counter of its samples, which the middleware's threads add to.
+  using Counters = std::vector<std::pair<std::string, std::atomic<std::uint64_t>*>>;
+  explicit Malformed(Counters counters);
+  ~Malformed();
+  Malformed(const Malformed&) = delete;
+  Malformed& operator=(const Malformed&) = delete;
+  /// Of a log line: true if it was counted.
+  bool take(std::string_view line) noexcept;
+
+ private:
+  Counters counters_;
 };
 
 /// Sleeps until one of its readers has data.

@@ -22,6 +22,7 @@ struct Wire {
   std::vector<CommandLong> commands;
   std::vector<std::string> texts;
   int heartbeats = 0, odometry = 0;
+  std::uint64_t odometry_us = 0;  ///< time of the last ODOMETRY
   std::size_t bytes = 0;
   bool commanded(std::uint16_t command) const;
 };
@@ -113,6 +114,14 @@ class Lockstep {
   std::vector<Setpoint> route_;
   Wire wire_;
   mavlink::Parser parser_;
+};
+
+/// A rig that has flown `seconds` of its route.
+struct InFlight : Lockstep {
+  explicit InFlight(double seconds = 2) {
+    take_off();
+    start_route(seconds);
+  }
 };
 
 /// Shared by the tests of one program.

@@ -252,6 +252,19 @@ TEST_F(MapFaults, Row13TheAgeShrinksTheTrustedClearance) {
   EXPECT_EQ(ticks_until(Mode::hold, 60), 26);
 }
 
+// Past a narrow place what is ahead counts: 0.1 m for the first two seconds, 0.5 m from there on.
+TEST_F(MapFaults, Row13TheClearanceOfWhatIsBehindDoesNotCount) {
+  settings_.live = true;
+  settings_.closing_speed = 0.2;
+  lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+  enable();
+  fly(true, 0.1);
+  segment_->clearance_ahead = {0.1, 0.1, 0.5, 0.5};
+  for (int n = 0; n < 110; ++n) tick();
+  map_moves_on_ = false;
+  EXPECT_EQ(ticks_until(Mode::hold, 60), 51);  // 1 s: 0.5 m would last longer
+}
+
 TEST_F(MapFaults, Row13AtRestAnOldMapIsNoFault) {
   settings_.live = true;
   lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # What the ground station may ask for, with real processes: a take-off that is refused arms nothing, a second station is
-# refused by name, and hold in flight stops on the way with every sample inside its set.
+# refused by name, hold in flight stops on the way with every sample inside its set, and follow flies each leg of a file.
 #   daemon_commands.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
@@ -18,7 +18,7 @@ refused() { # refused TEXT ARGUMENT …
 }
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/status.json"; }
 
-start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --log "$work/truth.csv"
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 enable
 refused 'not safe' takeoff --height 9 --wait
@@ -43,4 +43,31 @@ assert s["state"] == "tracking" and not s["moving"], s
 assert -1.9 < x < 1.9, "the flight was not stopped on its way"
 assert s["samples_outside"] == 0 and abs(s["position"][0] - x) < 0.1, s
 PYTHON
+
+# follow: a file that is none is refused before anything is sent, by file and line; a good one is flown leg by leg.
+printf 'x_m,y_m,z_m\n1.5,0.8,1.2\n1.5,far,1.2\n' >"$work/bad.csv"
+refused "bad.csv:3: '1.5,far,1.2' is not three numbers" follow "$work/bad.csv"
+printf '1.5,0.8,1.2\n' >"$work/bad.csv"
+refused 'bad.csv:1: the first line is' follow "$work/bad.csv"
+refused 'cannot be read' follow "$work/absent.csv"
+printf 'x_m,y_m,z_m\n1.5,0.8,1.2\n1.5,-0.8,1.4\n-1,0,1.2\n' >"$work/route.csv"
+ctl follow "$work/route.csv" --wait
+sleep 0.5
+status
 ctl land --wait
+stop
+python3 - "$work/status.json" "$work/truth.csv" "$work/route.csv" <<'PYTHON'
+import csv, json, math, sys
+status = json.load(open(sys.argv[1]))
+rows = [[{k: float(v) for k, v in row.items()} for row in csv.DictReader(open(f))] for f in sys.argv[2:]]
+truth, route = rows
+at = 0
+for point in route:  # in their order, at rest at each
+    goal = [point["x_m"], point["y_m"], point["z_m"]]
+    near = [n for n in range(at, len(truth)) if math.dist([truth[n][c] for c in ("x_m", "y_m", "z_m")], goal) < 0.12
+            and math.hypot(truth[n]["vx_mps"], truth[n]["vy_mps"], truth[n]["vz_mps"]) < 0.15]
+    assert near, f"the vehicle was never at rest at {goal}"
+    at = near[0]
+    print(f"at {goal} at {truth[at]['t_s'] - truth[0]['t_s']:.1f} s")
+assert status["samples_outside"] == 0 and status["state"] == "tracking" and not status["moving"], status
+PYTHON

@@ -47,7 +47,13 @@ expect backwash 's["foreign_writers"] == 1 and s["state"] == "tracking"'
 probe frame
 expect backwash 's["odometry_refused"] > 0 and s["odometry_rejected"] == 0 and s["state"] == "tracking"'
 probe oversized
-expect backwash '2 <= s["scans_rejected"] <= 6 and s["scans_accepted"] == 0'
+expect backwash '1 <= s["scans_rejected"] <= 5 and s["scans_accepted"] == 0'
+grep -q 'refused: point cloud: 400000 points, at most' "$log" || die "the oversized cloud was not refused as that"
+sleep 1.1  # one warning a second is written
+probe lying
+expect backwash 's["scans_rejected"] >= 6 and s["scans_accepted"] == 0 and s["state"] == "tracking"'
+grep -q 'refused: point cloud: its sizes do not agree: 1000 x 1 points of 12 bytes, rows of 12000, data of 12' "$log" ||
+  die "the cloud with false sizes was not refused as that"
 probe corrupt
 expect backwash 's["maps_rejected"] == 2 and s["maps_accepted"] == 1 and s["state"] == "tracking"'
 expect second 's["foreign_writers"] == 0 and s["odometry_refused"] == 0 and s["maps_rejected"] == 0'

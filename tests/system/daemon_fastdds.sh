@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# A foreign middleware as ROS 2 brings it: a Fast DDS process is the daemon's only odometry and reads its status.
+# A foreign middleware as ROS 2 brings it: a Fast DDS process is the daemon's only odometry and reads its status. A second
+# one sends odometry that breaks off in the middle: counted, and nothing else (faults.md row 27).
 #   daemon_fastdds.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
@@ -24,4 +25,13 @@ s = json.load(open(sys.argv[1]))
 print(f"{s['odometry_received']} samples received, age {s['odometry_age_s']:.3f} s, at {s['position']}")
 assert s["odometry_received"] > 100 and s["odometry_rejected"] == s["odometry_refused"] == 0, s
 assert s["position"] == [-2, 0, 0.16] and s["odometry_age_s"] < 0.1, s
+PYTHON
+"$build/tests/fastdds_peer" "$domain" rt/foreign/odometry rt/backwash/status -2 0 0.16 3 cut >"$work/peer"
+"$bin/backwashctl" --domain "$domain" status --json >"$work/cut.json"
+python3 - "$work/status.json" "$work/cut.json" <<'PYTHON'
+import json, sys
+before, after = (json.load(open(f)) for f in sys.argv[1:])
+print(f"{after['odometry_refused']} broken samples counted")
+assert after["odometry_refused"] > 100 and after["foreign_writers"] == 0, after
+assert after["odometry_rejected"] == 0 and after["state"] == "passive", after
 PYTHON

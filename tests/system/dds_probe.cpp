@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a confused or hostile participant sends, for tests/system/daemon_dds.sh (faults.md rows 2, 3, 12, 26, 27).
-//   dds_probe DOMAIN NAMESPACE foreign|frame|oversized|corrupt|flood|nan|jump
+//   dds_probe DOMAIN NAMESPACE foreign|frame|oversized|lying|corrupt|flood|nan|jump
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -54,30 +54,27 @@ int odometry(const dds::Participant& participant, const std::string& name_space,
   return 0;
 }
 
-// More points than anything that flies sends, and one whose sizes are a lie.
-int oversized(const dds::Participant& participant, const std::string& name_space) {
+// Clouds of `count` points of which the first `held` are there.
+int clouds(const dds::Participant& participant, const std::string& name_space, std::uint32_t count,
+           std::uint32_t held) {
   auto writer = dds::make_writer<dds::PointCloud>(participant, name_space);
   until_matched(writer);
   char frame[] = "map", x[] = "x", y[] = "y", z[] = "z";
   dds::PointField fields[3] = {{x, 0, 7, 1}, {y, 4, 7, 1}, {z, 8, 7, 1}};
-  std::vector<std::uint8_t> data(400'000 * 12);
+  std::vector<std::uint8_t> data(held * 12);
   dds::PointCloud m{};
   m.header.frame_id = frame;
   m.fields = {3, 3, fields, false};
   m.height = 1;
-  m.width = 400'000;
+  m.width = count;
   m.point_step = 12;
-  m.row_step = m.width * 12;
-  m.data = {m.row_step, m.row_step, data.data(), false};
+  m.row_step = count * 12;
+  m.data = {held * 12, held * 12, data.data(), false};
   // Several times: best effort may lose a fragment of 4.8 MB.
   for (int n = 0; n < 5; ++n) {
     writer.write(m);
     std::this_thread::sleep_for(200ms);
   }
-  m.width = 0xffffffff;
-  m.data._length = 12;
-  writer.write(m);
-  std::this_thread::sleep_for(500ms);
   return 0;
 }
 
@@ -113,7 +110,8 @@ int main(int argc, char** argv) {
   // Not at the rate of the true odometry: of two samples in one tick the daemon sees the newer.
   if (what == "nan") return odometry(participant, name_space, 700, 17ms, "map", std::nan(""));
   if (what == "jump") return odometry(participant, name_space, 60, 17ms, "map", 50);
-  if (what == "oversized") return oversized(participant, name_space);
+  if (what == "oversized") return clouds(participant, name_space, 400'000, 400'000);
+  if (what == "lying") return clouds(participant, name_space, 1000, 1);
   if (what == "corrupt") return corrupt(participant, name_space);
   return 64;
 }

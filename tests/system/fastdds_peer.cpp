@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // ROS 2's default middleware as a foreign peer: a Fast DDS participant with its own hand-written types sends odometry
 // of a vehicle at rest and reads the daemon's status, for tests/system/daemon_fastdds.sh.
-//   fastdds_peer DOMAIN ODOMETRY_TOPIC STATUS_TOPIC X Y Z SECONDS
+//   fastdds_peer DOMAIN ODOMETRY_TOPIC STATUS_TOPIC X Y Z SECONDS [cut]
+// With `cut` its odometry breaks off after the stamp: bytes that are no sample of the type they claim to be.
 // Prints the last status that it read: "vehicle state"; 1 if there was none.
 #include <fastcdr/Cdr.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -31,6 +32,7 @@ namespace {
 
 struct Odometry {
   double x = 0, y = 0, z = 0;
+  bool cut = false;
 };
 
 struct Status {
@@ -64,9 +66,11 @@ class OdometryType : public Type {
     cdr.serialize_encapsulation();
     const auto now = monotonic().count();
     cdr << static_cast<std::int32_t>(now / 1'000'000'000) << static_cast<std::uint32_t>(now % 1'000'000'000);
-    cdr << std::string("map") << std::string("base_link");
-    for (const double v : {o.x, o.y, o.z, 0.0, 0.0, 0.0, 1.0}) cdr << v;
-    for (int n = 0; n < 36 + 6 + 36; ++n) cdr << 0.0;
+    if (!o.cut) {
+      cdr << std::string("map") << std::string("base_link");
+      for (const double v : {o.x, o.y, o.z, 0.0, 0.0, 0.0, 1.0}) cdr << v;
+      for (int n = 0; n < 36 + 6 + 36; ++n) cdr << 0.0;
+    }
     payload->length = static_cast<std::uint32_t>(cdr.getSerializedDataLength());
     return true;
   }
@@ -113,7 +117,8 @@ fast::DomainParticipantQos local_only(unsigned domain) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 8) return 64;
+  const bool cut = argc == 9 && std::string(argv[8]) == "cut";
+  if (argc != 8 && !cut) return 64;
   const auto domain = static_cast<unsigned>(std::atoi(argv[1]));
   auto* participant = fast::DomainParticipantFactory::get_instance()->create_participant(domain, local_only(domain));
   if (!participant) return 70;
@@ -130,7 +135,7 @@ int main(int argc, char** argv) {
   reader_qos.reliability().kind = fast::BEST_EFFORT_RELIABILITY_QOS;
   auto* reader =
       participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT)->create_datareader(status_topic, reader_qos);
-  Odometry odometry{std::atof(argv[4]), std::atof(argv[5]), std::atof(argv[6])};
+  Odometry odometry{std::atof(argv[4]), std::atof(argv[5]), std::atof(argv[6]), cut};
   Status status;
   fast::SampleInfo info;
   const int samples = 100 * std::atoi(argv[7]);

@@ -16,18 +16,19 @@ Vehicle vehicle() {
   return v;
 }
 
+reach::ReachTube tube_of(const std::vector<Setpoint>& commands) {
+  reach::ReachTube tube(commands.size() + 1);
+  for (std::size_t k = 0; k < tube.size(); ++k) {
+    tube[k].center.p_W = commands[std::min(k, commands.size() - 1)].p_W;
+    tube[k].half_widths.fill(0.2), tube[k].half_widths_interval.fill(0.2);
+  }
+  return tube;
+}
+
 /// Along x at 1 m/s for five seconds; half widths of 0.2 m around the commands; a verified stop every ten commands.
 AcceptedSegment straight() {
   AcceptedSegment s;
   s.id = 1;
-  const auto tube_of = [](const std::vector<Setpoint>& commands) {
-    reach::ReachTube tube(commands.size() + 1);
-    for (std::size_t k = 0; k < tube.size(); ++k) {
-      tube[k].center.p_W = commands[std::min(k, commands.size() - 1)].p_W;
-      tube[k].half_widths.fill(0.2), tube[k].half_widths_interval.fill(0.2);
-    }
-    return tube;
-  };
   for (int k = 0; k < 250; ++k) s.commands.push_back({{0.02 * k, 0, 1}, {1, 0, 0}, Vec3::Zero(), 0});
   s.tube = tube_of(s.commands);
   for (std::size_t branch = 0; branch < 250; branch += 10) {
@@ -127,6 +128,80 @@ TEST(FlightTick, AnObstacleInTheStopItBrakesOnFreezesTheSetpoint) {
   flight.in.surroundings.tube_blocked = true;
   EXPECT_EQ(flight.step().command.p_W, last);
   EXPECT_EQ(flight.out.command.v_W, Vec3::Zero());
+}
+
+/// Leaves the stop that the flight brakes on, at command 120, with the commands flown until then.
+AcceptedSegment around(const Flight& flight) {
+  const auto& stop = flight.segment.stops[11];
+  AcceptedSegment on = flight.segment;
+  on.id = 99;
+  on.continues = flight.segment.id;
+  on.branch = 120;
+  on.stops.clear();
+  for (std::size_t k = stop.branch; k < on.commands.size(); ++k) {
+    on.commands[k] = k < on.branch ? stop.commands[k - stop.branch] : on.commands[on.branch - 1];
+    if (k >= on.branch) on.commands[k].p_W.y() += 0.001 * static_cast<double>(k - on.branch);
+  }
+  on.tube = tube_of(on.commands);
+  return on;
+}
+
+// Row 14: it need not come to rest first.
+TEST(FlightTick, AFlightThatBrakesForAnObstacleGoesOnAroundItAlongItsStop) {
+  Flight flight;
+  const auto on = around(flight);
+  flight.in.surroundings.tube_blocked = true;
+  flight.step();
+  flight.in.surroundings.tube_blocked = false;
+  for (int n = 0; n < 12; ++n) flight.step();
+  ASSERT_EQ(flight.tracker().index(), 114u);
+  flight.in.segment = &on;
+  flight.step();
+  EXPECT_TRUE(flight.out.accepted);
+  EXPECT_EQ(flight.out.supervisor.mode, Mode::tracking);
+  EXPECT_EQ(flight.out.command.p_W, flight.segment.stops[11].commands[4].p_W);
+  for (std::size_t k = 115; k < 140; ++k) EXPECT_EQ(flight.step().command.p_W, on.commands[k].p_W) << k;
+}
+
+TEST(FlightTick, WhileItBrakesASegmentThatDoesNotKnowOfTheStopIsRefused) {
+  for (const std::size_t branch : {std::size_t{105}, std::size_t{111}, std::size_t{120}}) {
+    Flight flight;
+    AcceptedSegment unaware = flight.segment;  // its commands go on at full speed
+    unaware.id = 99;
+    unaware.continues = flight.segment.id;
+    unaware.branch = branch;
+    flight.in.surroundings.tube_blocked = true;
+    flight.step();
+    flight.in.surroundings.tube_blocked = false;
+    flight.in.segment = &unaware;
+    flight.step();
+    EXPECT_TRUE(flight.out.refused) << branch;
+    EXPECT_EQ(flight.out.supervisor.mode, Mode::hold);
+    EXPECT_TRUE(flight.tracker().braking());
+  }
+}
+
+TEST(FlightTick, AnOperatorsStopWinsOverAFlightThatWouldGoOn) {
+  for (const int late : {0, 1, 3}) {  // ticks from the stop to the segment
+    Flight flight;
+    const auto on = around(flight);
+    flight.in.surroundings.tube_blocked = true;
+    flight.step();
+    flight.in.surroundings.tube_blocked = false;
+    for (int n = 0; n < 3; ++n) flight.step();
+    flight.in.request = Request::stop;
+    if (late == 0) flight.in.segment = &on;
+    flight.step();
+    for (int n = 1; n <= late; ++n) {
+      if (n == late) flight.in.segment = &on;
+      flight.step();
+      EXPECT_EQ(flight.out.refused, n == late);
+    }
+    for (int n = 0; n < 300; ++n) flight.step();
+    EXPECT_EQ(flight.out.supervisor.mode, Mode::hold) << late;
+    EXPECT_EQ(flight.out.supervisor.reason, Reason::stop_requested);
+    EXPECT_EQ(flight.out.command.v_W, Vec3::Zero());
+  }
 }
 
 // Rows 9, 10 and 13, as far as the tick decides them.
