@@ -165,6 +165,9 @@ std::vector<AgainstMargin> set_against_margins(const plan::World& world, const s
     const double nearest = std::ranges::min(h), corner = Vec3(h[kX], h[kY], h[kZ]).norm();  // at least the farthest
     for (auto& against : result) {
       ++against.voxels;
+      const bool ball_safe = world.distance.at(n) > taken + against.margin_m;
+      against.only_ball_safe += ball_safe && !set.safe();
+      against.only_set_safe += set.safe() && !ball_safe;
       if (!set.bounded) {
         ++against.unbounded;
       } else {

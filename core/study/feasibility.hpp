@@ -59,6 +59,8 @@ struct AgainstMargin {
   std::size_t ball_inside_set = 0;  ///< voxels where every face of the set is at least the margin away
   std::size_t set_inside_ball = 0;  ///< voxels where no corner is farther away than it
   std::size_t unbounded = 0;        ///< voxels where the set leaves the clear space: in neither count
+  std::size_t only_ball_safe = 0;   ///< voxels where hovering is safe with the ball and not with the set
+  std::size_t only_set_safe = 0;    ///< and the other way round
 };
 /// One entry a margin. Precondition: no constant margin in the world. O(voxels · prism_distance): offline.
 std::vector<AgainstMargin> set_against_margins(const plan::World& world, const std::vector<double>& margins_m);

@@ -78,7 +78,9 @@ void print_json(const plan::World& world, const study::Regions& regions, const s
                          {"voxels", a.voxels},
                          {"ball_inside_set", a.ball_inside_set},
                          {"set_inside_ball", a.set_inside_ball},
-                         {"unbounded", a.unbounded}});
+                         {"unbounded", a.unbounded},
+                         {"only_ball_safe", a.only_ball_safe},
+                         {"only_set_safe", a.only_set_safe}});
     json["set_against_margins"] = std::move(against);
   }
   print(json);
@@ -100,8 +102,10 @@ void print_text(const plan::World& world, const study::Regions& regions, const s
         "%zu voxels\n",
         1e3 * sets->cost.median_m, 1e3 * sets->cost.quantile95_m, sets->cost.lost, sets->cost.safe_at_centre);
     for (const auto& a : sets->against)
-      std::printf("of %zu voxels free for the body, the set holds a ball of %.1f m in %zu and fits into it in %zu\n",
-                  a.voxels, a.margin_m, a.ball_inside_set, a.set_inside_ball);
+      std::printf(
+          "against a ball of %.1f m, of %zu voxels free for the body: safe with the ball alone %zu, with the set alone "
+          "%zu\n",
+          a.margin_m, a.voxels, a.only_ball_safe, a.only_set_safe);
   }
   if (!way) return;
   const auto name = [](int region) {
