@@ -262,7 +262,8 @@ tl::expected<SearchResult, SearchFailure> search(const SafeView& space, const St
   if (!found && found.error() == Kind::deadline) return failed(Kind::deadline);
   if (!found) {
     SearchResult slow{stop_and_go(space, start, goal_W, options.v_max, options.a_max), 0, guided.lower_bound(), 0};
-    if (slow.motions.empty()) return failed(found.error());
+    // Hops also go across edges and corners, where no motion can: shared faces are what joins.
+    if (slow.motions.empty()) return failed(space.chain(from, to).empty() ? Kind::no_path : found.error());
     for (const Motion& m : slow.motions) slow.cost += m.effort() + guided.rho() * m.duration;
     found = std::move(slow);
   }

@@ -29,7 +29,7 @@ struct PlanOptions {
   double deadline_s = 10.0;         ///< whole plan, monotonic clock; what is found when it passes is still verified
   std::size_t max_nodes = 400'000;  ///< states that an attempt of the search may keep
   std::size_t evaluations = 50;     ///< of the cost, per round of the optimiser
-  std::size_t polish = 100;         ///< evaluations spent on a trajectory that is verified already, while they pay
+  std::size_t polish = 400;         ///< evaluations spent on a trajectory that is verified already, while they pay
   YawLimits yaw{};                  ///< the heading follows the path; rate 0: it is held
   bool norm_cost = false;           ///< the cost takes ‖h‖₂ for the set, as the paper does: for comparison only
   double least_clearance_m = 0;     ///< that the verified tube, and hovering at start and goal, must pass, m

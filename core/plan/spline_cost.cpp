@@ -11,7 +11,7 @@ namespace backwash::plan {
 namespace {
 
 constexpr double kExact = 0.3;         ///< m: nearer than this the tube's clearance is measured with its prism
-constexpr double kNear = 0.25;         ///< m: farther than this beyond the margin a sample costs nothing
+constexpr double kNear = 0.12;         ///< m: farther than this beyond the margin a sample costs nothing
 constexpr double kForgotten = 0.1;     ///< share of the hover set whose oldest causes are left out of Δe
 constexpr std::size_t kSettling = 20;  ///< periods of the hold that count
 constexpr std::size_t kLongestStride = 5;
@@ -199,9 +199,11 @@ void SplineCost::grow(const std::vector<Vec3>& p, const std::vector<std::size_t>
                       std::vector<LocalBound>& local) const {
   if (G_horizontal_.empty()) return;
   const std::size_t longest = std::max(G_horizontal_.size(), G_vertical_.size());
-  const std::size_t begin = near.front() > longest ? near.front() - longest : 0;
   local.resize(near.back());
-  for (std::size_t j = begin; j < near.back(); ++j) local[j] = interpolated(world_.grid, world_.bounds, p[j]);
+  std::size_t known = 0;  // below it, what a near sample needs is there
+  for (const std::size_t m : near)
+    for (known = std::max(known, m > longest ? m - longest : 0); known < m; ++known)
+      local[known] = interpolated(world_.grid, world_.bounds, p[known]);
   for (std::size_t n = 0; n < near.size(); ++n)
     for (std::size_t d = 0; d < kDirections; ++d) {
       const double k = samples_[near[n]].k[d];

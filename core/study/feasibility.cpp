@@ -153,6 +153,32 @@ SetCost cost_of_set(const plan::World& world) {
   return cost;
 }
 
+std::vector<AgainstMargin> set_against_margins(const plan::World& world, const std::vector<double>& margins_m) {
+  const auto& [grid, reach] = std::tie(world.grid, world.reach);
+  const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
+  std::vector<AgainstMargin> result;
+  for (const double margin : margins_m) result.push_back({margin});
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    if (grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
+    const auto set = reach::hover_set(reach, grid, world.distance, world.bounds, grid.center(grid.voxel(n)));
+    const auto& h = set.half_widths;
+    const double nearest = std::ranges::min(h), corner = Vec3(h[kX], h[kY], h[kZ]).norm();  // at least the farthest
+    for (auto& against : result) {
+      ++against.voxels;
+      const bool ball_safe = world.distance.at(n) > taken + against.margin_m;
+      against.only_ball_safe += ball_safe && !set.safe();
+      against.only_set_safe += set.safe() && !ball_safe;
+      if (!set.bounded) {
+        ++against.unbounded;
+      } else {
+        against.ball_inside_set += nearest >= against.margin_m;
+        against.set_inside_ball += corner <= against.margin_m;
+      }
+    }
+  }
+  return result;
+}
+
 std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions,
                                        const std::function<bool(const Vec3&)>& can_take_off) {
   const auto& grid = world.grid;

@@ -50,6 +50,21 @@ struct SetCost {
 /// Precondition: method tight, no constant margin. O(voxels · prism_distance): offline.
 SetCost cost_of_set(const plan::World& world);
 
+/// The hover set against a ball of constant radius in its place, over the free voxels where body and estimation fit
+/// (distance > body.radius + estimation.position): where one holds the other, hovering safely with the larger implies
+/// it with the smaller, whatever stands around.
+struct AgainstMargin {
+  double margin_m;
+  std::size_t voxels = 0;           ///< of these,
+  std::size_t ball_inside_set = 0;  ///< voxels where every face of the set is at least the margin away
+  std::size_t set_inside_ball = 0;  ///< voxels where no corner is farther away than it
+  std::size_t unbounded = 0;        ///< voxels where the set leaves the clear space: in neither count
+  std::size_t only_ball_safe = 0;   ///< voxels where hovering is safe with the ball and not with the set
+  std::size_t only_set_safe = 0;    ///< and the other way round
+};
+/// One entry a margin. Precondition: no constant margin in the world. O(voxels · prism_distance): offline.
+std::vector<AgainstMargin> set_against_margins(const plan::World& world, const std::vector<double>& margins_m);
+
 /// Two hover points far apart in the largest region, one a column where its clearance is largest; the first one passes
 /// `can_take_off`. Deterministic for a world.
 struct HoverPair {

@@ -18,6 +18,12 @@ struct Options {
   bool json = false;
 };
 
+/// What only the sets of method tight are asked.
+struct Sets {
+  study::SetCost cost;
+  std::vector<study::AgainstMargin> against;
+};
+
 /// The question about one way: its ends' regions and its tightest place.
 struct Way {
   int start_region, goal_region;
@@ -38,7 +44,7 @@ Json to_json(const study::Region& r, const plan::World&) {
 }
 
 void print_json(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way,
-                const std::optional<study::SetCost>& cost) {
+                const std::optional<Sets>& sets) {
   Json list = Json::array();
   std::size_t voxels = 0;
   for (const auto& region : regions.regions) {
@@ -61,17 +67,27 @@ void print_json(const plan::World& world, const study::Regions& regions, const s
     }
     json["way"] = std::move(entry);
   }
-  if (cost) {
-    json["sigma_over_set"] = {{"safe_voxels_at_centre", cost->safe_at_centre},
-                              {"lost_voxels", cost->lost},
-                              {"margin_median_m", cost->median_m},
-                              {"margin_95_m", cost->quantile95_m}};
+  if (sets) {
+    json["sigma_over_set"] = {{"safe_voxels_at_centre", sets->cost.safe_at_centre},
+                              {"lost_voxels", sets->cost.lost},
+                              {"margin_median_m", sets->cost.median_m},
+                              {"margin_95_m", sets->cost.quantile95_m}};
+    Json against = Json::array();
+    for (const auto& a : sets->against)
+      against.push_back({{"margin_m", a.margin_m},
+                         {"voxels", a.voxels},
+                         {"ball_inside_set", a.ball_inside_set},
+                         {"set_inside_ball", a.set_inside_ball},
+                         {"unbounded", a.unbounded},
+                         {"only_ball_safe", a.only_ball_safe},
+                         {"only_set_safe", a.only_set_safe}});
+    json["set_against_margins"] = std::move(against);
   }
   print(json);
 }
 
 void print_text(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way,
-                const std::optional<study::SetCost>& cost) {
+                const std::optional<Sets>& sets) {
   std::printf("%zu hover-safe regions, voxels of %.3f m\n", regions.regions.size(), world.grid.resolution());
   constexpr std::size_t kShown = 10;
   for (std::size_t n = 0; n < std::min(kShown, regions.regions.size()); ++n) {
@@ -80,11 +96,16 @@ void print_text(const plan::World& world, const study::Regions& regions, const s
                 to_text(r.low_W).c_str(), to_text(r.high_W).c_str(), to_text(r.widest_W).c_str(), r.widest_clearance_m);
   }
   if (regions.regions.size() > kShown) std::printf("     and %zu smaller ones\n", regions.regions.size() - kShown);
-  if (cost) {
+  if (sets) {
     std::printf(
         "the disturbance over the set, not at its centre, costs %.1f mm of clearance (95 %%: %.1f mm) and %zu of "
         "%zu voxels\n",
-        1e3 * cost->median_m, 1e3 * cost->quantile95_m, cost->lost, cost->safe_at_centre);
+        1e3 * sets->cost.median_m, 1e3 * sets->cost.quantile95_m, sets->cost.lost, sets->cost.safe_at_centre);
+    for (const auto& a : sets->against)
+      std::printf(
+          "against a ball of %.1f m, of %zu voxels free for the body: safe with the ball alone %zu, with the set alone "
+          "%zu\n",
+          a.margin_m, a.voxels, a.only_ball_safe, a.only_set_safe);
   }
   if (!way) return;
   const auto name = [](int region) {
@@ -117,9 +138,10 @@ int run(const Options& options) {
     way = Way{region_of(*world, regions, *options.start), region_of(*world, regions, *options.goal),
               study::widest_way(*world, *options.start, *options.goal)};
   }
-  std::optional<study::SetCost> cost;
-  if (options.method == "tight" && !options.margin) cost = study::cost_of_set(*world);
-  options.json ? print_json(*world, regions, way, cost) : print_text(*world, regions, way, cost);
+  std::optional<Sets> sets;
+  if (options.method == "tight" && !options.margin)
+    sets = Sets{study::cost_of_set(*world), study::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4})};
+  options.json ? print_json(*world, regions, way, sets) : print_text(*world, regions, way, sets);
   return kOk;
 }
 

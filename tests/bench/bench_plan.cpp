@@ -3,14 +3,16 @@
 // model, v_max 3 m/s, a_max 2 m/s²: what Fast-Planner's launch defaults fly (there: 200 queries, horizon 7 m, search
 // 0.44 ms mean and 0.84 ms p95, optimisation 3.2 ms mean, 3 of 200 in collision, 105 of 200 beyond a limit).
 //
-// forest/N: 200 queries whose hover-safe start and goal are drawn at random, at rest, N m apart at most and 80 % of
-// that at least, flown to a stop exactly at the goal. N is the ancestor's horizon of 7 m, where it may end moving
-// anywhere beyond, and 20 and 60 m for the growth of the cost (60 m in two forests end to end, 300 pillars, 20 rings).
-// World (distance, field, hover map) is built before timing. Each query is planned three times and counts with its
-// median; times are CPU time of the thread in ms (search: the same search called alone; verify: the planner's own wall
-// clock). kernel: 10⁶ look-ups of the distance field at random points, in the same run. Judged here and not by the
-// planner: a trajectory collides if a point of it, every millisecond, is nearer to an obstacle than the body's radius
-// (exact distance); it breaks a limit if velocity or acceleration of an axis pass theirs.
+// forest/first/N and forest/polished/N (until the first verified trajectory, as the ancestor's figures are, and with
+// the evaluations of PlanOptions::polish on top): 200 queries whose hover-safe start and goal are drawn at random, at
+// rest, N m apart at most and 80 % of that at least, flown to a stop exactly at the goal. N is the ancestor's horizon
+// of 7 m, where it may end moving anywhere beyond, and 20 and 60 m for the growth of the cost (60 m in two forests end
+// to end, 300 pillars, 20 rings). jerk2: the sum over the queries of the trajectories' ∫‖jerk‖² dt. World (distance,
+// field, hover map) is built before timing. Each query is planned three times and counts with its median; times are CPU
+// time of the thread in ms (search: the same search called alone; verify: the planner's own wall clock). kernel: 10⁶
+// look-ups of the distance field at random points, in the same run. Judged here and not by the planner: a trajectory
+// collides if a point of it, every millisecond, is nearer to an obstacle than the body's radius (exact distance); it
+// breaks a limit if velocity or acceleration of an axis pass theirs.
 //
 // success/SCENE: pairs drawn anywhere; exists counts those that an exhaustive search over hover-safe voxels joins,
 // found the plans, wrong the pairs it cannot join whose status is anything but no_path.
@@ -118,7 +120,7 @@ double quantile(std::vector<double> values, double q) {
 
 struct Tally {
   std::vector<double> search, total, verify, expanded, evaluations, length;
-  double ok = 0, collisions = 0, violations = 0;
+  double ok = 0, collisions = 0, violations = 0, jerk2 = 0;
 };
 
 void report(benchmark::State& state, const Tally& t, double kernel) {
@@ -130,32 +132,35 @@ void report(benchmark::State& state, const Tally& t, double kernel) {
   c["total/kernel"] = quantile(t.total, 0.5) / kernel;
   c["expanded_p50"] = quantile(t.expanded, 0.5), c["expanded_p95"] = quantile(t.expanded, 0.95);
   c["evaluations_p50"] = quantile(t.evaluations, 0.5), c["evaluations_p95"] = quantile(t.evaluations, 0.95);
-  c["length_p50"] = quantile(t.length, 0.5);
+  c["length_p50"] = quantile(t.length, 0.5), c["jerk2"] = t.jerk2;
   c["queries"] = static_cast<double>(t.total.size()), c["ok"] = t.ok;
   c["collisions"] = t.collisions, c["violations"] = t.violations;
 }
 
 plan::PlanStart at_rest(const Vec3& p_W) { return {{p_W, Vec3::Zero()}, {p_W, Vec3::Zero(), Vec3::Zero(), 0}}; }
 
-const plan::PlanOptions kLimits{.v_max = kVMax, .a_max = kAMax, .polish = getenv("POL") ? std::stoul(getenv("POL")) : 100};
+/// Until the first trajectory is verified, as the ancestor's figures are.
+const plan::PlanOptions kFirst{.v_max = kVMax, .a_max = kAMax, .polish = 0};
+const plan::PlanOptions kPolished{.v_max = kVMax, .a_max = kAMax};
 
 double search_ms(const plan::World& world, const Query& q) {
   const double begun = cpu_ms();
   const plan::SafeView space(world.safe, {world.grid.index(q.start), world.grid.index(q.goal)});
   benchmark::DoNotOptimize(
       plan::search(space, {q.start, Vec3::Zero()}, q.goal,
-                   {0.9 * kVMax, 0.9 * kAMax, kLimits.max_nodes, plan::Clock::now() + std::chrono::seconds(10)}));
+                   {0.9 * kVMax, 0.9 * kAMax, kFirst.max_nodes, plan::Clock::now() + std::chrono::seconds(10)}));
   return cpu_ms() - begun;
 }
 
-Tally planned(const plan::World& world, const std::vector<Query>& queries, std::string& refusal) {
+Tally planned(const plan::World& world, const std::vector<Query>& queries, const plan::PlanOptions& options,
+              std::string& refusal) {
   Tally tally;
   for (const Query& q : queries) {
     std::vector<double> search, total, verify;
     plan::Plan p;
     for (int repeat = 0; repeat < 3; ++repeat) {
       const double begun = cpu_ms();
-      p = plan::plan(world, at_rest(q.start), q.goal, kLimits);
+      p = plan::plan(world, at_rest(q.start), q.goal, options);
       total.push_back(cpu_ms() - begun);
       search.push_back(search_ms(world, q)), verify.push_back(p.metrics.verify_ms);
     }
@@ -163,7 +168,7 @@ Tally planned(const plan::World& world, const std::vector<Query>& queries, std::
     tally.verify.push_back(quantile(verify, 0.5));
     tally.expanded.push_back(static_cast<double>(p.metrics.expanded));
     tally.evaluations.push_back(static_cast<double>(p.metrics.evaluations));
-    tally.length.push_back(p.metrics.length_m);
+    tally.length.push_back(p.metrics.length_m), tally.jerk2 += p.metrics.jerk2;
     if (p.status != plan::PlanStatus::ok) {
       refusal = "last refusal: " + p.message;
       continue;
@@ -175,17 +180,18 @@ Tally planned(const plan::World& world, const std::vector<Query>& queries, std::
   return tally;
 }
 
-void forest(benchmark::State& state) {
+void forest(benchmark::State& state, const plan::PlanOptions& options) {
   const auto horizon = static_cast<double>(state.range(0));
   const auto& w = world(horizon > 30 ? 2 : 1);
   std::string refusal;
   for (auto _ : state) {
     const double kernel = kernel_ms(w);
-    report(state, planned(w, queries(w, 200, 0.8 * horizon, horizon), refusal), kernel);
+    report(state, planned(w, queries(w, 200, 0.8 * horizon, horizon), options, refusal), kernel);
   }
   state.SetLabel(refusal);
 }
-BENCHMARK(forest)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK_CAPTURE(forest, first, kFirst)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK_CAPTURE(forest, polished, kPolished)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
 
 /// Regions of hover-safe voxels that share faces, flooded apart from the planner's own.
 std::vector<int> regions(const plan::World& world) {
@@ -242,7 +248,7 @@ void set_extent(benchmark::State& state) {
   std::vector<double> ratio;
   for (auto _ : state)
     for (const Query& q : queries(w, 50, 5.6, 7)) {
-      const auto p = plan::plan(w, at_rest(q.start), q.goal, kLimits);
+      const auto p = plan::plan(w, at_rest(q.start), q.goal, kPolished);
       for (const auto& step : p.tube) {
         const auto& h = step.half_widths;
         const double prism = reach::prism_distance(w.grid, step.center.p_W, h, 0.5);

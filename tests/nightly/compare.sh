@@ -7,7 +7,7 @@ set -euo pipefail
 backwash=$(realpath "${1:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}")
 out=${2:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}
 seed=${3:-1}
-flights=88
+flights=92
 mkdir -p "$out"
 scenes=(builtin)
 geb079=$(dirname "${BASH_SOURCE[0]}")/../../../shared/data/maps/geb079.bt

@@ -189,6 +189,34 @@ TEST(Plan, KeepsAConstantMarginFromEverything) {
   EXPECT_EQ(plan(*narrow, at_rest(kStart), kGoal, {1.5, 2}).status, PlanStatus::no_path);
 }
 
+TEST(Plan, PolishingNeverCostsMoreThanTheFirstVerifiedTrajectory) {
+  double first = 0, polished = 0;
+  for (const Vec3& goal : {kGoal, Vec3(5.2, 2.1, 0.6), Vec3(4.1, 1.4, 1.1), Vec3(5.5, 3.4, 0.9)}) {
+    const auto cost = [&](std::size_t evaluations) {
+      const PlanOptions options{.v_max = 1.5, .a_max = 2, .polish = evaluations};
+      const Plan p = plan(gap_world(), at_rest(kStart), goal, options);
+      expect_sound(gap_world(), p, at_rest(kStart), goal, options);
+      return p.metrics.jerk2 * std::pow(p.metrics.time_s, 5);
+    };
+    const double a = cost(0), b = cost(400);
+    EXPECT_LE(b, a) << goal.transpose();
+    first += a, polished += b;
+  }
+  EXPECT_LT(polished, first);
+}
+
+TEST(Plan, SaysThatTheStartIsBlockedWhereTheVehicleItselfIsNotClear) {
+  // The command is at a clear place; the vehicle has been pushed beside the wall at x = 3.
+  PlanStart start = at_rest({2.6, 1, 0.8});
+  ASSERT_EQ(plan(gap_world(), start, {1, 1, 0.8}, {1.5, 2}).status, PlanStatus::ok);
+  start.estimated.p_W.x() = 2.83;
+  const Plan p = plan(gap_world(), start, {1, 1, 0.8}, {1.5, 2});
+  EXPECT_EQ(p.status, PlanStatus::start_blocked);
+  EXPECT_NE(p.message.find("(2.83, 1.00, 0.80), where the vehicle is now, is not clear"), std::string::npos)
+      << p.message;
+  EXPECT_EQ(p.metrics.expanded, 0u);
+}
+
 TEST(NearestApproach, FindsTheOneStepThatTouches) {
   const World& world = gap_world();
   reach::ReachTube tube = still_tube({1.5, 2, 0.8}, 100, 0.05);
