@@ -7,82 +7,13 @@
 #include "core/config/config.hpp"
 #include "core/field/disturbance_field.hpp"
 #include "tests/study_worlds/effects.hpp"
+#include "tests/study_worlds/plan.hpp"
 #include "tests/study_worlds/world.hpp"
 
 namespace study_worlds {
 namespace {
 
-using Rng = std::mt19937_64;
-constexpr double kG = 9.80665, kStep = 0.005;
-
-struct Command {
-  Vec3 p, v, a;
-  double yaw;
-  int segment;
-};
-
-/// Minimum-jerk line, sampled at kStep.
-void append_line(std::vector<Command>& plan, const Vec3& from, const Vec3& to, double yaw_from, double yaw_to,
-                 double a_max) {
-  const double length = (to - from).norm();
-  const double time = std::max({std::sqrt(5.78 * length / a_max), 1.875 * length / 1.3, 1.0});
-  const int n = static_cast<int>(time / kStep);
-  const double turn = std::remainder(yaw_to - yaw_from, 2 * M_PI);
-  for (int i = 0; i < n; ++i) {
-    const double s = (i + 0.5) / n;
-    const double q = s * s * s * (10 + s * (6 * s - 15)), dq = 30 * s * s * (1 - s) * (1 - s) / time,
-                 ddq = 60 * s * (1 - s) * (1 - 2 * s) / (time * time);
-    plan.push_back({from + q * (to - from), dq * (to - from), ddq * (to - from), yaw_from + q * turn, -1});
-  }
-}
-
-/// Hover points: near the floor, a ceiling, a wall, and anywhere; at least 0.35 m from everything but by intent.
-Vec3 draw_spot(const Room& room, Rng& rng, int kind, bool two_heights) {
-  const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
-  const Box& in = room.inside;
-  if (two_heights)
-    return {u(0.5, in.high.x() - 0.5), u(0.5, in.high.y() - 0.5), u(0, 1) < 0.5 ? 0.4 : in.high.z() - 0.4};
-  for (;;) {
-    Vec3 p(u(0.5, in.high.x() - 0.5), u(0.5, in.high.y() - 0.5), u(0.5, in.high.z() - 0.5));
-    if (kind == 0) p.z() = u(0.3, 0.45);
-    if (kind == 2) (u(0, 1) < 0.5 ? p.x() : p.y()) = u(0.3, 0.45);
-    if (kind == 3) p.y() = in.high.y() - u(0.3, 0.45);
-    bool inside_solid = false;
-    for (const Box& b : room.solids)
-      inside_solid = inside_solid || Box{b.low - Vec3::Constant(0.25), b.high + Vec3::Constant(0.25)}.contains(p);
-    const double gap = room.gap_to_ceiling(p), height = room.height_above_solid(p);
-    if (kind == 1 && std::isfinite(gap)) p.z() += gap - u(0.22, 0.4), inside_solid = p.z() < 0.9;
-    if (!inside_solid && height > 0.25) return p;
-  }
-}
-
-std::vector<Command> draw_plan(const World& world, Rng& rng) {
-  const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
-  const bool turns = world.request.confound != "yaw", two_heights = world.request.confound == "height";
-  const int dwells = static_cast<int>(u(9, 13));
-  std::vector<int> kinds;
-  for (int i = 0; i < dwells; ++i) kinds.push_back(i % 5);
-  std::shuffle(kinds.begin(), kinds.end(), rng);
-  std::vector<Command> plan;
-  Vec3 at = draw_spot(world.room, rng, 4, two_heights);
-  double yaw = turns ? u(-M_PI, M_PI) : 0;
-  for (int i = 0; i < dwells; ++i) {
-    const int n = static_cast<int>(u(4, 7) / kStep);
-    for (int k = 0; k < n; ++k) plan.push_back({at, Vec3::Zero(), Vec3::Zero(), yaw, i});
-    const Vec3 next = draw_spot(world.room, rng, kinds[static_cast<std::size_t>(i)], two_heights);
-    const double turned = turns ? u(-M_PI, M_PI) : 0;
-    const double a_max = u(0.8, 2.0), z = 1.2;
-    if (two_heights) {
-      append_line(plan, at, next, yaw, turned, a_max);
-    } else {
-      append_line(plan, at, {at.x(), at.y(), z}, yaw, yaw, a_max);
-      append_line(plan, {at.x(), at.y(), z}, {next.x(), next.y(), z}, yaw, turned, a_max);
-      append_line(plan, {next.x(), next.y(), z}, next, turned, turned, a_max);
-    }
-    at = next, yaw = turned;
-  }
-  return plan;
-}
+constexpr double kG = 9.80665;
 
 double thrust_of(const Craft& c, double u, double slope) {
   const double f = c.thr_mdl_fac, u0 = [&] {

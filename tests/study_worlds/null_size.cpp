@@ -78,8 +78,7 @@ NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path&
 void add(NullSize& sum, const NullSize& one) {
   for (const auto& [key, rates] : one) {
     auto& [five, three] = sum[key];
-    five.hits += rates.first.hits, five.n += rates.first.n;
-    three.hits += rates.second.hits, three.n += rates.second.n;
+    five.add(rates.first), three.add(rates.second);
   }
 }
 

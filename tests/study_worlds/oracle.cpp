@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/study_worlds/oracle.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -54,7 +55,7 @@ std::vector<Compared> compare(const World& world, const discrepancy::Accepted& f
   std::vector<Compared> all;
   for (const auto& p : found.parameters)
     if (const auto truth = truth_of(cause, p.name, world.effects.of(cause), world.effects.shape_of(cause)))
-      all.push_back({p.name, p.value, p.low, p.high, *truth});
+      all.push_back({p.name, p.value, p.low, p.high, *truth, {}});
   return all;
 }
 
@@ -65,19 +66,37 @@ std::optional<double> parameter_error(const std::vector<Compared>& compared) {
   return std::sqrt(off / size);
 }
 
-std::optional<double> share_of_oracle(const discrepancy::Accepted& found, const discrepancy::Observations& seen,
-                                      const std::vector<Table>& flights) {
+namespace {
+
+discrepancy::Column oracle_column(const discrepancy::Observations& seen, const std::vector<Table>& flights) {
   discrepancy::Column column;
   const auto add = [&](discrepancy::Channel channel, const std::function<double(const Hidden&)>& value) {
     auto x = window_means(seen, flights, value);
-    for (const double v : x)
-      if (std::abs(v) > 1e-9) return column.parts.push_back({channel, std::move(x)});
+    if (std::any_of(x.begin(), x.end(), [](double v) { return std::abs(v) > 1e-9; }))
+      column.parts.push_back({channel, std::move(x)});
   };
   for (int i = 0; i < 3; ++i)
     add(static_cast<discrepancy::Channel>(discrepancy::kMeanX + i), [i](const Hidden& h) { return h.push[i]; });
   for (const auto c : {discrepancy::kVarX, discrepancy::kVarY, discrepancy::kVarZ})
     add(c, [](const Hidden& h) { return h.ln_variance; });
-  if (column.parts.empty()) return std::nullopt;
+  return column;
+}
+
+/// The columns in those channels alone that the oracle moves.
+std::vector<discrepancy::Column> seen_by(const discrepancy::Column& oracle, std::vector<discrepancy::Column> columns) {
+  for (auto& column : columns)
+    std::erase_if(column.parts, [&](const auto& part) {
+      return std::none_of(oracle.parts.begin(), oracle.parts.end(), [&](auto& o) { return o.channel == part.channel; });
+    });
+  return columns;
+}
+
+}  // namespace
+
+void compare_with_oracle(Outcome& outcome, const discrepancy::Accepted& found, const discrepancy::Observations& seen,
+                         const std::vector<Table>& flights) {
+  const discrepancy::Column column = oracle_column(seen, flights);
+  if (column.parts.empty()) return;
   discrepancy::Evidence evidence(seen);
   evidence.whiten({column});
   std::vector<discrepancy::Column> both = found.columns, free;
@@ -88,8 +107,16 @@ std::optional<double> share_of_oracle(const discrepancy::Accepted& found, const 
     return normal.solvable ? normal.gain() : 0.0;
   };
   const double oracle = gain({column});
-  if (!(oracle > 0)) return std::nullopt;
-  return gain(found.columns) / oracle;
+  if (oracle > 0) outcome.gain_share = gain(found.columns) / oracle;
+
+  auto comparable = seen_by(column, found.columns);
+  comparable.push_back(column);
+  const auto A = evidence.normal(comparable, free).total;
+  const auto p = A.rows() - 1;
+  const Eigen::VectorXd best = A.topLeftCorner(p, p).ldlt().solve(A.topRightCorner(p, 1));
+  for (auto& c : outcome.compared)
+    for (Eigen::Index k = 0; k < p; ++k)
+      if (found.form->parameters[static_cast<std::size_t>(k)] == c.name) c.best = best[k];
 }
 
 }  // namespace study_worlds

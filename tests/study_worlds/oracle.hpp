@@ -12,10 +12,10 @@ std::vector<Compared> compare(const World& world, const backwash::study::discrep
 /// |value − truth|/|truth| over all of them as one vector.
 std::optional<double> parameter_error(const std::vector<Compared>& compared);
 
-/// Held-out gain of the found cause over that of an oracle: one column that is the hidden effect's own value, averaged
-/// over each window, one factor fitted. Nothing for effects that are neither a push nor a factor on the variance.
-std::optional<double> share_of_oracle(const backwash::study::discrepancy::Accepted& found,
-                                      const backwash::study::discrepancy::Observations& seen,
-                                      const std::vector<Table>& flights);
+/// Compares with an oracle's column, the hidden effect's own value averaged over each window: sets `gain_share`, the
+/// held-out gain of the found cause over that of the oracle with one factor fitted, and of each compared parameter
+/// `best`. Leaves them empty for effects that are neither a push nor a factor on the variance.
+void compare_with_oracle(Outcome& outcome, const backwash::study::discrepancy::Accepted& found,
+                         const backwash::study::discrepancy::Observations& seen, const std::vector<Table>& flights);
 
 }  // namespace study_worlds

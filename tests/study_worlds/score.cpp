@@ -89,7 +89,7 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
     if (cause.found.form->cause != out.truth.front()) continue;
     out.compared = compare(world, cause.found);
     out.error = parameter_error(out.compared);
-    out.gain_share = share_of_oracle(cause.found, seen, tables);
+    compare_with_oracle(out, cause.found, seen, tables);
   }
   return out;
 }
@@ -99,8 +99,11 @@ nlohmann::json to_json(const Outcome& o) {
                          {"truth", o.truth},     {"sets", o.sets},         {"unknown", o.unknown},
                          {"study_s", o.study_s}, {"world_s", o.world_s},   {"told", told(o.sets, o.unknown)},
                          {"right", o.right()},   {"in_sets", o.in_sets()}, {"wrong_name", o.wrong_name()}};
-  for (const auto& c : o.compared)
-    json["compared"].push_back({{"name", c.name}, {"value", c.value}, {"ci95", {c.low, c.high}}, {"truth", c.truth}});
+  for (const auto& c : o.compared) {
+    nlohmann::json one = {{"name", c.name}, {"value", c.value}, {"ci95", {c.low, c.high}}, {"truth", c.truth}};
+    if (c.best) one["best_of_form"] = *c.best;
+    json["compared"].push_back(one);
+  }
   if (o.error) json["parameter_error"] = *o.error;
   if (o.gain_share) json["gain_share"] = *o.gain_share;
   return json;
@@ -113,8 +116,10 @@ Outcome from_json(const nlohmann::json& json) {
   o.sets = json.at("sets").get<std::vector<std::vector<std::string>>>();
   o.unknown = json.at("unknown").get<std::vector<std::string>>();
   o.study_s = json.at("study_s"), o.world_s = json.at("world_s");
-  for (const auto& c : json.value("compared", nlohmann::json::array()))
-    o.compared.push_back({c.at("name"), c.at("value"), c.at("ci95").at(0), c.at("ci95").at(1), c.at("truth")});
+  for (const auto& c : json.value("compared", nlohmann::json::array())) {
+    o.compared.push_back({c.at("name"), c.at("value"), c.at("ci95").at(0), c.at("ci95").at(1), c.at("truth"), {}});
+    if (c.contains("best_of_form")) o.compared.back().best = c.at("best_of_form").get<double>();
+  }
   if (json.contains("parameter_error")) o.error = json.at("parameter_error").get<double>();
   if (json.contains("gain_share")) o.gain_share = json.at("gain_share").get<double>();
   return o;

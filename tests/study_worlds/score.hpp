@@ -24,6 +24,8 @@ const std::vector<Cell>& cells();
 struct Compared {
   std::string name;
   double value, low, high, truth;
+  std::optional<double> best;  ///< with which the study's form, at its scale, comes nearest to the hidden effect
+  bool covers(double x) const { return low <= x && x <= high; }
 };
 
 /// How the study fared in one world.

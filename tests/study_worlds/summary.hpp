@@ -13,6 +13,7 @@ namespace study_worlds {
 struct Rate {
   int hits = 0, n = 0;
   void count(bool hit) { hits += hit ? 1 : 0, ++n; }
+  void add(const Rate& other) { hits += other.hits, n += other.n; }
   double low() const;
   double high() const;
 };
@@ -21,10 +22,10 @@ struct Rate {
 struct CellSummary {
   std::string cell;
   Rate right, in_sets, wrong_name, silent, ambiguous;
-  Rate covered;                                   ///< parameters within their intervals
+  Rate covered;                                   ///< parameters whose interval holds the truth in the table's unit
+  Rate covered_best;                              ///< and those whose interval holds the best value of their form
   std::vector<double> errors, gain_shares;        ///< sorted
   std::vector<std::pair<int, std::string>> told;  ///< most frequent first
-  std::vector<std::string> not_compared;          ///< parameters are not in a shared unit
 };
 std::vector<CellSummary> summarise(const std::vector<Outcome>& outcomes);
 

@@ -108,7 +108,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
     const Vec3 offset = map_offset(static_cast<std::size_t>(cause.scale));
     cause.parameters.clear();
     for (int i = 0; i < 2; ++i) {
-      const auto [low, high] = std::minmax(share.low * offset[i], share.high * offset[i]);
+      const auto [low, high] = std::minmax({share.low * offset[i], share.high * offset[i]});
       cause.parameters.push_back({i == 0 ? "x_m" : "y_m", share.value * offset[i], low, high});
     }
   } else if (scaled) {

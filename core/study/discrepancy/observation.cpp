@@ -72,6 +72,11 @@ T mean(Stretch w, T sum, F value) {
   return sum;
 }
 
+/// The attitude without its tilt, which answers the gusts as the thrust does.
+Mat3 heading(const Mat3& R_WB) {
+  return Eigen::AngleAxisd(std::atan2(R_WB(1, 0), R_WB(0, 0)), Vec3::UnitZ()).toRotationMatrix();
+}
+
 /// Σ z·y and Σ z·x of detrended z over √Σz²: one row of an instrumental regression; nothing without excitation.
 struct Moment {
   double y = 0, square = 0;
@@ -204,7 +209,7 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
   row.p_W = mean_of(p), row.v_W = mean_of(v);
   row.speed = mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); });
   row.R_WB = Mat3::Zero();
-  if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) -> Mat3 { return s.R_WB[i]; });
+  if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
   row.yaw = std::atan2(row.R_WB(1, 0), row.R_WB(0, 0));
   row.thrust_acc = s.thrust_acc.empty() ? kGravity : mean(w, 0.0, [&](std::size_t i) { return s.thrust_acc[i]; });
   row.voltage = column_mean("battery_v"), row.temperature = column_mean("temperature_c");

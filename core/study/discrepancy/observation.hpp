@@ -66,7 +66,7 @@ struct WindowRow {
   double duration;    ///< s
   Vec3 p_W, v_W;      ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
   double speed;       ///< m/s, mean of the norm
-  Mat3 R_WB;          ///< mean of the rotation matrices (not orthonormal); zero without attitude
+  Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
   double yaw;         ///< rad
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
   double voltage, temperature;

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "tests/study_worlds/world.hpp"
+
+namespace study_worlds {
+
+using Rng = std::mt19937_64;
+
+inline constexpr double kStep = 0.005;  ///< s, of the plan and of the integration
+
+/// What the craft is told at a step.
+struct Command {
+  Vec3 p, v, a;
+  double yaw;
+  int segment;
+};
+
+/// A flight: dwells at places that the request's circumstances allow, and the ways between them, sampled at kStep.
+std::vector<Command> draw_plan(const World& world, Rng& rng);
+
+}  // namespace study_worlds
