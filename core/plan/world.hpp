@@ -49,7 +49,7 @@ World with_clearance_by(World world, reach::Method method, double constant_margi
 /// The same as build_world(grid, …), from a world of which only the voxels in `changed` differ: Σ and the hover map are
 /// computed anew where a change can reach them and copied elsewhere. `old` must have been built with this model;
 /// precondition: grids of the same place and size. Measured (bench_world, 1 m³ in a furnished room of 10 × 10 × 3 m at
-/// 0.1 m, one thread): 0.46 of the rebuild's processor time, 464 against 1002 ms on a machine shared by many.
+/// 0.1 m, one thread): 0.35 of the rebuild's processor time, 89 against 257 ms on a machine shared by many.
 std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
                                           const Model& model, const Parallel& parallel = run_serial);
 
