@@ -16,6 +16,7 @@ if [[ -f $geb079 ]]; then scenes+=("$geb079"); else echo "geb079.bt is not there
 "$backwash" compare --scenes "${scenes[@]}" --flights $flights --seed "$seed" --json --force \
   --report "$out/compare.html" --out "$out/compare.csv" >"$out/compare.json"
 
+python3 "$(dirname "${BASH_SOURCE[0]}")/compare_table.py" "$out/compare.json" >"$out/compare.md"
 python3 - "$out/compare.json" <<'PYTHON'
 import json, sys
 found = json.load(open(sys.argv[1]))
