@@ -25,6 +25,13 @@ build() {
 }
 
 rtsan() {
+  build build/rtsan test_daemon -- -DCMAKE_C_COMPILER=clang-22 -DCMAKE_CXX_COMPILER=clang++-22 \
+    -DCMAKE_C_FLAGS='-fsanitize=realtime -w' -DCMAKE_CXX_FLAGS='-fsanitize=realtime -w'
+  RTSAN_SYMBOLIZER_PATH=/usr/lib/llvm-22/bin/llvm-symbolizer \
+    RTSAN_OPTIONS="suppressions=$PWD/tests/nightly/rtsan.supp:halt_on_error=true" build/rtsan/tests/test_daemon
+}
+
+tsan() {
   build_preset release --target backwashctl bench dds_probe
   build build/tsan backwashd test_sync -- -DCMAKE_CXX_FLAGS='-fsanitize=thread -w'
   [[ $(nm -C build/tsan/services/backwashd | grep -c '__tsan_read') -gt 0 ]] || { echo "not instrumented" >&2; return 70; }
