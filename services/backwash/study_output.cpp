@@ -58,12 +58,17 @@ Json to_json(const discrepancy::StudyResult& result, const discrepancy::Observat
                {"causes", Json::array()},
                {"unknown", Json::array()},
                {"not_tested", Json::array()},
+               {"remaining_dependence", Json::array()},
                {"minimum_detectable", Json::object()}};
   for (const auto& [gate, count] : seen.gated_out) json["gated_out"][gate] = count;
   for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause));
   for (const auto& u : result.unknown)
     json["unknown"].push_back({{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}});
   for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
+  for (const auto& d : result.remaining)
+    if (d.found())
+      json["remaining_dependence"].push_back(
+          {{"regressor", d.regressor}, {"group", d.group}, {"hsic", d.hsic}, {"p", d.p}, {"p_holm", d.p_holm}});
   for (const auto& [cause, sizes] : result.minimum_detectable)
     for (const auto& [parameter, size] : sizes) json["minimum_detectable"][cause][parameter] = size;
   json["threshold_nats"] = result.threshold;
@@ -115,6 +120,9 @@ void print_text(const discrepancy::StudyResult& result, const discrepancy::Obser
   }
   for (const auto& u : result.unknown)
     std::printf("unknown structure in %s along %s, p %.4f\n", u.group.c_str(), u.along.c_str(), u.p);
+  for (const auto& d : result.remaining)
+    if (d.found())
+      std::printf("what remains in %s depends on %s, p %.4f (Holm)\n", d.group.c_str(), d.regressor.c_str(), d.p_holm);
   for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
   const auto ratio = [](const char* name, const study::calibrate::Estimate& e) {
     std::printf("vertical variance %s: x%.2f [%.2f, %.2f], day and speed held fixed\n", name, e.value, e.ci95.low,

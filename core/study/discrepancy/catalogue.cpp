@@ -104,16 +104,26 @@ std::vector<Regressor> regressors(const Observations& seen) {
   return all;
 }
 
-std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group) {
+std::vector<double> ranks(const Regressor& along, const Windows& windows) {
   std::vector<double> u = values(windows, along.value);
-  if (!along.circular) {
-    std::vector<double> sorted = u;
-    std::sort(sorted.begin(), sorted.end());
-    for (double& x : u) {
-      const auto [low, high] = std::equal_range(sorted.begin(), sorted.end(), x);
-      x = 0.5 * static_cast<double>((low - sorted.begin()) + (high - sorted.begin())) / static_cast<double>(u.size());
-    }
+  if (along.circular) return u;
+  std::vector<double> sorted = u;
+  std::sort(sorted.begin(), sorted.end());
+  for (double& x : u) {
+    const auto [low, high] = std::equal_range(sorted.begin(), sorted.end(), x);
+    x = 0.5 * static_cast<double>((low - sorted.begin()) + (high - sorted.begin())) / static_cast<double>(u.size());
   }
+  return u;
+}
+
+const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups() {
+  static const std::vector<std::pair<std::string, std::vector<Channel>>> all = {
+      {"mean x, y", {kMeanX, kMeanY}}, {"mean z", {kMeanZ}}, {"ln variance", {kVarX, kVarY, kVarZ}}};
+  return all;
+}
+
+std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group) {
+  const std::vector<double> u = ranks(along, windows);
   std::vector<Column> columns;
   for (int k = 1; k <= 4; ++k) {
     std::vector<double> x;

@@ -50,6 +50,10 @@ struct Regressor {
   std::function<double(const WindowRow&)> value;
 };
 std::vector<Regressor> regressors(const Observations& seen);
+/// Each window's rank q in [0, 1] along a regressor (ties share theirs); circular: the angle itself, rad.
+std::vector<double> ranks(const Regressor& along, const Windows& windows);
+/// The channels that a smooth moves together, with their name.
+const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups();
 /// cos(π k q), k = 1 … 4, of the regressor's rank q in [0, 1] (circular: sin and cos of one and two turns), in the
 /// channels of one group: level means each for themselves, ln variance along all axes as one.
 std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group);

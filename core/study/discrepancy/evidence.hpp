@@ -56,12 +56,20 @@ class Evidence {
   /// Mean of x xᵀ, by weight, over the measured windows of the channels that the columns move: √(θᵀ size θ) is the root
   /// mean square of Σ θ x.
   SmallMatrix size(const std::vector<Column>& columns) const;
+  /// What `columns`, fitted to all flights, leave of each channel (decorrelated), in units of its scatter within
+  /// flights: each flight's own mean and, in the level means, its own trim (shrunk by σ_t²) taken out; 0 where not
+  /// measured.
+  Column whitened(const std::vector<Column>& columns) const;
+  /// Whether a window measures a channel (decorrelated).
+  bool measured(Channel c, std::size_t window) const { return weight_[c][window] > 0; }
   double within(Channel c) const { return within_[c]; }
   double between(Channel c) const { return between_[c]; }
 
  private:
   /// XᵀV⁻¹X of each flight, X the columns and last y.
   std::vector<Eigen::MatrixXd> grams(const std::vector<const Column*>& columns) const;
+  Column residual(const std::vector<Column>& columns) const;
+  void take_flights_out(Column& residual) const;
   void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const;
   void anova(Channel c, const std::vector<double>& residual);
   void weigh_means(const std::vector<double>& ln_variance);

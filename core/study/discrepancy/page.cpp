@@ -222,6 +222,19 @@ std::string rotor_section(const RotorVerdict& v) {
          "</table>\n</section>\n";
 }
 
+/// Whether what the accepted causes leave depends on something.
+std::string remaining_section(const std::vector<Dependence>& all) {
+  if (all.empty()) return "";
+  std::string text = "<section><h2>What remains</h2>\n";
+  if (!all.front().found())
+    return text + "<p>No dependence left was found (smallest corrected p " + number(all.front().p_holm) + " of " +
+           std::to_string(all.size()) + " tested).</p>\n</section>\n";
+  text += "<p>What remains depends on the following; the verdict does not count it.</p>\n<table>\n";
+  for (const auto& d : all)
+    if (d.found()) text += row(d.group + " on " + d.regressor, "p " + number(d.p_holm) + ", corrected (Holm)");
+  return text + "</table>\n</section>\n";
+}
+
 }  // namespace
 
 tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
@@ -248,6 +261,7 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
       page += row(u.group + " along " + u.along, "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
     page += "</table>\n</section>\n";
   }
+  page += remaining_section(result.remaining);
   page += "<section><h2>What was not tested, and why</h2>\n<table>\n";
   for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
   if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");

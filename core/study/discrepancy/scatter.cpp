@@ -200,29 +200,72 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
   }
 }
 
+/// y (decorrelated) less what the columns explain of it, by weighted least squares over all flights.
+Column Evidence::residual(const std::vector<Column>& columns) const {
+  Column residual = y_;
+  if (columns.empty()) return residual;
+  std::vector<const Column*> pointers;
+  for (const auto& c : columns) pointers.push_back(&c);
+  const auto p = static_cast<Eigen::Index>(columns.size());
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p + 1, p + 1);
+  for (const auto& g : grams(pointers)) sum += g;
+  const Eigen::VectorXd theta =
+      sum.topLeftCorner(p, p).completeOrthogonalDecomposition().solve(sum.topRightCorner(p, 1));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    for (const auto& part : decorrelated(columns[k]).parts)
+      for (auto& r : residual.parts)
+        if (r.channel == part.channel)
+          for (std::size_t i = 0; i < r.x.size(); ++i) r.x[i] -= theta[static_cast<Eigen::Index>(k)] * part.x[i];
+  return residual;
+}
+
 void Evidence::whiten(const std::vector<Column>& accepted) {
   within_.fill(1), between_.fill(0), tilt_ = 0;
   std::vector<Column> columns = offsets(accepted, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
-  Column residual = y_;
-  if (!columns.empty()) {
-    std::vector<const Column*> pointers;
-    for (const auto& c : columns) pointers.push_back(&c);
-    const auto p = static_cast<Eigen::Index>(columns.size());
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p + 1, p + 1);
-    for (const auto& g : grams(pointers)) sum += g;
-    const Eigen::VectorXd theta =
-        sum.topLeftCorner(p, p).completeOrthogonalDecomposition().solve(sum.topRightCorner(p, 1));
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      for (const auto& part : decorrelated(columns[k]).parts)
-        for (auto& r : residual.parts)
-          if (r.channel == part.channel)
-            for (std::size_t i = 0; i < r.x.size(); ++i) r.x[i] -= theta[static_cast<Eigen::Index>(k)] * part.x[i];
-  }
-  for (const auto& r : residual.parts)
+  const Column rest = residual(columns);
+  for (const auto& r : rest.parts)
     if (r.channel == kVarX) anova(kVarX, r.x), weigh_means(r.x);
-  for (const auto& r : residual.parts) anova(r.channel, r.x);
-  if (!tilts_.empty()) tilt_ = trim_scatter(residual);
+  for (const auto& r : rest.parts) anova(r.channel, r.x);
+  if (!tilts_.empty()) tilt_ = trim_scatter(rest);
+}
+
+/// Takes each flight's mean out of every channel, and with the level means' its own trim, ridge 1/σ_t².
+void Evidence::take_flights_out(Column& residual) const {
+  const bool trimmed = tilt_ > 0;
+  for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
+    Eigen::Matrix4d normal = Eigen::Vector4d(0, 0, trimmed ? 1 / tilt_ : 1, trimmed ? 1 / tilt_ : 1).asDiagonal();
+    Eigen::Vector4d moved = Eigen::Vector4d::Zero();
+    const auto design = [&](Channel c, std::size_t i) {
+      Eigen::Vector4d d(c == kMeanX, c == kMeanY, 0, 0);
+      for (std::size_t k = 0; k < 2 && trimmed; ++k)
+        d[static_cast<Eigen::Index>(2 + k)] = tilts_[k].parts[c == kMeanX ? 0 : 1].x[i];
+      return d;
+    };
+    for (auto& [c, x] : residual.parts) {
+      double mean = 0, weight = 0;
+      for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
+        const double w = weight_[c][i] / within_[c];
+        mean += w * x[i], weight += w;
+        if (c > kMeanY || !(w > 0)) continue;
+        const Eigen::Vector4d d = design(c, i);
+        normal += w * d * d.transpose(), moved += w * x[i] * d;
+      }
+      if (c <= kMeanY || !(weight > 0)) continue;
+      for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) x[i] -= mean / weight;
+    }
+    const Eigen::Vector4d own = normal.completeOrthogonalDecomposition().solve(moved);
+    for (auto& [c, x] : residual.parts)
+      for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1] && c <= kMeanY; ++i) x[i] -= own.dot(design(c, i));
+  }
+}
+
+Column Evidence::whitened(const std::vector<Column>& columns) const {
+  Column rest = residual(columns);
+  take_flights_out(rest);
+  for (auto& [c, x] : rest.parts)
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] *= std::sqrt(weight_[c][i] / within_[c]);
+  return rest;
 }
 
 }  // namespace backwash::study::discrepancy

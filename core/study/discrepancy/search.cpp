@@ -22,12 +22,6 @@ constexpr double kLeftShare = 1, kLeftOfConstant = 0.5;
 constexpr double kFurtherLevel = 1.0 / 3;
 constexpr double kRivalNats = 3, kRivalErrors = 2;
 
-const std::vector<std::pair<std::string, std::vector<Channel>>>& groups() {
-  static const std::vector<std::pair<std::string, std::vector<Channel>>> all = {
-      {"mean x, y", {kMeanX, kMeanY}}, {"mean z", {kMeanZ}}, {"ln variance", {kVarX, kVarY, kVarZ}}};
-  return all;
-}
-
 /// Everything accepted but one, with what it leaves open, as columns.
 std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen,
                                std::size_t but = SIZE_MAX) {
@@ -217,7 +211,7 @@ std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Co
   }
   if (!smooths) return all;
   for (const auto& along : regressors(seen)) {
-    for (const auto& [name, channels] : groups()) {
+    for (const auto& [name, channels] : channel_groups()) {
       Candidate c{nullptr, along.name, 0, smooth_columns(along, seen.windows, channels), {}, 0, {}};
       auto nuisance = offsets(c.columns, seen);
       nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
@@ -253,7 +247,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     }
     if (smooth && smooth->gain >= needed_structure(*smooth, result.accepted) &&
         (!cause || smooth->gain - cause->gain > std::max(kSmoothLead, kSmoothShare * cause->gain))) {
-      const auto group = std::find_if(groups().begin(), groups().end(), [&](auto& g) {
+      const auto group = std::find_if(channel_groups().begin(), channel_groups().end(), [&](auto& g) {
         return g.second.front() == smooth->columns.front().parts.front().channel;
       });
       // A constant of which more than half as much again varies along a regressor is the structure's mean.
