@@ -65,8 +65,8 @@ tl::expected<SerialPort, PortError> SerialPort::open(const std::string& path, un
 }
 
 tl::expected<std::size_t, PortError> SerialPort::read(std::span<std::uint8_t> into) noexcept {
-  // Only what is at hand is read: a read from an empty terminal waits, even when non-blocking, until a kernel worker has
-  // flushed the line, and that worker has ordinary priority (up to 300 ms seen with both processors busy).
+  // Only what is at hand is read: a read from an empty terminal waits, even when non-blocking, until a kernel worker
+  // has flushed the line, and that worker has ordinary priority (up to 300 ms seen with both processors busy).
   int at_hand = 0;
   if (::ioctl(fd_.get(), FIONREAD, &at_hand) != 0) return error(Kind::kLost, errno);
   if (at_hand <= 0) return 0U;

@@ -54,9 +54,9 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
     if (!live) return tl::unexpected(live.error());
     d.map.live = *live;
   }
-  for (const auto& [key, value] : {std::pair{"dds.domain", domain}, std::pair{"link.baud", baud},
-                                   std::pair{"link.system", system}, std::pair{"control.priority", priority},
-                                   std::pair{"control.cpu", cpu}})
+  for (const auto& [key, value] :
+       {std::pair{"dds.domain", domain}, std::pair{"link.baud", baud}, std::pair{"link.system", system},
+        std::pair{"control.priority", priority}, std::pair{"control.cpu", cpu}})
     if (value != static_cast<int>(value)) return tl::unexpected(file->error(key, "needs a whole number"));
   d.dds.domain = static_cast<int>(domain);
   d.link.baud = static_cast<int>(baud);

@@ -16,7 +16,8 @@ struct RotorContrasts {
   double yaw;   ///< (s1 − s2 + s3 − s4)/4
   double a, b;  ///< (s3 − s1)/2, (s4 − s2)/2
 };
-/// Median over each flight's windows (take-off and landing are few of them); flights without motor commands are left out.
+/// Median over each flight's windows (take-off and landing are few of them); flights without motor commands are left
+/// out.
 std::vector<RotorContrasts> rotor_contrasts(const Observations& seen);
 
 /// What a group of flights says of its rotors against flights of the same vehicle known to be sound.
