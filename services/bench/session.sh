@@ -67,11 +67,12 @@ TOML
 # ctl VERB …: one command of the ground station; its failure ends the script.
 ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1 || die "backwashctl $1 failed: $(tail -n 1 "$log")"; }
 
-# Enables control; a daemon that has just started may not have heard its autopilot yet.
+# Enables control; a daemon that has just started may not have heard its autopilot yet, or, while others start beside it, not
+# for the 1.5 s after which it goes quiet. The vehicle stands disarmed: asking again is safe.
 enable() {
   for _ in $(seq 20); do
     "$bin/backwashctl" --domain "$domain" enable --wait >>"$log" 2>&1 && return
-    tail -n 1 "$log" | grep -q 'refused: no ' || break
+    tail -n 1 "$log" | grep -Eq 'refused: no |no heartbeat from the autopilot' || break
     sleep 0.25
   done
   die "enabling failed: $(tail -n 1 "$log")"
