@@ -25,6 +25,17 @@ std::vector<double> per_dwell(const discrepancy::Windows& windows, std::mt19937_
   return x;
 }
 
+std::vector<double> per_flight(const discrepancy::Windows& windows, std::mt19937_64& rng) {
+  std::map<std::size_t, double> drawn;
+  std::vector<double> x;
+  for (const auto& w : windows) {
+    const auto [at, fresh] = drawn.try_emplace(w.flight, 0);
+    if (fresh) at->second = std::normal_distribution()(rng);
+    x.push_back(at->second);
+  }
+  return x;
+}
+
 std::vector<double> course_of_time(const discrepancy::Windows& windows, std::mt19937_64& rng) {
   std::uniform_real_distribution turn(0.0, 2 * M_PI);
   const double a = turn(rng), b = turn(rng), c = turn(rng);
@@ -62,16 +73,19 @@ NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path&
     sizes[{name, kind}].first.count(p <= 0.05), sizes[{name, kind}].second.count(p <= 0.03);
   };
   for (int draw = 0; draw < kDraws; ++draw) {
-    const auto dwell = per_dwell(seen.windows, rng), course = course_of_time(seen.windows, rng);
+    const auto dwell = per_dwell(seen.windows, rng), course = course_of_time(seen.windows, rng),
+               flight = per_flight(seen.windows, rng);
     for (std::size_t c = 0; c < discrepancy::kChannels; ++c) {
       const auto channel = static_cast<discrepancy::Channel>(c);
       if (!seen.measured(channel)) continue;
       std::string family = discrepancy::channel_name(channel);
       if (const auto digit = family.find_last_of("1234"); digit + 1 == family.size()) family.pop_back();
       test(family, "dwell", {channel}, dwell), test(family, "time", {channel}, course);
+      test(family, "flight", {channel}, flight);
     }
     const std::vector<discrepancy::Channel> variances = {discrepancy::kVarX, discrepancy::kVarY, discrepancy::kVarZ};
     test("ln variance, all axes", "dwell", variances, dwell), test("ln variance, all axes", "time", variances, course);
+    test("ln variance, all axes", "flight", variances, flight);
   }
   // Family-wise: the smallest p, corrected, of all pairs of what remains.
   const auto remaining = discrepancy::remaining_dependence(evidence, {}, static_cast<unsigned>(seed));
