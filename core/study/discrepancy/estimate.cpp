@@ -121,10 +121,16 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
   }
 }
 
-bool excludes_zero(const Accepted& cause) {
-  const auto p = static_cast<std::size_t>(cause.theta.size());
-  for (std::size_t k = 0; k < p && k < cause.parameters.size(); ++k)
-    if (cause.parameters[k].low > 0 || cause.parameters[k].high < 0) return true;
+bool excludes_zero(const Normal& normal, const std::vector<Column>& columns) {
+  const SmallVector theta = normal.fit();
+  const auto flights = normal.b.size();
+  const double count = static_cast<double>(flights), t = student_975(count - 1);
+  SmallVector mean = SmallVector::Zero(theta.size()), square = mean;
+  for (std::size_t f = 0; f < flights; ++f) mean += normal.fit_without(f) / count;
+  for (std::size_t f = 0; f < flights; ++f) square += (normal.fit_without(f) - mean).cwiseAbs2() * (count - 1) / count;
+  for (Eigen::Index k = 0; k < theta.size(); ++k)
+    if (std::abs(theta[k]) > t * std::hypot(std::sqrt(square[k]), built_error(columns[static_cast<std::size_t>(k)])))
+      return true;
   return false;
 }
 

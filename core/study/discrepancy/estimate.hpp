@@ -10,8 +10,10 @@ namespace backwash::study::discrepancy {
 /// columns, theta, gain and parameters.
 void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others);
 
-/// Whether some parameter's interval excludes 0.
-bool excludes_zero(const Accepted& cause);
+/// Whether the 95 % interval of some parameter, by leaving flights out at this scale, excludes 0. The scale's own error
+/// is no part of it: where a scale cannot be told, a size extrapolated to its reference can, with every scale, be of
+/// one sign.
+bool excludes_zero(const Normal& normal, const std::vector<Column>& columns);
 
 /// Quantile 0.975 of Student's t.
 double student_975(double degrees);

@@ -13,7 +13,7 @@ namespace {
 
 /// Nats by which a smooth must beat the best cause, and the share of the cause's own gain.
 constexpr double kSmoothLead = 3, kSmoothShare = 0.6;
-/// A further cause explains at least this share of the first one's gain: less repairs the first one's form.
+/// A further cause that an accepted one's form could leave over explains at least this share of its gain.
 constexpr double kLeastShare = 0.08, kRepairShare = 0.25;
 /// And a smooth left over in a cause's channels more than the cause itself, than half of it if the cause is a constant:
 /// less is the error of the cause's form.
@@ -42,11 +42,28 @@ std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& col
   return nuisance;
 }
 
-/// Gain that a further cause needs: a share of the first one's, a larger one where it repairs the form of an accepted
-/// cause in the same moments of the thrust's or the commands' delay.
+/// What a cause may disturb besides the channels that its columns move: the error of its form is left over there too.
+/// Bits: means; variance, tail and lines; delays and slope; single rotors.
+unsigned disturbs(const std::vector<Column>& columns) {
+  unsigned kinds = 0;
+  for (const auto& column : columns) {
+    for (const auto& part : column.parts) {
+      const Channel c = part.channel;
+      if (c <= kMeanZ) kinds |= 1;
+      if ((c >= kVarX && c <= kTail) || (c >= kLine1 && c <= kLine4)) kinds |= 2;
+      if (c >= kThrustDelay && c <= kCommandDelayZ) kinds |= 4;
+      if (c >= kLine1) kinds |= 8;
+    }
+  }
+  return kinds;
+}
+
+/// Gain that a further cause needs: a share of that of each accepted one whose form's error it might be, a larger one
+/// where it repairs it in the same moments of the thrust's or the commands' delay.
 double needed_gain(const Candidate& candidate, const std::vector<Accepted>& accepted, double threshold) {
   double needed = threshold;
   for (const auto& a : accepted) {
+    if (!(disturbs(a.columns) & disturbs(candidate.columns))) continue;
     const auto dynamic = [](const std::vector<Column>& columns) {
       const Channel c = columns.front().parts.front().channel;
       return c >= kThrustDelay && c <= kCommandDelayZ;
@@ -242,6 +259,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
                                      [&](auto& a) { return c.form && a.form->cause == c.name; });
       if (known) continue;
       if (c.gain < needed_gain(c, result.accepted, result.threshold) || !c.effect(c.normal.fit())) continue;
+      if (c.form && !excludes_zero(c.normal, c.columns)) continue;
       if (!c.form && (!smooth || c.gain > smooth->gain)) smooth = &c;
       if (c.form && (!cause || c.gain > cause->gain)) cause = &c;
     }
@@ -260,7 +278,6 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     Accepted a{cause->form, cause->scale, cause->columns, {}, p_value(result.null_gain, cause->gain), cause->gain, {},
                {}};
     refine(evidence, a, accepted);
-    if (!excludes_zero(a)) break;
     result.accepted.push_back(std::move(a));
   }
   evidence.whiten(columns_of(result.accepted, evidence.seen()));
