@@ -80,6 +80,26 @@ TEST(Study, NamesNothingFromFewerThanTenFlights) {
   EXPECT_TRUE(result.causes.empty());
 }
 
+TEST(Study, TellsAWeakCauseBesideAStrongOneOfOtherChannels) {
+  for (const auto& strong : {"heavy_tails", "vibration"}) {
+    const auto told = study_worlds::told(studied(world_with({strong, "draft"}, 1)));
+    EXPECT_NE(told.find(strong), std::string::npos) << "seed " << seed() << ": " << told;
+    EXPECT_NE(told.find("draft"), std::string::npos) << "seed " << seed() << ": " << told;
+  }
+}
+
+TEST(Study, NamesACeilingOfWhichTwoHeightsCannotTellTheLength) {
+  int in_set = 0;
+  std::string all;
+  for (int k = 0; k < 4; ++k) {
+    const study_worlds::Request request{seed() + static_cast<std::uint64_t>(k), {"ceiling"}, 1, 12, "height"};
+    const auto told = study_worlds::told(studied(study_worlds::observe(study_worlds::draw_world(request), folder())));
+    in_set += told.find("ceiling") != std::string::npos ? 1 : 0;
+    all += told + "; ";
+  }
+  EXPECT_GE(in_set, 3) << "seed " << seed() << ": " << all;
+}
+
 TEST(Study, FindsTheInjectedMassWithinItsInterval) {
   const study_worlds::Request request{seed(), {"payload"}, 2, 12, ""};
   const auto world = study_worlds::draw_world(request);

@@ -24,7 +24,7 @@ struct Normal {
   /// NᵀV⁻¹X̃ per flight (sum 0) and (ΣNᵀV⁻¹N)⁺, N the nuisance columns: what fitting them takes out of flipped flights.
   std::vector<Eigen::MatrixXd> cross;
   Eigen::MatrixXd nuisance_inverse;
-  bool solvable = false;              ///< every flight may be left out
+  bool solvable = false;  ///< every flight may be left out
 
   /// θ = (ΣA)⁻¹ Σ s_f b_f.
   SmallVector fit(const std::vector<int>& signs = {}) const;
