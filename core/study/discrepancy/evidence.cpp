@@ -18,32 +18,16 @@ SmallVector Normal::fit_without(std::size_t flight) const {
   return left_out[flight] * sum;
 }
 
-namespace {
-
-double sum_of_gains(const Normal& n, const std::vector<int>& signs) {
-  SmallVector sum = SmallVector::Zero(n.total.rows());
-  for (std::size_t f = 0; f < n.b.size(); ++f) sum += (signs.empty() ? 1 : signs[f]) * n.b[f];
+double Normal::gain(const std::vector<int>& signs) const {
+  SmallVector sum = SmallVector::Zero(total.rows());
+  for (std::size_t f = 0; f < b.size(); ++f) sum += (signs.empty() ? 1 : signs[f]) * b[f];
   double nats = 0;
-  for (std::size_t f = 0; f < n.b.size(); ++f) {
-    const SmallVector own = (signs.empty() ? 1 : signs[f]) * n.b[f];
-    const SmallVector theta = n.left_out[f] * (sum - own);
-    nats += theta.dot(own) - 0.5 * theta.dot(n.A[f] * theta);
+  for (std::size_t f = 0; f < b.size(); ++f) {
+    const SmallVector own = (signs.empty() ? 1 : signs[f]) * b[f];
+    const SmallVector theta = left_out[f] * (sum - own);
+    nats += theta.dot(own) - 0.5 * theta.dot(A[f] * theta);
   }
   return nats;
-}
-
-}  // namespace
-
-double Normal::gain() const { return sum_of_gains(*this, {}); }
-
-double Normal::gain(const std::vector<int>& signs) const {
-  const double raw = sum_of_gains(*this, signs);
-  if (nuisance_inverse.size() == 0 || !(raw > 0)) return raw;
-  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(nuisance_inverse.rows(), total.cols());
-  for (std::size_t f = 0; f < cross.size(); ++f) D += signs[f] * cross[f];
-  const double lost = (total_inverse * (D.transpose() * (nuisance_inverse * D))).trace();
-  const double p = static_cast<double>(total.rows());
-  return raw * p / std::max(p - lost, 0.1 * p);
 }
 
 std::vector<double> Normal::gain_per_flight() const {
@@ -64,16 +48,15 @@ Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Co
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(q + p + 1, q + p + 1);
   for (const auto& g : G) sum += g;
   // T maps (nuisance, columns, y) to the columns and y without what the nuisance explains of them.
-  Normal normal;
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(p + 1, q + p + 1);
   T.rightCols(p + 1).setIdentity();
   if (q > 0) {
-    normal.nuisance_inverse = sum.topLeftCorner(q, q).completeOrthogonalDecomposition().pseudoInverse();
-    T.leftCols(q) = -(normal.nuisance_inverse * sum.topRightCorner(q, p + 1)).transpose();
+    const Eigen::MatrixXd N = sum.topLeftCorner(q, q);
+    T.leftCols(q) = -N.completeOrthogonalDecomposition().solve(sum.topRightCorner(q, p + 1)).transpose();
   }
+  Normal normal;
   normal.total = SmallMatrix::Zero(p, p);
   for (const auto& g : G) {
-    if (q > 0) normal.cross.push_back((g.topRows(q) * T.transpose()).leftCols(p));
     const Eigen::MatrixXd reduced = T * g * T.transpose();
     normal.A.push_back(reduced.topLeftCorner(p, p));
     normal.b.push_back(reduced.topRightCorner(p, 1));
@@ -91,7 +74,6 @@ Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Co
     normal.left_out.push_back(rest.inverse());
     if (!normal.left_out.back().allFinite()) normal.solvable = false;
   }
-  if (normal.solvable) normal.total_inverse = normal.total.inverse();
   return normal;
 }
 

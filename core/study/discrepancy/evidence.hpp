@@ -20,24 +20,15 @@ struct Normal {
   std::vector<SmallMatrix> A;
   std::vector<SmallVector> b;
   std::vector<SmallMatrix> left_out;  ///< (ΣA − A_f)⁻¹
-  SmallMatrix total, total_inverse;   ///< ΣA and its inverse
-  /// NᵀV⁻¹X̃ per flight (sum 0) and (ΣNᵀV⁻¹N)⁺, N the nuisance columns: what fitting them takes out of flipped flights.
-  std::vector<Eigen::MatrixXd> cross;
-  Eigen::MatrixXd nuisance_inverse;
-  bool solvable = false;  ///< every flight may be left out
+  SmallMatrix total;                  ///< ΣA
+  bool solvable = false;              ///< every flight may be left out
 
   /// θ = (ΣA)⁻¹ Σ s_f b_f.
   SmallVector fit(const std::vector<int>& signs = {}) const;
   /// θ₋f.
   SmallVector fit_without(std::size_t flight) const;
-  /// Held-out gain in nats: Σ_f θ₋fᵀ b_f − ½ θ₋fᵀ A_f θ₋f.
-  double gain() const;
-  /// The same with the flights' residuals multiplied by signs s_f = ±1, in units of their own scatter: Σ s_f b_f of
-  /// residuals from which the nuisance was fitted varies by A_s = ΣA − D_sᵀ (ΣNᵀV⁻¹N)⁺ D_s, D_s = Σ s_f NᵀV⁻¹X̃_f, and
-  /// not by ΣA as Σ b_f does; the gain is multiplied by p/tr((ΣA)⁻¹A_s) ≥ 1. Without it columns that differ mostly
-  /// between flights would be called an effect too often. Source: De Santis, Goeman, Davenport, Hemerik, Finos,
-  /// "Inference in generalized linear models with robustness to misspecified variances" (standardised sign flips).
-  double gain(const std::vector<int>& signs) const;
+  /// Held-out gain in nats: Σ_f θ₋fᵀ s_f b_f − ½ θ₋fᵀ A_f θ₋f, flights' residuals multiplied by signs ±1.
+  double gain(const std::vector<int>& signs = {}) const;
   std::vector<double> gain_per_flight() const;
 };
 
