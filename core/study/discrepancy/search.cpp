@@ -43,13 +43,14 @@ std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& col
 }
 
 /// What a cause may disturb besides the channels that its columns move: the error of its form is left over there too.
-/// Bits: means; variance, tail and lines; delays and slope; single rotors.
+/// Bits: level means; vertical mean; variance, tail and lines; delays and slope; single rotors.
 unsigned disturbs(const std::vector<Column>& columns) {
   unsigned kinds = 0;
   for (const auto& column : columns) {
     for (const auto& part : column.parts) {
       const Channel c = part.channel;
-      if (c <= kMeanZ) kinds |= 1;
+      if (c == kMeanX || c == kMeanY) kinds |= 1;
+      if (c == kMeanZ) kinds |= 16;
       if ((c >= kVarX && c <= kTail) || (c >= kLine1 && c <= kLine4)) kinds |= 2;
       if (c >= kThrustDelay && c <= kCommandDelayZ) kinds |= 4;
       if (c >= kLine1) kinds |= 8;
