@@ -3,18 +3,21 @@
 # and backwashd as processes of their own, in a DDS domain of their own. Whatever is started is stopped when the script ends.
 # BACKWASHD: another build of the daemon than the bench's. BENCH_NICE: the bench's niceness (it stands for hardware that
 # does not wait for this machine's processors; below 0 needs the right).
+# What all of them say goes to $log, which is shown if the script fails, unless start_bench is given a file to keep.
 
-bench_pid='' daemon_pid='' work=$(mktemp -d)
+bench_pid='' daemon_pid='' more_pids=() work=$(mktemp -d)
+log=$work/log
+: >"$log"
 # Domains above 200 would use port numbers that the system hands out itself.
 domain=${BACKWASH_DOMAIN:-$((1 + $$ % 200))}
 
 stop() {
   local pid
-  for pid in $daemon_pid $bench_pid; do kill -TERM "$pid" 2>/dev/null || true; done
-  for pid in $daemon_pid $bench_pid; do wait "$pid" 2>/dev/null || true; done
-  daemon_pid='' bench_pid=''
+  for pid in $daemon_pid $bench_pid "${more_pids[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
+  for pid in $daemon_pid $bench_pid "${more_pids[@]}"; do wait "$pid" 2>/dev/null || true; done
+  daemon_pid='' bench_pid='' more_pids=()
 }
-trap 'stop; rm -rf "$work"' EXIT
+trap 'status=$?; stop; [[ $status == 0 || $log != "$work/log" ]] || cat "$log" >&2; rm -rf "$work"' EXIT
 die() {
   echo "flight: $*; see $log" >&2
   exit 70

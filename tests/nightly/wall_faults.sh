@@ -19,9 +19,6 @@ if [[ $# -gt 1 ]]; then
 fi
 fault=$1
 source "$source_dir/services/bench/session.sh"
-log=$work/log
-: >"$log"
-trap 'status=$?; stop; [[ $status == 0 ]] || cat "$log" >&2; rm -rf "$work"' EXIT
 mkdir "$work/logs"
 options=(--log "$work/truth.csv" --wire "$work/wire.csv")
 [[ $fault == nan ]] && options+=(--stop-odometry 7)

@@ -6,9 +6,6 @@
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
-log=$work/log
-: >"$log"
-trap 'status=$?; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
 refused() { # refused TEXT ARGUMENT …
   local text=$1
   shift

@@ -6,10 +6,6 @@
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
-log=$work/log
-: >"$log"
-second_pids=()
-trap 'status=$?; kill "${second_pids[@]}" 2>/dev/null || true; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
 status() { "$bin/backwashctl" --domain "$domain" --namespace "$1" status --json >"$work/$1.json"; }
 expect() { # expect NAMESPACE 'PYTHON EXPRESSION OVER s'
   status "$1"
@@ -22,13 +18,13 @@ start_daemon builtin:quad-5in "$work/flight.bwlog"
 # A second vehicle in the same domain: its own bench and daemon, elsewhere in the same map.
 "$bin/backwash-bench" --map builtin:parallel-walls-4m --start 1,0,1.2 --link "$work/second" --domain "$domain" \
   --namespace second >>"$log" 2>&1 &
-second_pids+=($!)
+more_pids+=($!)
 sed -e 's/namespace = .*/namespace = "second"/' -e 's#rt/backwash/odometry#rt/second/odometry#' \
   -e "s#^device = .*#device = \"$work/second\"#" -e "s#^file = .*#file = \"$work/second.bwlog\"#" \
   "$work/backwashd.toml" >"$work/second.toml"
 for _ in $(seq 100); do [[ -e $work/second ]] && break; sleep 0.05; done
 "$bin/backwashd" --config "$work/second.toml" >>"$log" 2>&1 &
-second_pids+=($!)
+more_pids+=($!)
 
 # The preflight finds the one parameter that is unsafe, and says what to do about it.
 sleep 6

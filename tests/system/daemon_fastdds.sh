@@ -6,9 +6,6 @@
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
-log=$work/log
-: >"$log"
-trap 'status=$?; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
 # The bench's own odometry goes where nobody listens.
 start_daemon builtin:quad-5in "$work/flight.bwlog" rt/foreign/odometry

@@ -6,9 +6,6 @@
 set -euo pipefail
 source_dir=$1 build=$2 fault=$3
 source "$source_dir/services/bench/session.sh"
-log=$work/log
-: >"$log"
-trap 'status=$?; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
 options=(--log "$work/truth.csv" --wire "$work/wire.csv")
 # The fault comes on the way: the flight takes 4 s up and about 6 s along.
 [[ $fault == vio ]] && options+=(--stop-odometry 6.5)

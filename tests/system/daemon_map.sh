@@ -7,9 +7,6 @@
 set -euo pipefail
 source_dir=$1 build=$2 fault=$3
 source "$source_dir/services/bench/session.sh"
-log=$work/log
-: >"$log"
-trap 'status=$?; stop; [[ $status == 0 ]] || cat "$log"; rm -rf "$work"' EXIT
 options=(--log "$work/truth.csv" --wire "$work/wire.csv")
 [[ $fault == obstacle ]] && options+=(--crate 1.3,0,1.2 --crate-edge 0.4 --event-x -0.8)
 [[ $fault == closure ]] && options+=(--drift 0,0.25,0 --event-x -0.8)

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "firmware_bridge/autopilot_link.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "tests/bridge/emulated_controller.hpp"
+
+namespace backwash::firmware_bridge::test {
+namespace {
+
+using mavlink::test::operator+;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr auto kTick = 20ms;
+
+TEST_F(LinkTest, NamesALostHeartbeatAfterOneAndAHalfSeconds) {
+  introduce_vehicle();
+  EXPECT_EQ(link_.heartbeat_age(kStart + 100ms), 100ms);
+  EXPECT_FALSE(link_.fault(kStart + 1499ms));
+  EXPECT_EQ(link_.fault(kStart + 1500ms), LinkFault::kHeartbeatLost);
+  say_and_poll(mavlink::LocalPositionNed{}, kStart + 1500ms);
+  EXPECT_EQ(link_.fault(kStart + 1500ms), LinkFault::kHeartbeatLost) << "other messages are no heartbeat";
+  introduce_vehicle(kStart + 1600ms);
+  EXPECT_FALSE(link_.fault(kStart + 1600ms));
+}
+
+TEST_F(LinkTest, TellsAWrongBaudRateFromASilentLine) {
+  EXPECT_FALSE(link_.heartbeat_age(kStart));
+  EXPECT_FALSE(link_.fault(kStart + 1999ms));
+  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::kNothingReceived);
+  std::mt19937 random(3);
+  Bytes garbage(500);
+  for (auto& b : garbage) b = static_cast<std::uint8_t>(random());
+  far_.write(garbage);
+  for (int i = 0; i < 1000 && link_.received().bytes == 0; ++i) {
+    ASSERT_TRUE(link_.poll(kStart + 1s));
+    ::usleep(1000);
+  }
+  EXPECT_FALSE(link_.fault(kStart + 1999ms));
+  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::kNoValidFrame);
+  introduce_vehicle(kStart + 3s);
+  EXPECT_FALSE(link_.fault(kStart + 3s));
+}
+
+TEST_F(LinkTest, NoticesAnUnpluggedPortWithinOneTickAndStaysSilentAfterANewOne) {
+  introduce_vehicle();
+  far_.hang_up();
+  EXPECT_FALSE(link_.poll(kStart + kTick));
+  EXPECT_EQ(link_.fault(kStart + kTick), LinkFault::kPortLost);
+  EXPECT_FALSE(link_.send_setpoint({}, kStart + kTick));
+
+  PseudoTerminal replacement;
+  link_.reconnect(open(replacement.path()), kStart + 1s);
+  EXPECT_FALSE(link_.vehicle());
+  EXPECT_FALSE(link_.telemetry().status);
+  EXPECT_TRUE(link_.poll(kStart + 1s));
+  EXPECT_FALSE(link_.send_setpoint({}, kStart + 1s)) << "passive until the vehicle is heard again";
+  ::usleep(20'000);
+  EXPECT_TRUE(replacement.read().empty());
+}
+
+TEST_F(LinkTest, NeverBlocksWhenNobodyReadsAndFlagsTheSecondMissedSetpoint) {
+  introduce_vehicle();
+  int ticks = 0, first_missed = 0;
+  const Time now = kStart;  // stands still, so that no heartbeat is missed
+  const auto before = std::chrono::steady_clock::now();
+  for (; ticks < 2000; ++ticks) {
+    ASSERT_TRUE(link_.poll(now));
+    Setpoint s;
+    s.p_W.z() = ticks;
+    ASSERT_TRUE(link_.send_setpoint(s, now));
+    if (first_missed == 0 && link_.transmit().missed_setpoints() == 1) first_missed = ticks;
+    if (link_.fault(now) == LinkFault::kTransmitStalled) break;
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - before, 2s);
+  ASSERT_GT(first_missed, 1);
+  EXPECT_EQ(ticks, first_missed + 1);
+  EXPECT_LE(link_.transmit().waiting(), 2U) << "one part of a frame on the wire and the newest set-point";
+
+  // Once the far end reads again every frame is whole, the stale ones are gone and the newest is the last.
+  Bytes wire;
+  for (int i = 0; i < 100; ++i) {
+    wire = wire + far_.read();
+    ASSERT_TRUE(link_.poll(now));
+    ::usleep(500);
+  }
+  mavlink::Parser parser;
+  std::vector<mavlink::test::Received> frames;
+  mavlink::test::collect(parser, wire, frames);
+  EXPECT_EQ(parser.counters().skipped_bytes, 0U);
+  EXPECT_EQ(frames.size(), link_.transmit().sent());
+  EXPECT_EQ(frames.size() + link_.transmit().dropped(), static_cast<std::size_t>(ticks) + 1);
+  EXPECT_EQ(mavlink::decode<mavlink::SetPositionTargetLocalNed>(frames.back().payload).z, static_cast<float>(-ticks));
+  EXPECT_FALSE(link_.fault(now));
+}
+
+TEST_F(LinkTest, SendsNoOldSetpointAfterDiscarding) {
+  introduce_vehicle();
+  for (int i = 0; i < 2000 && link_.fault(kStart) != LinkFault::kTransmitStalled; ++i) {
+    ASSERT_TRUE(link_.send_setpoint({}, kStart));
+  }
+  ASSERT_EQ(link_.fault(kStart), LinkFault::kTransmitStalled);
+  link_.discard_unsent();
+  EXPECT_EQ(link_.transmit().waiting(), 0U);
+  EXPECT_FALSE(link_.fault(kStart));
+  // Only what the far end's line discipline had taken (4096 bytes, 63 set-points) is still read.
+  const auto before = mavlink::test::parse(far_.await());
+  EXPECT_LE(before.size(), 63U);
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(link_.poll(kStart));
+    ::usleep(2000);
+    EXPECT_TRUE(far_.read().empty());
+  }
+  ASSERT_TRUE(link_.send_heartbeat());
+  EXPECT_EQ(mavlink::test::parse(far_.await()).size(), 1U) << "and the port works on";
+}
+
+TEST(TransmitQueue, FinishesAHalfWrittenFrameAndDropsTheOldestWholeOne) {
+  TransmitQueue queue;
+  const auto frame = [](std::uint8_t sequence) {
+    return mavlink::encode_frame({1, 191, sequence}, mavlink::Heartbeat{});
+  };
+  Bytes wire;
+  std::size_t room = 5;
+  const auto write = [&](std::span<const std::uint8_t> bytes) -> tl::expected<std::size_t, PortError> {
+    const std::size_t n = std::min(room, bytes.size());
+    wire.insert(wire.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n));
+    room -= n;
+    return n;
+  };
+  queue.push(frame(0), TransmitQueue::Kind::kOther);
+  ASSERT_TRUE(queue.flush(write));
+  for (std::uint8_t i = 1; i < 20; ++i) queue.push(frame(i), TransmitQueue::Kind::kOther);
+  EXPECT_EQ(queue.waiting(), TransmitQueue::kCapacity);
+  EXPECT_EQ(queue.dropped(), 4U);
+  room = 100'000;
+  ASSERT_TRUE(queue.flush(write));
+  const auto frames = mavlink::test::parse(wire);
+  ASSERT_EQ(frames.size(), TransmitQueue::kCapacity);
+  EXPECT_EQ(frames[0].frame.sender.sequence, 0);
+  EXPECT_EQ(frames[1].frame.sender.sequence, 5) << "1 to 4 were the oldest whole frames";
+  EXPECT_EQ(frames.back().frame.sender.sequence, 19);
+}
+
+}  // namespace
+}  // namespace backwash::firmware_bridge::test
