@@ -22,11 +22,11 @@ Around Surroundings::around(const Vec3& p_W) const {
   return field::around(*grid_, p_W, {20, 20, kSight});
 }
 
-const Vec3& Surroundings::lattice_sigma(const Index3& at) {
+const Vec3& Surroundings::lattice_ln_sigma(const Index3& at) {
   auto& stored = lattice_[static_cast<std::size_t>(at.x() + size_.x() * (at.y() + size_.y() * at.z()))];
   if (!stored) {
     const Variance s = field_->at(low_ + kLattice * at.cast<double>()).sigma();
-    stored = Vec3(s.xx, s.yy, s.zz);
+    stored = Vec3(s.xx, s.yy, s.zz).array().max(1e-9).log().matrix();
   }
   return *stored;
 }
@@ -45,7 +45,7 @@ Vec3 Surroundings::sigma(const Vec3& p_W) {
     const Index3 bit(n & 1, (n >> 1) & 1, n >> 2);
     double weight = 1;
     for (int i = 0; i < 3; ++i) weight *= bit[i] ? f[i] : 1 - f[i];
-    if (weight > 1e-9) ln += weight * lattice_sigma(corner + bit).array().max(1e-9).log().matrix();
+    if (weight > 1e-9) ln += weight * lattice_ln_sigma(corner + bit);
   }
   return ln.array().exp();
 }

@@ -25,7 +25,7 @@ class Surroundings {
 
  private:
   static constexpr double kLattice = 0.15;  ///< m
-  const Vec3& lattice_sigma(const Index3& at);
+  const Vec3& lattice_ln_sigma(const Index3& at);
 
   const map::OccupancyGrid* grid_;
   Vec3 base_;
