@@ -12,6 +12,7 @@ namespace backwash::study::discrepancy {
 namespace {
 
 constexpr int kFine = 12;  // points of the finer grid of scales
+constexpr int kTurns = 4;  // of where the craft is and how it is pushed there
 constexpr double kNormal975 = 1.959964;
 
 /// A shape of the cause at a scale, fitted to all flights, with its error by leaving each out.
@@ -177,7 +178,7 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
 void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
   if (cause.form->cause == "map_offset") return refine_offset(evidence, cause, others);
   const Form& form = *cause.form;
-  const auto& windows = evidence.seen().windows;
+  Windows windows = evidence.seen().windows;
   const auto normal_at = [&](const Form& shape, double scale) {
     const auto columns = shape.columns(windows, scale);
     auto nuisance = form.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
@@ -192,12 +193,20 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
       if (n.solvable) members.push_back(fitted(std::move(n), scale, 1.0 / static_cast<double>(scales.size()), own));
     }
   };
+  const auto best = [&] {
+    return *std::max_element(members.begin(), members.end(), [](auto& a, auto& b) { return a.height < b.height; });
+  };
   add(form, true);
   if (members.empty()) return;
+  for (int i = 0; i < kTurns && form.by_place; ++i) {
+    const Member now = best();
+    windows = moved_by(evidence.seen().windows, form.columns(windows, now.scale), now.theta);
+    members.clear();
+    add(form, true);
+    if (members.empty()) return;
+  }
+  Member fit = best();
   const bool scaled = members.size() > 1;
-  const auto best =
-      std::max_element(members.begin(), members.end(), [](auto& a, auto& b) { return a.height < b.height; });
-  Member fit = *best;
   if (scaled) {
     const double low = std::log(members.front().scale), high = std::log(members.back().scale);
     const auto ln = polished({std::log(fit.scale)}, 0.5 * (high - low) / kFine, {low}, {high}, [&](auto& x) {

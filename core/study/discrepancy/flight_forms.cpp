@@ -20,11 +20,12 @@ std::vector<Form> surface_forms() {
            .parameters = {"A_mps2"},
            .scale_name = "L_m",
            .scales = kLengths,
+           .by_place = true,
            .floor = 0.02,
            .columns =
                [](const Windows& ws, double length) {
                  return std::vector{in(kMeanZ, ws, [&](auto& w) {
-                   return near_surface(w.around.height, field::kSurfaceReference, length);
+                   return along(w, [&](auto& at) { return near_surface(at.height, field::kSurfaceReference, length); });
                  })};
                }},
           {.cause = "ceiling",
@@ -32,11 +33,13 @@ std::vector<Form> surface_forms() {
            .parameters = {"A_mps2"},
            .scale_name = "L_m",
            .scales = kLengths,
+           .by_place = true,
            .floor = 0.02,
            .columns =
                [](const Windows& ws, double length) {
                  return std::vector{in(kMeanZ, ws, [&](auto& w) {
-                   return near_surface(w.around.ceiling_gap, field::kCeilingReference, length);
+                   return along(
+                       w, [&](auto& at) { return near_surface(at.ceiling_gap, field::kCeilingReference, length); });
                  })};
                }},
           {.cause = "ceiling",
@@ -48,7 +51,8 @@ std::vector<Form> surface_forms() {
            .columns =
                [](const Windows& ws, double length) {
                  return std::vector{in_variance(ws, [&](auto& w) {
-                   return near_surface(w.around.ceiling_gap, field::kCeilingReference, length);
+                   return along(
+                       w, [&](auto& at) { return near_surface(at.ceiling_gap, field::kCeilingReference, length); });
                  })};
                }},
           {.cause = "wall_attraction",
@@ -56,10 +60,13 @@ std::vector<Form> surface_forms() {
            .parameters = {"A_mps2"},
            .scale_name = "L_m",
            .scales = kLengths,
+           .by_place = true,
            .floor = 0.02,
            .columns = [](const Windows& ws, double length) {
              return std::vector{level(ws, [&](auto& w) {
-               return towards_walls(w, [&](double d) { return near_surface(d, field::kSurfaceReference, length); });
+               return along(w, [&](auto& at) {
+                 return towards(at.walls, [&](double d) { return near_surface(d, field::kSurfaceReference, length); });
+               });
              })};
            }}};
 }

@@ -54,11 +54,21 @@ Column in_variance(const Windows& windows, F value) {
 double offset_code(const Vec3& offset_W);
 Vec3 map_offset(double code);
 
-/// Σ amount(d) over the walls, towards each.
+/// Mean of value(place) along the window.
 template <typename F>
-Vec3 towards_walls(const WindowRow& w, F amount) {
+auto along(const WindowRow& w, F value) {
+  if (w.path.empty()) return value(w.around);
+  auto sum = value(w.path.front());
+  for (std::size_t k = 1; k < w.path.size(); ++k) sum += value(w.path[k]);
+  sum /= static_cast<double>(w.path.size());
+  return sum;
+}
+
+/// Σ amount(d) over walls, towards each.
+template <typename F>
+Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {
   Vec3 sum = Vec3::Zero();
-  for (const auto& [distance, direction] : w.around.walls) sum += amount(distance) * direction;
+  for (const auto& [distance, direction] : walls) sum += amount(distance) * direction;
   return sum;
 }
 

@@ -222,6 +222,8 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kStray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
   row.p_W = mean_of(p), row.v_W = mean_of(v);
+  const auto& kp = vehicle_.controller.kp;
+  row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
   row.speed = mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); });
   row.R_WB = Mat3::Zero();
   if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
@@ -233,12 +235,12 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
     if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
     if (log.has("ceiling") && column_mean("ceiling") > 0.5) row.around.ceiling_gap = 0.3;
   }
-  look_up_sigma(row, begin, end, p);
+  look_along(row, begin, end, p);
   return row;
 }
 
-/// Σ along the window, a moving vehicle crosses different air, as it is and with the window moved.
-void Observer::look_up_sigma(WindowRow& row, std::size_t begin, std::size_t end, const std::vector<Vec3>& p) {
+/// Σ along the window (a moving vehicle crosses different air), as it is and with the window moved; surfaces too.
+void Observer::look_along(WindowRow& row, std::size_t begin, std::size_t end, const std::vector<Vec3>& p) {
   constexpr std::size_t kPoints = 7;
   const auto at = [&](std::size_t k) -> const Vec3& { return p[begin + (2 * k + 1) * (end - begin) / (2 * kPoints)]; };
   const bool still = (at(0) - at(kPoints - 1)).norm() + (at(0) - at(kPoints / 2)).norm() < kStill;
@@ -249,6 +251,8 @@ void Observer::look_up_sigma(WindowRow& row, std::size_t begin, std::size_t end,
     return sum;
   };
   row.sigma = along(Vec3::Zero());
+  for (std::size_t k = 0; k < kPoints && !still && surroundings_.has_map(); ++k)
+    row.path.push_back(surroundings_.around(at(k)));
   for (std::size_t n = 0; n < row.ln_sigma_moved.size(); ++n) {
     constexpr double kMiddle = (kOffsetsAside - 1) / 2;
     const Vec3 offset_W = kOffsetStep * Vec3(static_cast<double>(n / kOffsetsAside) - kMiddle,

@@ -70,8 +70,10 @@ struct WindowRow {
   double yaw;         ///< rad
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
   double voltage, temperature;
-  Around around;
-  Vec3 sigma;  ///< modelled variance per axis, (m/s²)²
+  Place around;             ///< of p_W
+  std::vector<Place> path;  ///< of points along the window; empty where it is one place
+  Vec3 give;                ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  Vec3 sigma;               ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   std::array<double, 2> delay_gain{}, slope_gain{};  ///< design of kThrustDelay and kThrustSlope: of (delay, slope)
@@ -108,7 +110,7 @@ class Observer {
   void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
                   std::size_t begin, std::size_t end);
   WindowRow placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end);
-  void look_up_sigma(WindowRow& row, std::size_t begin, std::size_t end, const std::vector<Vec3>& p);
+  void look_along(WindowRow& row, std::size_t begin, std::size_t end, const std::vector<Vec3>& p);
   void put(std::size_t channel, double y, double weight);
   std::vector<double> put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
   void put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);

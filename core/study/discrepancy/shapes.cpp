@@ -32,22 +32,35 @@ std::vector<Form> shapes_of(const Form& form) {
   const auto is = [&](const char* cause, const char* parameter) {
     return form.cause == cause && form.parameters.front() == parameter;
   };
+  using field::near_surface, field::kSurfaceReference, field::kCeilingReference;
   if (is("ground_thrust", "A_mps2"))
     return {like(form, "z push A (0.4 m/h)^n", kOfDistance, [](const Windows& ws, double n) {
-      return std::vector{
-          in(kMeanZ, ws, [&](auto& w) { return power_of(w.around.height, field::kSurfaceReference, n); })};
+      return std::vector{in(kMeanZ, ws, [&](auto& w) {
+        return along(w, [&](auto& at) { return power_of(at.height, kSurfaceReference, n); });
+      })};
     })};
   if (is("ceiling", "A_mps2"))
     return {like(form, "z push A (0.3 m/d)^n", kOfDistance, [](const Windows& ws, double n) {
-      return std::vector{
-          in(kMeanZ, ws, [&](auto& w) { return power_of(w.around.ceiling_gap, field::kCeilingReference, n); })};
-    })};
-  if (is("wall_attraction", "A_mps2"))
-    return {like(form, "push A (0.4 m/d)^n towards each wall", kOfDistance, [](const Windows& ws, double n) {
-      return std::vector{level(ws, [&](auto& w) {
-        return towards_walls(w, [&](double d) { return power_of(d, field::kSurfaceReference, n); });
+      return std::vector{in(kMeanZ, ws, [&](auto& w) {
+        return along(w, [&](auto& at) { return power_of(at.ceiling_gap, kCeilingReference, n); });
       })};
     })};
+  if (is("wall_attraction", "A_mps2")) {
+    const auto pull = [](bool whole, auto amount) {
+      return [whole, amount](const Windows& ws, double scale) {
+        return std::vector{level(ws, [&](auto& w) {
+          return along(w, [&](auto& at) {
+            return towards(whole ? at.whole_walls : at.walls, [&](double d) { return amount(d, scale); });
+          });
+        })};
+      };
+    };
+    const auto exponential = [](double d, double length) { return near_surface(d, kSurfaceReference, length); };
+    const auto power = [](double d, double n) { return power_of(d, kSurfaceReference, n); };
+    return {like(form, "push A (0.4 m/d)^n towards each wall", kOfDistance, pull(false, power)),
+            like(form, form.formula + ", from floor to ceiling alone", form.scales, pull(true, exponential)),
+            like(form, "push A (0.4 m/d)^n towards walls from floor to ceiling", kOfDistance, pull(true, power))};
+  }
   if (is("imu_drift", "x_mps2_per_100s"))
     return {like(form, "accelerometer bias b (t/100 s)^n, fixed to the body", kOfTime, [](const Windows& ws, double n) {
       return body_drift(ws, [n](auto& w) { return std::pow(std::max(w.t, 0.0) / 100, n); });
