@@ -11,14 +11,14 @@
 namespace backwash::study::discrepancy {
 namespace {
 
-constexpr int kFine = 12;  // points of the finer grid of scales
-constexpr int kTurns = 4;  // of where the craft is and how it is pushed there
+constexpr int kFine = 12;               // points of the finer grid of scales
+constexpr int kRounds = 2, kTurns = 4;  // of the likeliest shape; of where the craft is and how it is pushed there
 constexpr double kNormal975 = 1.959964;
 
 /// A shape of the cause at a scale, fitted to all flights, with its error by leaving each out.
 struct Member {
+  const Form* shape;
   double scale, prior;
-  bool own;  ///< the cause's own form
   Normal normal;
   SmallVector theta, error;
   double height;  ///< ln likelihood over that without the cause
@@ -38,7 +38,9 @@ Eigen::VectorXd jackknife(const Eigen::MatrixXd& left) {
   return ((n - 1) / n * (left.colwise() - left.rowwise().mean()).rowwise().squaredNorm()).cwiseSqrt();
 }
 
-Member fitted(Normal normal, double scale, double prior, bool own) {
+bool lower(const Member& a, const Member& b) { return a.height < b.height; }
+
+Member fitted(Normal normal, const Form* shape, double scale, double prior) {
   Eigen::MatrixXd left(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size()));
   SmallVector sum = SmallVector::Zero(normal.total.rows());
   for (std::size_t f = 0; f < normal.b.size(); ++f) {
@@ -47,7 +49,7 @@ Member fitted(Normal normal, double scale, double prior, bool own) {
   }
   SmallVector theta = normal.fit();
   const double height = 0.5 * theta.dot(sum);
-  return {scale, prior, own, std::move(normal), theta, SmallVector(jackknife(left)), height};
+  return {shape, scale, prior, std::move(normal), theta, SmallVector(jackknife(left)), height};
 }
 
 using Objective = std::function<double(const std::vector<double>&)>;
@@ -185,39 +187,44 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
     nuisance.insert(nuisance.end(), others.begin(), others.end());
     return evidence.normal(columns, nuisance);
   };
+  auto shapes = shapes_of(form);
+  shapes.insert(shapes.begin(), form);
   std::vector<Member> members;
-  const auto add = [&](const Form& shape, bool own) {
-    const auto scales = fine_scales(shape, cause.scale);
-    for (const double scale : scales) {
-      Normal n = normal_at(shape, scale);
-      if (n.solvable) members.push_back(fitted(std::move(n), scale, 1.0 / static_cast<double>(scales.size()), own));
+  const auto fit_all = [&] {
+    members.clear();
+    for (const Form& shape : shapes) {
+      const auto scales = fine_scales(shape, cause.scale);
+      for (const double scale : scales) {
+        Normal n = normal_at(shape, scale);
+        if (n.solvable)
+          members.push_back(fitted(std::move(n), &shape, scale, 1.0 / static_cast<double>(scales.size())));
+      }
     }
   };
-  const auto best = [&] {
-    return *std::max_element(members.begin(), members.end(), [](auto& a, auto& b) { return a.height < b.height; });
-  };
-  add(form, true);
-  if (members.empty()) return;
-  for (int i = 0; i < kTurns && form.by_place; ++i) {
-    const Member now = best();
-    windows = moved_by(evidence.seen().windows, form.columns(windows, now.scale), now.theta);
-    members.clear();
-    add(form, true);
-    if (members.empty()) return;
+  fit_all();
+  for (int i = 0; i < kRounds && form.by_place && !members.empty(); ++i) {
+    Member now = *std::max_element(members.begin(), members.end(), lower);
+    for (int k = 0; k < kTurns; ++k) {
+      windows = moved_by(evidence.seen().windows, now.shape->columns(windows, now.scale), now.theta);
+      now.theta = normal_at(*now.shape, now.scale).fit();
+    }
+    fit_all();
   }
-  Member fit = best();
-  const bool scaled = members.size() > 1;
-  if (scaled) {
-    const double low = std::log(members.front().scale), high = std::log(members.back().scale);
+  const auto others_begin =
+      std::find_if(members.begin(), members.end(), [&](auto& m) { return m.shape != &shapes[0]; });
+  const std::size_t own = static_cast<std::size_t>(others_begin - members.begin());
+  if (own == 0) return;
+  Member fit = *std::max_element(members.begin(), others_begin, lower);
+  if (own > 1) {
+    const double low = std::log(members[0].scale), high = std::log(members[own - 1].scale);
     const auto ln = polished({std::log(fit.scale)}, 0.5 * (high - low) / kFine, {low}, {high}, [&](auto& x) {
       const Normal n = normal_at(form, std::exp(x[0]));
-      return n.solvable ? fitted(n, 0, 0, true).height : 0.0;
+      return n.solvable ? fitted(n, nullptr, 0, 0).height : 0.0;
     });
-    fit = fitted(normal_at(form, std::exp(ln[0])), std::exp(ln[0]), 0, true);
+    fit = fitted(normal_at(form, std::exp(ln[0])), nullptr, std::exp(ln[0]), 0);
   }
   cause.scale = fit.scale, cause.theta = fit.theta, cause.gain = fit.normal.gain();
   cause.columns = form.columns(windows, cause.scale);
-  for (const Form& shape : shapes_of(form)) add(shape, false);
 
   double highest = fit.height;
   for (const auto& m : members) highest = std::max(highest, m.height);
@@ -230,11 +237,11 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
       guesses.push_back({m.prior * std::exp(m.height - highest), m.theta[k], wide * std::hypot(m.error[k], built)});
     cause.parameters.push_back(averaged(form.parameters[static_cast<std::size_t>(k)], guesses));
   }
-  if (scaled) {
+  if (own > 1) {
     std::vector<Guess> guesses;
     const double step = std::log(members[1].scale / members[0].scale);
-    for (const auto& m : members)
-      if (m.own) guesses.push_back({std::exp(m.height - highest), std::log(m.scale), step / 2});
+    for (std::size_t i = 0; i < own; ++i)
+      guesses.push_back({std::exp(members[i].height - fit.height), std::log(members[i].scale), step / 2});
     const Estimate ln = averaged(form.scale_name, guesses);
     cause.parameters.push_back({form.scale_name, cause.scale, std::exp(ln.low), std::exp(ln.high)});
   } else if (!form.scale_name.empty()) {
@@ -244,7 +251,9 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
 }
 
 bool excludes_zero(const Accepted& cause) {
-  const auto p = static_cast<std::size_t>(cause.theta.size());
+  // A map offset's parameters are its coordinates, of which one may be 0; a form's own come before its scale.
+  const bool offset = cause.form->cause == "map_offset";
+  const auto p = offset ? cause.parameters.size() : static_cast<std::size_t>(cause.theta.size());
   for (std::size_t k = 0; k < p && k < cause.parameters.size(); ++k)
     if (cause.parameters[k].low > 0 || cause.parameters[k].high < 0) return true;
   return false;
