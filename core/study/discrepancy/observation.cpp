@@ -244,10 +244,16 @@ void Observer::look_along(WindowRow& row, std::size_t begin, std::size_t end, co
   constexpr std::size_t kPoints = 7;
   const auto at = [&](std::size_t k) -> const Vec3& { return p[begin + (2 * k + 1) * (end - begin) / (2 * kPoints)]; };
   const bool still = (at(0) - at(kPoints - 1)).norm() + (at(0) - at(kPoints / 2)).norm() < kStill;
+  // An offset that puts the craft into a solid says nothing of the air there: as far along it as is free.
+  const auto sigma = [&](const Vec3& from_W, const Vec3& offset_W) {
+    double share = 1;
+    while (share > 0 && surroundings_.inside_solid(from_W + share * offset_W)) share -= 0.25;
+    return surroundings_.sigma(from_W + share * offset_W);
+  };
   const auto along = [&](const Vec3& offset_W) {
-    if (still) return surroundings_.sigma(row.p_W + offset_W);
+    if (still) return sigma(row.p_W, offset_W);
     Vec3 sum = Vec3::Zero();
-    for (std::size_t k = 0; k < kPoints; ++k) sum += surroundings_.sigma(at(k) + offset_W) / kPoints;
+    for (std::size_t k = 0; k < kPoints; ++k) sum += sigma(at(k), offset_W) / kPoints;
     return sum;
   };
   row.sigma = along(Vec3::Zero());
