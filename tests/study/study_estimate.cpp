@@ -162,8 +162,8 @@ TEST(Refine, FindsAMapOffsetBetweenTheOnesTriedAndCoversBothOfItsCoordinates) {
     for (std::size_t i = 0; i < seen.windows.size(); ++i) {
       const double x = place(rng), y = place(rng);
       for (std::size_t n = 0; n < seen.windows[i].ln_sigma_moved.size(); ++n) {
-        const double dx = kOffsetStep * (static_cast<double>(n / kOffsetsAside) - 3),
-                     dy = kOffsetStep * (static_cast<double>(n % kOffsetsAside) - 3);
+        const double dx = kOffsetStep * (static_cast<double>(n / kOffsetsAside) - (kOffsetsAside - 1) / 2.0),
+                     dy = kOffsetStep * (static_cast<double>(n % kOffsetsAside) - (kOffsetsAside - 1) / 2.0);
         seen.windows[i].ln_sigma_moved[n].setConstant(ln_sigma(x + dx, y + dy) - ln_sigma(x, y));
       }
       for (const Channel c : kVariances) measure(seen, c, i, ln_sigma(x + kX, y + kY) - ln_sigma(x, y) + noise(rng));

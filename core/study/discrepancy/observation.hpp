@@ -55,8 +55,8 @@ enum Channel : std::size_t {
 const char* channel_name(Channel c);
 
 /// Level offsets of the map at which Σ is looked up: a square of so many points, and their spacing.
-inline constexpr std::size_t kOffsetsAside = 7;
-inline constexpr double kOffsetStep = 0.15;  ///< m
+inline constexpr std::size_t kOffsetsAside = 9;
+inline constexpr double kOffsetStep = 0.1;  ///< m
 
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {
