@@ -119,22 +119,48 @@ Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
 
 namespace {
 
-/// The offset o at which ln Σ(p + o) − ln Σ(p), share 1, is likeliest, with its error by leaving flights out: of its
-/// linearisation there, as (x, y).
+/// ln Σ with the map moved, less that as it is.
+Column with_map_moved(const Windows& windows, double x, double y) {
+  Column moved;
+  for (const Channel c : kVariances)
+    moved.parts.push_back({c, values(windows, [&](auto& w) {
+                             return w.ln_sigma_at({x, y, 0})[static_cast<int>(c - kVarX)];
+                           })});
+  return moved;
+}
+
+/// Standard errors of the offset (x, y) that fits best: jackknife of the fit's linearisation there.
+Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>& nuisance, double x, double y) {
+  constexpr double kDifference = 0.05;  // m
+  const auto& windows = evidence.seen().windows;
+  const auto slope = [&](double dx, double dy) {
+    Column high = with_map_moved(windows, x + dx, y + dy);
+    const Column low = with_map_moved(windows, x - dx, y - dy);
+    for (std::size_t k = 0; k < high.parts.size(); ++k)
+      for (std::size_t i = 0; i < windows.size(); ++i)
+        high.parts[k].x[i] = (high.parts[k].x[i] - low.parts[k].x[i]) / (2 * kDifference);
+    return high;
+  };
+  const Normal n =
+      evidence.normal({slope(kDifference, 0), slope(0, kDifference), with_map_moved(windows, x, y)}, nuisance);
+  Eigen::MatrixXd left(2, static_cast<Eigen::Index>(n.b.size()));
+  for (std::size_t out = 0; out < n.b.size(); ++out) {
+    Eigen::Matrix2d A = 1e-9 * Eigen::Matrix2d::Identity();
+    Eigen::Vector2d b = Eigen::Vector2d::Zero();
+    for (std::size_t f = 0; f < n.b.size(); ++f)
+      if (f != out) A += n.A[f].topLeftCorner(2, 2), b += n.b[f].head(2) - n.A[f].col(2).head(2);
+    left.col(static_cast<Eigen::Index>(out)) = A.ldlt().solve(b);
+  }
+  return jackknife(left);
+}
+
+/// The offset o at which ln Σ(p + o) − ln Σ(p), share 1, is likeliest.
 void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
   const auto& windows = evidence.seen().windows;
-  const auto column = [&](double x, double y) {
-    Column moved;
-    for (const Channel c : kVariances)
-      moved.parts.push_back({c, values(windows, [&](auto& w) {
-                               return w.ln_sigma_at({x, y, 0})[static_cast<int>(c - kVarX)];
-                             })});
-    return moved;
-  };
   auto nuisance = offsets(cause.columns, evidence.seen());
   nuisance.insert(nuisance.end(), others.begin(), others.end());
   const auto height = [&](const std::vector<double>& o) {
-    const Normal n = evidence.normal({column(o[0], o[1])}, nuisance);
+    const Normal n = evidence.normal({with_map_moved(windows, o[0], o[1])}, nuisance);
     double sum = 0;
     for (std::size_t f = 0; f < n.b.size(); ++f) sum += n.b[f][0] - 0.5 * n.A[f](0, 0);
     return sum;
@@ -142,108 +168,120 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
   const Vec3 start = map_offset(cause.scale);
   const double far = kOffsetStep * (kOffsetsAside - 1) / 2;
   const auto best = polished({start.x(), start.y()}, 0.1, {-far, -far}, {far, far}, height);
-  constexpr double kDifference = 0.05;
-  const auto slope = [&](double dx, double dy) {
-    Column high = column(best[0] + dx, best[1] + dy);
-    const Column low = column(best[0] - dx, best[1] - dy);
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t i = 0; i < windows.size(); ++i)
-        high.parts[k].x[i] = (high.parts[k].x[i] - low.parts[k].x[i]) / (2 * kDifference);
-    return high;
-  };
-  const Normal n = evidence.normal({slope(kDifference, 0), slope(0, kDifference), column(best[0], best[1])}, nuisance);
-  const std::size_t flights = n.b.size();
-  Eigen::MatrixXd left(2, static_cast<Eigen::Index>(flights));
-  for (std::size_t out = 0; out < flights; ++out) {
-    Eigen::Matrix2d A = 1e-9 * Eigen::Matrix2d::Identity();
-    Eigen::Vector2d b = Eigen::Vector2d::Zero();
-    for (std::size_t f = 0; f < flights; ++f)
-      if (f != out) A += n.A[f].topLeftCorner(2, 2), b += n.b[f].head(2) - n.A[f].col(2).head(2);
-    left.col(static_cast<Eigen::Index>(out)) = A.ldlt().solve(b);
-  }
-  const Eigen::VectorXd error = jackknife(left);
   cause.scale = offset_code({best[0], best[1], 0});
   cause.columns = cause.form->columns(windows, cause.scale);
   cause.theta = SmallVector::Ones(1);
   const Normal own = evidence.normal(cause.columns, nuisance);
   if (own.solvable) cause.gain = own.gain();
-  const double t = student_975(static_cast<double>(flights) - 1);
-  cause.parameters.clear();
-  for (int i = 0; i < 2; ++i)
-    cause.parameters.push_back({i == 0 ? "x_m" : "y_m", best[static_cast<std::size_t>(i)],
-                                best[static_cast<std::size_t>(i)] - t * error[i],
-                                best[static_cast<std::size_t>(i)] + t * error[i]});
+  const Eigen::VectorXd error =
+      student_975(static_cast<double>(own.b.size()) - 1) * offset_error(evidence, nuisance, best[0], best[1]);
+  cause.parameters = {{"x_m", best[0], best[0] - error[0], best[0] + error[0]},
+                      {"y_m", best[1], best[1] - error[1], best[1] + error[1]}};
 }
+
+/// All shapes of a form at all scales, fitted where the craft was.
+struct Family {
+  const Evidence& evidence;
+  const std::vector<Column>& others;
+  double scale;              ///< of a form without a grid of scales
+  std::vector<Form> shapes;  ///< the form itself first
+  Windows windows;
+  std::vector<Member> members = {};  ///< in the order of shapes and scales
+
+  Normal normal_at(const Form& shape, double at) const {
+    const auto columns = shape.columns(windows, at);
+    auto nuisance = shape.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
+    nuisance.insert(nuisance.end(), others.begin(), others.end());
+    return evidence.normal(columns, nuisance);
+  }
+
+  void fit() {
+    members.clear();
+    for (const Form& shape : shapes) {
+      const auto scales = fine_scales(shape, scale);
+      for (const double at : scales) {
+        Normal n = normal_at(shape, at);
+        if (n.solvable) members.push_back(fitted(std::move(n), &shape, at, 1.0 / static_cast<double>(scales.size())));
+      }
+    }
+  }
+
+  /// Moves the craft to where the likeliest shape pushes it, and fits again there.
+  void follow_push() {
+    for (int i = 0; i < kRounds && !members.empty(); ++i) {
+      Member now = *std::max_element(members.begin(), members.end(), lower);
+      for (int k = 0; k < kTurns; ++k) {
+        windows = moved_by(evidence.seen().windows, now.shape->columns(windows, now.scale), now.theta);
+        now.theta = normal_at(*now.shape, now.scale).fit();
+      }
+      fit();
+    }
+  }
+
+  /// How many members are of the form itself.
+  std::size_t own() const {
+    return static_cast<std::size_t>(
+        std::count_if(members.begin(), members.end(), [&](auto& m) { return m.shape == &shapes[0]; }));
+  }
+
+  /// The form itself at its likeliest scale. Precondition: own() > 0.
+  Member best_own() const {
+    const auto n = static_cast<std::ptrdiff_t>(own());
+    const Member& start = *std::max_element(members.begin(), members.begin() + n, lower);
+    if (n == 1) return start;
+    const double low = std::log(members.front().scale), high = std::log(members[own() - 1].scale);
+    const auto height = [&](const std::vector<double>& ln) {
+      Normal normal = normal_at(shapes[0], std::exp(ln[0]));
+      return normal.solvable ? fitted(std::move(normal), nullptr, 0, 0).height : -1.0;  // no height is negative
+    };
+    const double at = std::exp(polished({std::log(start.scale)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
+    return fitted(normal_at(shapes[0], at), &shapes[0], at, 0);
+  }
+
+  /// Each parameter, averaged over the members. `columns`: of the form itself.
+  std::vector<Estimate> parameters(const std::vector<Column>& columns) const {
+    const double highest = std::max_element(members.begin(), members.end(), lower)->height;
+    const double wide = student_975(static_cast<double>(members.front().normal.b.size()) - 1) / kNormal975;
+    std::vector<Estimate> all;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      std::vector<Guess> guesses;
+      for (const auto& m : members) {
+        const auto i = static_cast<Eigen::Index>(k);
+        guesses.push_back({m.prior * std::exp(m.height - highest), m.theta[i],
+                           wide * std::hypot(m.error[i], built_error(columns[k]))});
+      }
+      all.push_back(averaged(shapes[0].parameters[k], guesses));
+    }
+    return all;
+  }
+
+  /// Interval of the form's own scale, by likelihood over its grid.
+  Estimate scale_interval(const Member& best) const {
+    std::vector<Guess> guesses;
+    const double step = std::log(members[1].scale / members[0].scale);
+    for (std::size_t i = 0; i < own(); ++i)
+      guesses.push_back({std::exp(members[i].height - best.height), std::log(members[i].scale), step / 2});
+    const Estimate ln = averaged(shapes[0].scale_name, guesses);
+    return {ln.name, best.scale, std::exp(ln.low), std::exp(ln.high)};
+  }
+};
 
 }  // namespace
 
 void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
-  if (cause.form->cause == "map_offset") return refine_offset(evidence, cause, others);
   const Form& form = *cause.form;
-  Windows windows = evidence.seen().windows;
-  const auto normal_at = [&](const Form& shape, double scale) {
-    const auto columns = shape.columns(windows, scale);
-    auto nuisance = form.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
-    nuisance.insert(nuisance.end(), others.begin(), others.end());
-    return evidence.normal(columns, nuisance);
-  };
-  auto shapes = shapes_of(form);
-  shapes.insert(shapes.begin(), form);
-  std::vector<Member> members;
-  const auto fit_all = [&] {
-    members.clear();
-    for (const Form& shape : shapes) {
-      const auto scales = fine_scales(shape, cause.scale);
-      for (const double scale : scales) {
-        Normal n = normal_at(shape, scale);
-        if (n.solvable)
-          members.push_back(fitted(std::move(n), &shape, scale, 1.0 / static_cast<double>(scales.size())));
-      }
-    }
-  };
-  fit_all();
-  for (int i = 0; i < kRounds && form.by_place && !members.empty(); ++i) {
-    Member now = *std::max_element(members.begin(), members.end(), lower);
-    for (int k = 0; k < kTurns; ++k) {
-      windows = moved_by(evidence.seen().windows, now.shape->columns(windows, now.scale), now.theta);
-      now.theta = normal_at(*now.shape, now.scale).fit();
-    }
-    fit_all();
-  }
-  const auto others_begin =
-      std::find_if(members.begin(), members.end(), [&](auto& m) { return m.shape != &shapes[0]; });
-  const std::size_t own = static_cast<std::size_t>(others_begin - members.begin());
-  if (own == 0) return;
-  Member fit = *std::max_element(members.begin(), others_begin, lower);
-  if (own > 1) {
-    const double low = std::log(members[0].scale), high = std::log(members[own - 1].scale);
-    const auto ln = polished({std::log(fit.scale)}, 0.5 * (high - low) / kFine, {low}, {high}, [&](auto& x) {
-      const Normal n = normal_at(form, std::exp(x[0]));
-      return n.solvable ? fitted(n, nullptr, 0, 0).height : 0.0;
-    });
-    fit = fitted(normal_at(form, std::exp(ln[0])), nullptr, std::exp(ln[0]), 0);
-  }
-  cause.scale = fit.scale, cause.theta = fit.theta, cause.gain = fit.normal.gain();
-  cause.columns = form.columns(windows, cause.scale);
-
-  double highest = fit.height;
-  for (const auto& m : members) highest = std::max(highest, m.height);
-  const double wide = student_975(static_cast<double>(fit.normal.b.size()) - 1) / kNormal975;
-  cause.parameters.clear();
-  for (Eigen::Index k = 0; k < fit.theta.size(); ++k) {
-    const double built = built_error(cause.columns[static_cast<std::size_t>(k)]);
-    std::vector<Guess> guesses;
-    for (const auto& m : members)
-      guesses.push_back({m.prior * std::exp(m.height - highest), m.theta[k], wide * std::hypot(m.error[k], built)});
-    cause.parameters.push_back(averaged(form.parameters[static_cast<std::size_t>(k)], guesses));
-  }
-  if (own > 1) {
-    std::vector<Guess> guesses;
-    const double step = std::log(members[1].scale / members[0].scale);
-    for (std::size_t i = 0; i < own; ++i)
-      guesses.push_back({std::exp(members[i].height - fit.height), std::log(members[i].scale), step / 2});
-    const Estimate ln = averaged(form.scale_name, guesses);
-    cause.parameters.push_back({form.scale_name, cause.scale, std::exp(ln.low), std::exp(ln.high)});
+  if (form.cause == "map_offset") return refine_offset(evidence, cause, others);
+  Family family{evidence, others, cause.scale, shapes_of(form), evidence.seen().windows};
+  family.shapes.insert(family.shapes.begin(), form);
+  family.fit();
+  if (form.by_place) family.follow_push();
+  if (family.own() == 0) return;
+  const Member best = family.best_own();
+  cause.scale = best.scale, cause.theta = best.theta, cause.gain = best.normal.gain();
+  cause.columns = form.columns(family.windows, cause.scale);
+  cause.parameters = family.parameters(cause.columns);
+  if (family.own() > 1) {
+    cause.parameters.push_back(family.scale_interval(best));
   } else if (!form.scale_name.empty()) {
     const double value = cause.scale + (form.integer_scale ? 1 : 0);  // rotors count from 1
     cause.parameters.push_back({form.scale_name, value, value, value});
