@@ -7,6 +7,11 @@
 #include "core/study/discrepancy/forms.hpp"
 
 namespace backwash::study::discrepancy {
+namespace {
+
+constexpr double kStrayed = 0.1;  // m: a push that moves the craft farther is not believed
+
+}  // namespace
 
 const std::vector<std::string>& cause_names() {
   static const std::vector<std::string> names = {"ground_thrust",
@@ -150,6 +155,33 @@ std::vector<Column> companions(const Form& form, const Observations& seen) {
             level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
   }
   return {};
+}
+
+Windows moved_by(const Windows& windows, const std::vector<Column>& columns, const Eigen::VectorXd& theta) {
+  Windows moved = windows;
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    Vec3 push = Vec3::Zero();
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      for (const auto& part : columns[k].parts)
+        if (part.channel <= kMeanZ)
+          push[static_cast<Eigen::Index>(part.channel)] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
+    const Vec3 by = push.cwiseProduct(moved[i].give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
+    const auto move = [&](Place& place) {
+      place.height += by.z(), place.ceiling_gap -= by.z();
+      for (auto* walls : {&place.walls, &place.whole_walls})
+        for (auto& [distance, direction] : *walls) distance -= by.dot(direction);
+    };
+    move(moved[i].around);
+    for (auto& place : moved[i].path) move(place);
+  }
+  return moved;
+}
+
+Windows moved_by_itself(const Form& form, const Windows& windows, double scale, const Eigen::VectorXd& theta) {
+  constexpr int kTurns = 4;
+  Windows moved = windows;
+  for (int i = 0; i < kTurns && form.by_place; ++i) moved = moved_by(windows, form.columns(moved, scale), theta);
+  return moved;
 }
 
 std::vector<Column> offsets(const std::vector<Column>& columns, const Observations& seen) {

@@ -30,6 +30,7 @@ struct Form {
   std::vector<double> scales = {0};     ///< grid
   bool integer_scale = false;           ///< a rotor number: not polished
   bool constant = false;                ///< is itself what a free offset would be: tested without one
+  bool by_place = false;                ///< a push that differs by place: it moves the craft in itself
   double floor = 0;                     ///< least root mean square over the flown windows that is called an effect
   double least = 0;                     ///< least magnitude of the first parameter that is called an effect
   bool one_sided = false;               ///< the first parameter cannot be negative
@@ -61,6 +62,12 @@ std::vector<Column> smooth_columns(const Regressor& along, const Windows& window
 /// What an accepted form leaves open and no other cause may claim: the reference voltage of a sagging battery, the
 /// bias at which a drift begins.
 std::vector<Column> companions(const Form& form, const Observations& seen);
+
+/// Windows where a push Σ θ x, in the mean channels, has moved the craft: the loop gives way by push/k_p (e = w/k_p at
+/// rest), so that the craft is not where the set-points alone lead.
+Windows moved_by(const Windows& windows, const std::vector<Column>& columns, const Eigen::VectorXd& theta);
+/// The same by a form's own push, where it is one by place: push and place found in turns.
+Windows moved_by_itself(const Form& form, const Windows& windows, double scale, const Eigen::VectorXd& theta);
 
 /// Free offsets of the channels that columns move: constants, and for level means those fixed to the body too; in
 /// variance channels also the noise of the accelerometer, a constant over Σ.

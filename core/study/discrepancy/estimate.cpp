@@ -3,11 +3,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <nlopt.hpp>
+
+#include "core/study/discrepancy/forms.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {
 
-constexpr int kFine = 12;  // points of the finer grid of scales
+constexpr int kFine = 12;               // points of the finer grid of scales
+constexpr int kRounds = 2, kTurns = 4;  // of the likeliest shape; of where the craft is and how it is pushed there
+constexpr double kNormal975 = 1.959964;
+
+/// A shape of the cause at a scale, fitted to all flights, with its error by leaving each out.
+struct Member {
+  const Form* shape;
+  double scale, prior;
+  Normal normal;
+  SmallVector theta, error;
+  double height;  ///< ln likelihood over that without the cause
+};
 
 std::vector<double> fine_scales(const Form& form, double at) {
   if (form.integer_scale || form.scales.size() < 2) return {at};
@@ -17,32 +32,49 @@ std::vector<double> fine_scales(const Form& form, double at) {
   return scales;
 }
 
-/// Parameters and ln scale of the likelihood's maximum, flight `without` left out (none: SIZE_MAX).
-Eigen::VectorXd maximum(const std::vector<Normal>& normals, const std::vector<double>& scales, std::size_t without) {
-  std::size_t best = 0;
-  std::vector<double> height;
-  std::vector<SmallVector> theta;
-  for (const Normal& n : normals) {
-    SmallVector sum = SmallVector::Zero(n.total.rows());
-    for (std::size_t f = 0; f < n.b.size(); ++f)
-      if (f != without) sum += n.b[f];
-    theta.push_back(without == SIZE_MAX ? SmallVector(n.total.ldlt().solve(sum))
-                                        : SmallVector(n.left_out[without] * sum));
-    height.push_back(0.5 * theta.back().dot(sum));
-    if (height.back() > height[best]) best = height.size() - 1;
+/// Standard errors by the jackknife: √((n − 1)/n Σ (θ₋f − θ̄)²), one column of `left` per flight.
+Eigen::VectorXd jackknife(const Eigen::MatrixXd& left) {
+  const double n = static_cast<double>(left.cols());
+  return ((n - 1) / n * (left.colwise() - left.rowwise().mean()).rowwise().squaredNorm()).cwiseSqrt();
+}
+
+bool lower(const Member& a, const Member& b) { return a.height < b.height; }
+
+Member fitted(Normal normal, const Form* shape, double scale, double prior) {
+  Eigen::MatrixXd left(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size()));
+  SmallVector sum = SmallVector::Zero(normal.total.rows());
+  for (std::size_t f = 0; f < normal.b.size(); ++f) {
+    left.col(static_cast<Eigen::Index>(f)) = normal.fit_without(f);
+    sum += normal.b[f];
   }
-  const auto p = theta[best].size();
-  Eigen::VectorXd out(p + 1);
-  double ln = std::log(std::max(scales[best], 1e-9)), shift = 0;
-  if (best > 0 && best + 1 < scales.size()) {
-    const double a = height[best - 1], b = height[best], c = height[best + 1];
-    shift = std::clamp(0.5 * (a - c) / std::min(a - 2 * b + c, -1e-12), -0.5, 0.5);
-    ln += shift * std::log(scales[best + 1] / scales[best]);
+  SmallVector theta = normal.fit();
+  const double height = 0.5 * theta.dot(sum);
+  return {shape, scale, prior, std::move(normal), theta, SmallVector(jackknife(left)), height};
+}
+
+using Objective = std::function<double(const std::vector<double>&)>;
+
+double evaluate(const std::vector<double>& x, std::vector<double>&, void* objective) {
+  return (*static_cast<Objective*>(objective))(x);
+}
+
+/// Where the objective is largest between the bounds; the start if the solver fails.
+std::vector<double> polished(const std::vector<double>& start, double step, const std::vector<double>& low,
+                             const std::vector<double>& high, Objective objective) {
+  nlopt::opt solver(nlopt::LN_NELDERMEAD, static_cast<unsigned>(start.size()));
+  solver.set_max_objective(evaluate, &objective);
+  solver.set_lower_bounds(low), solver.set_upper_bounds(high);
+  solver.set_initial_step(step);
+  solver.set_xtol_abs(step / 100);
+  solver.set_maxeval(60);
+  std::vector<double> best = start;
+  try {
+    double f = 0;
+    solver.optimize(best, f);
+  } catch (const std::exception&) {
+    return start;
   }
-  const std::size_t next = shift > 0 ? best + 1 : shift < 0 ? best - 1 : best;
-  out.head(p) = theta[best] + std::abs(shift) * (theta[next] - theta[best]);
-  out[p] = ln;
-  return out;
+  return best;
 }
 
 /// What of a rotor's deviation is how the craft was built, the same in each of its flights: of θ = Σ x y / Σ x².
@@ -63,58 +95,193 @@ double student_975(double n) {
          (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
 }
 
-void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
-  const Form& form = *cause.form;
+Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
+  double total = 0, value = 0, low = guesses.front().value, high = low;
+  for (const auto& g : guesses) {
+    total += g.weight, value += g.weight * g.value;
+    low = std::min(low, g.value - 6 * g.error), high = std::max(high, g.value + 6 * g.error);
+  }
+  value /= total;
+  const auto quantile = [&](double p) {
+    double a = low, b = high;
+    for (int i = 0; i < 60; ++i) {
+      const double q = (a + b) / 2;
+      double below = 0;
+      for (const auto& g : guesses)
+        below +=
+            g.weight / total * (g.error > 0 ? 0.5 * std::erfc((g.value - q) / g.error / std::sqrt(2.0)) : q >= g.value);
+      (below < p ? a : b) = q;
+    }
+    return (a + b) / 2;
+  };
+  return {name, value, quantile(0.025), quantile(0.975)};
+}
+
+namespace {
+
+/// ln Σ with the map moved, less that as it is.
+Column with_map_moved(const Windows& windows, double x, double y) {
+  Column moved;
+  for (const Channel c : kVariances)
+    moved.parts.push_back({c, values(windows, [&](auto& w) {
+                             return w.ln_sigma_at({x, y, 0})[static_cast<int>(c - kVarX)];
+                           })});
+  return moved;
+}
+
+/// Standard errors of the offset (x, y) that fits best: jackknife of the fit's linearisation there.
+Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>& nuisance, double x, double y) {
+  constexpr double kDifference = 0.05;  // m
   const auto& windows = evidence.seen().windows;
-  std::vector<Normal> normals;
-  std::vector<double> scales;
-  const auto normal_at = [&](double scale) {
-    const auto columns = form.columns(windows, scale);
-    auto nuisance = form.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
+  const auto slope = [&](double dx, double dy) {
+    Column high = with_map_moved(windows, x + dx, y + dy);
+    const Column low = with_map_moved(windows, x - dx, y - dy);
+    for (std::size_t k = 0; k < high.parts.size(); ++k)
+      for (std::size_t i = 0; i < windows.size(); ++i)
+        high.parts[k].x[i] = (high.parts[k].x[i] - low.parts[k].x[i]) / (2 * kDifference);
+    return high;
+  };
+  const Normal n =
+      evidence.normal({slope(kDifference, 0), slope(0, kDifference), with_map_moved(windows, x, y)}, nuisance);
+  Eigen::MatrixXd left(2, static_cast<Eigen::Index>(n.b.size()));
+  for (std::size_t out = 0; out < n.b.size(); ++out) {
+    Eigen::Matrix2d A = 1e-9 * Eigen::Matrix2d::Identity();
+    Eigen::Vector2d b = Eigen::Vector2d::Zero();
+    for (std::size_t f = 0; f < n.b.size(); ++f)
+      if (f != out) A += n.A[f].topLeftCorner(2, 2), b += n.b[f].head(2) - n.A[f].col(2).head(2);
+    left.col(static_cast<Eigen::Index>(out)) = A.ldlt().solve(b);
+  }
+  return jackknife(left);
+}
+
+/// The offset o at which ln Σ(p + o) − ln Σ(p), share 1, is likeliest.
+void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
+  const auto& windows = evidence.seen().windows;
+  auto nuisance = offsets(cause.columns, evidence.seen());
+  nuisance.insert(nuisance.end(), others.begin(), others.end());
+  const auto height = [&](const std::vector<double>& o) {
+    const Normal n = evidence.normal({with_map_moved(windows, o[0], o[1])}, nuisance);
+    double sum = 0;
+    for (std::size_t f = 0; f < n.b.size(); ++f) sum += n.b[f][0] - 0.5 * n.A[f](0, 0);
+    return sum;
+  };
+  const Vec3 start = map_offset(cause.scale);
+  const double far = kOffsetStep * (kOffsetsAside - 1) / 2;
+  const auto best = polished({start.x(), start.y()}, 0.1, {-far, -far}, {far, far}, height);
+  cause.scale = offset_code({best[0], best[1], 0});
+  cause.columns = cause.form->columns(windows, cause.scale);
+  cause.theta = SmallVector::Ones(1);
+  const Normal own = evidence.normal(cause.columns, nuisance);
+  if (own.solvable) cause.gain = own.gain();
+  const Eigen::VectorXd error =
+      student_975(static_cast<double>(own.b.size()) - 1) * offset_error(evidence, nuisance, best[0], best[1]);
+  cause.parameters = {{"x_m", best[0], best[0] - error[0], best[0] + error[0]},
+                      {"y_m", best[1], best[1] - error[1], best[1] + error[1]}};
+}
+
+/// All shapes of a form at all scales, fitted where the craft was.
+struct Family {
+  const Evidence& evidence;
+  const std::vector<Column>& others;
+  double scale;              ///< of a form without a grid of scales
+  std::vector<Form> shapes;  ///< the form itself first
+  Windows windows;
+  std::vector<Member> members = {};  ///< in the order of shapes and scales
+
+  Normal normal_at(const Form& shape, double at) const {
+    const auto columns = shape.columns(windows, at);
+    auto nuisance = shape.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
     nuisance.insert(nuisance.end(), others.begin(), others.end());
     return evidence.normal(columns, nuisance);
-  };
-  for (const double scale : fine_scales(form, cause.scale)) {
-    Normal n = normal_at(scale);
-    if (n.solvable) normals.push_back(std::move(n)), scales.push_back(scale);
   }
-  if (normals.empty()) return;
-  const Eigen::VectorXd best = maximum(normals, scales, SIZE_MAX);
-  const auto p = best.size() - 1;
-  const bool scaled = scales.size() > 1;
-  if (scaled) cause.scale = std::exp(best[p]);
-  cause.columns = form.columns(windows, cause.scale);
-  const Normal n = normal_at(cause.scale);
-  cause.theta = n.fit();
-  cause.gain = n.solvable ? n.gain() : cause.gain;
 
-  const std::size_t flights = evidence.seen().first.size() - 1;
-  const double count = static_cast<double>(flights);
-  Eigen::MatrixXd left(p + 1, static_cast<Eigen::Index>(flights));
-  for (std::size_t f = 0; f < flights; ++f) left.col(static_cast<Eigen::Index>(f)) = maximum(normals, scales, f);
-  const Eigen::VectorXd mean = left.rowwise().mean();
-  Eigen::VectorXd error = ((count - 1) / count * (left.colwise() - mean).rowwise().squaredNorm()).cwiseSqrt();
-  for (Eigen::Index k = 0; k < p; ++k)
-    error[k] = std::hypot(error[k], built_error(cause.columns[static_cast<std::size_t>(k)]));
-  const double t = student_975(count - 1);
-  cause.parameters.clear();
-  for (Eigen::Index k = 0; k < p; ++k) {
-    const double value = cause.theta[k];
-    cause.parameters.push_back(
-        {form.parameters[static_cast<std::size_t>(k)], value, value - t * error[k], value + t * error[k]});
-  }
-  if (form.cause == "map_offset") {  // one share of one offset: told as the offset itself
-    const Estimate share = cause.parameters.front();
-    const Vec3 offset = map_offset(static_cast<std::size_t>(cause.scale));
-    cause.parameters.clear();
-    for (int i = 0; i < 2; ++i) {
-      const auto [low, high] = std::minmax({share.low * offset[i], share.high * offset[i]});
-      cause.parameters.push_back({i == 0 ? "x_m" : "y_m", share.value * offset[i], low, high});
+  void fit() {
+    members.clear();
+    for (const Form& shape : shapes) {
+      const auto scales = fine_scales(shape, scale);
+      for (const double at : scales) {
+        Normal n = normal_at(shape, at);
+        if (n.solvable) members.push_back(fitted(std::move(n), &shape, at, 1.0 / static_cast<double>(scales.size())));
+      }
     }
-  } else if (scaled) {
-    const double ln = best[p];
-    cause.parameters.push_back(
-        {form.scale_name, std::exp(ln), std::exp(ln - t * error[p]), std::exp(ln + t * error[p])});
+  }
+
+  /// Moves the craft to where the likeliest shape pushes it, and fits again there.
+  void follow_push() {
+    for (int i = 0; i < kRounds && !members.empty(); ++i) {
+      Member now = *std::max_element(members.begin(), members.end(), lower);
+      for (int k = 0; k < kTurns; ++k) {
+        windows = moved_by(evidence.seen().windows, now.shape->columns(windows, now.scale), now.theta);
+        now.theta = normal_at(*now.shape, now.scale).fit();
+      }
+      fit();
+    }
+  }
+
+  /// How many members are of the form itself.
+  std::size_t own() const {
+    return static_cast<std::size_t>(
+        std::count_if(members.begin(), members.end(), [&](auto& m) { return m.shape == &shapes[0]; }));
+  }
+
+  /// The form itself at its likeliest scale. Precondition: own() > 0.
+  Member best_own() const {
+    const auto n = static_cast<std::ptrdiff_t>(own());
+    const Member& start = *std::max_element(members.begin(), members.begin() + n, lower);
+    if (n == 1) return start;
+    const double low = std::log(members.front().scale), high = std::log(members[own() - 1].scale);
+    const auto height = [&](const std::vector<double>& ln) {
+      Normal normal = normal_at(shapes[0], std::exp(ln[0]));
+      return normal.solvable ? fitted(std::move(normal), nullptr, 0, 0).height : -1.0;  // no height is negative
+    };
+    const double at = std::exp(polished({std::log(start.scale)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
+    return fitted(normal_at(shapes[0], at), &shapes[0], at, 0);
+  }
+
+  /// Each parameter, averaged over the members. `columns`: of the form itself.
+  std::vector<Estimate> parameters(const std::vector<Column>& columns) const {
+    const double highest = std::max_element(members.begin(), members.end(), lower)->height;
+    const double wide = student_975(static_cast<double>(members.front().normal.b.size()) - 1) / kNormal975;
+    std::vector<Estimate> all;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      std::vector<Guess> guesses;
+      for (const auto& m : members) {
+        const auto i = static_cast<Eigen::Index>(k);
+        guesses.push_back({m.prior * std::exp(m.height - highest), m.theta[i],
+                           wide * std::hypot(m.error[i], built_error(columns[k]))});
+      }
+      all.push_back(averaged(shapes[0].parameters[k], guesses));
+    }
+    return all;
+  }
+
+  /// Interval of the form's own scale, by likelihood over its grid.
+  Estimate scale_interval(const Member& best) const {
+    std::vector<Guess> guesses;
+    const double step = std::log(members[1].scale / members[0].scale);
+    for (std::size_t i = 0; i < own(); ++i)
+      guesses.push_back({std::exp(members[i].height - best.height), std::log(members[i].scale), step / 2});
+    const Estimate ln = averaged(shapes[0].scale_name, guesses);
+    return {ln.name, best.scale, std::exp(ln.low), std::exp(ln.high)};
+  }
+};
+
+}  // namespace
+
+void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
+  const Form& form = *cause.form;
+  if (form.cause == "map_offset") return refine_offset(evidence, cause, others);
+  Family family{evidence, others, cause.scale, shapes_of(form), evidence.seen().windows};
+  family.shapes.insert(family.shapes.begin(), form);
+  family.fit();
+  if (form.by_place) family.follow_push();
+  if (family.own() == 0) return;
+  const Member best = family.best_own();
+  cause.scale = best.scale, cause.theta = best.theta, cause.gain = best.normal.gain();
+  cause.columns = form.columns(family.windows, cause.scale);
+  cause.parameters = family.parameters(cause.columns);
+  if (family.own() > 1) {
+    cause.parameters.push_back(family.scale_interval(best));
   } else if (!form.scale_name.empty()) {
     const double value = cause.scale + (form.integer_scale ? 1 : 0);  // rotors count from 1
     cause.parameters.push_back({form.scale_name, value, value, value});
@@ -122,14 +289,10 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
 }
 
 bool excludes_zero(const Normal& normal, const std::vector<Column>& columns) {
-  const SmallVector theta = normal.fit();
-  const auto flights = normal.b.size();
-  const double count = static_cast<double>(flights), t = student_975(count - 1);
-  SmallVector mean = SmallVector::Zero(theta.size()), square = mean;
-  for (std::size_t f = 0; f < flights; ++f) mean += normal.fit_without(f) / count;
-  for (std::size_t f = 0; f < flights; ++f) square += (normal.fit_without(f) - mean).cwiseAbs2() * (count - 1) / count;
-  for (Eigen::Index k = 0; k < theta.size(); ++k)
-    if (std::abs(theta[k]) > t * std::hypot(std::sqrt(square[k]), built_error(columns[static_cast<std::size_t>(k)])))
+  const double t = student_975(static_cast<double>(normal.b.size()) - 1);
+  const Member fit = fitted(normal, nullptr, 0, 0);
+  for (Eigen::Index k = 0; k < fit.theta.size(); ++k)
+    if (std::abs(fit.theta[k]) > t * std::hypot(fit.error[k], built_error(columns[static_cast<std::size_t>(k)])))
       return true;
   return false;
 }

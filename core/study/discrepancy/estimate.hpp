@@ -5,15 +5,25 @@
 
 namespace backwash::study::discrepancy {
 
-/// Fits an accepted cause given the others' columns: the scale between the grid's points (parabola of the likelihood
-/// over a finer grid), the parameters, and their intervals with the scale refitted without each flight. Sets scale,
-/// columns, theta, gain and parameters.
+/// Fits an accepted cause given the others' columns. Sets the scale (the likelihood's maximum: best point of a grid,
+/// then NLopt), columns, theta and gain of the cause's own form, which field, reach and plan evaluate; and the
+/// parameters with their intervals, which are averaged over every shape of the cause (shapes_of) and every scale that
+/// the data do not reject. A map offset is fitted along x and y.
 void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others);
 
 /// Whether the 95 % interval of some parameter, by leaving flights out at this scale, excludes 0. The scale's own error
 /// is no part of it: where a scale cannot be told, a size extrapolated to its reference can, with every scale, be of
 /// one sign.
 bool excludes_zero(const Normal& normal, const std::vector<Column>& columns);
+
+/// What one model says of a quantity: its weight among the models, value and standard error.
+struct Guess {
+  double weight, value, error;
+};
+/// Model-averaged value, and interval at 95 % by model-averaged tail areas (Turek and Fletcher, Computational
+/// Statistics and Data Analysis 56, 2012): its ends leave 2.5 % of Σ w N(value, error) outside each. Weights need no
+/// sum of 1; one guess: value ± 1.96 error.
+Estimate averaged(const std::string& name, const std::vector<Guess>& guesses);
 
 /// Quantile 0.975 of Student's t.
 double student_975(double degrees);

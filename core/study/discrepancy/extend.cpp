@@ -113,7 +113,11 @@ std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen) {
       left.push_back(term);
       continue;
     }
-    const auto columns = form->columns(seen.windows, term.scale);
+    const auto columns = form->columns(
+        moved_by_itself(
+            *form, seen.windows, term.scale,
+            Eigen::Map<const Eigen::VectorXd>(term.theta.data(), static_cast<Eigen::Index>(term.theta.size()))),
+        term.scale);
     for (std::size_t k = 0; k < columns.size(); ++k)
       for (const auto& part : columns[k].parts)
         for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] -= term.theta[k] * part.x[i];
@@ -125,10 +129,11 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
   const Accepted& f = cause.found;
   const std::string &name = f.form->cause, &first = f.form->parameters.front();
   const bool variance = first == "B_ln";
-  const auto with = [&](Kind kind, double factor = 1) {
+  // The form's own fit, which holds where it was flown; the interval is of all shapes at the reference.
+  const auto with = [&](Kind kind) {
     const Estimate& e = f.parameters.front();
-    return std::vector{
-        ModelEffect{kind, Vec3(factor * e.value, 0, 0), Vec3(std::abs(factor) * half_width(e), 0, 0), f.scale}};
+    const double value = f.theta[0], error = std::max({0.0, e.high - value, value - e.low});
+    return std::vector{ModelEffect{kind, Vec3(value, 0, 0), Vec3(error, 0, 0), f.scale}};
   };
   if (name == "ground_thrust") return with(Kind::push_over_surface);
   if (name == "ceiling") return with(variance ? Kind::ln_variance_under_surface : Kind::push_under_surface);

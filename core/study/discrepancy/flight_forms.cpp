@@ -10,13 +10,6 @@ namespace {
 
 using field::near_surface;
 
-Vec3 pull(const WindowRow& w, double length) {
-  Vec3 sum = Vec3::Zero();
-  for (const auto& [distance, direction] : w.around.walls)
-    sum += near_surface(distance, field::kSurfaceReference, length) * direction;
-  return sum;
-}
-
 const std::vector<double> kLengths = {0.08, 0.15, 0.3, 0.6};
 
 }  // namespace
@@ -27,11 +20,12 @@ std::vector<Form> surface_forms() {
            .parameters = {"A_mps2"},
            .scale_name = "L_m",
            .scales = kLengths,
+           .by_place = true,
            .floor = 0.02,
            .columns =
                [](const Windows& ws, double length) {
                  return std::vector{in(kMeanZ, ws, [&](auto& w) {
-                   return near_surface(w.around.height, field::kSurfaceReference, length);
+                   return along(w, [&](auto& at) { return near_surface(at.height, field::kSurfaceReference, length); });
                  })};
                }},
           {.cause = "ceiling",
@@ -39,11 +33,13 @@ std::vector<Form> surface_forms() {
            .parameters = {"A_mps2"},
            .scale_name = "L_m",
            .scales = kLengths,
+           .by_place = true,
            .floor = 0.02,
            .columns =
                [](const Windows& ws, double length) {
                  return std::vector{in(kMeanZ, ws, [&](auto& w) {
-                   return near_surface(w.around.ceiling_gap, field::kCeilingReference, length);
+                   return along(
+                       w, [&](auto& at) { return near_surface(at.ceiling_gap, field::kCeilingReference, length); });
                  })};
                }},
           {.cause = "ceiling",
@@ -55,7 +51,8 @@ std::vector<Form> surface_forms() {
            .columns =
                [](const Windows& ws, double length) {
                  return std::vector{in_variance(ws, [&](auto& w) {
-                   return near_surface(w.around.ceiling_gap, field::kCeilingReference, length);
+                   return along(
+                       w, [&](auto& at) { return near_surface(at.ceiling_gap, field::kCeilingReference, length); });
                  })};
                }},
           {.cause = "wall_attraction",
@@ -63,9 +60,14 @@ std::vector<Form> surface_forms() {
            .parameters = {"A_mps2"},
            .scale_name = "L_m",
            .scales = kLengths,
+           .by_place = true,
            .floor = 0.02,
            .columns = [](const Windows& ws, double length) {
-             return std::vector{level(ws, [&](auto& w) { return pull(w, length); })};
+             return std::vector{level(ws, [&](auto& w) {
+               return along(w, [&](auto& at) {
+                 return towards(at.walls, [&](double d) { return near_surface(d, field::kSurfaceReference, length); });
+               });
+             })};
            }}};
 }
 
@@ -147,9 +149,6 @@ std::vector<Form> vehicle_forms() {
        }}};
 }
 
-namespace {
-
-/// A vector of the body, growing with `amount`, in all mean channels.
 std::vector<Column> body_drift(const Windows& ws, const std::function<double(const WindowRow&)>& amount) {
   std::vector<Column> columns;
   for (int i = 0; i < 3; ++i) {
@@ -159,8 +158,6 @@ std::vector<Column> body_drift(const Windows& ws, const std::function<double(con
   }
   return columns;
 }
-
-}  // namespace
 
 std::vector<Form> push_forms() {
   return {{.cause = "trim",
@@ -197,6 +194,28 @@ std::vector<Form> push_forms() {
            }}};
 }
 
+double offset_code(const Vec3& offset_W) {
+  return 1000 * std::round(500 + 1000 * offset_W.x()) + std::round(500 + 1000 * offset_W.y());
+}
+
+Vec3 map_offset(double code) {
+  const double x = std::floor(code / 1000);
+  return {(x - 500) / 1000, (code - 1000 * x - 500) / 1000, 0};
+}
+
+namespace {
+
+/// Eight directions, 0.15 and 0.3 m.
+std::vector<double> tried_offsets() {
+  std::vector<double> codes;
+  for (const double length : {0.15, 0.3})
+    for (int k = 0; k < 8; ++k)
+      codes.push_back(offset_code(length * Vec3(std::cos(M_PI * k / 4), std::sin(M_PI * k / 4), 0)));
+  return codes;
+}
+
+}  // namespace
+
 std::vector<Form> variance_forms() {
   return {{.cause = "recirculation",
            .formula = "ln variance + B (1 - exp(-t/tau)), t since the flight's start",
@@ -212,23 +231,17 @@ std::vector<Form> variance_forms() {
            .formula = "ln variance as modelled at the position plus a level offset",
            .parameters = {"share"},
            .scale_name = "offset",
-           .scales =
-               [] {
-                 std::vector<double> all(kMapOffsets);
-                 for (std::size_t k = 0; k < kMapOffsets; ++k) all[k] = static_cast<double>(k);
-                 return all;
-               }(),
+           .scales = tried_offsets(),
            .integer_scale = true,
            .floor = 0.12,
            .one_sided = true,
            .columns =
-               [](const Windows& ws, double offset) {
+               [](const Windows& ws, double code) {
+                 const Vec3 offset = map_offset(code);
                  Column column;
                  for (const Channel c : kVariances)
                    column.parts.push_back(
-                       {c, values(ws, [&](auto& w) {
-                          return w.ln_sigma_moved[static_cast<std::size_t>(offset)][static_cast<int>(c - kVarX)];
-                        })});
+                       {c, values(ws, [&](auto& w) { return w.ln_sigma_at(offset)[static_cast<int>(c - kVarX)]; })});
                  return std::vector{column};
                }},
           {.cause = "heavy_tails",

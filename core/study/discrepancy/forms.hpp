@@ -14,6 +14,10 @@ std::vector<Form> push_forms();      ///< fixed to the body or the world
 std::vector<Form> variance_forms();  ///< of the disturbance and its tail
 std::vector<Form> rotor_forms();     ///< single rotors
 
+/// Other shapes of an effect's form, in the literature as good as its own: the same parameters, at the same reference.
+/// They take no part in the search; estimates are averaged over them (estimate.hpp).
+std::vector<Form> shapes_of(const Form& form);
+
 /// What columns are built of: one value per window in one channel, in both level means, in ln variance along all axes.
 inline constexpr std::array<Channel, 3> kVariances = {kVarX, kVarY, kVarZ};
 
@@ -44,6 +48,32 @@ Column in_variance(const Windows& windows, F value) {
   for (const Channel c : kVariances) column.parts.push_back({c, values(windows, value)});
   return column;
 }
+
+/// A level offset of the map, m (less than 0.5 along each axis), as one number, the scale of its form: millimetres +
+/// 500 along x, times 1,000, and along y.
+double offset_code(const Vec3& offset_W);
+Vec3 map_offset(double code);
+
+/// Mean of value(place) along the window.
+template <typename F>
+auto along(const WindowRow& w, F value) {
+  if (w.path.empty()) return value(w.around);
+  auto sum = value(w.path.front());
+  for (std::size_t k = 1; k < w.path.size(); ++k) sum += value(w.path[k]);
+  sum /= static_cast<double>(w.path.size());
+  return sum;
+}
+
+/// Σ amount(d) over walls, towards each.
+template <typename F>
+Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {
+  Vec3 sum = Vec3::Zero();
+  for (const auto& [distance, direction] : walls) sum += amount(distance) * direction;
+  return sum;
+}
+
+/// A vector of the body, growing with `amount`, in all mean channels.
+std::vector<Column> body_drift(const Windows& windows, const std::function<double(const WindowRow&)>& amount);
 
 /// −x T/m: a share of the thrust that is missing, seen in the mean and in what a change of the command is worth.
 Column missing_thrust(const Windows& windows, const std::function<double(const WindowRow&)>& share);

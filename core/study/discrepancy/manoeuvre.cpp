@@ -69,6 +69,7 @@ Windows flown(const WindowRow& median, const Manoeuvre* manoeuvre) {
   Windows windows(kWindows, median);
   for (std::size_t i = 0; i < kWindows; ++i) {
     WindowRow& w = windows[i];
+    w.path.clear();
     w.v_W.setZero(), w.speed = 0, w.delay_gain = {}, w.slope_gain = {}, w.command_gain = {};
     if (manoeuvre) manoeuvre->set(w, (static_cast<double>(i) + 0.5) / kWindows);
   }

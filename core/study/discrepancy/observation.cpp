@@ -143,11 +143,6 @@ const char* channel_name(Channel c) {
   return kNames[c];
 }
 
-Vec3 map_offset(std::size_t k) {
-  const double angle = 2 * M_PI * static_cast<double>(k % 8) / 8, length = k < 8 ? 0.15 : 0.3;
-  return {length * std::cos(angle), length * std::sin(angle), 0};
-}
-
 bool Observations::measured(Channel c) const {
   return std::any_of(weight[c].begin(), weight[c].end(), [](double w) { return w > 0; });
 }
@@ -207,6 +202,8 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kStray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
   row.p_W = mean_of(p), row.v_W = mean_of(v);
+  const auto& kp = vehicle_.controller.kp;
+  row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
   row.speed = mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); });
   row.R_WB = Mat3::Zero();
   if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
@@ -218,14 +215,7 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
     if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
     if (log.has("ceiling") && column_mean("ceiling") > 0.5) row.around.ceiling_gap = 0.3;
   }
-  constexpr std::size_t kPoints = 7;  // along the window: a moving vehicle crosses different air
-  row.sigma = Vec3::Zero();
-  for (std::size_t k = 0; k < kPoints; ++k)
-    row.sigma += surroundings_.sigma(p[begin + (2 * k + 1) * w.size() / (2 * kPoints)]) / kPoints;
-  const Vec3 here = surroundings_.sigma(row.p_W);
-  for (std::size_t k = 0; k < kMapOffsets; ++k)
-    row.ln_sigma_moved[k] =
-        (surroundings_.sigma(row.p_W + map_offset(k)).array() / here.array()).log().max(-2.0).min(2.0);
+  look_along(row, begin, end, p);
   return row;
 }
 

@@ -54,9 +54,9 @@ enum Channel : std::size_t {
 };
 const char* channel_name(Channel c);
 
-/// Level offsets of the map that are tried: eight directions, 0.15 and 0.3 m.
-inline constexpr std::size_t kMapOffsets = 16;
-Vec3 map_offset(std::size_t k);  ///< m
+/// Level offsets of the map at which Σ is looked up: a square of so many points, and their spacing.
+inline constexpr std::size_t kOffsetsAside = 9;
+inline constexpr double kOffsetStep = 0.1;  ///< m
 
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {
@@ -70,12 +70,17 @@ struct WindowRow {
   double yaw;         ///< rad
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
   double voltage, temperature;
-  Around around;
-  Vec3 sigma;                                        ///< modelled variance per axis, (m/s²)²
-  std::array<Vec3, kMapOffsets> ln_sigma_moved;      ///< ln of Σ per axis at p + map_offset(k), less that at p
+  Place around;             ///< of p_W
+  std::vector<Place> path;  ///< of points along the window; empty where it is one place
+  Vec3 give;                ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  Vec3 sigma;               ///< modelled variance per axis, (m/s²)²
+  /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
+  std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   std::array<double, 2> delay_gain{}, slope_gain{};  ///< design of kThrustDelay and kThrustSlope: of (delay, slope)
   std::array<double, 2> command_gain{};              ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                            ///< (m/s²)²
+  /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
+  Vec3 ln_sigma_at(const Vec3& offset_W) const;
 };
 
 /// All flights of a study as rows of windows, in flight order.
@@ -105,6 +110,7 @@ class Observer {
   void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
                   std::size_t begin, std::size_t end);
   WindowRow placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end);
+  void look_along(WindowRow& row, std::size_t begin, std::size_t end, const std::vector<Vec3>& p);
   void put(std::size_t channel, double y, double weight);
   std::vector<double> put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
   void put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);

@@ -17,16 +17,30 @@ Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
   lattice_.resize(static_cast<std::size_t>(size_.prod()));
 }
 
-Around Surroundings::around(const Vec3& p_W) const {
-  if (!grid_) return {p_W.z(), kNoSurface, {}};
-  return field::around(*grid_, p_W, {20, 20, kSight});
+Place Surroundings::around(const Vec3& p_W) const {
+  if (!grid_) return {{p_W.z(), kNoSurface, {}}, {}};
+  Place place{field::around(*grid_, p_W, {20, 20, kSight}), {}};
+  for (const auto& wall : place.walls)
+    if (whole(p_W, place, wall)) place.whole_walls.push_back(wall);
+  return place;
 }
 
-const Vec3& Surroundings::lattice_sigma(const Index3& at) {
+bool Surroundings::whole(const Vec3& p_W, const field::Around& around, const std::pair<double, Vec3>& wall) const {
+  constexpr double kOpen = 1;  // m: how far it must reach where nothing is below or above
+  const double a = grid_->resolution();
+  const double down = std::isfinite(around.height) ? around.height : kOpen;
+  const double up = std::isfinite(around.ceiling_gap) ? around.ceiling_gap : kOpen;
+  const Vec3 inside = p_W + (wall.first + 0.5 * a) * wall.second;
+  for (double z = p_W.z() - down + 0.5 * a; z < p_W.z() + up; z += a)
+    if (!grid_->occupied(grid_->index(Vec3(inside.x(), inside.y(), z)))) return false;
+  return true;
+}
+
+const Vec3& Surroundings::lattice_ln_sigma(const Index3& at) {
   auto& stored = lattice_[static_cast<std::size_t>(at.x() + size_.x() * (at.y() + size_.y() * at.z()))];
   if (!stored) {
     const Variance s = field_->at(low_ + kLattice * at.cast<double>()).sigma();
-    stored = Vec3(s.xx, s.yy, s.zz);
+    stored = Vec3(s.xx, s.yy, s.zz).array().max(1e-9).log().matrix();
   }
   return *stored;
 }
@@ -45,7 +59,7 @@ Vec3 Surroundings::sigma(const Vec3& p_W) {
     const Index3 bit(n & 1, (n >> 1) & 1, n >> 2);
     double weight = 1;
     for (int i = 0; i < 3; ++i) weight *= bit[i] ? f[i] : 1 - f[i];
-    if (weight > 1e-9) ln += weight * lattice_sigma(corner + bit).array().max(1e-9).log().matrix();
+    if (weight > 1e-9) ln += weight * lattice_ln_sigma(corner + bit);
   }
   return ln.array().exp();
 }
