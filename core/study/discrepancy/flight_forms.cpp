@@ -79,14 +79,14 @@ Column missing_thrust(const Windows& ws, const std::function<double(const Window
 std::vector<Form> vehicle_forms() {
   return {
       {.cause = "battery_sag",
-       .formula = "thrust (1 - s (V0 - V)/V0), V0 the highest voltage seen",
+       .formula = "thrust (1 - s (V0 - V)/Vm), V0 the highest and Vm the mean voltage flown",
        .parameters = {"s"},
        .floor = 0.01,
        .columns =
            [](const Windows& ws, double) {
-             double highest = 1e-6;
-             for (const auto& w : ws) highest = std::max(highest, w.voltage);
-             return std::vector{missing_thrust(ws, [&](auto& w) { return (highest - w.voltage) / highest; })};
+             double highest = 0, mean = 1e-6;
+             for (const auto& w : ws) highest = std::max(highest, w.voltage), mean += w.voltage / ws.size();
+             return std::vector{missing_thrust(ws, [&](auto& w) { return (highest - w.voltage) / mean; })};
            }},
       {.cause = "payload",
        .formula = "thrust per mass (1 - m), m the relative excess of mass",

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <span>
 
 #include "core/study/discrepancy/rotor_channels.hpp"
 #include "core/study/discrepancy/series.hpp"
@@ -180,7 +182,42 @@ void Observer::add(const FlightLog& log) {
       add_window(log, s, rotors, flight, w.begin, w.end);
     }
   }
+  smooth_voltage(seen_.first.back());
   seen_.first.push_back(seen_.windows.size());
+}
+
+void Observer::smooth_voltage(std::size_t first_window) {
+  const auto windows = std::span(seen_.windows).subspan(first_window);
+  std::vector<double> t, volts;
+  for (const auto& w : windows) t.push_back(w.t), volts.push_back(w.voltage);
+  const auto course = slow_course(t, volts);
+  for (std::size_t i = 0; i < windows.size(); ++i) windows[i].voltage = course[i];
+}
+
+void FirstStage::add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust) {
+  const auto product = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  };
+  for (std::size_t i = 0; i < 2; ++i)
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(k);
+      instruments(row, column) += product(z[i], z[k]), followed(row, column) += product(z[i], thrust[k]);
+    }
+}
+
+Eigen::Matrix2d FirstStage::coefficients() const {
+  if (!(instruments.determinant() > 1e-6 * instruments(0, 0) * instruments(1, 1))) return Eigen::Matrix2d::Identity();
+  return instruments.ldlt().solve(followed);
+}
+
+/// The designs, so far Σ z (level, rate)/√Σz², become those of (delay, slope): of −Ṫ/m and T/m − g as they follow z.
+void Observer::follow_thrust() {
+  const Eigen::Matrix2d follows = thrust_stage_.coefficients();
+  for (auto& w : seen_.windows)
+    for (auto* gain : {&w.delay_gain, &w.slope_gain}) {
+      const Eigen::RowVector2d flown = Eigen::RowVector2d((*gain)[0], (*gain)[1]) * follows;
+      *gain = {-flown[1], flown[0]};
+    }
 }
 
 void Observer::put(std::size_t channel, double y, double weight) {
@@ -262,15 +299,18 @@ void Observer::put_delays(WindowRow& row, const Series& s, std::size_t begin, st
     // design that shares their noise with the residual would be biased.
     const auto r = detrended_values(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
     const auto rate = rates(s, w, nominal(2)), level = detrended_values(w, nominal(2));
+    const auto thrust = [&](std::size_t i) { return s.thrust_acc[i]; };
+    const auto flown = detrended_values(w, thrust), flown_rate = rates(s, w, thrust);
     const Moment delay(rate), slope(level);
     if (delay.excited(0.05)) {
-      row.delay_gain = {-delay.with(rate), delay.with(level)};
+      row.delay_gain = {delay.with(level), delay.with(rate)};
       put(kThrustDelay, delay.with(r), 1);
     }
     if (slope.excited(0.05)) {
-      row.slope_gain = {-slope.with(rate), slope.with(level)};
+      row.slope_gain = {slope.with(level), slope.with(rate)};
       put(kThrustSlope, slope.with(r), 1);
     }
+    if (delay.excited(0.05) || slope.excited(0.05)) thrust_stage_.add({level, rate}, {flown, flown_rate});
   }
   double y_h = 0, g_h = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -297,6 +337,7 @@ void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhas
 }
 
 Observations Observer::finish() {
+  follow_thrust();
   const auto need = [&](const std::string& name, std::initializer_list<const char*> columns) {
     for (const char* column : columns)
       if (!ever_.contains(column)) seen_.missing.emplace(name, std::string("no ") + column + " column");

@@ -69,11 +69,13 @@ struct WindowRow {
   Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
   double yaw;         ///< rad
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
-  double voltage, temperature;
+  double voltage;  ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
+  double temperature;
   Around around;
   Vec3 sigma;                                        ///< modelled variance per axis, (m/s²)²
   std::array<Vec3, kMapOffsets> ln_sigma_moved;      ///< ln of Σ per axis at p + map_offset(k), less that at p
-  std::array<double, 2> delay_gain{}, slope_gain{};  ///< design of kThrustDelay and kThrustSlope: of (delay, slope)
+  /// Design of kThrustDelay and kThrustSlope: of (delay, slope).
+  std::array<double, 2> delay_gain{}, slope_gain{};
   std::array<double, 2> command_gain{};              ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                            ///< (m/s²)²
 };
@@ -88,6 +90,15 @@ struct Observations {
   std::map<std::string, std::string> missing;            ///< what no flight had: "battery_v" → "no battery_v column"
   bool has(const std::string& what) const { return !missing.contains(what); }
   bool measured(Channel c) const;
+};
+
+/// How the flown thrust T − mg and its rate follow the set-points' own vertical acceleration and its rate, z: sums of
+/// z zᵀ and z (T/m, Ṫ/m) over all windows, in which the gusts' part of the thrust averages out.
+struct FirstStage {
+  Eigen::Matrix2d instruments = Eigen::Matrix2d::Zero(), followed = Eigen::Matrix2d::Zero();
+  void add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust);
+  /// Column k: T/m − g, Ṫ/m as combinations of z = (level, rate). The nominal itself where nothing was excited.
+  Eigen::Matrix2d coefficients() const;
 };
 
 /// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
@@ -105,12 +116,15 @@ class Observer {
   void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
                   std::size_t begin, std::size_t end);
   WindowRow placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end);
+  void smooth_voltage(std::size_t first_window);
+  void follow_thrust();
   void put(std::size_t channel, double y, double weight);
   std::vector<double> put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
   void put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
 
   const Vehicle vehicle_;
   Observations seen_;
+  FirstStage thrust_stage_;
   std::set<std::string> ever_;  // columns that some flight had
   std::optional<Surroundings> own_;
   Surroundings& surroundings_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/discrepancy/signals.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -47,6 +48,19 @@ std::vector<double> detrended(std::span<const double> x) {
   std::vector<double> out(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) out[i] = x[i] - mean - slope * (static_cast<double>(i) - middle);
   return out;
+}
+
+std::vector<double> slow_course(std::span<const double> t, std::span<const double> x) {
+  const auto n = static_cast<Eigen::Index>(x.size());
+  if (n == 0) return {};
+  const auto at = Eigen::Map<const Eigen::ArrayXd>(t.data(), n);
+  const double low = at.minCoeff(), length = std::max(at.maxCoeff() - low, 1e-9);
+  Eigen::MatrixXd powers(n, n < 4 ? 1 : n < 8 ? 2 : 3);
+  powers.col(0).setOnes();
+  for (Eigen::Index k = 1; k < powers.cols(); ++k) powers.col(k) = powers.col(k - 1).array() * (at - low) / length;
+  const auto values = Eigen::Map<const Eigen::VectorXd>(x.data(), n);
+  const Eigen::VectorXd fit = powers * powers.colPivHouseholderQr().solve(values);
+  return {fit.data(), fit.data() + n};
 }
 
 Spread spread(std::span<const double> x) {

@@ -9,6 +9,10 @@ namespace backwash::study::discrepancy {
 /// Removes the straight line that fits best.
 std::vector<double> detrended(std::span<const double> x);
 
+/// The parabola (fewer than 8 points: the line; fewer than 4: the mean) through x that fits best: a slow course without
+/// what answers the moment.
+std::vector<double> slow_course(std::span<const double> t, std::span<const double> x);
+
 /// Variance of a detrended stretch, and how many independent samples it is worth: n (1 − ρ²)/(1 + ρ²) with ρ the
 /// correlation of neighbours (a first-order process).
 struct Spread {
