@@ -96,6 +96,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
   Eigen::VectorXd error = ((count - 1) / count * (left.colwise() - mean).rowwise().squaredNorm()).cwiseSqrt();
   for (Eigen::Index k = 0; k < p; ++k)
     error[k] = std::hypot(error[k], built_error(cause.columns[static_cast<std::size_t>(k)]));
+  error[0] = std::hypot(error[0], form.unknowable(evidence.seen()) / std::sqrt(3.0));  // anywhere in the range
   const double t = student_975(count - 1);
   cause.parameters.clear();
   for (Eigen::Index k = 0; k < p; ++k) {

@@ -17,6 +17,13 @@ Vec3 pull(const WindowRow& w, double length) {
   return sum;
 }
 
+/// Mean of the power, not the power of the mean: a window holds a start or a stop.
+double speed_power(const WindowRow& w, double power) {
+  double sum = 0;
+  for (const double v : w.speeds) sum += std::pow(v, power) / kPoints;
+  return sum;
+}
+
 const std::vector<double> kLengths = {0.08, 0.15, 0.3, 0.6};
 
 }  // namespace
@@ -120,6 +127,7 @@ std::vector<Form> vehicle_forms() {
        .parameters = {"latency_s"},
        .constant = true,
        .least = 0.015,
+       .unknowable = [](const Observations& seen) { return seen.row_period / 4; },
        .columns =
            [](const Windows& ws, double) {
              return std::vector{in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; })};
@@ -135,7 +143,7 @@ std::vector<Form> vehicle_forms() {
        .parameters = {"C_mps2"},
        .floor = 0.02,
        .columns = [](const Windows& ws,
-                     double) { return std::vector{in(kMeanZ, ws, [](auto& w) { return w.speed * w.speed; })}; }},
+                     double) { return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })}; }},
       {.cause = "forward_speed",
        .formula = "ln variance + B (v/1 m/s)^n",
        .parameters = {"B_ln"},
@@ -143,7 +151,7 @@ std::vector<Form> vehicle_forms() {
        .scales = {1, 2},
        .floor = 0.12,
        .columns = [](const Windows& ws, double power) {
-         return std::vector{in_variance(ws, [&](auto& w) { return std::pow(w.speed, power); })};
+         return std::vector{in_variance(ws, [&](auto& w) { return speed_power(w, power); })};
        }}};
 }
 

@@ -9,9 +9,12 @@
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
+#include "core/study/discrepancy/instrument.hpp"
 #include "core/study/discrepancy/rotor_channels.hpp"
 #include "core/study/discrepancy/series.hpp"
+#include "core/study/discrepancy/stretch.hpp"
 #include "core/study/discrepancy/surroundings.hpp"
+#include "core/study/discrepancy/texture.hpp"
 #include "core/study/flight_log.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
@@ -26,10 +29,10 @@ enum Channel : std::size_t {
   kMeanX,  ///< mean of a − a_sim along W, m/s²
   kMeanY,
   kMeanZ,
-  kVarX,  ///< ln of measured over modelled variance of a − a_sim, bias of the logarithm removed
+  kVarX,  ///< ln of measured (less the accelerometer's noise) over modelled variance of a − a_sim, its bias removed
   kVarY,
   kVarZ,
-  kTail,           ///< ln kurtosis of a − a_sim less that of Gaussian surrogates with the same spectrum
+  kTail,           ///< ln kurtosis of a − a_sim over a Gaussian's, `tails`
   kThrustDelay,    ///< Σ z (a − a_sim)·b_z/√Σz², z the set-points' own thrust rate: how late the thrust comes
   kThrustSlope,    ///< the same with the set-points' own vertical acceleration: how steep the thrust curve is
   kCommandDelayH,  ///< Σ x (a − a_nominal)/√Σx², x = −ȧ_nominal of the closed loop that hears set-points alone
@@ -58,26 +61,30 @@ const char* channel_name(Channel c);
 inline constexpr std::size_t kMapOffsets = 16;
 Vec3 map_offset(std::size_t k);  ///< m
 
+/// Places along a window: a moving vehicle crosses different air at different speeds.
+inline constexpr std::size_t kPoints = 7;
+
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {
   std::size_t flight;
-  int segment;        ///< −1 in transit or unknown
-  double t;           ///< s since the flight's first row, middle of the window
-  double duration;    ///< s
-  Vec3 p_W, v_W;      ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
-  double speed;       ///< m/s, mean of the norm
+  int segment;      ///< −1 in transit or unknown
+  double t;         ///< s since the flight's first row, middle of the window
+  double duration;  ///< s
+  Vec3 p_W, v_W;    ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
+  double speed;     ///< m/s, mean of the norm
+  std::array<double, kPoints> speeds{};  ///< m/s, along the window
   Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
   double yaw;         ///< rad
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
-  double voltage;  ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
+  double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
   double temperature;
   Around around;
-  Vec3 sigma;                                        ///< modelled variance per axis, (m/s²)²
-  std::array<Vec3, kMapOffsets> ln_sigma_moved;      ///< ln of Σ per axis at p + map_offset(k), less that at p
+  Vec3 sigma;                                    ///< modelled variance per axis, (m/s²)²
+  std::array<Vec3, kMapOffsets> ln_sigma_moved;  ///< ln of Σ per axis at p + map_offset(k), less that at p
   /// Design of kThrustDelay and kThrustSlope: of (delay, slope).
   std::array<double, 2> delay_gain{}, slope_gain{};
-  std::array<double, 2> command_gain{};              ///< design of kCommandDelayH, kCommandDelayZ
-  Vec3 measured_variance;                            ///< (m/s²)²
+  std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
+  Vec3 measured_variance;                ///< (m/s²)²
 };
 
 /// All flights of a study as rows of windows, in flight order.
@@ -85,20 +92,12 @@ struct Observations {
   std::size_t flights = 0;
   std::vector<WindowRow> windows;
   std::vector<std::size_t> first;                        ///< window at which each flight begins; one more at the end
+  double row_period = 0;                                 ///< s, longest of the flights' mean
   std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
   std::map<std::string, std::size_t> gated_out;          ///< frozen, gap, perched, saturated, inconsistent: windows
   std::map<std::string, std::string> missing;            ///< what no flight had: "battery_v" → "no battery_v column"
   bool has(const std::string& what) const { return !missing.contains(what); }
   bool measured(Channel c) const;
-};
-
-/// How the flown thrust T − mg and its rate follow the set-points' own vertical acceleration and its rate, z: sums of
-/// z zᵀ and z (T/m, Ṫ/m) over all windows, in which the gusts' part of the thrust averages out.
-struct FirstStage {
-  Eigen::Matrix2d instruments = Eigen::Matrix2d::Zero(), followed = Eigen::Matrix2d::Zero();
-  void add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust);
-  /// Column k: T/m − g, Ṫ/m as combinations of z = (level, rate). The nominal itself where nothing was excited.
-  Eigen::Matrix2d coefficients() const;
 };
 
 /// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
@@ -113,19 +112,24 @@ class Observer {
   Observations finish();
 
  private:
-  void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
-                  std::size_t begin, std::size_t end);
-  WindowRow placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end);
-  void smooth_voltage(std::size_t first_window);
-  void follow_thrust();
+  void add_windows(const FlightLog& log, const Series& s, const RotorPhases& rotors, const std::vector<Stretch>& good);
+  WindowRow placed(const FlightLog& log, const Series& s, Stretch w);
+  Residual put_means(const WindowRow& row, const Series& s, Stretch w);
+  void put_delays(WindowRow& row, const Series& s, Stretch w);
+  void put_command_delay(const Series& s, Stretch w, int from, int to);
+  void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
   void put(std::size_t channel, double y, double weight);
-  std::vector<double> put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
-  void put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
+  void smooth_voltage();
+  void follow_thrust();
+  void settle_commands();
+  void put_tails();
 
   const Vehicle vehicle_;
   Observations seen_;
   FirstStage thrust_stage_;
-  std::set<std::string> ever_;  // columns that some flight had
+  std::array<DelayStage, 2> command_stage_;  // level, vertical
+  std::vector<Fourth> tails_;                // of every window
+  std::set<std::string> ever_;               // columns that some flight had
   std::optional<Surroundings> own_;
   Surroundings& surroundings_;
 };

@@ -8,8 +8,6 @@
 #include <complex>
 #include <limits>
 #include <numbers>
-#include <random>
-#include <unsupported/Eigen/FFT>
 
 namespace backwash::study::discrepancy {
 namespace {
@@ -26,13 +24,6 @@ double trigamma(double x) {
   for (; x < 6; x += 1) sum += 1 / (x * x);
   const double q = 1 / (x * x);
   return sum + 1 / x + q / 2 + q / x * (1.0 / 6 - q * (1.0 / 30 - q / 42));
-}
-
-double ln_kurtosis(std::span<const double> x) {
-  double m2 = 0, m4 = 0;
-  for (const double v : x) m2 += v * v, m4 += v * v * v * v;
-  const double n = static_cast<double>(x.size());
-  return m2 > 0 ? std::log(n * m4 / (m2 * m2)) : 0;
 }
 
 }  // namespace
@@ -78,28 +69,6 @@ Spread spread(std::span<const double> x) {
 
 double ln_bias(double n) { return digamma(n / 2) - std::log(n / 2); }
 double ln_variance(double n) { return trigamma(n / 2); }
-
-double excess_tail(std::span<const double> x, int surrogates) {
-  using Complex = std::complex<double>;
-  Eigen::FFT<double> fft;
-  std::vector<double> signal(x.begin(), x.end());
-  std::vector<Complex> spectrum, turned;
-  fft.fwd(spectrum, signal);
-  std::mt19937_64 rng(12345);
-  double expected = 0;
-  const std::size_t n = signal.size();
-  for (int draw = 0; draw < surrogates; ++draw) {
-    turned = spectrum;
-    for (std::size_t k = 1; 2 * k < n; ++k) {
-      const double phase = 2 * std::numbers::pi * static_cast<double>(rng() >> 11) * 0x1p-53;
-      turned[k] = std::polar(std::abs(spectrum[k]), phase);
-      turned[n - k] = std::conj(turned[k]);
-    }
-    fft.inv(signal, turned);
-    expected += ln_kurtosis(signal) / surrogates;
-  }
-  return ln_kurtosis(x) - expected;
-}
 
 double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
   constexpr int kBeside = 4;  // on each side, 1 Hz apart from 1.5 Hz on

@@ -25,10 +25,6 @@ Spread spread(std::span<const double> detrended);
 double ln_bias(double n);
 double ln_variance(double n);
 
-/// ln of the kurtosis over that of Gaussian surrogates with the same spectrum (random phases, mean of `surrogates`
-/// draws, fixed seed). 0 for a Gaussian stretch whatever its spectrum.
-double excess_tail(std::span<const double> detrended, int surrogates);
-
 /// ln of the power at a rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz, less
 /// its expectation for noise; twice the rotor's rate (two blades) is summed in; NaN where sampling folds both
 /// next to 0 or half the rate. `phase`: rad at each sample, `t`: s.
