@@ -158,9 +158,11 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, Stretch w) {
   row.sigma = Vec3::Zero();
   for (std::size_t k = 0; k < kPoints; ++k) {
     const std::size_t i = w.begin + (2 * k + 1) * w.size() / (2 * kPoints);
-    row.sigma += surroundings_.sigma(p[i]) / kPoints;
-    row.speeds[k] = v[i].norm();
+    const Vec3 sigma = surroundings_.sigma(p[i]);
+    row.sigma += sigma / kPoints;
+    row.speeds[k] = v[i].norm(), row.shares[k] = sigma.sum();
   }
+  for (double& share : row.shares) share /= kPoints * row.sigma.sum();
   const Vec3 here = surroundings_.sigma(row.p_W);
   for (std::size_t k = 0; k < kMapOffsets; ++k)
     row.ln_sigma_moved[k] =

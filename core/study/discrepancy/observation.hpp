@@ -72,7 +72,7 @@ struct WindowRow {
   double duration;  ///< s
   Vec3 p_W, v_W;    ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
   double speed;     ///< m/s, mean of the norm
-  std::array<double, kPoints> speeds{};  ///< m/s, along the window
+  std::array<double, kPoints> speeds{}, shares{};  ///< m/s, along the window; of the modelled variance, sum 1
   Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
   double yaw;         ///< rad
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
