@@ -5,6 +5,8 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/study_worlds/plan.hpp"
+
 namespace study_worlds {
 
 namespace discrepancy = backwash::study::discrepancy;
@@ -17,8 +19,10 @@ std::optional<double> truth_of(const std::string& cause, const std::string& para
   // Sizes that are defined at the same reference on both sides.
   for (const char* same :
        {"ground_thrust.A_mps2", "ceiling.A_mps2", "wall_attraction.A_mps2", "forward_speed.B_ln", "recirculation.B_ln",
-        "battery_sag.s", "thrust_slope.s", "rotor_drag.k_per_s", "actuator_lag.tau_s", "command_latency.latency_s"})
+        "battery_sag.s", "thrust_slope.s", "rotor_drag.k_per_s", "command_latency.latency_s"})
     if (key == same) return s;
+  // Integrated in steps at whose beginning the lag hears the command already: b − r = h/(e^(h/τ) − 1) ṙ.
+  if (key == "actuator_lag.tau_s") return kStep / std::expm1(kStep / s);
   if (key == "payload.m") return 1 - 1 / (1 + s);
   if (key == "trim.body_x_mps2" || key == "draft.x_mps2" || key == "map_offset.x_m") return s * std::cos(angle);
   if (key == "trim.body_y_mps2" || key == "draft.y_mps2" || key == "map_offset.y_m") return s * std::sin(angle);

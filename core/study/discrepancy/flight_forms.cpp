@@ -252,6 +252,7 @@ std::vector<Form> variance_forms() {
            .constant = true,
            .floor = 0.15,
            .one_sided = true,
+           .unknowable = [](const Observations&) { return kScatter2 / 2; },  // how much of the wander is within 1 s
            .columns = [](const Windows& ws, double) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; }}};
 }
 
