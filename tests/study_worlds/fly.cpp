@@ -98,7 +98,7 @@ class Flight {
       if (t > dropout_at && t < dropout_at + 0.7) continue;
       auto row = record(plan[k], t);
       const Instant now = instant(t);
-      table.hidden.push_back({hidden_push(world_, now) + drift(t), hidden_ln_variance(world_, now)});
+      table.hidden.push_back({hidden_push(world_, now) + drift(t), hidden_ln_variance(world_, now), burst_});
       if (t > frozen_from && t < frozen_from + 1.5 && !table.rows.empty()) {
         row = table.rows.back();
         row[0] = t;
@@ -173,7 +173,8 @@ class Flight {
       if (burst_left_ < -0.7 * std::exponential_distribution(1.0)(rng_) - 0.4) burst_left_ = 0.08;
       const double k = std::exp(world_.effects.of("heavy_tails")) - 1;
       const double inside = std::sqrt(1 + k * 4), outside = std::sqrt(std::max(0.1, 1 - k * 0.25));
-      wind_ *= burst_left_ > 0 ? inside : outside;
+      burst_ = burst_left_ > 0 ? inside : outside;
+      wind_ *= burst_;
     }
   }
 
@@ -240,7 +241,7 @@ class Flight {
   Vec3 p_, v_ = Vec3::Zero(), a_ = Vec3::Zero(), thrust_, produced_, wind_ = Vec3::Zero(), gust_ = Vec3::Zero(),
            vio_ = Vec3::Zero(), accelerometer_bias_, tilt_;
   double yaw_ = 0, u_ = 0, lagged_ = kG, charge_, voltage_ = 16, temperature_ = 25, ambient_, warmth_ = 0, ln_var_,
-         ln_wander_ = 0, thrust_scale_, accelerometer_noise_, burst_left_ = 0;
+         ln_wander_ = 0, thrust_scale_, accelerometer_noise_, burst_left_ = 0, burst_ = 1;
   int tail_nu_;
   double offset_[8];  // the craft's own small asymmetry, the same in each of its flights
   double spin_[4] = {}, motor_[4] = {}, phase_[4] = {0.3, 1.9, 4.0, 5.5};

@@ -8,7 +8,8 @@ namespace study_worlds {
 
 /// The estimated parameters of which the generator knows the value in the same unit (README.md of the study lists
 /// them); empty for a cause without one.
-std::vector<Compared> compare(const World& world, const backwash::study::discrepancy::Accepted& found);
+std::vector<Compared> compare(const World& world, const std::vector<Table>& flights,
+                              const backwash::study::discrepancy::Accepted& found);
 /// |value − truth|/|truth| over all of them as one vector.
 std::optional<double> parameter_error(const std::vector<Compared>& compared);
 

@@ -87,7 +87,7 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   if (out.truth.size() != 1) return out;
   for (const auto& cause : result.causes) {
     if (cause.found.form->cause != out.truth.front()) continue;
-    out.compared = compare(world, cause.found);
+    out.compared = compare(world, tables, cause.found);
     out.error = parameter_error(out.compared);
     compare_with_oracle(out, cause.found, seen, tables);
   }

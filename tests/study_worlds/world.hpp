@@ -63,10 +63,11 @@ struct World {
 
 World draw_world(const Request& request);
 /// What is hidden at a row: push by the effects of the mean, m/s² in W as the accelerometer tells it; ln of the factor
-/// on the variance. Never written to a file: for the oracle fit alone.
+/// on the variance; factor of the bursts on the gusts. Never written to a file: for the oracle fit alone.
 struct Hidden {
   Vec3 push;
   double ln_variance;
+  double burst = 1;
 };
 /// One flight as a table: column names and rows. Deterministic in (world, number).
 struct Table {

@@ -31,9 +31,9 @@ Vec3 WindowRow::ln_sigma_at(const Vec3& offset_W) const {
 }
 
 /// Σ along the window (a moving vehicle crosses different air), as it is and with the window moved; surfaces too.
-void Observer::look_along(WindowRow& row, std::size_t begin, std::size_t end, const std::vector<Vec3>& p) {
-  constexpr std::size_t kPoints = 7;
-  const auto at = [&](std::size_t k) -> const Vec3& { return p[begin + (2 * k + 1) * (end - begin) / (2 * kPoints)]; };
+void Observer::look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v) {
+  const auto sample = [&](std::size_t k) { return w.begin + (2 * k + 1) * w.size() / (2 * kPoints); };
+  const auto at = [&](std::size_t k) -> const Vec3& { return p[sample(k)]; };
   const bool still = (at(0) - at(kPoints - 1)).norm() + (at(0) - at(kPoints / 2)).norm() < kStill;
   // An offset that puts the craft into a solid says nothing of the air there: as far along it as is free.
   const auto sigma = [&](const Vec3& from_W, const Vec3& offset_W) {
@@ -48,6 +48,10 @@ void Observer::look_along(WindowRow& row, std::size_t begin, std::size_t end, co
     return sum;
   };
   row.sigma = along(Vec3::Zero());
+  for (std::size_t k = 0; k < kPoints; ++k) {
+    row.speeds[k] = v[sample(k)].norm();
+    row.shares[k] = still ? 1.0 / kPoints : surroundings_.sigma(at(k)).sum() / (kPoints * row.sigma.sum());
+  }
   for (std::size_t k = 0; k < kPoints && !still && surroundings_.has_map(); ++k)
     row.path.push_back(surroundings_.around(at(k)));
   for (std::size_t n = 0; n < row.ln_sigma_moved.size(); ++n) {

@@ -34,6 +34,8 @@ struct Form {
   double floor = 0;                     ///< least root mean square over the flown windows that is called an effect
   double least = 0;                     ///< least magnitude of the first parameter that is called an effect
   bool one_sided = false;               ///< the first parameter cannot be negative
+  /// Half the range, in the first parameter's unit, in which the logs alone cannot tell the value.
+  std::function<double(const Observations&)> unknowable = [](const Observations&) { return 0.0; };
   std::function<std::vector<Column>(const Windows&, double scale)> columns = {};
 };
 

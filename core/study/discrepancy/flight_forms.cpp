@@ -10,6 +10,20 @@ namespace {
 
 using field::near_surface;
 
+/// Mean of the power, not the power of the mean: a window holds a start or a stop.
+double speed_power(const WindowRow& w, double power) {
+  double sum = 0;
+  for (const double v : w.speeds) sum += std::pow(v, power) / kPoints;
+  return sum;
+}
+
+/// The same where the gusts are: a window that climbs away from the floor has most of its variance while it is slow.
+double gusts_speed_power(const WindowRow& w, double power) {
+  double sum = 0;
+  for (std::size_t k = 0; k < kPoints; ++k) sum += w.shares[k] * std::pow(w.speeds[k], power);
+  return sum;
+}
+
 const std::vector<double> kLengths = {0.08, 0.15, 0.3, 0.6};
 
 }  // namespace
@@ -81,14 +95,14 @@ Column missing_thrust(const Windows& ws, const std::function<double(const Window
 std::vector<Form> vehicle_forms() {
   return {
       {.cause = "battery_sag",
-       .formula = "thrust (1 - s (V0 - V)/V0), V0 the highest voltage seen",
+       .formula = "thrust (1 - s (V0 - V)/Vm), V0 the highest and Vm the mean voltage flown",
        .parameters = {"s"},
        .floor = 0.01,
        .columns =
            [](const Windows& ws, double) {
-             double highest = 1e-6;
-             for (const auto& w : ws) highest = std::max(highest, w.voltage);
-             return std::vector{missing_thrust(ws, [&](auto& w) { return (highest - w.voltage) / highest; })};
+             double highest = 0, mean = 1e-6;
+             for (const auto& w : ws) highest = std::max(highest, w.voltage), mean += w.voltage / ws.size();
+             return std::vector{missing_thrust(ws, [&](auto& w) { return (highest - w.voltage) / mean; })};
            }},
       {.cause = "payload",
        .formula = "thrust per mass (1 - m), m the relative excess of mass",
@@ -122,6 +136,7 @@ std::vector<Form> vehicle_forms() {
        .parameters = {"latency_s"},
        .constant = true,
        .least = 0.015,
+       .unknowable = [](const Observations& seen) { return seen.row_period / 4; },
        .columns =
            [](const Windows& ws, double) {
              return std::vector{in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; })};
@@ -137,7 +152,7 @@ std::vector<Form> vehicle_forms() {
        .parameters = {"C_mps2"},
        .floor = 0.02,
        .columns = [](const Windows& ws,
-                     double) { return std::vector{in(kMeanZ, ws, [](auto& w) { return w.speed * w.speed; })}; }},
+                     double) { return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })}; }},
       {.cause = "forward_speed",
        .formula = "ln variance + B (v/1 m/s)^n",
        .parameters = {"B_ln"},
@@ -145,7 +160,7 @@ std::vector<Form> vehicle_forms() {
        .scales = {1, 2},
        .floor = 0.12,
        .columns = [](const Windows& ws, double power) {
-         return std::vector{in_variance(ws, [&](auto& w) { return std::pow(w.speed, power); })};
+         return std::vector{in_variance(ws, [&](auto& w) { return gusts_speed_power(w, power); })};
        }}};
 }
 
@@ -250,6 +265,7 @@ std::vector<Form> variance_forms() {
            .constant = true,
            .floor = 0.15,
            .one_sided = true,
+           .unknowable = [](const Observations&) { return kScatter2 / 2; },  // how much of the wander is within 1 s
            .columns = [](const Windows& ws, double) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; }}};
 }
 

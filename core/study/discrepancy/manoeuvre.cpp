@@ -49,7 +49,7 @@ const Manoeuvre kManoeuvres[] = {
      }},
     {"fly fast and slow on one line at one height",
      [](WindowRow& w, double s) {
-       w.speed = 1.5 * s;
+       w.speed = 1.5 * s, w.speeds.fill(w.speed);
        w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
      }},
     {"thrust pulses: climb and sink with 2 m/s² in turn",
@@ -70,7 +70,7 @@ Windows flown(const WindowRow& median, const Manoeuvre* manoeuvre) {
   for (std::size_t i = 0; i < kWindows; ++i) {
     WindowRow& w = windows[i];
     w.path.clear();
-    w.v_W.setZero(), w.speed = 0, w.delay_gain = {}, w.slope_gain = {}, w.command_gain = {};
+    w.v_W.setZero(), w.speed = 0, w.speeds.fill(0), w.delay_gain = {}, w.slope_gain = {}, w.command_gain = {};
     if (manoeuvre) manoeuvre->set(w, (static_cast<double>(i) + 0.5) / kWindows);
   }
   return windows;

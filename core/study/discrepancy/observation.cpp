@@ -3,68 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "core/study/discrepancy/instrument.hpp"
 #include "core/study/discrepancy/rotor_channels.hpp"
 #include "core/study/discrepancy/series.hpp"
 #include "core/study/discrepancy/signals.hpp"
+#include "core/study/discrepancy/stretch.hpp"
+#include "core/study/discrepancy/texture.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {
 
-constexpr double kWindow = 2.0;      // s
+constexpr double kLeastGusts = 0.2;  // share of a window's variance that is left when noise is taken out
 constexpr double kStray = 0.3;       // m: a craft farther from where its set-points lead does not follow them
-constexpr std::size_t kFewest = 20;  // samples of a window
-
-struct Stretch {
-  std::size_t begin, end;
-  std::size_t size() const { return end - begin; }
-};
-
-/// Windows of 2 s (to the nearest whole number in each run of rows without a gap and of one segment).
-std::vector<Stretch> cut(const Series& s) {
-  std::vector<double> spacing;
-  for (std::size_t i = 1; i < s.size(); ++i) spacing.push_back(s.t[i] - s.t[i - 1]);
-  std::nth_element(spacing.begin(), spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2), spacing.end());
-  const double longest = std::max(0.1, 5 * spacing[spacing.size() / 2]);
-  std::vector<Stretch> windows;
-  for (std::size_t begin = 0; begin < s.size();) {
-    std::size_t end = begin + 1;
-    while (end < s.size() && s.segment[end] == s.segment[begin] && s.t[end] - s.t[end - 1] <= longest) ++end;
-    const double length = s.t[end - 1] - s.t[begin];
-    const auto parts = static_cast<std::size_t>(std::lround(length / kWindow));
-    for (std::size_t k = 0; k < parts; ++k) {
-      const std::size_t a = begin + k * (end - begin) / parts, b = begin + (k + 1) * (end - begin) / parts;
-      if (b - a >= kFewest) windows.push_back({a, b});
-    }
-    begin = end;
-  }
-  return windows;
-}
-
-/// Why a window is left out; null if it is good.
-const char* gate(const Series& s, const FlightLog& log, Stretch w) {
-  std::size_t repeated = 0, full = 0;
-  for (std::size_t i = w.begin + 1; i < w.end; ++i)
-    repeated += s.p[i] == s.p[i - 1] && s.a[i] == s.a[i - 1] && s.v[i] == s.v[i - 1] ? 1u : 0u;
-  if (20 * repeated > w.size()) return "frozen";
-  Vec3 low = s.p[w.begin], high = low;
-  double thrust = 0;
-  for (std::size_t i = w.begin; i < w.end; ++i) {
-    low = low.cwiseMin(s.p[i]), high = high.cwiseMax(s.p[i]);
-    if (!s.thrust_acc.empty()) thrust += s.thrust_acc[i] / static_cast<double>(w.size());
-  }
-  if ((high - low).maxCoeff() < 5e-4 || (!s.thrust_acc.empty() && thrust < 0.6 * kGravity)) return "perched";
-  if (log.has("thrust"))
-    for (std::size_t i = w.begin; i < w.end; ++i) full += log.column("thrust")[i] >= 0.99 ? 1u : 0u;
-  if (50 * full > w.size()) return "saturated";
-  if (s.has_velocity) {  // position and velocity must tell the same story
-    const double time = s.t[w.end - 1] - s.t[w.begin];
-    Vec3 flown = Vec3::Zero();
-    for (std::size_t i = w.begin + 1; i < w.end; ++i) flown += 0.5 * (s.v[i] + s.v[i - 1]) * (s.t[i] - s.t[i - 1]);
-    if (((s.p[w.end - 1] - s.p[w.begin] - flown) / time).norm() > 0.15) return "inconsistent";
-  }
-  return nullptr;
-}
 
 template <typename T, typename F>
 T mean(Stretch w, T sum, F value) {
@@ -75,39 +27,6 @@ T mean(Stretch w, T sum, F value) {
 /// The attitude without its tilt, which answers the gusts as the thrust does.
 Mat3 heading(const Mat3& R_WB) {
   return Eigen::AngleAxisd(std::atan2(R_WB(1, 0), R_WB(0, 0)), Vec3::UnitZ()).toRotationMatrix();
-}
-
-/// Σ z·y and Σ z·x of detrended z over √Σz²: one row of an instrumental regression; nothing without excitation.
-struct Moment {
-  double y = 0, square = 0;
-  std::vector<double> z;
-  explicit Moment(std::vector<double> instrument) : z(std::move(instrument)) {
-    for (const double v : z) square += v * v;
-  }
-  double with(const std::vector<double>& x) const {
-    double sum = 0;
-    for (std::size_t i = 0; i < z.size(); ++i) sum += z[i] * x[i];
-    return sum / std::sqrt(square);
-  }
-  bool excited(double least_rms) const { return square > least_rms * least_rms * static_cast<double>(z.size()); }
-};
-
-template <typename F>
-std::vector<double> detrended_values(Stretch w, F value) {
-  std::vector<double> x;
-  for (std::size_t i = w.begin; i < w.end; ++i) x.push_back(value(i));
-  return detrended(x);
-}
-
-/// Slope over the neighbours.
-template <typename F>
-std::vector<double> rates(const Series& s, Stretch w, F value) {
-  std::vector<double> x;
-  for (std::size_t i = w.begin; i < w.end; ++i) {
-    const std::size_t a = i > 0 ? i - 1 : 0, b = std::min(i + 1, s.size() - 1);
-    x.push_back((value(b) - value(a)) / (s.t[b] - s.t[a]));
-  }
-  return detrended(x);
 }
 
 }  // namespace
@@ -160,9 +79,10 @@ Observer::Observer(const Vehicle& vehicle, Surroundings& surroundings)
 void Observer::add(const FlightLog& log) {
   const Series s = series_of(log, vehicle_);
   for (const auto& [name, column] : log.columns) ever_.insert(name);
-  const std::size_t flight = seen_.flights++;
+  ++seen_.flights;
   if (s.size() >= kFewest) {
     const auto rotors = rotor_phases(log, s);
+    std::vector<Stretch> good;
     for (const Stretch w : cut(s)) {
       if (const char* why = gate(s, log, w)) {
         ++seen_.gated_out[why];
@@ -172,10 +92,28 @@ void Observer::add(const FlightLog& log) {
         ++seen_.gated_out["inconsistent"];
         continue;
       }
-      add_window(log, s, rotors, flight, w.begin, w.end);
+      good.push_back(w);
     }
+    add_windows(log, s, rotors, good);
   }
   seen_.first.push_back(seen_.windows.size());
+}
+
+void Observer::smooth_voltage() {
+  const auto windows = std::span(seen_.windows).subspan(seen_.first.back());
+  std::vector<double> t, volts;
+  for (const auto& w : windows) t.push_back(w.t), volts.push_back(w.voltage);
+  const auto course = slow_course(t, volts);
+  for (std::size_t i = 0; i < windows.size(); ++i) windows[i].voltage = course[i];
+}
+
+void Observer::put_tails() {
+  std::vector<Fourth> whole;
+  std::vector<std::size_t> of;
+  for (std::size_t i = 0; i < tails_.size(); ++i)
+    if (tails_[i].at_once > 0) whole.push_back(tails_[i]), of.push_back(i);
+  const auto y = tails(whole);
+  for (std::size_t i = 0; i < y.size(); ++i) seen_.y[kTail][of[i]] = y[i], seen_.weight[kTail][of[i]] = 1;
 }
 
 void Observer::put(std::size_t channel, double y, double weight) {
@@ -183,8 +121,7 @@ void Observer::put(std::size_t channel, double y, double weight) {
   seen_.y[channel].back() = y, seen_.weight[channel].back() = weight;
 }
 
-WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end) {
-  const Stretch w{begin, end};
+WindowRow Observer::placed(const FlightLog& log, const Series& s, Stretch w) {
   WindowRow row{};
   const auto column_mean = [&](const char* name) {
     if (!log.has(name)) return 0.0;
@@ -194,9 +131,9 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
   const auto mean_of = [&](const std::vector<Vec3>& x) -> Vec3 {
     return mean(w, Vec3(Vec3::Zero()), [&](std::size_t i) -> Vec3 { return x[i]; });
   };
-  row.segment = s.segment[begin];
-  row.t = 0.5 * (s.t[begin] + s.t[end - 1]);
-  row.duration = s.t[end - 1] - s.t[begin];
+  row.segment = s.segment[w.begin];
+  row.t = 0.5 * (s.t[w.begin] + s.t[w.end - 1]);
+  row.duration = s.t[w.end - 1] - s.t[w.begin];
   // A gust that pushes the craft up is in its mean residual and in its measured height: a place that answers the gusts
   // would explain them. Where the set-points lead is known without them, unless the craft flies elsewhere.
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kStray;
@@ -215,78 +152,67 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
     if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
     if (log.has("ceiling") && column_mean("ceiling") > 0.5) row.around.ceiling_gap = 0.3;
   }
-  look_along(row, begin, end, p);
+  look_along(row, w, p, v);
   return row;
 }
 
-/// Means, ln variances and the tail; returns the detrended vertical residual.
-std::vector<double> Observer::put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end) {
-  const Stretch w{begin, end};
-  double tail = 0;
-  std::vector<double> vertical;
+/// Means; returns the detrended residuals.
+Residual Observer::put_means(const WindowRow& row, const Series& s, Stretch w) {
+  Residual rest{{}, row.sigma};
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
     // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
     put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
-    const auto x = detrended_values(w, residual);
-    const auto [variance, samples] = spread(x);
-    row.measured_variance[axis] = variance;
-    if (variance > 0 && samples > 2) {
-      const double own = ln_variance(samples);
-      put(kVarX + a, std::log(variance / row.sigma[axis]) - ln_bias(samples), 1 / (own + kScatter2));
-    }
-    tail += excess_tail(x, 3) / 3;
-    if (axis == 2) vertical = x;
+    rest.x[a] = detrended_values(w, residual);
   }
-  put(kTail, tail, 1);
-  return vertical;
+  return rest;
 }
 
-/// How late and how steeply thrust and commands act.
-void Observer::put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end) {
-  const Stretch w{begin, end};
-  const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
-  if (s.simulated_by_thrust) {
-    // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
-    // design that shares their noise with the residual would be biased.
-    const auto r = detrended_values(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
-    const auto rate = rates(s, w, nominal(2)), level = detrended_values(w, nominal(2));
-    const Moment delay(rate), slope(level);
-    if (delay.excited(0.05)) {
-      row.delay_gain = {-delay.with(rate), delay.with(level)};
-      put(kThrustDelay, delay.with(r), 1);
+/// ln variances of the last windows, the accelerometer's noise taken out, and what their tails are made of.
+void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_hz) {
+  const Texture texture = texture_of(residuals, rate_hz);
+  const std::size_t first = seen_.windows.size() - residuals.size();
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    WindowRow& row = seen_.windows[first + i];
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      const auto [variance, samples] = spread(residuals[i].x[a]);
+      row.measured_variance[axis] = variance;
+      if (!(variance > 0) || !(samples > 2)) continue;
+      const double gusts = std::max(variance - texture.white[axis], kLeastGusts * variance);
+      const double own = ln_variance(samples) * std::pow(variance / gusts, 2);
+      seen_.y[kVarX + a][first + i] = std::log(gusts / row.sigma[axis]) - ln_bias(samples);
+      seen_.weight[kVarX + a][first + i] = 1 / (own + kScatter2);
     }
-    if (slope.excited(0.05)) {
-      row.slope_gain = {-slope.with(rate), slope.with(level)};
-      put(kThrustSlope, slope.with(r), 1);
-    }
+    tails_.push_back(fourth_moments(residuals[i], texture));
   }
-  double y_h = 0, g_h = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Moment m(rates(s, w, nominal(axis)));
-    if (!m.excited(0.05)) continue;
-    const auto late = detrended_values(w, [&](std::size_t i) { return s.a[i][axis] - s.a_nominal[i][axis]; });
-    const double y = m.with(late), gain = -std::sqrt(m.square);
-    if (axis < 2) y_h += y * gain, g_h += gain * gain;
-    if (axis == 2) put(kCommandDelayZ, y, 1), row.command_gain[1] = gain;
-  }
-  if (g_h > 0) put(kCommandDelayH, y_h / std::sqrt(g_h), 1), row.command_gain[0] = std::sqrt(g_h);
 }
 
-void Observer::add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
-                          std::size_t begin, std::size_t end) {
-  for (std::size_t c = 0; c < kChannels; ++c) seen_.y[c].push_back(0), seen_.weight[c].push_back(0);
-  WindowRow row = placed(log, s, begin, end);
-  row.flight = flight;
-  const auto vertical = put_moments(row, s, begin, end);
-  if (!s.a_nominal.empty()) put_delays(row, s, begin, end);
-  for (const auto& [channel, value, weight] : rotor_values(log, s, rotors, vehicle_, vertical, begin, end))
-    put(channel, value, weight);
-  seen_.windows.push_back(std::move(row));
+void Observer::add_windows(const FlightLog& log, const Series& s, const RotorPhases& rotors,
+                           const std::vector<Stretch>& good) {
+  std::vector<Residual> residuals;
+  for (const Stretch w : good) {
+    for (std::size_t c = 0; c < kChannels; ++c) seen_.y[c].push_back(0), seen_.weight[c].push_back(0);
+    seen_.windows.push_back(placed(log, s, w));
+    WindowRow& row = seen_.windows.back();
+    row.flight = seen_.flights - 1;
+    residuals.push_back(put_means(row, s, w));
+    if (!s.a_nominal.empty()) put_delays(row, s, w);
+    for (const auto& [channel, value, weight] :
+         rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end))
+      put(channel, value, weight);
+  }
+  const double period = s.t.back() / static_cast<double>(s.size() - 1);
+  seen_.row_period = std::max(seen_.row_period, period);
+  put_spreads(residuals, 1 / period);
+  smooth_voltage();
 }
 
 Observations Observer::finish() {
+  follow_thrust();
+  settle_commands();
+  put_tails();
   const auto need = [&](const std::string& name, std::initializer_list<const char*> columns) {
     for (const char* column : columns)
       if (!ever_.contains(column)) seen_.missing.emplace(name, std::string("no ") + column + " column");

@@ -9,9 +9,12 @@
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
+#include "core/study/discrepancy/instrument.hpp"
 #include "core/study/discrepancy/rotor_channels.hpp"
 #include "core/study/discrepancy/series.hpp"
+#include "core/study/discrepancy/stretch.hpp"
 #include "core/study/discrepancy/surroundings.hpp"
+#include "core/study/discrepancy/texture.hpp"
 #include "core/study/flight_log.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
@@ -26,10 +29,10 @@ enum Channel : std::size_t {
   kMeanX,  ///< mean of a − a_sim along W, m/s²
   kMeanY,
   kMeanZ,
-  kVarX,  ///< ln of measured over modelled variance of a − a_sim, bias of the logarithm removed
+  kVarX,  ///< ln of measured (less the accelerometer's noise) over modelled variance of a − a_sim, its bias removed
   kVarY,
   kVarZ,
-  kTail,           ///< ln kurtosis of a − a_sim less that of Gaussian surrogates with the same spectrum
+  kTail,           ///< ln kurtosis of a − a_sim over a Gaussian's, `tails`
   kThrustDelay,    ///< Σ z (a − a_sim)·b_z/√Σz², z the set-points' own thrust rate: how late the thrust comes
   kThrustSlope,    ///< the same with the set-points' own vertical acceleration: how steep the thrust curve is
   kCommandDelayH,  ///< Σ x (a − a_nominal)/√Σx², x = −ȧ_nominal of the closed loop that hears set-points alone
@@ -58,27 +61,33 @@ const char* channel_name(Channel c);
 inline constexpr std::size_t kOffsetsAside = 9;
 inline constexpr double kOffsetStep = 0.1;  ///< m
 
+/// Places along a window: a moving vehicle crosses different air at different speeds.
+inline constexpr std::size_t kPoints = 7;
+
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {
   std::size_t flight;
-  int segment;        ///< −1 in transit or unknown
-  double t;           ///< s since the flight's first row, middle of the window
-  double duration;    ///< s
-  Vec3 p_W, v_W;      ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
-  double speed;       ///< m/s, mean of the norm
+  int segment;      ///< −1 in transit or unknown
+  double t;         ///< s since the flight's first row, middle of the window
+  double duration;  ///< s
+  Vec3 p_W, v_W;    ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
+  double speed;     ///< m/s, mean of the norm
+  std::array<double, kPoints> speeds{}, shares{};  ///< m/s, along the window; of the modelled variance, sum 1
   Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
   double yaw;         ///< rad
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
-  double voltage, temperature;
+  double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
+  double temperature;
   Place around;             ///< of p_W
   std::vector<Place> path;  ///< of points along the window; empty where it is one place
   Vec3 give;                ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
   Vec3 sigma;               ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
-  std::array<double, 2> delay_gain{}, slope_gain{};  ///< design of kThrustDelay and kThrustSlope: of (delay, slope)
-  std::array<double, 2> command_gain{};              ///< design of kCommandDelayH, kCommandDelayZ
-  Vec3 measured_variance;                            ///< (m/s²)²
+  /// Design of kThrustDelay and kThrustSlope: of (delay, slope).
+  std::array<double, 2> delay_gain{}, slope_gain{};
+  std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
+  Vec3 measured_variance;                ///< (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
 };
@@ -88,6 +97,7 @@ struct Observations {
   std::size_t flights = 0;
   std::vector<WindowRow> windows;
   std::vector<std::size_t> first;                        ///< window at which each flight begins; one more at the end
+  double row_period = 0;                                 ///< s, longest of the flights' mean
   std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
   std::map<std::string, std::size_t> gated_out;          ///< frozen, gap, perched, saturated, inconsistent: windows
   std::map<std::string, std::string> missing;            ///< what no flight had: "battery_v" → "no battery_v column"
@@ -107,17 +117,25 @@ class Observer {
   Observations finish();
 
  private:
-  void add_window(const FlightLog& log, const Series& s, const RotorPhases& rotors, std::size_t flight,
-                  std::size_t begin, std::size_t end);
-  WindowRow placed(const FlightLog& log, const Series& s, std::size_t begin, std::size_t end);
-  void look_along(WindowRow& row, std::size_t begin, std::size_t end, const std::vector<Vec3>& p);
+  void add_windows(const FlightLog& log, const Series& s, const RotorPhases& rotors, const std::vector<Stretch>& good);
+  WindowRow placed(const FlightLog& log, const Series& s, Stretch w);
+  void look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
+  Residual put_means(const WindowRow& row, const Series& s, Stretch w);
+  void put_delays(WindowRow& row, const Series& s, Stretch w);
+  void put_command_delay(const Series& s, Stretch w, int from, int to);
+  void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
   void put(std::size_t channel, double y, double weight);
-  std::vector<double> put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
-  void put_delays(WindowRow& row, const Series& s, std::size_t begin, std::size_t end);
+  void smooth_voltage();
+  void follow_thrust();
+  void settle_commands();
+  void put_tails();
 
   const Vehicle vehicle_;
   Observations seen_;
-  std::set<std::string> ever_;  // columns that some flight had
+  FirstStage thrust_stage_;
+  std::array<DelayStage, 2> command_stage_;  // level, vertical
+  std::vector<Fourth> tails_;                // of every window
+  std::set<std::string> ever_;               // columns that some flight had
   std::optional<Surroundings> own_;
   Surroundings& surroundings_;
 };

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/discrepancy/signals.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
 #include <limits>
 #include <numbers>
-#include <random>
-#include <unsupported/Eigen/FFT>
 
 namespace backwash::study::discrepancy {
 namespace {
@@ -27,13 +26,6 @@ double trigamma(double x) {
   return sum + 1 / x + q / 2 + q / x * (1.0 / 6 - q * (1.0 / 30 - q / 42));
 }
 
-double ln_kurtosis(std::span<const double> x) {
-  double m2 = 0, m4 = 0;
-  for (const double v : x) m2 += v * v, m4 += v * v * v * v;
-  const double n = static_cast<double>(x.size());
-  return m2 > 0 ? std::log(n * m4 / (m2 * m2)) : 0;
-}
-
 }  // namespace
 
 std::vector<double> detrended(std::span<const double> x) {
@@ -47,6 +39,19 @@ std::vector<double> detrended(std::span<const double> x) {
   std::vector<double> out(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) out[i] = x[i] - mean - slope * (static_cast<double>(i) - middle);
   return out;
+}
+
+std::vector<double> slow_course(std::span<const double> t, std::span<const double> x) {
+  const auto n = static_cast<Eigen::Index>(x.size());
+  if (n == 0) return {};
+  const auto at = Eigen::Map<const Eigen::ArrayXd>(t.data(), n);
+  const double low = at.minCoeff(), length = std::max(at.maxCoeff() - low, 1e-9);
+  Eigen::MatrixXd powers(n, n < 4 ? 1 : n < 8 ? 2 : 3);
+  powers.col(0).setOnes();
+  for (Eigen::Index k = 1; k < powers.cols(); ++k) powers.col(k) = powers.col(k - 1).array() * (at - low) / length;
+  const auto values = Eigen::Map<const Eigen::VectorXd>(x.data(), n);
+  const Eigen::VectorXd fit = powers * powers.colPivHouseholderQr().solve(values);
+  return {fit.data(), fit.data() + n};
 }
 
 Spread spread(std::span<const double> x) {
@@ -64,28 +69,6 @@ Spread spread(std::span<const double> x) {
 
 double ln_bias(double n) { return digamma(n / 2) - std::log(n / 2); }
 double ln_variance(double n) { return trigamma(n / 2); }
-
-double excess_tail(std::span<const double> x, int surrogates) {
-  using Complex = std::complex<double>;
-  Eigen::FFT<double> fft;
-  std::vector<double> signal(x.begin(), x.end());
-  std::vector<Complex> spectrum, turned;
-  fft.fwd(spectrum, signal);
-  std::mt19937_64 rng(12345);
-  double expected = 0;
-  const std::size_t n = signal.size();
-  for (int draw = 0; draw < surrogates; ++draw) {
-    turned = spectrum;
-    for (std::size_t k = 1; 2 * k < n; ++k) {
-      const double phase = 2 * std::numbers::pi * static_cast<double>(rng() >> 11) * 0x1p-53;
-      turned[k] = std::polar(std::abs(spectrum[k]), phase);
-      turned[n - k] = std::conj(turned[k]);
-    }
-    fft.inv(signal, turned);
-    expected += ln_kurtosis(signal) / surrogates;
-  }
-  return ln_kurtosis(x) - expected;
-}
 
 double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
   constexpr int kBeside = 4;  // on each side, 1 Hz apart from 1.5 Hz on

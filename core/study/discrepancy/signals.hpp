@@ -9,6 +9,10 @@ namespace backwash::study::discrepancy {
 /// Removes the straight line that fits best.
 std::vector<double> detrended(std::span<const double> x);
 
+/// The parabola (fewer than 8 points: the line; fewer than 4: the mean) through x that fits best: a slow course without
+/// what answers the moment.
+std::vector<double> slow_course(std::span<const double> t, std::span<const double> x);
+
 /// Variance of a detrended stretch, and how many independent samples it is worth: n (1 − ρ²)/(1 + ρ²) with ρ the
 /// correlation of neighbours (a first-order process).
 struct Spread {
@@ -20,10 +24,6 @@ Spread spread(std::span<const double> detrended);
 /// adds to the logarithm of the variance.
 double ln_bias(double n);
 double ln_variance(double n);
-
-/// ln of the kurtosis over that of Gaussian surrogates with the same spectrum (random phases, mean of `surrogates`
-/// draws, fixed seed). 0 for a Gaussian stretch whatever its spectrum.
-double excess_tail(std::span<const double> detrended, int surrogates);
 
 /// ln of the power at a rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz, less
 /// its expectation for noise; twice the rotor's rate (two blades) is summed in; NaN where sampling folds both
