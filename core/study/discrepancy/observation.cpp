@@ -41,6 +41,43 @@ std::vector<Stretch> cut(const Series& s) {
   return windows;
 }
 
+/// Whether every rotor is told to stand still in some row: on the ground, or about to leave it.
+bool rotors_rest(const Series& s, const FlightLog& log, Stretch w) {
+  constexpr double kIdle = 0.05;  // of the full command
+  std::array<const std::vector<double>*, 4> motors{};
+  for (std::size_t rotor = 0; rotor < 4; ++rotor) {
+    const std::string name = "motor" + std::to_string(rotor + 1);
+    if (!log.has(name)) return false;
+    motors[rotor] = &log.column(name);
+  }
+  for (std::size_t i = w.begin; i < w.end; ++i)
+    if (std::all_of(motors.begin(), motors.end(), [&](auto* m) { return (*m)[s.row[i]] <= kIdle; })) return true;
+  return false;
+}
+
+/// Whether the vehicle goes somewhere: farther in half a second than hovers do.
+bool under_way(const Series& s, Stretch w) {
+  constexpr double kStill = 0.12, kOver = 0.5;  // m/s, s: as hovers are found for calibration (WindowOptions)
+  for (std::size_t a = w.begin, b = w.begin; b < w.end; ++b) {
+    while (s.t[b] - s.t[a] > kOver) ++a;
+    if (s.t[b] - s.t[a] > 0.8 * kOver && (s.p[b] - s.p[a]).norm() > kStill * (s.t[b] - s.t[a])) return true;
+  }
+  return false;
+}
+
+/// Nothing says what the vehicle was told or what its rotors gave: its own manoeuvres are then no residual.
+bool simulated(const Series& s) { return s.simulated_by_thrust || !s.a_nominal.empty(); }
+
+/// Whether it stands on, or may touch, what it stood on at first (recordings that say where that is).
+bool touches(const Series& s, const FlightLog& log, Stretch w) {
+  constexpr double kClear = 0.005;  // m
+  if (!log.has("stood_z_m")) return false;
+  double height = 0;
+  for (std::size_t i = w.begin; i < w.end; ++i)
+    height += (s.p[i].z() - log.column("stood_z_m")[s.row[i]]) / static_cast<double>(w.size());
+  return height < kClear;
+}
+
 /// Why a window is left out; null if it is good.
 const char* gate(const Series& s, const FlightLog& log, Stretch w) {
   std::size_t repeated = 0, full = 0;
@@ -54,6 +91,8 @@ const char* gate(const Series& s, const FlightLog& log, Stretch w) {
     if (!s.thrust_acc.empty()) thrust += s.thrust_acc[i] / static_cast<double>(w.size());
   }
   if ((high - low).maxCoeff() < 5e-4 || (!s.thrust_acc.empty() && thrust < 0.6 * kGravity)) return "perched";
+  if (rotors_rest(s, log, w) || touches(s, log, w)) return "perched";
+  if (!simulated(s) && !log.has("motor1") && under_way(s, w)) return "transit";
   if (log.has("thrust"))
     for (std::size_t i = w.begin; i < w.end; ++i) full += log.column("thrust")[i] >= 0.99 ? 1u : 0u;
   if (50 * full > w.size()) return "saturated";
@@ -207,7 +246,8 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kStray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
   row.p_W = mean_of(p), row.v_W = mean_of(v);
-  row.speed = mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); });
+  // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
+  row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
   row.R_WB = Mat3::Zero();
   if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
   row.yaw = std::atan2(row.R_WB(1, 0), row.R_WB(0, 0));
@@ -232,24 +272,25 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
 /// Means, ln variances and the tail; returns the detrended vertical residual.
 std::vector<double> Observer::put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end) {
   const Stretch w{begin, end};
+  const bool comparable = simulated(s) || !under_way(s, w);
   double tail = 0;
   std::vector<double> vertical;
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
     // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
-    put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
+    if (comparable) put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
     const auto x = detrended_values(w, residual);
     const auto [variance, samples] = spread(x);
     row.measured_variance[axis] = variance;
-    if (variance > 0 && samples > 2) {
+    if (comparable && variance > 0 && samples > 2) {
       const double own = ln_variance(samples);
       put(kVarX + a, std::log(variance / row.sigma[axis]) - ln_bias(samples), 1 / (own + kScatter2));
     }
     tail += excess_tail(x, 3) / 3;
     if (axis == 2) vertical = x;
   }
-  put(kTail, tail, 1);
+  if (comparable) put(kTail, tail, 1);
   return vertical;
 }
 

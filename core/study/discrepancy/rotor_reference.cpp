@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "core/study/discrepancy/estimate.hpp"
 
@@ -22,10 +23,8 @@ double student_of_four(double n) {
 /// Quantile 0.95 of F with 2 and n degrees: closed form.
 double f_of_two(double n) { return n / 2 * (std::pow(0.05, -2 / n) - 1); }
 
-double median(std::vector<double> x) {
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
+double mean(const std::vector<double>& x) {
+  return std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
 }
 
 using Contrast = Eigen::Array3d;  // yaw, a, b
@@ -58,7 +57,7 @@ std::vector<RotorContrasts> rotor_contrasts(const Observations& seen) {
       for (std::size_t r = 0; r < 4 && seen.weight[kMotor1][i] > 0; ++r) shares[r].push_back(seen.y[kMotor1 + r][i]);
     if (shares[0].empty()) continue;
     std::array<double, 4> s;
-    std::transform(shares.begin(), shares.end(), s.begin(), median);
+    std::transform(shares.begin(), shares.end(), s.begin(), mean);
     all.push_back({(s[0] - s[1] + s[2] - s[3]) / 4, (s[2] - s[0]) / 2, (s[3] - s[1]) / 2});
   }
   return all;
