@@ -42,7 +42,8 @@ Column decorrelated(const Column& column);
 /// Observations with the scatter of each channel (after `decorrelated`): within flights (σ_w²) and between them (σ_b²,
 /// a random intercept), by analysis of variance of what the accepted columns leave. V = diag(σ_w²/weight) + σ_b² 11ᵀ
 /// per flight and channel, and in the level means + σ_t² ZZᵀ, Z the body's two level axes: craft are trimmed anew
-/// before each flight. A window's mean weighs more where its own variance, shrunk towards its flight's, is small.
+/// before each flight. Where several flights make one unit (`Observations::first` of days), flights of a unit have
+/// σ_b², and units σ_u² beside it. A window's mean weighs more where its own variance, shrunk towards its flight's, is small.
 class Evidence {
  public:
   explicit Evidence(const Observations& seen);
@@ -79,7 +80,8 @@ class Evidence {
   Column y_;  // every channel, decorrelated
   std::array<std::vector<double>, kChannels> weight_;
   std::vector<Column> tilts_;  // Z; empty without attitude
-  std::array<double, kChannels> within_{}, between_{};
+  std::vector<std::size_t> flight_end_;  // per window, where its flight ends
+  std::array<double, kChannels> within_{}, between_{}, unit_{};
   double tilt_ = 0;  // σ_t²
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/discrepancy/gates.hpp"
 #include "core/study/discrepancy/rotor_channels.hpp"
 #include "core/study/discrepancy/series.hpp"
 #include "core/study/discrepancy/signals.hpp"
@@ -39,70 +40,6 @@ std::vector<Stretch> cut(const Series& s) {
     begin = end;
   }
   return windows;
-}
-
-/// Whether every rotor is told to stand still in some row: on the ground, or about to leave it.
-bool rotors_rest(const Series& s, const FlightLog& log, Stretch w) {
-  constexpr double kIdle = 0.05;  // of the full command
-  std::array<const std::vector<double>*, 4> motors{};
-  for (std::size_t rotor = 0; rotor < 4; ++rotor) {
-    const std::string name = "motor" + std::to_string(rotor + 1);
-    if (!log.has(name)) return false;
-    motors[rotor] = &log.column(name);
-  }
-  for (std::size_t i = w.begin; i < w.end; ++i)
-    if (std::all_of(motors.begin(), motors.end(), [&](auto* m) { return (*m)[s.row[i]] <= kIdle; })) return true;
-  return false;
-}
-
-/// Whether the vehicle goes somewhere: farther in half a second than hovers do.
-bool under_way(const Series& s, Stretch w) {
-  constexpr double kStill = 0.12, kOver = 0.5;  // m/s, s: as hovers are found for calibration (WindowOptions)
-  for (std::size_t a = w.begin, b = w.begin; b < w.end; ++b) {
-    while (s.t[b] - s.t[a] > kOver) ++a;
-    if (s.t[b] - s.t[a] > 0.8 * kOver && (s.p[b] - s.p[a]).norm() > kStill * (s.t[b] - s.t[a])) return true;
-  }
-  return false;
-}
-
-/// Nothing says what the vehicle was told or what its rotors gave: its own manoeuvres are then no residual.
-bool simulated(const Series& s) { return s.simulated_by_thrust || !s.a_nominal.empty(); }
-
-/// Whether it stands on, or may touch, what it stood on at first (recordings that say where that is).
-bool touches(const Series& s, const FlightLog& log, Stretch w) {
-  constexpr double kClear = 0.005;  // m
-  if (!log.has("stood_z_m")) return false;
-  double height = 0;
-  for (std::size_t i = w.begin; i < w.end; ++i)
-    height += (s.p[i].z() - log.column("stood_z_m")[s.row[i]]) / static_cast<double>(w.size());
-  return height < kClear;
-}
-
-/// Why a window is left out; null if it is good.
-const char* gate(const Series& s, const FlightLog& log, Stretch w) {
-  std::size_t repeated = 0, full = 0;
-  for (std::size_t i = w.begin + 1; i < w.end; ++i)
-    repeated += s.p[i] == s.p[i - 1] && s.a[i] == s.a[i - 1] && s.v[i] == s.v[i - 1] ? 1u : 0u;
-  if (20 * repeated > w.size()) return "frozen";
-  Vec3 low = s.p[w.begin], high = low;
-  double thrust = 0;
-  for (std::size_t i = w.begin; i < w.end; ++i) {
-    low = low.cwiseMin(s.p[i]), high = high.cwiseMax(s.p[i]);
-    if (!s.thrust_acc.empty()) thrust += s.thrust_acc[i] / static_cast<double>(w.size());
-  }
-  if ((high - low).maxCoeff() < 5e-4 || (!s.thrust_acc.empty() && thrust < 0.6 * kGravity)) return "perched";
-  if (rotors_rest(s, log, w) || touches(s, log, w)) return "perched";
-  if (!simulated(s) && !log.has("motor1") && under_way(s, w)) return "transit";
-  if (log.has("thrust"))
-    for (std::size_t i = w.begin; i < w.end; ++i) full += log.column("thrust")[i] >= 0.99 ? 1u : 0u;
-  if (50 * full > w.size()) return "saturated";
-  if (s.has_velocity) {  // position and velocity must tell the same story
-    const double time = s.t[w.end - 1] - s.t[w.begin];
-    Vec3 flown = Vec3::Zero();
-    for (std::size_t i = w.begin + 1; i < w.end; ++i) flown += 0.5 * (s.v[i] + s.v[i - 1]) * (s.t[i] - s.t[i - 1]);
-    if (((s.p[w.end - 1] - s.p[w.begin] - flown) / time).norm() > 0.15) return "inconsistent";
-  }
-  return nullptr;
 }
 
 template <typename T, typename F>
@@ -208,7 +145,7 @@ void Observer::add(const FlightLog& log) {
   if (s.size() >= kFewest) {
     const auto rotors = rotor_phases(log, s);
     for (const Stretch w : cut(s)) {
-      if (const char* why = gate(s, log, w)) {
+      if (const char* why = gate(s, log, w.begin, w.end)) {
         ++seen_.gated_out[why];
         continue;
       }
@@ -272,7 +209,7 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, std::size_t be
 /// Means, ln variances and the tail; returns the detrended vertical residual.
 std::vector<double> Observer::put_moments(WindowRow& row, const Series& s, std::size_t begin, std::size_t end) {
   const Stretch w{begin, end};
-  const bool comparable = simulated(s) || !under_way(s, w);
+  const bool comparable = simulated(s) || !under_way(s, begin, end);
   double tail = 0;
   std::vector<double> vertical;
   for (int axis = 0; axis < 3; ++axis) {

@@ -7,16 +7,11 @@
 #include <optional>
 #include <sstream>
 
+#include "core/study/discrepancy/page_sections.hpp"
 #include "core/study/page.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
 
 /// A name of the catalogue as people write it: "wall attraction"; a parameter: "A, m/s²".
 std::string spoken(std::string name) {
@@ -76,7 +71,7 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
     case Verdict::unknown_structure:
       return "The simulation is wrong along " + result.unknown.front().along + ", and no known cause fits" + of + ".";
     case Verdict::insufficient:
-      return "Fewer than 10 flights do not warrant a name" + of + ".";
+      return "Too little to name a cause: " + too_few(seen);
     default:
       return "Nothing found that the simulation gets wrong" + of + ".";
   }
@@ -128,10 +123,6 @@ tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Obse
   return draw(script.str(), Format::svg, 860, 380);
 }
 
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + escaped(name) + "</th><td>" + escaped(value) + "</td></tr>\n";
-}
-
 std::string figures(const NamedCause& cause) {
   const auto& g = cause.gain;
   std::string text = "<table>\n";
@@ -179,47 +170,6 @@ std::string consequence_section(const Consequence& c) {
     line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
   }
   return text + "</table>\n</section>\n";
-}
-
-std::string height_section(const calibrate::HeightEffect& h) {
-  const auto ratio = [](const calibrate::Estimate& e) {
-    return "×" + number(e.value) + "  [" + number(e.ci95.low) + ", " + number(e.ci95.high) + "] at 95 %";
-  };
-  std::string text =
-      "<section><h2>Vertical variance by height and plate, day and speed held fixed</h2>\n<table>\n" +
-      row(number(h.low_m) + " m over the surface against " + number(h.high_m) + " m", ratio(h.low_over_high));
-  if (h.ceiling.value > 0) text += row("Under a plate against without", ratio(h.ceiling));
-  return text +
-         row("From", std::to_string(h.windows) + " windows of " + std::to_string(h.flights) + " flights on " +
-                         std::to_string(h.days) + " days") +
-         "</table>\n</section>\n";
-}
-
-/// What the motor shares say against those of sound flights.
-std::string rotor_sentence(const RotorVerdict& v) {
-  using Kind = RotorVerdict::Kind;
-  const std::string rotor = "rotor " + std::to_string(v.rotor);
-  switch (v.kind) {
-    case Kind::as_sound:
-      return "Not told from the sound flights.";
-    case Kind::propeller_damage:
-      return "The propeller of " + rotor + " is damaged: it needs " + number(100 * v.d) + " % [" + number(100 * v.low) +
-             ", " + number(100 * v.high) + "] more of its command.";
-    case Kind::payload:
-      return "An off-centre weight, no damaged propeller.";
-    case Kind::cannot_tell:
-      return "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
-    default:
-      return "Differs from the sound flights as neither a damaged propeller nor a weight does.";
-  }
-}
-
-std::string rotor_section(const RotorVerdict& v) {
-  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(rotor_sentence(v)) + "</p>\n<table>\n" +
-         row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
-         row("Twist, which a weight does not give, t", number(v.t_yaw)) +
-         row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
-         "</table>\n</section>\n";
 }
 
 /// Whether what the accepted causes leave depends on something.

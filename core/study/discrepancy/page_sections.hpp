@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "core/study/calibrate/height_effect.hpp"
+#include "core/study/discrepancy/observation.hpp"
+#include "core/study/discrepancy/rotor_reference.hpp"
+
+namespace backwash::study::discrepancy {
+
+/// Three digits.
+std::string number(double value);
+/// A row of a two-column table; escapes both.
+std::string row(const std::string& name, const std::string& value);
+
+/// Why no cause is named: how many flights (or groups of them) have good windows, how many are needed, and what was
+/// left out of the others.
+std::string too_few(const Observations& seen);
+
+/// What the motor shares say against those of sound flights, in a sentence, and as a section of the page.
+std::string rotor_sentence(const RotorVerdict& verdict);
+std::string rotor_section(const RotorVerdict& verdict);
+
+/// Ratios of the vertical variance by height and plate, of all windows and of hovers alone.
+std::string height_section(const calibrate::HeightEffects& effects);
+
+}  // namespace backwash::study::discrepancy
