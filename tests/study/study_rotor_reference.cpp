@@ -67,7 +67,7 @@ TEST(RotorsAgainstReference, NameADamagedPropellerButNoWeightAndNoSoundVehicle) 
   EXPECT_GE(named_weight, 0.9 * kTrials);
   EXPECT_GE(sound_in_set, 0.9 * kTrials);
   EXPECT_LE(sound[Kind::propeller_damage], 0.03 * kTrials);
-  EXPECT_EQ(sound[Kind::as_sound], 0) << "6 % would not show among flights that scatter so";
+  EXPECT_LE(sound[Kind::as_sound], 0.1 * kTrials) << "6 % would not show among flights that scatter so";
   EXPECT_GE(quiet[Kind::as_sound], 0.9 * kTrials);
 }
 
@@ -95,18 +95,18 @@ TEST(RotorsAgainstReference, NameTheSmallestDamageThatTheyPromiseAboutFourTimesI
   }
 }
 
-/// What the sound flights' few sessions cost: seven flights of three sessions, yaw scattering 0.0225 between and 0.008
-/// within them, pairs 0.04 and 0.01 (as recorded by CrazyPAD), judged against a fourth.
-TEST(RotorsAgainstReference, CallASoundVehicleDamagedSeldomEvenWhereItsReferenceIsOfThreeSessions) {
+/// What the sound flights' few sessions cost: seven flights of three sessions, yaw scattering 0.025 between and 0.011
+/// within them, pairs 0.045 and 0.02 (about as recorded by CrazyPAD), judge a fourth. Nominal is less than 0.05.
+TEST(RotorsAgainstReference, CallASoundVehicleDamagedMoreOftenWhereTheReferenceIsOfThreeSessions) {
   std::mt19937 rng(5);
   std::normal_distribution<double> normal;
   int damaged = 0, other = 0;
   constexpr int kTrials = 2000;
   const auto session = [&](int count) {
-    const RotorContrasts at{0.0225 * normal(rng), 0.04 * normal(rng), 0.04 * normal(rng)};
+    const RotorContrasts at{0.025 * normal(rng), 0.045 * normal(rng), 0.045 * normal(rng)};
     std::vector<RotorContrasts> all;
     for (int i = 0; i < count; ++i)
-      all.push_back({at.yaw + 0.008 * normal(rng), at.a + 0.01 * normal(rng), at.b + 0.01 * normal(rng)});
+      all.push_back({at.yaw + 0.011 * normal(rng), at.a + 0.02 * normal(rng), at.b + 0.02 * normal(rng)});
     return all;
   };
   for (int k = 0; k < kTrials; ++k) {
@@ -118,8 +118,9 @@ TEST(RotorsAgainstReference, CallASoundVehicleDamagedSeldomEvenWhereItsReference
   }
   std::printf("seven flights of three sessions: called damaged %.3f, not as sound %.3f\n", damaged / double{kTrials},
               other / double{kTrials});
-  EXPECT_LT(damaged, 0.06 * kTrials);
-  EXPECT_LT(other, 0.4 * kTrials);
+  EXPECT_GT(damaged, 0.02 * kTrials);
+  EXPECT_LT(damaged, 0.1 * kTrials);
+  EXPECT_LT(other, 0.35 * kTrials);
 }
 
 TEST(RotorsAgainstReference, NeedFourSoundFlights) {

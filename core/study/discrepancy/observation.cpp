@@ -215,8 +215,10 @@ std::vector<double> Observer::put_moments(WindowRow& row, const Series& s, std::
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
-    // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
-    if (comparable) put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
+    // Unsimulated, a mean would be the velocity's change and no push. It scatters with the modelled variance; the
+    // constant stands for the accelerometer's noise.
+    if (simulated(s))
+      put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
     const auto x = detrended_values(w, residual);
     const auto [variance, samples] = spread(x);
     row.measured_variance[axis] = variance;
