@@ -73,7 +73,9 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
     case Verdict::insufficient:
       return "Too little to name a cause: " + too_few(seen);
     default:
-      return "Nothing found that the simulation gets wrong" + of + ".";
+      return "Nothing found that the simulation gets wrong" + of + ", with " +
+             std::to_string(result.not_tested.size()) + " of " + std::to_string(cause_names().size()) +
+             " causes not tested.";
   }
 }
 
@@ -189,12 +191,16 @@ std::string remaining_section(const std::vector<Dependence>& all) {
 
 tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
                                                 const PageContext& context) {
-  std::string page = "<h1>What the simulation gets wrong</h1>\n";
+  std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
+  if (context.height) beside = height_sentence(*context.height);
+  if (!beside.empty()) beside.insert(0, " ");
   page += "<p class=\"context\">Map " + escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
           escaped(context.vehicle) + ", model " + escaped(context.model) + "; backwash " + escaped(context.version) +
           "</p>\n<p class=\"verdict " +
-          (result.verdict == Verdict::nothing_found || result.verdict == Verdict::cause_found ? "passed" : "failed") +
-          "\">" + escaped(verdict_sentence(result, seen)) +
+          (result.verdict == Verdict::cause_found || (result.verdict == Verdict::nothing_found && beside.empty())
+               ? "passed"
+               : "failed") +
+          "\">" + escaped(verdict_sentence(result, seen)) + escaped(beside) +
           (context.rotors ? " Motor shares: " + escaped(rotor_sentence(*context.rotors)) : "") + "</p>\n";
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
@@ -203,7 +209,11 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
             escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
   }
   if (context.height) page += height_section(*context.height);
-  if (context.rotors) page += rotor_section(*context.rotors);
+  if (context.rotors) {
+    const auto section = rotor_section(*context.rotors);
+    if (!section) return tl::make_unexpected(section.error());
+    page += *section;
+  }
   if (context.consequence) page += consequence_section(*context.consequence);
   if (!result.unknown.empty()) {
     page += "<section><h2>Without a name</h2>\n<table>\n";

@@ -2,6 +2,7 @@
 #include "core/study/discrepancy/page_sections.hpp"
 
 #include <cstdio>
+#include <sstream>
 
 #include "core/study/discrepancy/study.hpp"
 #include "core/study/page.hpp"
@@ -72,14 +73,33 @@ std::string rotor_sentence(const RotorVerdict& v) {
   }
 }
 
-std::string rotor_section(const RotorVerdict& v) {
-  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(rotor_sentence(v)) + "</p>\n<table>\n" +
-         row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
+tl::expected<std::string, PlotError> rotor_section(const RotorVerdict& v) {
+  std::ostringstream script;
+  script << "$each << EOD\n";
+  for (std::size_t r = 0; r < v.each.size(); ++r)
+    script << r + 1 << ' ' << 100 * v.each[r].d << ' ' << 100 * v.each[r].low << ' ' << 100 * v.each[r].high << '\n';
+  script << "EOD\nset xrange [0.5:4.5]\nset xtics ('rotor 1' 1, 'rotor 2' 2, 'rotor 3' 3, 'rotor 4' 4)\n"
+         << "set ylabel 'command needed more, %'\nset grid y\nset key top left\nset xzeroaxis lt 1 lc rgb '#888888'\n"
+         << "plot " << 100 * v.minimum << " with lines dt 2 lw 2 lc rgb '#c0561d' title 'named four times in five', "
+         << "$each using 1:2:3:4 with yerrorbars lw 2 pt 7 lc rgb '#1f6f9f' title 'if this rotor alone, 95 %'\n";
+  const auto drawn = draw(script.str(), Format::svg, 860, 300);
+  if (!drawn) return drawn;
+  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(rotor_sentence(v)) + "</p>\n" + *drawn +
+         "<table>\n" + row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
          row("Smallest that is named with 80 % power", percent(v.minimum)) +
          row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
          row("Twist, which a weight does not give, t", number(v.t_yaw)) +
          row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
          "</table>\n</section>\n";
+}
+
+std::string height_sentence(const calibrate::HeightEffects& effects) {
+  const auto& h = effects.hovers ? *effects.hovers : effects.all;
+  std::string text;
+  const auto differs = [](const calibrate::Estimate& e) { return e.value > 0 && (e.ci95.low > 1 || e.ci95.high < 1); };
+  if (differs(h.bins)) text += " near the surface " + ratio(h.bins);
+  if (differs(h.ceiling)) text += std::string(text.empty() ? "" : ",") + " under a plate " + ratio(h.ceiling);
+  return text.empty() ? text : "Vertical variance of hovers, day and speed held fixed:" + text + ".";
 }
 
 std::string height_section(const calibrate::HeightEffects& effects) {

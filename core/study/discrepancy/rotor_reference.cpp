@@ -78,17 +78,17 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
 
   const double degrees = n - 1, t975 = student_975(degrees), needed = student_of_four(degrees);
   using Kind = RotorVerdict::Kind;
-  RotorVerdict v{Kind::as_sound, {"sound"}, 0, 0, 0, 0, t[0], t[1], t[2], 0, needed, 0};
+  RotorVerdict v{Kind::as_sound, {"sound"}, 0, 0, 0, 0, {}, t[0], t[1], t[2], 0, needed, 0};
   double left = 0;
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
     const Contrast unit = damaged(rotor) / error;
     const double size = std::sqrt(unit.square().sum()), t_d = (unit * t).sum() / size;
     const double named = std::max(powerful(needed, degrees) / size, powerful(t975, degrees) / std::abs(unit[0]));
     v.minimum = std::max(v.minimum, std::expm1(named));
-    if (rotor > 0 && t_d <= v.t_d) continue;
     const double half = t975 / size;
-    v.rotor = rotor + 1, v.t_d = t_d, v.d = std::expm1(t_d / size);
-    v.low = std::expm1(t_d / size - half), v.high = std::expm1(t_d / size + half);
+    v.each[rotor] = {std::expm1(t_d / size), std::expm1(t_d / size - half), std::expm1(t_d / size + half)};
+    if (rotor > 0 && t_d <= v.t_d) continue;
+    v.rotor = rotor + 1, v.t_d = t_d, v.d = v.each[rotor].d, v.low = v.each[rotor].low, v.high = v.each[rotor].high;
     left = t.square().sum() - t_d * t_d;
   }
   constexpr double kOfInterest = 0.06;  // README.md, "Effect sizes"

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,11 @@ struct RotorContrasts {
 /// motor commands are left out.
 std::vector<RotorContrasts> rotor_contrasts(const Observations& seen);
 
+/// Share of thrust command that a rotor needs more, and its 95 % interval.
+struct RotorNeed {
+  double d = 0, low = 0, high = 0;
+};
+
 /// What a group of flights says of its rotors against flights of the same vehicle known to be sound.
 struct RotorVerdict {
   enum class Kind {
@@ -31,7 +37,8 @@ struct RotorVerdict {
   } kind;
   std::vector<std::string> set;        ///< all that the flights do not tell apart: sound, propeller_damage, payload
   std::size_t rotor = 0;               ///< 1 … 4, the damage that fits best
-  double d = 0, low = 0, high = 0;     ///< share of thrust command that it needs more, 95 %
+  double d = 0, low = 0, high = 0;     ///< share of thrust command that `rotor` needs more, 95 %
+  std::array<RotorNeed, 4> each;       ///< of every rotor, if it is that one alone
   double t_yaw = 0, t_a = 0, t_b = 0;  ///< differences in standard errors of a further flight
   double t_d = 0, needed = 0;          ///< of d, and what it must pass: 5 % over the four rotors
   double minimum = 0;                  ///< least d that would be named propeller_damage with 80 % power
