@@ -200,8 +200,8 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
           (result.verdict == Verdict::cause_found || (result.verdict == Verdict::nothing_found && beside.empty())
                ? "passed"
                : "failed") +
-          "\">" + escaped(verdict_sentence(result, seen)) + escaped(beside) +
-          (context.rotors ? " Motor shares: " + escaped(rotor_sentence(*context.rotors)) : "") + "</p>\n";
+          "\">" + (context.rotors ? escaped(rotor_sentence(*context.rotors)) + " " : "") +
+          escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());

@@ -79,7 +79,8 @@ tl::expected<std::string, PlotError> rotor_section(const RotorVerdict& v) {
   for (std::size_t r = 0; r < v.each.size(); ++r)
     script << r + 1 << ' ' << 100 * v.each[r].d << ' ' << 100 * v.each[r].low << ' ' << 100 * v.each[r].high << '\n';
   script << "EOD\nset xrange [0.5:4.5]\nset xtics ('rotor 1' 1, 'rotor 2' 2, 'rotor 3' 3, 'rotor 4' 4)\n"
-         << "set ylabel 'command needed more, %'\nset grid y\nset key top left\nset xzeroaxis lt 1 lc rgb '#888888'\n"
+         << "set ylabel 'command needed more, %'\nset grid y\nset key outside top center horizontal\nset xzeroaxis lt "
+            "1 lc rgb '#888888'\n"
          << "plot " << 100 * v.minimum << " with lines dt 2 lw 2 lc rgb '#c0561d' title 'named four times in five', "
          << "$each using 1:2:3:4 with yerrorbars lw 2 pt 7 lc rgb '#1f6f9f' title 'if this rotor alone, 95 %'\n";
   const auto drawn = draw(script.str(), Format::svg, 860, 300);
