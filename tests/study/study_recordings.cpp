@@ -77,6 +77,17 @@ TEST(StudyGates, CompareAPassOnlyWhereSomethingSimulatesIt) {
   EXPECT_FALSE(shares.measured(kVarZ));
 }
 
+TEST(StudyGates, GustsOfAHoverAreNoSpeedWithoutSetPoints) {
+  auto hover = flown(0, 0.5);
+  std::mt19937 rng(4);
+  std::normal_distribution<double> gust(0, 0.1);
+  for (const char* v : {"vx_mps", "vy_mps", "vz_mps"})
+    for (double& value : hover.columns[v]) value = gust(rng);
+  const auto seen = observed(hover);
+  ASSERT_EQ(seen.windows.size(), 4u);
+  for (const auto& w : seen.windows) EXPECT_LT(w.speed, 0.05);  // the mean of |v| is 0.16
+}
+
 TEST(TooFew, SaysHowManyMoreAndWhatWasLeftOut) {
   auto low = flown(0, 0.503);
   add_column(low, "stood_z_m", 0.5);
