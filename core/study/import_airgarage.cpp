@@ -97,7 +97,7 @@ tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
   for (std::size_t i = 0; i < t.size(); ++i)
     p.emplace_back(raw->column("x")[i], raw->column("y")[i], raw->column("z")[i]);
   const std::vector<double> at_first(raw->column("z").begin(), raw->column("z").begin() + 50);
-  const double surface = median(at_first) - kMarkerHeight;
+  const double stood = median(at_first);
   const std::string name = std::filesystem::path(path).stem().string();
   const double ceiling = plate_above(name);
   const double day =
@@ -114,7 +114,8 @@ tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
     log.t_s.push_back(t[i]);
     add(log, "", "_m", p[i]), add(log, "v", "_mps", f.v), add(log, "a", "_mps2", f.a);
     for (const char* q : {"qw", "qx", "qy", "qz"}) log.columns[q].push_back(raw->column(q)[i]);
-    log.columns["surface_z_m"].push_back(surface);
+    log.columns["stood_z_m"].push_back(stood);
+    log.columns["surface_z_m"].push_back(stood - kMarkerHeight);
     log.columns["ceiling"].push_back(ceiling);
     log.columns["day"].push_back(day);
   }

@@ -12,8 +12,6 @@ namespace {
 
 using namespace study::calibrate;
 
-constexpr double kReturnLength = 0.05;  // m, about two rotor radii of the small vehicles recorded without a map
-
 /// A floor at z = 0 with free space above, 0.04 m voxels.
 map::OccupancyGrid flat_floor() {
   constexpr double kEdge = 0.04, kHalf = 2.4, kTop = 2.0;
@@ -26,25 +24,6 @@ map::OccupancyGrid flat_floor() {
 
 double value_of(const study::FlightLog& log, const std::string& column, double otherwise) {
   return log.has(column) && !log.column(column).empty() ? log.column(column).front() : otherwise;
-}
-
-/// Rows of the height effect; windows less than 5 mm above where it stood may touch the ground.
-void add_rows(std::vector<HeightRow>& rows, const study::FlightWindows& flight, const study::FlightLog& log,
-              std::size_t number) {
-  const double ceiling = value_of(log, "ceiling", 0), surface = value_of(log, "surface_z_m", 0);
-  if (ceiling < 0) return;
-  constexpr double kMarker = 0.027, kLeast = 0.005;
-  for (const auto& w : flight.windows) {
-    const double height = w.p_W.z() - surface - kMarker;
-    if (height < kLeast || !(w.variance.z() > 0) || !(w.speed_mps > 0)) continue;
-    rows.push_back({number, static_cast<int>(value_of(log, "day", 0)), std::log(w.variance.z()), std::log(w.speed_mps),
-                    height, ceiling > 0});
-  }
-}
-
-std::optional<HeightEffect> effect_of(const std::vector<HeightRow>& rows, std::uint64_t seed) {
-  if (rows.size() < 10) return std::nullopt;
-  return height_effect(rows, 0.01, 0.8, kReturnLength, 500, seed);
 }
 
 study::WindowOptions mapless_windows(const Model& gates) {
@@ -106,7 +85,10 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
       if (std::find(campaign.not_tested.begin(), campaign.not_tested.end(), what) == campaign.not_tested.end())
         campaign.not_tested.push_back(what);
     }
-    if (mapless) add_rows(rows, *flight, log, number);
+    if (mapless) {
+      const auto more = height_rows(*flight, log, number);
+      rows.insert(rows.end(), more.begin(), more.end());
+    }
     for (auto& w : flight->windows) {
       if (mapless) w.p_W = {0, 0, std::max(0.02, w.p_W.z() - value_of(log, "surface_z_m", 0))};
     }
@@ -116,20 +98,21 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
     campaign.data.place.push_back(place), campaign.logs.push_back(file.path);
   }
   campaign.signal = study::to_string(*signal), campaign.pushes = signal == study::Signal::commanded;
-  campaign.height = effect_of(rows, seed);
+  if (const auto effects = height_effects(rows, seed)) campaign.height = effects->all;
   return campaign;
 }
 
-std::optional<HeightEffect> read_height_effect(const std::vector<std::string>& logs, const Model& gates,
-                                               std::uint64_t seed) {
+std::optional<HeightEffects> read_height_effects(const std::vector<std::string>& logs, const Model& gates,
+                                                 std::uint64_t seed) {
   std::vector<HeightRow> rows;
   for (std::size_t k = 0; k < logs.size(); ++k) {
     const auto log = read_table(logs[k], "t_s");
     const auto flight = study::flight_windows(log, std::nullopt, mapless_windows(gates), logs[k]);
     if (!flight) throw Failure(kBadData, flight.error().message);
-    add_rows(rows, *flight, log, k);
+    const auto more = height_rows(*flight, log, k);
+    rows.insert(rows.end(), more.begin(), more.end());
   }
-  return effect_of(rows, seed);
+  return height_effects(rows, seed);
 }
 
 }  // namespace backwash::services

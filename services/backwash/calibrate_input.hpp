@@ -42,7 +42,7 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
                        std::uint64_t seed);
 
 /// What logs flown without a map say of height and ceiling, as read_campaign does; nothing from fewer than 10 windows.
-std::optional<study::calibrate::HeightEffect> read_height_effect(const std::vector<std::string>& logs,
-                                                                 const Model& gates, std::uint64_t seed);
+std::optional<study::calibrate::HeightEffects> read_height_effects(const std::vector<std::string>& logs,
+                                                                   const Model& gates, std::uint64_t seed);
 
 }  // namespace backwash::services

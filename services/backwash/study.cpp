@@ -131,10 +131,10 @@ std::optional<discrepancy::RotorVerdict> against_reference(const Options& option
 
 /// Ratios of the vertical variance by height and plate, day and speed held fixed, of recordings that say what they
 /// stood on and under (`backwash import airgarage`).
-std::optional<study::calibrate::HeightEffect> height_effect(const Options& options, const Model& model,
-                                                            const discrepancy::Observations& seen) {
+std::optional<study::calibrate::HeightEffects> height_effects(const Options& options, const Model& model,
+                                                              const discrepancy::Observations& seen) {
   if (!options.map.empty() || !seen.has("ceiling")) return std::nullopt;
-  return read_height_effect(options.logs, model, options.seed);
+  return read_height_effects(options.logs, model, options.seed);
 }
 
 int run(const Options& options) {
@@ -156,7 +156,7 @@ int run(const Options& options) {
   if (!left.empty())
     for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
-  const auto height = height_effect(options, model, seen);
+  const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
   std::optional<discrepancy::RotorVerdict> rotors;
   if (!options.reference.empty()) {

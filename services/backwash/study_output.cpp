@@ -3,6 +3,8 @@
 
 #include <cstdio>
 
+#include "core/study/discrepancy/page_sections.hpp"
+
 namespace backwash::services {
 
 namespace discrepancy = study::discrepancy;
@@ -33,6 +35,17 @@ Json to_json(const discrepancy::NamedCause& cause) {
             {"variance_coverage_before", g.coverage_before},
             {"variance_coverage_after", g.coverage_after}}},
           {"separate_by", separate}};
+}
+
+void print_text(const char* of, const study::calibrate::HeightEffect& h) {
+  const auto ratio = [](const char* name, const study::calibrate::Estimate& e) {
+    if (e.value > 0) std::printf("  %s: x%.2f [%.2f, %.2f]\n", name, e.value, e.ci95.low, e.ci95.high);
+  };
+  std::printf("vertical variance, day and speed held fixed, %s: %zu windows, %zu flights, %zu days\n", of, h.windows,
+              h.flights, h.days);
+  ratio("near the surface against far from it, by the law of height", h.low_over_high);
+  ratio("the same by heights within a factor of two", h.bins);
+  ratio("under a plate against without", h.ceiling);
 }
 
 Json to_json(const discrepancy::Outcome& o) {
@@ -82,32 +95,44 @@ Json to_json(const discrepancy::Consequence& c) {
 }
 
 Json to_json(const discrepancy::RotorVerdict& v) {
-  using Kind = discrepancy::RotorVerdict::Kind;
-  Json json = {{"verdict", discrepancy::to_string(v.kind)},
-               {"t", {{"yaw", v.t_yaw}, {"pair_1_3", v.t_a}, {"pair_2_4", v.t_b}, {"damage", v.t_d}}},
-               {"needed", v.needed}};
-  if (v.kind == Kind::propeller_damage || v.kind == Kind::cannot_tell)
-    json.update({{"rotor", v.rotor}, {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}}});
-  return json;
+  return {{"verdict", discrepancy::to_string(v.kind)},
+          {"set", v.set},
+          {"rotor", v.rotor},
+          {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}},
+          {"minimum_detectable", {{"d", v.minimum}}},
+          {"t", {{"yaw", v.t_yaw}, {"pair_1_3", v.t_a}, {"pair_2_4", v.t_b}, {"damage", v.t_d}}},
+          {"needed", v.needed}};
 }
 
-Json to_json(const study::calibrate::HeightEffect& h) {
+Json to_json(const study::calibrate::HeightEffects& effects) {
   const auto ratio = [](const study::calibrate::Estimate& e) {
     return Json{{"value", e.value}, {"ci95", {e.ci95.low, e.ci95.high}}};
   };
-  Json json = {{"low_m", h.low_m},     {"high_m", h.high_m},   {"variance_ratio_z", ratio(h.low_over_high)},
-               {"windows", h.windows}, {"flights", h.flights}, {"days", h.days}};
-  if (h.ceiling.value > 0) json["plate_variance_ratio_z"] = ratio(h.ceiling);
+  const auto one = [&](const study::calibrate::HeightEffect& h) {
+    Json json = {{"low_m", h.low_m},
+                 {"high_m", h.high_m},
+                 {"variance_ratio_z", ratio(h.low_over_high)},
+                 {"windows", h.windows},
+                 {"flights", h.flights},
+                 {"low_flights", h.low_flights},
+                 {"high_flights", h.high_flights},
+                 {"days", h.days},
+                 {"sd_ln_variance", {{"within_flights", h.within}, {"between_flights", h.between}}}};
+    if (h.bins.value > 0) json["variance_ratio_z_without_law"] = ratio(h.bins);
+    if (h.ceiling.value > 0) json["plate_variance_ratio_z"] = ratio(h.ceiling);
+    return json;
+  };
+  Json json = one(effects.all);
+  if (effects.hovers) json["hovers"] = one(*effects.hovers);
   return json;
 }
 
 void print_text(const discrepancy::StudyResult& result, const discrepancy::Observations& seen,
                 const std::optional<discrepancy::RotorVerdict>& rotors,
-                const std::optional<study::calibrate::HeightEffect>& height) {
+                const std::optional<study::calibrate::HeightEffects>& height) {
   std::printf("%s: %zu flights, %zu windows\n", discrepancy::to_string(result.verdict), seen.flights,
               seen.windows.size());
-  if (result.verdict == discrepancy::Verdict::insufficient)
-    std::printf("fewer than 10 flights with good windows do not warrant a name; fly more\n");
+  if (result.verdict == discrepancy::Verdict::insufficient) std::printf("%s\n", discrepancy::too_few(seen).c_str());
   for (const auto& cause : result.causes) {
     std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause.c_str(),
                 cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
@@ -124,17 +149,12 @@ void print_text(const discrepancy::StudyResult& result, const discrepancy::Obser
     if (d.found())
       std::printf("what remains in %s depends on %s, p %.4f (Holm)\n", d.group.c_str(), d.regressor.c_str(), d.p_holm);
   for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
-  const auto ratio = [](const char* name, const study::calibrate::Estimate& e) {
-    std::printf("vertical variance %s: x%.2f [%.2f, %.2f], day and speed held fixed\n", name, e.value, e.ci95.low,
-                e.ci95.high);
-  };
-  if (height) {
-    ratio("near the surface against far from it", height->low_over_high);
-    if (height->ceiling.value > 0) ratio("under a plate against without", height->ceiling);
+  if (height) print_text("hovers and passes", height->all);
+  if (height && height->hovers) print_text("hovers", *height->hovers);
+  if (rotors) {
+    std::printf("rotors against the reference flights: %s\n", discrepancy::rotor_sentence(*rotors).c_str());
+    std::printf("  t of damage %.1f, needed %.1f; of yaw %.1f\n", rotors->t_d, rotors->needed, rotors->t_yaw);
   }
-  if (rotors)
-    std::printf("rotors against the reference flights: %s (t of damage %.1f, needed %.1f; of yaw %.1f)\n",
-                discrepancy::to_string(rotors->kind), rotors->t_d, rotors->needed, rotors->t_yaw);
 }
 
 }  // namespace backwash::services

@@ -15,10 +15,10 @@ namespace backwash::services {
 Json to_json(const study::discrepancy::StudyResult& result, const study::discrepancy::Observations& seen);
 Json to_json(const study::discrepancy::Consequence& consequence);
 Json to_json(const study::discrepancy::RotorVerdict& verdict);
-Json to_json(const study::calibrate::HeightEffect& height);
+Json to_json(const study::calibrate::HeightEffects& height);
 /// The same for people, on stdout.
 void print_text(const study::discrepancy::StudyResult& result, const study::discrepancy::Observations& seen,
                 const std::optional<study::discrepancy::RotorVerdict>& rotors,
-                const std::optional<study::calibrate::HeightEffect>& height);
+                const std::optional<study::calibrate::HeightEffects>& height);
 
 }  // namespace backwash::services

@@ -85,6 +85,8 @@ std::optional<std::string> why_not_tested(const Form& form, const Observations& 
   for (const auto& column : form.columns(seen.windows, form.scales.front()))
     if (std::any_of(column.parts.begin(), column.parts.end(), [&](auto& p) { return seen.measured(p.channel); }))
       return std::nullopt;
+  if (!(seen.has("thrust") && seen.has("attitude")) && !seen.has("setpoints"))
+    return "without thrust and attitude or set-points no push shows, and other effects in hover only";
   return "no window measures it";
 }
 

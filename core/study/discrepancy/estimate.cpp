@@ -244,7 +244,8 @@ struct Family {
     const double wide = student_975(static_cast<double>(members.front().normal.b.size()) - 1) / kNormal975;
     std::vector<Estimate> all;
     for (std::size_t k = 0; k < columns.size(); ++k) {
-      const double unknowable = k == 0 ? shapes[0].unknowable(evidence.seen()) / std::sqrt(3.0) : 0.0;  // any value alike
+      const double unknowable =
+          k == 0 ? shapes[0].unknowable(evidence.seen()) / std::sqrt(3.0) : 0.0;  // any value alike
       std::vector<Guess> guesses;
       for (const auto& m : members) {
         const auto i = static_cast<Eigen::Index>(k);

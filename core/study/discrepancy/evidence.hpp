@@ -42,7 +42,9 @@ Column decorrelated(const Column& column);
 /// Observations with the scatter of each channel (after `decorrelated`): within flights (σ_w²) and between them (σ_b²,
 /// a random intercept), by analysis of variance of what the accepted columns leave. V = diag(σ_w²/weight) + σ_b² 11ᵀ
 /// per flight and channel, and in the level means + σ_t² ZZᵀ, Z the body's two level axes: craft are trimmed anew
-/// before each flight. A window's mean weighs more where its own variance, shrunk towards its flight's, is small.
+/// before each flight. Where several flights make one unit (`Observations::first` of days), flights of a unit have
+/// σ_b², and units σ_u² beside it. A window's mean weighs more where its own variance, shrunk towards its flight's, is
+/// small.
 class Evidence {
  public:
   explicit Evidence(const Observations& seen);
@@ -64,6 +66,7 @@ class Evidence {
   bool measured(Channel c, std::size_t window) const { return weight_[c][window] > 0; }
   double within(Channel c) const { return within_[c]; }
   double between(Channel c) const { return between_[c]; }
+  double between_units(Channel c) const { return unit_[c]; }  ///< of several flights each; 0 where a unit is a flight
 
  private:
   /// XᵀV⁻¹X of each flight, X the columns and last y.
@@ -78,8 +81,9 @@ class Evidence {
   const Observations* seen_;
   Column y_;  // every channel, decorrelated
   std::array<std::vector<double>, kChannels> weight_;
-  std::vector<Column> tilts_;  // Z; empty without attitude
-  std::array<double, kChannels> within_{}, between_{};
+  std::vector<Column> tilts_;            // Z; empty without attitude
+  std::vector<std::size_t> flight_end_;  // per window, where its flight ends
+  std::array<double, kChannels> within_{}, between_{}, unit_{};
   double tilt_ = 0;  // σ_t²
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "core/study/discrepancy/gates.hpp"
 #include "core/study/discrepancy/instrument.hpp"
 #include "core/study/discrepancy/rotor_channels.hpp"
 #include "core/study/discrepancy/series.hpp"
@@ -141,7 +142,8 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, Stretch w) {
   row.p_W = mean_of(p), row.v_W = mean_of(v);
   const auto& kp = vehicle_.controller.kp;
   row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
-  row.speed = mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); });
+  // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
+  row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
   row.R_WB = Mat3::Zero();
   if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
   row.yaw = std::atan2(row.R_WB(1, 0), row.R_WB(0, 0));
@@ -153,17 +155,20 @@ WindowRow Observer::placed(const FlightLog& log, const Series& s, Stretch w) {
     if (log.has("ceiling") && column_mean("ceiling") > 0.5) row.around.ceiling_gap = 0.3;
   }
   look_along(row, w, p, v);
+  if (!as_told) row.speeds.fill(row.speed);
   return row;
 }
 
 /// Means; returns the detrended residuals.
 Residual Observer::put_means(const WindowRow& row, const Series& s, Stretch w) {
-  Residual rest{{}, row.sigma};
+  Residual rest{{}, row.sigma, simulated(s) || !under_way(s, w)};
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
-    // A mean scatters with the modelled variance; the constant stands for the accelerometer's noise.
-    put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
+    // Unsimulated, a mean would be the velocity's change and no push. It scatters with the modelled variance; the
+    // constant stands for the accelerometer's noise.
+    if (simulated(s))
+      put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
     rest.x[a] = detrended_values(w, residual);
   }
   return rest;
@@ -179,13 +184,13 @@ void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_h
       const auto axis = static_cast<Eigen::Index>(a);
       const auto [variance, samples] = spread(residuals[i].x[a]);
       row.measured_variance[axis] = variance;
-      if (!(variance > 0) || !(samples > 2)) continue;
+      if (!residuals[i].comparable || !(variance > 0) || !(samples > 2)) continue;
       const double gusts = std::max(variance - texture.white[axis], kLeastGusts * variance);
       const double own = ln_variance(samples) * std::pow(variance / gusts, 2);
       seen_.y[kVarX + a][first + i] = std::log(gusts / row.sigma[axis]) - ln_bias(samples);
       seen_.weight[kVarX + a][first + i] = 1 / (own + kScatter2);
     }
-    tails_.push_back(fourth_moments(residuals[i], texture));
+    tails_.push_back(residuals[i].comparable ? fourth_moments(residuals[i], texture) : Fourth{});
   }
 }
 

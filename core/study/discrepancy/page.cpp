@@ -7,16 +7,11 @@
 #include <optional>
 #include <sstream>
 
+#include "core/study/discrepancy/page_sections.hpp"
 #include "core/study/page.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
 
 /// A name of the catalogue as people write it: "wall attraction"; a parameter: "A, m/s²".
 std::string spoken(std::string name) {
@@ -76,9 +71,11 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
     case Verdict::unknown_structure:
       return "The simulation is wrong along " + result.unknown.front().along + ", and no known cause fits" + of + ".";
     case Verdict::insufficient:
-      return "Fewer than 10 flights do not warrant a name" + of + ".";
+      return "Too little to name a cause: " + too_few(seen);
     default:
-      return "Nothing found that the simulation gets wrong" + of + ".";
+      return "Nothing found that the simulation gets wrong" + of + ", with " +
+             std::to_string(result.not_tested.size()) + " of " + std::to_string(cause_names().size()) +
+             " causes not tested.";
   }
 }
 
@@ -126,10 +123,6 @@ tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Obse
          << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
          << "$lines using 1:3 with linespoints lw 3 pt 7 lc rgb '#1f6f9f' title 'after'\n";
   return draw(script.str(), Format::svg, 860, 380);
-}
-
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + escaped(name) + "</th><td>" + escaped(value) + "</td></tr>\n";
 }
 
 std::string figures(const NamedCause& cause) {
@@ -181,47 +174,6 @@ std::string consequence_section(const Consequence& c) {
   return text + "</table>\n</section>\n";
 }
 
-std::string height_section(const calibrate::HeightEffect& h) {
-  const auto ratio = [](const calibrate::Estimate& e) {
-    return "×" + number(e.value) + "  [" + number(e.ci95.low) + ", " + number(e.ci95.high) + "] at 95 %";
-  };
-  std::string text =
-      "<section><h2>Vertical variance by height and plate, day and speed held fixed</h2>\n<table>\n" +
-      row(number(h.low_m) + " m over the surface against " + number(h.high_m) + " m", ratio(h.low_over_high));
-  if (h.ceiling.value > 0) text += row("Under a plate against without", ratio(h.ceiling));
-  return text +
-         row("From", std::to_string(h.windows) + " windows of " + std::to_string(h.flights) + " flights on " +
-                         std::to_string(h.days) + " days") +
-         "</table>\n</section>\n";
-}
-
-/// What the motor shares say against those of sound flights.
-std::string rotor_sentence(const RotorVerdict& v) {
-  using Kind = RotorVerdict::Kind;
-  const std::string rotor = "rotor " + std::to_string(v.rotor);
-  switch (v.kind) {
-    case Kind::as_sound:
-      return "Not told from the sound flights.";
-    case Kind::propeller_damage:
-      return "The propeller of " + rotor + " is damaged: it needs " + number(100 * v.d) + " % [" + number(100 * v.low) +
-             ", " + number(100 * v.high) + "] more of its command.";
-    case Kind::payload:
-      return "An off-centre weight, no damaged propeller.";
-    case Kind::cannot_tell:
-      return "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
-    default:
-      return "Differs from the sound flights as neither a damaged propeller nor a weight does.";
-  }
-}
-
-std::string rotor_section(const RotorVerdict& v) {
-  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(rotor_sentence(v)) + "</p>\n<table>\n" +
-         row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
-         row("Twist, which a weight does not give, t", number(v.t_yaw)) +
-         row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
-         "</table>\n</section>\n";
-}
-
 /// Whether what the accepted causes leave depends on something.
 std::string remaining_section(const std::vector<Dependence>& all) {
   if (all.empty()) return "";
@@ -239,13 +191,17 @@ std::string remaining_section(const std::vector<Dependence>& all) {
 
 tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
                                                 const PageContext& context) {
-  std::string page = "<h1>What the simulation gets wrong</h1>\n";
+  std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
+  if (context.height) beside = height_sentence(*context.height);
+  if (!beside.empty()) beside.insert(0, " ");
   page += "<p class=\"context\">Map " + escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
           escaped(context.vehicle) + ", model " + escaped(context.model) + "; backwash " + escaped(context.version) +
           "</p>\n<p class=\"verdict " +
-          (result.verdict == Verdict::nothing_found || result.verdict == Verdict::cause_found ? "passed" : "failed") +
-          "\">" + escaped(verdict_sentence(result, seen)) +
-          (context.rotors ? " Motor shares: " + escaped(rotor_sentence(*context.rotors)) : "") + "</p>\n";
+          (result.verdict == Verdict::cause_found || (result.verdict == Verdict::nothing_found && beside.empty())
+               ? "passed"
+               : "failed") +
+          "\">" + (context.rotors ? escaped(rotor_sentence(*context.rotors)) + " " : "") +
+          escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());
@@ -253,7 +209,11 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
             escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
   }
   if (context.height) page += height_section(*context.height);
-  if (context.rotors) page += rotor_section(*context.rotors);
+  if (context.rotors) {
+    const auto section = rotor_section(*context.rotors);
+    if (!section) return tl::make_unexpected(section.error());
+    page += *section;
+  }
   if (context.consequence) page += consequence_section(*context.consequence);
   if (!result.unknown.empty()) {
     page += "<section><h2>Without a name</h2>\n<table>\n";

@@ -17,7 +17,7 @@ struct PageContext {
   std::string version;
   std::optional<Consequence> consequence;  ///< of the accepted causes
   std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
-  std::optional<calibrate::HeightEffect> height;
+  std::optional<calibrate::HeightEffects> height;
 };
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,

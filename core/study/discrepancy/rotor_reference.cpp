@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "core/study/discrepancy/estimate.hpp"
 
@@ -22,11 +23,12 @@ double student_of_four(double n) {
 /// Quantile 0.95 of F with 2 and n degrees: closed form.
 double f_of_two(double n) { return n / 2 * (std::pow(0.05, -2 / n) - 1); }
 
-double median(std::vector<double> x) {
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
+double mean(const std::vector<double>& x) {
+  return std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
 }
+
+/// Effect in standard errors that passes t with 80 % power.
+double powerful(double t, double degrees) { return t + 0.8416212 * std::sqrt(1 + t * t / (2 * degrees)); }
 
 using Contrast = Eigen::Array3d;  // yaw, a, b
 
@@ -46,7 +48,7 @@ Contrast damaged(std::size_t rotor) {
 }  // namespace
 
 const char* to_string(RotorVerdict::Kind kind) {
-  static const char* const kNames[] = {"as_sound", "propeller_damage", "payload", "cannot_tell", "neither"};
+  static const char* const kNames[] = {"as_sound", "propeller_damage", "payload", "cannot_distinguish", "neither"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -58,7 +60,7 @@ std::vector<RotorContrasts> rotor_contrasts(const Observations& seen) {
       for (std::size_t r = 0; r < 4 && seen.weight[kMotor1][i] > 0; ++r) shares[r].push_back(seen.y[kMotor1 + r][i]);
     if (shares[0].empty()) continue;
     std::array<double, 4> s;
-    std::transform(shares.begin(), shares.end(), s.begin(), median);
+    std::transform(shares.begin(), shares.end(), s.begin(), mean);
     all.push_back({(s[0] - s[1] + s[2] - s[3]) / 4, (s[2] - s[0]) / 2, (s[3] - s[1]) / 2});
   }
   return all;
@@ -74,23 +76,35 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
   const Contrast error = (square / (n - 1) * (1 + 1 / n)).sqrt();  // of one further flight
   const Contrast t = (mean_of(group) - centre) / error;
 
+  const double degrees = n - 1, t975 = student_975(degrees), needed = student_of_four(degrees);
   using Kind = RotorVerdict::Kind;
-  RotorVerdict v{Kind::as_sound, 0, 0, 0, 0, t[0], t[1], t[2], 0, student_of_four(n - 1)};
+  RotorVerdict v{Kind::as_sound, {"sound"}, 0, 0, 0, 0, {}, t[0], t[1], t[2], 0, needed, 0};
   double left = 0;
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
     const Contrast unit = damaged(rotor) / error;
     const double size = std::sqrt(unit.square().sum()), t_d = (unit * t).sum() / size;
-    if (t_d <= v.t_d) continue;
-    const double half = student_975(n - 1) / size;
-    v.rotor = rotor + 1, v.t_d = t_d, v.d = t_d / size, v.low = v.d - half, v.high = v.d + half;
+    const double named = std::max(powerful(needed, degrees) / size, powerful(t975, degrees) / std::abs(unit[0]));
+    v.minimum = std::max(v.minimum, std::expm1(named));
+    const double half = t975 / size;
+    v.each[rotor] = {std::expm1(t_d / size), std::expm1(t_d / size - half), std::expm1(t_d / size + half)};
+    if (rotor > 0 && t_d <= v.t_d) continue;
+    v.rotor = rotor + 1, v.t_d = t_d, v.d = v.each[rotor].d, v.low = v.each[rotor].low, v.high = v.each[rotor].high;
     left = t.square().sum() - t_d * t_d;
   }
-  const double f = f_of_two(n - 1);
-  const bool twisted = std::abs(t[0]) > student_975(n - 1);
-  if (v.t_d > v.needed)
-    v.kind = !twisted ? Kind::cannot_tell : left <= 2 * f ? Kind::propeller_damage : Kind::neither;
-  else if (t[1] * t[1] + t[2] * t[2] > 2 * f)
-    v.kind = twisted ? Kind::neither : Kind::payload;
+  constexpr double kOfInterest = 0.06;  // README.md, "Effect sizes"
+  const double f = f_of_two(degrees);
+  const bool twisted = std::abs(t[0]) > t975, apart = t[1] * t[1] + t[2] * t[2] > 2 * f;
+  const auto told = [&v](Kind kind, std::vector<std::string> set) { v.kind = kind, v.set = std::move(set); };
+  if (v.t_d > needed && !twisted)
+    told(Kind::cannot_distinguish, {"propeller_damage", "payload"});
+  else if (v.t_d > needed && left <= 2 * f)
+    told(Kind::propeller_damage, {"propeller_damage"});
+  else if (v.t_d > needed || (apart && twisted))
+    told(Kind::neither, {});
+  else if (apart)
+    told(Kind::payload, {"payload"});
+  else if (v.minimum > kOfInterest)
+    told(Kind::cannot_distinguish, {"sound", "propeller_damage", "payload"});
   return v;
 }
 

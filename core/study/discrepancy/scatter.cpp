@@ -40,7 +40,13 @@ Column decorrelated(const Column& column) {
   return turned;
 }
 
-Evidence::Evidence(const Observations& seen) : seen_(&seen), weight_(seen.weight) {
+Evidence::Evidence(const Observations& seen)
+    : seen_(&seen), weight_(seen.weight), flight_end_(seen.windows.size(), seen.windows.size()) {
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f)
+    for (std::size_t i = seen.first[f + 1]; i-- > seen.first[f];) {
+      const bool last = i + 1 == seen.first[f + 1] || seen.windows[i + 1].flight != seen.windows[i].flight;
+      flight_end_[i] = last ? i + 1 : flight_end_[i + 1];
+    }
   Column all;
   for (std::size_t c = 0; c < kChannels; ++c) all.parts.push_back({static_cast<Channel>(c), seen.y[c]});
   y_ = decorrelated(all);
@@ -61,35 +67,6 @@ Evidence::Evidence(const Observations& seen) : seen_(&seen), weight_(seen.weight
   whiten({});
 }
 
-void Evidence::anova(Channel c, const std::vector<double>& r) {
-  double sse = 0, n = 0, groups = 0, grand = 0, total = 0;
-  std::vector<std::pair<double, double>> flights;  // weight, mean
-  for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
-    double weight = 0, mean = 0, square = 0, count = 0;
-    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
-      const double w = weight_[c][i];
-      if (!(w > 0)) continue;
-      weight += w, mean += w * r[i], square += w * r[i] * r[i], count += 1;
-    }
-    if (count == 0) continue;
-    mean /= weight;
-    sse += square - weight * mean * mean, n += count, groups += 1;
-    flights.emplace_back(weight, mean);
-    grand += weight * mean, total += weight;
-  }
-  // A channel that is exact in every window (no dropout at all) keeps a least scatter.
-  const double least = c >= kMotor1 ? 1e-6 : 1e-8;
-  within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
-  const double built = built_scatter(c);
-  between_[c] = built * built;
-  if (groups < 2) return;
-  grand /= total;
-  double ssb = 0, squares = 0;
-  for (const auto& [weight, mean] : flights)
-    ssb += weight * (mean - grand) * (mean - grand), squares += weight * weight;
-  between_[c] = std::max(between_[c], (ssb - (groups - 1) * within_[c]) / (total - squares / total));
-}
-
 /// Adds one channel's part of every flight's XᵀV⁻¹X, the random trim left aside.
 void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const {
   std::vector<std::pair<Eigen::Index, const std::vector<double>*>> active;
@@ -99,27 +76,37 @@ void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const
   if (active.empty() || active.front().first + 1 == static_cast<Eigen::Index>(columns.size())) return;  // only y
   const auto n = static_cast<Eigen::Index>(active.size());
   Eigen::MatrixXd outer(n, n);
-  Eigen::VectorXd sum(n), x(n);
-  for (std::size_t f = 0; f < grams.size(); ++f) {
-    outer.setZero(), sum.setZero();
-    double weight = 0;
-    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
-      const double w = weight_[c][i] / within_[c];
-      if (!(w > 0)) continue;
-      for (Eigen::Index k = 0; k < n; ++k) x[k] = (*active[static_cast<std::size_t>(k)].second)[i];
-      for (Eigen::Index k = 0; k < n; ++k)
-        for (Eigen::Index l = 0; l <= k; ++l) outer(k, l) += w * x[k] * x[l];
-      sum += w * x, weight += w;
-    }
-    const double shrink = between_[c] / (1 + between_[c] * weight);
+  Eigen::VectorXd sum(n), x(n), unit_sum(n);
+  const auto less = [&](Eigen::MatrixXd& gram, double shrink, const Eigen::VectorXd& of) {
     for (Eigen::Index k = 0; k < n; ++k) {
       for (Eigen::Index l = 0; l <= k; ++l) {
-        const double value = outer(k, l) - shrink * sum[k] * sum[l];
+        const double value = outer(k, l) - shrink * of[k] * of[l];
         const auto row = active[static_cast<std::size_t>(k)].first, column = active[static_cast<std::size_t>(l)].first;
-        grams[f](row, column) += value;
-        if (row != column) grams[f](column, row) += value;
+        gram(row, column) += value;
+        if (row != column) gram(column, row) += value;
       }
     }
+  };
+  for (std::size_t f = 0; f < grams.size(); ++f) {
+    unit_sum.setZero();
+    double unit_weight = 0;
+    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1];) {
+      outer.setZero(), sum.setZero();
+      double weight = 0;
+      for (const std::size_t end = flight_end_[i]; i < end; ++i) {
+        const double w = weight_[c][i] / within_[c];
+        if (!(w > 0)) continue;
+        for (Eigen::Index k = 0; k < n; ++k) x[k] = (*active[static_cast<std::size_t>(k)].second)[i];
+        for (Eigen::Index k = 0; k < n; ++k)
+          for (Eigen::Index l = 0; l <= k; ++l) outer(k, l) += w * x[k] * x[l];
+        sum += w * x, weight += w;
+      }
+      const double own = 1 + between_[c] * weight;
+      less(grams[f], between_[c] / own, sum);
+      unit_sum += sum / own, unit_weight += weight / own;
+    }
+    outer.setZero();
+    if (unit_[c] > 0) less(grams[f], unit_[c] / (1 + unit_[c] * unit_weight), unit_sum);
   }
 }
 
@@ -220,7 +207,7 @@ Column Evidence::residual(const std::vector<Column>& columns) const {
 }
 
 void Evidence::whiten(const std::vector<Column>& accepted) {
-  within_.fill(1), between_.fill(0), tilt_ = 0;
+  within_.fill(1), between_.fill(0), unit_.fill(0), tilt_ = 0;
   std::vector<Column> columns = offsets(accepted, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
   const Column rest = residual(columns);

@@ -26,28 +26,4 @@ std::vector<Stretch> cut(const Series& s) {
   return windows;
 }
 
-const char* gate(const Series& s, const FlightLog& log, Stretch w) {
-  std::size_t repeated = 0, full = 0;
-  for (std::size_t i = w.begin + 1; i < w.end; ++i)
-    repeated += s.p[i] == s.p[i - 1] && s.a[i] == s.a[i - 1] && s.v[i] == s.v[i - 1] ? 1u : 0u;
-  if (20 * repeated > w.size()) return "frozen";
-  Vec3 low = s.p[w.begin], high = low;
-  double thrust = 0;
-  for (std::size_t i = w.begin; i < w.end; ++i) {
-    low = low.cwiseMin(s.p[i]), high = high.cwiseMax(s.p[i]);
-    if (!s.thrust_acc.empty()) thrust += s.thrust_acc[i] / static_cast<double>(w.size());
-  }
-  if ((high - low).maxCoeff() < 5e-4 || (!s.thrust_acc.empty() && thrust < 0.6 * kGravity)) return "perched";
-  if (log.has("thrust"))
-    for (std::size_t i = w.begin; i < w.end; ++i) full += log.column("thrust")[i] >= 0.99 ? 1u : 0u;
-  if (50 * full > w.size()) return "saturated";
-  if (s.has_velocity) {  // position and velocity must tell the same story
-    const double time = s.t[w.end - 1] - s.t[w.begin];
-    Vec3 flown = Vec3::Zero();
-    for (std::size_t i = w.begin + 1; i < w.end; ++i) flown += 0.5 * (s.v[i] + s.v[i - 1]) * (s.t[i] - s.t[i - 1]);
-    if (((s.p[w.end - 1] - s.p[w.begin] - flown) / time).norm() > 0.15) return "inconsistent";
-  }
-  return nullptr;
-}
-
 }  // namespace backwash::study::discrepancy

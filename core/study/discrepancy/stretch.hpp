@@ -18,7 +18,5 @@ struct Stretch {
 
 /// Windows of 2 s (to the nearest whole number in each run of rows without a gap and of one segment).
 std::vector<Stretch> cut(const Series& s);
-/// Why a window is left out; null if it is good.
-const char* gate(const Series& s, const FlightLog& log, Stretch w);
 
 }  // namespace backwash::study::discrepancy

@@ -26,7 +26,8 @@ double white_part(double c0, double c1, double c2) {
 Texture texture_of(const std::vector<Residual>& windows, double rate_hz) {
   Texture t;
   std::size_t shortest = SIZE_MAX;
-  for (const auto& w : windows) shortest = std::min(shortest, w.x[0].size());
+  for (const auto& w : windows)
+    if (w.comparable) shortest = std::min(shortest, w.x[0].size());
   for (double seconds = kNearest; seconds <= kFarthest; seconds += kBetween) {
     const auto lag = static_cast<std::size_t>(std::lround(seconds * rate_hz));
     if (lag > 2 && lag + 5 < shortest && (t.lags.empty() || lag > t.lags.back())) t.lags.push_back(lag);
@@ -37,6 +38,7 @@ Texture texture_of(const std::vector<Residual>& windows, double rate_hz) {
     std::array<double, 3> c{};
     double weight = 0;
     for (const auto& w : windows) {
+      if (!w.comparable) continue;
       const auto& x = w.x[static_cast<std::size_t>(axis)];
       for (std::size_t k = 0; k < 3; ++k) c[k] += shared(x, k) / w.sigma[axis];
       for (std::size_t k = 0; k < t.lags.size(); ++k) t.correlation[k] += shared(x, t.lags[k]) / w.sigma[axis];

@@ -12,6 +12,7 @@ namespace backwash::study::discrepancy {
 struct Residual {
   std::array<std::vector<double>, 3> x;
   Vec3 sigma;
+  bool comparable = true;  ///< else the vehicle's own manoeuvres are in it: measured, and not used
 };
 
 /// What a flight's residuals are made of, pooled over its windows (each over its modelled variance).
