@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/map/occupancy_grid.hpp"
 #include "core/study/discrepancy/evidence.hpp"
 #include "core/study/discrepancy/page_sections.hpp"
 
@@ -88,6 +89,19 @@ TEST(StudyGates, GustsOfAHoverAreNoSpeedWithoutSetPoints) {
   for (const auto& w : seen.windows) {
     EXPECT_LT(w.speed, 0.05);  // the mean of |v| is 0.16
     for (const double v : w.speeds) EXPECT_LT(v, 0.05);
+  }
+}
+
+TEST(StudyGates, LeaveOutWhatIsFarOutsideTheMapHoweverFar) {
+  const auto room = map::OccupancyGrid({-2, -2, 0}, 0.1, {40, 40, 25}, map::Cell::free);
+  for (const double away : {6.0, 1e12, 1e200}) {
+    auto log = flown(0, 0.5);
+    for (std::size_t i = 0; i < 100; ++i) log.columns["x_m"][i] += away;
+    Observer observer(Vehicle{}, Model{}, &room);
+    observer.add(log);
+    const auto seen = observer.finish();
+    EXPECT_EQ(seen.gated_out.at("outside"), 1u) << away;
+    EXPECT_EQ(seen.windows.size(), 3u) << away;
   }
 }
 

@@ -89,8 +89,8 @@ void Observer::add(const FlightLog& log) {
         ++seen_.gated_out[why];
         continue;
       }
-      if (surroundings_.inside_solid(s.p[(w.begin + w.end) / 2])) {  // the map and the log contradict each other
-        ++seen_.gated_out["inconsistent"];
+      if (const char* why = misplaced(s, w)) {
+        ++seen_.gated_out[why];
         continue;
       }
       good.push_back(w);
@@ -98,6 +98,13 @@ void Observer::add(const FlightLog& log) {
     add_windows(log, s, rotors, good);
   }
   seen_.first.push_back(seen_.windows.size());
+}
+
+const char* Observer::misplaced(const Series& s, Stretch w) const {
+  for (const auto* x : {&s.p, &s.p_nominal})
+    for (std::size_t i = w.begin; i < w.end && !x->empty(); ++i)
+      if (!surroundings_.near((*x)[i])) return "outside";
+  return surroundings_.inside_solid(s.p[(w.begin + w.end) / 2]) ? "inconsistent" : nullptr;
 }
 
 void Observer::smooth_voltage() {

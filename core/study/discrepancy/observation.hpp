@@ -99,7 +99,7 @@ struct Observations {
   std::vector<std::size_t> first;                        ///< window at which each flight begins; one more at the end
   double row_period = 0;                                 ///< s, longest of the flights' mean
   std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
-  std::map<std::string, std::size_t> gated_out;          ///< frozen, gap, perched, saturated, inconsistent: windows
+  std::map<std::string, std::size_t> gated_out;          ///< windows by reason: gates.hpp, outside (of the map)
   std::map<std::string, std::string> missing;            ///< what no flight had: "battery_v" → "no battery_v column"
   bool has(const std::string& what) const { return !missing.contains(what); }
   bool measured(Channel c) const;
@@ -118,6 +118,8 @@ class Observer {
 
  private:
   void add_windows(const FlightLog& log, const Series& s, const RotorPhases& rotors, const std::vector<Stretch>& good);
+  /// Why the map leaves a window out: far outside of it, or in a solid (map and log contradict each other).
+  const char* misplaced(const Series& s, Stretch w) const;
   WindowRow placed(const FlightLog& log, const Series& s, Stretch w);
   void look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
   Residual put_means(const WindowRow& row, const Series& s, Stretch w);

@@ -17,6 +17,12 @@ Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
   lattice_.resize(static_cast<std::size_t>(size_.prod()));
 }
 
+bool Surroundings::near(const Vec3& p_W) const {
+  if (!grid_) return (p_W.array().abs() < 1e5).all();
+  const Vec3 high = low_ + grid_->resolution() * grid_->size().cast<double>();
+  return (p_W.array() > low_.array() - kSight).all() && (p_W.array() < high.array() + kSight).all();
+}
+
 Place Surroundings::around(const Vec3& p_W) const {
   if (!grid_) return {{p_W.z(), kNoSurface, {}}, {}};
   Place place{field::around(*grid_, p_W, {20, 20, kSight}), {}};

@@ -25,6 +25,9 @@ class Surroundings {
   Place around(const Vec3& p_W) const;
   /// Diagonal of Σ at p, (m/s²)²: trilinear between points on a lattice of kLattice, evaluated exactly once each.
   Vec3 sigma(const Vec3& p_W);
+  /// Whether a flight may be there: within sight of the map's box; without a map, of anything (100 km). False for what
+  /// is not finite. Precondition of all the others.
+  bool near(const Vec3& p_W) const;
   bool inside_solid(const Vec3& p_W) const { return grid_ && grid_->occupied(grid_->index(p_W)); }
   bool has_map() const noexcept { return grid_ != nullptr; }
 
