@@ -165,4 +165,23 @@ std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Ou
                      median(search), search.back(), median(world));
 }
 
+std::string self_test_rows(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes, int flights) {
+  std::uint64_t seed = UINT64_MAX;
+  for (const auto& o : outcomes) seed = std::min(seed, o.seed);
+  std::string rows =
+      "// Written by study_matrix --self-test. confusion.md has the whole campaign.\n// clang-format off\n";
+  rows += "constexpr std::uint64_t kSeed = " + std::to_string(seed) +
+          ";\nconstexpr int kFlights = " + std::to_string(flights) + ";\nstatic constexpr SelfTestRow kRows[] = {\n";
+  for (const auto& c : cells) {
+    if (!plain(c) && c.cell != "unknown" && c.cell != "none") continue;
+    const auto as_hidden = [&](const std::string& told) {
+      return told == c.cell || (c.cell == "none" && told == "nothing") || (c.cell == "unknown" && told[0] == '?');
+    };
+    const auto other = std::find_if(c.told.begin(), c.told.end(), [&](auto& t) { return !as_hidden(t.second); });
+    rows += text("    {\"%s\", %d, %d, %d, %d, \"%s\"},\n", c.cell.c_str(), c.right.n, c.right.hits, c.in_sets.hits,
+                 c.wrong_name.hits, other == c.told.end() ? "" : other->second.c_str());
+  }
+  return rows + "};\n// clang-format on\n";
+}
+
 }  // namespace study_worlds

@@ -8,20 +8,11 @@
 #include <sstream>
 
 #include "core/study/discrepancy/page_sections.hpp"
+#include "core/study/discrepancy/self_test.hpp"
 #include "core/study/page.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {
-
-/// A name of the catalogue as people write it: "wall attraction"; a parameter: "A, m/s²".
-std::string spoken(std::string name) {
-  constexpr std::pair<const char*, const char*> kUnits[] = {
-      {"_mps2", ", m/s²"}, {"_per_s", ", 1/s"}, {"_ln", ", ln"}, {"_m", ", m"}, {"_s", ", s"}};
-  for (const auto& [suffix, unit] : kUnits)
-    if (name.ends_with(suffix)) return name.substr(0, name.size() - std::string(suffix).size()) + unit;
-  std::replace(name.begin(), name.end(), '_', ' ');
-  return name;
-}
 
 /// What the picture of a cause shows of a window: the residual of its first channel, or, for walls, its part towards
 /// the nearest one. Nothing where it was not measured.
@@ -233,9 +224,13 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
     for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
   page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
   for (const auto& [gate, count] : seen.gated_out) page += row(gate, std::to_string(count) + " windows");
-  page +=
-      "</table>\n<p>How often the method names the right cause, and what it confuses: table in "
-      "core/study/discrepancy/README.md.</p>\n</section>\n";
+  page += "</table>\n</section>\n";
+  std::vector<std::string> told;
+  for (const auto& cause : result.causes) {
+    told.push_back(cause.found.form->cause);
+    for (const auto& rival : cause.found.rivals) told.push_back(rival.name);
+  }
+  page += self_test_section(told);
   return html_page("backwash study", page);
 }
 

@@ -27,6 +27,15 @@ std::string ratio(const calibrate::Estimate& e) {
 
 }  // namespace
 
+std::string spoken(std::string name) {
+  constexpr std::pair<const char*, const char*> kUnits[] = {
+      {"_mps2", ", m/s²"}, {"_per_s", ", 1/s"}, {"_ln", ", ln"}, {"_m", ", m"}, {"_s", ", s"}};
+  for (const auto& [suffix, unit] : kUnits)
+    if (name.ends_with(suffix)) return name.substr(0, name.size() - std::string(suffix).size()) + unit;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
 std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);

@@ -10,6 +10,8 @@
 
 namespace backwash::study::discrepancy {
 
+/// A name of the catalogue as people write it: "wall attraction"; a parameter: "A, m/s²".
+std::string spoken(std::string name);
 /// Three digits.
 std::string number(double value);
 /// A row of a two-column table; escapes both.
