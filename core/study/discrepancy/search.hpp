@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/study/discrepancy/evidence.hpp"
+#include "core/study/discrepancy/intervals.hpp"
 
 namespace backwash::study::discrepancy {
 
@@ -29,12 +30,6 @@ struct Candidate {
 
   /// Whether parameters are an effect at all: at least the stated floor, and of a possible sign.
   bool effect(const SmallVector& theta) const;
-};
-
-/// A parameter with its interval at 95 %, by leaving flights out one at a time (Student's t).
-struct Estimate {
-  std::string name;
-  double value, low, high;
 };
 
 struct Rival {
