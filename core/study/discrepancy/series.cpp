@@ -69,7 +69,7 @@ Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool 
   for (std::size_t i = 0; i < s.size(); ++i) {
     const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
     if (dt > 0.2) p = s.p[i], v = s.v[i];  // a gap: start again where the vehicle is
-    const int steps = std::max(1, static_cast<int>(std::ceil(dt / 0.005)));
+    const int steps = dt > 0.2 ? 1 : std::max(1, static_cast<int>(std::ceil(dt / 0.005)));
     for (int k = 0; k < steps; ++k) {
       const double h = dt > 0.2 ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
       while (heard + 1 < s.size() && s.t[heard + 1] <= now - age + 1e-9) ++heard;
@@ -100,7 +100,9 @@ void read_motion(Series& s, const FlightLog& log, const Rows& rows) {
   s.has_velocity = has3(log, "vx_mps", "vy_mps", "vz_mps");
   s.has_acceleration = has3(log, "ax_mps2", "ay_mps2", "az_mps2");
   const double rate = s.size() > 1 ? static_cast<double>(s.size() - 1) / (s.t.back() - s.t.front()) : 1;
-  const auto reach = [&](double seconds) { return std::max<std::size_t>(1, std::lround(seconds * rate / 2)); };
+  const auto reach = [&](double seconds) {
+    return static_cast<std::size_t>(std::lround(std::clamp(seconds * rate / 2, 1.0, 1000.0)));
+  };
   s.v = s.has_velocity ? vectors(log, rows, "vx_mps", "vy_mps", "vz_mps") : derivative(s.t, s.p, reach(0.06));
   s.a = s.has_acceleration ? vectors(log, rows, "ax_mps2", "ay_mps2", "az_mps2") : derivative(s.t, s.v, reach(0.06));
 }
@@ -130,7 +132,8 @@ Series series_of(const FlightLog& log, const Vehicle& vehicle) {
   }
   s.segment.assign(s.size(), -1);
   if (log.has("segment"))
-    for (std::size_t k = 0; k < rows.size(); ++k) s.segment[k] = static_cast<int>(log.column("segment")[rows[k]]);
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      s.segment[k] = static_cast<int>(std::clamp(log.column("segment")[rows[k]], -1.0, 1e9));
   s.simulated_by_thrust = !s.thrust_acc.empty() && !s.R_WB.empty();
   const bool commanded = has3(log, "cmd_x_m", "cmd_y_m", "cmd_z_m");
   if (s.simulated_by_thrust) {

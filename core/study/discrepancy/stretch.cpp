@@ -16,7 +16,8 @@ std::vector<Stretch> cut(const Series& s) {
     std::size_t end = begin + 1;
     while (end < s.size() && s.segment[end] == s.segment[begin] && s.t[end] - s.t[end - 1] <= longest) ++end;
     const double length = s.t[end - 1] - s.t[begin];
-    const auto parts = static_cast<std::size_t>(std::lround(length / kWindow));
+    const double most = static_cast<double>(end - begin) / (kFewest - 1);  // of parts that hold enough samples
+    const auto parts = static_cast<std::size_t>(std::lround(length / kWindow < most ? length / kWindow : 0.0));
     for (std::size_t k = 0; k < parts; ++k) {
       const std::size_t a = begin + k * (end - begin) / parts, b = begin + (k + 1) * (end - begin) / parts;
       if (b - a >= kFewest) windows.push_back({a, b});
