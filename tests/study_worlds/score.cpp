@@ -79,7 +79,7 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   const auto seen = observe(world, tables, folder);
   const double observed = cpu();
   backwash::study::discrepancy::StudyOptions options;
-  options.minimum_detectable = false;
+  options.minimum_detectable = options.dependence = false;
   const auto result = backwash::study::discrepancy::study(seen, options);
   out.world_s = observed - start, out.study_s = cpu() - observed;
   out.sets = sets_of(result);

@@ -145,8 +145,10 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   result.verdict = !result.causes.empty()    ? (ambiguous ? Verdict::cannot_distinguish : Verdict::cause_found)
                    : !result.unknown.empty() ? Verdict::unknown_structure
                                              : Verdict::nothing_found;
-  options.search.progress("whether what remains depends on something");
-  result.remaining = remaining_dependence(evidence, others_of(found.accepted, SIZE_MAX, seen), options.search.seed);
+  if (options.dependence) {
+    options.search.progress("whether what remains depends on something");
+    result.remaining = remaining_dependence(evidence, others_of(found.accepted, SIZE_MAX, seen), options.search.seed);
+  }
   if (options.minimum_detectable) {
     options.search.progress("smallest effects that these flights would show");
     result.minimum_detectable = minimum_detectable(evidence, options.search, std::max(found.threshold, 0.5));

@@ -36,6 +36,7 @@ struct NamedCause {
 struct StudyOptions {
   SearchOptions search;
   bool minimum_detectable = true;
+  bool dependence = true;           ///< whether what remains depends on something: no part of the verdict
   std::size_t fewest_flights = 10;  ///< fewer do not warrant a name (README.md)
 };
 
