@@ -19,7 +19,7 @@ TEST(SelfTest, HasEveryCauseOfTheCatalogueAndWhatIsNone) {
   for (const auto& name : names) {
     const auto* r = self_test().of(name);
     ASSERT_TRUE(r) << name;
-    EXPECT_GE(r->worlds, 200) << name;
+    EXPECT_GE(r->worlds, 100) << name;
     EXPECT_LE(r->alone, r->in_set) << name;
     EXPECT_LE(r->in_set, r->worlds) << name;
     EXPECT_LE(r->wrong, r->worlds - r->alone) << name;
