@@ -3,7 +3,7 @@
 """Mutation test of the safety-relevant code (README.md).
 
   mutants.py check              the table still fits the sources (seconds; a test of ./check)
-  mutants.py build              all mutants as switches of one build, in build/mutants
+  mutants.py build [PROGRAM …]  all mutants as switches of one build, in build/mutants
   mutants.py run [ID …]         which are killed; exit 1 if the score is below 0.97
 """
 import argparse
@@ -28,7 +28,7 @@ PROGRAMS = ["test_config", "test_track", "test_bridge", "test_map", "test_field"
 LEAST_SCORE = 0.97
 
 
-def build(mutants: list[table.Mutant]) -> None:
+def build(mutants: list[table.Mutant], programs: list[str]) -> None:
     """Copies what changed, rewrites, compiles. A file is written only if its content differs: little is compiled."""
     wrong = table.check(mutants, ROOT)
     if wrong:
@@ -55,7 +55,7 @@ def build(mutants: list[table.Mutant]) -> None:
     if (ROOT.parent / "shared").exists() and not shared.exists():
         shared.symlink_to(ROOT.parent / "shared")
     subprocess.run(["cmake", "--preset", "release"], cwd=TREE, check=True, stdout=subprocess.DEVNULL)
-    subprocess.run(["cmake", "--build", "--preset", "release", "--target", *PROGRAMS, "--", "-k", "0"],
+    subprocess.run(["cmake", "--build", "--preset", "release", "--target", *programs, "--", "-k", "0"],
                    cwd=TREE, check=True)
 
 
@@ -153,7 +153,7 @@ def main() -> int:
     """Command line."""
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("what", choices=["check", "build", "run"])
-    arguments.add_argument("ids", nargs="*", help="only these mutants; a trailing * stands for anything")
+    arguments.add_argument("names", nargs="*", help="only these mutants, a trailing * stands for anything; or programs to build")
     arguments.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments.add_argument("--quick", action="store_true", help="only the tests that the rows name")
     arguments.add_argument("--result", type=pathlib.Path, default=WORK / "result.tsv")
@@ -164,10 +164,10 @@ def main() -> int:
         print("\n".join(wrong) or f"{len(mutants)} mutants, each where the table says")
         return 1 if wrong else 0
     if given.what == "build":
-        build(mutants)
+        build(mutants, given.names or PROGRAMS)
         return 0
-    chosen = [m for m in mutants if not given.ids or
-              any(m.id == i or (i.endswith("*") and m.id.startswith(i[:-1])) for i in given.ids)]
+    chosen = [m for m in mutants if not given.names or
+              any(m.id == i or (i.endswith("*") and m.id.startswith(i[:-1])) for i in given.names)]
     return run(chosen, given.jobs, given.quick, given.result)
 
 
