@@ -50,7 +50,7 @@ class MapFaults : public testing::Test {
   void SetUp() override {
     lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
     map::OccupancyGrid grid = map::builtin_scene("parallel-walls-4m", 0.2).value();
-    channels_->worlds.offer(plan::build_world(std::move(grid), Model{}, kVehicle));
+    channels_->worlds.offer({plan::build_world(std::move(grid), Model{}, kVehicle)});
   }
   Vec3 in_map() const { return map_from_odom_.point(odom_); }
 
@@ -203,7 +203,7 @@ TEST_F(MapFaults, Row9APoseOutsideTheMapIsHeld) {
   EXPECT_EQ(out_.supervisor.mode, Mode::tracking);
   // A map of another place comes.
   map::OccupancyGrid elsewhere({10, 10, 0}, 0.2, {5, 5, 5}, map::Cell::free);
-  channels_->worlds.offer(plan::build_world(std::move(elsewhere), Model{}, kVehicle));
+  channels_->worlds.offer({plan::build_world(std::move(elsewhere), Model{}, kVehicle)});
   EXPECT_EQ(ticks_until(Mode::hold, 3), 1);
   EXPECT_EQ(out_.supervisor.reason, Reason::outside_map);
 }

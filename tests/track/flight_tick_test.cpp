@@ -50,6 +50,7 @@ class Flight {
     in.autopilot.offboard = in.autopilot.armed = true;
     step();
     EXPECT_EQ(out.supervisor.mode, Mode::tracking);
+    segment.epoch = tick_.epoch();
     in.segment = &segment;
     step();
     EXPECT_TRUE(out.accepted);
@@ -72,6 +73,7 @@ class Flight {
   TickInput in;
   TickOutput out;
   const Tracker& tracker() const { return tick_.tracker(); }
+  const Epoch& epoch() const { return tick_.epoch(); }
 
  private:
   FlightTick tick_;
@@ -228,9 +230,10 @@ TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
 
 TEST(FlightTick, GivesEverySegmentBackExactlyOnce) {
   Flight flight;
-  const AcceptedSegment elsewhere = [] {
+  const AcceptedSegment elsewhere = [&flight] {
     auto s = straight();
     s.id = 2;
+    s.epoch = flight.epoch();
     for (auto& set : s.tube) set.center.p_W.y() += 5;
     return s;
   }();
