@@ -12,8 +12,8 @@ tl::unexpected<LogError> bad(const std::string& what) {
   return tl::make_unexpected(LogError{LogError::Kind::bad_data, what});
 }
 
-// An offer is doubles only: head (id, continues, branch, closures, epoch, arms, commands, sets, stops), commands of 10, sets of 16,
-// then each stop: branch, commands, sets, and its rows. Whole numbers up to 2^53 are exact.
+// An offer is doubles only: head (id, continues, branch, closures, epoch, arms, commands, sets, stops), commands of 10,
+// sets of 16, then each stop: branch, commands, sets, and its rows. Whole numbers up to 2^53 are exact.
 constexpr std::size_t kCommand = 10, kSet = 16;
 
 class Rows {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kArmingTicks = 150;  // 3 s: heartbeats come once a second
 constexpr int kDisarmEvery = 25;   // ticks: one command may be lost
-constexpr int kDisorder = 3;  // more in a row are as no odometry at all (faults.md row 5)
+constexpr int kDisorder = 3;       // more in a row are as no odometry at all (faults.md row 5)
 
 double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
 
@@ -92,8 +92,8 @@ void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
   // What was planned before an operator's order, or before the mode last ended it, is not flown (faults.md row 39).
   const bool following = mode() == Mode::tracking || mode() == Mode::hold;
-  out.accepted = following && in.segment->epoch == epoch_ && gate_.last() &&
-                 tracker_.accept(*in.segment, gate_.last()->state);
+  out.accepted =
+      following && in.segment->epoch == epoch_ && gate_.last() && tracker_.accept(*in.segment, gate_.last()->state);
   out.refused = !out.accepted;
   out.released[0] = out.accepted ? std::exchange(segment_, in.segment) : in.segment;
 }
@@ -162,8 +162,8 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
   }
 }
 
-// The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on the
-// ground stops them again; the autopilot itself refuses to disarm in the air.
+// The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on
+// the ground stops them again; the autopilot itself refuses to disarm in the air.
 void FlightTick::ask_of_motors(const TickInput& in, TickOutput& out) noexcept {
   const bool stands = in.autopilot.landed.value_or(false), runs = in.autopilot.armed || arming_ > 0;
   arming_ = std::max(0, arming_ - 1);

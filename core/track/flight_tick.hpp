@@ -13,7 +13,7 @@ struct AutopilotFacts {
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row did not get out
   bool armed = false, offboard = false;
-  std::optional<bool> landed;  ///< as it says itself
+  std::optional<bool> landed;                                      ///< as it says itself
   double heartbeat_age = std::numeric_limits<double>::infinity();  ///< s
   struct Pose {
     std::int64_t at_ns = 0;               ///< when the position arrived
@@ -102,9 +102,9 @@ class FlightTick {
   Epoch epoch_;
   int arming_ = 0;     ///< ticks left in which the autopilot may yet say that it armed
   int abandoned_ = 0;  ///< ticks left in which motors that start for a take-off that was stopped are stopped again
-  std::uint32_t closures_ = 0;                ///< loop closures seen
-  RigidShift map_from_odom_;                  ///< of the last
-  Setpoint command_;                          ///< of the last tick
+  std::uint32_t closures_ = 0;  ///< loop closures seen
+  RigidShift map_from_odom_;    ///< of the last
+  Setpoint command_;            ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
   int disorder_ = 0;                  ///< samples in a row whose stamp did not rise

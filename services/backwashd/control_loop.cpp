@@ -126,6 +126,7 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
       row_.odometry_to_wire_us = static_cast<float>(us);
     }
   }
+  link_.answer_timesync(s.send_heartbeat);  // quiet is quiet: not a byte
   if (s.send_heartbeat && view_.ticks % kTicksPerSecond == 0 && link_.send_heartbeat()) row_.sent |= 2;
   if (s.forward_odometry && out.fresh) forward_odometry();
   if (s.request_offboard) link_.send_follow_setpoints();

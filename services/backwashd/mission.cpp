@@ -236,9 +236,8 @@ Decision Mission::start(PlanJob::Kind kind, const Goal& goal) {
   }
   job_ = ++last_job_;
   task_ = "planning";
-  return {Answer{kAccepted, "planning"},
-          {},
-          PlanJob{kind, *job_, goal.position, goal.yaw, {orders_, view_.epoch.lapse}}};
+  return {
+      Answer{kAccepted, "planning"}, {}, PlanJob{kind, *job_, goal.position, goal.yaw, {orders_, view_.epoch.lapse}}};
 }
 
 }  // namespace backwash::daemon

@@ -29,8 +29,8 @@ struct Decision {
 
 /// What the other threads have said since the last call.
 struct MissionInput {
-  double now_s = 0;                                        ///< monotonic
-  std::optional<ControlView> view;                         ///< newest, if there is a new one
+  double now_s = 0;                                         ///< monotonic
+  std::optional<ControlView> view;                          ///< newest, if there is a new one
   std::optional<std::shared_ptr<const plan::World>> world;  ///< newest, if there is a new one
   std::span<const PlanOutcome> outcomes;
 };

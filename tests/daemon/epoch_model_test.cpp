@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// STOP means stop, model-checked (faults.md rows 39 and 40): every order of up to kDepth events between the real Mission,
-// PlanFront, Orders and FlightTick, by a deterministic scheduler. What takes milliseconds in flight, planning, is a
-// segment made here; everything that decides is the daemon's own. Events that change nothing now are left out: the
+// STOP means stop, model-checked (faults.md rows 39 and 40): every order of up to kDepth events between the real
+// Mission, PlanFront, Orders and FlightTick, by a deterministic scheduler. What takes milliseconds in flight, planning,
+// is a segment made here; everything that decides is the daemon's own. Events that change nothing now are left out: the
 // sequences with them are those without, and shorter.
 #include <gtest/gtest.h>
 
@@ -26,8 +26,21 @@ constexpr std::uint8_t kGoto = backwash_msgs_msg_dds__COMMAND_GOTO, kStop = back
                        kDisable = backwash_msgs_msg_dds__COMMAND_DISABLE,
                        kEnable = backwash_msgs_msg_dds__COMMAND_ENABLE,
                        kTakeoff = backwash_msgs_msg_dds__COMMAND_TAKEOFF;
-const char* const kNames[] = {"go", "END", "enable", "job taken", "planned", "offered", "tick", "world", "pilot", "mission"};
-enum Event { kGo, kEnd, kEnableAgain, kJobTaken, kPlanned, kOffered, kTick, kWorldChanges, kPilot, kMissionLooks, kEvents };
+const char* const kNames[] = {"go",      "END",  "enable", "job taken", "planned",
+                              "offered", "tick", "world",  "pilot",     "mission"};
+enum Event {
+  kGo,
+  kEnd,
+  kEnableAgain,
+  kJobTaken,
+  kPlanned,
+  kOffered,
+  kTick,
+  kWorldChanges,
+  kPilot,
+  kMissionLooks,
+  kEvents
+};
 
 constexpr std::size_t kLength = 12, kStopEvery = 2;  // commands
 constexpr double kStep = 0.004;                      // m a command
@@ -73,14 +86,14 @@ struct Daemon {
   track::Orders orders;
   Mission mission;
   PlanFront front;
-  ControlView view;                                      // as the control thread wrote it last
-  bool unread = false;                                   // by the mission
-  std::vector<track::Order> sent;                        // orders under way
-  std::optional<PlanJob> job, planning;                  // handed over, begun
+  ControlView view;                      // as the control thread wrote it last
+  bool unread = false;                   // by the mission
+  std::vector<track::Order> sent;        // orders under way
+  std::optional<PlanJob> job, planning;  // handed over, begun
   std::optional<PlanOutcome> outcome;
-  std::shared_ptr<AcceptedSegment> ready, flown;         // stamped and not yet offered; accepted
+  std::shared_ptr<AcceptedSegment> ready, flown;  // stamped and not yet offered; accepted
   std::shared_ptr<AcceptedSegment> offered;
-  std::vector<std::shared_ptr<AcceptedSegment>> alive;   // that the tick may look at
+  std::vector<std::shared_ptr<AcceptedSegment>> alive;  // that the tick may look at
   track::TickInput in;
   track::TickOutput out;
   std::uint32_t sequence = 0;
@@ -88,8 +101,8 @@ struct Daemon {
   int arming = 0;
 
   // What must hold.
-  int since_end = -1;       // ticks since an acknowledged END that nothing later revoked; −1: none
-  bool held = false;        // that END was a hold
+  int since_end = -1;  // ticks since an acknowledged END that nothing later revoked; −1: none
+  bool held = false;   // that END was a hold
   bool takeoff_asked = false;
   Vec3 before = Vec3::Zero();
 };
@@ -311,7 +324,8 @@ Daemon EpochModel::start(const Start& from) {
   EXPECT_EQ(d.view.mode, Mode::tracking);
   EXPECT_EQ(d.before.z(), air_ ? 1.0 : 0.2);
   for (const int event : from.events) EXPECT_TRUE(apply(d, event)) << from_ << ": " << kNames[event];
-  EXPECT_EQ(d.view.segment != 0, !from.events.empty()) << from_ << ": " << to_string(d.view.mode) << ", " << to_string(d.view.reason);
+  EXPECT_EQ(d.view.segment != 0, !from.events.empty())
+      << from_ << ": " << to_string(d.view.mode) << ", " << to_string(d.view.reason);
   return d;
 }
 
