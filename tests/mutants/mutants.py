@@ -4,7 +4,7 @@
 
   mutants.py check              the table still fits the sources (seconds; a test of ./check)
   mutants.py build [PROGRAM …]  all mutants as switches of one build, in build/mutants
-  mutants.py run [ID …]         which are killed; exit 1 if the score is below 0.97
+  mutants.py run [ID|PATH …]    which are killed; exit 1 if the score is below 0.97
 """
 import argparse
 import concurrent.futures
@@ -153,11 +153,11 @@ def main() -> int:
     """Command line."""
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("what", choices=["check", "build", "run"])
-    arguments.add_argument("names", nargs="*", help="only these mutants, a trailing * stands for anything; or programs to build")
+    arguments.add_argument("names", nargs="*", help="only these mutants, or those of these folders; programs to build")
     arguments.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments.add_argument("--quick", action="store_true", help="only the tests that the rows name")
     arguments.add_argument("--result", type=pathlib.Path, default=WORK / "result.tsv")
-    given = arguments.parse_args()
+    given = arguments.parse_intermixed_args()
     mutants = table.load()
     if given.what == "check":
         wrong = table.check(mutants, ROOT)
@@ -167,7 +167,7 @@ def main() -> int:
         build(mutants, given.names or PROGRAMS)
         return 0
     chosen = [m for m in mutants if not given.names or
-              any(m.id == i or (i.endswith("*") and m.id.startswith(i[:-1])) for i in given.names)]
+              any(m.id == name or m.file.startswith(name) for name in given.names)]
     return run(chosen, given.jobs, given.quick, given.result)
 
 
