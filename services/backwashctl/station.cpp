@@ -67,12 +67,19 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
     waitset_.wait(0.05);
     acks_.take([](const dds::Ack&) {});
     statuses_.take([&](const dds::Status& s) {
-      newest = StatusCopy{
-          s, text(s.vehicle), text(s.state), text(s.reason), text(s.task), text(s.mismatch), text(s.place), {}};
+      newest = StatusCopy{s,
+                          text(s.vehicle),
+                          text(s.state),
+                          text(s.reason),
+                          text(s.task),
+                          text(s.mismatch),
+                          text(s.place),
+                          text(s.refused),
+                          {}};
       for (std::uint32_t n = 0; n < s.parameters._length; ++n)
         newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
       auto& own = newest->numbers;
-      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = nullptr;
+      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.refused = nullptr;
       own.parameters = {};
     });
   }

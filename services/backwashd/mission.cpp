@@ -219,6 +219,7 @@ void run_mission(Channels& channels, Mission& mission, const SendAnswer& answer)
   while (!channels.stop) {
     mission.refresh();
     while (const auto command = channels.commands.pop()) {
+      if (command->departed) continue;
       const Answer a = mission.handle(*command, seconds_now());
       spdlog::info("command {} from {}: {}", command->verb, command->station.data(), a.reason);
       answer(*command, a);
