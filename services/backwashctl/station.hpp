@@ -12,6 +12,12 @@
 
 namespace backwash::ctl {
 
+/// From now on SIGINT and SIGTERM end every wait of a station, so that its participant is deleted and the daemon knows
+/// at once that its session has ended.
+void end_waits_on_signals();
+/// The signal that came, or 0.
+int interrupted() noexcept;
+
 /// Where the daemon is and who asks.
 struct Options {
   int domain = 0;

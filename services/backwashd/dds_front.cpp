@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "services/backwashd/text.hpp"
+#include "services/dds/packet_filter.hpp"
 #include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
@@ -53,7 +54,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
                 dds::TopicOf<dds::Odometry>::kDelivery),
       closures_(dds::make_reader<dds::TransformStamped>(participant_, config.dds.name_space)),
       commands_(dds::make_reader<dds::Command>(participant_, config.dds.name_space)),
-      foreign_(participant_),
+      foreign_(participant_, {&odometry_, &closures_, &commands_}),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
       waitset_(participant_) {
@@ -203,6 +204,7 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.heartbeat_age = view.heartbeat_age;
     s.mismatch = dds::c_string(mismatch);
     s.place = place.data();
+    s.parts_filtered = dds::filtered_parts();
     s.refused = refused.data();
     std::array<dds::Parameter, kParameters.size()> parameters{};
     std::uint32_t known = 0;

@@ -27,7 +27,7 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, {.apart = true}),
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
       scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
-      foreign_(participant_),
+      foreign_(participant_, {&maps_, &scans_}),
       tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
       trajectory_(dds::make_writer<dds::Path>(participant_, config.dds.name_space)),
       waitset_(participant_) {

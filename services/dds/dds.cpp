@@ -3,13 +3,28 @@
 
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <span>
 #include <string_view>
+
+#include "services/dds/packet_filter.hpp"
+
+// Takes the C library's place in every program that links this: the middleware receives by it and by nothing else.
+extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
+  const ssize_t received = syscall(SYS_recvmsg, socket, message, flags);
+  if (received <= 0 || message->msg_iovlen != 1 || (flags & MSG_PEEK)) return received;
+  const std::span datagram(static_cast<std::uint8_t*>(message->msg_iov[0].iov_base),
+                           std::min(static_cast<std::size_t>(received), message->msg_iov[0].iov_len));
+  return static_cast<ssize_t>(backwash::dds::filter_packet(datagram));
+}
 
 namespace backwash::dds {
 namespace {
@@ -104,7 +119,8 @@ std::string text(const Guid& guid) {
 namespace detail {
 
 ReaderBase::ReaderBase(const Participant& participant, const dds_topic_descriptor& type, const std::string& topic,
-                       Delivery delivery) {
+                       Delivery delivery)
+    : topic_(topic), type_(type.m_typename) {
   const Entity handle = make_topic(participant.handle(), type, topic);
   dds_qos_t* qos = make_qos(delivery);
   const dds_return_t reader = dds_create_reader(participant.handle(), handle, qos, nullptr);
@@ -179,11 +195,13 @@ bool WriterBase::write(const void* sample) { return dds_write(writer_, sample) =
 
 }  // namespace detail
 
-ForeignWriters::ForeignWriters(const Participant& participant)
-    : participant_(participant.handle()),
-      publications_(
+ForeignWriters::ForeignWriters(const Participant& participant,
+                               std::initializer_list<const detail::ReaderBase*> readers)
+    : publications_(
           checked(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr),
-                  "reader of the participants' writers")) {}
+                  "reader of the participants' writers")) {
+  for (const auto* reader : readers) types_[reader->topic()] = reader->type();
+}
 
 std::size_t ForeignWriters::take_new() {
   const std::size_t before = seen_.size();
@@ -192,15 +210,12 @@ std::size_t ForeignWriters::take_new() {
   while (dds_take(publications_, &sample, &info, 1, 1) == 1) {
     if (info.valid_data) {
       const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
-      const Entity ours = dds_find_topic(DDS_FIND_SCOPE_PARTICIPANT, participant_, writer.topic_name, nullptr, 0);
-      std::array<char, 256> type{};
-      if (ours > 0 && dds_get_type_name(ours, type.data(), type.size()) > 0 &&
-          std::string_view(type.data()) != writer.type_name) {
+      const auto ours = types_.find(writer.topic_name);
+      if (ours != types_.end() && ours->second != writer.type_name && seen_.size() < kMost) {
         Guid guid;
         std::copy_n(writer.key.v, guid.size(), guid.begin());
-        if (seen_.size() < kMost) seen_.insert(guid);
+        seen_.insert(guid);
       }
-      if (ours > 0) dds_delete(ours);
     }
     dds_return_loan(publications_, &sample, 1);
     sample = nullptr;

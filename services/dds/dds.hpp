@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -74,6 +75,8 @@ class ReaderBase {
   ReaderBase(const Participant& participant, const dds_topic_descriptor& type, const std::string& topic,
              Delivery delivery);
   Entity handle() const noexcept { return reader_; }
+  const std::string& topic() const noexcept { return topic_; }
+  const std::string& type() const noexcept { return type_; }
   /// Writers that were matched at the last call and are gone since: deleted, or silent for their lease (10 s) after a
   /// crash. Cheap while none comes or goes. Call from the thread that takes.
   std::vector<Guid> departed();
@@ -84,6 +87,7 @@ class ReaderBase {
 
  private:
   const Guid& writer(std::uint64_t publication);
+  std::string topic_, type_;
   Entity reader_;
   std::map<std::uint64_t, Guid> writers_;  // by the middleware's handle
 };
@@ -130,17 +134,18 @@ class Writer : public detail::WriterBase {
   bool write(const T& sample) { return WriterBase::write(&sample); }
 };
 
-/// Counts the writers of other participants that use the name of one of this participant's topics with another type:
-/// the middleware does not connect them and tells nobody (faults.md row 27).
+/// Counts the writers of other participants that use the topic of one of these readers with another type: the middleware
+/// does not connect them and tells nobody (faults.md row 27).
 class ForeignWriters {
  public:
-  explicit ForeignWriters(const Participant& participant);
+  ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);
   /// How many came since the last call; after kMost of them no more are counted. Call from one thread.
   std::size_t take_new();
 
  private:
   static constexpr std::size_t kMost = 1000;  // their identities are kept
-  Entity participant_, publications_;
+  Entity publications_;
+  std::map<std::string, std::string> types_;  // by topic
   std::set<Guid> seen_;
 };
 

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/dds/packet_filter.hpp"
 
-#include <sys/socket.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cstring>
@@ -109,12 +105,3 @@ std::size_t filter_packet(Bytes datagram) noexcept {
 std::uint64_t filtered_parts() noexcept { return filtered; }
 
 }  // namespace backwash::dds
-
-/// Takes the C library's place in every program that links this: the middleware receives by it and by nothing else.
-extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
-  const ssize_t received = syscall(SYS_recvmsg, socket, message, flags);
-  if (received <= 0 || message->msg_iovlen != 1 || (flags & MSG_PEEK)) return received;
-  const std::span datagram(static_cast<std::uint8_t*>(message->msg_iov[0].iov_base),
-                           std::min(static_cast<std::size_t>(received), message->msg_iov[0].iov_len));
-  return static_cast<ssize_t>(backwash::dds::filter_packet(datagram));
-}
