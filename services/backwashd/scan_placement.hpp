@@ -27,6 +27,9 @@ class ScanPlacement {
   /// right.
   tl::expected<Scan, std::string> scan(const dds::PointCloud& message, std::int64_t received_ns) const;
 
+  /// Held now; bounded whatever is added.
+  std::size_t poses() const noexcept { return history_.size(); }
+
  private:
   struct Pose {
     std::int64_t stamp_ns;

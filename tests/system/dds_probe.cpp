@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a confused or hostile participant sends, for the scripts beside it (faults.md rows 2, 3, 12, 26, 27, 46, 48).
-//   dds_probe DOMAIN NAMESPACE foreign|frame|oversized|lying|corrupt|large
+//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|large
 //   dds_probe DOMAIN NAMESPACE flood [SECONDS]
 //   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1 it
 //   is
@@ -185,6 +185,7 @@ int main(int argc, char** argv) {
   const std::string name_space = argv[2], what = argv[3];
   if (what == "foreign") return foreign(participant, name_space);
   if (what == "frame") return odometry(participant, name_space, 50, 20ms);
+  if (what == "second") return odometry(participant, name_space, 50, 20ms, "map", 1);
   if (what == "flood")
     return odometry(participant, name_space, argc == 5 ? 10'000 * std::atoi(argv[4]) : 100'000, 100us);
   if (what == "nan") return relay(participant, name_space, std::nan(""), 700);
