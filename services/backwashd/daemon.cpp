@@ -12,6 +12,7 @@
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/link_watch.hpp"
+#include "services/backwashd/map_front.hpp"
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/planner_worker.hpp"
 #include "services/parallel/real_time.hpp"
@@ -59,6 +60,7 @@ int run(const Settings& settings) {
   const int control = settings.daemon.control.priority;
   DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), settings.vehicle,
                  *channels, recorder);
+  MapFront maps(settings.daemon, *channels, recorder);  // after the front, which watches the middleware's log
   Mission mission;
   ControlLoop loop(*channels, link, settings.vehicle, settings.daemon.control.battery_land, settings.daemon.map);
   {
@@ -67,7 +69,7 @@ int run(const Settings& settings) {
         std::jthread(
             [&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle, settings.daemon.map); }),
         std::jthread([&] {
-          run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); });
+          run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { maps.send(segment); });
         }),
         std::jthread([&] {
           run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); });
@@ -78,6 +80,7 @@ int run(const Settings& settings) {
           run_control(*channels, loop);
         }),
         std::jthread([&] { front.run_readers(); }),
+        std::jthread([&] { maps.run_readers(); }),
         std::jthread([&] { run_link_watch(*channels, settings.daemon.link); })};
     spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}", settings.vehicle.name,
                  settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space);
