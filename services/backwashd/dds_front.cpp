@@ -50,7 +50,8 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
                   {topic_of<dds::Octomap>(config), &channels.maps_rejected},
                   {topic_of<dds::PointCloud>(config), &channels.scans_rejected},
                   {topic_of<dds::TransformStamped>(config), &channels.closures_refused},
-                  {topic_of<dds::Command>(config), &channels.commands_refused}}),
+                  {topic_of<dds::Command>(config), &channels.commands_refused}},
+                 [](std::string_view line) { spdlog::warn("DDS: {}", line); }),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, priority),
       odometry_(participant_, dds::TopicOf<dds::Odometry>::type(), config.dds.odometry_topic,
                 dds::TopicOf<dds::Odometry>::kDelivery),
@@ -74,8 +75,9 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
 void DdsFront::refuse(std::atomic<std::uint64_t>& counter, const std::string& why) {
   constexpr std::int64_t kPause_ns = 1'000'000'000;
   ++counter;
-  if (now_ns() - said_ns_ < kPause_ns) return;
-  said_ns_ = now_ns();
+  auto& said_ns = said_ns_[&counter];
+  if (now_ns() - said_ns < kPause_ns) return;
+  said_ns = now_ns();
   spdlog::warn("refused: {}", why);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
+
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/localization.hpp"
@@ -20,7 +22,7 @@ class DdsFront {
   DdsFront& operator=(const DdsFront&) = delete;
 
   /// Thread body: odometry, loop closures, scans, maps and commands in. New voxels of a scan go straight to the control
-  /// thread, the scan to the map worker. What is refused is counted, and said at most once a second.
+  /// thread, the scan to the map worker. What is refused is counted, and said at most once a second of each topic.
   void run_readers();
   /// Thread body: status out at 10 Hz.
   void run_status(const Vehicle& vehicle);
@@ -42,9 +44,9 @@ class DdsFront {
   int priority_;
   double sensor_range_;
   Localization localization_;
-  const Worlds::Pointer* world_ = nullptr;  // the reader's
-  std::int64_t said_ns_ = 0;
-  dds::Malformed malformed_;  // before the middleware's threads
+  const Worlds::Pointer* world_ = nullptr;       // the reader's
+  std::map<const void*, std::int64_t> said_ns_;  // when each cause was last told, by its counter
+  dds::Malformed malformed_;                     // before the middleware's threads
   dds::Participant participant_;
   dds::Reader<dds::Odometry> odometry_;
   dds::Reader<dds::Octomap> maps_;

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <string_view>
 
@@ -152,11 +151,12 @@ std::size_t ForeignWriters::count() {
   return seen_.size();
 }
 
-Malformed::Malformed(Counters counters) : counters_(std::move(counters)) {
+Malformed::Malformed(Counters counters, Say say) : counters_(std::move(counters)), say_(say) {
   dds_set_log_sink(
       [](void* self, const dds_log_data_t* data) {
-        if (!static_cast<Malformed*>(self)->take({data->message, data->size}))
-          std::fwrite(data->message - data->hdrsize, 1, data->hdrsize + data->size + 1, stderr);  // with its line end
+        auto& malformed = *static_cast<Malformed*>(self);
+        const std::string_view line(data->message, data->size);
+        if (!malformed.take(line)) malformed.say_(line);
       },
       this);
 }

@@ -118,12 +118,13 @@ class ForeignWriters {
 
 /// Counts samples that the middleware drops because their bytes are none of their topic's type (faults.md row 27). It
 /// says so nowhere but in its log, a line for each: while this lives it takes those lines out of that log, which is one
-/// for the whole process. Other lines go to stderr as before.
+/// for the whole process. Other lines are given to `say`, by the middleware's own threads.
 class Malformed {
  public:
   /// Each topic by its whole name, with the counter of its samples, which the middleware's threads add to.
   using Counters = std::vector<std::pair<std::string, std::atomic<std::uint64_t>*>>;
-  explicit Malformed(Counters counters);
+  using Say = void (*)(std::string_view line);
+  Malformed(Counters counters, Say say);
   ~Malformed();
   Malformed(const Malformed&) = delete;
   Malformed& operator=(const Malformed&) = delete;
@@ -132,6 +133,7 @@ class Malformed {
 
  private:
   Counters counters_;
+  Say say_;
 };
 
 /// Sleeps until one of its readers has data.
