@@ -44,6 +44,12 @@ firmware_bridge::SerialPort open_port(const decltype(config::Daemon::link)& link
   return std::move(*port);
 }
 
+// What carries odometry to the control thread comes right below it, before the middleware starts its threads.
+int reader_priority(const config::Daemon& daemon) {
+  const int control = daemon.control.priority;
+  return allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0));
+}
+
 }  // namespace
 
 tl::expected<Settings, std::string> load_settings(const std::string& path) {
@@ -58,87 +64,77 @@ tl::expected<Settings, std::string> load_settings(const std::string& path) {
 
 namespace {
 
-/// All but the recorder: ended first, so that what they said last is recorded.
-void start(Threads& threads, const Settings& settings, Channels& channels, Recorder& recorder, Mission& mission,
-           DdsFront& front, ControlLoop& loop, firmware_bridge::AutopilotLink& link) {
-  const auto& daemon = settings.daemon;
-  threads.start("map worker",
-                [&] { run_map_worker(channels, recorder, settings.model, settings.vehicle, daemon.map); });
-  threads.start("planner", [&] {
-    run_planner(channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); });
+/// Everything that runs. What others use comes first.
+struct Flight {
+  explicit Flight(const Settings& s)
+      : settings(s),
+        port(open_port(s.daemon.link)),  // first: a start that fails there leaves no log behind
+        recorder(made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file); })),
+        log(recorder->path()),
+        link(std::move(port), static_cast<std::uint8_t>(s.daemon.link.system), std::chrono::steady_clock::now()),
+        front(made(kSystem,
+                   [&] {
+                     return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels,
+                                                       *recorder);
+                   })),
+        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {}
+
+  const Settings& settings;
+  std::unique_ptr<Channels> channels = std::make_unique<Channels>();
+  firmware_bridge::SerialPort port;
+  std::unique_ptr<Recorder> recorder;
+  const std::string log;  ///< file that the recorder began with
+  firmware_bridge::AutopilotLink link;
+  std::unique_ptr<DdsFront> front;
+  Mission mission{*channels};
+  ControlLoop loop;
+  Failure failure{channels->stop};
+  CatchTheRest rest{failure};
+  std::atomic<bool> recorded{false};
+  Threads writer{failure}, threads{failure};  ///< the writer ends last, so that what the others said is recorded
+};
+
+void start(Flight& f) {
+  Channels& channels = *f.channels;
+  const auto& daemon = f.settings.daemon;
+  f.writer.start("recorder", [&] { f.recorder->run(channels, f.recorded); });
+  f.threads.start("map worker",
+                  [&] { run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map); });
+  f.threads.start("planner", [&] {
+    run_planner(channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.front->send(segment); });
   });
-  threads.start("mission", [&] {
-    run_mission(channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); });
+  f.threads.start("mission", [&] {
+    run_mission(channels, f.mission, [&](const CommandMessage& c, const Answer& a) { f.front->send(c, a); });
   });
-  threads.start("status", [&] { front.run_status(settings.vehicle); });
-  threads.start("control", [&] {
+  f.threads.start("status", [&] { f.front->run_status(f.settings.vehicle); });
+  f.threads.start("control", [&] {
     make_real_time({daemon.control.priority, daemon.control.cpu});
-    run_control(channels, loop);
-    link.discard_unsent();
+    run_control(channels, f.loop);
+    f.link.discard_unsent();
   });
-  threads.start("reader", [&] { front.run_readers(); });
-  threads.start("link watch", [&] { run_link_watch(channels, daemon.link); });
+  f.threads.start("reader", [&] { f.front->run_readers(); });
+  f.threads.start("link watch", [&] { run_link_watch(channels, daemon.link); });
 }
 
-/// After `channels.stop`: waits for the threads, then closes the log with why the flight ended. Returns the exit code
-/// if all of them have ended; otherwise they still use what the caller owns, and the process ends here.
-int end(Threads& threads, Threads& writer, Channels& channels, Recorder& recorder, std::atomic<bool>& recorded,
-        firmware_bridge::AutopilotLink& link, Failure& failure, LogSink& sink, const std::string& log) {
-  const bool ended = threads.join(failure.happened() ? kToFail : kToEnd);
-  if (!ended) {
-    link.discard_unsent();  // of a control thread that hangs
-    failure.note("main", "a thread does not end");
-  }
+/// Waits for the threads and closes the log, with why the flight ended if nobody asked for it. False: a thread hangs.
+bool end(Flight& f) {
+  f.channels->stop = true;
+  const bool ended = f.threads.join(f.failure.happened() ? kToFail : kToEnd);
+  if (!ended) f.link.discard_unsent();  // of a control thread that hangs
   try {
-    if (failure.happened()) recorder.append(study::RecordKind::failure, failure.text());
+    if (f.failure.happened()) f.recorder->append(study::RecordKind::failure, f.failure.text());
   } catch (const std::bad_alloc&) {
   }
-  recorded = true;
-  const bool closed = writer.join(kToRecord);
-  const auto lost = recorder.lost() + channels.control_log.lost();
-  if (lost > 0 || !closed) spdlog::warn("{}: {} records were lost{}", log, lost, closed ? "" : ", the disk hangs");
-  if (failure.happened())
-    spdlog::critical("backwashd: {}: the flight was ended in silence", failure.text());
+  f.recorded = true;
+  const bool closed = f.writer.join(kToRecord);
+  if (!closed) f.failure.note("recorder", "the disk does not answer", kInputOutput);
+  if (const auto lost = f.recorder->lost() + f.channels->control_log.lost())
+    spdlog::warn("{}: {} records were lost", f.log, lost);
+  if (f.failure.happened())
+    spdlog::critical("backwashd: {}; nothing more is sent", f.failure.text());
   else
-    spdlog::info("stopped");
-  const int code = failure.happened() ? failure.code() : closed ? 0 : kInputOutput;
-  if (ended && closed) return code;
-  sink.close(kToSay);
-  ::_exit(code);
-}
-
-int fly(const Settings& settings, const sigset_t& signals, LogSink& sink) {
-  const auto& daemon = settings.daemon;
-  // The port first: a start that fails there leaves no log behind.
-  auto port = open_port(daemon.link);
-  auto channels = std::make_unique<Channels>();
-  auto recorder = made(kCannotCreate, [&] { return std::make_unique<Recorder>(daemon.log.file); });
-  const std::string log = recorder->path();
-  firmware_bridge::AutopilotLink link(std::move(port), static_cast<std::uint8_t>(daemon.link.system),
-                                      std::chrono::steady_clock::now());
-  // What carries odometry to the control thread comes right below it, before the middleware starts its threads.
-  const int control = daemon.control.priority;
-  const int reader = allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0));
-  auto front =
-      made(kSystem, [&] { return std::make_unique<DdsFront>(daemon, reader, settings.vehicle, *channels, *recorder); });
-  Mission mission(*channels);
-  ControlLoop loop(*channels, link, settings.vehicle, daemon.control.battery_land, daemon.map);
-
-  Failure failure(channels->stop);
-  const CatchTheRest rest(failure);
-  std::atomic<bool> recorded{false};
-  Threads writer(failure), threads(failure);
-  try {
-    writer.start("recorder", [&] { recorder->run(*channels, recorded); });
-    start(threads, settings, *channels, *recorder, mission, *front, loop, link);
-    spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}, raw log {}", settings.vehicle.name,
-                 daemon.link.device, daemon.dds.domain, daemon.dds.name_space, log);
-    wait_for_end(signals, failure);
-  } catch (const std::system_error& e) {
-    failure.note("start", e.what(), kSystem);
-  }
-  channels->stop = true;
-  return end(threads, writer, *channels, *recorder, recorded, link, failure, sink, log);
+    spdlog::info("stopped{}", ended ? "" : ", with a thread still at work");
+  return ended && closed;
 }
 
 }  // namespace
@@ -149,7 +145,22 @@ int run(const Settings& settings) {
   spdlog::set_default_logger(std::make_shared<spdlog::logger>("backwashd", sink));
   int code = kSoftware;
   try {
-    code = fly(settings, signals, *sink);
+    auto flight = std::make_unique<Flight>(settings);
+    try {
+      start(*flight);
+      spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}, raw log {}", settings.vehicle.name,
+                   settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space,
+                   flight->log);
+      wait_for_end(signals, flight->failure);
+    } catch (const std::system_error& e) {
+      flight->failure.note("start", e.what(), kSystem);
+    }
+    const bool ended = end(*flight);
+    code = flight->failure.code();
+    if (!ended) {  // what hangs still uses the flight
+      sink->close(kToSay);
+      ::_exit(code);
+    }
   } catch (const StartError& error) {
     code = error.code;
     spdlog::error("backwashd: {}", error.what);

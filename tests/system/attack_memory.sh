@@ -19,7 +19,7 @@ kill -0 "$daemon_pid" 2>/dev/null && die 'it goes on without memory'
 wait "$daemon_pid" || code=$?
 daemon_pid=''
 [[ $code == 70 ]] || die "ended with $code instead of 70"
-grep '\[critical\] backwashd: .*: .*: the flight was ended in silence' "$log" || die 'it did not say why'
+grep '\[critical\] backwashd: .*: .*; nothing more is sent' "$log" || die 'it did not say why'
 stop
 PYTHONPATH=$source_dir/tests/system python3 - "$work" <<'PYTHON'
 import sys
