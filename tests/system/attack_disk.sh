@@ -8,7 +8,7 @@ set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
 now() { python3 -c 'import time; print(time.monotonic())'; }
-status() { timeout 10 "$bin/backwashctl" --domain "$domain" status --json >"$work/status.json" || die 'no status'; }
+status() { timeout 10 "$bin/backwashctl" --domain "$domain" status --json >"$work/status.json" || { rm -f "$work/hangs"; die 'no status'; }; }
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv"
 cat >"$work/daemon" <<SH
 #!/bin/sh
@@ -27,6 +27,8 @@ rm "$work/hangs"
 sleep 1
 touch "$work/hangs"
 kill -TERM "$daemon_pid"
+for _ in $(seq 150); do kill -0 "$daemon_pid" 2>/dev/null || break; sleep 0.1; done
+rm "$work/hangs"
 code=0
 wait "$daemon_pid" || code=$?
 daemon_pid=''
