@@ -33,8 +33,9 @@ enum class RecordKind : std::uint32_t {
   lost = 13,        ///< LostRecord: the disk did not take what came before
   scan = 14,        ///< text, one line: a scan was handed to the control thread and to the map worker
   world = 15,       ///< text, one line: a new snapshot was handed out
+  failure = 16,     ///< text, one line: an exception in a thread, which ended the daemon
 };
-inline constexpr auto kLastKind = RecordKind::world;
+inline constexpr auto kLastKind = RecordKind::failure;
 
 struct RecordHeader {
   std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it

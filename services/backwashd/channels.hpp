@@ -191,6 +191,7 @@ struct Channels {
   sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
   sync::Handover<FreshPort> ports;                                         // link watch → control
   std::atomic<std::uint8_t> link_fault{0};         // control → link watch: 1 + LinkFault, 0: none
+  std::atomic<std::uint32_t> port_losses{0};       // control → link watch: times that a good port was lost
   sync::LatestValue<std::array<char, 192>> place;  // mission → status: what keeps it from flying from here
   sync::LatestValue<std::array<char, 192>> task;   // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
