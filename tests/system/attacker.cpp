@@ -22,13 +22,11 @@ using namespace std::chrono_literals;
 namespace {
 
 const std::string kNamespace = "backwash";
-const std::map<std::string, std::uint8_t> kVerbs{{"enable", backwash_msgs_msg_dds__COMMAND_ENABLE},
-                                                 {"disable", backwash_msgs_msg_dds__COMMAND_DISABLE},
-                                                 {"takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF},
-                                                 {"goto", backwash_msgs_msg_dds__COMMAND_GOTO},
-                                                 {"hold", backwash_msgs_msg_dds__COMMAND_HOLD},
-                                                 {"land", backwash_msgs_msg_dds__COMMAND_LAND},
-                                                 {"stop", backwash_msgs_msg_dds__COMMAND_STOP}};
+const std::map<std::string, std::uint8_t> kVerbs{
+    {"enable", backwash_msgs_msg_dds__COMMAND_ENABLE},   {"disable", backwash_msgs_msg_dds__COMMAND_DISABLE},
+    {"takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF}, {"goto", backwash_msgs_msg_dds__COMMAND_GOTO},
+    {"hold", backwash_msgs_msg_dds__COMMAND_HOLD},       {"land", backwash_msgs_msg_dds__COMMAND_LAND},
+    {"stop", backwash_msgs_msg_dds__COMMAND_STOP},       {"release", backwash_msgs_msg_dds__COMMAND_RELEASE}};
 
 double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
@@ -92,8 +90,8 @@ int send(const dds::Participant& participant, int count, char** steps) {
   return station.all_answered() ? 0 : 69;
 }
 
-int relay(const dds::Participant& participant, const std::string& from, const std::string& to,
-          const std::string& what, double value, double x) {
+int relay(const dds::Participant& participant, const std::string& from, const std::string& to, const std::string& what,
+          double value, double x) {
   dds::Reader<dds::Odometry> reader(participant, dds::TopicOf<dds::Odometry>::type(), from, dds::Delivery::latest);
   dds::Writer<dds::Odometry> writer(participant, dds::TopicOf<dds::Odometry>::type(), to, dds::Delivery::latest);
   dds::WaitSet waitset(participant);

@@ -178,7 +178,8 @@ void DaemonRig::apply_to_map(const Event& e) {
       return offer_map(grid, map::encode_octomap(grid));
     }
     case Kind::map_elsewhere: {
-      const map::OccupancyGrid other({10 * e.a, 10 * e.b, 10 * e.c}, 0.2, {10, 10, 10}, map::Cell::free);
+      const Vec3 corner(std::round(50 * e.a), std::round(50 * e.b), std::round(50 * e.c));
+      const map::OccupancyGrid other(0.2 * corner, 0.2, {10, 10, 10}, map::Cell::free);
       return offer_map(other, map::encode_octomap(other));
     }
     case Kind::map_damaged: {
@@ -251,11 +252,13 @@ void DaemonRig::apply_to_line(const Event& e) {
       return lock_.say(
           CommandAck{.command = static_cast<std::uint16_t>(e.n), .result = static_cast<std::uint8_t>(e.b)});
     case Kind::position: {
+      watch_.frame_moved(tick_);
       std::array<float, 6> m{5, -3, 0, 0, 0, 0};
       m[static_cast<std::size_t>(e.b) % 6] = e.c > 0 ? std::numeric_limits<float>::quiet_NaN() : value;
       return lock_.say(LocalPositionNed{static_cast<std::uint32_t>(20 * tick_), m[0], m[1], m[2], m[3], m[4], m[5]});
     }
     case Kind::attitude:
+      watch_.frame_moved(tick_);
       return lock_.say(AttitudeQuaternion{.q1 = value, .q2 = value, .q3 = 0, .q4 = 1});
     case Kind::battery:
       lock_.autopilot->battery = std::clamp(std::abs(e.a), 0.0, 1.0);

@@ -61,7 +61,7 @@ void DaemonRig::start() {
   watch_.restarted();
 }
 
-std::optional<Violation> DaemonRig::run(int ticks) {
+std::optional<Violation> DaemonRig::run(int ticks) try {
   while (tick_ < ticks && !violation_) {
     advance();
     if (restarts_) {
@@ -74,6 +74,8 @@ std::optional<Violation> DaemonRig::run(int ticks) {
     if (!lasting(Kind::slow_planner)) threads_->planner.step();
   }
   return violation_;
+} catch (const std::exception& e) {  // a thread that ends so ends the daemon
+  return Violation{tick_, std::string("exception: ") + e.what()};
 }
 
 // One tick, also while the planner waits for an answer.

@@ -30,7 +30,7 @@ class Watch {
 
   /// Verb (COMMAND_…) of the holder's command that was accepted in this tick.
   void acknowledged(std::uint8_t verb, int tick);
-  /// The autopilot's estimator was reset, or said so.
+  /// The autopilot's estimator was reset, or a message of it said so.
   void frame_moved(int tick) { frame_moved_ = tick; }
   /// The daemon was started anew.
   void restarted();
