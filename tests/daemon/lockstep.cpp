@@ -162,7 +162,7 @@ Lockstep::~Lockstep() {
   channels->ports.collect();
 }
 
-void Lockstep::restart() {
+void Lockstep::restart(bool with_map) {
   loop_.reset();
   link_.reset();
   line_ = make_line();
@@ -172,7 +172,7 @@ void Lockstep::restart() {
   link_ = std::make_unique<firmware_bridge::AutopilotLink>(line_->open(), std::uint8_t{1},
                                                            firmware_bridge::Time(std::chrono::nanoseconds(now_ns_)));
   loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand);
-  channels->worlds.offer(world_);
+  if (with_map) channels->worlds.offer(world_);
   log.clear();
 }
 
@@ -283,6 +283,7 @@ int Lockstep::ticks_until(track::Mode wanted, int most) {
 std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops) {
   auto segment = std::make_unique<track::AcceptedSegment>();
   segment->id = ++last_segment_;
+  segment->closures = view().closures;
   const State start = view().state;
   segment->tube = reach::tube_over_field(world_->reach, start, view().command, commands, world_->bounds);
   if (with_stops)

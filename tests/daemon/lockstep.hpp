@@ -88,7 +88,7 @@ class Lockstep {
   bool unread = false;                                    ///< the flight controller does not read
   void hang_up();                                         ///< the line is unplugged
   void plug_in();                                         ///< a new line, handed over as the link watch does
-  void restart();                                         ///< the daemon is killed and started anew
+  void restart(bool with_map = true);                     ///< the daemon is killed and started anew
 
   std::vector<std::uint8_t> inject_;
   bench::LocalFrame local_frame;  ///< the controller's true one
