@@ -59,7 +59,7 @@ int run(const Settings& settings) {
   const int control = settings.daemon.control.priority;
   DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), settings.vehicle,
                  *channels, recorder);
-  Mission mission(*channels);
+  Mission mission;
   ControlLoop loop(*channels, link, settings.vehicle, settings.daemon.control.battery_land, settings.daemon.map);
   {
     const std::array threads = {

@@ -42,7 +42,7 @@ class DdsFront {
   int priority_;
   double sensor_range_;
   Localization localization_;
-  const Worlds::Pointer* world_ = nullptr;  // the reader's
+  const Snapshot* world_ = nullptr;  // the reader's
   std::int64_t said_ns_ = 0;
   dds::Malformed malformed_;  // before the middleware's threads
   dds::Participant participant_;

@@ -85,11 +85,11 @@ TEST(Row9, BeyondEachOfTheMapsSixSidesTheSetpointRests) {
   for (int side = 0; side < 6; ++side) {
     Hovering rig;
     const Vec3 here = rig.view().state.p_W;
-    rig.channels->worlds.offer(box_around(here, side, 0.15));
+    rig.channels->worlds.offer({box_around(here, side, 0.15), rig.now_ns()});
     rig.ticks(20);
     EXPECT_EQ(rig.mode(), Mode::tracking) << "inside by 15 cm, " << kSides[side] << ": " << to_string(rig.reason());
     const Vec3 before = rig.in_map(rig.wire().setpoints.at(0)).p_W;
-    rig.channels->worlds.offer(box_around(rig.view().state.p_W, side, -0.15));
+    rig.channels->worlds.offer({box_around(rig.view().state.p_W, side, -0.15), rig.now_ns()});
     rig.tick();
     EXPECT_EQ(rig.mode(), Mode::hold) << kSides[side];
     EXPECT_EQ(rig.reason(), Reason::outside_map) << kSides[side];
@@ -107,8 +107,8 @@ TEST(Row9, BeyondEachOfTheMapsSixSidesEnablingIsRefused) {
     for (const double beyond : {-0.15, 0.15}) {
       Lockstep rig({0.7, Vec3(5, -3, 0.2)}, Medium::udp);
       rig.ticks(60);
-      rig.channels->worlds.offer(box_around(rig.view().state.p_W, side, beyond));
-      rig.channels->requests.push(track::Request::enable);
+      rig.channels->worlds.offer({box_around(rig.view().state.p_W, side, beyond), rig.now_ns()});
+      rig.channels->orders.push({track::Request::enable});
       rig.tick();
       EXPECT_EQ(rig.mode(), beyond < 0 ? Mode::passive : Mode::enabling) << side;
       if (beyond > 0) continue;
@@ -157,7 +157,7 @@ TEST_F(Maps, Row10WithoutAMapOrWithAnEmptyOneNothingIsEverCommanded) {
     EXPECT_EQ(rig.channels->maps_rejected, 1u);
     rig.ticks(60);
     for (int n = 0; n < 150; ++n) {
-      if (n % 50 == 0) rig.channels->requests.push(track::Request::enable);
+      if (n % 50 == 0) rig.channels->orders.push({track::Request::enable});
       const Wire& wire = rig.tick();
       ASSERT_EQ(rig.mode(), Mode::passive);
       ASSERT_TRUE(wire.setpoints.empty() && !wire.commanded(kCommandMode) && !wire.commanded(kCommandArm));

@@ -39,6 +39,8 @@ void DaemonRig::apply(const Event& e) {
     case Kind::foreign: {
       auto other = last_command_;
       std::snprintf(other.station.data(), other.station.size(), "another");
+      other.writer[0] = 2;
+      other.session = 1'000'000;
       other.verb = static_cast<std::uint8_t>(e.n);
       other.position = place(e);
       other.sequence = sequence_ + 1;
@@ -48,6 +50,13 @@ void DaemonRig::apply(const Event& e) {
     case Kind::repeated:
       lock_.channels->commands.push(last_command_);
       return;
+    case Kind::departed: {
+      daemon::CommandMessage gone;
+      gone.departed = true;
+      gone.writer[0] = static_cast<std::uint8_t>(e.n % 3);
+      lock_.channels->commands.push(gone);
+      return;
+    }
     case Kind::old_number: {
       auto old = last_command_;
       old.sequence -= std::min<std::uint32_t>(old.sequence, 1 + sequence_ / 2);
@@ -83,6 +92,7 @@ void DaemonRig::apply(const Event& e) {
 void DaemonRig::send(std::uint8_t verb, const Event& e) {
   daemon::CommandMessage c;
   std::snprintf(c.station.data(), c.station.size(), "station");
+  c.writer[0] = 1;
   c.session = session_;
   c.sequence = ++sequence_;
   c.verb = verb;

@@ -32,7 +32,6 @@ std::shared_ptr<const plan::World> world() {
 DaemonRig::Threads::Threads(DaemonRig& rig, daemon::Channels& channels)
     : recorder(rig.log_),
       map(channels, recorder, Model{}, vehicle_5in(), settings),
-      mission(channels),
       planner(
           channels, recorder, [&rig](const auto&) { ++rig.plans_; }, [&rig] { rig.advance(); }) {}
 
@@ -90,7 +89,7 @@ void DaemonRig::advance() {
   delay_segments();
   const std::uint64_t segment = lock_.view().segment;
   const auto& wire = lock_.tick(missed_);
-  if (!lasting(Kind::slow_mission)) answer_commands();
+  if (!lasting(Kind::slow_mission)) run_mission();
   const auto& view = lock_.view();
   ++spent_[static_cast<std::size_t>(view.mode)];
   Seen seen{tick_, view.mode, view.armed, view.offboard, wire.bytes};
@@ -113,19 +112,39 @@ void DaemonRig::advance() {
 void DaemonRig::look() {
   auto& from = lock_.channels->worlds.reader;
   if (const auto* newest = from.take()) {
-    threads_->known = *newest;
+    threads_->known = newest->world;
     from.give_back(newest);
   }
 }
 
-// As services/backwashd/mission.cpp's thread.
-void DaemonRig::answer_commands() {
-  auto& mission = threads_->mission;
-  mission.refresh();
-  while (const auto command = lock_.channels->commands.pop()) {
-    const auto answer = mission.handle(*command, static_cast<double>(lock_.now_ns()) * 1e-9);
-    if (answer.result == backwash_msgs_msg_dds__ACK_ACCEPTED) watch_.acknowledged(command->verb, tick_);
+// As services/backwashd/run_mission.cpp's thread.
+void DaemonRig::run_mission() {
+  auto& channels = *lock_.channels;
+  daemon::MissionInput in;
+  in.now_s = static_cast<double>(lock_.now_ns()) * 1e-9;
+  in.view = channels.view_mission.read_new();
+  if (const auto* newest = channels.worlds.mission.take()) {
+    in.world = newest->world;
+    channels.worlds.mission.give_back(newest);
   }
+  std::vector<daemon::PlanOutcome> outcomes;
+  while (const auto outcome = channels.outcomes.pop()) outcomes.push_back(*outcome);
+  in.outcomes = outcomes;
+  carry_out(threads_->mission.observe(in));
+  while (const auto command = channels.commands.pop()) {
+    const auto decision = threads_->mission.handle(*command, in.now_s);
+    const bool done = carry_out(decision);
+    if (done && decision.answer && decision.answer->result == backwash_msgs_msg_dds__ACK_ACCEPTED)
+      watch_.acknowledged(command->verb, tick_);
+  }
+}
+
+bool DaemonRig::carry_out(const daemon::Decision& decision) {
+  auto& channels = *lock_.channels;
+  channels.jobs.collect();
+  if (decision.order && !channels.orders.push(*decision.order)) return false;
+  if (decision.job) channels.jobs.offer(std::make_unique<const daemon::PlanJob>(*decision.job));
+  return true;
 }
 
 // A segment on its way is one that took longer to plan.

@@ -58,7 +58,8 @@ class DaemonRig {
   void apply_to_map(const Event& event);
   void operate(const Event& event);
   void send(std::uint8_t verb, const Event& event);
-  void answer_commands();
+  void run_mission();
+  bool carry_out(const daemon::Decision& decision);
   void delay_segments();
   void look();
   void offer_map(const map::OccupancyGrid& grid, std::vector<std::int8_t> data);

@@ -17,6 +17,7 @@ struct Event {
     repeated,     ///< the last command once more
     old_number,   ///< verb n with an old sequence number
     new_session,  ///< verb n of a new session of the same station
+    departed,     ///< writer n of commands is gone
     // The VIO, for n ticks.
     vio_off,
     vio_shift,  ///< by a, b, c m
