@@ -5,10 +5,11 @@
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "core/files/read_file.hpp"
 #include "services/backwashctl/preflight.hpp"
 #include "services/backwashctl/status_output.hpp"
 
@@ -187,13 +188,15 @@ int Verbs::go_to() {
 
 // The file is the points CSV of the other programs.
 int Verbs::follow() {
-  std::ifstream file(route_);
+  auto content = files::read_file(route_, files::kLargestConfiguration, "a points CSV file");
   std::string line;
   const auto fail = [&](int code, const std::string& where, const std::string& why) {
     std::cerr << "backwashctl follow: " << where << ": " << why << "\n";
     return code;
   };
-  if (!std::getline(file, line)) return fail(66, route_, "cannot be read");
+  if (!content) return fail(66, route_, content.error().message);
+  std::istringstream file(std::move(*content));
+  std::getline(file, line);
   if (line != "x_m,y_m,z_m") return fail(65, route_ + ":1", "the first line is '" + line + "', expected x_m,y_m,z_m");
   for (int number = 2; std::getline(file, line); ++number) {
     Vec3 p;

@@ -37,7 +37,7 @@ class MapFront {
   double sensor_range_;
   ScanPlacement placement_;
   Refusals refusals_;
-  const Worlds::Pointer* world_ = nullptr;  // the reader's
+  const Snapshot* world_ = nullptr;  // the reader's
   dds::Participant participant_;
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;

@@ -107,7 +107,7 @@ flood() {
 wall() {
   build_preset release
   local status=0
-  ctest --preset release -R '^daemon_' || status=$?
+  ctest --preset release -R '^(daemon|attack)_' || status=$?
   tests/nightly/wall_faults.sh "$PWD" build/release || status=$?
   return "$status"
 }

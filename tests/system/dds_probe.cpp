@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a confused or hostile participant sends, for the scripts beside it (faults.md rows 2, 3, 12, 26, 27, 46, 48).
-//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|large
+//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closures|large|roomy
 //   dds_probe DOMAIN NAMESPACE flood [SECONDS]
 //   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1 it
 //   is
@@ -157,6 +157,25 @@ int large(const dds::Participant& participant, const std::string& name_space) {
   return 0;
 }
 
+// Loop closures of frames that nobody has, with names that steer terminals, at 1 kHz.
+int closures(const dds::Participant& participant, const std::string& name_space) {
+  auto writer = dds::make_writer<dds::TransformStamped>(participant, name_space);
+  until_matched(writer);
+  char child[] = "body";
+  auto due = std::chrono::steady_clock::now();
+  for (int n = 0; n < 4000; ++n) {
+    std::string frame = "\n\x1b[2J" + std::string(1, static_cast<char>('a' + n % 26)) + std::string(200, '!');
+    dds::TransformStamped m{};
+    m.header.frame_id = frame.data();
+    m.child_frame_id = child;
+    m.transform.rotation.w = 1;
+    writer.write(m);
+    due += 1ms;
+    std::this_thread::sleep_until(due);
+  }
+  return 0;
+}
+
 int corrupt(const dds::Participant& participant, const std::string& name_space) {
   auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
   until_matched(writer);
@@ -177,6 +196,28 @@ int corrupt(const dds::Participant& participant, const std::string& name_space) 
   return 0;
 }
 
+// A good map of two free cubes of 6.4 m: a box of 128 x 128 x 128 voxels, whose snapshot needs 240 MB.
+int large_map(const dds::Participant& participant, const std::string& name_space) {
+  auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
+  until_matched(writer);
+  std::vector<std::uint8_t> data{0x03, 0xc0};
+  for (int n = 0; n < 8; ++n) data.insert(data.end(), {0x00, 0xc0});
+  data.insert(data.end(), {0x00, 0x40});
+  for (int n = 0; n < 8; ++n) data.insert(data.end(), {0x03, 0x00});
+  data.insert(data.end(), {0x01, 0x00});
+  char frame[] = "map", id[] = "OcTree";
+  dds::Octomap m{};
+  m.header.frame_id = frame;
+  m.id = id;
+  m.binary = true;
+  m.resolution = 0.1;
+  const auto size = static_cast<std::uint32_t>(data.size());
+  m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(data.data()), false};
+  writer.write(m);
+  std::this_thread::sleep_for(1s);
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -190,9 +231,11 @@ int main(int argc, char** argv) {
     return odometry(participant, name_space, argc == 5 ? 10'000 * std::atoi(argv[4]) : 100'000, 100us);
   if (what == "nan") return relay(participant, name_space, std::nan(""), 700);
   if (what == "jump") return relay(participant, name_space, 50, 60);
+  if (what == "closures") return closures(participant, name_space);
   if (what == "oversized") return clouds(participant, name_space, 400'000, 400'000);
   if (what == "lying") return clouds(participant, name_space, 1000, 1);
   if (what == "large") return large(participant, name_space);
+  if (what == "roomy") return large_map(participant, name_space);
   if (what == "corrupt") return corrupt(participant, name_space);
   return 64;
 }
