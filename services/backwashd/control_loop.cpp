@@ -58,8 +58,10 @@ void ControlLoop::poll(std::int64_t now_ns) noexcept {
   if (const FreshPort* fresh = channels_.ports.take()) {
     fresh->port = link_.reconnect(std::move(fresh->port), time_of(now_ns));
     channels_.ports.give_back(fresh);
+    port_open_ = true;
   }
-  port_open_ = link_.poll(time_of(now_ns)).has_value();
+  const bool open = link_.poll(time_of(now_ns)).has_value();
+  if (std::exchange(port_open_, open) && !open) channels_.port_losses.fetch_add(1, std::memory_order_relaxed);
   const auto fault = link_.fault(time_of(now_ns));
   channels_.link_fault.store(fault ? static_cast<std::uint8_t>(1 + static_cast<int>(*fault)) : 0,
                              std::memory_order_relaxed);

@@ -60,8 +60,13 @@ struct Scheduling {
 /// counted; the phase is kept.
 void run_control(Channels& channels, ControlLoop& loop);
 
-/// Locks memory, touches the stack, binds the calling thread to its processor and asks for SCHED_FIFO; says in one
-/// warning each what was not allowed, and goes on without it.
+/// Locks the process's memory, what it has and what it will have. Where RLIMIT_MEMLOCK is finite (and CAP_IPC_LOCK is
+/// not there to lift it) only what it has: with a limit on what it will have, the next large map would be refused its
+/// memory in flight. Says in one warning what is not locked and which limit to raise.
+void lock_memory();
+
+/// Calls lock_memory(), touches the stack, binds the calling thread to its processor and asks for SCHED_FIFO; says in
+/// one warning each what was not allowed, and goes on without it.
 void make_real_time(const Scheduling& scheduling);
 
 }  // namespace backwash::daemon

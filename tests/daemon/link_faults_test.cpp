@@ -56,6 +56,7 @@ TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   watch.step();
   EXPECT_EQ(channels.ports.take(), nullptr);
   channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
+  channels.port_losses = 1;
   watch.step();
   const auto* port = channels.ports.take();
   ASSERT_NE(port, nullptr);
@@ -63,6 +64,32 @@ TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   EXPECT_EQ(channels.ports.take(), nullptr) << "opened twice";
   channels.ports.give_back(port);
   channels.ports.collect();
+}
+
+// Lost, opened again and lost again between two looks of the watch: the fault that it sees has not changed.
+TEST(Row17, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
+  InFlight rig;
+  rig.hang_up();
+  rig.ticks(3);
+  EXPECT_EQ(rig.channels->port_losses, 1u);
+  rig.plug_in();
+  rig.hang_up();
+  rig.ticks(3);
+  EXPECT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  EXPECT_EQ(rig.channels->port_losses, 2u);
+
+  firmware_bridge::test::PseudoTerminal line;
+  Channels channels;
+  LinkWatch watch(channels, line.path(), 921600);
+  for (std::uint32_t losses = 1; losses <= 3; ++losses) {
+    channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
+    channels.port_losses = losses;
+    watch.step();
+    const auto* port = channels.ports.take();
+    ASSERT_NE(port, nullptr) << "after loss " << losses;
+    channels.ports.give_back(port);
+    channels.ports.collect();
+  }
 }
 
 TEST(Row18, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
