@@ -94,10 +94,13 @@ void DaemonRig::advance() {
   ++spent_[static_cast<std::size_t>(view.mode)];
   Seen seen{tick_, view.mode, view.armed, view.offboard, wire.bytes};
   seen.setpoints = static_cast<int>(wire.setpoints.size());
-  seen.commands = static_cast<int>(wire.commands.size());
   if (seen.setpoints > 0) seen.setpoint = {wire.setpoints.back().x, wire.setpoints.back().y, wire.setpoints.back().z};
-  for (const auto& c : wire.commands)
-    seen.arms = seen.arms || (c.command == daemon::test::kCommandArm && c.param1 == 1);
+  for (const auto& c : wire.commands) {
+    const bool arming = c.command == daemon::test::kCommandArm;
+    seen.arms = seen.arms || (arming && c.param1 == 1);
+    seen.disarms = seen.disarms || (arming && c.param1 == 0);
+    seen.commands += !(arming && c.param1 == 0);
+  }
   seen.accepted = view.segment != segment && view.segment != 0;
   look();
   const auto& grid = threads_->known ? threads_->known->grid : room();
@@ -134,7 +137,8 @@ void DaemonRig::run_mission() {
   while (const auto command = channels.commands.pop()) {
     const auto decision = threads_->mission.handle(*command, in.now_s);
     const bool done = carry_out(decision);
-    if (done && decision.answer && decision.answer->result == backwash_msgs_msg_dds__ACK_ACCEPTED)
+    const bool decided = decision.order || decision.job;  // else it is an answer given once more
+    if (done && decided && decision.answer->result == backwash_msgs_msg_dds__ACK_ACCEPTED)
       watch_.acknowledged(command->verb, tick_);
   }
 }

@@ -14,6 +14,7 @@ using track::Mode;
 constexpr int kRequests = 16 + 2;   // ticks until the control thread has taken every request that can wait
 constexpr int kBraking = 100;       // ticks that a verified stop takes at most, with the way to its branch
 constexpr int kRest = 25;           // ticks without motion: the way is over
+constexpr int kDisarming = 170;     // ticks for which a stop on the ground asks to disarm
 constexpr int kNewFrame = 3;        // ticks in which a reset of the autopilot's frame shows
 constexpr double kStill = 2e-5;     // m in a tick: single precision some metres from the origin
 constexpr double kRounding = 1e-3;  // m in a tick; v_max is per axis
@@ -30,13 +31,14 @@ void Watch::acknowledged(std::uint8_t verb, int tick) {
   switch (verb) {
     case backwash_msgs_msg_dds__COMMAND_STOP:
       licence_ = Licence::stopping;
-      stopped_ = tick;
+      stopped_ = disarm_from_ = tick;
       may_arm_ = false;
       break;
     case backwash_msgs_msg_dds__COMMAND_LAND:
     case backwash_msgs_msg_dds__COMMAND_DISABLE:
       licence_ = Licence::stopping;
       stopped_ = left_ = tick;
+      if (verb == backwash_msgs_msg_dds__COMMAND_DISABLE) disarm_from_ = tick;
       may_arm_ = false;
       break;
     case backwash_msgs_msg_dds__COMMAND_HOLD:
@@ -91,6 +93,7 @@ std::optional<std::string> Watch::silence(const Seen& now) const {
 }
 
 std::optional<std::string> Watch::arming(const Seen& now) {
+  if (now.disarms && now.tick > disarm_from_ + kDisarming) return "disarmed without a stop or disable";
   if (!now.arms) return std::nullopt;
   if (!may_arm_) return "armed without a take-off that was asked for";
   if (!now.accepted) return "armed in a tick that accepted no segment";

@@ -15,9 +15,9 @@ struct Seen {
   track::Mode mode = track::Mode::passive;
   bool armed = false, offboard = false;  ///< as the autopilot's last heartbeat said
   std::size_t bytes = 0;                 ///< sent
-  int setpoints = 0, commands = 0;       ///< sent
+  int setpoints = 0, commands = 0;       ///< sent; commands without those to disarm
   Vec3 setpoint = Vec3::Zero();          ///< the last one, in the autopilot's local frame, m
-  bool arms = false;                     ///< the vehicle was told to arm
+  bool arms = false, disarms = false;    ///< the vehicle was told to
   bool accepted = false;                 ///< a new segment was accepted
   bool inside = true;                    ///< the command lies in the newest map
 };
@@ -52,7 +52,8 @@ class Watch {
   int left_ = -1;     ///< tick in which the autopilot, or its pilot, took control or was asked to land
   int rested_ = 0;    ///< ticks in a row in which the set-point did not move
   int frame_moved_ = -1000;
-  bool may_arm_ = false;  ///< a take-off was asked for, and neither flown yet nor cancelled
+  int disarm_from_ = -1000;  ///< tick of the last stop or disable
+  bool may_arm_ = false;     ///< a take-off was asked for, and neither flown yet nor cancelled
 };
 
 }  // namespace backwash::fuzz

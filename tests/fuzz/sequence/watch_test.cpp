@@ -152,6 +152,18 @@ TEST_F(Flight, ArmingIsForTheAcceptedTakeoffThatWasAskedForOnce) {
   }
 }
 
+TEST_F(Flight, DisarmingIsForAStopOrADisable) {
+  hold();
+  seen_.disarms = true;
+  EXPECT_TRUE(tick());
+  ask(backwash_msgs_msg_dds__COMMAND_STOP);
+  EXPECT_FALSE(tick());
+  seen_.disarms = false;
+  rest(170);
+  seen_.disarms = true;
+  EXPECT_TRUE(tick());
+}
+
 TEST_F(Flight, ASetpointOutsideTheMapIsFound) {
   seen_.inside = false;
   EXPECT_TRUE(tick(kStep));
