@@ -121,7 +121,7 @@ def run(mutants: list[table.Mutant], jobs: int, quick: bool, result: pathlib.Pat
             for mutant, by in zip(todo, pool.map(lambda m, s=specs: judge(m, s(m), baseline), todo)):
                 if by:
                     killed[mutant.id] = by
-                print(f"{mutant.number:4} {mutant.id}: {by or 'lives'}", flush=True)
+                print(f"{mutant.id}: {by or 'lives'}", flush=True)
     return report(mutants, killed, result)
 
 
