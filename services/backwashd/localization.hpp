@@ -22,8 +22,8 @@ class Localization {
   Localization(const config::Daemon& config, double max_sigma) : frames_(config.frames), max_sigma_(max_sigma) {}
 
   /// Checks frames and covariance: a position that the VIO itself holds for worse than max_sigma is a bad one. A
-  /// covariance whose first number is 0 or −1 is not known. A pose that is not finite or no rotation is refused;
-  /// whether it is credible is for the odometry gate.
+  /// covariance whose first number is 0 or −1 is not known. A pose that is not finite, beyond 10 km or 100 m/s, or
+  /// no rotation is refused; whether it is credible is for the odometry gate.
   tl::expected<OdometrySample, std::string> odometry(const dds::Odometry& message, std::int64_t received_ns);
   /// From now on, odometry is brought into the map by this transform; it turns about z only. A message that repeats the
   /// last transform changes nothing.
@@ -32,6 +32,7 @@ class Localization {
   /// by the loop closure. The sensor is the cloud's viewpoint, or, without one, the body's origin.
   tl::expected<Scan, std::string> scan(const dds::PointCloud& message, std::int64_t received_ns) const;
   std::uint32_t closures() const noexcept { return closures_; }
+  std::size_t poses_kept() const noexcept { return history_.size(); }
 
  private:
   struct Pose {
@@ -45,7 +46,7 @@ class Localization {
   double max_sigma_;
   std::optional<track::RigidShift> map_from_odom_;
   std::uint32_t closures_ = 0;
-  std::deque<Pose> history_;  // of the last second
+  std::deque<Pose> history_;  // of the last second, stamps rising, at most 1,000
 };
 
 /// The voxels of `known` that a point of the scan lies in and that are not occupied there, as cubes: at most

@@ -161,6 +161,39 @@ TEST(Localization, RefusesABrokenPose) {
   EXPECT_EQ(scan->points_W[0], Vec3(1, 0, 1));
 }
 
+// faults.md row 43: a float on the wire would be infinite, or too coarse.
+TEST(Localization, RefusesWhatIsFiniteAndNowhere) {
+  auto l = localization();
+  EXPECT_TRUE(l.odometry(odometry(kMap, {9'999, 0, 1}, about_z(0), {0, 99, 0}, 1.0), 0));
+  for (const double far : {1e308, 1e39, -1e39, 10'001.0})
+    EXPECT_FALSE(l.odometry(odometry(kMap, {0, far, 1}, about_z(0), kZero, 1.1), 0)) << far;
+  for (const double fast : {1e308, 1e39, -1e39, 101.0})
+    EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), {0, 0, fast}, 1.1), 0)) << fast;
+  for (const double far : {1e308, 1e39, -10'001.0})
+    EXPECT_FALSE(l.loop_closure(closure(Quaternion::Identity(), {0, far, 0}))) << far;
+  ASSERT_TRUE(l.loop_closure(closure(Quaternion::Identity(), {9'999, 0, 0})));
+  EXPECT_FALSE(l.odometry(odometry(kOdom, {5, 0, 1}, about_z(0), kZero, 1.1), 0)) << "together they are beyond";
+  EXPECT_EQ(l.poses_kept(), 1u);
+}
+
+TEST(Localization, KeepsABoundedHistoryWhateverTheStampsDo) {
+  for (const double step : {0.0, 1e-9, 1e-5, -1e-9}) {
+    auto l = localization();
+    for (int n = 0; n < 5000; ++n) {
+      auto m = odometry(kMap, {0.001 * n, 0, 1});
+      const auto ns = 500'000'000 + std::llround(1e9 * step * n);
+      m.header.stamp = {1, static_cast<std::uint32_t>(ns)};
+      ASSERT_TRUE(l.odometry(m, 0));
+    }
+    EXPECT_LE(l.poses_kept(), 1000u) << step;
+    EXPECT_GE(l.poses_kept(), 1u);
+    // The newest pose places the scan.
+    const auto scan = l.scan(PointMessage(kBody, {0, 0, 0}, 1.5 + 5000 * step).m, 0);
+    ASSERT_TRUE(scan) << scan.error();
+    EXPECT_NEAR(scan->points_W[0].x(), 4.999, 1e-2) << step;
+  }
+}
+
 TEST(NewVoxels, CoverEveryNewPointAndNoKnownOneInAtMost256Cubes) {
   std::mt19937_64 random(1);
   for (const int points : {3, 200, 5000}) {
