@@ -157,8 +157,8 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) co
   facts.autopilot_reset = reset_;
   facts.closure_refused = closure_refused_now_;
   const auto& pose = in.autopilot.pose;
-  facts.pose_age = pose ? seconds(in.now_ns - std::min(pose->at_ns, pose->attitude_at_ns))
-                        : std::numeric_limits<double>::infinity();
+  facts.pose_age =
+      pose ? seconds(in.now_ns - std::min(pose->at_ns, pose->attitude_at_ns)) : std::numeric_limits<double>::infinity();
   facts.mismatch = alignment_.mismatch();
   facts.inside = out.inside.inside;
   facts.new_segment = out.accepted;

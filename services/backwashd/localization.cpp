@@ -59,17 +59,17 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
   // nav_msgs/Odometry: the twist is in the child (body) frame.
   Eigen::Quaterniond attitude(q.w, q.x, q.y, q.z);
   s.state = {{p.x, p.y, p.z}, attitude * Vec3(v.x, v.y, v.z)};
-  // The gate would reject it too, but here it takes no good sample's place, and places no scan.
+  // The gate would reject what is refused here too, but here it takes no good sample's place, and places no scan.
   if (!(std::abs(attitude.norm() - 1) < kUnit))
     return tl::unexpected<std::string>("the odometry's quaternion is not of unit length");
-  if (!within(s.state.p_W, kFarthest) || !within(s.state.v_W, kFastest))
-    return tl::unexpected<std::string>("the odometry is not finite, further than 10 km or faster than 100 m/s");
   if (frame == frames_.odometry) {
     s.map_from_odom = *map_from_odom_;
     s.closures = closures_;
     s.state = map_from_odom_->state(s.state);
     attitude = Eigen::Quaterniond(Eigen::AngleAxisd(map_from_odom_->yaw, Vec3::UnitZ())) * attitude;
   }
+  if (!within(s.state.p_W, kFarthest) || !within(s.state.v_W, kFastest))
+    return tl::unexpected<std::string>("the odometry is not finite, further than 10 km or faster than 100 m/s");
   s.q = {attitude.w(), attitude.x(), attitude.y(), attitude.z()};
   // A stamp that stands still, or goes back, brings no history.
   if (!history_.empty() && s.stamp_ns < history_.back().stamp_ns) history_.clear();

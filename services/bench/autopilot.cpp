@@ -16,7 +16,8 @@ constexpr std::uint8_t kQuadrotor = 2, kPx4 = 12, kArmedFlag = 128, kCustomFlag 
 constexpr std::uint32_t kManual = 1u << 16, kOffboard = 6u << 16, kAutoLand = 4u << 16 | 6u << 24;
 constexpr std::uint16_t kSetMode = 176, kArm = 400, kLand = 21, kMessageInterval = 511;
 constexpr std::uint8_t kAccepted = 0, kTemporarilyRejected = 1, kUnsupported = 3;
-constexpr double kHistory = 1.0;  // s
+constexpr double kHistory = 1.0;   // s
+constexpr long kReportEvery = 20;  // steps, position and attitude
 
 Eigen::Matrix3d yaw_matrix(double yaw) { return Eigen::AngleAxisd(yaw, Vec3::UnitZ()).toRotationMatrix(); }
 
@@ -73,10 +74,11 @@ void Autopilot::steer() {
   vehicle_.command({here + R * (target_.p_W - here), R * target_.v_W, R * target_.a_W, target_.yaw - yaw_error_});
 }
 
-// As gyros measure it, FLU.
-Vec3 Autopilot::body_rates() const {
-  const Eigen::Quaterniond turn = before_.conjugate() * attitude();
-  return 2 / sim::Quadrotor::kStep * (turn.w() < 0 ? -turn.vec() : turn.vec());
+// As gyros measure it, FLU: the mean since the report before.
+Vec3 Autopilot::body_rates() {
+  const Eigen::Quaterniond turn = reported_.conjugate() * attitude();
+  reported_ = attitude();
+  return (turn.w() < 0 ? -2 : 2) / (kReportEvery * sim::Quadrotor::kStep) * turn.vec();
 }
 
 void Autopilot::on(const mavlink::SetPositionTargetLocalNed& m, double t) {
@@ -211,7 +213,7 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
     const std::uint8_t state = landed_ ? 1 : mode_ == Mode::land ? 4 : 2;
     send(mavlink::ExtendedSysState{.vtol_state = 0, .landed_state = state}, out);
   }
-  if (steps_ % 20 == 0 && !silent_attitude) {
+  if (steps_ % kReportEvery == 0 && !silent_attitude) {
     const Eigen::Quaterniond q =
         mavlink::swap_ned_frd(Eigen::Quaterniond(yaw_matrix(frame_.yaw + yaw_error_)) * attitude());
     const Eigen::Vector3f omega = mavlink::swap_frd(body_rates()).cast<float>();
@@ -225,7 +227,7 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
                                      .yawspeed = omega.z()},
          out);
   }
-  if (steps_ % 20 == 0 && local_position_ && !silent_pose) {
+  if (steps_ % kReportEvery == 0 && local_position_ && !silent_pose) {
     const State b = believed();
     const Eigen::Vector3f p = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.p_W + frame_.origin).cast<float>();
     const Eigen::Vector3f v = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.v_W).cast<float>();
@@ -236,7 +238,6 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
 
 void Autopilot::step(double t, std::vector<std::uint8_t>& out) {
   t_ = t;
-  before_ = attitude();
   fly(t);
   history_.push_back({t, truth(), attitude()});
   while (history_.front().t < t - kHistory) history_.pop_front();

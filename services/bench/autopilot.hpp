@@ -84,7 +84,7 @@ class Autopilot {
   State believed() const;
   State felt() const;
   void steer();
-  Vec3 body_rates() const;
+  Vec3 body_rates();
   void fly(double t);
   void telemetry(double t, std::vector<std::uint8_t>& out);
   template <typename Message>
@@ -109,8 +109,8 @@ class Autopilot {
   std::deque<Truth> history_;  // of the last second
   // What the newest odometry said against the truth at its stamp: believed = R_z(yaw_error_) truth + error_.
   State error_;
-  double yaw_error_ = 0;                   // 0 unless the heading is followed
-  Eigen::Quaterniond before_{1, 0, 0, 0};  // attitude of the step before
+  double yaw_error_ = 0;                     // 0 unless the heading is followed
+  Eigen::Quaterniond reported_{1, 0, 0, 0};  // true attitude of the report before
   std::vector<mavlink::CommandAck> acks_;
   std::vector<mavlink::ParamValue> values_;  // asked for and not yet sent
   std::ofstream wire_;

@@ -95,7 +95,7 @@ Course fly_with(const Wrong& wrong, bool follows_yaw) {
 }
 
 void print(const std::string& what, bool follows_yaw, const Course& c) {
-  std::printf("| %-34s | %-7s | %4d | %-38s | %5.2f |\n", what.c_str(), follows_yaw ? "follows" : "own",
+  std::printf("| %-34s | %-7s | %4d | %-43s | %5.2f |\n", what.c_str(), follows_yaw ? "follows" : "own",
               c.ticks_to_hold, to_string(c.reason), c.off);
 }
 
@@ -112,8 +112,9 @@ void expect_safe(const std::string& what, const Wrong& wrong, int ticks, double 
     print(what, follows_yaw, c);
     EXPECT_GE(c.ticks_to_hold, 0) << what << " is flown to the end";
     EXPECT_LE(c.ticks_to_hold, ticks) << what;
-    EXPECT_FALSE(c.moved) << what;
-    EXPECT_TRUE(c.down) << what;
+    // One that leaves its set first stops on its verified way, and rests there: then nothing speaks against the pose.
+    EXPECT_TRUE(!c.moved || c.reason == Reason::outside_set) << what;
+    EXPECT_TRUE(c.down || c.reason == Reason::outside_set) << what;
     EXPECT_LT(c.off, off) << what;
   }
 }
@@ -259,36 +260,41 @@ class RoughVio {
   std::normal_distribution<double> normal_;
 };
 
-/// A figure of eight in the corridor at up to 1.4 m/s and 1.9 m/s², the heading turning at up to 1 rad/s.
-std::vector<Setpoint> eights(const Setpoint& from, double seconds) {
+/// Back to `home` within 4 s, then figures of eight before it at up to 1.4 m/s and 1.9 m/s², the heading turning at up
+/// to 1 rad/s.
+std::vector<Setpoint> eights(const Setpoint& from, const Vec3& home, double seconds) {
   std::vector<Setpoint> commands;
-  for (int k = 0; k < static_cast<int>(seconds / kControlPeriod); ++k) {
-    const double t = k * kControlPeriod, w = 1.1, in = std::min(1., t / 4), rate = t < 4 ? 0.25 : 0;
-    const auto swing = [&](double amplitude, double omega) {
-      const double s = std::sin(omega * t), c = omega * std::cos(omega * t);
-      return std::array{amplitude * in * s, amplitude * (in * c + rate * s),
-                        amplitude * (2 * rate * c - in * omega * omega * s)};
+  const Vec3 way = home - from.p_W;
+  for (double t = 0; t < 4; t += kControlPeriod) {
+    const double s = t / 4, v = 30 * s * s * (1 - s) * (1 - s) / 4, a = 60 * s * (1 - s) * (1 - 2 * s) / 16;
+    commands.push_back({from.p_W + s * s * s * (10 - 15 * s + 6 * s * s) * way, v * way, a * way, from.yaw});
+  }
+  for (double t = 0; t < seconds; t += kControlPeriod) {
+    const auto swing = [t](double amplitude, double omega) {  // from rest
+      const double s = std::sin(omega * t), c = std::cos(omega * t);
+      return std::array{amplitude * (1 - c), amplitude * omega * s, amplitude * omega * omega * c};
     };
-    const auto x = swing(1.1, w), y = swing(0.35, 2 * w), z = swing(0.2, 0.7), yaw = swing(1.2, 0.8);
-    commands.push_back({from.p_W + Vec3(x[0], y[0], z[0]), {x[1], y[1], z[1]}, {x[2], y[2], z[2]}, from.yaw + yaw[0]});
+    const auto x = swing(1.1, 1.25), y = swing(0.15, 2.5), z = swing(0.2, 0.7), yaw = swing(1.2, 0.8);
+    commands.push_back({home + Vec3(x[0], y[0], z[0]), {x[1], y[1], z[1]}, {x[2], y[2], z[2]}, from.yaw + yaw[0]});
   }
   return commands;
 }
 
-// 20 minutes: ten flights, each with four stops out of full motion, which tilt the vehicle at up to 13 rad/s.
+// More than 20 minutes: eleven flights, each with five stops out of full motion, which tilt the vehicle at up to 13 rad/s.
 TEST(PoseFaults, RoughFlightsOnANoisyVioAreNeverHeld) {
   long ticks = 0, holds = 0;
   double worst_drift = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 11; ++seed) {
     Lockstep rig;
     rig.recorded = false;
     rig.autopilot->follows_yaw = seed % 2 == 0;
     rig.take_off();
+    const Vec3 home = rig.view().command.p_W;
     RoughVio vio(rig, seed);
     for (int leg = 0; leg < 5; ++leg) {
       rig.spoil = nullptr, rig.vio_on = true, rig.vio_age_steps = 0;
       rig.ticks(100);
-      rig.offer(eights(rig.view().command, 22), false);
+      rig.offer(eights(rig.view().command, home, 18), false);
       rig.tick();
       ASSERT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
       rig.spoil = std::ref(vio);
@@ -311,7 +317,7 @@ TEST(PoseFaults, RoughFlightsOnANoisyVioAreNeverHeld) {
   }
   std::printf("%ld ticks (%.1f min), %ld false holds, largest yaw residual %.2f°\n", ticks,
               static_cast<double>(ticks) / 3000, holds, worst_drift / kDegree);
-  EXPECT_GE(ticks, 20 * 60 * 45);
+  EXPECT_GE(ticks, 20 * 60 * 50);
 }
 
 }  // namespace
