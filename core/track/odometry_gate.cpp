@@ -30,9 +30,9 @@ OdometrySample moved(const RigidShift& D, OdometrySample sample) noexcept {
 }
 
 // Each comparison is written so that what is no number jumps.
-bool OdometryGate::jumps(const OdometrySample& sample, double dt, double dt_least) const noexcept {
+bool OdometryGate::jumps(const OdometrySample& sample, double dt) const noexcept {
   const Vec3 predicted = last_->state.p_W + dt * last_->state.v_W;
-  if (!((sample.state.p_W - predicted).norm() <= v_max_ * dt_least + 3 * sigma_)) return true;
+  if (!((sample.state.p_W - predicted).norm() <= v_max_ * dt + 3 * sigma_)) return true;
   const double sigma_v = sigma_ / kSettle;
   if (!((sample.state.v_W - last_->state.v_W).norm() <= kMaxAcceleration * dt + kVelocityNoises * sigma_v)) return true;
   if (!(std::abs(wrap_angle(heading(sample.q) - heading(last_->q))) <= kMaxYawRate * dt + kAngleNoise)) return true;
@@ -76,15 +76,14 @@ OdometryGate::Verdict OdometryGate::take(const OdometrySample& sample, bool movi
   const double by_reception = std::max(0.0, static_cast<double>(sample.received_ns - last_->received_ns) * 1e-9);
   const bool clock_was_set = std::abs(by_stamp - by_reception) > kClockStep;
   if (!clock_was_set && by_stamp <= 0) return Verdict::disorder;
+  const double dt = clock_was_set ? by_reception : std::min(by_stamp, by_reception + late());
   time(sample, clock_was_set);
-  const double dt = clock_was_set ? by_reception : std::min(by_stamp, by_reception + kJitter);
   // Counts the samples that repeat the last good pose, which is the first of the row. At rest an estimator may well
   // stand still.
   const bool repeats = sample.state.p_W == last_->state.p_W && q == last_->q;
   identical_ = moving && repeats ? std::min(identical_ + 1, kFrozen) : 0;
   if (identical_ >= kFrozen - 1) return Verdict::frozen;
-  // Stamps ahead of their reception widen nothing.
-  if (jumps(sample, dt, std::min(dt, by_reception))) return Verdict::jump;
+  if (jumps(sample, dt)) return Verdict::jump;
   if (contradicts(sample, dt)) return Verdict::inconsistent;
   last_ = sample;
   return Verdict::good;

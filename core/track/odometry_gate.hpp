@@ -38,7 +38,6 @@ class OdometryGate {
   };
   static constexpr int kFrozen = 5;          ///< row 6
   static constexpr double kClockStep = 0.5;  ///< s
-  static constexpr double kJitter = 0.02;    ///< s, of receptions: the newest of a tick may be a period old
   /// rad/s about the vertical: autopilots turn at most at 200°/s (PX4's MC_YAWRATE_MAX), our flights at 1 rad/s.
   static constexpr double kMaxYawRate = 3;
   static constexpr double kMaxTiltRate = 15;      ///< rad/s: a racing quadrotor's 860°/s
@@ -53,9 +52,9 @@ class OdometryGate {
   explicit OdometryGate(const Vehicle& vehicle) noexcept
       : v_max_(vehicle.limits.v_max), sigma_(vehicle.estimation.position) {}
 
-  /// Judges one sample; only a good one becomes last(). dt is the stamps' difference, at most kJitter more than the
-  /// receptions'; or, where the two are more than kClockStep apart, the receptions': then the sender's wall clock was
-  /// set (row 30).
+  /// Judges one sample; only a good one becomes last(). dt is the stamps' difference, at most the receptions' and what
+  /// the last sample was late: a stamp ahead of that widens nothing (row 49). Where the two are more than kClockStep
+  /// apart it is the receptions': then the sender's wall clock was set (row 30).
   Verdict take(const OdometrySample& sample, bool moving) noexcept;
   /// The last good sample.
   const std::optional<OdometrySample>& last() const noexcept { return last_; }
@@ -68,7 +67,7 @@ class OdometryGate {
   void forget() noexcept { last_.reset(), fastest_ns_.reset(), drift_ = Vec3::Zero(); }
 
  private:
-  bool jumps(const OdometrySample& sample, double dt, double dt_least) const noexcept;
+  bool jumps(const OdometrySample& sample, double dt) const noexcept;
   bool contradicts(const OdometrySample& sample, double dt) noexcept;
   void time(const OdometrySample& sample, bool clock_was_set) noexcept;
 

@@ -74,13 +74,13 @@ enum class Request : std::uint8_t { none, enable, disable, land, stop };
 /// Facts of this tick. Ages in s; a thing never received has an infinite age.
 struct SupervisorInput {
   Request request = Request::none;
-  double odometry_age = 0;                                    ///< since the last good sample
-  bool odometry_jump = false;                                 ///< the newest sample failed the innovation gate
-  bool odometry_inconsistent = false;                         ///< its positions go another way than its velocities
-  bool odometry_frozen = false;                               ///< five identical samples under commanded motion
-  bool odometry_disorder = false;                             ///< more than three stamps in a row did not rise
-  double heartbeat_age = 0;                                   ///< since the autopilot's last heartbeat
-  double pose_age = 0;  ///< of the older of its position and its attitude
+  double odometry_age = 0;             ///< since the last good sample
+  bool odometry_jump = false;          ///< the newest sample failed the innovation gate
+  bool odometry_inconsistent = false;  ///< its positions go another way than its velocities
+  bool odometry_frozen = false;        ///< five identical samples under commanded motion
+  bool odometry_disorder = false;      ///< more than three stamps in a row did not rise
+  double heartbeat_age = 0;            ///< since the autopilot's last heartbeat
+  double pose_age = 0;                 ///< of the older of its position and its attitude
   bool armed = false;
   bool offboard = false;         ///< the autopilot follows our set-points
   bool frames_aligned = false;   ///< residual of local ← map below 5 cm and 3°
