@@ -48,6 +48,28 @@ long page_faults() {
   return usage.ru_minflt + usage.ru_majflt;
 }
 
+/// Every float of every message is a number, but for the one NaN by which MAVLink's ODOMETRY marks unknown rates, and a
+/// block of variances.
+template <typename Message>
+void expect_finite(const Message& message) {
+  constexpr bool kOdometry = std::is_same_v<Message, mavlink::Odometry>;
+  const auto number = [](std::string_view name, float v, bool may_be_unknown) {
+    EXPECT_TRUE(std::isfinite(v) || (may_be_unknown && std::isnan(v))) << Message::kName << '.' << name << " is " << v;
+  };
+  const auto field = [&](const auto& f) {
+    const auto& value = message.*f.member;
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, float>) {
+      number(f.name, value, kOdometry && (f.name == "rollspeed" || f.name == "pitchspeed" || f.name == "yawspeed"));
+    } else if constexpr (requires { value.size(); }) {
+      if constexpr (std::is_same_v<typename Value::value_type, float>)
+        for (const float v : value)
+          number(f.name, v, kOdometry && (f.name == "pose_covariance" || f.name == "velocity_covariance"));
+    }
+  };
+  std::apply([&](const auto&... f) { (field(f), ...); }, Message::fields());
+}
+
 }  // namespace
 
 Vehicle vehicle_5in() { return config::load_vehicle("builtin:quad-5in").value(); }
