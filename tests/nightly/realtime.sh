@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The real-time proofs that need minutes, the wall clock or another compiler. CI calls it nightly.
-#   realtime.sh [rtsan] [tsan] [asan] [fuzz] [rtps] [stress] [flood] [stops] [soak] [wall]      no argument: all of them
+#   realtime.sh [rtsan] [tsan] [asan] [fuzz] [rtps] [stress] [overload] [flood] [stops] [soak] [wall]      no argument: all of them
 # What each part proves, how long it takes and what it last measured: README.md here.
 set -euo pipefail
 script=$(realpath "${BASH_SOURCE[0]}")
@@ -92,6 +92,11 @@ stress() {
   return "$status"
 }
 
+overload() {
+  build_preset release --target backwashd backwashctl bench
+  tests/nightly/overload.sh "$PWD" build/release
+}
+
 soak() {
   build_preset release --target backwashd backwashctl bench backwash
   rm -f "$out"/soak.*
@@ -116,7 +121,7 @@ if [[ ${1:-} == --part ]]; then
   "$2"
   exit
 fi
-[[ $# -gt 0 ]] || set -- rtsan tsan asan fuzz rtps stress flood stops soak wall
+[[ $# -gt 0 ]] || set -- rtsan tsan asan fuzz rtps stress overload flood stops soak wall
 failed=()
 for part; do
   echo "== $part"

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # What a start must not do (../../shared/faults.md rows 38, 45): with an invalid configuration no port is opened, no file is
 # waited for and nothing is made; a start that fails, and one that does not, leaves every earlier log byte for byte.
-#   attack_start.sh BACKWASHD
+#   attack_start.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 unset CYCLONEDDS_URI
-python3 - "${1:?usage: attack_start.sh BACKWASHD}" "$work" <<'PYTHON'
+python3 - "${2:?usage: attack_start.sh SOURCE_DIR BUILD_DIR}/services/backwashd" "$work" <<'PYTHON'
 import fcntl, os, select, signal, struct, subprocess, sys, time
 daemon, work = sys.argv[1:]
 log = work + "/flight.bwlog"

@@ -2,9 +2,8 @@
 // What a confused or hostile participant sends, for the scripts beside it (faults.md rows 2, 3, 12, 26, 27, 46, 48).
 //   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closures|large|roomy
 //   dds_probe DOMAIN NAMESPACE flood [SECONDS]
-//   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1 it
-//   is
-//                                            the one writer that the daemon listens to that fails
+//   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1
+//                                            the one writer that the daemon listens to fails
 #include <algorithm>
 #include <chrono>
 #include <cmath>
