@@ -164,7 +164,7 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
   if (!for_us(m.target_system, m.target_component)) return;
   const std::int64_t now_ns = nanoseconds_of(now);
   if (m.tc1 == 0) {
-    send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
+    if (answers_) send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
   } else if (m.ts1 == timesync_asked_ns_ && timesync_asked_ns_ != 0) {
     constexpr std::int64_t kSane_ns = std::int64_t{1} << 62;  // 146 years: differences do not overflow
     if (m.tc1 < 0 || m.tc1 > kSane_ns) return;

@@ -206,7 +206,7 @@ TEST(Row42, EnableIsRefusedOnAnOldPose) {
     rig.ticks(16);
     for (const int later : {0, 500}) {
       rig.ticks(later);
-      rig.channels->requests.push(track::Request::enable);
+      rig.channels->orders.push({track::Request::enable});
       rig.ticks(2);
       EXPECT_EQ(rig.mode(), Mode::passive);
       EXPECT_EQ(rig.reason(), Reason::pose_silent);
@@ -306,7 +306,7 @@ TEST(PoseFaults, RoughFlightsOnANoisyVioAreNeverHeld) {
             << to_string(rig.reason()) << ", seed " << seed << ", leg " << leg << ", tick " << n;
         worst_drift = std::max(worst_drift, rig.view().residual_rad);
       }
-      rig.channels->requests.push(track::Request::stop);
+      rig.channels->orders.push({track::Request::stop});
       for (int n = 0; n < 100; ++n, ++ticks) {
         vio.before_tick();
         rig.tick();
