@@ -130,6 +130,26 @@ TEST_F(MapWorkerTest, AHugeMapIsRefusedAndMemoryGrowsByNothing) {
   EXPECT_LT(resident_kib() - resident, 1024);
 }
 
+// faults.md row 11: of a snapshot, 115 bytes a voxel.
+TEST_F(MapWorkerTest, TheCapIsThatOfTheSnapshotToAVoxel) {
+  MapSettings settings;
+  settings.max_mib = 1;
+  MapWorker worker(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings);
+  const auto offer = [&](int edge) {
+    const map::OccupancyGrid grid({0, 0, 0}, 0.2, {edge, 20, 20}, map::Cell::free);
+    channels_->maps.offer(
+        std::make_unique<const MapMessage>(MapMessage{map::encode_octomap(grid), 0.2, true, "OcTree", 1}));
+    EXPECT_TRUE(worker.step());
+  };
+  offer(23);  // 9,200 voxels of 9,118
+  EXPECT_EQ(channels_->maps_rejected, 1u);
+  EXPECT_EQ(world(), nullptr);
+  offer(22);  // 8,800
+  EXPECT_EQ(channels_->maps_rejected, 1u);
+  ASSERT_TRUE(world());
+  EXPECT_EQ(world()->grid.size(), Index3(22, 20, 20));
+}
+
 TEST_F(MapWorkerTest, AScanChangesTheWorldWhereItSaysSomethingNew) {
   const Vec3 sensor(0.1, 0.1, 1.1), point(1.1, 0.1, 1.1);
   scan({point}, sensor, 5);

@@ -7,6 +7,7 @@ set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
 now() { python3 -c 'import time; print(time.monotonic())'; }
+datagrams() { awk '/^Udp: [0-9]/ { print $2 }' /proc/net/snmp; } # that sockets here have read
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json"; }
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
 start_daemon builtin:quad-5in "$work/flight.bwlog"
@@ -18,16 +19,17 @@ from=$(now)
 sleep 6
 status before
 flood=$(now)
-# Of what the flood's sender takes of the processors, the daemon is not the cause.
+heard=$(datagrams)
 nice -n 10 "$build/tests/dds_probe" "$domain" backwash large
 end=$(now)
+heard=$(($(datagrams) - heard))
 status after
 stop
-PYTHONPATH=$source_dir/tests/system python3 - "$work" "$from" "$flood" "$end" "$(stat -c %s "$work/flight.bwlog")" <<'PYTHON'
+PYTHONPATH=$source_dir/tests/system python3 - "$work" "$from" "$flood" "$end" "$(stat -c %s "$work/flight.bwlog")" "$heard" <<'PYTHON'
 import json, struct, sys
 import raw_log
 work = sys.argv[1]
-start, flood, end, size = map(float, sys.argv[2:])
+start, flood, end, size, heard = map(float, sys.argv[2:])
 quantile = lambda values, q: sorted(values)[int(q * (len(values) - 1))]
 odometry = [(t, t - struct.unpack_from("<q", body)[0] * 1e-9)
             for t, kind, body in raw_log.records(work + "/flight.bwlog") if kind == raw_log.ODOMETRY]
@@ -47,8 +49,9 @@ for name, values in (("odometry", odometry), ("answer", answers)):
     good = good and rate(during, end - flood - 0.5) > 0.9 * rate(before, flood - start)
 one, two = (json.load(open(f"{work}/{f}.json")) for f in ("before", "after"))
 taken = {k: two[k] - one[k] for k in ("maps_rejected", "scans_accepted", "scans_rejected")}
-print(f"{taken}; raw log {size / 2**20:.1f} MiB")
-assert taken["maps_rejected"] >= 3 and taken["scans_accepted"] + taken["scans_rejected"] >= 10, "it was not received"
+# How many become whole is up to the machine: best effort loses clouds, and a map is replaced by the next one.
+print(f"{heard:.0f} datagrams read, {taken}; raw log {size / 2**20:.1f} MiB")
+assert heard > 10000, "there was no flood"
 assert size < 30 * 2**20, "what was refused fills the disk"
 assert {t.mode for t in raw_log.ticks(work + "/flight.bwlog") if flood < t.t < end} == {"tracking"}
 assert good, "large samples hold odometry or commands up"

@@ -95,7 +95,6 @@ int script(Station& station) {
       std::printf("%d %s\n", answer->result, answer->reason.c_str());
     else
       std::puts("silence");
-    std::fflush(stdout);
   }
   return 0;
 }
@@ -143,7 +142,6 @@ int stops(Station& station, int count, double x) {
       return 1;
     }
     std::printf("%.6f\n", sent);
-    std::fflush(stdout);
     std::this_thread::sleep_for(300ms);
   }
   return 0;
@@ -154,6 +152,7 @@ int stops(Station& station, int count, double x) {
 int main(int argc, char** argv) {
   const std::string what = argc > 3 ? argv[3] : "";
   if (argc < 4) return 64;
+  std::setvbuf(stdout, nullptr, _IOLBF, 1 << 12);  // whole lines, whenever it is ended
   Station station(static_cast<std::uint32_t>(std::atoi(argv[1])), argv[2]);
   if (what == "script") return script(station);
   if (what == "answers" && argc == 5) return answers(station, std::atof(argv[4]));
