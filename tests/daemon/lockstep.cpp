@@ -26,22 +26,6 @@ constexpr std::int64_t kTick_ns = 20'000'000, kStep_ns = 1'000'000;
 constexpr double kBatteryLand = 0.15;
 const Vec3 kStart(-2, 0, 1.2), kGoal(2, 0, 1.2);
 
-/// Every float of a message that was sent is a number, but for what MAVLink itself marks as unknown by NaN.
-template <class Message>
-void expect_finite(const Message& message) {
-  const auto look = [&]<class Member>(const mavlink::Field<Message, Member>& f) {
-    using Scalar = typename mavlink::Wire<Member>::Scalar;
-    if constexpr (std::is_same_v<Scalar, float>) {
-      if (std::is_same_v<Message, mavlink::Odometry> && f.name.ends_with("_covariance")) return;
-      std::array<float, sizeof(Member) / sizeof(float)> values;
-      std::memcpy(values.data(), &(message.*f.member), sizeof(Member));
-      for (const float v : values)
-        EXPECT_TRUE(std::isfinite(v)) << Message::kName << "." << f.name << " was sent as " << v;
-    }
-  };
-  std::apply([&](const auto&... f) { (look(f), ...); }, Message::fields());
-}
-
 long page_faults() {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);
