@@ -11,7 +11,7 @@ import tomllib
 from dataclasses import dataclass, field
 
 HERE = pathlib.Path(__file__).resolve().parent
-LEAST_ROWS = 50
+LEAST_ROWS = 150
 
 
 class TableError(Exception):
@@ -129,8 +129,20 @@ def check(mutants: list[Mutant], root: pathlib.Path) -> list[str]:
     seen = [m.id for m in mutants]
     wrong += [f"{name}: more than one row has this id" for name in sorted({n for n in seen if seen.count(n) > 1})]
     for name, rows in by_file(mutants).items():
-        try:
-            spans_of(rows, (root / name).read_text())
-        except (TableError, OSError) as error:
-            wrong.append(str(error))
+        if not (root / name).is_file():
+            wrong.append(f"{name}: no such file")
+            continue
+        text = (root / name).read_text()
+        misplaced = []
+        for row in rows:
+            try:
+                span_of(row, text)
+            except TableError as error:
+                misplaced.append(str(error))
+        wrong += misplaced
+        if not misplaced:
+            try:
+                spans_of(rows, text)
+            except TableError as error:
+                wrong.append(str(error))
     return wrong
