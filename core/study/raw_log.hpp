@@ -100,18 +100,18 @@ struct LostRecord {
 
 /// track::TickInput, flat.
 struct TickInputRecord {
-  std::int64_t now_ns, odometry_received_ns, odometry_stamp_ns, pose_at_ns;
-  std::uint64_t segment;                   ///< id of the segment offered, 0: none
-  std::uint64_t order;                     ///< number of the newest order, 0: none new
-  double p[3], v[3], q[4];                 ///< odometry
-  double pose_p[3], pose_v[3], pose_q[4];  ///< the autopilot's
+  std::int64_t now_ns, odometry_received_ns, odometry_stamp_ns, pose_at_ns, attitude_at_ns;
+  std::uint64_t segment;                                  ///< id of the segment offered, 0: none
+  std::uint64_t order;                                    ///< number of the newest order, 0: none new
+  double p[3], v[3], q[4];                                ///< odometry
+  double pose_p[3], pose_v[3], pose_q[4], pose_omega[3];  ///< the autopilot's
   double heartbeat_age, battery;
   double map_from_odom[4];  ///< yaw and translation of the newest loop closure
   std::int32_t missed_periods;
   std::uint32_t request, flags, reset_counter;  ///< flags: core/study/tick_log.cpp
   std::uint32_t closures, padding;
 };
-static_assert(sizeof(TickInputRecord) == 280);
+static_assert(sizeof(TickInputRecord) == 312);
 
 /// A record as read back.
 struct RawRecord {

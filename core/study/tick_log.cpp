@@ -61,6 +61,8 @@ TickInputRecord encode(const track::TickInput& in) noexcept {
   }
   if (a.pose) {
     r.pose_at_ns = a.pose->at_ns;
+    r.attitude_at_ns = a.pose->attitude_at_ns;
+    put(a.pose->omega_B, r.pose_omega);
     put(a.pose->state.p_W, r.pose_p);
     put(a.pose->state.v_W, r.pose_v);
     std::ranges::copy(a.pose->q, r.pose_q);
@@ -87,8 +89,11 @@ track::TickInput decode(const TickInputRecord& r, const track::AcceptedSegment* 
         r.odometry_received_ns,           r.odometry_stamp_ns, {vec(r.p), vec(r.v)},
         {r.q[0], r.q[1], r.q[2], r.q[3]}, r.closures,          {r.map_from_odom[0], vec(r.map_from_odom + 1)}};
   if (has(kPose))
-    in.autopilot.pose = {
-        r.pose_at_ns, {vec(r.pose_p), vec(r.pose_v)}, {r.pose_q[0], r.pose_q[1], r.pose_q[2], r.pose_q[3]}};
+    in.autopilot.pose = {r.pose_at_ns,
+                         {vec(r.pose_p), vec(r.pose_v)},
+                         {r.pose_q[0], r.pose_q[1], r.pose_q[2], r.pose_q[3]},
+                         r.attitude_at_ns,
+                         vec(r.pose_omega)};
   if (has(kResetCounter)) in.autopilot.reset_counter = static_cast<std::uint8_t>(r.reset_counter);
   if (has(kBattery)) in.autopilot.battery = r.battery;
   in.surroundings = {has(kMapMissing), has(kOutside), has(kMapLate), has(kTubeBlocked), has(kStopBlocked)};

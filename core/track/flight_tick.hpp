@@ -19,6 +19,8 @@ struct AutopilotFacts {
     std::int64_t at_ns = 0;               ///< when the position arrived
     State state;                          ///< in the controller's local frame, z-up
     std::array<double, 4> q{1, 0, 0, 0};  ///< body to local: w, x, y, z
+    std::int64_t attitude_at_ns = 0;      ///< when the attitude arrived
+    Vec3 omega_B = Vec3::Zero();          ///< rad/s, as the gyros measure it
   };
   std::optional<Pose> pose;
   std::optional<std::uint8_t> reset_counter;  ///< of its estimator
@@ -67,6 +69,11 @@ struct TickOutput {
 /// output of its own. The daemon's control thread and `backwash replay` run the same object.
 class FlightTick {
  public:
+  /// A loop closure that moves a flying vehicle in the map by more is not flown: drift is corrected in steps of
+  /// decimetres and degrees, and the tubes of a room are narrower than this.
+  static constexpr double kMaxClosure = 1.0;                              ///< m
+  static constexpr double kMaxClosureTurn = 10 * 3.14159265358979 / 180;  ///< rad
+
   /// `battery_land`: remaining share below which LAND is asked for once; 0: never.
   FlightTick(const Vehicle& vehicle, double battery_land);
 
@@ -83,8 +90,8 @@ class FlightTick {
   const Epoch& epoch() const noexcept { return epoch_; }
 
  private:
-  void take_closure(const TickInput& in) noexcept;
-  void take_odometry(const TickInput& in, TickOutput& out) noexcept;
+  void take_closure(std::optional<OdometrySample>& sample) noexcept;
+  void take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample, TickOutput& out) noexcept;
   void align(const TickInput& in, bool fresh) noexcept;
   void take_segment(const TickInput& in, TickOutput& out) noexcept;
   void judge(TickOutput& out) noexcept;
@@ -102,13 +109,16 @@ class FlightTick {
   Epoch epoch_;
   int arming_ = 0;     ///< ticks left in which the autopilot may yet say that it armed
   int abandoned_ = 0;  ///< ticks left in which motors that start for a take-off that was stopped are stopped again
-  std::uint32_t closures_ = 0;  ///< loop closures seen
-  RigidShift map_from_odom_;    ///< of the last
-  Setpoint command_;            ///< of the last tick
+  std::uint32_t closures_ = 0;         ///< of the map frame that is flown in
+  RigidShift map_from_odom_;           ///< of that
+  std::uint32_t closure_refused_ = 0;  ///< the last one that is not flown; closures_: none
+  bool closure_refused_now_ = false;
+  Setpoint command_;  ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
   int disorder_ = 0;                  ///< samples in a row whose stamp did not rise
-  std::int64_t last_good_ns_ = -1, last_pose_ns_ = -1;
+  std::int64_t last_good_ns_ = -1;    ///< reception, less what it was late
+  std::int64_t last_pose_ns_ = -1, last_attitude_ns_ = -1;
   std::optional<std::uint8_t> reset_counter_;
   double odometry_age_ = std::numeric_limits<double>::infinity();
 };

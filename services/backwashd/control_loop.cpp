@@ -79,8 +79,12 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   if (const auto age = link_.heartbeat_age(time_of(now_ns)))
     facts.heartbeat_age = std::chrono::duration<double>(*age).count();
   if (telemetry.local_state && telemetry.attitude) {
-    const auto& q = telemetry.attitude->value.q_LB;
-    facts.pose = {ns_of(telemetry.local_state->at), telemetry.local_state->value, {q.w(), q.x(), q.y(), q.z()}};
+    const auto& [q, omega_B] = telemetry.attitude->value;
+    facts.pose = {ns_of(telemetry.local_state->at),
+                  telemetry.local_state->value,
+                  {q.w(), q.x(), q.y(), q.z()},
+                  ns_of(telemetry.attitude->at),
+                  omega_B};
   }
   if (telemetry.reset_counter) facts.reset_counter = telemetry.reset_counter->value;
   if (telemetry.battery) facts.battery = telemetry.battery->value.remaining;
@@ -112,7 +116,6 @@ void ControlLoop::forward_odometry() noexcept {
   vio.p_O = odom_from_map.point(s.state.p_W);
   vio.q_OB = Eigen::Quaterniond(Eigen::AngleAxisd(odom_from_map.yaw, Vec3::UnitZ())) * attitude;
   vio.v_B = attitude.conjugate() * s.state.v_W;
-  vio.omega_B = Vec3::Zero();
   if (link_.send_odometry(vio)) row_.sent |= 4;
 }
 

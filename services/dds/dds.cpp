@@ -194,8 +194,7 @@ bool WriterBase::write(const void* sample) { return dds_write(writer_, sample) =
 
 }  // namespace detail
 
-ForeignWriters::ForeignWriters(const Participant& participant,
-                               std::initializer_list<const detail::ReaderBase*> readers)
+ForeignWriters::ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers)
     : publications_(
           checked(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr),
                   "reader of the participants' writers")) {

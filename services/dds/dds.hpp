@@ -134,8 +134,8 @@ class Writer : public detail::WriterBase {
   bool write(const T& sample) { return WriterBase::write(&sample); }
 };
 
-/// Counts the writers of other participants that use the topic of one of these readers with another type: the middleware
-/// does not connect them and tells nobody (faults.md row 27).
+/// Counts the writers of other participants that use the topic of one of these readers with another type: the
+/// middleware does not connect them and tells nobody (faults.md row 27).
 class ForeignWriters {
  public:
   ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);

@@ -147,8 +147,10 @@ void EpochModel::tick(Daemon& d) {
   // A vehicle that follows perfectly; the motors run a tick after they were asked to.
   if (!d.in.odometry) d.in.odometry = OdometrySample{};
   d.in.odometry->received_ns = d.in.odometry->stamp_ns = d.in.now_ns;
-  d.in.odometry->state = {d.before, Vec3::Zero()};
-  d.in.autopilot.pose = track::AutopilotFacts::Pose{d.in.now_ns, d.in.odometry->state, {1, 0, 0, 0}};
+  const Vec3 faster = d.out.command.v_W - d.in.odometry->state.v_W;  // by at most 10 m/s²
+  d.in.odometry->state.v_W += std::min(1.0, 10 * kControlPeriod / std::max(1e-9, faster.norm())) * faster;
+  d.in.odometry->state.p_W = d.before;
+  d.in.autopilot.pose = track::AutopilotFacts::Pose{d.in.now_ns, d.in.odometry->state, {1, 0, 0, 0}, d.in.now_ns};
   if (d.arming > 0 && --d.arming == 0) d.in.autopilot.armed = true;
   d.in.autopilot.landed = d.before.z() < 0.5;
 

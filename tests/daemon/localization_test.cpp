@@ -124,5 +124,19 @@ TEST(Localization, RefusesABrokenPose) {
   EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(2, 0, 0, 0), kZero, 1.05), 0));
 }
 
+// faults.md row 43: a float on the wire would be infinite, or too coarse.
+TEST(Localization, RefusesWhatIsFiniteAndNowhere) {
+  auto l = localization();
+  EXPECT_TRUE(l.odometry(odometry(kMap, {9'999, 0, 1}, about_z(0), {0, 99, 0}, 1.0), 0));
+  for (const double far : {1e308, 1e39, -1e39, 10'001.0})
+    EXPECT_FALSE(l.odometry(odometry(kMap, {0, far, 1}, about_z(0), kZero, 1.1), 0)) << far;
+  for (const double fast : {1e308, 1e39, -1e39, 101.0})
+    EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), {0, 0, fast}, 1.1), 0)) << fast;
+  for (const double far : {1e308, 1e39, -10'001.0})
+    EXPECT_FALSE(l.loop_closure(closure(Quaternion::Identity(), {0, far, 0}))) << far;
+  ASSERT_TRUE(l.loop_closure(closure(Quaternion::Identity(), {9'999, 0, 0})));
+  EXPECT_FALSE(l.odometry(odometry(kOdom, {5, 0, 1}, about_z(0), kZero, 1.1), 0)) << "together they are beyond";
+}
+
 }  // namespace
 }  // namespace backwash::daemon

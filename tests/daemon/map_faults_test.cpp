@@ -41,11 +41,12 @@ class MapFaults : public testing::Test {
   track::FlightTick flight_{kVehicle, 0};
   track::TickOutput out_;
   std::int64_t now_ns_ = 0;
-  Vec3 odom_{-2, 0, 1};  // of the vehicle, in the VIO's frame
+  Vec3 odom_{-2, 0, 1}, odom_before_ = odom_;  // of the vehicle, in the VIO's frame; a tick before
+  Vec3 velocity_ = Vec3::Zero();
   track::RigidShift map_from_odom_;
   std::uint32_t closures_ = 0;
   std::unique_ptr<track::AcceptedSegment> segment_;
-  bool map_moves_on_ = true;
+  bool map_moves_on_ = true, offboard_ = true;
   std::int64_t seen_ns_ = 0;  // of the map that segments are verified in
 
   void SetUp() override {
@@ -65,14 +66,19 @@ class MapFaults : public testing::Test {
     in.segment = segment;
     in.odometry.emplace();
     in.odometry->received_ns = in.odometry->stamp_ns = now_ns_;
-    in.odometry->state.p_W = in_map();
+    // It is where it was told to be; its velocity comes to that by 10 m/s².
+    const Vec3 faster = (odom_ - odom_before_) / kControlPeriod - velocity_;
+    velocity_ += std::min(1.0, 10 * kControlPeriod / std::max(1e-9, faster.norm())) * faster;
+    odom_before_ = odom_;
+    in.odometry->state = {in_map(), map_from_odom_.rotate(velocity_)};
     in.odometry->q = {std::cos(map_from_odom_.yaw / 2), 0, 0, std::sin(map_from_odom_.yaw / 2)};
     in.odometry->closures = closures_;
     in.odometry->map_from_odom = map_from_odom_;
-    in.autopilot.armed = in.autopilot.offboard = true;
+    in.autopilot.armed = true;
+    in.autopilot.offboard = offboard_;
     in.autopilot.heartbeat_age = 0.1;
     in.autopilot.pose.emplace();
-    in.autopilot.pose->at_ns = now_ns_;
+    in.autopilot.pose->at_ns = in.autopilot.pose->attitude_at_ns = now_ns_;
     in.autopilot.pose->state.p_W = kLocalFromOdom.point(odom_);
     in.autopilot.pose->q = {std::cos(kLocalFromOdom.yaw / 2), 0, 0, std::sin(kLocalFromOdom.yaw / 2)};
     in.surroundings = lookout_->look(flight_, now_ns_);
@@ -142,7 +148,7 @@ TEST_F(MapFaults, Row14AnObstacleOnThePathIsDecidedOnInOneTickAndTheVehicleRests
     tick();
     EXPECT_LE(std::abs(out_.command.p_W.x() - last), kVehicle.limits.v_max * kControlPeriod);
     last = out_.command.p_W.x();
-    ASSERT_EQ(out_.supervisor.mode, Mode::hold);
+    ASSERT_EQ(out_.supervisor.mode, Mode::hold) << to_string(out_.supervisor.reason);
     EXPECT_TRUE(out_.inside.inside);
   }
   EXPECT_EQ(out_.command.v_W, Vec3::Zero());
@@ -362,12 +368,60 @@ TEST_F(MapFaults, Row4AfterAClosureNewVoxelsMeetTheTrajectoryWhereItNowIs) {
   fly();
   for (int n = 0; n < 100; ++n) tick();
   closures_ = 2;
-  map_from_odom_ = {0, {0, 1, 0}};
+  map_from_odom_ = {0, {0, 0.9, 0}};
   tick();
   voxel_at({odom_.x() + 1, 0, 1});  // where the path was
   EXPECT_EQ(ticks_until(Mode::hold, 3), 4);
-  voxel_at({odom_.x() + 1, 1, 1});  // where it is
+  voxel_at({odom_.x() + 1, 0.9, 1});  // where it is
   EXPECT_EQ(ticks_until(Mode::hold, 3), 1);
+}
+
+TEST_F(MapFaults, Row4AnAbsurdLoopClosureIsNotFlown) {
+  const track::RigidShift absurd[] = {{0, {10, 0, 0}}, {1.57, {0, 0, 0}}, {0, {0, 1.05, 0}}, {0.18, {0, 0, 0}}};
+  for (const track::RigidShift& shift : absurd) {
+    closures_ = 1;
+    map_from_odom_ = {0.1, {0.5, -0.3, 0}};
+    flight_ = track::FlightTick(kVehicle, 0);
+    odom_ = odom_before_ = {-2, 0, 1};
+    enable();
+    fly();
+    for (int n = 0; n < 150; ++n) tick();
+    const track::RigidShift flown = map_from_odom_;
+    Setpoint last = out_.command_local;
+    // About the vehicle, so that a turn alone moves it nowhere.
+    map_from_odom_ = track::RigidShift{0, in_map()} * shift * track::RigidShift{0, -in_map()} * map_from_odom_;
+    closures_ = 2;
+    EXPECT_EQ(tick().supervisor.mode, Mode::hold);
+    EXPECT_EQ(out_.supervisor.reason, Reason::closure_refused);
+    EXPECT_EQ(flight_.tracker().closures(), 1u);
+    for (int n = 0; n < 200; ++n) {
+      EXPECT_LE((out_.command_local.p_W - last.p_W).norm(), kVehicle.limits.v_max * kControlPeriod);
+      EXPECT_LT((flight_.odometry()->state.p_W - flown.point(odom_before_)).norm(), 1e-9)
+          << "in the map that is flown in";
+      EXPECT_EQ(out_.supervisor.mode, Mode::hold);
+      last = out_.command_local;
+      tick();
+    }
+    EXPECT_EQ(out_.command.v_W, Vec3::Zero());
+    // Neither a segment of the map that is flown in nor one of the new map moves it.
+    for (const std::uint32_t of : {1u, 2u}) {
+      auto next = *segment_;
+      next.id = 8 + of;
+      next.closures = of;
+      next.epoch = flight_.epoch();
+      for (auto& set : next.tube) set.center.p_W += flight_.odometry()->state.p_W - segment_->tube.front().center.p_W;
+      tick(track::Request::none, &next);
+      EXPECT_TRUE(out_.refused) << of;
+    }
+    // In other hands it is where the closure says.
+    offboard_ = false;
+    tick();
+    tick();
+    offboard_ = true;
+    EXPECT_EQ(out_.supervisor.mode, Mode::passive);
+    EXPECT_EQ(flight_.tracker().closures(), 2u);
+    EXPECT_LT((flight_.odometry()->state.p_W - in_map()).norm(), 1e-6);
+  }
 }
 
 }  // namespace

@@ -40,7 +40,8 @@ AcceptedSegment straight() {
   return s;
 }
 
-/// A perfect vehicle that follows set-points: its pose is the last command, in both frames.
+/// A vehicle that follows set-points: its place is the last command's, in both frames, and its velocity comes to the
+/// command's by 10 m/s².
 class Flight {
  public:
   Flight() : tick_(vehicle(), 0.15) {
@@ -58,12 +59,14 @@ class Flight {
   }
   const TickOutput& step() {
     in.now_ns += 20'000'000;
-    if (in.odometry) in.odometry->state = {out.command.p_W, out.command.v_W};
     if (!in.odometry) in.odometry = OdometrySample{};
+    const Vec3 faster = out.command.v_W - in.odometry->state.v_W;
+    in.odometry->state.v_W += std::min(1.0, 10 * kControlPeriod / std::max(1e-9, faster.norm())) * faster;
+    in.odometry->state.p_W = out.command.p_W;
     in.odometry->received_ns = in.odometry->stamp_ns = in.now_ns;
     in.autopilot.heartbeat_age = 0.1;
     if (tick_.mode() == Mode::passive) in.odometry->state = {{0, 0, 1}, Vec3::Zero()};
-    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, in.odometry->state, {1, 0, 0, 0}};
+    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, in.odometry->state, {1, 0, 0, 0}, in.now_ns};
     out = tick_.step(in);
     in.request = Request::none;
     in.segment = nullptr;
@@ -142,7 +145,9 @@ AcceptedSegment around(const Flight& flight) {
   on.stops.clear();
   for (std::size_t k = stop.branch; k < on.commands.size(); ++k) {
     on.commands[k] = k < on.branch ? stop.commands[k - stop.branch] : on.commands[on.branch - 1];
-    if (k >= on.branch) on.commands[k].p_W.y() += 0.001 * static_cast<double>(k - on.branch);
+    if (k < on.branch) continue;
+    on.commands[k].p_W.y() += 0.001 * static_cast<double>(k - on.branch);
+    on.commands[k].v_W = {0, 0.05, 0};
   }
   on.tube = tube_of(on.commands);
   return on;
@@ -290,6 +295,7 @@ TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
   FlightTick tick(vehicle(), 0);
   TickInput in;
   in.autopilot.heartbeat_age = 0;
+  in.autopilot.pose = AutopilotFacts::Pose{};
   in.odometry = OdometrySample{};
   in.request = Request::enable;
   in.surroundings.missing = true;

@@ -138,6 +138,7 @@ void DaemonRig::run_mission() {
     const auto decision = threads_->mission.handle(*command, in.now_s);
     const bool done = carry_out(decision);
     const bool decided = decision.order || decision.job;  // else it is an answer given once more
+    if (done && decided && command->verb == backwash_msgs_msg_dds__COMMAND_STOP) watch_.stop_given(tick_);
     if (done && decided && decision.answer->result == backwash_msgs_msg_dds__ACK_ACCEPTED)
       watch_.acknowledged(command->verb, tick_);
   }

@@ -64,6 +64,10 @@ void Watch::acknowledged(std::uint8_t verb, int tick) {
   }
 }
 
+void Watch::stop_given(int tick) {
+  if (last_.mode != Mode::passive && last_.mode != Mode::quiet) disarm_from_ = tick;
+}
+
 void Watch::restarted() {
   const int moved = frame_moved_;
   *this = Watch(v_max_);

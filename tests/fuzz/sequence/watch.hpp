@@ -30,6 +30,8 @@ class Watch {
 
   /// Verb (COMMAND_…) of the holder's command that was accepted in this tick.
   void acknowledged(std::uint8_t verb, int tick);
+  /// A stop that is answered by no more than what is already so (landing): it may still disarm what stands.
+  void stop_given(int tick);
   /// The autopilot's estimator was reset, or a message of it said so.
   void frame_moved(int tick) { frame_moved_ = tick; }
   /// The daemon was started anew.
