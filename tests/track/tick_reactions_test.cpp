@@ -90,7 +90,7 @@ class Flown {
     in.autopilot.heartbeat_age = 0.1;
     State local = truth_L;
     local.p_W += local_off;
-    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, local, quaternion(kYaw)};
+    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, local, quaternion(kYaw), in.now_ns};
     out = tick.step(in);
     started_ = tick.mode() != Mode::passive && tick.mode() != Mode::quiet;
     in.request = Request::none;
