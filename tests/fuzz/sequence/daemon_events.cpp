@@ -207,7 +207,7 @@ void DaemonRig::apply_to_map(const Event& e) {
   }
 }
 
-// As services/backwashd/dds_front.cpp takes a scan, but for the message around it.
+// As services/backwashd/map_front.cpp takes a scan, but for the message around it.
 void DaemonRig::scan_box(const Vec3& at) {
   std::vector<Vec3> points;
   for (int i = -2; i <= 2; ++i)

@@ -10,6 +10,7 @@
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/mission.hpp"
 #include "services/backwashd/planner_worker.hpp"
+#include "services/backwashd/scan_placement.hpp"
 #include "tests/daemon/lockstep.hpp"
 #include "tests/fuzz/sequence/event.hpp"
 #include "tests/fuzz/sequence/watch.hpp"
