@@ -34,11 +34,14 @@ reach::ReachTube tube_of(const std::vector<Setpoint>& commands) {
   return tube;
 }
 
-/// Along x at 1 m/s for eight seconds, with a verified stop every ten commands.
+/// Along x for eight seconds, after half a second at 1 m/s, with a verified stop every ten commands.
 AcceptedSegment straight() {
   AcceptedSegment s;
   s.id = 1;
-  for (int k = 0; k < 400; ++k) s.commands.push_back({{0.02 * k, 0, 1}, {1, 0, 0}, Vec3::Zero(), 0});
+  for (int k = 0; k < 400; ++k) {
+    const double t = kControlPeriod * k, x = t < 0.5 ? t * t : t - 0.25;
+    s.commands.push_back({{x, 0, 1}, {std::min(1.0, 2 * t), 0, 0}, Vec3::Zero(), 0});
+  }
   s.tube = tube_of(s.commands);
   for (std::size_t branch = 0; branch < 400; branch += 10) {
     const auto stopped = plan::stop_along(s.commands, branch, 4);
@@ -294,7 +297,7 @@ TEST(TickReactions, ALoopClosureMovesWhatIsHeld) {
 }
 
 TEST(TickReactions, WhileTheFramesDisagreeTheyAreNotTakenAnew) {
-  Flown f;
+  Flown f(Flown::Until::tracking);
   f.in.autopilot.reset_counter = std::uint8_t{1};
   for (int n = 0; f.out.supervisor.mode == Mode::tracking && n < 200; ++n) {
     f.local_off.y() += 0.001;
