@@ -17,6 +17,9 @@ namespace {
 using daemon::test::vehicle_5in;
 using Kind = Event::Kind;
 
+constexpr double kLeap = 0.06;   // m in a tick: faster than it flies
+constexpr int kDrainEvery = 50;  // ticks: the recorder's memory is bounded
+
 const map::OccupancyGrid& room() {
   static const auto grid = map::builtin_scene("parallel-walls-4m", 0.2).value();
   return grid;
@@ -102,6 +105,8 @@ void DaemonRig::advance() {
     seen.commands += !(arming && c.param1 == 0);
   }
   seen.accepted = view.segment != segment && view.segment != 0;
+  hear_autopilot();
+  if (tick_ % kDrainEvery == 0) threads_->recorder.drain(*lock_.channels);
   look();
   const auto& grid = threads_->known ? threads_->known->grid : room();
   seen.inside = grid.inside(grid.index(view.command.p_W));
@@ -110,6 +115,14 @@ void DaemonRig::advance() {
   if (failures.size() > 0) violation_ = {tick_, failures.GetTestPartResult(0).message()};
   if (violation_) lock_.channels->stop = true;  // the planner returns
   ++tick_;
+}
+
+// An estimator that follows the VIO leaps with it, as soon as it is told: the same place then has another number.
+void DaemonRig::hear_autopilot() {
+  const auto& said = lock_.link().telemetry().local_state;
+  if (!said) return;
+  if (autopilot_at_ && (said->value.p_W - *autopilot_at_).norm() > kLeap) watch_.frame_moved(tick_);
+  autopilot_at_ = said->value.p_W;
 }
 
 void DaemonRig::look() {
