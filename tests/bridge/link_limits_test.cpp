@@ -98,7 +98,7 @@ TEST(SerialPort, ForgetsWhatCameBeforeItWasOpened) {
 
 // A datagram of somebody else that waited already when the peer was found.
 TEST(UdpPort, KeepsItsPeerWhoeverSpeaksAfterIt) {
-  auto port = UdpPort::open({"127.0.0.1", 0});
+  auto port = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
   ASSERT_TRUE(port);
   const UdpPort::Endpoint to{"127.0.0.1", port->local_port()};
   auto peer = UdpPort::open({"127.0.0.1", 0}, to), other = UdpPort::open({"127.0.0.1", 0}, to);

@@ -47,7 +47,11 @@ TEST_F(VerifiedStops, AreThoseWhoseWholeSweptTubeIsClearAndNoOthers) {
 }
 
 TEST_F(VerifiedStops, BrakeWithinTheLimitOnTheFlightsOwnPathAndRestForTwoSeconds) {
+  std::size_t judged = 0;
   for (const Stop& s : stops([](const auto&) { return 1.0; })) {
+    // The flight's own commands end at full speed: a stop that has no room before that is not judged.
+    if (s.commands.back().p_W == commands_.back().p_W) continue;
+    ++judged;
     ASSERT_EQ(s.tube.size(), s.commands.size() + 1);
     Setpoint before = commands_[s.branch];
     for (const Setpoint& c : s.commands) {
@@ -62,6 +66,7 @@ TEST_F(VerifiedStops, BrakeWithinTheLimitOnTheFlightsOwnPathAndRestForTwoSeconds
     // The braking itself ends when it has to: the rest after it is no longer than two seconds and a period.
     EXPECT_NE(s.commands[s.commands.size() - 103].p_W, s.commands.back().p_W);
   }
+  EXPECT_GT(judged, 5u);
 }
 
 }  // namespace

@@ -25,11 +25,11 @@ FrameAlignment watched(const Vec3& off, double turned) {
   const Frames truth(0.5, {1, 2, 3});
   const FramePose map{{1, 1, 1}, 0.2};
   FrameAlignment alignment;
-  for (int i = 0; i < 50; ++i) alignment.update(map, truth.local(map), true);
+  for (int i = 0; i < 50; ++i) alignment.update(map, truth.local(map), kControlPeriod, true);
   FramePose local = truth.local(map);
   local.p += off;
   local.yaw += turned;
-  for (int i = 0; i < 200; ++i) alignment.update(map, local, false);
+  for (int i = 0; i < 200; ++i) alignment.update(map, local, kControlPeriod, false);
   return alignment;
 }
 
@@ -51,7 +51,7 @@ TEST(FrameAlignmentLimits, NeedsHalfASecondOfSamples) {
   const FramePose map{{1, 1, 1}, 0.2};
   FrameAlignment alignment;
   for (int i = 1; i <= 25; ++i) {
-    alignment.update(map, truth.local(map), true);
+    alignment.update(map, truth.local(map), kControlPeriod, true);
     EXPECT_EQ(alignment.aligned(), i == 25) << i;
   }
 }

@@ -7,6 +7,7 @@
 
 #include "core/map/octomap_message.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
+#include "services/backwashd/scan_placement.hpp"
 #include "tests/fuzz/sequence/daemon_rig.hpp"
 
 namespace backwash::fuzz {
