@@ -100,7 +100,8 @@ TEST(Cloud, SizesThatDoNotFitTheDataAreRefused) {
       if (random() % 2) *size = extreme[random() % std::size(extreme)];
     const auto cloud = decode_cloud(m);
     const bool fits = std::uint64_t{m.width} * m.point_step <= m.row_step &&
-                      std::uint64_t{m.row_step} * m.height <= 120 && m.point_step >= 12;
+                      std::uint64_t{m.row_step} * m.height <= 120 && m.point_step >= 12 &&
+                      m.point_step <= kMaxPointBytes;
     const bool many = std::uint64_t{m.width} * m.height > kMaxCloudPoints;
     EXPECT_EQ(cloud.has_value(), fits && !many)
         << m.width << " " << m.height << " " << m.point_step << " " << m.row_step;

@@ -17,6 +17,9 @@ namespace {
 using daemon::test::vehicle_5in;
 using Kind = Event::Kind;
 
+constexpr double kLeap = 0.06;   // m in a tick: faster than it flies
+constexpr int kDrainEvery = 50;  // ticks: the recorder's memory is bounded
+
 const map::OccupancyGrid& room() {
   static const auto grid = map::builtin_scene("parallel-walls-4m", 0.2).value();
   return grid;
@@ -89,7 +92,6 @@ void DaemonRig::advance() {
   delay_segments();
   const std::uint64_t segment = lock_.view().segment;
   const auto& wire = lock_.tick(missed_);
-  if (!lasting(Kind::slow_mission)) run_mission();
   const auto& view = lock_.view();
   ++spent_[static_cast<std::size_t>(view.mode)];
   Seen seen{tick_, view.mode, view.armed, view.offboard, wire.bytes};
@@ -102,14 +104,25 @@ void DaemonRig::advance() {
     seen.commands += !(arming && c.param1 == 0);
   }
   seen.accepted = view.segment != segment && view.segment != 0;
+  hear_autopilot();
+  if (tick_ % kDrainEvery == 0) threads_->recorder.drain(*lock_.channels);
   look();
   const auto& grid = threads_->known ? threads_->known->grid : room();
   seen.inside = grid.inside(grid.index(view.command.p_W));
   const auto broken = watch_.check(seen);
   if (broken) violation_ = {tick_, *broken};
   if (failures.size() > 0) violation_ = {tick_, failures.GetTestPartResult(0).message()};
-  if (violation_) lock_.channels->stop = true;  // the planner returns
+  if (!lasting(Kind::slow_mission)) run_mission();  // what it acknowledges holds from the next tick on
+  if (violation_) lock_.channels->stop = true;      // the planner returns
   ++tick_;
+}
+
+// An estimator that follows the VIO leaps with it, as soon as it is told: the same place then has another number.
+void DaemonRig::hear_autopilot() {
+  const auto& said = lock_.link().telemetry().local_state;
+  if (!said) return;
+  if (autopilot_at_ && (said->value.p_W - *autopilot_at_).norm() > kLeap) watch_.frame_moved(tick_);
+  autopilot_at_ = said->value.p_W;
 }
 
 void DaemonRig::look() {

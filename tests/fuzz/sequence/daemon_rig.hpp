@@ -63,6 +63,7 @@ class DaemonRig {
   bool carry_out(const daemon::Decision& decision);
   void delay_segments();
   void look();
+  void hear_autopilot();
   void offer_map(const map::OccupancyGrid& grid, std::vector<std::int8_t> data);
   void scan_box(const Vec3& at);
   std::optional<track::OdometrySample> read(const track::OdometrySample& sample);
@@ -81,7 +82,8 @@ class DaemonRig {
   std::optional<track::OdometrySample> frozen_;  // of vio_freeze
   std::int64_t repeated_ns_ = 0;
   Vec3 drifted_ = Vec3::Zero();
-  track::RigidShift closure_;  // of the VIO, which reports in its own frame
+  std::optional<Vec3> autopilot_at_;  // where it says it is, in its own frame
+  track::RigidShift closure_;         // of the VIO, which reports in its own frame
   daemon::CommandMessage last_command_;
   std::uint32_t sequence_ = 0;
   std::uint64_t session_ = 1;

@@ -32,7 +32,7 @@ class Watch {
   void acknowledged(std::uint8_t verb, int tick);
   /// A stop that is answered by no more than what is already so (landing): it may still disarm what stands.
   void stop_given(int tick);
-  /// The autopilot's estimator was reset, or a message of it said so.
+  /// The autopilot's estimator was reset or leapt, or a message of it said so: for three ticks a leap is not judged.
   void frame_moved(int tick) { frame_moved_ = tick; }
   /// The daemon was started anew.
   void restarted();
