@@ -93,7 +93,9 @@ class Flown {
     in.autopilot.heartbeat_age = 0.1;
     State local = truth_L;
     local.p_W += local_off;
-    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, local, quaternion(kYaw), in.now_ns};
+    in.autopilot.pose =
+        AutopilotFacts::Pose{in.now_ns, local, quaternion(kYaw), attitude_on ? in.now_ns : attitude_at_ns};
+    attitude_at_ns = in.autopilot.pose->attitude_at_ns;
     out = tick.step(in);
     started_ = tick.mode() != Mode::passive && tick.mode() != Mode::quiet;
     in.request = Request::none;
@@ -114,7 +116,8 @@ class Flown {
   Vec3 local_off = Vec3::Zero();  ///< of the controller's estimate
   RigidShift frame_W;             ///< map ← odometry, of the newest loop closure
   std::uint32_t closures = 0;
-  bool vio_on = true;
+  bool vio_on = true, attitude_on = true;
+  std::int64_t attitude_at_ns = 0;
   std::int64_t age_ns = 0;  ///< of a sample when the tick sees it
   std::function<void(OdometrySample&)> spoil;
 
@@ -309,6 +312,192 @@ TEST(TickReactions, WhileTheFramesDisagreeTheyAreNotTakenAnew) {
   f.step();
   ASSERT_EQ(f.out.supervisor.mode, Mode::hold);
   EXPECT_LT((f.out.command_local.p_W - local).norm(), 1e-9);
+}
+
+/// A flight at rest in a map that has seen one loop closure already.
+Flown after_a_closure(const RigidShift& first) {
+  Flown f(Flown::Until::aligned);
+  f.closures = 1, f.frame_W = first;
+  for (int n = 0; n < 60; ++n) f.step();
+  f.in.request = Request::enable;
+  f.step();
+  f.in.autopilot.offboard = f.in.autopilot.armed = true;
+  for (int n = 0; n < 100; ++n) f.step();
+  EXPECT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
+  return f;
+}
+
+TEST(TickReactions, AnAbsurdLoopClosureIsHeldAndNothingIsFlownAfterIt) {
+  const RigidShift first{0.1, {1, -1, 0.2}};
+  for (const bool turn : {false, true}) {
+    Flown f = after_a_closure(first);
+    const Setpoint before = f.out.command, local = f.out.command_local;
+    RigidShift D{turn ? 0.2 : 0.0, {turn ? 0.0 : 1.2, 0, 0}};
+    if (turn) D.t = before.p_W - D.rotate(before.p_W);  // about the vehicle: it stays where it is
+    f.closures = 2, f.frame_W = D * first;
+    f.step();
+    EXPECT_EQ(f.out.supervisor.mode, Mode::hold);
+    EXPECT_EQ(f.out.supervisor.reason, Reason::closure_refused);
+    for (int n = 0; n < 50; ++n) {
+      f.step();
+      EXPECT_LT((f.out.command.p_W - before.p_W).norm(), 1e-9);
+      EXPECT_LT((f.out.command_local.p_W - local.p_W).norm(), 1e-9);
+    }
+    AcceptedSegment on = straight();
+    for (auto& c : on.commands) c = first.setpoint(c);
+    for (auto& t : on.tube) t.center = first.state(t.center);
+    on.closures = 1;
+    EXPECT_TRUE(f.offer(on).refused);
+  }
+}
+
+// In one tick: a loop closure, and a hold that has no stop to rest on.
+TEST(TickReactions, AHoldInTheTickOfALoopClosureIsWhereItPhysicallyWas) {
+  const RigidShift first{0.1, {1, -1, 0.2}};
+  Flown f = after_a_closure(first);
+  const Setpoint local = f.out.command_local;
+  f.closures = 2, f.frame_W = RigidShift{0.13, {1.3, -1.2, 0.25}};
+  f.in.surroundings.outside = true;
+  f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::hold);
+  EXPECT_LT((f.out.command_local.p_W - local.p_W).norm(), 1e-6);
+}
+
+TEST(TickReactions, OdometryThatIsLateByItsOwnStampsIsAsOldAsThat) {
+  Flown f(Flown::Until::tracking);
+  int n = 0;
+  f.spoil = [&](auto& s) { s.stamp_ns -= n * 1'000'000; };
+  for (n = 1; n < 200 && f.out.supervisor.mode == Mode::tracking; ++n) f.step();
+  EXPECT_EQ(f.out.supervisor.reason, Reason::odometry_lost);
+  EXPECT_NEAR(n, 81, 3);
+}
+
+// The controller follows the VIO, so that the frames agree: only the velocities contradict it.
+TEST(TickReactions, PositionsThatGoAnotherWayThanTheirVelocitiesHold) {
+  Flown f(Flown::Until::tracking);
+  Vec3 drift = Vec3::Zero();
+  f.spoil = [&](auto& s) { s.state.p_W += drift; };
+  for (int n = 0; n < 100 && f.out.supervisor.mode == Mode::tracking; ++n) {
+    drift.y() += 0.004;
+    f.local_off = RigidShift{Flown::kYaw, Vec3::Zero()}.rotate(drift);
+    f.step();
+  }
+  EXPECT_EQ(f.out.supervisor.reason, Reason::odometry_inconsistent);
+}
+
+// Slow enough for the gate. Nothing says that the controller's own estimate was reset.
+TEST(TickReactions, ATurningVioIsNotTakenForAResetOfTheController) {
+  Flown f(Flown::Until::tracking);
+  const Vec3 local = f.out.command_local.p_W;
+  double yaw = 0;
+  f.spoil = [&](auto& s) { s.q = Flown::quaternion(yaw); };
+  for (int n = 0; n < 60; ++n) {
+    yaw = std::min(yaw + 0.05, 1.0);
+    f.step();
+    EXPECT_NE(f.out.supervisor.reason, Reason::autopilot_reset);
+    EXPECT_LT((f.out.command_local.p_W - local).norm(), 1e-9) << n;
+  }
+  EXPECT_NE(f.out.supervisor.mode, Mode::tracking);
+}
+
+TEST(TickReactions, AnAttitudeThatStopsArrivingHoldsAlsoWhileThePositionComes) {
+  Flown f(Flown::Until::tracking);
+  f.attitude_on = false;
+  int ticks = 0;
+  for (; f.out.supervisor.mode == Mode::tracking && ticks < 30; ++ticks) f.step();
+  EXPECT_EQ(f.out.supervisor.reason, Reason::pose_silent);
+  EXPECT_EQ(ticks, 15);
+}
+
+/// Enabled on the ground and not armed.
+Flown on_the_ground() {
+  Flown f(Flown::Until::aligned);
+  f.in.autopilot.landed = true;
+  f.in.request = Request::enable;
+  f.step();
+  f.in.autopilot.offboard = true;
+  f.step();
+  EXPECT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
+  return f;
+}
+
+AcceptedSegment take_off() {
+  AcceptedSegment s = straight();
+  s.arms = true;
+  return s;
+}
+
+TEST(TickReactions, NothingIsAcceptedWhileNobodyFollows) {
+  Flown f(Flown::Until::aligned);
+  AcceptedSegment s = take_off();
+  EXPECT_TRUE(f.offer(s).refused);
+  EXPECT_FALSE(f.out.arm);
+}
+
+TEST(TickReactions, ArmsForAnAcceptedTakeoffThatGoesOnAndForNothingElse) {
+  AcceptedSegment good = take_off(), elsewhere = take_off();
+  for (auto& t : elsewhere.tube) t.center.p_W.y() += 3;
+  {
+    Flown f = on_the_ground();
+    EXPECT_TRUE(f.offer(good).arm);
+  }
+  {
+    Flown f = on_the_ground();
+    EXPECT_TRUE(f.offer(elsewhere).refused);
+    EXPECT_FALSE(f.out.arm);
+  }
+  {
+    Flown f = on_the_ground();
+    f.in.surroundings.outside = true;  // a hold in the same tick
+    EXPECT_TRUE(f.offer(good).accepted);
+    ASSERT_EQ(f.out.supervisor.mode, Mode::hold);
+    EXPECT_FALSE(f.out.arm);
+  }
+  {
+    Flown f = on_the_ground();
+    f.in.autopilot.armed = true;
+    EXPECT_TRUE(f.offer(good).accepted);
+    EXPECT_FALSE(f.out.arm) << "it is armed already";
+  }
+}
+
+TEST(TickReactions, AVehicleThatWasAskedToArmCountsAsArmed) {
+  Flown f = on_the_ground();
+  AcceptedSegment s = take_off();
+  ASSERT_TRUE(f.offer(s).arm);
+  f.in.request = Request::disable;
+  EXPECT_EQ(f.step().supervisor.mode, Mode::hold) << "it may be in the air before it says so";
+}
+
+/// Orders to disarm in the three seconds after the tick of the STOP, of a vehicle that was armed for a take-off and
+/// stopped on the ground.
+int disarms(Flown& f, const std::function<void()>& then) {
+  AcceptedSegment s = take_off();
+  EXPECT_TRUE(f.offer(s).arm);
+  f.in.autopilot.armed = true;
+  f.step();
+  f.in.request = Request::stop;
+  f.step();
+  then();
+  int asked = 0;
+  for (int n = 0; n < 160; ++n) asked += f.step().disarm;
+  return asked;
+}
+
+TEST(TickReactions, AStopOnTheGroundStopsTheMotorsThereAndOnlyUntilTheNextTakeoff) {
+  Flown f = on_the_ground();
+  EXPECT_GE(disarms(f, [] {}), 2);
+  Flown g = on_the_ground();
+  EXPECT_EQ(disarms(g, [&] { g.in.autopilot.landed = false; }), 0) << "it is in the air";
+  Flown h = on_the_ground();
+  AcceptedSegment again = take_off();
+  again.id = 2;
+  EXPECT_EQ(disarms(h,
+                    [&] {
+                      again.tube.front().center = Flown::map_of(h.truth_L);
+                      EXPECT_TRUE(h.offer(again).accepted);
+                    }),
+            0);
 }
 
 }  // namespace
