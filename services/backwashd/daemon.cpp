@@ -47,11 +47,15 @@ int run(const Settings& settings) {
   const sigset_t signals = block_signals();
   auto channels = std::make_unique<Channels>();
   Recorder recorder(settings.daemon.log.file);
-  auto port =
-      firmware_bridge::SerialPort::open(settings.daemon.link.device, static_cast<unsigned>(settings.daemon.link.baud));
-  if (!port) {
+  using Kind = firmware_bridge::PortError::Kind;
+  auto port = open_port(settings.daemon.link);
+  if (!port && port.error().kind != Kind::kOpen && port.error().kind != Kind::kBusy) {
     spdlog::error("{}: {}", settings.daemon.link.device, describe(port.error()));
     return kInputOutput;
+  }
+  if (!port) {  // it may be plugged in, or its simulator started, later: the link watch goes on trying
+    spdlog::warn("{} {}; waiting for it", settings.daemon.link.device, describe(port.error()));
+    port = firmware_bridge::ClosedPort{};
   }
   firmware_bridge::AutopilotLink link(std::move(*port), static_cast<std::uint8_t>(settings.daemon.link.system),
                                       std::chrono::steady_clock::now());

@@ -18,7 +18,8 @@ struct Settings {
 /// Reads the daemon's file and the vehicle and model files that it names. Error: one line naming file, line and key.
 tl::expected<Settings, std::string> load_settings(const std::string& path);
 
-/// Runs until SIGINT or SIGTERM; returns the exit code: 0, or 74 when the port cannot be opened. Throws for DDS and log
+/// Runs until SIGINT or SIGTERM; returns the exit code: 0, or 74 when the device is no port
+/// that we could use (one that is missing or busy is waited for). Throws for DDS and log
 /// failures at start.
 int run(const Settings& settings);
 
