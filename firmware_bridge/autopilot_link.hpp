@@ -69,7 +69,7 @@ class AutopilotLink {
   /// known of the vehicle is forgotten; nothing waits to be sent.
   Port reconnect(Port port, Time now) noexcept;
 
-  /// Reads what has arrived (at most 8 KiB), then sends what waits. Error: kLost, also on every later call.
+  /// Reads what has arrived (at most about 8 KiB), then sends what waits. Error: kLost, also on every later call.
   tl::expected<void, PortError> poll(Time now) noexcept;
 
   const Telemetry& telemetry() const noexcept { return telemetry_; }
