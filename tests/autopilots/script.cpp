@@ -34,11 +34,6 @@ struct Options {
   int pid = 0;
 };
 
-std::unique_ptr<TruthSource> truth_source(const std::string& text) {
-  const auto comma = text.find(',');
-  return comma == text.npos ? ardupilot_truth(text) : px4_truth(text.substr(0, comma), text.substr(comma + 1));
-}
-
 template <std::size_t N>
 std::string text_of(const std::array<char, N>& zero_filled) {
   return {zero_filled.begin(), std::ranges::find(zero_filled, char{0})};
@@ -207,6 +202,7 @@ class Session {
       } else if (t_ > until_) {
         std::cerr << "at " << t_ << " s: waited in vain: " << line_ << "\n";
         row("note", "waited in vain: " + line_, {});
+        busy_ = false;
         return !must_;
       } else {
         return true;
@@ -349,8 +345,7 @@ int main(int argc, char** argv) {
   backwash::autopilots::Options o;
   CLI::App app{"autopilot_script: plays a script against an autopilot and writes a trace"};
   app.add_option("--device", o.device, "as in the daemon's [link]")->required();
-  app.add_option("--truth", o.truth, "ArduPilot: device of its second line; PX4: two files that its listener writes")
-      ->required();
+  app.add_option("--truth", o.truth, "see truth.hpp")->required();
   app.add_option("--script", o.script)->required();
   app.add_option("--trace", o.trace, "CSV")->required();
   app.add_option("--noise", o.noise, "of the odometry's position, m");

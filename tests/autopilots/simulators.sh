@@ -37,20 +37,15 @@ start_px4() {
   local build=$1 setting
   shift
   mkdir "$work/px4"
-  mkfifo "$work/position" "$work/attitude"
+  mkfifo "$work/silence"
+  exec 6<>"$work/silence"  # its shell spins on a standard input that has ended
   (
     cd "$work/px4"
     while read -r setting; do export "PX4_PARAM_${setting?}"; done < <(grep -v '^#' "$here/px4.params"; printf '%s\n' "$@")
     export PATH=$build/bin:$PATH PX4_SIM_MODEL=sihsim_quadx PX4_SIMULATOR=sihsim
     fifo "$build/bin/px4" -d "$build/etc"
-  ) >"$work/autopilot.log" 2>&1 </dev/null &
-  autopilot_pid=$! device=udpin:127.0.0.1:14540 truth=$work/position,$work/attitude
+  ) >"$work/autopilot.log" 2>&1 <&6 &
+  autopilot_pid=$! device=udpin:127.0.0.1:14540 truth=/tmp/px4-sock-0
   pids+=("$autopilot_pid")
   for _ in $(seq 300); do grep -q 'Startup script returned successfully' "$work/autopilot.log" && break; sleep 0.1; done
-  # Open for both, so that neither waits for the other.
-  exec 8<>"$work/position" 9<>"$work/attitude"
-  sleep infinity | "$build/bin/px4-listener" vehicle_local_position_groundtruth -r 125 -n 100000000 >&8 &
-  pids+=($!)
-  sleep infinity | "$build/bin/px4-listener" vehicle_attitude_groundtruth -r 125 -n 100000000 >&9 &
-  pids+=($!)
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/autopilots/truth.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 
 #include <cmath>
 #include <map>
@@ -62,85 +62,81 @@ class ArduPilotTruth : public TruthSource {
   Truth last_;
 };
 
-/// The fields of what `listener` prints, sample by sample: "name: value", lists in brackets.
-class ListenerFile {
- public:
-  explicit ListenerFile(const std::string& path) : fd_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {
-    if (fd_.get() < 0) throw std::runtime_error(path + ": cannot be read");
-  }
-  using Sample = std::map<std::string, std::vector<double>>;
+/// What PX4's command `listener` says of a topic: its fields by name.
+using Sample = std::map<std::string, std::vector<double>, std::less<>>;
 
-  /// Calls take(sample) for each that is complete, which a line of its next one shows.
-  template <class Take>
-  void poll(Take&& take) {
-    std::array<char, 8192> bytes;
-    for (ssize_t n; (n = ::read(fd_.get(), bytes.data(), bytes.size())) > 0;) text_.append(bytes.data(), n);
-    for (std::size_t end; (end = text_.find('\n')) != text_.npos; text_.erase(0, end + 1)) {
-      const std::string line = text_.substr(0, end);
-      if (line.find("TOPIC:") != line.npos) {
-        if (!sample_.empty()) take(sample_);
-        sample_.clear();
-      } else if (const auto colon = line.find(": "); colon != line.npos) {
-        std::string values = line.substr(colon + 2);
-        if (const auto remark = values.find(" ("); remark != values.npos) values.resize(remark);
-        for (char& c : values)
-          if (c == '[' || c == ']' || c == ',') c = ' ';
-        std::istringstream in(values);
-        auto& into = sample_[line.substr(line.find_first_not_of(" \t"), colon - line.find_first_not_of(" \t"))];
-        for (double v; in >> v;) into.push_back(v);
-      }
-    }
+/// Lines "name: value", lists in brackets, remarks in parentheses behind.
+Sample parse_sample(const std::string& text) {
+  Sample sample;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const auto begin = line.find_first_not_of(" \t"), colon = line.find(": ");
+    if (colon == line.npos) continue;
+    std::string values = line.substr(colon + 2);
+    if (const auto remark = values.find(" ("); remark != values.npos) values.resize(remark);
+    for (char& c : values)
+      if (c == '[' || c == ']' || c == ',') c = ' ';
+    std::istringstream in(values);
+    auto& into = sample[line.substr(begin, colon - begin)];
+    for (double v; in >> v;) into.push_back(v);
   }
+  return sample;
+}
 
- private:
-  firmware_bridge::FileDescriptor fd_;
-  std::string text_;
-  Sample sample_;
-};
+/// Asks PX4's shell, as its own clients do: the command, a zero (no terminal); the answer ends with the connection.
+Sample ask_px4(const std::string& socket_path, const std::string& topic) {
+  firmware_bridge::FileDescriptor fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_un there{};
+  there.sun_family = AF_UNIX;
+  std::copy_n(socket_path.begin(), std::min(socket_path.size(), sizeof there.sun_path - 1), there.sun_path);
+  const std::string command = "listener " + topic + '\0';
+  const timeval patience{5, 0};
+  ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&there), sizeof there) != 0 ||
+      ::send(fd.get(), command.data(), command.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(command.size()))
+    throw std::runtime_error(socket_path + ": PX4 does not answer");
+  std::string text;
+  std::array<char, 4096> bytes;
+  for (ssize_t n; (n = ::recv(fd.get(), bytes.data(), bytes.size(), 0)) > 0;)
+    text.append(bytes.data(), static_cast<std::size_t>(n));
+  return parse_sample(text);
+}
 
 class Px4Truth : public TruthSource {
  public:
-  Px4Truth(const std::string& position, const std::string& attitude) : position_(position), attitude_(attitude) {}
+  explicit Px4Truth(std::string socket_path) : socket_path_(std::move(socket_path)) {}
 
   std::optional<Truth> newest() override {
-    std::optional<Truth> last;
-    attitude_.poll([&](ListenerFile::Sample& s) {
-      if (const auto& q = s["q"]; q.size() == 4)
-        q_EB_ = mavlink::swap_ned_frd(Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized());
-    });
-    position_.poll([&](ListenerFile::Sample& s) {
-      for (const char* key : {"timestamp_sample", "x", "y", "z", "vx", "vy", "vz"})
-        if (s[key].size() != 1) return;
-      Truth t;
-      // PX4's clock is ours but for a constant: what arrives soonest after its stamp tells it.
-      const std::int64_t stamp_ns = static_cast<std::int64_t>(s["timestamp_sample"][0]) * 1000;
-      behind_ns_ = std::min(behind_ns_, daemon::now_ns() - stamp_ns);
-      t.at_ns = stamp_ns + behind_ns_;
-      t.p_E = mavlink::swap_ned({s["x"][0], s["y"][0], s["z"][0]});
-      if (!first_) first_ = t.p_E;
-      t.p_E -= *first_;
-      t.v_E = mavlink::swap_ned({s["vx"][0], s["vy"][0], s["vz"][0]});
-      t.q_EB = q_EB_;
-      last = t;
-    });
-    return last;
+    if (daemon::now_ns() < due_ns_) return std::nullopt;
+    due_ns_ = std::max(due_ns_ + 10'000'000, daemon::now_ns());
+    Sample at = ask_px4(socket_path_, "vehicle_attitude_groundtruth");
+    Sample p = ask_px4(socket_path_, "vehicle_local_position_groundtruth");
+    if (at["q"].size() != 4) return std::nullopt;
+    for (const char* key : {"timestamp_sample", "x", "y", "z", "vx", "vy", "vz"})
+      if (p[key].size() != 1) return std::nullopt;
+    Truth t;
+    t.at_ns = static_cast<std::int64_t>(p["timestamp_sample"][0]) * 1000;  // PX4's clock on Linux is CLOCK_MONOTONIC
+    t.p_E = mavlink::swap_ned({p["x"][0], p["y"][0], p["z"][0]});
+    if (!first_) first_ = t.p_E;
+    t.p_E -= *first_;
+    t.v_E = mavlink::swap_ned({p["vx"][0], p["vy"][0], p["vz"][0]});
+    t.q_EB = mavlink::swap_ned_frd(Eigen::Quaterniond(at["q"][0], at["q"][1], at["q"][2], at["q"][3]).normalized());
+    if (t.at_ns == last_ns_) return std::nullopt;
+    last_ns_ = t.at_ns;
+    return t;
   }
 
  private:
-  ListenerFile position_, attitude_;
-  Eigen::Quaterniond q_EB_ = Eigen::Quaterniond::Identity();
+  std::string socket_path_;
+  std::int64_t due_ns_ = 0, last_ns_ = 0;
   std::optional<Vec3> first_;
-  std::int64_t behind_ns_ = std::numeric_limits<std::int64_t>::max();
 };
 
 }  // namespace
 
-std::unique_ptr<TruthSource> ardupilot_truth(const std::string& device) {
-  return std::make_unique<ArduPilotTruth>(device);
-}
-
-std::unique_ptr<TruthSource> px4_truth(const std::string& position_file, const std::string& attitude_file) {
-  return std::make_unique<Px4Truth>(position_file, attitude_file);
+std::unique_ptr<TruthSource> truth_source(const std::string& where) {
+  if (where.starts_with('/')) return std::make_unique<Px4Truth>(where);
+  return std::make_unique<ArduPilotTruth>(where);
 }
 
 }  // namespace backwash::autopilots

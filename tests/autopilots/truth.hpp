@@ -27,12 +27,11 @@ class TruthSource {
   virtual std::optional<Truth> newest() = 0;
 };
 
-/// ArduPilot's SIM_STATE at 100 Hz on a second MAVLink line (its TCP port 5762). Position comes there in steps of 11
-/// mm, velocity exactly: the velocity is integrated and kept within the step.
-std::unique_ptr<TruthSource> ardupilot_truth(const std::string& device);
-
-/// What PX4's own `listener` prints of vehicle_local_position_groundtruth and vehicle_attitude_groundtruth (to 10 µm;
-/// HIL_STATE_QUATERNION has steps of 11 mm and 1 cm/s): files, usually pipes, that it writes.
-std::unique_ptr<TruthSource> px4_truth(const std::string& position_file, const std::string& attitude_file);
+/// Where a simulator tells it:
+/// - a MAVLink device (tcp:127.0.0.1:5762, the second line): ArduPilot's SIM_STATE at 100 Hz. Position comes there in
+///   steps of 11 mm, velocity exactly: the velocity is integrated and kept within the step.
+/// - a path (/tmp/px4-sock-0): PX4's shell, asked 100 times a second for its ground-truth topics, which have 10 µm
+///   (HIL_STATE_QUATERNION has steps of 11 mm and 1 cm/s).
+std::unique_ptr<TruthSource> truth_source(const std::string& where);
 
 }  // namespace backwash::autopilots

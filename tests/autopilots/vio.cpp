@@ -86,11 +86,6 @@ class Vio {
     if (!grid) throw std::runtime_error(grid.error().message);
     return std::move(*grid);
   }
-  static std::unique_ptr<TruthSource> truth_source(const std::string& text) {
-    const auto comma = text.find(',');
-    return comma == text.npos ? ardupilot_truth(text) : px4_truth(text.substr(0, comma), text.substr(comma + 1));
-  }
-
   void publish_map() {
     static const std::string frame = "map", id = "OcTree";
     map_data_ = map::encode_octomap(grid_);
@@ -195,8 +190,7 @@ class Vio {
 int main(int argc, char** argv) {
   backwash::autopilots::Options o;
   CLI::App app{"autopilot_vio: VIO and mapper beside a real autopilot in its simulator"};
-  app.add_option("--truth", o.truth, "ArduPilot: device of its second line; PX4: two files that its listener writes")
-      ->required();
+  app.add_option("--truth", o.truth, "see truth.hpp")->required();
   app.add_option("--map", o.map)->required();
   app.add_option("--vehicle", o.vehicle)->required();
   app.add_option("--start", o.start, "x,y,z of the vehicle's centre as it stands, m")
