@@ -26,12 +26,12 @@ std::uint32_t milliseconds_of(Time t) noexcept {
   return static_cast<std::uint32_t>(duration_cast<milliseconds>(t.time_since_epoch()).count());
 }
 
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 using UpperTriangle = std::array<float, 21>;
 
 /// Upper triangle of the 6×6 diag(first, second); an absent first part marks all of it unknown, as MAVLink has it.
 UpperTriangle covariance(const std::optional<Vec3>& first, const std::optional<Vec3>& second) noexcept {
   constexpr std::array<std::size_t, 6> kDiagonal{0, 6, 11, 15, 18, 20};
-  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   UpperTriangle c{};
   for (std::size_t i = 0; i < 3; ++i) {
     c[kDiagonal[i]] = first ? static_cast<float>((*first)(static_cast<int>(i))) : kUnknown;
@@ -46,11 +46,29 @@ std::optional<Vec3> swap_variance_ned(const std::optional<Vec3>& v) noexcept {
   return mavlink::swap_ned(*v).cwiseAbs();
 }
 
+/// What is given is a number; what is absent will be NaN on purpose.
 bool finite(const VioSample& s) noexcept {
-  const auto finite_or_absent = [](const std::optional<Vec3>& v) { return !v || v->allFinite(); };
-  return s.p_O.allFinite() && s.v_B.allFinite() && s.omega_B.allFinite() && s.q_OB.coeffs().allFinite() &&
-         finite_or_absent(s.position_variance_O) && finite_or_absent(s.attitude_variance_O) &&
-         finite_or_absent(s.velocity_variance_B);
+  const auto finite_or_absent = [](const std::optional<Vec3>& v) { return !v || v->cast<float>().allFinite(); };
+  return finite_or_absent(s.omega_B) && finite_or_absent(s.position_variance_O) &&
+         finite_or_absent(s.attitude_variance_O) && finite_or_absent(s.velocity_variance_B);
+}
+
+/// Every float of the message is a number, but for those of ODOMETRY that may be marked as unknown.
+template <class Message>
+bool finite(const Message& message) noexcept {
+  const auto number = [&]<class Member>(const mavlink::Field<Message, Member>& f) {
+    using Scalar = typename mavlink::Wire<Member>::Scalar;
+    if constexpr (!std::is_same_v<Scalar, float>) {
+      return true;
+    } else if constexpr (mavlink::Wire<Member>::kArray > 0) {
+      return f.name.ends_with("_covariance") ||
+             std::ranges::all_of(message.*f.member, [](float v) { return std::isfinite(v); });
+    } else {
+      const bool rate = std::is_same_v<Message, mavlink::Odometry> && f.name.ends_with("speed");
+      return rate || std::isfinite(message.*f.member);
+    }
+  };
+  return std::apply([&](const auto&... f) { return (number(f) && ...); }, Message::fields());
 }
 
 }  // namespace
@@ -148,8 +166,10 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
   if (!for_us(m.target_system, m.target_component)) return;
   const std::int64_t now_ns = nanoseconds_of(now);
   if (m.tc1 == 0) {
-    send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
+    if (answers_) send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
   } else if (m.ts1 == timesync_asked_ns_ && timesync_asked_ns_ != 0) {
+    constexpr std::int64_t kSane_ns = std::int64_t{1} << 62;  // 146 years: differences do not overflow
+    if (m.tc1 < 0 || m.tc1 > kSane_ns) return;
     timesync_asked_ns_ = 0;
     const std::int64_t round_trip = now_ns - m.ts1;
     clock_ = {ClockOffset{m.tc1 - (m.ts1 + round_trip / 2), round_trip}, now};
@@ -175,7 +195,7 @@ std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
 
 template <class Message>
 bool AutopilotLink::send(const Message& message, TransmitQueue::Kind kind) noexcept {
-  if (!heard_ || lost_) return false;
+  if (!heard_ || lost_ || !finite(message)) return false;
   flush();  // first, so that an older set-point that fits by now is not counted as missed
   const mavlink::EncodedFrame frame = mavlink::encode_frame({*heard_, kOnboardComputer, sequence_++}, message);
   if (tap_) tap_(tap_context_, true, frame.view());
@@ -185,7 +205,6 @@ bool AutopilotLink::send(const Message& message, TransmitQueue::Kind kind) noexc
 }
 
 bool AutopilotLink::send_setpoint(const Setpoint& s, Time now) noexcept {
-  if (!s.p_W.allFinite() || !s.v_W.allFinite() || !s.a_W.allFinite() || !std::isfinite(s.yaw)) return false;
   const Eigen::Vector3f p = mavlink::swap_ned(s.p_W).cast<float>();
   const Eigen::Vector3f v = mavlink::swap_ned(s.v_W).cast<float>();
   const Eigen::Vector3f a = mavlink::swap_ned(s.a_W).cast<float>();
@@ -219,7 +238,8 @@ bool AutopilotLink::send_odometry(const VioSample& s) noexcept {
   const Eigen::Vector3f p = mavlink::swap_ned(s.p_O).cast<float>();
   const Eigen::Quaternionf q = mavlink::swap_ned_frd(s.q_OB).cast<float>();
   const Eigen::Vector3f v = mavlink::swap_frd(s.v_B).cast<float>();
-  const Eigen::Vector3f w = mavlink::swap_frd(s.omega_B).cast<float>();
+  const Eigen::Vector3f w =
+      s.omega_B ? Eigen::Vector3f(mavlink::swap_frd(*s.omega_B).cast<float>()) : Eigen::Vector3f::Constant(kUnknown);
   return send(mavlink::Odometry{
       .time_usec = s.time_us,
       .x = p.x(),
@@ -259,9 +279,6 @@ bool AutopilotLink::send_timesync(Time now) noexcept {
 }
 
 bool AutopilotLink::send_command(std::uint16_t command, const std::array<float, 7>& p) noexcept {
-  for (const float value : p) {
-    if (!std::isfinite(value)) return false;
-  }
   return send(mavlink::CommandLong{p[0], p[1], p[2], p[3], p[4], p[5], p[6], command, heard_.value_or(0),
                                    kFlightController, 0});
 }

@@ -48,7 +48,7 @@ struct VioSample {
   Vec3 p_O;                                                      ///< m
   Eigen::Quaterniond q_OB;                                       ///< body FLU to O
   Vec3 v_B;                                                      ///< velocity of the body, in body FLU, m/s
-  Vec3 omega_B;                                                  ///< rad/s, FLU
+  std::optional<Vec3> omega_B;                                   ///< rad/s, FLU; absent: not known
   std::optional<Vec3> position_variance_O, attitude_variance_O;  ///< per axis of O, m², rad²
   std::optional<Vec3> velocity_variance_B;                       ///< per axis of B, (m/s)²
   std::uint8_t reset_counter = 0;                                ///< counts jumps of O, as loop closures make them
@@ -88,7 +88,8 @@ class AutopilotLink {
   const TransmitQueue& transmit() const noexcept { return queue_; }
 
   /// Each of these encodes one frame and hands it to the port, or keeps it for poll(). False: refused, because no
-  /// vehicle is known, the port is lost, or a value is not finite.
+  /// vehicle is known, the port is lost, or a value is not finite as the float that it would be on the wire. ODOMETRY
+  /// alone holds NaN: where MAVLink has it say "not known", in rates and covariances.
   ///
   /// Set-point in the controller's local frame L, z-up (p_W stands for p_L and so on): position, velocity,
   /// acceleration and yaw; the yaw rate is left to the controller.
@@ -107,6 +108,9 @@ class AutopilotLink {
   bool send_land() noexcept;
   /// Asks for a message at `rate_hz` > 0.
   bool send_message_interval(std::uint32_t message_id, double rate_hz) noexcept;
+
+  /// Whether TIMESYNC is answered from now on: nothing else is sent of the link's own accord.
+  void answer_timesync(bool answers) noexcept { answers_ = answers; }
 
   /// Asks for a parameter by name; Telemetry::parameter() has the answer.
   bool send_parameter_request(std::string_view name) noexcept;
@@ -132,6 +136,7 @@ class AutopilotLink {
   std::optional<std::uint8_t> heard_;
   std::optional<Received<ClockOffset>> clock_;
   std::int64_t timesync_asked_ns_ = 0;
+  bool answers_ = true;
   std::uint8_t sequence_ = 0;
   Tap tap_ = nullptr;
   void* tap_context_ = nullptr;

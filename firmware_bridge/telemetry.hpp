@@ -74,8 +74,8 @@ struct StatusLine {
 };
 
 /// The newest of everything that the flight controller said, converted to z-up and FLU. What never came is absent; what
-/// came broken (not finite, no unit quaternion) or after its successor is dropped and counted.
-/// Real-time: take() is wait-free, no allocation.
+/// came broken (not finite, no unit quaternion, further than 10 km or faster than 100 m/s or 100 rad/s) or after its
+/// successor is dropped and counted. Real-time: take() is wait-free, no allocation.
 class Telemetry {
  public:
   Latest<VehicleStatus> status;

@@ -41,7 +41,7 @@ struct Daemon {
     double battery_land = 0;  ///< remaining share below which LAND is asked for, once; 0: never
   } control;
   struct {
-    std::string file;  ///< raw log, made anew at each start
+    std::string file;  ///< raw log; a start that finds it makes the next of NAME-2, NAME-3 …
   } log;
 };
 

@@ -1,8 +1,53 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include "core/config/daemon_config.hpp"
 #include "core/config/strict_table.hpp"
 
 namespace backwash::config {
+namespace {
+
+bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+bool digit(char c) { return c >= '0' && c <= '9'; }
+
+/// ROS 2's rules for names: tokens of letters, digits and underscores, none that begins with a digit or holds two
+/// underscores in a row, between single slashes.
+bool ros_name(std::string_view name, std::size_t longest) {
+  if (name.empty() || name.size() > longest || name.find("__") != name.npos) return false;
+  for (std::size_t at = 0; at <= name.size();) {
+    const std::string_view token = name.substr(at, name.find('/', at) - at);
+    if (token.empty() || digit(token[0])) return false;
+    if (!std::ranges::all_of(token, [](char c) { return letter(c) || digit(c); })) return false;
+    at += token.size() + 1;
+  }
+  return true;
+}
+
+/// As Linux allows (15 characters), and nothing that means something in the middleware's XML.
+bool interface_name(std::string_view name) {
+  constexpr std::string_view kMarks = ".:-@";
+  return name.size() <= 15 &&
+         std::ranges::all_of(name, [&](char c) { return letter(c) || digit(c) || kMarks.find(c) != kMarks.npos; });
+}
+
+/// What is wrong with the names that go to the middleware, if anything.
+tl::expected<void, ConfigError> check_names(const StrictTable& file, const Daemon& d) {
+  // 255 is what DDS takes for a topic; rt/NAMESPACE/loop_closure has to fit.
+  constexpr std::size_t kTopic = 255, kNamespace = kTopic - 16;
+  const std::string rule =
+      " characters: tokens of letters, digits and single '_' that begin with no digit, between '/'";
+  if (!interface_name(d.dds.interface))
+    return tl::unexpected(file.error("dds.interface", "needs an interface name: up to 15 letters, digits, . : - @ _"));
+  if (!ros_name(d.dds.name_space, kNamespace))
+    return tl::unexpected(
+        file.error("dds.namespace", "needs a ROS 2 namespace, up to " + std::to_string(kNamespace) + rule));
+  if (!ros_name(d.dds.odometry_topic, kTopic))
+    return tl::unexpected(
+        file.error("dds.odometry_topic", "needs a ROS 2 topic on the wire, up to " + std::to_string(kTopic) + rule));
+  return {};
+}
+
+}  // namespace
 
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   const auto file = StrictTable::open(path, ".daemon.toml");
@@ -41,6 +86,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
     if (!text) return tl::unexpected(text.error());
     *target = std::move(*text);
   }
+  if (auto good = check_names(*file, d); !good) return tl::unexpected(good.error());
   for (const auto& [key, target] : frames) {
     if (!file->has(key)) continue;
     auto text = file->text(key);

@@ -2,14 +2,12 @@
 #include "core/config/strict_table.hpp"
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <iomanip>
-#include <iterator>
 #include <set>
 #include <sstream>
 
 #include "core/config/builtin_files.hpp"
+#include "core/files/read_file.hpp"
 
 namespace backwash::config {
 namespace {
@@ -31,11 +29,11 @@ tl::expected<std::string, ConfigError> builtin_contents(const std::string& path,
 
 tl::expected<std::string, ConfigError> contents(const std::string& path, std::string_view suffix) {
   if (path.starts_with(kBuiltin)) return builtin_contents(path, suffix);
-  std::ifstream in(path, std::ios::binary);
-  if (!in || std::filesystem::is_directory(path))
-    return tl::unexpected(
-        ConfigError{ConfigError::Kind::not_found, path + ": cannot be read; needs the path of a TOML file"});
-  return std::string(std::istreambuf_iterator<char>(in), {});
+  auto text = files::read_file(path, files::kLargestConfiguration, "the path of a TOML file");
+  if (text) return std::move(*text);
+  const bool too_large = text.error().kind == files::FileError::Kind::too_large;
+  return tl::unexpected(ConfigError{too_large ? ConfigError::Kind::invalid : ConfigError::Kind::not_found,
+                                    path + ": " + text.error().message});
 }
 
 std::string range_text(const Range& range) {
@@ -177,6 +175,8 @@ tl::expected<void, ConfigError> StrictTable::read(std::span<const NumberKey> key
 tl::expected<std::string, ConfigError> StrictTable::text(std::string_view path) const {
   const auto value = root_.at_path(path).value<std::string>();
   if (!value || value->empty()) return tl::unexpected(error(path, "needs a string that is not empty"));
+  if (std::ranges::any_of(*value, [](unsigned char c) { return c < ' ' || c == 0x7f; }))
+    return tl::unexpected(error(path, "needs a string without control characters"));
   return *value;
 }
 

@@ -41,7 +41,7 @@ class StrictTable {
   /// Stores every number. `others`: keys that are allowed and left alone, whatever they hold. Error: the first unknown
   /// key, wrong type, value out of range (NaN is in no range) or missing key.
   tl::expected<void, ConfigError> read(std::span<const NumberKey> keys, std::span<const std::string_view> others) const;
-  /// A string that is not empty.
+  /// A string that is not empty and holds no control characters.
   tl::expected<std::string, ConfigError> text(std::string_view path) const;
   /// true or false.
   tl::expected<bool, ConfigError> flag(std::string_view path) const;

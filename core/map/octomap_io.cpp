@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <charconv>
-#include <filesystem>
 #include <fstream>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
 
+#include "core/files/read_file.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap_message.hpp"
 #include "core/map/octomap_tree.hpp"
@@ -20,24 +20,12 @@ tl::unexpected<MapError> error(MapError::Kind kind, const std::string& path, con
   return tl::make_unexpected(MapError{kind, path + ": " + what});
 }
 
-tl::expected<std::string, MapError> read_file(const std::string& path, std::size_t max_bytes) {
+tl::expected<std::string, MapError> content_of(const std::string& path, std::size_t max_bytes) {
   using Kind = MapError::Kind;
-  std::error_code failed;
-  if (!std::filesystem::exists(path, failed)) return error(Kind::not_found, path, "no such file");
-  if (!std::filesystem::is_regular_file(path, failed)) return error(Kind::not_found, path, "not a regular file");
-  const auto size = std::filesystem::file_size(path, failed);
-  if (failed) return error(Kind::not_found, path, "cannot be read");
-  if (size > max_bytes) {
-    return error(
-        Kind::too_large, path,
-        "the file has " + std::to_string(size >> 20) + " MiB, the cap is " + std::to_string(max_bytes >> 20) + " MiB");
-  }
-  std::string content(size, '\0');
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(content.data(), static_cast<std::streamsize>(size))) {
-    return error(Kind::not_found, path, "cannot be read");
-  }
-  return content;
+  auto content = files::read_file(path, max_bytes, "an OctoMap file");
+  if (content) return std::move(*content);
+  const bool too_large = content.error().kind == files::FileError::Kind::too_large;
+  return error(too_large ? Kind::too_large : Kind::not_found, path, content.error().message);
 }
 
 /// A number that fills the whole text, or nothing.
@@ -76,7 +64,7 @@ Header parse_header(std::string_view text) {
 
 tl::expected<OccupancyGrid, MapError> load_octomap(const std::string& path, std::size_t max_bytes) {
   using Kind = MapError::Kind;
-  const auto content = read_file(path, max_bytes);
+  const auto content = content_of(path, max_bytes);
   if (!content) return tl::make_unexpected(content.error());
   const bool binary = content->starts_with(kBinaryMagic);
   if (!binary && !content->starts_with(kFullMagic)) {

@@ -7,7 +7,11 @@
 #include <fstream>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string_view>
+#include <utility>
+
+#include "core/study/log_file.hpp"
 
 namespace backwash::study {
 namespace {
@@ -47,13 +51,20 @@ void append(std::string& text, double value) {
 
 }  // namespace
 
+tl::expected<std::string, LogError> read_log_file(const std::string& path, std::size_t most_bytes,
+                                                  const std::string& wanted) {
+  auto content = files::read_file(path, most_bytes, wanted);
+  if (content) return std::move(*content);
+  const bool too_large = content.error().kind == files::FileError::Kind::too_large;
+  return tl::make_unexpected(LogError{too_large ? LogError::Kind::bad_data : LogError::Kind::not_found,
+                                      path + ":1: " + content.error().message});
+}
+
 tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column,
                                            const std::set<std::string>& unread) {
-  std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path)) {
-    return tl::make_unexpected(
-        LogError{LogError::Kind::not_found, path + ":1: cannot be opened; give a readable CSV file"});
-  }
+  auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
+  if (!content) return tl::make_unexpected(content.error());
+  std::istringstream file(std::move(*content));
   std::string text;
   if (!std::getline(file, text)) return bad(path, 1, "the file is empty; the first line must name the columns");
 

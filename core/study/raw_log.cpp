@@ -2,38 +2,38 @@
 #include "core/study/raw_log.hpp"
 
 #include <cstring>
-#include <fstream>
+#include <string_view>
+
+#include "core/study/log_file.hpp"
 
 namespace backwash::study {
 
 tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
   constexpr std::uint32_t kLargest = 1u << 30;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return tl::unexpected(LogError{LogError::Kind::not_found, path + ": cannot be read; needs a raw log"});
-  char magic[sizeof kRawLogMagic - 1];
-  if (!in.read(magic, sizeof magic) || std::memcmp(magic, kRawLogMagic, sizeof magic) != 0)
+  constexpr std::string_view kMagic(kRawLogMagic);
+  const auto content = read_log_file(path, files::kLargestLog, "a raw log");
+  if (!content) return tl::unexpected(content.error());
+  if (!content->starts_with(kMagic))
     return tl::unexpected(LogError{LogError::Kind::bad_data,
                                    path + ": byte 0: does not begin as a raw log of this version of backwashd"});
 
-  in.seekg(0, std::ios::end);
-  const auto file_size = static_cast<std::uint64_t>(in.tellg());
-  in.seekg(sizeof magic);
   RawLog log;
-  std::uint64_t offset = sizeof magic;
-  while (offset < file_size) {
+  std::uint64_t offset = kMagic.size();
+  while (content->size() - offset >= sizeof(RecordHeader)) {
     RawRecord record{{}, {}, offset};
-    if (!in.read(reinterpret_cast<char*>(&record.header), sizeof record.header)) break;
+    std::memcpy(&record.header, content->data() + offset, sizeof record.header);
     const auto kind = static_cast<std::uint32_t>(record.header.kind);
     if (kind < 1 || kind > static_cast<std::uint32_t>(kLastKind) || record.header.size > kLargest)
       return tl::unexpected(LogError{LogError::Kind::bad_data,
                                      path + ": byte " + std::to_string(offset) + ": is not the head of a record"});
-    if (record.header.size > file_size - offset - sizeof record.header) break;
-    record.bytes.resize(record.header.size);
-    if (!in.read(reinterpret_cast<char*>(record.bytes.data()), record.header.size)) break;
-    offset += sizeof record.header + record.header.size;
+    const auto body = offset + sizeof record.header;
+    if (record.header.size > content->size() - body) break;
+    record.bytes.assign(content->begin() + static_cast<std::ptrdiff_t>(body),
+                        content->begin() + static_cast<std::ptrdiff_t>(body + record.header.size));
+    offset = body + record.header.size;
     log.records.push_back(std::move(record));
   }
-  if (offset < file_size) log.cut_at = offset;
+  if (offset < content->size()) log.cut_at = offset;
   return log;
 }
 

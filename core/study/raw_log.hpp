@@ -15,12 +15,12 @@ namespace backwash::study {
 
 /// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is the line
 /// kRawLogMagic, then records: RecordHeader and `size` bytes, little-endian, no padding between records.
-inline constexpr char kRawLogMagic[] = "backwash raw log 2\n";
+inline constexpr char kRawLogMagic[] = "backwash raw log 3\n";
 
 enum class RecordKind : std::uint32_t {
   configuration = 1,  ///< text: the vehicle, model and daemon files as given
   odometry = 2,       ///< OdometryRecord
-  map = 3,            ///< MapRecord, then the octomap data
+  map = 3,            ///< MapRecord, then the octomap data, or RejectedMap
   command = 4,        ///< text, one line
   ack = 5,            ///< text, one line
   frame_in = 6,       ///< one MAVLink frame received
@@ -33,8 +33,9 @@ enum class RecordKind : std::uint32_t {
   lost = 13,        ///< LostRecord: the disk did not take what came before
   scan = 14,        ///< text, one line: a scan was handed to the control thread and to the map worker
   world = 15,       ///< text, one line: a new snapshot was handed out
+  failure = 16,     ///< text, one line: an exception in a thread, which ended the daemon
 };
-inline constexpr auto kLastKind = RecordKind::world;
+inline constexpr auto kLastKind = RecordKind::failure;
 
 struct RecordHeader {
   std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
@@ -53,6 +54,12 @@ struct MapRecord {
   double resolution;     ///< m
   std::uint32_t binary;  ///< octomap_msgs/Octomap.binary
   std::uint32_t accepted;
+};
+
+/// In place of the data of a map that was not accepted.
+struct RejectedMap {
+  std::uint64_t bytes;  ///< that the map had
+  std::uint64_t hash;   ///< of them: 64-bit FNV-1a
 };
 
 struct SegmentRecord {
@@ -93,17 +100,18 @@ struct LostRecord {
 
 /// track::TickInput, flat.
 struct TickInputRecord {
-  std::int64_t now_ns, odometry_received_ns, odometry_stamp_ns, pose_at_ns;
-  std::uint64_t segment;                   ///< id of the segment offered, 0: none
-  double p[3], v[3], q[4];                 ///< odometry
-  double pose_p[3], pose_v[3], pose_q[4];  ///< the autopilot's
+  std::int64_t now_ns, odometry_received_ns, odometry_stamp_ns, pose_at_ns, attitude_at_ns;
+  std::uint64_t segment;                                  ///< id of the segment offered, 0: none
+  std::uint64_t order;                                    ///< number of the newest order, 0: none new
+  double p[3], v[3], q[4];                                ///< odometry
+  double pose_p[3], pose_v[3], pose_q[4], pose_omega[3];  ///< the autopilot's
   double heartbeat_age, battery;
   double map_from_odom[4];  ///< yaw and translation of the newest loop closure
   std::int32_t missed_periods;
   std::uint32_t request, flags, reset_counter;  ///< flags: core/study/tick_log.cpp
   std::uint32_t closures, padding;
 };
-static_assert(sizeof(TickInputRecord) == 272);
+static_assert(sizeof(TickInputRecord) == 312);
 
 /// A record as read back.
 struct RawRecord {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <span>
 
+#include "core/study/log_file.hpp"
 #include "core/study/ulog.hpp"
 
 namespace backwash::study {
@@ -107,10 +106,9 @@ FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
 }  // namespace
 
 tl::expected<FlightLog, LogError> read_ulog(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path))
-    return tl::make_unexpected(LogError{LogError::Kind::not_found, path + ":1: cannot be opened; give a .ulg file"});
-  const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const auto content = read_log_file(path, files::kLargestTable, "a .ulg file");
+  if (!content) return tl::make_unexpected(content.error());
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
   const auto bad = [&](const std::string& what) {
     return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + what});
   };

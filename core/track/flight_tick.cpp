@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/track/flight_tick.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -9,22 +8,34 @@
 namespace backwash::track {
 namespace {
 
-constexpr int kDisorder = 3;  // more in a row are as no odometry at all (faults.md row 5)
+constexpr int kArmingTicks = 150;  // 3 s: heartbeats come once a second
+constexpr int kDisarmEvery = 25;   // ticks: one command may be lost
+constexpr int kDisorder = 3;       // more in a row are as no odometry at all (faults.md row 5)
 
 double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
+std::int64_t nanoseconds(double s) noexcept { return static_cast<std::int64_t>(s * 1e9); }
 
-FramePose pose_of(const State& state, const std::array<double, 4>& wxyz) noexcept {
-  const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
-  const double yaw = std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()));
-  return {state.p_W, yaw, state.v_W, q.conjugate() * Vec3::UnitZ()};
+FramePose pose_of(const State& state, const std::array<double, 4>& q) noexcept {
+  return {state.p_W, heading(q), state.v_W, up_in_body(q)};
+}
+
+// With the heading's rate: the body's about the vertical, over the share of it that turns the heading.
+FramePose pose_of(const AutopilotFacts::Pose& pose) noexcept {
+  FramePose result = pose_of(pose.state, pose.q);
+  const Vec3& up = result.up_B;
+  result.yaw_rate =
+      (pose.omega_B.y() * up.y() + pose.omega_B.z() * up.z()) / std::max(1e-3, up.tail<2>().squaredNorm());
+  return result;
 }
 
 bool commanding(Mode mode) noexcept {
   return mode == Mode::enabling || mode == Mode::tracking || mode == Mode::hold || mode == Mode::land;
 }
 
+// As the floats that go on the wire.
 bool finite(const Setpoint& s) noexcept {
-  return s.p_W.allFinite() && s.v_W.allFinite() && s.a_W.allFinite() && std::isfinite(s.yaw);
+  return s.p_W.cast<float>().allFinite() && s.v_W.cast<float>().allFinite() && s.a_W.cast<float>().allFinite() &&
+         std::isfinite(s.yaw);
 }
 
 }  // namespace
@@ -34,13 +45,26 @@ FlightTick::FlightTick(const Vehicle& vehicle, double battery_land)
 
 // A loop closure (faults.md row 4) moves the map frame under the vehicle. Everything that is in it moves along within
 // this tick, so that in the controller's frame, and physically, nothing has moved; the planner then brings the flight
-// back to its place in the map (rectified()).
-void FlightTick::take_closure(const TickInput& in) noexcept {
-  if (!in.odometry || in.odometry->closures == closures_) return;
-  const RigidShift D = in.odometry->map_from_odom * map_from_odom_.inverse();
+// back to its place in the map (rectified()). One that is absurd is not flown: the samples are brought back into the
+// frame that is flown in, until the vehicle is in other hands.
+void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
+  closure_refused_now_ = false;
+  if (!sample || sample->closures == closures_) return;
+  const RigidShift D = sample->map_from_odom * map_from_odom_.inverse();
   const bool first = closures_ == 0;
-  closures_ = in.odometry->closures;
-  map_from_odom_ = in.odometry->map_from_odom;
+  const OdometrySample before = moved(D.inverse(), *sample);
+  // Written so that what is no number is refused.
+  const bool small = (sample->state.p_W - before.state.p_W).norm() <= kMaxClosure && std::abs(D.yaw) <= kMaxClosureTurn;
+  if (was_commanding_ && !small) {
+    closure_refused_now_ = closure_refused_ != sample->closures;
+    closure_refused_ = sample->closures;
+    sample = before;
+    sample->closures = closures_;
+    sample->map_from_odom = map_from_odom_;
+    return;
+  }
+  closure_refused_ = closures_ = sample->closures;
+  map_from_odom_ = sample->map_from_odom;
   if (first) return tracker_.rebase({}, closures_);  // until now nothing was in the map by way of it
   gate_.rebase(D);
   alignment_.rebase(D);
@@ -48,51 +72,63 @@ void FlightTick::take_closure(const TickInput& in) noexcept {
   command_ = D.setpoint(command_);
 }
 
-void FlightTick::take_odometry(const TickInput& in, TickOutput& out) noexcept {
-  if (!in.odometry) return;
+void FlightTick::take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample,
+                               TickOutput& out) noexcept {
+  if (!sample) return;
   // After a jump or a gap a sample that looks good again may still be in another place: it is not believed, and not
   // forwarded, until the vehicle is in other hands.
   if (odometry_distrusted_) {
     out.verdict = OdometryGate::Verdict::rejected;
     return;
   }
+  using Verdict = OdometryGate::Verdict;
   const bool moving = command_.v_W.norm() > 0.05;
-  out.verdict = gate_.take(*in.odometry, moving);
-  disorder_ = out.verdict == OdometryGate::Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
-  if (out.verdict == OdometryGate::Verdict::good) {
-    last_good_ns_ = std::min(in.odometry->received_ns, in.now_ns);
+  out.verdict = gate_.take(*sample, moving);
+  disorder_ = out.verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
+  if (out.verdict == Verdict::good) {
+    last_good_ns_ = std::min(sample->received_ns, in.now_ns) - nanoseconds(gate_.late());
     out.fresh = true;
   }
-  if (out.verdict == OdometryGate::Verdict::jump && !was_commanding_) gate_.forget();
+  const bool elsewhere = out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent ||
+                         disorder_ > kDisorder ||
+                         (out.fresh && seconds(in.now_ns - last_good_ns_) > Supervisor::kHoldAfter);
+  if (elsewhere && !was_commanding_) gate_.forget();
 }
 
-// Learns local ← map while nothing is commanded, watches it otherwise; takes it anew when the controller's estimator
-// was reset. The odometry is brought to the moment at which the controller's position arrived.
+// Learns local ← map while nothing is commanded, watches it otherwise. Takes it anew when the controller's estimator
+// was reset: by its counter, or by its own samples, which jumped while the odometry passed its gate. The odometry is
+// brought to the moment at which the controller's pose arrived.
 void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   reset_ = false;
-  if (!in.autopilot.pose || !gate_.last() || !fresh || in.autopilot.pose->at_ns == last_pose_ns_) return;
-  last_pose_ns_ = in.autopilot.pose->at_ns;
-  OdometrySample odometry = *gate_.last();
-  odometry.state.p_W += seconds(in.now_ns - odometry.received_ns) * odometry.state.v_W;
-  const FramePose in_map = pose_of(odometry.state, odometry.q);
-  const FramePose in_local = pose_of(in.autopilot.pose->state, in.autopilot.pose->q);
+  const auto& pose = in.autopilot.pose;
+  if (!pose || !gate_.last() || !fresh || pose->at_ns == last_pose_ns_ || pose->attitude_at_ns == last_attitude_ns_)
+    return;
+  const double dt = seconds(pose->at_ns - last_pose_ns_);
+  last_pose_ns_ = pose->at_ns;
+  last_attitude_ns_ = pose->attitude_at_ns;
+  const FramePose in_local = pose_of(*pose);
+  FramePose in_map = pose_of(gate_.last()->state, gate_.last()->q);
+  const double age = seconds(in.now_ns - last_good_ns_);
+  in_map.p += age * in_map.v;
+  in_map.yaw += age * in_local.yaw_rate;
   const bool counted = reset_counter_ && in.autopilot.reset_counter && *reset_counter_ != *in.autopilot.reset_counter;
   if (in.autopilot.reset_counter) reset_counter_ = in.autopilot.reset_counter;
   const bool may_move = mode() != Mode::land && !(mode() == Mode::hold && !supervisor_.pose_trusted());
-  if (may_move && (counted || alignment_.reset_between(in_map, in_local))) {
+  const bool jumped =
+      alignment_.reset_between(in_map, in_local) && (!was_commanding_ || alignment_.local_jumped(in_local, dt));
+  if (may_move && (counted || jumped)) {
     alignment_.rebase(in_map, in_local);
     reset_ = was_commanding_;
   }
-  alignment_.update(in_map, in_local, !was_commanding_);
+  alignment_.update(in_map, in_local, dt, !was_commanding_);
 }
 
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
-  // A flight that is being stopped goes on by itself after an obstacle only: any other hold is an operator's to end.
-  const bool goes_on = tracker_.braking() && in.segment->continues != 0;
-  const bool following = mode() == Mode::tracking ||
-                         (mode() == Mode::hold && (!goes_on || supervisor_.reason() == Reason::obstacle_ahead));
-  out.accepted = following && gate_.last() && tracker_.accept(*in.segment, gate_.last()->state);
+  // What was planned before an operator's order, or before the mode last ended it, is not flown (faults.md row 39).
+  const bool following = (mode() == Mode::tracking || mode() == Mode::hold) && closure_refused_ == closures_;
+  out.accepted =
+      following && in.segment->epoch == epoch_ && gate_.last() && tracker_.accept(*in.segment, gate_.last()->state);
   out.refused = !out.accepted;
   out.released[0] = out.accepted ? std::exchange(segment_, in.segment) : in.segment;
 }
@@ -111,13 +147,19 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) co
   facts.request = in.request;
   facts.odometry_age = odometry_age_;
   facts.odometry_jump = out.verdict == OdometryGate::Verdict::jump;
+  facts.odometry_inconsistent = out.verdict == OdometryGate::Verdict::inconsistent;
   facts.odometry_frozen = out.verdict == OdometryGate::Verdict::frozen;
   facts.odometry_disorder = disorder_ > kDisorder;
   facts.heartbeat_age = in.autopilot.heartbeat_age;
   facts.armed = in.autopilot.armed;
+  facts.arming = arming_ > 0;
   facts.offboard = in.autopilot.offboard;
   facts.frames_aligned = alignment_.aligned();
   facts.autopilot_reset = reset_;
+  facts.closure_refused = closure_refused_now_;
+  const auto& pose = in.autopilot.pose;
+  facts.pose_age =
+      pose ? seconds(in.now_ns - std::min(pose->at_ns, pose->attitude_at_ns)) : std::numeric_limits<double>::infinity();
   facts.mismatch = alignment_.mismatch();
   facts.inside = out.inside.inside;
   facts.new_segment = out.accepted;
@@ -160,16 +202,34 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
   }
 }
 
+// The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on
+// the ground stops them again; the autopilot itself refuses to disarm in the air.
+void FlightTick::ask_of_motors(const TickInput& in, TickOutput& out) noexcept {
+  const bool stands = in.autopilot.landed.value_or(false), runs = in.autopilot.armed || arming_ > 0;
+  arming_ = std::max(0, arming_ - 1);
+  abandoned_ = std::max(0, abandoned_ - 1);
+  const bool ends = in.request == Request::stop || in.request == Request::disable;
+  if (stands && runs && ends) abandoned_ = kArmingTicks;
+  if (out.accepted) abandoned_ = 0;
+  out.arm = out.accepted && in.segment->arms && out.supervisor.mode == Mode::tracking && !in.autopilot.armed;
+  if (out.arm) arming_ = kArmingTicks;
+  out.disarm = abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
+}
+
 TickOutput FlightTick::step(const TickInput& in) noexcept {
   TickOutput out;
-  take_closure(in);
-  take_odometry(in, out);
+  epoch_.order = std::max(epoch_.order, in.order);
+  std::optional<OdometrySample> sample = in.odometry;
+  take_closure(sample);
+  take_odometry(in, sample, out);
   align(in, out.fresh);
   take_segment(in, out);
   judge(out);
   odometry_age_ = last_good_ns_ < 0 ? std::numeric_limits<double>::infinity() : seconds(in.now_ns - last_good_ns_);
   const Mode before = mode();
   out.supervisor = supervisor_.step(facts(in, out));
+  const auto& s = out.supervisor;
+  if (s.changed && s.mode != Mode::tracking && s.reason != Reason::obstacle_ahead) ++epoch_.lapse;
   follow(in, before, out);
   was_commanding_ = commanding(out.supervisor.mode);
   odometry_distrusted_ =
@@ -180,7 +240,7 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   out.command_local = alignment_.to_local(command_);
   out.finite = finite(out.command_local);
   out.supervisor.send_setpoint = out.supervisor.send_setpoint && out.finite;
-  out.arm = in.arm && out.supervisor.mode == Mode::tracking;
+  ask_of_motors(in, out);
   return out;
 }
 

@@ -13,11 +13,14 @@ struct AutopilotFacts {
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row did not get out
   bool armed = false, offboard = false;
+  std::optional<bool> landed;                                      ///< as it says itself
   double heartbeat_age = std::numeric_limits<double>::infinity();  ///< s
   struct Pose {
     std::int64_t at_ns = 0;               ///< when the position arrived
     State state;                          ///< in the controller's local frame, z-up
     std::array<double, 4> q{1, 0, 0, 0};  ///< body to local: w, x, y, z
+    std::int64_t attitude_at_ns = 0;      ///< when the attitude arrived
+    Vec3 omega_B = Vec3::Zero();          ///< rad/s, as the gyros measure it
   };
   std::optional<Pose> pose;
   std::optional<std::uint8_t> reset_counter;  ///< of its estimator
@@ -39,8 +42,8 @@ struct TickInput {
   int missed_periods = 0;                    ///< whole periods skipped before this tick
   std::optional<OdometrySample> odometry;    ///< newest since the last tick
   Request request = Request::none;           ///< of the operator
+  std::uint64_t order = 0;                   ///< number of the newest order, 0: none new
   const AcceptedSegment* segment = nullptr;  ///< offered since the last tick
-  bool arm = false;                          ///< a take-off was found clear: the vehicle may be armed
   AutopilotFacts autopilot;
   Surroundings surroundings;
 };
@@ -54,6 +57,7 @@ struct TickOutput {
   OdometryGate::Verdict verdict = OdometryGate::Verdict::good;  ///< of the tick's sample, if there was one
   bool fresh = false;                                           ///< there was a good sample
   bool arm = false;                                             ///< ask the autopilot to arm
+  bool disarm = false;                                          ///< ask it to disarm: it stands on the ground
   Inside inside;
   std::uint64_t judged_segment = 0, judged_index = 0;  ///< the set that `inside` is about
   bool accepted = false, refused = false;              ///< the offered segment
@@ -65,6 +69,11 @@ struct TickOutput {
 /// output of its own. The daemon's control thread and `backwash replay` run the same object.
 class FlightTick {
  public:
+  /// A loop closure that moves a flying vehicle in the map by more is not flown: drift is corrected in steps of
+  /// decimetres and degrees, and the tubes of a room are narrower than this.
+  static constexpr double kMaxClosure = 1.0;                              ///< m
+  static constexpr double kMaxClosureTurn = 10 * 3.14159265358979 / 180;  ///< rad
+
   /// `battery_land`: remaining share below which LAND is asked for once; 0: never.
   FlightTick(const Vehicle& vehicle, double battery_land);
 
@@ -77,15 +86,18 @@ class FlightTick {
   const FrameAlignment& alignment() const noexcept { return alignment_; }
   const Tracker& tracker() const noexcept { return tracker_; }
   double odometry_age() const noexcept { return odometry_age_; }  ///< s, at the last tick
+  /// A segment of another one is refused.
+  const Epoch& epoch() const noexcept { return epoch_; }
 
  private:
-  void take_closure(const TickInput& in) noexcept;
-  void take_odometry(const TickInput& in, TickOutput& out) noexcept;
+  void take_closure(std::optional<OdometrySample>& sample) noexcept;
+  void take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample, TickOutput& out) noexcept;
   void align(const TickInput& in, bool fresh) noexcept;
   void take_segment(const TickInput& in, TickOutput& out) noexcept;
   void judge(TickOutput& out) noexcept;
   SupervisorInput facts(const TickInput& in, const TickOutput& out) const noexcept;
   void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
+  void ask_of_motors(const TickInput& in, TickOutput& out) noexcept;
   void drop_segment(TickOutput& out) noexcept;
 
   double battery_land_;
@@ -94,13 +106,19 @@ class FlightTick {
   Supervisor supervisor_;
   Tracker tracker_;
   const AcceptedSegment* segment_ = nullptr;  ///< the tracker's
-  std::uint32_t closures_ = 0;                ///< loop closures seen
-  RigidShift map_from_odom_;                  ///< of the last
-  Setpoint command_;                          ///< of the last tick
+  Epoch epoch_;
+  int arming_ = 0;     ///< ticks left in which the autopilot may yet say that it armed
+  int abandoned_ = 0;  ///< ticks left in which motors that start for a take-off that was stopped are stopped again
+  std::uint32_t closures_ = 0;         ///< of the map frame that is flown in
+  RigidShift map_from_odom_;           ///< of that
+  std::uint32_t closure_refused_ = 0;  ///< the last one that is not flown; closures_: none
+  bool closure_refused_now_ = false;
+  Setpoint command_;  ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
   int disorder_ = 0;                  ///< samples in a row whose stamp did not rise
-  std::int64_t last_good_ns_ = -1, last_pose_ns_ = -1;
+  std::int64_t last_good_ns_ = -1;    ///< reception, less what it was late
+  std::int64_t last_pose_ns_ = -1, last_attitude_ns_ = -1;
   std::optional<std::uint8_t> reset_counter_;
   double odometry_age_ = std::numeric_limits<double>::infinity();
 };

@@ -11,6 +11,7 @@ namespace {
 
 // Low-pass weights at 50 Hz: the transform averages over 1 s, the residuals over 0.2 s; velocities fade over 5 s.
 constexpr double kLearn = 0.02, kWatch = 0.1, kFade = 0.996;
+constexpr double kLongestStep = 0.1;  // s: gyros and velocity are not carried on for longer
 
 Vec3 turned(double yaw, const Vec3& v) noexcept {
   const double c = std::cos(yaw), s = std::sin(yaw);
@@ -46,7 +47,11 @@ double wrap_angle(double angle) noexcept {
 
 Vec3 FrameAlignment::rotate(const Vec3& v) const noexcept { return turned(yaw_, v); }
 
-void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, bool learn) noexcept {
+void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, double dt, bool learn) noexcept {
+  watch_tilt(in_map, in_local);
+  watch_turn(in_map, in_local, dt);
+  map_yaw_ = in_map.yaw;
+  local_ = in_local;
   const double yaw = wrap_angle(in_local.yaw - in_map.yaw);
   if (learn) {
     // A running mean first, then a low-pass: the first samples count as much as later ones.
@@ -62,6 +67,21 @@ void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, 
   samples_ = std::min(samples_ + 1, 1'000'000);
 }
 
+// Autopilots whose heading follows the odometry turn along with it: then only their gyros can contradict it.
+void FrameAlignment::watch_turn(const FramePose& in_map, const FramePose& in_local, double dt) noexcept {
+  const bool gap = samples_ == 0 || !(dt > 0 && dt < kLongestStep);
+  const double by_gyros = dt / 2 * (local_.yaw_rate + in_local.yaw_rate);
+  gyro_turn_ = gap ? 0 : std::exp(-dt / kTurnOver) * gyro_turn_ + wrap_angle(in_map.yaw - map_yaw_) - by_gyros;
+}
+
+// The rotation from one up to the other, as an angle about the body's x and y axes; past 90° it is as wrong.
+void FrameAlignment::watch_tilt(const FramePose& in_map, const FramePose& in_local) noexcept {
+  const Vec3 axis = in_map.up_B.cross(in_local.up_B);
+  const bool upside_down = in_map.up_B.dot(in_local.up_B) < 0;
+  roll_ += kWatch * ((upside_down ? std::numbers::pi : std::asin(std::clamp(axis.x(), -1.0, 1.0))) - roll_);
+  pitch_ += kWatch * (std::asin(std::clamp(axis.y(), -1.0, 1.0)) - pitch_);
+}
+
 void FrameAlignment::rebase(const FramePose& in_map, const FramePose& in_local) noexcept {
   yaw_ = wrap_angle(in_local.yaw - in_map.yaw);
   translation_ = in_local.p - rotate(in_map.p);
@@ -72,6 +92,7 @@ void FrameAlignment::rebase(const RigidShift& D) noexcept {
   const RigidShift local_from_new = RigidShift{yaw_, translation_} * D.inverse();
   yaw_ = local_from_new.yaw;
   translation_ = local_from_new.t;
+  map_yaw_ = wrap_angle(map_yaw_ + D.yaw);
 }
 
 bool FrameAlignment::reset_between(const FramePose& in_map, const FramePose& in_local) const noexcept {
@@ -79,18 +100,23 @@ bool FrameAlignment::reset_between(const FramePose& in_map, const FramePose& in_
                                      std::abs(wrap_angle(in_local.yaw - in_map.yaw - yaw_)) > kResetYaw);
 }
 
+// As far as a pair may lie from the transform already may hide a part of the reset.
+bool FrameAlignment::local_jumped(const FramePose& in_local, double dt) const noexcept {
+  if (samples_ == 0 || !(dt > 0 && dt < kLongestStep)) return false;
+  const Vec3 carried = local_.p + dt / 2 * (local_.v + in_local.v);
+  const double turned = local_.yaw + dt / 2 * (local_.yaw_rate + in_local.yaw_rate);
+  return (in_local.p - carried).norm() > kResetPosition - kMaxPosition ||
+         std::abs(wrap_angle(in_local.yaw - turned)) > kResetYaw - kMaxYaw;
+}
+
 bool FrameAlignment::aligned() const noexcept {
-  return samples_ >= kMinSamples && position_residual_ < kMaxPosition && yaw_residual_ < kMaxYaw;
+  return samples_ >= kMinSamples && position_residual_ < kMaxPosition && yaw_residual_ < kMaxYaw &&
+         std::hypot(roll_, pitch_) < kMaxTilt && std::abs(gyro_turn_) < kMaxGyroTurn;
 }
 
 void FrameAlignment::correlate(const FramePose& in_map, const FramePose& in_local) noexcept {
   cross_ = kFade * cross_ + turned(-yaw_, in_local.v) * in_map.v.transpose();
   energy_ = kFade * energy_ + in_map.v.cwiseProduct(in_map.v);
-  // The rotation from one up to the other, as an angle about the body's x and y axes; past 90° it is as wrong.
-  const Vec3 axis = in_map.up_B.cross(in_local.up_B);
-  const bool upside_down = in_map.up_B.dot(in_local.up_B) < 0;
-  roll_ += kWatch * ((upside_down ? std::numbers::pi : std::asin(std::clamp(axis.x(), -1.0, 1.0))) - roll_);
-  pitch_ += kWatch * (std::asin(std::clamp(axis.y(), -1.0, 1.0)) - pitch_);
 }
 
 Mismatch FrameAlignment::mismatch() const noexcept {

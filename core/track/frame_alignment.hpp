@@ -15,6 +15,7 @@ struct FramePose {
   double yaw = 0;             ///< rad
   Vec3 v = Vec3::Zero();      ///< m/s
   Vec3 up_B = Vec3::UnitZ();  ///< the frame's z axis in the body's, x forward, y left
+  double yaw_rate = 0;        ///< as the autopilot's gyros measure it, rad/s; in_local only
 };
 
 /// In what two descriptions of the same motion contradict each other: an axis of the map, or an angle.
@@ -29,24 +30,30 @@ class FrameAlignment {
   static constexpr double kMaxPosition = 0.05;                     ///< m: aligned below this residual
   static constexpr double kMaxYaw = 3.0 * 3.14159265358979 / 180;  ///< rad
   static constexpr int kMinSamples = 25;                           ///< half a second at 50 Hz
-  /// A single pair further apart than three times the above means that the controller's estimator was reset: odometry
-  /// that jumps so far does not pass its gate.
+  /// A single pair further apart than three times the above is no noise.
   static constexpr double kResetPosition = 3 * kMaxPosition, kResetYaw = 3 * kMaxYaw;
-  static constexpr double kMaxTilt = 5.0 * 3.14159265358979 / 180;   ///< rad
+  static constexpr double kMaxTilt = 5.0 * 3.14159265358979 / 180;  ///< rad
+  /// Turn of the odometry beyond the gyros', rad, fading over kTurnOver: 1 rad/s and 50 ms between the two, or a drift
+  /// of 0.8°/s.
+  static constexpr double kMaxGyroTurn = 4.0 * 3.14159265358979 / 180, kTurnOver = 5.0;
   static constexpr double kMaxTurn = 10.0 * 3.14159265358979 / 180;  ///< rad, between the velocities' directions
   static constexpr double kExcited = 25 * 0.15 * 0.15;               ///< (m/s)²: half a second at 0.15 m/s
   static constexpr double kLeastGain = 0.5, kLeastRotation = 0.8;    ///< of velocity, both 1 in a perfect match
 
-  /// One pair of poses, 20 ms after the last. Real-time: wait-free, no allocation.
-  void update(const FramePose& in_map, const FramePose& in_local, bool learn) noexcept;
+  /// One pair of poses, `dt` s after the last. Real-time: wait-free, no allocation.
+  void update(const FramePose& in_map, const FramePose& in_local, double dt, bool learn) noexcept;
   /// Takes local ← map anew from this one pair. Real-time: wait-free, no allocation.
   void rebase(const FramePose& in_map, const FramePose& in_local) noexcept;
   /// The map moved under the vehicle (loop closure), the controller's frame did not: local ← map_new, for
   /// D = map_new ← map_old. Real-time: wait-free, no allocation.
   void rebase(const RigidShift& D) noexcept;
-  /// This pair lies further from the transform than any noise (faults.md row 8). Real-time: wait-free, no allocation.
+  /// This pair lies further from the transform than any noise. Real-time: wait-free, no allocation.
   bool reset_between(const FramePose& in_map, const FramePose& in_local) const noexcept;
-  /// Enough samples, and their residuals (low-passed over 0.2 s) are small.
+  /// The controller's own estimate, `dt` s after the pair before, is not where its own velocity and gyros have carried
+  /// it: it was reset, or follows something that jumped (faults.md row 8). Real-time: wait-free, no allocation.
+  bool local_jumped(const FramePose& in_local, double dt) const noexcept;
+  /// Enough samples; their residuals and the two attitudes' tilt (low-passed over 0.2 s) are small; and the odometry
+  /// has turned no further than the gyros say.
   bool aligned() const noexcept;
   double position_residual() const noexcept { return position_residual_; }  ///< m
   double yaw_residual() const noexcept { return yaw_residual_; }            ///< rad
@@ -61,6 +68,8 @@ class FrameAlignment {
 
  private:
   Vec3 rotate(const Vec3& v) const noexcept;
+  void watch_turn(const FramePose& in_map, const FramePose& in_local, double dt) noexcept;
+  void watch_tilt(const FramePose& in_map, const FramePose& in_local) noexcept;
   void correlate(const FramePose& in_map, const FramePose& in_local) noexcept;
   Mismatch horizontal_mismatch() const noexcept;
 
@@ -72,6 +81,9 @@ class FrameAlignment {
   Mat3 cross_ = Mat3::Zero();
   Vec3 energy_ = Vec3::Zero();
   double roll_ = 0, pitch_ = 0;  ///< tilt between the two, low-passed, rad
+  double gyro_turn_ = 0;         ///< turn of the odometry beyond the gyros', fading, rad
+  double map_yaw_ = 0;           ///< of the last pair
+  FramePose local_;              ///< of the last pair
 };
 
 /// Angle wrapped to (−π, π], rad.

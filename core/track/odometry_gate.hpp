@@ -21,37 +21,70 @@ struct OdometrySample {
   RigidShift map_from_odom{};           ///< by which the VIO's own pose was brought there
 };
 
-/// Lets only credible odometry through (faults.md rows 2, 3, 5, 6). It sees the newest sample of each tick. Real-time:
-/// wait-free, no allocation.
+/// Lets only credible odometry through (faults.md rows 2, 3, 5, 6, 41, 49). It sees the newest sample of each tick.
+/// Real-time: wait-free, no allocation.
+///
+/// Its noise level is σ = estimation.position. A position error of σ takes half a second or more to build up, so the
+/// velocity is good to σ_v = σ / 0.5 s.
 class OdometryGate {
  public:
   enum class Verdict : std::uint8_t {
     good,
-    rejected,  ///< not finite, or the quaternion is not unit
-    disorder,  ///< the stamp does not rise
-    frozen,    ///< the kFrozen-th identical pose in a row, or a later one, while the vehicle is commanded to move
-    jump,      ///< further from the last good sample's prediction than v_max·dt + 3σ
+    rejected,      ///< not a number, or the quaternion is not unit
+    disorder,      ///< the stamp does not rise
+    frozen,        ///< the kFrozen-th identical pose in a row, or a later one, while the vehicle is commanded to move
+    jump,          ///< in position, velocity or attitude: further from the last good sample than the vehicle can get
+    inconsistent,  ///< the way that the positions went is not what the velocities claim
   };
   static constexpr int kFrozen = 5;          ///< row 6
   static constexpr double kClockStep = 0.5;  ///< s
+  /// rad/s about the vertical: autopilots turn at most at 200°/s (PX4's MC_YAWRATE_MAX), our flights at 1 rad/s.
+  static constexpr double kMaxYawRate = 3;
+  static constexpr double kMaxTiltRate = 15;      ///< rad/s: a racing quadrotor's 860°/s
+  static constexpr double kAngleNoise = 0.06;     ///< rad, between two samples
+  static constexpr double kMaxAcceleration = 15;  ///< m/s²: tilted by 45° and thrust of two weights, √2 g, and gusts
+  static constexpr double kVelocityNoises = 4;    ///< σ_v between two samples: 3 √2
+  static constexpr double kOverspeed = 4;         ///< of v_max: no flight of ours, nor what a gust adds to one
+  static constexpr double kConsistentOver = 1.0;  ///< s, after which a contradiction is forgotten
+  static constexpr double kSettle = 0.5;          ///< s, of σ_v
+  static constexpr double kLongestStep = 0.1;     ///< s between two samples that are still held against each other
 
   explicit OdometryGate(const Vehicle& vehicle) noexcept
       : v_max_(vehicle.limits.v_max), sigma_(vehicle.estimation.position) {}
 
-  /// Judges one sample; only a good one becomes last(). dt is the stamps' difference, or, where that is more than
-  /// kClockStep off the receptions' difference, the latter: then the sender's wall clock was set (row 30).
+  /// Judges one sample; only a good one becomes last(). dt is the stamps' difference, at most the receptions' and what
+  /// the last sample was late: a stamp ahead of that widens nothing (row 49). Where the two are more than kClockStep
+  /// apart it is the receptions': then the sender's wall clock was set (row 30).
   Verdict take(const OdometrySample& sample, bool moving) noexcept;
   /// The last good sample.
   const std::optional<OdometrySample>& last() const noexcept { return last_; }
+  /// How much longer the newest sample took from its stamp to its reception than the fastest one so far, s, ≥ 0 (row
+  /// 49). Clocks that differ by up to 100 ppm add nothing.
+  double late() const noexcept { return static_cast<double>(late_ns_) * 1e-9; }
   /// The map moved under the vehicle (loop closure): the last sample is what it would have said. map_new ← map_old.
   void rebase(const RigidShift& D) noexcept;
   /// After a jump: the next sample is believed whatever it says. Only while nothing is commanded.
-  void forget() noexcept { last_.reset(); }
+  void forget() noexcept { last_.reset(), fastest_ns_.reset(), drift_ = Vec3::Zero(); }
 
  private:
+  bool jumps(const OdometrySample& sample, double dt) const noexcept;
+  bool contradicts(const OdometrySample& sample, double dt) noexcept;
+  void time(const OdometrySample& sample, bool clock_was_set) noexcept;
+
   double v_max_, sigma_;
   std::optional<OdometrySample> last_;
   int identical_ = 0;
+  std::optional<std::int64_t> fastest_ns_;  ///< least reception − stamp, which is the clocks' difference and the way
+  std::int64_t late_ns_ = 0;
+  /// Displacement less the integral of the claimed velocity, fading over kConsistentOver, m.
+  Vec3 drift_ = Vec3::Zero();
 };
+
+/// The sample as it would be in a frame moved by D. Real-time: wait-free, no allocation.
+OdometrySample moved(const RigidShift& D, OdometrySample sample) noexcept;
+/// Heading of a body-to-world quaternion (w, x, y, z), rad. Real-time: wait-free, no allocation.
+double heading(const std::array<double, 4>& q) noexcept;
+/// The world's z axis in the body. Real-time: wait-free, no allocation.
+Vec3 up_in_body(const std::array<double, 4>& q) noexcept;
 
 }  // namespace backwash::track

@@ -23,6 +23,9 @@ constexpr Transition kTransitions[] = {
     {kEnabling, Reason::operator_request, Mode::passive},
     {kEnabling, Reason::odometry_lost, Mode::passive},
     {kEnabling, Reason::odometry_jump, Mode::passive},
+    {kEnabling, Reason::odometry_inconsistent, Mode::passive},
+    {kEnabling, Reason::pose_silent, Mode::passive},
+    {kEnabling, Reason::closure_refused, Mode::passive},
     {kEnabling, Reason::frame_mismatch_x, Mode::passive},
     {kEnabling, Reason::frame_mismatch_y, Mode::passive},
     {kEnabling, Reason::frame_mismatch_z, Mode::passive},
@@ -37,13 +40,17 @@ constexpr Transition kTransitions[] = {
     {kFollowed, Reason::land_requested, Mode::land},
     {kFollowed, Reason::operator_request, Mode::passive},
     {kHold, Reason::pose_untrusted, Mode::land},
+    {kFollowed, Reason::pose_lost, Mode::land},
     {kFollowed, Reason::odometry_jump, Mode::hold},
+    {kFollowed, Reason::odometry_inconsistent, Mode::hold},
     {kFollowed, Reason::odometry_frozen, Mode::hold},
     {kFollowed, Reason::odometry_disorder, Mode::hold},
     {kFollowed, Reason::odometry_lost, Mode::hold},
     {kFollowed, Reason::frames_disagree, Mode::hold},
     {kFollowed, Reason::battery_low, Mode::land},
     {kFollowed, Reason::autopilot_reset, Mode::hold},
+    {kFollowed, Reason::pose_silent, Mode::hold},
+    {kFollowed, Reason::closure_refused, Mode::hold},
     {kFollowed, Reason::stop_requested, Mode::hold},
     {kTracking, Reason::obstacle_ahead, Mode::hold},
     {kTracking, Reason::outside_map, Mode::hold},
@@ -56,15 +63,16 @@ constexpr Transition kTransitions[] = {
 };
 
 constexpr Reason kRefusals[] = {
-    Reason::port_lost,          Reason::autopilot_silent,    Reason::odometry_lost,        Reason::map_missing,
-    Reason::outside_map,        Reason::frame_mismatch_x,    Reason::frame_mismatch_y,     Reason::frame_mismatch_z,
-    Reason::frame_mismatch_yaw, Reason::frame_mismatch_roll, Reason::frame_mismatch_pitch,
+    Reason::port_lost,        Reason::autopilot_silent,   Reason::odometry_lost,       Reason::pose_silent,
+    Reason::map_missing,      Reason::outside_map,        Reason::frame_mismatch_x,    Reason::frame_mismatch_y,
+    Reason::frame_mismatch_z, Reason::frame_mismatch_yaw, Reason::frame_mismatch_roll, Reason::frame_mismatch_pitch,
 };
 
 // A pose that these speak of is not to be flown by.
 constexpr bool distrusts(Reason reason) noexcept {
   return reason == Reason::odometry_jump || reason == Reason::odometry_lost || reason == Reason::odometry_frozen ||
-         reason == Reason::odometry_disorder || reason == Reason::frames_disagree;
+         reason == Reason::odometry_disorder || reason == Reason::odometry_inconsistent ||
+         reason == Reason::frames_disagree;
 }
 
 constexpr const char* kModeNames[kModes] = {"passive", "enabling", "tracking", "hold", "land", "quiet"};
@@ -106,6 +114,10 @@ constexpr const char* kReasonNames[kReasons] = {
     "map and autopilot disagree in roll",
     "map and autopilot disagree in pitch",
     "operator asks to stop",
+    "odometry contradicts its own velocity",
+    "autopilot's pose older than 0.3 s",
+    "no pose from the autopilot for 1 s",
+    "loop closure beyond 1 m or 10 degrees",
 };
 
 }  // namespace
@@ -161,9 +173,11 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::clock_stopped:
       return in.missed_periods >= kMissedQuiet;  // row 32
     case Reason::operator_request:
-      return in.request == Request::disable && (mode_ == Mode::enabling || !in.armed);
+      return (in.request == Request::disable || in.request == Request::stop) &&
+             (mode_ == Mode::enabling || !(in.armed || in.arming));
     case Reason::stop_requested:
-      return in.request == Request::stop;
+      // A disable that comes when the vehicle may have left the ground.
+      return in.request == Request::stop || in.request == Request::disable;
     case Reason::land_requested:
       return in.request == Request::land;
     case Reason::autopilot_follows:
@@ -176,6 +190,14 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
       return was_armed_ && !in.armed;  // row 23
     case Reason::odometry_jump:
       return in.odometry_jump;  // row 3
+    case Reason::odometry_inconsistent:
+      return in.odometry_inconsistent;  // row 41
+    case Reason::pose_silent:
+      return in.pose_age > kPoseSilent - kControlPeriod / 2;  // row 42
+    case Reason::pose_lost:
+      return in.pose_age > kPoseLost - kControlPeriod / 2;
+    case Reason::closure_refused:
+      return in.closure_refused;
     case Reason::odometry_frozen:
       return in.odometry_frozen;  // row 6
     case Reason::odometry_disorder:

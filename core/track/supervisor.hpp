@@ -60,25 +60,40 @@ enum class Reason : std::uint8_t {
   frame_mismatch_roll,
   frame_mismatch_pitch,
   stop_requested,
+  odometry_inconsistent,
+  pose_silent,
+  pose_lost,
+  closure_refused,
 };
-inline constexpr int kReasons = 36;
+inline constexpr int kReasons = 40;
 const char* to_string(Reason reason) noexcept;
 
-/// What an operator asked for since the last tick.
-enum class Request : std::uint8_t { none, enable, disable, land, stop };
+/// What an operator asked for since the last tick. `hold` ends what was planned before it and changes no mode: a plan
+/// that slows the flight down follows.
+enum class Request : std::uint8_t { none, enable, disable, land, stop, hold };
+
+/// A request with its number, which rises with each; 0: none.
+struct Order {
+  Request request = Request::none;
+  std::uint64_t number = 0;
+};
 
 /// Facts of this tick. Ages in s; a thing never received has an infinite age.
 struct SupervisorInput {
   Request request = Request::none;
-  double odometry_age = 0;         ///< since the last good sample
-  bool odometry_jump = false;      ///< the newest sample failed the innovation gate
-  bool odometry_frozen = false;    ///< five identical samples under commanded motion
-  bool odometry_disorder = false;  ///< more than three stamps in a row did not rise
-  double heartbeat_age = 0;        ///< since the autopilot's last heartbeat
+  double odometry_age = 0;             ///< since the last good sample
+  bool odometry_jump = false;          ///< the newest sample failed the innovation gate
+  bool odometry_inconsistent = false;  ///< its positions go another way than its velocities
+  bool odometry_frozen = false;        ///< five identical samples under commanded motion
+  bool odometry_disorder = false;      ///< more than three stamps in a row did not rise
+  double heartbeat_age = 0;            ///< since the autopilot's last heartbeat
+  double pose_age = 0;                 ///< of the older of its position and its attitude
   bool armed = false;
+  bool arming = false;           ///< it was asked to arm a moment ago: its next heartbeat may say so
   bool offboard = false;         ///< the autopilot follows our set-points
   bool frames_aligned = false;   ///< residual of local ← map below 5 cm and 3°
   bool autopilot_reset = false;  ///< its estimator was reset this tick; local ← map was taken anew
+  bool closure_refused = false;  ///< a loop closure came that is too large to be flown
   Mismatch mismatch = Mismatch::none;
   bool inside = true;           ///< measured error inside the set predicted for it
   bool new_segment = false;     ///< the tracker was given a segment
@@ -133,6 +148,8 @@ class Supervisor {
   static constexpr double kLandAfter = 0.38;     ///< s without odometry until LAND (row 1: 400 ms)
   static constexpr double kUntrusted = 0.30;     ///< s of hold with an untrusted pose until LAND
   static constexpr double kHeartbeatLost = 1.5;  ///< s (row 21)
+  static constexpr double kPoseSilent = 0.3;     ///< s without the autopilot's position or attitude (row 42)
+  static constexpr double kPoseLost = 1.0;       ///< s of that until LAND (row 42)
   static constexpr double kEnableTimeout = 5.0;  ///< s from the request until the autopilot must follow
   static constexpr double kStreamBefore = 1.0;   ///< s of set-points before offboard is asked for (PX4 wants a stream)
   static constexpr int kOutsideTicks = 3;        ///< row 16

@@ -3,9 +3,9 @@
 
 #include <toml++/toml.h>
 #include <cmath>
-#include <filesystem>
 #include <initializer_list>
 
+#include "core/files/read_file.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -80,11 +80,11 @@ sim::HoverGrid hover_grid(const std::string& path, const toml::table& table) {
 }  // namespace
 
 sim::HoverFlight read_flight_spec(const std::string& path, std::optional<std::uint64_t> given_seed) {
-  if (!std::filesystem::is_regular_file(path))
-    throw Failure(kNoInput, path + ":1: cannot be opened; give a flight specification");
+  const auto text = files::read_file(path, files::kLargestConfiguration, "a flight specification");
+  if (!text) throw Failure(kNoInput, path + ":1: " + text.error().message);
   toml::table file;
   try {
-    file = toml::parse_file(path);
+    file = toml::parse(*text, path);
   } catch (const toml::parse_error& error) {
     wrong(path, error.source(), std::string(error.description()) + "; the file must be TOML");
   }

@@ -5,10 +5,11 @@
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "core/files/read_file.hpp"
 #include "services/backwashctl/preflight.hpp"
 #include "services/backwashctl/status_output.hpp"
 
@@ -141,6 +142,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     return kUnavailable;
   };
   const auto answer = station.send(verb, position, yaw_.value_or(0), waypoints_);
+  if (interrupted()) return fail("interrupted");
   if (!answer)
     return fail("no daemon answered in domain " + std::to_string(options_.domain) + " on interface " +
                 options_.interface + ", namespace " + options_.name_space + "; is backwashd running?");
@@ -159,6 +161,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     const bool lost = s.state == "quiet" || held || (s.state == "passive" && name != "land");
     return lost && name != "hold" && name != "stop";
   });
+  if (interrupted()) return fail("interrupted; the session is over, the daemon is " + last);
   return reached ? 0 : fail("not reached; the daemon is " + last);
 }
 
@@ -185,13 +188,15 @@ int Verbs::go_to() {
 
 // The file is the points CSV of the other programs.
 int Verbs::follow() {
-  std::ifstream file(route_);
+  auto content = files::read_file(route_, files::kLargestConfiguration, "a points CSV file");
   std::string line;
   const auto fail = [&](int code, const std::string& where, const std::string& why) {
     std::cerr << "backwashctl follow: " << where << ": " << why << "\n";
     return code;
   };
-  if (!std::getline(file, line)) return fail(66, route_, "cannot be read");
+  if (!content) return fail(66, route_, content.error().message);
+  std::istringstream file(std::move(*content));
+  std::getline(file, line);
   if (line != "x_m,y_m,z_m") return fail(65, route_ + ":1", "the first line is '" + line + "', expected x_m,y_m,z_m");
   for (int number = 2; std::getline(file, line); ++number) {
     Vec3 p;
@@ -212,7 +217,7 @@ int Verbs::check() {
   auto after = before;
   const auto begun = std::chrono::steady_clock::now();
   const auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
-  while (after && since() < kWatch) after = station.status(1.0);
+  while (after && !interrupted() && since() < kWatch) after = station.status(1.0);
   if (!after) {
     std::cerr << "backwashctl check: no daemon in domain " << options_.domain << " on interface "
               << options_.interface << ", namespace " << options_.name_space << "; is backwashd running?\n";
@@ -233,12 +238,13 @@ int Verbs::check() {
 
 int Verbs::watch() {
   Station station(options_);
-  for (;;) {
+  while (!interrupted()) {
     if (const auto now = station.status(2.0))
       print(*now);
-    else
+    else if (!interrupted())
       std::cerr << "no status for 2 s\n";
   }
+  return 0;
 }
 
 }  // namespace backwash::ctl

@@ -57,21 +57,35 @@ struct NewVoxels {
   std::array<std::array<double, 3>, kMost> centers{};  ///< m
 };
 
-/// The newest snapshot of the surroundings, to each thread that looks at it. Freed by the map worker alone.
-struct Worlds {
-  using Pointer = std::shared_ptr<const plan::World>;
-  sync::Handover<Pointer> mission, planner, reader, control;
+/// The surroundings as they were seen.
+struct Snapshot {
+  std::shared_ptr<const plan::World> world;
+  std::int64_t seen_ns = 0;  ///< reception of the newest data in it
+};
 
-  void offer(const Pointer& world) {
-    for (auto* to : {&mission, &planner, &reader, &control}) to->offer(std::make_unique<const Pointer>(world));
+/// The newest snapshot, to each thread that looks at it. Freed by the map worker alone.
+struct Worlds {
+  sync::Handover<Snapshot> mission, planner, reader, control;
+
+  void offer(const Snapshot& newest) {
+    for (auto* to : {&mission, &planner, &reader, &control}) to->offer(std::make_unique<const Snapshot>(newest));
   }
   void collect() {
     for (auto* to : {&mission, &planner, &reader, &control}) to->collect();
   }
 };
 
-/// One command as received; strings that do not fit are cut, which no valid station has.
+/// One line for the operator.
+using Line = std::array<char, 192>;
+
+/// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
+using WriterId = std::array<std::uint8_t, 16>;
+
+/// One command as received, or the news that a writer of commands is gone. Of the station's name only printable
+/// characters are left, and as many as fit.
 struct CommandMessage {
+  WriterId writer{};      ///< another one at each start of a process
+  bool departed = false;  ///< no command: this writer is gone, and with it its session; nothing else here is set
   std::array<char, 64> station{};
   std::uint64_t session = 0;
   std::uint32_t sequence = 0;
@@ -96,6 +110,7 @@ struct ControlView {
   double odometry_age = 1e9, heartbeat_age = 1e9;  ///< s
   State state;                                     ///< newest good odometry
   Setpoint command;                                ///< sent or held this tick, map frame
+  track::Epoch epoch;                              ///< what is planned under another one is refused
   std::uint64_t segment = 0;                       ///< accepted segment, 0 before the first
   std::uint64_t index = 0;                         ///< of its next command
   bool finished = true;                            ///< the segment's commands are all sent
@@ -139,13 +154,13 @@ struct BulkRecord {
   std::vector<std::uint8_t> bytes;
 };
 
-/// What the mission asks the planner for.
+/// What the mission asks the planner for. It plans in the newest world.
 struct PlanJob {
   enum class Kind { takeoff, go_to, brake } kind = Kind::takeoff;
   std::uint64_t id = 0;
   Vec3 position = Vec3::Zero();  ///< goal; take-off: z counts
   std::optional<double> yaw;     ///< heading at the goal, rad; none: as the path leads there
-  std::shared_ptr<const plan::World> world;
+  track::Epoch epoch;            ///< that it was asked for in: it is not done in another
 };
 
 /// How a job ended.
@@ -157,15 +172,17 @@ struct PlanOutcome {
 
 struct Channels {
   sync::LatestValue<OdometrySample> odometry;              // DDS reader → control
+  sync::RecordRing<OdometrySample, 512> poses;             // DDS reader → map reader
+  sync::LatestValue<track::RigidShift> map_from_odom;      // DDS reader → map reader: the newest loop closure
+  sync::LatestValue<Line> refused, refused_map;            // DDS reader, map reader → status: the newest, and why
   sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
-  sync::Handover<MapMessage> maps;                         // DDS reader → map worker
-  sync::RecordRing<Scan*, 16> scans;                       // DDS reader → map worker, which frees them
+  sync::Handover<MapMessage> maps;                         // map reader → map worker
+  sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
   Worlds worlds;                                           // map worker → each
-  sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // DDS reader, map worker → control
+  sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control
   std::atomic<std::int64_t> map_ns{-1};                    // map worker: reception of the newest data in the snapshot
   std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
-  sync::RecordRing<track::Request, 16> requests;           // mission → control
-  std::atomic<bool> arm{false};                            // planner → control: arm once
+  sync::RecordRing<track::Order, 64> orders;               // mission → control
   sync::Handover<PlanJob> jobs;                            // mission → planner
   sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
   sync::Handover<track::AcceptedSegment> segments;         // planner → control
@@ -174,6 +191,7 @@ struct Channels {
   sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
   sync::Handover<FreshPort> ports;                                         // link watch → control
   std::atomic<std::uint8_t> link_fault{0};         // control → link watch: 1 + LinkFault, 0: none
+  std::atomic<std::uint32_t> port_losses{0};       // control → link watch: times that a good port was lost
   sync::LatestValue<std::array<char, 192>> place;  // mission → status: what keeps it from flying from here
   sync::LatestValue<std::array<char, 192>> task;   // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/track/flight_tick.hpp"
+#include "core/track/orders.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
@@ -42,6 +43,7 @@ class ControlLoop {
   Lookout lookout_;
   SenderClock sender_clock_;  // of the odometry's
   bool port_open_ = true;
+  track::Orders orders_;
   std::int64_t now_ns_ = 0;
   ControlView view_;
   study::TickRecord row_{};
@@ -58,8 +60,13 @@ struct Scheduling {
 /// counted; the phase is kept.
 void run_control(Channels& channels, ControlLoop& loop);
 
-/// Locks memory, touches the stack, binds the calling thread to its processor and asks for SCHED_FIFO; says in one
-/// warning each what was not allowed, and goes on without it.
+/// Locks the process's memory, what it has and what it will have. Where RLIMIT_MEMLOCK is finite (and CAP_IPC_LOCK is
+/// not there to lift it) only what it has: with a limit on what it will have, the next large map would be refused its
+/// memory in flight. Says in one warning what is not locked and which limit to raise.
+void lock_memory();
+
+/// Calls lock_memory(), touches the stack, binds the calling thread to its processor and asks for SCHED_FIFO; says in
+/// one warning each what was not allowed, and goes on without it.
 void make_real_time(const Scheduling& scheduling);
 
 }  // namespace backwash::daemon

@@ -1,34 +1,59 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashd/daemon.hpp"
 
-#include <pthread.h>
-#include <signal.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <thread>
+#include <new>
+#include <system_error>
 
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/link_watch.hpp"
+#include "services/backwashd/log_sink.hpp"
+#include "services/backwashd/map_front.hpp"
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/planner_worker.hpp"
+#include "services/backwashd/process.hpp"
 #include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
 namespace {
 
-constexpr int kInputOutput = 74;
+constexpr double kToEnd = 10, kToFail = 2, kToRecord = 2, kToSay = 0.5;  // s that threads and lines are waited for
 
-// Every thread started after this leaves the signals to wait_for_signal().
-sigset_t block_signals() {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &set, nullptr);
-  return set;
+/// What keeps the daemon from starting, and is not its own fault.
+struct StartError {
+  int code;
+  std::string what;
+};
+
+/// Calls `make` and gives what it throws its exit code.
+template <typename Make>
+auto made(int code, Make&& make) {
+  try {
+    return make();
+  } catch (const std::exception& e) {
+    throw StartError{code, e.what()};
+  }
+}
+
+/// A port that is missing or busy may be plugged in, or its simulator started, later: the link watch goes on trying.
+firmware_bridge::Port port_at_start(const decltype(config::Daemon::link)& link) {
+  using Kind = firmware_bridge::PortError::Kind;
+  auto port = open_port(link);
+  if (port) return std::move(*port);
+  const std::string what = link.device + ": " + describe(port.error());
+  if (port.error().kind != Kind::kOpen && port.error().kind != Kind::kBusy) throw StartError{kInputOutput, what};
+  spdlog::warn("{}; waiting for it", what);
+  return firmware_bridge::ClosedPort{};
+}
+
+// What carries odometry to the control thread comes right below it, before the middleware starts its threads.
+int reader_priority(const config::Daemon& daemon) {
+  const int control = daemon.control.priority;
+  return allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0));
 }
 
 }  // namespace
@@ -43,56 +68,116 @@ tl::expected<Settings, std::string> load_settings(const std::string& path) {
   return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model)};
 }
 
+namespace {
+
+/// Everything that runs. What others use comes first.
+struct Flight {
+  explicit Flight(const Settings& s)
+      : settings(s),
+        port(port_at_start(s.daemon.link)),  // first: a start that fails there leaves no log behind
+        recorder(made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file); })),
+        log(recorder->path()),
+        link(std::move(port), static_cast<std::uint8_t>(s.daemon.link.system), std::chrono::steady_clock::now()),
+        front(made(kSystem,
+                   [&] {
+                     return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels,
+                                                       *recorder);
+                   })),
+        maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
+        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {}
+
+  const Settings& settings;
+  std::unique_ptr<Channels> channels = std::make_unique<Channels>();
+  firmware_bridge::Port port;
+  std::unique_ptr<Recorder> recorder;
+  const std::string log;  ///< file that the recorder began with
+  firmware_bridge::AutopilotLink link;
+  std::unique_ptr<DdsFront> front;
+  std::unique_ptr<MapFront> maps;  ///< after the front, which watches the middleware's log
+  Mission mission;
+  ControlLoop loop;
+  Failure failure{channels->stop};
+  CatchTheRest rest{failure};
+  std::atomic<bool> recorded{false};
+  Threads writer{failure}, threads{failure};  ///< the writer ends last, so that what the others said is recorded
+};
+
+void start(Flight& f) {
+  Channels& channels = *f.channels;
+  const auto& daemon = f.settings.daemon;
+  f.writer.start("recorder", [&] { f.recorder->run(channels, f.recorded); });
+  f.threads.start("map worker",
+                  [&] { run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map); });
+  f.threads.start("planner", [&] {
+    run_planner(channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.maps->send(segment); });
+  });
+  f.threads.start("mission", [&] {
+    run_mission(channels, f.mission, [&](const CommandMessage& c, const Answer& a) { f.front->send(c, a); });
+  });
+  f.threads.start("status", [&] { f.front->run_status(f.settings.vehicle); });
+  f.threads.start("control", [&] {
+    make_real_time({daemon.control.priority, daemon.control.cpu});
+    run_control(channels, f.loop);
+    f.link.discard_unsent();
+  });
+  f.threads.start("reader", [&] { f.front->run_readers(); });
+  f.threads.start("map reader", [&] { f.maps->run_readers(); });
+  f.threads.start("link watch", [&] { run_link_watch(channels, daemon.link); });
+}
+
+/// Waits for the threads and closes the log, with why the flight ended if nobody asked for it. False: a thread hangs.
+bool end(Flight& f) {
+  f.channels->stop = true;
+  const bool ended = f.threads.join(f.failure.happened() ? kToFail : kToEnd);
+  if (!ended) f.link.discard_unsent();  // of a control thread that hangs
+  try {
+    if (f.failure.happened()) f.recorder->append(study::RecordKind::failure, f.failure.text());
+  } catch (const std::bad_alloc&) {
+  }
+  f.recorded = true;
+  const bool closed = f.writer.join(kToRecord);
+  if (!closed) f.failure.note("recorder", "the disk does not answer", kInputOutput);
+  if (const auto lost = f.recorder->lost() + f.channels->control_log.lost())
+    spdlog::warn("{}: {} records were lost", f.log, lost);
+  if (f.failure.happened())
+    spdlog::critical("backwashd: {}; nothing more is sent", f.failure.text());
+  else
+    spdlog::info("stopped{}", ended ? "" : ", with a thread still at work");
+  return ended && closed;
+}
+
+}  // namespace
+
 int run(const Settings& settings) {
-  const sigset_t signals = block_signals();
-  auto channels = std::make_unique<Channels>();
-  Recorder recorder(settings.daemon.log.file);
-  using Kind = firmware_bridge::PortError::Kind;
-  auto port = open_port(settings.daemon.link);
-  if (!port && port.error().kind != Kind::kOpen && port.error().kind != Kind::kBusy) {
-    spdlog::error("{}: {}", settings.daemon.link.device, describe(port.error()));
-    return kInputOutput;
+  const sigset_t signals = shield_process();
+  const auto sink = LogSink::start(STDERR_FILENO);
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("backwashd", sink));
+  int code = kSoftware;
+  try {
+    auto flight = std::make_unique<Flight>(settings);
+    try {
+      start(*flight);
+      spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}, raw log {}", settings.vehicle.name,
+                   settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space,
+                   flight->log);
+      wait_for_end(signals, flight->failure);
+    } catch (const std::system_error& e) {
+      flight->failure.note("start", e.what(), kSystem);
+    }
+    const bool ended = end(*flight);
+    code = flight->failure.code();
+    if (!ended) {  // what hangs still uses the flight
+      sink->close(kToSay);
+      ::_exit(code);
+    }
+  } catch (const StartError& error) {
+    code = error.code;
+    spdlog::error("backwashd: {}", error.what);
+  } catch (const std::exception& e) {
+    spdlog::critical("backwashd: {}", e.what());
   }
-  if (!port) {  // it may be plugged in, or its simulator started, later: the link watch goes on trying
-    spdlog::warn("{} {}; waiting for it", settings.daemon.link.device, describe(port.error()));
-    port = firmware_bridge::ClosedPort{};
-  }
-  firmware_bridge::AutopilotLink link(std::move(*port), static_cast<std::uint8_t>(settings.daemon.link.system),
-                                      std::chrono::steady_clock::now());
-  // What carries odometry to the control thread comes right below it, before the middleware starts its threads.
-  const int control = settings.daemon.control.priority;
-  DdsFront front(settings.daemon, allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0)), settings.vehicle,
-                 *channels, recorder);
-  Mission mission(*channels);
-  ControlLoop loop(*channels, link, settings.vehicle, settings.daemon.control.battery_land, settings.daemon.map);
-  {
-    const std::array threads = {
-        std::jthread([&] { recorder.run(*channels); }),
-        std::jthread(
-            [&] { run_map_worker(*channels, recorder, settings.model, settings.vehicle, settings.daemon.map); }),
-        std::jthread([&] {
-          run_planner(*channels, recorder, [&](const track::AcceptedSegment& segment) { front.send(segment); });
-        }),
-        std::jthread([&] {
-          run_mission(*channels, mission, [&](const CommandMessage& c, const Answer& a) { front.send(c, a); });
-        }),
-        std::jthread([&] { front.run_status(settings.vehicle); }),
-        std::jthread([&] {
-          make_real_time({settings.daemon.control.priority, settings.daemon.control.cpu});
-          run_control(*channels, loop);
-        }),
-        std::jthread([&] { front.run_readers(); }),
-        std::jthread([&] { run_link_watch(*channels, settings.daemon.link); })};
-    spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}", settings.vehicle.name,
-                 settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space);
-    int signal = 0;
-    sigwait(&signals, &signal);
-    channels->stop = true;
-  }
-  if (const auto lost = recorder.lost() + channels->control_log.lost())
-    spdlog::warn("{}: {} records were lost", settings.daemon.log.file, lost);
-  spdlog::info("stopped");
-  return 0;
+  sink->close(kToSay);
+  return code;
 }
 
 }  // namespace backwash::daemon

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <thread>
+#include <utility>
 
 namespace backwash::daemon {
 namespace {
@@ -41,21 +42,23 @@ tl::expected<Port, PortError> open_port(const decltype(config::Daemon::link)& li
 
 void LinkWatch::step() {
   while (const auto event = channels_.events.pop()) tell(*event);
+  constexpr std::uint8_t kPortLost = 1 + static_cast<std::uint8_t>(LinkFault::kPortLost);
+  const std::uint32_t losses = channels_.port_losses.load(std::memory_order_relaxed);
   const std::uint8_t fault = channels_.link_fault.load(std::memory_order_relaxed);
+  if (std::exchange(losses_, losses) != losses)
+    spdlog::error("{}: {}, loss {}", link_.device, name(LinkFault::kPortLost), losses);
   if (fault != fault_) {
-    if (fault != 0)
-      spdlog::error("{}: {}", link_.device, name(static_cast<LinkFault>(fault - 1)));
-    else
+    if (fault == 0)
       spdlog::info("{}: link good", link_.device);
+    else if (fault != kPortLost)
+      spdlog::error("{}: {}", link_.device, name(static_cast<LinkFault>(fault - 1)));
     fault_ = fault;
   }
   channels_.ports.collect();
-  const bool lost = fault == 1 + static_cast<std::uint8_t>(LinkFault::kPortLost);
-  if (!lost) offered_ = false;
-  if (!lost || offered_) return;
+  if (losses == mended_) return;
   if (auto port = open_port(link_)) {
     channels_.ports.offer(std::make_unique<const FreshPort>(std::move(*port)));
-    offered_ = true;
+    mended_ = losses;
   }
 }
 

@@ -13,15 +13,17 @@ tl::expected<firmware_bridge::Port, firmware_bridge::PortError> open_port(const 
 class LinkWatch {
  public:
   LinkWatch(Channels& channels, const decltype(config::Daemon::link)& link) : channels_(channels), link_(link) {}
-  /// Logs what the control thread reported and a link fault that is new, and opens a lost port again (faults.md rows 17
-  /// and 19). To be called a few times a second.
+  /// Logs what the control thread reported, each loss of the port and a link fault that is new, and opens a lost port
+  /// again (faults.md rows 17 and 19), one that was lost again between two calls too. To be called a few times a
+  /// second.
   void step();
 
  private:
   Channels& channels_;
   decltype(config::Daemon::link) link_;
   std::uint8_t fault_ = 0;
-  bool offered_ = false;  ///< a fresh port that the control thread has not yet said to be good
+  std::uint32_t losses_ = 0;  ///< that were told
+  std::uint32_t mended_ = 0;  ///< for which a fresh port was offered: a loss of that one is the next
 };
 
 /// Thread body: step() every 50 ms.

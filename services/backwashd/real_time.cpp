@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <linux/capability.h>
 #include <sched.h>
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -23,12 +27,31 @@ void prefault_stack() {
   (void)stack[0];
 }
 
+// The kernel asks for it where a lock would pass RLIMIT_MEMLOCK.
+bool may_lock_beyond_limit() {
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  __user_cap_data_struct data[_LINUX_CAPABILITY_U32S_3]{};
+  return ::syscall(SYS_capget, &header, data) == 0 && (data[0].effective & (1u << CAP_IPC_LOCK)) != 0;
+}
+
 }  // namespace
 
-void make_real_time(const Scheduling& scheduling) {
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+void lock_memory() {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_MEMLOCK, &limit);
+  const bool finite = limit.rlim_cur != RLIM_INFINITY && !may_lock_beyond_limit();
+  const bool locked = mlockall(finite ? MCL_CURRENT : MCL_CURRENT | MCL_FUTURE) == 0;
+  if (finite) {
+    spdlog::warn("RLIMIT_MEMLOCK is {} KiB: {}; page faults may delay ticks; set LimitMEMLOCK=infinity",
+                 limit.rlim_cur / 1024, locked ? "memory for later maps is not locked" : "memory is not locked");
+  } else if (!locked) {
     spdlog::warn("memory is not locked ({}): page faults may delay ticks; grant CAP_IPC_LOCK or LimitMEMLOCK",
                  std::strerror(errno));
+  }
+}
+
+void make_real_time(const Scheduling& scheduling) {
+  lock_memory();
   prefault_stack();
   if (scheduling.cpu >= 0) {
     cpu_set_t set;

@@ -6,9 +6,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -16,25 +19,65 @@
 namespace backwash::daemon {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr std::int64_t kCheckEvery_ns = 500'000'000;  // that the file is still in its directory
+constexpr std::size_t kChunk = 1u << 20;              // bytes written at once
+constexpr int kMostNumbers = 1'000'000;
+
+std::string numbered(const fs::path& name, int number) {
+  return (name.parent_path() / (name.stem().string() + "-" + std::to_string(number) + name.extension().string()))
+      .string();
+}
+
+/// The highest N of the files STEM-N.EXTENSION beside `name`; 1 if there is none.
+int highest_number(const fs::path& name) {
+  const std::string before = name.stem().string() + "-", after = name.extension().string();
+  int highest = 1;
+  std::error_code gone;
+  for (fs::directory_iterator at(name.has_parent_path() ? name.parent_path() : ".", gone), end; !gone && at != end;
+       at.increment(gone)) {
+    const std::string file = at->path().filename().string();
+    if (file.size() <= before.size() + after.size() || !file.starts_with(before) || !file.ends_with(after)) continue;
+    const char *digits = file.data() + before.size(), *last = file.data() + file.size() - after.size();
+    int number = 0;
+    const auto [read, failed] = std::from_chars(digits, last, number);
+    if (failed == std::errc{} && read == last && number < kMostNumbers) highest = std::max(highest, number);
+  }
+  return highest;
+}
 
 }  // namespace
 
-Recorder::Recorder(const std::string& path) : path_(path) {
-  if (!create()) throw std::runtime_error(path + ": raw log cannot be created; give log.file a writable directory");
+Recorder::Recorder(const std::string& name) : name_(name), path_(name) {
+  if (!create())
+    throw std::runtime_error(name + ": raw log cannot be created: " + std::strerror(errno) +
+                             "; give log.file a writable directory");
 }
 
 bool Recorder::create() {
-  file_ = firmware_bridge::FileDescriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  const auto open_new = [this] {
+    // Exclusive: an earlier flight's log, or a link, is never written to.
+    return ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0640);
+  };
+  path_ = name_;
+  int fd = open_new();
+  if (fd < 0 && errno == EEXIST) {
+    int number = highest_number(name_);
+    do path_ = numbered(name_, ++number);
+    while ((fd = open_new()) < 0 && errno == EEXIST && number < kMostNumbers);
+  }
+  file_ = firmware_bridge::FileDescriptor(fd);
   written_ = 0;
+  told_lost_ = 0;
   const std::string_view magic(study::kRawLogMagic);
-  return file_.get() >= 0 && write({magic.begin(), magic.end()});
+  return fd >= 0 && write({magic.begin(), magic.end()});
 }
 
 bool Recorder::still_there() const {
   struct stat ours {
   }, named{};
-  return ::fstat(file_.get(), &ours) == 0 && ::stat(path_.c_str(), &named) == 0 && ours.st_ino == named.st_ino &&
+  return ::fstat(file_.get(), &ours) == 0 && ::lstat(path_.c_str(), &named) == 0 && ours.st_ino == named.st_ino &&
          ours.st_dev == named.st_dev;
 }
 
@@ -58,6 +101,13 @@ bool Recorder::write(const std::vector<std::uint8_t>& bytes) {
 }
 
 void Recorder::append(study::RecordKind kind, std::span<const std::uint8_t> bytes) {
+  const std::size_t size = sizeof(study::RecordHeader) + bytes.size();
+  if (pending_bytes_.fetch_add(size) + size > kMostPending) {
+    pending_bytes_ -= size;
+    ++lost_;
+    spdlog::warn("{}: the disk does not follow; the flight goes on, records are lost", name_);
+    return;
+  }
   BulkRecord record{{now_ns(), kind, static_cast<std::uint32_t>(bytes.size())}, {bytes.begin(), bytes.end()}};
   const std::lock_guard lock(mutex_);
   pending_.push_back(std::move(record));
@@ -67,53 +117,82 @@ void Recorder::append(study::RecordKind kind, const std::string& text) {
   append(kind, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
-void Recorder::put(std::vector<std::uint8_t>& to, const study::RecordHeader& header, const std::uint8_t* bytes) {
+void Recorder::put(const study::RecordHeader& header, const std::uint8_t* bytes) {
   const auto* head = reinterpret_cast<const std::uint8_t*>(&header);
-  to.insert(to.end(), head, head + sizeof header);
-  to.insert(to.end(), bytes, bytes + header.size);
+  batch_.insert(batch_.end(), head, head + sizeof header);
+  batch_.insert(batch_.end(), bytes, bytes + header.size);
 }
 
-void Recorder::fail(std::uint64_t records, const char* why) {
-  lost_ += records;
+void Recorder::put_control(const ControlRecord& record) {
+  put(record.header, record.bytes.data());
+  ++in_batch_;
+  if (record.header.kind != study::RecordKind::tick) return;
+  study::TickRecord tick;
+  std::memcpy(&tick, record.bytes.data(), sizeof tick);
+  if (std::exchange(mode_, tick.mode) != tick.mode) sync_due_ = true;
+}
+
+void Recorder::fail(const char* why) {
+  lost_ += std::exchange(in_batch_, 0);
+  batch_.clear();
   if (!std::exchange(failing_, true)) spdlog::warn("{}: {}; the flight goes on, records are lost", path_, why);
 }
 
+/// Whether there is a file to write to, made anew if it has vanished: no more often than it is looked for, because a
+/// directory that is gone stays so for a while.
+bool Recorder::open_again(std::int64_t now) {
+  const bool check = now - checked_ns_ > kCheckEvery_ns;
+  if (check) checked_ns_ = now;
+  if (file_.get() >= 0 && !(check && !still_there())) return true;
+  if (!check || !create()) {
+    file_ = firmware_bridge::FileDescriptor();
+    return false;
+  }
+  failing_ = true;
+  return true;
+}
+
+void Recorder::write_batch(std::uint64_t lost_in_ring) {
+  if (in_batch_ == 0) return;
+  const std::int64_t now = now_ns();
+  if (!open_again(now)) return fail("is gone");
+  const study::LostRecord lost{lost_ + lost_in_ring};
+  if (lost.records != told_lost_) {
+    const std::vector<std::uint8_t> rest = std::exchange(batch_, {});
+    put({now, study::RecordKind::lost, sizeof lost}, reinterpret_cast<const std::uint8_t*>(&lost));
+    batch_.insert(batch_.end(), rest.begin(), rest.end());
+  }
+  if (!write(batch_)) return fail(std::strerror(errno));
+  told_lost_ = lost.records;
+  in_batch_ = 0;
+  batch_.clear();
+  if (std::exchange(failing_, false)) spdlog::warn("{}: written again after {} records were lost", path_, lost.records);
+}
+
 void Recorder::drain(Channels& channels) {
-  std::vector<std::uint8_t> batch;
-  std::uint64_t records = 0;
-  while (const auto record = channels.control_log.pop()) put(batch, record->header, record->bytes.data()), ++records;
+  const auto when_full = [&] {
+    if (batch_.size() > kChunk) write_batch(channels.control_log.lost());
+  };
+  while (const auto record = channels.control_log.pop()) put_control(*record), when_full();
   std::vector<BulkRecord> bulk;
   {
     const std::lock_guard lock(mutex_);
     bulk.swap(pending_);
   }
-  for (const auto& record : bulk) put(batch, record.header, record.bytes.data()), ++records;
-  if (records == 0) return;
-
-  const std::int64_t now = now_ns();
-  const bool check = now - checked_ns_ > kCheckEvery_ns;
-  if (check) checked_ns_ = now;
-  if (file_.get() < 0 || (check && !still_there())) {
-    // Made anew no more often than it is looked for: a directory that is gone stays so for a while.
-    if (!check) return fail(records, "cannot be created again");
-    if (!create()) {
-      file_ = firmware_bridge::FileDescriptor();
-      return fail(records, "is gone");
-    }
-    failing_ = true;
+  for (BulkRecord& record : bulk) {
+    put(record.header, record.bytes.data());
+    ++in_batch_;
+    when_full();
+    pending_bytes_ -= sizeof record.header + record.bytes.size();
+    record.bytes = {};
   }
-  std::vector<std::uint8_t> out;
-  if (failing_) {
-    const study::LostRecord lost{lost_};
-    put(out, {now, study::RecordKind::lost, sizeof lost}, reinterpret_cast<const std::uint8_t*>(&lost));
-  }
-  out.insert(out.end(), batch.begin(), batch.end());
-  if (!write(out)) return fail(records, std::strerror(errno));
-  if (std::exchange(failing_, false)) spdlog::warn("{}: written again after {} records were lost", path_, lost_.load());
+  write_batch(channels.control_log.lost());
+  if (std::exchange(sync_due_, false) && file_.get() >= 0 && ::fdatasync(file_.get()) != 0)
+    spdlog::warn("{}: not on the disk yet: {}", path_, std::strerror(errno));
 }
 
-void Recorder::run(Channels& channels) {
-  while (!channels.stop) {
+void Recorder::run(Channels& channels, const std::atomic<bool>& end) {
+  while (!end) {
     drain(channels);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

@@ -13,38 +13,56 @@
 
 namespace backwash::daemon {
 
-/// Writes the raw log from its own thread: the control thread's ring, and what the other threads append. A full disk or
-/// a vanished directory costs records and nothing else (faults.md row 35): they are counted, one warning is given, and
-/// a file that can be written again goes on with a `lost` record. Whole batches are written or taken back, so that the
-/// file stays readable.
+/// Writes the raw log from its own thread: the control thread's ring, and what the other threads append. A full disk, a
+/// vanished directory or a disk that does not answer costs records and nothing else (faults.md row 35): they are
+/// counted, a warning is given, and a file that can be written again goes on with a `lost` record. What waits for the
+/// disk is bounded by kMostPending. Whole batches are written or taken back, so that the file stays readable.
+///
+/// A file that exists is never opened (row 45). `name` itself is taken if nothing has it, otherwise the next number
+/// above those in its directory: flight.bwlog, flight-2.bwlog, flight-3.bwlog … The file is 0640, and no link is
+/// followed. It is on the disk as far as the last change of the mode.
 class Recorder {
  public:
-  /// Makes the file anew. Throws std::runtime_error naming it if that fails: at start it is a configuration error.
-  explicit Recorder(const std::string& path);
-  /// For every thread but the control thread's.
+  static constexpr std::size_t kMostPending = 64u << 20;  ///< bytes of other threads' records that wait for the disk
+
+  /// Makes the file. Throws std::runtime_error naming it if that fails.
+  explicit Recorder(const std::string& name);
+  /// For every thread but the control thread's. Copies the bytes; waits for no disk.
   void append(study::RecordKind kind, std::span<const std::uint8_t> bytes);
   void append(study::RecordKind kind, const std::string& text);
   /// Writes what has come since the last call.
   void drain(Channels& channels);
-  /// Thread body: drains every 20 ms; returns after `channels.stop` and one last drain.
-  void run(Channels& channels);
-  /// Records that the disk did not take.
+  /// Thread body: drains every 20 ms; returns after `end` and one last drain.
+  void run(Channels& channels, const std::atomic<bool>& end);
+  /// Records that did not get room or that the disk did not take; those of the control thread's ring are its own.
   std::uint64_t lost() const noexcept { return lost_; }
+  /// The file's name now; the recorder's thread may change it.
+  const std::string& path() const noexcept { return path_; }
 
  private:
   bool create();
   bool still_there() const;
+  bool open_again(std::int64_t now);
   bool write(const std::vector<std::uint8_t>& bytes);
-  void fail(std::uint64_t records, const char* why);
-  static void put(std::vector<std::uint8_t>& to, const study::RecordHeader& header, const std::uint8_t* bytes);
+  void write_batch(std::uint64_t lost_in_ring);
+  void put(const study::RecordHeader& header, const std::uint8_t* bytes);
+  void put_control(const ControlRecord& record);
+  void fail(const char* why);
 
+  const std::string name_;
   std::string path_;
   firmware_bridge::FileDescriptor file_;
   std::int64_t written_ = 0;  ///< bytes, all of whole records
   std::int64_t checked_ns_ = 0;
   bool failing_ = false;
+  std::uint32_t mode_ = 0;  ///< of the last tick record
+  bool sync_due_ = false;
+  std::vector<std::uint8_t> batch_;
+  std::uint64_t in_batch_ = 0;   ///< records
+  std::uint64_t told_lost_ = 0;  ///< of the file's last `lost` record
   std::mutex mutex_;
   std::vector<BulkRecord> pending_;
+  std::atomic<std::size_t> pending_bytes_{0};
   std::atomic<std::uint64_t> lost_{0};
 };
 

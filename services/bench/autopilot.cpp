@@ -16,7 +16,8 @@ constexpr std::uint8_t kQuadrotor = 2, kPx4 = 12, kArmedFlag = 128, kCustomFlag 
 constexpr std::uint32_t kManual = 1u << 16, kOffboard = 6u << 16, kAutoLand = 4u << 16 | 6u << 24;
 constexpr std::uint16_t kSetMode = 176, kArm = 400, kLand = 21, kMessageInterval = 511;
 constexpr std::uint8_t kAccepted = 0, kTemporarilyRejected = 1, kUnsupported = 3;
-constexpr double kHistory = 1.0;  // s
+constexpr double kHistory = 1.0;   // s
+constexpr long kReportEvery = 20;  // steps, position and attitude
 
 Eigen::Matrix3d yaw_matrix(double yaw) { return Eigen::AngleAxisd(yaw, Vec3::UnitZ()).toRotationMatrix(); }
 
@@ -58,7 +59,27 @@ Setpoint Autopilot::to_map(const Setpoint& local) const {
 }
 
 // The estimator: the truth as its inertial sensors would carry it on, plus what the odometry had wrong.
-State Autopilot::believed() const { return {truth().p_W + error_.p_W, truth().v_W + error_.v_W}; }
+State Autopilot::believed() const {
+  const Eigen::Matrix3d R = yaw_matrix(yaw_error_);
+  return {R * truth().p_W + error_.p_W, R * truth().v_W + error_.v_W};
+}
+
+// An estimator whose heading is wrong turns everything that it asks of the vehicle. The simulated controller sees but
+// differences, so what it is given is turned back about the place where the estimator believes to be.
+State Autopilot::felt() const { return {believed().p_W, yaw_matrix(-yaw_error_) * believed().v_W}; }
+
+void Autopilot::steer() {
+  const Eigen::Matrix3d R = yaw_matrix(-yaw_error_);
+  const Vec3 here = believed().p_W;
+  vehicle_.command({here + R * (target_.p_W - here), R * target_.v_W, R * target_.a_W, target_.yaw - yaw_error_});
+}
+
+// As gyros measure it, FLU: the mean since the report before.
+Vec3 Autopilot::body_rates() {
+  const Eigen::Quaterniond turn = reported_.conjugate() * attitude();
+  reported_ = attitude();
+  return (turn.w() < 0 ? -2 : 2) / (kReportEvery * sim::Quadrotor::kStep) * turn.vec();
+}
 
 void Autopilot::on(const mavlink::SetPositionTargetLocalNed& m, double t) {
   last_setpoint_ = t;
@@ -70,18 +91,21 @@ void Autopilot::on(const mavlink::SetPositionTargetLocalNed& m, double t) {
   local.yaw = mavlink::swap_yaw(m.yaw);
   if (mode_ == Mode::offboard && armed_) {
     target_ = to_map(local);
-    vehicle_.command(target_);
+    steer();
   }
 }
 
 void Autopilot::on(const mavlink::Odometry& m, double) {
   const double stamp = static_cast<double>(m.time_usec) * 1e-6;
-  const auto then = std::find_if(history_.begin(), history_.end(), [&](const auto& h) { return h.first >= stamp; });
+  const auto then = std::find_if(history_.begin(), history_.end(), [&](const Truth& h) { return h.t >= stamp; });
   if (then == history_.end()) return;
   const Vec3 p = mavlink::swap_ned({m.x, m.y, m.z});
   const Eigen::Quaterniond q = mavlink::swap_ned_frd(Eigen::Quaterniond(m.q[0], m.q[1], m.q[2], m.q[3]));
   const Vec3 v = q * mavlink::swap_frd({m.vx, m.vy, m.vz});
-  error_ = {p - then->second.p_W, v - then->second.v_W};
+  const Vec3 x = q * Vec3::UnitX(), x_then = then->attitude * Vec3::UnitX();
+  yaw_error_ = follows_yaw ? std::atan2(x.y(), x.x()) - std::atan2(x_then.y(), x_then.x()) : 0;
+  const Eigen::Matrix3d R = yaw_matrix(yaw_error_);
+  error_ = {p - R * then->state.p_W, v - R * then->state.v_W};
   local_position_ = true;
 }
 
@@ -93,9 +117,10 @@ void Autopilot::on(const mavlink::CommandLong& m, double t) {
     result = m.param2 == 6 && streaming ? kAccepted : kTemporarilyRejected;
     if (result == kAccepted) mode_ = Mode::offboard;
   } else if (m.command == kArm) {
-    armed_ = m.param1 == 1;
+    // Not forced, so that it is no way to fall.
+    result = m.param1 == 1 || landed_ ? kAccepted : kTemporarilyRejected;
+    if (result == kAccepted) armed_ = m.param1 == 1;
     vehicle_.set_motors(armed_);
-    result = kAccepted;
   } else if (m.command == kLand) {
     if (mode_ != Mode::land) target_ = {believed().p_W, Vec3::Zero(), Vec3::Zero(), target_.yaw};
     mode_ = Mode::land;
@@ -143,10 +168,10 @@ void Autopilot::fly(double t) {
   if (mode_ == Mode::land && armed_ && steps_ % 20 == 0) {
     target_.v_W = {0, 0, -kDescent};
     target_.p_W.z() = std::max(target_.p_W.z() - kDescent * 0.02, believed().p_W.z() - 0.5);
-    vehicle_.command(target_);
+    steer();
   }
   const Vec3 gust = air_.step(truth().p_W, sim::Quadrotor::kStep);
-  vehicle_.step(armed_ && !vehicle_.on_ground() ? gust : Vec3::Zero(), believed());
+  vehicle_.step(armed_ && !vehicle_.on_ground() ? gust : Vec3::Zero(), felt());
   if (!vehicle_.on_ground()) landed_since_ = t;
   landed_ = t - landed_since_ > 0.2;
   if (mode_ == Mode::land && armed_ && t - landed_since_ > 0.5) {
@@ -189,20 +214,25 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
     const std::uint8_t state = landed_ ? 1 : mode_ == Mode::land ? 4 : 2;
     send(mavlink::ExtendedSysState{.vtol_state = 0, .landed_state = state}, out);
   }
-  if (steps_ % 20 == 0) {
-    const Eigen::Quaterniond q = mavlink::swap_ned_frd(Eigen::Quaterniond(yaw_matrix(frame_.yaw)) * attitude());
+  if (steps_ % kReportEvery == 0 && !silent_attitude) {
+    const Eigen::Quaterniond q =
+        mavlink::swap_ned_frd(Eigen::Quaterniond(yaw_matrix(frame_.yaw + yaw_error_)) * attitude());
+    const Eigen::Vector3f omega = mavlink::swap_frd(body_rates()).cast<float>();
     send(mavlink::AttitudeQuaternion{.time_boot_ms = boot_ms,
                                      .q1 = static_cast<float>(q.w()),
                                      .q2 = static_cast<float>(q.x()),
                                      .q3 = static_cast<float>(q.y()),
-                                     .q4 = static_cast<float>(q.z())},
+                                     .q4 = static_cast<float>(q.z()),
+                                     .rollspeed = omega.x(),
+                                     .pitchspeed = omega.y(),
+                                     .yawspeed = omega.z()},
          out);
-    if (local_position_) {
-      const State b = believed();
-      const Eigen::Vector3f p = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.p_W + frame_.origin).cast<float>();
-      const Eigen::Vector3f v = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.v_W).cast<float>();
-      send(mavlink::LocalPositionNed{boot_ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, out);
-    }
+  }
+  if (steps_ % kReportEvery == 0 && local_position_ && !silent_pose) {
+    const State b = believed();
+    const Eigen::Vector3f p = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.p_W + frame_.origin).cast<float>();
+    const Eigen::Vector3f v = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.v_W).cast<float>();
+    send(mavlink::LocalPositionNed{boot_ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, out);
   }
   (void)t;
 }
@@ -210,8 +240,8 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
 void Autopilot::step(double t, std::vector<std::uint8_t>& out) {
   t_ = t;
   fly(t);
-  history_.emplace_back(t, truth());
-  while (history_.front().first < t - kHistory) history_.pop_front();
+  history_.push_back({t, truth(), attitude()});
+  while (history_.front().t < t - kHistory) history_.pop_front();
   telemetry(t, out);
   ++steps_;
 }

@@ -51,6 +51,10 @@ class Autopilot {
 
   /// While true no telemetry is sent (heartbeat lost, faults.md row 21).
   bool mute = false;
+  /// While true the position, or the attitude, is not reported, and everything else goes on (row 42).
+  bool silent_pose = false, silent_attitude = false;
+  /// The estimator takes its heading from the odometry too; otherwise from its own sensors, which are right.
+  bool follows_yaw = false;
   /// What PARAM_REQUEST_READ is answered from: safe indoors until changed. Those whose name ends in _T are floats.
   std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5},
                                            {"COM_OBL_RC_ACT", 4},
@@ -78,6 +82,9 @@ class Autopilot {
   void on(const Other&, double) {}
   Setpoint to_map(const Setpoint& local) const;
   State believed() const;
+  State felt() const;
+  void steer();
+  Vec3 body_rates();
   void fly(double t);
   void telemetry(double t, std::vector<std::uint8_t>& out);
   template <typename Message>
@@ -93,9 +100,17 @@ class Autopilot {
   double t_ = 0, last_setpoint_ = -1e9, landed_since_ = 0;
   long steps_ = 0;
   std::uint64_t setpoints_ = 0;
-  Setpoint target_;                               // map frame
-  std::deque<std::pair<double, State>> history_;  // truth of the last second
-  State error_;                                   // what the newest odometry said, less the truth at its stamp
+  struct Truth {
+    double t;
+    State state;
+    Eigen::Quaterniond attitude;
+  };
+  Setpoint target_;            // in the map as the estimator believes it to lie
+  std::deque<Truth> history_;  // of the last second
+  // What the newest odometry said against the truth at its stamp: believed = R_z(yaw_error_) truth + error_.
+  State error_;
+  double yaw_error_ = 0;                     // 0 unless the heading is followed
+  Eigen::Quaterniond reported_{1, 0, 0, 0};  // true attitude of the report before
   std::vector<mavlink::CommandAck> acks_;
   std::vector<mavlink::ParamValue> values_;  // asked for and not yet sent
   std::ofstream wire_;

@@ -12,6 +12,7 @@ out=$(cd "$2" && pwd)
 
 start_bench "$build/services" "$out/$name.log" "$map" "$start" "$vehicle" --seed "$seed" --log "$out/$name.truth.csv" \
   --wire "$out/$name.wire.csv"
+rm -f "$out/$name.bwlog" # of an earlier run; the daemon itself would leave it and take the next name
 start_daemon "$vehicle" "$out/$name.bwlog"
 enable
 ctl takeoff --height "${start##*,}" --wait

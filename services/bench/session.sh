@@ -35,9 +35,8 @@ start_bench() {
   die "the bench did not start"
 }
 
-# start_daemon VEHICLE RAW_LOG [ODOMETRY_TOPIC]: returns once it has built its world from the map.
-start_daemon() {
-  local from=$(wc -l <"$log")
+# write_configuration VEHICLE RAW_LOG [ODOMETRY_TOPIC]: $work/backwashd.toml.
+write_configuration() {
   cat >"$work/backwashd.toml" <<TOML
 vehicle = "$1"
 model = "$1"
@@ -57,6 +56,12 @@ battery_land = 0.15
 [log]
 file = "$2"
 TOML
+}
+
+# start_daemon VEHICLE RAW_LOG [ODOMETRY_TOPIC]: returns once it has built its world from the map.
+start_daemon() {
+  local from=$(wc -l <"$log")
+  write_configuration "$@"
   "${BACKWASHD:-$bin/backwashd}" --config "$work/backwashd.toml" >>"$log" 2>&1 &
   daemon_pid=$!
   for _ in $(seq 1200); do

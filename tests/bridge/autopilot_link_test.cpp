@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <limits>
 #include <random>
 
@@ -73,15 +74,31 @@ TEST_F(LinkTest, PutsThePositionVelocityAccelerationAndYawOfASetpointOnTheWireIn
 TEST_F(LinkTest, NeverSendsAValueThatIsNotFinite) {
   introduce_vehicle();
   const double inf = std::numeric_limits<double>::infinity();
-  for (const double bad : {kNan, inf, -inf}) {
+  for (const double bad : {kNan, inf, -inf, 1e39, -1e39}) {  // the last two are finite but as floats
     for (int i = 0; i < 10; ++i) {
       Setpoint s;
       (i < 3 ? s.p_W[i] : i < 6 ? s.v_W[i - 3] : i < 9 ? s.a_W[i - 6] : s.yaw) = bad;
-      EXPECT_FALSE(link_.send_setpoint(s, kStart));
+      // Any finite angle has a heading.
+      if (i == 9 && std::isfinite(bad)) continue;
+      EXPECT_FALSE(link_.send_setpoint(s, kStart)) << i;
     }
     EXPECT_FALSE(link_.send_command(21, {0, 0, 0, 0, 0, 0, static_cast<float>(bad)}));
-    VioSample vio{0, Vec3(0, bad, 0), Eigen::Quaterniond::Identity(), Vec3::Zero(), Vec3::Zero(), {}, {}, {}, 0};
-    EXPECT_FALSE(link_.send_odometry(vio));
+    const Vec3 wrong(0, bad, 0);
+    const VioSample good{0, Vec3::Zero(), Eigen::Quaterniond::Identity(), Vec3::Zero(), {}, {}, {}, {}, 0};
+    const std::function<void(VioSample&)> spoils[] = {
+        [&](auto& v) { v.p_O = wrong; },
+        [&](auto& v) { v.v_B = wrong; },
+        [&](auto& v) { v.omega_B = wrong; },
+        [&](auto& v) { v.q_OB.z() = bad; },
+        [&](auto& v) { v.position_variance_O = wrong; },
+        [&](auto& v) { v.attitude_variance_O = wrong; },
+        [&](auto& v) { v.velocity_variance_B = wrong; },
+    };
+    for (const auto& spoil : spoils) {
+      VioSample vio = good;
+      spoil(vio);
+      EXPECT_FALSE(link_.send_odometry(vio)) << &spoil - spoils;
+    }
   }
   ::usleep(20'000);
   EXPECT_TRUE(far_.read().empty());
@@ -91,7 +108,7 @@ TEST_F(LinkTest, ForwardsVioAsOdometryOfOneFrameWithItsSetpoints) {
   introduce_vehicle();
   const Eigen::Quaterniond q(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()));
   const VioSample vio{
-      77, {2, 1, 3}, q, {0.5, 0.25, -0.125}, {1, 2, 3}, Vec3(0.25, 0.5, 1), Vec3(2, 4, 8), Vec3(16, 32, 64), 5};
+      77, {2, 1, 3}, q, {0.5, 0.25, -0.125}, Vec3(1, 2, 3), Vec3(0.25, 0.5, 1), Vec3(2, 4, 8), Vec3(16, 32, 64), 5};
   ASSERT_TRUE(link_.send_odometry(vio));
   const auto m = heard_one<mavlink::Odometry>();
   EXPECT_EQ(m.time_usec, 77U);
@@ -116,13 +133,13 @@ TEST_F(LinkTest, ForwardsVioAsOdometryOfOneFrameWithItsSetpoints) {
   EXPECT_EQ(m.pose_covariance[1], 0.0F);
 }
 
-TEST_F(LinkTest, MarksAnUnknownCovarianceAsUnknown) {
+TEST_F(LinkTest, MarksUnknownRatesAndAnUnknownCovarianceAsUnknown) {
   introduce_vehicle();
-  ASSERT_TRUE(link_.send_odometry(
-      {1, Vec3::Zero(), Eigen::Quaterniond::Identity(), Vec3::Zero(), Vec3::Zero(), {}, {}, {}, 0}));
+  ASSERT_TRUE(link_.send_odometry({1, Vec3::Zero(), Eigen::Quaterniond::Identity(), Vec3::Zero(), {}, {}, {}, {}, 0}));
   const auto m = heard_one<mavlink::Odometry>();
   EXPECT_TRUE(std::isnan(m.pose_covariance[0]));
   EXPECT_TRUE(std::isnan(m.velocity_covariance[0]));
+  EXPECT_TRUE(std::isnan(m.rollspeed) && std::isnan(m.pitchspeed) && std::isnan(m.yawspeed));
 }
 
 TEST_F(LinkTest, AsksPx4ForOffboardArmingLandingAndRates) {
@@ -176,6 +193,11 @@ TEST_F(LinkTest, AnswersTimesyncAndMeasuresTheOffset) {
   EXPECT_EQ(question.ts1, 1'000'000'000'000);
   say_and_poll(mavlink::Timesync{.tc1 = 5'000'000, .ts1 = question.ts1 - 1}, kStart + 4ms);
   EXPECT_FALSE(link_.clock()) << "an answer to somebody else's question";
+  for (const std::int64_t absurd :
+       {std::numeric_limits<std::int64_t>::min(), std::int64_t{-1}, std::numeric_limits<std::int64_t>::max()}) {
+    say_and_poll(mavlink::Timesync{.tc1 = absurd, .ts1 = question.ts1}, kStart + 4ms);
+    EXPECT_FALSE(link_.clock()) << "a time that no clock shows";
+  }
   say_and_poll(mavlink::Timesync{.tc1 = 5'000'000, .ts1 = question.ts1}, kStart + 4ms);
   ASSERT_TRUE(link_.clock());
   EXPECT_EQ(link_.clock()->value.round_trip_ns, 4'000'000);

@@ -94,6 +94,22 @@ TEST(Telemetry, DropsAndCountsWhatCannotBe) {
   EXPECT_FALSE(t.local_state || t.attitude || t.imu || t.landed_state);
 }
 
+// Finite numbers that no vehicle indoors has: float's largest, and just beyond the bounds.
+TEST(Telemetry, DropsAndCountsWhatNoVehicleReaches) {
+  constexpr float kMax = std::numeric_limits<float>::max();
+  Telemetry t;
+  for (const float far : {kMax, -kMax, 10'001.0F}) t.take(mavlink::LocalPositionNed{1, 0, far, 0, 0, 0, 0}, kNow);
+  for (const float fast : {kMax, -kMax, 101.0F}) t.take(mavlink::LocalPositionNed{1, 0, 0, 0, 0, 0, fast}, kNow);
+  for (const float fast : {kMax, 101.0F}) {
+    t.take(mavlink::AttitudeQuaternion{.time_boot_ms = 1, .q1 = 1, .yawspeed = fast}, kNow);
+    t.take(mavlink::Attitude{.time_boot_ms = 1, .rollspeed = fast}, kNow);
+  }
+  EXPECT_EQ(t.broken, 10U);
+  EXPECT_FALSE(t.local_state || t.attitude);
+  t.take(mavlink::LocalPositionNed{1, 9'999, 0, 0, 0, 99, 0}, kNow);
+  EXPECT_TRUE(t.local_state);
+}
+
 TEST(Telemetry, DropsSwappedPacketsButFollowsARestartedClock) {
   Telemetry t;
   const auto position_at = [](std::uint32_t ms, float x) {

@@ -86,5 +86,33 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
   EXPECT_TRUE(names(error_after("body = \"base_link\"", "body = \"map\""), 25, "frames"));
 }
 
+// They end up in the middleware's XML and in topic names.
+TEST(DaemonFile, RefusesNamesThatRos2OrTheKernelWouldNotTake) {
+  const std::string long_name(300, 'a');
+  const auto error = [](const std::string& key, const std::string& was, const std::string& is) {
+    return error_after(key + " = \"" + was + "\"", key + " = \"" + is + "\"");
+  };
+  for (const char* bad :
+       {"back wash", "a\\\"/><b", "/abs", "a/", "a//b", "2fast", "a__b", "a-b", "caf\u00e9", "a\\u0000b"})
+    EXPECT_NE(error("namespace", "backwash", bad).find(".toml:9: key 'dds.namespace' = "), std::string::npos) << bad;
+  for (const std::string& bad : {std::string("rt/odom etry"), long_name, std::string("rt/7")})
+    EXPECT_NE(error("odometry_topic", "rt/backwash/odometry", bad).find(".toml:10: key 'dds.odometry_topic' = "),
+              std::string::npos)
+        << bad;
+  for (const char* bad : {"lo\\\"/>", "a name", "sixteen_characte", "eth0&amp;"})
+    EXPECT_NE(error("interface", "lo", bad).find(".toml:8: key 'dds.interface' = "), std::string::npos) << bad;
+  EXPECT_EQ(error("namespace", "backwash", "fleet/uav_2"), "no error");
+  EXPECT_EQ(error("interface", "lo", "enp0s31f6.100"), "no error");
+  EXPECT_EQ(error("odometry_topic", "rt/backwash/odometry", "rt/ov_msckf/odomimu"), "no error");
+}
+
+TEST(DaemonFile, RefusesTextThatWouldSteerATerminalOrCutAPath) {
+  for (const char* bad : {"/dev/tty\\u0000x", "/dev/\\u001b[2J"}) {
+    const std::string said = error_after("/dev/ttyAMA0", bad);
+    EXPECT_NE(said.find(".toml:13: key 'link.device'"), std::string::npos) << said;
+    EXPECT_EQ(said.find('\x1b'), std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace backwash::config

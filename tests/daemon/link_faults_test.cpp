@@ -45,17 +45,22 @@ TEST(Row17, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
   EXPECT_EQ(rig.mode(), Mode::quiet);
   EXPECT_EQ(rig.channels->link_fault, 0);
   // The line works again: an operator can take control anew.
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   EXPECT_EQ(rig.ticks_until(Mode::enabling, 3), 1) << to_string(rig.reason());
+}
+
+decltype(config::Daemon::link) serial(const std::string& path) {
+  return {.device = path, .endpoint = {config::LinkDevice::Kind::serial, path, 0}, .baud = 921600, .system = 1};
 }
 
 TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
-  LinkWatch watch(channels, line.path(), 921600);
+  LinkWatch watch(channels, serial(line.path()));
   watch.step();
   EXPECT_EQ(channels.ports.take(), nullptr);
   channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
+  channels.port_losses = 1;
   watch.step();
   const auto* port = channels.ports.take();
   ASSERT_NE(port, nullptr);
@@ -63,6 +68,55 @@ TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   EXPECT_EQ(channels.ports.take(), nullptr) << "opened twice";
   channels.ports.give_back(port);
   channels.ports.collect();
+}
+
+// Lost from the start: a controller that boots after its companion.
+TEST(Row17, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
+  firmware_bridge::test::PseudoTerminal line;
+  const auto path = std::filesystem::temp_directory_path() / ("backwash_late_port_" + std::to_string(::getpid()));
+  auto channels = std::make_unique<Channels>();
+  firmware_bridge::AutopilotLink link(firmware_bridge::ClosedPort{}, std::uint8_t{1}, firmware_bridge::Time{});
+  ControlLoop loop(*channels, link, vehicle_5in(), 0.15);
+  LinkWatch watch(*channels, serial(path));
+  const auto together = [&](std::int64_t t_ns) {
+    loop.tick(t_ns, 0, 0);
+    watch.step();
+  };
+  for (std::int64_t n = 0; n < 5; ++n) together(n * 20'000'000);
+  EXPECT_EQ(channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  std::filesystem::create_symlink(line.path(), path);
+  for (std::int64_t n = 5; n < 10; ++n) together(n * 20'000'000);
+  std::filesystem::remove(path);
+  EXPECT_EQ(channels->link_fault, 0);
+  EXPECT_EQ(channels->port_losses, 1u);
+  EXPECT_EQ(loop.view().mode, Mode::passive);
+  channels->ports.collect();
+}
+
+// Lost, opened again and lost again between two looks of the watch: the fault that it sees has not changed.
+TEST(Row17, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
+  InFlight rig;
+  rig.hang_up();
+  rig.ticks(3);
+  EXPECT_EQ(rig.channels->port_losses, 1u);
+  rig.plug_in();
+  rig.hang_up();
+  rig.ticks(3);
+  EXPECT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  EXPECT_EQ(rig.channels->port_losses, 2u);
+
+  firmware_bridge::test::PseudoTerminal line;
+  Channels channels;
+  LinkWatch watch(channels, serial(line.path()));
+  for (std::uint32_t losses = 1; losses <= 3; ++losses) {
+    channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
+    channels.port_losses = losses;
+    watch.step();
+    const auto* port = channels.ports.take();
+    ASSERT_NE(port, nullptr) << "after loss " << losses;
+    channels.ports.give_back(port);
+    channels.ports.collect();
+  }
 }
 
 TEST(Row18, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
@@ -126,7 +180,7 @@ TEST(Row19, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
   rig.ticks(2);
   ASSERT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kNoValidFrame));
   EXPECT_EQ(name(firmware_bridge::LinkFault::kNoValidFrame), "no valid frame (wrong baud rate?)");
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   rig.tick();
   EXPECT_EQ(rig.mode(), Mode::passive);
   EXPECT_EQ(rig.reason(), Reason::autopilot_silent);
@@ -179,7 +233,7 @@ TEST(Row25, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
     if (from == Mode::hold) {
       rig.tick(3);
     } else if (from == Mode::land) {
-      rig.channels->requests.push(track::Request::land);
+      rig.channels->orders.push({track::Request::land});
       rig.tick();
     }
     ASSERT_EQ(rig.mode(), from);
@@ -201,7 +255,7 @@ TEST(Row23, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
   EXPECT_EQ(rig.reason(), Reason::disarmed);
   EXPECT_EQ(rig.view().segment, 0u);
   for (int n = 0; n < 100; ++n) EXPECT_TRUE(rig.tick().setpoints.empty());
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   // Enabled anew it holds where it is; the old trajectory is not resumed.
   const Vec3 here = rig.autopilot->truth().p_W;
@@ -225,7 +279,7 @@ TEST(Row24, ALowBatteryAsksToLandOnce) {
   EXPECT_GE(asked, 1);
   EXPECT_EQ(rig.reason(), Reason::landed);
   // An operator who takes control again with the same battery is not landed a second time.
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   rig.ticks(200);
   EXPECT_EQ(rig.mode(), Mode::tracking);

@@ -32,6 +32,28 @@ long page_faults() {
   return usage.ru_minflt + usage.ru_majflt;
 }
 
+/// Every float of every message is a number, but for the one NaN by which MAVLink's ODOMETRY marks unknown rates, and a
+/// block of variances.
+template <typename Message>
+void expect_finite(const Message& message) {
+  constexpr bool kOdometry = std::is_same_v<Message, mavlink::Odometry>;
+  const auto number = [](std::string_view name, float v, bool may_be_unknown) {
+    EXPECT_TRUE(std::isfinite(v) || (may_be_unknown && std::isnan(v))) << Message::kName << '.' << name << " is " << v;
+  };
+  const auto field = [&](const auto& f) {
+    const auto& value = message.*f.member;
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, float>) {
+      number(f.name, value, kOdometry && (f.name == "rollspeed" || f.name == "pitchspeed" || f.name == "yawspeed"));
+    } else if constexpr (requires { value.size(); }) {
+      if constexpr (std::is_same_v<typename Value::value_type, float>)
+        for (const float v : value)
+          number(f.name, v, kOdometry && (f.name == "pose_covariance" || f.name == "velocity_covariance"));
+    }
+  };
+  std::apply([&](const auto&... f) { (field(f), ...); }, Message::fields());
+}
+
 }  // namespace
 
 Vehicle vehicle_5in() { return config::load_vehicle("builtin:quad-5in").value(); }
@@ -47,27 +69,95 @@ bool Wire::commanded(std::uint16_t command) const {
   return false;
 }
 
-/// A pseudo-terminal and an own look at the daemon's end of it: the kernel moves bytes in its own time.
+/// The line between the flight controller and the daemon.
 struct Lockstep::Line {
+  virtual ~Line() = default;
+  virtual firmware_bridge::Port open() = 0;  ///< the daemon's end
+  /// From the flight controller; returns when all of it can be read at the other end.
+  virtual void write(const std::vector<std::uint8_t>& bytes) = 0;
+  /// What has arrived at the flight controller, at least `expected` bytes unless they do not come.
+  virtual std::vector<std::uint8_t> read(std::size_t expected) = 0;
+};
+
+/// A pseudo-terminal and an own look at the daemon's end of it: the kernel moves bytes in its own time.
+struct Lockstep::Serial : Line {
   firmware_bridge::test::PseudoTerminal master;
   firmware_bridge::FileDescriptor own{::open(master.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK)};
-  std::vector<std::uint8_t> received;
 
-  Line() {
+  Serial() {
     termios raw{};
     EXPECT_EQ(::tcgetattr(own.get(), &raw), 0);
     ::cfmakeraw(&raw);
     ::tcsetattr(own.get(), TCSANOW, &raw);
   }
-  firmware_bridge::Port open() const {
+  firmware_bridge::Port open() override {
     auto port = firmware_bridge::SerialPort::open(master.path(), 921600);
     if (!port) throw std::runtime_error(describe(port.error()));
     return std::move(*port);
   }
+  void write(const std::vector<std::uint8_t>& bytes) override {
+    int before = 0, now = 0;
+    ::ioctl(own.get(), FIONREAD, &before);
+    master.write(bytes);
+    for (int i = 0; i < 5000 && now < before + static_cast<int>(bytes.size()); ++i) {
+      ::ioctl(own.get(), FIONREAD, &now);
+      if (i > 20) ::usleep(200);
+    }
+    ASSERT_EQ(now, before + static_cast<int>(bytes.size())) << "the pseudo-terminal did not deliver";
+  }
+  std::vector<std::uint8_t> read(std::size_t expected) override {
+    std::vector<std::uint8_t> bytes;
+    for (int i = 0; i < 5000 && bytes.size() < expected; ++i) {
+      const auto more = master.read();
+      bytes.insert(bytes.end(), more.begin(), more.end());
+      if (i > 20) ::usleep(200);
+    }
+    const auto surplus = master.read();
+    bytes.insert(bytes.end(), surplus.begin(), surplus.end());
+    return bytes;
+  }
 };
 
-Lockstep::Lockstep(const bench::LocalFrame& local)
-    : local_frame(local), world_(corridor()), vehicle_(vehicle_5in()), vio_(0.75 * vehicle_.estimation.position, 2) {
+/// The flight controller's socket; the daemon's knows it as its one peer.
+struct Lockstep::Datagrams : Line {
+  static constexpr std::size_t kMost = 480;  // bytes in one: the daemon reads 512
+  firmware_bridge::UdpPort controller = firmware_bridge::UdpPort::open({"127.0.0.1", 0}, std::nullopt).value();
+
+  firmware_bridge::Port open() override {
+    auto port = firmware_bridge::UdpPort::open(
+        {"127.0.0.1", 0}, firmware_bridge::UdpPort::Endpoint{"127.0.0.1", controller.local_port()});
+    if (!port) throw std::runtime_error(describe(port.error()));
+    // The controller's answers go to who spoke first.
+    std::uint8_t hello = 0;
+    if (!port->write({&hello, 1}) || !controller.read({&hello, 1})) throw std::runtime_error("no loopback");
+    return std::move(*port);
+  }
+  void write(const std::vector<std::uint8_t>& bytes) override {
+    for (std::size_t at = 0; at < bytes.size(); at += kMost) {
+      const auto piece = std::span(bytes).subspan(at, std::min(kMost, bytes.size() - at));
+      ASSERT_EQ(controller.write(piece).value_or(0), piece.size()) << "the loopback did not deliver";
+    }
+  }
+  std::vector<std::uint8_t> read(std::size_t) override {
+    std::vector<std::uint8_t> bytes;
+    std::array<std::uint8_t, 2048> datagram;
+    for (auto n = controller.read(datagram); n && *n > 0; n = controller.read(datagram))
+      bytes.insert(bytes.end(), datagram.begin(), datagram.begin() + static_cast<std::ptrdiff_t>(*n));
+    return bytes;
+  }
+};
+
+std::unique_ptr<Lockstep::Line> Lockstep::make_line() const {
+  if (medium_ == Medium::udp) return std::make_unique<Datagrams>();
+  return std::make_unique<Serial>();
+}
+
+Lockstep::Lockstep(const bench::LocalFrame& local, Medium medium, std::shared_ptr<const plan::World> world)
+    : local_frame(local),
+      world_(std::move(world)),
+      vehicle_(vehicle_5in()),
+      vio_(0.75 * vehicle_.estimation.position, 2),
+      medium_(medium) {
   const Vec3 ground(kStart.x(), kStart.y(), vehicle_.body.radius);
   autopilot = std::make_unique<bench::Autopilot>(world_->grid, vehicle_, ground, local_frame, 1, 1);
   restart();
@@ -78,17 +168,17 @@ Lockstep::~Lockstep() {
   channels->ports.collect();
 }
 
-void Lockstep::restart() {
+void Lockstep::restart(bool with_map) {
   loop_.reset();
   link_.reset();
-  line_ = std::make_unique<Line>();
+  line_ = make_line();
   void* memory = ::mmap(nullptr, sizeof(Channels), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
   channels.reset(new (memory) Channels);
   link_ = std::make_unique<firmware_bridge::AutopilotLink>(line_->open(), std::uint8_t{1},
                                                            firmware_bridge::Time(std::chrono::nanoseconds(now_ns_)));
   loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand);
-  channels->worlds.offer(world_);
+  if (with_map) channels->worlds.offer({world_, now_ns_});
   log.clear();
 }
 
@@ -102,20 +192,12 @@ void Lockstep::forget_pages() { ASSERT_EQ(::madvise(channels.get(), sizeof(Chann
 void Lockstep::hang_up() { line_.reset(); }
 
 void Lockstep::plug_in() {
-  line_ = std::make_unique<Line>();
+  line_ = make_line();
   channels->ports.offer(std::make_unique<const FreshPort>(line_->open()));
 }
 
 void Lockstep::hand_over(const std::vector<std::uint8_t>& bytes) {
-  if (!line_ || bytes.empty()) return;
-  int before = 0, now = 0;
-  ::ioctl(line_->own.get(), FIONREAD, &before);
-  line_->master.write(bytes);
-  for (int i = 0; i < 5000 && now < before + static_cast<int>(bytes.size()); ++i) {
-    ::ioctl(line_->own.get(), FIONREAD, &now);
-    if (i > 20) ::usleep(200);
-  }
-  ASSERT_EQ(now, before + static_cast<int>(bytes.size())) << "the pseudo-terminal did not deliver";
+  if (line_ && !bytes.empty()) line_->write(bytes);
 }
 
 void Lockstep::drain_log() {
@@ -128,14 +210,7 @@ void Lockstep::drain_log() {
 void Lockstep::read_wire(std::size_t expected) {
   wire_ = {};
   if (!line_ || unread) return;
-  std::vector<std::uint8_t> bytes;
-  for (int i = 0; i < 5000 && bytes.size() < expected; ++i) {
-    const auto more = line_->master.read();
-    bytes.insert(bytes.end(), more.begin(), more.end());
-    if (i > 20) ::usleep(200);
-  }
-  const auto surplus = line_->master.read();
-  bytes.insert(bytes.end(), surplus.begin(), surplus.end());
+  const std::vector<std::uint8_t> bytes = line_->read(expected);
   if (recorded) {
     ASSERT_EQ(bytes.size(), expected) << "what is on the wire is not what was logged";
   }
@@ -143,6 +218,7 @@ void Lockstep::read_wire(std::size_t expected) {
   parser_.feed(bytes, [&](const mavlink::Frame& f) {
     mavlink::decode_and_visit(f.id, f.payload, [&](const auto& message) {
       using M = std::decay_t<decltype(message)>;
+      expect_finite(message);
       if constexpr (std::is_same_v<M, SetPositionTargetLocalNed>) wire_.setpoints.push_back(message);
       if constexpr (std::is_same_v<M, CommandLong>) wire_.commands.push_back(message);
       if constexpr (std::is_same_v<M, mavlink::Heartbeat>) ++wire_.heartbeats;
@@ -151,9 +227,6 @@ void Lockstep::read_wire(std::size_t expected) {
         wire_.texts.emplace_back(message.text.data(), ::strnlen(message.text.data(), message.text.size()));
     });
   });
-  for (const auto& s : wire_.setpoints)
-    for (const float v : {s.x, s.y, s.z, s.vx, s.vy, s.vz, s.afx, s.afy, s.afz, s.yaw})
-      ASSERT_TRUE(std::isfinite(v)) << "a set-point that is not finite was sent";
   autopilot->receive(bytes, static_cast<double>(now_ns_) * 1e-9);
 }
 
@@ -171,7 +244,8 @@ const Wire& Lockstep::tick(int missed) {
     const auto q = autopilot->attitude();
     sample.q = {q.w(), q.x(), q.y(), q.z()};
     if (spoil) spoil(sample);
-    channels->odometry.write(sample);
+    const auto taken = reader ? reader(sample) : std::optional(sample);
+    if (taken) channels->odometry.write(*taken);
   }
   out.insert(out.end(), inject_.begin(), inject_.end());
   inject_.clear();
@@ -212,9 +286,13 @@ int Lockstep::ticks_until(track::Mode wanted, int most) {
   return -1;
 }
 
-std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops) {
+std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops, bool arms) {
   auto segment = std::make_unique<track::AcceptedSegment>();
   segment->id = ++last_segment_;
+  segment->closures = view().closures;
+  segment->epoch = view().epoch;
+  segment->arms = arms;
+  segment->seen_ns = now_ns_;
   const State start = view().state;
   segment->tube = reach::tube_over_field(world_->reach, start, view().command, commands, world_->bounds);
   if (with_stops)
@@ -229,16 +307,15 @@ std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops) {
 
 void Lockstep::take_off() {
   ticks(60);
-  channels->requests.push(track::Request::enable);
+  channels->orders.push({track::Request::enable});
   ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
   const auto& limits = vehicle_.limits;
   auto commands = plan::vertical_commands(view().state.p_W, kStart, limits.v_max, limits.a_max);
   const auto hold = sim::hold_commands(kStart, 2.0);
   commands.insert(commands.end(), hold.begin(), hold.end());
   for (auto& c : commands) c.yaw = view().command.yaw;
-  channels->arm = true;
   const auto count = static_cast<int>(commands.size());
-  offer(std::move(commands));
+  offer(std::move(commands), true, true);
   ticks(count + 5);
   ASSERT_EQ(mode(), track::Mode::tracking) << to_string(reason());
   ASSERT_TRUE(view().finished);

@@ -13,6 +13,10 @@
 
 namespace backwash::daemon::test {
 
+/// Shared by the tests of one program.
+std::shared_ptr<const plan::World> corridor();
+Vehicle vehicle_5in();
+
 using mavlink::CommandLong;
 using mavlink::SetPositionTargetLocalNed;
 
@@ -29,12 +33,17 @@ struct Wire {
 
 inline constexpr std::uint16_t kCommandLand = 21, kCommandMode = 176, kCommandArm = 400;
 
-/// The daemon's control loop and link on a real pseudo-terminal, the bench's emulated autopilot with its simulated
-/// vehicle at the other end, and time that moves by 20 ms a tick: nothing depends on the machine's speed. Each tick is
-/// watched: it must not allocate, lock, read the wall clock, or send anything that is not finite.
+/// What the daemon's link runs over: a pseudo-terminal, or two UDP sockets on the loopback, where a byte that was
+/// written has arrived and a tick takes a tenth of the time.
+enum class Medium { serial, udp };
+
+/// The daemon's control loop and link on a real port, the bench's emulated autopilot with its simulated vehicle at the
+/// other end, and time that moves by 20 ms a tick: nothing depends on the machine's speed. Each tick is watched: it
+/// must not allocate, lock, read the wall clock, or send anything that is not finite.
 class Lockstep {
  public:
-  explicit Lockstep(const bench::LocalFrame& frame = {0.7, Vec3(5, -3, 0.2)});
+  explicit Lockstep(const bench::LocalFrame& frame = {0.7, Vec3(5, -3, 0.2)}, Medium medium = Medium::serial,
+                    std::shared_ptr<const plan::World> world = corridor());
   ~Lockstep();
 
   /// One control period: 20 steps of physics, then one tick of the daemon.
@@ -47,8 +56,9 @@ class Lockstep {
   void take_off();
   /// Plans to the goal, offers it with its stops, and flies `seconds` of it.
   void start_route(double seconds);
-  /// Offers these commands from where the vehicle is now; returns the id.
-  std::uint64_t offer(std::vector<Setpoint> commands, bool with_stops = true);
+  /// Offers these commands from where the vehicle is now, planned in the present epoch; returns the id. `arms`: as a
+  /// take-off.
+  std::uint64_t offer(std::vector<Setpoint> commands, bool with_stops = true, bool arms = false);
   /// Commands of the planned route.
   const std::vector<Setpoint>& route() const { return route_; }
 
@@ -70,14 +80,16 @@ class Lockstep {
   }
 
   bool vio_on = true;
-  int vio_age_steps = 0;                                  ///< ms between a sample's reception and the tick that sees it
-  std::function<void(OdometrySample&)> spoil;             ///< changes each sample
+  int vio_age_steps = 0;                       ///< ms between a sample's reception and the tick that sees it
+  std::function<void(OdometrySample&)> spoil;  ///< changes each sample
+  /// What the DDS reader makes of a sample; nothing: it is refused there.
+  std::function<std::optional<OdometrySample>(const OdometrySample&)> reader;
   std::function<void(std::vector<std::uint8_t>&)> noise;  ///< changes what the flight controller sends
   bool recorded = true;                                   ///< the control thread's records are taken out of their ring
   bool unread = false;                                    ///< the flight controller does not read
   void hang_up();                                         ///< the line is unplugged
   void plug_in();                                         ///< a new line, handed over as the link watch does
-  void restart();                                         ///< the daemon is killed and started anew
+  void restart(bool with_map = true);                     ///< the daemon is killed and started anew
 
   std::vector<std::uint8_t> inject_;
   bench::LocalFrame local_frame;  ///< the controller's true one
@@ -98,13 +110,16 @@ class Lockstep {
 
  private:
   struct Line;
-  void connect();
+  struct Serial;
+  struct Datagrams;
+  std::unique_ptr<Line> make_line() const;
   void hand_over(const std::vector<std::uint8_t>& bytes);
   void drain_log();
   void read_wire(std::size_t expected);
 
   Vehicle vehicle_;
   sim::EmulatedVio vio_;
+  Medium medium_;
   std::unique_ptr<Line> line_;
   std::unique_ptr<firmware_bridge::AutopilotLink> link_;
   std::unique_ptr<ControlLoop> loop_;
@@ -123,9 +138,5 @@ struct InFlight : Lockstep {
     start_route(seconds);
   }
 };
-
-/// Shared by the tests of one program.
-std::shared_ptr<const plan::World> corridor();
-Vehicle vehicle_5in();
 
 }  // namespace backwash::daemon::test

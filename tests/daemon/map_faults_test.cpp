@@ -41,16 +41,18 @@ class MapFaults : public testing::Test {
   track::FlightTick flight_{kVehicle, 0};
   track::TickOutput out_;
   std::int64_t now_ns_ = 0;
-  Vec3 odom_{-2, 0, 1};  // of the vehicle, in the VIO's frame
+  Vec3 odom_{-2, 0, 1}, odom_before_ = odom_;  // of the vehicle, in the VIO's frame; a tick before
+  Vec3 velocity_ = Vec3::Zero();
   track::RigidShift map_from_odom_;
   std::uint32_t closures_ = 0;
   std::unique_ptr<track::AcceptedSegment> segment_;
-  bool map_moves_on_ = true;
+  bool map_moves_on_ = true, offboard_ = true;
+  std::int64_t seen_ns_ = 0;  // of the map that segments are verified in
 
   void SetUp() override {
     lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
     map::OccupancyGrid grid = map::builtin_scene("parallel-walls-4m", 0.2).value();
-    channels_->worlds.offer(plan::build_world(std::move(grid), Model{}, kVehicle));
+    channels_->worlds.offer({plan::build_world(std::move(grid), Model{}, kVehicle)});
   }
   Vec3 in_map() const { return map_from_odom_.point(odom_); }
 
@@ -64,14 +66,19 @@ class MapFaults : public testing::Test {
     in.segment = segment;
     in.odometry.emplace();
     in.odometry->received_ns = in.odometry->stamp_ns = now_ns_;
-    in.odometry->state.p_W = in_map();
+    // It is where it was told to be; its velocity comes to that by 10 m/s².
+    const Vec3 faster = (odom_ - odom_before_) / kControlPeriod - velocity_;
+    velocity_ += std::min(1.0, 10 * kControlPeriod / std::max(1e-9, faster.norm())) * faster;
+    odom_before_ = odom_;
+    in.odometry->state = {in_map(), map_from_odom_.rotate(velocity_)};
     in.odometry->q = {std::cos(map_from_odom_.yaw / 2), 0, 0, std::sin(map_from_odom_.yaw / 2)};
     in.odometry->closures = closures_;
     in.odometry->map_from_odom = map_from_odom_;
-    in.autopilot.armed = in.autopilot.offboard = true;
+    in.autopilot.armed = true;
+    in.autopilot.offboard = offboard_;
     in.autopilot.heartbeat_age = 0.1;
     in.autopilot.pose.emplace();
-    in.autopilot.pose->at_ns = now_ns_;
+    in.autopilot.pose->at_ns = in.autopilot.pose->attitude_at_ns = now_ns_;
     in.autopilot.pose->state.p_W = kLocalFromOdom.point(odom_);
     in.autopilot.pose->q = {std::cos(kLocalFromOdom.yaw / 2), 0, 0, std::sin(kLocalFromOdom.yaw / 2)};
     in.surroundings = lookout_->look(flight_, now_ns_);
@@ -91,6 +98,8 @@ class MapFaults : public testing::Test {
     segment_ = std::make_unique<track::AcceptedSegment>();
     segment_->id = 7;
     segment_->closures = closures_;
+    segment_->epoch = flight_.epoch();
+    segment_->seen_ns = seen_ns_;
     segment_->clearance = clearance;
     const Vec3 from = in_map();
     for (int k = 0; k <= kSteps; ++k) {
@@ -111,6 +120,7 @@ class MapFaults : public testing::Test {
   }
   void voxel_at(const Vec3& p) {
     NewVoxels voxels;
+    voxels.received_ns = now_ns_;
     voxels.edge = 0.2;
     voxels.count = 1;
     voxels.centers[0] = {p.x(), p.y(), p.z()};
@@ -138,7 +148,7 @@ TEST_F(MapFaults, Row14AnObstacleOnThePathIsDecidedOnInOneTickAndTheVehicleRests
     tick();
     EXPECT_LE(std::abs(out_.command.p_W.x() - last), kVehicle.limits.v_max * kControlPeriod);
     last = out_.command.p_W.x();
-    ASSERT_EQ(out_.supervisor.mode, Mode::hold);
+    ASSERT_EQ(out_.supervisor.mode, Mode::hold) << to_string(out_.supervisor.reason);
     EXPECT_TRUE(out_.inside.inside);
   }
   EXPECT_EQ(out_.command.v_W, Vec3::Zero());
@@ -185,6 +195,35 @@ TEST_F(MapFaults, Row14VoxelsThatCameBeforeTheSegmentAreHeldAgainstIt) {
   EXPECT_EQ(ticks_until(Mode::hold, 2), 1);
 }
 
+TEST_F(MapFaults, Row14EverythingSeenWhileThePlanWasMadeIsHeldAgainstItAndNothingThatThePlanKnew) {
+  for (const bool known : {false, true}) {
+    SetUp();
+    enable();
+    voxel_at({in_map().x() + 2, 0, 1});
+    seen_ns_ = known ? now_ns_ : now_ns_ - 1;
+    for (int n = 0; n < 5; ++n) {  // and then much that does not matter
+      tick();
+      voxel_at({in_map().x() + 2, 1.5, 1});
+    }
+    for (int n = 0; n < 3; ++n) tick();
+    fly();
+    EXPECT_EQ(ticks_until(Mode::hold, 5) <= 3, !known);
+    TearDown();
+    flight_ = track::FlightTick{kVehicle, 0};
+    odom_ = {-2, 0, 1};
+  }
+}
+
+TEST_F(MapFaults, Row14WhereMoreWasSeenThanIsKeptTheFlightCountsAsBlocked) {
+  enable();
+  for (int n = 0; n < 40; ++n) {
+    voxel_at({in_map().x() + 2, 1.5, 1});
+    tick();
+  }
+  fly();
+  EXPECT_EQ(ticks_until(Mode::hold, 2), 1);
+}
+
 TEST_F(MapFaults, Row14AFlightThatIsNotClearInTheNewestWorldIsBraked) {
   enable();
   fly();
@@ -203,7 +242,7 @@ TEST_F(MapFaults, Row9APoseOutsideTheMapIsHeld) {
   EXPECT_EQ(out_.supervisor.mode, Mode::tracking);
   // A map of another place comes.
   map::OccupancyGrid elsewhere({10, 10, 0}, 0.2, {5, 5, 5}, map::Cell::free);
-  channels_->worlds.offer(plan::build_world(std::move(elsewhere), Model{}, kVehicle));
+  channels_->worlds.offer({plan::build_world(std::move(elsewhere), Model{}, kVehicle)});
   EXPECT_EQ(ticks_until(Mode::hold, 3), 1);
   EXPECT_EQ(out_.supervisor.reason, Reason::outside_map);
 }
@@ -329,12 +368,60 @@ TEST_F(MapFaults, Row4AfterAClosureNewVoxelsMeetTheTrajectoryWhereItNowIs) {
   fly();
   for (int n = 0; n < 100; ++n) tick();
   closures_ = 2;
-  map_from_odom_ = {0, {0, 1, 0}};
+  map_from_odom_ = {0, {0, 0.9, 0}};
   tick();
   voxel_at({odom_.x() + 1, 0, 1});  // where the path was
   EXPECT_EQ(ticks_until(Mode::hold, 3), 4);
-  voxel_at({odom_.x() + 1, 1, 1});  // where it is
+  voxel_at({odom_.x() + 1, 0.9, 1});  // where it is
   EXPECT_EQ(ticks_until(Mode::hold, 3), 1);
+}
+
+TEST_F(MapFaults, Row4AnAbsurdLoopClosureIsNotFlown) {
+  const track::RigidShift absurd[] = {{0, {10, 0, 0}}, {1.57, {0, 0, 0}}, {0, {0, 1.05, 0}}, {0.18, {0, 0, 0}}};
+  for (const track::RigidShift& shift : absurd) {
+    closures_ = 1;
+    map_from_odom_ = {0.1, {0.5, -0.3, 0}};
+    flight_ = track::FlightTick(kVehicle, 0);
+    odom_ = odom_before_ = {-2, 0, 1};
+    enable();
+    fly();
+    for (int n = 0; n < 150; ++n) tick();
+    const track::RigidShift flown = map_from_odom_;
+    Setpoint last = out_.command_local;
+    // About the vehicle, so that a turn alone moves it nowhere.
+    map_from_odom_ = track::RigidShift{0, in_map()} * shift * track::RigidShift{0, -in_map()} * map_from_odom_;
+    closures_ = 2;
+    EXPECT_EQ(tick().supervisor.mode, Mode::hold);
+    EXPECT_EQ(out_.supervisor.reason, Reason::closure_refused);
+    EXPECT_EQ(flight_.tracker().closures(), 1u);
+    for (int n = 0; n < 200; ++n) {
+      EXPECT_LE((out_.command_local.p_W - last.p_W).norm(), kVehicle.limits.v_max * kControlPeriod);
+      EXPECT_LT((flight_.odometry()->state.p_W - flown.point(odom_before_)).norm(), 1e-9)
+          << "in the map that is flown in";
+      EXPECT_EQ(out_.supervisor.mode, Mode::hold);
+      last = out_.command_local;
+      tick();
+    }
+    EXPECT_EQ(out_.command.v_W, Vec3::Zero());
+    // Neither a segment of the map that is flown in nor one of the new map moves it.
+    for (const std::uint32_t of : {1u, 2u}) {
+      auto next = *segment_;
+      next.id = 8 + of;
+      next.closures = of;
+      next.epoch = flight_.epoch();
+      for (auto& set : next.tube) set.center.p_W += flight_.odometry()->state.p_W - segment_->tube.front().center.p_W;
+      tick(track::Request::none, &next);
+      EXPECT_TRUE(out_.refused) << of;
+    }
+    // In other hands it is where the closure says.
+    offboard_ = false;
+    tick();
+    tick();
+    offboard_ = true;
+    EXPECT_EQ(out_.supervisor.mode, Mode::passive);
+    EXPECT_EQ(flight_.tracker().closures(), 2u);
+    EXPECT_LT((flight_.odometry()->state.p_W - in_map()).norm(), 1e-6);
+  }
 }
 
 }  // namespace

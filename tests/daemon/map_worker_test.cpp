@@ -5,6 +5,7 @@
 #include <malloc.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -23,7 +24,7 @@ class MapWorkerTest : public testing::Test {
   MapSettings settings_;
   MapWorker worker_{*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_};
   map::OccupancyGrid grid_ = map::builtin_scene("parallel-walls-2m", 0.2).value();
-  const Worlds::Pointer* held_ = nullptr;
+  const Snapshot* held_ = nullptr;
 
   ~MapWorkerTest() override {
     channels_->worlds.control.give_back(held_);
@@ -42,7 +43,7 @@ class MapWorkerTest : public testing::Test {
   const plan::World* world() {
     if (const auto* newest = channels_->worlds.control.take())
       channels_->worlds.control.give_back(std::exchange(held_, newest));
-    return held_ ? held_->get() : nullptr;
+    return held_ ? held_->world.get() : nullptr;
   }
   void scan(const std::vector<Vec3>& points, const Vec3& sensor, std::int64_t received_ns) {
     channels_->scans.push(new Scan{points, sensor, received_ns});
@@ -60,12 +61,34 @@ TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {
   for (auto* to : {&channels_->worlds.mission, &channels_->worlds.planner, &channels_->worlds.reader}) {
     const auto* taken = to->take();
     ASSERT_TRUE(taken);
-    EXPECT_EQ(taken->get(), world());
+    EXPECT_EQ(taken->world.get(), world());
     to->give_back(taken);
   }
 }
 
 // faults.md rows 10 and 12.
+// Row 46: 5 Hz of 40 MB of anything must not fill the disk.
+TEST_F(MapWorkerTest, ARejectedMapCostsTheRawLogAFewBytesThatTellItApart) {
+  recorder_.drain(*channels_);
+  const auto before = std::filesystem::file_size(log_);
+  for (const int fill : {1, 1, 2}) send(std::vector<std::int8_t>(1 << 20, static_cast<std::int8_t>(fill)), 0.1);
+  EXPECT_EQ(channels_->maps_rejected, 3u);
+  recorder_.drain(*channels_);
+  EXPECT_LT(std::filesystem::file_size(log_) - before, 300u);
+  std::vector<study::RejectedMap> seen;
+  const auto log = study::read_raw_log(log_);
+  ASSERT_TRUE(log);
+  for (const auto& record : log->records)
+    if (record.header.kind == study::RecordKind::map) {
+      ASSERT_EQ(record.bytes.size(), sizeof(study::MapRecord) + sizeof(study::RejectedMap));
+      std::memcpy(&seen.emplace_back(), record.bytes.data() + sizeof(study::MapRecord), sizeof(study::RejectedMap));
+    }
+  ASSERT_EQ(seen.size(), 3u);
+  EXPECT_EQ(seen[0].bytes, 1u << 20);
+  EXPECT_EQ(seen[0].hash, seen[1].hash);
+  EXPECT_NE(seen[0].hash, seen[2].hash);
+}
+
 TEST_F(MapWorkerTest, ACorruptEmptyOrForeignMapIsRejectedWholeAndTheOldWorldStays) {
   send(grid_);
   const auto* before = world();
@@ -105,6 +128,26 @@ TEST_F(MapWorkerTest, AHugeMapIsRefusedAndMemoryGrowsByNothing) {
   EXPECT_EQ(channels_->maps_rejected, 1u);
   EXPECT_EQ(world(), before);
   EXPECT_LT(resident_kib() - resident, 1024);
+}
+
+// faults.md row 11: of a snapshot, 115 bytes a voxel.
+TEST_F(MapWorkerTest, TheCapIsThatOfTheSnapshotToAVoxel) {
+  MapSettings settings;
+  settings.max_mib = 1;
+  MapWorker worker(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings);
+  const auto offer = [&](int edge) {
+    const map::OccupancyGrid grid({0, 0, 0}, 0.2, {edge, 20, 20}, map::Cell::free);
+    channels_->maps.offer(
+        std::make_unique<const MapMessage>(MapMessage{map::encode_octomap(grid), 0.2, true, "OcTree", 1}));
+    EXPECT_TRUE(worker.step());
+  };
+  offer(23);  // 9,200 voxels of 9,118
+  EXPECT_EQ(channels_->maps_rejected, 1u);
+  EXPECT_EQ(world(), nullptr);
+  offer(22);  // 8,800
+  EXPECT_EQ(channels_->maps_rejected, 1u);
+  ASSERT_TRUE(world());
+  EXPECT_EQ(world()->grid.size(), Index3(22, 20, 20));
 }
 
 TEST_F(MapWorkerTest, AScanChangesTheWorldWhereItSaysSomethingNew) {

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Row 35 of faults.md: a full disk and a log directory that is gone cost records, are told, and nothing else.
+// Rows 35 and 45 of faults.md: a full disk, one that hangs and a log directory that is gone cost records, are told, and
+// nothing else; what an earlier flight has recorded is never touched.
 #include "services/backwashd/recorder.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <signal.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "core/study/raw_log.hpp"
+#include "tests/daemon/traps.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -91,6 +97,120 @@ TEST_F(Row35Recorder, AFileThatCannotBeMadeAtStartIsAConfigurationErrorThatNames
   } catch (const std::runtime_error& e) {
     EXPECT_NE(std::string(e.what()).find(folder_ + "/nowhere/flight.bwlog"), std::string::npos);
   }
+}
+
+// A file system without room, not a limit of the process.
+TEST_F(Row35Recorder, ASmallDiskThatIsFullLosesRecordsUntilSomethingIsDeleted) {
+  if (::unshare(CLONE_NEWNS) != 0 || ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+      ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=128k") != 0)
+    GTEST_SKIP() << "a file system cannot be mounted here: " << std::strerror(errno);
+  {
+    Recorder recorder(path_);
+    put(10);
+    recorder.drain(*channels_);
+    std::ofstream(folder_ + "/other") << std::string(200'000, 'x');  // takes all that is left
+    for (int n = 0; n < 5; ++n) {
+      put(1000);
+      recorder.drain(*channels_);
+    }
+    EXPECT_EQ(recorder.lost(), 5000u);
+    std::filesystem::remove(folder_ + "/other");
+    put(20);
+    recorder.drain(*channels_);
+    EXPECT_EQ(recorder.lost(), 5000u);
+    EXPECT_EQ(read(), std::pair(std::size_t{10 + 1 + 20}, std::uint64_t{5000}));
+  }
+  ::umount(folder_.c_str());
+}
+
+TEST_F(Row35Recorder, ADiskThatHangsDelaysNobodyAndHoldsNoMoreThanItsShareOfMemory) {
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns write()";
+  constexpr std::size_t kMiB = 1u << 20;
+  Recorder recorder(path_);
+  std::atomic<bool> end{false};
+  std::thread thread([&] { recorder.run(*channels_, end); });
+  backwash::test::hang_disk(true);
+  put(10);
+  while (backwash::test::hanging_writes() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  const std::vector<std::uint8_t> map(kMiB);
+  for (int n = 0; n < 100; ++n) recorder.append(study::RecordKind::map, map);  // would wait for ever
+  put(3000);                                                                   // the ring holds 2048
+  EXPECT_GE(recorder.lost(), 100 - Recorder::kMostPending / kMiB);
+  EXPECT_LE(recorder.lost(), 100 - Recorder::kMostPending / kMiB + 1);
+  EXPECT_GE(channels_->control_log.lost(), 900u);
+  backwash::test::hang_disk(false);
+  end = true;
+  thread.join();
+  const auto lost = recorder.lost() + channels_->control_log.lost();
+  const auto [records, told] = read();
+  EXPECT_EQ(told, lost);
+  EXPECT_EQ(records + lost, 10u + 100 + 3000 + 1);  // one says what was lost
+}
+
+TEST_F(Row35Recorder, EachChangeOfTheModeIsPutOnTheDiskByTheRecordersThread) {
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns fdatasync()";
+  Recorder recorder(path_);
+  const auto tick = [&](std::uint32_t mode) {
+    study::TickRecord row{};
+    row.mode = mode;
+    ControlRecord r;
+    r.header = {now_ns(), study::RecordKind::tick, sizeof row};
+    std::memcpy(r.bytes.data(), &row, sizeof row);
+    channels_->control_log.push(r);
+    recorder.drain(*channels_);
+    return backwash::test::disk_syncs();
+  };
+  const int before = backwash::test::disk_syncs();
+  EXPECT_EQ(tick(0), before);
+  EXPECT_EQ(tick(2), before + 1);
+  EXPECT_EQ(tick(2), before + 1);
+  EXPECT_EQ(tick(5), before + 2);
+}
+
+std::string content(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST_F(Row35Recorder, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) {
+  for (const char* file : {"flight-7.bwlog", "flight-x.bwlog", "flight-07x.bwlog", "flighty-9.bwlog"})
+    std::ofstream(folder_ + "/" + file) << file;
+  EXPECT_EQ(Recorder(path_).path(), path_);
+  std::ofstream(path_) << "an earlier flight";
+  EXPECT_EQ(Recorder(path_).path(), folder_ + "/flight-8.bwlog");
+  EXPECT_EQ(Recorder(path_).path(), folder_ + "/flight-9.bwlog");
+  EXPECT_EQ(content(path_), "an earlier flight");
+  EXPECT_EQ(content(folder_ + "/flight-7.bwlog"), "flight-7.bwlog");
+  EXPECT_EQ(content(folder_ + "/flight-8.bwlog"), study::kRawLogMagic);
+  struct stat status {};
+  const mode_t mask = ::umask(0);
+  const Recorder open_to_all(path_);
+  ::umask(mask);
+  ASSERT_EQ(::stat(open_to_all.path().c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0640u);
+}
+
+TEST_F(Row35Recorder, ALinkInThePlaceOfTheLogIsNotFollowed) {
+  std::ofstream(folder_ + "/other") << "of somebody else";
+  std::filesystem::create_symlink(folder_ + "/other", path_);
+  std::filesystem::create_symlink(folder_ + "/nowhere", folder_ + "/flight-2.bwlog");
+  EXPECT_EQ(Recorder(path_).path(), folder_ + "/flight-3.bwlog");
+  EXPECT_EQ(content(folder_ + "/other"), "of somebody else");
+  EXPECT_FALSE(std::filesystem::exists(folder_ + "/nowhere"));
+}
+
+TEST_F(Row35Recorder, AFileThatWasReplacedInFlightIsLeftAndTheNextOneMade) {
+  Recorder recorder(path_);
+  put(5);
+  recorder.drain(*channels_);
+  std::filesystem::remove(path_);
+  std::ofstream(path_) << "of somebody else";
+  std::this_thread::sleep_for(std::chrono::milliseconds(510));
+  put(4);
+  recorder.drain(*channels_);
+  EXPECT_EQ(content(path_), "of somebody else");
+  EXPECT_EQ(recorder.path(), folder_ + "/flight-2.bwlog");
+  EXPECT_EQ(study::read_raw_log(recorder.path()).value().records.size(), 4u);
 }
 
 }  // namespace

@@ -4,8 +4,11 @@
 #include <dlfcn.h>
 #include <pthread.h>
 #include <semaphore.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/time.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
@@ -37,10 +40,24 @@ namespace {
 thread_local int depth = 0;
 std::atomic<long> scopes{0};
 thread_local Trapped counted;
+std::atomic<bool> disk_hangs{false};
+std::atomic<int> writes_hanging{0}, syncs{0}, lock_flags{0};
 
 #if BACKWASH_TRAPS
 void note(long Trapped::*kind) {
   if (depth > 0) ++(counted.*kind);
+}
+
+void count_sync() { ++syncs; }
+void note_lock(int flags) { lock_flags = flags; }
+
+// As a disk that does not answer does it: without an end, and for files alone.
+void wait_for_disk(int fd) {
+  struct stat status {};
+  if (!disk_hangs || ::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) return;
+  ++writes_hanging;
+  while (disk_hangs) ::usleep(1000);
+  --writes_hanging;
 }
 
 // The C library's own function; looked up outside of any watched scope, at the program's start.
@@ -68,6 +85,10 @@ Watched::~Watched() {
 }
 long watched_scopes() { return scopes; }
 Trapped trapped() { return counted; }
+void hang_disk(bool hangs) { disk_hangs = hangs; }
+int hanging_writes() { return writes_hanging; }
+int disk_syncs() { return syncs; }
+int locked_with() { return lock_flags; }
 bool traps_work() { return BACKWASH_TRAPS != 0; }
 
 }  // namespace backwash::test
@@ -141,6 +162,19 @@ int gettimeofday(timeval* t, void* zone) noexcept {
 time_t time(time_t* t) noexcept {
   static auto* const real = next<time_t(time_t*)>("time");
   return note(&Trapped::wall_clock), real(t);
+}
+
+ssize_t write(int fd, const void* bytes, std::size_t size) {
+  backwash::test::wait_for_disk(fd);
+  return ::syscall(SYS_write, fd, bytes, size);
+}
+int mlockall(int flags) noexcept {
+  backwash::test::note_lock(flags);
+  return static_cast<int>(::syscall(SYS_mlockall, flags));
+}
+int fdatasync(int fd) {
+  backwash::test::count_sync();
+  return static_cast<int>(::syscall(SYS_fdatasync, fd));
 }
 
 }  // extern "C"

@@ -25,6 +25,13 @@ class Watched {
 long watched_scopes();
 /// All that was counted on this thread.
 Trapped trapped();
+/// A disk that does not answer: while true, write() to a regular file waits.
+void hang_disk(bool hangs);
+/// Writes that wait now, and fdatasync() calls so far.
+int hanging_writes();
+int disk_syncs();
+/// Flags of the last mlockall(), 0 before the first.
+int locked_with();
 /// False in builds whose sanitizer owns these functions.
 bool traps_work();
 

@@ -9,6 +9,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/../../services/bench/session.sh"
 build=$1 out=$2 seconds=$3
 : >"$out/soak.log"
 start_bench "$build/services" "$out/soak.log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --duration "$((seconds + 120))"
+rm -f "$out/soak.bwlog" # of an earlier run; the daemon itself would leave it and take the next name
 start_daemon builtin:quad-5in "$out/soak.bwlog"
 enable
 ctl takeoff --height 1.2 --wait

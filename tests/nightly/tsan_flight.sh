@@ -12,6 +12,7 @@ build=$1 out=$2
 : >"$out/tsan.log"
 start_bench "$build/services" "$out/tsan.log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --crate 1.3,0,1.2 \
   --crate-edge 0.4 --drift 0,0.15,0 --event-x -0.8
+rm -f "$out/tsan.bwlog" # of an earlier run; the daemon itself would leave it and take the next name
 start_daemon builtin:quad-5in "$out/tsan.bwlog"
 enable
 ctl takeoff --height 1.2 --wait

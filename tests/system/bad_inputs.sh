@@ -12,7 +12,7 @@ failed=0
 refused() {
   local code=$1 words=$2 line
   shift 2
-  "$backwash" "$@" >stdout 2>stderr
+  timeout 20 "$backwash" "$@" >stdout 2>stderr
   local got=$?
   line=$(cat stderr)
   if [[ $got != "$code" || $(wc -l <stderr) != 1 || $line != "backwash${1:+ }${1:-}:"* || $line != *"$words"* ]]; then
@@ -36,6 +36,7 @@ printf 'x_m,y_m\n0,0\n' >no_z_points.csv
 printf 'start = [1, 0, 1]\n[[hover]]\np = [2, 0, 1]\ndwel = 3\n' >spec_key.toml
 printf 'start = [1, 1.5, 1]\n[[hover]]\np = [5, 1.5, 1]\ndwell = 3\n' >spec_wall.toml
 touch exists
+mkfifo fifo
 # An OctoMap of two free cubes, from (-1.6, -1.6, -1.6) to the origin and from there to (1.6, 1.6, 1.6); the rest of its
 # extent is unknown. Two bytes a node, two bits a child: 00 unknown, 10 free, 11 inner.
 {
@@ -61,6 +62,16 @@ refused 66 "apartment" fly --map builtin:no-such-world
 refused 66 "absent.toml" fly --vehicle absent.toml
 refused 66 "absent.csv" reach --vehicle $quad --track absent.csv
 refused 66 "absent.toml" simulate --map builtin:narrow-gap --vehicle $quad --flight absent.toml --out log.csv
+# what would never end: a FIFO without a writer, a device without an end
+refused 66 "fifo: is a FIFO; needs an OctoMap file" fly --map fifo
+refused 66 "/dev/zero: is a device; needs an OctoMap file" fly --map /dev/zero
+refused 66 "fifo: is a FIFO; needs the path of a TOML file" fly --model fifo
+refused 66 "/dev/zero: is a device; needs the path of a TOML file" fly --vehicle /dev/zero
+refused 66 "fifo:1: is a FIFO; needs a readable CSV file" reach --vehicle $quad --track fifo
+refused 66 "/dev/zero:1: is a device; needs a readable CSV file" field --map builtin:narrow-gap --model $quad --points /dev/zero
+refused 66 "fifo:1: is a FIFO; needs a flight specification" simulate --map builtin:narrow-gap --vehicle $quad --flight fifo --out log.csv
+refused 66 "/dev/zero:1: is a device; needs a raw log" replay --log /dev/zero
+refused 66 "fifo:1: is a FIFO; needs a raw log" replay --log fifo
 # bad data
 refused 65 "corrupt.bt" fly --map corrupt.bt
 refused 65 "gap.csv:4:" reach --vehicle $quad --track gap.csv

@@ -21,15 +21,22 @@ if [[ $fault == kill ]]; then
   killed=$(python3 -c 'import time; print(time.monotonic())')
   wait "$daemon_pid" 2>/dev/null || true
   sleep 0.2
-  start_daemon builtin:quad-5in "$work/second.bwlog"
+  cp "$work/flight.bwlog" "$work/killed.bwlog"
+  start_daemon builtin:quad-5in "$work/flight.bwlog" # the same configuration, as a watchdog starts it
 fi
 sleep 8
+if [[ $fault == kill ]]; then
+  enabled=$(python3 -c 'import time; print(time.monotonic())')
+  enable
+  sleep 0.5
+fi
 stop
+[[ $fault != kill ]] || cmp "$work/flight.bwlog" "$work/killed.bwlog" || die 'the restart touched the last log'
 
-PYTHONPATH=$source_dir/tests/system python3 - "$work" "$fault" "${killed:-0}" <<'PYTHON'
+PYTHONPATH=$source_dir/tests/system python3 - "$work" "$fault" "${killed:-0}" "${enabled:-0}" <<'PYTHON'
 import csv, sys
 import raw_log
-work, fault, killed = sys.argv[1], sys.argv[2], float(sys.argv[3])
+work, fault, killed, enabled = sys.argv[1], sys.argv[2], float(sys.argv[3]), float(sys.argv[4])
 wire = list(raw_log.wire(work + "/wire.csv"))
 truth = list(csv.DictReader(open(work + "/truth.csv")))
 landed = [float(r["t_s"]) for r in truth if r["armed"] == "0" and float(r["t_s"]) > wire[0][0] + 5]
@@ -64,7 +71,8 @@ else:
           f"{sum(t > killed + 0.05 for t, _, _ in wire)} frames since")
     assert armed_after[-1] - killed > 1, "the vehicle was not in the air"
     assert not [t for t, i, _ in wire if killed + 0.05 < t < armed_after[-1] - 0.1], "frames to an armed vehicle after the restart"
-    second = list(raw_log.ticks(work + "/second.bwlog"))
-    assert second and {t.mode for t in second} == {"passive"}, "the restarted daemon took control by itself"
-    assert not [t for t, i, _ in wire if i == raw_log.SETPOINT and t > killed + 0.05]
+    second = list(raw_log.ticks(work + "/flight-2.bwlog"))
+    assert {t.mode for t in second if t.t < enabled} == {"passive"}, "the restarted daemon took control by itself"
+    assert not [t for t, i, _ in wire if i == raw_log.SETPOINT and killed + 0.05 < t < enabled]
+    assert [t for t, i, _ in wire if i == raw_log.SETPOINT and t > enabled], "an operator cannot enable it again"
 PYTHON

@@ -4,8 +4,8 @@ import collections
 import csv
 import struct
 
-MAGIC = b"backwash raw log 2\n"
-ODOMETRY, FRAME_IN, FRAME_OUT, TICK, SCAN, WORLD = 2, 6, 7, 8, 14, 15
+MAGIC = b"backwash raw log 3\n"
+ODOMETRY, FRAME_IN, FRAME_OUT, TICK, LOST, SCAN, WORLD, FAILURE = 2, 6, 7, 8, 13, 14, 15, 16
 MODES = ["passive", "enabling", "tracking", "hold", "land", "quiet"]
 SETPOINT, HEARTBEAT, COMMAND = 84, 0, 76
 

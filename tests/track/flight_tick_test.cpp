@@ -40,7 +40,8 @@ AcceptedSegment straight() {
   return s;
 }
 
-/// A perfect vehicle that follows set-points: its pose is the last command, in both frames.
+/// A vehicle that follows set-points: its place is the last command's, in both frames, and its velocity comes to the
+/// command's by 10 m/s².
 class Flight {
  public:
   Flight() : tick_(vehicle(), 0.15) {
@@ -50,6 +51,7 @@ class Flight {
     in.autopilot.offboard = in.autopilot.armed = true;
     step();
     EXPECT_EQ(out.supervisor.mode, Mode::tracking);
+    segment.epoch = tick_.epoch();
     in.segment = &segment;
     step();
     EXPECT_TRUE(out.accepted);
@@ -57,12 +59,14 @@ class Flight {
   }
   const TickOutput& step() {
     in.now_ns += 20'000'000;
-    if (in.odometry) in.odometry->state = {out.command.p_W, out.command.v_W};
     if (!in.odometry) in.odometry = OdometrySample{};
+    const Vec3 faster = out.command.v_W - in.odometry->state.v_W;
+    in.odometry->state.v_W += std::min(1.0, 10 * kControlPeriod / std::max(1e-9, faster.norm())) * faster;
+    in.odometry->state.p_W = out.command.p_W;
     in.odometry->received_ns = in.odometry->stamp_ns = in.now_ns;
     in.autopilot.heartbeat_age = 0.1;
     if (tick_.mode() == Mode::passive) in.odometry->state = {{0, 0, 1}, Vec3::Zero()};
-    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, in.odometry->state, {1, 0, 0, 0}};
+    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, in.odometry->state, {1, 0, 0, 0}, in.now_ns};
     out = tick_.step(in);
     in.request = Request::none;
     in.segment = nullptr;
@@ -72,6 +76,7 @@ class Flight {
   TickInput in;
   TickOutput out;
   const Tracker& tracker() const { return tick_.tracker(); }
+  const Epoch& epoch() const { return tick_.epoch(); }
 
  private:
   FlightTick tick_;
@@ -140,7 +145,9 @@ AcceptedSegment around(const Flight& flight) {
   on.stops.clear();
   for (std::size_t k = stop.branch; k < on.commands.size(); ++k) {
     on.commands[k] = k < on.branch ? stop.commands[k - stop.branch] : on.commands[on.branch - 1];
-    if (k >= on.branch) on.commands[k].p_W.y() += 0.001 * static_cast<double>(k - on.branch);
+    if (k < on.branch) continue;
+    on.commands[k].p_W.y() += 0.001 * static_cast<double>(k - on.branch);
+    on.commands[k].v_W = {0, 0.05, 0};
   }
   on.tube = tube_of(on.commands);
   return on;
@@ -204,6 +211,78 @@ TEST(FlightTick, AnOperatorsStopWinsOverAFlightThatWouldGoOn) {
   }
 }
 
+// Row 39.
+TEST(FlightTick, ASegmentOfAnotherEpochIsRefusedInEveryMode) {
+  for (const Epoch wrong : {Epoch{1, 0}, Epoch{0, 1}, Epoch{0, static_cast<std::uint64_t>(-1)}}) {
+    Flight flight;
+    AcceptedSegment on = flight.segment;
+    on.id = 99;
+    on.continues = flight.segment.id;
+    on.branch = 130;
+    flight.in.segment = &on;
+    on.epoch = {flight.epoch().order + wrong.order, flight.epoch().lapse + wrong.lapse};
+    flight.step();
+    EXPECT_TRUE(flight.out.refused);
+    on.epoch = flight.epoch();
+    flight.in.segment = &on;
+    flight.step();
+    EXPECT_TRUE(flight.out.accepted);
+  }
+}
+
+TEST(FlightTick, EveryHoldButTheOneForAnObstacleEndsWhatWasPlanned) {
+  Flight flight;
+  const Epoch before = flight.epoch();
+  flight.in.surroundings.tube_blocked = true;
+  flight.step();
+  EXPECT_EQ(flight.out.supervisor.reason, Reason::obstacle_ahead);
+  EXPECT_EQ(flight.epoch(), before);
+  flight.in.surroundings.tube_blocked = false;
+  flight.in.request = Request::stop;
+  flight.in.order = 5;
+  flight.step();
+  EXPECT_EQ(flight.epoch(), (Epoch{5, before.lapse + 1}));
+  Flight late;
+  late.in.surroundings.late = true;
+  late.step();
+  EXPECT_EQ(late.out.supervisor.mode, Mode::hold);
+  EXPECT_EQ(late.epoch().lapse, before.lapse + 1);
+}
+
+// Row 40: the motors start in the tick that accepts a take-off, and on the ground a stop stops them.
+TEST(FlightTick, ArmsInTheTickThatAcceptsATakeoffAloneAndDisarmsOnTheGroundAloneAfterAStop) {
+  for (const bool arms : {true, false}) {
+    for (const bool stands : {true, false}) {
+      Flight flight;
+      flight.in.autopilot.armed = false;
+      flight.step();  // disarmed: passive
+      flight.in.request = Request::enable;
+      flight.step();
+      flight.step();
+      ASSERT_EQ(flight.out.supervisor.mode, Mode::tracking);
+      AcceptedSegment up = flight.segment;
+      up.epoch = flight.epoch();
+      up.arms = arms;
+      const Vec3 from = flight.out.command.p_W - up.commands[0].p_W;
+      for (auto& command : up.commands) command.p_W += from;
+      up.tube = tube_of(up.commands);
+      flight.in.segment = &up;
+      flight.step();
+      ASSERT_TRUE(flight.out.accepted);
+      EXPECT_EQ(flight.out.arm, arms);
+      for (int n = 0; n < 20; ++n) EXPECT_FALSE(flight.step().arm);
+      flight.in.autopilot.armed = true;
+      flight.in.autopilot.landed = stands;
+      flight.in.request = Request::stop;
+      int disarmed = flight.step().disarm;
+      EXPECT_EQ(flight.out.supervisor.mode, Mode::hold) << to_string(flight.out.supervisor.reason);
+      for (int n = 0; n < 200; ++n) disarmed += flight.step().disarm;
+      EXPECT_EQ(disarmed > 0, stands);
+      EXPECT_LE(disarmed, 7);
+    }
+  }
+}
+
 // Rows 9, 10 and 13, as far as the tick decides them.
 TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
   for (const bool outside : {true, false}) {
@@ -216,6 +295,7 @@ TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
   FlightTick tick(vehicle(), 0);
   TickInput in;
   in.autopilot.heartbeat_age = 0;
+  in.autopilot.pose = AutopilotFacts::Pose{};
   in.odometry = OdometrySample{};
   in.request = Request::enable;
   in.surroundings.missing = true;
@@ -228,9 +308,10 @@ TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
 
 TEST(FlightTick, GivesEverySegmentBackExactlyOnce) {
   Flight flight;
-  const AcceptedSegment elsewhere = [] {
+  const AcceptedSegment elsewhere = [&flight] {
     auto s = straight();
     s.id = 2;
+    s.epoch = flight.epoch();
     for (auto& set : s.tube) set.center.p_W.y() += 5;
     return s;
   }();

@@ -32,7 +32,7 @@ TEST(FrameAlignment, FindsYawAndTranslationAcrossTheWrap) {
       const FramePose map{{2 + noise(rng), 3 + noise(rng), 1 + noise(rng)}, 3.0 + noise(rng)};
       FramePose local = truth.local(map);
       local.p += Vec3(noise(rng), noise(rng), noise(rng));
-      alignment.update(map, local, true);
+      alignment.update(map, local, kControlPeriod, true);
     }
     ASSERT_TRUE(alignment.aligned()) << yaw;
     const Setpoint sent = alignment.to_local({{2.5, 3.5, 1.2}, {1, 2, 0.5}, {0.1, 0.2, 0.3}, 0.25});
@@ -46,20 +46,80 @@ TEST(FrameAlignment, NoticesWithinAFewTicksThatTheControllerReset) {
   const Frames truth(0.5, {1, 2, 3});
   FrameAlignment alignment;
   const FramePose map{{1, 1, 1}, 0};
-  for (int i = 0; i < 100; ++i) alignment.update(map, truth.local(map), true);
+  for (int i = 0; i < 100; ++i) alignment.update(map, truth.local(map), kControlPeriod, true);
   ASSERT_TRUE(alignment.aligned());
   FramePose jumped = truth.local(map);
   jumped.p.x() += 0.8;
   int ticks = 0;
-  while (alignment.aligned() && ticks < 50) alignment.update(map, jumped, false), ++ticks;
+  while (alignment.aligned() && ticks < 50) alignment.update(map, jumped, kControlPeriod, false), ++ticks;
   EXPECT_LE(ticks, 2);
 }
 
 TEST(FrameAlignment, DoesNotAlignFramesThatKeepTurning) {
   FrameAlignment alignment;
   for (int i = 0; i < 300; ++i)
-    alignment.update({{1, 1, 1}, 0}, Frames(0.02 * i, {0, 0, 0}).local({{1, 1, 1}, 0}), true);
+    alignment.update({{1, 1, 1}, 0}, Frames(0.02 * i, {0, 0, 0}).local({{1, 1, 1}, 0}), kControlPeriod, true);
   EXPECT_FALSE(alignment.aligned());
+}
+
+// What the controller's own samples say of a reset: jumps against its own velocity and gyros do, its motion does not.
+TEST(FrameAlignment, AControllersEstimateJumpedOnlyIfItsOwnMotionDoesNotExplainIt) {
+  FrameAlignment alignment;
+  const FramePose map{};
+  FramePose local{{1, 2, 3}, 0.5, {1.4, 0, 0}};
+  local.yaw_rate = 1;
+  alignment.update(map, local, kControlPeriod, true);
+  for (const double dt : {0.02, 0.04, 0.08}) {
+    FramePose next = local;
+    next.p.x() += 1.4 * dt;
+    next.yaw += dt;
+    EXPECT_FALSE(alignment.local_jumped(next, dt));
+    FramePose moved = next;
+    moved.p.y() += 0.11;
+    EXPECT_TRUE(alignment.local_jumped(moved, dt));
+    moved.p.y() -= 0.02;
+    EXPECT_FALSE(alignment.local_jumped(moved, dt)) << "a pair apart by so little is no reset";
+    FramePose turned = next;
+    turned.yaw += 0.11;
+    EXPECT_TRUE(alignment.local_jumped(turned, dt));
+    turned.yaw -= 0.02;
+    EXPECT_FALSE(alignment.local_jumped(turned, dt));
+  }
+  EXPECT_FALSE(alignment.local_jumped({{9, 9, 9}, 0}, 0.2)) << "nothing is carried on over a gap";
+}
+
+// Two frames that turn together, as with an autopilot that takes its heading from the odometry: the gyros tell.
+TEST(FrameAlignment, FramesThatTurnTogetherAreAlignedOnlyAsFarAsTheGyrosTurn) {
+  const auto ticks_aligned = [](double odometry, double gyros) {  // rad/s
+    FrameAlignment alignment;
+    for (int i = 0; i < 50; ++i) alignment.update({}, {}, kControlPeriod, true);
+    int n = 0;
+    for (; n < 1000 && alignment.aligned(); ++n) {
+      FramePose map{};
+      map.yaw = wrap_angle(odometry * n * kControlPeriod);
+      FramePose local = map;
+      local.yaw_rate = gyros;
+      alignment.update(map, local, kControlPeriod, false);
+    }
+    return n;
+  };
+  EXPECT_EQ(ticks_aligned(1, 1), 1000);
+  EXPECT_EQ(ticks_aligned(-3, -3), 1000);
+  EXPECT_EQ(ticks_aligned(0.01, 0), 1000) << "0.6°/s";
+  EXPECT_LT(ticks_aligned(0.1, 0), 50);
+  EXPECT_LT(ticks_aligned(0, 0.1), 50);
+  EXPECT_LE(ticks_aligned(3.6, 0), 2);
+}
+
+TEST(FrameAlignment, IsNotAlignedWhileTheAttitudesAreTilted) {
+  FrameAlignment alignment;
+  for (int i = 0; i < 50; ++i) alignment.update({}, {}, kControlPeriod, true);
+  ASSERT_TRUE(alignment.aligned());
+  FramePose tilted{};
+  tilted.up_B = Eigen::AngleAxisd(0.17, Vec3(1, 1, 0).normalized()) * Vec3::UnitZ();
+  int ticks = 0;
+  while (alignment.aligned() && ticks < 50) alignment.update(tilted, {}, kControlPeriod, false), ++ticks;
+  EXPECT_LE(ticks, 8);
 }
 
 }  // namespace

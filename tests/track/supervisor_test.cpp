@@ -177,6 +177,29 @@ TEST(Supervisor, LandsOnRequestAndIsPassiveOnceDisarmed) {
   EXPECT_EQ(s.reason(), Reason::landed);
 }
 
+// Row 42.
+TEST(Supervisor, HoldsAndThenLandsWhenTheAutopilotsPoseGrowsOldAndDoesNotEnableOnIt) {
+  Supervisor s = flying();
+  const auto silent = [](auto& in, int tick) { in.pose_age = tick * kControlPeriod; };
+  EXPECT_EQ(ticks_until(s, Mode::hold, 50, silent), 15);
+  EXPECT_EQ(s.reason(), Reason::pose_silent);
+  EXPECT_TRUE(s.pose_trusted()) << "the odometry is: it stops on a verified way";
+  SupervisorInput in = healthy();
+  in.pose_age = 0.98;
+  EXPECT_EQ(s.step(in).mode, Mode::hold);
+  in.pose_age = 1.0;
+  EXPECT_TRUE(s.step(in).request_land);
+  EXPECT_EQ(s.reason(), Reason::pose_lost);
+  for (const double age : {0.31, 10.0, std::numeric_limits<double>::infinity()}) {
+    Supervisor fresh;
+    in = healthy();
+    in.pose_age = age;
+    in.request = Request::enable;
+    EXPECT_EQ(fresh.step(in).mode, Mode::passive);
+    EXPECT_EQ(fresh.reason(), Reason::pose_silent);
+  }
+}
+
 // The table of core/track/README.md, as the code would write it.
 std::string table() {
   std::string text = "| in | when | to |\n| --- | --- | --- |\n";
@@ -203,7 +226,7 @@ TEST(Supervisor, EveryModeAndReasonHasANameOfItsOwn) {
     EXPECT_LE(std::string(to_string(static_cast<Reason>(a))).size(), 50u);  // a STATUSTEXT holds it whole
     for (int b = 0; b < a; ++b) EXPECT_STRNE(to_string(static_cast<Reason>(a)), to_string(static_cast<Reason>(b)));
   }
-  EXPECT_STREQ(to_string(static_cast<Reason>(kReasons - 1)), "operator asks to stop");
+  EXPECT_STREQ(to_string(static_cast<Reason>(kReasons - 1)), "loop closure beyond 1 m or 10 degrees");
   EXPECT_STREQ(to_string(static_cast<Reason>(kReasons)), "?");
 }
 

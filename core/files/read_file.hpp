@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <tl/expected.hpp>
+
+/// The one way in which the programs read a file.
+namespace backwash::files {
+
+/// Sizes up to which files are read, bytes.
+inline constexpr std::size_t kLargestConfiguration = 1u << 20;
+inline constexpr std::size_t kLargestTable = std::size_t{2} << 30;  ///< CSV and flight recordings
+inline constexpr std::size_t kLargestLog = std::size_t{8} << 30;    ///< raw logs
+
+struct FileError {
+  enum class Kind { not_found, not_regular, too_large } kind;
+  std::string message;  ///< without the path: what is wrong, and what would be right
+};
+
+/// The whole content of a regular file. `wanted` says what the caller needs ("the path of a TOML file"). Never waits
+/// for another program and reads no endless device: FIFOs, devices, directories and sockets are not_regular. A file
+/// that grows while it is read is read up to the size that it had. Error too_large: above `most_bytes`, nothing is
+/// read.
+tl::expected<std::string, FileError> read_file(const std::string& path, std::size_t most_bytes,
+                                               const std::string& wanted);
+
+}  // namespace backwash::files

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the link must not do, where nothing else would show it.
+#include <gtest/gtest.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+
+#include <cerrno>
+#include <limits>
+
+#include "tests/bridge/emulated_controller.hpp"
+
+namespace backwash::firmware_bridge::test {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+TEST_F(LinkTest, BelievesNoTelemetryBeforeTheVehiclesHeartbeat) {
+  say_and_poll(mavlink::LocalPositionNed{.time_boot_ms = 1, .x = 3});
+  EXPECT_FALSE(link_.telemetry().local_state);
+  introduce_vehicle();
+  say_and_poll(mavlink::LocalPositionNed{.time_boot_ms = 2, .x = 3});
+  EXPECT_TRUE(link_.telemetry().local_state);
+}
+
+TEST_F(LinkTest, SendsNothingToANewPortThatWaitedForTheOldOne) {
+  introduce_vehicle();
+  for (int n = 0; n < 2000 && link_.transmit().waiting() < 4; ++n) link_.send_heartbeat();  // nobody reads
+  ASSERT_GE(link_.transmit().waiting(), 4U);
+  PseudoTerminal replacement;
+  link_.reconnect(open(replacement.path()), kStart);
+  EXPECT_EQ(link_.transmit().waiting(), 0U);
+  EXPECT_TRUE(link_.poll(kStart));
+  ::usleep(20'000);
+  EXPECT_TRUE(replacement.read().empty());
+}
+
+TEST_F(LinkTest, NoticesAnUnpluggedPortWhereItWrites) {
+  introduce_vehicle();
+  far_.hang_up();
+  EXPECT_FALSE(link_.send_heartbeat());
+  EXPECT_EQ(link_.fault(kStart), LinkFault::kPortLost);
+}
+
+TEST_F(LinkTest, AsksForNoRateThatIsNone) {
+  introduce_vehicle();
+  for (const double rate : {0.0, -1.0, static_cast<double>(kNan)})
+    EXPECT_FALSE(link_.send_message_interval(32, rate)) << rate;
+  EXPECT_EQ(link_.transmit().sent(), 0U);
+}
+
+TEST(Telemetry, DropsRatesAndParametersThatAreNoNumbers) {
+  Telemetry t;
+  t.take(mavlink::AttitudeQuaternion{1, 1, 0, 0, 0, kNan, 0, 0}, kStart);
+  t.take(mavlink::AttitudeQuaternion{1, 1, 0, 0, 0, 0, 0, kNan}, kStart);
+  EXPECT_FALSE(t.attitude);
+  mavlink::ParamValue parameter{.param_value = kNan};
+  parameter.param_id[0] = 'X';
+  t.take(parameter, kStart);
+  EXPECT_FALSE(t.parameter("X"));
+  EXPECT_EQ(t.broken, 3U);
+}
+
+// Root may open it all the same: the flag itself is asked for.
+TEST(SerialPort, IsOursAlone) {
+  PseudoTerminal far;
+  const auto port = SerialPort::open(far.path(), 921600);
+  ASSERT_TRUE(port);
+  const FileDescriptor second(::open(far.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK));
+  if (second.get() < 0) {
+    EXPECT_EQ(errno, EBUSY);
+    return;
+  }
+  int exclusive = 0;
+  ASSERT_EQ(::ioctl(second.get(), TIOCGEXCL, &exclusive), 0);
+  EXPECT_NE(exclusive, 0);
+}
+
+TEST(SerialPort, ForgetsWhatCameBeforeItWasOpened) {
+  PseudoTerminal far;
+  const FileDescriptor earlier(::open(far.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK));
+  ASSERT_GE(earlier.get(), 0);
+  termios raw{};
+  ASSERT_EQ(::tcgetattr(earlier.get(), &raw), 0);
+  ::cfmakeraw(&raw);
+  ASSERT_EQ(::tcsetattr(earlier.get(), TCSANOW, &raw), 0);
+  far.write(Bytes{1, 2, 3});
+  int waiting = 0;
+  for (int i = 0; i < 1000 && waiting < 3; ++i) {
+    ::usleep(1000);
+    ASSERT_EQ(::ioctl(earlier.get(), FIONREAD, &waiting), 0);
+  }
+  ASSERT_EQ(waiting, 3);
+  auto port = SerialPort::open(far.path(), 921600);
+  ASSERT_TRUE(port);
+  std::array<std::uint8_t, 8> bytes;
+  EXPECT_EQ(port->read(bytes), 0U);
+}
+
+// A datagram of somebody else that waited already when the peer was found.
+TEST(UdpPort, KeepsItsPeerWhoeverSpeaksAfterIt) {
+  auto port = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
+  ASSERT_TRUE(port);
+  const UdpPort::Endpoint to{"127.0.0.1", port->local_port()};
+  auto peer = UdpPort::open({"127.0.0.1", 0}, to), other = UdpPort::open({"127.0.0.1", 0}, to);
+  ASSERT_TRUE(peer && other);
+  ASSERT_EQ(peer->write(Bytes{1}), 1U);
+  ASSERT_EQ(other->write(Bytes{2}), 1U);
+  std::array<std::uint8_t, 8> bytes;
+  for (int n = 0; n < 3; ++n) ASSERT_TRUE(port->read(bytes));
+  ASSERT_EQ(port->write(Bytes{3}), 1U);
+  EXPECT_EQ(peer->read(bytes), 1U);
+  EXPECT_EQ(other->read(bytes), 0U);
+}
+
+}  // namespace
+}  // namespace backwash::firmware_bridge::test

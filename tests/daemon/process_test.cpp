@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Rows 44 and 50 of faults.md: what a signal, a closed descriptor or an exception does to the process.
+#include "services/backwashd/process.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <linux/capability.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "services/backwashd/control_loop.hpp"
+#include "tests/daemon/traps.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// What `body` returns in a process of its own; 1000 + N: signal N killed it.
+template <typename Body>
+int in_a_process(Body&& body) {
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(body());
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFSIGNALED(status) ? 1000 + WTERMSIG(status) : WEXITSTATUS(status);
+}
+
+TEST(Row50, AnExceptionInAThreadEndsTheOthersAndKeepsItsNameAndText) {
+  std::atomic<bool> stop{false};
+  Failure failure(stop);
+  Threads threads(failure);
+  int ticks = 0;
+  threads.start("control", [&] {
+    for (; !stop; ++ticks) std::this_thread::sleep_for(1ms);
+  });
+  EXPECT_EQ(failure.text(), "");
+  EXPECT_EQ(failure.code(), 0);
+  threads.start("planner", [] { throw std::runtime_error("no such primitive"); });
+  EXPECT_TRUE(threads.join(10));
+  EXPECT_TRUE(stop);
+  EXPECT_EQ(failure.text(), "planner: no such primitive");
+  EXPECT_EQ(failure.code(), 70);
+  failure.note("mission", "later ones do not take its place");
+  EXPECT_EQ(failure.text(), "planner: no such primitive");
+}
+
+TEST(Row50, AFailedAllocationAndAThrownNumberAreFailuresToo) {
+  for (const bool memory : {true, false}) {
+    std::atomic<bool> stop{false};
+    Failure failure(stop);
+    Threads threads(failure);
+    threads.start("map worker", [&] {
+      if (memory) static_cast<void>(std::vector<double>(std::size_t{1} << 58));
+      throw 42;
+    });
+    EXPECT_TRUE(threads.join(10));
+    EXPECT_EQ(failure.text(), memory ? "map worker: std::bad_alloc" : "map worker: an exception of unknown type");
+  }
+}
+
+TEST(Row50, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
+  const int code = in_a_process([] {
+    std::atomic<bool> stop{false};
+    Failure failure(stop);
+    Threads threads(failure);
+    threads.start("status", [] { ::pause(); });
+    return threads.join(0.05) ? 1 : (::_exit(7), 0);
+  });
+  EXPECT_EQ(code, 7);
+}
+
+// What no catch sees: a throwing function that promised not to, and a C library without memory.
+TEST(Row50, TerminateAndAbortInAThreadLeaveTheOthersToCloseDown) {
+  for (const bool aborts : {true, false}) {
+    const int code = in_a_process([aborts] {
+      std::atomic<bool> stop{false};
+      Failure failure(stop);
+      const CatchTheRest rest(failure);
+      Threads threads(failure);
+      threads.start("reader", [aborts] {
+        if (aborts) std::abort();
+        []() noexcept { std::vector<int>().at(7); }();
+      });
+      const sigset_t signals = shield_process();
+      wait_for_end(signals, failure);
+      const bool right = failure.text() ==
+                         (aborts ? "abort: a library gave up"
+                                 : "terminate: vector::_M_range_check: __n (which is 7) >= this->size() (which is 0)");
+      ::_exit(stop && right && !threads.join(0.05) ? failure.code() : 1);
+      return 0;
+    });
+    EXPECT_EQ(code, 70) << (aborts ? "abort" : "terminate");
+  }
+}
+
+TEST(Row44, PipesTerminalsAndLimitsKillAndStopNoProcessAndHangUpsAreIgnored) {
+  const int code = in_a_process([] {
+    const sigset_t signals = shield_process();
+    std::atomic<bool> stop{false};
+    Failure failure(stop);
+    for (const int harmless : {SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN, SIGHUP}) ::kill(::getpid(), harmless);
+    std::thread later([] {
+      std::this_thread::sleep_for(100ms);
+      ::kill(::getpid(), SIGTERM);
+    });
+    const auto begun = std::chrono::steady_clock::now();
+    wait_for_end(signals, failure);
+    later.join();
+    return std::chrono::steady_clock::now() - begun >= 90ms ? 5 : 1;
+  });
+  EXPECT_EQ(code, 5);
+}
+
+TEST(Row44, AClosedStandardDescriptorIsNeverGivenToAPortOrLog) {
+  const int code = in_a_process([] {
+    ::close(STDIN_FILENO);
+    ::close(STDERR_FILENO);
+    shield_process();
+    const int next = ::open("/dev/null", O_RDONLY);
+    return next > STDERR_FILENO && ::write(STDERR_FILENO, "x", 1) == 1 ? 5 : 1;
+  });
+  EXPECT_EQ(code, 5);
+}
+
+// MCL_FUTURE under a finite limit: the memory for the next map would be refused in flight.
+TEST(MemoryLock, UnderAFiniteLimitOnlyWhatIsThereIsLockedOtherwiseLaterMemoryToo) {
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns the C library's functions";
+  constexpr rlim_t kFinite = 8u << 20;
+  const auto locks = [](bool capable) {
+    return in_a_process([capable] {
+      __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+      __user_cap_data_struct data[_LINUX_CAPABILITY_U32S_3]{};
+      ::syscall(SYS_capget, &header, data);
+      if (capable && !(data[0].effective & (1u << CAP_IPC_LOCK))) return 100;
+      if (!capable) data[0].effective &= ~(1u << CAP_IPC_LOCK);
+      const rlimit limit{kFinite, kFinite};
+      if (::syscall(SYS_capset, &header, data) != 0 || ::setrlimit(RLIMIT_MEMLOCK, &limit) != 0) return 101;
+      lock_memory();
+      return backwash::test::locked_with();
+    });
+  };
+  EXPECT_EQ(locks(false), MCL_CURRENT);
+  const int capable = locks(true);
+  if (capable == 100) GTEST_SKIP() << "CAP_IPC_LOCK is not there to lift the limit";
+  EXPECT_EQ(capable, MCL_CURRENT | MCL_FUTURE);
+}
+
+}  // namespace
+}  // namespace backwash::daemon

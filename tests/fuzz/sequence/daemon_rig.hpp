@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "services/backwashd/localization.hpp"
+#include "services/backwashd/map_worker.hpp"
+#include "services/backwashd/mission.hpp"
+#include "services/backwashd/planner_worker.hpp"
+#include "services/backwashd/scan_placement.hpp"
+#include "tests/daemon/lockstep.hpp"
+#include "tests/fuzz/sequence/event.hpp"
+#include "tests/fuzz/sequence/watch.hpp"
+
+namespace backwash::fuzz {
+
+/// What broke, and when.
+struct Violation {
+  int tick = 0;
+  std::string what;
+};
+
+/// The daemon without its threads and sockets: control loop and link in lockstep, mission, planner, map worker and
+/// localization in one thread, and what a Watch sees of them. While the planner waits ticks pass, while it computes
+/// none do; `late_segment` is a plan that took its time.
+class DaemonRig {
+ public:
+  DaemonRig(const std::vector<Event>& events, daemon::test::Medium medium);
+  ~DaemonRig();
+
+  /// Runs the events for so many ticks, or until something is violated.
+  std::optional<Violation> run(int ticks);
+  /// The log of the last start, replayed: what differs, or nothing.
+  std::optional<std::string> replayed();
+  int ticks() const { return tick_; }
+  int plans() const { return plans_; }
+  /// Ticks spent in each mode.
+  const std::array<long, track::kModes>& spent() const { return spent_; }
+
+ private:
+  /// What are threads in the daemon, and live as long as one start of it.
+  struct Threads {
+    Threads(DaemonRig& rig, daemon::Channels& channels);
+    daemon::Recorder recorder;
+    daemon::MapSettings settings;
+    daemon::MapWorker map;
+    daemon::Mission mission;
+    daemon::Localization localization{config::Daemon{}, daemon::test::vehicle_5in().estimation.position};
+    daemon::PlannerWorker planner;
+    std::shared_ptr<const plan::World> known;  // newest that the DDS reader has
+  };
+  void start();
+  void advance();
+  void apply(const Event& event);
+  void apply_to_line(const Event& event);
+  void apply_to_map(const Event& event);
+  void operate(const Event& event);
+  void send(std::uint8_t verb, const Event& event);
+  void run_mission();
+  bool carry_out(const daemon::Decision& decision);
+  void delay_segments();
+  void look();
+  void hear_autopilot();
+  void offer_map(const map::OccupancyGrid& grid, std::vector<std::int8_t> data);
+  void scan_box(const Vec3& at);
+  std::optional<track::OdometrySample> read(const track::OdometrySample& sample);
+  void spoil_bytes(std::vector<std::uint8_t>& bytes);
+  const Event* lasting(Event::Kind kind) const;
+
+  std::vector<Event> events_;
+  std::size_t next_ = 0;
+  int tick_ = 0, missed_ = 0, plans_ = 0;
+  daemon::test::Lockstep lock_;
+  Watch watch_;
+  std::string log_;
+  std::unique_ptr<Threads> threads_;
+  std::optional<Violation> violation_;
+  std::map<Event::Kind, Event> lasting_;         // what goes on: the tick it ends in is `tick` + n
+  std::optional<track::OdometrySample> frozen_;  // of vio_freeze
+  std::int64_t repeated_ns_ = 0;
+  Vec3 drifted_ = Vec3::Zero();
+  std::optional<Vec3> autopilot_at_;  // where it says it is, in its own frame
+  track::RigidShift closure_;         // of the VIO, which reports in its own frame
+  daemon::CommandMessage last_command_;
+  std::uint32_t sequence_ = 0;
+  std::uint64_t session_ = 1;
+  bool restarts_ = false, with_maps_ = false;
+  std::unique_ptr<const track::AcceptedSegment> late_;
+  std::array<long, track::kModes> spent_{};
+};
+
+}  // namespace backwash::fuzz

@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# There is no memory left while it commands (../../shared/faults.md row 50): the set-points end and nothing else follows, the
+# flight log is closed with the reason, and the daemon says it and exits with 70.
+#   attack_memory.sh SOURCE_DIR BUILD_DIR
+set -euo pipefail
+source_dir=$1 build=$2
+source "$source_dir/services/bench/session.sh"
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv"
+start_daemon builtin:quad-5in "$work/flight.bwlog"
+enable
+sleep 0.5
+used=$(awk '$1 == "VmSize:" {print $2}' "/proc/$daemon_pid/status")
+prlimit --pid "$daemon_pid" --as=$((used * 1024))
+"$build/tests/dds_probe" "$domain" backwash roomy || die 'dds_probe failed'
+code=0
+for _ in $(seq 100); do kill -0 "$daemon_pid" 2>/dev/null || break; sleep 0.1; done
+kill -0 "$daemon_pid" 2>/dev/null && die 'it goes on without memory'
+wait "$daemon_pid" || code=$?
+daemon_pid=''
+[[ $code == 70 ]] || die "ended with $code instead of 70"
+grep '\[critical\] backwashd: .*: .*; nothing more is sent' "$log" || die 'it did not say why'
+stop
+PYTHONPATH=$source_dir/tests/system python3 - "$work" <<'PYTHON'
+import sys
+import raw_log
+work = sys.argv[1]
+records = list(raw_log.records(work + "/flight.bwlog"))
+last = max(t.t for t in raw_log.ticks(work + "/flight.bwlog"))
+why = raw_log.lines(work + "/flight.bwlog", raw_log.FAILURE)
+after = [(t, i) for t, i, _ in raw_log.wire(work + "/wire.csv") if t > last + 0.030]
+print(f"flight log ends with: {why[0][1]}; {len(after)} frames after its last tick")
+assert len(why) == 1 and records[-1][1] == raw_log.FAILURE, "the flight log was not closed with the reason"
+assert not after, after[:3]
+PYTHON

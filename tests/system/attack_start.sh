@@ -1,0 +1,129 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# What a start must not do (../../shared/faults.md rows 38, 45): with an invalid configuration no port is opened, no file is
+# waited for and nothing is made; a start that fails, and one that does not, leaves every earlier log byte for byte.
+#   attack_start.sh SOURCE_DIR BUILD_DIR
+set -euo pipefail
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+unset CYCLONEDDS_URI
+python3 - "${2:?usage: attack_start.sh SOURCE_DIR BUILD_DIR}/services/backwashd" "$work" <<'PYTHON'
+import fcntl, os, select, signal, struct, subprocess, sys, time
+daemon, work = sys.argv[1:]
+log = work + "/flight.bwlog"
+
+
+class Port:
+    """A pseudo-terminal whose far end can tell whether the near one was ever opened: then, and only then, it hangs up."""
+
+    def __init__(self):
+        self.far = os.open("/dev/ptmx", os.O_RDWR | os.O_NOCTTY)
+        fcntl.ioctl(self.far, 0x40045431, struct.pack("i", 0))  # TIOCSPTLCK
+        self.path = "/dev/pts/%d" % struct.unpack("I", fcntl.ioctl(self.far, 0x80045430, b"\0" * 4))[0]  # TIOCGPTN
+
+    def was_opened(self):
+        poll = select.poll()
+        poll.register(self.far, select.POLLIN)
+        return bool(poll.poll(0))
+
+    def __del__(self):
+        os.close(self.far)
+
+
+def configuration(port, **changed):
+    keys = dict(vehicle="builtin:quad-5in", model="builtin:quad-5in", domain="9", interface="lo", namespace="backwash",
+                topic="rt/backwash/odometry", baud="921600", file=log, more="")
+    keys.update(changed)
+    return """vehicle = "{vehicle}"
+model = "{model}"
+[dds]
+domain = {domain}
+interface = "{interface}"
+namespace = "{namespace}"
+odometry_topic = "{topic}"
+[link]
+device = "{device}"
+baud = {baud}
+system = 1
+[control]
+priority = 0
+cpu = -1
+battery_land = 0.15
+{more}
+[log]
+file = "{file}"
+""".format(device=port, **keys)
+
+
+def start(path):
+    ran = subprocess.run([daemon, "--config", path], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=20)
+    return ran.returncode, ran.stderr
+
+
+def logs():
+    return {name: open(work + "/" + name, "rb").read() for name in os.listdir(work) if name.endswith(".bwlog")}
+
+
+path = work + "/daemon.toml"
+os.mkfifo(work + "/fifo")
+with open(work + "/large.toml", "wb") as f:
+    f.truncate(1 << 40)
+cases = [
+    ("baud", {"baud": "12"}, ":10: key 'link.baud' = 12"),
+    ("unknown key", {"more": "turbo = 1"}, ":16: key 'control.turbo' = 1"),
+    ("domain", {"domain": "231"}, ":4: key 'dds.domain' = 231"),
+    ("XML in the interface", {"interface": r"lo\"/><x y=\""}, ":5: key 'dds.interface'"),
+    ("namespace", {"namespace": "back wash"}, ":6: key 'dds.namespace' = "),
+    ("topic", {"topic": "rt/9lives"}, ":7: key 'dds.odometry_topic' = "),
+    ("not TOML", {"more": "]["}, ":16: not valid TOML"),
+    ("vehicle absent", {"vehicle": work + "/absent.toml"}, "/absent.toml: cannot be read: No such file"),
+    ("vehicle FIFO", {"vehicle": work + "/fifo"}, "/fifo: is a FIFO; needs the path of a TOML file"),
+    ("model endless", {"model": "/dev/zero"}, "/dev/zero: is a device; needs the path of a TOML file"),
+    ("model a directory", {"model": work}, ": is a directory; needs the path of a TOML file"),
+    ("vehicle huge", {"vehicle": work + "/large.toml"}, "/large.toml: has 1048576 MiB, the cap is 1 MiB"),
+]
+for name, changed, words in cases:
+    port = Port()
+    open(path, "w").write(configuration(port.path, **changed))
+    code, said = start(path)
+    assert code == 78 and words in said and said.count("\n") == 1, (name, code, said)
+    assert not port.was_opened(), f"{name}: the port was opened"
+    assert not logs(), f"{name}: a log was made"
+for special, words in ((work + "/fifo", "is a FIFO"), ("/dev/zero", "is a device"), (work, "is a directory")):
+    code, said = start(special)
+    assert code == 78 and words in said and said.count("\n") == 1, (special, code, said)
+print(f"{len(cases) + 3} invalid configurations: exit 78, no port opened")
+
+# What is not the configuration's fault has codes of its own; what an earlier flight left is not touched.
+open(log, "wb").write(b"an earlier flight")
+earlier = logs()
+code, said = start((open(path, "w").write(configuration("/nowhere/tty")), path)[1])
+assert code == 74 and "/nowhere/tty: cannot be opened" in said and logs() == earlier, (code, said)
+port = Port()
+open(path, "w").write(configuration(port.path, file="/nowhere/flight.bwlog"))
+code, said = start(path)
+assert code == 73 and "/nowhere/flight.bwlog" in said and port.was_opened() and logs() == earlier, (code, said)
+port = Port()
+open(path, "w").write(configuration(port.path, interface="nowhere0"))
+code, said = start(path)
+assert code == 71 and "nowhere0" in said, (code, said)
+assert open(log, "rb").read() == b"an earlier flight"
+
+# A good one: the port is opened, and the log is a new file beside the earlier ones.
+before = logs()
+port = Port()
+open(path, "w").write(configuration(port.path))
+running = subprocess.Popen([daemon, "--config", path], stderr=subprocess.PIPE, text=True)
+for line in running.stderr:
+    if "raw log" in line:
+        break
+made = line.split("raw log ")[1].strip()
+running.send_signal(signal.SIGTERM)
+assert running.wait(20) == 0
+assert port.was_opened(), "the far end cannot tell an opened port"
+assert made == work + "/flight-%d.bwlog" % (len(before) + 1), (made, list(before))
+after = logs()
+assert all(after[name] == text for name, text in before.items()), "an earlier log was touched"
+assert after[os.path.basename(made)].startswith(b"backwash raw log") and os.stat(made).st_mode & 0o777 == 0o640
+print("exit 74, 73, 71 for port, log, interface; the earlier logs are untouched, the new one is", os.path.basename(made))
+PYTHON

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What an operator in a hurry and a VIO gone wrong send, for tests/system/attack_*.sh.
+//   attacker DOMAIN send STEP …               STEP: VERB[=X,Y,Z] or +MILLISECONDS; no step waits for an answer. Each
+//                                             answer is a line: time (s, monotonic), verb, result, reason
+//   attacker DOMAIN relay FROM TO WHAT VALUE X  odometry from one topic to another; as soon as the vehicle is beyond X,
+//                                             turn: by VALUE rad; velocity: VALUE m/s along the body's x axis
+#include <Eigen/Geometry>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <string>
+#include <thread>
+
+#include "services/dds/topics.hpp"
+
+namespace dds = backwash::dds;
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+namespace {
+
+const std::string kNamespace = "backwash";
+const std::map<std::string, std::uint8_t> kVerbs{
+    {"enable", backwash_msgs_msg_dds__COMMAND_ENABLE},   {"disable", backwash_msgs_msg_dds__COMMAND_DISABLE},
+    {"takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF}, {"goto", backwash_msgs_msg_dds__COMMAND_GOTO},
+    {"hold", backwash_msgs_msg_dds__COMMAND_HOLD},       {"land", backwash_msgs_msg_dds__COMMAND_LAND},
+    {"stop", backwash_msgs_msg_dds__COMMAND_STOP},       {"release", backwash_msgs_msg_dds__COMMAND_RELEASE}};
+
+double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
+
+/// One station with one session.
+class Operator {
+ public:
+  explicit Operator(const dds::Participant& participant)
+      : writer_(dds::make_writer<dds::Command>(participant, kNamespace)),
+        acks_(dds::make_reader<dds::Ack>(participant, kNamespace)),
+        session_(static_cast<std::uint64_t>(Clock::now().time_since_epoch().count())) {
+    // The daemon's answers must find us, too: what was sent before is not repeated to a late reader.
+    for (int n = 0; n < 500 && writer_.matched() == 0; ++n) std::this_thread::sleep_for(10ms);
+    std::this_thread::sleep_for(300ms);
+  }
+  bool send(const std::string& step) {
+    const auto equals = step.find('=');
+    const auto verb = kVerbs.find(step.substr(0, equals));
+    if (verb == kVerbs.end()) return false;
+    dds::Command c{};
+    c.station = station_;
+    c.session = session_;
+    c.sequence_number = ++sequence_;
+    c.verb = verb->second;
+    auto& p = c.position;
+    if (equals != step.npos && std::sscanf(step.c_str() + equals, "=%lf,%lf,%lf", &p.x, &p.y, &p.z) != 3) return false;
+    sent_[sequence_] = verb->first;
+    writer_.write(c);
+    return true;
+  }
+  void listen(std::chrono::milliseconds how_long) {
+    const auto until = Clock::now() + how_long;
+    do {
+      acks_.take([&](const dds::Ack& ack) {
+        if (ack.session != session_ || !sent_.contains(ack.sequence_number)) return;
+        std::printf("%.6f %s %d %s\n", now_s(), sent_[ack.sequence_number].c_str(), ack.result, ack.reason);
+        sent_.erase(ack.sequence_number);
+      });
+      std::this_thread::sleep_for(1ms);
+    } while (Clock::now() < until);
+  }
+  bool all_answered() const { return sent_.empty(); }
+
+ private:
+  dds::Writer<dds::Command> writer_;
+  dds::Reader<dds::Ack> acks_;
+  std::uint64_t session_;
+  std::uint32_t sequence_ = 0;
+  std::map<std::uint32_t, std::string> sent_;
+  char station_[9] = "operator";
+};
+
+int send(const dds::Participant& participant, int count, char** steps) {
+  Operator station(participant);
+  for (int n = 0; n < count; ++n) {
+    if (steps[n][0] == '+')
+      station.listen(std::chrono::milliseconds(std::atoi(steps[n] + 1)));
+    else if (!station.send(steps[n]))
+      return 64;
+  }
+  for (int n = 0; n < 20 && !station.all_answered(); ++n) station.listen(100ms);
+  return station.all_answered() ? 0 : 69;
+}
+
+int relay(const dds::Participant& participant, const std::string& from, const std::string& to, const std::string& what,
+          double value, double x) {
+  dds::Reader<dds::Odometry> reader(participant, dds::TopicOf<dds::Odometry>::type(), from, dds::Delivery::latest);
+  dds::Writer<dds::Odometry> writer(participant, dds::TopicOf<dds::Odometry>::type(), to, dds::Delivery::latest);
+  dds::WaitSet waitset(participant);
+  waitset.add(reader);
+  bool wrong = false;
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(value, Eigen::Vector3d::UnitZ()));
+  for (;;) {
+    waitset.wait(0.1);
+    reader.take([&](const dds::Odometry& sample) {
+      dds::Odometry m = sample;
+      auto& p = m.pose.pose.position;
+      auto& q = m.pose.pose.orientation;
+      if (!wrong && p.x > x) {
+        wrong = true;
+        std::printf("%.6f wrong from here: %.3f %.3f %.3f\n", now_s(), p.x, p.y, p.z);
+        std::fflush(stdout);
+      }
+      if (wrong && what == "velocity") m.twist.twist.linear.x = value;
+      if (wrong && what == "turn") {
+        const Eigen::Vector3d turned = turn * Eigen::Vector3d(p.x, p.y, p.z);
+        const Eigen::Quaterniond attitude = turn * Eigen::Quaterniond(q.w, q.x, q.y, q.z);
+        p = {turned.x(), turned.y(), turned.z()};
+        q = {attitude.x(), attitude.y(), attitude.z(), attitude.w()};
+      }
+      writer.write(m);
+    });
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 4) return 64;
+  const dds::Participant participant(static_cast<std::uint32_t>(std::atoi(argv[1])), "lo");
+  const std::string mode = argv[2];
+  if (mode == "send") return send(participant, argc - 3, argv + 3);
+  if (mode == "relay" && argc == 8)
+    return relay(participant, argv[3], argv[4], argv[5], std::atof(argv[6]), std::atof(argv[7]));
+  return 64;
+}

@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the tick makes of odometry, frames, loop closures and the autopilot's facts, with a vehicle that flies perfectly
+// in a controller's frame that is turned and moved against the map.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+#include "core/plan/stop.hpp"
+#include "core/track/flight_tick.hpp"
+
+namespace backwash::track {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Vehicle vehicle() {
+  Vehicle v;
+  v.limits = {1.5, 2};
+  v.estimation = {0.02};
+  v.initial_error = {0.1, 0.5};
+  return v;
+}
+
+reach::ReachTube tube_of(const std::vector<Setpoint>& commands) {
+  reach::ReachTube tube(commands.size() + 1);
+  for (std::size_t k = 0; k < tube.size(); ++k) {
+    tube[k].center.p_W = commands[std::min(k, commands.size() - 1)].p_W;
+    tube[k].half_widths.fill(0.2), tube[k].half_widths_interval.fill(0.2);
+  }
+  return tube;
+}
+
+/// Along x for eight seconds, after half a second at 1 m/s, with a verified stop every ten commands.
+AcceptedSegment straight() {
+  AcceptedSegment s;
+  s.id = 1;
+  for (int k = 0; k < 400; ++k) {
+    const double t = kControlPeriod * k, x = t < 0.5 ? t * t : t - 0.25;
+    s.commands.push_back({{x, 0, 1}, {std::min(1.0, 2 * t), 0, 0}, Vec3::Zero(), 0});
+  }
+  s.tube = tube_of(s.commands);
+  for (std::size_t branch = 0; branch < 400; branch += 10) {
+    const auto stopped = plan::stop_along(s.commands, branch, 4);
+    const auto tube = tube_of(stopped);
+    const auto from = static_cast<std::ptrdiff_t>(branch);
+    s.stops.push_back({branch, {stopped.begin() + from, stopped.end()}, {tube.begin() + from, tube.end()}});
+  }
+  return s;
+}
+
+/// Two seconds into the flight unless told otherwise.
+class Flown {
+ public:
+  enum class Until { aligned, tracking, flying };
+  explicit Flown(Until until = Until::flying) {
+    for (int n = 0; n < 30; ++n) step();
+    if (until == Until::aligned) return;
+    in.request = Request::enable;
+    step();
+    in.autopilot.offboard = in.autopilot.armed = true;
+    step();
+    EXPECT_EQ(out.supervisor.mode, Mode::tracking) << to_string(out.supervisor.reason);
+    if (until == Until::tracking) return;
+    offer(segment);
+    EXPECT_TRUE(out.accepted);
+    for (int n = 0; n < 100; ++n) step();
+  }
+  const TickOutput& offer(AcceptedSegment& offered) {
+    offered.epoch = tick.epoch();
+    in.segment = &offered;
+    return step();
+  }
+  const TickOutput& step() {
+    in.now_ns += 20'000'000;
+    // Physically: where the last command was, in the controller's frame.
+    if (started_) truth_L = {out.command_local.p_W, out.command_local.v_W};
+    in.odometry.reset();
+    if (vio_on) {
+      OdometrySample s;
+      s.received_ns = s.stamp_ns = in.now_ns - age_ns;
+      s.state = frame_W.state(map_of(truth_L));
+      s.state.p_W -= static_cast<double>(age_ns) * 1e-9 * s.state.v_W;
+      s.q = quaternion(frame_W.yaw);
+      s.closures = closures;
+      s.map_from_odom = frame_W;
+      if (spoil) spoil(s);
+      in.odometry = s;
+    }
+    in.autopilot.heartbeat_age = 0.1;
+    State local = truth_L;
+    local.p_W += local_off;
+    in.autopilot.pose = AutopilotFacts::Pose{in.now_ns, local, quaternion(kYaw), in.now_ns};
+    out = tick.step(in);
+    started_ = tick.mode() != Mode::passive && tick.mode() != Mode::quiet;
+    in.request = Request::none;
+    in.segment = nullptr;
+    return out;
+  }
+  static std::array<double, 4> quaternion(double yaw) { return {std::cos(yaw / 2), 0, 0, std::sin(yaw / 2)}; }
+  /// Of a state in the controller's frame, before any loop closure.
+  static State map_of(const State& local) { return RigidShift{kYaw, kT}.inverse().state(local); }
+
+  static constexpr double kYaw = 0.4;
+  inline static const Vec3 kT{3, -2, 0.5};
+  FlightTick tick{vehicle(), 0.15};
+  TickInput in;
+  TickOutput out;
+  AcceptedSegment segment = straight();
+  State truth_L = RigidShift{kYaw, kT}.state(State{{0, 0, 1}, Vec3::Zero()});
+  Vec3 local_off = Vec3::Zero();  ///< of the controller's estimate
+  RigidShift frame_W;             ///< map ← odometry, of the newest loop closure
+  std::uint32_t closures = 0;
+  bool vio_on = true;
+  std::int64_t age_ns = 0;  ///< of a sample when the tick sees it
+  std::function<void(OdometrySample&)> spoil;
+
+ private:
+  bool started_ = false;
+};
+
+/// The mode changes to a hold that freezes the set-point: no new positions, then LAND.
+void expect_frozen_then_land(Flown& f, const Vec3& last) {
+  ASSERT_EQ(f.out.supervisor.mode, Mode::hold) << to_string(f.out.supervisor.reason);
+  for (int n = 0; f.out.supervisor.mode == Mode::hold && n < 30; ++n) {
+    EXPECT_TRUE(f.out.supervisor.freeze);
+    EXPECT_LT((f.out.command.p_W - last).norm(), 1e-9) << n;
+    EXPECT_EQ(f.out.command.v_W, Vec3::Zero());
+    EXPECT_FALSE(f.out.fresh) << "what comes after the fault is not believed";
+    f.step();
+  }
+  EXPECT_EQ(f.out.supervisor.mode, Mode::land);
+}
+
+TEST(TickReactions, AJumpFreezesAndGoodSamplesAfterItAreNotBelieved) {
+  Flown f;
+  const Vec3 last = f.out.command.p_W;
+  f.spoil = [](auto& s) { s.state.p_W.y() += 0.5; };
+  f.step();
+  EXPECT_EQ(f.out.supervisor.reason, Reason::odometry_jump);
+  f.spoil = nullptr;  // as good as before
+  expect_frozen_then_land(f, last);
+}
+
+TEST(TickReactions, OdometryThatStopsHoldsWithin100MillisecondsOfItsReception) {
+  Flown f;
+  f.vio_on = false;
+  int ticks = 0;
+  while (f.out.supervisor.mode == Mode::tracking && ticks < 20) f.step(), ++ticks;
+  EXPECT_EQ(ticks, 5);
+  EXPECT_EQ(f.out.supervisor.reason, Reason::odometry_lost);
+}
+
+TEST(TickReactions, FourStampsThatDoNotRiseHoldAndThreeDoNot) {
+  Flown f;
+  const std::int64_t stamp = f.in.now_ns;
+  f.spoil = [=](auto& s) { s.stamp_ns = stamp; };
+  for (int n = 0; n < 3; ++n) EXPECT_EQ(f.step().supervisor.mode, Mode::tracking) << n;
+  EXPECT_EQ(f.step().supervisor.mode, Mode::hold);
+  EXPECT_EQ(f.out.supervisor.reason, Reason::odometry_disorder);
+}
+
+TEST(TickReactions, TheErrorIsJudgedForATicksOwnSampleOnly) {
+  Flown f;
+  EXPECT_TRUE(f.step().inside.judged);
+  f.vio_on = false;
+  EXPECT_FALSE(f.step().inside.judged);
+}
+
+TEST(TickReactions, ALowBatteryLands) {
+  Flown f;
+  f.in.autopilot.battery = 0.16;
+  EXPECT_EQ(f.step().supervisor.mode, Mode::tracking);
+  f.in.autopilot.battery = 0.14;
+  EXPECT_EQ(f.step().supervisor.mode, Mode::land);
+}
+
+TEST(TickReactions, TheAutopilotsOwnCountOfResetsIsEnough) {
+  Flown f;
+  f.in.autopilot.reset_counter = std::uint8_t{7};
+  EXPECT_EQ(f.step().supervisor.mode, Mode::tracking);
+  EXPECT_EQ(f.step().supervisor.mode, Mode::tracking);
+  f.in.autopilot.reset_counter = std::uint8_t{8};
+  EXPECT_EQ(f.step().supervisor.mode, Mode::hold);
+  EXPECT_EQ(f.out.supervisor.reason, Reason::autopilot_reset);
+}
+
+TEST(TickReactions, FramesThatDriftApartHold) {
+  Flown f;
+  int ticks = 0;
+  for (; f.out.supervisor.mode == Mode::tracking && ticks < 200; ++ticks) {
+    f.local_off.y() += 0.001;
+    f.step();
+  }
+  EXPECT_EQ(f.out.supervisor.reason, Reason::frames_disagree);
+  EXPECT_GT(f.local_off.y(), 0.05);
+  EXPECT_LT(f.local_off.y(), 0.07);
+}
+
+// At 1 m/s a sample of 15 ms ago lies 1.5 cm behind the controller's position of now.
+TEST(TickReactions, TheOdometryIsComparedWithTheAutopilotAtOneMoment) {
+  Flown f(Flown::Until::tracking);
+  f.age_ns = 15'000'000;
+  f.offer(f.segment);
+  for (int n = 0; n < 100; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::tracking);
+  EXPECT_LT(f.tick.alignment().position_residual(), 0.003);
+}
+
+TEST(TickReactions, WhileNothingIsCommandedAVioMayStartAnewElsewhere) {
+  Flown f(Flown::Until::aligned);
+  ASSERT_TRUE(f.out.fresh);
+  f.spoil = [](auto& s) { s.state.p_W.x() += 5; };
+  EXPECT_FALSE(f.step().fresh);
+  EXPECT_TRUE(f.step().fresh);
+}
+
+TEST(TickReactions, ASetpointThatIsNoNumberIsNotSent) {
+  for (const int part : {0, 1, 2, 3}) {
+    Flown f(Flown::Until::tracking);
+    for (auto& c : f.segment.commands) {
+      if (part == 0) c.p_W.z() = kNan;
+      if (part == 1) c.v_W.x() = kNan;
+      if (part == 2) c.a_W.y() = kNan;
+      if (part == 3) c.yaw = kNan;
+    }
+    f.offer(f.segment);
+    ASSERT_TRUE(f.out.accepted);
+    EXPECT_FALSE(f.out.finite) << part;
+    EXPECT_FALSE(f.out.supervisor.send_setpoint) << part;
+  }
+}
+
+/// A second loop closure in flight: everything of the map moves by D, and nothing physically.
+TEST(TickReactions, ALoopClosureMovesMapAndFlightTogetherAndNothingPhysically) {
+  const RigidShift first{0.1, {1, -1, 0.2}}, second{0.13, {1.3, -1.2, 0.25}};
+  Flown f(Flown::Until::aligned);
+  f.closures = 1, f.frame_W = first;
+  for (int n = 0; n < 60; ++n) f.step();  // the frames are learnt anew
+  f.in.request = Request::enable;
+  f.step();
+  f.in.autopilot.offboard = f.in.autopilot.armed = true;
+  for (int n = 0; n < 100 && f.out.supervisor.mode != Mode::tracking; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
+  for (auto& c : f.segment.commands) c = first.setpoint(c);
+  for (auto& t : f.segment.tube) t.center = first.state(t.center);
+  f.segment.closures = 1;
+  f.offer(f.segment);
+  ASSERT_TRUE(f.out.accepted);
+  for (int n = 0; n < 100; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
+
+  const RigidShift D = second * first.inverse();
+  const Setpoint map_before = f.out.command;
+  Setpoint before = f.out.command_local;
+  f.closures = 2, f.frame_W = second;
+  for (int n = 0; n < 100; ++n) {
+    f.step();
+    ASSERT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason) << " " << n;
+    EXPECT_TRUE(f.out.fresh);
+    EXPECT_TRUE(f.out.inside.inside);
+    EXPECT_NEAR((f.out.command_local.p_W - before.p_W).norm(), 0.02, 1e-6) << n;
+    if (n == 0) {
+      EXPECT_LT((f.out.command.p_W - D.point(map_before.p_W)).norm(), 0.0201);
+      EXPECT_LT((f.out.command.v_W - D.rotate(map_before.v_W)).norm(), 1e-9);
+    }
+    before = f.out.command_local;
+  }
+  EXPECT_LT(f.tick.alignment().position_residual(), 0.002);
+  AcceptedSegment old = f.segment;
+  old.id = 2, old.continues = 1, old.branch = 350;
+  EXPECT_TRUE(f.offer(old).refused) << "it is of the map before the closure";
+  old.closures = 2;
+  EXPECT_TRUE(f.offer(old).accepted);
+}
+
+// The same at rest: what is held moves with the map.
+TEST(TickReactions, ALoopClosureMovesWhatIsHeld) {
+  const RigidShift first{0.1, {1, -1, 0.2}}, second{0.13, {1.3, -1.2, 0.25}};
+  Flown f(Flown::Until::aligned);
+  f.closures = 1, f.frame_W = first;
+  for (int n = 0; n < 60; ++n) f.step();
+  f.in.request = Request::enable;
+  f.step();
+  f.in.autopilot.offboard = f.in.autopilot.armed = true;
+  for (int n = 0; n < 100; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
+  const Setpoint before = f.out.command, local = f.out.command_local;
+  f.closures = 2, f.frame_W = second;
+  f.step();
+  EXPECT_LT((f.out.command.p_W - (second * first.inverse()).point(before.p_W)).norm(), 1e-9);
+  EXPECT_LT((f.out.command_local.p_W - local.p_W).norm(), 1e-6);
+  EXPECT_NEAR(wrap_angle(f.out.command_local.yaw - local.yaw), 0, 1e-6);
+}
+
+TEST(TickReactions, WhileTheFramesDisagreeTheyAreNotTakenAnew) {
+  Flown f(Flown::Until::tracking);
+  f.in.autopilot.reset_counter = std::uint8_t{1};
+  for (int n = 0; f.out.supervisor.mode == Mode::tracking && n < 200; ++n) {
+    f.local_off.y() += 0.001;
+    f.step();
+  }
+  ASSERT_EQ(f.out.supervisor.reason, Reason::frames_disagree);
+  const Vec3 local = f.out.command_local.p_W;
+  f.in.autopilot.reset_counter = std::uint8_t{2};
+  f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::hold);
+  EXPECT_LT((f.out.command_local.p_W - local).norm(), 1e-9);
+}
+
+}  // namespace
+}  // namespace backwash::track
