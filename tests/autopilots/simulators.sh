@@ -30,6 +30,11 @@ start_ardupilot() {
   autopilot_pid=$! device=tcp:127.0.0.1:5760 truth=tcp:127.0.0.1:5762
   pids+=("$autopilot_pid")
   for _ in $(seq 100); do grep -q 'bind port 5762' "$work/autopilot.log" && break; sleep 0.1; done
+  # The pilot's sticks in the middle (16 channels of 1500 µs): a mode of the pilot's would otherwise get no throttle.
+  local middle
+  middle=$(printf '\\xdc\\x05%.0s' $(seq 16))
+  (while printf "$middle" >/dev/udp/127.0.0.1/5501; do sleep 0.1; done) 2>/dev/null &
+  pids+=($!)
 }
 
 # start_px4 BUILD_DIR [NAME=VALUE …]: PX4 with its SIH quadrotor.

@@ -155,7 +155,7 @@ TEST(LinkOverUdp, TakesAllDatagramsOfATickInOnePollAndEachOneWhole) {
   for (int i = 0; i < 1000 && far->read(heard).value_or(0) == 0; ++i) ::usleep(1000);
   AutopilotLink link(std::move(*near), std::uint8_t{1}, kStart);
   Bytes gathered;
-  const auto frame = [n = std::uint8_t{0}]() mutable {
+  auto frame = [n = std::uint8_t{0}]() mutable {
     return mavlink::encode_frame({1, 1, n++}, mavlink::Heartbeat{.autopilot = 12, .mavlink_version = 3});
   };
   for (int i = 0; i < 40; ++i) ASSERT_TRUE(far->write(frame().view()));

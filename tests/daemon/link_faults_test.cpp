@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Rows 17 to 25 of faults.md in lockstep: the line, the controller and the pilot.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <random>
 
 #include "services/backwashd/link_watch.hpp"
