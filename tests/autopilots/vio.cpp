@@ -60,7 +60,7 @@ class Vio {
         vehicle_(config::load_vehicle(o.vehicle).value()),
         start_(o.start[0], o.start[1], o.start[2]),
         R_(Eigen::AngleAxisd(o.yaw, Vec3::UnitZ())),
-        participant_(static_cast<std::uint32_t>(o.domain), "lo", allowed_fifo(60)),
+        participant_(static_cast<std::uint32_t>(o.domain), "lo", {.priority = allowed_fifo(60)}),
         odometry_(dds::make_writer<dds::Odometry>(participant_, "backwash")),
         map_(dds::make_writer<dds::Octomap>(participant_, "backwash")),
         log_(o.log),
