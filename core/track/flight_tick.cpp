@@ -203,9 +203,11 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
 }
 
 // The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on
-// the ground stops them again; the autopilot itself refuses to disarm in the air.
-void FlightTick::ask_of_motors(const TickInput& in, TickOutput& out) noexcept {
-  const bool stands = in.autopilot.landed.value_or(false), runs = in.autopilot.armed || arming_ > 0;
+// the ground stops them again, unless somebody else started them; the autopilot itself refuses to disarm in the air.
+void FlightTick::ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept {
+  const bool followed = before == Mode::tracking || before == Mode::hold;
+  const bool stands = in.autopilot.landed.value_or(false);
+  const bool runs = arming_ > 0 || (followed && in.autopilot.armed);
   arming_ = std::max(0, arming_ - 1);
   abandoned_ = std::max(0, abandoned_ - 1);
   const bool ends = in.request == Request::stop || in.request == Request::disable;
@@ -213,7 +215,10 @@ void FlightTick::ask_of_motors(const TickInput& in, TickOutput& out) noexcept {
   if (out.accepted) abandoned_ = 0;
   out.arm = out.accepted && in.segment->arms && out.supervisor.mode == Mode::tracking && !in.autopilot.armed;
   if (out.arm) arming_ = kArmingTicks;
-  out.disarm = abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
+  const auto& s = out.supervisor;
+  const bool ours = s.mode == Mode::tracking || s.mode == Mode::hold ||
+                    (s.mode == Mode::passive && s.reason == Reason::operator_request);  // neither quiet nor a pilot's
+  out.disarm = ours && abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
 }
 
 TickOutput FlightTick::step(const TickInput& in) noexcept {
@@ -240,7 +245,7 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   out.command_local = alignment_.to_local(command_);
   out.finite = finite(out.command_local);
   out.supervisor.send_setpoint = out.supervisor.send_setpoint && out.finite;
-  ask_of_motors(in, out);
+  ask_of_motors(in, before, out);
   return out;
 }
 

@@ -97,7 +97,7 @@ class FlightTick {
   void judge(TickOutput& out) noexcept;
   SupervisorInput facts(const TickInput& in, const TickOutput& out) const noexcept;
   void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
-  void ask_of_motors(const TickInput& in, TickOutput& out) noexcept;
+  void ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept;
   void drop_segment(TickOutput& out) noexcept;
 
   double battery_land_;

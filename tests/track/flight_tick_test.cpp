@@ -283,6 +283,39 @@ TEST(FlightTick, ArmsInTheTickThatAcceptsATakeoffAloneAndDisarmsOnTheGroundAlone
   }
 }
 
+// Row 25: whoever armed it beside us.
+TEST(FlightTick, AStopDisarmsNoVehicleThatAPilotArmedOnTheGround) {
+  for (const bool enabling : {false, true}) {
+    Flight flight;
+    flight.in.autopilot.offboard = false;  // passive
+    flight.in.autopilot.landed = true;
+    flight.step();
+    ASSERT_EQ(flight.out.supervisor.mode, Mode::passive);
+    if (enabling) {
+      flight.in.request = Request::enable;
+      flight.step();
+      ASSERT_EQ(flight.out.supervisor.mode, Mode::enabling);
+    }
+    flight.in.request = Request::stop;
+    EXPECT_FALSE(flight.step().disarm);
+    for (int n = 0; n < 200; ++n) EXPECT_FALSE(flight.step().disarm) << n;
+    EXPECT_EQ(flight.out.supervisor.mode, Mode::passive);
+  }
+}
+
+TEST(FlightTick, AStoppedTakeoffIsNotDisarmedByUsOnceWeAreQuietOrAPilotHasIt) {
+  for (const bool pilot : {false, true}) {
+    Flight flight;
+    flight.in.autopilot.landed = true;
+    flight.in.request = Request::stop;
+    flight.step();
+    ASSERT_EQ(flight.out.supervisor.mode, Mode::hold);
+    (pilot ? flight.in.autopilot.offboard : flight.in.autopilot.port_open) = false;
+    for (int n = 0; n < 200; ++n) EXPECT_FALSE(flight.step().disarm) << n;
+    EXPECT_EQ(flight.out.supervisor.mode, pilot ? Mode::passive : Mode::quiet);
+  }
+}
+
 // Rows 9, 10 and 13, as far as the tick decides them.
 TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
   for (const bool outside : {true, false}) {

@@ -92,7 +92,6 @@ void DaemonRig::advance() {
   delay_segments();
   const std::uint64_t segment = lock_.view().segment;
   const auto& wire = lock_.tick(missed_);
-  if (!lasting(Kind::slow_mission)) run_mission();
   const auto& view = lock_.view();
   ++spent_[static_cast<std::size_t>(view.mode)];
   Seen seen{tick_, view.mode, view.armed, view.offboard, wire.bytes};
@@ -113,7 +112,8 @@ void DaemonRig::advance() {
   const auto broken = watch_.check(seen);
   if (broken) violation_ = {tick_, *broken};
   if (failures.size() > 0) violation_ = {tick_, failures.GetTestPartResult(0).message()};
-  if (violation_) lock_.channels->stop = true;  // the planner returns
+  if (!lasting(Kind::slow_mission)) run_mission();  // what it acknowledges holds from the next tick on
+  if (violation_) lock_.channels->stop = true;      // the planner returns
   ++tick_;
 }
 

@@ -115,6 +115,8 @@ std::optional<std::string> Watch::motion(const Seen& now) {
   const double step = (now.setpoint - last_.setpoint).norm();
   rested_ = step > kStill ? 0 : rested_ + 1;
   if (now.tick <= frame_moved_ + kNewFrame) return std::nullopt;  // the same place, told in another frame
+  // A take-off begins where the vehicle stands, whatever was held above it.
+  if (now.accepted && !now.armed) return std::nullopt;
   if (!(step <= std::sqrt(3.0) * v_max_ * kControlPeriod + kRounding)) return line("a set-point step of %.3f m", step);
   if (licence_ == Licence::stopping && now.tick > stopped_ + kRequests + kBraking) licence_ = Licence::none;
   if (licence_ == Licence::slowing && rested_ >= kRest) licence_ = Licence::none;
