@@ -400,6 +400,24 @@ TEST(TickReactions, ATurningVioIsNotTakenForAResetOfTheController) {
   EXPECT_NE(f.out.supervisor.mode, Mode::tracking);
 }
 
+// It claims a flight that the vehicle could fly; the controller's own estimate stands still and did not jump.
+TEST(TickReactions, AVioThatFliesAwayIsNotTakenForAResetOfTheController) {
+  Flown f(Flown::Until::tracking);
+  const Vec3 local = f.out.command_local.p_W;
+  double off = 0, v = 0;
+  std::optional<Reason> held;
+  f.spoil = [&](auto& s) { s.state.p_W.y() += off, s.state.v_W.y() += v; };
+  for (int n = 0; n < 30; ++n) {
+    const double before = v;
+    v = std::min(v + 0.4, 1.4);
+    off += kControlPeriod * (before + v) / 2;
+    f.step();
+    if (!held && f.out.supervisor.mode == Mode::hold) held = f.out.supervisor.reason;
+    EXPECT_LT((f.out.command_local.p_W - local).norm(), 1e-9) << n;
+  }
+  EXPECT_EQ(held, Reason::frames_disagree);
+}
+
 TEST(TickReactions, AnAttitudeThatStopsArrivingHoldsAlsoWhileThePositionComes) {
   Flown f(Flown::Until::tracking);
   f.attitude_on = false;
