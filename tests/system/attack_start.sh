@@ -97,8 +97,8 @@ print(f"{len(cases) + 3} invalid configurations: exit 78, no port opened")
 # What is not the configuration's fault has codes of its own; what an earlier flight left is not touched.
 open(log, "wb").write(b"an earlier flight")
 earlier = logs()
-code, said = start((open(path, "w").write(configuration("/nowhere/tty")), path)[1])
-assert code == 74 and "/nowhere/tty: cannot be opened" in said and logs() == earlier, (code, said)
+code, said = start((open(path, "w").write(configuration(path)), path)[1])
+assert code == 74 and path + ": is not a serial port" in said and logs() == earlier, (code, said)
 port = Port()
 open(path, "w").write(configuration(port.path, file="/nowhere/flight.bwlog"))
 code, said = start(path)
@@ -108,6 +108,20 @@ open(path, "w").write(configuration(port.path, interface="nowhere0"))
 code, said = start(path)
 assert code == 71 and "nowhere0" in said, (code, said)
 assert open(log, "rb").read() == b"an earlier flight"
+
+# A port that is missing at start is waited for, said once, and opened when it appears.
+later = work + "/later"
+open(path, "w").write(configuration(later))
+running = subprocess.Popen([daemon, "--config", path], stderr=subprocess.PIPE, text=True)
+for line in running.stderr:
+    if later in line:
+        break
+assert "cannot be opened: No such file or directory; waiting for it" in line, line
+port = Port()
+os.symlink(port.path, later)
+time.sleep(5)
+running.send_signal(signal.SIGTERM)
+assert running.wait(20) == 0 and port.was_opened(), "a port that appeared was not opened"
 
 # A good one: the port is opened, and the log is a new file beside the earlier ones.
 before = logs()
