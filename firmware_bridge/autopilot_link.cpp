@@ -11,9 +11,9 @@ namespace {
 
 using namespace std::chrono;
 
-constexpr int kReadsPerPoll = 16;
-constexpr std::size_t kReadSize = 512;
-constexpr std::uint8_t kFlightController = 1;  // MAV_COMP_ID_AUTOPILOT1
+constexpr std::size_t kReadsPerPoll = 64, kBytesPerPoll = 8192;  // a socket gives a datagram a read
+constexpr std::size_t kReadSize = 2048;                          // more than a datagram: its rest would be lost
+constexpr std::uint8_t kFlightController = 1;                    // MAV_COMP_ID_AUTOPILOT1
 
 // Values of common.xml.
 constexpr std::uint8_t kTypeOnboardController = 18, kAutopilotInvalid = 8, kStateActive = 4, kMavlinkVersion = 3;
@@ -107,10 +107,12 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
 
 tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {
   std::array<std::uint8_t, kReadSize> bytes;
-  for (int i = 0; i < kReadsPerPoll && !lost_; ++i) {
+  std::size_t taken = 0;
+  for (std::size_t i = 0; i < kReadsPerPoll && taken < kBytesPerPoll && !lost_; ++i) {
     const auto n = std::visit([&](auto& port) { return port.read(bytes); }, port_);
     if (!n) lost_ = n.error();
     if (!n || *n == 0) break;
+    taken += *n;
     parser_.feed(std::span(bytes).first(*n), [&](const mavlink::Frame& frame) { take_frame(frame, now); });
   }
   flush();

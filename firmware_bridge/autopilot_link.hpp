@@ -8,13 +8,14 @@
 #include <variant>
 
 #include "firmware_bridge/serial_port.hpp"
+#include "firmware_bridge/tcp_port.hpp"
 #include "firmware_bridge/telemetry.hpp"
 #include "firmware_bridge/transmit_queue.hpp"
 #include "firmware_bridge/udp_port.hpp"
 
 namespace backwash::firmware_bridge {
 
-using Port = std::variant<SerialPort, UdpPort>;
+using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort>;
 
 inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< faults.md row 21
 inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);         ///< faults.md row 19
@@ -68,7 +69,7 @@ class AutopilotLink {
   /// known of the vehicle is forgotten; nothing waits to be sent.
   Port reconnect(Port port, Time now) noexcept;
 
-  /// Reads what has arrived (at most 8 KiB), then sends what waits. Error: kLost, also on every later call.
+  /// Reads what has arrived (at most about 8 KiB), then sends what waits. Error: kLost, also on every later call.
   tl::expected<void, PortError> poll(Time now) noexcept;
 
   const Telemetry& telemetry() const noexcept { return telemetry_; }

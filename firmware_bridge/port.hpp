@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <tl/expected.hpp>
 #include <utility>
@@ -24,6 +27,17 @@ struct PortError {
 
 /// One line for the operator. Not real-time.
 std::string describe(const PortError& error);
+
+/// Stands for a port that could not be opened yet: lost from the start, so that the one that is opened later takes its
+/// place like any other. Real-time.
+struct ClosedPort {
+  tl::expected<std::size_t, PortError> read(std::span<std::uint8_t>) noexcept { return lost(); }
+  tl::expected<std::size_t, PortError> write(std::span<const std::uint8_t>) noexcept { return lost(); }
+  void discard_output() noexcept {}
+
+ private:
+  static tl::unexpected<PortError> lost() noexcept { return tl::unexpected(PortError{PortError::Kind::kLost}); }
+};
 
 /// Owns a file descriptor.
 class FileDescriptor {

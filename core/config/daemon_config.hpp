@@ -5,6 +5,7 @@
 #include <tl/expected.hpp>
 
 #include "core/config/config.hpp"
+#include "core/config/link_device.hpp"
 
 namespace backwash::config {
 
@@ -29,9 +30,10 @@ struct Daemon {
     double max_mib = 512;        ///< largest snapshot made of a map, MiB
   } map;
   struct {
-    std::string device;  ///< serial port or pty
-    int baud = 0;
-    int system = 1;  ///< MAVLink system id of the vehicle
+    std::string device;   ///< as written: for messages
+    LinkDevice endpoint;  ///< the same, read
+    int baud = 0;         ///< of a serial port; a socket has none
+    int system = 1;       ///< MAVLink system id of the vehicle
   } link;
   struct {
     int priority = 0;         ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling

@@ -93,6 +93,12 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
     if (!text) return tl::unexpected(text.error());
     *target = std::move(*text);
   }
+  const auto endpoint = link_device(d.link.device);
+  if (!endpoint)
+    return tl::unexpected(file->error(
+        "link.device",
+        "needs a path, or udp:, udpin: or tcp: with a numeric IPv4 address and a port, as udp:127.0.0.1:14580"));
+  d.link.endpoint = *endpoint;
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
     return tl::unexpected(file->error("frames", "needs three different names"));
   if (file->has("map.live")) {

@@ -215,7 +215,10 @@ void FlightTick::ask_of_motors(const TickInput& in, Mode before, TickOutput& out
   if (out.accepted) abandoned_ = 0;
   out.arm = out.accepted && in.segment->arms && out.supervisor.mode == Mode::tracking && !in.autopilot.armed;
   if (out.arm) arming_ = kArmingTicks;
-  out.disarm = abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
+  const auto& s = out.supervisor;
+  const bool ours = s.mode == Mode::tracking || s.mode == Mode::hold ||
+                    (s.mode == Mode::passive && s.reason == Reason::operator_request);  // neither quiet nor a pilot's
+  out.disarm = ours && abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
 }
 
 TickOutput FlightTick::step(const TickInput& in) noexcept {

@@ -85,4 +85,40 @@ struct HilStateQuaternion {
   }
 };
 
+/// SIM_STATE: ArduPilot's simulated truth: q = (w, x, y, z), rad, m/s² with gravity, rad/s, degrees, m above the sea,
+/// m/s in NED; lat_int and lon_int in 1e-7 degrees (a float has no more than 0.4 m).
+struct SimState {
+  static constexpr std::uint32_t kId = 108;
+  static constexpr std::string_view kName = "SIM_STATE";
+  float q1 = 0, q2 = 0, q3 = 0, q4 = 0, roll = 0, pitch = 0, yaw = 0, xacc = 0, yacc = 0, zacc = 0, xgyro = 0,
+        ygyro = 0, zgyro = 0, lat = 0, lon = 0, alt = 0, std_dev_horz = 0, std_dev_vert = 0, vn = 0, ve = 0, vd = 0;
+  std::int32_t lat_int = 0, lon_int = 0;
+  static constexpr auto fields() noexcept {
+    using M = SimState;
+    return std::tuple{field("q1", &M::q1),
+                      field("q2", &M::q2),
+                      field("q3", &M::q3),
+                      field("q4", &M::q4),
+                      field("roll", &M::roll),
+                      field("pitch", &M::pitch),
+                      field("yaw", &M::yaw),
+                      field("xacc", &M::xacc),
+                      field("yacc", &M::yacc),
+                      field("zacc", &M::zacc),
+                      field("xgyro", &M::xgyro),
+                      field("ygyro", &M::ygyro),
+                      field("zgyro", &M::zgyro),
+                      field("lat", &M::lat),
+                      field("lon", &M::lon),
+                      field("alt", &M::alt),
+                      field("std_dev_horz", &M::std_dev_horz),
+                      field("std_dev_vert", &M::std_dev_vert),
+                      field("vn", &M::vn),
+                      field("ve", &M::ve),
+                      field("vd", &M::vd),
+                      extension("lat_int", &M::lat_int),
+                      extension("lon_int", &M::lon_int)};
+  }
+};
+
 }  // namespace backwash::mavlink

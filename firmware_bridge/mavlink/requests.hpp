@@ -199,4 +199,19 @@ struct ParamSet {
   }
 };
 
+/// SET_GPS_GLOBAL_ORIGIN: Where the local frame's origin lies: 1e-7 degrees, mm above the sea.
+struct SetGpsGlobalOrigin {
+  static constexpr std::uint32_t kId = 48;
+  static constexpr std::string_view kName = "SET_GPS_GLOBAL_ORIGIN";
+  std::int32_t latitude = 0, longitude = 0, altitude = 0;
+  std::uint8_t target_system = 0;
+  std::uint64_t time_usec = 0;
+  static constexpr auto fields() noexcept {
+    using M = SetGpsGlobalOrigin;
+    return std::tuple{field("latitude", &M::latitude), field("longitude", &M::longitude),
+                      field("altitude", &M::altitude), field("target_system", &M::target_system),
+                      extension("time_usec", &M::time_usec)};
+  }
+};
+
 }  // namespace backwash::mavlink

@@ -39,10 +39,15 @@ auto made(int code, Make&& make) {
   }
 }
 
-firmware_bridge::SerialPort open_port(const decltype(config::Daemon::link)& link) {
-  auto port = firmware_bridge::SerialPort::open(link.device, static_cast<unsigned>(link.baud));
-  if (!port) throw StartError{kInputOutput, link.device + ": " + describe(port.error())};
-  return std::move(*port);
+/// A port that is missing or busy may be plugged in, or its simulator started, later: the link watch goes on trying.
+firmware_bridge::Port port_at_start(const decltype(config::Daemon::link)& link) {
+  using Kind = firmware_bridge::PortError::Kind;
+  auto port = open_port(link);
+  if (port) return std::move(*port);
+  const std::string what = link.device + ": " + describe(port.error());
+  if (port.error().kind != Kind::kOpen && port.error().kind != Kind::kBusy) throw StartError{kInputOutput, what};
+  spdlog::warn("{}; waiting for it", what);
+  return firmware_bridge::ClosedPort{};
 }
 
 // What carries odometry to the control thread comes right below it, before the middleware starts its threads.
@@ -69,7 +74,7 @@ namespace {
 struct Flight {
   explicit Flight(const Settings& s)
       : settings(s),
-        port(open_port(s.daemon.link)),  // first: a start that fails there leaves no log behind
+        port(port_at_start(s.daemon.link)),  // first: a start that fails there leaves no log behind
         recorder(made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file); })),
         log(recorder->path()),
         link(std::move(port), static_cast<std::uint8_t>(s.daemon.link.system), std::chrono::steady_clock::now()),
@@ -83,7 +88,7 @@ struct Flight {
 
   const Settings& settings;
   std::unique_ptr<Channels> channels = std::make_unique<Channels>();
-  firmware_bridge::SerialPort port;
+  firmware_bridge::Port port;
   std::unique_ptr<Recorder> recorder;
   const std::string log;  ///< file that the recorder began with
   firmware_bridge::AutopilotLink link;

@@ -18,7 +18,8 @@ struct Settings {
 /// Reads the daemon's file and the vehicle and model files that it names. Error: one line naming file, line and key.
 tl::expected<Settings, std::string> load_settings(const std::string& path);
 
-/// Runs until SIGINT or SIGTERM; returns the exit code: 0; 74 when the port cannot be opened, 73 when the log cannot be
+/// Runs until SIGINT or SIGTERM; returns the exit code: 0; 74 when the device is no port that can be
+/// used (one that is missing or busy is waited for), 73 when the log cannot be
 /// made, 71 when the middleware or a thread cannot be started; 70 after an exception in any thread, which ends the
 /// flight in silence (faults.md row 50); 74 also when the disk does not answer at the end. Each is one line on standard
 /// error.

@@ -9,7 +9,7 @@
 namespace backwash::daemon {
 namespace {
 
-using firmware_bridge::LinkFault;
+using namespace firmware_bridge;
 
 void tell(const ControlEvent& event) {
   switch (event.kind) {
@@ -24,30 +24,46 @@ void tell(const ControlEvent& event) {
 
 }  // namespace
 
+tl::expected<Port, PortError> open_port(const decltype(config::Daemon::link)& link) {
+  const auto& [kind, address, port] = link.endpoint;
+  const auto as_port = [](auto&& open) { return Port(std::move(open)); };
+  switch (kind) {
+    case config::LinkDevice::Kind::serial:
+      return SerialPort::open(address, static_cast<unsigned>(link.baud)).map(as_port);
+    case config::LinkDevice::Kind::udp:
+      return UdpPort::open({"0.0.0.0", 0}, UdpPort::Endpoint{address, port}).map(as_port);
+    case config::LinkDevice::Kind::udpin:
+      return UdpPort::open({address, port}, std::nullopt).map(as_port);
+    case config::LinkDevice::Kind::tcp:
+      return TcpPort::open(address, port, std::chrono::milliseconds(500)).map(as_port);
+  }
+  return tl::unexpected(PortError{PortError::Kind::kAddress});
+}
+
 void LinkWatch::step() {
   while (const auto event = channels_.events.pop()) tell(*event);
   constexpr std::uint8_t kPortLost = 1 + static_cast<std::uint8_t>(LinkFault::kPortLost);
   const std::uint32_t losses = channels_.port_losses.load(std::memory_order_relaxed);
   const std::uint8_t fault = channels_.link_fault.load(std::memory_order_relaxed);
   if (std::exchange(losses_, losses) != losses)
-    spdlog::error("{}: {}, loss {}", device_, name(LinkFault::kPortLost), losses);
+    spdlog::error("{}: {}, loss {}", link_.device, name(LinkFault::kPortLost), losses);
   if (fault != fault_) {
     if (fault == 0)
-      spdlog::info("{}: link good", device_);
+      spdlog::info("{}: link good", link_.device);
     else if (fault != kPortLost)
-      spdlog::error("{}: {}", device_, name(static_cast<LinkFault>(fault - 1)));
+      spdlog::error("{}: {}", link_.device, name(static_cast<LinkFault>(fault - 1)));
     fault_ = fault;
   }
   channels_.ports.collect();
   if (losses == mended_) return;
-  if (auto port = firmware_bridge::SerialPort::open(device_, baud_)) {
+  if (auto port = open_port(link_)) {
     channels_.ports.offer(std::make_unique<const FreshPort>(std::move(*port)));
     mended_ = losses;
   }
 }
 
 void run_link_watch(Channels& channels, const decltype(config::Daemon::link)& link) {
-  LinkWatch watch(channels, link.device, static_cast<unsigned>(link.baud));
+  LinkWatch watch(channels, link);
   while (!channels.stop) {
     watch.step();
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

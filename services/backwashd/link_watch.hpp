@@ -6,11 +6,13 @@
 
 namespace backwash::daemon {
 
+/// Opens what [link] device names. Not real-time: a TCP connection is waited for half a second.
+tl::expected<firmware_bridge::Port, firmware_bridge::PortError> open_port(const decltype(config::Daemon::link)& link);
+
 /// What the operator is told of the control thread, and the work on its port that must not be done in a tick.
 class LinkWatch {
  public:
-  LinkWatch(Channels& channels, std::string device, unsigned baud)
-      : channels_(channels), device_(std::move(device)), baud_(baud) {}
+  LinkWatch(Channels& channels, const decltype(config::Daemon::link)& link) : channels_(channels), link_(link) {}
   /// Logs what the control thread reported, each loss of the port and a link fault that is new, and opens a lost port
   /// again (faults.md rows 17 and 19), one that was lost again between two calls too. To be called a few times a
   /// second.
@@ -18,8 +20,7 @@ class LinkWatch {
 
  private:
   Channels& channels_;
-  std::string device_;
-  unsigned baud_;
+  decltype(config::Daemon::link) link_;
   std::uint8_t fault_ = 0;
   std::uint32_t losses_ = 0;  ///< that were told
   std::uint32_t mended_ = 0;  ///< for which a fresh port was offered: a loss of that one is the next

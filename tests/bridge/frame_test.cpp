@@ -66,6 +66,10 @@ TEST(MavlinkCrc, CrcExtraFollowsFromTheDefinitions) {
   EXPECT_EQ(info<CommandLong>().crc_extra, 152);
   EXPECT_EQ(info<Statustext>().crc_extra, 83);  // an array
   EXPECT_EQ(info<Odometry>().crc_extra, 91);    // arrays and extensions
+  EXPECT_EQ(info<SimState>().crc_extra, 32);
+  EXPECT_EQ(info<SimState>().base_length, 84U);
+  EXPECT_EQ(info<SetGpsGlobalOrigin>().crc_extra, 41);
+  EXPECT_EQ(info<SetGpsGlobalOrigin>().base_length, 13U);
 }
 
 TEST(MavlinkFrame, EncodesAHeartbeatAsTheGuideLaysItOut) {

@@ -144,5 +144,31 @@ TEST(TransmitQueue, FinishesAHalfWrittenFrameAndDropsTheOldestWholeOne) {
   EXPECT_EQ(frames.back().frame.sender.sequence, 19);
 }
 
+// PX4 sends a datagram for each message, about 20 in a tick; ArduPilot gathers them in datagrams of up to 1,500 bytes.
+TEST(LinkOverUdp, TakesAllDatagramsOfATickInOnePollAndEachOneWhole) {
+  auto far = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
+  ASSERT_TRUE(far);
+  auto near = UdpPort::open({"127.0.0.1", 0}, UdpPort::Endpoint{"127.0.0.1", far->local_port()});
+  ASSERT_TRUE(near);
+  ASSERT_TRUE(near->write(Bytes{0}));  // so that the far end knows its peer
+  std::array<std::uint8_t, 8> heard;
+  for (int i = 0; i < 1000 && far->read(heard).value_or(0) == 0; ++i) ::usleep(1000);
+  AutopilotLink link(std::move(*near), std::uint8_t{1}, kStart);
+  Bytes gathered;
+  auto frame = [n = std::uint8_t{0}]() mutable {
+    return mavlink::encode_frame({1, 1, n++}, mavlink::Heartbeat{.autopilot = 12, .mavlink_version = 3});
+  };
+  for (int i = 0; i < 40; ++i) ASSERT_TRUE(far->write(frame().view()));
+  for (int i = 0; i < 60; ++i) {
+    const auto f = frame();
+    gathered.insert(gathered.end(), f.view().begin(), f.view().end());
+  }
+  ASSERT_GT(gathered.size(), 1200U);
+  ASSERT_TRUE(far->write(gathered));
+  ASSERT_TRUE(link.poll(kStart));
+  EXPECT_EQ(link.received().frames, 100U);
+  EXPECT_EQ(link.received().skipped_bytes, 0U);
+}
+
 }  // namespace
 }  // namespace backwash::firmware_bridge::test

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 
 #include <chrono>
 #include <numeric>
 
 #include "firmware_bridge/serial_port.hpp"
+#include "firmware_bridge/tcp_port.hpp"
 #include "firmware_bridge/udp_port.hpp"
 #include "tests/bridge/pseudo_terminal.hpp"
 
@@ -148,6 +151,69 @@ TEST(UdpPort, OutlivesAPeerThatIsNotThere) {
 
 TEST(UdpPort, NamesAnAddressThatIsNone) {
   EXPECT_EQ(UdpPort::open({"nowhere", 0}, std::nullopt).error().kind, Kind::kAddress);
+}
+
+/// Listens on a free port of the loopback and takes one connection.
+class Listener {
+ public:
+  Listener() {
+    sockaddr_in a{};
+    a.sin_family = AF_INET;
+    a.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof a;
+    EXPECT_EQ(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&a), size), 0);
+    EXPECT_EQ(::listen(socket_.get(), 1), 0);
+    EXPECT_EQ(::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&a), &size), 0);
+    port_ = ntohs(a.sin_port);
+  }
+  std::uint16_t port() const { return port_; }
+  FileDescriptor accepted() const { return FileDescriptor(::accept(socket_.get(), nullptr, nullptr)); }
+
+ private:
+  FileDescriptor socket_{::socket(AF_INET, SOCK_STREAM, 0)};
+  std::uint16_t port_ = 0;
+};
+
+TEST(TcpPort, CarriesEveryByteValueUnchangedBothWaysAndReportsThatThePeerHasClosed) {
+  const Listener listener;
+  auto port = TcpPort::open("127.0.0.1", listener.port(), std::chrono::milliseconds(500));
+  ASSERT_TRUE(port);
+  std::array<std::uint8_t, 512> bytes{};
+  EXPECT_EQ(port->read(bytes), 0U) << "nothing yet, and no waiting";
+  {
+    const FileDescriptor far = listener.accepted();
+    ASSERT_EQ(port->write(every_byte()), 256U);
+    ASSERT_EQ(::recv(far.get(), bytes.data(), bytes.size(), MSG_WAITALL | MSG_DONTWAIT), 256);
+    EXPECT_TRUE(std::ranges::equal(std::span(bytes).first(256), every_byte()));
+    ASSERT_EQ(::send(far.get(), every_byte().data(), 256, 0), 256);
+    EXPECT_EQ(read_all(*port, 256), every_byte());
+  }
+  const auto n = port->read(bytes);
+  ASSERT_FALSE(n) << "closed by the peer";
+  EXPECT_EQ(n.error().kind, Kind::kLost);
+}
+
+TEST(TcpPort, TakesNoMoreThanTheKernelHasRoomForAndNeverBlocks) {
+  const Listener listener;
+  auto port = TcpPort::open("127.0.0.1", listener.port(), std::chrono::milliseconds(500));
+  ASSERT_TRUE(port);
+  const Bytes block(10'000, 0x5A);
+  int refused = 0;
+  for (int i = 0; i < 2000 && refused == 0; ++i) {
+    const auto n = port->write(block);
+    ASSERT_TRUE(n);
+    refused += *n == 0;
+  }
+  EXPECT_EQ(refused, 1) << "nobody reads at the far end";
+}
+
+TEST(TcpPort, NamesWhyItCannotBeOpened) {
+  std::uint16_t closed_port = 0;
+  { closed_port = Listener().port(); }
+  const auto refused = TcpPort::open("127.0.0.1", closed_port, std::chrono::milliseconds(500));
+  EXPECT_EQ(refused.error().kind, Kind::kOpen);
+  EXPECT_NE(describe(refused.error()).find("refused"), std::string::npos);
+  EXPECT_EQ(TcpPort::open("nowhere", 1, std::chrono::milliseconds(1)).error().kind, Kind::kAddress);
 }
 
 }  // namespace

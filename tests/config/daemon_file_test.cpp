@@ -39,6 +39,22 @@ TEST(DaemonFile, ReadsTheShippedExample) {
   EXPECT_DOUBLE_EQ(d->control.battery_land, 0.15);
 }
 
+TEST(DaemonFile, ReadsTheFormsOfALinkDevice) {
+  using Kind = LinkDevice::Kind;
+  const auto read = [](const char* text) {
+    const auto d = link_device(text).value_or(LinkDevice{Kind::serial, "none", 0});
+    return std::tuple(d.kind, d.address, int{d.port});
+  };
+  EXPECT_EQ(read("/dev/ttyAMA0"), std::tuple(Kind::serial, "/dev/ttyAMA0", 0));
+  EXPECT_EQ(read("udp:127.0.0.1:14580"), std::tuple(Kind::udp, "127.0.0.1", 14580));
+  EXPECT_EQ(read("udpin:0.0.0.0:14540"), std::tuple(Kind::udpin, "0.0.0.0", 14540));
+  EXPECT_EQ(read("tcp:192.168.1.255:65535"), std::tuple(Kind::tcp, "192.168.1.255", 65535));
+  for (const char* bad :
+       {"udp:", "udp:127.0.0.1", "udp:localhost:14580", "tcp:127.0.0.1:0", "tcp:127.0.0.1:65536", "tcp:127.0.0.1:5760x",
+        "udp:127.0.0.256:1", "udp:1.2.3:1", "udp:1.2.3.4.5:1", "udp:1..2.3:1", "udp:127.0.0.1:-1"})
+    EXPECT_FALSE(link_device(bad)) << bad;
+}
+
 TEST(DaemonFile, FramesAndMapMayBeLeftOut) {
   std::string text = shipped();
   text.resize(text.find("\n[frames]"));
@@ -58,6 +74,7 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
   EXPECT_TRUE(names(error_after("domain = 0", "domain = 231"), 7, "dds.domain"));
   EXPECT_TRUE(names(error_after("domain = 0", "domain = 1.5"), 7, "dds.domain"));
   EXPECT_TRUE(names(error_after("baud = 921600", "baud = \"fast\""), 14, "link.baud"));
+  EXPECT_TRUE(names(error_after("\"/dev/ttyAMA0\"", "\"udp:there:14580\""), 13, "link.device"));
   EXPECT_TRUE(names(error_after("baud = 921600", "bauds = 921600"), 14, "link.bauds"));
   EXPECT_TRUE(names(error_after("device = \"/dev/ttyAMA0\"", "device = \"\""), 13, "link.device"));
   EXPECT_TRUE(names(error_after("file = ", "path = "), 23, "log.path"));

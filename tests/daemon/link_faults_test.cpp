@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Rows 17 to 25 of faults.md in lockstep: the line, the controller and the pilot.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <random>
 
 #include "services/backwashd/link_watch.hpp"
@@ -49,10 +51,14 @@ TEST(Row17, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
   EXPECT_EQ(rig.ticks_until(Mode::enabling, 3), 1) << to_string(rig.reason());
 }
 
+decltype(config::Daemon::link) serial(const std::string& path) {
+  return {.device = path, .endpoint = {config::LinkDevice::Kind::serial, path, 0}, .baud = 921600, .system = 1};
+}
+
 TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
-  LinkWatch watch(channels, line.path(), 921600);
+  LinkWatch watch(channels, serial(line.path()));
   watch.step();
   EXPECT_EQ(channels.ports.take(), nullptr);
   channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
@@ -64,6 +70,29 @@ TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   EXPECT_EQ(channels.ports.take(), nullptr) << "opened twice";
   channels.ports.give_back(port);
   channels.ports.collect();
+}
+
+// Lost from the start: a controller that boots after its companion.
+TEST(Row17, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
+  firmware_bridge::test::PseudoTerminal line;
+  const auto path = std::filesystem::temp_directory_path() / ("backwash_late_port_" + std::to_string(::getpid()));
+  auto channels = std::make_unique<Channels>();
+  firmware_bridge::AutopilotLink link(firmware_bridge::ClosedPort{}, std::uint8_t{1}, firmware_bridge::Time{});
+  ControlLoop loop(*channels, link, vehicle_5in(), 0.15);
+  LinkWatch watch(*channels, serial(path));
+  const auto together = [&](std::int64_t t_ns) {
+    loop.tick(t_ns, 0, 0);
+    watch.step();
+  };
+  for (std::int64_t n = 0; n < 5; ++n) together(n * 20'000'000);
+  EXPECT_EQ(channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  std::filesystem::create_symlink(line.path(), path);
+  for (std::int64_t n = 5; n < 10; ++n) together(n * 20'000'000);
+  std::filesystem::remove(path);
+  EXPECT_EQ(channels->link_fault, 0);
+  EXPECT_EQ(channels->port_losses, 1u);
+  EXPECT_EQ(loop.view().mode, Mode::passive);
+  channels->ports.collect();
 }
 
 // Lost, opened again and lost again between two looks of the watch: the fault that it sees has not changed.
@@ -80,7 +109,7 @@ TEST(Row17, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
 
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
-  LinkWatch watch(channels, line.path(), 921600);
+  LinkWatch watch(channels, serial(line.path()));
   for (std::uint32_t losses = 1; losses <= 3; ++losses) {
     channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
     channels.port_losses = losses;

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# A take-off that was cancelled before it was flown, then enable (../../shared/faults.md row 40): the motors never start.
+# A take-off that was cancelled before it was flown, then enable (../../shared/faults.md row 40): the motors start for no plan of
+# before the STOP: at most for one that was accepted and armed for by then.
 #   attack_02_cancelled_takeoff_arms.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
@@ -20,10 +21,15 @@ PYTHONPATH=$source_dir/tests/system python3 - "$work" <<'PYTHON'
 import csv, struct, sys
 import raw_log
 work = sys.argv[1]
-sent = [body for _, kind, body in raw_log.records(work + "/flight.bwlog") if kind == raw_log.FRAME_OUT]
-commands = [struct.unpack_from("<H", b[10:] + bytes(40), 28)[0] for b in sent if raw_log.message_id(b) == raw_log.COMMAND]
+answers = [line.split(maxsplit=3) for line in open(work + "/answers")]
+sent = [(t, body[10:] + bytes(40)) for t, kind, body in raw_log.records(work + "/flight.bwlog")
+        if kind == raw_log.FRAME_OUT and raw_log.message_id(body) == raw_log.COMMAND]
+commands = [(t, struct.unpack_from("<H", p, 28)[0], struct.unpack_from("<f", p, 0)[0]) for t, p in sent]
+arms = [t for t, command, first in commands if command == 400 and first == 1]
+late = [t for t in arms if [a[1] for a in answers if float(a[0]) < t][-1:] == ["stop"]]
 armed = sum(r["armed"] == "1" for r in csv.DictReader(open(work + "/truth.csv")))
-print(f"{len(commands)} commands to the autopilot, {commands.count(400)} of them to arm; armed for {armed * 0.02:.2f} s")
-assert 176 in commands, "it never took control"
-assert 400 not in commands and armed == 0, "a cancelled take-off armed the vehicle"
+print(f"{len(commands)} commands to the autopilot, {len(arms)} of them to arm, {len(late)} after a STOP; "
+      f"armed for {armed * 0.02:.2f} s")
+assert 176 in [command for _, command, _ in commands], "it never took control"
+assert not late and (arms or armed == 0), "a cancelled take-off armed the vehicle"
 PYTHON

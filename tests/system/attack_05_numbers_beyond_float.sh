@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Finite numbers that no float holds (../../shared/faults.md row 43): a velocity of 1e39 m/s. No float in any message is
-# infinite or NaN but the covariances of ODOMETRY, and the flight is held as with a broken sample.
+# infinite or NaN but the rates and covariances of ODOMETRY, and the flight is held as with a broken sample.
 #   attack_05_numbers_beyond_float.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
@@ -22,8 +22,8 @@ import raw_log
 work = sys.argv[1]
 huge = float(open(work + "/huge").read().split()[0])
 log = work + "/flight.bwlog"
-# Message: offset and number of its floats; ODOMETRY's covariances, which may be unknown (NaN), left out.
-floats = {raw_log.SETPOINT: (4, 11), raw_log.COMMAND: (0, 7), 331: (8, 13)}
+# Message: offset and number of its floats; ODOMETRY's rates and covariances, which may be unknown (NaN), left out.
+floats = {raw_log.SETPOINT: (4, 11), raw_log.COMMAND: (0, 7), 331: (8, 10)}
 sent = bad = 0
 for t, kind, body in raw_log.records(log):
     if kind != raw_log.FRAME_OUT or raw_log.message_id(body) not in floats:

@@ -8,11 +8,13 @@ source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv"
 mv "$work/autopilot" "$work/controller"
-"$source_dir/tests/system/line_filter.py" "$(readlink "$work/controller")" "$work/autopilot" armed >>"$log" 2>&1 &
+"$source_dir/tests/system/line_filter.py" "$(readlink "$work/controller")" "$work/autopilot" armed "$work/armed" >>"$log" 2>&1 &
 more_pids+=($!)
 for _ in $(seq 100); do [[ -e $work/autopilot ]] && break; sleep 0.05; done
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 sleep 2.5 # the frames are learnt
+touch "$work/armed"
+sleep 1.2 # its next heartbeat says so
 for pause in 100 250 500; do
   "$build/tests/attacker" "$domain" send enable +$pause stop +1800 release >>"$work/answers" || die "no answer"
 done

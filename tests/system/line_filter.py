@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Stands between the flight controller's serial port and the daemon's, and changes what the controller says.
 
-line_filter.py CONTROLLER LINK armed        its heartbeats say that it is armed
+line_filter.py CONTROLLER LINK armed FILE   from when FILE exists: its heartbeats say that it is armed
 line_filter.py CONTROLLER LINK silent FILE  from when FILE exists: neither LOCAL_POSITION_NED nor attitude
 """
 import os
@@ -35,19 +35,19 @@ def frames(buffer):
 
 def changed(frame, what, trigger):
     message = frame[7] | frame[8] << 8 | frame[9] << 16
+    if not os.path.exists(trigger):
+        return frame
     if what == "armed" and message == HEARTBEAT and frame[1] >= 7:
         frame[10 + 6] |= 0x80
         value = crc(frame[1:-2] + bytes([HEARTBEAT_EXTRA]))
         frame[-2:] = bytes([value & 0xFF, value >> 8])
-    silent = what == "silent" and os.path.exists(trigger)
-    if silent and message in (ATTITUDE, ATTITUDE_QUATERNION, LOCAL_POSITION_NED):
+    if what == "silent" and message in (ATTITUDE, ATTITUDE_QUATERNION, LOCAL_POSITION_NED):
         return b""
     return frame
 
 
 def main():
-    controller_path, link, what = sys.argv[1:4]
-    trigger = sys.argv[4] if len(sys.argv) > 4 else ""
+    controller_path, link, what, trigger = sys.argv[1:]
     controller = os.open(controller_path, os.O_RDWR | os.O_NOCTTY)
     tty.setraw(controller)
     ours, daemons = os.openpty()

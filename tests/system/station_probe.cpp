@@ -83,7 +83,7 @@ class Station {
 
 int script(Station& station) {
   std::string line;
-  while (std::getline(std::cin, line)) {
+  while (std::getline(std::cin, line) && line != "end") {
     std::istringstream words(line);
     std::string name;
     unsigned verb = 0;

@@ -303,6 +303,19 @@ TEST(FlightTick, AStopDisarmsNoVehicleThatAPilotArmedOnTheGround) {
   }
 }
 
+TEST(FlightTick, AStoppedTakeoffIsNotDisarmedByUsOnceWeAreQuietOrAPilotHasIt) {
+  for (const bool pilot : {false, true}) {
+    Flight flight;
+    flight.in.autopilot.landed = true;
+    flight.in.request = Request::stop;
+    flight.step();
+    ASSERT_EQ(flight.out.supervisor.mode, Mode::hold);
+    (pilot ? flight.in.autopilot.offboard : flight.in.autopilot.port_open) = false;
+    for (int n = 0; n < 200; ++n) EXPECT_FALSE(flight.step().disarm) << n;
+    EXPECT_EQ(flight.out.supervisor.mode, pilot ? Mode::passive : Mode::quiet);
+  }
+}
+
 // Rows 9, 10 and 13, as far as the tick decides them.
 TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
   for (const bool outside : {true, false}) {

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Sourced by ardupilot.sh and px4.sh: one flight of the daemon with a given build of a real autopilot in its own
+# simulator, with our VIO fed by that simulator's truth: take off, fly through builtin:apartment's door, land.
+#   NAME.sh PATH_OF_BUILD [BUILD_DIR [OUT_DIR [GOAL]]]
+# Exits 77 without a build to fly, otherwise with the judgement of `backwash report`, or 1 after a contact.
+
+fly_real() {
+  name=$1 path=${2:-} build=${3:-$root/build/release} out=${4:-} goal=${5:-7.4,3.0,1.2}
+  if [[ -z $path || ! -e $path ]]; then
+    echo "skipped: tests/autopilots/$name.sh needs the path of a build of $name"
+    exit 77
+  fi
+  if [[ ${BACKWASH_NETNS:-} != own ]]; then
+    BACKWASH_NETNS=own exec unshare -n -- bash "$0" "$path" "$build" "$out" "$goal"
+  fi
+  ip link set lo up
+  source "$root/tests/autopilots/simulators.sh"
+  bin=$build/services domain=7
+  out=${out:-$work/out}
+  mkdir -p "$out"
+  log=$out/$name.log
+  : >"$log"
+  local settings=()
+  [[ -z ${SETTINGS:-} ]] || read -ra settings <<<"$SETTINGS"
+  "start_$name" "$path" "${settings[@]}"
+  vehicle=${VEHICLE:-$root/tests/autopilots/$name.vehicle.toml}
+  mkfifo "$work/faults"
+  exec 7<>"$work/faults"
+  "$build/tests/autopilot_vio" --truth "$truth" --map builtin:apartment --vehicle "$vehicle" --start "${START:-3.0,4.2,0.26}" \
+    --yaw "${MAP_YAW:-0.6}" --domain "$domain" --log "$out/$name.truth.csv" <&7 >"$out/$name.vio.log" 2>&1 &
+  vio_pid=$!
+  pids+=("$vio_pid")
+  daemon "$vehicle" "$out/$name.bwlog"
+
+}
+
+die() {
+  echo "flight: $*; see $log" >&2
+  tail -n 20 "$log" >&2
+  exit 70
+}
+
+# daemon VEHICLE RAW_LOG: writes its configuration and starts it; the map may take a minute to be ready.
+daemon() {
+  cat >"$work/backwashd.toml" <<TOML
+vehicle = "$1"
+model = "builtin:quad-5in"
+[dds]
+domain = $domain
+interface = "lo"
+namespace = "backwash"
+odometry_topic = "rt/backwash/odometry"
+[link]
+device = "$device"
+baud = 921600
+system = 1
+[control]
+priority = 80
+cpu = -1
+battery_land = 0.15
+[log]
+file = "$2"
+TOML
+  "$bin/backwashd" --config "$work/backwashd.toml" >>"$log" 2>&1 &
+  daemon_pid=$!
+  pids+=("$daemon_pid")
+  for _ in $(seq 1200); do
+    grep -q 'map accepted' "$log" && return
+    kill -0 "$daemon_pid" 2>/dev/null || die "the daemon stopped"
+    sleep 0.1
+  done
+  die "the daemon accepted no map"
+}
+
+ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1; }
+must() { ctl "$@" || die "backwashctl $* failed: $(tail -n 1 "$log")"; }
+
+# The flight itself, after fly_real: enable, take off, go, land, judge.
+judge_flight() {
+  for n in $(seq 60); do
+    ctl enable --wait && break
+    [[ $n != 60 ]] || die "enabling failed: $(tail -n 1 "$log")"
+    sleep 1
+  done
+  must takeoff --height 1.2 --wait
+  must goto "$goal" --wait
+  sleep 3
+  ctl status --json >/dev/null || true
+  "$bin/backwashctl" --domain "$domain" status --json >"$out/$name.status.json" 2>>"$log" || die "no status at the goal"
+  must land --wait
+  kill -TERM "$daemon_pid" "$vio_pid"
+  wait "$daemon_pid" "$vio_pid" 2>/dev/null || true
+  tail -n 1 "$out/$name.vio.log"
+  grep -q ' contacts 0,' "$out/$name.vio.log" || die "the vehicle touched the map"
+  "$bin/backwash" report --log "$out/$name.bwlog" --truth "$out/$name.truth.csv" --vehicle "$vehicle" \
+    --model builtin:quad-5in --out "$out/$name.html" --force
+}

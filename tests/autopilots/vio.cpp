@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The VIO and the mapper beside a real autopilot in its simulator: the simulator's truth, placed in a map, becomes
+// odometry with noise on DDS; the map is published; the truth is logged and held against the map.
+// Faults come as lines of standard input: stop, go, freeze, jump X Y Z (m), turn YAW (rad).
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "core/config/config.hpp"
+#include "core/map/distance_field.hpp"
+#include "core/map/load_map.hpp"
+#include "core/map/octomap_message.hpp"
+#include "services/backwashd/channels.hpp"
+#include "services/bench/scans.hpp"
+#include "services/dds/topics.hpp"
+#include "services/parallel/real_time.hpp"
+#include "tests/autopilots/truth.hpp"
+
+namespace backwash::autopilots {
+namespace {
+
+volatile std::sig_atomic_t stopped = 0;
+
+struct Options {
+  std::string truth, map, vehicle, log;
+  std::vector<double> start;  // the vehicle's centre as it stands, m
+  double yaw = 0;             // map <- east, north, up
+  double noise = 0.001;       // m
+  int domain = 0;
+};
+
+/// What the VIO does wrong.
+struct Fault {
+  bool stopped = false;
+  Vec3 jump = Vec3::Zero();  // map frame
+  double turn = 0;           // about the place where it began
+  Vec3 pivot = Vec3::Zero();
+  std::optional<Truth> frozen;
+};
+
+struct Pose {
+  Vec3 p, v;
+  Eigen::Quaterniond q;
+};
+
+class Vio {
+ public:
+  explicit Vio(const Options& o)
+      : o_(o),
+        grid_(loaded(o.map)),
+        distance_(grid_),
+        vehicle_(config::load_vehicle(o.vehicle).value()),
+        start_(o.start[0], o.start[1], o.start[2]),
+        R_(Eigen::AngleAxisd(o.yaw, Vec3::UnitZ())),
+        participant_(static_cast<std::uint32_t>(o.domain), "lo", {.priority = allowed_fifo(60)}),
+        odometry_(dds::make_writer<dds::Odometry>(participant_, "backwash")),
+        map_(dds::make_writer<dds::Octomap>(participant_, "backwash")),
+        log_(o.log),
+        truth_(truth_source(o.truth)) {
+    log_ << "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,qw,qx,qy,qz\n" << std::setprecision(15);
+    publish_map();
+  }
+
+  void run() {
+    ::fcntl(STDIN_FILENO, F_SETFL, O_NONBLOCK);
+    while (!stopped) {
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
+      listen();
+      if (const auto truth = truth_->newest()) take(*truth);
+    }
+    std::cout << "closest " << closest_ << " m at " << closest_at_.transpose() << ", contacts " << contacts_
+              << ", samples " << samples_ << std::endl;
+  }
+
+ private:
+  static map::OccupancyGrid loaded(const std::string& name) {
+    auto grid = map::load_map(name);
+    if (!grid) throw std::runtime_error(grid.error().message);
+    return std::move(*grid);
+  }
+  void publish_map() {
+    static const std::string frame = "map", id = "OcTree";
+    map_data_ = map::encode_octomap(grid_);
+    dds::Octomap m{};
+    m.header.frame_id = dds::c_string(frame);
+    m.binary = true;
+    m.id = dds::c_string(id);
+    m.resolution = grid_.resolution();
+    const auto size = static_cast<std::uint32_t>(map_data_.size());
+    m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(map_data_.data()), false};
+    map_.write(m);
+  }
+
+  Pose in_map(const Truth& t) const { return {start_ + R_ * t.p_E, R_ * t.v_E, R_ * t.q_EB}; }
+
+  void listen() {
+    std::array<char, 512> bytes;
+    for (ssize_t n; (n = ::read(STDIN_FILENO, bytes.data(), bytes.size())) > 0;)
+      heard_.append(bytes.data(), static_cast<std::size_t>(n));
+    for (std::size_t end; (end = heard_.find('\n')) != heard_.npos; heard_.erase(0, end + 1)) {
+      std::istringstream in(heard_.substr(0, end));
+      std::string verb;
+      in >> verb;
+      if (verb == "stop") fault_.stopped = true;
+      if (verb == "go") fault_ = {};
+      if (verb == "freeze") fault_.frozen = last_;
+      if (verb == "jump") in >> fault_.jump.x() >> fault_.jump.y() >> fault_.jump.z();
+      if (verb == "turn") in >> fault_.turn, fault_.pivot = in_map(last_).p;
+      std::cout << "fault " << verb << " at " << last_.at_ns << std::endl;
+    }
+  }
+
+  void take(const Truth& t) {
+    const Pose p = in_map(t);
+    const double dt = static_cast<double>(t.at_ns - last_.at_ns) * 1e-9;
+    const Vec3 a = samples_ > 0 && dt > 0 ? Vec3(R_ * (t.v_E - last_.v_E) / dt) : Vec3::Zero();
+    last_ = t;
+    ++samples_;
+    judge(p);
+    log_ << static_cast<double>(t.at_ns) * 1e-9;
+    for (const Vec3& v : {p.p, p.v, a}) log_ << ',' << v.x() << ',' << v.y() << ',' << v.z();
+    log_ << ',' << p.q.w() << ',' << p.q.x() << ',' << p.q.y() << ',' << p.q.z() << '\n';
+    if (!fault_.stopped) send(in_map(fault_.frozen ? *fault_.frozen : t), t.at_ns);
+  }
+
+  /// The vehicle's ball against the map; the floor that it stands on is no obstacle below half its radius above.
+  void judge(const Pose& p) {
+    if (p.p.z() < start_.z() + 0.5 * vehicle_.body.radius) return;
+    const double clearance = distance_.exact(grid_, p.p) - vehicle_.body.radius;
+    if (clearance < closest_) closest_ = clearance, closest_at_ = p.p;
+    const bool contact = clearance < 0;
+    contacts_ += contact && !touching_;
+    touching_ = contact;
+  }
+
+  void send(Pose p, std::int64_t at_ns) {
+    static const std::string frame = "map", child = "base_link";
+    std::normal_distribution<double> normal(0, o_.noise);
+    const auto noise = [&] { return Vec3(normal(random_), normal(random_), normal(random_)); };
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(fault_.turn, Vec3::UnitZ()));
+    p = {fault_.pivot + turn * (p.p - fault_.pivot) + fault_.jump + noise(), turn * p.v + 5 * noise(), turn * p.q};
+    dds::Odometry m{};
+    m.header.stamp = bench::stamp(static_cast<double>(at_ns) * 1e-9);
+    m.header.frame_id = dds::c_string(frame);
+    m.child_frame_id = dds::c_string(child);
+    m.pose.pose.position = {p.p.x(), p.p.y(), p.p.z()};
+    m.pose.pose.orientation = {p.q.x(), p.q.y(), p.q.z(), p.q.w()};
+    const Vec3 v_B = p.q.conjugate() * p.v;
+    m.twist.twist.linear = {v_B.x(), v_B.y(), v_B.z()};
+    for (std::size_t i = 0; i < 6; ++i) {
+      m.pose.covariance[7 * i] = i < 3 ? o_.noise * o_.noise : 1e-6;
+      m.twist.covariance[7 * i] = i < 3 ? 25 * o_.noise * o_.noise : 1e-4;
+    }
+    odometry_.write(m);
+  }
+
+  Options o_;
+  map::OccupancyGrid grid_;
+  map::DistanceField distance_;
+  Vehicle vehicle_;
+  Vec3 start_;
+  Eigen::Quaterniond R_;  // map <- E
+  dds::Participant participant_;
+  dds::Writer<dds::Odometry> odometry_;
+  dds::Writer<dds::Octomap> map_;
+  std::vector<std::int8_t> map_data_;
+  std::ofstream log_;
+  std::unique_ptr<TruthSource> truth_;
+  std::string heard_;
+  Fault fault_;
+  Truth last_;
+  long samples_ = 0, contacts_ = 0;
+  bool touching_ = false;
+  double closest_ = 1e9;
+  Vec3 closest_at_ = Vec3::Zero();
+  std::mt19937 random_{2};
+};
+
+}  // namespace
+}  // namespace backwash::autopilots
+
+int main(int argc, char** argv) {
+  backwash::autopilots::Options o;
+  CLI::App app{"autopilot_vio: VIO and mapper beside a real autopilot in its simulator"};
+  app.add_option("--truth", o.truth, "see truth.hpp")->required();
+  app.add_option("--map", o.map)->required();
+  app.add_option("--vehicle", o.vehicle)->required();
+  app.add_option("--start", o.start, "x,y,z of the vehicle's centre as it stands, m")
+      ->required()
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--yaw", o.yaw, "of the map against east, rad");
+  app.add_option("--noise", o.noise, "of the position, m");
+  app.add_option("--domain", o.domain)->required();
+  app.add_option("--log", o.log, "the truth, CSV")->required();
+  CLI11_PARSE(app, argc, argv);
+  std::signal(SIGTERM, [](int) { backwash::autopilots::stopped = 1; });
+  std::signal(SIGINT, [](int) { backwash::autopilots::stopped = 1; });
+  try {
+    backwash::autopilots::Vio vio(o);
+    backwash::set_fifo(backwash::allowed_fifo(60));
+    vio.run();
+    return 0;
+  } catch (const std::exception& e) {
+    std::cerr << "autopilot_vio: " << e.what() << "\n";
+    return 70;
+  }
+}
