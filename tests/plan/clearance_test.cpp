@@ -95,6 +95,8 @@ TEST(LateralClearance, BesideAPillarIsTheGapLessSetBodyAndEstimation) {
   EXPECT_NEAR(at(1.6, 0.2), 0.9 - 0.2 - body(), 1e-9);
   EXPECT_NEAR(lateral_clearance(*world, tube_along({{1.6, 2, 0.6}, {1.7, 2, 0.6}})), 0.8 - 0.05 - body(), 1e-9)
       << "the set is swept to the next one";
+  // Past the pillar at x = 2.3 in one step, neither end nor the middle of which is beside it.
+  EXPECT_NEAR(lateral_clearance(*world, tube_along({{2.3, 0.8, 0.6}, {2.3, 2.5, 0.6}})), 0.2 - 0.05 - body(), 1e-9);
   const auto with_margin = world_of(pillar(0, 19), 0.3);
   EXPECT_NEAR(lateral_clearance(*with_margin, tube_along({{1.6, 2, 0.6}, {1.6, 2, 0.6}})), 0.9 - 0.3 - body(), 1e-9);
 }

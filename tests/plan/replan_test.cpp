@@ -153,5 +153,96 @@ TEST(Replan, StopsOnItsPathWhereTheWayIsClosed) {
   EXPECT_NE(next.message.find("no way"), std::string::npos) << next.message;
 }
 
+TEST(Replan, SaysThatNothingIsSafeWhereEvenTheStopIsTooLong) {
+  const Vec3 goal_W(5.05, 2.05, 0.95);
+  const auto c = changed(goal_W, [](OccupancyGrid&) {});
+  OccupancyGrid closed = c.before->grid;
+  const double x = c.route.commands[75].p_W.x() + 0.25;
+  fill(closed, {x, 0, 0}, {x + 0.2, 4, 1.8}, Cell::occupied);
+  const auto next = replan(*world_of(closed), c.route, 60, 75, goal_W, {{1.0, 1.5}, 7});
+  EXPECT_EQ(next.kind, Replan::Kind::unsafe);
+  EXPECT_LE(next.clearance_m, 0);
+}
+
+TEST(Replan, WhatWasFlownAlreadyIsNoReasonToStop) {
+  const Vec3 goal_W(5.05, 2.05, 0.95);
+  const auto c = changed(goal_W, [](OccupancyGrid& g) { fill(g, {0.9, 1.9, 0}, {1.2, 2.2, 1.8}, Cell::occupied); });
+  ASSERT_GT(c.route.commands[150].p_W.x(), 1.8);
+  const auto next = replan(*c.after, c.route, 150, 165, goal_W, {{1.0, 1.5}, 7});
+  EXPECT_EQ(next.kind, Replan::Kind::kept);
+  EXPECT_GT(next.clearance_m, 0);
+}
+
+TEST(Replan, GoesNoFartherThanItsHorizonAtATime) {
+  const auto c = changed({5.05, 2.05, 0.95}, [](OccupancyGrid&) {});
+  const Vec3 start_W(1.05, 2.05, 0.95);
+  const auto next = replan(*c.before, hovering(*c.before, start_W), 0, 10, {5.05, 2.05, 0.95}, {{1.0, 1.5}, 1.5});
+  ASSERT_EQ(next.kind, Replan::Kind::extended) << next.message;
+  EXPECT_FALSE(next.reaches_goal);
+  EXPECT_LE((next.route.commands.back().p_W - start_W).norm(), 1.5 + 1e-6);
+  EXPECT_GT((next.route.commands.back().p_W - start_W).norm(), 1.0);
+}
+
+TEST(Replan, KeepsTheReserveThatIsAskedForAlsoWhereTheGoalHasLess) {
+  const auto c = changed({5.05, 2.05, 0.95}, [](OccupancyGrid&) {});
+  const Vec3 start_W(1.05, 2.05, 0.95), goal_W(5.05, 0.45, 0.95);
+  ReplanOptions options{{1.0, 1.5}, 7};
+  options.reserve_m = 0.3;
+  const auto next = replan(*c.before, hovering(*c.before, start_W), 0, 10, goal_W, options);
+  ASSERT_EQ(next.kind, Replan::Kind::extended) << next.message;
+  EXPECT_FALSE(next.reaches_goal);
+  const auto& w = *c.before;
+  EXPECT_GT(reach::hover_set(w.reach, w.grid, w.distance, w.bounds, next.route.commands.back().p_W).clearance, 0.3);
+}
+
+// A slot of 20 cm in a known wall, everything around it unknown.
+TEST(OptimisticWay, DoesNotLeadThroughWhatIsTooNarrowForTheBody) {
+  for (const bool wide : {false, true}) {
+    OccupancyGrid grid = truth();
+    fill(grid, {2.4, 0, 0}, {3.7, 4, 1.8}, Cell::unknown);
+    fill(grid, {3, 0, 0}, {3.1, 4, 1.8}, Cell::occupied);
+    fill(grid, {3, 2, 0}, {3.1, wide ? 3.0 : 2.2, 1.8}, Cell::unknown);
+    const auto world = world_of(grid);
+    EXPECT_EQ(optimistic_way(*world, {1.05, 2.05, 0.95}, {5.05, 2.05, 0.95}).empty(), !wide);
+  }
+}
+
+TEST(PlanPromises, ATrajectoryKeepsTheLimitsAndHoversASecondAtItsGoal) {
+  const auto world = world_of(truth());
+  const Vec3 start_W(1.05, 1.05, 0.95), goal_W(5.05, 0.95, 0.95);
+  const PlanOptions options{1.0, 1.5};
+  const auto planned = plan(*world, {{start_W, Vec3::Zero()}, {start_W}}, goal_W, options);
+  ASSERT_EQ(planned.status, PlanStatus::ok) << planned.message;
+  ASSERT_EQ(planned.tube.size(), planned.commands.size() + 1);
+  double fastest = 0, hardest = 0;
+  for (const Setpoint& c : planned.commands) {
+    fastest = std::max(fastest, c.v_W.cwiseAbs().maxCoeff());
+    hardest = std::max(hardest, c.a_W.cwiseAbs().maxCoeff());
+  }
+  EXPECT_LE(fastest, 1.0 + 1e-6);
+  EXPECT_LE(hardest, 1.5 + 1e-6);
+  EXPECT_GT(std::max(fastest / 1.0, hardest / 1.5), 0.5) << "and is no crawl";
+  for (std::size_t n = planned.commands.size() - 51; n < planned.commands.size(); ++n) {
+    EXPECT_LT((planned.commands[n].p_W - goal_W).norm(), 1e-6) << n;
+    EXPECT_TRUE(planned.commands[n].v_W.isZero()) << n;
+  }
+}
+
+TEST(PlanPromises, ARefusedGoalIsToldByWhatIsThere) {
+  OccupancyGrid grid = truth();
+  fill(grid, {4, 3, 0}, {4.4, 3.4, 1.8}, Cell::unknown);
+  const auto world = world_of(grid);
+  const Vec3 start_W(1.05, 1.05, 0.95);
+  const auto why = [&](const Vec3& goal_W) {
+    const auto planned = plan(*world, {{start_W, Vec3::Zero()}, {start_W}}, goal_W, {1.0, 1.5});
+    EXPECT_EQ(planned.status, PlanStatus::goal_blocked);
+    return planned.message;
+  };
+  EXPECT_NE(why({4.15, 3.15, 0.95}).find("is unknown space"), std::string::npos);
+  EXPECT_NE(why({3.05, 1, 0.95}).find("is occupied"), std::string::npos);
+  EXPECT_NE(why({9, 1, 0.95}).find("is outside the map"), std::string::npos);
+  EXPECT_NE(why({5.05, 0.2, 0.95}).find("is not clear"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace backwash::plan

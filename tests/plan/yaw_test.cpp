@@ -81,5 +81,16 @@ TEST(TurnedTo, ReachesTheHeadingTheShortWayWithinTheLimitsFromRestToRest) {
   EXPECT_TRUE(turned_to({}, 1, {0, 2}).empty());
 }
 
+// A path that turns until its end: the heading cannot follow it to there.
+TEST(FacingAhead, IsAtRestWhenTheCommandsEnd) {
+  std::vector<Setpoint> commands;
+  for (int k = 0; k < 200; ++k)
+    commands.push_back({{std::cos(0.02 * k), std::sin(0.02 * k), 1}, Vec3::Zero(), Vec3::Zero(), 0});
+  const YawLimits limits{2, 4};
+  const auto turned = facing_ahead(commands, {std::numbers::pi / 2, 1}, limits);
+  EXPECT_GT(std::abs(turned[100].yaw - turned[99].yaw), 0.01) << "there is something to turn";
+  EXPECT_LE(std::abs(turned[199].yaw - turned[198].yaw), limits.acceleration * kControlPeriod * kControlPeriod + 1e-9);
+}
+
 }  // namespace
 }  // namespace backwash::plan

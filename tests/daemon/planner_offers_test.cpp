@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the planner offers, and what it does not: alone against a control thread that the test plays.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <functional>
+
+#include "core/map/load_map.hpp"
+#include "services/backwashd/flying.hpp"
+#include "services/backwashd/planner_worker.hpp"
+#include "tests/daemon/lockstep.hpp"
+
+namespace backwash::daemon::test {
+namespace {
+
+using map::Cell;
+using map::OccupancyGrid;
+
+/// A room of 6 × 4 × 2 m with solid floor, at 0.1 m.
+OccupancyGrid room() {
+  OccupancyGrid grid({0, 0, 0}, 0.1, {60, 40, 20}, Cell::free);
+  for (int j = 0; j < 40; ++j)
+    for (int i = 0; i < 60; ++i) grid.set({i, j, 0}, Cell::occupied);
+  return grid;
+}
+
+void fill(OccupancyGrid& grid, const Index3& low, const Index3& high) {
+  for (int k = low.z(); k <= high.z(); ++k)
+    for (int j = low.y(); j <= high.y(); ++j)
+      for (int i = low.x(); i <= high.x(); ++i) grid.set({i, j, k}, Cell::occupied);
+}
+
+std::shared_ptr<const plan::World> world_of(const OccupancyGrid& grid) {
+  return plan::build_world(grid, Model{}, vehicle_5in());
+}
+
+class PlannerOffers : public testing::Test {
+ protected:
+  static constexpr std::int64_t kSeen_ns = 4711;
+  std::string log_ = std::filesystem::temp_directory_path() / ("backwash_offers." + std::to_string(getpid()));
+  std::unique_ptr<Channels> channels_ = std::make_unique<Channels>();
+  Recorder recorder_{log_};
+  ControlView view_;
+  std::vector<track::AcceptedSegment> offers_;
+  std::function<void(const track::AcceptedSegment&)> answer_ = [this](const auto& s) { view_.segment = s.id; };
+  PlannerWorker planner_{*channels_, recorder_, [](const auto&) {}, [this] { control(); }};
+  std::shared_ptr<const plan::World> world_;
+
+  ~PlannerOffers() override {
+    channels_->worlds.collect();
+    channels_->segments.collect();
+    std::filesystem::remove(log_);
+  }
+  void stand(const Vec3& p_W) {
+    view_.mode = track::Mode::tracking;
+    view_.state = {p_W, Vec3::Zero()};
+    view_.command = {p_W, Vec3::Zero(), Vec3::Zero(), 0.3};
+    view_.epoch = {7, 2};
+    show();
+  }
+  void show() { channels_->view_planner.write(view_); }
+  void know(const OccupancyGrid& grid) {
+    world_ = world_of(grid);
+    channels_->worlds.offer({world_, kSeen_ns});
+  }
+  /// The control thread's part of a pause.
+  void control() {
+    if (const auto* s = channels_->segments.take()) {
+      offers_.push_back(*s);
+      channels_->segments.give_back(s);
+      answer_(*s);
+    }
+    view_.t_ns += 20'000'000;
+    show();
+  }
+  /// "", or why not.
+  std::string ask(PlanJob::Kind kind, const Vec3& position, const track::Epoch& epoch = {7, 2}) {
+    channels_->jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, 1, position, {}, epoch}));
+    EXPECT_TRUE(planner_.step());
+    const auto outcome = channels_->outcomes.pop();
+    return outcome->ok ? "" : outcome->reason.data();
+  }
+};
+
+TEST_F(PlannerOffers, ATakeoffToTheLowestClearHeightThatArmsOnceItIsAccepted) {
+  know(room());
+  stand({3.05, 2.05, 0.3});
+  const auto column = plan::takeoff_column(*world_, view_.state.p_W);
+  ASSERT_TRUE(column);
+  ASSERT_GT(column->z_safe, 0.35);
+  EXPECT_EQ(ask(PlanJob::Kind::takeoff, {0, 0, 0.31}), "");
+  ASSERT_EQ(offers_.size(), 1u);
+  const auto& s = offers_[0];
+  EXPECT_TRUE(s.arms);
+  EXPECT_NEAR(s.commands.back().p_W.z(), column->z_safe, 1e-9);
+  EXPECT_EQ(s.epoch, (track::Epoch{7, 2}));
+  EXPECT_EQ(s.seen_ns, kSeen_ns);
+  EXPECT_GT(s.clearance, 0);
+  EXPECT_NEAR(s.clearance, plan::takeoff_clearance(*world_, s.tube, column->z_safe), 1e-9);
+  EXPECT_FALSE(s.stops.empty());
+  for (const Setpoint& c : s.commands) EXPECT_EQ(c.yaw, 0.3);
+}
+
+TEST_F(PlannerOffers, NoTakeoffToWhereHoveringIsNotSafe) {
+  know(room());
+  stand({3.05, 2.05, 0.3});
+  EXPECT_NE(ask(PlanJob::Kind::takeoff, {0, 0, 1.9}).find("not safe"), std::string::npos);
+  EXPECT_TRUE(offers_.empty());
+}
+
+// Above a low box beside it hovering is clear; on the way there it is not.
+TEST_F(PlannerOffers, NoTakeoffWhoseTubeIsNotClear) {
+  OccupancyGrid grid = room();
+  fill(grid, {32, 18, 1}, {34, 22, 3});
+  know(grid);
+  stand({3.0, 2.05, 0.3});
+  ASSERT_TRUE(plan::takeoff_column(*world_, view_.state.p_W));
+  EXPECT_NE(ask(PlanJob::Kind::takeoff, {0, 0, 1.2}).find("not clear"), std::string::npos);
+  EXPECT_TRUE(offers_.empty());
+}
+
+TEST_F(PlannerOffers, AFlightWithItsTubeClearanceStopsAndHoverThatDoesNotArm) {
+  know(room());
+  stand({1.05, 2.05, 1.05});
+  EXPECT_EQ(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}), "");
+  ASSERT_EQ(offers_.size(), 1u);
+  const auto& s = offers_[0];
+  EXPECT_FALSE(s.arms);
+  EXPECT_NEAR(s.clearance, plan::tube_clearance(*world_, s.tube), 1e-9);
+  EXPECT_GT(s.stops.size(), 3u);
+  ASSERT_GT(s.commands.size(), 150u);
+  for (std::size_t n = s.commands.size() - 150; n < s.commands.size(); ++n) {  // one second of the plan's and two
+    EXPECT_LT((s.commands[n].p_W - Vec3(4.05, 2.05, 1.05)).norm(), 1e-6) << n;
+    EXPECT_TRUE(s.commands[n].v_W.isZero());
+  }
+}
+
+TEST_F(PlannerOffers, NothingForAGoalThatNoPlanReaches) {
+  OccupancyGrid grid = room();
+  fill(grid, {30, 0, 1}, {31, 39, 19});
+  know(grid);
+  stand({1.05, 2.05, 1.05});
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "");
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {3.05, 2.05, 1.05}), "");
+  EXPECT_TRUE(offers_.empty());
+}
+
+TEST_F(PlannerOffers, NothingThatIsEndedAlreadyOrWithoutControl) {
+  know(room());
+  stand({1.05, 2.05, 1.05});
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}, {6, 2}), "") << "an earlier order's";
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}, {7, 1}), "") << "before the mode ended it";
+  view_.mode = track::Mode::passive;
+  show();
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}), "");
+  EXPECT_TRUE(offers_.empty());
+}
+
+// The control thread refuses the first offer: the next one is made only if nothing has ended the plan meanwhile.
+TEST_F(PlannerOffers, NothingMoreOnceALaterOrderOrALoopClosureCameBetweenTwoOffers) {
+  for (const bool closure : {false, true}) {
+    offers_.clear();
+    know(room());
+    stand({1.05, 2.05, 1.05});
+    view_.closures = 0;
+    answer_ = [&](const auto& s) {
+      view_.refused_segment = s.id;
+      if (closure)
+        view_.closures = 1;
+      else
+        ++view_.epoch.order;
+    };
+    ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05});
+    for (const auto& s : offers_) EXPECT_EQ(s.closures, &s == &offers_[0] ? 0u : 1u);
+    if (!closure) {
+      EXPECT_EQ(offers_.size(), 1u);
+    }
+    view_.epoch = {7, 2};
+  }
+}
+
+/// A flight along x at 1 m/s that ends at x = 4.5 m, in the room with this in it.
+Flying along_x(const plan::World& world, double slow_from = 4.0) {
+  Flying f{};
+  f.segment.id = 1;
+  for (double x = 1; x < 4.5;) {
+    const double v = x < slow_from ? 1.0 : std::max(0.05, std::sqrt(2 * 1.0 * (4.5 - x)));
+    f.segment.commands.push_back({{x, 2.05, 1.05}, {v, 0, 0}, Vec3::Zero(), 0});
+    x += v * kControlPeriod;
+  }
+  append_hold(f.segment.commands);
+  f.start = {{1, 2.05, 1.05}, {1, 0, 0}};
+  f.previous = f.segment.commands.front();
+  verify(f, world);
+  return f;
+}
+
+// The room narrows at its beginning: what is left behind does not count.
+TEST(FlyingGuards, TheClearanceAheadIsThatOfWhatIsStillToBeFlown) {
+  OccupancyGrid grid = room();
+  fill(grid, {10, 14, 1}, {12, 15, 19});
+  const auto world = world_of(grid);
+  Flying f = along_x(*world);
+  add_guards(f, *world);
+  const auto& ahead = f.segment.clearance_ahead;
+  ASSERT_GT(ahead.size(), 3u);
+  EXPECT_NEAR(ahead[0], f.segment.clearance, 1e-9);
+  EXPECT_GT(ahead[2], ahead[0] + 0.1);
+  for (std::size_t n = 0; n < ahead.size(); ++n)
+    EXPECT_NEAR(ahead[n], clearance_from(f, *world, f.segment.tube, 50 * n), 1e-9) << n;
+  add_guards(f, *world, 120);
+  EXPECT_NEAR(f.segment.clearance_ahead[0], clearance_from(f, *world, f.segment.tube, 120), 1e-9)
+      << "of what was flown already nothing counts";
+}
+
+// A wall before the end of the flight: the stops that need more room than there is are left out.
+TEST(FlyingGuards, EveryStopThatIsOfferedIsClear) {
+  OccupancyGrid grid = room();
+  fill(grid, {38, 0, 1}, {39, 39, 19});
+  const auto world = world_of(grid);
+  Flying f = along_x(*world);
+  EXPECT_LE(f.segment.clearance, 0);
+  add_guards(f, *world);
+  ASSERT_GT(f.segment.stops.size(), 3u);
+  EXPECT_LT(f.segment.stops.back().branch, 140u);
+  for (const plan::Stop& stop : f.segment.stops) EXPECT_GT(plan::tube_clearance(*world, stop.tube), 0) << stop.branch;
+}
+
+}  // namespace
+}  // namespace backwash::daemon::test
