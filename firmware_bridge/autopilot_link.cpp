@@ -146,7 +146,7 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
   if (!for_us(m.target_system, m.target_component)) return;
   const std::int64_t now_ns = nanoseconds_of(now);
   if (m.tc1 == 0) {
-    send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
+    if (answers_) send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
   } else if (m.ts1 == timesync_asked_ns_ && timesync_asked_ns_ != 0) {
     timesync_asked_ns_ = 0;
     const std::int64_t round_trip = now_ns - m.ts1;

@@ -107,6 +107,9 @@ class AutopilotLink {
   /// Asks for a message at `rate_hz` > 0.
   bool send_message_interval(std::uint32_t message_id, double rate_hz) noexcept;
 
+  /// Whether TIMESYNC is answered from now on: nothing else is sent of the link's own accord.
+  void answer_timesync(bool answers) noexcept { answers_ = answers; }
+
   /// Asks for a parameter by name; Telemetry::parameter() has the answer.
   bool send_parameter_request(std::string_view name) noexcept;
 
@@ -131,6 +134,7 @@ class AutopilotLink {
   std::optional<std::uint8_t> heard_;
   std::optional<Received<ClockOffset>> clock_;
   std::int64_t timesync_asked_ns_ = 0;
+  bool answers_ = true;
   std::uint8_t sequence_ = 0;
   Tap tap_ = nullptr;
   void* tap_context_ = nullptr;

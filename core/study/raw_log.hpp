@@ -15,7 +15,7 @@ namespace backwash::study {
 
 /// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is the line
 /// kRawLogMagic, then records: RecordHeader and `size` bytes, little-endian, no padding between records.
-inline constexpr char kRawLogMagic[] = "backwash raw log 2\n";
+inline constexpr char kRawLogMagic[] = "backwash raw log 3\n";
 
 enum class RecordKind : std::uint32_t {
   configuration = 1,  ///< text: the vehicle, model and daemon files as given
@@ -96,6 +96,7 @@ struct LostRecord {
 struct TickInputRecord {
   std::int64_t now_ns, odometry_received_ns, odometry_stamp_ns, pose_at_ns;
   std::uint64_t segment;                   ///< id of the segment offered, 0: none
+  std::uint64_t order;                     ///< number of the newest order, 0: none new
   double p[3], v[3], q[4];                 ///< odometry
   double pose_p[3], pose_v[3], pose_q[4];  ///< the autopilot's
   double heartbeat_age, battery;
@@ -104,7 +105,7 @@ struct TickInputRecord {
   std::uint32_t request, flags, reset_counter;  ///< flags: core/study/tick_log.cpp
   std::uint32_t closures, padding;
 };
-static_assert(sizeof(TickInputRecord) == 272);
+static_assert(sizeof(TickInputRecord) == 280);
 
 /// A record as read back.
 struct RawRecord {

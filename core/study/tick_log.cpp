@@ -9,7 +9,6 @@ namespace {
 
 enum Flag : std::uint32_t {
   kOdometry = 1u << 0,
-  kArm = 1u << 1,
   kPortOpen = 1u << 2,
   kTransmitFailed = 1u << 3,
   kArmed = 1u << 4,
@@ -22,6 +21,8 @@ enum Flag : std::uint32_t {
   kMapLate = 1u << 11,
   kTubeBlocked = 1u << 12,
   kStopBlocked = 1u << 13,
+  kLandedKnown = 1u << 14,
+  kLanded = 1u << 15,
 };
 
 void put(const Vec3& from, double* to) noexcept { std::copy_n(from.data(), 3, to); }
@@ -38,14 +39,16 @@ TickInputRecord encode(const track::TickInput& in) noexcept {
   r.segment = in.segment ? in.segment->id : 0;
   r.missed_periods = in.missed_periods;
   r.request = static_cast<std::uint32_t>(in.request);
+  r.order = in.order;
   r.heartbeat_age = a.heartbeat_age;
   r.reset_counter = a.reset_counter.value_or(0);
   r.battery = a.battery.value_or(0);
-  r.flags = bit(in.odometry.has_value(), kOdometry) | bit(in.arm, kArm) | bit(a.port_open, kPortOpen) |
+  r.flags = bit(in.odometry.has_value(), kOdometry) | bit(a.port_open, kPortOpen) |
             bit(a.transmit_failed, kTransmitFailed) | bit(a.armed, kArmed) | bit(a.offboard, kOffboard) |
             bit(a.pose.has_value(), kPose) | bit(a.reset_counter.has_value(), kResetCounter) |
             bit(a.battery.has_value(), kBattery) | bit(s.missing, kMapMissing) | bit(s.outside, kOutside) |
-            bit(s.late, kMapLate) | bit(s.tube_blocked, kTubeBlocked) | bit(s.stop_blocked, kStopBlocked);
+            bit(s.late, kMapLate) | bit(s.tube_blocked, kTubeBlocked) | bit(s.stop_blocked, kStopBlocked) |
+            bit(a.landed.has_value(), kLandedKnown) | bit(a.landed.value_or(false), kLanded);
   if (in.odometry) {
     r.odometry_received_ns = in.odometry->received_ns;
     r.odometry_stamp_ns = in.odometry->stamp_ns;
@@ -71,12 +74,13 @@ track::TickInput decode(const TickInputRecord& r, const track::AcceptedSegment* 
   in.now_ns = r.now_ns;
   in.missed_periods = r.missed_periods;
   in.request = static_cast<track::Request>(r.request);
+  in.order = r.order;
   in.segment = segment;
-  in.arm = has(kArm);
   in.autopilot.port_open = has(kPortOpen);
   in.autopilot.transmit_failed = has(kTransmitFailed);
   in.autopilot.armed = has(kArmed);
   in.autopilot.offboard = has(kOffboard);
+  if (has(kLandedKnown)) in.autopilot.landed = has(kLanded);
   in.autopilot.heartbeat_age = r.heartbeat_age;
   if (has(kOdometry))
     in.odometry = {
@@ -117,7 +121,7 @@ void decided(const track::FlightTick& flight, const track::TickOutput& out, Tick
   const auto& s = out.supervisor;
   r.asked = bit(s.send_setpoint, kAskedSetpoint) | bit(s.send_heartbeat, kAskedHeartbeat) |
             bit(s.forward_odometry && out.fresh, kAskedOdometry) | bit(s.request_offboard, kAskedOffboard) |
-            bit(s.request_land, kAskedLand) | bit(out.arm, kAskedArm);
+            bit(s.request_land, kAskedLand) | bit(out.arm, kAskedArm) | bit(out.disarm, kAskedDisarm);
 }
 
 ConstantsRecord constants(const Vehicle& vehicle, double battery_land) noexcept {

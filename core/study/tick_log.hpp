@@ -19,6 +19,7 @@ enum Asked : std::uint32_t {
   kAskedOffboard = 8,
   kAskedLand = 16,
   kAskedArm = 32,
+  kAskedDisarm = 64,
 };
 
 /// Real-time: wait-free, no allocation.

@@ -12,8 +12,8 @@ tl::unexpected<LogError> bad(const std::string& what) {
   return tl::make_unexpected(LogError{LogError::Kind::bad_data, what});
 }
 
-// An offer is doubles only: head (id, continues, branch, closures, commands, sets, stops), commands of 10, sets of 16,
-// then each stop: branch, commands, sets, and its rows. Whole numbers up to 2^53 are exact.
+// An offer is doubles only: head (id, continues, branch, closures, epoch, arms, commands, sets, stops), commands of 10,
+// sets of 16, then each stop: branch, commands, sets, and its rows. Whole numbers up to 2^53 are exact.
 constexpr std::size_t kCommand = 10, kSet = 16;
 
 class Rows {
@@ -152,7 +152,8 @@ tl::expected<Segments, LogError> segments_of(const RawLog& log, const std::strin
 
 std::vector<std::uint8_t> encode(const track::AcceptedSegment& s) {
   Rows rows;
-  for (const std::uint64_t n : {s.id, s.continues, std::uint64_t{s.branch}, std::uint64_t{s.closures}})
+  for (const std::uint64_t n : {s.id, s.continues, std::uint64_t{s.branch}, std::uint64_t{s.closures}, s.epoch.order,
+                                s.epoch.lapse, std::uint64_t{s.arms}})
     rows.add(static_cast<double>(n));
   for (const std::size_t n : {s.commands.size(), s.tube.size(), s.stops.size()}) rows.add(static_cast<double>(n));
   rows.add(s.commands);
@@ -172,6 +173,8 @@ tl::expected<std::unique_ptr<track::AcceptedSegment>, LogError> decode_offer(std
   s->continues = in.whole();
   s->branch = in.whole();
   s->closures = static_cast<std::uint32_t>(in.whole());
+  s->epoch = {in.whole(), in.whole()};
+  s->arms = in.whole() != 0;
   const std::size_t commands = in.count(kCommand), sets = in.count(kSet), stops = in.count(3);
   s->commands = in.commands(commands);
   s->tube = in.tube(sets);

@@ -33,10 +33,11 @@ class Handover {
     while (const auto returned = returned_.pop()) delete *returned;
   }
 
-  /// The newest object not yet taken, or null (also while there is no room to give one back). The reader keeps it,
-  /// however many are offered later, and gives it back exactly once. Real-time: wait-free, no allocation.
+  /// The newest object not yet taken, or null (also while there is no room to give it and one held before back in one
+  /// go). The reader keeps it, however many are offered later, and gives it back exactly once. Real-time: wait-free, no
+  /// allocation.
   const T* take() noexcept {
-    if (!offered_.load(std::memory_order_relaxed) || returned_.full()) return nullptr;
+    if (!offered_.load(std::memory_order_relaxed) || returned_.room() < 2) return nullptr;
     return offered_.exchange(nullptr, std::memory_order_acq_rel);
   }
   /// Hands an object back to be freed. Null is allowed. Precondition: at most one object is held beyond the one taken

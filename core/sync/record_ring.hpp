@@ -21,7 +21,7 @@ class RecordRing {
  public:
   /// False, and counted, if the ring is full. Real-time: wait-free, no allocation.
   bool push(const T& record) noexcept {
-    if (full()) {
+    if (room() == 0) {
       lost_.fetch_add(1, std::memory_order_relaxed);
       return false;
     }
@@ -38,9 +38,9 @@ class RecordRing {
     head_.store(head + 1, std::memory_order_release);
     return record;
   }
-  /// Whether push() would refuse now; writer's thread only.
-  bool full() const noexcept {
-    return tail_.load(std::memory_order_relaxed) - head_.load(std::memory_order_acquire) == kCapacity;
+  /// How many records push() would take now; writer's thread only. Real-time: wait-free, no allocation.
+  std::size_t room() const noexcept {
+    return kCapacity - (tail_.load(std::memory_order_relaxed) - head_.load(std::memory_order_acquire));
   }
   /// Records refused so far.
   std::uint64_t lost() const noexcept { return lost_.load(std::memory_order_relaxed); }

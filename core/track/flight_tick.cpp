@@ -9,7 +9,9 @@
 namespace backwash::track {
 namespace {
 
-constexpr int kDisorder = 3;  // more in a row are as no odometry at all (faults.md row 5)
+constexpr int kArmingTicks = 150;  // 3 s: heartbeats come once a second
+constexpr int kDisarmEvery = 25;   // ticks: one command may be lost
+constexpr int kDisorder = 3;       // more in a row are as no odometry at all (faults.md row 5)
 
 double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
 
@@ -88,11 +90,10 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
 
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
-  // A flight that is being stopped goes on by itself after an obstacle only: any other hold is an operator's to end.
-  const bool goes_on = tracker_.braking() && in.segment->continues != 0;
-  const bool following = mode() == Mode::tracking ||
-                         (mode() == Mode::hold && (!goes_on || supervisor_.reason() == Reason::obstacle_ahead));
-  out.accepted = following && gate_.last() && tracker_.accept(*in.segment, gate_.last()->state);
+  // What was planned before an operator's order, or before the mode last ended it, is not flown (faults.md row 39).
+  const bool following = mode() == Mode::tracking || mode() == Mode::hold;
+  out.accepted =
+      following && in.segment->epoch == epoch_ && gate_.last() && tracker_.accept(*in.segment, gate_.last()->state);
   out.refused = !out.accepted;
   out.released[0] = out.accepted ? std::exchange(segment_, in.segment) : in.segment;
 }
@@ -115,6 +116,7 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) co
   facts.odometry_disorder = disorder_ > kDisorder;
   facts.heartbeat_age = in.autopilot.heartbeat_age;
   facts.armed = in.autopilot.armed;
+  facts.arming = arming_ > 0;
   facts.offboard = in.autopilot.offboard;
   facts.frames_aligned = alignment_.aligned();
   facts.autopilot_reset = reset_;
@@ -160,8 +162,23 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
   }
 }
 
+// The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on
+// the ground stops them again; the autopilot itself refuses to disarm in the air.
+void FlightTick::ask_of_motors(const TickInput& in, TickOutput& out) noexcept {
+  const bool stands = in.autopilot.landed.value_or(false), runs = in.autopilot.armed || arming_ > 0;
+  arming_ = std::max(0, arming_ - 1);
+  abandoned_ = std::max(0, abandoned_ - 1);
+  const bool ends = in.request == Request::stop || in.request == Request::disable;
+  if (stands && runs && ends) abandoned_ = kArmingTicks;
+  if (out.accepted) abandoned_ = 0;
+  out.arm = out.accepted && in.segment->arms && out.supervisor.mode == Mode::tracking && !in.autopilot.armed;
+  if (out.arm) arming_ = kArmingTicks;
+  out.disarm = abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
+}
+
 TickOutput FlightTick::step(const TickInput& in) noexcept {
   TickOutput out;
+  epoch_.order = std::max(epoch_.order, in.order);
   take_closure(in);
   take_odometry(in, out);
   align(in, out.fresh);
@@ -170,6 +187,8 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   odometry_age_ = last_good_ns_ < 0 ? std::numeric_limits<double>::infinity() : seconds(in.now_ns - last_good_ns_);
   const Mode before = mode();
   out.supervisor = supervisor_.step(facts(in, out));
+  const auto& s = out.supervisor;
+  if (s.changed && s.mode != Mode::tracking && s.reason != Reason::obstacle_ahead) ++epoch_.lapse;
   follow(in, before, out);
   was_commanding_ = commanding(out.supervisor.mode);
   odometry_distrusted_ =
@@ -180,7 +199,7 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   out.command_local = alignment_.to_local(command_);
   out.finite = finite(out.command_local);
   out.supervisor.send_setpoint = out.supervisor.send_setpoint && out.finite;
-  out.arm = in.arm && out.supervisor.mode == Mode::tracking;
+  ask_of_motors(in, out);
   return out;
 }
 

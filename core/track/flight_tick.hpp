@@ -13,6 +13,7 @@ struct AutopilotFacts {
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row did not get out
   bool armed = false, offboard = false;
+  std::optional<bool> landed;                                      ///< as it says itself
   double heartbeat_age = std::numeric_limits<double>::infinity();  ///< s
   struct Pose {
     std::int64_t at_ns = 0;               ///< when the position arrived
@@ -39,8 +40,8 @@ struct TickInput {
   int missed_periods = 0;                    ///< whole periods skipped before this tick
   std::optional<OdometrySample> odometry;    ///< newest since the last tick
   Request request = Request::none;           ///< of the operator
+  std::uint64_t order = 0;                   ///< number of the newest order, 0: none new
   const AcceptedSegment* segment = nullptr;  ///< offered since the last tick
-  bool arm = false;                          ///< a take-off was found clear: the vehicle may be armed
   AutopilotFacts autopilot;
   Surroundings surroundings;
 };
@@ -54,6 +55,7 @@ struct TickOutput {
   OdometryGate::Verdict verdict = OdometryGate::Verdict::good;  ///< of the tick's sample, if there was one
   bool fresh = false;                                           ///< there was a good sample
   bool arm = false;                                             ///< ask the autopilot to arm
+  bool disarm = false;                                          ///< ask it to disarm: it stands on the ground
   Inside inside;
   std::uint64_t judged_segment = 0, judged_index = 0;  ///< the set that `inside` is about
   bool accepted = false, refused = false;              ///< the offered segment
@@ -77,6 +79,8 @@ class FlightTick {
   const FrameAlignment& alignment() const noexcept { return alignment_; }
   const Tracker& tracker() const noexcept { return tracker_; }
   double odometry_age() const noexcept { return odometry_age_; }  ///< s, at the last tick
+  /// A segment of another one is refused.
+  const Epoch& epoch() const noexcept { return epoch_; }
 
  private:
   void take_closure(const TickInput& in) noexcept;
@@ -86,6 +90,7 @@ class FlightTick {
   void judge(TickOutput& out) noexcept;
   SupervisorInput facts(const TickInput& in, const TickOutput& out) const noexcept;
   void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
+  void ask_of_motors(const TickInput& in, TickOutput& out) noexcept;
   void drop_segment(TickOutput& out) noexcept;
 
   double battery_land_;
@@ -94,9 +99,12 @@ class FlightTick {
   Supervisor supervisor_;
   Tracker tracker_;
   const AcceptedSegment* segment_ = nullptr;  ///< the tracker's
-  std::uint32_t closures_ = 0;                ///< loop closures seen
-  RigidShift map_from_odom_;                  ///< of the last
-  Setpoint command_;                          ///< of the last tick
+  Epoch epoch_;
+  int arming_ = 0;     ///< ticks left in which the autopilot may yet say that it armed
+  int abandoned_ = 0;  ///< ticks left in which motors that start for a take-off that was stopped are stopped again
+  std::uint32_t closures_ = 0;  ///< loop closures seen
+  RigidShift map_from_odom_;    ///< of the last
+  Setpoint command_;            ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
   int disorder_ = 0;                  ///< samples in a row whose stamp did not rise

@@ -161,9 +161,11 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::clock_stopped:
       return in.missed_periods >= kMissedQuiet;  // row 32
     case Reason::operator_request:
-      return in.request == Request::disable && (mode_ == Mode::enabling || !in.armed);
+      return (in.request == Request::disable || in.request == Request::stop) &&
+             (mode_ == Mode::enabling || !(in.armed || in.arming));
     case Reason::stop_requested:
-      return in.request == Request::stop;
+      // A disable that comes when the vehicle may have left the ground.
+      return in.request == Request::stop || in.request == Request::disable;
     case Reason::land_requested:
       return in.request == Request::land;
     case Reason::autopilot_follows:

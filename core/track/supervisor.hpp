@@ -64,8 +64,15 @@ enum class Reason : std::uint8_t {
 inline constexpr int kReasons = 36;
 const char* to_string(Reason reason) noexcept;
 
-/// What an operator asked for since the last tick.
-enum class Request : std::uint8_t { none, enable, disable, land, stop };
+/// What an operator asked for since the last tick. `hold` ends what was planned before it and changes no mode: a plan
+/// that slows the flight down follows.
+enum class Request : std::uint8_t { none, enable, disable, land, stop, hold };
+
+/// A request with its number, which rises with each; 0: none.
+struct Order {
+  Request request = Request::none;
+  std::uint64_t number = 0;
+};
 
 /// Facts of this tick. Ages in s; a thing never received has an infinite age.
 struct SupervisorInput {
@@ -76,6 +83,7 @@ struct SupervisorInput {
   bool odometry_disorder = false;  ///< more than three stamps in a row did not rise
   double heartbeat_age = 0;        ///< since the autopilot's last heartbeat
   bool armed = false;
+  bool arming = false;           ///< it was asked to arm a moment ago: its next heartbeat may say so
   bool offboard = false;         ///< the autopilot follows our set-points
   bool frames_aligned = false;   ///< residual of local ← map below 5 cm and 3°
   bool autopilot_reset = false;  ///< its estimator was reset this tick; local ← map was taken anew

@@ -14,6 +14,15 @@
 
 namespace backwash::track {
 
+/// What a plan was made under. It is flown only while nothing has ended that since: an operator's command, or an event
+/// after which the vehicle moves on at a later command alone (faults.md row 39).
+struct Epoch {
+  std::uint64_t order = 0;  ///< number of the operator's newest order to the control thread
+  std::uint64_t lapse = 0;  ///< times that the mode itself ended what was planned: every mode but tracking, and every
+                            ///< hold but the one for an obstacle
+  friend bool operator==(const Epoch&, const Epoch&) = default;
+};
+
 /// A piece of flight whose swept tube was verified: commands every 20 ms and the tube propagated once, from the state
 /// estimated at acceptance. A segment that `continues` another shares its start and its first `branch` commands and
 /// differs after them, so that it can take over in flight without a new start.
@@ -25,6 +34,9 @@ struct AcceptedSegment {
   reach::ReachTube tube;            ///< commands.size() + 1 entries; past its end the last entry holds
   std::vector<plan::Stop> stops{};  ///< ascending by branch; may be empty
   std::uint32_t closures = 0;       ///< loop closures that the map frame it is in has seen
+  Epoch epoch{};                    ///< that it was planned under
+  bool arms = false;                ///< a take-off that was found clear: the vehicle is armed when it is accepted
+  std::int64_t seen_ns = 0;         ///< reception of the newest data in the map that it was verified in
   double clearance = 0;             ///< smallest of its swept tube in the map it was verified in, m
   /// Entry n: the same of its sets from command kClearanceEvery · n on, rising; may be empty.
   std::vector<double> clearance_ahead{};
@@ -79,6 +91,7 @@ class Tracker {
   bool braking() const noexcept { return stop_ != nullptr; }
   std::size_t stop_branch() const noexcept { return stop_ ? stop_->branch : 0; }  ///< of the stop it is braking on
   std::uint64_t segment() const noexcept { return segment_ ? segment_->id : 0; }
+  std::int64_t seen_ns() const noexcept { return segment_ ? segment_->seen_ns : 0; }
   std::size_t index() const noexcept { return next_; }  ///< of the command that the next step() gives
   /// Of the accepted tube from the next command on, to a second, m.
   double clearance() const noexcept;

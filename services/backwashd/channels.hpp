@@ -57,21 +57,31 @@ struct NewVoxels {
   std::array<std::array<double, 3>, kMost> centers{};  ///< m
 };
 
-/// The newest snapshot of the surroundings, to each thread that looks at it. Freed by the map worker alone.
-struct Worlds {
-  using Pointer = std::shared_ptr<const plan::World>;
-  sync::Handover<Pointer> mission, planner, reader, control;
+/// The surroundings as they were seen.
+struct Snapshot {
+  std::shared_ptr<const plan::World> world;
+  std::int64_t seen_ns = 0;  ///< reception of the newest data in it
+};
 
-  void offer(const Pointer& world) {
-    for (auto* to : {&mission, &planner, &reader, &control}) to->offer(std::make_unique<const Pointer>(world));
+/// The newest snapshot, to each thread that looks at it. Freed by the map worker alone.
+struct Worlds {
+  sync::Handover<Snapshot> mission, planner, reader, control;
+
+  void offer(const Snapshot& newest) {
+    for (auto* to : {&mission, &planner, &reader, &control}) to->offer(std::make_unique<const Snapshot>(newest));
   }
   void collect() {
     for (auto* to : {&mission, &planner, &reader, &control}) to->collect();
   }
 };
 
+/// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
+using WriterId = std::array<std::uint8_t, 16>;
+
 /// One command as received; strings that do not fit are cut, which no valid station has.
 struct CommandMessage {
+  bool departed = false;  ///< no command: this writer is gone, and with it its session
+  WriterId writer{};
   std::array<char, 64> station{};
   std::uint64_t session = 0;
   std::uint32_t sequence = 0;
@@ -96,6 +106,7 @@ struct ControlView {
   double odometry_age = 1e9, heartbeat_age = 1e9;  ///< s
   State state;                                     ///< newest good odometry
   Setpoint command;                                ///< sent or held this tick, map frame
+  track::Epoch epoch;                              ///< what is planned under another one is refused
   std::uint64_t segment = 0;                       ///< accepted segment, 0 before the first
   std::uint64_t index = 0;                         ///< of its next command
   bool finished = true;                            ///< the segment's commands are all sent
@@ -139,13 +150,13 @@ struct BulkRecord {
   std::vector<std::uint8_t> bytes;
 };
 
-/// What the mission asks the planner for.
+/// What the mission asks the planner for. It plans in the newest world.
 struct PlanJob {
   enum class Kind { takeoff, go_to, brake } kind = Kind::takeoff;
   std::uint64_t id = 0;
   Vec3 position = Vec3::Zero();  ///< goal; take-off: z counts
   std::optional<double> yaw;     ///< heading at the goal, rad; none: as the path leads there
-  std::shared_ptr<const plan::World> world;
+  track::Epoch epoch;            ///< that it was asked for in: it is not done in another
 };
 
 /// How a job ended.
@@ -164,8 +175,7 @@ struct Channels {
   sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // DDS reader, map worker → control
   std::atomic<std::int64_t> map_ns{-1};                    // map worker: reception of the newest data in the snapshot
   std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
-  sync::RecordRing<track::Request, 16> requests;           // mission → control
-  std::atomic<bool> arm{false};                            // planner → control: arm once
+  sync::RecordRing<track::Order, 64> orders;               // mission → control
   sync::Handover<PlanJob> jobs;                            // mission → planner
   sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
   sync::Handover<track::AcceptedSegment> segments;         // planner → control

@@ -74,6 +74,8 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   facts.transmit_failed = link_.transmit().missed_setpoints() >= firmware_bridge::kMaxMissedSetpoints;
   facts.armed = telemetry.status && telemetry.status->value.armed;
   facts.offboard = telemetry.status && telemetry.status->value.follows_setpoints;
+  if (telemetry.landed_state && telemetry.landed_state->value != firmware_bridge::LandedState::kUndefined)
+    facts.landed = telemetry.landed_state->value == firmware_bridge::LandedState::kOnGround;
   if (const auto age = link_.heartbeat_age(time_of(now_ns)))
     facts.heartbeat_age = std::chrono::duration<double>(*age).count();
   if (telemetry.local_state && telemetry.attitude) {
@@ -90,9 +92,11 @@ track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
   in.now_ns = now_ns;
   in.missed_periods = missed;
   in.odometry = channels_.odometry.read_new();
-  if (const auto request = channels_.requests.pop()) in.request = *request;
+  while (const auto order = channels_.orders.pop()) orders_.add(*order);
+  const track::Order order = orders_.next();
+  in.request = order.request;
+  in.order = order.number;
   in.segment = channels_.segments.take();
-  in.arm = channels_.arm.load(std::memory_order_relaxed);
   in.autopilot = autopilot(now_ns);
   in.surroundings = lookout_.look(flight_, now_ns);
   return in;
@@ -124,11 +128,13 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
       row_.odometry_to_wire_us = static_cast<float>(us);
     }
   }
+  link_.answer_timesync(s.send_heartbeat);  // quiet is quiet: not a byte
   if (s.send_heartbeat && view_.ticks % kTicksPerSecond == 0 && link_.send_heartbeat()) row_.sent |= 2;
   if (s.forward_odometry && out.fresh) forward_odometry();
   if (s.request_offboard) link_.send_follow_setpoints();
   if (s.request_land) link_.send_land();
-  if (out.arm && channels_.arm.exchange(false, std::memory_order_relaxed)) link_.send_arm(true);
+  if (out.arm) link_.send_arm(true);
+  if (out.disarm) link_.send_arm(false);
   if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
     link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
                           to_string(s.reason));
@@ -160,6 +166,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.heartbeat_age = in.autopilot.heartbeat_age;
   if (flight_.odometry()) view_.state = flight_.odometry()->state;
   view_.command = out.command;
+  view_.epoch = flight_.epoch();
   view_.segment = tracker.segment();
   view_.index = tracker.index();
   view_.finished = tracker.finished();

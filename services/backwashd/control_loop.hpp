@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/track/flight_tick.hpp"
+#include "core/track/orders.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
@@ -42,6 +43,7 @@ class ControlLoop {
   Lookout lookout_;
   SenderClock sender_clock_;  // of the odometry's
   bool port_open_ = true;
+  track::Orders orders_;
   std::int64_t now_ns_ = 0;
   ControlView view_;
   study::TickRecord row_{};

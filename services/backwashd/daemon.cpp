@@ -86,7 +86,7 @@ struct Flight {
   const std::string log;  ///< file that the recorder began with
   firmware_bridge::AutopilotLink link;
   std::unique_ptr<DdsFront> front;
-  Mission mission{*channels};
+  Mission mission;
   ControlLoop loop;
   Failure failure{channels->stop};
   CatchTheRest rest{failure};

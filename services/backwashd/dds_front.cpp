@@ -105,7 +105,7 @@ void DdsFront::take_scans() {
     if (!scan) return refuse(channels_.scans_rejected, scan.error());
     std::size_t fresh = 0;
     if (world_) {
-      const NewVoxels voxels = new_voxels((*world_)->grid, *scan, sensor_range_);
+      const NewVoxels voxels = new_voxels(world_->world->grid, *scan, sensor_range_);
       fresh = voxels.count;
       if (fresh > 0) channels_.scan_voxels.push(voxels);
     }

@@ -44,7 +44,7 @@ class DdsFront {
   int priority_;
   double sensor_range_;
   Localization localization_;
-  const Worlds::Pointer* world_ = nullptr;       // the reader's
+  const Snapshot* world_ = nullptr;              // the reader's
   std::map<const void*, std::int64_t> said_ns_;  // when each cause was last told, by its counter
   dds::Malformed malformed_;                     // before the middleware's threads
   dds::Participant participant_;

@@ -47,6 +47,20 @@ void Lookout::hold_against(const NewVoxels& voxels, const track::Tracker& tracke
   }
 }
 
+// What was seen between the snapshot that the segment was verified in and its acceptance. False: not all of it is kept.
+bool Lookout::catch_up(const track::Tracker& tracker, track::Surroundings& result) noexcept {
+  const std::size_t oldest = recorded_ - std::min(recorded_, kKept);
+  const bool lost = unchecked_ < oldest && oldest > 0 && recent_[oldest % kKept].received_ns > tracker.seen_ns();
+  unchecked_ = std::max(unchecked_, oldest);
+  for (int n = 0; unchecked_ < recorded_ && n < kRecordsInTick; ++unchecked_) {
+    const NewVoxels& voxels = recent_[unchecked_ % kKept];
+    if (voxels.received_ns <= tracker.seen_ns()) continue;
+    hold_against(voxels, tracker, result);
+    ++n;
+  }
+  return !lost;
+}
+
 track::Surroundings Lookout::look(const track::FlightTick& flight, std::int64_t now_ns) noexcept {
   if (const auto* newest = channels_.worlds.control.take())
     channels_.worlds.control.give_back(std::exchange(world_, newest));
@@ -54,7 +68,7 @@ track::Surroundings Lookout::look(const track::FlightTick& flight, std::int64_t 
   result.missing = world_ == nullptr;
   const auto& tracker = flight.tracker();
   if (world_ && flight.odometry()) {
-    const auto& grid = (*world_)->grid;
+    const auto& grid = world_->world->grid;
     const Vec3& p = flight.odometry()->state.p_W;
     const Vec3 off = (p - grid.origin()) / grid.resolution();
     // Compared before anything is made an integer.
@@ -62,14 +76,17 @@ track::Surroundings Lookout::look(const track::FlightTick& flight, std::int64_t 
   }
   result.late = late(tracker, now_ns);
 
-  const bool accepted = std::exchange(segment_, tracker.segment()) != tracker.segment();
-  if (accepted) hold_against(recent_, tracker, result);
+  // Voxels of before a loop closure are where the map was then.
+  if (std::exchange(closures_, tracker.closures()) != tracker.closures()) recorded_ = unchecked_ = 0;
+  if (std::exchange(segment_, tracker.segment()) != tracker.segment()) unchecked_ = 0;
+  if (segment_ != 0 && !catch_up(tracker, result)) result.tube_blocked = result.stop_blocked = true;
   for (auto* ring : {&channels_.scan_voxels, &channels_.map_voxels}) {
     for (int n = 0; n < kRecordsInTick; ++n) {
       const auto voxels = ring->pop();
       if (!voxels) break;
       hold_against(*voxels, tracker, result);
-      recent_ = *voxels;
+      unchecked_ += unchecked_ == recorded_;
+      recent_[recorded_++ % kKept] = *voxels;
     }
   }
   // The planner has found that the newest snapshot does not leave the flight clear.

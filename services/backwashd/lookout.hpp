@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+
 #include "core/config/daemon_config.hpp"
 #include "core/track/flight_tick.hpp"
 #include "core/types/vehicle.hpp"
@@ -22,20 +24,25 @@ class Lookout {
   Lookout& operator=(const Lookout&) = delete;
 
   /// `flight` as of the last tick. New voxels are held against the sets still to be flown and against the next verified
-  /// stop; the newest ones again when a segment was accepted since. Real-time: wait-free, no allocation; 3 to 5 ns per
-  /// voxel and set, at most 3 × NewVoxels::kMost voxels.
+  /// stop; so are, two records a tick, those that came after the snapshot in which a segment that was accepted since
+  /// was verified. Where more came than are kept the segment counts as blocked. Real-time: wait-free, no allocation; 3
+  /// to 5 ns per voxel and set, at most 6 × NewVoxels::kMost voxels.
   track::Surroundings look(const track::FlightTick& flight, std::int64_t now_ns) noexcept;
 
  private:
   bool late(const track::Tracker& tracker, std::int64_t now_ns) const noexcept;
+  bool catch_up(const track::Tracker& tracker, track::Surroundings& result) noexcept;
   void hold_against(const NewVoxels& voxels, const track::Tracker& tracker, track::Surroundings& result) const noexcept;
 
   Channels& channels_;
   MapSettings map_;
   double taken_;
-  const Worlds::Pointer* world_ = nullptr;
-  NewVoxels recent_;  // the newest of a scan
+  const Snapshot* world_ = nullptr;
+  static constexpr std::size_t kKept = 32;  // 3 s of scans at 10 Hz: a snapshot of a building takes that long
+  std::array<NewVoxels, kKept> recent_{};   // record n at n % kKept
+  std::size_t recorded_ = 0, unchecked_ = 0;
   std::uint64_t segment_ = 0;
+  std::uint32_t closures_ = 0;
 };
 
 }  // namespace backwash::daemon

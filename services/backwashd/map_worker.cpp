@@ -72,7 +72,7 @@ void MapWorker::reject(const std::string& why) {
 void MapWorker::publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns) {
   world_ = std::move(world);
   channels_.map_ns.store(received_ns, std::memory_order_relaxed);
-  channels_.worlds.offer(world_);
+  channels_.worlds.offer({world_, received_ns});
   const double age = static_cast<double>(now_ns() - received_ns) * 1e-6;
   recorder_.append(study::RecordKind::world, "snapshot " + std::to_string(age) + " ms after its newest data");
 }

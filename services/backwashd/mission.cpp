@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashd/mission.hpp"
 
-#include <spdlog/spdlog.h>
-
-#include <thread>
+#include <algorithm>
+#include <utility>
 
 #include "core/plan/planner.hpp"
 #include "services/dds/topics.hpp"
@@ -11,120 +10,129 @@
 namespace backwash::daemon {
 namespace {
 
+using track::Mode;
+using track::Request;
+
 constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED;
 constexpr std::uint8_t kRefused = backwash_msgs_msg_dds__ACK_REFUSED;
 constexpr std::uint8_t kNotYours = backwash_msgs_msg_dds__ACK_NOT_YOURS;
 constexpr std::uint8_t kInvalid = backwash_msgs_msg_dds__ACK_INVALID;
 
-constexpr double kRetry = 1.0;  // s from the end of one job to the next try
+constexpr double kRetry = 1.0;       // s from the end of one job to the next try
+constexpr double kJudgeEvery = 1.0;  // s
 
-Answer accepted(std::string what) { return {kAccepted, std::move(what)}; }
-Answer refused(std::string why) { return {kRefused, std::move(why)}; }
+Decision only(std::uint8_t result, std::string what) { return {Answer{result, std::move(what)}, {}, {}}; }
+Decision refused(std::string why) { return only(kRefused, std::move(why)); }
 
-double seconds_now() { return static_cast<double>(now_ns()) * 1e-9; }
+bool flies(Mode mode) { return mode == Mode::tracking || mode == Mode::hold; }
 
 }  // namespace
 
-void Mission::refresh() {
-  channels_.jobs.collect();
-  if (const auto view = channels_.view_mission.read_new()) view_ = *view;
-  if (const auto* world = channels_.worlds.mission.take()) {
-    world_ = *world;
-    channels_.worlds.mission.give_back(world);
-  }
-  while (const auto outcome = channels_.outcomes.pop()) {
-    if (job_ != outcome->job) continue;  // a newer command took its place
+Decision Mission::observe(const MissionInput& in) {
+  if (in.view) view_ = *in.view;
+  if (in.world) world_ = *in.world;
+  for (const PlanOutcome& outcome : in.outcomes) {
+    if (job_ != outcome.job) continue;  // a newer command took its place
     job_.reset();
-    report(outcome->ok ? "" : std::string("refused: ") + outcome->reason.data());
-    retry_at_s_ = seconds_now() + kRetry;
-    if (outcome->ok) continue;
-    spdlog::warn("refused: {}", outcome->reason.data());
-    if (view_.reason != track::Reason::obstacle_ahead) route_.clear();
+    task_ = outcome.ok ? "" : std::string("refused: ") + outcome.reason.data();
+    retry_at_s_ = in.now_s + kRetry;
+    if (!outcome.ok && view_.reason != track::Reason::obstacle_ahead) route_.clear();
   }
-  continue_route();
-  judge_place(seconds_now());
+  if (in.now_s >= judge_at_s_) {
+    judge_at_s_ = in.now_s + kJudgeEvery;
+    place_ = judge_place();
+  }
+  return {{}, {}, continue_route(in.now_s)};
 }
 
 // Whether map and vehicle overlap such that it could take off: for `backwashctl check`.
-void Mission::judge_place(double now_s) {
-  constexpr double kEvery = 1.0;  // s
-  if (now_s < judge_at_s_) return;
-  judge_at_s_ = now_s + kEvery;
-  std::string why;
-  if (!world_) {
-    why = "no map was received yet";
-  } else if (const Index3 v = world_->grid.index(view_.state.p_W); !world_->grid.inside(v)) {
-    why = "the vehicle is outside the map";
-  } else if (!world_->grid.free(v)) {
-    why = "the vehicle is in a voxel that is not free";
-  } else if (view_.landed && !plan::takeoff_column(*world_, view_.state.p_W)) {
-    why = "there is no clear hover height above a known floor here";
-  }
-  std::array<char, 192> line{};
-  std::snprintf(line.data(), line.size(), "%s", why.c_str());
-  channels_.place.write(line);
+std::string Mission::judge_place() const {
+  if (!world_) return "no map was received yet";
+  const Index3 v = world_->grid.index(view_.state.p_W);
+  if (!world_->grid.inside(v)) return "the vehicle is outside the map";
+  if (!world_->grid.free(v)) return "the vehicle is in a voxel that is not free";
+  if (view_.landed && !plan::takeoff_column(*world_, view_.state.p_W))
+    return "there is no clear hover height above a known floor here";
+  return "";
 }
 
 // To the next goal of a route at rest at the last one; and to the same goal again where the flight came to rest on the
 // way: something stood in it, or the map did not show more of it yet.
-void Mission::continue_route() {
+std::optional<PlanJob> Mission::continue_route(double now_s) {
   constexpr double kAtGoal = 0.01, kRest = 0.1;  // m, m/s
-  const bool tracking = view_.mode == track::Mode::tracking;
-  if (!tracking && view_.mode != track::Mode::hold) route_.clear();
-  if (route_.empty() || job_ || !view_.finished) return;
+  const bool tracking = view_.mode == Mode::tracking;
+  const bool obstacle = view_.mode == Mode::hold && view_.reason == track::Reason::obstacle_ahead;
+  // Any other mode, and any other hold, is an operator's to end.
+  if (!tracking && !obstacle) route_.clear();
+  if (route_.empty() || job_ || order_under_way() || !view_.finished) return std::nullopt;
   if (tracking && (view_.command.p_W - route_.front().position).norm() < kAtGoal) {
     route_.pop_front();
-    if (!route_.empty()) start(PlanJob::Kind::go_to, route_.front());
-  } else if ((tracking || view_.reason == track::Reason::obstacle_ahead) && view_.state.v_W.norm() < kRest &&
-             seconds_now() > retry_at_s_) {
-    start(PlanJob::Kind::go_to, route_.front());
+    if (!route_.empty()) return start(PlanJob::Kind::go_to, route_.front()).job;
+  } else if (view_.state.v_W.norm() < kRest && now_s > retry_at_s_) {
+    return start(PlanJob::Kind::go_to, route_.front()).job;
   }
-}
-
-void Mission::report(const std::string& task) {
-  std::array<char, 192> line{};
-  std::snprintf(line.data(), line.size(), "%s", task.c_str());
-  channels_.task.write(line);
+  return std::nullopt;
 }
 
 std::string Mission::station(double now_s) const {
   return lease_ && now_s < lease_->until_s ? lease_->station : std::string();
 }
 
-Answer Mission::handle(const CommandMessage& command, double now_s) {
-  const std::string from(command.station.data());
-  if (from.empty() || !command.position.allFinite() || !std::isfinite(command.yaw))
-    return {kInvalid, "a command needs a station name and finite numbers"};
-  if (const std::string holder = station(now_s); !holder.empty() && holder != from) {
-    ++channels_.commands_refused;
-    return {kNotYours, "session held by " + holder};
-  }
-  if (!lease_ || lease_->station != from || lease_->session != command.session) {
-    lease_ = Lease{from, command.session, command.sequence, 0, {}};
-  } else if (command.sequence == lease_->sequence) {
-    return lease_->last;
-  } else if (command.sequence < lease_->sequence) {
-    return {kInvalid, "sequence number " + std::to_string(command.sequence) + " is older than " +
-                          std::to_string(lease_->sequence)};
-  }
-  lease_->sequence = command.sequence;
-  lease_->until_s = now_s + kLease;
-  lease_->last = decide(command);
-  const Answer answer = lease_->last;
-  if (answer.result != kAccepted) ++channels_.commands_refused;
-  if (command.verb == backwash_msgs_msg_dds__COMMAND_RELEASE) lease_.reset();
-  return answer;
+void Mission::end_lease() {
+  if (!lease_) return;
+  ended_.push_back(lease_->session);
+  if (ended_.size() > kEndedSessions) ended_.pop_front();
+  lease_.reset();
 }
 
-Answer Mission::decide(const CommandMessage& command) {
-  const bool commanding = view_.mode == track::Mode::tracking || view_.mode == track::Mode::hold;
+/// Why the command is not this session's to give now, or the answer that it got before; nothing if it is to be decided.
+std::optional<Answer> Mission::session(const CommandMessage& command, double now_s) {
+  const std::string from(command.station.data());
+  const bool ours = lease_ && lease_->writer == command.writer && lease_->session == command.session;
+  if (!ours) {
+    if (std::ranges::find(ended_, command.session) != ended_.end())
+      return Answer{kInvalid, "session " + std::to_string(command.session) + " is over: a station begins a new one"};
+    const std::string holder = station(now_s);
+    if (!holder.empty() && lease_->writer != command.writer)
+      return Answer{kNotYours, "session held by " + holder + (holder == from ? ", another process of that name" : "")};
+    end_lease();
+    lease_ = Lease{command.writer, from, command.session, command.sequence, 0, {}};
+    return std::nullopt;
+  }
+  if (command.sequence == lease_->sequence) return lease_->last;
+  if (command.sequence < lease_->sequence)
+    return Answer{kInvalid, "sequence number " + std::to_string(command.sequence) + " is older than " +
+                                std::to_string(lease_->sequence)};
+  return std::nullopt;
+}
+
+Decision Mission::handle(const CommandMessage& command, double now_s) {
+  if (command.departed) {
+    if (lease_ && lease_->writer == command.writer) end_lease();
+    return {};
+  }
+  if (command.station[0] == 0 || !command.position.allFinite() || !std::isfinite(command.yaw))
+    return only(kInvalid, "a command needs a station name and finite numbers");
+  if (const auto answered = session(command, now_s)) {
+    // Whoever sees that the flight must end may end it; the lease stays where it is.
+    const bool stops = command.verb == backwash_msgs_msg_dds__COMMAND_STOP && answered->result == kNotYours;
+    return stops ? stop() : Decision{answered, {}, {}};
+  }
+  Decision decision = decide(command);
+  lease_->sequence = command.sequence;
+  lease_->until_s = now_s + kLease;
+  lease_->last = *decision.answer;
+  if (command.verb == backwash_msgs_msg_dds__COMMAND_RELEASE) end_lease();
+  return decision;
+}
+
+Decision Mission::decide(const CommandMessage& command) {
   switch (command.verb) {
     case backwash_msgs_msg_dds__COMMAND_ENABLE:
       return enable();
     case backwash_msgs_msg_dds__COMMAND_DISABLE:
-      if (view_.armed) return refused("the vehicle is armed: land first");
-      channels_.requests.push(track::Request::disable);
-      return accepted("disabling");
+      if (view_.armed && view_.mode != Mode::enabling) return refused("the vehicle is armed: land first");
+      return order(Request::disable, "disabling");
     case backwash_msgs_msg_dds__COMMAND_TAKEOFF:
       return take_off(command);
     case backwash_msgs_msg_dds__COMMAND_GOTO:
@@ -133,26 +141,30 @@ Answer Mission::decide(const CommandMessage& command) {
     case backwash_msgs_msg_dds__COMMAND_FOLLOW:
       return follow(command);
     case backwash_msgs_msg_dds__COMMAND_HOLD:
-      if (!commanding) return refused("not enabled");
-      route_.clear();
-      return start(PlanJob::Kind::brake);
+      return hold();
     case backwash_msgs_msg_dds__COMMAND_STOP:
       return stop();
     case backwash_msgs_msg_dds__COMMAND_LAND:
-      if (!commanding) return refused("not enabled");
-      route_.clear();
-      channels_.requests.push(track::Request::land);
-      return accepted("landing");
+      return flies(view_.mode) ? order(Request::land, "landing") : refused("not enabled");
     case backwash_msgs_msg_dds__COMMAND_RELEASE:
-      return accepted("session released");
+      return only(kAccepted, "session released");
     default:
-      return {kInvalid, "unknown command " + std::to_string(command.verb)};
+      return only(kInvalid, "unknown command " + std::to_string(command.verb));
   }
 }
 
+/// An order to the control thread: it ends what was asked for before it.
+Decision Mission::order(Request request, std::string answer) {
+  route_.clear();
+  job_.reset();
+  task_.clear();
+  return {Answer{kAccepted, std::move(answer)}, track::Order{request, ++orders_}, {}};
+}
+
 // What has to be right before the daemon takes control; the frames are judged by the supervisor while it is enabling.
-Answer Mission::enable() {
-  if (view_.mode != track::Mode::passive && view_.mode != track::Mode::quiet)
+Decision Mission::enable() {
+  if (order_under_way()) return refused("the last order is still being carried out: ask again");
+  if (view_.mode != Mode::passive && view_.mode != Mode::quiet)
     return refused(std::string("already ") + to_string(view_.mode));
   if (!world_) return refused("no map was received yet");
   if (view_.mismatch != track::Mismatch::none)
@@ -160,71 +172,72 @@ Answer Mission::enable() {
   if (view_.odometry_age > track::Supervisor::kHoldAfter) return refused("no odometry");
   if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
-  channels_.requests.push(track::Request::enable);
-  return accepted("enabling");
+  return order(Request::enable, "enabling");
 }
 
-Answer Mission::take_off(const CommandMessage& command) {
-  if (view_.mode != track::Mode::tracking) return refused("not enabled");
+Decision Mission::take_off(const CommandMessage& command) {
+  if (view_.mode != Mode::tracking) return refused("not enabled");
   if (!view_.landed) return refused("already in the air");
   return start(PlanJob::Kind::takeoff, {command.position, {}});
 }
 
-Answer Mission::go_to(const CommandMessage& command) {
-  if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return refused("not enabled");
+Decision Mission::go_to(const CommandMessage& command) {
+  if (!flies(view_.mode)) return refused("not enabled");
   if (view_.landed) return refused("on the ground: take off first");
   if (!view_.finished) return refused("flying: hold first");
   Goal goal{command.position, {}};
   if (command.verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING) goal.yaw = command.yaw;
-  const Answer answer = start(PlanJob::Kind::go_to, goal);
-  if (answer.result == kAccepted) route_ = {goal};
-  return answer;
+  Decision decision = start(PlanJob::Kind::go_to, goal);
+  if (decision.job) route_ = {goal};
+  return decision;
 }
 
-Answer Mission::follow(const CommandMessage& command) {
+Decision Mission::follow(const CommandMessage& command) {
   if (command.waypoints == 0 || command.waypoints > command.kMostWaypoints)
-    return {kInvalid, "follow needs 1 to " + std::to_string(command.kMostWaypoints) + " waypoints"};
+    return only(kInvalid, "follow needs 1 to " + std::to_string(command.kMostWaypoints) + " waypoints");
   CommandMessage first = command;
   std::deque<Goal> route;
   for (std::size_t n = 0; n < command.waypoints; ++n) {
     const auto& p = command.waypoint[n];
     route.push_back({{p[0], p[1], p[2]}, {}});
-    if (!route.back().position.allFinite()) return {kInvalid, "a waypoint is not finite"};
+    if (!route.back().position.allFinite()) return only(kInvalid, "a waypoint is not finite");
   }
   first.position = route.front().position;
-  const Answer answer = go_to(first);
-  if (answer.result == kAccepted) route_ = std::move(route);
-  return answer;
+  Decision decision = go_to(first);
+  if (decision.job) route_ = std::move(route);
+  return decision;
 }
 
-Answer Mission::stop() {
-  if (view_.mode == track::Mode::passive || view_.mode == track::Mode::quiet) return refused("not enabled");
-  route_.clear();
-  job_.reset();
+/// What was planned ends at once; a plan that slows the flight down on its path follows.
+Decision Mission::hold() {
+  if (!flies(view_.mode)) return refused("not enabled");
+  Decision decision = order(Request::hold, "planning");
+  if (world_) decision.job = start(PlanJob::Kind::brake).job;
+  return decision;
+}
+
+/// Goes to the control thread in every mode: what is shown here may be a moment old, and an order to enable on its way.
+Decision Mission::stop() {
+  const bool idle = view_.mode == Mode::passive || view_.mode == Mode::quiet;
+  const bool pending = order_under_way();
   const bool standing = view_.landed && !view_.armed;
-  channels_.requests.push(standing ? track::Request::disable : track::Request::stop);
-  return accepted(standing ? "disabling" : "stopping");
+  const Mode mode = view_.mode;
+  Decision decision = order(Request::stop, standing ? "disabling" : "stopping");
+  if (mode == Mode::land) decision.answer = {kRefused, "landing: the autopilot lands, and ends that by itself"};
+  if (idle && !pending) decision.answer = {kRefused, "not enabled"};
+  return decision;
 }
 
-Answer Mission::start(PlanJob::Kind kind, const Goal& goal) {
+Decision Mission::start(PlanJob::Kind kind, const Goal& goal) {
   if (!world_) return refused("no map was received yet");
-  if (job_ && kind != PlanJob::Kind::brake) return refused("still planning the last command");
-  job_ = ++last_job_;
-  channels_.jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, *job_, goal.position, goal.yaw, world_}));
-  report("planning");
-  return accepted("planning");
-}
-
-void run_mission(Channels& channels, Mission& mission, const SendAnswer& answer) {
-  while (!channels.stop) {
-    mission.refresh();
-    while (const auto command = channels.commands.pop()) {
-      const Answer a = mission.handle(*command, seconds_now());
-      spdlog::info("command {} from {}: {}", command->verb, command->station.data(), a.reason);
-      answer(*command, a);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  if (kind != PlanJob::Kind::brake) {
+    if (job_) return refused("still planning the last command");
+    if (order_under_way()) return refused("the last order is still being carried out: ask again");
   }
+  job_ = ++last_job_;
+  task_ = "planning";
+  return {
+      Answer{kAccepted, "planning"}, {}, PlanJob{kind, *job_, goal.position, goal.yaw, {orders_, view_.epoch.lapse}}};
 }
 
 }  // namespace backwash::daemon

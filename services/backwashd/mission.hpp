@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "services/backwashd/channels.hpp"
@@ -17,49 +18,79 @@ struct Answer {
   std::string reason;
 };
 
+/// What a command, or what has happened meanwhile, makes of the mission. The order goes to the control thread before
+/// the job goes to the planner; where it cannot be handed over, nothing else of the decision may be, and the station is
+/// told (run_mission).
+struct Decision {
+  std::optional<Answer> answer;
+  std::optional<track::Order> order;
+  std::optional<PlanJob> job;
+};
+
+/// What the other threads have said since the last call.
+struct MissionInput {
+  double now_s = 0;                                         ///< monotonic
+  std::optional<ControlView> view;                          ///< newest, if there is a new one
+  std::optional<std::shared_ptr<const plan::World>> world;  ///< newest, if there is a new one
+  std::span<const PlanOutcome> outcomes;
+};
+
 /// Decides on the ground stations' commands: who may command (one session lease at a time), what is possible now, and
-/// what the control and planner threads are asked for.
+/// what the control and planner threads are asked for. Pure: it has no clock and no channel of its own.
+///
+/// Every order has a number, and everything that is planned belongs to the order after which it was asked for: a STOP,
+/// land, disable or hold thereby ends whatever was planned before it, wherever that is by then (faults.md row 39).
 class Mission {
  public:
   static constexpr double kLease = 10.0;  ///< s after a station's last command until another may take over
 
-  explicit Mission(Channels& channels) : channels_(channels) {}
-
-  /// Takes what the other threads have said since the last call.
-  void refresh();
-  /// Answers one command and starts what it asks for. A repeated sequence number of a session is answered again, not
-  /// done again (faults.md row 28 and the session rules of the IDL).
-  Answer handle(const CommandMessage& command, double now_s);
+  /// Takes what the other threads have said; a job, if the flight goes on by itself.
+  Decision observe(const MissionInput& in);
+  /// Answers one command and decides what it asks for. A repeated sequence number of a session is answered again, not
+  /// done again (faults.md row 28 and the session rules of the IDL). A session is its writer's: a writer that departs
+  /// ends it, and no other one can go on with it (row 48). STOP is taken from every station.
+  Decision handle(const CommandMessage& command, double now_s);
   /// Holder of the lease, empty if none.
   std::string station(double now_s) const;
   const ControlView& view() const noexcept { return view_; }
+  /// What became of the last task: "", "planning", or "refused: why".
+  const std::string& task() const noexcept { return task_; }
+  /// "", or why the vehicle could not take off where it is; judged once a second.
+  const std::string& place() const noexcept { return place_; }
 
  private:
-  Answer decide(const CommandMessage& command);
-  Answer enable();
-  Answer take_off(const CommandMessage& command);
-  Answer go_to(const CommandMessage& command);
-  void report(const std::string& task);
   /// A place to fly to, and the heading there if one was asked for.
   struct Goal {
     Vec3 position;
     std::optional<double> yaw;
   };
-  Answer start(PlanJob::Kind kind, const Goal& goal = {});
-  Answer follow(const CommandMessage& command);
-  Answer stop();
-  void continue_route();
-  void judge_place(double now_s);
+  std::optional<Answer> session(const CommandMessage& command, double now_s);
+  Decision decide(const CommandMessage& command);
+  Decision enable();
+  Decision take_off(const CommandMessage& command);
+  Decision go_to(const CommandMessage& command);
+  Decision follow(const CommandMessage& command);
+  Decision hold();
+  Decision stop();
+  Decision start(PlanJob::Kind kind, const Goal& goal = {});
+  Decision order(track::Request request, std::string answer);
+  std::optional<PlanJob> continue_route(double now_s);
+  std::string judge_place() const;
+  /// The control thread has not yet taken the newest order.
+  bool order_under_way() const noexcept { return view_.epoch.order < orders_; }
+  void end_lease();
 
-  Channels& channels_;
   ControlView view_;
   std::shared_ptr<const plan::World> world_;
+  std::uint64_t orders_ = 0;
   std::optional<std::uint64_t> job_;  // under way
-  std::deque<Goal> route_;            // still to be reached; the first is the one flown to
+  std::uint64_t last_job_ = 0;
+  std::deque<Goal> route_;  // still to be reached; the first is the one flown to
   double judge_at_s_ = 0;
   double retry_at_s_ = 0;  // from rest on the way
-  std::uint64_t last_job_ = 0;
+  std::string task_, place_;
   struct Lease {
+    WriterId writer{};
     std::string station;
     std::uint64_t session = 0;
     std::uint32_t sequence = 0;
@@ -67,6 +98,8 @@ class Mission {
     Answer last;
   };
   std::optional<Lease> lease_;
+  static constexpr std::size_t kEndedSessions = 64;
+  std::deque<std::uint64_t> ended_;  // sessions that are over, newest last
 };
 
 /// Thread body: commands in, acknowledgements out through `answer`.

@@ -22,8 +22,12 @@ std::string metres(double d) { return std::to_string(d) + " m"; }
 void PlannerWorker::watch() {
   refresh();
   if (!flying_ || view_.segment != flying_->segment.id) return pursuit_.reset();
+  front_.begin(flying_->segment.epoch);
+  // What flies is still watched over; nothing new is offered to it.
+  const bool ended = front_.standing(view_) == PlanFront::Standing::ended;
+  if (ended) pursuit_.reset();
   if (view_.closures != flying_->segment.closures) {
-    if (view_.braking || blocked_ == view_.segment) return;
+    if (view_.braking || blocked_ == view_.segment || (ended && view_.finished)) return;
     if (const auto why = rectify()) block("after a loop closure: " + *why);
   } else if (pursues()) {
     pursue();
@@ -101,7 +105,7 @@ std::optional<std::string> PlannerWorker::rectify() {
     const std::size_t branch = view_.index + kRectifyAfter;
     auto commands = track::rectified(flying_->segment.commands, branch, D, limits.v_max, limits.a_max);
     if (commands.size() > flying_->segment.commands.size()) append_hold(commands);
-    Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
+    Flying next{{0, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
                 D.state(flying_->start),
                 D.setpoint(flying_->previous),
                 flying_->metrics,

@@ -31,6 +31,8 @@ plan::PlanOptions limits_of(const plan::World& world) {
   return options;
 }
 
+const std::string kEnded = "a later command, or what happened meanwhile, ended it";
+
 std::string not_clear(const std::string& what, double clearance) {
   char line[128];
   std::snprintf(line, sizeof line, "%s is not clear: %.3f m", what.c_str(), clearance);
@@ -75,10 +77,22 @@ void PlannerWorker::refresh() {
   channels_.segments.collect();
   if (const auto view = channels_.view_planner.read_new()) view_ = *view;
   if (const auto* world = channels_.worlds.planner.take()) {
-    world_ = *world;
+    world_ = world->world;
+    seen_ns_ = world->seen_ns;
     channels_.worlds.planner.give_back(world);
     new_world_ = true;
   }
+}
+
+/// Whether what is planned may still be flown; waits for the control thread to take the order that it was made under.
+bool PlannerWorker::current() {
+  refresh();
+  for (std::size_t wait = 0; wait < kAnswerPauses && !channels_.stop; ++wait) {
+    if (front_.standing(view_) != PlanFront::Standing::early) break;
+    pause_();
+    refresh();
+  }
+  return front_.standing(view_) == PlanFront::Standing::current;
 }
 
 /// Where the map ends the airflow of what is behind is not known: a way with something to spare comes first.
@@ -95,58 +109,57 @@ plan::Replan PlannerWorker::onward(const plan::World& world, const plan::Route& 
 /// Why the job could not be done; nothing when it is flying.
 std::optional<std::string> PlannerWorker::perform(const PlanJob& job) {
   pursuit_.reset();
+  front_.begin(job.epoch);
+  if (!current()) return kEnded;
+  if (!world_) return "no map was received yet";
   switch (job.kind) {
     case PlanJob::Kind::takeoff:
       return take_off(job);
     case PlanJob::Kind::go_to:
       return go_to(job);
     default:
-      return brake(job);
+      return brake();
   }
 }
 
 std::optional<std::string> PlannerWorker::take_off(const PlanJob& job) {
-  refresh();
   const Vec3 here = view_.state.p_W;
-  const auto column = plan::takeoff_column(*job.world, here);
+  const auto column = plan::takeoff_column(*world_, here);
   if (!column) return "there is no clear hover height above a known floor here";
   Vec3 target = here;
   target.z() = std::max(job.position.z(), column->z_safe);
-  if (target.z() > here.z() && !job.world->hover.safe(job.world->grid.index(target)))
+  if (target.z() > here.z() && !world_->hover.safe(world_->grid.index(target)))
     return "hovering at the height asked for is not safe";
-  const auto& limits = job.world->reach.vehicle.limits;
+  const auto& limits = world_->reach.vehicle.limits;
   auto commands = plan::vertical_commands(here, target, limits.v_max, limits.a_max);
   for (Setpoint& command : commands) command.yaw = view_.command.yaw;
-  // The motors start only for a take-off that is known to be clear.
-  const auto tube = reach::tube_over_field(job.world->reach, view_.state, view_.command, commands, job.world->bounds);
-  if (!(plan::takeoff_clearance(*job.world, tube, column->z_safe) > 0)) return "the take-off column is not clear";
-  channels_.arm.store(true);
-  return fly(job, std::move(commands), {}, column->z_safe, view_.closures);
+  return fly(std::move(commands), {}, column->z_safe, view_.closures);
 }
 
 /// Plans again from the newest state when the tube of the one planned from no longer holds.
 std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
   std::optional<std::string> why;
   for (int attempt = 0; attempt < kPlans; ++attempt) {
-    refresh();
+    if (!current()) return kEnded;
+    const auto world = world_;  // a newer one may come while this is planned in
     const std::uint32_t closures = view_.closures;
-    const auto options = limits_of(*job.world);
-    auto planned = plan::plan(*job.world, {view_.state, view_.command}, job.position, options);
+    const auto options = limits_of(*world);
+    auto planned = plan::plan(*world, {view_.state, view_.command}, job.position, options);
     spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
                  plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
                  planned.metrics.verify_ms, planned.metrics.min_clearance_m);
     const bool hidden =
         planned.status == plan::PlanStatus::no_path ||
-        (planned.status == plan::PlanStatus::goal_blocked && may_become_clear(job.world->grid, job.position));
-    if (hidden && !plan::optimistic_way(*job.world, view_.command.p_W, job.position).empty()) return explore(job);
+        (planned.status == plan::PlanStatus::goal_blocked && may_become_clear(world->grid, job.position));
+    if (hidden && !plan::optimistic_way(*world, view_.command.p_W, job.position).empty()) return explore(job);
     if (planned.status != plan::PlanStatus::ok)
       return std::string(plan::to_string(planned.status)) + ": " + planned.message;
     if (job.yaw) {
       const auto turn = plan::turned_to(planned.commands.back(), *job.yaw, options.yaw);
       planned.commands.insert(planned.commands.end(), turn.begin(), turn.end());
     }
-    why = fly(job, std::move(planned.commands), planned.metrics, std::nullopt, closures);
-    if (why) continue;
+    why = fly(std::move(planned.commands), planned.metrics, std::nullopt, closures);
+    if (why) continue;  // current() ends this for what has been ended
     pursuit_ = Pursuit{job.position, job.yaw};
     return why;
   }
@@ -155,59 +168,59 @@ std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
 
 /// From rest, the first segment of a flight whose way is not known yet; waits a little for scans that show more of it.
 std::optional<std::string> PlannerWorker::explore(const PlanJob& job) {
-  refresh();
   const std::int64_t until_ns = view_.t_ns + static_cast<std::int64_t>(kPatience * 1e9);
-  PlanJob now = job;
   std::string why;
   while (!channels_.stop) {
-    if (world_) now.world = world_;
+    if (!current()) return kEnded;
+    const auto world = world_;
     new_world_ = false;
     const std::uint32_t closures = view_.closures;
     plan::Route here{view_.state, view_.command, {}, {}};
     here.commands.assign(1, {view_.command.p_W, Vec3::Zero(), Vec3::Zero(), view_.command.yaw});
-    auto next = onward(*now.world, here, 0, 0, job.position);
+    auto next = onward(*world, here, 0, 0, job.position);
     why = next.message;
     if (next.kind == plan::Replan::Kind::extended) {
       spdlog::info("towards a goal that is not known to be clear yet: {} commands", next.route.commands.size());
-      const auto refused = fly(now, std::move(next.route.commands), next.metrics, std::nullopt, closures);
+      const auto refused = fly(std::move(next.route.commands), next.metrics, std::nullopt, closures);
       if (!refused) pursuit_ = Pursuit{job.position, job.yaw};
       return refused;
     }
-    while (!new_world_ && view_.t_ns < until_ns && !channels_.stop) pause_(), refresh();
+    while (!new_world_ && view_.t_ns < until_ns && !channels_.stop && current()) pause_();
     if (view_.t_ns >= until_ns) break;
   }
   return "nothing more of the way became known" + (why.empty() ? "" : ": " + why);
 }
 
 /// The current segment, slowed to rest on its own path from a little ahead of now.
-std::optional<std::string> PlannerWorker::brake(const PlanJob& job) {
-  refresh();
-  if (view_.finished || !flying_ || view_.segment != flying_->segment.id) return std::nullopt;  // already at rest
+std::optional<std::string> PlannerWorker::brake() {
+  const bool rests = view_.finished || view_.braking;
+  if (rests || !flying_ || view_.segment != flying_->segment.id) return std::nullopt;  // or about to
   if (view_.closures != flying_->segment.closures) return "a loop closure is being worked in: ask again";
   const std::size_t branch = view_.index + kBrakeAfter;
-  auto commands = plan::stop_along(flying_->segment.commands, branch, job.world->reach.vehicle.limits.a_max);
+  auto commands = plan::stop_along(flying_->segment.commands, branch, world_->reach.vehicle.limits.a_max);
   if (commands.empty()) return std::nullopt;  // it ends by itself before that
   Flying next = continued(branch, std::move(commands));
-  verify(next, *job.world, view_.index);
+  verify(next, *world_, view_.index);
   if (!(next.segment.clearance > 0)) return not_clear("braking here", next.segment.clearance);
   return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
 }
 
 /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may
 /// have moved further than the first set allows.
-std::optional<std::string> PlannerWorker::fly(const PlanJob& job, std::vector<Setpoint> commands,
-                                              const plan::PlanMetrics& metrics, std::optional<double> z_safe,
-                                              std::uint32_t closures) {
+/// A take-off (with `z_safe`) arms the vehicle when it is accepted: only here, where it was found clear.
+std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
+                                              std::optional<double> z_safe, std::uint32_t closures) {
   append_hold(commands);
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    refresh();
+    if (!current()) return kEnded;
     if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
     if (view_.closures != closures) return "a loop closure moved the map meanwhile";
-    Flying next{{++last_id_, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
-    verify(next, *job.world);
+    Flying next{{0, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
+    next.segment.arms = z_safe.has_value();
+    verify(next, *world_);
     if (!(next.segment.clearance > 0))
       return not_clear("the tube from the state estimated now", next.segment.clearance);
-    add_guards(next, *job.world);
+    add_guards(next, *world_);
     if (offer(std::move(next))) return std::nullopt;
   }
   return "the vehicle is not still enough to start: its state left the first set each time";
@@ -216,7 +229,7 @@ std::optional<std::string> PlannerWorker::fly(const PlanJob& job, std::vector<Se
 /// A segment that shares its start and its first commands with what flies.
 Flying PlannerWorker::continued(std::size_t branch, std::vector<Setpoint> commands) {
   append_hold(commands);
-  Flying next{{++last_id_, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
+  Flying next{{0, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
               flying_->start,
               flying_->previous,
               flying_->metrics,
@@ -225,19 +238,21 @@ Flying PlannerWorker::continued(std::size_t branch, std::vector<Setpoint> comman
 }
 
 bool PlannerWorker::offer(Flying next) {
-  const std::uint64_t id = next.segment.id;
+  front_.stamp(next.segment);
+  next.segment.seen_ns = seen_ns_;  // every caller verified it in the newest world
   recorder_.append(study::RecordKind::offer, study::encode(next.segment));
   channels_.segments.offer(std::make_unique<const track::AcceptedSegment>(next.segment));
   for (std::size_t wait = 0; wait < kAnswerPauses && !channels_.stop; ++wait) {
     pause_();
     refresh();
-    if (view_.segment == id) {
+    const auto fate = front_.fate(view_);
+    if (fate == PlanFront::Fate::accepted) {
       recorder_.append(study::RecordKind::segment, segment_record(next));
       accepted_(next.segment);
       flying_ = std::move(next);
       return true;
     }
-    if (view_.refused_segment == id) return false;
+    if (fate == PlanFront::Fate::refused) return false;
   }
   return false;
 }

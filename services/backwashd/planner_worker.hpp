@@ -9,6 +9,7 @@
 #include "core/plan/replan.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/flying.hpp"
+#include "services/backwashd/plan_front.hpp"
 #include "services/backwashd/recorder.hpp"
 
 namespace backwash::daemon {
@@ -18,7 +19,8 @@ using SegmentAccepted = std::function<void(const track::AcceptedSegment&)>;
 
 /// Plans what the mission asks for, verifies the whole swept tube from the state estimated now, and offers the segment
 /// to the control thread, again from a fresh state if that has moved on meanwhile. Between jobs it keeps what flies
-/// right in each new world and after loop closures.
+/// right in each new world and after loop closures. A job is given up as soon as a later order or another event has
+/// ended what it was asked for in (PlanFront).
 ///
 /// A goal that is clear in the map is flown to by one whole plan. One that the map does not know yet, or to which it
 /// does not know the way, is flown to with a receding horizon (plan::replan): each new world extends the flight from a
@@ -47,8 +49,8 @@ class PlannerWorker {
   std::optional<std::string> take_off(const PlanJob& job);
   std::optional<std::string> go_to(const PlanJob& job);
   std::optional<std::string> explore(const PlanJob& job);
-  std::optional<std::string> brake(const PlanJob& job);
-  std::optional<std::string> fly(const PlanJob& job, std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
+  std::optional<std::string> brake();
+  std::optional<std::string> fly(std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
                                  std::optional<double> z_safe, std::uint32_t closures);
   plan::Replan onward(const plan::World& world, const plan::Route& route, std::size_t now, std::size_t branch,
                       const Vec3& goal_W) const;
@@ -61,6 +63,7 @@ class PlannerWorker {
   std::optional<std::string> rectify();
 
   void refresh();
+  bool current();
   Flying continued(std::size_t branch, std::vector<Setpoint> commands);
   bool offer(Flying next);
 
@@ -70,8 +73,10 @@ class PlannerWorker {
   std::function<void()> pause_;
   ControlView view_;
   std::shared_ptr<const plan::World> world_;
+  std::int64_t seen_ns_ = 0;  // of that world
   bool new_world_ = false;
-  std::uint64_t last_id_ = 0, blocked_ = 0;
+  PlanFront front_;
+  std::uint64_t blocked_ = 0;
   std::optional<Flying> flying_;
   std::optional<Pursuit> pursuit_;
 };

@@ -93,9 +93,10 @@ void Autopilot::on(const mavlink::CommandLong& m, double t) {
     result = m.param2 == 6 && streaming ? kAccepted : kTemporarilyRejected;
     if (result == kAccepted) mode_ = Mode::offboard;
   } else if (m.command == kArm) {
-    armed_ = m.param1 == 1;
+    // Not forced, so that it is no way to fall.
+    result = m.param1 == 1 || landed_ ? kAccepted : kTemporarilyRejected;
+    if (result == kAccepted) armed_ = m.param1 == 1;
     vehicle_.set_motors(armed_);
-    result = kAccepted;
   } else if (m.command == kLand) {
     if (mode_ != Mode::land) target_ = {believed().p_W, Vec3::Zero(), Vec3::Zero(), target_.yaw};
     mode_ = Mode::land;

@@ -40,7 +40,7 @@ TEST(Tick, NeitherAllocatesNorLocksNorReadsTheWallClockNorFaultsAPageInAWholeFli
   Lockstep rig;
   rig.take_off();
   rig.start_route(7);
-  rig.channels->requests.push(track::Request::land);
+  rig.channels->orders.push({track::Request::land});
   ASSERT_GT(rig.ticks_until(track::Mode::passive, 600), 0);
   EXPECT_EQ(rig.reason(), track::Reason::landed);
   EXPECT_GT(rig.view().inside, 400u);

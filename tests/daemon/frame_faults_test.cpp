@@ -23,7 +23,7 @@ Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond
   // Room for wherever the carried vehicle is seen: outside its map it would be refused for that.
   map::OccupancyGrid room({-20, -20, -10}, 1.0, {40, 40, 20}, map::Cell::free);
   rig.channels->worlds.offer(
-      plan::build_world(std::move(room), Model{}, config::load_vehicle("builtin:quad-5in").value()));
+      {plan::build_world(std::move(room), Model{}, config::load_vehicle("builtin:quad-5in").value())});
   const double yaw = 0.4;
   const Eigen::Quaterniond q(Eigen::AngleAxisd(yaw, Vec3::UnitZ()));
   commanded = false;
@@ -53,7 +53,7 @@ Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond
       s.state = {seen.p_W + Vec3(-1, 0, 1.2), seen.v_W};  // within the map, however it is mirrored
       s.q = {attitude_seen.w(), attitude_seen.x(), attitude_seen.y(), attitude_seen.z()};
     };
-    if (n == 280) rig.channels->requests.push(track::Request::enable);
+    if (n == 280) rig.channels->orders.push({track::Request::enable});
     const Wire& wire = rig.tick();
     commanded = commanded || !wire.setpoints.empty() || wire.commanded(kCommandMode);
     if (n == 280) return rig.reason();

@@ -45,7 +45,7 @@ TEST(Row17, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
   EXPECT_EQ(rig.mode(), Mode::quiet);
   EXPECT_EQ(rig.channels->link_fault, 0);
   // The line works again: an operator can take control anew.
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   EXPECT_EQ(rig.ticks_until(Mode::enabling, 3), 1) << to_string(rig.reason());
 }
 
@@ -153,7 +153,7 @@ TEST(Row19, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
   rig.ticks(2);
   ASSERT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kNoValidFrame));
   EXPECT_EQ(name(firmware_bridge::LinkFault::kNoValidFrame), "no valid frame (wrong baud rate?)");
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   rig.tick();
   EXPECT_EQ(rig.mode(), Mode::passive);
   EXPECT_EQ(rig.reason(), Reason::autopilot_silent);
@@ -206,7 +206,7 @@ TEST(Row25, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
     if (from == Mode::hold) {
       rig.tick(3);
     } else if (from == Mode::land) {
-      rig.channels->requests.push(track::Request::land);
+      rig.channels->orders.push({track::Request::land});
       rig.tick();
     }
     ASSERT_EQ(rig.mode(), from);
@@ -228,7 +228,7 @@ TEST(Row23, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
   EXPECT_EQ(rig.reason(), Reason::disarmed);
   EXPECT_EQ(rig.view().segment, 0u);
   for (int n = 0; n < 100; ++n) EXPECT_TRUE(rig.tick().setpoints.empty());
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   // Enabled anew it holds where it is; the old trajectory is not resumed.
   const Vec3 here = rig.autopilot->truth().p_W;
@@ -252,7 +252,7 @@ TEST(Row24, ALowBatteryAsksToLandOnce) {
   EXPECT_GE(asked, 1);
   EXPECT_EQ(rig.reason(), Reason::landed);
   // An operator who takes control again with the same battery is not landed a second time.
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   rig.ticks(200);
   EXPECT_EQ(rig.mode(), Mode::tracking);

@@ -88,7 +88,7 @@ void Lockstep::restart() {
   link_ = std::make_unique<firmware_bridge::AutopilotLink>(line_->open(), std::uint8_t{1},
                                                            firmware_bridge::Time(std::chrono::nanoseconds(now_ns_)));
   loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand);
-  channels->worlds.offer(world_);
+  channels->worlds.offer({world_, now_ns_});
   log.clear();
 }
 
@@ -212,9 +212,12 @@ int Lockstep::ticks_until(track::Mode wanted, int most) {
   return -1;
 }
 
-std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops) {
+std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops, bool arms) {
   auto segment = std::make_unique<track::AcceptedSegment>();
   segment->id = ++last_segment_;
+  segment->epoch = view().epoch;
+  segment->arms = arms;
+  segment->seen_ns = now_ns_;
   const State start = view().state;
   segment->tube = reach::tube_over_field(world_->reach, start, view().command, commands, world_->bounds);
   if (with_stops)
@@ -229,16 +232,15 @@ std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops) {
 
 void Lockstep::take_off() {
   ticks(60);
-  channels->requests.push(track::Request::enable);
+  channels->orders.push({track::Request::enable});
   ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
   const auto& limits = vehicle_.limits;
   auto commands = plan::vertical_commands(view().state.p_W, kStart, limits.v_max, limits.a_max);
   const auto hold = sim::hold_commands(kStart, 2.0);
   commands.insert(commands.end(), hold.begin(), hold.end());
   for (auto& c : commands) c.yaw = view().command.yaw;
-  channels->arm = true;
   const auto count = static_cast<int>(commands.size());
-  offer(std::move(commands));
+  offer(std::move(commands), true, true);
   ticks(count + 5);
   ASSERT_EQ(mode(), track::Mode::tracking) << to_string(reason());
   ASSERT_TRUE(view().finished);

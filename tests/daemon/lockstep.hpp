@@ -47,8 +47,9 @@ class Lockstep {
   void take_off();
   /// Plans to the goal, offers it with its stops, and flies `seconds` of it.
   void start_route(double seconds);
-  /// Offers these commands from where the vehicle is now; returns the id.
-  std::uint64_t offer(std::vector<Setpoint> commands, bool with_stops = true);
+  /// Offers these commands from where the vehicle is now, planned in the present epoch; returns the id. `arms`: as a
+  /// take-off.
+  std::uint64_t offer(std::vector<Setpoint> commands, bool with_stops = true, bool arms = false);
   /// Commands of the planned route.
   const std::vector<Setpoint>& route() const { return route_; }
 

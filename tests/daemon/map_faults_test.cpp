@@ -46,11 +46,12 @@ class MapFaults : public testing::Test {
   std::uint32_t closures_ = 0;
   std::unique_ptr<track::AcceptedSegment> segment_;
   bool map_moves_on_ = true;
+  std::int64_t seen_ns_ = 0;  // of the map that segments are verified in
 
   void SetUp() override {
     lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
     map::OccupancyGrid grid = map::builtin_scene("parallel-walls-4m", 0.2).value();
-    channels_->worlds.offer(plan::build_world(std::move(grid), Model{}, kVehicle));
+    channels_->worlds.offer({plan::build_world(std::move(grid), Model{}, kVehicle)});
   }
   Vec3 in_map() const { return map_from_odom_.point(odom_); }
 
@@ -91,6 +92,8 @@ class MapFaults : public testing::Test {
     segment_ = std::make_unique<track::AcceptedSegment>();
     segment_->id = 7;
     segment_->closures = closures_;
+    segment_->epoch = flight_.epoch();
+    segment_->seen_ns = seen_ns_;
     segment_->clearance = clearance;
     const Vec3 from = in_map();
     for (int k = 0; k <= kSteps; ++k) {
@@ -111,6 +114,7 @@ class MapFaults : public testing::Test {
   }
   void voxel_at(const Vec3& p) {
     NewVoxels voxels;
+    voxels.received_ns = now_ns_;
     voxels.edge = 0.2;
     voxels.count = 1;
     voxels.centers[0] = {p.x(), p.y(), p.z()};
@@ -185,6 +189,35 @@ TEST_F(MapFaults, Row14VoxelsThatCameBeforeTheSegmentAreHeldAgainstIt) {
   EXPECT_EQ(ticks_until(Mode::hold, 2), 1);
 }
 
+TEST_F(MapFaults, Row14EverythingSeenWhileThePlanWasMadeIsHeldAgainstItAndNothingThatThePlanKnew) {
+  for (const bool known : {false, true}) {
+    SetUp();
+    enable();
+    voxel_at({in_map().x() + 2, 0, 1});
+    seen_ns_ = known ? now_ns_ : now_ns_ - 1;
+    for (int n = 0; n < 5; ++n) {  // and then much that does not matter
+      tick();
+      voxel_at({in_map().x() + 2, 1.5, 1});
+    }
+    for (int n = 0; n < 3; ++n) tick();
+    fly();
+    EXPECT_EQ(ticks_until(Mode::hold, 5) <= 3, !known);
+    TearDown();
+    flight_ = track::FlightTick{kVehicle, 0};
+    odom_ = {-2, 0, 1};
+  }
+}
+
+TEST_F(MapFaults, Row14WhereMoreWasSeenThanIsKeptTheFlightCountsAsBlocked) {
+  enable();
+  for (int n = 0; n < 40; ++n) {
+    voxel_at({in_map().x() + 2, 1.5, 1});
+    tick();
+  }
+  fly();
+  EXPECT_EQ(ticks_until(Mode::hold, 2), 1);
+}
+
 TEST_F(MapFaults, Row14AFlightThatIsNotClearInTheNewestWorldIsBraked) {
   enable();
   fly();
@@ -203,7 +236,7 @@ TEST_F(MapFaults, Row9APoseOutsideTheMapIsHeld) {
   EXPECT_EQ(out_.supervisor.mode, Mode::tracking);
   // A map of another place comes.
   map::OccupancyGrid elsewhere({10, 10, 0}, 0.2, {5, 5, 5}, map::Cell::free);
-  channels_->worlds.offer(plan::build_world(std::move(elsewhere), Model{}, kVehicle));
+  channels_->worlds.offer({plan::build_world(std::move(elsewhere), Model{}, kVehicle)});
   EXPECT_EQ(ticks_until(Mode::hold, 3), 1);
   EXPECT_EQ(out_.supervisor.reason, Reason::outside_map);
 }

@@ -23,7 +23,7 @@ class MapWorkerTest : public testing::Test {
   MapSettings settings_;
   MapWorker worker_{*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_};
   map::OccupancyGrid grid_ = map::builtin_scene("parallel-walls-2m", 0.2).value();
-  const Worlds::Pointer* held_ = nullptr;
+  const Snapshot* held_ = nullptr;
 
   ~MapWorkerTest() override {
     channels_->worlds.control.give_back(held_);
@@ -42,7 +42,7 @@ class MapWorkerTest : public testing::Test {
   const plan::World* world() {
     if (const auto* newest = channels_->worlds.control.take())
       channels_->worlds.control.give_back(std::exchange(held_, newest));
-    return held_ ? held_->get() : nullptr;
+    return held_ ? held_->world.get() : nullptr;
   }
   void scan(const std::vector<Vec3>& points, const Vec3& sensor, std::int64_t received_ns) {
     channels_->scans.push(new Scan{points, sensor, received_ns});
@@ -60,7 +60,7 @@ TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {
   for (auto* to : {&channels_->worlds.mission, &channels_->worlds.planner, &channels_->worlds.reader}) {
     const auto* taken = to->take();
     ASSERT_TRUE(taken);
-    EXPECT_EQ(taken->get(), world());
+    EXPECT_EQ(taken->world.get(), world());
     to->give_back(taken);
   }
 }

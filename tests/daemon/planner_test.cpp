@@ -107,7 +107,7 @@ class PlannerFlight : public testing::Test {
   /// As the mission does.
   void know() {
     if (const auto* world = rig_.channels->worlds.mission.take()) {
-      known_ = *world;
+      known_ = world->world;
       rig_.channels->worlds.mission.give_back(world);
     }
   }
@@ -117,7 +117,7 @@ class PlannerFlight : public testing::Test {
   std::string go(const Vec3& goal, std::optional<double> yaw = {}) {
     know();
     rig_.channels->jobs.offer(
-        std::make_unique<const PlanJob>(PlanJob{PlanJob::Kind::go_to, ++jobs_, goal, yaw, known_}));
+        std::make_unique<const PlanJob>(PlanJob{PlanJob::Kind::go_to, ++jobs_, goal, yaw, rig_.view().epoch}));
     EXPECT_TRUE(planner_.step());
     const auto outcome = rig_.channels->outcomes.pop();
     return outcome->ok ? "" : outcome->reason.data();
@@ -217,7 +217,7 @@ TEST_F(CrateAppears, AnOperatorsStopEndsTheFlightAlsoWhileItBrakesForTheCrate) {
   bool stopped = false;
   fly(3000, [&] {
     appear();
-    if (!stopped && rig_.mode() == track::Mode::hold) stopped = rig_.channels->requests.push(track::Request::stop);
+    if (!stopped && rig_.mode() == track::Mode::hold) stopped = rig_.channels->orders.push({track::Request::stop});
   });
   ASSERT_TRUE(stopped);
   EXPECT_EQ(rig_.mode(), track::Mode::hold);

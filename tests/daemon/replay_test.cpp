@@ -23,7 +23,7 @@ class Replay : public testing::Test {
     rig.start_route(2);
     rig.tick(3);
     rig.ticks(100);
-    rig.channels->requests.push(track::Request::land);
+    rig.channels->orders.push({track::Request::land});
     rig.ticks(50);
     ticks_ = rig.view().ticks;
     path_ = testing::TempDir() + "replay_" + std::to_string(::getpid()) + ".bwlog";
@@ -105,9 +105,9 @@ TEST_F(Replay, NamesTheByteOfWhatIsDamaged) {
   flip(record.offset + 8);
 
   const auto& offer = nth(log, RecordKind::offer, 1);
-  flip(offer.offset + sizeof(study::RecordHeader) + 4 * 8 + 6);  // the number of its commands
+  flip(offer.offset + sizeof(study::RecordHeader) + 7 * 8 + 6);  // the number of its commands
   expect_named(study::replay(read(), path_), offer.offset);
-  flip(offer.offset + sizeof(study::RecordHeader) + 4 * 8 + 6);
+  flip(offer.offset + sizeof(study::RecordHeader) + 7 * 8 + 6);
 
   const std::uint64_t last = log.records.back().offset;
   std::filesystem::resize_file(path_, std::filesystem::file_size(path_) - 5);

@@ -47,7 +47,7 @@ struct Outcome {
 Bytes raw_log() {
   Lockstep rig;
   rig.ticks(60);
-  rig.channels->requests.push(track::Request::enable);
+  rig.channels->orders.push({track::Request::enable});
   EXPECT_GT(rig.ticks_until(track::Mode::tracking, 250), 0);
   rig.offer(std::vector<Setpoint>(10, Setpoint{rig.view().state.p_W, Vec3::Zero(), Vec3::Zero(), 0}));
   rig.ticks(12);

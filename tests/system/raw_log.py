@@ -4,7 +4,7 @@ import collections
 import csv
 import struct
 
-MAGIC = b"backwash raw log 2\n"
+MAGIC = b"backwash raw log 3\n"
 ODOMETRY, FRAME_IN, FRAME_OUT, TICK, LOST, SCAN, WORLD, FAILURE = 2, 6, 7, 8, 13, 14, 15, 16
 MODES = ["passive", "enabling", "tracking", "hold", "land", "quiet"]
 SETPOINT, HEARTBEAT, COMMAND = 84, 0, 76

@@ -50,6 +50,7 @@ class Flight {
     in.autopilot.offboard = in.autopilot.armed = true;
     step();
     EXPECT_EQ(out.supervisor.mode, Mode::tracking);
+    segment.epoch = tick_.epoch();
     in.segment = &segment;
     step();
     EXPECT_TRUE(out.accepted);
@@ -72,6 +73,7 @@ class Flight {
   TickInput in;
   TickOutput out;
   const Tracker& tracker() const { return tick_.tracker(); }
+  const Epoch& epoch() const { return tick_.epoch(); }
 
  private:
   FlightTick tick_;
@@ -204,6 +206,78 @@ TEST(FlightTick, AnOperatorsStopWinsOverAFlightThatWouldGoOn) {
   }
 }
 
+// Row 39.
+TEST(FlightTick, ASegmentOfAnotherEpochIsRefusedInEveryMode) {
+  for (const Epoch wrong : {Epoch{1, 0}, Epoch{0, 1}, Epoch{0, static_cast<std::uint64_t>(-1)}}) {
+    Flight flight;
+    AcceptedSegment on = flight.segment;
+    on.id = 99;
+    on.continues = flight.segment.id;
+    on.branch = 130;
+    flight.in.segment = &on;
+    on.epoch = {flight.epoch().order + wrong.order, flight.epoch().lapse + wrong.lapse};
+    flight.step();
+    EXPECT_TRUE(flight.out.refused);
+    on.epoch = flight.epoch();
+    flight.in.segment = &on;
+    flight.step();
+    EXPECT_TRUE(flight.out.accepted);
+  }
+}
+
+TEST(FlightTick, EveryHoldButTheOneForAnObstacleEndsWhatWasPlanned) {
+  Flight flight;
+  const Epoch before = flight.epoch();
+  flight.in.surroundings.tube_blocked = true;
+  flight.step();
+  EXPECT_EQ(flight.out.supervisor.reason, Reason::obstacle_ahead);
+  EXPECT_EQ(flight.epoch(), before);
+  flight.in.surroundings.tube_blocked = false;
+  flight.in.request = Request::stop;
+  flight.in.order = 5;
+  flight.step();
+  EXPECT_EQ(flight.epoch(), (Epoch{5, before.lapse + 1}));
+  Flight late;
+  late.in.surroundings.late = true;
+  late.step();
+  EXPECT_EQ(late.out.supervisor.mode, Mode::hold);
+  EXPECT_EQ(late.epoch().lapse, before.lapse + 1);
+}
+
+// Row 40: the motors start in the tick that accepts a take-off, and on the ground a stop stops them.
+TEST(FlightTick, ArmsInTheTickThatAcceptsATakeoffAloneAndDisarmsOnTheGroundAloneAfterAStop) {
+  for (const bool arms : {true, false}) {
+    for (const bool stands : {true, false}) {
+      Flight flight;
+      flight.in.autopilot.armed = false;
+      flight.step();  // disarmed: passive
+      flight.in.request = Request::enable;
+      flight.step();
+      flight.step();
+      ASSERT_EQ(flight.out.supervisor.mode, Mode::tracking);
+      AcceptedSegment up = flight.segment;
+      up.epoch = flight.epoch();
+      up.arms = arms;
+      const Vec3 from = flight.out.command.p_W - up.commands[0].p_W;
+      for (auto& command : up.commands) command.p_W += from;
+      up.tube = tube_of(up.commands);
+      flight.in.segment = &up;
+      flight.step();
+      ASSERT_TRUE(flight.out.accepted);
+      EXPECT_EQ(flight.out.arm, arms);
+      for (int n = 0; n < 20; ++n) EXPECT_FALSE(flight.step().arm);
+      flight.in.autopilot.armed = true;
+      flight.in.autopilot.landed = stands;
+      flight.in.request = Request::stop;
+      int disarmed = flight.step().disarm;
+      EXPECT_EQ(flight.out.supervisor.mode, Mode::hold) << to_string(flight.out.supervisor.reason);
+      for (int n = 0; n < 200; ++n) disarmed += flight.step().disarm;
+      EXPECT_EQ(disarmed > 0, stands);
+      EXPECT_LE(disarmed, 7);
+    }
+  }
+}
+
 // Rows 9, 10 and 13, as far as the tick decides them.
 TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
   for (const bool outside : {true, false}) {
@@ -228,9 +302,10 @@ TEST(FlightTick, HoldsOutsideTheMapAndOnALateMapAndDoesNotEnableWithoutOne) {
 
 TEST(FlightTick, GivesEverySegmentBackExactlyOnce) {
   Flight flight;
-  const AcceptedSegment elsewhere = [] {
+  const AcceptedSegment elsewhere = [&flight] {
     auto s = straight();
     s.id = 2;
+    s.epoch = flight.epoch();
     for (auto& set : s.tube) set.center.p_W.y() += 5;
     return s;
   }();

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The mission's decisions: who may command, what is done once, and what an order ends (faults.md rows 28, 39, 40, 48).
+#include "services/backwashd/mission.hpp"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "services/dds/topics.hpp"
+#include "tests/daemon/lockstep.hpp"
+
+namespace backwash::daemon::test {
+namespace {
+
+using track::Mode;
+using track::Request;
+
+constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED, kRefused = backwash_msgs_msg_dds__ACK_REFUSED,
+                       kNotYours = backwash_msgs_msg_dds__ACK_NOT_YOURS, kInvalid = backwash_msgs_msg_dds__ACK_INVALID;
+constexpr std::uint8_t kEnable = backwash_msgs_msg_dds__COMMAND_ENABLE,
+                       kDisable = backwash_msgs_msg_dds__COMMAND_DISABLE,
+                       kTakeoff = backwash_msgs_msg_dds__COMMAND_TAKEOFF, kGoto = backwash_msgs_msg_dds__COMMAND_GOTO,
+                       kFollow = backwash_msgs_msg_dds__COMMAND_FOLLOW, kHold = backwash_msgs_msg_dds__COMMAND_HOLD,
+                       kStop = backwash_msgs_msg_dds__COMMAND_STOP, kLand = backwash_msgs_msg_dds__COMMAND_LAND,
+                       kRelease = backwash_msgs_msg_dds__COMMAND_RELEASE;
+
+/// A process of a ground station.
+struct Station {
+  std::uint8_t writer;
+  std::uint64_t session;
+  const char* name = "gcs";
+  std::uint32_t sequence = 0;
+
+  CommandMessage next(std::uint8_t verb) { return at(++sequence, verb); }
+  CommandMessage at(std::uint32_t number, std::uint8_t verb) const {
+    CommandMessage c;
+    c.writer[0] = writer;
+    std::snprintf(c.station.data(), c.station.size(), "%s", name);
+    c.session = session;
+    c.sequence = number;
+    c.verb = verb;
+    c.position = {1, 0, 1.2};
+    return c;
+  }
+};
+
+class MissionTest : public testing::Test {
+ protected:
+  Mission mission_;
+  ControlView view_;
+  double now_s_ = 100;
+  Station gcs_{1, 11}, other_{2, 22, "other"};
+
+  /// In the air, at rest, tracking.
+  void SetUp() override {
+    view_.mode = Mode::tracking;
+    view_.armed = view_.offboard = true;
+    view_.landed = false;
+    view_.odometry_age = view_.heartbeat_age = 0;
+    view_.state.p_W = view_.command.p_W = {-2, 0, 1.2};
+    MissionInput in;
+    in.now_s = now_s_;
+    in.view = view_;
+    in.world = corridor();
+    mission_.observe(in);
+  }
+  Decision look(std::span<const PlanOutcome> outcomes = {}) {
+    MissionInput in;
+    in.now_s = now_s_;
+    in.view = view_;
+    in.outcomes = outcomes;
+    return mission_.observe(in);
+  }
+  Decision give(const CommandMessage& c) {
+    Decision d = mission_.handle(c, now_s_);
+    if (d.order) view_.epoch.order = d.order->number;  // the control thread takes it at once
+    return d;
+  }
+  std::uint8_t result(const Decision& d) { return d.answer->result; }
+};
+
+TEST_F(MissionTest, ARepeatedCommandIsAnsweredAgainAndNotDoneAgain) {
+  const Decision first = give(gcs_.next(kGoto));
+  ASSERT_EQ(result(first), kAccepted);
+  ASSERT_TRUE(first.job);
+  const Decision again = give(gcs_.at(gcs_.sequence, kGoto));
+  EXPECT_EQ(result(again), kAccepted);
+  EXPECT_FALSE(again.job || again.order);
+  // Also where the state would now give another answer.
+  const Decision land = give(gcs_.next(kLand));
+  ASSERT_TRUE(land.order);
+  view_.mode = Mode::passive;
+  look();
+  const Decision land_again = give(gcs_.at(gcs_.sequence, kLand));
+  EXPECT_EQ(result(land_again), kAccepted);
+  EXPECT_FALSE(land_again.order);
+}
+
+TEST_F(MissionTest, AnOlderSequenceNumberIsInvalidAndDoesNothing) {
+  give(gcs_.next(kGoto));
+  give(gcs_.next(kStop));
+  const Decision old = give(gcs_.at(1, kGoto));
+  EXPECT_EQ(result(old), kInvalid);
+  EXPECT_FALSE(old.job || old.order);
+}
+
+TEST_F(MissionTest, TheLeaseLastsTenSecondsFromTheHoldersLastCommand) {
+  give(gcs_.next(kGoto));
+  now_s_ += 9.9;
+  EXPECT_EQ(result(give(other_.next(kLand))), kNotYours);
+  EXPECT_NE(give(other_.next(kLand)).answer->reason.find("gcs"), std::string::npos);
+  EXPECT_EQ(mission_.station(now_s_), "gcs");
+  now_s_ += 0.2;
+  EXPECT_EQ(mission_.station(now_s_), "");
+  EXPECT_EQ(result(give(other_.next(kLand))), kAccepted);
+  EXPECT_EQ(mission_.station(now_s_), "other");
+}
+
+// Row 48.
+TEST_F(MissionTest, ASessionIsItsWritersAndNotItsNames) {
+  give(gcs_.next(kHold));
+  Station impostor{3, gcs_.session, gcs_.name, gcs_.sequence};
+  EXPECT_EQ(result(give(impostor.next(kGoto))), kNotYours);
+  Station namesake{4, 44, gcs_.name};
+  EXPECT_EQ(result(give(namesake.next(kGoto))), kNotYours);
+  EXPECT_EQ(result(give(gcs_.next(kHold))), kAccepted);
+}
+
+TEST_F(MissionTest, ADepartedWriterEndsItsSessionAtOnceAndNoOneElses) {
+  give(gcs_.next(kHold));
+  CommandMessage gone;
+  gone.departed = true;
+  gone.writer[0] = other_.writer;
+  EXPECT_FALSE(give(gone).answer);
+  EXPECT_EQ(mission_.station(now_s_), "gcs");
+  gone.writer[0] = gcs_.writer;
+  give(gone);
+  EXPECT_EQ(mission_.station(now_s_), "");
+  EXPECT_EQ(result(give(other_.next(kHold))), kAccepted);
+}
+
+TEST_F(MissionTest, ASessionThatIsOverNeverCountsAgain) {
+  give(gcs_.next(kHold));
+  give(gcs_.next(kRelease));
+  for (const std::uint8_t writer : {std::uint8_t{1}, std::uint8_t{9}}) {
+    Station replay{writer, gcs_.session, gcs_.name, 100};
+    const Decision d = give(replay.next(kGoto));
+    EXPECT_EQ(result(d), kInvalid);
+    EXPECT_FALSE(d.job || d.order);
+  }
+  Station anew{1, 12, "gcs"};
+  EXPECT_EQ(result(give(anew.next(kHold))), kAccepted);
+}
+
+TEST_F(MissionTest, StopIsTakenFromEveryStationAndLeavesTheLeaseWhereItIs) {
+  give(gcs_.next(kGoto));
+  const Decision d = give(other_.next(kStop));
+  EXPECT_EQ(result(d), kAccepted);
+  ASSERT_TRUE(d.order);
+  EXPECT_EQ(d.order->request, Request::stop);
+  EXPECT_EQ(mission_.station(now_s_), "gcs");
+  EXPECT_EQ(result(give(gcs_.next(kHold))), kAccepted);
+}
+
+// Row 39.
+TEST_F(MissionTest, EveryEndingCommandHasALaterOrderThanWhatWasPlannedBefore) {
+  for (const std::uint8_t verb : {kStop, kLand, kHold}) {
+    const Decision go = give(gcs_.next(kGoto));
+    ASSERT_TRUE(go.job);
+    const Decision end = give(gcs_.next(verb));
+    ASSERT_TRUE(end.order);
+    EXPECT_GT(end.order->number, go.job->epoch.order);
+    if (end.job) {
+      EXPECT_EQ(end.job->kind, PlanJob::Kind::brake);
+      EXPECT_EQ(end.job->epoch.order, end.order->number);
+    }
+    const PlanOutcome late{go.job->id, false, {"too late"}};
+    look({&late, 1});
+    EXPECT_NE(mission_.task(), "refused: too late") << "the outcome of a job that was ended is nobody's";
+    const PlanOutcome brake{end.job ? end.job->id : 0, true, {}};
+    look({&brake, 1});
+  }
+}
+
+TEST_F(MissionTest, AStopEndsTheRouteEvenIfTheVehicleRestsAtItsNextGoal) {
+  CommandMessage follow = gcs_.next(kFollow);
+  follow.waypoints = 2;
+  follow.waypoint[0] = {1, 0, 1.2};
+  follow.waypoint[1] = {-1, 0, 1.2};
+  const Decision d = give(follow);
+  ASSERT_TRUE(d.job);
+  const PlanOutcome done{d.job->id, true, {}};
+  view_.command.p_W = view_.state.p_W = {1, 0, 1.2};
+  give(gcs_.next(kStop));
+  now_s_ += 5;
+  EXPECT_FALSE(look({&done, 1}).job);
+}
+
+TEST_F(MissionTest, ARouteGoesOnAtItsNextGoalAndAfterAnObstacleAndAfterNoOtherHold) {
+  const auto begun = [&] {
+    mission_ = Mission();
+    gcs_ = {1, gcs_.session + 1};
+    SetUp();
+    CommandMessage follow = gcs_.next(kFollow);
+    follow.waypoints = 2;
+    follow.waypoint[0] = {1, 0, 1.2};
+    follow.waypoint[1] = {-1, 0, 1.2};
+    const Decision d = give(follow);
+    const PlanOutcome done{d.job->id, true, {}};
+    view_.finished = false;
+    look({&done, 1});
+    now_s_ += 5;
+    view_.finished = true;
+  };
+  begun();
+  view_.command.p_W = view_.state.p_W = {1, 0, 1.2};
+  const Decision on = look();
+  ASSERT_TRUE(on.job);
+  EXPECT_EQ(on.job->position, Vec3(-1, 0, 1.2));
+  for (int r = 0; r < track::kReasons; ++r) {
+    begun();
+    view_.mode = Mode::hold;
+    view_.reason = static_cast<track::Reason>(r);
+    EXPECT_EQ(look().job.has_value(), view_.reason == track::Reason::obstacle_ahead) << to_string(view_.reason);
+  }
+}
+
+TEST_F(MissionTest, WhatIsPlannedBelongsToTheLapseThatTheVehicleIsIn) {
+  view_.epoch.lapse = 7;
+  look();
+  EXPECT_EQ(give(gcs_.next(kGoto)).job->epoch.lapse, 7u);
+}
+
+// Row 40, and STOP while enabling: what is shown may be a moment old, the order to enable still on its way.
+TEST_F(MissionTest, AStopRightAfterAnEnableReachesTheControlThread) {
+  view_.mode = Mode::passive;
+  view_.armed = false;
+  view_.landed = true;
+  look();
+  const Decision enabled = mission_.handle(gcs_.next(kEnable), now_s_);  // not yet taken
+  ASSERT_TRUE(enabled.order);
+  const Decision stopped = mission_.handle(gcs_.next(kStop), now_s_);
+  EXPECT_EQ(result(stopped), kAccepted);
+  ASSERT_TRUE(stopped.order);
+  EXPECT_EQ(stopped.order->request, Request::stop);
+  EXPECT_GT(stopped.order->number, enabled.order->number);
+}
+
+TEST_F(MissionTest, NothingIsPlannedWhileAnOrderIsOnItsWay) {
+  ASSERT_TRUE(mission_.handle(gcs_.next(kStop), now_s_).order);  // not yet taken
+  const Decision go = mission_.handle(gcs_.next(kGoto), now_s_);
+  EXPECT_EQ(result(go), kRefused);
+  EXPECT_FALSE(go.job);
+}
+
+TEST_F(MissionTest, RefusesWhatTheModeDoesNotAllow) {
+  view_.mode = Mode::passive;
+  look();
+  for (const std::uint8_t verb : {kTakeoff, kGoto, kHold, kLand, kStop})
+    EXPECT_EQ(result(give(gcs_.next(verb))), kRefused) << int{verb};
+  EXPECT_EQ(result(give(gcs_.next(99))), kInvalid);
+  view_.mode = Mode::tracking;
+  look();
+  EXPECT_EQ(result(give(gcs_.next(kTakeoff))), kRefused) << "already in the air";
+  EXPECT_EQ(result(give(gcs_.next(kDisable))), kRefused) << "armed";
+  EXPECT_EQ(result(give(gcs_.next(kEnable))), kRefused) << "already enabled";
+  view_.finished = false;
+  look();
+  EXPECT_EQ(result(give(gcs_.next(kGoto))), kRefused) << "flying";
+  view_.mode = Mode::enabling;
+  look();
+  EXPECT_EQ(result(give(gcs_.next(kDisable))), kAccepted) << "an armed vehicle that is being enabled";
+}
+
+TEST_F(MissionTest, AnOrderThatTheControlThreadDoesNotTakeIsNotAcknowledged) {
+  Channels channels;
+  channels.view_mission.write(view_);
+  channels.worlds.offer({corridor()});
+  while (channels.orders.push({})) {
+  }
+  channels.commands.push(gcs_.next(kStop));
+  channels.commands.push(gcs_.next(kHold));
+  std::vector<Answer> answers;
+  Mission mission;
+  std::thread thread([&] {
+    run_mission(channels, mission, [&](const CommandMessage&, const Answer& a) {
+      answers.push_back(a);
+      if (answers.size() == 2) channels.stop = true;
+    });
+  });
+  thread.join();
+  ASSERT_EQ(answers.size(), 2u);
+  for (const Answer& a : answers) EXPECT_EQ(a.result, kRefused) << a.reason;
+  EXPECT_EQ(channels.jobs.take(), nullptr) << "a plan without its order";
+}
+
+}  // namespace
+}  // namespace backwash::daemon::test
