@@ -71,7 +71,7 @@ refused 66 "fifo:1: is a FIFO; needs a readable CSV file" reach --vehicle $quad 
 refused 66 "/dev/zero:1: is a device; needs a readable CSV file" field --map builtin:narrow-gap --model $quad --points /dev/zero
 refused 66 "fifo:1: is a FIFO; needs a flight specification" simulate --map builtin:narrow-gap --vehicle $quad --flight fifo --out log.csv
 refused 66 "/dev/zero:1: is a device; needs a raw log" replay --log /dev/zero
-refused 66 "fifo:1: is a FIFO; needs a raw log" report --log fifo
+refused 66 "fifo:1: is a FIFO; needs a raw log" replay --log fifo
 # bad data
 refused 65 "corrupt.bt" fly --map corrupt.bt
 refused 65 "gap.csv:4:" reach --vehicle $quad --track gap.csv
