@@ -20,7 +20,7 @@ inline constexpr char kRawLogMagic[] = "backwash raw log 3\n";
 enum class RecordKind : std::uint32_t {
   configuration = 1,  ///< text: the vehicle, model and daemon files as given
   odometry = 2,       ///< OdometryRecord
-  map = 3,            ///< MapRecord, then the octomap data
+  map = 3,            ///< MapRecord, then the octomap data, or RejectedMap
   command = 4,        ///< text, one line
   ack = 5,            ///< text, one line
   frame_in = 6,       ///< one MAVLink frame received
@@ -54,6 +54,12 @@ struct MapRecord {
   double resolution;     ///< m
   std::uint32_t binary;  ///< octomap_msgs/Octomap.binary
   std::uint32_t accepted;
+};
+
+/// In place of the data of a map that was not accepted.
+struct RejectedMap {
+  std::uint64_t bytes;  ///< that the map had
+  std::uint64_t hash;   ///< of them: 64-bit FNV-1a
 };
 
 struct SegmentRecord {

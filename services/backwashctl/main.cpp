@@ -11,7 +11,9 @@ int main(int argc, char** argv) {
   backwash::ctl::Verbs verbs(app);
   try {
     app.parse(argc, argv);
-    return verbs.run();
+    backwash::ctl::end_waits_on_signals();
+    const int code = verbs.run();
+    return backwash::ctl::interrupted() ? 128 + backwash::ctl::interrupted() : code;
   } catch (const CLI::Success& asked) {
     return app.exit(asked);
   } catch (const CLI::ParseError& wrong) {

@@ -2,6 +2,7 @@
 #include "services/backwashctl/station.hpp"
 
 #include <chrono>
+#include <csignal>
 #include <random>
 #include <thread>
 
@@ -14,7 +15,15 @@ double since(Clock::time_point t) { return std::chrono::duration<double>(Clock::
 
 std::string text(const char* s) { return s ? s : ""; }
 
+volatile std::sig_atomic_t signal_that_came = 0;
+
 }  // namespace
+
+void end_waits_on_signals() {
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int which) { signal_that_came = which; });
+}
+
+int interrupted() noexcept { return signal_that_came; }
 
 Station::Station(const Options& options)
     : options_(options),
@@ -32,7 +41,7 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
                                              const std::vector<Vec3>& waypoints) {
   constexpr double kRepeat = 0.5;  // s
   const auto begun = Clock::now();
-  while (commands_.matched() == 0 && since(begun) < options_.timeout_s)
+  while (!interrupted() && commands_.matched() == 0 && since(begun) < options_.timeout_s)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   dds::Command command{};
   command.station = dds::c_string(options_.station);
@@ -47,7 +56,7 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
   command.waypoints = {count, count, points.data(), false};
   std::optional<Result> result;
   auto sent = Clock::time_point{};
-  while (!result && since(begun) < options_.timeout_s) {
+  while (!interrupted() && !result && since(begun) < options_.timeout_s) {
     if (since(sent) > kRepeat) {
       commands_.write(command);
       sent = Clock::now();
@@ -63,16 +72,23 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
 std::optional<StatusCopy> Station::status(double timeout_s) {
   const auto begun = Clock::now();
   std::optional<StatusCopy> newest;
-  while (!newest && since(begun) < timeout_s) {
+  while (!interrupted() && !newest && since(begun) < timeout_s) {
     waitset_.wait(0.05);
     acks_.take([](const dds::Ack&) {});
     statuses_.take([&](const dds::Status& s) {
-      newest = StatusCopy{
-          s, text(s.vehicle), text(s.state), text(s.reason), text(s.task), text(s.mismatch), text(s.place), {}};
+      newest = StatusCopy{s,
+                          text(s.vehicle),
+                          text(s.state),
+                          text(s.reason),
+                          text(s.task),
+                          text(s.mismatch),
+                          text(s.place),
+                          text(s.refused),
+                          {}};
       for (std::uint32_t n = 0; n < s.parameters._length; ++n)
         newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
       auto& own = newest->numbers;
-      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = nullptr;
+      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.refused = nullptr;
       own.parameters = {};
     });
   }
@@ -82,7 +98,7 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
 bool Station::wait(double timeout_s, const std::function<bool(const StatusCopy&)>& done,
                    const std::function<bool(const StatusCopy&)>& failed) {
   const auto begun = Clock::now();
-  while (since(begun) < timeout_s) {
+  while (!interrupted() && since(begun) < timeout_s) {
     const auto now = status(1.0);
     if (!now) continue;
     if (done(*now)) return true;

@@ -12,6 +12,12 @@
 
 namespace backwash::ctl {
 
+/// From now on SIGINT and SIGTERM end every wait of a station, so that its participant is deleted and the daemon knows
+/// at once that its session has ended.
+void end_waits_on_signals();
+/// The signal that came, or 0.
+int interrupted() noexcept;
+
 /// Where the daemon is and who asks.
 struct Options {
   int domain = 0;
@@ -22,7 +28,7 @@ struct Options {
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its members that own memory are null
-  std::string vehicle, state, reason, task, mismatch, place;
+  std::string vehicle, state, reason, task, mismatch, place, refused;
   std::vector<std::pair<std::string, double>> parameters;
 };
 

@@ -49,6 +49,8 @@ nlohmann::json json_of(const StatusCopy& s) {
           {"frame_mismatch", s.mismatch},
           {"heartbeat_age_s", n.heartbeat_age},
           {"place", s.place},
+          {"parts_filtered", n.parts_filtered},
+          {"refused", s.refused},
           {"parameters", s.parameters},
           {"tick_us", timing(n.tick)},
           {"lateness_us", timing(n.lateness)},

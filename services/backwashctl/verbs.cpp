@@ -142,6 +142,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     return kUnavailable;
   };
   const auto answer = station.send(verb, position, yaw_.value_or(0), waypoints_);
+  if (interrupted()) return fail("interrupted");
   if (!answer)
     return fail("no daemon answered in domain " + std::to_string(options_.domain) + " on interface " +
                 options_.interface + ", namespace " + options_.name_space + "; is backwashd running?");
@@ -160,6 +161,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     const bool lost = s.state == "quiet" || held || (s.state == "passive" && name != "land");
     return lost && name != "hold" && name != "stop";
   });
+  if (interrupted()) return fail("interrupted; the session is over, the daemon is " + last);
   return reached ? 0 : fail("not reached; the daemon is " + last);
 }
 
@@ -215,7 +217,7 @@ int Verbs::check() {
   auto after = before;
   const auto begun = std::chrono::steady_clock::now();
   const auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
-  while (after && since() < kWatch) after = station.status(1.0);
+  while (after && !interrupted() && since() < kWatch) after = station.status(1.0);
   if (!after) {
     std::cerr << "backwashctl check: no daemon in domain " << options_.domain << " on interface "
               << options_.interface << ", namespace " << options_.name_space << "; is backwashd running?\n";
@@ -236,12 +238,13 @@ int Verbs::check() {
 
 int Verbs::watch() {
   Station station(options_);
-  for (;;) {
+  while (!interrupted()) {
     if (const auto now = station.status(2.0))
       print(*now);
-    else
+    else if (!interrupted())
       std::cerr << "no status for 2 s\n";
   }
+  return 0;
 }
 
 }  // namespace backwash::ctl

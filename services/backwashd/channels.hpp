@@ -75,13 +75,17 @@ struct Worlds {
   }
 };
 
+/// One line for the operator.
+using Line = std::array<char, 192>;
+
 /// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
 using WriterId = std::array<std::uint8_t, 16>;
 
-/// One command as received; strings that do not fit are cut, which no valid station has.
+/// One command as received, or the news that a writer of commands is gone. Of the station's name only printable
+/// characters are left, and as many as fit.
 struct CommandMessage {
-  bool departed = false;  ///< no command: this writer is gone, and with it its session
-  WriterId writer{};
+  WriterId writer{};      ///< another one at each start of a process
+  bool departed = false;  ///< no command: this writer is gone, and with it its session; nothing else here is set
   std::array<char, 64> station{};
   std::uint64_t session = 0;
   std::uint32_t sequence = 0;
@@ -168,11 +172,14 @@ struct PlanOutcome {
 
 struct Channels {
   sync::LatestValue<OdometrySample> odometry;              // DDS reader → control
+  sync::RecordRing<OdometrySample, 512> poses;             // DDS reader → map reader
+  sync::LatestValue<track::RigidShift> map_from_odom;      // DDS reader → map reader: the newest loop closure
+  sync::LatestValue<Line> refused, refused_map;            // DDS reader, map reader → status: the newest, and why
   sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
-  sync::Handover<MapMessage> maps;                         // DDS reader → map worker
-  sync::RecordRing<Scan*, 16> scans;                       // DDS reader → map worker, which frees them
+  sync::Handover<MapMessage> maps;                         // map reader → map worker
+  sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
   Worlds worlds;                                           // map worker → each
-  sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // DDS reader, map worker → control
+  sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control
   std::atomic<std::int64_t> map_ns{-1};                    // map worker: reception of the newest data in the snapshot
   std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
   sync::RecordRing<track::Order, 64> orders;               // mission → control

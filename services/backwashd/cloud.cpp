@@ -51,6 +51,9 @@ std::optional<Coordinates> find_three(const dds::PointCloud& m, const std::strin
 
 tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& m) {
   const auto wrong = [](const std::string& what) { return tl::unexpected<std::string>("point cloud: " + what); };
+  if (m.fields._length > kMaxCloudFields || m.point_step > kMaxPointBytes)
+    return wrong(std::to_string(m.fields._length) + " fields in points of " + std::to_string(m.point_step) +
+                 " bytes, at most " + std::to_string(kMaxCloudFields) + " in " + std::to_string(kMaxPointBytes));
   if (m.is_bigendian) return wrong("big-endian data, expected little-endian");
   const auto xyz = find_three(m, "");
   if (!xyz) return wrong("fields x, y, z of type float32 or float64 within a point are needed");

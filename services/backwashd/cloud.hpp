@@ -17,12 +17,12 @@ struct Cloud {
   std::optional<Vec3> viewpoint;  ///< the sensor: fields vp_x, vp_y, vp_z of the first point, if the cloud has them
 };
 
-/// Largest cloud that is read: four times a dense depth image of 320 × 240.
-inline constexpr std::size_t kMaxCloudPoints = 320 * 240 * 4;
+/// Largest cloud that is read: four times a dense depth image of 320 × 240, of points as drivers send them at most.
+inline constexpr std::size_t kMaxCloudPoints = 320 * 240 * 4, kMaxCloudFields = 32, kMaxPointBytes = 128;
 
 /// Reads x, y, z (float32 or float64) of every point; nothing is read outside `data`. Errors, one line: no such fields
 /// or another type, sizes that do not agree with each other or with the data (faults.md row 27), big-endian data, more
-/// than kMaxCloudPoints points. O(points).
+/// than the largest cloud has. O(points).
 tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& message);
 
 }  // namespace backwash::daemon

@@ -12,6 +12,7 @@
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/link_watch.hpp"
 #include "services/backwashd/log_sink.hpp"
+#include "services/backwashd/map_front.hpp"
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/planner_worker.hpp"
 #include "services/backwashd/process.hpp"
@@ -77,6 +78,7 @@ struct Flight {
                      return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels,
                                                        *recorder);
                    })),
+        maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
         loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {}
 
   const Settings& settings;
@@ -86,6 +88,7 @@ struct Flight {
   const std::string log;  ///< file that the recorder began with
   firmware_bridge::AutopilotLink link;
   std::unique_ptr<DdsFront> front;
+  std::unique_ptr<MapFront> maps;  ///< after the front, which watches the middleware's log
   Mission mission;
   ControlLoop loop;
   Failure failure{channels->stop};
@@ -101,7 +104,7 @@ void start(Flight& f) {
   f.threads.start("map worker",
                   [&] { run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map); });
   f.threads.start("planner", [&] {
-    run_planner(channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.front->send(segment); });
+    run_planner(channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.maps->send(segment); });
   });
   f.threads.start("mission", [&] {
     run_mission(channels, f.mission, [&](const CommandMessage& c, const Answer& a) { f.front->send(c, a); });
@@ -113,6 +116,7 @@ void start(Flight& f) {
     f.link.discard_unsent();
   });
   f.threads.start("reader", [&] { f.front->run_readers(); });
+  f.threads.start("map reader", [&] { f.maps->run_readers(); });
   f.threads.start("link watch", [&] { run_link_watch(channels, daemon.link); });
 }
 

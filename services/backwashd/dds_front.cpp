@@ -3,28 +3,22 @@
 
 #include <spdlog/spdlog.h>
 
-#include <Eigen/Geometry>
-
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
+#include <iterator>
 #include <thread>
-#include <utility>
 
+#include "services/backwashd/text.hpp"
+#include "services/dds/packet_filter.hpp"
 #include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
 namespace {
 
-// The frame that everything on our topics is in.
-const std::string kMapFrame = "map";
-
-builtin_interfaces_msg_dds__Time_ wall_clock() {
-  const auto since = std::chrono::system_clock::now().time_since_epoch();
-  const auto s = std::chrono::duration_cast<std::chrono::seconds>(since);
-  return {static_cast<std::int32_t>(s.count()),
-          static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since - s).count())};
-}
+// Odometry, closures and commands are small; one of 64 waypoints takes 2 kB.
+constexpr std::size_t kMaxSampleBytes = 64u << 10;
+// After which a bound odometry writer that is gone is let go of: by then an enabling that it began has ended.
+constexpr std::int64_t kForget_ns = 500'000'000;
 
 template <typename T>
 std::string topic_of(const config::Daemon& config) {
@@ -44,98 +38,66 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
     : channels_(channels),
       recorder_(recorder),
       priority_(priority),
-      sensor_range_(config.map.sensor_range),
       localization_(config, vehicle.estimation.position),
+      refusals_(channels.refused),
       malformed_({{config.dds.odometry_topic, &channels.odometry_refused},
                   {topic_of<dds::Octomap>(config), &channels.maps_rejected},
                   {topic_of<dds::PointCloud>(config), &channels.scans_rejected},
                   {topic_of<dds::TransformStamped>(config), &channels.closures_refused},
                   {topic_of<dds::Command>(config), &channels.commands_refused}},
-                 [](std::string_view line) { spdlog::warn("DDS: {}", line); }),
-      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, priority),
+                 [](std::string_view line, std::int64_t left_out) {
+                   spdlog::warn("DDS: {} ({} more left out)", printable(line, 240), left_out);
+                 }),
+      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface,
+                   {.priority = priority, .max_sample_bytes = kMaxSampleBytes}),
       odometry_(participant_, dds::TopicOf<dds::Odometry>::type(), config.dds.odometry_topic,
                 dds::TopicOf<dds::Odometry>::kDelivery),
-      maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
-      scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
       closures_(dds::make_reader<dds::TransformStamped>(participant_, config.dds.name_space)),
       commands_(dds::make_reader<dds::Command>(participant_, config.dds.name_space)),
-      foreign_(participant_),
+      foreign_(participant_, {&odometry_, &closures_, &commands_}),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
-      tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
-      trajectory_(dds::make_writer<dds::Path>(participant_, config.dds.name_space)),
       waitset_(participant_) {
   waitset_.add(odometry_);
-  waitset_.add(maps_);
-  waitset_.add(scans_);
   waitset_.add(closures_);
   waitset_.add(commands_);
 }
 
-void DdsFront::refuse(std::atomic<std::uint64_t>& counter, const std::string& why) {
-  constexpr std::int64_t kPause_ns = 1'000'000'000;
-  ++counter;
-  auto& said_ns = said_ns_[&counter];
-  if (now_ns() - said_ns < kPause_ns) return;
-  said_ns = now_ns();
-  spdlog::warn("refused: {}", why);
-}
-
 void DdsFront::take_odometry() {
-  odometry_.take([&](const dds::Odometry& m) {
-    if (const auto sample = localization_.odometry(m, now_ns()))
-      channels_.odometry.write(*sample);
-    else
-      refuse(channels_.odometry_refused, sample.error());
+  odometry_.take([&](const dds::Odometry& m, const dds::Guid& writer) {
+    if (bound_ && *bound_ != writer)
+      return refusals_.add(channels_.odometry_refused, [&] {
+        return "odometry of writer " + dds::text(writer) + ": that of " + dds::text(*bound_) +
+               (gone_ns_ ? ", which is gone, was flown with: disable first" : " is in use");
+      });
+    const auto sample = localization_.odometry(m, now_ns());
+    if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
+    if (!bound_) spdlog::info("odometry is taken from writer {}", dds::text(writer));
+    bound_ = writer;
+    channels_.odometry.write(*sample);
+    channels_.poses.push(*sample);
   });
+  for (const dds::Guid& gone : odometry_.departed())
+    if (bound_ == gone) gone_ns_ = now_ns();
+  if (!gone_ns_ || commanding_ || now_ns() - *gone_ns_ < kForget_ns) return;
+  bound_.reset();
+  gone_ns_.reset();
 }
 
 void DdsFront::take_closures() {
   closures_.take([&](const dds::TransformStamped& m) {
-    if (const auto taken = localization_.loop_closure(m); !taken) refuse(channels_.closures_refused, taken.error());
+    const auto taken = localization_.loop_closure(m);
+    if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
     channels_.loop_closures = localization_.closures();
-  });
-}
-
-void DdsFront::take_scans() {
-  if (const auto* newest = channels_.worlds.reader.take())
-    channels_.worlds.reader.give_back(std::exchange(world_, newest));
-  scans_.take([&](const dds::PointCloud& m) {
-    auto scan = localization_.scan(m, now_ns());
-    if (!scan) return refuse(channels_.scans_rejected, scan.error());
-    std::size_t fresh = 0;
-    if (world_) {
-      const NewVoxels voxels = new_voxels(world_->world->grid, *scan, sensor_range_);
-      fresh = voxels.count;
-      if (fresh > 0) channels_.scan_voxels.push(voxels);
-    }
-    recorder_.append(study::RecordKind::scan, "scan of " + std::to_string(scan->points_W.size()) + " points, " +
-                                                  std::to_string(fresh) + " new voxels");
-    auto owned = std::make_unique<Scan>(std::move(*scan));
-    if (channels_.scans.push(owned.get()))
-      owned.release();
-    else
-      refuse(channels_.scans_rejected, "a scan: the map worker has 16 waiting");
-  });
-}
-
-void DdsFront::take_maps() {
-  maps_.take([&](const dds::Octomap& m) {
-    MapMessage message;
-    message.data.assign(reinterpret_cast<const std::int8_t*>(m.data._buffer),
-                        reinterpret_cast<const std::int8_t*>(m.data._buffer) + m.data._length);
-    message.resolution = m.resolution;
-    message.binary = m.binary;
-    message.id = m.id ? m.id : "";
-    message.received_ns = now_ns();
-    channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+    channels_.map_from_odom.write(*localization_.map_from_odom());
   });
 }
 
 void DdsFront::take_commands() {
-  commands_.take([&](const dds::Command& m) {
+  commands_.take([&](const dds::Command& m, const dds::Guid& writer) {
     CommandMessage c;
-    std::snprintf(c.station.data(), c.station.size(), "%s", m.station ? m.station : "");
+    c.writer = writer;
+    std::snprintf(c.station.data(), c.station.size(), "%s", printable(m.station ? m.station : "").c_str());
     c.session = m.session;
     c.sequence = m.sequence_number;
     c.verb = m.verb;
@@ -144,13 +106,23 @@ void DdsFront::take_commands() {
     c.waypoints = m.waypoints._length;
     for (std::size_t n = 0; n < std::min(c.waypoints, c.kMostWaypoints); ++n)
       c.waypoint[n] = {m.waypoints._buffer[n].x, m.waypoints._buffer[n].y, m.waypoints._buffer[n].z};
-    char line[256];
-    std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f", c.station.data(),
+    char line[320];
+    std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s", c.station.data(),
                   static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
-                  c.position.z(), c.yaw);
+                  c.position.z(), c.yaw, dds::text(writer).c_str());
     recorder_.append(study::RecordKind::command, line);
-    if (!channels_.commands.push(c)) ++channels_.commands_refused;
+    if (!channels_.commands.push(c))
+      refusals_.add(channels_.commands_refused, [] { return "a command: 64 others wait to be answered"; });
   });
+  // After what they said last. Who finds no room is told of in the next round.
+  std::ranges::copy(commands_.departed(), std::back_inserter(gone_));
+  while (!gone_.empty()) {
+    CommandMessage c;
+    c.writer = gone_.back();
+    c.departed = true;
+    if (!channels_.commands.push(c)) return;
+    gone_.pop_back();
+  }
 }
 
 void DdsFront::run_readers() {
@@ -159,12 +131,10 @@ void DdsFront::run_readers() {
     waitset_.wait(0.1);
     take_closures();  // before the odometry that it is about
     take_odometry();
-    take_scans();
     take_commands();
-    take_maps();
-    if (const auto writers = foreign_.count(); writers != channels_.foreign_writers) {
-      channels_.foreign_writers = writers;
-      spdlog::warn("a writer on one of our topics has another type: it is not listened to ({} so far)", writers);
+    if (const auto writers = foreign_.take_new()) {
+      channels_.foreign_writers += writers;
+      spdlog::warn("{} writers on our topics have another type: they are not listened to", writers);
     }
   }
 }
@@ -178,32 +148,9 @@ void DdsFront::send(const CommandMessage& command, const Answer& answer) {
                                                std::to_string(answer.result) + ": " + answer.reason);
 }
 
-void DdsFront::send(const track::AcceptedSegment& segment) {
-  const std_msgs_msg_dds__Header_ header{wall_clock(), dds::c_string(kMapFrame)};
-  std::vector<dds::TubeStep> steps;
-  std::vector<dds::PoseStamped> poses;
-  for (const auto& s : segment.tube) {
-    dds::TubeStep step{s.t, point(s.center.p_W), {}};
-    std::copy(s.half_widths_interval.begin(), s.half_widths_interval.end(), step.half_widths);
-    steps.push_back(step);
-  }
-  for (const Setpoint& c : segment.commands)
-    poses.push_back({header, {point(c.p_W), {0, 0, std::sin(c.yaw / 2), std::cos(c.yaw / 2)}}});
-  dds::Tube tube{};
-  tube.header = header;
-  tube.steps = {static_cast<std::uint32_t>(steps.size()), static_cast<std::uint32_t>(steps.size()), steps.data(),
-                false};
-  tube_.write(tube);
-  dds::Path path{};
-  path.header = header;
-  path.poses = {static_cast<std::uint32_t>(poses.size()), static_cast<std::uint32_t>(poses.size()), poses.data(),
-                false};
-  trajectory_.write(path);
-}
-
 void DdsFront::run_status(const Vehicle& vehicle) {
   ControlView view;
-  std::array<char, 192> task{}, place{};
+  Line task{}, place{}, refused{};
   const std::vector<std::string> names(kParameters.begin(), kParameters.end());
   auto next = std::chrono::steady_clock::now();
   while (!channels_.stop) {
@@ -212,10 +159,13 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     if (const auto newest = channels_.task.read_new()) task = *newest;
     if (const auto newest = channels_.view_status.read_new()) view = *newest;
     if (const auto newest = channels_.place.read_new()) place = *newest;
+    for (auto* line : {&channels_.refused, &channels_.refused_map})
+      if (const auto newest = line->read_new()) refused = *newest;
+    commanding_ = view.mode != track::Mode::passive && view.mode != track::Mode::quiet;
     const std::string mode = to_string(view.mode), reason = to_string(view.reason);
     const std::string mismatch = to_string(view.mismatch);
     dds::Status s{};
-    s.stamp = wall_clock();
+    s.stamp = dds::wall_clock();
     s.vehicle = dds::c_string(vehicle.name);
     s.state = dds::c_string(mode);
     s.reason = dds::c_string(reason);
@@ -254,6 +204,8 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.heartbeat_age = view.heartbeat_age;
     s.mismatch = dds::c_string(mismatch);
     s.place = place.data();
+    s.parts_filtered = dds::filtered_parts();
+    s.refused = refused.data();
     std::array<dds::Parameter, kParameters.size()> parameters{};
     std::uint32_t known = 0;
     for (std::size_t n = 0; n < kParameters.size(); ++n)

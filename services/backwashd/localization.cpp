@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/backwashd/text.hpp"
+
 namespace backwash::daemon {
 namespace {
 
-constexpr std::int64_t kHistory_ns = 1'000'000'000, kSlack_ns = 50'000'000;
 constexpr double kUnit = 1e-2;                             // of a quaternion's norm
 constexpr double kMaxTilt = 1.0 * 3.14159265358979 / 180;  // rad
 
@@ -19,14 +20,12 @@ std::int64_t nanoseconds(const builtin_interfaces_msg_dds__Time_& t) {
 
 std::string text(const char* s) { return s ? s : ""; }
 
-Eigen::Quaterniond quaternion(const std::array<double, 4>& q) { return {q[0], q[1], q[2], q[3]}; }
+}  // namespace
 
 tl::unexpected<std::string> wrong_frame(const std::string& what, const std::string& frame, const std::string& right) {
-  return tl::unexpected(what + " is in frame '" + frame + "', expected " + right +
+  return tl::unexpected(what + " is in frame '" + printable(frame, 128) + "', expected " + right +
                         "; see [frames] of the configuration");
 }
-
-}  // namespace
 
 tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odometry& m, std::int64_t received_ns) {
   const std::string frame = text(m.header.frame_id), child = text(m.child_frame_id);
@@ -63,9 +62,6 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
     attitude = Eigen::Quaterniond(Eigen::AngleAxisd(map_from_odom_->yaw, Vec3::UnitZ())) * attitude;
   }
   s.q = {attitude.w(), attitude.x(), attitude.y(), attitude.z()};
-  if (!history_.empty() && s.stamp_ns < history_.back().stamp_ns) history_.clear();
-  history_.push_back({s.stamp_ns, s.state.p_W, s.q});
-  while (history_.front().stamp_ns < s.stamp_ns - kHistory_ns) history_.pop_front();
   return s;
 }
 
@@ -86,80 +82,9 @@ tl::expected<void, std::string> Localization::loop_closure(const dds::TransformS
   const track::RigidShift newest{
       std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z())), translation};
   if (map_from_odom_ && map_from_odom_->yaw == newest.yaw && map_from_odom_->t == newest.t) return {};
-  if (map_from_odom_) {
-    const track::RigidShift D = newest * map_from_odom_->inverse();
-    const Eigen::Quaterniond turn(Eigen::AngleAxisd(D.yaw, Vec3::UnitZ()));
-    for (Pose& pose : history_) {
-      const Eigen::Quaterniond turned = turn * quaternion(pose.q);
-      pose = {pose.stamp_ns, D.point(pose.p), {turned.w(), turned.x(), turned.y(), turned.z()}};
-    }
-  }
   map_from_odom_ = newest;
   ++closures_;
   return {};
-}
-
-std::optional<Localization::Pose> Localization::pose_at(std::int64_t stamp_ns) const {
-  if (history_.empty() || stamp_ns < history_.front().stamp_ns - kSlack_ns ||
-      stamp_ns > history_.back().stamp_ns + kSlack_ns)
-    return std::nullopt;
-  const auto after = std::ranges::lower_bound(history_, stamp_ns, {}, &Pose::stamp_ns);
-  if (after == history_.end()) return history_.back();
-  if (after == history_.begin()) return *after;
-  const Pose &a = *std::prev(after), &b = *after;
-  const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
-  const Eigen::Quaterniond q = quaternion(a.q).slerp(share, quaternion(b.q));
-  return Pose{stamp_ns, a.p + share * (b.p - a.p), {q.w(), q.x(), q.y(), q.z()}};
-}
-
-tl::expected<Scan, std::string> Localization::scan(const dds::PointCloud& m, std::int64_t received_ns) const {
-  const std::string frame = text(m.header.frame_id);
-  if (frame != frames_.body && frame != frames_.map && frame != frames_.odometry)
-    return wrong_frame("the point cloud", frame,
-                       "'" + frames_.body + "', '" + frames_.odometry + "' or '" + frames_.map + "'");
-  auto cloud = decode_cloud(m);
-  if (!cloud) return tl::unexpected(std::move(cloud.error()));
-  const auto pose = pose_at(nanoseconds(m.header.stamp));
-  if (!pose) return tl::unexpected(std::string("a point cloud whose stamp is not within that of the odometry"));
-  if (frame == frames_.odometry && !map_from_odom_)
-    return tl::unexpected<std::string>("a point cloud in frame '" + frame + "' before the first loop closure");
-  Eigen::Isometry3d place = Eigen::Isometry3d::Identity();
-  if (frame == frames_.body) {
-    place = Eigen::Translation3d(pose->p) * quaternion(pose->q).normalized();
-  } else if (frame == frames_.odometry) {
-    place = Eigen::Translation3d(map_from_odom_->t) * Eigen::AngleAxisd(map_from_odom_->yaw, Vec3::UnitZ());
-  }
-  Scan scan{std::move(cloud->points), cloud->viewpoint ? place * *cloud->viewpoint : pose->p, received_ns};
-  for (Vec3& p : scan.points_W) p = place * p;
-  return scan;
-}
-
-NewVoxels new_voxels(const map::OccupancyGrid& known, const Scan& scan, double max_range) {
-  std::vector<Index3> voxels;
-  for (const Vec3& p : scan.points_W) {
-    if ((p - scan.sensor_W).norm() > max_range) continue;
-    const Index3 v = known.index(p);
-    if (known.inside(v) && !known.occupied(v)) voxels.push_back(v);
-  }
-  const auto less = [](const Index3& a, const Index3& b) {
-    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
-  };
-  int edge = 1;
-  for (;; edge *= 2) {
-    std::ranges::sort(voxels, less);
-    voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
-    if (voxels.size() <= NewVoxels::kMost) break;
-    for (Index3& v : voxels) v = v.array() / 2;  // inside the grid: never negative
-  }
-  NewVoxels result;
-  result.received_ns = scan.received_ns;
-  result.edge = edge * known.resolution();
-  result.count = voxels.size();
-  for (std::size_t n = 0; n < voxels.size(); ++n) {
-    const Vec3 c = known.origin() + result.edge * (voxels[n].cast<double>() + Vec3::Constant(0.5));
-    result.centers[n] = {c.x(), c.y(), c.z()};
-  }
-  return result;
 }
 
 }  // namespace backwash::daemon

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <deque>
 #include <optional>
-#include <span>
 #include <string>
 #include <tl/expected.hpp>
 
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/channels.hpp"
-#include "services/backwashd/cloud.hpp"
+#include "services/dds/topics.hpp"
 
 namespace backwash::daemon {
 
@@ -28,28 +26,18 @@ class Localization {
   /// From now on, odometry is brought into the map by this transform; it turns about z only. A message that repeats the
   /// last transform changes nothing.
   tl::expected<void, std::string> loop_closure(const dds::TransformStamped& message);
-  /// A scan in the map: points in the body's frame are placed by the odometry at their stamp, points in the VIO's frame
-  /// by the loop closure. The sensor is the cloud's viewpoint, or, without one, the body's origin.
-  tl::expected<Scan, std::string> scan(const dds::PointCloud& message, std::int64_t received_ns) const;
   std::uint32_t closures() const noexcept { return closures_; }
+  /// The newest; nothing before the first.
+  const std::optional<track::RigidShift>& map_from_odom() const noexcept { return map_from_odom_; }
 
  private:
-  struct Pose {
-    std::int64_t stamp_ns;
-    Vec3 p;  // in the map
-    std::array<double, 4> q;
-  };
-  std::optional<Pose> pose_at(std::int64_t stamp_ns) const;
-
   decltype(config::Daemon::frames) frames_;
   double max_sigma_;
   std::optional<track::RigidShift> map_from_odom_;
   std::uint32_t closures_ = 0;
-  std::deque<Pose> history_;  // of the last second
 };
 
-/// The voxels of `known` that a point of the scan lies in and that are not occupied there, as cubes: at most
-/// NewVoxels::kMost, in larger cubes of the grid's lattice if there are more. O(points).
-NewVoxels new_voxels(const map::OccupancyGrid& known, const Scan& scan, double max_range);
+/// The refusal of a message in a frame that is none of ours: what is in which frame, and which would be `right`.
+tl::unexpected<std::string> wrong_frame(const std::string& what, const std::string& frame, const std::string& right);
 
 }  // namespace backwash::daemon

@@ -8,10 +8,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <span>
 #include <thread>
 
 #include "core/map/octomap_message.hpp"
-#include "services/backwashd/localization.hpp"
+#include "services/backwashd/scan_placement.hpp"
 #include "services/parallel/parallel.hpp"
 
 namespace backwash::daemon {
@@ -23,11 +24,22 @@ constexpr std::size_t kBytesPerVoxel = 115;
 // Resolutions for which the field is known to hold (tests/field, test_resolution_and_yaw), m.
 constexpr double kFinest = 0.02, kCoarsest = 0.2;
 
+// 64-bit FNV-1a.
+std::uint64_t hash(const std::vector<std::int8_t>& data) {
+  std::uint64_t h = 0xcbf29ce484222325;
+  for (const std::int8_t byte : data) h = (h ^ static_cast<std::uint8_t>(byte)) * 0x100000001b3;
+  return h;
+}
+
+// A rejected map is told apart by its hash: whoever sends 40 MB of anything does not fill the disk with it.
 void record(Recorder& recorder, const MapMessage& message, bool accepted) {
   const study::MapRecord head{message.resolution, message.binary, accepted};
-  std::vector<std::uint8_t> bytes(sizeof head + message.data.size());
+  const study::RejectedMap rejected{message.data.size(), accepted ? 0 : hash(message.data)};
+  const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
+  const auto rest = accepted ? std::as_bytes(std::span(message.data)) : bytes_of(rejected);
+  std::vector<std::uint8_t> bytes(sizeof head + rest.size());
   std::memcpy(bytes.data(), &head, sizeof head);
-  if (!message.data.empty()) std::memcpy(bytes.data() + sizeof head, message.data.data(), message.data.size());
+  if (!rest.empty()) std::memcpy(bytes.data() + sizeof head, rest.data(), rest.size());
   recorder.append(study::RecordKind::map, bytes);
 }
 

@@ -124,7 +124,7 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   const sim::EmulatedVio vio(kVioShare * vehicle.estimation.position, options.seed + 1);
   // The bench stands in for hardware: where it may, it runs before everything but the daemon's own real-time threads.
   const int priority = allowed_fifo(kPriority);
-  dds::Participant participant(static_cast<std::uint32_t>(options.domain), options.interface, priority);
+  dds::Participant participant(static_cast<std::uint32_t>(options.domain), options.interface, {.priority = priority});
   if (priority > 0) set_fifo(priority);
   auto odometry_writer = dds::make_writer<dds::Odometry>(participant, options.name_space);
   auto map_writer = dds::make_writer<dds::Octomap>(participant, options.name_space);

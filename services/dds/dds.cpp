@@ -3,11 +3,27 @@
 
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <cstring>
+#include <span>
 #include <string_view>
+
+#include "services/dds/packet_filter.hpp"
+
+// Takes the C library's place in every program that links this: the middleware receives by it and by nothing else.
+extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
+  const ssize_t received = syscall(SYS_recvmsg, socket, message, flags);
+  if (received <= 0 || message->msg_iovlen != 1 || (flags & MSG_PEEK)) return received;
+  const std::span datagram(static_cast<std::uint8_t*>(message->msg_iov[0].iov_base),
+                           std::min(static_cast<std::size_t>(received), message->msg_iov[0].iov_len));
+  return static_cast<ssize_t>(backwash::dds::filter_packet(datagram));
+}
 
 namespace backwash::dds {
 namespace {
@@ -29,18 +45,29 @@ std::string threads(int priority) {
   return xml + "</Threads>";
 }
 
-std::string configuration(const std::string& interface, int priority, std::size_t max_sample_bytes) {
+std::string configuration(const std::string& interface, const Receiving& receiving) {
   // The loopback interface has no multicast: participants find each other by asking the first thirty ports in turn.
+  // Elsewhere multicast is for discovery alone: data sent to a group would reach the sockets of every participant.
   const bool loopback = interface == "lo";
   return "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"" + interface +
-         "\"/></Interfaces>" + (loopback ? "<AllowMulticast>false</AllowMulticast>" : "") + "</General>" +
+         "\"/></Interfaces><AllowMulticast>" + (loopback ? "false" : "spdp") + "</AllowMulticast></General>" +
          (loopback ? "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>30"
                      "</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>"
                    : "") +
-         threads(priority) + "<Internal><MaxSampleSize>" + std::to_string(max_sample_bytes) + "B</MaxSampleSize>" +
+         threads(receiving.priority) + "<Internal><MaxSampleSize>" + std::to_string(receiving.max_sample_bytes) +
+         "B</MaxSampleSize>" +
          // One receiving thread: the others' scheduling cannot be configured.
-         (priority > 0 ? "<MultipleReceiveThreads>false</MultipleReceiveThreads>" : "") +
+         (receiving.priority > 0 ? "<MultipleReceiveThreads>false</MultipleReceiveThreads>" : "") +
          "</Internal></Domain></CycloneDDS>";
+}
+
+// The middleware shares sockets and threads within a domain object, of which a process has one for each number. Another
+// number, which on the wire is the same domain, gives a participant its own.
+constexpr std::uint32_t kApart = 1000;  // above every domain that has ports
+
+std::string on_the_wire(std::uint32_t domain) {
+  return ",<CycloneDDS><Domain Id=\"any\"><Discovery><ExternalDomainId>" + std::to_string(domain) +
+         "</ExternalDomainId></Discovery></Domain></CycloneDDS>";
 }
 
 // The topic and its delivery; the caller owns both through `participant` and dds_delete_qos.
@@ -62,13 +89,15 @@ dds_qos_t* make_qos(Delivery delivery) {
 
 }  // namespace
 
-Participant::Participant(std::uint32_t domain, const std::string& interface, int priority,
-                         std::size_t max_sample_bytes) {
-  if (!std::getenv("CYCLONEDDS_URI"))
-    domain_ = checked(dds_create_domain(domain, configuration(interface, priority, max_sample_bytes).c_str()),
-                      "domain " + std::to_string(domain) + " on interface " + interface);
-  participant_ = checked(dds_create_participant(domain, nullptr, nullptr),
-                         "participant in domain " + std::to_string(domain) + " on interface " + interface);
+Participant::Participant(std::uint32_t domain, const std::string& interface, const Receiving& receiving) {
+  const char* environment = std::getenv("CYCLONEDDS_URI");
+  const std::string where = "domain " + std::to_string(domain) + " on interface " + interface;
+  const std::uint32_t number = domain + (receiving.apart ? kApart : 0);
+  const std::string chosen = environment ? environment : configuration(interface, receiving);
+  if (receiving.apart || !environment)
+    domain_ =
+        checked(dds_create_domain(number, (chosen + (receiving.apart ? on_the_wire(domain) : "")).c_str()), where);
+  participant_ = checked(dds_create_participant(number, nullptr, nullptr), "participant in " + where);
 }
 
 Participant::~Participant() {
@@ -76,10 +105,21 @@ Participant::~Participant() {
   if (domain_ > 0) dds_delete(domain_);
 }
 
+std::string text(const Guid& guid) {
+  std::string all;
+  for (std::size_t n = 0; n < guid.size(); ++n) {
+    char byte[4];
+    std::snprintf(byte, sizeof byte, n % 4 == 0 && n > 0 ? ":%02x" : "%02x", guid[n]);
+    all += byte;
+  }
+  return all;
+}
+
 namespace detail {
 
 ReaderBase::ReaderBase(const Participant& participant, const dds_topic_descriptor& type, const std::string& topic,
-                       Delivery delivery) {
+                       Delivery delivery)
+    : topic_(topic), type_(type.m_typename) {
   const Entity handle = make_topic(participant.handle(), type, topic);
   dds_qos_t* qos = make_qos(delivery);
   const dds_return_t reader = dds_create_reader(participant.handle(), handle, qos, nullptr);
@@ -87,7 +127,37 @@ ReaderBase::ReaderBase(const Participant& participant, const dds_topic_descripto
   reader_ = checked(reader, "reader of " + topic);
 }
 
-std::size_t ReaderBase::take(const std::function<void(const void*)>& each) {
+const Guid& ReaderBase::writer(std::uint64_t publication) {
+  const auto [at, fresh] = writers_.try_emplace(publication);
+  if (!fresh) return at->second;
+  if (dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(reader_, publication)) {
+    std::copy_n(endpoint->key.v, at->second.size(), at->second.begin());
+    dds_builtintopic_free_endpoint(endpoint);
+  } else {  // gone before its sample was taken: as good as any other that will not come again
+    std::memcpy(at->second.data(), &publication, sizeof publication);
+  }
+  return at->second;
+}
+
+std::vector<Guid> ReaderBase::departed() {
+  dds_subscription_matched_status_t status{};
+  dds_get_subscription_matched_status(reader_, &status);
+  if (status.total_count_change == 0 && status.current_count_change == 0) return {};
+  std::vector<dds_instance_handle_t> matched(status.current_count + 16);
+  const dds_return_t count = dds_get_matched_publications(reader_, matched.data(), matched.size());
+  if (count < 0 || static_cast<std::size_t>(count) > matched.size()) return {};
+  matched.resize(static_cast<std::size_t>(count));
+  for (const auto publication : matched) writer(publication);
+  std::vector<Guid> gone;
+  std::erase_if(writers_, [&](const auto& known) {
+    if (std::ranges::find(matched, known.first) != matched.end()) return false;
+    gone.push_back(known.second);
+    return true;
+  });
+  return gone;
+}
+
+std::size_t ReaderBase::take(const std::function<void(const void*, const Guid&)>& each) {
   std::array<void*, kTakeAtOnce> samples{};
   std::array<dds_sample_info_t, kTakeAtOnce> infos;
   std::size_t taken = 0;
@@ -96,8 +166,9 @@ std::size_t ReaderBase::take(const std::function<void(const void*)>& each) {
     const dds_return_t count = dds_take(reader_, samples.data(), infos.data(), kTakeAtOnce, kTakeAtOnce);
     if (count <= 0) return taken;
     for (dds_return_t i = 0; i < count; ++i) {
-      if (!infos[static_cast<std::size_t>(i)].valid_data) continue;
-      each(samples[static_cast<std::size_t>(i)]);
+      const dds_sample_info_t& info = infos[static_cast<std::size_t>(i)];
+      if (!info.valid_data) continue;
+      each(samples[static_cast<std::size_t>(i)], writer(info.publication_handle));
       ++taken;
     }
     dds_return_loan(reader_, samples.data(), count);
@@ -123,42 +194,51 @@ bool WriterBase::write(const void* sample) { return dds_write(writer_, sample) =
 
 }  // namespace detail
 
-ForeignWriters::ForeignWriters(const Participant& participant)
-    : participant_(participant.handle()),
-      publications_(
+ForeignWriters::ForeignWriters(const Participant& participant,
+                               std::initializer_list<const detail::ReaderBase*> readers)
+    : publications_(
           checked(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr),
-                  "reader of the participants' writers")) {}
+                  "reader of the participants' writers")) {
+  for (const auto* reader : readers) types_[reader->topic()] = reader->type();
+}
 
-std::size_t ForeignWriters::count() {
+std::size_t ForeignWriters::take_new() {
+  const std::size_t before = seen_.size();
   void* sample = nullptr;
   dds_sample_info_t info;
   while (dds_take(publications_, &sample, &info, 1, 1) == 1) {
     if (info.valid_data) {
       const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
-      const Entity ours = dds_find_topic(DDS_FIND_SCOPE_PARTICIPANT, participant_, writer.topic_name, nullptr, 0);
-      std::array<char, 256> type{};
-      if (ours > 0 && dds_get_type_name(ours, type.data(), type.size()) > 0 &&
-          std::string_view(type.data()) != writer.type_name) {
-        std::array<std::uint8_t, 16> key{};
-        std::copy_n(writer.key.v, key.size(), key.begin());
-        seen_.insert(key);
+      const auto ours = types_.find(writer.topic_name);
+      if (ours != types_.end() && ours->second != writer.type_name && seen_.size() < kMost) {
+        Guid guid;
+        std::copy_n(writer.key.v, guid.size(), guid.begin());
+        seen_.insert(guid);
       }
-      if (ours > 0) dds_delete(ours);
     }
     dds_return_loan(publications_, &sample, 1);
     sample = nullptr;
   }
-  return seen_.size();
+  return seen_.size() - before;
 }
 
-Malformed::Malformed(Counters counters, Say say) : counters_(std::move(counters)), say_(say) {
+Malformed::Malformed(Counters counters, Other other) : counters_(std::move(counters)), other_(std::move(other)) {
   dds_set_log_sink(
       [](void* self, const dds_log_data_t* data) {
-        auto& malformed = *static_cast<Malformed*>(self);
         const std::string_view line(data->message, data->size);
-        if (!malformed.take(line)) malformed.say_(line);
+        if (!static_cast<Malformed*>(self)->take(line)) static_cast<Malformed*>(self)->pass_on(line);
       },
       this);
+}
+
+void Malformed::pass_on(std::string_view line) {
+  const std::int64_t now = dds_time();
+  std::int64_t next = next_ns_;
+  // Of the threads that come at once, one speaks.
+  if (now < next || !next_ns_.compare_exchange_strong(next, now + DDS_SECS(1)))
+    ++left_out_;
+  else
+    other_(line, left_out_.exchange(0));
 }
 
 Malformed::~Malformed() { dds_set_log_sink(nullptr, nullptr); }

@@ -5,10 +5,13 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
+#include <map>
 #include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -33,15 +36,23 @@ enum class Delivery {
   state,     ///< reliable, transient local, keep last 1: late joiners get the newest: map, trajectory, tube
 };
 
+/// How a participant receives.
+struct Receiving {
+  /// SCHED_FIFO priority of the threads that receive, so that a busy machine does not delay samples; the caller must
+  /// have the right. 0: ordinary.
+  int priority = 0;
+  std::size_t max_sample_bytes = 64u << 20;  ///< larger samples are dropped by the middleware, either way
+  /// Sockets and threads that no other participant of this process uses: what floods one never waits before the other.
+  /// One participant of a process and domain may be the one that is not apart.
+  bool apart = false;
+};
+
 /// One participant in a domain. Topic names get the prefix `rt` and the name space: rt/backwash/…
 class Participant {
  public:
-  /// `interface`: network interface by name; ignored if the environment's CYCLONEDDS_URI already configures the
-  /// middleware. `priority` > 0: SCHED_FIFO priority of the threads that receive, so that a busy machine does not delay
-  /// samples; the caller must have the right. `max_sample_bytes`: larger samples are dropped by the middleware. Throws
-  /// Error.
-  Participant(std::uint32_t domain, const std::string& interface, int priority = 0,
-              std::size_t max_sample_bytes = 64u << 20);
+  /// `interface`: network interface by name; with it, priority and size, ignored if the environment's CYCLONEDDS_URI
+  /// already configures the middleware (whose Domain Id then has to be "any"). Throws Error.
+  Participant(std::uint32_t domain, const std::string& interface, const Receiving& receiving = {});
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
@@ -51,6 +62,12 @@ class Participant {
   Entity domain_ = 0, participant_ = 0;
 };
 
+/// Identity of one writer: its process draws it anew at each start.
+using Guid = std::array<std::uint8_t, 16>;
+
+/// As the tools of DDS print it: 8 hexadecimal digits four times.
+std::string text(const Guid& guid);
+
 namespace detail {
 
 class ReaderBase {
@@ -58,13 +75,21 @@ class ReaderBase {
   ReaderBase(const Participant& participant, const dds_topic_descriptor& type, const std::string& topic,
              Delivery delivery);
   Entity handle() const noexcept { return reader_; }
+  const std::string& topic() const noexcept { return topic_; }
+  const std::string& type() const noexcept { return type_; }
+  /// Writers that were matched at the last call and are gone since: deleted, or silent for their lease (10 s) after a
+  /// crash. Cheap while none comes or goes. Call from the thread that takes.
+  std::vector<Guid> departed();
 
  protected:
-  /// Calls `each` with every valid sample received since the last call; returns how many.
-  std::size_t take(const std::function<void(const void*)>& each);
+  /// Calls `each` with every valid sample received since the last call and its writer; returns how many.
+  std::size_t take(const std::function<void(const void*, const Guid&)>& each);
 
  private:
+  const Guid& writer(std::uint64_t publication);
+  std::string topic_, type_;
   Entity reader_;
+  std::map<std::uint64_t, Guid> writers_;  // by the middleware's handle
 };
 
 class WriterBase {
@@ -89,9 +114,15 @@ template <typename T>
 class Reader : public detail::ReaderBase {
  public:
   using ReaderBase::ReaderBase;
+  /// `each` takes a sample, or a sample and its writer's Guid.
   template <typename Each>
   std::size_t take(Each&& each) {
-    return ReaderBase::take([&](const void* sample) { each(*static_cast<const T*>(sample)); });
+    return ReaderBase::take([&](const void* sample, const Guid& writer) {
+      if constexpr (std::is_invocable_v<Each, const T&, const Guid&>)
+        each(*static_cast<const T*>(sample), writer);
+      else
+        each(*static_cast<const T*>(sample));
+    });
   }
 };
 
@@ -103,37 +134,44 @@ class Writer : public detail::WriterBase {
   bool write(const T& sample) { return WriterBase::write(&sample); }
 };
 
-/// Counts the writers of other participants that use the name of one of this participant's topics with another type:
-/// the middleware does not connect them and tells nobody (faults.md row 27).
+/// Counts the writers of other participants that use the topic of one of these readers with another type: the middleware
+/// does not connect them and tells nobody (faults.md row 27).
 class ForeignWriters {
  public:
-  explicit ForeignWriters(const Participant& participant);
-  /// All that were seen so far. Call from one thread.
-  std::size_t count();
+  ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);
+  /// How many came since the last call; after kMost of them no more are counted. Call from one thread.
+  std::size_t take_new();
 
  private:
-  Entity participant_, publications_;
-  std::set<std::array<std::uint8_t, 16>> seen_;
+  static constexpr std::size_t kMost = 1000;  // their identities are kept
+  Entity publications_;
+  std::map<std::string, std::string> types_;  // by topic
+  std::set<Guid> seen_;
 };
 
 /// Counts samples that the middleware drops because their bytes are none of their topic's type (faults.md row 27). It
 /// says so nowhere but in its log, a line for each: while this lives it takes those lines out of that log, which is one
-/// for the whole process. Other lines are given to `say`, by the middleware's own threads.
+/// for the whole process. Others go to `other`, at most one a second: what a hostile peer provokes is one line for each
+/// packet, written by the threads that receive.
 class Malformed {
  public:
   /// Each topic by its whole name, with the counter of its samples, which the middleware's threads add to.
   using Counters = std::vector<std::pair<std::string, std::atomic<std::uint64_t>*>>;
-  using Say = void (*)(std::string_view line);
-  Malformed(Counters counters, Say say);
+  /// Called by the middleware's threads with a line, and how many were left out since the last.
+  using Other = std::function<void(std::string_view line, std::int64_t left_out)>;
+  Malformed(Counters counters, Other other);
   ~Malformed();
   Malformed(const Malformed&) = delete;
   Malformed& operator=(const Malformed&) = delete;
   /// Of a log line: true if it was counted.
   bool take(std::string_view line) noexcept;
+  /// Hands a line that was not counted on, or leaves it out.
+  void pass_on(std::string_view line);
 
  private:
   Counters counters_;
-  Say say_;
+  Other other_;
+  std::atomic<std::int64_t> next_ns_{0}, left_out_{0};
 };
 
 /// Sleeps until one of its readers has data.

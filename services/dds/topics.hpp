@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include "backwash_msgs.h"
@@ -28,6 +29,14 @@ using TubeStep = backwash_msgs_msg_dds__ReachStep_;
 /// Topic `name` of the vehicle with this name space, as ROS 2 spells it on the wire: rt/NAMESPACE/NAME.
 inline std::string topic(const std::string& name_space, const std::string& name) {
   return "rt/" + name_space + "/" + name;
+}
+
+/// Now, as ROS 2 stamps messages.
+inline builtin_interfaces_msg_dds__Time_ wall_clock() {
+  const auto since = std::chrono::system_clock::now().time_since_epoch();
+  const auto s = std::chrono::duration_cast<std::chrono::seconds>(since);
+  return {static_cast<std::int32_t>(s.count()),
+          static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since - s).count())};
 }
 
 template <typename T>

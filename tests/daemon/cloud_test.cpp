@@ -74,6 +74,20 @@ TEST(Cloud, RefusesWhatItCannotRead) {
   EXPECT_TRUE(decode_cloud(none.m)->points.empty());
 }
 
+TEST(Cloud, MoreFieldsOrWiderPointsThanDriversSendAreRefused) {
+  std::vector<std::string> names{"x", "y", "z"};
+  while (names.size() < kMaxCloudFields) names.push_back("extra");
+  EXPECT_TRUE(decode_cloud(Message(names, kFloat32, std::vector<float>(names.size(), 1)).m));
+  names.push_back("extra");
+  EXPECT_FALSE(decode_cloud(Message(names, kFloat32, std::vector<float>(names.size(), 1)).m));
+  Message wide({"x", "y", "z"}, kFloat32, std::vector<float>(99, 1));
+  wide.m.width = 1;
+  wide.m.point_step = wide.m.row_step = kMaxPointBytes;
+  EXPECT_TRUE(decode_cloud(wide.m));
+  wide.m.point_step = wide.m.row_step = kMaxPointBytes + 4;
+  EXPECT_FALSE(decode_cloud(wide.m));
+}
+
 // faults.md row 27: whatever the sizes claim, nothing beyond the data is read.
 TEST(Cloud, SizesThatDoNotFitTheDataAreRefused) {
   std::mt19937 random(1);

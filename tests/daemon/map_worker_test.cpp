@@ -5,6 +5,7 @@
 #include <malloc.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -66,6 +67,28 @@ TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {
 }
 
 // faults.md rows 10 and 12.
+// Row 46: 5 Hz of 40 MB of anything must not fill the disk.
+TEST_F(MapWorkerTest, ARejectedMapCostsTheRawLogAFewBytesThatTellItApart) {
+  recorder_.drain(*channels_);
+  const auto before = std::filesystem::file_size(log_);
+  for (const int fill : {1, 1, 2}) send(std::vector<std::int8_t>(1 << 20, static_cast<std::int8_t>(fill)), 0.1);
+  EXPECT_EQ(channels_->maps_rejected, 3u);
+  recorder_.drain(*channels_);
+  EXPECT_LT(std::filesystem::file_size(log_) - before, 300u);
+  std::vector<study::RejectedMap> seen;
+  const auto log = study::read_raw_log(log_);
+  ASSERT_TRUE(log);
+  for (const auto& record : log->records)
+    if (record.header.kind == study::RecordKind::map) {
+      ASSERT_EQ(record.bytes.size(), sizeof(study::MapRecord) + sizeof(study::RejectedMap));
+      std::memcpy(&seen.emplace_back(), record.bytes.data() + sizeof(study::MapRecord), sizeof(study::RejectedMap));
+    }
+  ASSERT_EQ(seen.size(), 3u);
+  EXPECT_EQ(seen[0].bytes, 1u << 20);
+  EXPECT_EQ(seen[0].hash, seen[1].hash);
+  EXPECT_NE(seen[0].hash, seen[2].hash);
+}
+
 TEST_F(MapWorkerTest, ACorruptEmptyOrForeignMapIsRejectedWholeAndTheOldWorldStays) {
   send(grid_);
   const auto* before = world();

@@ -12,7 +12,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap_message.hpp"
-#include "services/backwashd/localization.hpp"
+#include "services/backwashd/scan_placement.hpp"
 #include "services/backwashd/map_worker.hpp"
 #include "tests/daemon/lockstep.hpp"
 

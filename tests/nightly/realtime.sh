@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The real-time proofs that need minutes, the wall clock or another compiler. CI calls it nightly.
-#   realtime.sh [rtsan] [tsan] [asan] [fuzz] [stress] [flood] [soak] [wall]      no argument: all of them
+#   realtime.sh [rtsan] [tsan] [asan] [fuzz] [rtps] [stress] [flood] [stops] [soak] [wall]      no argument: all of them
 # What each part proves, how long it takes and what it last measured: README.md here.
 set -euo pipefail
 script=$(realpath "${BASH_SOURCE[0]}")
@@ -66,6 +66,21 @@ fuzz() {
   BACKWASH_FUZZ_BYTES=${FUZZ_BYTES:-1e8} build/asan/tests/test_fuzz
 }
 
+# In rounds, each with a daemon and a seed of its own.
+rtps() {
+  build_preset release --target backwashd backwashctl bench rtps_fuzz
+  local round packets=${RTPS_PACKETS:-1e7} rounds=${RTPS_ROUNDS:-10}
+  for round in $(seq "$rounds"); do
+    tests/system/daemon_rtps_fuzz.sh "$PWD" build/release "$(python3 -c "print(int($packets / $rounds))")" "$round"
+  done
+}
+
+stops() {
+  build_preset release --target backwashd backwashctl bench station_probe
+  BENCH_NICE=-10 tests/system/daemon_stop_latency.sh "$PWD" build/release "${STOPS:-1000}"
+  BENCH_NICE=-10 tests/system/daemon_stop_latency.sh "$PWD" build/release "${STOPS:-1000}" load
+}
+
 stress() {
   build_preset release --target backwashd backwashctl bench backwash
   stress-ng --cpu "$(nproc)" --timeout 120 >/dev/null 2>&1 &
@@ -101,7 +116,7 @@ if [[ ${1:-} == --part ]]; then
   "$2"
   exit
 fi
-[[ $# -gt 0 ]] || set -- rtsan tsan asan fuzz stress flood soak wall
+[[ $# -gt 0 ]] || set -- rtsan tsan asan fuzz rtps stress flood stops soak wall
 failed=()
 for part; do
   echo "== $part"

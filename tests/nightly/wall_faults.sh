@@ -23,19 +23,24 @@ mkdir "$work/logs"
 options=(--log "$work/truth.csv" --wire "$work/wire.csv")
 [[ $fault == nan ]] && options+=(--stop-odometry 7)
 bench() { start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in "${options[@]}"; }
-probe() { "$build/tests/dds_probe" "$domain" backwash "$1"; }
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/status.json"; }
 now() { python3 -c 'import time; print(time.monotonic())'; }
 
 bench
-start_daemon builtin:quad-5in "$work/logs/flight.bwlog"
+topic=rt/backwash/odometry
+if [[ $fault == nan || $fault == jump ]]; then # through the one writer that the daemon listens to
+  "$build/tests/dds_probe" "$domain" backwash "$fault" >>"$log" 2>&1 &
+  relay=$! more_pids+=($!)
+  topic=rt/relay/odometry
+fi
+start_daemon builtin:quad-5in "$work/logs/flight.bwlog" "$topic"
 enable
 ctl takeoff --height 1.2 --wait
 [[ $fault == disk ]] || ctl goto 2,0,1.2
 at=$(now)
 case $fault in
-  nan) probe nan; status ;;
-  jump) sleep 1; probe jump; sleep 3 ;;
+  nan) kill -USR1 "$relay"; wait "$relay"; status ;;
+  jump) sleep 1; kill -USR1 "$relay"; wait "$relay"; sleep 3 ;;
   unplug)
     sleep 1
     kill -KILL "$bench_pid"

@@ -12,7 +12,7 @@ enable
 sleep 0.5
 used=$(awk '$1 == "VmSize:" {print $2}' "/proc/$daemon_pid/status")
 prlimit --pid "$daemon_pid" --as=$((used * 1024))
-"$build/tests/dds_probe" "$domain" backwash large || die 'dds_probe failed'
+"$build/tests/dds_probe" "$domain" backwash roomy || die 'dds_probe failed'
 code=0
 for _ in $(seq 100); do kill -0 "$daemon_pid" 2>/dev/null || break; sleep 0.1; done
 kill -0 "$daemon_pid" 2>/dev/null && die 'it goes on without memory'

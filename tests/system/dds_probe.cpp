@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a confused or hostile participant sends, for tests/system/daemon_dds.sh (faults.md rows 2, 3, 12, 26, 27).
-//   dds_probe DOMAIN NAMESPACE foreign|frame|oversized|lying|corrupt|flood|closures|large|nan|jump
+// What a confused or hostile participant sends, for the scripts beside it (faults.md rows 2, 3, 12, 26, 27, 46, 48).
+//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closures|large|roomy
+//   dds_probe DOMAIN NAMESPACE flood [SECONDS]
+//   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1 it
+//   is
+//                                            the one writer that the daemon listens to that fails
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <thread>
@@ -78,6 +84,79 @@ int clouds(const dds::Participant& participant, const std::string& name_space, s
   return 0;
 }
 
+volatile std::sig_atomic_t failing = 0;
+
+// Hands odometry on as its only writer; once failing, with `broken` x between (not a number) or instead (far away).
+int relay(const dds::Participant& participant, const std::string& name_space, double broken, int count) {
+  std::signal(SIGUSR1, [](int) { failing = 1; });
+  auto reader = dds::make_reader<dds::Odometry>(participant, name_space);
+  auto writer = dds::make_writer<dds::Odometry>(participant, "relay");
+  dds::WaitSet waitset(participant);
+  waitset.add(reader);
+  char frame[] = "map", child[] = "base_link";
+  auto due = std::chrono::steady_clock::now();
+  while (count > 0) {
+    waitset.wait(0.005);
+    reader.take([&](const dds::Odometry& m) {
+      if (!failing || std::isnan(broken)) writer.write(m);
+    });
+    const auto now = std::chrono::steady_clock::now();
+    // Not at the rate of the true odometry: of two samples in one tick the daemon sees the newer.
+    if (!failing || now < due) continue;
+    due = now + 17ms;
+    --count;
+    dds::Odometry m{};
+    const auto t = now.time_since_epoch();
+    m.header.stamp = {static_cast<std::int32_t>(t / 1s), static_cast<std::uint32_t>((t % 1s).count())};
+    m.header.frame_id = frame;
+    m.child_frame_id = child;
+    m.pose.pose.position.x = broken;
+    m.pose.pose.orientation.w = 1;
+    writer.write(m);
+  }
+  return 0;
+}
+
+// For 6 s the largest that is allowed: maps of 40 MB at 5 Hz, clouds of 300,000 points at 10 Hz.
+int large(const dds::Participant& participant, const std::string& name_space) {
+  auto maps = dds::make_writer<dds::Octomap>(participant, name_space);
+  auto clouds_out = dds::make_writer<dds::PointCloud>(participant, name_space);
+  until_matched(maps);
+  until_matched(clouds_out);
+  char frame[] = "map", id[] = "OcTree", x[] = "x", y[] = "y", z[] = "z";
+  std::vector<std::uint8_t> tree(40'000'000, 0xff);
+  dds::Octomap map{};
+  map.header.frame_id = frame;
+  map.id = id;
+  map.binary = true;
+  map.resolution = 0.1;
+  map.data = {40'000'000, 40'000'000, reinterpret_cast<decltype(map.data._buffer)>(tree.data()), false};
+  dds::PointField fields[3] = {{x, 0, 7, 1}, {y, 4, 7, 1}, {z, 8, 7, 1}};
+  std::vector<float> points(4 * 300'000);
+  for (std::size_t n = 0; n < points.size(); ++n) points[n] = 0.001f * static_cast<float>(n % 1777);
+  dds::PointCloud cloud{};
+  cloud.header.frame_id = frame;
+  cloud.fields = {3, 3, fields, false};
+  cloud.height = 1;
+  cloud.width = 300'000;
+  cloud.point_step = 16;
+  cloud.row_step = 16 * 300'000;
+  cloud.data = {cloud.row_step, cloud.row_step, reinterpret_cast<std::uint8_t*>(points.data()), false};
+  int written = 0;
+  auto due = std::chrono::steady_clock::now();
+  const auto end = due + 6s;
+  for (int n = 0; due < end; ++n) {
+    if (n % 2 == 0) written += maps.write(map);
+    const auto t = std::chrono::steady_clock::now().time_since_epoch();
+    cloud.header.stamp = {static_cast<std::int32_t>(t / 1s), static_cast<std::uint32_t>((t % 1s).count())};
+    clouds_out.write(cloud);
+    due = std::max(due + 100ms, std::chrono::steady_clock::now() - 100ms);
+    std::this_thread::sleep_until(due);
+  }
+  std::printf("%d maps of 40 MB written\n", written);
+  return 0;
+}
+
 // Loop closures of frames that nobody has, with names that steer terminals, at 1 kHz.
 int closures(const dds::Participant& participant, const std::string& name_space) {
   auto writer = dds::make_writer<dds::TransformStamped>(participant, name_space);
@@ -142,19 +221,21 @@ int large_map(const dds::Participant& participant, const std::string& name_space
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 64;
+  if (argc != 4 && argc != 5) return 64;
   const dds::Participant participant(static_cast<std::uint32_t>(std::atoi(argv[1])), "lo");
   const std::string name_space = argv[2], what = argv[3];
   if (what == "foreign") return foreign(participant, name_space);
   if (what == "frame") return odometry(participant, name_space, 50, 20ms);
-  if (what == "flood") return odometry(participant, name_space, 100'000, 100us);
-  // Not at the rate of the true odometry: of two samples in one tick the daemon sees the newer.
+  if (what == "second") return odometry(participant, name_space, 50, 20ms, "map", 1);
+  if (what == "flood")
+    return odometry(participant, name_space, argc == 5 ? 10'000 * std::atoi(argv[4]) : 100'000, 100us);
+  if (what == "nan") return relay(participant, name_space, std::nan(""), 700);
+  if (what == "jump") return relay(participant, name_space, 50, 60);
   if (what == "closures") return closures(participant, name_space);
-  if (what == "large") return large_map(participant, name_space);
-  if (what == "nan") return odometry(participant, name_space, 700, 17ms, "map", std::nan(""));
-  if (what == "jump") return odometry(participant, name_space, 60, 17ms, "map", 50);
   if (what == "oversized") return clouds(participant, name_space, 400'000, 400'000);
   if (what == "lying") return clouds(participant, name_space, 1000, 1);
+  if (what == "large") return large(participant, name_space);
+  if (what == "roomy") return large_map(participant, name_space);
   if (what == "corrupt") return corrupt(participant, name_space);
   return 64;
 }

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/map_front.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <utility>
+
+#include "services/backwashd/text.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+// The frame that everything on our topics is in.
+const std::string kMapFrame = "map";
+
+geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+}  // namespace
+
+MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
+    : channels_(channels),
+      recorder_(recorder),
+      sensor_range_(config.map.sensor_range),
+      placement_(config),
+      refusals_(channels.refused_map),
+      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, {.apart = true}),
+      maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
+      scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
+      foreign_(participant_, {&maps_, &scans_}),
+      tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
+      trajectory_(dds::make_writer<dds::Path>(participant_, config.dds.name_space)),
+      waitset_(participant_) {
+  waitset_.add(maps_);
+  waitset_.add(scans_);
+}
+
+void MapFront::take_poses() {
+  if (const auto shift = channels_.map_from_odom.read_new()) placement_.close(*shift);
+  while (const auto sample = channels_.poses.pop()) placement_.add(*sample);
+}
+
+void MapFront::take_scans() {
+  if (const auto* newest = channels_.worlds.reader.take())
+    channels_.worlds.reader.give_back(std::exchange(world_, newest));
+  take_poses();
+  scans_.take([&](const dds::PointCloud& m) {
+    auto scan = placement_.scan(m, now_ns());
+    if (!scan) return refusals_.add(channels_.scans_rejected, [&] { return scan.error(); });
+    std::size_t fresh = 0;
+    if (world_) {
+      const NewVoxels voxels = new_voxels(world_->world->grid, *scan, sensor_range_);
+      fresh = voxels.count;
+      if (fresh > 0) channels_.scan_voxels.push(voxels);
+    }
+    recorder_.append(study::RecordKind::scan, "scan of " + std::to_string(scan->points_W.size()) + " points, " +
+                                                  std::to_string(fresh) + " new voxels");
+    auto owned = std::make_unique<Scan>(std::move(*scan));
+    if (channels_.scans.push(owned.get()))
+      owned.release();
+    else
+      refusals_.add(channels_.scans_rejected, [] { return "a scan: the map worker has 16 waiting"; });
+  });
+}
+
+void MapFront::take_maps() {
+  maps_.take([&](const dds::Octomap& m) {
+    if (m.data._length > kMaxMapBytes)
+      return refusals_.add(channels_.maps_rejected, [&] {
+        return "a map of " + std::to_string(m.data._length) + " bytes, at most " + std::to_string(kMaxMapBytes);
+      });
+    MapMessage message;
+    message.data.assign(reinterpret_cast<const std::int8_t*>(m.data._buffer),
+                        reinterpret_cast<const std::int8_t*>(m.data._buffer) + m.data._length);
+    message.resolution = m.resolution;
+    message.binary = m.binary;
+    message.id = printable(m.id ? m.id : "");
+    message.received_ns = now_ns();
+    channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+  });
+}
+
+void MapFront::run_readers() {
+  while (!channels_.stop) {
+    waitset_.wait(0.1);
+    take_poses();
+    take_scans();
+    take_maps();
+    if (const auto writers = foreign_.take_new()) {
+      channels_.foreign_writers += writers;
+      spdlog::warn("{} writers of maps or scans have another type: they are not listened to", writers);
+    }
+  }
+}
+
+void MapFront::send(const track::AcceptedSegment& segment) {
+  const std_msgs_msg_dds__Header_ header{dds::wall_clock(), dds::c_string(kMapFrame)};
+  std::vector<dds::TubeStep> steps;
+  std::vector<dds::PoseStamped> poses;
+  for (const auto& s : segment.tube) {
+    dds::TubeStep step{s.t, point(s.center.p_W), {}};
+    std::copy(s.half_widths_interval.begin(), s.half_widths_interval.end(), step.half_widths);
+    steps.push_back(step);
+  }
+  for (const Setpoint& c : segment.commands)
+    poses.push_back({header, {point(c.p_W), {0, 0, std::sin(c.yaw / 2), std::cos(c.yaw / 2)}}});
+  dds::Tube tube{};
+  tube.header = header;
+  tube.steps = {static_cast<std::uint32_t>(steps.size()), static_cast<std::uint32_t>(steps.size()), steps.data(),
+                false};
+  tube_.write(tube);
+  dds::Path path{};
+  path.header = header;
+  path.poses = {static_cast<std::uint32_t>(poses.size()), static_cast<std::uint32_t>(poses.size()), poses.data(),
+                false};
+  trajectory_.write(path);
+}
+
+}  // namespace backwash::daemon

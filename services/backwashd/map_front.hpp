@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/config/daemon_config.hpp"
+#include "services/backwashd/channels.hpp"
+#include "services/backwashd/recorder.hpp"
+#include "services/backwashd/refusals.hpp"
+#include "services/backwashd/scan_placement.hpp"
+#include "services/dds/topics.hpp"
+
+namespace backwash::daemon {
+
+/// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube and trajectory out. Its
+/// participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here, odometry and commands
+/// (DdsFront) do not wait for it (faults.md row 46).
+class MapFront {
+ public:
+  static constexpr std::size_t kMaxMapBytes = 48u << 20;  ///< larger maps are refused before they are copied
+
+  MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder);
+  ~MapFront() { channels_.worlds.reader.give_back(world_); }
+  MapFront(const MapFront&) = delete;
+  MapFront& operator=(const MapFront&) = delete;
+
+  /// Thread body: new voxels of a scan go straight to the control thread, the scan to the map worker.
+  void run_readers();
+  /// Called by the planner thread: tube and trajectory out.
+  void send(const track::AcceptedSegment& segment);
+
+ private:
+  void take_poses();
+  void take_maps();
+  void take_scans();
+
+  Channels& channels_;
+  Recorder& recorder_;
+  double sensor_range_;
+  ScanPlacement placement_;
+  Refusals refusals_;
+  const Snapshot* world_ = nullptr;  // the reader's
+  dds::Participant participant_;
+  dds::Reader<dds::Octomap> maps_;
+  dds::Reader<dds::PointCloud> scans_;
+  dds::ForeignWriters foreign_;
+  dds::Writer<dds::Tube> tube_;
+  dds::Writer<dds::Path> trajectory_;
+  dds::WaitSet waitset_;
+};
+
+}  // namespace backwash::daemon

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/scan_placement.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+
+#include "services/backwashd/localization.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+constexpr std::int64_t kHistory_ns = 1'000'000'000, kSlack_ns = 50'000'000;
+constexpr std::size_t kMostPoses = 2048;  // of a flood
+
+std::int64_t nanoseconds(const builtin_interfaces_msg_dds__Time_& t) {
+  return std::int64_t{t.sec} * 1'000'000'000 + t.nanosec;
+}
+
+Eigen::Quaterniond quaternion(const std::array<double, 4>& q) { return {q[0], q[1], q[2], q[3]}; }
+
+}  // namespace
+
+void ScanPlacement::add(const OdometrySample& s) {
+  if (s.closures != closures_ && closures_ > 0) {
+    const track::RigidShift D = s.map_from_odom * history_from_odom_.inverse();
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(D.yaw, Vec3::UnitZ()));
+    for (Pose& pose : history_) {
+      const Eigen::Quaterniond turned = turn * quaternion(pose.q);
+      pose = {pose.stamp_ns, D.point(pose.p), {turned.w(), turned.x(), turned.y(), turned.z()}};
+    }
+  }
+  closures_ = s.closures;
+  history_from_odom_ = s.map_from_odom;
+  if (!history_.empty() && s.stamp_ns < history_.back().stamp_ns) history_.clear();
+  if (!history_.empty() && s.stamp_ns == history_.back().stamp_ns) history_.pop_back();
+  history_.push_back({s.stamp_ns, s.state.p_W, s.q});
+  while (history_.front().stamp_ns < s.stamp_ns - kHistory_ns || history_.size() > kMostPoses) history_.pop_front();
+}
+
+std::optional<ScanPlacement::Pose> ScanPlacement::pose_at(std::int64_t stamp_ns) const {
+  if (history_.empty() || stamp_ns < history_.front().stamp_ns - kSlack_ns ||
+      stamp_ns > history_.back().stamp_ns + kSlack_ns)
+    return std::nullopt;
+  const auto after = std::ranges::lower_bound(history_, stamp_ns, {}, &Pose::stamp_ns);
+  if (after == history_.end()) return history_.back();
+  if (after == history_.begin()) return *after;
+  const Pose &a = *std::prev(after), &b = *after;
+  const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
+  const Eigen::Quaterniond q = quaternion(a.q).slerp(share, quaternion(b.q));
+  return Pose{stamp_ns, a.p + share * (b.p - a.p), {q.w(), q.x(), q.y(), q.z()}};
+}
+
+tl::expected<Scan, std::string> ScanPlacement::scan(const dds::PointCloud& m, std::int64_t received_ns) const {
+  const std::string frame = m.header.frame_id ? m.header.frame_id : "";
+  if (frame != frames_.body && frame != frames_.map && frame != frames_.odometry)
+    return wrong_frame("the point cloud", frame,
+                       "'" + frames_.body + "', '" + frames_.odometry + "' or '" + frames_.map + "'");
+  auto cloud = decode_cloud(m);
+  if (!cloud) return tl::unexpected(std::move(cloud.error()));
+  const auto pose = pose_at(nanoseconds(m.header.stamp));
+  if (!pose) return tl::unexpected(std::string("a point cloud whose stamp is not within that of the odometry"));
+  if (frame == frames_.odometry && !map_from_odom_)
+    return tl::unexpected<std::string>("a point cloud in frame '" + frame + "' before the first loop closure");
+  Eigen::Isometry3d place = Eigen::Isometry3d::Identity();
+  if (frame == frames_.body) {
+    place = Eigen::Translation3d(pose->p) * quaternion(pose->q).normalized();
+  } else if (frame == frames_.odometry) {
+    place = Eigen::Translation3d(map_from_odom_->t) * Eigen::AngleAxisd(map_from_odom_->yaw, Vec3::UnitZ());
+  }
+  Scan scan{std::move(cloud->points), cloud->viewpoint ? place * *cloud->viewpoint : pose->p, received_ns};
+  for (Vec3& p : scan.points_W) p = place * p;
+  return scan;
+}
+
+NewVoxels new_voxels(const map::OccupancyGrid& known, const Scan& scan, double max_range) {
+  std::vector<Index3> voxels;
+  for (const Vec3& p : scan.points_W) {
+    if ((p - scan.sensor_W).norm() > max_range) continue;
+    const Index3 v = known.index(p);
+    if (known.inside(v) && !known.occupied(v)) voxels.push_back(v);
+  }
+  const auto less = [](const Index3& a, const Index3& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  };
+  int edge = 1;
+  for (;; edge *= 2) {
+    std::ranges::sort(voxels, less);
+    voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+    if (voxels.size() <= NewVoxels::kMost) break;
+    for (Index3& v : voxels) v = v.array() / 2;  // inside the grid: never negative
+  }
+  NewVoxels result;
+  result.received_ns = scan.received_ns;
+  result.edge = edge * known.resolution();
+  result.count = voxels.size();
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    const Vec3 c = known.origin() + result.edge * (voxels[n].cast<double>() + Vec3::Constant(0.5));
+    result.centers[n] = {c.x(), c.y(), c.z()};
+  }
+  return result;
+}
+
+}  // namespace backwash::daemon

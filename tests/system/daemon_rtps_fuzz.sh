@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# A hostile peer sends damaged copies of its own RTPS packets to daemon, bench and all (../../shared/faults.md row 47):
+# nobody dies, the daemon's memory stays bounded, and afterwards odometry and commands work as before.
+#   daemon_rtps_fuzz.sh SOURCE_DIR BUILD_DIR PACKETS [SEED]
+set -euo pipefail
+source_dir=$1 build=$2 packets=$3 seed=${4:-1}
+# The only peers must be ours: what is damaged goes to every port that is open.
+if [[ ${5:-} != inside ]]; then
+  if ! unshare --net true 2>/dev/null; then
+    echo "SKIPPED: needs the right to make a network namespace"
+    exit 77
+  fi
+  exec unshare --net bash -c 'ip link set lo up && exec "$@"' - "$0" "$source_dir" "$build" "$packets" "$seed" inside
+fi
+source "$source_dir/services/bench/session.sh"
+status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json"; }
+resident() { awk '/VmRSS/ { print $2 }' "/proc/$daemon_pid/status"; }
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
+start_daemon builtin:quad-5in "$work/flight.bwlog"
+before=$(resident)
+"$build/tests/rtps_fuzz" "$domain" backwash "$packets" "$seed" 2>"$work/fuzz" || { tail -n 3 "$work/fuzz"; die "a peer is gone"; }
+kill -0 "$daemon_pid" || die "the daemon died"
+kill -0 "$bench_pid" || die "the bench died"
+after=$(resident)
+status one
+sleep 1
+status two
+enable
+ctl stop --wait
+python3 - "$work/one.json" "$work/two.json" "$before" "$after" <<'PYTHON'
+import json, sys
+one, two = (json.load(open(f)) for f in sys.argv[1:3])
+before, after = map(int, sys.argv[3:])
+fresh = two["odometry_received"] - one["odometry_received"]
+print(f"{two['parts_filtered']} parts filtered; {fresh} odometry samples in the second after; "
+      f"resident {before / 1024:.1f} -> {after / 1024:.1f} MiB")
+assert two["parts_filtered"] > 0, "nothing was filtered: was anything sent?"
+assert fresh > 20 and two["odometry_rejected"] == 0, two
+assert after < before + 64 * 1024, "the daemon's memory grows with what strangers send"
+PYTHON
