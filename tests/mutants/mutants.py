@@ -25,7 +25,7 @@ BIN = TREE / "build" / "release" / "tests"
 COPIED = ["CMakeLists.txt", "CMakePresets.json", "README.md", "core", "firmware_bridge", "idl", "services", "tests"]
 # Those that a mutant must survive to count as living, the quickest first.
 PROGRAMS = ["test_config", "test_files", "test_track", "test_bridge", "test_map", "test_field", "test_reach", "test_daemon",
-            "test_plan"]
+            "test_plan", "test_sim"]
 LEAST_SCORE = 0.97
 
 
@@ -110,18 +110,31 @@ def judge(mutant: table.Mutant, specs: list[str], baseline: Baseline) -> str:
     return ""
 
 
+def rows_of(result: pathlib.Path) -> dict[str, list[str]]:
+    """What an earlier run wrote of each mutant: id, file, verdict, by or why, promise."""
+    lines = result.read_text().splitlines()[1:] if result.exists() else []
+    return {line.split("\t")[0]: line.split("\t") for line in lines}
+
+
+def killers(result: pathlib.Path) -> dict[str, list[str]]:
+    """The one test that killed each mutant of an earlier run, if a test did: if it is still there, the quickest proof."""
+    return {id: [row[3]] for id, row in rows_of(result).items() if row[2] == "killed" and len(row[3].split()) == 2}
+
+
 def run(mutants: list[table.Mutant], jobs: int, quick: bool, result: pathlib.Path) -> int:
-    """First the tests that each row names, then all programs for those that lived."""
-    baseline = Baseline({spec for m in mutants for spec in m.tests} | set([] if quick else PROGRAMS), jobs)
+    """First what killed it the last time, then the tests that each row names, then all programs for those that live."""
+    earlier = killers(result)
+    passes = [lambda m: earlier.get(m.id, []), lambda m: m.tests] + ([] if quick else [lambda _: PROGRAMS])
+    baseline = Baseline({spec for m in mutants for specs in passes for spec in specs(m)}, jobs)
     killed: dict[str, str] = {}
-    passes = [lambda m: m.tests] if quick else [lambda m: m.tests, lambda _: PROGRAMS]
     for specs in passes:
         todo = [m for m in mutants if m.id not in killed]
         with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
             for mutant, by in zip(todo, pool.map(lambda m, s=specs: judge(m, s(m), baseline), todo)):
                 if by:
                     killed[mutant.id] = by
-                print(f"{mutant.id}: {by or 'lives'}", flush=True)
+                if by or specs is passes[-1]:
+                    print(f"{mutant.id}: {by or 'lives'}", flush=True)
     return report(mutants, killed, result)
 
 
@@ -130,11 +143,12 @@ def report(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.
     def verdict(m: table.Mutant) -> str:
         return "killed" if m.id in killed else "equivalent" if m.equivalent else "real" if m.real else "lived"
 
-    lines = ["id\tfile\tverdict\tby or why\tpromise"]
+    rows = rows_of(result)  # those that were not tried this time stay
     for m in mutants:
-        lines.append(f"{m.id}\t{m.file}\t{verdict(m)}\t{killed.get(m.id) or m.equivalent or m.real}\t{m.promise}")
+        rows[m.id] = [m.id, m.file, verdict(m), killed.get(m.id) or m.equivalent or m.real, m.promise]
     result.parent.mkdir(parents=True, exist_ok=True)
-    result.write_text("\n".join(lines) + "\n")
+    result.write_text("\n".join("\t".join(row) for row in [["id", "file", "verdict", "by or why", "promise"],
+                                                           *rows.values()]) + "\n")
 
     print(f"\n| {'sources':20} | mutants | killed | lived | equivalent | score |\n|---|---|---|---|---|---|")
     folders: dict[str, list[str]] = {}
