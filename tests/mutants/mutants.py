@@ -7,6 +7,7 @@
   mutants.py run [ID|PATH …]    which are killed; exit 1 if the score is below 0.97
 """
 import argparse
+import collections
 import concurrent.futures
 import os
 import pathlib
@@ -86,18 +87,20 @@ def run_test(spec: str, number: int, cpu_seconds: int) -> tuple[str, float]:
 
 
 class Baseline:
-    """Processor time of each choice of tests without a mutant, s; it must pass."""
+    """Processor time of each choice of tests without a mutant, s; it must pass. Measured when it is first asked for."""
 
-    def __init__(self, specs: set[str], jobs: int):
-        with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-            done = dict(zip(sorted(specs), pool.map(lambda s: run_test(s, 0, 600), sorted(specs))))
-        broken = [failed for failed, _ in done.values() if failed]
-        if broken:
-            sys.exit("without a mutant: " + "; ".join(broken))
-        self.seconds = {spec: seconds for spec, (_, seconds) in done.items()}
+    def __init__(self):
+        self.seconds: dict[str, float] = {}
+        self.locks = collections.defaultdict(threading.Lock)
 
     def limit(self, spec: str) -> int:
         """Of processor time, s: more is a hang."""
+        with self.locks[spec]:
+            if spec not in self.seconds:
+                failed, self.seconds[spec] = run_test(spec, 0, 600)
+                if failed:
+                    print(f"without a mutant: {failed}", flush=True)
+                    os._exit(1)  # from any thread: nothing that follows would mean anything
         return 10 + int(8 * self.seconds[spec])
 
 
@@ -125,7 +128,7 @@ def run(mutants: list[table.Mutant], jobs: int, quick: bool, result: pathlib.Pat
     """First what killed it the last time, then the tests that each row names, then all programs for those that live."""
     earlier = killers(result)
     passes = [lambda m: earlier.get(m.id, []), lambda m: m.tests] + ([] if quick else [lambda _: PROGRAMS])
-    baseline = Baseline({spec for m in mutants for specs in passes for spec in specs(m)}, jobs)
+    baseline = Baseline()
     killed: dict[str, str] = {}
     for specs in passes:
         todo = [m for m in mutants if m.id not in killed]
