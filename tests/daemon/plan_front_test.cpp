@@ -12,7 +12,7 @@ using Fate = PlanFront::Fate;
 TEST(PlanFront, APlanIsWaitedForOnlyUntilItsOwnOrderAndNeverPastALapse) {
   PlanFront front;
   front.begin({.order = 7, .lapse = 3});
-  const auto standing = [&](std::uint32_t order, std::uint32_t lapse) {
+  const auto standing = [&](std::uint64_t order, std::uint64_t lapse) {
     ControlView view;
     view.epoch = {order, lapse};
     return front.standing(view);
