@@ -103,7 +103,7 @@ TEST_F(PlannerWatch, AfterALoopClosureTheFlightGoesBackToItsPlaceInTheMapIfThatI
 TEST_F(PlannerWatch, BrakingThatWouldTouchIsNotOffered) {
   fly_past(2.5);
   know(walled(view_.state.p_W.x() + 0.6, false));
-  EXPECT_NE(ask(PlanJob::Kind::brake, {}).find("not clear"), std::string::npos);
+  EXPECT_NE(ask(PlanJob::Kind::brake, Vec3::Zero()).find("not clear"), std::string::npos);
   EXPECT_EQ(offers_.size(), 1u);
 }
 
