@@ -2,6 +2,8 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <numeric>
@@ -114,6 +116,22 @@ TEST(SerialPort, NamesWhyItCannotBeOpened) {
   EXPECT_EQ(SerialPort::open("/dev/null", 115200).error().kind, Kind::kNotSerial);
   EXPECT_EQ(SerialPort::open(far.path(), 115201).error().kind, Kind::kBaudRate);
   EXPECT_NE(describe(SerialPort::open("/nonexistent/tty", 115200).error()).find("No such file"), std::string::npos);
+}
+
+// Two daemons on one line would each get half of what the autopilot says, and both would command it.
+TEST(SerialPort, IsBusyForAnyOtherProcessRootsToo) {
+  PseudoTerminal far;
+  auto port = SerialPort::open(far.path(), 921600);
+  ASSERT_TRUE(port);
+  const pid_t other = ::fork();
+  if (other == 0) {
+    const auto second = SerialPort::open(far.path(), 57600);
+    ::_exit(!second && second.error().kind == Kind::kBusy ? 5 : 1);
+  }
+  int status = 0;
+  ::waitpid(other, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 5);
+  EXPECT_TRUE(SerialPort::open(far.path(), 921600) || ::geteuid() != 0) << "the daemon itself opens a lost port again";
 }
 
 TEST(UdpPort, TalksToAGivenPeerAndHearsNobodyElse) {
