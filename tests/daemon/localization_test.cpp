@@ -87,7 +87,8 @@ TEST(Localization, APositionTheVioItselfDoesNotTrustIsRefused) {
   EXPECT_FALSE(with(0.019 * 0.019, 0.021 * 0.021));
   EXPECT_FALSE(with(std::nan(""), 0));
   EXPECT_FALSE(with(-2, 0));
-  EXPECT_TRUE(with(0, 0));   // not known
+  EXPECT_TRUE(with(0, 0));  // not known
+  EXPECT_FALSE(with(0, 100)) << "one axis that is known well, and one that is lost";
   EXPECT_TRUE(with(-1, 0));  // not known
 }
 
