@@ -42,7 +42,8 @@ constexpr double kLiftedAt = 0.5;            // of WPNAV_ACCEL_Z, source: then i
 constexpr double kReached = 0.9, kSlow = 0.1;  // source: the take-off is complete at 90 % of the height, below 10 % of the speed
 constexpr double kLandSpeed = 0.5;           // m/s: ardupilot-flight.csv:358–375
 constexpr double kLandPause = 4.2;           // s until a failsafe's landing descends: ardupilot-vio.csv:265,296
-constexpr double kReturnHeight = 2.0, kReturnSpeed = 0.47;  // m, m/s: RTL, ardupilot-modes.csv:359–405
+constexpr double kReturnHeight = 2.0, kReturnPause = 0.5;  // m, s: RTL waits and climbs, ardupilot-modes.csv:363–387
+constexpr AxisLimits kReturn{1.5, 0.47, 0.5, 1.0};         // ibid.
 // clang-format on
 
 enum CustomMode : std::uint32_t { stabilize = 0, alt_hold = 2, guided = 4, loiter = 5, rtl = 6, land = 9, brake = 17 };
@@ -124,7 +125,8 @@ class ArduCopter : public Firmware {
     return kDenied;
   }
 
-  // Any set-point ends the autopilot's own take-off, and moves nothing while landed (source).
+  // Any set-point ends the autopilot's own take-off, without a word, and moves nothing while landed:
+  // ardupilot-cancel.csv.
   void on(const mavlink::SetPositionTargetLocalNed& m, double t) override {
     ++setpoints_;
     if (mode_ != guided) return;
@@ -149,8 +151,8 @@ class ArduCopter : public Firmware {
       }
     } else {
       x = shaped_velocity(x, 0, across, kStep), y = shaped_velocity(y, 0, across, kStep);
-      if (mode_ == rtl) along.speed_up = kReturnSpeed;
-      if (climbing_ || mode_ == rtl)
+      if (mode_ == rtl) along = kReturn;
+      if (climbing_ || (mode_ == rtl && t - changed_at_ > kReturnPause))
         z = shaped(z, {std::max(armed_z_ + (climbing_ ? height_ : kReturnHeight), climbing_ ? -1e9 : z.p), 0, 0}, along,
                    kStep);
       else
@@ -162,7 +164,7 @@ class ArduCopter : public Firmware {
       landed_state_ = in_air;
     }
     const LoopGains horizontal{parameter("PSC_POSXY_P"), parameter("PSC_VELXY_P"), parameter("PSC_VELXY_I"),
-                               parameter("PSC_VELXY_D")};
+                               parameter("PSC_VELXY_D"), true};
     Vec3 u = follow(shaped_, horizontal, {parameter("PSC_POSZ_P"), parameter("PSC_VELZ_P"), 0, 0}, kNoLimits.speed_down,
                     kNoLimits.speed_up);
     if (blind_ || mode_ == stabilize) u.x() = u.y() = 0;  // level: without a position it has nothing to hold
@@ -176,7 +178,7 @@ class ArduCopter : public Firmware {
   }
   /// On the ground: the throttle rises from the end of the spool-up until the vehicle moves.
   Vec3 lift(double t) {
-    const double begun = std::max(armed_at_ + kArmingDelay, take_off_at_) + parameter("MOT_SPOOL_TIME");
+    const double begun = std::max(armed_at_ + kArmingDelay + parameter("MOT_SPOOL_TIME"), take_off_at_);
     if (!take_off_ || t < begun) return rest();
     const double up = ((t - begun) / parameter("TKOFF_SLEW_TIME") / kHoverThrottle - 1) * kGravity;
     if (up > kLiftedAt * parameter("WPNAV_ACCEL_Z") / 100) {

@@ -21,8 +21,8 @@ AxisTarget advanced(const AxisTarget& now, double a, double dt) {
 }  // namespace
 
 AxisTarget shaped_velocity(const AxisTarget& now, double v, const AxisLimits& limits, double dt) noexcept {
-  const double wanted = std::clamp(square_root(v - now.v, limits.jerk / limits.acceleration, limits.jerk, dt),
-                                   -limits.acceleration, limits.acceleration);
+  const double wanted =
+      std::clamp(square_root(v - now.v, limits.gain, limits.jerk, dt), -limits.acceleration, limits.acceleration);
   return advanced(now, std::clamp(wanted, now.a - limits.jerk * dt, now.a + limits.jerk * dt), dt);
 }
 
@@ -30,8 +30,8 @@ AxisTarget shaped(const AxisTarget& now, const AxisTarget& goal, const AxisLimit
   const double gain = 0.5 * limits.jerk / limits.acceleration;
   const double v = goal.v + square_root(goal.p - now.p, gain, 0.5 * limits.acceleration, dt);
   const double error = std::clamp(v, -limits.speed_down, limits.speed_up) - now.v;
-  const double wanted = goal.a + std::clamp(square_root(error, limits.jerk / limits.acceleration, limits.jerk, dt),
-                                            -limits.acceleration, limits.acceleration);
+  const double wanted =
+      goal.a + std::clamp(square_root(error, limits.gain, limits.jerk, dt), -limits.acceleration, limits.acceleration);
   return advanced(now, std::clamp(wanted, now.a - limits.jerk * dt, now.a + limits.jerk * dt), dt);
 }
 
@@ -39,7 +39,8 @@ double CascadeLoop::step(const LoopGains& gains, const AxisTarget& target, doubl
                          double speed_down, double speed_up, double dt) noexcept {
   const double error = std::clamp(target.v + gains.position * (target.p - p), -speed_down, speed_up) - v;
   integral_ = std::clamp(integral_ + gains.integral * error * dt, -kMostIntegral, kMostIntegral);
-  return target.a + gains.velocity * error + integral_ - gains.derivative * v_dot;
+  return target.a + gains.velocity * error + integral_ +
+         gains.derivative * ((gains.derivative_of_error ? target.a : 0) - v_dot);
 }
 
 }  // namespace backwash::bench

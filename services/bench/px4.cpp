@@ -34,7 +34,7 @@ const Profile kProfile{
     .drift = 0.10, .drift_rate = 0, .drift_speed = 0.27,  // docs/autopilots.md: 0.05, 0.23, 0.48, 1.02 m at 1, 2, 3, 5 s
     .drift_way = {0.75, 0.66, 0},            // px4-vio.csv:190–235, against the truth's way
     .fusion = 0.3,                           // right within 1 s: px4-vio.csv:244–252
-    .estimator_lost = 4.6,                   // px4-vio.csv:190,222
+    .estimator_lost = 4.4,                   // descends 4.6 s after, px4-vio.csv:190,222
     .estimator_found = 1.2,                  // px4-vio.csv:244,256
     .landed_after = 3.3,                     // px4-flight.csv:367,390; -loss0.3:247,266; -vio:235,258; -modes:431,456
     .disarms_after = 2.0};                   // COM_DISARM_LAND: px4-flight.csv:390,407
@@ -46,13 +46,15 @@ constexpr double kLandSpeed = 0.6, kCrawlSpeed = 0.3, kCrawlBelow = 0.75;  // m/
 constexpr double kSinkSpeed = 0.65;          // m/s: a failsafe's Position mode without RC: px4-loss0.3pos.csv:225–231
 constexpr double kSinkDecay = 0.8;           // s, of the speed across, ibid.:219–231
 constexpr double kSinkLanded = 1.05;         // s on the ground until "landed" there, ibid.:233,240
-constexpr double kBrakingJerk = 4.0;         // m/s³, MPC_JERK_AUTO, source
+constexpr double kBrakingJerk = 4.0, kBrakingGain = 8.0;  // m/s³ (MPC_JERK_AUTO, source), 1/s: nearly time-optimal, -loss0.3:221–228
+constexpr AxisLimits kAtOnce{12, 12, 3, 40, 13};  // a blind landing is not smoothed: px4-vio.csv:221–227
 constexpr double kSetDown = 0.3;             // s on the ground until an offboard thrust is cut: px4-vio.csv:252–262
 // clang-format on
 
 enum CustomMode : std::uint32_t {
   position = 3U << 16,
   loiter = 4U << 16 | 3U << 24,
+  rtl = 4U << 16 | 5U << 24,
   land = 4U << 16 | 6U << 24,
   offboard = 6U << 16
 };
@@ -83,6 +85,7 @@ class Px4 : public Firmware {
     blind_ = lost_;
     changed_at_ = now_;
     shaped_ = here();
+    if (mode != offboard) loops_[0].reset(), loops_[1].reset();  // brakes and swings back: px4-loss0.3.csv:221–231
     if (phase_ == Phase::flight) landed_state_ = mode == land && !blind_ ? landing : in_air;
   }
   bool streaming(double t) const { return t - last_setpoint_ < parameter("COM_OF_LOSS_T") + kLossNoticed; }
@@ -91,7 +94,7 @@ class Px4 : public Firmware {
   void on(const mavlink::CommandLong& m, double t) override {
     switch (m.command) {
       case kSetMode:
-        return set_mode(static_cast<std::uint32_t>(m.param2) << 16 | static_cast<std::uint32_t>(m.param3) << 24, t);
+        return set_mode(static_cast<std::uint32_t>(m.param2) << 16 | static_cast<std::uint32_t>(m.param3) << 24);
       case kArm: {
         const bool can = m.param1 == 1 ? has_position() : landed_state_ == on_ground;
         answer(kArm, can ? kAccepted : kTemporarilyRejected);
@@ -108,10 +111,13 @@ class Px4 : public Firmware {
         return answer(m.command, kUnsupported);
     }
   }
-  // Two answers each, the second of which is true: px4-modes.csv:193–194,248–250,302–304,347–348,370–372. Without RC a
-  // pilot's mode is not taken.
-  void set_mode(std::uint32_t wanted, double t) {
-    const bool taken = wanted == land || (wanted == offboard && streaming(t));
+  // Two answers each, the second of which is true: px4-modes.csv:193–194,248–250,302–304,347–348,370–372. In the air
+  // and without RC a pilot's mode is not taken; on the ground every mode is, offboard without set-points too:
+  // px4-refused.csv.
+  void set_mode(std::uint32_t wanted) {
+    constexpr std::array<std::uint32_t, 5> kMeasured{position, loiter, rtl, land, offboard};
+    const bool known = std::ranges::find(kMeasured, wanted) != kMeasured.end();
+    const bool taken = known && (!armed_ || wanted == land || wanted == offboard);
     if (taken) change(static_cast<CustomMode>(wanted), false);
     answer(kSetMode, kAccepted);
     answer(kSetMode, taken ? kAccepted : kTemporarilyRejected);
@@ -165,7 +171,7 @@ class Px4 : public Firmware {
                                           phase_ == Phase::ramp && i == 2 ? 0 : target_.a_W[i]};
       return t;
     }
-    const AxisLimits limits{12, 12, parameter("MPC_ACC_HOR"), kBrakingJerk};
+    const AxisLimits limits{12, 12, parameter("MPC_ACC_HOR"), kBrakingJerk, kBrakingGain};
     auto& [x, y, z] = shaped_;
     if (mode_ == position && failsafe_) {
       for (AxisTarget* s : {&x, &y}) *s = {s->p + s->v * kStep, s->v * std::exp(-kStep / kSinkDecay), 0};
@@ -174,7 +180,7 @@ class Px4 : public Firmware {
     }
     const bool low = z.p - armed_z_ < kCrawlBelow && !blind_;
     const double down = mode_ == land ? (low ? kCrawlSpeed : kLandSpeed) : failsafe_ ? kSinkSpeed : 0;
-    z = shaped_velocity(z, -down, limits, kStep);
+    z = shaped_velocity(z, -down, blind_ ? kAtOnce : limits, kStep);
     return shaped_;
   }
 
@@ -198,15 +204,17 @@ class Px4 : public Firmware {
     }
     const bool landed_long =
         phase_ == Phase::ready && landed_at_ > armed_at_ && t - landed_at_ > kProfile.disarms_after;
-    const bool idle = phase_ == Phase::ready && t - armed_at_ > parameter("COM_DISARM_PRFLT");
+    const bool idle = phase_ == Phase::ready && landed_at_ < armed_at_ &&
+                      t - armed_at_ > parameter("COM_DISARM_PRFLT") + parameter("COM_SPOOLUP_TIME");  // -refused
     if (!landed_long && !idle) return;
     disarm();
     change(offboard, false);  // px4-flight.csv:407
   }
 
   mavlink::Heartbeat heartbeat() const override {
-    const int base = mode_ == offboard ? 17 : mode_ == position ? 81 : 29;  // px4-flight.csv:5,119,407; -loss0.3pos:223
-    const bool ready = mode_ == offboard && has_position() && now_ - last_setpoint_ < kFresh;
+    const bool fresh = now_ - last_setpoint_ < kFresh, ready = mode_ == offboard && has_position() && fresh;
+    // px4-flight.csv:5,119,407; -loss0.3pos:223; -refused
+    const int base = mode_ == offboard ? (last_setpoint_ > 0 ? 17 : 1) : mode_ == position ? 81 : 29;
     return {.custom_mode = mode_,
             .type = 2,
             .autopilot = kProfile.autopilot,
