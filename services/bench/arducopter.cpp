@@ -26,7 +26,6 @@ const Profile kProfile{
     .integers_by_value = true,               // ardupilot-flight.csv:35,101,104
     .parameter_period = 0.1,                 // ardupilot-flight.csv:30–88
     .intervals_ms = {},                      // HEARTBEAT alone until asked: ardupilot-flight.csv:1–33
-    .drag = 0.17,                            // ardupilot-vio.csv:271–315 (level, 0.163 → 0.067 m/s in 6.5 s)
     .drift = 0.005, .drift_rate = 0.0038, .drift_speed = 10,  // ardupilot-vio.csv:214–271: 0.04, 0.15, 0.49 m at 3, 5, 8 s
     .drift_way = {0.73, -0.68, 0},           // ardupilot-vio.csv:271, against the truth's way
     .fusion = 0.15,                          // right within 0.5 s: ardupilot-vio.csv:269–276
@@ -101,7 +100,8 @@ class ArduCopter : public Firmware {
     constexpr std::array<std::uint32_t, 6> kMeasured{alt_hold, guided, loiter, rtl, land, brake};
     const bool known = std::ranges::find(kMeasured, wanted) != kMeasured.end();
     const bool possible = known && (has_position() || wanted == alt_hold || wanted == land);
-    if (possible) change(static_cast<CustomMode>(wanted));
+    // The mode that it is in already does not begin anew (source).
+    if (possible && wanted != mode_) change(static_cast<CustomMode>(wanted));
     answer(kSetMode, possible ? kAccepted : kFailed);
   }
   void arm(bool on, double t) {

@@ -156,6 +156,9 @@ void Autopilot::receive(std::span<const std::uint8_t> bytes, double t) {
         wire_ << t << ',' << frame.id << ',' << int{frame.sender.sequence};
         if constexpr (std::is_same_v<std::decay_t<decltype(message)>, mavlink::SetPositionTargetLocalNed>)
           wire_ << ',' << message.type_mask << ',' << message.x << ',' << message.y << ',' << message.z << '\n';
+        else if constexpr (std::is_same_v<std::decay_t<decltype(message)>, mavlink::CommandLong>)
+          wire_ << ',' << message.command << ',' << message.param1 << ',' << message.param2 << ',' << message.param7
+                << '\n';
         else
           wire_ << ",,,,\n";
       }

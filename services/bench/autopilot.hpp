@@ -71,7 +71,8 @@ class Autopilot {
   virtual void disarm() noexcept;
   /// The estimator is reset: from now on its local frame lies elsewhere.
   void reset_estimator(const LocalFrame& frame) noexcept { frame_ = frame; }
-  /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position.
+  /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position; of a command
+  /// its number and parameters 1, 2 and 7.
   void log_wire(const std::string& path);
 
  protected:

@@ -27,7 +27,8 @@ Firmware::Firmware(const Profile& profile, const Site& site)
     : Autopilot(site.grid, without_controller(site.vehicle), site.ground_W, site.frame, site.seed, site.system,
                 site.airflow),
       uptime_(site.uptime),
-      profile_(profile) {
+      profile_(profile),
+      drag_(site.drag) {
   parameters = profile.parameters;
   follows_yaw = true;
 }
@@ -115,7 +116,7 @@ void Firmware::fly(double t) {
   vehicle_.command({truth().p_W, Vec3::Zero(), yaw_matrix(-yaw_error_) * u, target_.yaw - yaw_error_});
   const Vec3 gust = air_.step(truth().p_W, kStep);
   const bool free = armed_ && !grounded();
-  vehicle_.step(free ? Vec3(gust - profile_.drag * truth().v_W) : Vec3::Zero(), truth());
+  vehicle_.step(free ? Vec3(gust - drag_ * truth().v_W) : Vec3::Zero(), truth());
   if (!grounded()) lifted_ = t;
   watch(t);
   landed_ = landed_state_ == on_ground;

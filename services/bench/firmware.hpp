@@ -19,7 +19,6 @@ struct Profile {
   bool integers_by_value = false;             ///< in PARAM_VALUE; otherwise by their bytes
   double parameter_period = 0;                ///< s: answers leave at multiples of this
   std::map<std::uint32_t, int> intervals_ms;  ///< of messages that are sent unasked
-  double drag = 0;                            ///< 1/s: the simulator's air takes this share of the velocity
   // Without ODOMETRY the estimate runs away: acceleration `drift + drift_rate·t` up to `drift_speed`, along drift_way.
   double drift = 0, drift_rate = 0, drift_speed = 0;  ///< m/s², m/s³, m/s
   Vec3 drift_way = Vec3::UnitX();                     ///< unit vector
@@ -38,6 +37,7 @@ struct Site {
   std::uint64_t seed = 1;
   std::uint8_t system = 1;
   double airflow = 1;
+  double drag = 0;    ///< 1/s: the air takes this share of the velocity
   double uptime = 0;  ///< s since it was switched on
 };
 
@@ -93,6 +93,7 @@ class Firmware : public Autopilot {
   void estimate(double t);
 
   Profile profile_;
+  double drag_;
   struct Pending {
     double due;
     std::string name;

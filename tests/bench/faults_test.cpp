@@ -90,8 +90,9 @@ TEST(FaultyChannel, IntermittentPassesItsShare) {
 TEST(FaultyChannel, AWrongLinkFlipsOneBitAndGarbageIsNoise) {
   const Bytes in(100, 0x55);
   FaultyChannel<Bytes> flips({{.channel = Fault::Channel::up, .kind = wrong, .from = 0, .until = 9}});
+  const Bytes flipped = flips.pass(in, 1).at(0);
   int bits = 0;
-  for (std::size_t n = 0; const std::uint8_t b : flips.pass(in, 1).at(0)) bits += __builtin_popcount(b ^ in[n++]);
+  for (std::size_t n = 0; n < in.size(); ++n) bits += __builtin_popcount(flipped.at(n) ^ in[n]);
   EXPECT_EQ(bits, 1);
   FaultyChannel<Bytes> noise({{.channel = Fault::Channel::up, .kind = garbage, .from = 0, .until = 9}});
   const Bytes out = noise.pass(in, 1).at(0);

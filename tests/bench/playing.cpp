@@ -19,7 +19,9 @@ std::string play(Kind kind, const std::string& script, const std::map<std::strin
   const map::OccupancyGrid nothing(Vec3(-1, -1, -1), 1.0, Index3(2, 2, 2), map::Cell::free);
   const bool px4 = kind == Kind::px4;
   const Vehicle vehicle = config::load_vehicle(kHome + (px4 ? "px4" : "ardupilot") + ".vehicle.toml").value();
-  const bench::Site site{.grid = nothing, .vehicle = vehicle, .airflow = 0};
+  // The simulators' air: ardupilot-vio.csv:271–315 (level, 0.163 → 0.067 m/s in 6.5 s); px4-loss1.csv:213 (0.108 rad
+  // at 1.10 m/s).
+  const bench::Site site{.grid = nothing, .vehicle = vehicle, .airflow = 0, .drag = px4 ? 1.0 : 0.17};
   const auto autopilot = px4 ? bench::make_px4(site) : bench::make_arducopter(site);
   for (const auto& [name, value] : parameters) autopilot->parameters.at(name) = value;
 
