@@ -143,7 +143,7 @@ class ArduCopter : public Firmware {
     AxisLimits along{parameter("WPNAV_SPEED_DN") / 100, parameter("WPNAV_SPEED_UP") / 100,
                      parameter("WPNAV_ACCEL_Z") / 100, parameter("PSC_JERK_Z")};
     auto& [x, y, z] = shaped_;
-    if (mode_ == guided && !climbing_ && last_setpoint_ > changed_at_) {
+    if (mode_ == guided && !climbing_ && last_setpoint_ > std::max(changed_at_, take_off_at_)) {
       move_target(t);
       for (int i = 0; i < 3; ++i) {
         AxisTarget& s = shaped_[static_cast<std::size_t>(i)];

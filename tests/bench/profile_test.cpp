@@ -250,6 +250,10 @@ TEST(ArduCopterProfile, ASetPointBeforeTheLiftOffCancelsTheTakeOff) {
   });
   compare(p, "second command: landed state 3 after, s", 0.3,
           [&](const Trace& t) { return since(t.at("in", "EXTENDED_SYS_STATE", {3}), again(t)); });
+  // The set-points before the second command ended at the ground: they do not count any more.
+  compare(p, "height held after it without set-points, m", 0.05, [&](const Trace& t) -> std::optional<double> {
+    return t.truth(t.at("in", "EXTENDED_SYS_STATE", {2}).value() + 1.8, 2);
+  });
   compare(p, "second command: landed state 2 after, s", 0.3,
           [&](const Trace& t) { return since(t.at("in", "EXTENDED_SYS_STATE", {2}), again(t)); });
 }
