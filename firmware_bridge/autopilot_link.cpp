@@ -12,7 +12,7 @@ namespace {
 using namespace std::chrono;
 
 constexpr std::size_t kReadsPerPoll = 64, kBytesPerPoll = 8192;  // a socket gives a datagram a read
-constexpr std::size_t kReadSize = 2048;                          // more than a datagram: its rest would be lost
+constexpr std::size_t kReadSize = PlainPort::kLargestRead;       // more than a datagram: its rest would be lost
 constexpr std::uint8_t kFlightController = 1;                    // MAV_COMP_ID_AUTOPILOT1
 
 // Values of common.xml.
@@ -81,6 +81,8 @@ std::string_view name(LinkFault fault) noexcept {
       return "nothing received";
     case LinkFault::kNoValidFrame:
       return "no valid frame (wrong baud rate?)";
+    case LinkFault::kNoneSignedRightly:
+      return "no frame with a good signature (another key, or not signed?)";
     case LinkFault::kHeartbeatLost:
       return "heartbeat lost";
     case LinkFault::kTransmitStalled:
@@ -102,10 +104,21 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   heard_.reset();
   clock_.reset();
   timesync_asked_ns_ = 0;
+  signed_rightly_ = false;
   return port;
 }
 
+void AutopilotLink::require_signatures(const mavlink::Signing& signing, Time now) noexcept {
+  signing_ = signing;
+  signing_start_ = signing.time();
+  signing_since_ = now;
+}
+
 tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {
+  if (signing_) {
+    const auto run = duration_cast<microseconds>(now - signing_since_).count() / 10;
+    signing_->advance_to(signing_start_ + static_cast<mavlink::SigningTime>(std::max<std::int64_t>(run, 0)));
+  }
   std::array<std::uint8_t, kReadSize> bytes;
   std::size_t taken = 0;
   for (std::size_t i = 0; i < kReadsPerPoll && taken < kBytesPerPoll && !lost_; ++i) {
@@ -133,8 +146,26 @@ void AutopilotLink::discard_unsent() noexcept {
   std::visit([](auto& port) { port.discard_output(); }, port_);
 }
 
+/// An autopilot without a clock of its own signs with an old time until it hears a newer one. As nothing else is sent
+/// before it counts as heard, it is asked for the time, once a second: that frame carries ours.
+bool AutopilotLink::signature_good(const mavlink::Frame& frame, Time now) noexcept {
+  const auto verdict = signing_->judge(frame);
+  if (verdict == mavlink::Verdict::kGood) return signed_rightly_ = true;
+  const bool late = verdict == mavlink::Verdict::kOld || verdict == mavlink::Verdict::kReplayed;
+  const bool from_vehicle = frame.sender.component == kFlightController &&
+                            frame.sender.system == configured_vehicle_.value_or(frame.sender.system);
+  const auto age = heartbeat_age(now);
+  if (late && from_vehicle && !(age && *age < kHeartbeatTimeout) && now - time_told_ >= 1s) {
+    time_told_ = now;
+    const mavlink::Timesync question{0, nanoseconds_of(now), frame.sender.system, kFlightController};
+    send_as(frame.sender.system, question, TransmitQueue::Kind::kOther);
+  }
+  return false;
+}
+
 void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
-  if (tap_) tap_(tap_context_, false, frame.bytes);
+  if (signing_ && !signature_good(frame, now)) return;
+  if (tap_) tap_(tap_context_, false, {frame.bytes.data(), frame.bytes.size() + frame.signature.size()});
   if (frame.sender.component != kFlightController) return;
   const auto expected = heard_ ? heard_ : configured_vehicle_;
   if (expected && frame.sender.system != *expected) return;
@@ -186,7 +217,8 @@ std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
   const auto age = heartbeat_age(now);
   if (!age && now - opened_at_ >= kFirstFrameTimeout) {
     if (received().bytes == 0) return LinkFault::kNothingReceived;
-    return received().frames == 0 ? LinkFault::kNoValidFrame : LinkFault::kHeartbeatLost;
+    if (received().frames == 0) return LinkFault::kNoValidFrame;
+    return signing_ && !signed_rightly_ ? LinkFault::kNoneSignedRightly : LinkFault::kHeartbeatLost;
   }
   if (age && *age >= kHeartbeatTimeout) return LinkFault::kHeartbeatLost;
   if (queue_.missed_setpoints() >= kMaxMissedSetpoints) return LinkFault::kTransmitStalled;
@@ -196,8 +228,15 @@ std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
 template <class Message>
 bool AutopilotLink::send(const Message& message, TransmitQueue::Kind kind) noexcept {
   if (!heard_ || lost_ || !finite(message)) return false;
+  return send_as(*heard_, message, kind);
+}
+
+template <class Message>
+bool AutopilotLink::send_as(std::uint8_t system, const Message& message, TransmitQueue::Kind kind) noexcept {
   flush();  // first, so that an older set-point that fits by now is not counted as missed
-  const mavlink::EncodedFrame frame = mavlink::encode_frame({*heard_, kOnboardComputer, sequence_++}, message);
+  const std::uint8_t flags = signing_ ? mavlink::kIncompatSigned : 0;
+  mavlink::EncodedFrame frame = mavlink::encode_frame({system, kOnboardComputer, sequence_++}, message, flags);
+  if (signing_ && !signing_->sign(frame)) return false;
   if (tap_) tap_(tap_context_, true, frame.view());
   queue_.push(frame, kind);
   flush();
@@ -292,6 +331,8 @@ bool AutopilotLink::send_follow_setpoints() noexcept {
       return send_command(kCommandSetMode, {kCustomModeEnabled, kPx4MainModeOffboard});
     case Autopilot::kArduPilot:
       return send_command(kCommandSetMode, {kCustomModeEnabled, kCopterModeGuided});
+    case Autopilot::kPlain:
+      return send_command(kCommandSetMode, {kCustomModeEnabled, static_cast<float>(kPlainModeFollow)});
     case Autopilot::kUnknown:
       return false;
   }

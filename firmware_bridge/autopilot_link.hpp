@@ -7,6 +7,8 @@
 #include <string_view>
 #include <variant>
 
+#include "firmware_bridge/mavlink/signing.hpp"
+#include "firmware_bridge/plain_port.hpp"
 #include "firmware_bridge/serial_port.hpp"
 #include "firmware_bridge/tcp_port.hpp"
 #include "firmware_bridge/telemetry.hpp"
@@ -15,7 +17,7 @@
 
 namespace backwash::firmware_bridge {
 
-using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort>;
+using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort, PlainPort>;
 
 inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< faults.md row 21
 inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);         ///< faults.md row 19
@@ -28,11 +30,12 @@ inline constexpr std::uint16_t kCommandMessage = 512, kCommandLand = 21, kComman
 
 /// What is wrong with the link, the gravest first.
 enum class LinkFault : std::uint8_t {
-  kPortLost,         ///< row 17: unplugged; reconnect() with a new port
-  kNothingReceived,  ///< row 19: not one byte within 2 s: cable, or the controller is off
-  kNoValidFrame,     ///< row 19: bytes, but no frame within 2 s: wrong baud rate or no MAVLink
-  kHeartbeatLost,    ///< row 21: none from the flight controller for 1.5 s
-  kTransmitStalled,  ///< row 20: two set-points in a row did not get out
+  kPortLost,           ///< row 17: unplugged; reconnect() with a new port
+  kNothingReceived,    ///< row 19: not one byte within 2 s: cable, or the controller is off
+  kNoValidFrame,       ///< row 19: bytes, but no frame within 2 s: wrong baud rate or no MAVLink
+  kNoneSignedRightly,  ///< row 29: frames, but none within 2 s whose signature is good: another key, or signing is off
+  kHeartbeatLost,      ///< row 21: none from the flight controller for 1.5 s
+  kTransmitStalled,    ///< row 20: two set-points in a row did not get out
 };
 std::string_view name(LinkFault fault) noexcept;
 
@@ -65,6 +68,12 @@ class AutopilotLink {
  public:
   /// `vehicle`: its system id; absent: that of the first flight controller heard.
   AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now);
+
+  /// From now on each frame is signed, and a frame without a good signature is not acted upon (row 29). Its time goes
+  /// on from `now` by the monotonic clock.
+  void require_signatures(const mavlink::Signing& signing, Time now) noexcept;
+  /// As it stands; absent: frames are not signed, and signatures are not looked at.
+  const std::optional<mavlink::Signing>& signing() const noexcept { return signing_; }
 
   /// Takes a newly opened port after a loss and returns the lost one (closing it may wait for the line). All that was
   /// known of the vehicle is forgotten; nothing waits to be sent.
@@ -125,8 +134,11 @@ class AutopilotLink {
  private:
   template <class Message>
   bool send(const Message& message, TransmitQueue::Kind kind = TransmitQueue::Kind::kOther) noexcept;
+  template <class Message>
+  bool send_as(std::uint8_t system, const Message& message, TransmitQueue::Kind kind) noexcept;
   void flush() noexcept;
   void take_frame(const mavlink::Frame& frame, Time now) noexcept;
+  bool signature_good(const mavlink::Frame& frame, Time now) noexcept;
   void take_timesync(const mavlink::Timesync& m, Time now) noexcept;
   bool for_us(std::uint8_t system, std::uint8_t component) const noexcept;
 
@@ -141,6 +153,10 @@ class AutopilotLink {
   std::optional<Received<ClockOffset>> clock_;
   std::int64_t timesync_asked_ns_ = 0;
   std::uint8_t sequence_ = 0;
+  std::optional<mavlink::Signing> signing_;
+  mavlink::SigningTime signing_start_ = 0;  // at signing_since_
+  Time signing_since_{}, time_told_{};
+  bool signed_rightly_ = false;  // a frame since the port was opened
   Tap tap_ = nullptr;
   void* tap_context_ = nullptr;
 };

@@ -24,7 +24,7 @@ std::string describe(const PortError& error) {
       text = "is not a serial port";
       break;
     case PortError::Kind::kBaudRate:
-      text = "has no such baud rate (9600 to 4000000 in the usual steps)";
+      text = "cannot do this baud rate";
       break;
     case PortError::Kind::kConfigure:
       text = "refused its settings";

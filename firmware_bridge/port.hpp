@@ -16,7 +16,7 @@ struct PortError {
     kOpen,       ///< the path or socket could not be opened
     kBusy,       ///< another program holds the serial port
     kNotSerial,  ///< the path is not a terminal device
-    kBaudRate,   ///< not a rate that termios knows
+    kBaudRate,   ///< a rate that the device cannot do
     kConfigure,  ///< the device refused its settings
     kAddress,    ///< not a numeric IPv4 address
     kLost,       ///< unplugged, hung up, or a failing device; open it again

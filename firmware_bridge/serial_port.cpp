@@ -1,36 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "firmware_bridge/serial_port.hpp"
 
+#include <asm/termbits.h>  // termios2, which <termios.h> does not have and does not go with
 #include <fcntl.h>
+#include <linux/serial.h>
 #include <sys/ioctl.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <optional>
+#include <cmath>
 
 namespace backwash::firmware_bridge {
 namespace {
 
-struct Rate {
-  unsigned baud;
-  speed_t code;
-};
-constexpr std::array kRates{Rate{9600, B9600},       Rate{19200, B19200},     Rate{38400, B38400},
-                            Rate{57600, B57600},     Rate{115200, B115200},   Rate{230400, B230400},
-                            Rate{460800, B460800},   Rate{500000, B500000},   Rate{576000, B576000},
-                            Rate{921600, B921600},   Rate{1000000, B1000000}, Rate{1152000, B1152000},
-                            Rate{1500000, B1500000}, Rate{2000000, B2000000}, Rate{2500000, B2500000},
-                            Rate{3000000, B3000000}, Rate{3500000, B3500000}, Rate{4000000, B4000000}};
-
-std::optional<speed_t> speed_code(unsigned baud) noexcept {
-  for (const auto& rate : kRates) {
-    if (rate.baud == baud) return rate.code;
-  }
-  return std::nullopt;
-}
+// A receiver samples the middle of the tenth bit half a bit off at 5 %; each end may have half of that.
+constexpr double kBaudTolerance = 0.025;
 
 using Kind = PortError::Kind;
 tl::unexpected<PortError> error(Kind kind, int number) { return tl::unexpected(PortError{kind, number}); }
@@ -46,31 +31,45 @@ bool lock(int fd) noexcept {
 
 bool nothing_now(int number) noexcept { return number == EAGAIN || number == EWOULDBLOCK || number == EINTR; }
 
+/// 8N1, nothing changed on the way, no flow control, `baud` bit/s whether it has a name or not.
+void make_raw(termios2& t, unsigned baud) noexcept {
+  t.c_iflag = 0;
+  t.c_oflag = 0;
+  t.c_lflag = 0;
+  t.c_cflag = CS8 | CLOCAL | CREAD | BOTHER;
+  t.c_ispeed = t.c_ospeed = baud;
+  // With at least one byte to wait for, "nothing yet" is EAGAIN, and a read of 0 bytes can only be a hang-up.
+  t.c_cc[VMIN] = 1;
+  t.c_cc[VTIME] = 0;
+}
+
+/// Some drivers gather what they receive for up to 16 ms; those without the flag have nothing to change.
+void ask_for_low_latency(int fd) noexcept {
+  serial_struct settings{};
+  if (::ioctl(fd, TIOCGSERIAL, &settings) != 0) return;
+  settings.flags |= ASYNC_LOW_LATENCY;
+  ::ioctl(fd, TIOCSSERIAL, &settings);
+}
+
 }  // namespace
 
 tl::expected<SerialPort, PortError> SerialPort::open(const std::string& path, unsigned baud) {
-  const auto speed = speed_code(baud);
-  if (!speed) return error(Kind::kBaudRate, 0);
+  if (baud == 0) return error(Kind::kBaudRate, 0);
   FileDescriptor fd(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (fd.get() < 0) return error(errno == EBUSY ? Kind::kBusy : Kind::kOpen, errno);
   if (!lock(fd.get())) return error(Kind::kBusy, errno);
-  termios settings{};
-  if (::tcgetattr(fd.get(), &settings) != 0) return error(errno == ENOTTY ? Kind::kNotSerial : Kind::kConfigure, errno);
-  ::cfmakeraw(&settings);
-  settings.c_cflag &= ~static_cast<tcflag_t>(CSTOPB | CRTSCTS);
-  settings.c_cflag |= CLOCAL | CREAD;
-  // With at least one byte to wait for, "nothing yet" is EAGAIN, and a read of 0 bytes can only be a hang-up.
-  settings.c_cc[VMIN] = 1;
-  settings.c_cc[VTIME] = 0;
-  if (::cfsetspeed(&settings, *speed) != 0 || ::tcsetattr(fd.get(), TCSANOW, &settings) != 0) {
-    return error(Kind::kConfigure, errno);
-  }
-  // tcsetattr succeeds when any of the settings was taken.
-  termios taken{};
-  if (::tcgetattr(fd.get(), &taken) != 0) return error(Kind::kConfigure, errno);
-  if (::cfgetospeed(&taken) != *speed) return error(Kind::kBaudRate, 0);
+  termios2 settings{};
+  if (::ioctl(fd.get(), TCGETS2, &settings) != 0)
+    return error(errno == ENOTTY ? Kind::kNotSerial : Kind::kConfigure, errno);
+  make_raw(settings, baud);
+  if (::ioctl(fd.get(), TCSETS2, &settings) != 0) return error(Kind::kConfigure, errno);
+  // The call succeeds when any of the settings was taken; a rate becomes what the device's clock can be divided to.
+  termios2 taken{};
+  if (::ioctl(fd.get(), TCGETS2, &taken) != 0) return error(Kind::kConfigure, errno);
+  if (std::abs(static_cast<double>(taken.c_ospeed) - baud) > kBaudTolerance * baud) return error(Kind::kBaudRate, 0);
+  ask_for_low_latency(fd.get());
   if (::ioctl(fd.get(), TIOCEXCL) != 0) return error(Kind::kConfigure, errno);
-  ::tcflush(fd.get(), TCIOFLUSH);
+  ::ioctl(fd.get(), TCFLSH, TCIOFLUSH);
   return SerialPort(std::move(fd));
 }
 
@@ -93,6 +92,6 @@ tl::expected<std::size_t, PortError> SerialPort::write(std::span<const std::uint
   return error(Kind::kLost, errno);
 }
 
-void SerialPort::discard_output() noexcept { ::tcflush(fd_.get(), TCOFLUSH); }
+void SerialPort::discard_output() noexcept { ::ioctl(fd_.get(), TCFLSH, TCOFLUSH); }
 
 }  // namespace backwash::firmware_bridge

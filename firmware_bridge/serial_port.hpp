@@ -12,8 +12,9 @@ namespace backwash::firmware_bridge {
 /// A serial line or pseudo-terminal: raw, 8N1, no flow control, non-blocking, held exclusively.
 class SerialPort {
  public:
-  /// Opens and configures `path` at `baud` bit/s (termios' rates from 9600 to 4,000,000); discards what was received
-  /// before. Errors: kOpen, kBusy, kNotSerial, kBaudRate, kConfigure. Not real-time.
+  /// Opens and configures `path` at `baud` bit/s, any rate that the device comes within 2.5 % of; asks its driver for
+  /// low latency; discards what was received before. Errors: kOpen, kBusy, kNotSerial, kBaudRate, kConfigure. Not
+  /// real-time.
   static tl::expected<SerialPort, PortError> open(const std::string& path, unsigned baud);
 
   /// Bytes at hand, 0 when there are none. Error: kLost. Real-time: one non-blocking system call, no allocation.

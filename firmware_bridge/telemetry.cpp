@@ -2,6 +2,7 @@
 #include "firmware_bridge/telemetry.hpp"
 
 #include "firmware_bridge/mavlink/frames.hpp"
+#include "firmware_bridge/plain_port.hpp"
 
 namespace backwash::firmware_bridge {
 namespace {
@@ -14,6 +15,7 @@ constexpr std::uint16_t kNoCell = 65535, kNoVoltage = 65535;
 
 Autopilot autopilot_of(std::uint8_t number) noexcept {
   if (number == kAutopilotPx4) return Autopilot::kPx4;
+  if (number == kAutopilotPlain) return Autopilot::kPlain;
   return number == kAutopilotArduPilot ? Autopilot::kArduPilot : Autopilot::kUnknown;
 }
 
@@ -24,6 +26,8 @@ bool follows_setpoints(const mavlink::Heartbeat& m) noexcept {
       return (m.custom_mode >> 16 & 0xFF) == kPx4MainModeOffboard;
     case Autopilot::kArduPilot:
       return m.custom_mode == kCopterModeGuided;
+    case Autopilot::kPlain:
+      return m.custom_mode == kPlainModeFollow;
     case Autopilot::kUnknown:
       return false;
   }

@@ -23,7 +23,8 @@ struct Received {
 template <class T>
 using Latest = std::optional<Received<T>>;
 
-enum class Autopilot : std::uint8_t { kUnknown, kArduPilot, kPx4 };
+/// kPlain: a controller behind a PlainPort.
+enum class Autopilot : std::uint8_t { kUnknown, kArduPilot, kPx4, kPlain };
 
 /// From HEARTBEAT.
 struct VehicleStatus {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 
 #include "core/config/config.hpp"
+#include "core/config/key_file.hpp"
 #include "core/config/link_device.hpp"
 
 namespace backwash::config {
@@ -32,8 +34,10 @@ struct Daemon {
   struct {
     std::string device;   ///< as written: for messages
     LinkDevice endpoint;  ///< the same, read
-    int baud = 0;         ///< of a serial port; a socket has none
-    int system = 1;       ///< MAVLink system id of the vehicle
+    LinkProtocol protocol = LinkProtocol::mavlink;
+    int baud = 0;                          ///< of a serial port; a socket has none
+    int system = 1;                        ///< MAVLink system id of the vehicle
+    std::optional<SecretKey> signing_key;  ///< of MAVLink's signatures, both ways; absent: none are made or asked for
   } link;
   struct {
     int priority = 0;         ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
@@ -46,8 +50,9 @@ struct Daemon {
 };
 
 /// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
-/// The tables frames and map may be left out, whole or in part: their defaults are above.
-/// `builtin:backwashd` is the shipped example.
+/// The tables frames and map, link.protocol and link.signing_key_file may be left out: their defaults are above. The
+/// key file is read here, so that a start with a bad one ends before any port opens. `builtin:backwashd` is the shipped
+/// example.
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
 
 }  // namespace backwash::config

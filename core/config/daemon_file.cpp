@@ -7,6 +7,9 @@
 namespace backwash::config {
 namespace {
 
+constexpr std::string_view kProtocol = "link.protocol";
+constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
+
 bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -47,6 +50,32 @@ tl::expected<void, ConfigError> check_names(const StrictTable& file, const Daemo
   return {};
 }
 
+tl::expected<void, ConfigError> read_protocol(const StrictTable& file, Daemon& d) {
+  if (!file.has(kProtocol)) return {};
+  const auto protocol = file.text(kProtocol);
+  if (!protocol) return tl::unexpected(protocol.error());
+  if (*protocol != "mavlink" && *protocol != "plain")
+    return tl::unexpected(file.error(kProtocol, "needs \"mavlink\" or \"plain\""));
+  if (*protocol == "mavlink") return {};
+  d.link.protocol = LinkProtocol::plain;
+  if (d.link.endpoint.kind != LinkDevice::Kind::serial)
+    return tl::unexpected(file.error(kProtocol, "needs a serial port as link.device"));
+  if (d.link.signing_key)
+    return tl::unexpected(
+        file.error(kSigningKeyFile, "needs protocol = \"mavlink\": the plain link has no signatures"));
+  return {};
+}
+
+tl::expected<void, ConfigError> read_signing_key(const StrictTable& file, Daemon& d) {
+  if (!file.has(kSigningKeyFile)) return {};
+  const auto path = file.text(kSigningKeyFile);
+  if (!path) return tl::unexpected(path.error());
+  const auto key = read_key_file(*path);
+  if (!key) return tl::unexpected(file.error(kSigningKeyFile, key.error()));
+  d.link.signing_key = *key;
+  return {};
+}
+
 }  // namespace
 
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
@@ -77,7 +106,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   };
   const std::pair<std::string_view, std::string*> frames[] = {
       {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
-  std::vector<std::string_view> text_keys{"map.live"};
+  std::vector<std::string_view> text_keys{"map.live", kProtocol, kSigningKeyFile};
   for (const auto& [key, target] : texts) text_keys.push_back(key);
   for (const auto& [key, target] : frames) text_keys.push_back(key);
   if (auto read = file->read(numbers, text_keys); !read) return tl::unexpected(read.error());
@@ -93,12 +122,14 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
     if (!text) return tl::unexpected(text.error());
     *target = std::move(*text);
   }
+  if (auto good = read_signing_key(*file, d); !good) return tl::unexpected(good.error());
   const auto endpoint = link_device(d.link.device);
   if (!endpoint)
     return tl::unexpected(file->error(
         "link.device",
         "needs a path, or udp:, udpin: or tcp: with a numeric IPv4 address and a port, as udp:127.0.0.1:14580"));
   d.link.endpoint = *endpoint;
+  if (auto good = read_protocol(*file, d); !good) return tl::unexpected(good.error());
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
     return tl::unexpected(file->error("frames", "needs three different names"));
   if (file->has("map.live")) {

@@ -8,6 +8,12 @@
 
 namespace backwash::config {
 
+/// What is spoken on the link.
+enum class LinkProtocol {
+  mavlink,
+  plain,  ///< firmware_bridge/plain/README.md, on a serial port
+};
+
 /// What [link] device names.
 struct LinkDevice {
   enum class Kind {

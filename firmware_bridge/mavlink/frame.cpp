@@ -130,12 +130,12 @@ std::optional<Frame> Parser::next() noexcept {
   return std::nullopt;
 }
 
-EncodedFrame encode_frame(const Sender& sender, std::uint32_t id, std::uint8_t crc_extra,
-                          const Payload& payload) noexcept {
+EncodedFrame encode_frame(const Sender& sender, std::uint32_t id, std::uint8_t crc_extra, const Payload& payload,
+                          std::uint8_t incompat_flags) noexcept {
   EncodedFrame f;
   const std::array<std::uint8_t, kHeaderV2> header{kMagicV2,
                                                    static_cast<std::uint8_t>(payload.length),
-                                                   0,
+                                                   incompat_flags,
                                                    0,
                                                    sender.sequence,
                                                    sender.system,

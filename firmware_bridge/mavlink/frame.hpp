@@ -30,8 +30,8 @@ struct Frame {
   Sender sender;
   std::uint32_t id = 0;
   std::span<const std::uint8_t> payload;
-  std::span<const std::uint8_t> bytes;      ///< the whole frame, without the signature block
-  std::span<const std::uint8_t> signature;  ///< link id, time and hash; empty when unsigned. Not verified by the parser
+  std::span<const std::uint8_t> bytes;      ///< the whole frame, without the signature block that follows it in memory
+  std::span<const std::uint8_t> signature;  ///< link id, time and hash; empty when unsigned. Signing judges it
 };
 
 /// What the parser saw since it was made. A byte is counted once: in an accepted frame, in a dropped one, or as
@@ -84,15 +84,16 @@ struct EncodedFrame {
   std::span<const std::uint8_t> view() const noexcept { return {bytes.data(), length}; }
 };
 
-/// MAVLink 2 frame of a payload, unsigned. Real-time: wait-free, no allocation.
-EncodedFrame encode_frame(const Sender& sender, std::uint32_t id, std::uint8_t crc_extra,
-                          const Payload& payload) noexcept;
+/// MAVLink 2 frame of a payload. With kIncompatSigned in the flags it is complete only once Signing::sign() has added
+/// the signature. Real-time: wait-free, no allocation.
+EncodedFrame encode_frame(const Sender& sender, std::uint32_t id, std::uint8_t crc_extra, const Payload& payload,
+                          std::uint8_t incompat_flags = 0) noexcept;
 
-/// MAVLink 2 frame of a message, unsigned. Real-time: wait-free, no allocation.
+/// MAVLink 2 frame of a message. Real-time: wait-free, no allocation.
 template <class Message>
-EncodedFrame encode_frame(const Sender& sender, const Message& message) noexcept {
+EncodedFrame encode_frame(const Sender& sender, const Message& message, std::uint8_t incompat_flags = 0) noexcept {
   constexpr MessageInfo m = info<Message>();
-  return encode_frame(sender, m.id, m.crc_extra, encode(message));
+  return encode_frame(sender, m.id, m.crc_extra, encode(message), incompat_flags);
 }
 
 }  // namespace backwash::mavlink

@@ -42,6 +42,7 @@ nlohmann::json json_of(const StatusCopy& s) {
           {"map_age_s", n.map_age},
           {"commands_refused", n.commands_refused},
           {"frames_bad", n.frames_bad},
+          {"frames_refused", n.frames_refused},
           {"records_lost", n.records_lost},
           {"page_faults", n.page_faults},
           {"frame_residual_m", n.frame_residual_m},

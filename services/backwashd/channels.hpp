@@ -121,6 +121,7 @@ struct ControlView {
   std::uint64_t refused_segment = 0;               ///< the last one refused
   std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
+  std::uint64_t frames_refused = 0;  ///< of the link, for their signature
   double residual_m = 0, residual_rad = 0;
   track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
   std::array<std::optional<double>, kParameters.size()> parameters{};
@@ -190,10 +191,11 @@ struct Channels {
   sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
   sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
   sync::Handover<FreshPort> ports;                                         // link watch → control
-  std::atomic<std::uint8_t> link_fault{0};         // control → link watch: 1 + LinkFault, 0: none
-  std::atomic<std::uint32_t> port_losses{0};       // control → link watch: times that a good port was lost
-  sync::LatestValue<std::array<char, 192>> place;  // mission → status: what keeps it from flying from here
-  sync::LatestValue<std::array<char, 192>> task;   // mission → status: of the last command
+  std::atomic<std::uint8_t> link_fault{0};            // control → link watch: 1 + LinkFault, 0: none
+  std::atomic<std::uint32_t> port_losses{0};          // control → link watch: times that a good port was lost
+  std::atomic<mavlink::SigningTime> signing_time{0};  // control → signing time: of the newest signature; 0: none
+  sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
+  sync::LatestValue<std::array<char, 192>> task;      // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
       closures_refused{0}, foreign_writers{0};

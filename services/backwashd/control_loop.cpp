@@ -213,6 +213,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   if (out.inside.judged) ++(out.inside.inside ? view_.inside : view_.outside);
   view_.missed += static_cast<std::uint64_t>(in.missed_periods);
   view_.frames_bad = link_.received().bad_crc;
+  if (link_.signing()) view_.frames_refused = link_.signing()->counters().refused();
   for (std::size_t n = 0; n < kParameters.size(); ++n)
     if (const auto p = telemetry.parameter(kParameters[n])) view_.parameters[n] = p->value.value;
   view_.residual_m = flight_.alignment().position_residual();
@@ -268,6 +269,7 @@ void ControlLoop::tick(std::int64_t now_ns, int missed, double lateness_us) noex
   publish(in, out);
   report(in, out);
   for (const auto* segment : out.released) channels_.segments.give_back(segment);
+  if (link_.signing()) channels_.signing_time.store(link_.signing()->time(), std::memory_order_relaxed);
   ++view_.ticks;
 }
 

@@ -16,6 +16,7 @@
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/planner_worker.hpp"
 #include "services/backwashd/process.hpp"
+#include "services/backwashd/signing_time.hpp"
 #include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
@@ -50,6 +51,18 @@ firmware_bridge::Port port_at_start(const decltype(config::Daemon::link)& link) 
   return firmware_bridge::ClosedPort{};
 }
 
+/// Lets the link sign, where a key is configured.
+std::unique_ptr<SigningTimeFile> sign(const config::Daemon& daemon, firmware_bridge::AutopilotLink& link) {
+  if (!daemon.link.signing_key) return nullptr;
+  constexpr std::uint8_t kLinkId = 0;  // this is the daemon's one link
+  auto time = made(kCannotCreate, [&] {
+    return std::make_unique<SigningTimeFile>(signing_time_path(daemon.log.file), std::chrono::system_clock::now());
+  });
+  link.require_signatures(mavlink::Signing(*daemon.link.signing_key, kLinkId, time->start()),
+                          std::chrono::steady_clock::now());
+  return time;
+}
+
 // What carries odometry to the control thread comes right below it, before the middleware starts its threads.
 int reader_priority(const config::Daemon& daemon) {
   const int control = daemon.control.priority;
@@ -78,6 +91,7 @@ struct Flight {
         recorder(made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file); })),
         log(recorder->path()),
         link(std::move(port), static_cast<std::uint8_t>(s.daemon.link.system), std::chrono::steady_clock::now()),
+        signing_time(sign(s.daemon, link)),
         front(made(kSystem,
                    [&] {
                      return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels,
@@ -92,6 +106,7 @@ struct Flight {
   std::unique_ptr<Recorder> recorder;
   const std::string log;  ///< file that the recorder began with
   firmware_bridge::AutopilotLink link;
+  std::unique_ptr<SigningTimeFile> signing_time;  ///< null: no key
   std::unique_ptr<DdsFront> front;
   std::unique_ptr<MapFront> maps;  ///< after the front, which watches the middleware's log
   Mission mission;
@@ -106,6 +121,7 @@ void start(Flight& f) {
   Channels& channels = *f.channels;
   const auto& daemon = f.settings.daemon;
   f.writer.start("recorder", [&] { f.recorder->run(channels, f.recorded); });
+  if (f.signing_time) f.writer.start("signing time", [&] { run_signing_time(*f.signing_time, channels, f.recorded); });
   f.threads.start("map worker",
                   [&] { run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map); });
   f.threads.start("planner", [&] {

@@ -212,6 +212,7 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.map_age = map_ns < 0 ? -1 : static_cast<double>(now_ns() - map_ns) * 1e-9;
     s.commands_refused = channels_.commands_refused;
     s.frames_bad = view.frames_bad;
+    s.frames_refused = view.frames_refused;
     s.records_lost = channels_.control_log.lost() + recorder_.lost();
     s.page_faults = view.page_faults;
     s.frame_residual_m = view.residual_m;

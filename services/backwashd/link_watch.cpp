@@ -29,6 +29,10 @@ tl::expected<Port, PortError> open_port(const decltype(config::Daemon::link)& li
   const auto as_port = [](auto&& open) { return Port(std::move(open)); };
   switch (kind) {
     case config::LinkDevice::Kind::serial:
+      if (link.protocol == config::LinkProtocol::plain)
+        return SerialPort::open(address, static_cast<unsigned>(link.baud)).map([&](SerialPort&& line) {
+          return Port(PlainPort(std::move(line), static_cast<std::uint8_t>(link.system)));
+        });
       return SerialPort::open(address, static_cast<unsigned>(link.baud)).map(as_port);
     case config::LinkDevice::Kind::udp:
       return UdpPort::open({"0.0.0.0", 0}, UdpPort::Endpoint{address, port}).map(as_port);

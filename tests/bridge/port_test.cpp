@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <arpa/inet.h>
+#include <asm/termbits.h>
 #include <gtest/gtest.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -114,7 +116,7 @@ TEST(SerialPort, NamesWhyItCannotBeOpened) {
   PseudoTerminal far;
   EXPECT_EQ(SerialPort::open("/nonexistent/tty", 115200).error().kind, Kind::kOpen);
   EXPECT_EQ(SerialPort::open("/dev/null", 115200).error().kind, Kind::kNotSerial);
-  EXPECT_EQ(SerialPort::open(far.path(), 115201).error().kind, Kind::kBaudRate);
+  EXPECT_EQ(SerialPort::open(far.path(), 0).error().kind, Kind::kBaudRate);
   EXPECT_NE(describe(SerialPort::open("/nonexistent/tty", 115200).error()).find("No such file"), std::string::npos);
 }
 
@@ -132,6 +134,21 @@ TEST(SerialPort, IsBusyForAnyOtherProcessRootsToo) {
   ::waitpid(other, &status, 0);
   EXPECT_EQ(WEXITSTATUS(status), 5);
   EXPECT_TRUE(SerialPort::open(far.path(), 921600) || ::geteuid() != 0) << "the daemon itself opens a lost port again";
+}
+
+TEST(SerialPort, RunsAtRatesThatHaveNoName) {
+  for (const unsigned baud : {9600U, 57'600U, 100'000U, 115'201U, 420'000U, 921'600U, 3'700'000U}) {
+    PseudoTerminal far;
+    auto port = SerialPort::open(far.path(), baud);
+    ASSERT_TRUE(port) << baud;
+    termios2 settings{};  // of the line: both ends show it
+    ASSERT_EQ(::ioctl(far.master(), TCGETS2, &settings), 0);
+    EXPECT_EQ(settings.c_ospeed, baud);
+    EXPECT_EQ(settings.c_ispeed, baud);
+    EXPECT_EQ(settings.c_cflag & static_cast<unsigned>(CSIZE | CSTOPB | PARENB | CRTSCTS), static_cast<unsigned>(CS8));
+    ASSERT_EQ(port->write(every_byte()), 256U);
+    EXPECT_EQ(far.await(), every_byte());
+  }
 }
 
 TEST(UdpPort, TalksToAGivenPeerAndHearsNobodyElse) {

@@ -29,6 +29,7 @@ class PseudoTerminal {
   ~PseudoTerminal() { hang_up(); }
 
   const std::string& path() const { return path_; }
+  int master() const { return master_; }
   void hang_up() {
     if (master_ >= 0) ::close(master_);
     master_ = -1;

@@ -77,13 +77,68 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
   EXPECT_TRUE(names(error_after("\"/dev/ttyAMA0\"", "\"udp:there:14580\""), 13, "link.device"));
   EXPECT_TRUE(names(error_after("baud = 921600", "bauds = 921600"), 14, "link.bauds"));
   EXPECT_TRUE(names(error_after("device = \"/dev/ttyAMA0\"", "device = \"\""), 13, "link.device"));
-  EXPECT_TRUE(names(error_after("file = ", "path = "), 23, "log.path"));
-  EXPECT_TRUE(names(error_after("cpu = -1", "cpu = 0.5"), 19, "control.cpu"));
-  EXPECT_TRUE(names(error_after("battery_land = 0.15", "battery_land = 15"), 20, "control.battery_land"));
-  EXPECT_TRUE(names(error_after("[control]", "[controls]"), 17, "controls"));
-  EXPECT_TRUE(names(error_after("live = false", "live = 0"), 31, "map.live"));
-  EXPECT_TRUE(names(error_after("max_mib = 512", "max_mib = 0"), 34, "map.max_mib"));
-  EXPECT_TRUE(names(error_after("body = \"base_link\"", "body = \"map\""), 25, "frames"));
+  EXPECT_TRUE(names(error_after("\nfile = ", "\npath = "), 25, "log.path"));
+  EXPECT_TRUE(names(error_after("cpu = -1", "cpu = 0.5"), 21, "control.cpu"));
+  EXPECT_TRUE(names(error_after("battery_land = 0.15", "battery_land = 15"), 22, "control.battery_land"));
+  EXPECT_TRUE(names(error_after("[control]", "[controls]"), 19, "controls"));
+  EXPECT_TRUE(names(error_after("live = false", "live = 0"), 33, "map.live"));
+  EXPECT_TRUE(names(error_after("max_mib = 512", "max_mib = 0"), 36, "map.max_mib"));
+  EXPECT_TRUE(names(error_after("body = \"base_link\"", "body = \"map\""), 27, "frames"));
+}
+
+/// What the shipped file says of itself with this key file; "no error" if it is taken.
+std::string with_key(const std::string& content, std::filesystem::perms mode) {
+  const auto path = std::filesystem::temp_directory_path() / "backwash_daemon_file_test.key";
+  std::ofstream(path, std::ios::binary) << content;
+  std::filesystem::permissions(path, mode);
+  const std::string said =
+      error_after("# signing_key_file = \"/etc/backwash/mavlink.key\"", "signing_key_file = \"" + path.string() + "\"");
+  std::filesystem::remove(path);
+  return said;
+}
+
+TEST(DaemonFile, TakesASigningKeyRawOrInHex) {
+  using enum std::filesystem::perms;
+  EXPECT_EQ(with_key(std::string(32, 'k'), owner_read | owner_write), "no error");
+  EXPECT_EQ(with_key(std::string(64, 'a') + "\n", owner_read), "no error");
+  const auto path = std::filesystem::temp_directory_path() / "backwash_key_file_test.key";
+  std::ofstream(path) << "000102030405060708090a0B0c0d0e0f101112131415161718191a1b1c1d1e1f\n";
+  std::filesystem::permissions(path, owner_read | owner_write);
+  const auto key = read_key_file(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(key) << key.error();
+  for (std::size_t i = 0; i < key->size(); ++i) EXPECT_EQ((*key)[i], i);
+}
+
+TEST(DaemonFile, RefusesASigningKeyThatOthersMayReadOrThatIsNone) {
+  using enum std::filesystem::perms;
+  const std::string good(64, 'a'), at = ".toml:17: key 'link.signing_key_file' = ";
+  const auto refused = [&](const std::string& said, const std::string& why) {
+    return said.find(at) != said.npos && said.find(why) != said.npos && said.find(good) == said.npos;
+  };
+  constexpr auto kOwner = owner_read | owner_write;
+  for (const auto other : {group_read, others_read, group_write, others_write, owner_exec})
+    EXPECT_TRUE(refused(with_key(good, kOwner | other), "needs 0600")) << static_cast<unsigned>(other);
+  for (const std::string& bad : {std::string(), std::string(31, 'k'), std::string(33, 'k'), std::string(63, 'a'),
+                                 std::string(65, 'a'), std::string(64, 'g'), std::string(200, 'a')})
+    EXPECT_TRUE(refused(with_key(bad, kOwner), "32 bytes or 64 hexadecimal digits")) << bad.size();
+  EXPECT_TRUE(refused(with_key(std::string(64, '0'), kOwner), "not all zero"));
+  const auto with_path = [](const std::string& path) {
+    return error_after("# signing_key_file = \"/etc/backwash/mavlink.key\"", "signing_key_file = \"" + path + "\"");
+  };
+  EXPECT_TRUE(refused(with_path("/nowhere/key"), "No such file"));
+  EXPECT_TRUE(refused(with_path("/dev/null"), "regular file"));
+  EXPECT_TRUE(refused(with_path("/"), "regular file"));
+}
+
+TEST(DaemonFile, ThePlainProtocolNeedsASerialPort) {
+  const std::string was = "# protocol = \"plain\"";
+  EXPECT_EQ(error_after(was, "protocol = \"plain\""), "no error");
+  EXPECT_EQ(error_after(was, "protocol = \"mavlink\""), "no error");
+  const auto unknown = error_after(was, "protocol = \"modbus\""), key = std::string("key 'link.protocol' = 'modbus'");
+  EXPECT_NE(unknown.find(".toml:16: " + key), unknown.npos) << unknown;
+  const auto socket = error_after("device = \"/dev/ttyAMA0\"", "device = \"tcp:1.2.3.4:5\"\nprotocol = \"plain\"");
+  EXPECT_NE(socket.find("needs a serial port"), socket.npos) << socket;
 }
 
 // They end up in the middleware's XML and in topic names.
