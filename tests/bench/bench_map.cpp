@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Box queries and hover maps on a real building, each beside the plain way to the same answer in the same run.
-// From the repository's root: build/release/tests/bench/bench_map [MAP], default geb079.bt of the data beside the clone.
+// From the repository's root: build/release/tests/bench/bench_map [MAP], default geb079.bt of the data beside the
+// clone.
 #include <benchmark/benchmark.h>
 
 #include <array>

@@ -17,9 +17,7 @@ using nlohmann::json;
 
 class MavlinkVectors : public testing::Test {
  protected:
-  void SetUp() override {
-    data_ = json::parse(std::ifstream(BACKWASH_SOURCE_DIR "/tests/data/mavlink_vectors.json"));
-  }
+  void SetUp() override { data_ = json::parse(std::ifstream(BACKWASH_SOURCE_DIR "/tests/data/mavlink_vectors.json")); }
   json data_;
 };
 
