@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The documents of docs/ are in plain words: no sentence, and no clause of a table's cell, has more than 35 words.
+"""Documents are in plain words: no sentence, and no clause of a table's cell, has more than 35 words.
 
 words.py SOURCE_DIR
 """
@@ -9,6 +9,11 @@ import re
 import sys
 
 MOST = 35
+# Documents that were rewritten to this rule; the others are still to be.
+PAGES = ["README.md", "docs/model.md", "docs/interfaces.md", "docs/faults.md", "core/README.md", "core/map/README.md",
+         "core/field/README.md", "core/reach/README.md", "core/plan/README.md", "core/plan/feasibility.md",
+         "core/sim/README.md", "core/sim/compare.md", "core/study/calibrate/README.md", "services/backwash/README.md",
+         "tests/data/README.md"]
 
 
 def blocks(text: str):
@@ -34,14 +39,14 @@ def blocks(text: str):
 
 def main() -> int:
     wrong = 0
-    for path in sorted((pathlib.Path(sys.argv[1]) / "docs").glob("*.md")):
-        for n, block in blocks(path.read_text()):
+    for page in PAGES:
+        for n, block in blocks((pathlib.Path(sys.argv[1]) / page).read_text()):
             # An abbreviation or a number is no end: a sentence ends before a capital or at the block's end.
             for sentence in re.split(r"[.:?!]\*{0,2}\s+(?=[A-ZΣΔ`*0-9(\[|])|\s→\s", re.sub(r"`[^`]*`", "X", block)):
                 words = [w for w in sentence.split() if re.search(r"\w", w)]
                 if len(words) > MOST:
                     wrong += 1
-                    print(f"docs/{path.name}:{n}: {len(words)} words: {sentence[:90]} …")
+                    print(f"{page}:{n}: {len(words)} words: {sentence[:90]} …")
     return 1 if wrong else 0
 
 
