@@ -13,7 +13,7 @@ MOST = 35
 PAGES = ["README.md", "docs/model.md", "docs/interfaces.md", "docs/faults.md", "core/README.md", "core/map/README.md",
          "core/field/README.md", "core/reach/README.md", "core/plan/README.md", "core/plan/feasibility.md",
          "core/sim/README.md", "core/sim/compare.md", "core/study/calibrate/README.md", "core/study/discrepancy/README.md",
-         "services/backwash/README.md",
+         "core/study/discrepancy/recordings.md", "SECURITY.md", "services/backwash/README.md",
          "tests/data/README.md"]
 
 
