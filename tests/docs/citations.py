@@ -3,7 +3,7 @@
 """Every citation of docs/ in code and documents leads somewhere: sections and equations of model.md, headings of
 interfaces.md, rows of faults.md; so do relative links, and paths of documents that text names.
 
-citations.py SOURCE_DIR
+citations.py SOURCE_DIR [--mend]    --mend: first makes docs/… of citations without a folder; format the code after it
 """
 import os
 import pathlib
@@ -44,8 +44,22 @@ def headings(text: str) -> list[str]:
     return re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M)
 
 
+def mended(text: str) -> str:
+    text = re.sub(r"(?:\.\./)*\bshared/(model|interfaces|faults)\.md", r"docs/\1.md", text)
+    return re.sub(r"(?<![\w./-])(?<!\]\()(model|interfaces|faults)\.md", r"docs/\1.md", text)
+
+
+def mend(root: pathlib.Path) -> None:
+    for path, text in texts(root):
+        if path.parts[0] != "docs" and path.parts[:2] != ("tests", "docs") and mended(text) != text:
+            (root / path).write_text(mended(text))
+            print(f"mended {path}")
+
+
 def main() -> int:
     root = pathlib.Path(sys.argv[1]).resolve()
+    if "--mend" in sys.argv:
+        mend(root)
     model, faults = (root / "docs/model.md").read_text(), (root / "docs/faults.md").read_text()
     sections = set(re.findall(rf"^#+ ({NUMBER})\.? ", model, re.M)) | {
         s.rstrip(".") for s in re.findall(rf"^#+ ({NUMBER}\.?) ", model, re.M)}
