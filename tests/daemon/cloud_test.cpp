@@ -88,7 +88,7 @@ TEST(Cloud, MoreFieldsOrWiderPointsThanDriversSendAreRefused) {
   EXPECT_FALSE(decode_cloud(wide.m));
 }
 
-// faults.md row 27: whatever the sizes claim, nothing beyond the data is read.
+// docs/faults.md row 27: whatever the sizes claim, nothing beyond the data is read.
 TEST(Cloud, SizesThatDoNotFitTheDataAreRefused) {
   std::mt19937 random(1);
   int refused = 0;
