@@ -238,7 +238,8 @@ bool FlightTick::lifted(const TickInput& in) noexcept {
 // until the vehicle stands or follows us again.
 void FlightTick::feed(const TickInput& in, TickOutput& out) noexcept {
   const bool again = !in.autopilot.armed || out.supervisor.mode == Mode::tracking;
-  feed_distrusted_ = odometry_distrusted_ || (feed_distrusted_ && !again);
+  const bool distrusted = odometry_distrusted_ || (was_commanding_ && !supervisor_.pose_trusted());
+  feed_distrusted_ = distrusted || (feed_distrusted_ && !again);
   out.forward_odometry = out.fresh && !feed_distrusted_;
   out.odometry_resets = odometry_resets_;
 }

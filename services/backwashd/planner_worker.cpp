@@ -96,15 +96,19 @@ bool PlannerWorker::current() {
   return front_.standing(view_) == PlanFront::Standing::current;
 }
 
-/// Where the map ends the airflow of what is behind is not known: a way with something to spare comes first.
+/// Where the map ends the airflow of what is behind is not known: a way with something to spare comes first. From rest
+/// at last one with nothing to spare: what has come to light may have left nothing where the vehicle is already.
 plan::Replan PlannerWorker::onward(const plan::World& world, const plan::Route& route, std::size_t now,
                                    std::size_t branch, const Vec3& goal_W) const {
   plan::ReplanOptions options{limits_of(world)};
-  options.reserve_m = kReserve;
-  auto next = plan::replan(world, route, now, branch, goal_W, options);
-  if (next.kind == plan::Replan::Kind::extended) return next;
-  options.reserve_m = kLeastReserve;
-  return plan::replan(world, route, now, branch, goal_W, options);
+  plan::Replan next;
+  for (const double reserve : {kReserve, kLeastReserve, 0.0}) {
+    if (reserve == 0 && branch > 0) break;
+    options.reserve_m = reserve;
+    next = plan::replan(world, route, now, branch, goal_W, options);
+    if (next.kind == plan::Replan::Kind::extended) break;
+  }
+  return next;
 }
 
 /// Why the job could not be done; nothing when it is flying.
