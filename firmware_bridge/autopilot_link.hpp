@@ -19,9 +19,9 @@ namespace backwash::firmware_bridge {
 
 using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort, PlainPort>;
 
-inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< faults.md row 21
-inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);         ///< faults.md row 19
-inline constexpr int kMaxMissedSetpoints = 2;                               ///< faults.md row 20
+inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< docs/faults.md row 21
+inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);         ///< docs/faults.md row 19
+inline constexpr int kMaxMissedSetpoints = 2;                               ///< docs/faults.md row 20
 inline constexpr std::uint8_t kOnboardComputer = 191;                       ///< our component id
 
 /// Commands that the link sends (MAV_CMD), to ask telemetry().result_of() for their answers.

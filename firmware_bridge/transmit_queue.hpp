@@ -42,7 +42,7 @@ class TransmitQueue {
   std::uint64_t sent() const noexcept { return sent_; }
   /// Frames that gave way to newer ones.
   std::uint64_t dropped() const noexcept { return dropped_; }
-  /// Set-points in a row that were not wholly written when the next one came (faults.md row 20).
+  /// Set-points in a row that were not wholly written when the next one came (docs/faults.md row 20).
   int missed_setpoints() const noexcept { return missed_setpoints_; }
 
  private:

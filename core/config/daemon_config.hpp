@@ -26,7 +26,7 @@ struct Daemon {
     std::string body = "base_link";  ///< child frame of odometry; clouds
   } frames;
   struct {
-    bool live = false;           ///< a mapper is declared: a late map is a fault (faults.md row 13)
+    bool live = false;           ///< a mapper is declared: a late map is a fault (docs/faults.md row 13)
     double closing_speed = 0.2;  ///< by which the age of a live map shrinks the trusted clearance, m/s
     double sensor_range = 8;     ///< points farther away only free the way up to there, m
     double max_mib = 512;        ///< largest snapshot made of a map, MiB

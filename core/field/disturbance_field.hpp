@@ -22,8 +22,8 @@ struct Breakdown {
   Variance sigma() const noexcept { return base + ground + corner + wall; }
 };
 
-/// Exact evaluation of model.md section 2 at any point. Holds the elements in buckets and its own copy of the occupied
-/// voxels, as they were when it was made; the grid must outlive it.
+/// Exact evaluation of docs/model.md section 2 at any point. Holds the elements in buckets and its own copy of the
+/// occupied voxels, as they were when it was made; the grid must outlive it.
 class ProximityField {
  public:
   /// O(cells).
@@ -42,7 +42,7 @@ class ProximityField {
   ElementBuckets up_, lateral_;
 };
 
-/// Σ stored at free voxel centres, (m/s²)² (model.md section 2, last paragraph).
+/// Σ stored at free voxel centres, (m/s²)² (docs/model.md section 2, last paragraph).
 class DisturbanceField {
  public:
   /// Empty field over the grid's extent: every voxel's Σ is unset.

@@ -12,7 +12,7 @@
 
 namespace backwash::field {
 
-/// Corner and wall terms (model.md section 2) in whole columns of voxel centres at once.
+/// Corner and wall terms (docs/model.md section 2) in whole columns of voxel centres at once.
 ///
 /// Lateral elements that stand on top of each other with one normal and one floor form a segment. Seen from the voxel
 /// centres of one column, all of them lie behind the same horizontal line, over the same columns of voxels: where these

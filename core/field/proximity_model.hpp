@@ -6,9 +6,9 @@
 
 namespace backwash::field {
 
-/// Contribution of one visible element to Σ at p, (m/s²)²: the three terms of model.md section 2 (paper Eq. 1–3), gates
-/// included, visibility not. With r = c − p, l = max(|r|, a/2) and θ the angle between r and straight down. Each term
-/// is zero for the wrong kind of element. Gates include their limit within 1e-9 (m or rad), so that a wall voxel
+/// Contribution of one visible element to Σ at p, (m/s²)²: the three terms of docs/model.md section 2 (paper Eq. 1–3),
+/// gates included, visibility not. With r = c − p, l = max(|r|, a/2) and θ the angle between r and straight down. Each
+/// term is zero for the wrong kind of element. Gates include their limit within 1e-9 (m or rad), so that a wall voxel
 /// exactly level with the vehicle (θ = π/2) counts whatever the rounding.
 class ProximityModel {
  public:

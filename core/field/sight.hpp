@@ -26,8 +26,8 @@ inline int floor_to_int(double x) noexcept {
   return i - (x < i ? 1 : 0);
 }
 
-/// The segment from p to c without its last 2a (model.md section 1, "Visible"), in voxel units; nothing when |c − p| ≤
-/// 2a.
+/// The segment from p to c without its last 2a (docs/model.md section 1, "Visible"), in voxel units; nothing when |c −
+/// p| ≤ 2a.
 std::optional<Segment> open_part(const Vec3& origin_W, double voxel_edge, const Vec3& p_W, const Vec3& c_W) noexcept;
 
 /// Whether the segment meets the closed box of a voxel, with the tolerance kTouch: the slab test.
@@ -83,7 +83,7 @@ bool clear(const Segment& segment, const EmptyRadius& empty_radius, int empty_st
                                   : clear_along<2>(segment, empty_radius, empty_start);
 }
 
-/// Whether the segment from p to c, its last 2a left out, meets no occupied voxel (model.md section 1, "Visible").
+/// Whether the segment from p to c, its last 2a left out, meets no occupied voxel (docs/model.md section 1, "Visible").
 /// Voxels are closed boxes: a segment through exactly an edge or a corner is blocked if any voxel that touches that
 /// point is occupied. Unknown voxels do not block. Does not test the normal. O(|c − p|/a).
 bool line_of_sight(const map::OccupancyGrid& grid, const Vec3& p_W, const Vec3& c_W) noexcept;

@@ -8,18 +8,18 @@
 
 namespace backwash::field {
 
-/// A piece of surface that throws the wash back at the vehicle (model.md section 1).
+/// A piece of surface that throws the wash back at the vehicle (docs/model.md section 1).
 struct Element {
   enum class Kind { up, lateral } kind;
   Vec3 c_W;     ///< position, m
   Vec3 normal;  ///< unit, W: +z for up, horizontal for lateral
   double area;  ///< A, m²
   std::optional<Vec3>
-      corner_W;  ///< lateral only: top of the floor below the element, horizontally at c (model.md section 2)
+      corner_W;  ///< lateral only: top of the floor below the element, horizontally at c (docs/model.md section 2)
 };
 
 /// All elements of a map, in a fixed order (by voxel, then up before lateral, then +x, −x, +y, −y).
-/// model.md section 1: up element of every occupied voxel whose top neighbour is free; lateral elements with the
+/// docs/model.md section 1: up element of every occupied voxel whose top neighbour is free; lateral elements with the
 /// normal m = g/|g| from the voxel's surroundings, or one per exposed face where m does not exist.
 std::vector<Element> surface_elements(const map::OccupancyGrid& grid);
 

@@ -13,7 +13,7 @@
 
 namespace backwash::field {
 
-/// Σ of model.md section 2 at many voxel centres at once: the same elements, gates, terms and lines of sight as
+/// Σ of docs/model.md section 2 at many voxel centres at once: the same elements, gates, terms and lines of sight as
 /// ProximityField::at, reordered. Nothing is quantised; what differs is the rounding.
 ///
 /// Ground: rows of 64 voxels along x are words of one bit each. Seen from a voxel's centre, the up element at the

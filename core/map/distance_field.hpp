@@ -8,7 +8,7 @@
 namespace backwash::map {
 
 /// Distance from points to the nearest face of an occupied or unknown voxel ("obstacle" below; outside the grid is
-/// unknown and therefore an obstacle), model.md section 4. Stored at voxel centres, 0 inside obstacles.
+/// unknown and therefore an obstacle), docs/model.md section 4. Stored at voxel centres, 0 inside obstacles.
 class DistanceField {
  public:
   /// Exact separable transform: the distance from each voxel centre to the nearest obstacle *box* (not centre), m, in

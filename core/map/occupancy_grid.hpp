@@ -11,7 +11,7 @@ namespace backwash::map {
 
 enum class Cell : std::uint8_t { unknown = 0, free = 1, occupied = 2 };
 
-/// Voxel grid with edge a in the world frame; everything outside it is unknown (model.md section 1).
+/// Voxel grid with edge a in the world frame; everything outside it is unknown (docs/model.md section 1).
 class OccupancyGrid {
  public:
   /// `origin_W`: minimum corner of voxel (0, 0, 0), m. `resolution`: edge a, m, > 0. `size`: voxels along x, y, z, > 0.

@@ -34,7 +34,7 @@ struct SearchResult {
   std::size_t expanded;  ///< states expanded by all attempts
 };
 
-/// Hybrid-state A* (paper Sec. V-A, model.md section 5b) over (p, v): acceleration grid × two durations, cost
+/// Hybrid-state A* (paper Sec. V-A, docs/model.md section 5b) over (p, v): acceleration grid × two durations, cost
 /// G = ∫‖u‖² dt + ρT, each motion checked as a swept set and against the limits per axis, closed by the optimal cubic
 /// to the goal. The open set is taken by bands of f = G + H as wide as H(start), so the cost is below twice the best of
 /// the discretisation; inside a band greedily. A start faster than v_max may only slow down. Deterministic.

@@ -14,7 +14,7 @@ namespace backwash::plan {
 /// infeasible: start and goal are joined by hover-safe space, but no verified trajectory within the limits was found.
 /// deadline: time or the cap of states ran out before an answer.
 enum class PlanStatus { ok, no_path, infeasible, start_blocked, goal_blocked, deadline };
-/// "ok", "no_path", … as in the JSON of `plan` (interfaces.md).
+/// "ok", "no_path", … as in the JSON of `plan` (docs/interfaces.md).
 const char* to_string(PlanStatus status) noexcept;
 
 /// Where the predicted motion starts: the estimated state, and the command active now, which the plan continues.
@@ -38,7 +38,7 @@ struct PlanOptions {
 struct PlanMetrics {
   double length_m = 0, time_s = 0;
   double jerk2 = 0;            ///< ∫‖p⃛‖² dt of the command trajectory, (m/s³)² s
-  double min_clearance_m = 0;  ///< over the verified swept tube (model.md section 4)
+  double min_clearance_m = 0;  ///< over the verified swept tube (docs/model.md section 4)
   double search_ms = 0, optimise_ms = 0, verify_ms = 0;
   std::size_t expanded = 0, evaluations = 0;
 };
@@ -53,8 +53,8 @@ struct Plan {
 };
 
 /// Start of a plan: the state estimated now and the command active now (for continuity).
-/// Kinodynamic search → B-spline fit → optimisation → verification of the whole swept tube (model.md section 5b). What
-/// fails verification is re-optimised with a larger margin, then slowed, then refused; never returned as ok.
+/// Kinodynamic search → B-spline fit → optimisation → verification of the whole swept tube (docs/model.md section 5b).
+/// What fails verification is re-optimised with a larger margin, then slowed, then refused; never returned as ok.
 Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const PlanOptions& options);
 
 /// Where a tube comes nearest to obstacles.
@@ -70,7 +70,7 @@ Approach nearest_approach(const World& world, const reach::ReachTube& tube);
 double tube_clearance(const World& world, const reach::ReachTube& tube);
 
 /// Lowest clear hover height z_safe (m, W) of the column through p, and the floor below it; nothing if there is none.
-/// Take-off and landing move vertically in this column (model.md section 4).
+/// Take-off and landing move vertically in this column (docs/model.md section 4).
 struct Column {
   double z_floor;  ///< top of the first obstacle below, m
   double z_safe;   ///< m
@@ -80,11 +80,12 @@ std::optional<Column> takeoff_column(const World& world, const Vec3& p_W);
 /// Vertical commands from `from` to `to` (same column), rest to rest, minimum-jerk profile within the limits.
 std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
 
-/// Clearance that a take-off tube must have (model.md section 4): beside it only while its centre is below z_safe (m,
-/// W), all around from there on, m.
+/// Clearance that a take-off tube must have (docs/model.md section 4): beside it only while its centre is below z_safe
+/// (m, W), all around from there on, m.
 double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe);
 
-/// Smallest lateral clearance of a vertical tube: obstacles beside it, not the floor below (model.md section 4), m.
+/// Smallest lateral clearance of a vertical tube: obstacles beside it, not the floor below (docs/model.md section 4),
+/// m.
 double lateral_clearance(const World& world, const reach::ReachTube& tube);
 
 }  // namespace backwash::plan

@@ -22,7 +22,7 @@ std::size_t stride(double resolution, double v_max) {
   return static_cast<std::size_t>(std::clamp(periods, 1.0, static_cast<double>(kLongestStride)));
 }
 
-/// G_j of model.md section 5.2 summed over intervals of `stride` steps, until what is left is forgotten.
+/// G_j of docs/model.md section 5.2 summed over intervals of `stride` steps, until what is left is forgotten.
 std::vector<double> coarse(const reach::AxisResponse& response, std::size_t stride) {
   std::vector<double> sums;
   double covered = 0;

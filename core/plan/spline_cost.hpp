@@ -43,7 +43,7 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
 ///   f_s = Σ ‖−q_i + 3q_{i+1} − 3q_{i+2} + q_{i+3}‖²
 ///   f_c = Σ_m lack_m² [lack_m > 0] ‖v_p(τ_m)‖ δτ,   p_p, v_p the motion predicted under the held commands
 ///   f_p = Σ (V² − v_max²)² [V² > v_max²] + the same for accelerations, over control points and axes
-/// lack is model.md's r − d, written about the tube that the spline was verified with last:
+/// lack is docs/model.md's r − d, written about the tube that the spline was verified with last:
 ///   lack_m = margin − (c_m + d(p_p) − d(p_p⁰) − Δe_m),
 /// c_m the exact clearance of that tube's swept prism (its own ten faces, not ‖h‖₂), d the interpolated distance, and
 ///   Δe_m = Σ_n k_n Σ_{j<m} G_{m−1−j} (w̄_n(p_p(τ_j)) − w̄_n(p_p⁰(τ_j)))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Take-off and landing: the vertical corridor below the lowest clear hover height (model.md section 4).
+// Take-off and landing: the vertical corridor below the lowest clear hover height (docs/model.md section 4).
 #include <algorithm>
 
 #include "core/plan/planner.hpp"

@@ -13,10 +13,10 @@
 
 namespace backwash::reach {
 
-/// w̄ at every voxel of a stored field, for maxima over sets (model.md section 3, "Over the set, not at its centre"),
-/// and the mean push that an extended model has there: the disturbance at p is push(p, v) ± w̄. Keeps the maxima over
-/// all cubes of 1, 2 and 4 voxels whose lowest voxel is v, for the v where one is not zero: 64 bytes per entry, 4 bytes
-/// per voxel of the grid.
+/// w̄ at every voxel of a stored field, for maxima over sets (docs/model.md section 3, "Over the set, not at its
+/// centre"), and the mean push that an extended model has there: the disturbance at p is push(p, v) ± w̄. Keeps the
+/// maxima over all cubes of 1, 2 and 4 voxels whose lowest voxel is v, for the v where one is not zero: 64 bytes per
+/// entry, 4 bytes per voxel of the grid.
 class BoundField {
  public:
   /// Unstored voxels count as 0 (the vehicle's centre cannot be there).

@@ -8,7 +8,8 @@
 #include "core/reach/reach_tube.hpp"
 #include "core/types/disturbance.hpp"
 
-// Chance-constrained sets (model.md section 5.3): no worst case, but a stated probability of leaving them. In direction
+// Chance-constrained sets (docs/model.md section 5.3): no worst case, but a stated probability of leaving them. In
+// direction
 // n
 //   e_n = (support under the mean push and from the first set) + Gaussian part,  w_n(t) = s_n(t) ξ(t),  s_n = √(nᵀΣn),
 // with ξ stationary, Gaussian, of variance 1 and correlation e^{−|τ|/τ_w} (Ornstein–Uhlenbeck). The Gaussian part has

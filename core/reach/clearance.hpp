@@ -13,7 +13,7 @@
 namespace backwash::reach {
 
 /// Distance from an octagonal prism to the nearest face of an occupied or unknown voxel, m, 0 if they meet
-/// (model.md section 4, "Clearance", before body and estimation are taken off). The prism is
+/// (docs/model.md section 4, "Clearance", before body and estimation are taken off). The prism is
 /// {center + e : |unit(d)·e| ≤ half_widths[d] for every Direction d}; outside the grid is unknown.
 /// Exact up to `limit`; returns `limit` if nothing is nearer. O((extent/a)³).
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,

@@ -7,7 +7,7 @@
 
 #include "core/reach/error_dynamics.hpp"
 
-// The control error that a coloured Gaussian disturbance s ξ(t) makes: covariance, turning, exits (model.md
+// The control error that a coloured Gaussian disturbance s ξ(t) makes: covariance, turning, exits (docs/model.md
 // section 5.3).
 namespace backwash::reach {
 

@@ -10,8 +10,9 @@
 
 namespace backwash::reach {
 
-/// The second-order loop ë = −k_p e − k_d ė + w as a recursion of constant cost (model.md section 5.2). Underdamped,
-/// with g = e^{−στ} sin(ωτ)/ω, T = π/ω and ρ = e^{−σT}: |g|(τ) = g(τ) + 2 Σ_{m≥1} ρᵐ g(τ − mT), so that under w̄
+/// The second-order loop ë = −k_p e − k_d ė + w as a recursion of constant cost (docs/model.md section 5.2).
+/// Underdamped, with g = e^{−στ} sin(ωτ)/ω, T = π/ω and ρ = e^{−σT}: |g|(τ) = g(τ) + 2 Σ_{m≥1} ρᵐ g(τ − mT), so that
+/// under w̄
 ///   h(t) = y(t) + 2 Σ_{m=1}^{M} ρᵐ y(t − mT) + at most `tail`·max w̄,   ÿ = −k_p y − k_d ẏ + w̄, y(0) = ẏ(0) = 0.
 /// Exact at sample instants for w̄ constant in each step: y(t − mT) follows from the state at the sample before it by a
 /// fixed fractional step. Otherwise (critically damped, overdamped) g ≥ 0, M = 0 and h = y.

@@ -12,7 +12,7 @@ namespace backwash::reach {
 
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
-/// The paper's ellipsoidal reachable set of the error state (e_p, e_v) ∈ R⁶ (model.md section 5.1), kept as the
+/// The paper's ellipsoidal reachable set of the error state (e_p, e_v) ∈ R⁶ (docs/model.md section 5.1), kept as the
 /// reference. {e : eᵀ Q⁻¹ e ≤ 1}; Q in m², m²/s, m²/s². Second-order loop only.
 class EllipsoidRecursion {
  public:

@@ -14,7 +14,7 @@
 
 namespace backwash::reach {
 
-/// Which closed loop the sets are exact for (model.md section 4, "The loop").
+/// Which closed loop the sets are exact for (docs/model.md section 4, "The loop").
 enum class Loop {
   vehicle,     ///< continuous feedback with the vehicle's feedback delay and attitude lag: what flies
   continuous,  ///< the paper's second-order loop ë = −k_p e − k_d ė + w
@@ -24,7 +24,7 @@ enum class Loop {
 /// The horizontal or vertical axis of a vehicle, as `loop` sees it (continuous: delay and lag dropped).
 AxisLoop axis_loop(const Vehicle& vehicle, bool vertical, Loop loop);
 
-/// Response of one axis, sampled so that exact supports become a sum (model.md section 5.2):
+/// Response of one axis, sampled so that exact supports become a sum (docs/model.md section 5.2):
 ///   h(k dt) = √(q_p² r_p(k)² + q_v² r_v(k)²) + Σ_j w̄_{k−1−j} G_j,   G_j = ∫_{j dt}^{(j+1) dt} |g|,
 /// with g the impulse response from acceleration to position. Under sampled feedback g depends on the instant s of the
 /// impulse within its step, and G_j = ∫₀^dt |g((j + 1) dt, s)| ds. Tables have one entry per step of dt = 20 ms or,
@@ -69,14 +69,13 @@ AxisResponse axis_response(const AxisLoop& axis, Loop loop);
 Vec3 commanded_acceleration(const Vehicle& vehicle, const State& state, const Setpoint& command) noexcept;
 
 /// Predicted motion of the vehicle under held, delayed commands without disturbance: the centre of the sets
-/// (model.md section 4, "Centre"):  lag·ȧ = r(t) − k_p p(t − δ) − k_d v(t − δ) − a,  r = k_p p_cmd + k_d v_cmd + a_cmd.
-/// The set-point is held for one period and acts `latency` later: in a period the older command acts for the remainder
-/// of latency/dt, then the newer one. attitude_lag 0: the acceleration is the right-hand side at once. Loop::continuous
-/// drops lag and delay δ, not the latency. Loop::sampled: feedback of the state at k dt − δ, held for dt; the set-point
-/// part still switches in the period. Before the start the state is held constant for the delayed feedback, and
-/// `previous` is the active command.
-/// Exact (matrix exponentials) without delay and for Loop::sampled; continuous feedback with delay: steps of at most
-/// 1 ms with cubic interpolation of the feedback, within 1e-6 m.
+/// (docs/model.md section 4, "Centre"):  lag·ȧ = r(t) − k_p p(t − δ) − k_d v(t − δ) − a,  r = k_p p_cmd + k_d v_cmd +
+/// a_cmd. The set-point is held for one period and acts `latency` later: in a period the older command acts for the
+/// remainder of latency/dt, then the newer one. attitude_lag 0: the acceleration is the right-hand side at once.
+/// Loop::continuous drops lag and delay δ, not the latency. Loop::sampled: feedback of the state at k dt − δ, held for
+/// dt; the set-point part still switches in the period. Before the start the state is held constant for the delayed
+/// feedback, and `previous` is the active command. Exact (matrix exponentials) without delay and for Loop::sampled;
+/// continuous feedback with delay: steps of at most 1 ms with cubic interpolation of the feedback, within 1e-6 m.
 class CentrePredictor {
  public:
   static constexpr int kMaxDelaySteps = 16;  ///< longest latency and feedback delay, periods

@@ -11,7 +11,7 @@
 
 namespace backwash::reach {
 
-/// The infinite-time set of a vehicle hovering at a point (model.md sections 3 and 5).
+/// The infinite-time set of a vehicle hovering at a point (docs/model.md sections 3 and 5).
 struct HoverSet {
   PerDirection half_widths{};  ///< m
   Vec3 shift = Vec3::Zero();   ///< of its centre from the set-point, m: mean push of an extended model over k_p

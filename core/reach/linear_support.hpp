@@ -6,7 +6,8 @@
 
 namespace backwash::reach {
 
-/// The FIR of model.md section 5.2 for any linear system ẋ = A x + B u, y = c x: exact supports of one output, offline.
+/// The FIR of docs/model.md section 5.2 for any linear system ẋ = A x + B u, y = c x: exact supports of one output,
+/// offline.
 struct LinearSystem {
   Eigen::MatrixXd A;     ///< n × n
   Eigen::MatrixXd B;     ///< n × m

@@ -13,7 +13,8 @@
 
 namespace backwash::reach {
 
-/// The exact support of the position error in directions that share a response, propagated by model.md section 5.2.
+/// The exact support of the position error in directions that share a response, propagated by docs/model.md
+/// section 5.2.
 template <std::size_t Lanes>
 class SupportGroup {
  public:

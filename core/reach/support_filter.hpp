@@ -35,8 +35,8 @@ class NewestFirst {
   std::size_t begin_, size_ = 0;
 };
 
-/// The convolution Σ_j w̄_{k−1−j} G_j of model.md section 5.2 for `Lanes` sequences that share a response: by the delay
-/// recursion where the response has one, else by the FIR. The response must outlive it.
+/// The convolution Σ_j w̄_{k−1−j} G_j of docs/model.md section 5.2 for `Lanes` sequences that share a response: by the
+/// delay recursion where the response has one, else by the FIR. The response must outlive it.
 template <std::size_t Lanes>
 class SupportFilter {
  public:

@@ -52,7 +52,7 @@ std::vector<Setpoint> straight_commands(const Vec3& from_W, const Vec3& to_W, do
 /// The same command `seconds` long.
 std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds);
 
-/// Columns of interfaces.md, "Flight log, CSV"; position, velocity and attitude as estimated on board.
+/// Columns of docs/interfaces.md, "Flight log, CSV"; position, velocity and attitude as estimated on board.
 study::FlightLog to_log(const std::vector<FlightSample>& samples);
 
 struct FlightOptions {
@@ -115,7 +115,7 @@ struct TakeOff {
   double clearance_m;  ///< of the tube from exactly the ground point
 };
 /// Refused where there is no known floor, or where the tube of a vehicle that knows its position exactly is not clear:
-/// beside it below z_safe, all around above (model.md section 4).
+/// beside it below z_safe, all around above (docs/model.md section 4).
 tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const FlightOptions& options);
 
 /// Checks start, goal and take-off column, takes off, settles, plans from the estimated state, follows and holds: one

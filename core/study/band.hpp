@@ -9,7 +9,7 @@
 
 namespace backwash::study {
 
-/// Frequencies that a variance counts, Hz (model.md section 3).
+/// Frequencies that a variance counts, Hz (docs/model.md section 3).
 struct Band {
   double low_hz = 0.2, high_hz = 20;
   /// The band that a signal of this rate can carry: the top is lowered to 0.4·rate, below the Nyquist frequency.
@@ -33,8 +33,8 @@ struct Correlation {
 Correlation correlation(std::span<const double> signal, double rate_hz, double longest_s = 2.0);
 
 /// var(a)/var(w) of a closed position loop held at rest, for a disturbance w of correlation time tau_w (s; spectrum
-/// 1/(1 + (2πfτ)²)): ∫|H|²S / ∫S with H(s) = 1/(1 + (k_p + k_d s) e^(−s·delay)/(s² (1 + lag s))) (model.md section 3;
-/// 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both integrals run over it; without, over all
+/// 1/(1 + (2πfτ)²)): ∫|H|²S / ∫S with H(s) = 1/(1 + (k_p + k_d s) e^(−s·delay)/(s² (1 + lag s))) (docs/model.md section
+/// 3; 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both integrals run over it; without, over all
 /// frequencies. Numerical, relative error below 1e-4.
 double loop_attenuation(double k_p, double k_d, double delay_s, double lag_s, double tau_w,
                         const std::optional<Band>& band);

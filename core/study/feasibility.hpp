@@ -41,7 +41,7 @@ struct Bottleneck {
 /// the set does not fit. Nothing if the points are not joined by free voxels. O(cells log cells).
 std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_W, const Vec3& to_W);
 
-/// What taking Σ over the set instead of at its centre costs (model.md section 3).
+/// What taking Σ over the set instead of at its centre costs (docs/model.md section 3).
 struct SetCost {
   std::size_t safe_at_centre = 0;         ///< voxels that would be hover-safe with Σ of their centre
   std::size_t lost = 0;                   ///< of these, not hover-safe with Σ over the set

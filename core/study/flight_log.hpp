@@ -9,8 +9,8 @@
 
 namespace backwash::study {
 
-/// A flight log by column (interfaces.md, "Flight log, CSV"): SI units, world frame z-up. Columns that a log lacks are
-/// absent from the map, never zero.
+/// A flight log by column (docs/interfaces.md, "Flight log, CSV"): SI units, world frame z-up. Columns that a log lacks
+/// are absent from the map, never zero.
 struct FlightLog {
   std::vector<double> t_s;
   std::map<std::string, std::vector<double>> columns;  ///< name as in the file → one value per row

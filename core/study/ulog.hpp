@@ -33,7 +33,7 @@ struct ULog {
 /// cannot be, data without a subscription or of a wrong size.
 tl::expected<ULog, std::string> decode_ulog(std::span<const std::uint8_t> bytes);
 
-/// Reads a file as a flight log (interfaces.md): vehicle_local_position, vehicle_attitude, sensor_combined or
+/// Reads a file as a flight log (docs/interfaces.md): vehicle_local_position, vehicle_attitude, sensor_combined or
 /// vehicle_acceleration for acceleration (else that of the local position), trajectory_setpoint, battery_status,
 /// actuator_outputs/actuator_motors, vehicle_thrust_setpoint or the thrust of vehicle_attitude_setpoint; NED/FRD turned
 /// into z-up and x forward, y left, z up. Rows are those of the local position; other topics are joined by their latest

@@ -15,7 +15,7 @@
 
 namespace backwash::study {
 
-/// What stands for the disturbance w (model.md section 3).
+/// What stands for the disturbance w (docs/model.md section 3).
 enum class Signal {
   commanded,  ///< w = a − what the rotors were told to give: set-points in the log, gains in the vehicle file
   divided,    ///< raw acceleration; the closed loop's attenuation divided out of the variance
@@ -70,7 +70,7 @@ struct WindowOptions {
   double saturated_share = 0.02;  ///< of a window's rows
 };
 
-/// Cuts a flight into gated windows (model.md section 3). Needs x_m y_m z_m and ax_mps2 ay_mps2 az_mps2.
+/// Cuts a flight into gated windows (docs/model.md section 3). Needs x_m y_m z_m and ax_mps2 ay_mps2 az_mps2.
 ///
 ///   w = a − r,  lag·ṙ = u − r,  u = a_cmd(t − latency) + k_p (p_cmd(t − latency) − p(t − delay)) + k_d (v_cmd … − v …)
 ///

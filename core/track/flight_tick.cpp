@@ -14,7 +14,7 @@ constexpr int kDisarmEvery = 25;   // ticks: one command may be lost
 constexpr std::size_t kTakeoffEvery = 25;
 constexpr double kLeastBelow = 0.1;  // m: a lift-off is over from so far below its height on
 constexpr int kSettled = 50;  // ticks there: PX4 gives its loops their authority bit by bit, until 4 s after arming
-constexpr int kDisorder = 3;  // more in a row are as no odometry at all (faults.md row 5)
+constexpr int kDisorder = 3;  // more in a row are as no odometry at all (docs/faults.md row 5)
 
 double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
 std::int64_t nanoseconds(double s) noexcept { return static_cast<std::int64_t>(s * 1e9); }
@@ -45,10 +45,10 @@ bool finite(const Setpoint& s) noexcept {
 FlightTick::FlightTick(const Vehicle& vehicle, double battery_land)
     : battery_land_(battery_land), sigma_(vehicle.estimation.position), gate_(vehicle), tracker_(Setpoint{}, vehicle) {}
 
-// A loop closure (faults.md row 4) moves the map frame under the vehicle. Everything that is in it moves along within
-// this tick, so that in the controller's frame, and physically, nothing has moved; the planner then brings the flight
-// back to its place in the map (rectified()). One that is absurd is not flown: the samples are brought back into the
-// frame that is flown in, until the vehicle is in other hands.
+// A loop closure (docs/faults.md row 4) moves the map frame under the vehicle. Everything that is in it moves along
+// within this tick, so that in the controller's frame, and physically, nothing has moved; the planner then brings the
+// flight back to its place in the map (rectified()). One that is absurd is not flown: the samples are brought back into
+// the frame that is flown in, until the vehicle is in other hands.
 void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
   closure_refused_now_ = false;
   if (!sample || sample->closures == closures_) return;
@@ -129,7 +129,8 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
 
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
-  // What was planned before an operator's order, or before the mode last ended it, is not flown (faults.md row 39).
+  // What was planned before an operator's order, or before the mode last ended it, is not flown (docs/faults.md row
+  // 39).
   const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms);
   out.accepted = following && closure_refused_ == closures_ && in.segment->epoch == epoch_ && gate_.last() &&
                  tracker_.accept(*in.segment, gate_.last()->state);

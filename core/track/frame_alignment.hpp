@@ -23,7 +23,7 @@ enum class Mismatch : std::uint8_t { none, x, y, z, yaw, roll, pitch };
 const char* to_string(Mismatch mismatch) noexcept;
 
 /// Estimates local ← map, p_local = R_z(yaw) p_map + t, from the vehicle's pose in both frames at the same moments
-/// (interfaces.md, "Frames between map, odometry and controller"). While learning it follows the newest samples;
+/// (docs/interfaces.md, "Frames between map, odometry and controller"). While learning it follows the newest samples;
 /// frozen, it only watches how well they still agree.
 class FrameAlignment {
  public:
@@ -50,7 +50,7 @@ class FrameAlignment {
   /// This pair lies further from the transform than any noise. Real-time: wait-free, no allocation.
   bool reset_between(const FramePose& in_map, const FramePose& in_local) const noexcept;
   /// The controller's own estimate, `dt` s after the pair before, is not where its own velocity and gyros have carried
-  /// it: it was reset, or follows something that jumped (faults.md row 8). Real-time: wait-free, no allocation.
+  /// it: it was reset, or follows something that jumped (docs/faults.md row 8). Real-time: wait-free, no allocation.
   bool local_jumped(const FramePose& in_local, double dt) const noexcept;
   /// Enough samples; their residuals and the two attitudes' tilt (low-passed over 0.2 s) are small; and the odometry
   /// has turned no further than the gyros say.
@@ -61,8 +61,8 @@ class FrameAlignment {
   double yaw_residual() const noexcept { return yaw_residual_; }            ///< rad
 
   /// What is wrong with the frames, from the correlation of the two velocities (over the last 5 s of motion while
-  /// learning) and from the two attitudes' tilt (faults.md row 7). Velocity is judged along directions in which the
-  /// vehicle has moved; a vehicle that stood still shows its tilt only. Real-time: wait-free, no allocation.
+  /// learning) and from the two attitudes' tilt (docs/faults.md row 7). Velocity is judged along directions in which
+  /// the vehicle has moved; a vehicle that stood still shows its tilt only. Real-time: wait-free, no allocation.
   Mismatch mismatch() const noexcept;
 
   /// A command of the map frame in the controller's local frame. Real-time: wait-free, no allocation.

@@ -24,8 +24,8 @@ struct OdometrySample {
   std::optional<Vec3> position_variance{}, attitude_variance{}, velocity_variance{};
 };
 
-/// Lets only credible odometry through (faults.md rows 2, 3, 5, 6, 41, 49). It sees the newest sample of each tick.
-/// Real-time: wait-free, no allocation.
+/// Lets only credible odometry through (docs/faults.md rows 2, 3, 5, 6, 41, 49). It sees the newest sample of each
+/// tick. Real-time: wait-free, no allocation.
 ///
 /// Its noise level is σ = estimation.position. A position error of σ takes half a second or more to build up, so the
 /// velocity is good to σ_v = σ / 0.5 s.

@@ -23,7 +23,7 @@ enum class Mode : std::uint8_t {
 inline constexpr int kModes = 7;
 const char* to_string(Mode mode) noexcept;
 
-/// Why the mode is what it is; faults.md has the rows.
+/// Why the mode is what it is; docs/faults.md has the rows.
 enum class Reason : std::uint8_t {
   started,
   enabled,
@@ -152,10 +152,10 @@ std::span<const Transition> transitions() noexcept;
 /// the reason says so. If none occurs: → enabling.
 std::span<const Reason> refusals() noexcept;
 
-/// The daemon's explicit states and reactions: a pure function of the facts of each tick (faults.md).
+/// The daemon's explicit states and reactions: a pure function of the facts of each tick (docs/faults.md).
 class Supervisor {
  public:
-  static constexpr double kHoldAfter = 0.08;     ///< s without odometry until HOLD (faults.md row 1: 100 ms)
+  static constexpr double kHoldAfter = 0.08;     ///< s without odometry until HOLD (docs/faults.md row 1: 100 ms)
   static constexpr double kLandAfter = 0.38;     ///< s without odometry until LAND (row 1: 400 ms)
   static constexpr double kUntrusted = 0.30;     ///< s of hold with an untrusted pose until LAND
   static constexpr double kHeartbeatLost = 1.5;  ///< s (row 21)

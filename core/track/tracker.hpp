@@ -15,7 +15,7 @@
 namespace backwash::track {
 
 /// What a plan was made under. It is flown only while nothing has ended that since: an operator's command, or an event
-/// after which the vehicle moves on at a later command alone (faults.md row 39).
+/// after which the vehicle moves on at a later command alone (docs/faults.md row 39).
 struct Epoch {
   std::uint64_t order = 0;  ///< number of the operator's newest order to the control thread
   std::uint64_t lapse = 0;  ///< times that the mode itself ended what was planned: every mode but tracking, and every
@@ -44,7 +44,7 @@ struct AcceptedSegment {
   static constexpr std::size_t kClearanceEvery = 50;
 };
 
-/// What one tick says about the measured position (model.md section 5.4).
+/// What one tick says about the measured position (docs/model.md section 5.4).
 struct Inside {
   bool judged = false;         ///< false before the first segment: nothing is claimed
   bool inside = true;          ///< |e_n| ≤ h_n in all five directions
@@ -57,7 +57,7 @@ struct Inside {
 /// accept if there is something new, judge the measurement taken now, then step.
 class Tracker {
  public:
-  /// `initial`: half axes of the first set (model.md section 5): how far the state may have moved since the tube's
+  /// `initial`: half axes of the first set (docs/model.md section 5): how far the state may have moved since the tube's
   /// start.
   Tracker(const Setpoint& hold, const Vehicle& vehicle);
   /// Takes a segment over, or refuses it: a new one must start where the vehicle is now (its state within the ellipsoid

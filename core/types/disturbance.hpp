@@ -5,7 +5,7 @@
 
 namespace backwash {
 
-/// Variance of the vehicle's linear acceleration: a symmetric 3×3 tensor Σ in W, (m/s²)² (model.md section 2).
+/// Variance of the vehicle's linear acceleration: a symmetric 3×3 tensor Σ in W, (m/s²)² (docs/model.md section 2).
 /// A variance is not a bound: bound() below is the only conversion.
 struct Variance {
   double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
@@ -24,7 +24,7 @@ struct Variance {
     return xx * n.x() * n.x() + yy * n.y() * n.y() + zz * n.z() * n.z() +
            2 * (xy * n.x() * n.y() + xz * n.x() * n.z() + yz * n.y() * n.z());
   }
-  /// s_n m mᵀ + s_t t tᵀ + s_z z zᵀ with t = z × m, for a horizontal unit normal m (model.md section 2, wall and
+  /// s_n m mᵀ + s_t t tᵀ + s_z z zᵀ with t = z × m, for a horizontal unit normal m (docs/model.md section 2, wall and
   /// corner).
   static Variance about_normal(const Vec3& m, double s_n, double s_t, double s_z) noexcept {
     const double x = m.x(), y = m.y();
@@ -40,7 +40,7 @@ struct DisturbanceBound {
   PerDirection w{};  ///< m/s²
 };
 
-/// How a variance becomes a bound (model.md section 3); the `[bound]` table of a model file.
+/// How a variance becomes a bound (docs/model.md section 3); the `[bound]` table of a model file.
 struct BoundModel {
   double kappa = 3.0;            ///< bound in standard deviations
   double mean_horizontal = 0.0;  ///< largest steady push in any horizontal direction, m/s²
@@ -48,8 +48,8 @@ struct BoundModel {
   double tau_w = 0.15;           ///< correlation time of the disturbance, s (chance-constrained mode)
 };
 
-/// w̄_n = mean_n + κ √(nᵀΣn) in the five directions (model.md section 3): the one conversion from variance to bound.
-/// Negative variances from rounding count as 0. Real-time: wait-free, no allocation.
+/// w̄_n = mean_n + κ √(nᵀΣn) in the five directions (docs/model.md section 3): the one conversion from variance to
+/// bound. Negative variances from rounding count as 0. Real-time: wait-free, no allocation.
 inline DisturbanceBound bound(const Variance& sigma, const BoundModel& model) noexcept {
   DisturbanceBound b;
   for (std::size_t d = 0; d < kDirections; ++d) {

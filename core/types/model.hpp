@@ -26,7 +26,7 @@ struct ModelEffect {
   double scale = 0;                                 ///< m, or the exponent
 };
 
-/// Disturbance model, the content of a model file (interfaces.md, "Model file"). The defaults are the documented
+/// Disturbance model, the content of a model file (docs/interfaces.md, "Model file"). The defaults are the documented
 /// default model of the 5-inch vehicle. Variances in (m/s²)², lengths in m, angles in rad.
 struct Model {
   struct {

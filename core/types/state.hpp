@@ -11,7 +11,7 @@ struct State {
   Vec3 v_W = Vec3::Zero();  ///< velocity, m/s
 };
 
-/// One position command, held for one control period (model.md section 4).
+/// One position command, held for one control period (docs/model.md section 4).
 struct Setpoint {
   Vec3 p_W = Vec3::Zero();  ///< position, m
   Vec3 v_W = Vec3::Zero();  ///< velocity, m/s

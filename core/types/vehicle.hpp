@@ -5,7 +5,7 @@
 
 namespace backwash {
 
-/// The vehicle and its controller, the content of a vehicle file (interfaces.md, "vehicle.toml").
+/// The vehicle and its controller, the content of a vehicle file (docs/interfaces.md, "Vehicle file").
 struct Vehicle {
   struct HorizontalVertical {
     double horizontal = 0, vertical = 0;

@@ -11,7 +11,8 @@ namespace backwash::services {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON as interfaces.md fixes it: points [x, y, z]; symmetric tensors [xx, xy, xz, yy, yz, zz]; half widths by name.
+/// JSON as docs/interfaces.md fixes it: points [x, y, z]; symmetric tensors [xx, xy, xz, yy, yz, zz]; half widths by
+/// name.
 Json to_json(const Vec3& p);
 Json to_json(const Variance& sigma);
 Json to_json(const PerDirection& half_widths);

@@ -21,8 +21,8 @@ struct Cloud {
 inline constexpr std::size_t kMaxCloudPoints = 320 * 240 * 4, kMaxCloudFields = 32, kMaxPointBytes = 128;
 
 /// Reads x, y, z (float32 or float64) of every point; nothing is read outside `data`. Errors, one line: no such fields
-/// or another type, sizes that do not agree with each other or with the data (faults.md row 27), big-endian data, more
-/// than the largest cloud has. O(points).
+/// or another type, sizes that do not agree with each other or with the data (docs/faults.md row 27), big-endian data,
+/// more than the largest cloud has. O(points).
 tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& message);
 
 }  // namespace backwash::daemon

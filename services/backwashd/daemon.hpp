@@ -8,7 +8,7 @@
 
 namespace backwash::daemon {
 
-/// Everything that a daemon is started with, read and validated before any port is opened (faults.md row 38).
+/// Everything that a daemon is started with, read and validated before any port is opened (docs/faults.md row 38).
 struct Settings {
   config::Daemon daemon;
   Vehicle vehicle;
@@ -21,8 +21,8 @@ tl::expected<Settings, std::string> load_settings(const std::string& path);
 /// Runs until SIGINT or SIGTERM; returns the exit code: 0; 74 when the device is no port that can be
 /// used (one that is missing or busy is waited for), 73 when the log cannot be
 /// made, 71 when the middleware or a thread cannot be started; 70 after an exception in any thread, which ends the
-/// flight in silence (faults.md row 50); 74 also when the disk does not answer at the end. Each is one line on standard
-/// error.
+/// flight in silence (docs/faults.md row 50); 74 also when the disk does not answer at the end. Each is one line on
+/// standard error.
 int run(const Settings& settings);
 
 }  // namespace backwash::daemon

@@ -19,14 +19,14 @@
 namespace backwash::daemon {
 
 /// The daemon's side of the DDS topics that flight depends on: odometry, loop closures and commands in, answers and
-/// status out (interfaces.md); those with large samples are MapFront's.
+/// status out (docs/interfaces.md); those with large samples are MapFront's.
 class DdsFront {
  public:
   /// `priority`: SCHED_FIFO priority of the threads between the network and the control thread; 0: ordinary.
   DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels, Recorder& recorder);
 
   /// Thread body. Odometry is taken from one writer: the first whose sample was good, until it is gone and nothing is
-  /// commanded any more; that of others is refused by its identity (faults.md row 48).
+  /// commanded any more; that of others is refused by its identity (docs/faults.md row 48).
   void run_readers();
   /// Thread body: status out at 10 Hz.
   void run_status(const Vehicle& vehicle);

@@ -14,7 +14,7 @@ class LinkWatch {
  public:
   LinkWatch(Channels& channels, const decltype(config::Daemon::link)& link) : channels_(channels), link_(link) {}
   /// Logs what the control thread reported, each loss of the port and a link fault that is new, and opens a lost port
-  /// again (faults.md rows 17 and 19), one that was lost again between two calls too. To be called a few times a
+  /// again (docs/faults.md rows 17 and 19), one that was lost again between two calls too. To be called a few times a
   /// second.
   void step();
 

@@ -17,7 +17,7 @@ namespace backwash::daemon {
 
 /// Where the daemon's lines for the operator go: into a ring, and from there by one thread of its own to a descriptor,
 /// so that a terminal that nobody reads, a full pipe or a closed one delays no thread that has something to say
-/// (faults.md row 44). What does not fit is dropped, counted, and said as soon as lines can be written again.
+/// (docs/faults.md row 44). What does not fit is dropped, counted, and said as soon as lines can be written again.
 ///
 /// Text that others chose cannot forge lines or steer a terminal: all but printable ASCII is written as \xNN, and a
 /// line ends after kLongest characters. A cause (level and text up to its first digit or quote) may say kBurst lines at

@@ -11,7 +11,7 @@
 namespace backwash::daemon {
 namespace {
 
-constexpr double kLate = 1.0;      // s (faults.md row 13)
+constexpr double kLate = 1.0;      // s (docs/faults.md row 13)
 constexpr int kRecordsInTick = 2;  // of a ring: more than scans come in 20 ms
 
 using Sets = std::span<const reach::TubeStep>;

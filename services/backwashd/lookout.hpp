@@ -12,8 +12,8 @@ namespace backwash::daemon {
 
 using MapSettings = decltype(config::Daemon::map);
 
-/// What the map says about a tick (faults.md rows 9, 10, 13, 14). The control thread's part of the map: it looks at the
-/// newest snapshot and, before any snapshot holds them, at the voxels that a scan has just found occupied.
+/// What the map says about a tick (docs/faults.md rows 9, 10, 13, 14). The control thread's part of the map: it looks
+/// at the newest snapshot and, before any snapshot holds them, at the voxels that a scan has just found occupied.
 class Lookout {
  public:
   Lookout(Channels& channels, const Vehicle& vehicle, const MapSettings& map)

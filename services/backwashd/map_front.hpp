@@ -14,7 +14,7 @@ namespace backwash::daemon {
 
 /// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube and trajectory out. Its
 /// participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here, odometry and commands
-/// (DdsFront) do not wait for it (faults.md row 46).
+/// (DdsFront) do not wait for it (docs/faults.md row 46).
 class MapFront {
  public:
   static constexpr std::size_t kMaxMapBytes = 48u << 20;  ///< larger maps are refused before they are copied

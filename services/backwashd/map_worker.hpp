@@ -14,8 +14,8 @@ namespace backwash::daemon {
 
 /// Turns maps and scans into immutable worlds (grid, distance, field, bounds, hover map). A map that cannot be read,
 /// that has nothing free, another resolution than the one in use, or a snapshot above map.max_mib, is rejected whole
-/// and counted, and the old world stays (faults.md rows 10 to 12). Scans that came meanwhile are taken in together, and
-/// the world is updated where they changed something.
+/// and counted, and the old world stays (docs/faults.md rows 10 to 12). Scans that came meanwhile are taken in
+/// together, and the world is updated where they changed something.
 class MapWorker {
  public:
   MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,

@@ -39,7 +39,7 @@ struct MissionInput {
 /// what the control and planner threads are asked for. Pure: it has no clock and no channel of its own.
 ///
 /// Every order has a number, and everything that is planned belongs to the order after which it was asked for: a STOP,
-/// land, disable or hold thereby ends whatever was planned before it, wherever that is by then (faults.md row 39).
+/// land, disable or hold thereby ends whatever was planned before it, wherever that is by then (docs/faults.md row 39).
 class Mission {
  public:
   static constexpr double kLease = 10.0;  ///< s after a station's last command until another may take over
@@ -47,9 +47,9 @@ class Mission {
   /// Takes what the other threads have said; a job, if the flight goes on by itself.
   Decision observe(const MissionInput& in);
   /// Answers one command and decides what it asks for. A repeated sequence number of a session is answered again, not
-  /// done again (faults.md row 28 and the session rules of the IDL). A session is its writer's: a writer that departs
-  /// ends it, and no other one can go on with it (row 48). STOP is taken from everybody: of another session, of one
-  /// that is over, with an old number, with anything else in it that is no number.
+  /// done again (docs/faults.md row 28 and the session rules of the IDL). A session is its writer's: a writer that
+  /// departs ends it, and no other one can go on with it (row 48). STOP is taken from everybody: of another session, of
+  /// one that is over, with an old number, with anything else in it that is no number.
   Decision handle(const CommandMessage& command, double now_s);
   /// Holder of the lease, empty if none.
   std::string station(double now_s) const;

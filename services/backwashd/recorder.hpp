@@ -14,7 +14,7 @@
 namespace backwash::daemon {
 
 /// Writes the raw log from its own thread: the control thread's ring, and what the other threads append. A full disk, a
-/// vanished directory or a disk that does not answer costs records and nothing else (faults.md row 35): they are
+/// vanished directory or a disk that does not answer costs records and nothing else (docs/faults.md row 35): they are
 /// counted, a warning is given, and a file that can be written again goes on with a `lost` record. What waits for the
 /// disk is bounded by kMostPending. Whole batches are written or taken back, so that the file stays readable.
 ///

@@ -51,7 +51,7 @@ class Autopilot {
   virtual const char* mode() const noexcept;
   std::uint64_t setpoints() const noexcept { return setpoints_; }
 
-  /// While true no telemetry is sent (heartbeat lost, faults.md row 21).
+  /// While true no telemetry is sent (heartbeat lost, docs/faults.md row 21).
   bool mute = false;
   /// While true the position, or the attitude, is not reported, and everything else goes on (row 42).
   bool silent_pose = false, silent_attitude = false;

@@ -135,7 +135,7 @@ class Writer : public detail::WriterBase {
 };
 
 /// Counts the writers of other participants that use the topic of one of these readers with another type: the
-/// middleware does not connect them and tells nobody (faults.md row 27).
+/// middleware does not connect them and tells nobody (docs/faults.md row 27).
 class ForeignWriters {
  public:
   ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);
@@ -149,10 +149,10 @@ class ForeignWriters {
   std::set<Guid> seen_;
 };
 
-/// Counts samples that the middleware drops because their bytes are none of their topic's type (faults.md row 27). It
-/// says so nowhere but in its log, a line for each: while this lives it takes those lines out of that log, which is one
-/// for the whole process. Others go to `other`, at most one a second: what a hostile peer provokes is one line for each
-/// packet, written by the threads that receive.
+/// Counts samples that the middleware drops because their bytes are none of their topic's type (docs/faults.md row 27).
+/// It says so nowhere but in its log, a line for each: while this lives it takes those lines out of that log, which is
+/// one for the whole process. Others go to `other`, at most one a second: what a hostile peer provokes is one line for
+/// each packet, written by the threads that receive.
 class Malformed {
  public:
   /// Each topic by its whole name, with the counter of its samples, which the middleware's threads add to.

@@ -7,7 +7,7 @@
 
 namespace backwash::dds {
 
-/// What a datagram of RTPS (the wire protocol of DDS) must be before the middleware parses it (faults.md row 47).
+/// What a datagram of RTPS (the wire protocol of DDS) must be before the middleware parses it (docs/faults.md row 47).
 /// libddsc 0.10.2 trusts parts of what strangers send: descriptions of types end the process with abort() if they are
 /// malformed. Flight needs none of them: our types are final, generated without descriptions, and matched by name. So
 /// every datagram that the process receives goes through here first (recvmsg() in dds.cpp), and

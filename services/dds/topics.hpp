@@ -8,7 +8,7 @@
 #include "ros2.h"
 #include "services/dds/dds.hpp"
 
-/// The topics of interfaces.md: name, type and delivery in one place.
+/// The topics of docs/interfaces.md: name, type and delivery in one place.
 namespace backwash::dds {
 
 using Odometry = nav_msgs_msg_dds__Odometry_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Box queries and hover maps on a real building, each beside the plain way to the same answer in the same run.
-// From the repository's root: build/release/tests/bench/bench_map [MAP], default ../shared/data/maps/geb079.bt.
+// From the repository's root: build/release/tests/bench/bench_map [MAP], default geb079.bt of the data beside the
+// clone.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -21,7 +22,7 @@ namespace {
 using namespace backwash;
 using Boxes = std::vector<std::array<Vec3, 2>>;
 
-std::string map_file = "../shared/data/maps/geb079.bt";
+std::string map_file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
 
 const plan::World& world(reach::Method method) {
   static std::map<reach::Method, std::shared_ptr<const plan::World>> built;

@@ -185,7 +185,7 @@ INSTANTIATE_TEST_SUITE_P(Config, ShippedFile,
                                          "quad-7in.model.toml"));
 
 TEST(LoadModel, ShippedFiveInchIsTheDocumentedDefault) {
-  // The struct's initialisers are the documented defaults (interfaces.md); only the steady push differs.
+  // The struct's initialisers are the documented defaults (docs/interfaces.md); only the steady push differs.
   const Model m = load_model("builtin:quad-5in").value(), d;
   EXPECT_EQ(m.base.horizontal, d.base.horizontal);
   EXPECT_EQ(m.base.vertical, d.base.vertical);
@@ -264,7 +264,7 @@ constexpr const char* kKp = "kp = { horizontal = 10.0, vertical = 12.0 }   # 1/s
 constexpr const char* kKd = "kd = { horizontal = 5.5, vertical = 6.0 }     # 1/s\n";
 
 TEST(LoadVehicle, MultipliesPx4CascadedGains) {
-  // model.md section 4: k_p = P_pos·P_vel, k_d = P_vel; PX4's defaults 0.95, 1.8, 1.0, 4.0 where a key is absent.
+  // docs/model.md section 4: k_p = P_pos·P_vel, k_d = P_vel; PX4's defaults 0.95, 1.8, 1.0, 4.0 where a key is absent.
   std::string text = replaced(shipped("quad-5in.vehicle.toml"), kKp, "px4 = { MPC_XY_P = 1.5, MPC_Z_VEL_P_ACC = 5 }\n");
   const TemporaryFile file(replaced(text, kKd, ""));
   const auto v = load_vehicle(file.path);

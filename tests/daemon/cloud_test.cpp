@@ -96,7 +96,7 @@ TEST(Cloud, OfMorePointsThanTheLargestOrWithABrokenViewpointIsRefused) {
         Message({"x", "y", "z", "vp_x", "vp_y", "vp_z"}, kFloat32, std::vector<float>{1, 2, 3, 7, broken, 9}).m));
 }
 
-// faults.md row 27: whatever the sizes claim, nothing beyond the data is read.
+// docs/faults.md row 27: whatever the sizes claim, nothing beyond the data is read.
 TEST(Cloud, SizesThatDoNotFitTheDataAreRefused) {
   std::mt19937 random(1);
   int refused = 0;

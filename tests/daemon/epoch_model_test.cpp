@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// STOP means stop, model-checked (faults.md rows 39 and 40): every order of up to kDepth events between the real
+// STOP means stop, model-checked (docs/faults.md rows 39 and 40): every order of up to kDepth events between the real
 // Mission, PlanFront, Orders and FlightTick, by a deterministic scheduler. What takes milliseconds in flight, planning,
 // is a segment made here; everything that decides is the daemon's own. Events that change nothing now are left out: the
 // sequences with them are those without, and shorter.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Whole flights in lockstep: what the tick must never do, and the rows of faults.md that a good flight shows.
+// Whole flights in lockstep: what the tick must never do, and the rows of docs/faults.md that a good flight shows.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 17 to 25 of faults.md in lockstep: the line, the controller and the pilot.
+// Rows 17 to 25 of docs/faults.md in lockstep: the line, the controller and the pilot.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -116,7 +116,7 @@ TEST(Localization, ALoopClosureThatTiltsOrIsNoTransformIsRefused) {
   EXPECT_EQ(l.closures(), 0u);
 }
 
-// faults.md row 2: it takes no good sample's place.
+// docs/faults.md row 2: it takes no good sample's place.
 TEST(Localization, RefusesABrokenPose) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   auto l = localization();
@@ -127,7 +127,7 @@ TEST(Localization, RefusesABrokenPose) {
   EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(2, 0, 0, 0), kZero, 1.05), 0));
 }
 
-// faults.md row 43: a float on the wire would be infinite, or too coarse.
+// docs/faults.md row 43: a float on the wire would be infinite, or too coarse.
 TEST(Localization, RefusesWhatIsFiniteAndNowhere) {
   auto l = localization();
   EXPECT_TRUE(l.odometry(odometry(kMap, {9'999, 0, 1}, about_z(0), {0, 99, 0}, 1.0), 0));

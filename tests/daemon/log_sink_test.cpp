@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Row 44 of faults.md: whatever becomes of the terminal, nobody who has something to say waits for it.
+// Row 44 of docs/faults.md: whatever becomes of the terminal, nobody who has something to say waits for it.
 #include "services/backwashd/log_sink.hpp"
 
 #include <fcntl.h>

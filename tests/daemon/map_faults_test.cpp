@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Faults of the map in lockstep (faults.md rows 4, 9, 10, 13, 14): the control thread's decision and its lookout, with
-// a vehicle that follows perfectly. Time is counted in ticks.
+// Faults of the map in lockstep (docs/faults.md rows 4, 9, 10, 13, 14): the control thread's decision and its lookout,
+// with a vehicle that follows perfectly. Time is counted in ticks.
 #include <gtest/gtest.h>
 
 #include "core/config/config.hpp"

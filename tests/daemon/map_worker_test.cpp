@@ -66,7 +66,7 @@ TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {
   }
 }
 
-// faults.md rows 10 and 12.
+// docs/faults.md rows 10 and 12.
 // Row 46: 5 Hz of 40 MB of anything must not fill the disk.
 TEST_F(MapWorkerTest, ARejectedMapCostsTheRawLogAFewBytesThatTellItApart) {
   recorder_.drain(*channels_);
@@ -142,7 +142,7 @@ long resident_kib() {
   return resident * sysconf(_SC_PAGESIZE) / 1024;
 }
 
-// faults.md row 11: a few bytes that claim 2⁴⁸ voxels.
+// docs/faults.md row 11: a few bytes that claim 2⁴⁸ voxels.
 TEST_F(MapWorkerTest, AHugeMapIsRefusedAndMemoryGrowsByNothing) {
   send(grid_);
   const auto* before = world();
@@ -155,7 +155,7 @@ TEST_F(MapWorkerTest, AHugeMapIsRefusedAndMemoryGrowsByNothing) {
   EXPECT_LT(resident_kib() - resident, 1024);
 }
 
-// faults.md row 11: of a snapshot, 115 bytes a voxel.
+// docs/faults.md row 11: of a snapshot, 115 bytes a voxel.
 TEST_F(MapWorkerTest, TheCapIsThatOfTheSnapshotToAVoxel) {
   MapSettings settings;
   settings.max_mib = 1;

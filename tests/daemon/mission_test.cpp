@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The mission's decisions: who may command, what is done once, and what an order ends (faults.md rows 28, 39, 40, 48).
+// The mission's decisions: who may command, what is done once, and what an order ends (docs/faults.md rows 28, 39, 40,
+// 48).
 #include <thread>
 
 #include "tests/daemon/mission_rig.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 2 and 43 of faults.md in lockstep: every number of every message that comes in, as NaN, as infinite, and as a
-// finite double that no float holds. The rig looks at every float of every message that goes out, at each tick.
+// Rows 2 and 43 of docs/faults.md in lockstep: every number of every message that comes in, as NaN, as infinite, and as
+// a finite double that no float holds. The rig looks at every float of every message that goes out, at each tick.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 32, 33, 35 and 36 of faults.md in lockstep: the daemon's own clock, memory, disk and restart; how it holds and
-// what it tells.
+// Rows 32, 33, 35 and 36 of docs/faults.md in lockstep: the daemon's own clock, memory, disk and restart; how it holds
+// and what it tells.
 #include <gtest/gtest.h>
 
 #include "tests/daemon/lockstep.hpp"

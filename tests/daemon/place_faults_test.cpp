@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 8 to 11 of faults.md on wire bytes: where the vehicle is, in the controller's frame and in the map.
+// Rows 8 to 11 of docs/faults.md on wire bytes: where the vehicle is, in the controller's frame and in the map.
 #include <gtest/gtest.h>
 #include <malloc.h>
 #include <unistd.h>

@@ -171,7 +171,7 @@ TEST_F(PlannerFlight, AHeadingAskedForIsTurnedToAtTheGoal) {
   EXPECT_LE(fastest_turn_, plan::YawLimits{}.rate + 1e-3);
 }
 
-/// A crate stands in the way from when the vehicle has come some way; row 14 of faults.md.
+/// A crate stands in the way from when the vehicle has come some way; row 14 of docs/faults.md.
 class CrateAppears : public PlannerFlight {
  protected:
   const Vec3 goal_{2, 0, 1.2};

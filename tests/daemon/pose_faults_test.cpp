@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 41 and 42 of faults.md in lockstep: a VIO whose frame turns, tilts or rescales, and an autopilot that falls
+// Rows 41 and 42 of docs/faults.md in lockstep: a VIO whose frame turns, tilts or rescales, and an autopilot that falls
 // silent. With an autopilot that keeps its own heading and with one that takes it from the VIO.
 #include <gtest/gtest.h>
 

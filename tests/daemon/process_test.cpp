@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 44 and 50 of faults.md: what a signal, a closed descriptor or an exception does to the process.
+// Rows 44 and 50 of docs/faults.md: what a signal, a closed descriptor or an exception does to the process.
 #include "services/backwashd/process.hpp"
 
 #include <fcntl.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 35 and 45 of faults.md: a full disk, one that hangs and a log directory that is gone cost records, are told, and
-// nothing else; what an earlier flight has recorded is never touched.
+// Rows 35 and 45 of docs/faults.md: a full disk, one that hangs and a log directory that is gone cost records, are
+// told, and nothing else; what an earlier flight has recorded is never touched.
 #include "services/backwashd/recorder.hpp"
 
 #include <gtest/gtest.h>

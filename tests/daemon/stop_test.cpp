@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// STOP while a plan is under way (faults.md rows 39 and 40): real mission, planner, control loop and emulated autopilot
-// in one thread. While the planner waits ticks pass; while it computes, none do.
+// STOP while a plan is under way (docs/faults.md rows 39 and 40): real mission, planner, control loop and emulated
+// autopilot in one thread. While the planner waits ticks pass; while it computes, none do.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

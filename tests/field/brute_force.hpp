@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The oracle of tests/field: model.md sections 1 and 2 written a second time as loops over everything. Shares only the
-// plain types with core/field. A segment meets a box by the separating-axis test (core/field uses slabs).
+// The oracle of tests/field: docs/model.md sections 1 and 2 written a second time as loops over everything. Shares only
+// the plain types with core/field. A segment meets a box by the separating-axis test (core/field uses slabs).
 
 #include <Eigen/Geometry>
 #include <algorithm>

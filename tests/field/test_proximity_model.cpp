@@ -6,7 +6,7 @@
 namespace backwash::field {
 namespace {
 
-// Numbers in this file are worked out by hand from model.md section 2 with the default model and a = 0.1.
+// Numbers in this file are worked out by hand from docs/model.md section 2 with the default model and a = 0.1.
 constexpr double kEdge = 0.1;
 
 Element up_at(const Vec3& c) { return {Element::Kind::up, c, Vec3::UnitZ(), 0.01, std::nullopt}; }

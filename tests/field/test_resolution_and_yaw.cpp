@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the elements of model.md section 1 are for: a wall's Σ must not depend on how the voxels happen to lie.
+// What the elements of docs/model.md section 1 are for: a wall's Σ must not depend on how the voxels happen to lie.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// faults.md row 18: the serial line's bytes, through the parser and through the link to the flight controller.
+// docs/faults.md row 18: the serial line's bytes, through the parser and through the link to the flight controller.
 #include <gtest/gtest.h>
 
 #include <deque>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// faults.md rows 11, 12, 27: maps and scans, whatever their bytes and sizes say.
+// docs/faults.md rows 11, 12, 27: maps and scans, whatever their bytes and sizes say.
 #include <gtest/gtest.h>
 
 #include <filesystem>

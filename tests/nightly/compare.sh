@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The paper's Table I in full: at least 2,000 m of flight per method, both vehicles, built-in scenes and geb079 where the
-# shared data is there. Fails if the proposed method touches anything or leaves a set; everything else is reported.
+# The paper's Table I in full: at least 2,000 m of flight per method, both vehicles, built-in scenes and geb079 where
+# the examples of liboctomap-dev are installed. Fails if the proposed method touches anything or leaves a set; everything else is reported.
 # usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]
 set -euo pipefail
 backwash=$(realpath "${1:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}")
@@ -10,7 +10,7 @@ seed=${3:-1}
 flights=92
 mkdir -p "$out"
 scenes=(builtin)
-geb079=$(dirname "${BASH_SOURCE[0]}")/../../../shared/data/maps/geb079.bt
+geb079=/usr/share/doc/liboctomap-dev/examples/data/geb079.bt
 if [[ -f $geb079 ]]; then scenes+=("$geb079"); else echo "geb079.bt is not there: built-in scenes only" >&2; fi
 
 "$backwash" compare --scenes "${scenes[@]}" --flights $flights --seed "$seed" --json --force \

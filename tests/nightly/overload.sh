@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# CPU overload (../../shared/faults.md row 31): four busy processes for each processor. The control thread's tick times and
+# CPU overload (docs/faults.md row 31): four busy processes for each processor. The control thread's tick times and
 # wake-ups in flight under that load against those before it, in one run: at most twice as long (p50 and p95; of 500 ticks the
 # p99 rests on five), no period missed beyond those missed before, and the flight goes on.
 #   overload.sh SOURCE_DIR BUILD_DIR

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# More rows of ../../shared/faults.md on the wall clock, with real processes, than ./check has time for. Judged from the raw
+# More rows of docs/faults.md on the wall clock, with real processes, than ./check has time for. Judged from the raw
 # log and from the bytes that the flight controller received.
 #   wall_faults.sh SOURCE_DIR BUILD_DIR [nan] [jump] [unplug] [pause] [disk]        no fault named: all of them
 # nan     row 2   broken samples among good ones are refused; alone: HOLD, LAND, QUIET as if the VIO had stopped

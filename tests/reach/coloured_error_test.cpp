@@ -61,7 +61,7 @@ TEST(ErrorCovariance, OfALaggingAndDelayedLoopEqualsTheDoubleIntegralOfItsImpuls
   }
 }
 
-// model.md section 5.3: the 3σ worst case is 6 to 8 error standard deviations for τ_w of 0.1 to 0.2 s.
+// docs/model.md section 5.3: the 3σ worst case is 6 to 8 error standard deviations for τ_w of 0.1 to 0.2 s.
 TEST(ErrorCovariance, IsSixToEightTimesBelowTheWorstCase) {
   Vehicle vehicle;
   vehicle.controller.kp = {6, 6};

@@ -33,7 +33,7 @@ Mat6 error_matrix(const Vehicle& vehicle) {
   return Phi;
 }
 
-// The recursion as model.md 5.1 writes it: dense 6×6, X_i by composite Simpson integration.
+// The recursion as docs/model.md 5.1 writes it: dense 6×6, X_i by composite Simpson integration.
 class Literal {
  public:
   explicit Literal(const Vehicle& vehicle) : Phi_(error_matrix(vehicle)) {
@@ -112,7 +112,7 @@ TEST(EllipsoidRecursion, StartsFromNothingAndStaysFiniteWithoutDisturbance) {
   EXPECT_LT(std::sqrt(quiet.Q()(0, 0)), 1e-4);  // ε only
 }
 
-// Known answers of model.md 5.1: half axis over the exact one.
+// Known answers of docs/model.md 5.1: half axis over the exact one.
 TEST(EllipsoidRecursion, RatioToTheExactSetIsTheKnownOne) {
   const double exact = axis_response({6, 4, 0, 0}, Loop::continuous).h_inf;
   EllipsoidRecursion one(vehicle_with(6, 4, 6, 4, 0.02, 0.05)), three(vehicle_with(6, 4, 6, 4, 0.02, 0.05));

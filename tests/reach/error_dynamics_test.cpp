@@ -17,7 +17,7 @@ namespace {
 using Batch = AxisRollouts::Batch;
 constexpr int kPhases = AxisResponse::kPhases;
 
-// coth(πζ/(2√(1 − ζ²)))/k_p, or 1/k_p without overshoot (model.md section 5.2).
+// coth(πζ/(2√(1 − ζ²)))/k_p, or 1/k_p without overshoot (docs/model.md section 5.2).
 double closed_form_hover(double kp, double kd) {
   const double zeta = kd / (2 * std::sqrt(kp));
   if (zeta >= 1) return 1 / kp;

@@ -133,7 +133,7 @@ TEST(Quadrotor, FollowsAccelerationAndVelocityCommands) {
 }
 
 TEST(Quadrotor, FliesTheCentreThatReachPredicts) {
-  // Two implementations of model.md section 4: a matrix exponential per period there, integration at 1 kHz here.
+  // Two implementations of docs/model.md section 4: a matrix exponential per period there, integration at 1 kHz here.
   for (const char* name : {"builtin:quad-5in", "builtin:quad-7in"}) {
     const Vehicle v = config::load_vehicle(name).value();
     Quadrotor quad(v, kStart);

@@ -42,7 +42,7 @@ struct Corridors {
 };
 
 /// Flights of 20 hovers of four windows in each corridor. `sigma(place, spot)`: variance before the scatter of flights
-/// (sd of ln variance 0.35) and windows (0.55) that ../shared/data/README.md reports.
+/// (sd of ln variance 0.35) and windows (0.55) about as in real recordings.
 template <typename Sigma>
 Data sampled(const Corridors& corridors, int flights_per_corridor, std::uint64_t seed, Sigma sigma,
              double between = 0.35, double within = 0.55) {

@@ -135,7 +135,7 @@ TEST(Windows, EffectiveSampleSizePredictsTheScatterOfTheVariance) {
 }
 
 TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
-  // The two figures of model.md section 3, from residues (closed form) for a second-order loop without band.
+  // The two figures of docs/model.md section 3, from residues (closed form) for a second-order loop without band.
   EXPECT_NEAR(loop_attenuation(6, 4, 0, 0, 0.2, {}), 0.64, 0.005);
   EXPECT_NEAR(loop_attenuation(6, 4, 0, 0, 0.5, {}), 0.39, 0.005);
   // A push of that correlation time, through the simulated vehicle, logged without set-points.

@@ -18,7 +18,7 @@ using Vec3 = Eigen::Vector3d;
 /// What to make. Unset names are drawn from the seed.
 struct Request {
   std::uint64_t seed = 1;
-  std::vector<std::string> causes;  ///< names of interfaces.md, or "unknown"; empty: none
+  std::vector<std::string> causes;  ///< names of docs/interfaces.md, or "unknown"; empty: none
   double size = 1;                  ///< in units of the effect-size table (core/study/discrepancy/confusion.md)
   int flights = 12;
   /// "yaw": never turns; "battery": all flights start full and equal; "height": an empty room, hovers at two heights

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# STOP while a plan is under way (../../shared/faults.md row 39): goto, and STOP so many milliseconds later, from one station.
+# STOP while a plan is under way (docs/faults.md row 39): goto, and STOP so many milliseconds later, from one station.
 # Once the STOP is acknowledged no set-point moves but on the verified stop that was under way, until a later command.
 #   attack_01_plan_overrides_stop.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

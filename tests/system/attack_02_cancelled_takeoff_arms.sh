@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# A take-off that was cancelled before it was flown, then enable (../../shared/faults.md row 40): the motors start for no plan of
+# A take-off that was cancelled before it was flown, then enable (docs/faults.md row 40): the motors start for no plan of
 # before the STOP: at most for one that was accepted and armed for by then.
 #   attack_02_cancelled_takeoff_arms.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The VIO's frame turns by 90 degrees in flight (../../shared/faults.md row 41): the flight is held within two ticks of the
+# The VIO's frame turns by 90 degrees in flight (docs/faults.md row 41): the flight is held within two ticks of the
 # first turned sample, lands, and no set-point goes anywhere on what the VIO says from there on.
 #   attack_03_turned_vio.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# LOCAL_POSITION_NED and the attitude stop arriving while the heartbeat goes on (../../shared/faults.md row 42): HOLD after
+# LOCAL_POSITION_NED and the attitude stop arriving while the heartbeat goes on (docs/faults.md row 42): HOLD after
 # 300 ms, LAND after 1 s; then enabling is refused on the old pose.
 #   attack_04_silent_position.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

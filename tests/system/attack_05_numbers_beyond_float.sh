@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Finite numbers that no float holds (../../shared/faults.md row 43): a velocity of 1e39 m/s. No float in any message is
+# Finite numbers that no float holds (docs/faults.md row 43): a velocity of 1e39 m/s. No float in any message is
 # infinite or NaN but the rates and covariances of ODOMETRY, and the flight is held as with a broken sample.
 #   attack_05_numbers_beyond_float.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The disk does not answer while it commands, neither for the flight log nor for its own lines (../../shared/faults.md row 35):
+# The disk does not answer while it commands, neither for the flight log nor for its own lines (docs/faults.md row 35):
 # commands are answered and the set-points go on at 50 Hz; what is lost is counted in the status and, once the disk answers,
 # in the log; and a disk that hangs does not keep the daemon from ending.
 #   attack_disk.sh SOURCE_DIR BUILD_DIR

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# There is no memory left while it commands (../../shared/faults.md row 50): the set-points end and nothing else follows, the
+# There is no memory left while it commands (docs/faults.md row 50): the set-points end and nothing else follows, the
 # flight log is closed with the reason, and the daemon says it and exits with 70.
 #   attack_memory.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# What a start must not do (../../shared/faults.md rows 38, 45): with an invalid configuration no port is opened, no file is
+# What a start must not do (docs/faults.md rows 38, 45): with an invalid configuration no port is opened, no file is
 # waited for and nothing is made; a start that fails, and one that does not, leaves every earlier log byte for byte.
 #   attack_start.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The daemon's terminal is attacked while it commands (../../shared/faults.md row 44): nobody reads its full pipe while a
+# The daemon's terminal is attacked while it commands (docs/faults.md row 44): nobody reads its full pipe while a
 # participant's messages are refused at 1 kHz, then its signals come, then the pipe is closed. Commands are answered and the
 # set-points go on at 50 Hz, judged from the bytes that reached the flight controller.
 #   attack_terminal.sh SOURCE_DIR BUILD_DIR

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The wall clock really steps in flight (../../shared/faults.md row 30), as the daemon and its middleware see it: an hour
+# The wall clock really steps in flight (docs/faults.md row 30), as the daemon and its middleware see it: an hour
 # forward, two back, an hour forward, half a second apart (clock_shim.c). The flight reaches its goal, no sample is
 # rejected, and between two set-points passes no more time than what a stolen processor took.
 #   daemon_clock_step.sh SOURCE_DIR BUILD_DIR

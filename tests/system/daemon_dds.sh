@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# What other participants may do to a daemon, with real processes (../../shared/faults.md rows 7, 10 to 12, 27, 28): two
+# What other participants may do to a daemon, with real processes (docs/faults.md rows 7, 10 to 12, 27, 28): two
 # vehicles in one domain, a foreign type, unknown frames, oversized clouds, corrupt and huge maps; and the preflight.
 #   daemon_dds.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

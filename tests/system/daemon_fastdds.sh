@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # A foreign middleware as ROS 2 brings it: a Fast DDS process is the daemon's only odometry and reads its status. A second
-# one sends odometry that breaks off in the middle: counted, and nothing else (faults.md row 27).
+# one sends odometry that breaks off in the middle: counted, and nothing else (docs/faults.md row 27).
 #   daemon_fastdds.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Faults in flight, with real processes: VIO stops, the controller's heartbeat stops, the daemon is killed
-# (../../shared/faults.md rows 1, 21, 36). Judged from the raw log and from the bytes on the wire.
+# (docs/faults.md rows 1, 21, 36). Judged from the raw log and from the bytes on the wire.
 #   daemon_faults.sh SOURCE_DIR BUILD_DIR vio|heartbeat|kill
 set -euo pipefail
 source_dir=$1 build=$2 fault=$3

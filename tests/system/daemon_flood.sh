@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# A participant floods the odometry topic at 10 kHz (../../shared/faults.md row 26). The control thread's wake-up and tick
+# A participant floods the odometry topic at 10 kHz (docs/faults.md row 26). The control thread's wake-up and tick
 # times during the flood against those before it, in one run; at most 1.5 times as long.
 #   daemon_flood.sh SOURCE_DIR BUILD_DIR [SECONDS]      nightly 10; with fewer only the median is judged: 5 % of them are
 #                                                       what else shared processors do

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The largest allowed maps and clouds at their fastest (../../shared/faults.md row 46): how long odometry takes from its stamp
+# The largest allowed maps and clouds at their fastest (docs/faults.md row 46): how long odometry takes from its stamp
 # to its reception, and a command to its answer, during 6 s of them against 6 s before, in one run.
 #   daemon_large_samples.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The map changes in flight, with real processes (../../shared/faults.md rows 4 and 14): a crate appears on the path, a
+# The map changes in flight, with real processes (docs/faults.md rows 4 and 14): a crate appears on the path, a
 # loop closure corrects the VIO by a quarter of a metre, or the goal lies in a part of the room that the map does not hold
 # and scans reveal on the way. Judged from the raw log, the truth and the bytes on the wire.
 #   daemon_map.sh SOURCE_DIR BUILD_DIR obstacle|closure|unknown

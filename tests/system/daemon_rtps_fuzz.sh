@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# A hostile peer sends damaged copies of its own RTPS packets to daemon, bench and all (../../shared/faults.md row 47):
+# A hostile peer sends damaged copies of its own RTPS packets to daemon, bench and all (docs/faults.md row 47):
 # nobody dies, the daemon's memory stays bounded, and afterwards odometry and commands work as before.
 #   daemon_rtps_fuzz.sh SOURCE_DIR BUILD_DIR PACKETS [SEED]
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Who may command, and whose odometry is flown (../../shared/faults.md rows 28 and 48), with real processes: a second station
+# Who may command, and whose odometry is flown (docs/faults.md rows 28 and 48), with real processes: a second station
 # and a second writer under the holder's name are refused, replays too; a repeat is answered again and not done again; an
 # old sequence number counts for nothing; STOP is anybody's; a session ends with its process.
 #   daemon_sessions.sh SOURCE_DIR BUILD_DIR

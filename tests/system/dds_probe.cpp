@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a confused or hostile participant sends, for the scripts beside it (faults.md rows 2, 3, 12, 26, 27, 46, 48).
+// What a confused or hostile participant sends, for the scripts beside it (docs/faults.md rows 2, 3, 12, 26, 27, 46,
+// 48).
 //   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closures|large|roomy|elsewhere
 //   dds_probe DOMAIN NAMESPACE flood [SECONDS]
 //   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A hostile participant, for tests/system/daemon_rtps_fuzz.sh (faults.md row 47): it takes part in the domain as a real
-// peer with types that describe themselves, notes every packet that its own middleware sends, and sends damaged copies
-// of them to where they went. To be run in a network namespace of its own.
+// A hostile participant, for tests/system/daemon_rtps_fuzz.sh (docs/faults.md row 47): it takes part in the domain as a
+// real peer with types that describe themselves, notes every packet that its own middleware sends, and sends damaged
+// copies of them to where they went. To be run in a network namespace of its own.
 //   rtps_fuzz DOMAIN NAMESPACE PACKETS SEED
 // Prints how many were sent, and how many the receivers' sockets had no room for; 1 if it never met a peer.
 #include <arpa/inet.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A ground station that does what backwashctl never would, for the scripts beside it (faults.md rows 28, 46, 48).
+// A ground station that does what backwashctl never would, for the scripts beside it (docs/faults.md rows 28, 46, 48).
 //   station_probe DOMAIN NAMESPACE script               one writer; each line of standard input is a command,
 //                                                       STATION SESSION SEQUENCE VERB [X Y Z]; prints RESULT REASON of
 //                                                       its answer, or `silence` after 2 s

@@ -33,7 +33,7 @@ FrameAlignment watched(const Vec3& off, double turned) {
   return alignment;
 }
 
-// interfaces.md: residual below 5 cm and 3°.
+// docs/interfaces.md: residual below 5 cm and 3°.
 TEST(FrameAlignmentLimits, EndsAtFiveCentimetresAndThreeDegreesAndNowhereElse) {
   constexpr double kDegree = std::numbers::pi / 180;
   for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(0.6, 0, -0.8)}) {

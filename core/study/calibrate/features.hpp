@@ -43,7 +43,7 @@ Model with_parameters(const Model& gates, const Parameters& parameters) noexcept
 inline constexpr std::size_t kDecays = 16;
 const std::array<double, kDecays>& decay_grid() noexcept;
 
-/// What the geometry around a point contributes to Σ for amplitude 1 (model.md section 2), summed over visible
+/// What the geometry around a point contributes to Σ for amplitude 1 (docs/model.md section 2), summed over visible
 /// elements.
 struct Features {
   double ground_inverse;     ///< Σ A/l²

@@ -48,7 +48,7 @@ struct FitOptions {
   int rounds = 3;  ///< of flight levels and bound in turn
 };
 
-/// Quantile regression of ln variance on ln Σ(p; θ) (model.md section 2), θ ≥ 0:
+/// Quantile regression of ln variance on ln Σ(p; θ) (docs/model.md section 2), θ ≥ 0:
 ///
 ///   minimise Σ_windows Σ_axes ρ_q(ln v − b_flight − ln Σ_aa(p; θ)),  ρ_q(r) = r (q − [r < 0])
 ///

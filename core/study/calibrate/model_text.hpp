@@ -20,7 +20,7 @@ struct Provenance {
   double quantile = 0;
 };
 
-/// The model file (interfaces.md) with [confidence] (95 % intervals by dotted key, coverage, sharpness) and
+/// The model file (docs/interfaces.md) with [confidence] (95 % intervals by dotted key, coverage, sharpness) and
 /// [provenance]; config::load_model reads it. Constants that were not determined stand there too, named under
 /// provenance.kept_from_base, and have no interval.
 std::string model_text(const Calibration& calibration, const Provenance& provenance);

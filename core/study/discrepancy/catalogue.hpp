@@ -23,7 +23,7 @@ using Windows = std::vector<WindowRow>;
 
 /// One physical form of a cause, linear in its parameters at a given scale. README.md lists them with units.
 struct Form {
-  std::string cause;                    ///< name of interfaces.md
+  std::string cause;                    ///< name of docs/interfaces.md
   std::string formula;                  ///< what is added to which channel
   std::vector<std::string> parameters;  ///< one per column, unit in the name
   std::string scale_name = "";          ///< "L_m" …; empty without a scale
@@ -41,7 +41,7 @@ struct Form {
 
 /// Whole catalogue.
 const std::vector<Form>& catalogue();
-/// Every cause name of interfaces.md.
+/// Every cause name of docs/interfaces.md.
 const std::vector<std::string>& cause_names();
 /// Why these observations cannot test a form; nothing if they can.
 std::optional<std::string> why_not_tested(const Form& form, const Observations& seen);

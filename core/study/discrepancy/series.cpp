@@ -31,7 +31,7 @@ std::vector<Vec3> derivative(const std::vector<double>& t, const std::vector<Vec
   return d;
 }
 
-/// The set-points of a flight: absent velocities and accelerations are zero (interfaces.md).
+/// The set-points of a flight: absent velocities and accelerations are zero (docs/interfaces.md).
 struct Commands {
   std::vector<Vec3> p, v, a;
 };

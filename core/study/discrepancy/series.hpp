@@ -10,7 +10,7 @@
 
 namespace backwash::study::discrepancy {
 
-/// A flight by sample, with what the simulation says of it (interfaces.md, "Flight log, CSV").
+/// A flight by sample, with what the simulation says of it (docs/interfaces.md, "Flight log, CSV").
 struct Series {
   std::vector<double> t;           ///< s, from 0
   std::vector<std::size_t> row;    ///< the log's row of each sample

@@ -1,0 +1,243 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""docs/interfaces.md says what the programs are: nothing is missing from it and nothing in it is made up.
+
+interfaces.py SOURCE_DIR BUILD_DIR
+
+Keys of the files, as the programs tell them, with range and presence by the strict tables of core/config; verbs and options by --help, names of JSON, exit codes, kinds of
+effects, topics with type and delivery, verbs and results of commands, MAVLink messages.
+"""
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+wrong: list[str] = []
+
+
+def expect(where: str, documented: set, actual: set) -> None:
+    wrong.extend(f"{where}: not documented: {x}" for x in sorted(actual - documented))
+    wrong.extend(f"{where}: does not exist: {x}" for x in sorted(documented - actual))
+
+
+def sections(text: str) -> dict[str, str]:
+    """Each heading's own text, without that of the headings below it."""
+    parts = re.split(r"^#+ (.*)$", text, flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2]))
+
+
+def rows(section: str) -> list[list[str]]:
+    lines = [line for line in section.splitlines() if line.startswith("|") and not re.fullmatch(r"[| -]+", line)]
+    return [[c.strip() for c in re.split(r"(?<!\\)\|", line.strip()[1:-1])] for line in lines]
+
+
+def quoted(text: str) -> list[str]:
+    return re.findall(r"`([^`]+)`", text)
+
+
+# --- configuration ---------------------------------------------------------------------------------------------------
+
+def interval(code: str, constants: dict[str, str]) -> str:
+    """A Range of the code, {low, high[, above_low]}, as the document writes it."""
+    parts = [p.strip().replace("'", "") for p in constants.get(code, code).strip("{}").split(",")]
+    return f"{'(' if len(parts) > 2 else '['}{parts[0]}, {parts[1]}]"
+
+
+def keys_of_program(command: list[str], table: str = "") -> set[str]:
+    """The keys that a program knows, by asking it for one that it does not know; in `command` FILE is the file's name."""
+    with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+        file.write((f"[{table}]\n" if table else "") + "no_such_key = 1\n")
+        file.flush()
+        run = subprocess.run([w.replace("FILE", file.name) for w in command], capture_output=True, text=True, check=False)
+    known = re.search(r"no_such_key' = 1: unknown; known here: (.*)", run.stderr)
+    if not known:  # no table: a key
+        return {table}
+    return {key for name in known[1].split(", ")
+            for key in keys_of_program(command, f"{table}.{name}" if table else name)}
+
+
+def keys_of_code(source: str) -> dict[str, tuple[str, bool]]:
+    """Key → (range, needed) of a file of core/config; texts and flags have no range."""
+    constants = dict(re.findall(r"constexpr Range (\w+)(\{[^}]*\})", source))
+    keys = {}
+    for key, spec, presence in re.findall(r'\{"([\w.]+)", &[\w.]+, (\{[^}]*\}|\w+)(?:, ([\w:]+))?\}', source):
+        keys[key] = (interval(spec, constants), presence == "")
+    table = re.search(r"\*> texts\[\] = \{(.*?)\n  \};", source, re.S)
+    for key in re.findall(r'\{"([\w.]+)", &', table[1] if table else ""):
+        keys[key] = ("", True)
+    for body in re.findall(r"\*> frames\[\] = \{(.*?)\};", source, re.S):
+        keys.update({key: ("", False) for key in re.findall(r'\{"([\w.]+)", &', body)})
+    for body in re.findall(r"std::string_view(?:> text_keys| k\w+\[\] =) ?\{([^}]*)\}", source):
+        keys.update({key: ("", key == "name") for key in re.findall(r'"([\w.]+)"', body)})
+    return keys
+
+
+def check_keys(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, str]) -> None:
+    backwash, backwashd = str(build / "services/backwash"), str(build / "services/backwashd")
+    for heading, file, reads in (
+            ("Vehicle file", "vehicle_file", [backwash, "reach", "--vehicle", "FILE", "--track", "none"]),
+            ("Model file", "model_file", [backwash, "field", "--map", "builtin:narrow-gap", "--model", "FILE", "--at", "1,1,1"]),
+            ("Daemon file", "daemon_file", [backwashd, "--check-config", "--config", "FILE"])):
+        keys = keys_of_program(reads)
+        actual = keys_of_code((root / f"core/config/{file}.cpp").read_text())
+        documented = {}
+        for cells in rows(sections_of[heading]):
+            if len(cells) == 6 and quoted(cells[0]):
+                documented[quoted(cells[0])[0]] = (cells[2].replace("∞", "inf"), cells[3])
+        free = {"confidence", "provenance", "extension"} if file == "model_file" else set()  # in words below the table
+        wrong.extend(f"{heading}: not documented: {x}" for x in free if f"`{x}`" not in sections_of[heading])
+        expect(heading, set(documented), keys - free)
+        if len(keys) < 15 or len(actual) < len(keys) - 5:
+            wrong.append(f"{heading}: only {len(keys)} keys were told, {len(actual)} found in core/config/{file}.cpp")
+        for key in documented.keys() & actual.keys():
+            range_, needed = actual[key]
+            if documented[key][0] != range_:
+                wrong.append(f"{heading}: {key} has the range {range_ or '(none)'}, not {documented[key][0]}")
+            if (documented[key][1] == "needed") != needed:
+                wrong.append(f"{heading}: {key} is {'needed' if needed else 'not needed'}")
+    kinds = set(re.findall(r'\{"(\w+)", ModelEffect::Kind', (root / "core/config/model_file.cpp").read_text()))
+    table = [cells for cells in rows(sections_of["Model file"]) if len(cells) == 2]
+    expect("kinds of effects", {k for cells in table for k in quoted(cells[0])}, kinds)
+    spec = (root / "services/backwash/flight_spec.cpp").read_text()
+    known = re.search(r'only\(path, file, \{([^}]*)\}', spec)[1]
+    expect("Flight specification", {quoted(c[0])[0] for c in rows(sections_of["Flight specification"])[1:]},
+           set(re.findall(r'"(\w+)"', known)))
+
+
+# --- programs --------------------------------------------------------------------------------------------------------
+
+def help_of(*command: str) -> tuple[set[str], set[str]]:
+    """Verbs and options of a program, by its --help."""
+    text = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
+    verbs = re.findall(r"^  (\w+) {2,}", text.split("Subcommands:")[1], re.M) if "Subcommands:" in text else []
+    options = {o for line in re.findall(r"^  (-\S+)", text, re.M) for o in line.split(",")}
+    return set(verbs), options - {"-h", "--help", "--version"}
+
+
+def options_in(text: str) -> set[str]:
+    return {o for q in quoted(text) for o in re.findall(r"(?<![\w-])--?[a-z][a-z-]*", q)}
+
+
+def check_programs(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, str]) -> None:
+    services = build / "services"
+    usage = subprocess.run(["bash", str(root / "fly"), "--help"], capture_output=True, text=True, check=True).stdout
+    expect("fly", options_in(sections_of["fly"]), set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", usage)))
+    verbs, _ = help_of(str(services / "backwash"))
+    expect("verbs of backwash", {h.split()[1] for h in sections_of if h.startswith("backwash ")}, verbs)
+    for verb in verbs & {h.split()[1] for h in sections_of if h.startswith("backwash ")}:
+        # Options stand in the tables' first column.
+        cells = [c for c in rows(sections_of[f"backwash {verb}"]) if c[0].startswith("`-")]
+        _, options = help_of(str(services / "backwash"), verb)
+        expect(f"backwash {verb}", {o for c in cells for o in options_in(c[0])}, options)
+    for program in ("backwashd", "backwash-bench"):
+        _, options = help_of(str(services / program))
+        expect(program, {o for c in rows(sections_of[program]) for o in options_in(c[0])}, options)
+    verbs, common = help_of(str(services / "backwashctl"))
+    listed = [c for c in rows(sections_of["backwashctl"]) if len(c) == 3 and c[0].startswith("`")]
+    expect("verbs of backwashctl", {v for c in listed for v in quoted(c[0])}, verbs)
+    every, of_verbs = options_in(sections_of["backwashctl"].split("\n|")[0]), set()
+    expect("backwashctl", every, common)
+    for cells in listed:
+        actual = set()
+        for verb in set(quoted(cells[0])) & verbs:
+            actual |= help_of(str(services / "backwashctl"), verb)[1]
+        expect(f"backwashctl {cells[0]}", options_in(cells[2]), actual)
+
+
+# --- JSON and exit codes ---------------------------------------------------------------------------------------------
+
+def names_of_json(text: str) -> set[str]:
+    return set(re.findall(r'\{"([A-Za-z]\w*)",(?! *&)', text)) | set(re.findall(r'(?<=[\w\]])\["([A-Za-z]\w*)"\]', text))
+
+
+def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> None:
+    # Every name that the programs write is somewhere in the page; every name in a JSON table is written somewhere.
+    named = {part for q in quoted(text) for part in re.findall(r"[A-Za-z_]\w*", q)}
+    files = list((root / "services/backwash").glob("*.cpp")) + [root / "services/backwashctl" / name for name in ("status_output.cpp", "verbs.cpp")]
+    not_output = {"flight_spec.cpp", "import.cpp", "main.cpp"}
+    written = set()
+    for file in files:
+        code = file.read_text()
+        written |= names_of_json(code)
+        if file.name not in not_output:
+            input_names = set(re.findall(r'\(\*table\)\["(\w+)"\]', code))  # of TOML that is read
+            wrong.extend(f"JSON of {file.name}: not documented: {x}"
+                         for x in sorted(names_of_json(code) - input_names - named))
+    for measures in (root / "core/sim").glob("compare*.cpp"):  # names of Measure
+        written |= set(re.findall(r'"([a-z]\w*)"', measures.read_text()))
+    for heading, section in sections_of.items():
+        tables = re.split(r"\n\n", section)
+        for table in tables:
+            if not table.lstrip().startswith("| JSON") and heading != "JSON of status":
+                continue
+            for cells in rows(table)[1:]:
+                for name in quoted(cells[0]):
+                    for part in re.findall(r"\w+", name):
+                        if part not in written:
+                            wrong.append(f"{heading}: no JSON is called {part}")
+
+
+def check_exit_codes(root: pathlib.Path, sections_of: dict[str, str]) -> None:
+    documented = {int(c[0]) for c in rows(sections_of["Exit codes"]) if c[0].isdigit()}
+    actual = {0, 1}
+    for file in (root / "services").rglob("*.[ch]pp"):
+        for line in re.findall(r"constexpr int (k\w+ = \d+(?:, k\w+ = \d+)*);", file.read_text()):
+            actual |= {int(n) for n in re.findall(r"= (6[4-9]|7[0-8])\b", line)}
+        for body in re.findall(r"enum (?:class )?\w*Exit\w*[^{]*\{(.*?)\}", file.read_text(), re.S):
+            actual |= {int(n) for n in re.findall(r"= (\d+)", body)}
+    expect("exit codes", documented, actual)
+
+
+# --- DDS and MAVLink -------------------------------------------------------------------------------------------------
+
+DELIVERY = {"latest": "best effort, keep last 1", "scans": "best effort, keep last 8",
+            "reliable": "reliable, keep last 64", "state": "reliable, transient local, keep last 1"}
+
+
+def check_dds(root: pathlib.Path, sections_of: dict[str, str]) -> None:
+    code = (root / "services/dds/topics.hpp").read_text()
+    actual = set()
+    for type_, name, delivery in re.findall(
+            r"return (\w+)_desc; \}\s*static constexpr const char\* kName = \"(\w+)\";\s*"
+            r"static constexpr Delivery kDelivery = Delivery::(\w+);", code):
+        actual.add((name, type_.replace("_msg_dds__", "::msg::dds_::"), DELIVERY[delivery]))
+    documented = {(re.search(r"/(\w+)(?: |$)", c[0])[1], c[1], c[3]) for c in rows(sections_of["DDS"])[1:]}
+    expect("DDS topics", documented, actual)
+    idl = (root / "idl/backwash_msgs.idl").read_text()
+    for prefix in ("COMMAND_", "ACK_"):
+        cells = [c[0] for c in rows(sections_of["Commands"])]
+        expect(f"{prefix}…", {w for c in cells for w in re.findall(rf"{prefix}\w+", c)},
+               set(re.findall(rf"const octet ({prefix}\w+)", idl)))
+    status = {q for c in rows(sections_of["JSON of status"])[1:] for q in quoted(c[0])}
+    code = (root / "services/backwashctl/status_output.cpp").read_text()
+    expect("JSON of status", status, names_of_json(code.split("json_of(")[1]))
+
+
+def check_mavlink(root: pathlib.Path, sections_of: dict[str, str]) -> None:
+    actual = set()
+    for file in (root / "firmware_bridge/mavlink").glob("*.hpp"):
+        actual |= set(re.findall(r'kName = "([A-Z0-9_]+)"', file.read_text()))
+    section = sections_of["MAVLink"]
+    cells = " ".join(c[0] for c in rows(section))
+    words = set(re.findall(r"\b[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*\b", cells + section.split("The codec knows more")[1].split("\n\n")[0]))
+    expect("MAVLink messages", words, actual)
+
+
+def main() -> int:
+    root, build = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+    text = (root / "docs/interfaces.md").read_text()
+    sections_of = sections(text)
+    check_keys(root, build, sections_of)
+    check_programs(root, build, sections_of)
+    check_json(root, text, sections_of)
+    check_exit_codes(root, sections_of)
+    check_dds(root, sections_of)
+    check_mavlink(root, sections_of)
+    for line in wrong:
+        print(f"docs/interfaces.md: {line}")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""docs/model.md: equations are numbered once each, and each is followed by the code that computes it, which exists.
+
+model.py SOURCE_DIR
+"""
+import pathlib
+import re
+import sys
+
+CITATION = re.compile(r"`((?:core|services|firmware_bridge)/[\w./]+\.(?:cpp|hpp)):([\w:]+)`")
+NUMBER = re.compile(r"^(?:\*\*| {4,})(\d\w?(?:\.\d)?-\d+)\s")
+
+
+def names(code: str, symbol: str) -> bool:
+    """Whether code has the symbol: Class::function as it is defined, or both names in a header."""
+    if re.search(rf"\b{re.escape(symbol)}\b", code):
+        return True
+    return "::" in symbol and all(re.search(rf"\b{re.escape(part)}\b", code) for part in symbol.split("::"))
+
+
+def main() -> int:
+    source = pathlib.Path(sys.argv[1])
+    wrong, seen, open_equations = [], {}, []
+    section, blank = "", False
+
+    def close():
+        wrong.extend(f"{at}: nothing says what computes equation {number}" for at, number in open_equations)
+        open_equations.clear()
+
+    for n, line in enumerate((source / "docs/model.md").read_text().splitlines(), 1):
+        if heading := re.match(r"#+ (\d\w?(?:\.\d)?)?", line):
+            close()
+            section = heading[1] or ""
+        if not line:
+            blank = True
+        if equation := NUMBER.match(line):
+            if blank:  # equations of one block share an arrow
+                close()
+            number, blank = equation[1], False
+            if number in seen:
+                wrong.append(f"{n}: equation {number} is also in line {seen[number]}")
+            if number.rsplit("-", 1)[0].split(".")[0] != section.split(".")[0]:
+                wrong.append(f"{n}: equation {number} is in section {section}")
+            seen[number] = n
+            open_equations.append((n, number))
+        citations = CITATION.findall(line)
+        if line.startswith("→"):
+            open_equations.clear()
+            if not citations:
+                wrong.append(f"{n}: no `path:symbol` after the arrow")
+        for path, symbol in citations:
+            file = source / path
+            if not file.is_file():
+                wrong.append(f"{n}: there is no {path}")
+            elif not names(file.read_text(), symbol):
+                wrong.append(f"{n}: {path} has no {symbol}")
+    if len(seen) < 50:
+        wrong.append(f"1: only {len(seen)} equations were found")
+    for line in wrong:
+        print(f"docs/model.md:{line}")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
