@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# A stranger sends commands as fast as they go (../../shared/faults.md rows 26 and 28) and so gets the lease. The operator's
+# A stranger sends commands as fast as they go (docs/faults.md rows 26 and 28) and so gets the lease. The operator's
 # STOPs are taken all the same, each of them; odometry is not starved; the raw log holds what was acted on and not the flood.
 #   attack_command_flood.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail

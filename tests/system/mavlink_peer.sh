@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The link against an independent MAVLink library, node-mavlink from the npm registry, as the flight controller: over a serial
 # line and over UDP, both directions, unsigned, signed, with another key, and unsigned where a key is asked for. Then the daemon
-# itself with a key (faults.md row 29). Skipped without node, npm or the registry.
+# itself with a key (docs/faults.md row 29). Skipped without node, npm or the registry.
 #   mavlink_peer.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
