@@ -25,8 +25,9 @@ class Lookout {
 
   /// `flight` as of the last tick. New voxels are held against the sets still to be flown and against the next verified
   /// stop; so are, two records a tick, those that came after the snapshot in which a segment that was accepted since
-  /// was verified. Where more came than are kept the segment counts as blocked. Real-time: wait-free, no allocation; 3
-  /// to 5 ns per voxel and set, at most 6 × NewVoxels::kMost voxels.
+  /// was verified. Where more came than are kept the segment counts as blocked. Real-time: wait-free, no allocation; at
+  /// most 6 × NewVoxels::kMost voxels, each against boxes around runs of sets, and against the sets of the runs near
+  /// it.
   track::Surroundings look(const track::FlightTick& flight, std::int64_t now_ns) noexcept;
 
  private:

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the control thread makes of new voxels (faults.md row 14): the same as holding each against each set, and in a
+// tick also on a long flight.
+#include "services/backwashd/lookout.hpp"
+
+#include <gtest/gtest.h>
+#include <time.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "core/reach/clearance.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+Vehicle vehicle() {
+  Vehicle v;
+  v.body.radius = 0.16;
+  v.estimation.position = 0.02;
+  v.initial_error = {0.02, 0.05};
+  v.limits = {1.5, 2};
+  return v;
+}
+
+/// Flies a minute of a spiral, the tick and the lookout as in the daemon.
+struct LongFlight {
+  std::unique_ptr<Channels> channels = std::make_unique<Channels>();
+  track::FlightTick flight{vehicle(), 0};
+  Lookout lookout{*channels, vehicle(), {}};
+  track::AcceptedSegment segment;
+  track::TickInput in;
+
+  explicit LongFlight(std::size_t sets = 3000) {
+    segment.id = 1;
+    for (std::size_t k = 0; k <= sets; ++k) {
+      const double t = 0.02 * static_cast<double>(k);
+      reach::TubeStep s{};
+      s.center = {{2 * std::sin(0.4 * t), 2 - 2 * std::cos(0.4 * t), 1 + 0.02 * t}, Vec3::Zero()};
+      s.half_widths.fill(0.05 + 0.03 * std::sin(t));
+      s.half_widths_interval = s.half_widths;
+      segment.tube.push_back(s);
+      if (k < sets) segment.commands.push_back({s.center.p_W, Vec3::Zero(), Vec3::Zero(), 0});
+    }
+    plan::Stop stop;
+    stop.branch = 40;
+    stop.commands.assign(50, segment.commands[40]);
+    stop.tube.assign(51, segment.tube[40]);
+    segment.stops.push_back(stop);
+    in.now_ns = 1'000'000'000;
+    for (int n = 0; n < 60; ++n) tick();
+    tick(track::Request::enable);
+    for (int n = 0; n < 60; ++n) tick();
+    segment.epoch = flight.epoch();
+    in.segment = &segment;
+    tick();
+    in.segment = nullptr;
+    EXPECT_EQ(flight.tracker().segment(), 1u);
+  }
+  void tick(track::Request request = track::Request::none) {
+    in.now_ns += 20'000'000;
+    OdometrySample s;
+    s.received_ns = s.stamp_ns = in.now_ns;
+    s.state = segment.tube.front().center;
+    in.odometry = s;
+    in.request = request;
+    in.autopilot.heartbeat_age = 0;
+    in.autopilot.offboard = true;
+    in.autopilot.pose = {in.now_ns, s.state, s.q, in.now_ns, Vec3::Zero()};
+    flight.step(in);
+  }
+};
+
+NewVoxels one(const Vec3& p) {
+  NewVoxels v;
+  v.edge = 0.1;
+  v.count = 1;
+  v.centers[0] = {p.x(), p.y(), p.z()};
+  return v;
+}
+
+TEST(Lookout, FindsAVoxelInTheWayExactlyWhereTheSetsDo) {
+  LongFlight f;
+  const double taken = vehicle().body.radius + vehicle().estimation.position;
+  const auto ahead = f.flight.tracker().ahead();
+  const plan::Stop* stop = f.flight.tracker().next_stop();
+  ASSERT_TRUE(stop);
+  const auto in_way = [&](auto sets, const Vec3& p) {
+    return !sets.empty() && reach::first_blocked(sets, 0, {p, 0.1}, taken) < sets.size();
+  };
+  std::mt19937_64 rng(1);
+  std::uniform_real_distribution<double> across(-0.6, 0.6);
+  std::size_t in_tube = 0, in_stop = 0, beside = 0;
+  for (int n = 0; n < 3000; ++n) {
+    // Near some set, of every run and of its ends.
+    const auto& near = f.segment.tube[(n % 2 ? 32u * (rng() % 90) : rng() % 3000) + rng() % 2].center.p_W;
+    const Vec3 p = (n % 5 ? near : f.segment.tube[rng() % 60].center.p_W) + Vec3(across(rng), across(rng), across(rng));
+    f.channels->scan_voxels.push(one(p));
+    const auto seen = f.lookout.look(f.flight, f.in.now_ns);
+    const bool tube = in_way(ahead[0], p);
+    ASSERT_EQ(seen.tube_blocked, tube) << p.transpose();
+    const bool by_stop = in_way(ahead[0].first(stop->branch - f.flight.tracker().index()), p) ||
+                         in_way(std::span<const reach::TubeStep>(stop->tube), p);
+    ASSERT_EQ(seen.stop_blocked, by_stop) << p.transpose();
+    in_tube += tube, in_stop += by_stop, beside += !tube;
+  }
+  EXPECT_GT(in_tube, 300u);
+  EXPECT_GT(in_stop, 100u);
+  EXPECT_GT(beside, 300u);
+}
+
+double processor_s() {
+  timespec t{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// As many voxels as a scan hands over, a little beside a minute of flight, against holding each against each set.
+TEST(Lookout, OfALongFlightCostsATickATenthOfWhatEachAgainstEachWould) {
+  LongFlight f;
+  NewVoxels many;
+  many.edge = 0.1;
+  many.count = NewVoxels::kMost;
+  for (std::size_t n = 0; n < many.count; ++n) many.centers[n] = {0.01 * static_cast<double>(n) - 1.2, 2, 1.5};
+  const auto sets = f.flight.tracker().ahead()[0];
+  double each = 1e9, look = 1e9;
+  for (int n = 0; n < 5; ++n) {
+    double from = processor_s();
+    for (const auto& c : many.centers)
+      ASSERT_EQ(reach::first_blocked(sets, 0, {{c[0], c[1], c[2]}, 0.1}, 0.18), sets.size());
+    each = std::min(each, processor_s() - from);
+    f.channels->scan_voxels.push(many);
+    from = processor_s();
+    const auto seen = f.lookout.look(f.flight, f.in.now_ns);
+    look = std::min(look, processor_s() - from);
+    ASSERT_FALSE(seen.tube_blocked || seen.stop_blocked);
+  }
+  std::printf("256 voxels and %zu sets: %.3f ms, each against each %.3f ms\n", sets.size(), 1e3 * look, 1e3 * each);
+  EXPECT_LT(look, each / 10);
+}
+
+}  // namespace
+}  // namespace backwash::daemon
