@@ -12,7 +12,8 @@ namespace {
 constexpr int kArmingTicks = 150;  // 3 s: heartbeats come once a second
 constexpr int kDisarmEvery = 25;   // ticks: one command may be lost
 constexpr std::size_t kTakeoffEvery = 25;
-constexpr double kLeastBelow = 0.1;  // m: a lift-off is over from so far below its height on
+constexpr double kClosureFades = 10;  // s: closures add up for so long, or an absurd one would come in pieces
+constexpr double kLeastBelow = 0.1;   // m: a lift-off is over from so far below its height on
 constexpr int kSettled = 50;  // ticks there: PX4 gives its loops their authority bit by bit, until 4 s after arming
 constexpr int kDisorder = 3;  // more in a row are as no odometry at all (docs/faults.md row 5)
 
@@ -51,12 +52,16 @@ FlightTick::FlightTick(const Vehicle& vehicle, double battery_land)
 // the frame that is flown in, until the vehicle is in other hands.
 void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
   closure_refused_now_ = false;
+  const double faded = was_commanding_ ? 1 - kControlPeriod / kClosureFades : 0;
+  closed_m_ *= faded, closed_rad_ *= faded;
   if (!sample || sample->closures == closures_) return;
   const RigidShift D = sample->map_from_odom * map_from_odom_.inverse();
   const bool first = closures_ == 0;
   const OdometrySample before = moved(D.inverse(), *sample);
   // Written so that what is no number is refused.
-  const bool small = (sample->state.p_W - before.state.p_W).norm() <= kMaxClosure && std::abs(D.yaw) <= kMaxClosureTurn;
+  const double by = (sample->state.p_W - before.state.p_W).norm(), turn = std::abs(D.yaw);
+  const bool small = closed_m_ + by <= kMaxClosure && closed_rad_ + turn <= kMaxClosureTurn;
+  if (was_commanding_ && small) closed_m_ += by, closed_rad_ += turn;
   if (was_commanding_ && !small) {
     closure_refused_now_ = closure_refused_ != sample->closures;
     closure_refused_ = sample->closures;
@@ -84,7 +89,9 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
     return;
   }
   using Verdict = OdometryGate::Verdict;
-  const bool moving = command_.v_W.norm() > 0.05 && mode() != Mode::lifting;  // it may yet stand
+  // A pose that repeats to the last bit is frozen in the air even if nothing is to move; standing, it may be still.
+  const bool flies = in.autopilot.armed && in.autopilot.landed == false;
+  const bool moving = (command_.v_W.norm() > 0.05 || flies) && mode() != Mode::lifting;
   out.verdict = gate_.take(*sample, moving);
   disorder_ = out.verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
   if (out.verdict == Verdict::good) {

@@ -127,7 +127,8 @@ class FlightTick {
   RigidShift map_from_odom_;           ///< of that
   std::uint32_t closure_refused_ = 0;  ///< the last one that is not flown; closures_: none
   bool closure_refused_now_ = false;
-  Setpoint command_;  ///< of the last tick
+  double closed_m_ = 0, closed_rad_ = 0;  ///< by the closures that were flown lately, fading
+  Setpoint command_;                      ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
   bool feed_distrusted_ = false;      ///< since then, until the vehicle is disarmed or follows us again
