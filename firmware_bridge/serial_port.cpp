@@ -35,6 +35,15 @@ std::optional<speed_t> speed_code(unsigned baud) noexcept {
 using Kind = PortError::Kind;
 tl::unexpected<PortError> error(Kind kind, int number) { return tl::unexpected(PortError{kind, number}); }
 
+// TIOCEXCL keeps others out, but not root's. A lock of the process, so that this one may open a port that it lost again
+// before the old descriptor is closed.
+bool lock(int fd) noexcept {
+  struct flock whole {};
+  whole.l_type = F_WRLCK;
+  whole.l_whence = SEEK_SET;
+  return ::fcntl(fd, F_SETLK, &whole) == 0;
+}
+
 bool nothing_now(int number) noexcept { return number == EAGAIN || number == EWOULDBLOCK || number == EINTR; }
 
 }  // namespace
@@ -44,6 +53,7 @@ tl::expected<SerialPort, PortError> SerialPort::open(const std::string& path, un
   if (!speed) return error(Kind::kBaudRate, 0);
   FileDescriptor fd(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (fd.get() < 0) return error(errno == EBUSY ? Kind::kBusy : Kind::kOpen, errno);
+  if (!lock(fd.get())) return error(Kind::kBusy, errno);
   termios settings{};
   if (::tcgetattr(fd.get(), &settings) != 0) return error(errno == ENOTTY ? Kind::kNotSerial : Kind::kConfigure, errno);
   ::cfmakeraw(&settings);

@@ -26,6 +26,11 @@ std::optional<sockaddr_in> socket_address(const UdpPort::Endpoint& endpoint) {
   return a;
 }
 
+// The first byte of a frame: MAVLink 2, MAVLink 1.
+bool begins_frame(std::span<const std::uint8_t> bytes) noexcept {
+  return !bytes.empty() && (bytes[0] == 0xFD || bytes[0] == 0xFE);
+}
+
 const sockaddr* generic(const sockaddr_in* a) noexcept { return reinterpret_cast<const sockaddr*>(a); }
 
 }  // namespace
@@ -52,12 +57,24 @@ tl::expected<std::size_t, PortError> UdpPort::read(std::span<std::uint8_t> into)
   socklen_t size = sizeof(from);
   const auto n = ::recvfrom(fd_.get(), into.data(), into.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
   if (n < 0) {
-    if (nothing_now(errno)) return 0U;
-    return error(Kind::kLost, errno);
+    if (!nothing_now(errno)) return error(Kind::kLost, errno);
+    if (finds_peer_ && has_peer_ && ++silent_ >= kSilentReads) listen_to_anyone();
+    return 0U;
   }
+  silent_ = 0;
+  const auto size_read = static_cast<std::size_t>(n);
+  if (has_peer_) return size_read;
+  if (!begins_frame(into.first(size_read))) return 0U;
   // Connecting makes the kernel drop everybody else's datagrams from now on.
-  if (!has_peer_ && n > 0) has_peer_ = ::connect(fd_.get(), generic(&from), sizeof(from)) == 0;
-  return static_cast<std::size_t>(n);
+  has_peer_ = ::connect(fd_.get(), generic(&from), sizeof(from)) == 0;
+  return size_read;
+}
+
+void UdpPort::listen_to_anyone() noexcept {
+  sockaddr nobody{};
+  nobody.sa_family = AF_UNSPEC;
+  has_peer_ = ::connect(fd_.get(), &nobody, sizeof nobody) != 0;
+  silent_ = 0;
 }
 
 tl::expected<std::size_t, PortError> UdpPort::write(std::span<const std::uint8_t> bytes) noexcept {

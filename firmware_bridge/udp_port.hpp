@@ -10,10 +10,14 @@
 
 namespace backwash::firmware_bridge {
 
-/// A UDP socket with one peer, non-blocking. The peer is given, or is the first that sends anything; nobody else is
-/// heard after that. For simulators and bench set-ups: UDP itself does not authenticate anyone.
+/// A UDP socket with one peer, non-blocking. The peer is given, or is the first that sends what begins as a MAVLink
+/// frame; nobody else is heard while it speaks. One that was found and is silent for kSilentReads empty reads is let go
+/// of: a simulator that is started anew speaks from another port. For simulators and bench set-ups: UDP itself does not
+/// authenticate anyone.
 class UdpPort {
  public:
+  static constexpr int kSilentReads = 150;  ///< 3 s at one in each control period: by then the flight has ended
+
   struct Endpoint {
     std::string address;  ///< numeric IPv4
     std::uint16_t port = 0;
@@ -38,10 +42,13 @@ class UdpPort {
 
  private:
   UdpPort(FileDescriptor fd, std::uint16_t local_port, bool has_peer) noexcept
-      : fd_(std::move(fd)), local_port_(local_port), has_peer_(has_peer) {}
+      : fd_(std::move(fd)), local_port_(local_port), has_peer_(has_peer), finds_peer_(!has_peer) {}
+  void listen_to_anyone() noexcept;
+
   FileDescriptor fd_;
   std::uint16_t local_port_;
-  bool has_peer_;
+  bool has_peer_, finds_peer_;
+  int silent_ = 0;  ///< empty reads in a row
 };
 
 }  // namespace backwash::firmware_bridge

@@ -61,7 +61,9 @@ void Quadrotor::step(const Vec3& w_W, const State& estimated) {
   state_.v_W += kStep * acceleration_;
   state_.p_W += kStep * 0.5 * (start.v_W + state_.v_W);
 
-  on_ground_ = z_floor_ && state_.p_W.z() <= *z_floor_ && acceleration_.z() <= 0;
+  // What comes down does not pass through, even while it brakes.
+  const bool upwards = acceleration_.z() > 0 && state_.v_W.z() >= 0;
+  on_ground_ = z_floor_ && state_.p_W.z() <= *z_floor_ && !upwards;
   if (on_ground_) {  // friction holds it where it stands
     state_.p_W = Vec3(start.p_W.x(), start.p_W.y(), *z_floor_);
     state_.v_W = acceleration_ = Vec3::Zero();

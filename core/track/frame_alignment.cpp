@@ -11,7 +11,10 @@ namespace {
 
 // Low-pass weights at 50 Hz: the transform averages over 1 s, the residuals over 0.2 s; velocities fade over 5 s.
 constexpr double kLearn = 0.02, kWatch = 0.1, kFade = 0.996;
-constexpr double kLongestStep = 0.1;  // s: gyros and velocity are not carried on for longer
+constexpr double kLongestStep = 0.1;  // s: the velocity is not carried on for longer
+// s: gyros are, by the mean of both ends, as long as the autopilot's pose is used at all (Supervisor::kPoseSilent): at
+// 10 Hz and below a turn would go unseen. A heading that changes its rate by 2 rad/s² within adds at most 2.6°.
+constexpr double kLongestTurn = 0.31;
 
 Vec3 turned(double yaw, const Vec3& v) noexcept {
   const double c = std::cos(yaw), s = std::sin(yaw);
@@ -69,7 +72,7 @@ void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, 
 
 // Autopilots whose heading follows the odometry turn along with it: then only their gyros can contradict it.
 void FrameAlignment::watch_turn(const FramePose& in_map, const FramePose& in_local, double dt) noexcept {
-  const bool gap = samples_ == 0 || !(dt > 0 && dt < kLongestStep);
+  const bool gap = samples_ == 0 || !(dt > 0 && dt < kLongestTurn);
   const double by_gyros = dt / 2 * (local_.yaw_rate + in_local.yaw_rate);
   gyro_turn_ = gap ? 0 : std::exp(-dt / kTurnOver) * gyro_turn_ + wrap_angle(in_map.yaw - map_yaw_) - by_gyros;
 }

@@ -50,12 +50,12 @@ bool OdometryGate::contradicts(const OdometrySample& sample, double dt) noexcept
 }
 
 void OdometryGate::time(const OdometrySample& sample, bool clock_was_set) noexcept {
-  constexpr std::int64_t kClockDrift_ns = 2'000;  // a sample: 100 ppm at 50 Hz
+  constexpr std::int64_t kClockDrift = 10'000;  // one in so many: 100 ppm, whatever the samples' rate
   const std::int64_t way = sample.received_ns - sample.stamp_ns;
   if (!fastest_ns_ || clock_was_set || way < *fastest_ns_)
     fastest_ns_ = way;
-  else
-    *fastest_ns_ += kClockDrift_ns;
+  else if (last_)
+    *fastest_ns_ += std::max<std::int64_t>(0, sample.received_ns - last_->received_ns) / kClockDrift;
   late_ns_ = std::max<std::int64_t>(0, way - *fastest_ns_);
 }
 

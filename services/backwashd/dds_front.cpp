@@ -93,36 +93,52 @@ void DdsFront::take_closures() {
   });
 }
 
-void DdsFront::take_commands() {
-  commands_.take([&](const dds::Command& m, const dds::Guid& writer) {
-    CommandMessage c;
-    c.writer = writer;
-    std::snprintf(c.station.data(), c.station.size(), "%s", printable(m.station ? m.station : "").c_str());
-    c.session = m.session;
-    c.sequence = m.sequence_number;
-    c.verb = m.verb;
-    c.position = {m.position.x, m.position.y, m.position.z};
-    c.yaw = m.yaw;
-    c.waypoints = m.waypoints._length;
-    for (std::size_t n = 0; n < std::min(c.waypoints, c.kMostWaypoints); ++n)
-      c.waypoint[n] = {m.waypoints._buffer[n].x, m.waypoints._buffer[n].y, m.waypoints._buffer[n].z};
-    char line[320];
-    std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s", c.station.data(),
-                  static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
-                  c.position.z(), c.yaw, dds::text(writer).c_str());
-    recorder_.append(study::RecordKind::command, line);
-    if (!channels_.commands.push(c))
-      refusals_.add(channels_.commands_refused, [] { return "a command: 64 others wait to be answered"; });
-  });
-  // After what they said last. Who finds no room is told of in the next round.
+// A writer that floods us is cut to what can be carried out, before it costs anything: else it would fill the mission's
+// ring and the raw log, and keep the reader from the odometry. Its STOPs have an allowance of their own, and a STOP
+// waits for room.
+void DdsFront::take_command(const dds::Command& m, const dds::Guid& writer) {
+  const bool stops = m.verb == backwash_msgs_msg_dds__COMMAND_STOP;
+  if (!allowances_[writer][stops ? 0 : 1].take(now_ns()))
+    return refusals_.add(channels_.commands_refused,
+                         [&] { return "commands of writer " + dds::text(writer) + ": more than 50 a second"; });
+  CommandMessage c;
+  c.writer = writer;
+  std::snprintf(c.station.data(), c.station.size(), "%s", printable(m.station ? m.station : "").c_str());
+  c.session = m.session;
+  c.sequence = m.sequence_number;
+  c.verb = m.verb;
+  c.position = {m.position.x, m.position.y, m.position.z};
+  c.yaw = m.yaw;
+  c.waypoints = m.waypoints._length;
+  for (std::size_t n = 0; n < std::min(c.waypoints, c.kMostWaypoints); ++n)
+    c.waypoint[n] = {m.waypoints._buffer[n].x, m.waypoints._buffer[n].y, m.waypoints._buffer[n].z};
+  char line[320];
+  std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s", c.station.data(),
+                static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
+                c.position.z(), c.yaw, dds::text(writer).c_str());
+  recorder_.append(study::RecordKind::command, line);
+  if (channels_.commands.push(c)) return;
+  if (stops) stop_ = c;
+  refusals_.add(channels_.commands_refused, [] { return "a command: 64 others wait to be answered"; });
+}
+
+// After what they said last. Who finds no room is told of in the next round.
+void DdsFront::tell_of_departed() {
   std::ranges::copy(commands_.departed(), std::back_inserter(gone_));
   while (!gone_.empty()) {
     CommandMessage c;
     c.writer = gone_.back();
     c.departed = true;
     if (!channels_.commands.push(c)) return;
+    allowances_.erase(gone_.back());
     gone_.pop_back();
   }
+}
+
+void DdsFront::take_commands() {
+  commands_.take([&](const dds::Command& m, const dds::Guid& writer) { take_command(m, writer); });
+  if (stop_ && channels_.commands.push(*stop_)) stop_.reset();
+  tell_of_departed();
 }
 
 void DdsFront::run_readers() {

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <map>
 #include <optional>
 #include <vector>
 
 #include "core/config/daemon_config.hpp"
+#include "services/backwashd/allowance.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/localization.hpp"
 #include "services/backwashd/mission.hpp"
@@ -34,17 +37,21 @@ class DdsFront {
   void take_odometry();
   void take_closures();
   void take_commands();
+  void take_command(const dds::Command& message, const dds::Guid& writer);
+  void tell_of_departed();
 
   Channels& channels_;
   Recorder& recorder_;
   int priority_;
   Localization localization_;
   Refusals refusals_;
-  std::optional<dds::Guid> bound_;       // the odometry's writer
-  std::optional<std::int64_t> gone_ns_;  // since when it is gone
-  std::atomic<bool> commanding_{false};  // status → reader
-  std::vector<dds::Guid> gone_;          // writers of commands, of which the mission has not been told yet
-  dds::Malformed malformed_;             // before the middleware's threads
+  std::optional<dds::Guid> bound_;                            // the odometry's writer
+  std::optional<std::int64_t> gone_ns_;                       // since when it is gone
+  std::atomic<bool> commanding_{false};                       // status → reader
+  std::map<dds::Guid, std::array<Allowance, 2>> allowances_;  // of writers of commands: for STOP, for the others
+  std::optional<CommandMessage> stop_;                        // the newest STOP that the mission had no room for
+  std::vector<dds::Guid> gone_;  // writers of commands, of which the mission has not been told yet
+  dds::Malformed malformed_;     // before the middleware's threads
   dds::Participant participant_;
   dds::Reader<dds::Odometry> odometry_;
   dds::Reader<dds::TransformStamped> closures_;

@@ -49,7 +49,8 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
     return tl::unexpected<std::string>("odometry in frame '" + frame + "' before the first loop_closure from it to '" +
                                        frames_.map + "'");
   const double* covariance = m.pose.covariance;
-  if (covariance[0] != 0 && covariance[0] != -1) {
+  const bool unknown = covariance[0] == -1 || (covariance[0] == 0 && covariance[7] == 0 && covariance[14] == 0);
+  if (!unknown) {
     const double worst = std::max({covariance[0], covariance[7], covariance[14]});
     if (!(covariance[0] >= 0 && covariance[7] >= 0 && covariance[14] >= 0 && worst <= max_sigma_ * max_sigma_))
       return tl::unexpected<std::string>(

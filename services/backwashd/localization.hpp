@@ -20,8 +20,8 @@ class Localization {
   Localization(const config::Daemon& config, double max_sigma) : frames_(config.frames), max_sigma_(max_sigma) {}
 
   /// Checks frames and covariance: a position that the VIO itself holds for worse than max_sigma is a bad one. A
-  /// covariance whose first number is 0 or −1 is not known. A pose that is not finite, beyond 10 km or 100 m/s, or
-  /// no rotation is refused; whether it is credible is for the odometry gate.
+  /// covariance of zeros, or whose first number is −1, is not known. A pose that is not finite, beyond 10 km or 100
+  /// m/s, or no rotation is refused; whether it is credible is for the odometry gate.
   tl::expected<OdometrySample, std::string> odometry(const dds::Odometry& message, std::int64_t received_ns);
   /// From now on, odometry is brought into the map by this transform; it turns about z only. A message that repeats the
   /// last transform changes nothing.

@@ -6,13 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "services/backwashd/localization.hpp"
 #include "services/backwashd/text.hpp"
 
 namespace backwash::daemon {
 namespace {
-
-// The frame that everything on our topics is in.
-const std::string kMapFrame = "map";
 
 geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
@@ -21,6 +19,7 @@ geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()
 MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
     : channels_(channels),
       recorder_(recorder),
+      map_frame_(config.frames.map),
       sensor_range_(config.map.sensor_range),
       placement_(config),
       refusals_(channels.refused_map),
@@ -65,6 +64,10 @@ void MapFront::take_scans() {
 
 void MapFront::take_maps() {
   maps_.take([&](const dds::Octomap& m) {
+    const std::string frame = m.header.frame_id ? m.header.frame_id : "";
+    if (frame != map_frame_)
+      return refusals_.add(channels_.maps_rejected,
+                           [&] { return wrong_frame("the map", frame, "'" + map_frame_ + "'").value(); });
     if (m.data._length > kMaxMapBytes)
       return refusals_.add(channels_.maps_rejected, [&] {
         return "a map of " + std::to_string(m.data._length) + " bytes, at most " + std::to_string(kMaxMapBytes);
@@ -94,7 +97,7 @@ void MapFront::run_readers() {
 }
 
 void MapFront::send(const track::AcceptedSegment& segment) {
-  const std_msgs_msg_dds__Header_ header{dds::wall_clock(), dds::c_string(kMapFrame)};
+  const std_msgs_msg_dds__Header_ header{dds::wall_clock(), dds::c_string(map_frame_)};
   std::vector<dds::TubeStep> steps;
   std::vector<dds::PoseStamped> poses;
   for (const auto& s : segment.tube) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
+
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/recorder.hpp"
@@ -34,6 +36,7 @@ class MapFront {
 
   Channels& channels_;
   Recorder& recorder_;
+  std::string map_frame_;  // that everything on these topics is in
   double sensor_range_;
   ScanPlacement placement_;
   Refusals refusals_;

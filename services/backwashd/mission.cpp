@@ -18,8 +18,9 @@ constexpr std::uint8_t kRefused = backwash_msgs_msg_dds__ACK_REFUSED;
 constexpr std::uint8_t kNotYours = backwash_msgs_msg_dds__ACK_NOT_YOURS;
 constexpr std::uint8_t kInvalid = backwash_msgs_msg_dds__ACK_INVALID;
 
-constexpr double kRetry = 1.0;       // s from the end of one job to the next try
-constexpr double kJudgeEvery = 1.0;  // s
+constexpr double kRetry = 1.0;             // s from the end of one job to the next try
+constexpr double kJudgeEvery = 1.0;        // s
+constexpr std::uint64_t kMostOrders = 16;  // on their way at once; a STOP always finds room behind them
 
 Decision only(std::uint8_t result, std::string what) { return {Answer{result, std::move(what)}, {}, {}}; }
 Decision refused(std::string why) { return only(kRefused, std::move(why)); }
@@ -96,7 +97,7 @@ std::optional<Answer> Mission::session(const CommandMessage& command, double now
     if (!holder.empty() && lease_->writer != command.writer)
       return Answer{kNotYours, "session held by " + holder + (holder == from ? ", another process of that name" : "")};
     end_lease();
-    lease_ = Lease{command.writer, from, command.session, command.sequence, 0, {}};
+    lease_ = Lease{command.writer, from, command.session, command.sequence, 0, command.verb, {}};
     return std::nullopt;
   }
   if (command.sequence == lease_->sequence) return lease_->last;
@@ -111,15 +112,19 @@ Decision Mission::handle(const CommandMessage& command, double now_s) {
     if (lease_ && lease_->writer == command.writer) end_lease();
     return {};
   }
+  // Whoever sees that the flight must end may end it, whatever else is wrong with the command; the lease stays where it
+  // is. Only the repeat of a STOP is no new one.
+  const bool stops = command.verb == backwash_msgs_msg_dds__COMMAND_STOP;
   if (command.station[0] == 0 || !command.position.allFinite() || !std::isfinite(command.yaw))
-    return only(kInvalid, "a command needs a station name and finite numbers");
+    return stops ? stop() : only(kInvalid, "a command needs a station name and finite numbers");
   if (const auto answered = session(command, now_s)) {
-    // Whoever sees that the flight must end may end it; the lease stays where it is.
-    const bool stops = command.verb == backwash_msgs_msg_dds__COMMAND_STOP && answered->result == kNotYours;
-    return stops ? stop() : Decision{answered, {}, {}};
+    const bool repeat = lease_ && lease_->session == command.session && lease_->writer == command.writer &&
+                        lease_->sequence == command.sequence && lease_->verb == command.verb;
+    return stops && !repeat ? stop() : Decision{answered, {}, {}};
   }
   Decision decision = decide(command);
   lease_->sequence = command.sequence;
+  lease_->verb = command.verb;
   lease_->until_s = now_s + kLease;
   lease_->last = *decision.answer;
   if (command.verb == backwash_msgs_msg_dds__COMMAND_RELEASE) end_lease();
@@ -154,12 +159,20 @@ Decision Mission::decide(const CommandMessage& command) {
   }
 }
 
-/// An order to the control thread: it ends what was asked for before it.
+/// An order to the control thread: it ends what was asked for before it. The same order again, while that is still on
+/// its way, is that order: nothing was planned since. So however many ask, there is always room for another one.
 Decision Mission::order(Request request, std::string answer) {
+  const bool again = order_under_way() && request == last_request_;
+  if (!again && request != Request::stop && orders_ >= view_.epoch.order + kMostOrders)
+    return refused("the last orders are still being carried out: ask again");
   route_.clear();
   job_.reset();
   task_.clear();
-  return {Answer{kAccepted, std::move(answer)}, track::Order{request, ++orders_}, {}};
+  Decision decision{Answer{kAccepted, std::move(answer)}, {}, {}};
+  if (again) return decision;
+  last_request_ = request;
+  decision.order = track::Order{request, ++orders_};
+  return decision;
 }
 
 // What has to be right before the daemon takes control; the frames are judged by the supervisor while it is enabling.
@@ -180,6 +193,7 @@ Decision Mission::take_off(const CommandMessage& command) {
   if (view_.mode == Mode::lifting) return refused("taking off already");
   if (view_.mode != Mode::tracking) return refused("not enabled");
   if (!view_.landed) return refused("already in the air");
+  if (!view_.finished) return refused("already taking off");
   return start(PlanJob::Kind::takeoff, {command.position, {}});
 }
 
@@ -215,7 +229,7 @@ Decision Mission::follow(const CommandMessage& command) {
 Decision Mission::hold() {
   if (!flies(view_.mode)) return refused("not enabled");
   Decision decision = order(Request::hold, "planning");
-  if (world_) decision.job = start(PlanJob::Kind::brake).job;
+  if (world_ && decision.answer->result == kAccepted) decision.job = start(PlanJob::Kind::brake).job;
   return decision;
 }
 

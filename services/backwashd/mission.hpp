@@ -48,7 +48,8 @@ class Mission {
   Decision observe(const MissionInput& in);
   /// Answers one command and decides what it asks for. A repeated sequence number of a session is answered again, not
   /// done again (docs/faults.md row 28 and the session rules of the IDL). A session is its writer's: a writer that
-  /// departs ends it, and no other one can go on with it (row 48). STOP is taken from every station.
+  /// departs ends it, and no other one can go on with it (row 48). STOP is taken from everybody: of another session, of
+  /// one that is over, with an old number, with anything else in it that is no number.
   Decision handle(const CommandMessage& command, double now_s);
   /// Holder of the lease, empty if none.
   std::string station(double now_s) const;
@@ -83,7 +84,8 @@ class Mission {
   ControlView view_;
   std::shared_ptr<const plan::World> world_;
   std::uint64_t orders_ = 0;
-  std::optional<std::uint64_t> job_;  // under way
+  track::Request last_request_ = track::Request::none;  // of the newest order
+  std::optional<std::uint64_t> job_;                    // under way
   std::uint64_t last_job_ = 0;
   std::deque<Goal> route_;  // still to be reached; the first is the one flown to
   double judge_at_s_ = 0;
@@ -95,6 +97,7 @@ class Mission {
     std::uint64_t session = 0;
     std::uint32_t sequence = 0;
     double until_s = 0;
+    std::uint8_t verb = 0;  // of that sequence number
     Answer last;
   };
   std::optional<Lease> lease_;

@@ -94,10 +94,10 @@ sigset_t shield_process() {
     ::close(fd);
     break;
   }
-  for (const int ignored : {SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN}) ::signal(ignored, SIG_IGN);
+  for (const int ignored : {SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN, SIGTSTP, SIGUSR1, SIGUSR2}) ::signal(ignored, SIG_IGN);
   sigset_t set;
   sigemptyset(&set);
-  for (const int waited : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, waited);
+  for (const int waited : {SIGINT, SIGTERM, SIGQUIT, SIGHUP}) sigaddset(&set, waited);
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   return set;
 }

@@ -57,8 +57,9 @@ class Threads {
 
 /// At start, before any file is opened and any thread started:
 /// - a standard descriptor that is closed is opened on /dev/null, so that no port or log ever gets its number;
-/// - SIGPIPE, SIGXFSZ, SIGTTOU and SIGTTIN are ignored: a pipe, a limit or a terminal never ends or stops a flight;
-/// - SIGINT, SIGTERM and SIGHUP are blocked in every thread and left to wait_for_end().
+/// - SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN and SIGTSTP are ignored: a pipe, a limit or a terminal never ends or stops a
+///   flight; nor do SIGUSR1 and SIGUSR2, by which scripts ask programs for a new log;
+/// - SIGINT, SIGTERM, SIGQUIT and SIGHUP are blocked in every thread and left to wait_for_end().
 /// Returns the blocked ones.
 sigset_t shield_process();
 
@@ -72,7 +73,7 @@ class CatchTheRest {
   CatchTheRest& operator=(const CatchTheRest&) = delete;
 };
 
-/// Returns on SIGINT, SIGTERM or a failure. SIGHUP is told and ignored: a flight does not end with a terminal.
+/// Returns on SIGINT, SIGTERM, SIGQUIT or a failure. SIGHUP is told and ignored: a flight does not end with a terminal.
 void wait_for_end(const sigset_t& signals, const Failure& failure);
 
 }  // namespace backwash::daemon

@@ -31,17 +31,18 @@ Decision observe(Channels& channels, Mission& mission) {
   channels.jobs.collect();
   MissionInput in;
   in.now_s = seconds_now();
-  in.view = channels.view_mission.read_new();
-  if (const auto* world = channels.worlds.mission.take()) {
-    in.world = world->world;
-    channels.worlds.mission.give_back(world);
-  }
+  // Before the view: what has come to an end is then seen in it.
   std::vector<PlanOutcome> outcomes;
   while (const auto outcome = channels.outcomes.pop()) {
     if (!outcome->ok) spdlog::warn("refused: {}", outcome->reason.data());
     outcomes.push_back(*outcome);
   }
   in.outcomes = outcomes;
+  in.view = channels.view_mission.read_new();
+  if (const auto* world = channels.worlds.mission.take()) {
+    in.world = world->world;
+    channels.worlds.mission.give_back(world);
+  }
   return mission.observe(in);
 }
 

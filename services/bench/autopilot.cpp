@@ -24,9 +24,9 @@ Eigen::Matrix3d yaw_matrix(double yaw) { return Eigen::AngleAxisd(yaw, Vec3::Uni
 }  // namespace
 
 Autopilot::Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, const Vec3& ground_W,
-                     const LocalFrame& frame, std::uint64_t seed, std::uint8_t system)
+                     const LocalFrame& frame, std::uint64_t seed, std::uint8_t system, double airflow)
     : vehicle_(vehicle, State{ground_W, Vec3::Zero()}, ground_W.z()),
-      air_(grid, vehicle, seed),
+      air_(grid, vehicle, seed, airflow),
       frame_(frame),
       system_(system) {
   vehicle_.set_motors(false);
@@ -53,9 +53,10 @@ void Autopilot::disarm() noexcept {
   heartbeat_due_ = true;
 }
 
-Setpoint Autopilot::to_map(const Setpoint& local) const {
+Setpoint Autopilot::target_of(const mavlink::SetPositionTargetLocalNed& m) const {
   const Eigen::Matrix3d R = yaw_matrix(-frame_.yaw);
-  return {R * (local.p_W - frame_.origin), R * local.v_W, R * local.a_W, local.yaw - frame_.yaw};
+  return {R * (mavlink::swap_ned({m.x, m.y, m.z}) - frame_.origin), R * mavlink::swap_ned({m.vx, m.vy, m.vz}),
+          R * mavlink::swap_ned({m.afx, m.afy, m.afz}), mavlink::swap_yaw(m.yaw) - frame_.yaw};
 }
 
 // The estimator: the truth as its inertial sensors would carry it on, plus what the odometry had wrong.
@@ -77,36 +78,40 @@ void Autopilot::steer() {
 // As gyros measure it, FLU: the mean since the report before.
 Vec3 Autopilot::body_rates() {
   const Eigen::Quaterniond turn = reported_.conjugate() * attitude();
+  const auto elapsed = static_cast<double>(std::max(steps_ - reported_steps_, 1L)) * sim::Quadrotor::kStep;
   reported_ = attitude();
-  return (turn.w() < 0 ? -2 : 2) / (kReportEvery * sim::Quadrotor::kStep) * turn.vec();
+  reported_steps_ = steps_;
+  return (turn.w() < 0 ? -2 : 2) / elapsed * turn.vec();
 }
 
 void Autopilot::on(const mavlink::SetPositionTargetLocalNed& m, double t) {
   last_setpoint_ = t;
   ++setpoints_;
-  Setpoint local;
-  local.p_W = mavlink::swap_ned({m.x, m.y, m.z});
-  local.v_W = mavlink::swap_ned({m.vx, m.vy, m.vz});
-  local.a_W = mavlink::swap_ned({m.afx, m.afy, m.afz});
-  local.yaw = mavlink::swap_yaw(m.yaw);
   if (mode_ == Mode::offboard && armed_) {
-    target_ = to_map(local);
+    target_ = target_of(m);
     steer();
   }
 }
 
 void Autopilot::on(const mavlink::Odometry& m, double) {
+  const auto wrong = error_of(m);
+  if (!wrong) return;
+  error_ = wrong->error;
+  yaw_error_ = wrong->yaw;
+  local_position_ = true;
+}
+
+std::optional<Autopilot::OdometryError> Autopilot::error_of(const mavlink::Odometry& m) const {
   const double stamp = static_cast<double>(m.time_usec) * 1e-6;
   const auto then = std::find_if(history_.begin(), history_.end(), [&](const Truth& h) { return h.t >= stamp; });
-  if (then == history_.end()) return;
+  if (then == history_.end()) return std::nullopt;
   const Vec3 p = mavlink::swap_ned({m.x, m.y, m.z});
   const Eigen::Quaterniond q = mavlink::swap_ned_frd(Eigen::Quaterniond(m.q[0], m.q[1], m.q[2], m.q[3]));
   const Vec3 v = q * mavlink::swap_frd({m.vx, m.vy, m.vz});
   const Vec3 x = q * Vec3::UnitX(), x_then = then->attitude * Vec3::UnitX();
-  yaw_error_ = follows_yaw ? std::atan2(x.y(), x.x()) - std::atan2(x_then.y(), x_then.x()) : 0;
-  const Eigen::Matrix3d R = yaw_matrix(yaw_error_);
-  error_ = {p - R * then->state.p_W, v - R * then->state.v_W};
-  local_position_ = true;
+  const double yaw = follows_yaw ? std::atan2(x.y(), x.x()) - std::atan2(x_then.y(), x_then.x()) : 0;
+  const Eigen::Matrix3d R = yaw_matrix(yaw);
+  return OdometryError{{p - R * then->state.p_W, v - R * then->state.v_W}, yaw};
 }
 
 void Autopilot::on(const mavlink::CommandLong& m, double t) {
@@ -151,6 +156,9 @@ void Autopilot::receive(std::span<const std::uint8_t> bytes, double t) {
         wire_ << t << ',' << frame.id << ',' << int{frame.sender.sequence};
         if constexpr (std::is_same_v<std::decay_t<decltype(message)>, mavlink::SetPositionTargetLocalNed>)
           wire_ << ',' << message.type_mask << ',' << message.x << ',' << message.y << ',' << message.z << '\n';
+        else if constexpr (std::is_same_v<std::decay_t<decltype(message)>, mavlink::CommandLong>)
+          wire_ << ',' << message.command << ',' << message.param1 << ',' << message.param2 << ',' << message.param7
+                << '\n';
         else
           wire_ << ",,,,\n";
       }
@@ -181,24 +189,13 @@ void Autopilot::fly(double t) {
   }
 }
 
-template <typename Message>
-void Autopilot::send(const Message& message, std::vector<std::uint8_t>& out) {
-  const auto frame = mavlink::encode_frame({system_, 1, sequence_++}, message);
-  out.insert(out.end(), frame.view().begin(), frame.view().end());
-}
-
-void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
-  const auto boot_ms = static_cast<std::uint32_t>(steps_);
+void Autopilot::telemetry(double, std::vector<std::uint8_t>& out) {
   for (const auto& ack : acks_) send(ack, out);
   acks_.clear();
   for (const auto& value : values_) send(value, out);
   values_.clear();
   if (mute) return out.clear();
-  if (battery && steps_ % 1000 == 500) {
-    mavlink::BatteryStatus status{.battery_remaining = static_cast<std::int8_t>(std::lround(100 * *battery))};
-    status.voltages.fill(65535);
-    send(status, out);
-  }
+  if (battery && steps_ % 1000 == 500) send_battery(out);
   if (steps_ % 1000 == 0 || heartbeat_due_) {
     heartbeat_due_ = false;
     const std::uint32_t custom = mode_ == Mode::offboard ? kOffboard : mode_ == Mode::land ? kAutoLand : kManual;
@@ -214,31 +211,39 @@ void Autopilot::telemetry(double t, std::vector<std::uint8_t>& out) {
     const std::uint8_t state = landed_ ? 1 : mode_ == Mode::land ? 4 : 2;
     send(mavlink::ExtendedSysState{.vtol_state = 0, .landed_state = state}, out);
   }
-  if (steps_ % kReportEvery == 0 && !silent_attitude) {
-    const Eigen::Quaterniond q =
-        mavlink::swap_ned_frd(Eigen::Quaterniond(yaw_matrix(frame_.yaw + yaw_error_)) * attitude());
-    const Eigen::Vector3f omega = mavlink::swap_frd(body_rates()).cast<float>();
-    send(mavlink::AttitudeQuaternion{.time_boot_ms = boot_ms,
-                                     .q1 = static_cast<float>(q.w()),
-                                     .q2 = static_cast<float>(q.x()),
-                                     .q3 = static_cast<float>(q.y()),
-                                     .q4 = static_cast<float>(q.z()),
-                                     .rollspeed = omega.x(),
-                                     .pitchspeed = omega.y(),
-                                     .yawspeed = omega.z()},
-         out);
-  }
-  if (steps_ % kReportEvery == 0 && local_position_ && !silent_pose) {
-    const State b = believed();
-    const Eigen::Vector3f p = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.p_W + frame_.origin).cast<float>();
-    const Eigen::Vector3f v = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.v_W).cast<float>();
-    send(mavlink::LocalPositionNed{boot_ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, out);
-  }
-  (void)t;
+  if (steps_ % kReportEvery == 0 && !silent_attitude) send_attitude(out);
+  if (steps_ % kReportEvery == 0 && local_position_ && !silent_pose) send_position(out);
+}
+
+void Autopilot::send_attitude(std::vector<std::uint8_t>& out) {
+  const Eigen::Quaterniond q =
+      mavlink::swap_ned_frd(Eigen::Quaterniond(yaw_matrix(frame_.yaw + yaw_error_)) * attitude());
+  const Eigen::Vector3f omega = mavlink::swap_frd(body_rates()).cast<float>();
+  send(mavlink::AttitudeQuaternion{.time_boot_ms = static_cast<std::uint32_t>(steps_),
+                                   .q1 = static_cast<float>(q.w()),
+                                   .q2 = static_cast<float>(q.x()),
+                                   .q3 = static_cast<float>(q.y()),
+                                   .q4 = static_cast<float>(q.z()),
+                                   .rollspeed = omega.x(),
+                                   .pitchspeed = omega.y(),
+                                   .yawspeed = omega.z()},
+       out);
+}
+
+void Autopilot::send_position(std::vector<std::uint8_t>& out) {
+  const State b = believed();
+  const Eigen::Vector3f p = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.p_W + frame_.origin).cast<float>();
+  const Eigen::Vector3f v = mavlink::swap_ned(yaw_matrix(frame_.yaw) * b.v_W).cast<float>();
+  send(mavlink::LocalPositionNed{static_cast<std::uint32_t>(steps_), p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, out);
+}
+
+void Autopilot::send_battery(std::vector<std::uint8_t>& out) {
+  mavlink::BatteryStatus status{.battery_remaining = static_cast<std::int8_t>(std::lround(100 * battery.value_or(1)))};
+  status.voltages.fill(65535);
+  send(status, out);
 }
 
 void Autopilot::step(double t, std::vector<std::uint8_t>& out) {
-  t_ = t;
   fly(t);
   history_.push_back({t, truth(), attitude()});
   while (history_.front().t < t - kHistory) history_.pop_front();

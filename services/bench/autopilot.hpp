@@ -31,9 +31,11 @@ class Autopilot {
   static constexpr double kOffboardTimeout = 0.5;  ///< s without a set-point until the failsafe lands
   static constexpr double kDescent = 0.5;          ///< m/s
 
-  /// Stands disarmed at `ground_W` (the vehicle's centre, map frame).
+  /// Stands disarmed at `ground_W` (the vehicle's centre, map frame). `airflow`: factor on the variance of the air; 0
+  /// is calm.
   Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, const Vec3& ground_W, const LocalFrame& frame,
-            std::uint64_t seed, std::uint8_t system);
+            std::uint64_t seed, std::uint8_t system, double airflow = 1);
+  virtual ~Autopilot() = default;
 
   /// Frames from the companion computer, received at `t` (s, monotonic).
   void receive(std::span<const std::uint8_t> bytes, double t);
@@ -46,7 +48,7 @@ class Autopilot {
   double thrust() const noexcept { return armed_ ? vehicle_.thrust() : 0; }
   bool armed() const noexcept { return armed_; }
   bool landed() const noexcept { return landed_; }
-  const char* mode() const noexcept;
+  virtual const char* mode() const noexcept;
   std::uint64_t setpoints() const noexcept { return setpoints_; }
 
   /// While true no telemetry is sent (heartbeat lost, docs/faults.md row 21).
@@ -64,55 +66,78 @@ class Autopilot {
   /// Remaining share, sent once a second as BATTERY_STATUS while set.
   std::optional<double> battery;
   /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
-  void take_over() noexcept;
+  virtual void take_over() noexcept;
   /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
-  void disarm() noexcept;
+  virtual void disarm() noexcept;
   /// The estimator is reset: from now on its local frame lies elsewhere.
   void reset_estimator(const LocalFrame& frame) noexcept { frame_ = frame; }
-  /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position.
+  /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position; of a command
+  /// its number and parameters 1, 2 and 7.
   void log_wire(const std::string& path);
 
- private:
-  enum class Mode { manual, offboard, land };
-  void on(const mavlink::SetPositionTargetLocalNed& m, double t);
-  void on(const mavlink::Odometry& m, double t);
-  void on(const mavlink::CommandLong& m, double t);
-  void on(const mavlink::ParamRequestRead& m, double t);
-  template <typename Other>
-  void on(const Other&, double) {}
-  Setpoint to_map(const Setpoint& local) const;
+ protected:
+  // What a profile of a real firmware (firmware.hpp) does in its own way.
+  virtual void on(const mavlink::SetPositionTargetLocalNed& m, double t);
+  virtual void on(const mavlink::Odometry& m, double t);
+  virtual void on(const mavlink::CommandLong& m, double t);
+  virtual void on(const mavlink::ParamRequestRead& m, double t);
+  virtual void on(const mavlink::ParamSet&, double) {}
+  virtual void on(const mavlink::SetGpsGlobalOrigin&, double) {}
+  virtual void on(const mavlink::Timesync&, double) {}
+  virtual void fly(double t);
+  virtual void telemetry(double t, std::vector<std::uint8_t>& out);
+
+  /// What an ODOMETRY has wrong, against the truth at its stamp; nothing when the stamp is none of the last second's.
+  struct OdometryError {
+    State error;
+    double yaw;  ///< rad
+  };
+  std::optional<OdometryError> error_of(const mavlink::Odometry& m) const;
+  /// The set-point of a message, in the map as the controller believes it to lie.
+  Setpoint target_of(const mavlink::SetPositionTargetLocalNed& m) const;
   State believed() const;
   State felt() const;
-  void steer();
-  Vec3 body_rates();
-  void fly(double t);
-  void telemetry(double t, std::vector<std::uint8_t>& out);
+  void send_attitude(std::vector<std::uint8_t>& out);
+  void send_position(std::vector<std::uint8_t>& out);
+  void send_battery(std::vector<std::uint8_t>& out);
   template <typename Message>
-  void send(const Message& message, std::vector<std::uint8_t>& out);
+  void send(const Message& message, std::vector<std::uint8_t>& out) {
+    const auto frame = mavlink::encode_frame({system_, 1, sequence_++}, message);
+    out.insert(out.end(), frame.view().begin(), frame.view().end());
+  }
 
   sim::Quadrotor vehicle_;
   sim::AirflowTruth air_;
   LocalFrame frame_;
-  std::uint8_t system_, sequence_ = 0;
-  mavlink::Parser parser_;
   bool armed_ = false, landed_ = true, local_position_ = false, heartbeat_due_ = false;
-  Mode mode_ = Mode::manual;
-  double t_ = 0, last_setpoint_ = -1e9, landed_since_ = 0;
+  double last_setpoint_ = -1e9, landed_since_ = 0;
   long steps_ = 0;
   std::uint64_t setpoints_ = 0;
+  Setpoint target_;  // in the map as the estimator believes it to lie
+  // What the estimator has wrong: believed = R_z(yaw_error_) truth + error_.
+  State error_;
+  double yaw_error_ = 0;  // 0 unless the heading is followed
+  std::vector<mavlink::CommandAck> acks_;
+  std::vector<mavlink::ParamValue> values_;  // asked for and not yet sent
+
+ private:
+  enum class Mode { manual, offboard, land };
+  template <typename Other>
+  void on(const Other&, double) {}
+  void steer();
+  Vec3 body_rates();
+
+  std::uint8_t system_, sequence_ = 0;
+  mavlink::Parser parser_;
+  Mode mode_ = Mode::manual;
   struct Truth {
     double t;
     State state;
     Eigen::Quaterniond attitude;
   };
-  Setpoint target_;            // in the map as the estimator believes it to lie
-  std::deque<Truth> history_;  // of the last second
-  // What the newest odometry said against the truth at its stamp: believed = R_z(yaw_error_) truth + error_.
-  State error_;
-  double yaw_error_ = 0;                     // 0 unless the heading is followed
+  std::deque<Truth> history_;                // of the last second
   Eigen::Quaterniond reported_{1, 0, 0, 0};  // true attitude of the report before
-  std::vector<mavlink::CommandAck> acks_;
-  std::vector<mavlink::ParamValue> values_;  // asked for and not yet sent
+  long reported_steps_ = 0;
   std::ofstream wire_;
 };
 

@@ -3,16 +3,20 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <iomanip>
 #include <stdexcept>
 #include <thread>
 
+#include "core/map/distance_field.hpp"
 #include "core/map/octomap_message.hpp"
 #include "core/sim/vio.hpp"
+#include "services/bench/firmware.hpp"
 #include "services/bench/pty.hpp"
 #include "services/bench/scans.hpp"
 #include "services/dds/topics.hpp"
@@ -23,6 +27,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kOdometryEvery = 10;  // steps of 1 ms
+constexpr int kMapEvery = 5000;     // steps, when the map has faults; otherwise it is sent once
 constexpr int kPriority = 60;       // SCHED_FIFO
 constexpr double kVioShare = 0.75;  // of the vehicle's estimation.position
 
@@ -73,7 +78,8 @@ dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t) {
   return m;
 }
 
-dds::Odometry odometry(const State& estimate, const Eigen::Quaterniond& q, double t, bool drifting) {
+dds::Odometry odometry(const VioSample& sample, bool drifting) {
+  const auto& [estimate, q, t] = sample;
   static const std::string map_frame = "map", odom_frame = "odom", child = "base_link";
   const std::string& frame = drifting ? odom_frame : map_frame;
   dds::Odometry m{};
@@ -112,13 +118,110 @@ class TruthLog {
   std::ofstream file_;
 };
 
+/// The parameters that give a profile the vehicle file's gains: k_p = P_pos·P_vel, k_d = P_vel.
+std::map<std::string, double> gains(const std::string& autopilot, const Vehicle& vehicle) {
+  const auto& [kp, kd] = std::pair(vehicle.controller.kp, vehicle.controller.kd);
+  if (autopilot == "px4")
+    return {{"MPC_XY_P", kp.horizontal / kd.horizontal},
+            {"MPC_XY_VEL_P_ACC", kd.horizontal},
+            {"MPC_Z_P", kp.vertical / kd.vertical},
+            {"MPC_Z_VEL_P_ACC", kd.vertical}};
+  return {{"PSC_POSXY_P", kp.horizontal / kd.horizontal},
+          {"PSC_VELXY_P", kd.horizontal},
+          {"PSC_POSZ_P", kp.vertical / kd.vertical},
+          {"PSC_VELZ_P", kd.vertical}};
+}
+
+std::unique_ptr<Autopilot> make_autopilot(const Options& o, const map::OccupancyGrid& grid, const Vehicle& vehicle) {
+  constexpr double kUptime = 60;  // s: it was switched on before the bench
+  const Vec3 ground = ground_below(grid, vehicle, o.start);
+  const Site site{
+      .grid = grid, .vehicle = vehicle, .ground_W = ground, .frame = o.frame, .seed = o.seed, .uptime = kUptime};
+  std::unique_ptr<Autopilot> autopilot;
+  if (o.autopilot == "ardupilot") autopilot = make_arducopter(site);
+  if (o.autopilot == "px4") autopilot = make_px4(site);
+  if (!autopilot) autopilot = std::make_unique<Autopilot>(grid, vehicle, ground, o.frame, o.seed, std::uint8_t{1});
+  if (o.autopilot != "simple")
+    for (const auto& [name, value] : gains(o.autopilot, vehicle)) autopilot->parameters[name] = value;
+  for (const auto& [name, value] : o.parameters) autopilot->parameters[name] = value;
+  return autopilot;
+}
+
+/// The channels with their faults, and the judge of what the flight shall keep.
+class Faults {
+ public:
+  Faults(const Timeline& timeline, const map::OccupancyGrid& grid, const Vehicle& vehicle, double ground_z)
+      : up(timeline.of(Fault::Channel::up), 11),
+        down(timeline.of(Fault::Channel::down), 12),
+        odometry(timeline.of(Fault::Channel::odometry), 13),
+        maps(timeline.of(Fault::Channel::map), 14),
+        timeline_(timeline),
+        running_(timeline.faults.size(), false),
+        grid_(grid),
+        vehicle_(vehicle),
+        ground_z_(ground_z),
+        judge_(timeline.expectations, first()) {
+    if (!timeline.expectations.empty()) distance_.emplace(grid);
+  }
+  bool spoils_map() const { return !timeline_.of(Fault::Channel::map).empty(); }
+
+  void watch(const Autopilot& a, double t) {
+    for (std::size_t n = 0; n < running_.size(); ++n) {
+      const Fault& f = timeline_.faults[n];
+      const bool runs = t >= f.from && t < f.until;
+      if (runs != running_[n])
+        spdlog::info("fault {} {} {} at {:.2f} s", name_of(f.channel), name_of(f.kind), runs ? "begins" : "ends", t);
+      running_[n] = runs;
+    }
+    if (!distance_ || t < 0) return;
+    // The floor on which it stands is no obstacle below half its radius above.
+    const Vec3& p = a.truth().p_W;
+    const bool flies = p.z() > ground_z_ + 0.5 * vehicle_.body.radius;
+    judge_.take({a.truth(), a.landed(), flies ? distance_->exact(grid_, p) - vehicle_.body.radius : 1e9}, t);
+  }
+  /// Prints the table of expectations; true when each was kept.
+  bool report() const {
+    bool kept = true;
+    if (!timeline_.expectations.empty()) std::printf("%-10s %-18s %-14s\n", "expected", "limit", "measured");
+    for (const auto& v : judge_.verdicts()) {
+      std::printf("%-10s %-18s %-14s %s\n", v.what.c_str(), v.limit.c_str(), v.measured.c_str(),
+                  v.passed ? "pass" : "FAIL");
+      kept = kept && v.passed;
+    }
+    spdlog::info("spoilt: {} chunks up, {} down, {} samples of odometry, {} maps", up.spoilt(), down.spoilt(),
+                 odometry.spoilt(), maps.spoilt());
+    return kept;
+  }
+
+  FaultyChannel<Bytes> up, down;
+  FaultyChannel<VioSample> odometry;
+  FaultyChannel<MapMessage> maps;
+
+ private:
+  double first() const {
+    double t = timeline_.faults.empty() ? 0 : 1e9;
+    for (const Fault& f : timeline_.faults) t = std::min(t, f.from);
+    return t;
+  }
+  const Timeline& timeline_;
+  std::vector<bool> running_;
+  const map::OccupancyGrid& grid_;
+  const Vehicle& vehicle_;
+  double ground_z_;
+  std::optional<map::DistanceField> distance_;
+  Judge judge_;
+};
+
+std::optional<Bytes> some(Bytes bytes) { return bytes.empty() ? std::nullopt : std::optional(std::move(bytes)); }
+
 }  // namespace
 
 int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle) {
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });
-  Autopilot autopilot(grid, vehicle, ground_below(grid, vehicle, options.start), options.frame, options.seed, 1);
-  for (const auto& [name, value] : options.parameters) autopilot.parameters[name] = value;
+  const auto made = make_autopilot(options, grid, vehicle);
+  Autopilot& autopilot = *made;
+  Faults faults(options.timeline, grid, vehicle, autopilot.truth().p_W.z());
   if (!options.wire.empty()) autopilot.log_wire(options.wire);
   TruthLog log(options.log);
   const sim::EmulatedVio vio(kVioShare * vehicle.estimation.position, options.seed + 1);
@@ -132,8 +235,17 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   Scans scans(participant, options.name_space);
   if (options.drift) closure_writer.write(loop_closure(Vec3::Zero(), 0));
   bool closed = false, event = false;
-  std::vector<std::int8_t> map_data;
-  map_writer.write(octomap(options.hidden ? without(grid, *options.hidden) : grid, map_data));
+  const map::OccupancyGrid known = options.hidden ? without(grid, *options.hidden) : grid;
+  std::mt19937_64 noise(options.seed);
+  const auto send_map = [&](std::optional<MapMessage> in, double t) {
+    for (const MapMessage& m : faults.maps.pass(std::move(in), t)) {
+      std::vector<std::int8_t> data;
+      const dds::Octomap message = octomap(m.grid, data);
+      if (m.garbage) std::ranges::generate(data, [&] { return static_cast<std::int8_t>(noise()); });
+      map_writer.write(message);
+    }
+  };
+  send_map(MapMessage{known}, options.timeline.after_arming ? -1 : 0);
   Pty pty(options.link);
   spdlog::info("bench runs: {} in {}, controller on {}", vehicle.name, options.map, options.link);
 
@@ -145,11 +257,16 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
     due += std::chrono::milliseconds(1);
     std::this_thread::sleep_until(due);
     const double t = seconds(due);
-    autopilot.receive(pty.read(), seconds(Clock::now()));
+    const double timeline_t = !options.timeline.after_arming ? t - seconds(begun) : armed_at ? t - *armed_at : -1;
+    for (const Bytes& bytes : faults.up.pass(some(pty.read()), timeline_t))
+      autopilot.receive(bytes, seconds(Clock::now()));
     out.clear();
     autopilot.step(t, out);
-    pty.write(out);
+    for (const Bytes& bytes : faults.down.pass(some(out), timeline_t)) pty.write(bytes);
     if (!armed_at && autopilot.armed()) armed_at = t;
+    if (faults.spoils_map())
+      send_map(step % kMapEvery == 0 ? std::optional(MapMessage{known}) : std::nullopt, timeline_t);
+    if (step % 10 == 0) faults.watch(autopilot, timeline_t);
     const auto passed = [&](const std::optional<double>& s) { return s && armed_at && t - *armed_at > *s; };
     autopilot.mute = passed(options.stop_heartbeat_s);
     State estimate = vio.estimate(autopilot.truth(), t - seconds(begun));
@@ -163,13 +280,15 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
     if (step % 100 == 0 && options.crate && event)
       seen(seen_of_crate(*options.crate, options.crate_edge, autopilot.truth().p_W));
     if (step % 250 == 0 && options.hidden && autopilot.armed()) seen(seen_of_room(grid, autopilot.truth().p_W));
-    if (step % kOdometryEvery == 0 && !passed(options.stop_odometry_s))
-      odometry_writer.write(odometry(estimate, autopilot.attitude(), t, options.drift.has_value()));
+    std::optional<VioSample> sample;
+    if (step % kOdometryEvery == 0 && !passed(options.stop_odometry_s)) sample = {estimate, autopilot.attitude(), t};
+    for (const VioSample& s : faults.odometry.pass(sample, timeline_t))
+      odometry_writer.write(odometry(s, options.drift.has_value()));
     if (step % 20 == 0) log.row(t, autopilot, estimate);
   }
   spdlog::info("bench stopped: {}, {}, {} set-points received", autopilot.mode(),
                autopilot.landed() ? "on the ground" : "in the air", autopilot.setpoints());
-  return 0;
+  return faults.report() ? 0 : 1;
 }
 
 }  // namespace backwash::bench

@@ -9,11 +9,14 @@
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/vehicle.hpp"
 #include "services/bench/autopilot.hpp"
+#include "services/bench/faults.hpp"
 
 namespace backwash::bench {
 
 struct Options {
   std::string map, vehicle, link, log, wire;
+  /// simple, ardupilot or px4. The last two fly with the vehicle file's gains as their parameters.
+  std::string autopilot = "simple";
   Vec3 start = Vec3::Zero();  ///< above the place where the vehicle stands, m
   LocalFrame frame;
   std::uint64_t seed = 1;
@@ -31,11 +34,12 @@ struct Options {
   /// The VIO has drifted by −drift before the flight: odometry comes in the frame odom, and a loop closure, map ← odom,
   /// brings it to light at the event, m.
   std::optional<Vec3> drift;
+  Timeline timeline;
   double event_x = 0;  ///< the event: the armed vehicle has passed this x of the map, m
 };
 
 /// Runs the emulated flight controller, VIO (100 Hz) and mapper in real time until the duration has passed or SIGINT or
-/// SIGTERM. Returns the exit code; throws std::runtime_error at start.
+/// SIGTERM. Returns the exit code, 1 when an expectation of the timeline failed; throws std::runtime_error at start.
 int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle);
 
 }  // namespace backwash::bench

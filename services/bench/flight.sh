@@ -1,17 +1,24 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # One flight through the daemon, judged afterwards from its raw log.
-#   flight.sh BUILD_DIR OUT_DIR NAME MAP START GOAL [VEHICLE [SEED]]
+#   flight.sh BUILD_DIR OUT_DIR NAME MAP START GOAL [VEHICLE [SEED [AUTOPILOT [BENCH_OPTION …]]]]
+# AUTOPILOT: simple, ardupilot or px4, with what the daemon wants of the last two set.
 # Writes OUT_DIR/NAME.{html,bwlog,truth.csv,wire.csv,status.json,log}; exits with the code of `backwash report`.
 set -euo pipefail
-source "$(dirname "${BASH_SOURCE[0]}")/session.sh"
-build=$1 name=$3 map=$4 start=$5 goal=$6 vehicle=${7:-builtin:quad-5in} seed=${8:-1}
 mkdir -p "$2"
 out=$(cd "$2" && pwd)
+source "$(dirname "${BASH_SOURCE[0]}")/session.sh"
+build=$1 name=$3 map=$4 start=$5 goal=$6 vehicle=${7:-builtin:quad-5in} seed=${8:-1} autopilot=${9:-simple}
+shift $(($# < 9 ? $# : 9))
+case $autopilot in # as tests/autopilots/{ardupilot.parm,px4.params} set the real ones
+  ardupilot) settings=(GUID_TIMEOUT=0.3 WPNAV_ACCEL_Z=250 PSC_JERK_Z=20 PSC_JERK_XY=20) ;;
+  px4) settings=(COM_OF_LOSS_T=0.3 COM_OBL_RC_ACT=4) ;;
+  *) settings=() ;;
+esac
 : >"$out/$name.log"
 
 start_bench "$build/services" "$out/$name.log" "$map" "$start" "$vehicle" --seed "$seed" --log "$out/$name.truth.csv" \
-  --wire "$out/$name.wire.csv"
+  --wire "$out/$name.wire.csv" --autopilot "$autopilot" "${settings[@]/#/--parameter=}" "$@"
 rm -f "$out/$name.bwlog" # of an earlier run; the daemon itself would leave it and take the next name
 start_daemon "$vehicle" "$out/$name.bwlog"
 enable

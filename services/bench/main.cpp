@@ -45,6 +45,12 @@ int main(int argc, char** argv) {
   app.add_option("--wire", o.wire, "what arrived from the daemon, frame by frame, CSV");
   app.add_option("--stop-odometry", o.stop_odometry_s, "fault: VIO stops this long after arming, s");
   app.add_option("--stop-heartbeat", o.stop_heartbeat_s, "fault: the controller goes silent this long after arming, s");
+  app.add_option("--autopilot", o.autopilot, "simple, or as measured of a real one: ardupilot, px4")
+      ->check(CLI::IsMember({"simple", "ardupilot", "px4"}))
+      ->capture_default_str();
+  std::string timeline;
+  app.add_option("--faults", timeline,
+                 "timeline of faults and of what the flight shall keep, TOML; services/bench/README.md");
   std::vector<std::string> parameters;
   app.add_option("--parameter", parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
   std::vector<double> crate, drift, hidden;
@@ -89,6 +95,12 @@ int main(int argc, char** argv) {
     return failed(grid.error().kind == backwash::map::MapError::Kind::not_found ? 66 : 65, grid.error().message);
   const auto vehicle = backwash::config::load_vehicle(o.vehicle);
   if (!vehicle) return failed(78, vehicle.error().message);
+  if (!timeline.empty()) {
+    auto loaded = backwash::bench::load_timeline(timeline);
+    using Kind = backwash::config::ConfigError::Kind;
+    if (!loaded) return failed(loaded.error().kind == Kind::not_found ? 66 : 78, loaded.error().message);
+    o.timeline = std::move(*loaded);
+  }
   try {
     return backwash::bench::run(o, *grid, *vehicle);
   } catch (const std::exception& e) {

@@ -1,360 +1,54 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Plays a script against an autopilot, real or emulated, without the daemon: its own companion computer with odometry
-// made of the simulator's truth. Writes what passed on the line, and the truth, as a trace. tests/autopilots/README.md.
+// Plays a script against a real autopilot in its own simulator, in real time: session.hpp.
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
-#include <bit>
-#include <deque>
-#include <filesystem>
 #include <fstream>
-#include <functional>
-#include <iomanip>
 #include <iostream>
-#include <map>
-#include <random>
 #include <thread>
 
-#include "firmware_bridge/mavlink/frames.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/parallel/real_time.hpp"
-#include "tests/autopilots/peer.hpp"
-#include "tests/autopilots/truth.hpp"
+#include "tests/autopilots/device.hpp"
+#include "tests/autopilots/session.hpp"
 
 namespace backwash::autopilots {
 namespace {
 
-constexpr std::uint8_t kSystem = 1, kCompanion = 191, kFlightController = 1;
-constexpr std::uint8_t kLocalNed = 1, kLocalFrd = 20, kBodyFrd = 12, kVio = 3, kInt32 = 6, kReal32 = 9;
-
-struct Options {
-  std::string device, truth, script, trace;
-  double noise = 0.001;  // m, of the position
-  bool px4 = false;
-  int pid = 0;
-};
-
-template <std::size_t N>
-std::string text_of(const std::array<char, N>& zero_filled) {
-  return {zero_filled.begin(), std::ranges::find(zero_filled, char{0})};
+int play(const std::string& device, const std::string& truth_at, const std::string& trace_path,
+         const Session::Options& options) {
+  std::ofstream trace(trace_path);
+  Session session(open_line(device), options, trace);
+  const auto truth = truth_source(truth_at);
+  for (auto due = std::chrono::steady_clock::now(); !session.done();) {
+    due += std::chrono::milliseconds(1);
+    std::this_thread::sleep_until(due);
+    if (!session.step(daemon::now_ns(), truth->newest())) return 1;
+  }
+  session.finish();
+  return 0;
 }
-
-class Session {
- public:
-  explicit Session(const Options& o)
-      : o_(o), peer_(o.device, kSystem, kCompanion), truth_(truth_source(o.truth)), trace_(o.trace) {
-    trace_ << "t_s,who,what,a,b,c,d,e,f,g\n" << std::fixed << std::setprecision(4);
-    read(o.script);
-  }
-
-  int run() {
-    auto due = std::chrono::steady_clock::now();
-    for (long ms = 0; !script_.empty() || busy_; ++ms) {
-      due += std::chrono::milliseconds(1);
-      std::this_thread::sleep_until(due);
-      t_ = static_cast<double>(daemon::now_ns() - begun_ns_) * 1e-9;
-      peer_.poll([&](const mavlink::Sender& from, const auto& m) {
-        if (from.component == kFlightController) on(m);
-      });
-      if (const auto truth = truth_->newest()) forward(*truth);
-      if (ms % 1000 == 0) peer_.send(mavlink::Heartbeat{0, 18, 8, 0, 4, 3});
-      if (ms % 20 == 0) stream(ms);
-      if (!step()) return 1;
-    }
-    for (const auto& [name, count] : counts_) row("end", std::string(name), {double(count), count / t_});
-    return 0;
-  }
-
- private:
-  /// The lines of a script; `include FILE` stands for those of another beside it.
-  void read(const std::filesystem::path& path) {
-    std::ifstream in(path);
-    if (!in) throw std::runtime_error(path.string() + ": cannot be read");
-    for (std::string line; std::getline(in, line);) {
-      if (line.starts_with("include "))
-        read(path.parent_path() / line.substr(8));
-      else if (!line.empty() && line[0] != '#')
-        script_.push_back(line);
-    }
-  }
-  void row(const char* who, const std::string& what, std::initializer_list<double> values) {
-    trace_ << t_ << ',' << who << ',' << what;
-    for (const double v : values) trace_ << ',' << std::defaultfloat << std::setprecision(9) << v;
-    trace_ << std::fixed << std::setprecision(4) << '\n';
-  }
-  bool every(const char* what, double period) {
-    double& last = last_[what];
-    if (t_ - last < period) return false;
-    last = t_;
-    return true;
-  }
-
-  template <class Message>
-  void on(const Message& m) {
-    ++counts_[Message::kName];
-    take(m);
-  }
-  template <class Other>
-  void take(const Other&) {}
-  void take(const mavlink::Heartbeat& m) {
-    armed_ = m.base_mode & 128;
-    mode_ = m.custom_mode;
-    heard_ = true;
-    row("in", "HEARTBEAT", {double(m.base_mode), double(m.custom_mode), double(m.system_status)});
-  }
-  void take(const mavlink::ExtendedSysState& m) {
-    if (m.landed_state != landed_) row("in", "EXTENDED_SYS_STATE", {double(m.landed_state)});
-    landed_ = m.landed_state;
-  }
-  void take(const mavlink::CommandAck& m) {
-    acks_[m.command] = m.result;
-    if (m.command != 511) row("in", "COMMAND_ACK", {double(m.command), double(m.result), double(m.result_param2)});
-  }
-  void take(const mavlink::Statustext& m) {
-    std::string text = text_of(m.text);
-    std::ranges::replace(text, ',', ';');
-    row("in", "STATUSTEXT " + text, {double(m.severity)});
-  }
-  void take(const mavlink::ParamValue& m) {
-    const double value = o_.px4 && m.param_type != kReal32 ? std::bit_cast<std::int32_t>(m.param_value) : m.param_value;
-    parameters_[text_of(m.param_id)] = value;
-    row("in", "PARAM_VALUE " + text_of(m.param_id), {value, double(m.param_type)});
-  }
-  void take(const mavlink::LocalPositionNed& m) {
-    if (every("LOCAL_POSITION_NED", 0.1)) row("in", "LOCAL_POSITION_NED", {m.x, m.y, m.z, m.vx, m.vy, m.vz});
-  }
-  void take(const mavlink::EstimatorStatus& m) {
-    if (every("ESTIMATOR_STATUS", 0.5))
-      row("in", "ESTIMATOR_STATUS", {double(m.flags), m.pos_horiz_ratio, m.pos_vert_ratio, m.vel_ratio});
-  }
-  void take(const mavlink::Timesync& m) {
-    if (m.tc1 == 0) peer_.send(mavlink::Timesync{daemon::now_ns(), m.ts1, kSystem, kFlightController});
-  }
-
-  /// Truth to ODOMETRY, with white noise of the position and ten times as much per second of the velocity.
-  void forward(const Truth& truth) {
-    if (!have_truth_) row("note", "first truth", {});
-    have_truth_ = true;
-    now_ = truth;
-    if (every("truth", 0.05))
-      row("truth", "p v",
-          {truth.p_E.x(), truth.p_E.y(), truth.p_E.z(), truth.v_E.x(), truth.v_E.y(), truth.v_E.z(),
-           std::acos(std::clamp((truth.q_EB * Vec3::UnitZ()).z(), -1.0, 1.0))});
-    if (!odometry_) return;
-    std::normal_distribution<double> normal(0, o_.noise);
-    const auto noise = [&] { return Vec3(normal(random_), normal(random_), normal(random_)); };
-    const Vec3 p = mavlink::swap_ned(truth.p_E + noise());
-    const Vec3 v = mavlink::swap_frd(truth.q_EB.conjugate() * truth.v_E + 5 * noise());
-    const Eigen::Quaterniond q = mavlink::swap_ned_frd(truth.q_EB);
-    mavlink::Odometry m;
-    m.time_usec = static_cast<std::uint64_t>(truth.at_ns / 1000);
-    m.x = float(p.x()), m.y = float(p.y()), m.z = float(p.z());
-    m.q = {float(q.w()), float(q.x()), float(q.y()), float(q.z())};
-    m.vx = float(v.x()), m.vy = float(v.y()), m.vz = float(v.z());
-    m.rollspeed = m.pitchspeed = m.yawspeed = std::numeric_limits<float>::quiet_NaN();
-    constexpr std::array<std::size_t, 6> kDiagonal{0, 6, 11, 15, 18, 20};
-    for (int i = 0; i < 3; ++i) {
-      m.pose_covariance[kDiagonal[i]] = m.velocity_covariance[kDiagonal[i]] = 1e-4F;
-      m.pose_covariance[kDiagonal[i + 3]] = m.velocity_covariance[kDiagonal[i + 3]] = 1e-4F;
-    }
-    m.frame_id = kLocalFrd, m.child_frame_id = kBodyFrd, m.estimator_type = kVio, m.quality = 100;
-    peer_.send(m);
-  }
-
-  /// The set-point goes to the target at the script's speed and rests there; 0: at once.
-  void stream(long ms) {
-    Vec3 v = Vec3::Zero();
-    const Vec3 left = target_ - setpoint_;
-    if (speed_ > 0 && left.norm() > speed_ * 0.02) {
-      v = speed_ * left.normalized();
-      setpoint_ += v * 0.02;
-    } else {
-      setpoint_ = target_;
-    }
-    if (!streaming_) return;
-    const Vec3 p = mavlink::swap_ned(setpoint_), vn = mavlink::swap_ned(v);
-    peer_.send(mavlink::SetPositionTargetLocalNed{.time_boot_ms = std::uint32_t(ms),
-                                                  .x = float(p.x()),
-                                                  .y = float(p.y()),
-                                                  .z = float(p.z()),
-                                                  .vx = float(vn.x()),
-                                                  .vy = float(vn.y()),
-                                                  .vz = float(vn.z()),
-                                                  .yaw = float(yaw_),
-                                                  .type_mask = 2048,
-                                                  .target_system = kSystem,
-                                                  .target_component = kFlightController,
-                                                  .coordinate_frame = kLocalNed});
-    if (every("SET_POSITION_TARGET", 0.1))
-      row("out", "SET_POSITION_TARGET", {p.x(), p.y(), p.z(), vn.x(), vn.y(), vn.z(), yaw_});
-  }
-
-  double heading_ned() const {
-    const Vec3 ahead = mavlink::swap_ned(now_.q_EB * Vec3::UnitX());
-    return std::atan2(ahead.y(), ahead.x());
-  }
-
-  /// Begins the next line of the script when the last is done. False: a wait of it has failed.
-  bool step() {
-    if (busy_) {
-      if (done_()) {
-        busy_ = false;
-      } else if (t_ > until_) {
-        std::cerr << "at " << t_ << " s: waited in vain: " << line_ << "\n";
-        row("note", "waited in vain: " + line_, {});
-        busy_ = false;
-        return !must_;
-      } else {
-        return true;
-      }
-    }
-    if (script_.empty()) return true;
-    line_ = script_.front();
-    script_.pop_front();
-    row("note", line_, {});
-    std::istringstream in(line_);
-    begin(in);
-    return true;
-  }
-
-  void wait(std::function<bool()> done, double at_most, bool must = true) {
-    busy_ = true, must_ = must, done_ = std::move(done), until_ = t_ + at_most;
-  }
-
-  void begin(std::istringstream& in) {
-    std::string verb, word;
-    in >> verb;
-    const auto number = [&] {
-      double v = 0;
-      in >> v;
-      return v;
-    };
-    if (verb == "sleep") {
-      const double end = t_ + number();
-      wait([this, end] { return t_ >= end; }, 1e9);
-    } else if (verb == "await") {
-      await(in);
-    } else if (verb == "odometry") {
-      in >> word;
-      odometry_ = word == "on";
-    } else if (verb == "stream") {
-      in >> word;
-      streaming_ = word == "on";
-    } else if (verb == "here") {  // the set-point is where the vehicle is
-      setpoint_ = target_ = now_.p_E;
-      yaw_ = heading_ned();
-    } else if (verb == "move") {  // by x y z (east north up, m), at a speed, m/s
-      const double x = number(), y = number(), z = number();
-      target_ = target_ + Vec3(x, y, z);
-      speed_ = number();
-    } else if (verb == "command") {
-      std::array<float, 7> p{};
-      const auto id = static_cast<std::uint16_t>(number());
-      for (float& v : p) v = float(number());
-      acks_.erase(id);
-      peer_.send(mavlink::CommandLong{p[0], p[1], p[2], p[3], p[4], p[5], p[6], id, kSystem, kFlightController, 0});
-    } else if (verb == "retry") {  // seconds, then a command: every second until it is accepted
-      const double at_most = number();
-      const auto id = static_cast<std::uint16_t>(number());
-      mavlink::CommandLong m{0, 0, 0, 0, 0, 0, 0, id, kSystem, kFlightController, 0};
-      m.param1 = float(number()), m.param2 = float(number()), m.param3 = float(number());
-      acks_.erase(id);
-      wait(
-          [this, m, id] {
-            if (acks_.contains(id) && acks_[id] == 0) return true;
-            if (every("retry", 1)) peer_.send(m);
-            return false;
-          },
-          at_most);
-    } else if (verb == "origin") {
-      const auto lat = std::int32_t(number() * 1e7), lon = std::int32_t(number() * 1e7),
-                 alt = std::int32_t(number() * 1e3);
-      peer_.send(mavlink::SetGpsGlobalOrigin{lat, lon, alt, kSystem, 0});
-    } else if (verb == "read" || verb == "set") {
-      parameter(verb == "set", in);
-    } else if (verb == "signal") {
-      in >> word;
-      ::kill(o_.pid, word == "stop" ? SIGSTOP : SIGCONT);
-    } else {
-      throw std::runtime_error("no such verb: " + line_);
-    }
-  }
-
-  void parameter(bool set, std::istringstream& in) {
-    std::string name, type;
-    double value = 0;
-    in >> name;
-    std::array<char, 16> id{};
-    std::ranges::copy(name.substr(0, 16), id.begin());
-    parameters_.erase(name);
-    if (set) {
-      in >> value >> type;
-      const bool whole = o_.px4 && type == "int";
-      peer_.send(mavlink::ParamSet{whole ? std::bit_cast<float>(std::int32_t(value)) : float(value), kSystem,
-                                   kFlightController, id, whole ? kInt32 : kReal32});
-    } else {
-      peer_.send(mavlink::ParamRequestRead{-1, kSystem, kFlightController, id});
-    }
-    wait([this, name] { return parameters_.contains(name); }, 2, false);
-  }
-
-  void await(std::istringstream& in) {
-    std::string what;
-    double a = 0, at_most = 10;
-    in >> what;
-    if (what == "heartbeat") return in >> at_most, wait([this] { return heard_; }, at_most);
-    if (what == "truth") return in >> at_most, wait([this] { return have_truth_; }, at_most);
-    in >> a >> at_most;
-    if (what == "ack") return wait([this, a] { return acks_.contains(std::uint16_t(a)); }, at_most);
-    if (what == "accepted")
-      return wait([this, id = std::uint16_t(a)] { return acks_.contains(id) && acks_[id] == 0; }, at_most);
-    if (what == "landed") return wait([this, a] { return landed_ == a; }, at_most);
-    if (what == "armed") return wait([this, a] { return armed_ == (a != 0); }, at_most);
-    if (what == "mode") return wait([this, a] { return mode_ == std::uint32_t(a); }, at_most);
-    if (what == "height") return wait([this, a] { return now_.p_E.z() > a; }, at_most);
-    if (what == "rest") return wait([this, a] { return now_.v_E.norm() < a; }, at_most);
-    throw std::runtime_error("nothing to wait for: " + line_);
-  }
-
-  Options o_;
-  Peer peer_;
-  std::unique_ptr<TruthSource> truth_;
-  std::ofstream trace_;
-  std::deque<std::string> script_;
-  std::string line_;
-  std::function<bool()> done_;
-  bool busy_ = false, must_ = true;
-  double until_ = 0, t_ = 0;
-  std::int64_t begun_ns_ = daemon::now_ns();
-  bool odometry_ = false, streaming_ = false, have_truth_ = false, heard_ = false, armed_ = false;
-  int landed_ = -1;
-  std::uint32_t mode_ = 0;
-  Truth now_;
-  Vec3 setpoint_ = Vec3::Zero(), target_ = Vec3::Zero();
-  double speed_ = 0, yaw_ = 0;
-  std::mt19937 random_{1};
-  std::map<std::string, double> last_, parameters_;
-  std::map<std::uint16_t, std::uint8_t> acks_;
-  std::map<std::string_view, long> counts_;
-};
 
 }  // namespace
 }  // namespace backwash::autopilots
 
 int main(int argc, char** argv) {
-  backwash::autopilots::Options o;
+  backwash::autopilots::Session::Options o;
+  std::string device, truth, trace;
+  int pid = 0;
   CLI::App app{"autopilot_script: plays a script against an autopilot and writes a trace"};
-  app.add_option("--device", o.device, "as in the daemon's [link]")->required();
-  app.add_option("--truth", o.truth, "see truth.hpp")->required();
+  app.add_option("--device", device, "as in the daemon's [link]")->required();
+  app.add_option("--truth", truth, "see truth.hpp")->required();
   app.add_option("--script", o.script)->required();
-  app.add_option("--trace", o.trace, "CSV")->required();
+  app.add_option("--trace", trace, "CSV")->required();
   app.add_option("--noise", o.noise, "of the odometry's position, m");
   app.add_flag("--px4", o.px4, "integer parameters bytewise, as PX4 has them");
-  app.add_option("--pid", o.pid, "of the autopilot, for `signal`");
+  app.add_option("--pid", pid, "of the autopilot, for `signal`");
   CLI11_PARSE(app, argc, argv);
+  o.stopped = [pid](bool stop) { ::kill(pid, stop ? SIGSTOP : SIGCONT); };
   try {
     backwash::set_fifo(backwash::allowed_fifo(70));
-    return backwash::autopilots::Session(o).run();
+    return backwash::autopilots::play(device, truth, trace, o);
   } catch (const std::exception& e) {
     std::cerr << "autopilot_script: " << e.what() << "\n";
     return 70;

@@ -11,7 +11,7 @@
 
 #include "firmware_bridge/mavlink/frames.hpp"
 #include "services/backwashd/channels.hpp"
-#include "tests/autopilots/peer.hpp"
+#include "tests/autopilots/device.hpp"
 
 namespace backwash::autopilots {
 namespace {
@@ -21,7 +21,7 @@ constexpr double kHalfStep = 0.0056;                     // m: half a step of th
 
 class ArduPilotTruth : public TruthSource {
  public:
-  explicit ArduPilotTruth(const std::string& device) : peer_(device, 254, 190) { ask(); }
+  explicit ArduPilotTruth(const std::string& device) : peer_(open_line(device), 254, 190) { ask(); }
 
   std::optional<Truth> newest() override {
     std::optional<Truth> last;

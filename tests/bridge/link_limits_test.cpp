@@ -103,7 +103,7 @@ TEST(UdpPort, KeepsItsPeerWhoeverSpeaksAfterIt) {
   const UdpPort::Endpoint to{"127.0.0.1", port->local_port()};
   auto peer = UdpPort::open({"127.0.0.1", 0}, to), other = UdpPort::open({"127.0.0.1", 0}, to);
   ASSERT_TRUE(peer && other);
-  ASSERT_EQ(peer->write(Bytes{1}), 1U);
+  ASSERT_EQ(peer->write(Bytes{0xFD}), 1U);
   ASSERT_EQ(other->write(Bytes{2}), 1U);
   std::array<std::uint8_t, 8> bytes;
   for (int n = 0; n < 3; ++n) ASSERT_TRUE(port->read(bytes));

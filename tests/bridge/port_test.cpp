@@ -2,6 +2,8 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <numeric>
@@ -116,6 +118,22 @@ TEST(SerialPort, NamesWhyItCannotBeOpened) {
   EXPECT_NE(describe(SerialPort::open("/nonexistent/tty", 115200).error()).find("No such file"), std::string::npos);
 }
 
+// Two daemons on one line would each get half of what the autopilot says, and both would command it.
+TEST(SerialPort, IsBusyForAnyOtherProcessRootsToo) {
+  PseudoTerminal far;
+  auto port = SerialPort::open(far.path(), 921600);
+  ASSERT_TRUE(port);
+  const pid_t other = ::fork();
+  if (other == 0) {
+    const auto second = SerialPort::open(far.path(), 57600);
+    ::_exit(!second && second.error().kind == Kind::kBusy ? 5 : 1);
+  }
+  int status = 0;
+  ::waitpid(other, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 5);
+  EXPECT_TRUE(SerialPort::open(far.path(), 921600) || ::geteuid() != 0) << "the daemon itself opens a lost port again";
+}
+
 TEST(UdpPort, TalksToAGivenPeerAndHearsNobodyElse) {
   auto a = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
   ASSERT_TRUE(a);
@@ -124,13 +142,63 @@ TEST(UdpPort, TalksToAGivenPeerAndHearsNobodyElse) {
   ASSERT_TRUE(b);
   ASSERT_TRUE(stranger);
   EXPECT_EQ(a->write(every_byte()), 0U) << "no peer yet";
-  ASSERT_EQ(b->write(every_byte()), 256U);
-  EXPECT_EQ(read_all(*a, 256), every_byte());
+  Bytes frame = every_byte();
+  frame.front() = 0xFD;
+  ASSERT_EQ(b->write(frame), 256U);
+  EXPECT_EQ(read_all(*a, 256), frame);
   ASSERT_EQ(stranger->write(Bytes{1, 2, 3}), 3U);
   ASSERT_EQ(b->write(Bytes{4}), 1U);
   EXPECT_EQ(read_all(*a, 1), Bytes{4}) << "the first sender stays the only peer";
   ASSERT_EQ(a->write(Bytes{9}), 1U);
   EXPECT_EQ(read_all(*b, 1), Bytes{9});
+}
+
+// Whoever scans ports, or any other stray datagram, must not take the autopilot's place before it has spoken.
+TEST(UdpPort, WhatIsNoFrameMakesNoPeer) {
+  auto a = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
+  ASSERT_TRUE(a);
+  const UdpPort::Endpoint to{"127.0.0.1", a->local_port()};
+  auto stray = UdpPort::open({"127.0.0.1", 0}, to), autopilot = UdpPort::open({"127.0.0.1", 0}, to);
+  ASSERT_TRUE(stray && autopilot);
+  ASSERT_EQ(stray->write(Bytes{'h', 'i'}), 2U);
+  std::array<std::uint8_t, 8> bytes{};
+  EXPECT_EQ(a->read(bytes), 0U);
+  ASSERT_EQ(autopilot->write(Bytes{0xFE, 1}), 2U);
+  EXPECT_EQ(a->read(bytes), 2U);
+  ASSERT_EQ(a->write(Bytes{9}), 1U);
+  EXPECT_EQ(autopilot->read(bytes), 1U);
+  EXPECT_EQ(stray->read(bytes), 0U);
+}
+
+// A simulator that is started anew has another port of its own.
+TEST(UdpPort, ItsPeerIsLetGoOfWhenItHasBeenSilentAndNotBefore) {
+  std::uint16_t number = 0;
+  {
+    const auto any = UdpPort::open({"127.0.0.1", 0}, std::nullopt);
+    ASSERT_TRUE(any);
+    number = any->local_port();
+  }
+  auto a = UdpPort::open({"127.0.0.1", number}, std::nullopt);
+  ASSERT_TRUE(a);
+  const UdpPort::Endpoint to{"127.0.0.1", number};
+  auto first = UdpPort::open({"127.0.0.1", 0}, to), second = UdpPort::open({"127.0.0.1", 0}, to);
+  ASSERT_TRUE(first && second);
+  std::array<std::uint8_t, 8> bytes{};
+  const Bytes frame{0xFD, 1, 2};
+  ASSERT_EQ(first->write(frame), 3U);
+  ASSERT_EQ(a->read(bytes), 3U);
+  for (int second_s = 0; second_s < 2; ++second_s) {
+    for (int n = 0; n < UdpPort::kSilentReads - 1; ++n) ASSERT_EQ(a->read(bytes), 0U);
+    static_cast<void>(second->write(frame));  // refused by the kernel: a is connected to the first
+    ASSERT_EQ(first->write(frame), 3U);
+    ASSERT_EQ(a->read(bytes), 3U);
+  }
+  for (int n = 0; n < UdpPort::kSilentReads; ++n) ASSERT_EQ(a->read(bytes), 0U);
+  EXPECT_EQ(a->write(Bytes{9}), 0U) << "no peer";
+  for (int n = 0; n < 3; ++n) static_cast<void>(second->write(frame));
+  EXPECT_EQ(a->read(bytes), 3U);
+  ASSERT_EQ(a->write(Bytes{9}), 1U);
+  EXPECT_EQ(second->read(bytes), 1U);
 }
 
 TEST(UdpPort, OutlivesAPeerThatIsNotThere) {

@@ -88,6 +88,14 @@ TEST(Cloud, MoreFieldsOrWiderPointsThanDriversSendAreRefused) {
   EXPECT_FALSE(decode_cloud(wide.m));
 }
 
+TEST(Cloud, OfMorePointsThanTheLargestOrWithABrokenViewpointIsRefused) {
+  EXPECT_TRUE(decode_cloud(Message({"x", "y", "z"}, kFloat32, std::vector<float>(3 * kMaxCloudPoints, 1)).m));
+  EXPECT_FALSE(decode_cloud(Message({"x", "y", "z"}, kFloat32, std::vector<float>(3 * (kMaxCloudPoints + 1), 1)).m));
+  for (const float broken : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::infinity()})
+    EXPECT_FALSE(decode_cloud(
+        Message({"x", "y", "z", "vp_x", "vp_y", "vp_z"}, kFloat32, std::vector<float>{1, 2, 3, 7, broken, 9}).m));
+}
+
 // docs/faults.md row 27: whatever the sizes claim, nothing beyond the data is read.
 TEST(Cloud, SizesThatDoNotFitTheDataAreRefused) {
   std::mt19937 random(1);

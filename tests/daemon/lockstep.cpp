@@ -127,8 +127,8 @@ struct Lockstep::Datagrams : Line {
     auto port = firmware_bridge::UdpPort::open(
         {"127.0.0.1", 0}, firmware_bridge::UdpPort::Endpoint{"127.0.0.1", controller.local_port()});
     if (!port) throw std::runtime_error(describe(port.error()));
-    // The controller's answers go to who spoke first.
-    std::uint8_t hello = 0;
+    // The controller's answers go to who spoke first, and as MAVLink.
+    std::uint8_t hello = 0xFD;
     if (!port->write({&hello, 1}) || !controller.read({&hello, 1})) throw std::runtime_error("no loopback");
     return std::move(*port);
   }

@@ -104,6 +104,31 @@ TEST_F(MapWorkerTest, ACorruptEmptyOrForeignMapIsRejectedWholeAndTheOldWorldStay
   EXPECT_EQ(channels_->map_ns, 1);
 }
 
+TEST_F(MapWorkerTest, AFirstMapOfAResolutionThatNoFieldIsKnownForIsRejected) {
+  for (const double resolution : {0.019, 0.21}) send(map::encode_octomap(grid_), resolution);
+  EXPECT_EQ(channels_->maps_rejected, 2u);
+  EXPECT_EQ(world(), nullptr);
+}
+
+TEST_F(MapWorkerTest, AMapOfAnotherPlaceOfTheSameSizeIsAWorldOfItsOwn) {
+  send(grid_);
+  map::OccupancyGrid elsewhere(grid_.origin() + Vec3(0.4, 0, 0), grid_.resolution(), grid_.size(), map::Cell::free);
+  for (std::size_t n = 0; n < grid_.cell_count(); ++n) elsewhere.set(grid_.voxel(n), grid_.at(n));
+  send(elsewhere);
+  EXPECT_EQ(channels_->maps_accepted, 2u);
+  EXPECT_LT((world()->grid.origin() - elsewhere.origin()).norm(), 1e-9);
+}
+
+TEST_F(MapWorkerTest, AScanIsAddedToTheNewestMap) {
+  send(grid_);
+  const Index3 v = grid_.index({1.1, 0.1, 1.1});
+  grid_.set(v, map::Cell::occupied);
+  send(grid_, 4);
+  scan({{-1.1, 0.1, 1.1}}, {-0.1, 0.1, 1.1}, 9);
+  EXPECT_TRUE(world()->grid.occupied(grid_.index({-1.1, 0.1, 1.1})));
+  EXPECT_TRUE(world()->grid.occupied(v)) << "what the map before the scan had";
+}
+
 TEST_F(MapWorkerTest, AnEmptyMapIsNoMap) {
   send(std::vector<std::int8_t>{}, 0.2);
   EXPECT_EQ(world(), nullptr);

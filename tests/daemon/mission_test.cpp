@@ -1,84 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The mission's decisions: who may command, what is done once, and what an order ends (docs/faults.md rows 28, 39, 40,
 // 48).
-#include "services/backwashd/mission.hpp"
-
-#include <gtest/gtest.h>
-
 #include <thread>
 
-#include "services/dds/topics.hpp"
-#include "tests/daemon/lockstep.hpp"
+#include "tests/daemon/mission_rig.hpp"
 
 namespace backwash::daemon::test {
 namespace {
-
-using track::Mode;
-using track::Request;
-
-constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED, kRefused = backwash_msgs_msg_dds__ACK_REFUSED,
-                       kNotYours = backwash_msgs_msg_dds__ACK_NOT_YOURS, kInvalid = backwash_msgs_msg_dds__ACK_INVALID;
-constexpr std::uint8_t kEnable = backwash_msgs_msg_dds__COMMAND_ENABLE,
-                       kDisable = backwash_msgs_msg_dds__COMMAND_DISABLE,
-                       kTakeoff = backwash_msgs_msg_dds__COMMAND_TAKEOFF, kGoto = backwash_msgs_msg_dds__COMMAND_GOTO,
-                       kFollow = backwash_msgs_msg_dds__COMMAND_FOLLOW, kHold = backwash_msgs_msg_dds__COMMAND_HOLD,
-                       kStop = backwash_msgs_msg_dds__COMMAND_STOP, kLand = backwash_msgs_msg_dds__COMMAND_LAND,
-                       kRelease = backwash_msgs_msg_dds__COMMAND_RELEASE;
-
-/// A process of a ground station.
-struct Station {
-  std::uint8_t writer;
-  std::uint64_t session;
-  const char* name = "gcs";
-  std::uint32_t sequence = 0;
-
-  CommandMessage next(std::uint8_t verb) { return at(++sequence, verb); }
-  CommandMessage at(std::uint32_t number, std::uint8_t verb) const {
-    CommandMessage c;
-    c.writer[0] = writer;
-    std::snprintf(c.station.data(), c.station.size(), "%s", name);
-    c.session = session;
-    c.sequence = number;
-    c.verb = verb;
-    c.position = {1, 0, 1.2};
-    return c;
-  }
-};
-
-class MissionTest : public testing::Test {
- protected:
-  Mission mission_;
-  ControlView view_;
-  double now_s_ = 100;
-  Station gcs_{1, 11}, other_{2, 22, "other"};
-
-  /// In the air, at rest, tracking.
-  void SetUp() override {
-    view_.mode = Mode::tracking;
-    view_.armed = view_.offboard = true;
-    view_.landed = false;
-    view_.odometry_age = view_.heartbeat_age = 0;
-    view_.state.p_W = view_.command.p_W = {-2, 0, 1.2};
-    MissionInput in;
-    in.now_s = now_s_;
-    in.view = view_;
-    in.world = corridor();
-    mission_.observe(in);
-  }
-  Decision look(std::span<const PlanOutcome> outcomes = {}) {
-    MissionInput in;
-    in.now_s = now_s_;
-    in.view = view_;
-    in.outcomes = outcomes;
-    return mission_.observe(in);
-  }
-  Decision give(const CommandMessage& c) {
-    Decision d = mission_.handle(c, now_s_);
-    if (d.order) view_.epoch.order = d.order->number;  // the control thread takes it at once
-    return d;
-  }
-  std::uint8_t result(const Decision& d) { return d.answer->result; }
-};
 
 TEST_F(MissionTest, ARepeatedCommandIsAnsweredAgainAndNotDoneAgain) {
   const Decision first = give(gcs_.next(kGoto));
@@ -161,6 +89,67 @@ TEST_F(MissionTest, StopIsTakenFromEveryStationAndLeavesTheLeaseWhereItIs) {
   EXPECT_EQ(d.order->request, Request::stop);
   EXPECT_EQ(mission_.station(now_s_), "gcs");
   EXPECT_EQ(result(give(gcs_.next(kHold))), kAccepted);
+}
+
+TEST_F(MissionTest, AStopIsTakenWhateverIsWrongWithItsSessionItsNumberOrItsNumbers) {
+  const auto stops = [&](const CommandMessage& c) {
+    const Decision d = give(c);
+    look();
+    return result(d) == kAccepted && d.order && d.order->request == Request::stop;
+  };
+  // A number that has wrapped, one that is older, and the last command's.
+  gcs_.sequence = 0xfffffffe;
+  ASSERT_EQ(result(give(gcs_.next(kGoto))), kAccepted);
+  EXPECT_TRUE(stops(gcs_.at(0, kStop)));
+  EXPECT_TRUE(stops(gcs_.at(7, kStop)));
+  EXPECT_TRUE(stops(gcs_.at(gcs_.sequence, kStop)));
+  EXPECT_EQ(result(give(gcs_.at(0, kGoto))), kInvalid) << "nothing else comes that way";
+  // No name, and numbers that a STOP has no use for.
+  CommandMessage odd = gcs_.next(kStop);
+  odd.station = {};
+  EXPECT_TRUE(stops(odd));
+  odd = gcs_.next(kStop);
+  odd.yaw = NAN;
+  EXPECT_TRUE(stops(odd));
+  odd.position.x() = INFINITY;
+  EXPECT_TRUE(stops(odd));
+  // The lease ran out, another station took it: the first one's session is over, its operator's button is not.
+  now_s_ += Mission::kLease + 1;
+  ASSERT_EQ(result(give(other_.next(kGoto))), kAccepted);
+  EXPECT_TRUE(stops(gcs_.next(kStop)));
+  EXPECT_EQ(mission_.station(now_s_), "other");
+  EXPECT_EQ(result(give(gcs_.next(kGoto))), kInvalid);
+}
+
+TEST_F(MissionTest, ARepeatedStopIsAnsweredAgainAndNotDoneAgain) {
+  ASSERT_TRUE(give(gcs_.next(kStop)).order);
+  const Decision again = give(gcs_.at(gcs_.sequence, kStop));
+  EXPECT_EQ(result(again), kAccepted);
+  EXPECT_FALSE(again.order);
+}
+
+// Stations that give orders faster than the control thread ticks leave room for the one that counts.
+TEST_F(MissionTest, AStopIsTakenHoweverManyOrdersWaitForTheControlThread) {
+  std::size_t orders = 0;
+  const auto without_tick = [&](std::uint8_t verb) {
+    const Decision d = mission_.handle(gcs_.next(verb), now_s_);
+    orders += d.order.has_value();
+    return d;
+  };
+  for (int n = 0; n < 1000; ++n) without_tick(kHold);
+  const Decision stop = mission_.handle(other_.next(kStop), now_s_);
+  EXPECT_EQ(result(stop), kAccepted);
+  ASSERT_TRUE(stop.order);
+  EXPECT_EQ(stop.order->request, Request::stop);
+  orders += 1;
+  for (int n = 0; n < 1000; ++n)
+    for (const std::uint8_t verb : {kLand, kHold, kStop}) without_tick(verb);
+  EXPECT_EQ(result(mission_.handle(other_.next(kStop), now_s_)), kAccepted);
+  EXPECT_LT(orders, 40u) << "as many as the control thread's ring holds are 64";
+  // What is refused ends nothing, and after the next tick all goes on.
+  view_.epoch.order = 1000;
+  look();
+  EXPECT_EQ(result(mission_.handle(gcs_.next(kHold), now_s_)), kAccepted);
 }
 
 // Row 39.
@@ -252,6 +241,20 @@ TEST_F(MissionTest, NothingIsPlannedWhileAnOrderIsOnItsWay) {
   const Decision go = mission_.handle(gcs_.next(kGoto), now_s_);
   EXPECT_EQ(result(go), kRefused);
   EXPECT_FALSE(go.job);
+}
+
+// Until the rotors have spun up the vehicle still stands: a second take-off would begin again at the ground.
+TEST_F(MissionTest, ATakeoffThatIsFlownIsNotBegunAgain) {
+  view_.landed = true;
+  look();
+  const Decision rises = give(gcs_.next(kTakeoff));
+  ASSERT_TRUE(rises.job);
+  const PlanOutcome taken{rises.job->id, true, {}};
+  view_.finished = false;
+  look({&taken, 1});
+  const Decision again = give(gcs_.next(kTakeoff));
+  EXPECT_EQ(result(again), kRefused);
+  EXPECT_FALSE(again.job);
 }
 
 TEST_F(MissionTest, RefusesWhatTheModeDoesNotAllow) {

@@ -108,7 +108,8 @@ TEST(Row44, PipesTerminalsAndLimitsKillAndStopNoProcessAndHangUpsAreIgnored) {
     const sigset_t signals = shield_process();
     std::atomic<bool> stop{false};
     Failure failure(stop);
-    for (const int harmless : {SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN, SIGHUP}) ::kill(::getpid(), harmless);
+    for (const int harmless : {SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN, SIGTSTP, SIGUSR1, SIGUSR2, SIGHUP})
+      ::kill(::getpid(), harmless);
     std::thread later([] {
       std::this_thread::sleep_for(100ms);
       ::kill(::getpid(), SIGTERM);
@@ -117,6 +118,19 @@ TEST(Row44, PipesTerminalsAndLimitsKillAndStopNoProcessAndHangUpsAreIgnored) {
     wait_for_end(signals, failure);
     later.join();
     return std::chrono::steady_clock::now() - begun >= 90ms ? 5 : 1;
+  });
+  EXPECT_EQ(code, 5);
+}
+
+// Ctrl-\\: as it is, the log would end without what the last ticks decided.
+TEST(Row44, AQuitOfTheTerminalIsAnEndInOrder) {
+  const int code = in_a_process([] {
+    const sigset_t signals = shield_process();
+    std::atomic<bool> stop{false};
+    Failure failure(stop);
+    ::kill(::getpid(), SIGQUIT);
+    wait_for_end(signals, failure);
+    return failure.happened() ? 1 : 5;
   });
   EXPECT_EQ(code, 5);
 }

@@ -103,6 +103,9 @@ TEST(NewVoxels, CoverEveryNewPointAndNoKnownOneInAtMost256Cubes) {
       ASSERT_TRUE(covered) << p.transpose();
     }
   }
+  const map::OccupancyGrid empty({0, 0, 0}, 0.1, {40, 10, 10}, map::Cell::free);
+  const Scan far_and_near{{{2.75, 0.5, 0.5}, {2.45, 0.5, 0.5}}, {0.1, 0.5, 0.5}, 0};
+  EXPECT_EQ(new_voxels(empty, far_and_near, 2.5).count, 1u) << "what lies beyond the range is no obstacle";
   map::OccupancyGrid full({0, 0, 0}, 0.1, {10, 10, 10}, map::Cell::occupied);
   EXPECT_EQ(new_voxels(full, Scan{{{0.5, 0.5, 0.5}}, {0.1, 0.1, 0.1}, 0}, 5).count, 0u);
 }

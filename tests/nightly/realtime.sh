@@ -75,10 +75,31 @@ rtps() {
   done
 }
 
+# stops_beside NAME RIGS: STOPS of them, shared by as many daemons, benches and stations side by side.
+stops_beside() {
+  local rig pids=() status=0
+  rm -f "$out/$1".*.ms
+  for rig in $(seq "$2"); do
+    BENCH_NICE=-10 tests/system/daemon_stop_latency.sh "$PWD" build/release "$((${STOPS:-1000} / $2))" "$out/$1.$rig.ms" &
+    pids+=($!)
+  done
+  for rig in "${pids[@]}"; do wait "$rig" || status=$?; done
+  echo "$1, load average $(cut -d' ' -f1-3 /proc/loadavg):"
+  cat "$out/$1".*.ms | tests/nightly/stop_quantiles.py || status=$?
+  return "$status"
+}
+
+# A daemon takes a twentieth of a processor.
 stops() {
   build_preset release --target backwashd backwashctl bench station_probe
-  BENCH_NICE=-10 tests/system/daemon_stop_latency.sh "$PWD" build/release "${STOPS:-1000}"
-  BENCH_NICE=-10 tests/system/daemon_stop_latency.sh "$PWD" build/release "${STOPS:-1000}" load
+  local status=0
+  stops_beside stops_quiet 4 || status=$?
+  stress-ng --cpu "$(nproc)" --timeout 7200 >/dev/null 2>&1 &
+  local load=$!
+  stops_beside stops_load 4 || status=$?
+  kill "$load" 2>/dev/null || true
+  wait "$load" 2>/dev/null || true
+  return "$status"
 }
 
 stress() {

@@ -242,6 +242,15 @@ TEST(PlanPromises, ARefusedGoalIsToldByWhatIsThere) {
   EXPECT_NE(why({3.05, 1, 0.95}).find("is occupied"), std::string::npos);
   EXPECT_NE(why({9, 1, 0.95}).find("is outside the map"), std::string::npos);
   EXPECT_NE(why({5.05, 0.2, 0.95}).find("is not clear"), std::string::npos);
+
+  // Beside a wall whose wash no loop holds against.
+  Model stormy;
+  stormy.ground.l_max = stormy.ground.l_footprint_max = stormy.corner.l_max = stormy.wall.l_max = 0.6;
+  stormy.wall.k1 = {3000, 3000, 3000};
+  const auto storm = build_world(grid, stormy, config::load_vehicle("builtin:quad-5in").value());
+  const auto planned = plan(*storm, {{start_W, Vec3::Zero()}, {start_W}}, {5.05, 0.35, 0.95}, {1.0, 1.5});
+  EXPECT_EQ(planned.status, PlanStatus::goal_blocked);
+  EXPECT_NE(planned.message.find("has no bound"), std::string::npos) << planned.message;
 }
 
 }  // namespace

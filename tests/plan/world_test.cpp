@@ -144,5 +144,26 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnew) {
   EXPECT_GT(differ, 30u);  // the changes did change something
 }
 
+// A body that is wider than the field's range: a new obstacle takes hover places where no disturbance changes.
+TEST(World, UpdatedByRegionIsTheWorldBuiltAnewForAWideVehicleToo) {
+  Vehicle vehicle = vehicle_5in();
+  vehicle.body.radius = 1.2;
+  Model model;
+  model.ground.l_max = model.ground.l_footprint_max = model.corner.l_max = model.wall.l_max = 0.2;
+  map::OccupancyGrid grid(Vec3::Zero(), 0.1, Index3(70, 50, 30), map::Cell::free);
+  const auto before = build_world(grid, model, vehicle);
+  map::VoxelBox changed;
+  for (int k = 0; k < 30; ++k) grid.set({20, 25, k}, map::Cell::occupied), changed.add({20, 25, k});
+  const auto anew = build_world(grid, model, vehicle);
+  const auto updated = update_world(*before, grid, changed, model);
+  int far = 0;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const Index3 v = grid.voxel(n);
+    ASSERT_EQ(updated->hover.safe(v), anew->hover.safe(v)) << v.transpose();
+    far += before->hover.safe(v) && !anew->hover.safe(v) && v.x() > 20 + 10;
+  }
+  EXPECT_GT(far, 10);
+}
+
 }  // namespace
 }  // namespace backwash::plan

@@ -193,8 +193,9 @@ TEST(AxisResponse, RefusesUnstableLoopsAndNamesTheGains) {
   EXPECT_NE(why.find("k_p = 20"), std::string::npos) << why;
   EXPECT_NE(why.find("k_d = 4"), std::string::npos) << why;
   EXPECT_EQ(refused({20, 4, 0, 0.19}, Loop::vehicle), "");
-  EXPECT_NE(refused({0, 4, 0, 0}, Loop::vehicle), "");
-  EXPECT_NE(refused({6, -1, 0, 0}, Loop::continuous), "");
+  for (const Loop loop : {Loop::continuous, Loop::vehicle, Loop::sampled})
+    for (const auto& [kp, kd] : {std::pair(0, 4), std::pair(-6, 4), std::pair(6, 0), std::pair(6, -1)})
+      EXPECT_NE(refused({1.0 * kp, 1.0 * kd, 0, 0}, loop).find("gains must be positive"), std::string::npos);
   EXPECT_NE(refused({6, 4, -0.01, 0}, Loop::vehicle), "");
   EXPECT_NE(refused({6, 110, 0, 0}, Loop::sampled), "");  // k_d dt > 2
   EXPECT_EQ(refused({6, 90, 0, 0}, Loop::continuous), "");

@@ -224,6 +224,45 @@ TEST(HoverSet, ConstantMarginReplacesTheExtentAndNothingElse) {
   }
 }
 
+/// The bounds of a scene where the same mean push acts everywhere.
+BoundField pushed(const Scene& scene, const Vec3& push_W) {
+  Model model = scene.model;
+  model.extension = {{ModelEffect::Kind::push, push_W, Vec3::Zero(), 0}};
+  return {scene.grid, scene.field, model.bound, field::Extension(scene.grid, model)};
+}
+
+TEST(HoverSet, OfAPushedVehicleIsJudgedWhereThePushHoldsIt) {
+  const Scene& scene = default_scene();
+  const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
+  const Vec3 push(0, -1.2, 0.8), shift = push.cwiseQuotient(Vec3(6, 6, 8));
+  const BoundField bounds = pushed(scene, push);
+  int into_obstacles = 0, judged = 0;
+  for (const Vec3& p : random_points(scene.grid, 500, 9)) {
+    const HoverSet set = hover_set(reach, scene.grid, scene.distance, bounds, p);
+    const Vec3 c = p + shift;
+    if (!scene.grid.free(scene.grid.index(c))) {
+      EXPECT_FALSE(set.bounded) << p.transpose();
+      ++into_obstacles;
+    } else if (set.bounded) {
+      EXPECT_NEAR(set.clearance, std::min(1.0, prism_distance(scene.grid, c, set.half_widths, 1e3) - 0.16 - 0.02),
+                  1e-9);
+      ++judged;
+    }
+  }
+  EXPECT_GT(into_obstacles, 30);
+  EXPECT_GT(judged, 100);
+}
+
+TEST(HoverSet, IsNotSafeInAnObstacleThatThePushWouldTakeTheVehicleOutOf) {
+  const Scene& scene = default_scene();
+  const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
+  const BoundField bounds = pushed(scene, Vec3(0, 6 * 0.9, 0));
+  const Vec3 in_wall(0.85, 0.05, 0.75);
+  ASSERT_TRUE(hover_set(reach, scene.grid, scene.distance, scene.bounds, in_wall + Vec3(0, 0.9, 0)).safe());
+  EXPECT_FALSE(hover_set(reach, scene.grid, scene.distance, bounds, in_wall).bounded);
+  EXPECT_FALSE(hover_set(reach, scene.grid, scene.distance, bounds, in_wall, 0.05).bounded);
+}
+
 TEST(HoverSet, OfThePaperContainsTheTightOneAlongTheAxes) {
   const Scene scene = make_scene(with_kappa(1.5));  // the paper's larger sets must fit as well
   const Reachability tight(test_vehicle(), Method::tight, Loop::continuous);

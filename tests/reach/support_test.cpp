@@ -303,6 +303,25 @@ TEST(SupportRecursion, BeyondTheTableTheTailKeepsTheSumCovered) {
   EXPECT_LE(support.half_widths()[kZ], 2 * c.response.tail);
 }
 
+TEST(SupportRecursion, BeyondTheTableTheFirstErrorsAreStillCovered) {
+  Case c{{}, Loop::vehicle, {}};
+  c.vehicle.controller.attitude_lag = 0.05;
+  c.vehicle.controller.feedback_delay = 0;
+  c.vehicle.controller.kp = {20, 20};
+  c.vehicle.controller.kd = {4, 4};
+  c.response = axis_response(c.axis(), c.loop);
+  for (const auto& [position, velocity] : {std::pair(1.0, 0.0), std::pair(0.0, 1.0)}) {
+    c.vehicle.initial_error = {position, velocity};
+    SupportRecursion support(c.response, c.response, c.vehicle);
+    AxisRollouts e(c.axis(), false, kH, Batch{{position}}, Batch{{velocity}});
+    for (std::size_t k = 0; k < c.response.G.size() + 40; ++k) {
+      support.step(DisturbanceBound{});
+      for (int i = 0; i < kPerStep; ++i) e.step(Batch{{0.0}});
+      ASSERT_GE(support.half_widths()[kX], (1 - 1e-3) * std::abs(e.p()[0])) << "step " << k;
+    }
+  }
+}
+
 TEST(SupportRecursion, AxesAndDirectionsAreTheirOwn) {
   Case c{{}, Loop::continuous, {}};
   c.vehicle.controller.kp = {6, 16};

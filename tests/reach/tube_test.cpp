@@ -137,6 +137,51 @@ TEST(ReachTube, PaperIntervalContainsRolloutsBetweenSamples) {
     EXPECT_LE(tube[k].half_widths_interval[kX], std::max(tube[k].half_widths[kX], tube[k + 1].half_widths[kX]) + 1e-3);
 }
 
+// The vehicle already has the acceleration that its controller commands for where it is and how fast it moves.
+TEST(ReachTube, CentreStartsWithTheAccelerationThatTheErrorOfTheStartCommands) {
+  constexpr double h = 2e-3;
+  Vehicle vehicle = quad();
+  vehicle.controller.latency = vehicle.controller.feedback_delay = 0;
+  const Vec3 at(1, 2, 1.5), p(0.2, -0.1, 0.15), v(-0.4, 0.3, 0.5);
+  const std::vector<Setpoint> commands(60, Setpoint{at});
+  const ReachTube tube = tube_with_bounds(Reachability(vehicle, Method::tight, Loop::vehicle), {at + p, v}, commands[0],
+                                          commands, std::vector<DisturbanceBound>(60));
+  for (const int axis : {0, 1, 2}) {
+    const double kp = axis == 2 ? 12 : 10, kd = axis == 2 ? 6 : 5.5;
+    AxisRollouts error({kp, kd, 0, 0.05}, false, h, Eigen::ArrayXd{{p[axis]}}, Eigen::ArrayXd{{v[axis]}},
+                       Eigen::ArrayXd{{-kp * p[axis] - kd * v[axis]}});
+    for (std::size_t k = 0; k < tube.size(); ++k) {
+      ASSERT_NEAR(tube[k].center.p_W[axis], at[axis] + error.p()[0], 1e-7) << axis << " step " << k;
+      for (int i = 0; i < 10; ++i) error.step(Eigen::ArrayXd{{0.0}});
+    }
+  }
+}
+
+// An error that turns back between two samples is larger there than at both.
+TEST(ReachTube, PaperIntervalHoldsTheTurnOfAnErrorBetweenTwoSamples) {
+  constexpr double h = 5e-4;
+  int turns_between = 0;
+  for (double kp = 6; kp < 16; kp += 0.5) {
+    Vehicle vehicle = quad();
+    vehicle.controller.kp = {kp, kp};
+    vehicle.initial_error = {1e-4, 0.5};
+    const std::vector<Setpoint> commands(40);
+    const ReachTube tube = tube_with_bounds(Reachability(vehicle, Method::paper, Loop::continuous), {}, {}, commands,
+                                            std::vector<DisturbanceBound>(40));
+    AxisRollouts e({kp, 5.5, 0, 0}, false, h, Eigen::ArrayXd{{1e-4, 0}}, Eigen::ArrayXd{{0, 0.5}});
+    for (std::size_t k = 0; k < 40; ++k) {
+      double largest = 0;
+      for (int i = 0; i <= 40; ++i) {
+        largest = std::max(largest, e.p().matrix().norm());  // the support of the ellipse of first errors
+        if (i < 40) e.step(Eigen::ArrayXd{{0, 0}});
+      }
+      ASSERT_LE(largest, tube[k].half_widths_interval[kX]) << kp << " step " << k;
+      turns_between += largest > std::max(tube[k].half_widths[kX], tube[k + 1].half_widths[kX]);
+    }
+  }
+  EXPECT_GT(turns_between, 5);
+}
+
 TEST(ReachTube, PaperSetsIgnoreLagAndDelayAndContainTheExactOnesOfTheSecondOrderLoop) {
   Vehicle vehicle = quad();
   vehicle.controller.feedback_delay = 0.03;

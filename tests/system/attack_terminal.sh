@@ -40,7 +40,7 @@ for _ in 1 2 3; do
   sleep 0.3
 done
 alive 'a stalled terminal'
-for signal in HUP PIPE TTOU TTIN XFSZ; do
+for signal in HUP PIPE TTOU TTIN TSTP XFSZ USR1 USR2; do
   kill -"$signal" "$daemon_pid"
   sleep 0.1
   alive "SIG$signal"

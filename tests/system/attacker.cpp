@@ -2,6 +2,7 @@
 // What an operator in a hurry and a VIO gone wrong send, for tests/system/attack_*.sh.
 //   attacker DOMAIN send STEP …               STEP: VERB[=X,Y,Z] or +MILLISECONDS; no step waits for an answer. Each
 //                                             answer is a line: time (s, monotonic), verb, result, reason
+//   attacker DOMAIN flood SECONDS             commands of a stranger, as fast as they go
 //   attacker DOMAIN relay FROM TO WHAT VALUE X  odometry from one topic to another; as soon as the vehicle is beyond X,
 //                                             turn: by VALUE rad; velocity: VALUE m/s along the body's x axis
 #include <Eigen/Geometry>
@@ -90,6 +91,20 @@ int send(const dds::Participant& participant, int count, char** steps) {
   return station.all_answered() ? 0 : 69;
 }
 
+/// A stranger that never waits for an answer.
+int flood(const dds::Participant& participant, double seconds) {
+  auto writer = dds::make_writer<dds::Command>(participant, kNamespace);
+  for (int n = 0; n < 500 && writer.matched() == 0; ++n) std::this_thread::sleep_for(10ms);
+  char station[] = "stranger";
+  dds::Command c{};
+  c.station = station;
+  c.session = static_cast<std::uint64_t>(Clock::now().time_since_epoch().count());
+  c.verb = kVerbs.at("hold");
+  for (const double end = now_s() + seconds; now_s() < end; ++c.sequence_number) writer.write(c);
+  std::printf("%.6f flood of %u commands\n", now_s(), c.sequence_number);
+  return 0;
+}
+
 int relay(const dds::Participant& participant, const std::string& from, const std::string& to, const std::string& what,
           double value, double x) {
   dds::Reader<dds::Odometry> reader(participant, dds::TopicOf<dds::Odometry>::type(), from, dds::Delivery::latest);
@@ -128,6 +143,7 @@ int main(int argc, char** argv) {
   const dds::Participant participant(static_cast<std::uint32_t>(std::atoi(argv[1])), "lo");
   const std::string mode = argv[2];
   if (mode == "send") return send(participant, argc - 3, argv + 3);
+  if (mode == "flood" && argc == 4) return flood(participant, std::atof(argv[3]));
   if (mode == "relay" && argc == 8)
     return relay(participant, argv[3], argv[4], argv[5], std::atof(argv[6]), std::atof(argv[7]));
   return 64;

@@ -50,7 +50,10 @@ probe lying
 expect backwash 's["scans_rejected"] >= 6 and s["scans_accepted"] == 0 and s["state"] == "tracking"'
 grep -q 'refused: point cloud: its sizes do not agree: 1000 x 1 points of 12 bytes, rows of 12000, data of 12' "$log" ||
   die "the cloud with false sizes was not refused as that"
+probe elsewhere
+expect backwash 's["maps_rejected"] == 1 and s["maps_accepted"] == 1 and s["state"] == "tracking"'
+grep -q "refused: the map is in frame 'odom', expected 'map'" "$log" || die "the map of another frame was not refused as that"
 probe corrupt
-expect backwash 's["maps_rejected"] == 2 and s["maps_accepted"] == 1 and s["state"] == "tracking"'
+expect backwash 's["maps_rejected"] == 3 and s["maps_accepted"] == 1 and s["state"] == "tracking"'
 expect second 's["foreign_writers"] == 0 and s["odometry_refused"] == 0 and s["maps_rejected"] == 0'
 ctl stop --wait

@@ -16,7 +16,7 @@ fi
 source "$source_dir/services/bench/session.sh"
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json"; }
 resident() { awk '/VmRSS/ { print $2 }' "/proc/$daemon_pid/status"; }
-start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --duration 86400
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 before=$(resident)
 "$build/tests/rtps_fuzz" "$domain" backwash "$packets" "$seed" 2>"$work/fuzz" || { tail -n 3 "$work/fuzz"; die "a peer is gone"; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a confused or hostile participant sends, for the scripts beside it (docs/faults.md rows 2, 3, 12, 26, 27, 46,
 // 48).
-//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closures|large|roomy
+//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closures|large|roomy|elsewhere
 //   dds_probe DOMAIN NAMESPACE flood [SECONDS]
 //   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1
 //                                            the one writer that the daemon listens to fails
@@ -197,7 +197,7 @@ int corrupt(const dds::Participant& participant, const std::string& name_space) 
 }
 
 // A good map of two free cubes of 6.4 m: a box of 128 x 128 x 128 voxels, whose snapshot needs 240 MB.
-int large_map(const dds::Participant& participant, const std::string& name_space) {
+int large_map(const dds::Participant& participant, const std::string& name_space, std::string frame = "map") {
   auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
   until_matched(writer);
   std::vector<std::uint8_t> data{0x03, 0xc0};
@@ -205,9 +205,9 @@ int large_map(const dds::Participant& participant, const std::string& name_space
   data.insert(data.end(), {0x00, 0x40});
   for (int n = 0; n < 8; ++n) data.insert(data.end(), {0x03, 0x00});
   data.insert(data.end(), {0x01, 0x00});
-  char frame[] = "map", id[] = "OcTree";
+  char id[] = "OcTree";
   dds::Octomap m{};
-  m.header.frame_id = frame;
+  m.header.frame_id = frame.data();
   m.id = id;
   m.binary = true;
   m.resolution = 0.1;
@@ -236,6 +236,7 @@ int main(int argc, char** argv) {
   if (what == "lying") return clouds(participant, name_space, 1000, 1);
   if (what == "large") return large(participant, name_space);
   if (what == "roomy") return large_map(participant, name_space);
+  if (what == "elsewhere") return large_map(participant, name_space, "odom");
   if (what == "corrupt") return corrupt(participant, name_space);
   return 64;
 }

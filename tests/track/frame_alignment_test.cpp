@@ -111,6 +111,26 @@ TEST(FrameAlignment, FramesThatTurnTogetherAreAlignedOnlyAsFarAsTheGyrosTurn) {
   EXPECT_LE(ticks_aligned(3.6, 0), 2);
 }
 
+// An autopilot that reports its pose at 10 Hz, or 4, is used all the same.
+TEST(FrameAlignment, ATurnBeyondTheGyrosIsSeenHoweverSeldomThePoseIsReported) {
+  for (const double dt : {0.02, 0.1, 0.16, 0.3}) {
+    FrameAlignment turning, right;
+    double yaw = 0;
+    for (int n = 0; n < 30; ++n)
+      for (auto* alignment : {&turning, &right}) alignment->update({Vec3(1, 2, 3), 0}, {Vec3(1, 2, 3), 0}, dt, true);
+    ASSERT_TRUE(turning.aligned() && right.aligned()) << dt;
+    for (double t = 0; t < 3; t += dt) {
+      yaw += 0.1 * dt;  // 6°/s; both follow the odometry, the gyros of one say so too
+      FramePose local{Vec3(1, 2, 3), yaw};
+      turning.update({Vec3(1, 2, 3), yaw}, local, dt, false);
+      local.yaw_rate = 0.1;
+      right.update({Vec3(1, 2, 3), yaw}, local, dt, false);
+    }
+    EXPECT_FALSE(turning.aligned()) << dt;
+    EXPECT_TRUE(right.aligned()) << dt;
+  }
+}
+
 TEST(FrameAlignment, IsNotAlignedWhileTheAttitudesAreTilted) {
   FrameAlignment alignment;
   for (int i = 0; i < 50; ++i) alignment.update({}, {}, kControlPeriod, true);

@@ -163,6 +163,23 @@ TEST(OdometryGate, SaysHowLateASampleIsByItsOwnStamp) {
   }
 }
 
+// A camera of 30 Hz on a clock of its own, for an hour before the flight.
+TEST(OdometryGate, ClocksThatDifferBy100PpmMakeNoSampleLateWhateverTheRate) {
+  for (const std::int64_t period_ns : {10'000'000, 33'333'333}) {
+    OdometryGate gate(vehicle());
+    double latest = 0;
+    for (std::int64_t n = 0; n * period_ns < 3'600'000'000'000; ++n) {
+      OdometrySample s = at(0);
+      s.state.v_W.setZero();
+      s.received_ns = n * period_ns;
+      s.stamp_ns = s.received_ns - s.received_ns / 10'000;
+      ASSERT_EQ(gate.take(s, false), Verdict::good) << n;
+      latest = std::max(latest, gate.late());
+    }
+    EXPECT_LT(latest, 0.001) << period_ns;
+  }
+}
+
 // Row 6: the fifth identical pose, the first counted, while the vehicle is commanded to move.
 TEST(OdometryGate, FindsAPoseThatFreezesInMotionAndNotAtRest) {
   const auto verdicts = [](bool moving) {

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The bench's profiles against the real autopilots: the same script, the same code that reads the figures off the
+// recorded trace and off the profile's own, a stated tolerance each.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "tests/bench/playing.hpp"
+
+namespace backwash::autopilots {
+namespace {
+
+using Figure = std::function<std::optional<double>(const Trace&)>;
+
+struct Pair {
+  const Trace &real, &own;
+};
+Pair ardupilot(const std::string& script, const std::string& trace,
+               const std::map<std::string, double>& parameters = {}) {
+  return {recorded("ardupilot-" + trace), played(Kind::ardupilot, "ardupilot-" + script, parameters)};
+}
+Pair ardupilot(const std::string& script) { return ardupilot(script, script); }
+/// The recordings' settings (tests/autopilots/px4.params).
+Pair px4(const std::string& script, const std::string& trace, std::map<std::string, double> parameters = {}) {
+  parameters.try_emplace("COM_OBL_RC_ACT", 4);
+  return {recorded("px4-" + trace), played(Kind::px4, "px4-" + script, parameters)};
+}
+Pair px4(const std::string& script) { return px4(script, script); }
+
+/// The figure of both, one beside the other; the profile's may differ by `tolerance`.
+void compare(const Pair& pair, const char* name, double tolerance, const Figure& figure) {
+  const auto real = figure(pair.real), own = figure(pair.own);
+  ASSERT_TRUE(real) << name << " is not in the recorded trace";
+  ASSERT_TRUE(own) << name << " is not in the profile's trace";
+  std::printf("| %s | %.3f | %.3f | ±%.3f |\n", name, *real, *own, tolerance);
+  EXPECT_NEAR(*real, *own, tolerance) << name;
+}
+/// The same with a tolerance relative to the real one.
+void compare_share(const Pair& pair, const char* name, double share, const Figure& figure) {
+  compare(pair, name, share * std::abs(figure(pair.real).value_or(0)), figure);
+}
+
+std::optional<double> since(std::optional<double> t, std::optional<double> begun) {
+  if (!t || !begun) return std::nullopt;
+  return *t - *begun;
+}
+Figure after_arming(const std::string& what, double value) {
+  return [=](const Trace& t) { return since(t.at("in", what, {value}, t.armed().value()), t.armed()); };
+}
+Figure rise(double height) {
+  return [=](const Trace& t) { return since(t.crosses(2, height, t.armed().value()), t.armed()); };
+}
+/// The set-point after a move that steps, east, north, up.
+Vec3 goal(const Trace& t, const std::string& move) {
+  const double begun = t.note(move).value();
+  const auto& out = *std::ranges::find_if(t.rows(), [&](const Row& r) { return r.t > begun && r.who == "out"; });
+  return {out.values[1], out.values[0], -out.values[2]};
+}
+/// When this share of the way from the place at the note to the set-point is gone.
+Figure step_time(const std::string& move, int axis, double share) {
+  return [=](const Trace& t) {
+    const double begun = t.note(move).value(), from = t.position(begun)[axis];
+    return since(t.crosses(static_cast<std::size_t>(axis), from + share * (goal(t, move)[axis] - from), begun), begun);
+  };
+}
+Figure overshoot(const std::string& move, int axis, double within) {
+  return [=](const Trace& t) -> std::optional<double> {
+    const double begun = t.note(move).value(), end = goal(t, move)[axis];
+    return t.most(begun, begun + within, [&](double s) { return t.position(s)[axis] - end; });
+  };
+}
+Figure largest_speed(const std::string& move, double within) {
+  return [=](const Trace& t) -> std::optional<double> {
+    const double begun = t.note(move).value();
+    return t.most(begun, begun + within, [&](double s) { return t.velocity(s).norm(); });
+  };
+}
+/// How far from where it was at the note.
+Figure moved(const std::string& note, double later) {
+  return [=](const Trace& t) -> std::optional<double> {
+    const double begun = t.note(note).value();
+    return (t.position(begun + later) - t.position(begun)).head<2>().norm();
+  };
+}
+double stream_off(const Trace& t) { return t.note("stream off").value(); }
+
+constexpr double kLand = 100925440, kOffboard = 393216;  // PX4's custom modes
+
+Figure heartbeat_after(const std::string& note, double custom_mode) {
+  return [=](const Trace& t) -> std::optional<double> {
+    const double begun = t.note(note).value();
+    for (const Row& r : t.rows())
+      if (r.t >= begun && r.what == "HEARTBEAT" && r.values[1] == custom_mode) return r.t - begun;
+    return std::nullopt;
+  };
+}
+/// When it first sinks at 0.2 m/s.
+Figure descends_after(const std::string& note) {
+  return [=](const Trace& t) { return since(t.crosses(5, -0.2, t.note(note).value(), true), t.note(note)); };
+}
+/// How far LOCAL_POSITION_NED and truth lie apart, across.
+Figure estimate_wrong(const std::string& note, double later) {
+  return [=](const Trace& t) -> std::optional<double> {
+    const double at = t.note(note).value() + later;
+    const Row *before = nullptr, *after = nullptr;
+    for (const Row& r : t.rows()) {
+      if (r.what != "LOCAL_POSITION_NED" || r.who != "in") continue;
+      (r.t <= at ? before : after) = &r;
+      if (after) break;
+    }
+    if (!before || !after) return std::nullopt;
+    const auto wrong = [&](const Row& r) {
+      return (t.position(r.t).head<2>() - Vec3(r.values[1], r.values[0], 0).head<2>()).norm();
+    };
+    return wrong(*before) + (at - before->t) / (after->t - before->t) * (wrong(*after) - wrong(*before));
+  };
+}
+/// What was said in order from a note on; HEARTBEATs as base mode, custom mode, status.
+std::vector<std::string> heartbeats(const Trace& t, const std::string& from) {
+  return t.said("in", "HEARTBEAT", t.note(from).value());
+}
+/// Each answer by itself, equal ones too.
+std::vector<std::pair<double, double>> acks(const Trace& t, const std::string& from) {
+  std::vector<std::pair<double, double>> all;
+  for (const Row& r : t.rows())
+    if (r.t >= t.note(from).value() && r.who == "in" && r.what == "COMMAND_ACK")
+      all.emplace_back(r.values[0], r.values[1]);
+  return all;
+}
+/// Values and types of the parameters that the script reads.
+std::map<std::string, std::vector<double>> asked_values(const Trace& t) {
+  std::map<std::string, std::vector<double>> all;
+  for (const Row& r : t.rows())
+    if (r.what.starts_with("PARAM_VALUE ") && t.note("read " + r.what.substr(12))) all[r.what.substr(12)] = r.values;
+  return all;
+}
+
+void compare_run_out(const Pair& pair) {
+  compare_share(pair, "speed when set-points stop, m/s", 0.15,
+                [](const Trace& t) { return t.velocity(stream_off(t)).head<2>().norm(); });
+  compare_share(pair, "run-out, m", 0.25,
+                [](const Trace& t) { return t.run_out(stream_off(t), stream_off(t) + 9).distance; });
+  compare_share(pair, "until it stands, s", 0.25,
+                [](const Trace& t) { return t.run_out(stream_off(t), stream_off(t) + 9).time; });
+}
+
+/// `wander`: how much later or earlier the real one may be at 90 % by its simulator's noise, s.
+void compare_steps(const Pair& pair, double wander, double overshoots) {
+  const std::string across = "move 0.5 0 0 0", up = "move 0 0 0.4 0";
+  compare(pair, "step across of 0.5 m: 10 %, s", 0.3, step_time(across, 0, 0.1));
+  compare(pair, "step across of 0.5 m: 50 %, s", 0.3, step_time(across, 0, 0.5));
+  compare(pair, "step across of 0.5 m: 90 %, s", 0.3 + wander, step_time(across, 0, 0.9));
+  compare(pair, "step across: overshoot, m", overshoots, overshoot(across, 0, 6));
+  compare(pair, "step up of 0.4 m: 10 %, s", 0.3, step_time(up, 2, 0.1));
+  compare(pair, "step up of 0.4 m: 50 %, s", 0.3, step_time(up, 2, 0.5));
+  compare(pair, "step up of 0.4 m: 90 %, s", 0.3, step_time(up, 2, 0.9));
+  compare(pair, "step up: overshoot, m", 0.03, overshoot(up, 2, 6));
+  compare_share(pair, "fastest in a movement at 1 m/s, m/s", 0.15, largest_speed("move -3 0 0 1.0", 6));
+}
+
+void compare_landing(const Pair& pair, double down) {
+  compare(pair, "landing: ground reached, s", 0.5, [down](const Trace& t) {
+    const double begun = t.note("command 21").value();
+    return since(t.crosses(2, down, begun, true), begun);
+  });
+  compare(pair, "landing: on ground said, s", 0.7, [](const Trace& t) {
+    const double begun = t.note("command 21").value();
+    return since(t.at("in", "EXTENDED_SYS_STATE", {1}, begun), begun);
+  });
+}
+
+TEST(ArduCopterProfile, TakesOffByItself) {
+  const Pair p = ardupilot("flight");
+  compare(p, "landed state 3 after arming, s", 0.3, after_arming("EXTENDED_SYS_STATE", 3));
+  compare(p, "landed state 2 after arming, s", 0.3, after_arming("EXTENDED_SYS_STATE", 2));
+  for (const double h : {0.005, 0.1, 0.5, 1.0})
+    compare(p, ("height " + std::to_string(h) + " m, s").c_str(), 0.3, rise(h));
+}
+
+TEST(ArduCopterProfile, IsArmedAfterItsGyrosAgree) {
+  const Pair p = ardupilot("flight");
+  compare(p, "armed after its start, s", 1.5, [](const Trace& t) { return t.armed(); });
+  const auto last = [](const Trace& t) { return t.said("in", "COMMAND_ACK 400"); };
+  EXPECT_EQ(last(p.own), last(p.real));
+}
+
+TEST(ArduCopterProfile, FollowsStepsAndMovements) { compare_steps(ardupilot("flight"), 0, 0.03); }
+TEST(ArduCopterProfile, Lands) { compare_landing(ardupilot("flight"), 0.02); }
+TEST(ArduCopterProfile, RunsOutWithItsTimeoutOf3s) { compare_run_out(ardupilot("loss", "loss3")); }
+TEST(ArduCopterProfile, RunsOutWithATimeoutOf03s) {
+  compare_run_out(ardupilot("loss", "loss0.3", {{"GUID_TIMEOUT", 0.3}}));
+}
+
+TEST(ArduCopterProfile, DriftsWithoutOdometryAndFailsSafe) {
+  const Pair p = ardupilot("vio");
+  for (const double s : {3.0, 5.0, 7.0, 8.0})
+    compare(p, ("moved " + std::to_string(s) + " s without ODOMETRY, m").c_str(), 0.06, moved("odometry off", s));
+  compare(p, "LAND after ODOMETRY stopped, s", 0.3, heartbeat_after("odometry off", 9));
+  compare(p, "failsafe cleared after ODOMETRY came back, s", 0.2, [](const Trace& t) {
+    return since(t.at("in", "STATUSTEXT EKF Failsafe Cleared"), t.note("odometry on", t.note("odometry off").value()));
+  });
+  compare(p, "the failsafe's landing descends, s", 0.5, descends_after("odometry off"));
+  compare_share(p, "blind: part of the speed across left after 6 s", 0.35, [](const Trace& t) -> std::optional<double> {
+    const double at = t.note("odometry off").value() + 8;
+    return t.velocity(at + 6).head<2>().norm() / t.velocity(at).head<2>().norm();
+  });
+  const auto said = [](const Trace& t) { return t.said("in", "STATUSTEXT EKF ", t.note("odometry off").value()); };
+  EXPECT_EQ(said(p.own), said(p.real));
+  EXPECT_EQ(heartbeats(p.own, "odometry off"), heartbeats(p.real, "odometry off"));
+}
+
+TEST(ArduCopterProfile, TakesAndTellsEachMode) {
+  const Pair p = ardupilot("modes");
+  EXPECT_EQ(heartbeats(p.own, "command 176 1 5"), heartbeats(p.real, "command 176 1 5"));
+  EXPECT_EQ(acks(p.own, "command 176 1 5"), acks(p.real, "command 176 1 5"));
+  for (const char* mode : {"command 176 1 5", "command 176 1 17", "command 176 1 2"}) {
+    compare(p, (std::string(mode) + ": told after, s").c_str(), 0.05, [mode](const Trace& t) {
+      const double begun = t.note(mode).value();
+      return since(t.at("in", "COMMAND_ACK", {176, 0}, begun), begun);
+    });
+    compare(p, (std::string(mode) + ": moved in 2 s, m").c_str(), 0.02, moved(mode, 2));
+  }
+  const auto climbed = [](const Trace& t) -> std::optional<double> {
+    const double begun = t.note("command 176 1 6").value();
+    return t.truth(begun + 6, 2) - t.truth(begun, 2);
+  };
+  compare(p, "RTL climbs, m", 0.1, climbed);
+  compare(p, "RTL: half of it after, s", 0.4, [&](const Trace& t) {
+    const double begun = t.note("command 176 1 6").value();
+    return since(t.crosses(2, t.truth(begun, 2) + 0.4, begun), begun);
+  });
+}
+
+TEST(ArduCopterProfile, AnswersParametersByValueAndUnknownOnesNot) {
+  const Pair p = ardupilot("flight");
+  EXPECT_EQ(asked_values(p.own), asked_values(p.real));
+  EXPECT_EQ(p.own.said("note", "waited in vain"), p.real.said("note", "waited in vain"));
+  compare(p, "eight parameters one after the other, s", 0.2, [](const Trace& t) {
+    return since(t.at("in", "PARAM_VALUE PSC_ACCZ_P"), t.at("in", "PARAM_VALUE VISO_TYPE"));
+  });
+}
+
+TEST(ArduCopterProfile, ASetPointBeforeTheLiftOffCancelsTheTakeOff) {
+  const Pair p = ardupilot("cancel");
+  EXPECT_EQ(acks(p.own, "command 22 0 0 0 0 0 0 1.2"), acks(p.real, "command 22 0 0 0 0 0 0 1.2"));
+  const auto again = [](const Trace& t) { return t.note("command 22 0 0 0 0 0 0 1.2", stream_off(t)); };
+  compare(p, "height reached while set-points streamed, m", 0.001, [](const Trace& t) -> std::optional<double> {
+    return t.most(t.armed().value(), stream_off(t), [&](double s) { return t.truth(s, 2); });
+  });
+  compare(p, "second command: landed state 3 after, s", 0.3,
+          [&](const Trace& t) { return since(t.at("in", "EXTENDED_SYS_STATE", {3}), again(t)); });
+  // The set-points before the second command ended at the ground: they do not count any more.
+  compare(p, "height held after it without set-points, m", 0.05, [&](const Trace& t) -> std::optional<double> {
+    return t.truth(t.at("in", "EXTENDED_SYS_STATE", {2}).value() + 1.8, 2);
+  });
+  compare(p, "second command: landed state 2 after, s", 0.3,
+          [&](const Trace& t) { return since(t.at("in", "EXTENDED_SYS_STATE", {2}), again(t)); });
+}
+
+TEST(ArduCopterProfile, ChasesStaleSetPointsAfterAPause) {
+  const Pair p = ardupilot("sigstop");
+  compare_share(p, "fastest after 3 s of standstill, m/s", 0.25, largest_speed("signal cont", 6));
+  compare_share(p, "gone in the 4 s after it, m", 0.25, moved("signal cont", 4));
+  compare(p, "beyond the goal, m", 0.15, [](const Trace& t) -> std::optional<double> {
+    const double begun = t.note("move -4 0 0 0.5").value(), back = t.note("signal cont").value();
+    const double goal = t.truth(begun, 0) - 4;
+    return t.most(back, back + 8, [&](double s) { return goal - t.truth(s, 0); });
+  });
+}
+
+TEST(Px4Profile, SaysInAirBeforeItLifts) {
+  const Pair p = px4("flight");
+  compare(p, "landed state 2 after arming, s", 0.3, after_arming("EXTENDED_SYS_STATE", 2));
+  for (const double h : {0.005, 0.1, 0.5}) compare(p, ("height " + std::to_string(h) + " m, s").c_str(), 0.3, rise(h));
+  compare(p, "height 1 m, s", 0.7, rise(1.0));
+}
+TEST(Px4Profile, FollowsStepsAndMovements) { compare_steps(px4("flight"), 0.37, 0.10); }
+TEST(Px4Profile, Lands) { compare_landing(px4("flight"), 0.02); }
+TEST(Px4Profile, DriftsWithoutOdometryLandsAndTakesOffAgainByItself) {
+  const Pair p = px4("vio");
+  const auto back = [](const Trace& t) { return t.note("odometry on", t.note("odometry off").value()); };
+  compare(p, "estimate moved 3 s without ODOMETRY, m", 0.15, estimate_wrong("odometry off", 3));
+  compare(p, "estimate moved 4.5 s without ODOMETRY, m", 0.25, estimate_wrong("odometry off", 4.5));
+  compare(p, "descends after ODOMETRY stopped, s", 0.4, descends_after("odometry off"));
+  compare(p, "AUTO.LAND in HEARTBEAT, s", 1.0, heartbeat_after("odometry off", kLand));
+  compare(p, "offboard again after ODOMETRY came back, s", 1.0, [&](const Trace& t) {
+    return since(t.at("in", "HEARTBEAT", {145, kOffboard}, back(t).value()), back(t));
+  });
+  compare(p, "in air again after it came back, s", 0.7,
+          [&](const Trace& t) { return since(t.at("in", "EXTENDED_SYS_STATE", {2}, back(t).value()), back(t)); });
+  compare(p, "5 cm up again after it came back, s", 0.7, [&](const Trace& t) {
+    const double least = t.truth(back(t).value(), 2);
+    return since(t.crosses(2, least + 0.05, back(t).value()), back(t));
+  });
+  EXPECT_EQ(heartbeats(p.own, "odometry off"), heartbeats(p.real, "odometry off"));
+}
+
+TEST(Px4Profile, AnswersTwiceAndTakesNoPilotsModeInTheAir) {
+  const Pair p = px4("modes");
+  EXPECT_EQ(heartbeats(p.own, "command 176 1 3"), heartbeats(p.real, "command 176 1 3"));
+  EXPECT_EQ(acks(p.own, "command 176 1 3"), acks(p.real, "command 176 1 3"));
+  compare(p, "AUTO.LAND in HEARTBEAT, s", 1.0, heartbeat_after("command 176 1 4 6", kLand));
+  compare(p, "AUTO.LAND in EXTENDED_SYS_STATE, s", 0.25, [](const Trace& t) {
+    const double begun = t.note("command 176 1 4 6").value();
+    return since(t.at("in", "EXTENDED_SYS_STATE", {4}, begun), begun);
+  });
+}
+
+TEST(Px4Profile, TakesEveryModeOnTheGroundAndDisarmsWhenNotRaised) {
+  const Pair p = px4("refused");
+  EXPECT_EQ(heartbeats(p.own, "command 176 1 6"), heartbeats(p.real, "command 176 1 6"));
+  EXPECT_EQ(acks(p.own, "command 176 1 6"), acks(p.real, "command 176 1 6"));
+  compare(p, "disarmed again, told after, s", 1.0, [](const Trace& t) {
+    const double on = t.at("in", "HEARTBEAT", {145}).value();
+    return since(t.at("in", "HEARTBEAT", {17}, on), t.armed());
+  });
+  compare(
+      p, "height reached with the set-point below the ground, m", 0.001,
+      [](const Trace& t) -> std::optional<double> { return t.most(0, 25, [&](double s) { return t.truth(s, 2); }); });
+}
+
+TEST(Px4Profile, AnswersParametersByTheirBytesAndUnknownOnesNot) {
+  const Pair p = px4("flight");
+  EXPECT_EQ(asked_values(p.own), asked_values(p.real));
+  EXPECT_EQ(p.own.said("note", "waited in vain"), p.real.said("note", "waited in vain"));
+}
+
+TEST(Px4Profile, RunsOutWithItsTimeoutOf1s) { compare_run_out(px4("loss", "loss1")); }
+TEST(Px4Profile, RunsOutWithATimeoutOf03s) { compare_run_out(px4("loss", "loss0.3", {{"COM_OF_LOSS_T", 0.3}})); }
+TEST(Px4Profile, RunsOutAndSinksInPositionMode) {
+  compare_run_out(px4("loss", "loss0.3pos", {{"COM_OF_LOSS_T", 0.3}, {"COM_OBL_RC_ACT", 0}}));
+}
+
+}  // namespace
+}  // namespace backwash::autopilots

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the mission refuses, why it says so, and that nothing follows from it.
+#include <functional>
+#include <limits>
+
+#include "tests/daemon/mission_rig.hpp"
+
+namespace backwash::daemon::test {
+namespace {
+
+class MissionRefusals : public MissionTest {
+ protected:
+  void expect_nothing(const Decision& d, std::uint8_t result, const std::string& why) {
+    ASSERT_TRUE(d.answer);
+    EXPECT_EQ(d.answer->result, result) << why;
+    EXPECT_NE(d.answer->reason.find(why), std::string::npos) << d.answer->reason;
+    EXPECT_FALSE(d.job || d.order) << why;
+  }
+  CommandMessage route(std::size_t count) {
+    CommandMessage follow = gcs_.next(kFollow);
+    follow.waypoints = count;
+    for (auto& p : follow.waypoint) p = {1, 0, 1.2};
+    return follow;
+  }
+};
+
+TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTold) {
+  view_.mode = Mode::passive;
+  view_.armed = view_.offboard = false;
+  view_.landed = true;
+  const ControlView whole = view_;
+  const struct {
+    std::function<void()> fault;
+    const char* why;
+  } faults[] = {{[&] { view_.mismatch = track::Mismatch::yaw; }, "map and autopilot disagree"},
+                {[&] { view_.odometry_age = 0.2; }, "no odometry"},
+                {[&] { view_.heartbeat_age = 2; }, "no heartbeat"},
+                {[&] { view_.state.p_W.x() = 99; }, "outside the map"}};
+  for (const auto& [fault, why] : faults) {
+    view_ = whole;
+    fault();
+    look();
+    expect_nothing(give(gcs_.next(kEnable)), kRefused, why);
+  }
+  view_ = whole;
+  look();
+  Mission blind;
+  MissionInput in;
+  in.now_s = now_s_;
+  in.view = whole;
+  blind.observe(in);
+  expect_nothing(blind.handle(Station{7, 77}.next(kEnable), now_s_), kRefused, "no map");
+  ASSERT_TRUE(mission_.handle(gcs_.next(kStop), now_s_).order);  // not yet taken
+  expect_nothing(mission_.handle(gcs_.next(kEnable), now_s_), kRefused, "last order");
+  view_.epoch.order = 1;
+  look();
+  EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
+}
+
+TEST_F(MissionRefusals, ACommandWithoutANameOrWithANumberThatIsNoneIsInvalidAndTakesNoLease) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const std::function<void(CommandMessage&)> faults[] = {
+      [](CommandMessage& c) { c.station = {}; }, [=](CommandMessage& c) { c.position.x() = nan; },
+      [=](CommandMessage& c) { c.position.z() = -infinity; }, [=](CommandMessage& c) { c.yaw = nan; },
+      [=](CommandMessage& c) { c.yaw = infinity; }};
+  for (const auto& fault : faults)
+    for (const std::uint8_t verb : {kGoto, kTakeoff, std::uint8_t{backwash_msgs_msg_dds__COMMAND_GOTO_FACING}}) {
+      CommandMessage c = gcs_.next(verb);
+      fault(c);
+      expect_nothing(give(c), kInvalid, "finite numbers");
+      EXPECT_EQ(mission_.station(now_s_), "");
+    }
+}
+
+TEST_F(MissionRefusals, ARouteOfNoneOrTooManyOrBrokenWaypointsIsInvalid) {
+  constexpr std::size_t kMost = CommandMessage::kMostWaypoints;
+  expect_nothing(give(route(0)), kInvalid, "waypoints");
+  expect_nothing(give(route(kMost + 1)), kInvalid, "waypoints");
+  for (const std::size_t where : {std::size_t{0}, std::size_t{2}}) {
+    CommandMessage broken = route(3);
+    broken.waypoint[where][1] = std::numeric_limits<double>::infinity();
+    expect_nothing(give(broken), kInvalid, "not finite");
+  }
+  EXPECT_EQ(result(give(route(kMost))), kAccepted);
+}
+
+TEST_F(MissionRefusals, ATakeOffNeedsTrackingAndAFlightNeedsTheAir) {
+  view_.landed = true;
+  for (const Mode mode : {Mode::passive, Mode::enabling, Mode::hold, Mode::land, Mode::quiet}) {
+    view_.mode = mode;
+    look();
+    expect_nothing(give(gcs_.next(kTakeoff)), kRefused, "not enabled");
+  }
+  view_.mode = Mode::tracking;
+  look();
+  expect_nothing(give(gcs_.next(kGoto)), kRefused, "take off first");
+  EXPECT_TRUE(give(gcs_.next(kTakeoff)).job);
+}
+
+TEST_F(MissionRefusals, ASecondFlightWaitsUntilTheFirstIsPlanned) {
+  const Decision first = give(gcs_.next(kGoto));
+  ASSERT_TRUE(first.job);
+  expect_nothing(give(gcs_.next(kGoto)), kRefused, "still planning");
+  const PlanOutcome failed{first.job->id, false, {"no way"}};
+  look({&failed, 1});
+  EXPECT_TRUE(give(gcs_.next(kGoto)).job);
+}
+
+TEST_F(MissionRefusals, ARepeatedCommandIsRefusedAgainForTheSameReason) {
+  view_.finished = false;
+  look();
+  expect_nothing(give(gcs_.next(kGoto)), kRefused, "flying");
+  view_.finished = true;
+  look();
+  expect_nothing(give(gcs_.at(gcs_.sequence, kGoto)), kRefused, "flying");
+}
+
+TEST_F(MissionRefusals, AWayThatWasBlockedIsTriedAgainFromRestOnly) {
+  const Decision go = give(gcs_.next(kGoto));
+  const PlanOutcome done{go.job->id, true, {}};
+  view_.finished = false;
+  look({&done, 1});
+  now_s_ += 5;
+  view_.finished = true;
+  view_.mode = Mode::hold;
+  view_.reason = track::Reason::obstacle_ahead;
+  view_.state.v_W = {0.5, 0, 0};
+  EXPECT_FALSE(look().job);
+  view_.state.v_W.setZero();
+  EXPECT_TRUE(look().job);
+}
+
+}  // namespace
+}  // namespace backwash::daemon::test

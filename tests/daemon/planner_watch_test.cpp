@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the planner does about a flight under way: in a new world, after a loop closure, when it is to brake.
+#include "tests/daemon/planner_rig.hpp"
+
+namespace backwash::daemon::test {
+namespace {
+
+class PlannerWatch : public PlannerOffers {
+ protected:
+  /// Flies along the room and has come past x, at speed.
+  void fly_past(double x) {
+    know(room());
+    stand({1.05, 2.05, 1.05});
+    ASSERT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "");
+    const auto& commands = offers_.at(0).commands;
+    while (view_.index < commands.size() && commands[view_.index].p_W.x() < x) ++view_.index;
+    ASSERT_GT(commands.at(view_.index).v_W.x(), 0.5);
+    view_.command = commands[view_.index];
+    view_.state = offers_[0].tube[view_.index].center;
+    view_.finished = false;
+    show();
+    EXPECT_FALSE(planner_.step());
+    EXPECT_EQ(offers_.size(), 1u) << "as long as nothing is new the flight goes on as it is";
+  }
+  /// The room with a wall across it at x, and a gap in it beside the straight way.
+  static OccupancyGrid walled(double x, bool gap) {
+    OccupancyGrid grid = room();
+    const int i = static_cast<int>(x / 0.1);
+    fill(grid, {i, gap ? 15 : 0, 1}, {i, 39, 19});
+    return grid;
+  }
+  bool blocked() const { return channels_->blocked_segment != 0; }
+};
+
+TEST_F(PlannerWatch, ATakeoffIsBlockedByWhatComesToStandInItsWayAndByNothingElse) {
+  know(room());
+  stand({3.05, 2.05, 0.3});
+  ASSERT_EQ(ask(PlanJob::Kind::takeoff, {0, 0, 1.2}), "");
+  view_.finished = false;
+  show();
+  OccupancyGrid grid = room();
+  fill(grid, {50, 5, 1}, {52, 7, 19});
+  know(grid);
+  planner_.step();
+  EXPECT_FALSE(blocked());
+  fill(grid, {31, 19, 9}, {33, 21, 10});
+  know(grid);
+  planner_.step();
+  EXPECT_EQ(channels_->blocked_segment, view_.segment);
+}
+
+TEST_F(PlannerWatch, AFlightGoesOnRoundAnObstacleWithVerifiedStops) {
+  fly_past(1.4);
+  know(walled(3.8, true));
+  planner_.step();
+  ASSERT_EQ(offers_.size(), 2u);
+  const auto& s = offers_[1];
+  EXPECT_FALSE(blocked());
+  EXPECT_LT((s.commands.back().p_W - Vec3(5.05, 2.05, 1.05)).norm(), 1e-6);
+  EXPECT_GT(s.clearance, 0);
+  EXPECT_GT(s.stops.size(), 3u);
+  for (const plan::Stop& stop : s.stops) EXPECT_GT(plan::tube_clearance(*world_, stop.tube), 0) << stop.branch;
+}
+
+TEST_F(PlannerWatch, AFlightWithoutAClearWayOnIsBlocked) {
+  fly_past(2.5);
+  know(walled(view_.state.p_W.x() + 0.6, false));
+  planner_.step();
+  EXPECT_EQ(channels_->blocked_segment, view_.segment);
+  EXPECT_EQ(offers_.size(), 1u);
+}
+
+TEST_F(PlannerWatch, AFlightThatWasStoppedIsNotExtended) {
+  fly_past(1.4);
+  view_.mode = track::Mode::hold;
+  view_.reason = track::Reason::operator_request;
+  view_.braking = true;
+  show();
+  know(walled(3.8, true));
+  planner_.step();
+  EXPECT_EQ(offers_.size(), 1u);
+}
+
+TEST_F(PlannerWatch, AfterALoopClosureTheFlightGoesBackToItsPlaceInTheMapIfThatIsClear) {
+  for (const double sideways : {0.1, -1.85}) {  // within the room, and against its side
+    offers_.clear();
+    view_ = {};
+    channels_->blocked_segment = 0;
+    fly_past(1.8);
+    view_.closures = 1;
+    view_.shift.t = {0, sideways, 0};
+    show();
+    planner_.step();
+    const bool clear = sideways > 0;
+    EXPECT_EQ(blocked(), !clear);
+    ASSERT_EQ(offers_.size(), clear ? 2u : 1u);
+    if (!clear) continue;
+    EXPECT_EQ(offers_[1].closures, 1u);
+    EXPECT_LT((offers_[1].commands.back().p_W - Vec3(5.05, 2.05, 1.05)).norm(), 1e-6);
+  }
+}
+
+TEST_F(PlannerWatch, BrakingThatWouldTouchIsNotOffered) {
+  fly_past(2.5);
+  know(walled(view_.state.p_W.x() + 0.6, false));
+  EXPECT_NE(ask(PlanJob::Kind::brake, Vec3::Zero()).find("not clear"), std::string::npos);
+  EXPECT_EQ(offers_.size(), 1u);
+}
+
+}  // namespace
+}  // namespace backwash::daemon::test

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/plan/refinement.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+#include "core/plan/kinodynamic_astar.hpp"
+#include "core/plan/safe_space.hpp"
+
+namespace backwash::plan {
+namespace {
+
+const World& open_world() {
+  static const auto world = build_world(map::builtin_scene("parallel-walls-4m", 0.2).value(), Model{},
+                                        config::load_vehicle("builtin:quad-5in").value());
+  return *world;
+}
+
+PlanStart moving(const Vec3& p_W, const Vec3& v_W) { return {{p_W, v_W}, {p_W, v_W, Vec3::Zero(), 0}}; }
+
+// Short ways from a fast start are those that no timing suits; an optimiser that hardly runs leaves the rest to it.
+TEST(Refinement, WhatPlansReturnKeepsTheLimitsFromAnyMotionEvenHardlyOptimised) {
+  const Vec3 from(0, 0, 1.2);
+  const PlanOptions options{.v_max = 1.5, .a_max = 1.0, .evaluations = 1, .polish = 0};
+  int flown = 0;
+  for (const Vec3& v : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(0, 0.8, 0), Vec3(0.7, -0.7, 0)})
+    for (const Vec3& goal : {Vec3(2, 0, 1.2), Vec3(1, 0.6, 1.4), Vec3(0.6, 0, 1.2), Vec3(-0.6, 0.4, 1)}) {
+      const Plan p = plan(open_world(), moving(from, v), goal, options);
+      if (p.status != PlanStatus::ok) continue;
+      ++flown;
+      double fastest = 0, hardest = 0;
+      for (double t = 0; t <= p.trajectory.duration(); t += 0.005) {
+        fastest = std::max(fastest, p.trajectory.derivative(t, 1).cwiseAbs().maxCoeff());
+        hardest = std::max(hardest, p.trajectory.derivative(t, 2).cwiseAbs().maxCoeff());
+      }
+      EXPECT_LE(fastest, 1.5 + 1e-6) << v.transpose() << " to " << goal.transpose();
+      EXPECT_LE(hardest, 1.0 + 1e-6) << v.transpose() << " to " << goal.transpose();
+    }
+  EXPECT_GT(flown, 5);
+}
+
+TEST(Refinement, EndsAtItsDeadlineAndSaysSo) {
+  const PlanStart start = moving({-2, 0, 1.2}, Vec3::Zero());
+  const Vec3 goal(2, 0.4, 1.2);
+  const PlanOptions options{.v_max = 1.5, .a_max = 2};
+  const World& world = open_world();
+  const SafeView view(world.safe, {world.grid.index(start.command.p_W), world.grid.index(goal)});
+  const auto path = search(view, start.estimated, goal, {1.35, 1.8, options.max_nodes, Clock::time_point::max()});
+  ASSERT_TRUE(path);
+  const Refinement late = refine(world, path->motions, start, goal, options, Clock::now());
+  EXPECT_TRUE(late.out_of_time);
+  EXPECT_FALSE(late.found);
+  EXPECT_TRUE(refine(world, path->motions, start, goal, options, Clock::time_point::max()).found);
+}
+
+}  // namespace
+}  // namespace backwash::plan
