@@ -166,7 +166,7 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
   if (!for_us(m.target_system, m.target_component)) return;
   const std::int64_t now_ns = nanoseconds_of(now);
   if (m.tc1 == 0) {
-    if (answers_) send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
+    send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
   } else if (m.ts1 == timesync_asked_ns_ && timesync_asked_ns_ != 0) {
     constexpr std::int64_t kSane_ns = std::int64_t{1} << 62;  // 146 years: differences do not overflow
     if (m.tc1 < 0 || m.tc1 > kSane_ns) return;
@@ -298,7 +298,16 @@ bool AutopilotLink::send_follow_setpoints() noexcept {
   return false;
 }
 
+bool AutopilotLink::send_takeoff(double height) noexcept {
+  return send_command(kCommandTakeoff, {0, 0, 0, 0, 0, 0, static_cast<float>(height)});
+}
+
 bool AutopilotLink::send_land() noexcept { return send_command(kCommandLand, {}); }
+
+bool AutopilotLink::send_origin() noexcept {
+  constexpr std::int32_t kLatitude = 473'977'000, kLongitude = 85'456'000, kAltitude = 488'000;  // 1e-7 deg, mm
+  return send(mavlink::SetGpsGlobalOrigin{kLatitude, kLongitude, kAltitude, heard_.value_or(0), 0});
+}
 
 bool AutopilotLink::send_message_interval(std::uint32_t message_id, double rate_hz) noexcept {
   if (!(rate_hz > 0)) return false;

@@ -23,7 +23,8 @@ inline constexpr int kMaxMissedSetpoints = 2;                               ///<
 inline constexpr std::uint8_t kOnboardComputer = 191;                       ///< our component id
 
 /// Commands that the link sends (MAV_CMD), to ask telemetry().result_of() for their answers.
-inline constexpr std::uint16_t kCommandLand = 21, kCommandSetMode = 176, kCommandArm = 400, kCommandInterval = 511;
+inline constexpr std::uint16_t kCommandMessage = 512, kCommandLand = 21, kCommandTakeoff = 22, kCommandSetMode = 176,
+                               kCommandArm = 400, kCommandInterval = 511;
 
 /// What is wrong with the link, the gravest first.
 enum class LinkFault : std::uint8_t {
@@ -104,13 +105,16 @@ class AutopilotLink {
   bool send_arm(bool arm) noexcept;
   /// PX4's offboard or ArduPilot's guided mode; false also when the autopilot is neither.
   bool send_follow_setpoints() noexcept;
+  /// ArduPilot's own take-off, to a height above where it was armed, m.
+  bool send_takeoff(double height) noexcept;
   /// The autopilot's own landing.
   bool send_land() noexcept;
   /// Asks for a message at `rate_hz` > 0.
   bool send_message_interval(std::uint32_t message_id, double rate_hz) noexcept;
 
-  /// Whether TIMESYNC is answered from now on: nothing else is sent of the link's own accord.
-  void answer_timesync(bool answers) noexcept { answers_ = answers; }
+  /// Gives the autopilot's local frame a place on the globe, without which ArduPilot has no home and does not arm. Any
+  /// place does where there is no GPS: this one is in Zurich.
+  bool send_origin() noexcept;
 
   /// Asks for a parameter by name; Telemetry::parameter() has the answer.
   bool send_parameter_request(std::string_view name) noexcept;
@@ -136,7 +140,6 @@ class AutopilotLink {
   std::optional<std::uint8_t> heard_;
   std::optional<Received<ClockOffset>> clock_;
   std::int64_t timesync_asked_ns_ = 0;
-  bool answers_ = true;
   std::uint8_t sequence_ = 0;
   Tap tap_ = nullptr;
   void* tap_context_ = nullptr;

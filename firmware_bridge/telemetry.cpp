@@ -89,7 +89,13 @@ void Telemetry::take(const mavlink::Attitude& m, Time now) noexcept {
   take_attitude(q_NF, {m.rollspeed, m.pitchspeed, m.yawspeed}, m.time_boot_ms, now);
 }
 
-void Telemetry::take(const mavlink::Odometry& m, Time now) noexcept { reset_counter = {m.reset_counter, now}; }
+void Telemetry::take(const mavlink::Odometry& m, Time now) noexcept {
+  reset_counter = {m.reset_counter, now};
+  // x, y and z on the diagonal of the upper triangle; the first is NaN where nothing is known.
+  const double variance = std::max({m.pose_covariance[0], m.pose_covariance[6], m.pose_covariance[11]});
+  if (std::isfinite(m.pose_covariance[0]) && std::isfinite(variance) && variance > 0)
+    position_sigma = {std::sqrt(variance), now};
+}
 
 void Telemetry::take_imu(const Vec3& force_F, const Vec3& omega_F, Time now) noexcept {
   if (!force_F.allFinite() || !omega_F.allFinite()) {

@@ -82,10 +82,12 @@ class Telemetry {
   Latest<State> local_state;  ///< in the controller's own local frame L, z-up (p_W, v_W stand for p_L, v_L)
   Latest<VehicleAttitude> attitude;
   Latest<std::uint8_t> reset_counter;  ///< of the controller's estimator, from ODOMETRY; a change: L has moved
+  Latest<double> position_sigma;       ///< of local_state as the controller says, from ODOMETRY, m
   Latest<Imu> imu;
   Latest<Battery> battery;
   Latest<LandedState> landed_state;
   Latest<StatusLine> text;
+  bool has_origin = false;         ///< its local frame lies somewhere on the globe, as ArduPilot asks for before arming
   std::uint64_t broken = 0;        ///< messages with values that cannot be
   std::uint64_t out_of_order = 0;  ///< messages older than their predecessor
 
@@ -107,6 +109,7 @@ class Telemetry {
   void take(const mavlink::ExtendedSysState& m, Time now) noexcept;
   void take(const mavlink::CommandAck& m, Time now) noexcept;
   void take(const mavlink::Statustext& m, Time now) noexcept;
+  void take(const mavlink::GpsGlobalOrigin&, Time) noexcept { has_origin = true; }
   void take(const mavlink::ParamValue& m, Time now) noexcept;
 
  private:

@@ -109,7 +109,8 @@ struct TickInputRecord {
   double map_from_odom[4];  ///< yaw and translation of the newest loop closure
   std::int32_t missed_periods;
   std::uint32_t request, flags, reset_counter;  ///< flags: core/study/tick_log.cpp
-  std::uint32_t closures, padding;
+  std::uint32_t closures;
+  float position_sigma;  ///< m; 0: not known
 };
 static_assert(sizeof(TickInputRecord) == 312);
 

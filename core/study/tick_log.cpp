@@ -23,6 +23,10 @@ enum Flag : std::uint32_t {
   kStopBlocked = 1u << 13,
   kLandedKnown = 1u << 14,
   kLanded = 1u << 15,
+  kInAirKnown = 1u << 16,
+  kInAir = 1u << 17,
+  kLiftsItself = 1u << 18,
+  kTakeoffTaken = 1u << 19,
 };
 
 void put(const Vec3& from, double* to) noexcept { std::copy_n(from.data(), 3, to); }
@@ -43,12 +47,15 @@ TickInputRecord encode(const track::TickInput& in) noexcept {
   r.heartbeat_age = a.heartbeat_age;
   r.reset_counter = a.reset_counter.value_or(0);
   r.battery = a.battery.value_or(0);
+  r.position_sigma = in.position_sigma;
   r.flags = bit(in.odometry.has_value(), kOdometry) | bit(a.port_open, kPortOpen) |
             bit(a.transmit_failed, kTransmitFailed) | bit(a.armed, kArmed) | bit(a.offboard, kOffboard) |
             bit(a.pose.has_value(), kPose) | bit(a.reset_counter.has_value(), kResetCounter) |
             bit(a.battery.has_value(), kBattery) | bit(s.missing, kMapMissing) | bit(s.outside, kOutside) |
             bit(s.late, kMapLate) | bit(s.tube_blocked, kTubeBlocked) | bit(s.stop_blocked, kStopBlocked) |
-            bit(a.landed.has_value(), kLandedKnown) | bit(a.landed.value_or(false), kLanded);
+            bit(a.landed.has_value(), kLandedKnown) | bit(a.landed.value_or(false), kLanded) |
+            bit(a.in_air.has_value(), kInAirKnown) | bit(a.in_air.value_or(false), kInAir) |
+            bit(a.lifts_itself, kLiftsItself) | bit(a.takeoff_taken, kTakeoffTaken);
   if (in.odometry) {
     r.odometry_received_ns = in.odometry->received_ns;
     r.odometry_stamp_ns = in.odometry->stamp_ns;
@@ -78,11 +85,15 @@ track::TickInput decode(const TickInputRecord& r, const track::AcceptedSegment* 
   in.request = static_cast<track::Request>(r.request);
   in.order = r.order;
   in.segment = segment;
+  in.position_sigma = r.position_sigma;
   in.autopilot.port_open = has(kPortOpen);
   in.autopilot.transmit_failed = has(kTransmitFailed);
   in.autopilot.armed = has(kArmed);
   in.autopilot.offboard = has(kOffboard);
   if (has(kLandedKnown)) in.autopilot.landed = has(kLanded);
+  if (has(kInAirKnown)) in.autopilot.in_air = has(kInAir);
+  in.autopilot.lifts_itself = has(kLiftsItself);
+  in.autopilot.takeoff_taken = has(kTakeoffTaken);
   in.autopilot.heartbeat_age = r.heartbeat_age;
   if (has(kOdometry))
     in.odometry = {
@@ -125,8 +136,9 @@ void decided(const track::FlightTick& flight, const track::TickOutput& out, Tick
   r.local_yaw = out.command_local.yaw;
   const auto& s = out.supervisor;
   r.asked = bit(s.send_setpoint, kAskedSetpoint) | bit(s.send_heartbeat, kAskedHeartbeat) |
-            bit(s.forward_odometry && out.fresh, kAskedOdometry) | bit(s.request_offboard, kAskedOffboard) |
-            bit(s.request_land, kAskedLand) | bit(out.arm, kAskedArm) | bit(out.disarm, kAskedDisarm);
+            bit(out.forward_odometry, kAskedOdometry) | bit(s.request_offboard, kAskedOffboard) |
+            bit(s.request_land, kAskedLand) | bit(out.arm, kAskedArm) | bit(out.disarm, kAskedDisarm) |
+            bit(out.takeoff.has_value(), kAskedTakeoff);
 }
 
 ConstantsRecord constants(const Vehicle& vehicle, double battery_land) noexcept {

@@ -20,6 +20,7 @@ enum Asked : std::uint32_t {
   kAskedLand = 16,
   kAskedArm = 32,
   kAskedDisarm = 64,
+  kAskedTakeoff = 128,
 };
 
 /// Real-time: wait-free, no allocation.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace backwash::track {
@@ -10,7 +11,10 @@ namespace {
 
 constexpr int kArmingTicks = 150;  // 3 s: heartbeats come once a second
 constexpr int kDisarmEvery = 25;   // ticks: one command may be lost
-constexpr int kDisorder = 3;       // more in a row are as no odometry at all (docs/faults.md row 5)
+constexpr std::size_t kTakeoffEvery = 25;
+constexpr double kLeastBelow = 0.1;  // m: a lift-off is over from so far below its height on
+constexpr int kSettled = 50;  // ticks there: PX4 gives its loops their authority bit by bit, until 4 s after arming
+constexpr int kDisorder = 3;  // more in a row are as no odometry at all (docs/faults.md row 5)
 
 double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
 std::int64_t nanoseconds(double s) noexcept { return static_cast<std::int64_t>(s * 1e9); }
@@ -28,9 +32,7 @@ FramePose pose_of(const AutopilotFacts::Pose& pose) noexcept {
   return result;
 }
 
-bool commanding(Mode mode) noexcept {
-  return mode == Mode::enabling || mode == Mode::tracking || mode == Mode::hold || mode == Mode::land;
-}
+bool commanding(Mode mode) noexcept { return mode != Mode::passive && mode != Mode::quiet; }
 
 // As the floats that go on the wire.
 bool finite(const Setpoint& s) noexcept {
@@ -41,7 +43,7 @@ bool finite(const Setpoint& s) noexcept {
 }  // namespace
 
 FlightTick::FlightTick(const Vehicle& vehicle, double battery_land)
-    : battery_land_(battery_land), gate_(vehicle), tracker_(Setpoint{}, vehicle) {}
+    : battery_land_(battery_land), sigma_(vehicle.estimation.position), gate_(vehicle), tracker_(Setpoint{}, vehicle) {}
 
 // A loop closure (docs/faults.md row 4) moves the map frame under the vehicle. Everything that is in it moves along
 // within this tick, so that in the controller's frame, and physically, nothing has moved; the planner then brings the
@@ -82,7 +84,7 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
     return;
   }
   using Verdict = OdometryGate::Verdict;
-  const bool moving = command_.v_W.norm() > 0.05;
+  const bool moving = command_.v_W.norm() > 0.05 && mode() != Mode::lifting;  // it may yet stand
   out.verdict = gate_.take(*sample, moving);
   disorder_ = out.verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
   if (out.verdict == Verdict::good) {
@@ -92,7 +94,9 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
   const bool elsewhere = out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent ||
                          disorder_ > kDisorder ||
                          (out.fresh && seconds(in.now_ns - last_good_ns_) > Supervisor::kHoldAfter);
-  if (elsewhere && !was_commanding_) gate_.forget();
+  if (!elsewhere || was_commanding_) return;
+  gate_.forget();
+  if (out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent) ++odometry_resets_;
 }
 
 // Learns local ← map while nothing is commanded, watches it otherwise. Takes it anew when the controller's estimator
@@ -127,9 +131,9 @@ void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
   // What was planned before an operator's order, or before the mode last ended it, is not flown (docs/faults.md row
   // 39).
-  const bool following = (mode() == Mode::tracking || mode() == Mode::hold) && closure_refused_ == closures_;
-  out.accepted =
-      following && in.segment->epoch == epoch_ && gate_.last() && tracker_.accept(*in.segment, gate_.last()->state);
+  const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms);
+  out.accepted = following && closure_refused_ == closures_ && in.segment->epoch == epoch_ && gate_.last() &&
+                 tracker_.accept(*in.segment, gate_.last()->state);
   out.refused = !out.accepted;
   out.released[0] = out.accepted ? std::exchange(segment_, in.segment) : in.segment;
 }
@@ -143,7 +147,13 @@ void FlightTick::judge(TickOutput& out) noexcept {
   if (out.fresh) out.inside = tracker_.judge(gate_.last()->state.p_W);
 }
 
-SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) const noexcept {
+// What enabling allows, and three standard deviations of the two estimates against each other.
+double FlightTick::apart(const TickInput& in) const noexcept {
+  const double sigma = in.position_sigma > 0 ? static_cast<double>(in.position_sigma) : std::numbers::sqrt2 * sigma_;
+  return std::clamp(FrameAlignment::kMaxPosition + 3 * sigma, kLeastApart, kMostApart);
+}
+
+SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
   SupervisorInput facts;
   facts.request = in.request;
   facts.odometry_age = odometry_age_;
@@ -156,14 +166,19 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) co
   facts.arming = arming_ > 0;
   facts.offboard = in.autopilot.offboard;
   facts.frames_aligned = alignment_.aligned();
+  facts.frames_apart = alignment_.position_residual() > apart(in);
+  facts.frames_agree = alignment_.agree(2 * apart(in));
   facts.autopilot_reset = reset_;
   facts.closure_refused = closure_refused_now_;
   const auto& pose = in.autopilot.pose;
   facts.pose_age =
       pose ? seconds(in.now_ns - std::min(pose->at_ns, pose->attitude_at_ns)) : std::numeric_limits<double>::infinity();
   facts.mismatch = alignment_.mismatch();
-  facts.inside = out.inside.inside;
+  facts.inside = mode() == Mode::lifting ? !out.fresh || tracker_.within(gate_.last()->state.p_W) : out.inside.inside;
   facts.new_segment = out.accepted;
+  facts.takeoff = out.accepted && in.segment->arms;
+  facts.lifts_itself = in.autopilot.lifts_itself;
+  facts.lifted = lifted(in);
   facts.obstacle_ahead = in.surroundings.tube_blocked;
   facts.outside_map = in.surroundings.outside;
   facts.map_late = in.surroundings.late;
@@ -197,28 +212,59 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
       tracker_.hold_at(command_);
       drop_segment(out);
     }
-  } else if (now != Mode::tracking && before != now) {
+  } else if (before == Mode::lifting && now == Mode::tracking) {
+    tracker_.hold_at(tracker_.at(SIZE_MAX));
+    drop_segment(out);
+  } else if (now != Mode::tracking && now != Mode::lifting && before != now) {
     tracker_.hold_at(command_);
     drop_segment(out);
   }
 }
 
+// In the air, as it says itself where it does, and as high as the take-off that was accepted ends: an autopilot may
+// call itself in the air a second before it leaves the ground. For a second, so that its control has come to rest.
+bool FlightTick::lifted(const TickInput& in) noexcept {
+  const auto* top = tracker_.last_set();
+  const double below = top ? std::max(kLeastBelow, top->half_widths[kZ]) : 0;
+  const bool there = mode() == Mode::lifting && top && gate_.last() && in.autopilot.armed &&
+                     in.autopilot.in_air.value_or(true) &&
+                     gate_.last()->state.p_W.z() > tracker_.at(SIZE_MAX).p_W.z() - below;
+  settled_ = there ? settled_ + 1 : 0;
+  return settled_ > kSettled;
+}
+
+// Odometry is a sensor of the autopilot's, not a command: it gets every good sample in every mode, so that its
+// estimator stays right under a pilot's hands and after us. What we have stopped to believe in flight is not forwarded
+// until the vehicle stands or follows us again.
+void FlightTick::feed(const TickInput& in, TickOutput& out) noexcept {
+  const bool again = !in.autopilot.armed || out.supervisor.mode == Mode::tracking;
+  const bool distrusted = odometry_distrusted_ || (was_commanding_ && !supervisor_.pose_trusted());
+  feed_distrusted_ = distrusted || (feed_distrusted_ && !again);
+  out.forward_odometry = out.fresh && !feed_distrusted_;
+  out.odometry_resets = odometry_resets_;
+}
+
 // The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on
 // the ground stops them again, unless somebody else started them; the autopilot itself refuses to disarm in the air.
 void FlightTick::ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept {
-  const bool followed = before == Mode::tracking || before == Mode::hold;
+  const bool followed = before == Mode::tracking || before == Mode::hold || before == Mode::lifting;
   const bool stands = in.autopilot.landed.value_or(false);
   const bool runs = arming_ > 0 || (followed && in.autopilot.armed);
-  arming_ = std::max(0, arming_ - 1);
+  arming_ = in.autopilot.armed ? 0 : std::max(0, arming_ - 1);
   abandoned_ = std::max(0, abandoned_ - 1);
-  const bool ends = in.request == Request::stop || in.request == Request::disable;
+  const auto& s = out.supervisor;
+  const bool ends = in.request == Request::stop || in.request == Request::disable ||
+                    (before == Mode::lifting && s.mode == Mode::land);
   if (stands && runs && ends) abandoned_ = kArmingTicks;
   if (out.accepted) abandoned_ = 0;
-  out.arm = out.accepted && in.segment->arms && out.supervisor.mode == Mode::tracking && !in.autopilot.armed;
+  out.arm = out.accepted && s.mode == Mode::lifting && !in.autopilot.armed;
   if (out.arm) arming_ = kArmingTicks;
-  const auto& s = out.supervisor;
-  const bool ours = s.mode == Mode::tracking || s.mode == Mode::hold ||
-                    (s.mode == Mode::passive && s.reason == Reason::operator_request);  // neither quiet nor a pilot's
+  lift_ticks_ = s.mode == Mode::lifting ? lift_ticks_ + 1 : 0;
+  if (lift_ticks_ > 0 && in.autopilot.lifts_itself && in.autopilot.armed && !in.autopilot.takeoff_taken &&
+      lift_ticks_ % kTakeoffEvery == 2)
+    out.takeoff = tracker_.at(SIZE_MAX).p_W.z() - tracker_.at(0).p_W.z();
+  const bool left = s.reason == Reason::operator_request || s.reason == Reason::landed;
+  const bool ours = (s.mode != Mode::passive || left) && s.mode != Mode::quiet;  // neither quiet nor a pilot's
   out.disarm = ours && abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
 }
 
@@ -235,18 +281,24 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   const Mode before = mode();
   out.supervisor = supervisor_.step(facts(in, out));
   const auto& s = out.supervisor;
-  if (s.changed && s.mode != Mode::tracking && s.reason != Reason::obstacle_ahead) ++epoch_.lapse;
+  const bool goes_on = s.mode == Mode::tracking || s.mode == Mode::lifting ||
+                       (s.mode == Mode::hold && s.reason == Reason::obstacle_ahead);
+  if (s.changed && !goes_on) ++epoch_.lapse;
   follow(in, before, out);
   was_commanding_ = commanding(out.supervisor.mode);
   odometry_distrusted_ =
       was_commanding_ &&
-      (odometry_distrusted_ || (out.supervisor.freeze && out.supervisor.reason != Reason::frames_disagree));
-  command_ = was_commanding_ ? tracker_.step() : tracker_.held();
+      (odometry_distrusted_ || (!supervisor_.pose_trusted() && out.supervisor.reason != Reason::frames_disagree));
+  if (s.mode == Mode::lifting)
+    command_ = tracker_.at(lift_ticks_);
+  else
+    command_ = was_commanding_ ? tracker_.step() : tracker_.held();
   out.command = command_;
   out.command_local = alignment_.to_local(command_);
   out.finite = finite(out.command_local);
   out.supervisor.send_setpoint = out.supervisor.send_setpoint && out.finite;
   ask_of_motors(in, before, out);
+  feed(in, out);
   return out;
 }
 

@@ -13,7 +13,9 @@ struct AutopilotFacts {
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row did not get out
   bool armed = false, offboard = false;
-  std::optional<bool> landed;                                      ///< as it says itself
+  std::optional<bool> landed, in_air;                              ///< as it says itself; neither: between the two
+  bool lifts_itself = false;                                       ///< ArduPilot: takes off by a command of its own
+  bool takeoff_taken = false;                                      ///< and has acknowledged that one since it was asked
   double heartbeat_age = std::numeric_limits<double>::infinity();  ///< s
   struct Pose {
     std::int64_t at_ns = 0;               ///< when the position arrived
@@ -46,6 +48,8 @@ struct TickInput {
   const AcceptedSegment* segment = nullptr;  ///< offered since the last tick
   AutopilotFacts autopilot;
   Surroundings surroundings;
+  /// Of odometry and autopilot's estimate against each other, as both say themselves, m; 0: one does not say.
+  float position_sigma = 0;
 };
 
 /// What a tick decided.
@@ -58,6 +62,9 @@ struct TickOutput {
   bool fresh = false;                                           ///< there was a good sample
   bool arm = false;                                             ///< ask the autopilot to arm
   bool disarm = false;                                          ///< ask it to disarm: it stands on the ground
+  std::optional<double> takeoff;     ///< ask it to take off by itself to this height above here, m
+  bool forward_odometry = false;     ///< the tick's sample is good: the autopilot's estimator gets it
+  std::uint8_t odometry_resets = 0;  ///< times that the odometry began anew elsewhere
   Inside inside;
   std::uint64_t judged_segment = 0, judged_index = 0;  ///< the set that `inside` is about
   bool accepted = false, refused = false;              ///< the offered segment
@@ -73,6 +80,9 @@ class FlightTick {
   /// decimetres and degrees, and the tubes of a room are narrower than this.
   static constexpr double kMaxClosure = 1.0;                              ///< m
   static constexpr double kMaxClosureTurn = 10 * 3.14159265358979 / 180;  ///< rad
+  /// What the frames may come apart in flight, whatever the two estimates claim, m: one that boasts is not believed to
+  /// the millimetre, and one that knows nothing excuses nothing.
+  static constexpr double kLeastApart = 0.10, kMostApart = 0.25;
 
   /// `battery_land`: remaining share below which LAND is asked for once; 0: never.
   FlightTick(const Vehicle& vehicle, double battery_land);
@@ -95,12 +105,16 @@ class FlightTick {
   void align(const TickInput& in, bool fresh) noexcept;
   void take_segment(const TickInput& in, TickOutput& out) noexcept;
   void judge(TickOutput& out) noexcept;
-  SupervisorInput facts(const TickInput& in, const TickOutput& out) const noexcept;
+  SupervisorInput facts(const TickInput& in, const TickOutput& out) noexcept;
   void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
   void ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept;
+  bool lifted(const TickInput& in) noexcept;
+  void feed(const TickInput& in, TickOutput& out) noexcept;
   void drop_segment(TickOutput& out) noexcept;
 
-  double battery_land_;
+  double apart(const TickInput& in) const noexcept;
+
+  double battery_land_, sigma_;
   OdometryGate gate_;
   FrameAlignment alignment_;
   Supervisor supervisor_;
@@ -116,8 +130,12 @@ class FlightTick {
   Setpoint command_;  ///< of the last tick
   bool was_commanding_ = false, reset_ = false;
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
-  int disorder_ = 0;                  ///< samples in a row whose stamp did not rise
-  std::int64_t last_good_ns_ = -1;    ///< reception, less what it was late
+  bool feed_distrusted_ = false;      ///< since then, until the vehicle is disarmed or follows us again
+  std::uint8_t odometry_resets_ = 0;
+  std::size_t lift_ticks_ = 0;      ///< since the take-off was accepted
+  int settled_ = 0;                 ///< ticks in the air at its height
+  int disorder_ = 0;                ///< samples in a row whose stamp did not rise
+  std::int64_t last_good_ns_ = -1;  ///< reception, less what it was late
   std::int64_t last_pose_ns_ = -1, last_attitude_ns_ = -1;
   std::optional<std::uint8_t> reset_counter_;
   double odometry_age_ = std::numeric_limits<double>::infinity();

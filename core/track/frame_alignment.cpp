@@ -109,8 +109,10 @@ bool FrameAlignment::local_jumped(const FramePose& in_local, double dt) const no
          std::abs(wrap_angle(in_local.yaw - turned)) > kResetYaw - kMaxYaw;
 }
 
-bool FrameAlignment::aligned() const noexcept {
-  return samples_ >= kMinSamples && position_residual_ < kMaxPosition && yaw_residual_ < kMaxYaw &&
+bool FrameAlignment::aligned() const noexcept { return agree(kMaxPosition); }
+
+bool FrameAlignment::agree(double position) const noexcept {
+  return samples_ >= kMinSamples && position_residual_ < position && yaw_residual_ < kMaxYaw &&
          std::hypot(roll_, pitch_) < kMaxTilt && std::abs(gyro_turn_) < kMaxGyroTurn;
 }
 

@@ -55,6 +55,8 @@ class FrameAlignment {
   /// Enough samples; their residuals and the two attitudes' tilt (low-passed over 0.2 s) are small; and the odometry
   /// has turned no further than the gyros say.
   bool aligned() const noexcept;
+  /// The same in flight, where the autopilot's estimate wanders more: up to `position` m of residual.
+  bool agree(double position) const noexcept;
   double position_residual() const noexcept { return position_residual_; }  ///< m
   double yaw_residual() const noexcept { return yaw_residual_; }            ///< rad
 

@@ -19,6 +19,9 @@ struct OdometrySample {
   std::array<double, 4> q{1, 0, 0, 0};  ///< body to map: w, x, y, z
   std::uint32_t closures = 0;           ///< loop closures so far: which map frame this is in
   RigidShift map_from_odom{};           ///< by which the VIO's own pose was brought there
+  /// As the VIO says, of each axis: m², rad² of its own frame, (m/s)² of the body. Absent: it does not say. No decision
+  /// rests on them; the autopilot's estimator gets them.
+  std::optional<Vec3> position_variance{}, attitude_variance{}, velocity_variance{};
 };
 
 /// Lets only credible odometry through (docs/faults.md rows 2, 3, 5, 6, 41, 49). It sees the newest sample of each

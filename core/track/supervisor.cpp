@@ -8,10 +8,10 @@
 namespace backwash::track {
 namespace {
 
-constexpr ModeSet kCommanding = set_of({Mode::enabling, Mode::tracking, Mode::hold, Mode::land});
+constexpr ModeSet kCommanding = set_of({Mode::enabling, Mode::lifting, Mode::tracking, Mode::hold, Mode::land});
 constexpr ModeSet kFollowed = set_of({Mode::tracking, Mode::hold});
 constexpr ModeSet kEnabling = set_of({Mode::enabling}), kTracking = set_of({Mode::tracking});
-constexpr ModeSet kHold = set_of({Mode::hold}), kLand = set_of({Mode::land});
+constexpr ModeSet kHold = set_of({Mode::hold}), kLand = set_of({Mode::land}), kLifting = set_of({Mode::lifting});
 
 // core/track/README.md shows this table; a test compares the two.
 constexpr Transition kTransitions[] = {
@@ -34,6 +34,27 @@ constexpr Transition kTransitions[] = {
     {kEnabling, Reason::frame_mismatch_pitch, Mode::passive},
     {kEnabling, Reason::autopilot_follows, Mode::tracking},
     {kEnabling, Reason::enable_timeout, Mode::passive},
+    // Below the lowest safe hover height no hold is verified: what ends a lift-off lands.
+    {kLifting, Reason::offboard_left, Mode::passive},
+    {kLifting, Reason::disarmed, Mode::passive},
+    {kLifting, Reason::not_armed, Mode::passive},
+    {kLifting, Reason::land_requested, Mode::land},
+    {kLifting, Reason::stop_requested, Mode::land},
+    {kLifting, Reason::pose_silent, Mode::land},
+    {kLifting, Reason::odometry_jump, Mode::land},
+    {kLifting, Reason::odometry_inconsistent, Mode::land},
+    {kLifting, Reason::odometry_disorder, Mode::land},
+    {kLifting, Reason::odometry_lost, Mode::land},
+    {kLifting, Reason::frames_disagree, Mode::land},
+    {kLifting, Reason::autopilot_reset, Mode::land},
+    {kLifting, Reason::closure_refused, Mode::land},
+    {kLifting, Reason::battery_low, Mode::land},
+    {kLifting, Reason::obstacle_ahead, Mode::land},
+    {kLifting, Reason::outside_map, Mode::land},
+    {kLifting, Reason::map_late, Mode::land},
+    {kLifting, Reason::outside_column, Mode::land},
+    {kLifting, Reason::lift_timeout, Mode::land},
+    {kLifting, Reason::lifted_off, Mode::tracking},
     // The autopilot, its pilot and the operator come before everything that we notice.
     {kFollowed, Reason::offboard_left, Mode::passive},
     {kFollowed, Reason::disarmed, Mode::passive},
@@ -47,6 +68,7 @@ constexpr Transition kTransitions[] = {
     {kFollowed, Reason::odometry_disorder, Mode::hold},
     {kFollowed, Reason::odometry_lost, Mode::hold},
     {kFollowed, Reason::frames_disagree, Mode::hold},
+    {kFollowed, Reason::frames_apart, Mode::hold},
     {kFollowed, Reason::battery_low, Mode::land},
     {kFollowed, Reason::autopilot_reset, Mode::hold},
     {kFollowed, Reason::pose_silent, Mode::hold},
@@ -57,6 +79,7 @@ constexpr Transition kTransitions[] = {
     {kTracking, Reason::map_late, Mode::hold},
     {kTracking, Reason::outside_set, Mode::hold},
     {kTracking, Reason::deadline_missed, Mode::hold},
+    {kTracking, Reason::takeoff_accepted, Mode::lifting},
     {kHold, Reason::segment_accepted, Mode::tracking},
     {kLand, Reason::landed, Mode::passive},
     {kLand, Reason::land_sent, Mode::quiet},
@@ -75,7 +98,7 @@ constexpr bool distrusts(Reason reason) noexcept {
          reason == Reason::frames_disagree;
 }
 
-constexpr const char* kModeNames[kModes] = {"passive", "enabling", "tracking", "hold", "land", "quiet"};
+constexpr const char* kModeNames[kModes] = {"passive", "enabling", "tracking", "hold", "land", "quiet", "lifting"};
 
 constexpr const char* kReasonNames[kReasons] = {
     "started",
@@ -118,6 +141,12 @@ constexpr const char* kReasonNames[kReasons] = {
     "autopilot's pose older than 0.3 s",
     "no pose from the autopilot for 1 s",
     "loop closure beyond 1 m or 10 degrees",
+    "take-off accepted",
+    "lifted off",
+    "not in the air 12 s after the take-off began",
+    "outside the take-off's column for 3 ticks",
+    "autopilot did not arm within 3 s",
+    "map and autopilot frames come apart",
 };
 
 }  // namespace
@@ -154,7 +183,7 @@ void Supervisor::count(const SupervisorInput& in) noexcept {
     missed_.back() = period_ + in.missed_periods;
   }
   period_ += 1 + in.missed_periods;
-  outside_ = mode_ != Mode::tracking || in.inside ? 0 : outside_ + 1;
+  outside_ = (mode_ != Mode::tracking && mode_ != Mode::lifting) || in.inside ? 0 : outside_ + 1;
   if (!in.battery_low) battery_landed_ = false;
 }
 
@@ -207,7 +236,9 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::pose_untrusted:
       return in.odometry_age > kLandAfter || (!pose_trusted() && seconds_in_mode() > kUntrusted);
     case Reason::frames_disagree:
-      return !in.frames_aligned;
+      return !in.frames_agree;
+    case Reason::frames_apart:
+      return in.frames_apart;
     case Reason::battery_low:
       return in.battery_low && !battery_landed_;  // row 24
     case Reason::autopilot_reset:
@@ -219,13 +250,22 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::map_late:
       return in.map_late;  // row 13
     case Reason::outside_set:
+    case Reason::outside_column:
       return outside_ >= kOutsideTicks;  // row 16
+    case Reason::takeoff_accepted:
+      return in.new_segment && in.takeoff;
+    case Reason::not_armed:
+      return !in.armed && !in.arming;
+    case Reason::lifted_off:
+      return in.lifted;
+    case Reason::lift_timeout:
+      return seconds_in_mode() > kLiftTimeout;
     case Reason::deadline_missed:
       return in.missed_periods > 0 && missed_.front() >= period_ - 1 - kMissedWithin;  // row 32
     case Reason::segment_accepted:
-      return in.new_segment && pose_trusted();
+      return in.new_segment && pose_trusted() && !in.frames_apart;
     case Reason::landed:
-      return !in.armed;
+      return !in.armed && !in.arming;
     case Reason::land_sent:
       return reason_ == Reason::pose_untrusted && ticks_in_mode_ >= kLandTicks;
     case Reason::frame_mismatch_x:
@@ -277,10 +317,10 @@ SupervisorOutput Supervisor::output(const SupervisorInput& in) noexcept {
   out.changed = changed_;
   changed_ = false;
   out.freeze = mode_ == Mode::hold && !pose_trusted();
-  out.send_setpoint = contains(kFollowed, mode_) || (mode_ == Mode::enabling && in.frames_aligned);
-  // A vehicle found armed belongs to somebody else until an operator enables us: then nothing at all is sent (row 36).
+  out.send_setpoint = contains(kFollowed, mode_) || (mode_ == Mode::enabling && in.frames_aligned) ||
+                      (mode_ == Mode::lifting && !in.lifts_itself);
+  // A vehicle found armed belongs to somebody else until an operator enables us: then nothing is commanded (row 36).
   out.send_heartbeat = contains(kCommanding, mode_) || (mode_ == Mode::passive && !in.armed);
-  out.forward_odometry = out.send_heartbeat;
   out.request_offboard = mode_ == Mode::enabling && in.frames_aligned && !in.offboard &&
                          seconds_in_mode() > kStreamBefore && ticks_in_mode_ % 25 == 0;
   // Never again once the autopilot has left offboard: it lands, or a pilot has taken over.

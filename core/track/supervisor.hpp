@@ -18,8 +18,9 @@ enum class Mode : std::uint8_t {
   hold,      ///< a verified stop to rest, or the last good set-point frozen with zero velocity and acceleration
   land,      ///< the autopilot's own land mode was asked for; no set-points
   quiet,     ///< neither set-points nor heartbeat: the autopilot's failsafe acts
+  lifting,   ///< a take-off was accepted: motors start, and the vehicle leaves the ground by the autopilot's own means
 };
-inline constexpr int kModes = 6;
+inline constexpr int kModes = 7;
 const char* to_string(Mode mode) noexcept;
 
 /// Why the mode is what it is; docs/faults.md has the rows.
@@ -64,8 +65,14 @@ enum class Reason : std::uint8_t {
   pose_silent,
   pose_lost,
   closure_refused,
+  takeoff_accepted,
+  lifted_off,
+  lift_timeout,
+  outside_column,
+  not_armed,
+  frames_apart,
 };
-inline constexpr int kReasons = 40;
+inline constexpr int kReasons = 46;
 const char* to_string(Reason reason) noexcept;
 
 /// What an operator asked for since the last tick. `hold` ends what was planned before it and changes no mode: a plan
@@ -90,13 +97,18 @@ struct SupervisorInput {
   double pose_age = 0;                 ///< of the older of its position and its attitude
   bool armed = false;
   bool arming = false;           ///< it was asked to arm a moment ago: its next heartbeat may say so
+  bool lifts_itself = false;     ///< it takes off by a command of its own and ignores set-points on the ground
+  bool lifted = false;           ///< the vehicle is in the air, at the height of the take-off that was accepted
   bool offboard = false;         ///< the autopilot follows our set-points
   bool frames_aligned = false;   ///< residual of local ← map below 5 cm and 3°
+  bool frames_apart = false;     ///< in flight, further apart than the two estimates' own errors explain
+  bool frames_agree = true;      ///< in flight: not twice as far, and neither turned nor tilted
   bool autopilot_reset = false;  ///< its estimator was reset this tick; local ← map was taken anew
   bool closure_refused = false;  ///< a loop closure came that is too large to be flown
   Mismatch mismatch = Mismatch::none;
-  bool inside = true;           ///< measured error inside the set predicted for it
+  bool inside = true;           ///< measured error inside the set predicted for it; lifting: inside any of the column
   bool new_segment = false;     ///< the tracker was given a segment
+  bool takeoff = false;         ///< that is a take-off
   bool obstacle_ahead = false;  ///< something new reaches into the sets still to be flown
   bool outside_map = false;     ///< the newest pose is outside the map
   bool map_late = false;        ///< a live map is older than 1 s
@@ -115,7 +127,6 @@ struct SupervisorOutput {
   bool send_setpoint = false;
   bool freeze = false;  ///< hold with an untrusted pose: the last good set-point, no new positions
   bool send_heartbeat = false;
-  bool forward_odometry = false;
   bool request_offboard = false;
   bool request_land = false;
 };
@@ -153,6 +164,7 @@ class Supervisor {
   static constexpr double kEnableTimeout = 5.0;  ///< s from the request until the autopilot must follow
   static constexpr double kStreamBefore = 1.0;   ///< s of set-points before offboard is asked for (PX4 wants a stream)
   static constexpr int kOutsideTicks = 3;        ///< row 16
+  static constexpr double kLiftTimeout = 12.0;   ///< s from the take-off's acceptance until it must be in the air
   static constexpr std::int64_t kMissedWithin = 50;  ///< periods in which three missed ones lead to hold (row 32)
   static constexpr int kMissedQuiet = 25;            ///< missed periods in a row until QUIET (row 32)
   static constexpr int kLandTicks = 10;              ///< LAND is asked for twice in these, one command may be lost

@@ -113,6 +113,18 @@ Inside Tracker::judge(const Vec3& measured_W) const noexcept {
   return result;
 }
 
+bool Tracker::within(const Vec3& measured_W) const noexcept {
+  if (!segment_) return false;
+  const Vec3 p = shift_.inverse().point(measured_W);
+  return std::ranges::any_of(segment_->tube, [&p](const reach::TubeStep& set) {
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      const double e = unit(static_cast<Direction>(d)).dot(p - set.center.p_W);
+      if (!(std::abs(e) <= set.half_widths_interval[d])) return false;
+    }
+    return true;
+  });
+}
+
 Setpoint Tracker::command(std::size_t k) const noexcept {
   if (k >= end()) return at_rest(command(end() - 1));
   return stop_ && k >= stop_->branch ? stop_->commands[k - stop_->branch] : segment_->commands[k];

@@ -35,7 +35,8 @@ struct AcceptedSegment {
   std::vector<plan::Stop> stops{};  ///< ascending by branch; may be empty
   std::uint32_t closures = 0;       ///< loop closures that the map frame it is in has seen
   Epoch epoch{};                    ///< that it was planned under
-  bool arms = false;                ///< a take-off that was found clear: the vehicle is armed when it is accepted
+  bool arms = false;                ///< a take-off that was found clear: the vehicle is armed when it is accepted, and
+                                    ///< lifted to where it ends
   std::int64_t seen_ns = 0;         ///< reception of the newest data in the map that it was verified in
   double clearance = 0;             ///< smallest of its swept tube in the map it was verified in, m
   /// Entry n: the same of its sets from command kClearanceEvery · n on, rising; may be empty.
@@ -85,6 +86,13 @@ class Tracker {
   std::uint32_t closures() const noexcept { return closures_; }
   /// Judges the measured position at this tick against the set predicted for it. Real-time: wait-free, no allocation.
   Inside judge(const Vec3& measured_W) const noexcept;
+  /// Judges the measured position against the accepted tube as a whole: the region that was found clear, whenever the
+  /// vehicle is where in it. Real-time: wait-free, no allocation; 3 ns per set.
+  bool within(const Vec3& measured_W) const noexcept;
+  /// Command k of the segment, at rest past its end, in the map frame. Real-time: wait-free, no allocation.
+  Setpoint at(std::size_t k) const noexcept { return segment_ ? shift_.setpoint(command(k)) : hold_; }
+  /// The tube's last set, or null. Real-time: wait-free, no allocation.
+  const reach::TubeStep* last_set() const noexcept { return segment_ ? &segment_->tube.back() : nullptr; }
   /// Command of this tick, then moves on. Real-time: wait-free, no allocation.
   Setpoint step() noexcept;
   bool finished() const noexcept { return !segment_ || next_ >= end(); }

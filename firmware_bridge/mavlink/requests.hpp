@@ -214,4 +214,17 @@ struct SetGpsGlobalOrigin {
   }
 };
 
+/// GPS_GLOBAL_ORIGIN: the same, as the autopilot has it.
+struct GpsGlobalOrigin {
+  static constexpr std::uint32_t kId = 49;
+  static constexpr std::string_view kName = "GPS_GLOBAL_ORIGIN";
+  std::int32_t latitude = 0, longitude = 0, altitude = 0;
+  std::uint64_t time_usec = 0;
+  static constexpr auto fields() noexcept {
+    using M = GpsGlobalOrigin;
+    return std::tuple{field("latitude", &M::latitude), field("longitude", &M::longitude),
+                      field("altitude", &M::altitude), extension("time_usec", &M::time_usec)};
+  }
+};
+
 }  // namespace backwash::mavlink

@@ -35,6 +35,13 @@ std::function<bool(const StatusCopy&)> rests_at(const Vec3& goal) {
   };
 }
 
+/// The measured height counts: a set-point is there before the vehicle is.
+bool risen(const StatusCopy& s) {
+  constexpr double kNear = 0.1;  // m
+  return rests(s) && !s.numbers.landed && s.task.empty() &&
+         std::abs(s.numbers.position.z - s.numbers.setpoint.z) < kNear;
+}
+
 }  // namespace
 
 Verbs::Verbs(CLI::App& app) {
@@ -80,8 +87,7 @@ void Verbs::add_ways(CLI::App& app) {
   auto* takeoff = waiting(
       verb(app, "takeoff", "rise vertically to the lowest clear hover height, or higher", "takeoff --height 1.2 --wait",
            [this] {
-             return command("takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF, {0, 0, height_},
-                            [](const StatusCopy& s) { return rests(s) && !s.numbers.landed; });
+             return command("takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF, {0, 0, height_}, risen);
            }),
       60);
   takeoff->add_option("--height", height_, "z in the map, m; 0: the lowest clear height")->capture_default_str();

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
@@ -16,6 +17,7 @@ namespace {
 constexpr std::uint64_t kTicksPerSecond = 50;
 constexpr std::uint32_t kLocalPositionNed = 32, kAttitudeQuaternion = 31, kExtendedSysState = 245, kOdometry = 331,
                         kBatteryStatus = 147;
+constexpr float kGpsGlobalOrigin = 49;
 constexpr std::uint8_t kNotice = 5, kWarning = 4;  // severities of STATUSTEXT
 
 firmware_bridge::Time time_of(std::int64_t ns) noexcept { return firmware_bridge::Time(std::chrono::nanoseconds(ns)); }
@@ -74,8 +76,15 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   facts.transmit_failed = link_.transmit().missed_setpoints() >= firmware_bridge::kMaxMissedSetpoints;
   facts.armed = telemetry.status && telemetry.status->value.armed;
   facts.offboard = telemetry.status && telemetry.status->value.follows_setpoints;
-  if (telemetry.landed_state && telemetry.landed_state->value != firmware_bridge::LandedState::kUndefined)
-    facts.landed = telemetry.landed_state->value == firmware_bridge::LandedState::kOnGround;
+  using firmware_bridge::LandedState;
+  if (telemetry.landed_state && telemetry.landed_state->value != LandedState::kUndefined) {
+    facts.landed = telemetry.landed_state->value == LandedState::kOnGround;
+    facts.in_air = telemetry.landed_state->value == LandedState::kInAir;
+  }
+  facts.lifts_itself = telemetry.status && telemetry.status->value.autopilot == firmware_bridge::Autopilot::kArduPilot;
+  const auto taken = telemetry.result_of(firmware_bridge::kCommandTakeoff);
+  facts.takeoff_taken =
+      takeoff_asked_ns_ != 0 && taken && taken->value.result == 0 && ns_of(taken->at) >= takeoff_asked_ns_;
   if (const auto age = link_.heartbeat_age(time_of(now_ns)))
     facts.heartbeat_age = std::chrono::duration<double>(*age).count();
   if (telemetry.local_state && telemetry.attitude) {
@@ -103,10 +112,13 @@ track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
   in.segment = channels_.segments.take();
   in.autopilot = autopilot(now_ns);
   in.surroundings = lookout_.look(flight_, now_ns);
+  const auto& said = link_.telemetry().position_sigma;
+  if (in.odometry && in.odometry->position_variance) vio_sigma_ = std::sqrt(in.odometry->position_variance->maxCoeff());
+  if (said && vio_sigma_ > 0) in.position_sigma = static_cast<float>(std::hypot(said->value, vio_sigma_));
   return in;
 }
 
-void ControlLoop::forward_odometry() noexcept {
+void ControlLoop::forward_odometry(std::uint8_t resets) noexcept {
   // As the VIO said it: a loop closure moves the map and must not move the controller's frame.
   const OdometrySample& s = *flight_.odometry();
   const track::RigidShift odom_from_map = s.map_from_odom.inverse();
@@ -116,7 +128,23 @@ void ControlLoop::forward_odometry() noexcept {
   vio.p_O = odom_from_map.point(s.state.p_W);
   vio.q_OB = Eigen::Quaterniond(Eigen::AngleAxisd(odom_from_map.yaw, Vec3::UnitZ())) * attitude;
   vio.v_B = attitude.conjugate() * s.state.v_W;
+  vio.position_variance_O = s.position_variance;
+  vio.attitude_variance_O = s.attitude_variance;
+  vio.velocity_variance_B = s.velocity_variance;
+  vio.reset_counter = resets;
   if (link_.send_odometry(vio)) row_.sent |= 4;
+}
+
+// ArduPilot arms with a home alone, and has none without GPS until it is told an origin. One that it has stays.
+void ControlLoop::give_origin(const track::AutopilotFacts& autopilot) noexcept {
+  constexpr int kAsked = 2;  // times without an answer
+  if (!autopilot.lifts_itself || autopilot.armed || link_.telemetry().has_origin) {
+    origin_asked_ = 0;
+    return;
+  }
+  if (origin_asked_ >= kAsked && flight_.odometry()) link_.send_origin();
+  link_.send_command(firmware_bridge::kCommandMessage, {kGpsGlobalOrigin});
+  ++origin_asked_;
 }
 
 void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out) noexcept {
@@ -131,13 +159,14 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
       row_.odometry_to_wire_us = static_cast<float>(us);
     }
   }
-  link_.answer_timesync(s.send_heartbeat);  // quiet is quiet: not a byte
   if (s.send_heartbeat && view_.ticks % kTicksPerSecond == 0 && link_.send_heartbeat()) row_.sent |= 2;
-  if (s.forward_odometry && out.fresh) forward_odometry();
+  if (out.forward_odometry) forward_odometry(out.odometry_resets);
   if (s.request_offboard) link_.send_follow_setpoints();
   if (s.request_land) link_.send_land();
   if (out.arm) link_.send_arm(true);
   if (out.disarm) link_.send_arm(false);
+  if (s.mode != track::Mode::lifting) takeoff_asked_ns_ = 0;
+  if (out.takeoff && link_.send_takeoff(*out.takeoff) && takeoff_asked_ns_ == 0) takeoff_asked_ns_ = in.now_ns;
   if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
     link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
                           to_string(s.reason));
@@ -151,6 +180,7 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
     link_.send_message_interval(kExtendedSysState, 5);
     link_.send_message_interval(kOdometry, 5);  // for its reset counter
     link_.send_message_interval(kBatteryStatus, 1);
+    give_origin(in.autopilot);
   }
 }
 

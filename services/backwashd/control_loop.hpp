@@ -31,7 +31,8 @@ class ControlLoop {
   track::TickInput gather(std::int64_t now_ns, int missed) noexcept;
   track::AutopilotFacts autopilot(std::int64_t now_ns) const noexcept;
   void send(const track::TickInput& in, const track::TickOutput& out) noexcept;
-  void forward_odometry() noexcept;
+  void forward_odometry(std::uint8_t resets) noexcept;
+  void give_origin(const track::AutopilotFacts& autopilot) noexcept;
   void publish(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void report(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void record(study::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept;
@@ -43,7 +44,10 @@ class ControlLoop {
   Lookout lookout_;
   SenderClock sender_clock_;  // of the odometry's
   bool port_open_ = true;
+  int origin_asked_ = 0;
+  std::int64_t takeoff_asked_ns_ = 0;  ///< of the autopilot, for the first time in this lift-off; 0: not yet
   track::Orders orders_;
+  double vio_sigma_ = 0;  ///< as the newest odometry that says it, m
   std::int64_t now_ns_ = 0;
   ControlView view_;
   study::TickRecord row_{};

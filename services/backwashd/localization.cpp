@@ -25,6 +25,14 @@ bool within(const Vec3& v, double most) { return v.norm() <= most; }
 
 std::string text(const char* s) { return s ? s : ""; }
 
+/// Three of the diagonal of a row-major 6 × 6 covariance; nothing where it is not known.
+std::optional<Vec3> variances(const double* covariance, std::size_t first) {
+  const auto at = [&](std::size_t n) { return covariance[7 * (first + n)]; };
+  const Vec3 v(at(0), at(1), at(2));
+  if (!v.cast<float>().allFinite() || !(v.minCoeff() > 0)) return std::nullopt;
+  return v;
+}
+
 }  // namespace
 
 tl::unexpected<std::string> wrong_frame(const std::string& what, const std::string& frame, const std::string& right) {
@@ -54,6 +62,9 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
   OdometrySample s;
   s.received_ns = received_ns;
   s.stamp_ns = nanoseconds(m.header.stamp);
+  s.position_variance = variances(m.pose.covariance, 0);
+  s.attitude_variance = variances(m.pose.covariance, 3);
+  s.velocity_variance = variances(m.twist.covariance, 0);
   // nav_msgs/Odometry: the twist is in the child (body) frame.
   Eigen::Quaterniond attitude(q.w, q.x, q.y, q.z);
   s.state = {{p.x, p.y, p.z}, attitude * Vec3(v.x, v.y, v.z)};

@@ -145,7 +145,8 @@ Decision Mission::decide(const CommandMessage& command) {
     case backwash_msgs_msg_dds__COMMAND_STOP:
       return stop();
     case backwash_msgs_msg_dds__COMMAND_LAND:
-      return flies(view_.mode) ? order(Request::land, "landing") : refused("not enabled");
+      return flies(view_.mode) || view_.mode == Mode::lifting ? order(Request::land, "landing")
+                                                              : refused("not enabled");
     case backwash_msgs_msg_dds__COMMAND_RELEASE:
       return only(kAccepted, "session released");
     default:
@@ -176,12 +177,14 @@ Decision Mission::enable() {
 }
 
 Decision Mission::take_off(const CommandMessage& command) {
+  if (view_.mode == Mode::lifting) return refused("taking off already");
   if (view_.mode != Mode::tracking) return refused("not enabled");
   if (!view_.landed) return refused("already in the air");
   return start(PlanJob::Kind::takeoff, {command.position, {}});
 }
 
 Decision Mission::go_to(const CommandMessage& command) {
+  if (view_.mode == Mode::lifting) return refused("taking off: wait until it is in the air");
   if (!flies(view_.mode)) return refused("not enabled");
   if (view_.landed) return refused("on the ground: take off first");
   if (!view_.finished) return refused("flying: hold first");

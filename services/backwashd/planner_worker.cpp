@@ -19,6 +19,7 @@ constexpr int kAttempts = 25;               // offers of one segment, each from 
 constexpr int kPlans = 5;                   // of one route, while the state moves on
 constexpr std::size_t kBrakeAfter = 15;     // commands (0.3 s) that a stop on request leaves untouched
 constexpr double kPatience = 2.0;           // s at rest in which more of the way may become known
+constexpr double kLeastLift = 0.3;          // m: what an autopilot can tell from standing
 constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a segment or not
 
 constexpr double kReserve = 0.1;        // m of clearance towards what may turn out to be a wall
@@ -95,15 +96,19 @@ bool PlannerWorker::current() {
   return front_.standing(view_) == PlanFront::Standing::current;
 }
 
-/// Where the map ends the airflow of what is behind is not known: a way with something to spare comes first.
+/// Where the map ends the airflow of what is behind is not known: a way with something to spare comes first. From rest
+/// at last one with nothing to spare: what has come to light may have left nothing where the vehicle is already.
 plan::Replan PlannerWorker::onward(const plan::World& world, const plan::Route& route, std::size_t now,
                                    std::size_t branch, const Vec3& goal_W) const {
   plan::ReplanOptions options{limits_of(world)};
-  options.reserve_m = kReserve;
-  auto next = plan::replan(world, route, now, branch, goal_W, options);
-  if (next.kind == plan::Replan::Kind::extended) return next;
-  options.reserve_m = kLeastReserve;
-  return plan::replan(world, route, now, branch, goal_W, options);
+  plan::Replan next;
+  for (const double reserve : {kReserve, kLeastReserve, 0.0}) {
+    if (reserve == 0 && branch > 0) break;
+    options.reserve_m = reserve;
+    next = plan::replan(world, route, now, branch, goal_W, options);
+    if (next.kind == plan::Replan::Kind::extended) break;
+  }
+  return next;
 }
 
 /// Why the job could not be done; nothing when it is flying.
@@ -126,14 +131,37 @@ std::optional<std::string> PlannerWorker::take_off(const PlanJob& job) {
   const Vec3 here = view_.state.p_W;
   const auto column = plan::takeoff_column(*world_, here);
   if (!column) return "there is no clear hover height above a known floor here";
-  Vec3 target = here;
-  target.z() = std::max(job.position.z(), column->z_safe);
-  if (target.z() > here.z() && !world_->hover.safe(world_->grid.index(target)))
-    return "hovering at the height asked for is not safe";
+  Vec3 lift = here, target = here;
+  lift.z() = std::max(here.z() + kLeastLift, column->z_safe);
+  target.z() = std::max(job.position.z(), lift.z());
+  for (const Vec3& hover : {lift, target})
+    if (!world_->hover.safe(world_->grid.index(hover))) return "hovering at the height asked for is not safe";
+  const std::uint32_t closures = view_.closures;
+  Flying whole{{0, 0, 0, rise(here, target), {}, {}, closures}, view_.state, view_.command, {}, column->z_safe};
+  verify(whole, *world_);
+  if (!(whole.segment.clearance > 0)) return not_clear("the way up", whole.segment.clearance);
+  if (auto why = fly(rise(here, lift), {}, column->z_safe, closures, true)) return why;
+  if (auto why = lift_off(flying_->segment.id)) return why;
+  // From here on the sets hold: from the state in which the autopilot has come to fly.
+  return fly(rise(view_.command.p_W, target), {}, column->z_safe, closures);
+}
+
+std::vector<Setpoint> PlannerWorker::rise(const Vec3& from, const Vec3& to) const {
   const auto& limits = world_->reach.vehicle.limits;
-  auto commands = plan::vertical_commands(here, target, limits.v_max, limits.a_max);
+  auto commands = plan::vertical_commands(from, to, limits.v_max, limits.a_max);
   for (Setpoint& command : commands) command.yaw = view_.command.yaw;
-  return fly(std::move(commands), {}, column->z_safe, view_.closures);
+  return commands;
+}
+
+/// Waits until the autopilot has lifted the vehicle; the supervisor gives it its time.
+std::optional<std::string> PlannerWorker::lift_off(std::uint64_t lift) {
+  while (!channels_.stop) {
+    if (!current()) return "the take-off ended: " + std::string(to_string(view_.reason));
+    if (view_.segment != lift && view_.mode == track::Mode::tracking) return std::nullopt;
+    if (std::exchange(new_world_, false)) verify_again();
+    pause_();
+  }
+  return kEnded;
 }
 
 /// Plans again from the newest state when the tube of the one planned from no longer holds.
@@ -207,16 +235,16 @@ std::optional<std::string> PlannerWorker::brake() {
 
 /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may
 /// have moved further than the first set allows.
-/// A take-off (with `z_safe`) arms the vehicle when it is accepted: only here, where it was found clear.
+/// A lift-off arms the vehicle when it is accepted: only here, where it was found clear.
 std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
-                                              std::optional<double> z_safe, std::uint32_t closures) {
+                                              std::optional<double> z_safe, std::uint32_t closures, bool lifts) {
   append_hold(commands);
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (!current()) return kEnded;
     if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
     if (view_.closures != closures) return "a loop closure moved the map meanwhile";
     Flying next{{0, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
-    next.segment.arms = z_safe.has_value();
+    next.segment.arms = lifts;
     verify(next, *world_);
     if (!(next.segment.clearance > 0))
       return not_clear("the tube from the state estimated now", next.segment.clearance);
@@ -247,7 +275,8 @@ bool PlannerWorker::offer(Flying next) {
     refresh();
     const auto fate = front_.fate(view_);
     if (fate == PlanFront::Fate::accepted) {
-      recorder_.append(study::RecordKind::segment, segment_record(next));
+      // The flight is judged from where its sets hold: a lift-off is an offer in the log, and no segment of it.
+      if (!next.segment.arms) recorder_.append(study::RecordKind::segment, segment_record(next));
       accepted_(next.segment);
       flying_ = std::move(next);
       return true;

@@ -51,7 +51,9 @@ class PlannerWorker {
   std::optional<std::string> explore(const PlanJob& job);
   std::optional<std::string> brake();
   std::optional<std::string> fly(std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
-                                 std::optional<double> z_safe, std::uint32_t closures);
+                                 std::optional<double> z_safe, std::uint32_t closures, bool lifts = false);
+  std::vector<Setpoint> rise(const Vec3& from, const Vec3& to) const;
+  std::optional<std::string> lift_off(std::uint64_t lift);
   plan::Replan onward(const plan::World& world, const plan::Route& route, std::size_t now, std::size_t branch,
                       const Vec3& goal_W) const;
 

@@ -77,12 +77,12 @@ must() { ctl "$@" || die "backwashctl $* failed: $(tail -n 1 "$log")"; }
 
 # The flight itself, after fly_real: enable, take off, go, land, judge.
 judge_flight() {
-  for n in $(seq 60); do
-    ctl enable --wait && break
-    [[ $n != 60 ]] || die "enabling failed: $(tail -n 1 "$log")"
+  # Both refuse for a while: ArduCopter arms when its gyros have settled.
+  for n in $(seq 30); do
+    ctl enable --wait && ctl takeoff --height 1.2 --wait && break
+    [[ $n != 30 ]] || die "no take-off: $(tail -n 1 "$log")"
     sleep 1
   done
-  must takeoff --height 1.2 --wait
   must goto "$goal" --wait
   sleep 3
   ctl status --json >/dev/null || true
@@ -92,6 +92,6 @@ judge_flight() {
   wait "$daemon_pid" "$vio_pid" 2>/dev/null || true
   tail -n 1 "$out/$name.vio.log"
   grep -q ' contacts 0,' "$out/$name.vio.log" || die "the vehicle touched the map"
-  "$bin/backwash" report --log "$out/$name.bwlog" --truth "$out/$name.truth.csv" --vehicle "$vehicle" \
+  "$bin/backwash" report --log "$(sed -n 's/.* raw log //p' "$log" | tail -n 1)" --truth "$out/$name.truth.csv" --vehicle "$vehicle" \
     --model builtin:quad-5in --out "$out/$name.html" --force
 }

@@ -43,7 +43,7 @@ TEST(Tick, NeitherAllocatesNorLocksNorReadsTheWallClockNorFaultsAPageInAWholeFli
   rig.channels->orders.push({track::Request::land});
   ASSERT_GT(rig.ticks_until(track::Mode::passive, 600), 0);
   EXPECT_EQ(rig.reason(), track::Reason::landed);
-  EXPECT_GT(rig.view().inside, 400u);
+  EXPECT_GT(rig.view().inside, 340u);  // the lift-off is not judged
   EXPECT_EQ(rig.view().outside, 0u);
   EXPECT_EQ(rig.channels->control_log.lost(), 0u);
   if (locked && backwash::test::traps_work()) {  // a sanitizer's own bookkeeping touches new pages

@@ -309,17 +309,25 @@ void Lockstep::take_off() {
   ticks(60);
   channels->orders.push({track::Request::enable});
   ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
-  const auto& limits = vehicle_.limits;
-  auto commands = plan::vertical_commands(view().state.p_W, kStart, limits.v_max, limits.a_max);
-  const auto hold = sim::hold_commands(kStart, 2.0);
-  commands.insert(commands.end(), hold.begin(), hold.end());
-  for (auto& c : commands) c.yaw = view().command.yaw;
+  offer(rise(), true, true);
+  ASSERT_EQ(ticks_until(track::Mode::lifting, 3) > 0, true) << to_string(reason());
+  ASSERT_GT(ticks_until(track::Mode::tracking, 500), 0) << to_string(reason());
+  auto commands = rise();
   const auto count = static_cast<int>(commands.size());
-  offer(std::move(commands), true, true);
+  offer(std::move(commands));
   ticks(count + 5);
   ASSERT_EQ(mode(), track::Mode::tracking) << to_string(reason());
   ASSERT_TRUE(view().finished);
   ASSERT_LT((autopilot->truth().p_W - kStart).norm(), 0.2);
+}
+
+std::vector<Setpoint> Lockstep::rise() const {
+  const auto& limits = vehicle_.limits;
+  auto commands = plan::vertical_commands(view().command.p_W, kStart, limits.v_max, limits.a_max);
+  const auto hold = sim::hold_commands(kStart, 2.0);
+  commands.insert(commands.end(), hold.begin(), hold.end());
+  for (auto& c : commands) c.yaw = view().command.yaw;
+  return commands;
 }
 
 void Lockstep::start_route(double seconds) {

@@ -29,6 +29,8 @@ struct Wire {
   std::uint64_t odometry_us = 0;  ///< time of the last ODOMETRY
   std::size_t bytes = 0;
   bool commanded(std::uint16_t command) const;
+  /// Nothing that moves the vehicle or keeps a failsafe of its controller from acting; odometry may go on.
+  bool silent() const { return setpoints.empty() && commands.empty() && texts.empty() && heartbeats == 0; }
 };
 
 inline constexpr std::uint16_t kCommandLand = 21, kCommandMode = 176, kCommandArm = 400;
@@ -59,6 +61,8 @@ class Lockstep {
   /// Offers these commands from where the vehicle is now, planned in the present epoch; returns the id. `arms`: as a
   /// take-off.
   std::uint64_t offer(std::vector<Setpoint> commands, bool with_stops = true, bool arms = false);
+  /// Straight up from here to where routes start, and two seconds there.
+  std::vector<Setpoint> rise() const;
   /// Commands of the planned route.
   const std::vector<Setpoint>& route() const { return route_; }
 

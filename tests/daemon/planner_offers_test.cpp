@@ -71,6 +71,16 @@ class PlannerOffers : public testing::Test {
       channels_->segments.give_back(s);
       answer_(*s);
     }
+    // The autopilot lifts in no time.
+    if (view_.mode == track::Mode::lifting) {
+      view_.mode = track::Mode::tracking;
+      view_.reason = track::Reason::lifted_off;
+      view_.state = {offers_.back().commands.back().p_W, Vec3::Zero()};
+      view_.command = offers_.back().commands.back();
+      view_.segment = 0;
+    } else if (!offers_.empty() && view_.segment == offers_.back().id && offers_.back().arms) {
+      view_.mode = track::Mode::lifting;
+    }
     view_.t_ns += 20'000'000;
     show();
   }
@@ -83,17 +93,20 @@ class PlannerOffers : public testing::Test {
   }
 };
 
-TEST_F(PlannerOffers, ATakeoffToTheLowestClearHeightThatArmsOnceItIsAccepted) {
+TEST_F(PlannerOffers, ATakeoffThatArmsAndLiftsToTheLowestClearHeightAndAFlightFromThere) {
   know(room());
   stand({3.05, 2.05, 0.3});
   const auto column = plan::takeoff_column(*world_, view_.state.p_W);
   ASSERT_TRUE(column);
   ASSERT_GT(column->z_safe, 0.35);
-  EXPECT_EQ(ask(PlanJob::Kind::takeoff, {0, 0, 0.31}), "");
-  ASSERT_EQ(offers_.size(), 1u);
+  EXPECT_EQ(ask(PlanJob::Kind::takeoff, {0, 0, 1.0}), "");
+  ASSERT_EQ(offers_.size(), 2u);
   const auto& s = offers_[0];
   EXPECT_TRUE(s.arms);
-  EXPECT_NEAR(s.commands.back().p_W.z(), column->z_safe, 1e-9);
+  EXPECT_NEAR(s.commands.back().p_W.z(), std::max(column->z_safe, 0.6), 1e-9);
+  EXPECT_FALSE(offers_[1].arms);
+  EXPECT_EQ(offers_[1].commands.front().p_W, s.commands.back().p_W) << "from where the autopilot has lifted it";
+  EXPECT_NEAR(offers_[1].commands.back().p_W.z(), 1.0, 1e-9);
   EXPECT_EQ(s.epoch, (track::Epoch{7, 2}));
   EXPECT_EQ(s.seen_ns, kSeen_ns);
   EXPECT_GT(s.clearance, 0);

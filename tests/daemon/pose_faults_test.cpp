@@ -280,7 +280,8 @@ std::vector<Setpoint> eights(const Setpoint& from, const Vec3& home, double seco
   return commands;
 }
 
-// More than 20 minutes: eleven flights, each with five stops out of full motion, which tilt the vehicle at up to 13 rad/s.
+// More than 20 minutes: eleven flights, each with five stops out of full motion, which tilt the vehicle at up to 13
+// rad/s.
 TEST(PoseFaults, RoughFlightsOnANoisyVioAreNeverHeld) {
   long ticks = 0, holds = 0;
   double worst_drift = 0;

@@ -94,7 +94,7 @@ void DaemonRig::advance() {
   const auto& wire = lock_.tick(missed_);
   const auto& view = lock_.view();
   ++spent_[static_cast<std::size_t>(view.mode)];
-  Seen seen{tick_, view.mode, view.armed, view.offboard, wire.bytes};
+  Seen seen{tick_, view.mode, view.armed, view.offboard, wire.silent() ? 0 : wire.bytes};
   seen.setpoints = static_cast<int>(wire.setpoints.size());
   if (seen.setpoints > 0) seen.setpoint = {wire.setpoints.back().x, wire.setpoints.back().y, wire.setpoints.back().z};
   for (const auto& c : wire.commands) {

@@ -76,7 +76,9 @@ void Watch::restarted() {
 
 // A pilot's change of mode, and a disarmed vehicle, end whatever was asked for.
 void Watch::hear_pilot(const Seen& now) {
-  const bool followed = last_.mode == Mode::tracking || last_.mode == Mode::hold;
+  // A lift-off that ended may disarm what stands.
+  if (last_.mode == Mode::lifting && now.mode == Mode::land) disarm_from_ = now.tick;
+  const bool followed = last_.mode == Mode::tracking || last_.mode == Mode::hold || last_.mode == Mode::lifting;
   if (!followed || !((last_.offboard && !now.offboard) || (last_.armed && !now.armed))) return;
   licence_ = Licence::none;
   left_ = now.tick;
@@ -106,7 +108,8 @@ std::optional<std::string> Watch::arming(const Seen& now) {
 }
 
 std::optional<std::string> Watch::motion(const Seen& now) {
-  if (stopped_ >= 0 && now.tick > stopped_ + kRequests && (now.mode == Mode::tracking || now.mode == Mode::enabling))
+  if (stopped_ >= 0 && now.tick > stopped_ + kRequests &&
+      (now.mode == Mode::tracking || now.mode == Mode::enabling || now.mode == Mode::lifting))
     return line("%s %d ticks after an acknowledged stop", to_string(now.mode), now.tick - stopped_);
   if (now.setpoints == 0 || last_.setpoints == 0) {
     rested_ = 0;

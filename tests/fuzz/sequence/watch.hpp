@@ -14,7 +14,7 @@ struct Seen {
   int tick = 0;
   track::Mode mode = track::Mode::passive;
   bool armed = false, offboard = false;  ///< as the autopilot's last heartbeat said
-  std::size_t bytes = 0;                 ///< sent
+  std::size_t bytes = 0;                 ///< sent; 0 if it was odometry alone, a sensor and no command
   int setpoints = 0, commands = 0;       ///< sent; commands without those to disarm
   Vec3 setpoint = Vec3::Zero();          ///< the last one, in the autopilot's local frame, m
   bool arms = false, disarms = false;    ///< the vehicle was told to
