@@ -51,7 +51,7 @@ SigningTime SigningTimeFile::stored() const {
 }
 
 bool SigningTimeFile::write(SigningTime time) {
-  std::array<char, kDigits + 2> text;
+  std::array<char, 24> text;  // of any number; kept below 10¹⁵
   std::snprintf(text.data(), text.size(), "%015llu\n", static_cast<unsigned long long>(time));
   if (::pwrite(file_.get(), text.data(), kDigits + 1, 0) != static_cast<ssize_t>(kDigits + 1)) return false;
   if (::fdatasync(file_.get()) != 0) return false;

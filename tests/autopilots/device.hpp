@@ -15,7 +15,11 @@ namespace backwash::autopilots {
 inline Line open_line(const std::string& device) {
   const auto endpoint = config::link_device(device);
   if (!endpoint) throw std::runtime_error(device + ": no device");
-  auto opened = daemon::open_port({.device = device, .endpoint = *endpoint, .baud = 921600, .system = 1});
+  decltype(config::Daemon::link) link;
+  link.device = device;
+  link.endpoint = *endpoint;
+  link.baud = 921600;
+  auto opened = daemon::open_port(link);
   if (!opened) throw std::runtime_error(device + " " + describe(opened.error()));
   const auto port = std::make_shared<firmware_bridge::Port>(std::move(*opened));
   return {[port](std::span<std::uint8_t> bytes) {

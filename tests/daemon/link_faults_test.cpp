@@ -57,7 +57,11 @@ TEST(Row17, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
 }
 
 decltype(config::Daemon::link) serial(const std::string& path) {
-  return {.device = path, .endpoint = {config::LinkDevice::Kind::serial, path, 0}, .baud = 921600, .system = 1};
+  decltype(config::Daemon::link) link;
+  link.device = path;
+  link.endpoint = {config::LinkDevice::Kind::serial, path, 0};
+  link.baud = 921600;
+  return link;
 }
 
 TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {

@@ -37,6 +37,7 @@ struct LongFlight {
     for (std::size_t k = 0; k <= sets; ++k) {
       const double t = 0.02 * static_cast<double>(k);
       reach::TubeStep s{};
+      s.shape.setIdentity();
       s.center = {{2 * std::sin(0.4 * t), 2 - 2 * std::cos(0.4 * t), 1 + 0.02 * t}, Vec3::Zero()};
       s.half_widths.fill(0.05 + 0.03 * std::sin(t));
       s.half_widths_interval = s.half_widths;
