@@ -33,7 +33,7 @@ TEST(Row6, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
 }
 
 // What one closure of 90° or 10 m may not do, ten of 9° and twelve of 0.9 m do within a quarter of a second.
-TEST(MapFaults, Row4AnAbsurdLoopClosureInPiecesIsHeldToo) {
+TEST(Row4, AnAbsurdLoopClosureInPiecesIsHeldToo) {
   for (const bool turns : {false, true}) {
     Lockstep rig;
     rig.take_off();

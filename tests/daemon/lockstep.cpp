@@ -127,9 +127,12 @@ struct Lockstep::Datagrams : Line {
     auto port = firmware_bridge::UdpPort::open(
         {"127.0.0.1", 0}, firmware_bridge::UdpPort::Endpoint{"127.0.0.1", controller.local_port()});
     if (!port) throw std::runtime_error(describe(port.error()));
-    // The controller's answers go to who spoke first, and as MAVLink.
-    std::uint8_t hello = 0xFD;
-    if (!port->write({&hello, 1}) || !controller.read({&hello, 1})) throw std::runtime_error("no loopback");
+    // The same port again, which now knows its one peer, and does not let go of it when the daemon is quiet.
+    const auto number = controller.local_port();
+    controller = firmware_bridge::UdpPort::open({"127.0.0.1", 0}, std::nullopt).value();
+    controller = firmware_bridge::UdpPort::open({"127.0.0.1", number},
+                                                firmware_bridge::UdpPort::Endpoint{"127.0.0.1", port->local_port()})
+                     .value();
     return std::move(*port);
   }
   void write(const std::vector<std::uint8_t>& bytes) override {

