@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # From STOP on DDS to the first set-point of the stop on the wire, in flight: N times, to and fro at random moments.
-#   daemon_stop_latency.sh SOURCE_DIR BUILD_DIR N OUT
+#   daemon_stop_latency.sh SOURCE_DIR BUILD_DIR N [OUT]
 # Writes the latencies, ms, one a line, to OUT. tests/nightly/realtime.sh stops has several of these side by side.
 # The moment of the STOP is the station's clock right before it writes. Which set-point is the first of the stop says the
 # raw log: that of the first tick in mode hold; when it arrived says the bench's record of the wire, by its MAVLink sequence.
 set -euo pipefail
-source_dir=$1 build=$2 count=$3 out=$4
+source_dir=$1 build=$2 count=$3
 source "$source_dir/services/bench/session.sh"
+out=${4:-$work/latencies.ms}
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv" \
   --duration "$((count * 20 + 300))"
 start_daemon builtin:quad-5in "$work/flight.bwlog"
