@@ -7,7 +7,7 @@ import struct
 MAGIC = b"backwash raw log 3\n"
 ODOMETRY, FRAME_IN, FRAME_OUT, TICK, LOST, SCAN, WORLD, FAILURE = 2, 6, 7, 8, 13, 14, 15, 16
 MODES = ["passive", "enabling", "tracking", "hold", "land", "quiet", "lifting"]
-SETPOINT, HEARTBEAT, COMMAND = 84, 0, 76
+SETPOINT, HEARTBEAT, COMMAND, ODOMETRY_FRAME, TIMESYNC = 84, 0, 76, 331, 111
 
 Tick = collections.namedtuple("Tick", "t number segment index mode reason sent judged inside missed compute_us lateness_us")
 
