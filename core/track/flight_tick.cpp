@@ -154,6 +154,10 @@ void FlightTick::judge(TickOutput& out) noexcept {
   if (out.fresh) out.inside = tracker_.judge(gate_.last()->state.p_W);
 }
 
+double AutopilotFacts::pose_age(std::int64_t now_ns) const noexcept {
+  return pose ? seconds(now_ns - std::min(pose->at_ns, pose->attitude_at_ns)) : std::numeric_limits<double>::infinity();
+}
+
 // What enabling allows, and three standard deviations of the two estimates against each other.
 double FlightTick::apart(const TickInput& in) const noexcept {
   const double sigma = in.position_sigma > 0 ? static_cast<double>(in.position_sigma) : std::numbers::sqrt2 * sigma_;
@@ -177,9 +181,7 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) no
   facts.frames_agree = alignment_.agree(2 * apart(in));
   facts.autopilot_reset = reset_;
   facts.closure_refused = closure_refused_now_;
-  const auto& pose = in.autopilot.pose;
-  facts.pose_age =
-      pose ? seconds(in.now_ns - std::min(pose->at_ns, pose->attitude_at_ns)) : std::numeric_limits<double>::infinity();
+  facts.pose_age = in.autopilot.pose_age(in.now_ns);
   facts.mismatch = alignment_.mismatch();
   facts.inside = mode() == Mode::lifting ? !out.fresh || tracker_.within(gate_.last()->state.p_W) : out.inside.inside;
   facts.new_segment = out.accepted;

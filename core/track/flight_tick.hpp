@@ -25,6 +25,8 @@ struct AutopilotFacts {
     Vec3 omega_B = Vec3::Zero();          ///< rad/s, as the gyros measure it
   };
   std::optional<Pose> pose;
+  /// s, of the older of its position and its attitude; infinite before the first.
+  double pose_age(std::int64_t now_ns) const noexcept;
   std::optional<std::uint8_t> reset_counter;  ///< of its estimator
   std::optional<double> battery;              ///< remaining share, 0…1
 };

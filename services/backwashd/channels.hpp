@@ -107,18 +107,18 @@ struct ControlView {
   track::Mode mode = track::Mode::passive;
   track::Reason reason = track::Reason::started;
   bool armed = false, offboard = false, landed = true, aligned = false;
-  double odometry_age = 1e9, heartbeat_age = 1e9;  ///< s
-  State state;                                     ///< newest good odometry
-  Setpoint command;                                ///< sent or held this tick, map frame
-  track::Epoch epoch;                              ///< what is planned under another one is refused
-  std::uint64_t segment = 0;                       ///< accepted segment, 0 before the first
-  std::uint64_t index = 0;                         ///< of its next command
-  bool finished = true;                            ///< the segment's commands are all sent
-  bool braking = false;                            ///< on a verified stop of the segment
-  std::uint64_t stop_branch = 0;                   ///< of that stop
-  std::uint32_t closures = 0;                      ///< loop closures seen: the map frame of state and command
-  track::RigidShift shift;                         ///< from the segment's frame into that one
-  std::uint64_t refused_segment = 0;               ///< the last one refused
+  double odometry_age = 1e9, heartbeat_age = 1e9, pose_age = 1e9;  ///< s; pose: the autopilot's
+  State state;                                                     ///< newest good odometry
+  Setpoint command;                                                ///< sent or held this tick, map frame
+  track::Epoch epoch;                                              ///< what is planned under another one is refused
+  std::uint64_t segment = 0;                                       ///< accepted segment, 0 before the first
+  std::uint64_t index = 0;                                         ///< of its next command
+  bool finished = true;                                            ///< the segment's commands are all sent
+  bool braking = false;                                            ///< on a verified stop of the segment
+  std::uint64_t stop_branch = 0;                                   ///< of that stop
+  std::uint32_t closures = 0;         ///< loop closures seen: the map frame of state and command
+  track::RigidShift shift;            ///< from the segment's frame into that one
+  std::uint64_t refused_segment = 0;  ///< the last one refused
   std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
   std::uint64_t frames_refused = 0;  ///< of the link, for their signature

@@ -197,6 +197,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.mismatch = flight_.alignment().mismatch();
   view_.odometry_age = flight_.odometry_age();
   view_.heartbeat_age = in.autopilot.heartbeat_age;
+  view_.pose_age = in.autopilot.pose_age(in.now_ns);
   if (flight_.odometry()) view_.state = flight_.odometry()->state;
   view_.command = out.command;
   view_.epoch = flight_.epoch();

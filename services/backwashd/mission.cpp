@@ -185,6 +185,8 @@ Decision Mission::enable() {
     return refused(std::string("map and autopilot disagree: ") + to_string(view_.mismatch));
   if (view_.odometry_age > track::Supervisor::kHoldAfter) return refused("no odometry");
   if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");
+  if (view_.pose_age > track::Supervisor::kPoseSilent)
+    return refused("no pose from the autopilot: its estimator does not follow the VIO yet, or its stream is off");
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
   return order(Request::enable, "enabling");
 }

@@ -78,10 +78,12 @@ ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1 || die "backwas
 # Enables control; a daemon that has just started may not have heard its autopilot yet, or, while others start beside it, not
 # for the 1.5 s after which it goes quiet. The vehicle stands disarmed: asking again is safe.
 enable() {
-  for _ in $(seq 20); do
-    "$bin/backwashctl" --domain "$domain" enable --wait >>"$log" 2>&1 && return
-    tail -n 1 "$log" | grep -Eq 'refused: no |no heartbeat from the autopilot' || break
+  local answer
+  for _ in $(seq 40); do
+    answer=$("$bin/backwashctl" --domain "$domain" enable --wait 2>&1) && return
+    echo "$answer" >>"$log"
+    grep -Eq 'refused: no |no heartbeat from the autopilot|pose older than' <<<"$answer" || break
     sleep 0.25
   done
-  die "enabling failed: $(tail -n 1 "$log")"
+  die "enabling failed: $answer"
 }

@@ -184,7 +184,7 @@ void EpochModel::tick(Daemon& d) {
   v.reason = out.supervisor.reason;
   v.armed = d.in.autopilot.armed;
   v.landed = d.in.autopilot.landed.value_or(true);
-  v.odometry_age = v.heartbeat_age = 0;
+  v.odometry_age = v.heartbeat_age = v.pose_age = 0;
   v.state = d.in.odometry->state;
   v.command = out.command;
   v.epoch = d.tick.epoch();

@@ -35,6 +35,7 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
   } faults[] = {{[&] { view_.mismatch = track::Mismatch::yaw; }, "map and autopilot disagree"},
                 {[&] { view_.odometry_age = 0.2; }, "no odometry"},
                 {[&] { view_.heartbeat_age = 2; }, "no heartbeat"},
+                {[&] { view_.pose_age = 0.32; }, "no pose from the autopilot"},
                 {[&] { view_.state.p_W.x() = 99; }, "outside the map"}};
   for (const auto& [fault, why] : faults) {
     view_ = whole;

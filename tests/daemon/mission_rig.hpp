@@ -57,7 +57,7 @@ class MissionTest : public testing::Test {
     view_.mode = Mode::tracking;
     view_.armed = view_.offboard = true;
     view_.landed = false;
-    view_.odometry_age = view_.heartbeat_age = 0;
+    view_.odometry_age = view_.heartbeat_age = view_.pose_age = 0;
     view_.state.p_W = view_.command.p_W = {-2, 0, 1.2};
     MissionInput in;
     in.now_s = now_s_;
