@@ -98,6 +98,7 @@ struct Flight {
                                                        *recorder);
                    })),
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
+        mission(s.vehicle),
         loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {}
 
   const Settings& settings;
