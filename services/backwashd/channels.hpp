@@ -129,7 +129,7 @@ struct ControlView {
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 
-/// One record of the control thread for the raw log.
+/// One record of a real-time thread for the raw log.
 struct ControlRecord {
   study::RecordHeader header{};
   std::array<std::uint8_t, 512> bytes{};
@@ -197,9 +197,13 @@ struct Channels {
   sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
   sync::LatestValue<std::array<char, 192>> task;      // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
+  sync::RecordRing<ControlRecord, 256> command_log;                        // DDS reader → recorder
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
       closures_refused{0}, foreign_writers{0};
   std::atomic<bool> stop{false};
 };
 
 }  // namespace backwash::daemon
+
+  /// Records of real-time threads that the raw log had no room for.
+  std::uint64_t records_lost() const noexcept { return control_log.lost() + command_log.lost(); }

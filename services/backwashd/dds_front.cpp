@@ -33,10 +33,8 @@ dds::Timing timing(const TimingHistogram& h) {
 
 }  // namespace
 
-DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels,
-                   Recorder& recorder)
+DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels)
     : channels_(channels),
-      recorder_(recorder),
       priority_(priority),
       localization_(config, vehicle.estimation.position),
       refusals_(channels.refused),
@@ -112,11 +110,15 @@ void DdsFront::take_command(const dds::Command& m, const dds::Guid& writer) {
   c.waypoints = m.waypoints._length;
   for (std::size_t n = 0; n < std::min(c.waypoints, c.kMostWaypoints); ++n)
     c.waypoint[n] = {m.waypoints._buffer[n].x, m.waypoints._buffer[n].y, m.waypoints._buffer[n].z};
-  char line[320];
-  std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s", c.station.data(),
-                static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
-                c.position.z(), c.yaw, dds::text(writer).c_str());
-  recorder_.append(study::RecordKind::command, line);
+  ControlRecord record;
+  char* line = reinterpret_cast<char*>(record.bytes.data());
+  const int length =
+      std::snprintf(line, record.bytes.size(), "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s",
+                    c.station.data(), static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(),
+                    c.position.y(), c.position.z(), c.yaw, dds::text(writer).c_str());
+  const std::size_t size = std::min(static_cast<std::size_t>(std::max(length, 0)), record.bytes.size() - 1);
+  record.header = {now_ns(), study::RecordKind::command, static_cast<std::uint32_t>(size)};
+  channels_.command_log.push(record);
   if (channels_.commands.push(c)) return;
   if (stops) stop_ = c;
   refusals_.add(channels_.commands_refused, [] { return "a command: 64 others wait to be answered"; });
@@ -160,11 +162,9 @@ void DdsFront::send(const CommandMessage& command, const Answer& answer) {
   const dds::Ack ack{dds::c_string(station), command.session, command.sequence, answer.result,
                      dds::c_string(answer.reason)};
   acks_.write(ack);
-  recorder_.append(study::RecordKind::ack, station + " " + std::to_string(command.sequence) + " result " +
-                                               std::to_string(answer.result) + ": " + answer.reason);
 }
 
-void DdsFront::run_status(const Vehicle& vehicle) {
+void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
   ControlView view;
   Line task{}, place{}, refused{};
   const std::vector<std::string> names(kParameters.begin(), kParameters.end());
@@ -213,7 +213,7 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.commands_refused = channels_.commands_refused;
     s.frames_bad = view.frames_bad;
     s.frames_refused = view.frames_refused;
-    s.records_lost = channels_.control_log.lost() + recorder_.lost();
+    s.records_lost = channels_.records_lost() + recorder.lost();
     s.page_faults = view.page_faults;
     s.frame_residual_m = view.residual_m;
     s.frame_residual_rad = view.residual_rad;

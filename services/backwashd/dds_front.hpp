@@ -19,17 +19,18 @@
 namespace backwash::daemon {
 
 /// The daemon's side of the DDS topics that flight depends on: odometry, loop closures and commands in, answers and
-/// status out (docs/interfaces.md); those with large samples are MapFront's.
+/// status out (docs/interfaces.md); those with large samples are MapFront's. It has no Recorder, whose lock a thread of
+/// ordinary priority may hold: what is received goes to the raw log through Channels::command_log.
 class DdsFront {
  public:
   /// `priority`: SCHED_FIFO priority of the threads between the network and the control thread; 0: ordinary.
-  DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels, Recorder& recorder);
+  DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels);
 
   /// Thread body. Odometry is taken from one writer: the first whose sample was good, until it is gone and nothing is
   /// commanded any more; that of others is refused by its identity (docs/faults.md row 48).
   void run_readers();
   /// Thread body: status out at 10 Hz.
-  void run_status(const Vehicle& vehicle);
+  void run_status(const Vehicle& vehicle, const Recorder& recorder);
   /// Called by the mission thread.
   void send(const CommandMessage& command, const Answer& answer);
 
@@ -41,7 +42,6 @@ class DdsFront {
   void tell_of_departed();
 
   Channels& channels_;
-  Recorder& recorder_;
   int priority_;
   Localization localization_;
   Refusals refusals_;
