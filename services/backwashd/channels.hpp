@@ -32,6 +32,15 @@ inline std::int64_t now_ns() noexcept {
 
 using track::OdometrySample;
 
+/// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
+using WriterId = std::array<std::uint8_t, 16>;
+
+/// Whose map it is. In one term maps are taken of one writer alone: the first whose map was good.
+struct MapWriter {
+  std::uint32_t term = 0;
+  WriterId writer{};
+};
+
 /// One octomap_msgs/Octomap as received.
 struct MapMessage {
   std::vector<std::int8_t> data;
@@ -39,6 +48,7 @@ struct MapMessage {
   bool binary = true;
   std::string id;
   std::int64_t received_ns = 0;
+  MapWriter from;
 };
 
 /// One range scan in the map.
@@ -77,9 +87,6 @@ struct Worlds {
 
 /// One line for the operator.
 using Line = std::array<char, 192>;
-
-/// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
-using WriterId = std::array<std::uint8_t, 16>;
 
 /// One command as received, or the news that a writer of commands is gone. Of the station's name only printable
 /// characters are left, and as many as fit.
@@ -178,6 +185,7 @@ struct Channels {
   sync::LatestValue<Line> refused, refused_map;            // DDS reader, map reader → status: the newest, and why
   sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
   sync::Handover<MapMessage> maps;                         // map reader → map worker
+  sync::LatestValue<MapWriter> map_writer;                 // map worker → map reader: of the first good map of a term
   sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
   Worlds worlds;                                           // map worker → each
   sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control

@@ -17,8 +17,6 @@ namespace {
 
 // Odometry, closures and commands are small; one of 64 waypoints takes 2 kB.
 constexpr std::size_t kMaxSampleBytes = 64u << 10;
-// After which a bound odometry writer that is gone is let go of: by then an enabling that it began has ended.
-constexpr std::int64_t kForget_ns = 500'000'000;
 
 template <typename T>
 std::string topic_of(const config::Daemon& config) {
@@ -63,33 +61,30 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
 
 void DdsFront::take_odometry() {
   odometry_.take([&](const dds::Odometry& m, const dds::Guid& writer) {
-    if (bound_ && *bound_ != writer)
-      return refusals_.add(channels_.odometry_refused, [&] {
-        return "odometry of writer " + dds::text(writer) + ": that of " + dds::text(*bound_) +
-               (gone_ns_ ? ", which is gone, was flown with: disable first" : " is in use");
-      });
+    if (!odometry_writer_.hears(writer))
+      return refusals_.add(channels_.odometry_refused, [&] { return odometry_writer_.refusal(writer); });
     const auto sample = localization_.odometry(m, now_ns());
     if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
-    if (!bound_) spdlog::info("odometry is taken from writer {}", dds::text(writer));
-    bound_ = writer;
+    if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
     channels_.odometry.write(*sample);
     channels_.poses.push(*sample);
   });
-  for (const dds::Guid& gone : odometry_.departed())
-    if (bound_ == gone) gone_ns_ = now_ns();
-  if (!gone_ns_ || commanding_ || now_ns() - *gone_ns_ < kForget_ns) return;
-  bound_.reset();
-  gone_ns_.reset();
+  odometry_writer_.let_go(odometry_.departed(), !commanding_, now_ns());
 }
 
 void DdsFront::take_closures() {
-  closures_.take([&](const dds::TransformStamped& m) {
+  closures_.take([&](const dds::TransformStamped& m, const dds::Guid& writer) {
+    if (!closure_writer_.hears(writer))
+      return refusals_.add(channels_.closures_refused, [&] { return closure_writer_.refusal(writer); });
     const auto taken = localization_.loop_closure(m);
     if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
     channels_.loop_closures = localization_.closures();
+    if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
     channels_.map_from_odom.write(*localization_.map_from_odom());
   });
 }
+  // What the next writer said was refused while this one was not known to be gone; it is said once.
+  if (closure_writer_.let_go(closures_.departed(), !commanding_, now_ns())) closures_.renew(waitset_);
 
 // A writer that floods us is cut to what can be carried out, before it costs anything: else it would fill the mission's
 // ring and the raw log, and keep the reader from the odometry. Its STOPs have an allowance of their own, and a STOP

@@ -9,6 +9,7 @@
 
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/allowance.hpp"
+#include "services/backwashd/bound_writer.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/localization.hpp"
 #include "services/backwashd/mission.hpp"
@@ -26,8 +27,8 @@ class DdsFront {
   /// `priority`: SCHED_FIFO priority of the threads between the network and the control thread; 0: ordinary.
   DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels);
 
-  /// Thread body. Odometry is taken from one writer: the first whose sample was good, until it is gone and nothing is
-  /// commanded any more; that of others is refused by its identity (docs/faults.md row 48).
+  /// Thread body. Odometry is taken from one writer, and loop closures from one: the first whose sample was good, until
+  /// it is gone and nothing is commanded any more; those of others are refused by identity (docs/faults.md row 48).
   void run_readers();
   /// Thread body: status out at 10 Hz.
   void run_status(const Vehicle& vehicle, const Recorder& recorder);
@@ -45,8 +46,8 @@ class DdsFront {
   int priority_;
   Localization localization_;
   Refusals refusals_;
-  std::optional<dds::Guid> bound_;                            // the odometry's writer
-  std::optional<std::int64_t> gone_ns_;                       // since when it is gone
+  BoundWriter odometry_writer_{"odometry"}, closure_writer_{"a loop closure"};
+  std::optional<dds::Guid> other_daemon_;                     // another writer of our status
   std::atomic<bool> commanding_{false};                       // status → reader
   std::map<dds::Guid, std::array<Allowance, 2>> allowances_;  // of writers of commands: for STOP, for the others
   std::optional<CommandMessage> stop_;                        // the newest STOP that the mission had no room for

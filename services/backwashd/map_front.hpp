@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/config/daemon_config.hpp"
+#include "services/backwashd/bound_writer.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
@@ -16,6 +17,9 @@ namespace backwash::daemon {
 /// participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here, odometry and commands
 /// (DdsFront) do not wait for it (docs/faults.md row 46).
 class MapFront {
+///
+/// Maps are taken from one writer, and scans from one: the first whose sample was good, until it is gone (row 48). Its
+/// successor is listened to in flight too: without it what appears in the way would stay unseen.
  public:
   static constexpr std::size_t kMaxMapBytes = 48u << 20;  ///< larger maps are refused before they are copied
 
@@ -34,6 +38,7 @@ class MapFront {
   void take_maps();
   void take_scans();
 
+  void let_writers_go();
   Channels& channels_;
   Recorder& recorder_;
   std::string map_frame_;  // that everything on these topics is in
@@ -41,6 +46,8 @@ class MapFront {
   ScanPlacement placement_;
   Refusals refusals_;
   const Snapshot* world_ = nullptr;  // the reader's
+  BoundWriter map_writer_{"a map"}, scan_writer_{"a scan"};
+  std::uint32_t term_ = 0;           // rises when a map's writer is let go of
   dds::Participant participant_;
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;

@@ -166,6 +166,16 @@ std::size_t ReaderBase::take(const std::function<void(const void*, const Guid&)>
     const dds_return_t count = dds_take(reader_, samples.data(), infos.data(), kTakeAtOnce, kTakeAtOnce);
     if (count <= 0) return taken;
     for (dds_return_t i = 0; i < count; ++i) {
+void ReaderBase::renew(WaitSet& waitset) {
+  dds_qos_t* qos = dds_create_qos();
+  dds_get_qos(reader_, qos);
+  const Entity fresh = dds_create_reader(dds_get_participant(reader_), dds_get_topic(reader_), qos, nullptr);
+  dds_delete_qos(qos);
+  if (fresh < 0) return;  // no memory: the old one goes on
+  dds_delete(std::exchange(reader_, fresh));
+  waitset.add(*this);
+}
+
       const dds_sample_info_t& info = infos[static_cast<std::size_t>(i)];
       if (!info.valid_data) continue;
       each(samples[static_cast<std::size_t>(i)], writer(info.publication_handle));

@@ -70,6 +70,8 @@ std::string text(const Guid& guid);
 
 namespace detail {
 
+class WaitSet;
+
 class ReaderBase {
  public:
   ReaderBase(const Participant& participant, const dds_topic_descriptor& type, const std::string& topic,
@@ -83,6 +85,9 @@ class ReaderBase {
 
  protected:
   /// Calls `each` with every valid sample received since the last call and its writer; returns how many.
+  /// Is replaced by one that begins anew, in the wait set too: of a topic of Delivery::state it gets from each writer
+  /// what that said last, even if it was taken already. Call from the thread that takes.
+  void renew(WaitSet& waitset);
   std::size_t take(const std::function<void(const void*, const Guid&)>& each);
 
  private:
