@@ -197,21 +197,22 @@ struct Channels {
   sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
+  sync::RecordRing<ControlRecord, 256> command_log;                        // DDS reader → recorder
   sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
   sync::Handover<FreshPort> ports;                                         // link watch → control
   std::atomic<std::uint8_t> link_fault{0};            // control → link watch: 1 + LinkFault, 0: none
   std::atomic<std::uint32_t> port_losses{0};          // control → link watch: times that a good port was lost
   std::atomic<mavlink::SigningTime> signing_time{0};  // control → signing time: of the newest signature; 0: none
+  sync::LatestValue<Line> other_daemon;               // DDS reader → mission: "", or who else obeys our commands
   sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
   sync::LatestValue<std::array<char, 192>> task;      // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
-  sync::RecordRing<ControlRecord, 256> command_log;                        // DDS reader → recorder
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
       closures_refused{0}, foreign_writers{0};
   std::atomic<bool> stop{false};
-};
-
-}  // namespace backwash::daemon
 
   /// Records of real-time threads that the raw log had no room for.
   std::uint64_t records_lost() const noexcept { return control_log.lost() + command_log.lost(); }
+};
+
+}  // namespace backwash::daemon

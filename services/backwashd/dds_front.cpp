@@ -53,6 +53,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       foreign_(participant_, {&odometry_, &closures_, &commands_}),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
+      statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {
   waitset_.add(odometry_);
   waitset_.add(closures_);
@@ -138,12 +139,27 @@ void DdsFront::take_commands() {
   tell_of_departed();
 }
 
+void DdsFront::look_for_other_daemons() {
+  const auto other = statuses_.first();
+  if (other == other_daemon_) return;
+  other_daemon_ = other;
+  Line line{};
+  if (other)
+    std::snprintf(line.data(), line.size(), "another daemon in this namespace, writer %s", dds::text(*other).c_str());
+  if (other)
+    spdlog::error("{}: it obeys the same commands; nothing is enabled here meanwhile", line.data());
+  else
+    spdlog::info("the other daemon in this namespace is gone");
+  channels_.other_daemon.write(line);
+}
+
 void DdsFront::run_readers() {
   if (priority_ > 0) set_fifo(priority_);
   while (!channels_.stop) {
     waitset_.wait(0.1);
     take_closures();  // before the odometry that it is about
     take_odometry();
+    look_for_other_daemons();
     take_commands();
     if (const auto writers = foreign_.take_new()) {
       channels_.foreign_writers += writers;

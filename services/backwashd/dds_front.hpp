@@ -16,6 +16,7 @@
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/dds/topics.hpp"
+#include "services/dds/writers.hpp"
 
 namespace backwash::daemon {
 
@@ -41,6 +42,7 @@ class DdsFront {
   void take_commands();
   void take_command(const dds::Command& message, const dds::Guid& writer);
   void tell_of_departed();
+  void look_for_other_daemons();
 
   Channels& channels_;
   int priority_;
@@ -60,6 +62,7 @@ class DdsFront {
   dds::ForeignWriters foreign_;
   dds::Writer<dds::Ack> acks_;
   dds::Writer<dds::Status> status_;
+  dds::OtherWriters statuses_;
   dds::WaitSet waitset_;
 };
 

@@ -5,9 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <initializer_list>
 #include <map>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -17,8 +15,8 @@
 
 struct dds_topic_descriptor;
 
-/// Thin ownership around Cyclone DDS's C binding: what the daemon, the ground station and the bench share. Only dds.cpp
-/// sees the middleware's own header.
+/// Thin ownership around Cyclone DDS's C binding: what the daemon, the ground station and the bench share. Only the
+/// sources here see the middleware's own header.
 namespace backwash::dds {
 
 /// A call into the middleware failed; the message names the call, the topic and the reason. Thrown at start-up only.
@@ -59,6 +57,8 @@ class Participant {
   Entity handle() const noexcept { return participant_; }
 
  private:
+  /// Reader of the middleware's own topic of all writers in the domain, for writers.hpp. Throws Error.
+  Entity publications() const;
   Entity domain_ = 0, participant_ = 0;
 };
 
@@ -106,6 +106,7 @@ class WriterBase {
 
  protected:
   /// False if the middleware refused the sample.
+  Guid guid() const;
   bool write(const void* sample);
 
  private:
@@ -137,21 +138,6 @@ class Writer : public detail::WriterBase {
  public:
   using WriterBase::WriterBase;
   bool write(const T& sample) { return WriterBase::write(&sample); }
-};
-
-/// Counts the writers of other participants that use the topic of one of these readers with another type: the
-/// middleware does not connect them and tells nobody (docs/faults.md row 27).
-class ForeignWriters {
- public:
-  ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);
-  /// How many came since the last call; after kMost of them no more are counted. Call from one thread.
-  std::size_t take_new();
-
- private:
-  static constexpr std::size_t kMost = 1000;  // their identities are kept
-  Entity publications_;
-  std::map<std::string, std::string> types_;  // by topic
-  std::set<Guid> seen_;
 };
 
 /// Counts samples that the middleware drops because their bytes are none of their topic's type (docs/faults.md row 27).
