@@ -79,13 +79,13 @@ void DdsFront::take_closures() {
       return refusals_.add(channels_.closures_refused, [&] { return closure_writer_.refusal(writer); });
     const auto taken = localization_.loop_closure(m);
     if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
-    channels_.loop_closures = localization_.closures();
     if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
+    channels_.loop_closures = localization_.closures();
     channels_.map_from_odom.write(*localization_.map_from_odom());
   });
-}
   // What the next writer said was refused while this one was not known to be gone; it is said once.
   if (closure_writer_.let_go(closures_.departed(), !commanding_, now_ns())) closures_.renew(waitset_);
+}
 
 // A writer that floods us is cut to what can be carried out, before it costs anything: else it would fill the mission's
 // ring and the raw log, and keep the reader from the odometry. Its STOPs have an allowance of their own, and a STOP
@@ -170,8 +170,9 @@ void DdsFront::run_readers() {
 
 void DdsFront::send(const CommandMessage& command, const Answer& answer) {
   const std::string station(command.station.data());
-  const dds::Ack ack{dds::c_string(station), command.session, command.sequence, answer.result,
-                     dds::c_string(answer.reason)};
+  dds::Ack ack{
+      dds::c_string(station), command.session, command.sequence, answer.result, dds::c_string(answer.reason), {}};
+  std::ranges::copy(command.writer, ack.writer);
   acks_.write(ack);
 }
 

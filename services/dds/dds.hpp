@@ -26,11 +26,13 @@ struct Error : std::runtime_error {
 
 using Entity = std::int32_t;
 
+constexpr double kLease_s = 2;
+
 /// Delivery of a topic.
 enum class Delivery {
   latest,    ///< best effort, keep last 1: odometry, status
   scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data
-  reliable,  ///< reliable, keep last 64: commands and acknowledgements
+  reliable,  ///< reliable, keep last 64, a writer's liveliness has a lease of kLease_s: commands and acknowledgements
   state,     ///< reliable, transient local, keep last 1: late joiners get the newest: map, trajectory, tube
 };
 
@@ -55,10 +57,10 @@ class Participant {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
   Entity handle() const noexcept { return participant_; }
-
- private:
   /// Reader of the middleware's own topic of all writers in the domain, for writers.hpp. Throws Error.
   Entity publications() const;
+
+ private:
   Entity domain_ = 0, participant_ = 0;
 };
 
@@ -68,9 +70,9 @@ using Guid = std::array<std::uint8_t, 16>;
 /// As the tools of DDS print it: 8 hexadecimal digits four times.
 std::string text(const Guid& guid);
 
-namespace detail {
-
 class WaitSet;
+
+namespace detail {
 
 class ReaderBase {
  public:
@@ -79,15 +81,16 @@ class ReaderBase {
   Entity handle() const noexcept { return reader_; }
   const std::string& topic() const noexcept { return topic_; }
   const std::string& type() const noexcept { return type_; }
-  /// Writers that were matched at the last call and are gone since: deleted, or silent for their lease (10 s) after a
-  /// crash. Cheap while none comes or goes. Call from the thread that takes.
+  /// Writers that are gone since the last call: deleted, or silent after a crash, for the lease of their liveliness if
+  /// they have one (kLease_s), else for that of their process (10 s). Cheap while none comes or goes. Call from the
+  /// thread that takes. Of several whose liveliness ends at once one is told now, the others after the longer lease.
   std::vector<Guid> departed();
-
- protected:
-  /// Calls `each` with every valid sample received since the last call and its writer; returns how many.
   /// Is replaced by one that begins anew, in the wait set too: of a topic of Delivery::state it gets from each writer
   /// what that said last, even if it was taken already. Call from the thread that takes.
   void renew(WaitSet& waitset);
+
+ protected:
+  /// Calls `each` with every valid sample received since the last call and its writer; returns how many.
   std::size_t take(const std::function<void(const void*, const Guid&)>& each);
 
  private:
@@ -103,10 +106,10 @@ class WriterBase {
              Delivery delivery);
   /// Readers matched now.
   int matched() const;
+  Guid guid() const;
 
  protected:
   /// False if the middleware refused the sample.
-  Guid guid() const;
   bool write(const void* sample);
 
  private:
