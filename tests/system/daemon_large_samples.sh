@@ -6,7 +6,7 @@
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
-bursts=4
+bursts=3
 datagrams() { awk '/^Udp: [0-9]/ { print $2 }' /proc/net/snmp; } # that sockets here have read
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json"; }
 # The map comes through the probe: the daemon listens to one writer of maps.
