@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashctl/station.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <random>
@@ -63,7 +64,9 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
     }
     waitset_.wait(0.05);
     acks_.take([&](const dds::Ack& ack) {
-      if (ack.session == session_ && ack.sequence_number == sequence_) result = Result{ack.result, text(ack.reason)};
+      const bool ours = std::ranges::equal(ack.writer, commands_.guid());
+      if (ours && ack.session == session_ && ack.sequence_number == sequence_)
+        result = Result{ack.result, text(ack.reason)};
     });
   }
   return result;

@@ -17,8 +17,6 @@ namespace {
 
 // Odometry, closures and commands are small; one of 64 waypoints takes 2 kB.
 constexpr std::size_t kMaxSampleBytes = 64u << 10;
-// After which a bound odometry writer that is gone is let go of: by then an enabling that it began has ended.
-constexpr std::int64_t kForget_ns = 500'000'000;
 
 template <typename T>
 std::string topic_of(const config::Daemon& config) {
@@ -27,10 +25,8 @@ std::string topic_of(const config::Daemon& config) {
 
 }  // namespace
 
-DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels,
-                   Recorder& recorder)
+DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels)
     : channels_(channels),
-      recorder_(recorder),
       priority_(priority),
       localization_(config, vehicle.estimation.position),
       refusals_(channels.refused),
@@ -51,6 +47,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       foreign_(participant_, {&odometry_, &closures_, &commands_}),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
+      statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {
   waitset_.add(odometry_);
   waitset_.add(closures_);
@@ -59,32 +56,29 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
 
 void DdsFront::take_odometry() {
   odometry_.take([&](const dds::Odometry& m, const dds::Guid& writer) {
-    if (bound_ && *bound_ != writer)
-      return refusals_.add(channels_.odometry_refused, [&] {
-        return "odometry of writer " + dds::text(writer) + ": that of " + dds::text(*bound_) +
-               (gone_ns_ ? ", which is gone, was flown with: disable first" : " is in use");
-      });
+    if (!odometry_writer_.hears(writer))
+      return refusals_.add(channels_.odometry_refused, [&] { return odometry_writer_.refusal(writer); });
     const auto sample = localization_.odometry(m, now_ns());
     if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
-    if (!bound_) spdlog::info("odometry is taken from writer {}", dds::text(writer));
-    bound_ = writer;
+    if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
     channels_.odometry.write(*sample);
     channels_.poses.push(*sample);
   });
-  for (const dds::Guid& gone : odometry_.departed())
-    if (bound_ == gone) gone_ns_ = now_ns();
-  if (!gone_ns_ || commanding_ || now_ns() - *gone_ns_ < kForget_ns) return;
-  bound_.reset();
-  gone_ns_.reset();
+  odometry_writer_.let_go(odometry_.departed(), !commanding_, now_ns());
 }
 
 void DdsFront::take_closures() {
-  closures_.take([&](const dds::TransformStamped& m) {
+  closures_.take([&](const dds::TransformStamped& m, const dds::Guid& writer) {
+    if (!closure_writer_.hears(writer))
+      return refusals_.add(channels_.closures_refused, [&] { return closure_writer_.refusal(writer); });
     const auto taken = localization_.loop_closure(m);
     if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
+    if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
     channels_.loop_closures = localization_.closures();
     channels_.map_from_odom.write(*localization_.map_from_odom());
   });
+  // What the next writer said was refused while this one was not known to be gone; it is said once.
+  if (closure_writer_.let_go(closures_.departed(), !commanding_, now_ns())) closures_.renew(waitset_);
 }
 
 // A writer that floods us is cut to what can be carried out, before it costs anything: else it would fill the mission's
@@ -106,11 +100,15 @@ void DdsFront::take_command(const dds::Command& m, const dds::Guid& writer) {
   c.waypoints = m.waypoints._length;
   for (std::size_t n = 0; n < std::min(c.waypoints, c.kMostWaypoints); ++n)
     c.waypoint[n] = {m.waypoints._buffer[n].x, m.waypoints._buffer[n].y, m.waypoints._buffer[n].z};
-  char line[320];
-  std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s", c.station.data(),
-                static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
-                c.position.z(), c.yaw, dds::text(writer).c_str());
-  recorder_.append(study::RecordKind::command, line);
+  ControlRecord record;
+  char* line = reinterpret_cast<char*>(record.bytes.data());
+  const int length =
+      std::snprintf(line, record.bytes.size(), "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s",
+                    c.station.data(), static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(),
+                    c.position.y(), c.position.z(), c.yaw, dds::text(writer).c_str());
+  const std::size_t size = std::min(static_cast<std::size_t>(std::max(length, 0)), record.bytes.size() - 1);
+  record.header = {now_ns(), study::RecordKind::command, static_cast<std::uint32_t>(size)};
+  channels_.command_log.push(record);
   if (channels_.commands.push(c)) return;
   if (stops) stop_ = c;
   refusals_.add(channels_.commands_refused, [] { return "a command: 64 others wait to be answered"; });
@@ -135,12 +133,27 @@ void DdsFront::take_commands() {
   tell_of_departed();
 }
 
+void DdsFront::look_for_other_daemons() {
+  const auto other = statuses_.first();
+  if (other == other_daemon_) return;
+  other_daemon_ = other;
+  Line line{};
+  if (other)
+    std::snprintf(line.data(), line.size(), "another daemon in this namespace, writer %s", dds::text(*other).c_str());
+  if (other)
+    spdlog::error("{}: it obeys the same commands; nothing is enabled here meanwhile", line.data());
+  else
+    spdlog::info("the other daemon in this namespace is gone");
+  channels_.other_daemon.write(line);
+}
+
 void DdsFront::run_readers() {
   if (priority_ > 0) set_fifo(priority_);
   while (!channels_.stop) {
     waitset_.wait(0.1);
     take_closures();  // before the odometry that it is about
     take_odometry();
+    look_for_other_daemons();
     take_commands();
     if (const auto writers = foreign_.take_new()) {
       channels_.foreign_writers += writers;
@@ -151,11 +164,10 @@ void DdsFront::run_readers() {
 
 void DdsFront::send(const CommandMessage& command, const Answer& answer) {
   const std::string station(command.station.data());
-  const dds::Ack ack{dds::c_string(station), command.session, command.sequence, answer.result,
-                     dds::c_string(answer.reason)};
+  dds::Ack ack{
+      dds::c_string(station), command.session, command.sequence, answer.result, dds::c_string(answer.reason), {}};
+  std::ranges::copy(command.writer, ack.writer);
   acks_.write(ack);
-  recorder_.append(study::RecordKind::ack, station + " " + std::to_string(command.sequence) + " result " +
-                                               std::to_string(answer.result) + ": " + answer.reason);
 }
 
 }  // namespace backwash::daemon

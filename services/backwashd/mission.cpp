@@ -32,6 +32,7 @@ bool flies(Mode mode) { return mode == Mode::tracking || mode == Mode::hold; }
 Decision Mission::observe(const MissionInput& in) {
   if (in.view) view_ = *in.view;
   if (in.world) world_ = *in.world;
+  if (in.other_daemon) other_daemon_ = in.other_daemon->data();
   for (const PlanOutcome& outcome : in.outcomes) {
     if (job_ != outcome.job) continue;  // a newer command took its place
     job_.reset();
@@ -182,6 +183,7 @@ Decision Mission::enable() {
   if (order_under_way()) return refused("the last order is still being carried out: ask again");
   if (view_.mode != Mode::passive && view_.mode != Mode::quiet)
     return refused(std::string("already ") + to_string(view_.mode));
+  if (!other_daemon_.empty()) return refused(other_daemon_);
   if (!world_) return refused("no map was received yet");
   if (view_.mismatch != track::Mismatch::none)
     return refused(std::string("map and autopilot disagree: ") + to_string(view_.mismatch));

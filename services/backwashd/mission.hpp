@@ -32,6 +32,7 @@ struct MissionInput {
   double now_s = 0;                                         ///< monotonic
   std::optional<ControlView> view;                          ///< newest, if there is a new one
   std::optional<std::shared_ptr<const plan::World>> world;  ///< newest, if there is a new one
+  std::optional<Line> other_daemon;                         ///< newest, if there is a new one; "": there is none
   std::span<const PlanOutcome> outcomes;
 };
 
@@ -89,6 +90,7 @@ class Mission {
   Vehicle vehicle_;
   CommandId accepted_;
   ControlView view_;
+  std::string other_daemon_;  // in our namespace, "": none
   std::shared_ptr<const plan::World> world_;
   std::uint64_t orders_ = 0;
   track::Request last_request_ = track::Request::none;  // of the newest order

@@ -110,7 +110,7 @@ void set_counts(dds::Status& s, const Channels& channels) {
 
 }  // namespace
 
-void DdsFront::run_status(const Vehicle& vehicle) {
+void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
   ControlView view;
   CommandId accepted;
   Line task{}, place{}, refused{};
@@ -131,7 +131,7 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.vehicle = dds::c_string(vehicle.name);
     set_view(s, view, text);
     set_counts(s, channels_);
-    s.records_lost = channels_.control_log.lost() + recorder_.lost();
+    s.records_lost = channels_.records_lost() + recorder.lost();
     s.task = task.data();
     s.place = place.data();
     s.refused = refused.data();

@@ -60,6 +60,27 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
   EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
 }
 
+// Both would take control at one command. One that flies already goes on: it is in control.
+TEST_F(MissionRefusals, NothingIsEnabledWhileAnotherDaemonObeysTheSameCommands) {
+  const auto tell = [&](const char* who) {
+    MissionInput in;
+    in.now_s = now_s_;
+    in.other_daemon.emplace();
+    std::snprintf(in.other_daemon->data(), in.other_daemon->size(), "%s", who);
+    mission_.observe(in);
+  };
+  tell("another daemon in this namespace, writer 01");
+  EXPECT_EQ(result(give(gcs_.next(kGoto))), kAccepted);
+  EXPECT_EQ(result(give(gcs_.next(kStop))), kAccepted);
+  view_.mode = Mode::passive;
+  view_.armed = view_.offboard = false;
+  view_.landed = true;
+  look();
+  expect_nothing(give(gcs_.next(kEnable)), kRefused, "another daemon in this namespace, writer 01");
+  tell("");
+  EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
+}
+
 TEST_F(MissionRefusals, ACommandWithoutANameOrWithANumberThatIsNoneIsInvalidAndTakesNoLease) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const std::function<void(CommandMessage&)> faults[] = {
