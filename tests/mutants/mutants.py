@@ -7,16 +7,15 @@
   mutants.py run [ID|PATH …]    which are killed; exit 1 if the score is below 0.97
 """
 import argparse
-import collections
 import concurrent.futures
+import fnmatch
 import os
 import pathlib
 import shutil
 import subprocess
 import sys
-import tempfile
-import threading
 
+import suite
 import table
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -24,7 +23,7 @@ WORK = ROOT / "build" / "mutants"
 TREE = WORK / "tree"
 BIN = TREE / "build" / "release" / "tests"
 COPIED = ["CMakeLists.txt", "CMakePresets.json", "README.md", "core", "firmware_bridge", "idl", "services", "tests"]
-# Those that a mutant must survive to count as living, the quickest first.
+# Those that a mutant must survive to count as living.
 PROGRAMS = ["test_config", "test_files", "test_track", "test_bridge", "test_map", "test_field", "test_reach", "test_daemon",
             "test_plan", "test_sim"]
 LEAST_SCORE = 0.97
@@ -61,55 +60,28 @@ def build(mutants: list[table.Mutant], programs: list[str]) -> None:
                    cwd=TREE, check=True)
 
 
-def run_test(spec: str, number: int, cpu_seconds: int) -> tuple[str, float]:
-    """'' if the tests pass, else what failed first; and the processor time that they took, s. More than `cpu_seconds`
-    of it is a hang, and so are ten times as many seconds of waiting: the machine's load does not look like one."""
-    program, _, chosen = spec.partition(" ")
-    command = [str(BIN / program), "--gtest_fail_fast", "--gtest_brief=1"]
-    if chosen:
-        command.append(f"--gtest_filter={chosen}")
-    with tempfile.TemporaryFile() as output, subprocess.Popen(
-            ["/bin/sh", "-c", f'ulimit -t {cpu_seconds}; exec "$@"', "sh", *command], stdout=output,
-            stderr=subprocess.DEVNULL, env=os.environ | {"BACKWASH_MUTANT": str(number)}) as process:
-        watchdog = threading.Timer(10 * cpu_seconds, process.kill)
-        watchdog.start()
-        _, status, used = os.wait4(process.pid, 0)
-        watchdog.cancel()
-        process.returncode = os.waitstatus_to_exitcode(status)
-        seconds = used.ru_utime + used.ru_stime
-        if process.returncode == 0:
-            return "", seconds
-        output.seek(0)
-        failed = [line for line in output.read().decode(errors="replace").splitlines() if "[  FAILED  ]" in line]
-    if failed:
-        return f"{program} {failed[0].split(']')[1].split()[0].rstrip(',')}", seconds
-    return f"{program} {chosen}: ended with {process.returncode}", seconds
+def chosen(spec: str, test: suite.Test) -> bool:
+    """Whether "PROGRAM FILTER" chooses this test, as --gtest_filter would."""
+    program, _, patterns = spec.partition(" ")
+    return test.program == program and any(fnmatch.fnmatchcase(test.name, p) for p in (patterns or "*").split(":"))
 
 
-class Baseline:
-    """Processor time of each choice of tests without a mutant, s; it must pass. Measured when it is first asked for."""
-
-    def __init__(self):
-        self.seconds: dict[str, float] = {}
-        self.locks = collections.defaultdict(threading.Lock)
-
-    def limit(self, spec: str) -> int:
-        """Of processor time, s: more is a hang."""
-        with self.locks[spec]:
-            if spec not in self.seconds:
-                failed, self.seconds[spec] = run_test(spec, 0, 600)
-                if failed:
-                    print(f"without a mutant: {failed}", flush=True)
-                    os._exit(1)  # from any thread: nothing that follows would mean anything
-        return 10 + int(8 * self.seconds[spec])
+def in_order(mutant: table.Mutant, tests: list[suite.Test], earlier: str, quick: bool) -> list[suite.Test]:
+    """The tests that can see the mutant: what killed it the last time, those that its row names, then all others."""
+    seeing = [t for t in tests if t.passes(mutant.number)]
+    named = [t for t in seeing if any(chosen(spec, t) for spec in mutant.tests)]
+    first = [t for t in seeing if str(t) == earlier]
+    return list({str(t): t for t in first + named + ([] if quick else seeing)}.values())
 
 
-def judge(mutant: table.Mutant, specs: list[str], baseline: Baseline) -> str:
-    """What killed it, or ''."""
-    for spec in specs:
-        failed, _ = run_test(spec, mutant.number, baseline.limit(spec))
-        if failed:
-            return failed
+def judge(mutant: table.Mutant, tests: list[suite.Test]) -> str:
+    """What killed it, or ''. A failure counts if it comes twice: a test that the machine's load has upset says nothing."""
+    for test in tests:
+        ended = [suite.run(BIN / test.program, test.name, test.limit, {"BACKWASH_MUTANT": str(mutant.number)})[0]]
+        if ended[0] == "fails":
+            ended += [suite.run(BIN / test.program, test.name, test.limit, {"BACKWASH_MUTANT": str(mutant.number)})[0]]
+        if all(ended):
+            return f"{test}" if ended[0] == "fails" else f"{test} {ended[0]}"
     return ""
 
 
@@ -119,45 +91,54 @@ def rows_of(result: pathlib.Path) -> dict[str, list[str]]:
     return {line.split("\t")[0]: line.split("\t") for line in lines}
 
 
-def killers(result: pathlib.Path) -> dict[str, list[str]]:
-    """The one test that killed each mutant of an earlier run, if a test did: if it is still there, the quickest proof."""
-    return {id: [row[3]] for id, row in rows_of(result).items() if row[2] == "killed" and len(row[3].split()) == 2}
+def killers(result: pathlib.Path) -> dict[str, str]:
+    """The test that killed each mutant of an earlier run: if it is still there, the quickest proof."""
+    return {id: " ".join(row[3].split()[:2]) for id, row in rows_of(result).items() if row[2] == "killed"}
 
 
 def run(mutants: list[table.Mutant], jobs: int, quick: bool, result: pathlib.Path) -> int:
-    """First what killed it the last time, then the tests that each row names, then all programs for those that live."""
+    """Each mutant against the tests that pass its switch, until one fails."""
     earlier = killers(result)
-    passes = [lambda m: earlier.get(m.id, []), lambda m: m.tests] + ([] if quick else [lambda _: PROGRAMS])
-    baseline = Baseline()
+    tests = suite.survey([BIN / name for name in PROGRAMS], WORK / "survey.json", jobs)
     killed: dict[str, str] = {}
-    for specs in passes:
-        todo = [m for m in mutants if m.id not in killed]
-        with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-            for mutant, by in zip(todo, pool.map(lambda m, s=specs: judge(m, s(m), baseline), todo)):
-                if by:
-                    killed[mutant.id] = by
-                if by or specs is passes[-1]:
-                    print(f"{mutant.id}: {by or 'lives'}", flush=True)
-    return report(mutants, killed, result)
+
+    def one(m: table.Mutant) -> tuple[table.Mutant, str, int]:
+        order = in_order(m, tests, earlier.get(m.id, ""), quick)
+        return m, judge(m, order), len(order)
+
+    done: list[table.Mutant] = []
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        for mutant, by, count in pool.map(one, mutants):
+            done.append(mutant)
+            if by:
+                killed[mutant.id] = by
+            write(done, killed, result)
+            print(f"{mutant.id}: {by or f'lives, of {count} tests that pass it'}", flush=True)
+    return report(mutants, killed)
 
 
-def report(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.Path) -> int:
-    """Rows to `result`, the score per folder to the terminal."""
-    def verdict(m: table.Mutant) -> str:
-        return "killed" if m.id in killed else "equivalent" if m.equivalent else "real" if m.real else "lived"
+def verdict(m: table.Mutant, killed: dict[str, str]) -> str:
+    """Of one mutant that was tried."""
+    return "killed" if m.id in killed else "equivalent" if m.equivalent else "real" if m.real else "lived"
 
-    rows = rows_of(result)  # those that were not tried this time stay
+
+def write(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.Path) -> None:
+    """Rows to `result`; those of mutants that were not tried this time stay."""
+    rows = rows_of(result)
     for m in mutants:
-        rows[m.id] = [m.id, m.file, verdict(m), killed.get(m.id) or m.equivalent or m.real, m.promise]
+        rows[m.id] = [m.id, m.file, verdict(m, killed), killed.get(m.id) or m.equivalent or m.real, m.promise]
     result.parent.mkdir(parents=True, exist_ok=True)
     result.write_text("\n".join("\t".join(row) for row in [["id", "file", "verdict", "by or why", "promise"],
                                                            *rows.values()]) + "\n")
 
+
+def report(mutants: list[table.Mutant], killed: dict[str, str]) -> int:
+    """The score per folder to the terminal, and what lives."""
     print(f"\n| {'sources':20} | mutants | killed | lived | equivalent | score |\n|---|---|---|---|---|---|")
     folders: dict[str, list[str]] = {}
     for m in mutants:
-        folders.setdefault(str(pathlib.PurePath(m.file).parent), []).append(verdict(m))
-    folders["all"] = [verdict(m) for m in mutants]
+        folders.setdefault(str(pathlib.PurePath(m.file).parent), []).append(verdict(m, killed))
+    folders["all"] = [verdict(m, killed) for m in mutants]
     score = 0.0
     for name, verdicts in folders.items():
         equivalent, dead = verdicts.count("equivalent"), verdicts.count("killed")
@@ -168,7 +149,7 @@ def report(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.
     for name in wrong:
         print(f"{name}: said to be equivalent, but killed: {killed[name]}")
     for m in mutants:
-        if verdict(m) in ("lived", "real"):
+        if verdict(m, killed) in ("lived", "real"):
             print(f"{m.id} lives: {m.promise} {m.real}")
     return 1 if score < LEAST_SCORE or wrong else 0
 
@@ -190,9 +171,9 @@ def main() -> int:
     if given.what == "build":
         build(mutants, given.names or PROGRAMS)
         return 0
-    chosen = [m for m in mutants if not given.names or
+    wanted = [m for m in mutants if not given.names or
               any(m.id == name or m.file.startswith(name) for name in given.names)]
-    return run(chosen, given.jobs, given.quick, given.result)
+    return run(wanted, given.jobs, given.quick, given.result)
 
 
 if __name__ == "__main__":
