@@ -5,22 +5,28 @@
   mutants.py check              the table still fits the sources (seconds; a test of ./check)
   mutants.py build [PROGRAM …]  all mutants as switches of one build, in build/mutants
   mutants.py run [ID|PATH …]    which are killed; exit 1 if the score is below 0.97
+  mutants.py draw COUNT         operators of the same sources at random, and their build; then run --drawn
 """
 import argparse
 import concurrent.futures
+import dataclasses
 import fnmatch
+import json
 import os
 import pathlib
+import random
 import shutil
 import subprocess
 import sys
 
+import drawn
 import suite
 import table
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORK = ROOT / "build" / "mutants"
 TREE = WORK / "tree"
+DRAWN = WORK / "drawn.json"
 BIN = TREE / "build" / "release" / "tests"
 COPIED = ["CMakeLists.txt", "CMakePresets.json", "README.md", "core", "firmware_bridge", "idl", "services", "tests"]
 # Those that a mutant must survive to count as living.
@@ -29,11 +35,8 @@ PROGRAMS = ["test_config", "test_files", "test_track", "test_bridge", "test_map"
 LEAST_SCORE = 0.97
 
 
-def build(mutants: list[table.Mutant], programs: list[str]) -> None:
-    """Copies what changed, rewrites, compiles. A file is written only if its content differs: little is compiled."""
-    wrong = table.check(mutants, ROOT)
-    if wrong:
-        sys.exit("\n".join(wrong))
+def prepare(mutants: list[table.Mutant]) -> None:
+    """Copies what changed and rewrites. A file is written only if its content differs: little is compiled."""
     files = table.by_file(mutants)
     wanted = {}
     for top in COPIED:
@@ -56,8 +59,35 @@ def build(mutants: list[table.Mutant], programs: list[str]) -> None:
     if (ROOT.parent / "shared").exists() and not shared.exists():
         shared.symlink_to(ROOT.parent / "shared")
     subprocess.run(["cmake", "--preset", "release"], cwd=TREE, check=True, stdout=subprocess.DEVNULL)
+
+
+def build(mutants: list[table.Mutant], programs: list[str]) -> None:
+    """All mutants as switches of one build."""
+    prepare(mutants)
     subprocess.run(["cmake", "--build", "--preset", "release", "--target", *programs, "--", "-k", "0"],
                    cwd=TREE, check=True)
+
+
+def draw(count: int, seed: int) -> list[table.Mutant]:
+    """So many random mutants that compile, of the sources that the table has rows of."""
+    rows = drawn.draw(ROOT, {m.file for m in table.load()}, random.Random(seed))
+    compiled: dict[str, list[str]] = {}
+    while True:
+        prepare(rows[:count])
+        refused: set[str] = set()
+        for file, mutants in table.by_file(rows[:count]).items():
+            ids = [m.id for m in mutants]
+            if compiled.get(file) == ids:
+                continue
+            lines = drawn.refused_lines(TREE, file)
+            wrong = {m.id for m in mutants if int(m.id.split("-")[-2]) in lines}
+            if lines and not wrong:
+                sys.exit(f"{file} does not compile, and no mutant is to blame")
+            refused |= wrong
+            compiled[file] = ids
+        if not refused:
+            return rows[:count]
+        rows = [m for m in rows if m.id not in refused]
 
 
 def chosen(spec: str, test: suite.Test) -> bool:
@@ -157,15 +187,21 @@ def report(mutants: list[table.Mutant], killed: dict[str, str]) -> int:
 def main() -> int:
     """Command line."""
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("what", choices=["check", "build", "run"])
+    arguments.add_argument("what", choices=["check", "build", "run", "draw"])
     arguments.add_argument("names", nargs="*", help="only these mutants, or those of these folders; programs to build")
     arguments.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments.add_argument("--quick", action="store_true", help="only the tests that the rows name")
-    arguments.add_argument("--result", type=pathlib.Path, default=WORK / "result.tsv")
+    arguments.add_argument("--drawn", action="store_true", help="those that were drawn, not the table")
+    arguments.add_argument("--seed", type=int, default=1, help="of draw")
     given = arguments.parse_intermixed_args()
-    mutants = table.load()
-    if given.what == "check":
-        wrong = table.check(mutants, ROOT)
+    if given.what == "draw":
+        mutants = draw(int(given.names[0]), given.seed)
+        DRAWN.write_text(json.dumps([dataclasses.asdict(m) for m in mutants], indent=1))
+        build(mutants, PROGRAMS)
+        return 0
+    mutants = [table.Mutant(**m) for m in json.loads(DRAWN.read_text())] if given.drawn else table.load()
+    wrong = [] if given.drawn else table.check(mutants, ROOT)
+    if given.what == "check" or wrong:
         print("\n".join(wrong) or f"{len(mutants)} mutants, each where the table says")
         return 1 if wrong else 0
     if given.what == "build":
@@ -173,7 +209,7 @@ def main() -> int:
         return 0
     wanted = [m for m in mutants if not given.names or
               any(m.id == name or m.file.startswith(name) for name in given.names)]
-    return run(wanted, given.jobs, given.quick, given.result)
+    return run(wanted, given.jobs, given.quick, WORK / ("drawn.tsv" if given.drawn else "result.tsv"))
 
 
 if __name__ == "__main__":
