@@ -107,7 +107,9 @@ def rewritten(mutants: list[Mutant], text: str) -> str:
             at, first = span.end, following
         return out + text[at:end], first
 
-    return '#include "tests/mutants/switch.h"\n' + write(0, len(text), 0)[0]
+    # C knows no other folder than the file's own.
+    root = "../" * mutants[0].file.count("/") if mutants[0].file.endswith(".c") else ""
+    return f'#include "{root}tests/mutants/switch.h"\n' + write(0, len(text), 0)[0]
 
 
 def by_file(mutants: list[Mutant]) -> dict[str, list[Mutant]]:
