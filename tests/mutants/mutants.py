@@ -18,6 +18,7 @@ import random
 import shutil
 import subprocess
 import sys
+import threading
 
 import drawn
 import suite
@@ -96,12 +97,11 @@ def chosen(spec: str, test: suite.Test) -> bool:
     return test.program == program and any(fnmatch.fnmatchcase(test.name, p) for p in (patterns or "*").split(":"))
 
 
-def in_order(mutant: table.Mutant, tests: list[suite.Test], earlier: str, quick: bool) -> list[suite.Test]:
-    """The tests that can see the mutant: what killed it the last time, those that its row names, then all others."""
+def named(mutant: table.Mutant, tests: list[suite.Test], earlier: str) -> list[suite.Test]:
+    """Of the tests that can see the mutant: what killed it the last time, then those that its row names."""
     seeing = [t for t in tests if t.passes(mutant.number)]
-    named = [t for t in seeing if any(chosen(spec, t) for spec in mutant.tests)]
-    first = [t for t in seeing if str(t) == earlier]
-    return list({str(t): t for t in first + named + ([] if quick else seeing)}.values())
+    return ([t for t in seeing if str(t) == earlier] +
+            [t for t in seeing if str(t) != earlier and any(chosen(spec, t) for spec in mutant.tests)])
 
 
 def judge(mutant: table.Mutant, tests: list[suite.Test]) -> str:
@@ -127,23 +127,33 @@ def killers(result: pathlib.Path) -> dict[str, str]:
 
 
 def run(mutants: list[table.Mutant], jobs: int, quick: bool, result: pathlib.Path) -> int:
-    """Each mutant against the tests that pass its switch, until one fails."""
+    """Each mutant against the tests that pass its switch, until one fails: first those that its row names, then, of what
+    lives, all others."""
     earlier = killers(result)
-    tests = suite.survey([BIN / name for name in PROGRAMS], WORK / "survey.json", jobs)
     killed: dict[str, str] = {}
+    tried: dict[str, set[str]] = {m.id: set() for m in mutants}
+    lock = threading.Lock()
 
-    def one(m: table.Mutant) -> tuple[table.Mutant, str, int]:
-        order = in_order(m, tests, earlier.get(m.id, ""), quick)
-        return m, judge(m, order), len(order)
+    def attempt(m: table.Mutant, tests: list[suite.Test], last: bool) -> None:
+        fresh = [t for t in tests if str(t) not in tried[m.id]]
+        tried[m.id] |= {str(t) for t in fresh}
+        if by := judge(m, fresh):
+            killed[m.id] = by
+        if by or last:
+            print(f"{m.id}: {by or f'lives, of {len(tried[m.id])} tests that pass it'}", flush=True)
+            with lock:
+                write([m], killed, result)
 
-    done: list[table.Mutant] = []
+    def survey(programs: list[str]) -> list[suite.Test]:
+        return suite.survey([BIN / name for name in programs], WORK / "survey.json", jobs)
+
+    some = survey([p for p in PROGRAMS if any(spec.split()[0] == p for m in mutants for spec in m.tests)])
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        for mutant, by, count in pool.map(one, mutants):
-            done.append(mutant)
-            if by:
-                killed[mutant.id] = by
-            write(done, killed, result)
-            print(f"{mutant.id}: {by or f'lives, of {count} tests that pass it'}", flush=True)
+        list(pool.map(lambda m: attempt(m, named(m, some, earlier.get(m.id, "")), quick), mutants))
+        if not quick:
+            every = survey(PROGRAMS)
+            list(pool.map(lambda m: attempt(m, [t for t in every if t.passes(m.number)], True),
+                          [m for m in mutants if m.id not in killed]))
     return report(mutants, killed)
 
 
