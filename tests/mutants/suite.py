@@ -4,7 +4,7 @@
 What a test does cannot depend on a mutant whose switch it does not pass. So a mutant that no test has killed was tried
 against all of them, though only those that pass its switch were run.
 """
-import concurrent.futures
+import fnmatch
 import hashlib
 import json
 import os
@@ -85,20 +85,38 @@ def observe(program: pathlib.Path, name: str) -> Test | None:
     return None
 
 
-def survey(programs: list[pathlib.Path], cache: pathlib.Path, jobs: int) -> list[Test]:
-    """All tests of these programs, the quickest first. What was seen of the same program before is not run again."""
-    known = json.loads(cache.read_text()) if cache.exists() else {}
-    tests = []
-    for program in programs:
-        digest = hashlib.sha256(program.read_bytes()).hexdigest()
-        if known.get(program.name, {}).get("digest") != digest:
-            with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-                seen = list(pool.map(lambda name, p=program: observe(p, name), names(program)))
-            good = [t for t in seen if t]
-            whole = digest if len(good) == len(seen) else ""  # else it is asked again the next time
-            known[program.name] = {"digest": whole, "tests": [[t.name, t.seconds, sorted(t.marks)] for t in good]}
-            cache.write_text(json.dumps(known))
-            print(f"{program.name}: {len(good)} of {len(seen)} tests, {sum(t.seconds for t in good):.0f} s", flush=True)
-        tests += [Test(program.name, name, seconds, set(marks))
-                  for name, seconds, marks in known[program.name]["tests"]]
-    return sorted(tests, key=lambda t: t.seconds)
+class Suite:
+    """The tests of some programs. Each is seen without a mutant when it is first asked for, and remembered for as long
+    as its program stays as it is."""
+
+    def __init__(self, folder: pathlib.Path, programs: list[str], cache: pathlib.Path):
+        self.folder, self.cache, self.lock = folder, cache, threading.Lock()
+        known = json.loads(cache.read_text()) if cache.exists() else {}
+        self.seen: dict[str, dict] = {}
+        self.names: dict[str, list[str]] = {}
+        self.tests: dict[tuple[str, str], Test | None] = {}
+        for name in programs:
+            digest = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+            same = known.get(name, {}).get("digest") == digest
+            self.seen[name] = {"digest": digest, "tests": known[name]["tests"] if same else {}}
+            self.names[name] = names(folder / name)
+            for test, (seconds, marks) in self.seen[name]["tests"].items():
+                self.tests[name, test] = Test(name, test, seconds, set(marks))
+
+    def test(self, program: str, name: str) -> Test | None:
+        """None: it fails without a mutant."""
+        if (program, name) not in self.tests:
+            test = observe(self.folder / program, name)
+            with self.lock:
+                self.tests[program, name] = test
+                if test:
+                    self.seen[program]["tests"][name] = [test.seconds, sorted(test.marks)]
+                    self.cache.write_text(json.dumps(self.seen))
+        return self.tests[program, name]
+
+    def chosen(self, spec: str) -> list[tuple[str, str]]:
+        """The tests that "PROGRAM FILTER" chooses, as --gtest_filter would; those known to be quick first."""
+        program, _, patterns = spec.partition(" ")
+        found = [(program, n) for n in self.names[program]
+                 if any(fnmatch.fnmatchcase(n, p) for p in (patterns or "*").split(":"))]
+        return sorted(found, key=lambda t: self.tests[t].seconds if self.tests.get(t) else 1.0)
