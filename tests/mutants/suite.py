@@ -4,6 +4,7 @@
 What a test does cannot depend on a mutant whose switch it does not pass. So a mutant that no test has killed was tried
 against all of them, though only those that pass its switch were run.
 """
+import contextlib
 import fnmatch
 import hashlib
 import json
@@ -12,6 +13,7 @@ import pathlib
 import subprocess
 import tempfile
 import threading
+import time
 from dataclasses import dataclass
 
 MARKS = 65536  # of switch.h
@@ -41,17 +43,29 @@ class Test:
         return 10 + int(8 * self.seconds)
 
 
+def end_if_it_waits(process: subprocess.Popen, seconds: int, ended_yet: threading.Event) -> None:
+    """Kills a process that has waited so long, not counting what it waited for a processor."""
+    begun = time.monotonic()
+    while not ended_yet.wait(seconds / 20):
+        delayed = 0
+        for task in pathlib.Path(f"/proc/{process.pid}/task").glob("*/schedstat"):
+            with contextlib.suppress(OSError):
+                delayed += int(task.read_text().split()[1])
+        if time.monotonic() - begun - delayed * 1e-9 > seconds and not ended_yet.is_set():
+            return process.kill()
+
+
 def run(program: pathlib.Path, name: str, limit: int, environment: dict[str, str]) -> tuple[str, float]:
-    """'' if the test passes, else what failed; and the processor time that it took, s. More than `limit` of it is a hang,
-    and so are ten times as many seconds of waiting: the machine's load does not look like one."""
+    """'' if the test passes, else what failed; and the processor time that it took, s. More than `limit` of it is a
+    hang, and so are ten times as many seconds of waiting for anything but a processor."""
     command = [str(program), f"--gtest_filter={name}", "--gtest_fail_fast", "--gtest_brief=1"]
     with subprocess.Popen(["/bin/sh", "-c", f'ulimit -t {limit}; exec "$@"', "sh", *command],
                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                           env=os.environ | ENVIRONMENT | environment) as process:
-        watchdog = threading.Timer(10 * limit, process.kill)
-        watchdog.start()
+        ended_yet = threading.Event()
+        threading.Thread(target=end_if_it_waits, args=(process, 10 * limit, ended_yet), daemon=True).start()
         _, status, used = os.wait4(process.pid, 0)
-        watchdog.cancel()
+        ended_yet.set()
         process.returncode = os.waitstatus_to_exitcode(status)
     seconds = used.ru_utime + used.ru_stime
     ended = {0: "", 1: "fails"}.get(process.returncode, f"ends with {process.returncode}")
