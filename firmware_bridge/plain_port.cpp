@@ -175,11 +175,21 @@ void PlainPort::tell_refused(std::span<std::uint8_t>& into) noexcept {
   if (const std::size_t length = before.size() - into.size(); length > 0) before[length - 1] ^= 0x55;
 }
 
-void PlainPort::tell(const plain_state_t& s, std::span<std::uint8_t>& into) noexcept {
+void PlainPort::tell_pose(const plain_state_t& s, std::span<std::uint8_t>& into) noexcept {
   const auto p = mavlink::swap_ned(vec(s.position)).cast<float>().eval();
   const auto v = mavlink::swap_ned(vec(s.velocity)).cast<float>().eval();
   const auto q = mavlink::swap_ned_frd(quaternion(s.attitude)).cast<float>();
   const auto w = mavlink::swap_frd(vec(s.rates)).cast<float>().eval();
+  tell(mavlink::LocalPositionNed{s.time_ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, into);
+  tell(mavlink::AttitudeQuaternion{s.time_ms, q.w(), q.x(), q.y(), q.z(), w.x(), w.y(), w.z(), {}}, into);
+  // Of ODOMETRY the reset counter counts; the rest says the same as above.
+  tell(
+      mavlink::Odometry{
+          .x = p.x(), .y = p.y(), .z = p.z(), .q = {q.w(), q.x(), q.y(), q.z()}, .reset_counter = s.reset_counter},
+      into);
+}
+
+void PlainPort::tell(const plain_state_t& s, std::span<std::uint8_t>& into) noexcept {
   tell(mavlink::Heartbeat{.custom_mode = s.following ? kPlainModeFollow : 0,
                           .type = kTypeQuadrotor,
                           .autopilot = kAutopilotPlain,
@@ -189,14 +199,8 @@ void PlainPort::tell(const plain_state_t& s, std::span<std::uint8_t>& into) noex
                                                       : kStandby,
                           .mavlink_version = kMavlinkVersion},
        into);
-  tell(mavlink::LocalPositionNed{s.time_ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, into);
-  tell(mavlink::AttitudeQuaternion{s.time_ms, q.w(), q.x(), q.y(), q.z(), w.x(), w.y(), w.z(), {}}, into);
+  if (s.pose_known) tell_pose(s, into);
   if (s.ground_known) tell(mavlink::ExtendedSysState{0, s.on_ground ? kOnGround : kInAir}, into);
-  // Of ODOMETRY the reset counter counts; the rest says the same as above.
-  tell(
-      mavlink::Odometry{
-          .x = p.x(), .y = p.y(), .z = p.z(), .q = {q.w(), q.x(), q.y(), q.z()}, .reset_counter = s.reset_counter},
-      into);
   const bool percent_known = s.battery_percent <= 100;
   if (percent_known || s.battery_millivolts > 0) {
     mavlink::BatteryStatus b{.battery_remaining = static_cast<std::int8_t>(percent_known ? s.battery_percent : -1)};

@@ -51,6 +51,7 @@ class PlainPort {
   void ask(std::uint8_t request) noexcept;
   tl::expected<void, PortError> flush() noexcept;
   void tell(const plain_state_t& state, std::span<std::uint8_t>& into) noexcept;
+  void tell_pose(const plain_state_t& state, std::span<std::uint8_t>& into) noexcept;
   void tell_refused(std::span<std::uint8_t>& into) noexcept;
   template <class Message>
   void tell(const Message& message, std::span<std::uint8_t>& into) noexcept;

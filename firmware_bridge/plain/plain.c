@@ -20,6 +20,7 @@
 #define FLAG_ON_GROUND 0x04U
 #define FLAG_GROUND_KNOWN 0x08U
 #define FLAG_FAILSAFE 0x10U
+#define FLAG_POSE_KNOWN 0x20U
 
 static void put_u16(uint8_t* at, uint16_t value) {
   at[0] = (uint8_t)(value & 0xFFU);
@@ -147,6 +148,7 @@ static uint8_t flags_of(const plain_state_t* state) {
   flags |= state->on_ground ? FLAG_ON_GROUND : 0U;
   flags |= state->ground_known ? FLAG_GROUND_KNOWN : 0U;
   flags |= state->failsafe ? FLAG_FAILSAFE : 0U;
+  flags |= state->pose_known ? FLAG_POSE_KNOWN : 0U;
   return (uint8_t)flags;
 }
 
@@ -259,6 +261,7 @@ void plain_read_state(const plain_receiver_t* receiver, plain_state_t* state) {
   state->on_ground = (flags & FLAG_ON_GROUND) != 0U;
   state->ground_known = (flags & FLAG_GROUND_KNOWN) != 0U;
   state->failsafe = (flags & FLAG_FAILSAFE) != 0U;
+  state->pose_known = (flags & FLAG_POSE_KNOWN) != 0U;
   state->reset_counter = body[5];
   state->answered = get_u16(&body[6]);
   state->time_ms = get_u32(&body[8]);

@@ -69,6 +69,7 @@ typedef struct {
   uint16_t answered;     /* sequence of the last command with a request */
   uint8_t answer;        /* PLAIN_ANSWER_ */
   uint32_t time_ms;
+  bool pose_known;   /* otherwise position, velocity, attitude and rates are zero and mean nothing */
   float position[3]; /* in L */
   float velocity[3];
   float attitude[4];           /* w x y z, body to L */

@@ -87,11 +87,15 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
                           text(s.mismatch),
                           text(s.place),
                           text(s.refused),
+                          text(s.autopilot),
+                          text(s.autopilot_says),
                           {}};
       for (std::uint32_t n = 0; n < s.parameters._length; ++n)
-        newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
+        newest->parameters.push_back(
+            {text(s.parameters._buffer[n].name), s.parameters._buffer[n].value, text(s.parameters._buffer[n].advice)});
       auto& own = newest->numbers;
-      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.refused = nullptr;
+      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.refused = own.autopilot =
+          own.autopilot_says = nullptr;
       own.parameters = {};
     });
   }

@@ -18,6 +18,7 @@
 #include "core/sync/record_ring.hpp"
 #include "core/track/flight_tick.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
+#include "firmware_bridge/parameters.hpp"
 #include "services/backwashd/timing.hpp"
 
 /// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is
@@ -104,9 +105,13 @@ struct CommandMessage {
   std::array<std::array<double, 3>, kMostWaypoints> waypoint{};
 };
 
-/// Parameters of PX4 that decide what a failsafe does, which matters indoors; `backwashctl check` judges them.
-inline constexpr std::array<std::string_view, 5> kParameters{"COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_OVERRIDE",
-                                                             "NAV_DLL_ACT", "COM_LOW_BAT_ACT"};
+/// Which command of which session.
+struct CommandId {
+  std::uint64_t session = 0;
+  std::uint32_t sequence = 0;
+};
+
+inline constexpr std::uint64_t kTicksPerSecond = 50;
 
 /// What the control thread shows to the others, once a tick.
 struct ControlView {
@@ -131,7 +136,10 @@ struct ControlView {
   std::uint64_t frames_refused = 0;  ///< of the link, for their signature
   double residual_m = 0, residual_rad = 0;
   track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
-  std::array<std::optional<double>, kParameters.size()> parameters{};
+  firmware_bridge::Autopilot autopilot = firmware_bridge::Autopilot::kUnknown;
+  firmware_bridge::ParameterValues parameters{};  ///< of parameter_names(autopilot)
+  /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
+  firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
   std::uint64_t log_lost = 0;  ///< records that the raw log had no room for
   TimingHistogram tick, lateness, odometry_to_wire;
 };
@@ -205,6 +213,7 @@ struct Channels {
   std::atomic<mavlink::SigningTime> signing_time{0};  // control → signing time: of the newest signature; 0: none
   sync::LatestValue<Line> other_daemon;               // DDS reader → mission: "", or who else obeys our commands
   sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
+  sync::LatestValue<CommandId> accepted;              // mission → status: the newest command that was
   sync::LatestValue<std::array<char, 192>> task;      // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},

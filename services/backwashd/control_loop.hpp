@@ -6,6 +6,7 @@
 #include "firmware_bridge/autopilot_link.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
+#include "services/backwashd/parameter_reader.hpp"
 #include "services/backwashd/sender_clock.hpp"
 
 namespace backwash::daemon {
@@ -43,6 +44,7 @@ class ControlLoop {
   track::FlightTick flight_;
   Lookout lookout_;
   SenderClock sender_clock_;  // of the odometry's
+  ParameterReader parameters_;
   bool port_open_ = true;
   int origin_asked_ = 0;
   std::int64_t takeoff_asked_ns_ = 0;  ///< of the autopilot, for the first time in this lift-off; 0: not yet

@@ -96,6 +96,7 @@ struct Flight {
             kSystem,
             [&] { return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels); })),
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
+        mission(s.vehicle),
         loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {}
 
   const Settings& settings;

@@ -23,12 +23,6 @@ std::string topic_of(const config::Daemon& config) {
   return dds::topic(config.dds.name_space, dds::TopicOf<T>::kName);
 }
 
-geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
-
-dds::Timing timing(const TimingHistogram& h) {
-  return {static_cast<float>(h.quantile(0.5)), static_cast<float>(h.quantile(0.99)), static_cast<float>(h.max_us)};
-}
-
 }  // namespace
 
 DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels)
@@ -174,77 +168,6 @@ void DdsFront::send(const CommandMessage& command, const Answer& answer) {
       dds::c_string(station), command.session, command.sequence, answer.result, dds::c_string(answer.reason), {}};
   std::ranges::copy(command.writer, ack.writer);
   acks_.write(ack);
-}
-
-void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
-  ControlView view;
-  Line task{}, place{}, refused{};
-  const std::vector<std::string> names(kParameters.begin(), kParameters.end());
-  auto next = std::chrono::steady_clock::now();
-  while (!channels_.stop) {
-    next += std::chrono::milliseconds(100);
-    std::this_thread::sleep_until(next);
-    if (const auto newest = channels_.task.read_new()) task = *newest;
-    if (const auto newest = channels_.view_status.read_new()) view = *newest;
-    if (const auto newest = channels_.place.read_new()) place = *newest;
-    for (auto* line : {&channels_.refused, &channels_.refused_map})
-      if (const auto newest = line->read_new()) refused = *newest;
-    commanding_ = view.mode != track::Mode::passive && view.mode != track::Mode::quiet;
-    const std::string mode = to_string(view.mode), reason = to_string(view.reason);
-    const std::string mismatch = to_string(view.mismatch);
-    dds::Status s{};
-    s.stamp = dds::wall_clock();
-    s.vehicle = dds::c_string(vehicle.name);
-    s.state = dds::c_string(mode);
-    s.reason = dds::c_string(reason);
-    s.task = task.data();
-    s.armed = view.armed;
-    s.offboard = view.offboard;
-    s.landed = view.landed;
-    s.moving = !view.finished;
-    s.frames_aligned = view.aligned;
-    s.position = point(view.state.p_W);
-    s.setpoint = point(view.command.p_W);
-    s.ticks = view.ticks;
-    s.ticks_missed = view.missed;
-    s.setpoints_sent = view.setpoints;
-    s.samples_inside = view.inside;
-    s.samples_outside = view.outside;
-    s.odometry_received = view.odometry_received;
-    s.odometry_rejected = view.odometry_rejected;
-    s.maps_accepted = channels_.maps_accepted;
-    s.maps_rejected = channels_.maps_rejected;
-    s.scans_accepted = channels_.scans_accepted;
-    s.scans_rejected = channels_.scans_rejected;
-    s.odometry_refused = channels_.odometry_refused;
-    s.loop_closures = channels_.loop_closures;
-    s.closures_refused = channels_.closures_refused;
-    s.foreign_writers = channels_.foreign_writers;
-    const std::int64_t map_ns = channels_.map_ns;
-    s.map_age = map_ns < 0 ? -1 : static_cast<double>(now_ns() - map_ns) * 1e-9;
-    s.commands_refused = channels_.commands_refused;
-    s.frames_bad = view.frames_bad;
-    s.frames_refused = view.frames_refused;
-    s.records_lost = channels_.records_lost() + recorder.lost();
-    s.page_faults = view.page_faults;
-    s.frame_residual_m = view.residual_m;
-    s.frame_residual_rad = view.residual_rad;
-    s.odometry_age = view.odometry_age;
-    s.heartbeat_age = view.heartbeat_age;
-    s.mismatch = dds::c_string(mismatch);
-    s.place = place.data();
-    s.parts_filtered = dds::filtered_parts();
-    s.refused = refused.data();
-    std::array<dds::Parameter, kParameters.size()> parameters{};
-    std::uint32_t known = 0;
-    for (std::size_t n = 0; n < kParameters.size(); ++n)
-      if (view.parameters[n]) parameters[known++] = {dds::c_string(names[n]), *view.parameters[n]};
-    s.parameters = {known, known, parameters.data(), false};
-    s.tick = timing(view.tick);
-    s.lateness = timing(view.lateness);
-    s.odometry_to_wire = timing(view.odometry_to_wire);
-    status_.write(s);
-  }
 }
 
 }  // namespace backwash::daemon

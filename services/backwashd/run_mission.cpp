@@ -62,6 +62,7 @@ void run_mission(Channels& channels, Mission& mission, const SendAnswer& answer)
       spdlog::info("command {} from {}: {}", command->verb, command->station.data(), a.reason);
       answer(*command, a);
     }
+    channels.accepted.write(mission.accepted());
     show(channels.task, mission.task());
     show(channels.place, mission.place());
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -5,6 +5,7 @@
 # does not wait for this machine's processors; below 0 needs the right).
 # What all of them say goes to $log, which is shown if the script fails, unless start_bench is given a file to keep.
 
+source "$(dirname "${BASH_SOURCE[0]}")/configuration.sh"
 bench_pid='' daemon_pid='' more_pids=() work=$(mktemp -d)
 log=$work/log
 : >"$log"
@@ -33,29 +34,6 @@ start_bench() {
   bench_pid=$!
   for _ in $(seq 200); do [[ -e $work/autopilot ]] && return; sleep 0.05; done
   die "the bench did not start"
-}
-
-# write_configuration VEHICLE RAW_LOG [ODOMETRY_TOPIC]: $work/backwashd.toml.
-write_configuration() {
-  cat >"$work/backwashd.toml" <<TOML
-vehicle = "$1"
-model = "$1"
-[dds]
-domain = $domain
-interface = "lo"
-namespace = "backwash"
-odometry_topic = "${3:-rt/backwash/odometry}"
-[link]
-device = "$work/autopilot"
-baud = 921600
-system = 1
-[control]
-priority = 80
-cpu = -1
-battery_land = 0.15
-[log]
-file = "$2"
-TOML
 }
 
 # start_daemon VEHICLE RAW_LOG [ODOMETRY_TOPIC]: returns once it has built its world from the map.

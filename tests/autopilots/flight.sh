@@ -15,7 +15,8 @@ fly_real() {
   fi
   ip link set lo up
   source "$root/tests/autopilots/simulators.sh"
-  bin=$build/services domain=7
+  source "$root/services/bench/configuration.sh"
+  bin=$build/services domain=7 model=builtin:quad-5in
   out=${out:-$work/out}
   mkdir -p "$out"
   log=$out/$name.log
@@ -42,25 +43,7 @@ die() {
 
 # daemon VEHICLE RAW_LOG: writes its configuration and starts it; the map may take a minute to be ready.
 daemon() {
-  cat >"$work/backwashd.toml" <<TOML
-vehicle = "$1"
-model = "builtin:quad-5in"
-[dds]
-domain = $domain
-interface = "lo"
-namespace = "backwash"
-odometry_topic = "rt/backwash/odometry"
-[link]
-device = "$device"
-baud = 921600
-system = 1
-[control]
-priority = 80
-cpu = -1
-battery_land = 0.15
-[log]
-file = "$2"
-TOML
+  write_configuration "$1" "$2"
   "$bin/backwashd" --config "$work/backwashd.toml" >>"$log" 2>&1 &
   daemon_pid=$!
   pids+=("$daemon_pid")

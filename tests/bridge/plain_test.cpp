@@ -55,7 +55,7 @@ Bytes wire(const plain_state_t& s) {
 plain_state_t flying() {
   plain_state_t s{};
   s.sequence = 1;
-  s.armed = s.following = s.ground_known = true;
+  s.armed = s.following = s.ground_known = s.pose_known = true;
   s.reset_counter = 3;
   s.time_ms = 5000;
   const float position[3] = {1, -2, 3}, velocity[3] = {0.5, 0.25, -0.125}, rates[3] = {0.1F, 0.2F, -0.3F};
@@ -91,8 +91,9 @@ TEST(PlainFrame, TheDocumentsExamplesAreReadAndWrittenBitForBit) {
   ASSERT_EQ(events(receiver, example.at("state")), std::vector{PLAIN_STATE});
   plain_state_t s;
   plain_read_state(&receiver, &s);
-  EXPECT_EQ(std::tuple(s.sequence, s.armed, s.following, s.on_ground, s.ground_known, s.failsafe, s.reset_counter),
-            std::tuple(65535, true, true, false, true, false, 7));
+  EXPECT_EQ(std::tuple(s.sequence, s.armed, s.following, s.on_ground, s.ground_known, s.failsafe, s.pose_known),
+            std::tuple(65535, true, true, false, true, false, true));
+  EXPECT_EQ(s.reset_counter, 7);
   EXPECT_EQ(std::tuple(s.answered, s.answer, s.time_ms, s.battery_percent, s.battery_millivolts),
             std::tuple(258, 1, 123456U, 87, 15600));
   EXPECT_EQ(std::tuple(s.position[2], s.velocity[0], s.attitude[0], s.rates[2]), std::tuple(3.F, 0.5F, 1.F, 0.125F));
@@ -193,6 +194,24 @@ TEST_F(PlainLinkTest, AControllersStateIsTelemetry) {
   EXPECT_FALSE(t.status->value.follows_setpoints);
   EXPECT_EQ(t.status->value.system_status, 5);
   EXPECT_EQ(t.landed_state->value, LandedState::kOnGround);
+}
+
+TEST_F(PlainLinkTest, AControllerThatKnowsNoPoseYetIsHeardAndSentPoses) {
+  auto s = flying();
+  s.pose_known = false;
+  std::ranges::fill(s.attitude, 0.F);
+  say(s);
+  poll_until(3);  // HEARTBEAT, EXTENDED_SYS_STATE, BATTERY_STATUS
+  const auto& t = link_.telemetry();
+  EXPECT_EQ(link_.vehicle(), kVehicle);
+  EXPECT_TRUE(t.status && t.landed_state && t.battery);
+  EXPECT_FALSE(t.local_state || t.attitude || t.reset_counter);
+  EXPECT_EQ(t.broken, 0U);
+  VioSample vio{};
+  vio.p_O = vio.v_B = Vec3::Zero();
+  vio.q_OB = Eigen::Quaterniond::Identity();
+  ASSERT_TRUE(link_.send_odometry(vio));
+  EXPECT_EQ(heard(), std::vector{PLAIN_POSE});
 }
 
 TEST_F(PlainLinkTest, ARepeatedStateIsNoSignOfLife) {

@@ -36,6 +36,8 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
                 {[&] { view_.odometry_age = 0.2; }, "no odometry"},
                 {[&] { view_.heartbeat_age = 2; }, "no heartbeat"},
                 {[&] { view_.pose_age = 0.32; }, "no pose from the autopilot"},
+                {[&] { view_.autopilot = firmware_bridge::Autopilot::kArduPilot; },
+                 "no value of GUID_TIMEOUT from the autopilot yet"},
                 {[&] { view_.state.p_W.x() = 99; }, "outside the map"}};
   for (const auto& [fault, why] : faults) {
     view_ = whole;
@@ -45,7 +47,7 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
   }
   view_ = whole;
   look();
-  Mission blind;
+  Mission blind{Vehicle{}};
   MissionInput in;
   in.now_s = now_s_;
   in.view = whole;

@@ -10,28 +10,7 @@ start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:
 controller=$!
 more_pids+=("$controller")
 for _ in $(seq 100); do [[ -e $work/plain ]] && break; sleep 0.05; done
-write_configuration() {
-  cat >"$work/backwashd.toml" <<TOML
-vehicle = "$1"
-model = "$1"
-[dds]
-domain = $domain
-interface = "lo"
-namespace = "backwash"
-odometry_topic = "rt/backwash/odometry"
-[link]
-device = "$work/plain"
-protocol = "plain"
-baud = 921600
-system = 1
-[control]
-priority = 80
-cpu = -1
-battery_land = 0.15
-[log]
-file = "$2"
-TOML
-}
+device=$work/plain more_link='protocol = "plain"'
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1" 2>>"$log"; }
 enable

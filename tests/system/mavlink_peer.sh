@@ -17,14 +17,16 @@ fi
 source "$source_dir/services/bench/session.sh"
 key=000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f other=${key//0/f}
 
-# meet NAME TRANSPORT OUR_KEY PEER_KEY: a few seconds of both; what each heard goes to $work/NAME.ours and .peer.
+# meet NAME TRANSPORT OUR_KEY PEER_KEY: three seconds of the peer, ours around them; what each heard goes to $work/NAME.ours and .peer.
 meet() {
   local name=$1 where='' link
-  "$build/tests/link_peer" "$2" 4 ${3:+"$3"} >"$work/$name.out" &
+  : >"$work/$name.out"
+  "$build/tests/link_peer" "$2" ${3:+"$3"} >"$work/$name.out" &
   link=$!
   more_pids+=("$link")
   for _ in $(seq 100); do where=$(head -n 1 "$work/$name.out"); [[ -n $where ]] && break; sleep 0.05; done
   node "$source_dir/tests/bridge/peer/peer.cjs" "$modules" "$2" "$where" 3 ${4:+"$4"} >"$work/$name.peer"
+  kill -TERM "$link"
   wait "$link" || die "$name: our end failed"
   tail -n 1 "$work/$name.out" >"$work/$name.ours"
 }
@@ -63,20 +65,21 @@ for transport in "pty", "udp":
             assert peer["unsigned"] == peer["frames"], peer
 PYTHON
 
-# The daemon with a key: 3 s of a controller that does not sign, then 3 s of one that does.
+# The daemon with a key: 3 s of a controller that does not sign, then 3 s of one that does. Disarmed: a daemon that starts
+# beside an armed vehicle says nothing at all (docs/faults.md row 36).
+device=udpin:127.0.0.1:14599 system=42 more_link="signing_key_file = \"$work/key\""
 write_configuration builtin:quad-5in "$work/flight.bwlog"
 (umask 077 && echo $key >"$work/key")
-sed -i "s|^device = .*|device = \"udpin:127.0.0.1:14599\"|; s|^system = 1|system = 42\nsigning_key_file = \"$work/key\"|" "$work/backwashd.toml"
 chmod 0640 "$work/key"
 code=0
 "$build/services/backwashd" --config "$work/backwashd.toml" >"$work/refused" 2>&1 || code=$?
-[[ $code == 78 ]] && grep -q "backwashd.toml:13: key 'link.signing_key_file' = .*needs 0600" "$work/refused" ||
+[[ $code == 78 ]] && grep -q "backwashd.toml:12: key 'link.signing_key_file' = .*needs 0600" "$work/refused" ||
   { cat "$work/refused"; die "a key that others may read was taken, exit $code"; }
 chmod 0600 "$work/key"
 "$build/services/backwashd" --config "$work/backwashd.toml" >>"$log" 2>&1 &
 daemon_pid=$!
 for _ in $(seq 100); do grep -q 'backwashd runs' "$log" && break; sleep 0.1; done
-run_peer() { node "$source_dir/tests/bridge/peer/peer.cjs" "$modules" udp 14599 3 ${1:+"$1"}; }
+run_peer() { DISARMED=1 node "$source_dir/tests/bridge/peer/peer.cjs" "$modules" udp 14599 3 ${1:+"$1"}; }
 run_peer >"$work/silent"
 "$build/services/backwashctl" --domain "$domain" status --json >"$work/status.json" 2>>"$log"
 stop
@@ -90,7 +93,7 @@ python3 - "$work" <<'PYTHON'
 import json, sys
 silent, status, spoken = (json.load(open(f"{sys.argv[1]}/{f}")) for f in ("silent", "status.json", "spoken"))
 print("daemon", silent, status["frames_refused"], spoken)
-assert silent["frames"] == 0 and status["frames_refused"] > 100 and not status["armed"], (silent, status)
+assert silent["frames"] == 0 and status["frames_refused"] > 20 and not status["armed"], (silent, status)
 assert spoken["frames"] > 3 and spoken["good"] == spoken["frames"] and spoken["rising"], spoken
 assert spoken["sender"] == [42, 191], spoken
 PYTHON

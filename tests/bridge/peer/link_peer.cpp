@@ -2,9 +2,11 @@
 // Our end of the test against an independent MAVLink library: an AutopilotLink at 50 Hz on a serial line (two
 // pseudo-terminals and a relay between them) or on UDP. Says where the other end is to be found, and at its end, as one
 // line of JSON, what it heard.
-//   link_peer pty|udp SECONDS [KEY_HEX]
+//   link_peer pty|udp [KEY_HEX]
+// Ends with SIGTERM.
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -17,6 +19,8 @@ using namespace backwash::firmware_bridge;
 using namespace std::chrono_literals;
 
 namespace {
+
+volatile std::sig_atomic_t stopped = 0;
 
 /// A serial line of two pseudo-terminals: what is written into one comes out of the other.
 struct Line {
@@ -71,7 +75,7 @@ void tell(const AutopilotLink& link) {
               R"("good": %llu, "unsigned": %llu, "wrong": %llu, "replayed": %llu})"
               "\n",
               link.vehicle().value_or(0), t.status && t.status->value.armed, p.x(), p.y(), p.z(),
-              t.attitude.has_value(), ack ? ack->value.result : -1, parameter ? parameter->value.value : -1,
+              t.attitude.has_value(), ack ? ack->value.result : -1, parameter ? parameter->value : -1,
               t.battery && t.battery->value.voltage ? *t.battery->value.voltage : -1, link.clock().has_value(),
               count(link.received().frames), count(link.received().bad_crc), count(link.received().skipped_bytes),
               count(link.transmit().sent()), count(counted.good), count(counted.unsigned_frames),
@@ -89,7 +93,8 @@ tl::expected<Port, PortError> open(const std::optional<Line>& line) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 3) return 64;
+  if (argc < 2) return 64;
+  std::signal(SIGTERM, [](int) { stopped = 1; });
   const std::string kind = argv[1];
   std::optional<Line> line;
   if (kind == "pty") {
@@ -104,13 +109,12 @@ int main(int argc, char** argv) {
   }
   const Time start = std::chrono::steady_clock::now();
   AutopilotLink link(std::move(*port), std::nullopt, start);
-  if (argc > 3) {
+  if (argc > 2) {
     const auto since_2015 = std::chrono::system_clock::now().time_since_epoch() - 1'420'070'400s;
     const auto time = std::chrono::duration_cast<std::chrono::microseconds>(since_2015).count() / 10;
-    link.require_signatures(mavlink::Signing(key_of(argv[3]), 0, static_cast<mavlink::SigningTime>(time)), start);
+    link.require_signatures(mavlink::Signing(key_of(argv[2]), 0, static_cast<mavlink::SigningTime>(time)), start);
   }
-  const int ticks = static_cast<int>(std::stod(argv[2]) * 50);
-  for (int tick = 0; tick < ticks; ++tick) {
+  for (int tick = 0; stopped == 0; ++tick) {
     for (int i = 0; i < 4; ++i) {
       if (line) line->carry();
       ::usleep(5000);

@@ -2,9 +2,11 @@
 // The other end of the test against an independent MAVLink library: a flight controller made of node-mavlink (LGPL, a
 // separate program for tests alone). Says at its end, as one line of JSON, what it heard.
 //   node peer.cjs MODULES pty|udp PATH|PORT SECONDS [KEY_HEX]
+// Armed, unless DISARMED is set in the environment.
 const [modules, kind, where, seconds, keyHex] = process.argv.slice(2)
 const mav = require(require.resolve('node-mavlink', { paths: [modules] }))
 const { minimal, common } = mav
+const armed = process.env.DISARMED ? 0 : 128
 const key = keyHex ? Buffer.from(keyHex, 'hex') : null
 
 let output, input
@@ -68,7 +70,7 @@ let tick = 0
 const timer = setInterval(() => {
   const t = 20 * tick
   if (tick % 10 === 0) {
-    send(make(minimal.Heartbeat, { type: 2, autopilot: 12, baseMode: 129, customMode: 393216, systemStatus: 4 }))
+    send(make(minimal.Heartbeat, { type: 2, autopilot: 12, baseMode: 1 | armed, customMode: 393216, systemStatus: 4 }))
     send(make(common.BatteryStatus, { id: 0, voltages: [15600, 65535, 65535, 65535, 65535, 65535, 65535, 65535, 65535, 65535],
                                       batteryRemaining: 70 }))
   }

@@ -87,7 +87,7 @@ class Controller {
 
   void say_state() {
     const auto& t = vehicle_.telemetry();
-    if (!t.status || !t.local_state || !t.attitude) return;
+    if (!t.status) return;
     plain_state_t s{};
     s.sequence = ++sequence_;
     s.armed = t.status->value.armed;
@@ -101,16 +101,21 @@ class Controller {
     }
     const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(now_.time_since_epoch());
     s.time_ms = static_cast<std::uint32_t>(since.count());
+    s.pose_known = t.local_state && t.attitude;
+    if (s.pose_known) say_pose(t, s);
+    s.battery_percent = 255;
+    std::array<std::uint8_t, PLAIN_STATE_SIZE> wire;
+    plain_write_state(&s, wire.data());
+    line_.write(wire);
+  }
+
+  static void say_pose(const Telemetry& t, plain_state_t& s) {
     store(t.local_state->value.p_W, s.position);
     store(t.local_state->value.v_W, s.velocity);
     const auto& q = t.attitude->value.q_LB;
     const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
     for (int i = 0; i < 4; ++i) s.attitude[i] = static_cast<float>(wxyz[i]);
     store(t.attitude->value.omega_B, s.rates);
-    s.battery_percent = 255;
-    std::array<std::uint8_t, PLAIN_STATE_SIZE> wire;
-    plain_write_state(&s, wire.data());
-    line_.write(wire);
   }
 
   struct Asked {

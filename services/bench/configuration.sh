@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Sourced by every script that starts the daemon; needs $work and $domain.
+
+# write_configuration VEHICLE RAW_LOG [ODOMETRY_TOPIC]: $work/backwashd.toml. Of its other values, $model is the vehicle's
+# and $device the bench's if they are not set; $more_link holds further lines of [link], $more_tables whole tables.
+write_configuration() {
+  cat >"$work/backwashd.toml" <<TOML
+vehicle = "$1"
+model = "${model:-$1}"
+[dds]
+domain = $domain
+interface = "lo"
+namespace = "backwash"
+odometry_topic = "${3:-rt/backwash/odometry}"
+[link]
+device = "${device:-$work/autopilot}"
+baud = 921600
+system = ${system:-1}
+${more_link:-}
+[control]
+priority = 80
+cpu = -1
+battery_land = 0.15
+[log]
+file = "$2"
+${more_tables:-}
+TOML
+}
