@@ -49,7 +49,7 @@ struct MapMessage {
   bool binary = true;
   std::string id;
   std::int64_t received_ns = 0;
-  MapWriter from;
+  MapWriter from{};
 };
 
 /// One range scan in the map.
