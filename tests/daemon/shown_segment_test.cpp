@@ -11,7 +11,8 @@ namespace {
 
 TEST(ShownSegment, IsInTheFrameThatTheConfigurationCallsTheMaps) {
   track::AcceptedSegment segment{};
-  segment.commands = {{{1, 2, 3}, {}, {}, 0.4}, {{4, 5, 6}, {}, {}, -0.4}};
+  const Vec3 still = Vec3::Zero();
+  segment.commands = {{{1, 2, 3}, still, still, 0.4}, {{4, 5, 6}, still, still, -0.4}};
   segment.tube.resize(1);
   segment.tube[0].center.p_W = {7, 8, 9};
   segment.tube[0].half_widths_interval.fill(0.25);
