@@ -169,9 +169,10 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
     link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
                           to_string(s.reason));
-  // Only while nothing depends on the line's time.
+  // Only while nothing depends on the line's time. After a restart of the autopilot we are quiet, and it stands.
   const bool passive = s.mode == track::Mode::passive;
-  parameters_.step(link_, passive || s.mode == track::Mode::quiet, passive, view_);
+  const bool restarted = s.mode == track::Mode::quiet && !in.autopilot.armed;
+  parameters_.step(link_, passive || restarted, passive, view_);
   // What the tick needs is asked for again every 2 s: an autopilot may have restarted.
   if (s.send_heartbeat && view_.ticks % (2 * kTicksPerSecond) == 1) {
     link_.send_message_interval(kLocalPositionNed, 50);

@@ -54,6 +54,7 @@ struct LongFlight {
     tick(track::Request::enable);
     for (int n = 0; n < 60; ++n) tick();
     segment.epoch = flight.epoch();
+    segment.closures = closures;
     in.segment = &segment;
     tick();
     in.segment = nullptr;
