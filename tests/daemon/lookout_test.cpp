@@ -34,6 +34,7 @@ struct LongFlight {
 
   explicit LongFlight(std::size_t sets = 3000) {
     segment.id = 1;
+    segment.closures = closures;
     for (std::size_t k = 0; k <= sets; ++k) {
       const double t = 0.02 * static_cast<double>(k);
       reach::TubeStep s{};
