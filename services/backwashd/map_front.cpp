@@ -3,18 +3,13 @@
 
 #include <spdlog/spdlog.h>
 
-#include <cmath>
 #include <utility>
 
 #include "services/backwashd/localization.hpp"
+#include "services/backwashd/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
 
 namespace backwash::daemon {
-namespace {
-
-geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
-
-}  // namespace
 
 MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
     : channels_(channels),
@@ -115,26 +110,9 @@ void MapFront::run_readers() {
 }
 
 void MapFront::send(const track::AcceptedSegment& segment) {
-  const std_msgs_msg_dds__Header_ header{dds::wall_clock(), dds::c_string(map_frame_)};
-  std::vector<dds::TubeStep> steps;
-  std::vector<dds::PoseStamped> poses;
-  for (const auto& s : segment.tube) {
-    dds::TubeStep step{s.t, point(s.center.p_W), {}};
-    std::copy(s.half_widths_interval.begin(), s.half_widths_interval.end(), step.half_widths);
-    steps.push_back(step);
-  }
-  for (const Setpoint& c : segment.commands)
-    poses.push_back({header, {point(c.p_W), {0, 0, std::sin(c.yaw / 2), std::cos(c.yaw / 2)}}});
-  dds::Tube tube{};
-  tube.header = header;
-  tube.steps = {static_cast<std::uint32_t>(steps.size()), static_cast<std::uint32_t>(steps.size()), steps.data(),
-                false};
-  tube_.write(tube);
-  dds::Path path{};
-  path.header = header;
-  path.poses = {static_cast<std::uint32_t>(poses.size()), static_cast<std::uint32_t>(poses.size()), poses.data(),
-                false};
-  trajectory_.write(path);
+  const ShownSegment shown(segment, map_frame_);
+  tube_.write(shown.tube());
+  trajectory_.write(shown.trajectory());
 }
 
 }  // namespace backwash::daemon

@@ -34,6 +34,7 @@ struct LongFlight {
 
   explicit LongFlight(std::size_t sets = 3000) {
     segment.id = 1;
+    segment.closures = closures;
     for (std::size_t k = 0; k <= sets; ++k) {
       const double t = 0.02 * static_cast<double>(k);
       reach::TubeStep s{};
@@ -54,6 +55,7 @@ struct LongFlight {
     tick(track::Request::enable);
     for (int n = 0; n < 60; ++n) tick();
     segment.epoch = flight.epoch();
+    segment.closures = closures;
     in.segment = &segment;
     tick();
     in.segment = nullptr;

@@ -77,6 +77,8 @@ TEST_F(SigningTimeTest, AnEndInOrderIsGoneOnFrom) {
 TEST_F(SigningTimeTest, AFileThatHoldsNoTimeIsWrittenAnew) {
   for (const char* bad : {"x", "12", "garbage garbage garbage", "999999999999999\n", "-00000000000001\n"}) {
     std::ofstream(path_) << bad;
+    EXPECT_EQ(SigningTimeFile(path_, Wall{}).start(), 0U) << bad << " is no time, not even an early one";
+    std::ofstream(path_) << bad;
     EXPECT_EQ(SigningTimeFile(path_, kWall).start(), kThen) << bad;
     EXPECT_EQ(stored(), kThen + SigningTimeFile::kReserve);
   }

@@ -10,7 +10,6 @@
 import argparse
 import concurrent.futures
 import dataclasses
-import fnmatch
 import json
 import os
 import pathlib
@@ -91,28 +90,15 @@ def draw(count: int, seed: int) -> list[table.Mutant]:
         rows = [m for m in rows if m.id not in refused]
 
 
-def chosen(spec: str, test: suite.Test) -> bool:
-    """Whether "PROGRAM FILTER" chooses this test, as --gtest_filter would."""
-    program, _, patterns = spec.partition(" ")
-    return test.program == program and any(fnmatch.fnmatchcase(test.name, p) for p in (patterns or "*").split(":"))
+def judge(mutant: table.Mutant, test: suite.Test) -> str:
+    """How it killed the mutant, or ''. A failure counts if it comes twice: the machine's load may upset a test once."""
+    def ended() -> str:
+        return suite.run(BIN / test.program, test.name, test.limit, {"BACKWASH_MUTANT": str(mutant.number)})[0]
 
-
-def named(mutant: table.Mutant, tests: list[suite.Test], earlier: str) -> list[suite.Test]:
-    """Of the tests that can see the mutant: what killed it the last time, then those that its row names."""
-    seeing = [t for t in tests if t.passes(mutant.number)]
-    return ([t for t in seeing if str(t) == earlier] +
-            [t for t in seeing if str(t) != earlier and any(chosen(spec, t) for spec in mutant.tests)])
-
-
-def judge(mutant: table.Mutant, tests: list[suite.Test]) -> str:
-    """What killed it, or ''. A failure counts if it comes twice: a test that the machine's load has upset says nothing."""
-    for test in tests:
-        ended = [suite.run(BIN / test.program, test.name, test.limit, {"BACKWASH_MUTANT": str(mutant.number)})[0]]
-        if ended[0] == "fails":
-            ended += [suite.run(BIN / test.program, test.name, test.limit, {"BACKWASH_MUTANT": str(mutant.number)})[0]]
-        if all(ended):
-            return f"{test}" if ended[0] == "fails" else f"{test} {ended[0]}"
-    return ""
+    how = ended()
+    if how == "fails" and not ended():
+        return ""
+    return "" if not how else f"{test}" if how == "fails" else f"{test} {how}"
 
 
 def rows_of(result: pathlib.Path) -> dict[str, list[str]]:
@@ -121,39 +107,40 @@ def rows_of(result: pathlib.Path) -> dict[str, list[str]]:
     return {line.split("\t")[0]: line.split("\t") for line in lines}
 
 
-def killers(result: pathlib.Path) -> dict[str, str]:
+def killers(result: pathlib.Path) -> dict[str, list[str]]:
     """The test that killed each mutant of an earlier run: if it is still there, the quickest proof."""
-    return {id: " ".join(row[3].split()[:2]) for id, row in rows_of(result).items() if row[2] == "killed"}
+    return {id: [" ".join(row[3].split()[:2])] for id, row in rows_of(result).items() if row[2] == "killed"}
 
 
 def run(mutants: list[table.Mutant], jobs: int, quick: bool, result: pathlib.Path) -> int:
-    """Each mutant against the tests that pass its switch, until one fails: first those that its row names, then, of what
-    lives, all others."""
+    """Each mutant against the tests that pass its switch, until one fails: what killed it the last time and those that
+    its row names; then, of what lives, all others."""
     earlier = killers(result)
     killed: dict[str, str] = {}
-    tried: dict[str, set[str]] = {m.id: set() for m in mutants}
+    tried: dict[str, set[tuple[str, str]]] = {m.id: set() for m in mutants}
+    tests = suite.Suite(BIN, PROGRAMS, WORK / "survey.json")
     lock = threading.Lock()
 
-    def attempt(m: table.Mutant, tests: list[suite.Test], last: bool) -> None:
-        fresh = [t for t in tests if str(t) not in tried[m.id]]
-        tried[m.id] |= {str(t) for t in fresh}
-        if by := judge(m, fresh):
-            killed[m.id] = by
-        if by or last:
-            print(f"{m.id}: {by or f'lives, of {len(tried[m.id])} tests that pass it'}", flush=True)
+    def attempt(m: table.Mutant, specs: list[str], last: bool) -> None:
+        passed = 0
+        for program, name in [t for spec in specs for t in tests.chosen(spec)]:
+            if m.id in killed or (program, name) in tried[m.id]:
+                continue
+            tried[m.id].add((program, name))
+            test = tests.test(program, name)
+            if test and test.passes(m.number):
+                passed += 1
+                if by := judge(m, test):
+                    killed[m.id] = by
+        if m.id in killed or last:
+            print(f"{m.id}: {killed.get(m.id) or f'lives, of {passed} more tests that pass it'}", flush=True)
             with lock:
                 write([m], killed, result)
 
-    def survey(programs: list[str]) -> list[suite.Test]:
-        return suite.survey([BIN / name for name in programs], WORK / "survey.json", jobs)
-
-    some = survey([p for p in PROGRAMS if any(spec.split()[0] == p for m in mutants for spec in m.tests)])
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        list(pool.map(lambda m: attempt(m, named(m, some, earlier.get(m.id, "")), quick), mutants))
+        list(pool.map(lambda m: attempt(m, earlier.get(m.id, []) + m.tests, quick), mutants))
         if not quick:
-            every = survey(PROGRAMS)
-            list(pool.map(lambda m: attempt(m, [t for t in every if t.passes(m.number)], True),
-                          [m for m in mutants if m.id not in killed]))
+            list(pool.map(lambda m: attempt(m, PROGRAMS, True), [m for m in mutants if m.id not in killed]))
     return report(mutants, killed)
 
 
