@@ -83,12 +83,14 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
                           text(s.task),
                           text(s.mismatch),
                           text(s.place),
+                          text(s.stop_switch),
                           text(s.refused),
                           {}};
       for (std::uint32_t n = 0; n < s.parameters._length; ++n)
         newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
       auto& own = newest->numbers;
-      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.refused = nullptr;
+      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.stop_switch = own.refused =
+          nullptr;
       own.parameters = {};
     });
   }

@@ -180,6 +180,7 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     commanding_ = view.mode != track::Mode::passive && view.mode != track::Mode::quiet;
     const std::string mode = to_string(view.mode), reason = to_string(view.reason);
     const std::string mismatch = to_string(view.mismatch);
+    const std::string stop_switch(name(view.stop_switch));
     dds::Status s{};
     s.stamp = dds::wall_clock();
     s.vehicle = dds::c_string(vehicle.name);
@@ -211,6 +212,7 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     const std::int64_t map_ns = channels_.map_ns;
     s.map_age = map_ns < 0 ? -1 : static_cast<double>(now_ns() - map_ns) * 1e-9;
     s.commands_refused = channels_.commands_refused;
+    s.stop_switch = dds::c_string(stop_switch);
     s.frames_bad = view.frames_bad;
     s.frames_refused = view.frames_refused;
     s.records_lost = channels_.control_log.lost() + recorder_.lost();
@@ -219,6 +221,8 @@ void DdsFront::run_status(const Vehicle& vehicle) {
     s.frame_residual_rad = view.residual_rad;
     s.odometry_age = view.odometry_age;
     s.heartbeat_age = view.heartbeat_age;
+    s.clock_offset = view.clock ? 1e-9 * static_cast<double>(view.clock->offset_ns) : 0;
+    s.clock_delay = view.clock ? 0.5e-9 * static_cast<double>(view.clock->round_trip_ns) : -1;
     s.mismatch = dds::c_string(mismatch);
     s.place = place.data();
     s.parts_filtered = dds::filtered_parts();
