@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <array>
+#include <iterator>
 
 #include "core/config/daemon_config.hpp"
 #include "core/config/strict_table.hpp"
@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::string_view kProtocol = "link.protocol";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
-constexpr std::array<std::string_view, 4> kGpio{"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
+constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
 bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool digit(char c) { return c >= '0' && c <= '9'; }
@@ -128,7 +128,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   const std::pair<std::string_view, std::string*> frames[] = {
       {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
   std::vector<std::string_view> text_keys{"map.live", kProtocol, kSigningKeyFile};
-  text_keys.insert(text_keys.end(), kGpio.begin(), kGpio.end());
+  text_keys.insert(text_keys.end(), std::begin(kGpio), std::end(kGpio));
   for (const auto& [key, target] : texts) text_keys.push_back(key);
   for (const auto& [key, target] : frames) text_keys.push_back(key);
   if (auto read = file->read(numbers, text_keys); !read) return tl::unexpected(read.error());

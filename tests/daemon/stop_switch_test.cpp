@@ -48,7 +48,7 @@ TEST(Row37StopSwitch, PressedInFlightItIsAStopInItsTickForAsLongAsItIsPressed) {
     ASSERT_EQ(rig.wire().setpoints.size(), 1U);
     ASSERT_NE(rig.view().segment, moving);
   }
-  EXPECT_LT(rig.autopilot->truth().state().v_W.norm(), 0.05) << "it stands";
+  EXPECT_LT(rig.autopilot->truth().v_W.norm(), 0.05) << "it stands";
   rig.set(SwitchState::released);
   for (int n = 0; n < 50; ++n) rig.look_and_tick();
   EXPECT_EQ(rig.mode(), Mode::hold) << "released is no order to go on";
@@ -81,7 +81,7 @@ TEST(Row37StopSwitch, AThreadThatReadsNothingMoreIsALostLine) {
   Switched rig;
   rig.fly();
   rig.look_and_tick();
-  int ticks = 1;  // since the last reading
+  int ticks = 0;  // since the last reading
   for (; rig.mode() == Mode::tracking && ticks < 50; ++ticks) rig.tick();
   EXPECT_EQ(rig.mode(), Mode::hold);
   EXPECT_EQ(ticks, 16) << "300 ms";

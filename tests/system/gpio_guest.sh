@@ -46,6 +46,7 @@ mkdir -p "$guest"/{bin,proc,sys,dev,config,tmp,etc}
 cp "$cache"/{configfs.ko,gpio_guest.ko} "$guest/"
 cp "$cache/busybox" "$guest/bin/"
 cp "$source_dir/tests/system/gpio_guest_init.sh" "$guest/init"
+echo '127.0.0.1 localhost' >"$guest/etc/hosts"
 for program in backwashd backwashctl; do
   cp "$build/services/$program" "$guest/bin/"
   ldd "$build/services/$program" | grep -o '/[^ ]*' | while read -r library; do cp --parents -L -n "$library" "$guest/"; done
@@ -59,7 +60,7 @@ source "$source_dir/services/bench/configuration.sh"
 write_configuration builtin:quad-5in /tmp/flight.bwlog
 sed 's/^priority = .*/priority = 0/' "$work/backwashd.toml" >"$guest/etc/backwashd.toml"
 (cd "$guest" && find . | "$cache/busybox" cpio -o -H newc 2>/dev/null | gzip -1 >"$work/initrd")
-timeout 280 qemu-system-x86_64 -machine pc -accel tcg -smp 2 -m 1024 -nographic -no-reboot -nic none \
+timeout 900 qemu-system-x86_64 -machine pc -accel tcg -smp 2 -m 1024 -nographic -no-reboot -nic none \
   -kernel "$cache/vmlinuz" -initrd "$work/initrd" -append 'console=ttyS0 quiet panic=-1' </dev/null | tr -d '\r' >"$work/console" || true
 grep -a '^gpio: ' "$work/console" || true
 grep -aq '^gpio: all seen' "$work/console" || { tail -n 60 "$work/console" >&2; echo "gpio_guest: see above" >&2; exit 1; }
