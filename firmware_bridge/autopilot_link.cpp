@@ -324,7 +324,7 @@ bool AutopilotLink::send_parameter_request(std::string_view name) noexcept {
   mavlink::ParamRequestRead m{
       .param_index = -1, .target_system = heard_.value_or(0), .target_component = kFlightController, .param_id = {}};
   std::ranges::copy(name.substr(0, m.param_id.size()), m.param_id.begin());
-  return send(m);
+  return telemetry_.expect_parameter(name) && send(m);
 }
 
 bool AutopilotLink::send_timesync(Time now) noexcept {

@@ -20,10 +20,9 @@ namespace backwash::firmware_bridge {
 
 using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort, PlainPort>;
 
-inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< docs/faults.md row 21
-inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);         ///< docs/faults.md row 19
-inline constexpr int kMaxMissedSetpoints = 2;                               ///< docs/faults.md row 20
-inline constexpr std::uint8_t kOnboardComputer = 191;                       ///< our component id
+inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);  ///< docs/faults.md row 19
+inline constexpr int kMaxMissedSetpoints = 2;                        ///< docs/faults.md row 20
+inline constexpr std::uint8_t kOnboardComputer = 191;                ///< our component id
 
 /// Commands that the link sends (MAV_CMD), to ask telemetry().result_of() for their answers.
 inline constexpr std::uint16_t kCommandMessage = 512, kCommandLand = 21, kCommandTakeoff = 22, kCommandSetMode = 176,

@@ -39,6 +39,12 @@ bool follows_setpoints(const mavlink::Heartbeat& m) noexcept {
 constexpr double kFarthest = 10'000, kFastest = 100, kFastestTurn = 100;  // m, m/s, rad/s
 bool sane(const Vec3& v, double most) noexcept { return v.norm() <= most; }
 
+std::array<char, 16> parameter_id(std::string_view name) noexcept {
+  std::array<char, 16> id{};
+  std::ranges::copy(name.substr(0, id.size()), id.begin());
+  return id;
+}
+
 std::optional<double> share(std::int8_t percent) noexcept {
   if (percent < 0 || percent > 100) return std::nullopt;
   return percent / 100.0;
@@ -49,6 +55,7 @@ std::optional<double> share(std::int8_t percent) noexcept {
 void Telemetry::take(const mavlink::Heartbeat& m, Time now) noexcept {
   const VehicleStatus s{autopilot_of(m.autopilot), (m.base_mode & kSafetyArmed) != 0, follows_setpoints(m),
                         m.custom_mode, m.system_status};
+  if (status && now - status->at >= kHeartbeatTimeout) forget_parameters();
   status = {s, now};
 }
 
@@ -172,29 +179,34 @@ void Telemetry::take(const mavlink::Statustext& m, Time now) noexcept {
 // PX4 puts an integer's bytes where the float is; others convert.
 void Telemetry::take(const mavlink::ParamValue& m, Time now) noexcept {
   constexpr std::uint8_t kInt32 = 6;
-  Parameter p{m.param_id, static_cast<double>(m.param_value)};
+  double value = static_cast<double>(m.param_value);
   const bool px4 = status && status->value.autopilot == Autopilot::kPx4;
-  if (px4 && m.param_type == kInt32) p.value = std::bit_cast<std::int32_t>(m.param_value);
-  if (!std::isfinite(p.value)) {
+  if (px4 && m.param_type == kInt32) value = std::bit_cast<std::int32_t>(m.param_value);
+  if (!std::isfinite(value)) {
     ++broken;
     return;
   }
-  for (auto& known : parameters_) {
-    if (known && known->value.name == p.name) {
-      known = {p, now};
-      return;
-    }
-  }
-  parameters_[next_parameter_] = {p, now};
-  next_parameter_ = (next_parameter_ + 1) % parameters_.size();
+  for (std::size_t n = 0; n < expected_; ++n)
+    if (parameters_[n].name == m.param_id) parameters_[n].value = {value, now};
 }
 
-Latest<Parameter> Telemetry::parameter(std::string_view name) const noexcept {
-  std::array<char, 16> wanted{};
-  std::ranges::copy(name.substr(0, wanted.size()), wanted.begin());
-  for (const auto& p : parameters_) {
-    if (p && p->value.name == wanted) return p;
-  }
+bool Telemetry::expect_parameter(std::string_view name) noexcept {
+  const auto wanted = parameter_id(name);
+  const auto end = parameters_.begin() + static_cast<std::ptrdiff_t>(expected_);
+  if (std::find_if(parameters_.begin(), end, [&](const Parameter& p) { return p.name == wanted; }) != end) return true;
+  if (expected_ == parameters_.size()) return false;
+  parameters_[expected_++] = {wanted, {}};
+  return true;
+}
+
+void Telemetry::forget_parameters() noexcept {
+  for (Parameter& p : parameters_) p.value.reset();
+}
+
+Latest<double> Telemetry::parameter(std::string_view name) const noexcept {
+  const auto wanted = parameter_id(name);
+  for (std::size_t n = 0; n < expected_; ++n)
+    if (parameters_[n].name == wanted) return parameters_[n].value;
   return std::nullopt;
 }
 

@@ -14,6 +14,8 @@ namespace backwash::firmware_bridge {
 /// Monotonic time; the caller passes it in, so that tests can count it in ticks.
 using Time = std::chrono::steady_clock::time_point;
 
+inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< docs/faults.md row 21
+
 /// A value and when it arrived here.
 template <class T>
 struct Received {
@@ -62,12 +64,6 @@ struct CommandResult {
   std::uint8_t result = 0;    ///< MAV_RESULT, 0 = accepted
 };
 
-/// From PARAM_VALUE.
-struct Parameter {
-  std::array<char, 16> name{};  ///< zero-filled; all 16 may be used
-  double value = 0;
-};
-
 /// From STATUSTEXT.
 struct StatusLine {
   std::uint8_t severity = 0;    ///< 0 emergency … 7 debug
@@ -95,8 +91,11 @@ class Telemetry {
   /// Newest answer to this command, if any came since the start.
   Latest<CommandResult> result_of(std::uint16_t command) const noexcept;
 
-  /// The autopilot's value of a parameter that was asked for, if it came; the last eight names are kept.
-  Latest<Parameter> parameter(std::string_view name) const noexcept;
+  /// The autopilot's value of a parameter that was asked for, if it came. Others, which stations ask for, are not kept;
+  /// after a silence of kHeartbeatTimeout it may have restarted with other values, and none is.
+  Latest<double> parameter(std::string_view name) const noexcept;
+  /// This name will be asked for. False: there is no room for another one.
+  bool expect_parameter(std::string_view name) noexcept;
 
   void take(const mavlink::Heartbeat& m, Time now) noexcept;
   void take(const mavlink::LocalPositionNed& m, Time now) noexcept;
@@ -114,6 +113,7 @@ class Telemetry {
   void take(const mavlink::ParamValue& m, Time now) noexcept;
 
  private:
+  void forget_parameters() noexcept;
   void take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
                      Time now) noexcept;
   void take_imu(const Vec3& force_F, const Vec3& omega_F, Time now) noexcept;
@@ -123,8 +123,12 @@ class Telemetry {
   bool battery_status_seen_ = false;
   std::array<Latest<CommandResult>, 8> results_;
   std::size_t next_result_ = 0;
-  std::array<Latest<Parameter>, 8> parameters_;
-  std::size_t next_parameter_ = 0;
+  struct Parameter {
+    std::array<char, 16> name{};  // zero-filled; all 16 may be used
+    Latest<double> value;
+  };
+  std::array<Parameter, 48> parameters_;  // of two firmwares, should the controller be changed
+  std::size_t expected_ = 0;
 };
 
 }  // namespace backwash::firmware_bridge

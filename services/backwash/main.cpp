@@ -24,9 +24,9 @@ int main(int argc, char** argv) {
   try {
     app.set_version_flag("--version", std::string("backwash ") + backwash::kVersion);
     app.require_subcommand(1);
-    verbs = {fly_verb(app),       plan_verb(app),        reach_verb(app),   field_verb(app),
-             simulate_verb(app),  feasibility_verb(app), compare_verb(app), report_verb(app),
-             calibrate_verb(app), import_verb(app),      replay_verb(app),  study_verb(app)};
+    verbs = {fly_verb(app),         plan_verb(app),    reach_verb(app),  field_verb(app),     simulate_verb(app),
+             feasibility_verb(app), compare_verb(app), report_verb(app), calibrate_verb(app), import_verb(app),
+             replay_verb(app),      study_verb(app),   vehicle_verb(app)};
     for (const auto& v : verbs) {
       v.command->preparse_callback([&verb, &v](std::size_t) { verb = " " + v.command->get_name(); });
     }

@@ -50,6 +50,7 @@ Verb calibrate_verb(CLI::App& app);
 Verb import_verb(CLI::App& app);
 Verb replay_verb(CLI::App& app);
 Verb study_verb(CLI::App& app);
+Verb vehicle_verb(CLI::App& app);
 
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.
 CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional<Vec3>& target,

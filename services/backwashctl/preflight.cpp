@@ -2,6 +2,7 @@
 #include "services/backwashctl/preflight.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 namespace backwash::ctl {
@@ -11,54 +12,6 @@ std::string number(const char* format, double value) {
   char text[64];
   std::snprintf(text, sizeof text, format, value);
   return text;
-}
-
-/// A parameter that is unsafe indoors unless it has one of these values. Actions that return climb first; those that
-/// stop the motors or hand over to nobody fall.
-struct Rule {
-  const char* name;
-  bool (*good)(double);
-  const char* advice;
-};
-bool any_of(double value, std::initializer_list<int> allowed) {
-  return std::ranges::any_of(allowed, [&](int v) { return value == v; });
-}
-constexpr int kOffboardBit = 2;
-const Rule kRules[] = {
-    {"COM_OF_LOSS_T", [](double v) { return v > 0 && v <= 1; },
-     "set COM_OF_LOSS_T to 1 s or less: for so long the vehicle flies on when the set-points stop"},
-    {"COM_OBL_RC_ACT",
-     [](double v) {
-       return any_of(v, {4, 5});
-     },
-     "set COM_OBL_RC_ACT to 4 (land) or 5 (hold): 3 climbs and returns, 6 and 7 drop the vehicle"},
-    {"COM_RC_OVERRIDE", [](double v) { return (static_cast<int>(v) & kOffboardBit) != 0; },
-     "add 2 to COM_RC_OVERRIDE: without it the pilot's sticks do not take over in offboard"},
-    {"NAV_DLL_ACT",
-     [](double v) {
-       return any_of(v, {0, 1, 3});
-     },
-     "set NAV_DLL_ACT to 0 (none), 1 (hold) or 3 (land): 2 climbs and returns, 5 and 6 drop the vehicle"},
-    {"COM_LOW_BAT_ACT",
-     [](double v) {
-       return any_of(v, {0, 2});
-     },
-     "set COM_LOW_BAT_ACT to 2 (land): 1 and 3 climb and return"},
-};
-
-std::vector<Finding> parameters(const StatusCopy& s) {
-  std::vector<Finding> findings;
-  for (const Rule& rule : kRules) {
-    const auto known = std::ranges::find(s.parameters, rule.name, &std::pair<std::string, double>::first);
-    if (known == s.parameters.end()) {
-      findings.push_back({rule.name, false, "not known",
-                          "check the link: the autopilot has not answered; on ArduPilot look at FS_OPTIONS instead"});
-      continue;
-    }
-    const bool good = rule.good(known->second);
-    findings.push_back({rule.name, good, number("%g", known->second), good ? "" : rule.advice});
-  }
-  return findings;
 }
 
 }  // namespace
@@ -93,7 +46,8 @@ std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after
   add("map overlap", after.place.empty(), after.place.empty() ? "the vehicle stands in known free space" : after.place,
       "send the map of this place, or align the VIO with it, and put the vehicle where there is room to rise");
   add("map age", n.map_age >= 0, n.map_age < 0 ? "no map" : number("%.1f s", n.map_age), "send a map");
-  for (Finding& finding : parameters(after)) findings.push_back(std::move(finding));
+  for (const auto& p : after.parameters)
+    add(p.name, p.advice.empty(), std::isnan(p.value) ? "not known" : number("%g", p.value), p.advice);
   return findings;
 }
 

@@ -16,8 +16,8 @@ struct Finding {
   std::string advice;  ///< what to do; empty when good
 };
 
-/// Preflight from two statuses `seconds` apart: frames, rates, ages, clock, map, and those of PX4's parameters that are
-/// unsafe indoors. A parameter that the autopilot has not told is not judged as good.
+/// Preflight from two statuses `seconds` apart: frames, rates, ages, clock, map, and the autopilot's parameters as the
+/// daemon judges them. One that the autopilot has not told is not good.
 std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after, double seconds);
 
 }  // namespace backwash::ctl

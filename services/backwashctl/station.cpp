@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashctl/station.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <random>
@@ -63,7 +64,9 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
     }
     waitset_.wait(0.05);
     acks_.take([&](const dds::Ack& ack) {
-      if (ack.session == session_ && ack.sequence_number == sequence_) result = Result{ack.result, text(ack.reason)};
+      const bool ours = std::ranges::equal(ack.writer, commands_.guid());
+      if (ours && ack.session == session_ && ack.sequence_number == sequence_)
+        result = Result{ack.result, text(ack.reason)};
     });
   }
   return result;
@@ -85,12 +88,15 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
                           text(s.place),
                           text(s.stop_switch),
                           text(s.refused),
+                          text(s.autopilot),
+                          text(s.autopilot_says),
                           {}};
       for (std::uint32_t n = 0; n < s.parameters._length; ++n)
-        newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
+        newest->parameters.push_back(
+            {text(s.parameters._buffer[n].name), s.parameters._buffer[n].value, text(s.parameters._buffer[n].advice)});
       auto& own = newest->numbers;
       own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.stop_switch = own.refused =
-          nullptr;
+          own.autopilot = own.autopilot_says = nullptr;
       own.parameters = {};
     });
   }

@@ -28,8 +28,13 @@ struct Options {
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its members that own memory are null
-  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused;
-  std::vector<std::pair<std::string, double>> parameters;
+  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says;
+  struct Parameter {
+    std::string name;
+    double value;  ///< NaN: the autopilot has not answered
+    std::string advice;
+  };
+  std::vector<Parameter> parameters;
 };
 
 /// One ground station: sends commands, waits for their acknowledgement and watches the status.
@@ -44,6 +49,10 @@ class Station {
   /// Sends a command and repeats it, with the same sequence number, until it is acknowledged; nothing if it never is.
   std::optional<Result> send(std::uint8_t verb, const Vec3& position = Vec3::Zero(), double yaw = 0,
                              const std::vector<Vec3>& waypoints = {});
+  /// Whether this status knows of a later command than ours, whoever gave it.
+  bool superseded(const StatusCopy& s) const noexcept {
+    return s.numbers.session != session_ || s.numbers.sequence_number != sequence_;
+  }
   /// The next status; nothing after the timeout.
   std::optional<StatusCopy> status(double timeout_s);
   /// Waits until `done` holds for a status; false after `timeout_s`. `failed` ends the wait early with false.

@@ -158,9 +158,12 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
   station.status(1.0);
   station.status(1.0);
   std::string last = "no status";
+  bool superseded = false;
   const bool reached = station.wait(patience_s_, done, [&](const StatusCopy& s) {
-    last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task);
-    if (s.task.starts_with("refused")) return true;
+    last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task) +
+           (s.autopilot_says.empty() ? "" : "; the autopilot says: " + s.autopilot_says);
+    superseded = station.superseded(s);
+    if (superseded || s.task.starts_with("refused")) return true;
     // On its way to a goal it goes on by itself after an obstacle.
     const bool goes_on = (name == "goto" || name == "follow") && s.reason == "obstacle in the way";
     const bool held = s.state == "hold" && !goes_on;
@@ -168,6 +171,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     return lost && name != "hold" && name != "stop";
   });
   if (interrupted()) return fail("interrupted; the session is over, the daemon is " + last);
+  if (superseded) return fail("a later command took its place; the daemon is " + last);
   return reached ? 0 : fail("not reached; the daemon is " + last);
 }
 

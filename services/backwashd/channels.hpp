@@ -19,6 +19,7 @@
 #include "core/track/flight_tick.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
 #include "firmware_bridge/gpio/stop_switch.hpp"
+#include "firmware_bridge/parameters.hpp"
 #include "services/backwashd/timing.hpp"
 
 /// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is
@@ -33,6 +34,15 @@ inline std::int64_t now_ns() noexcept {
 
 using track::OdometrySample;
 
+/// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
+using WriterId = std::array<std::uint8_t, 16>;
+
+/// Whose map it is. In one term maps are taken of one writer alone: the first whose map was good.
+struct MapWriter {
+  std::uint32_t term = 0;
+  WriterId writer{};
+};
+
 /// One octomap_msgs/Octomap as received.
 struct MapMessage {
   std::vector<std::int8_t> data;
@@ -40,6 +50,7 @@ struct MapMessage {
   bool binary = true;
   std::string id;
   std::int64_t received_ns = 0;
+  MapWriter from{};
 };
 
 /// One range scan in the map.
@@ -79,9 +90,6 @@ struct Worlds {
 /// One line for the operator.
 using Line = std::array<char, 192>;
 
-/// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
-using WriterId = std::array<std::uint8_t, 16>;
-
 /// One command as received, or the news that a writer of commands is gone. Of the station's name only printable
 /// characters are left, and as many as fit.
 struct CommandMessage {
@@ -98,9 +106,13 @@ struct CommandMessage {
   std::array<std::array<double, 3>, kMostWaypoints> waypoint{};
 };
 
-/// Parameters of PX4 that decide what a failsafe does, which matters indoors; `backwashctl check` judges them.
-inline constexpr std::array<std::string_view, 5> kParameters{"COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_OVERRIDE",
-                                                             "NAV_DLL_ACT", "COM_LOW_BAT_ACT"};
+/// Which command of which session.
+struct CommandId {
+  std::uint64_t session = 0;
+  std::uint32_t sequence = 0;
+};
+
+inline constexpr std::uint64_t kTicksPerSecond = 50;
 
 /// What the control thread shows to the others, once a tick.
 struct ControlView {
@@ -127,12 +139,15 @@ struct ControlView {
   double residual_m = 0, residual_rad = 0;
   track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
   firmware_bridge::SwitchState stop_switch = firmware_bridge::SwitchState::absent;
-  std::array<std::optional<double>, kParameters.size()> parameters{};
+  firmware_bridge::Autopilot autopilot = firmware_bridge::Autopilot::kUnknown;
+  firmware_bridge::ParameterValues parameters{};  ///< of parameter_names(autopilot)
+  /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
+  firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
   std::uint64_t log_lost = 0;  ///< records that the raw log had no room for
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 
-/// One record of the control thread for the raw log.
+/// One record of a real-time thread for the raw log.
 struct ControlRecord {
   study::RecordHeader header{};
   std::array<std::uint8_t, 512> bytes{};
@@ -193,6 +208,7 @@ struct Channels {
   sync::LatestValue<Line> refused, refused_map;            // DDS reader, map reader → status: the newest, and why
   sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
   sync::Handover<MapMessage> maps;                         // map reader → map worker
+  sync::LatestValue<MapWriter> map_writer;                 // map worker → map reader: of the first good map of a term
   sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
   Worlds worlds;                                           // map worker → each
   sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control
@@ -204,12 +220,15 @@ struct Channels {
   sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
+  sync::RecordRing<ControlRecord, 256> command_log;                        // DDS reader → recorder
   sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
   sync::Handover<FreshPort> ports;                                         // link watch → control
   std::atomic<std::uint8_t> link_fault{0};            // control → link watch: 1 + LinkFault, 0: none
   std::atomic<std::uint32_t> port_losses{0};          // control → link watch: times that a good port was lost
   std::atomic<mavlink::SigningTime> signing_time{0};  // control → signing time: of the newest signature; 0: none
+  sync::LatestValue<Line> other_daemon;               // DDS reader → mission: "", or who else obeys our commands
   sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
+  sync::LatestValue<CommandId> accepted;              // mission → status: the newest command that was
   sync::LatestValue<std::array<char, 192>> task;      // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
@@ -217,6 +236,9 @@ struct Channels {
   SwitchReading stop_switch;  // gpio → control
   Pulse pulse;                // control → gpio
   std::atomic<bool> stop{false};
+
+  /// Records of real-time threads that the raw log had no room for.
+  std::uint64_t records_lost() const noexcept { return control_log.lost() + command_log.lost(); }
 };
 
 }  // namespace backwash::daemon

@@ -14,7 +14,6 @@
 namespace backwash::daemon {
 namespace {
 
-constexpr std::uint64_t kTicksPerSecond = 50;
 constexpr float kGpsGlobalOrigin = 49;
 constexpr std::uint8_t kNotice = 5, kWarning = 4;  // severities of STATUSTEXT
 
@@ -191,9 +190,10 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
     link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
                           to_string(s.reason));
-  // Five parameters, one a second, while nothing depends on the line's time.
-  if (s.mode == track::Mode::passive && s.send_heartbeat && view_.ticks % kTicksPerSecond == 25)
-    link_.send_parameter_request(kParameters[view_.ticks / kTicksPerSecond % kParameters.size()]);
+  // Only while nothing depends on the line's time. After a restart of the autopilot we are quiet, and it stands.
+  const bool passive = s.mode == track::Mode::passive;
+  const bool restarted = s.mode == track::Mode::quiet && !in.autopilot.armed;
+  parameters_.step(link_, passive || restarted, passive, view_);
   if (!s.send_heartbeat) return;
   ask_for_messages(in.now_ns);
   if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);
@@ -231,8 +231,8 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.missed += static_cast<std::uint64_t>(in.missed_periods);
   view_.frames_bad = link_.received().bad_crc;
   if (link_.signing()) view_.frames_refused = link_.signing()->counters().refused();
-  for (std::size_t n = 0; n < kParameters.size(); ++n)
-    if (const auto p = telemetry.parameter(kParameters[n])) view_.parameters[n] = p->value.value;
+  constexpr std::uint8_t kWorstNotice = 4;  // severity: 4 is a warning
+  if (telemetry.text && telemetry.text->value.severity <= kWorstNotice) view_.warning = telemetry.text;
   view_.residual_m = flight_.alignment().position_residual();
   view_.residual_rad = flight_.alignment().yaw_residual();
   view_.log_lost = channels_.control_log.lost();

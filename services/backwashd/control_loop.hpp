@@ -7,6 +7,7 @@
 #include "firmware_bridge/message_requests.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
+#include "services/backwashd/parameter_reader.hpp"
 #include "services/backwashd/sender_clock.hpp"
 #include "services/backwashd/switch_reaction.hpp"
 
@@ -49,6 +50,7 @@ class ControlLoop {
   track::FlightTick flight_;
   Lookout lookout_;
   SenderClock sender_clock_;  // of the odometry's
+  ParameterReader parameters_;
   bool port_open_ = true;
   firmware_bridge::MessageRequests requests_;
   int origin_asked_ = 0;

@@ -94,12 +94,11 @@ struct Flight {
         log(recorder->path()),
         link(std::move(port), static_cast<std::uint8_t>(s.daemon.link.system), std::chrono::steady_clock::now()),
         signing_time(sign(s.daemon, link)),
-        front(made(kSystem,
-                   [&] {
-                     return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels,
-                                                       *recorder);
-                   })),
+        front(made(
+            kSystem,
+            [&] { return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels); })),
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
+        mission(s.vehicle),
         loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {}
 
   const Settings& settings;
@@ -130,9 +129,13 @@ void start(Flight& f) {
     run_planner(channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.maps->send(segment); });
   });
   f.threads.start("mission", [&] {
-    run_mission(channels, f.mission, [&](const CommandMessage& c, const Answer& a) { f.front->send(c, a); });
+    run_mission(channels, f.mission, [&](const CommandMessage& c, const Answer& a) {
+      f.front->send(c, a);
+      f.recorder->append(study::RecordKind::ack, std::string(c.station.data()) + " " + std::to_string(c.sequence) +
+                                                     " result " + std::to_string(a.result) + ": " + a.reason);
+    });
   });
-  f.threads.start("status", [&] { f.front->run_status(f.settings.vehicle); });
+  f.threads.start("status", [&] { f.front->run_status(f.settings.vehicle, *f.recorder); });
   if (!daemon.gpio.chip.empty())
     f.threads.start("gpio", [&] { run_gpio(channels, daemon.gpio, reader_priority(daemon)); });
   f.threads.start("control", [&] {
@@ -157,7 +160,7 @@ bool end(Flight& f) {
   f.recorded = true;
   const bool closed = f.writer.join(kToRecord);
   if (!closed) f.failure.note("recorder", "the disk does not answer", kInputOutput);
-  if (const auto lost = f.recorder->lost() + f.channels->control_log.lost())
+  if (const auto lost = f.recorder->lost() + f.channels->records_lost())
     spdlog::warn("{}: {} records were lost", f.log, lost);
   if (f.failure.happened())
     spdlog::critical("backwashd: {}; nothing more is sent", f.failure.text());

@@ -17,26 +17,16 @@ namespace {
 
 // Odometry, closures and commands are small; one of 64 waypoints takes 2 kB.
 constexpr std::size_t kMaxSampleBytes = 64u << 10;
-// After which a bound odometry writer that is gone is let go of: by then an enabling that it began has ended.
-constexpr std::int64_t kForget_ns = 500'000'000;
 
 template <typename T>
 std::string topic_of(const config::Daemon& config) {
   return dds::topic(config.dds.name_space, dds::TopicOf<T>::kName);
 }
 
-geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
-
-dds::Timing timing(const TimingHistogram& h) {
-  return {static_cast<float>(h.quantile(0.5)), static_cast<float>(h.quantile(0.99)), static_cast<float>(h.max_us)};
-}
-
 }  // namespace
 
-DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels,
-                   Recorder& recorder)
+DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels)
     : channels_(channels),
-      recorder_(recorder),
       priority_(priority),
       localization_(config, vehicle.estimation.position),
       refusals_(channels.refused),
@@ -57,6 +47,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       foreign_(participant_, {&odometry_, &closures_, &commands_}),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
+      statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {
   waitset_.add(odometry_);
   waitset_.add(closures_);
@@ -65,32 +56,29 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
 
 void DdsFront::take_odometry() {
   odometry_.take([&](const dds::Odometry& m, const dds::Guid& writer) {
-    if (bound_ && *bound_ != writer)
-      return refusals_.add(channels_.odometry_refused, [&] {
-        return "odometry of writer " + dds::text(writer) + ": that of " + dds::text(*bound_) +
-               (gone_ns_ ? ", which is gone, was flown with: disable first" : " is in use");
-      });
+    if (!odometry_writer_.hears(writer))
+      return refusals_.add(channels_.odometry_refused, [&] { return odometry_writer_.refusal(writer); });
     const auto sample = localization_.odometry(m, now_ns());
     if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
-    if (!bound_) spdlog::info("odometry is taken from writer {}", dds::text(writer));
-    bound_ = writer;
+    if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
     channels_.odometry.write(*sample);
     channels_.poses.push(*sample);
   });
-  for (const dds::Guid& gone : odometry_.departed())
-    if (bound_ == gone) gone_ns_ = now_ns();
-  if (!gone_ns_ || commanding_ || now_ns() - *gone_ns_ < kForget_ns) return;
-  bound_.reset();
-  gone_ns_.reset();
+  odometry_writer_.let_go(odometry_.departed(), !commanding_, now_ns());
 }
 
 void DdsFront::take_closures() {
-  closures_.take([&](const dds::TransformStamped& m) {
+  closures_.take([&](const dds::TransformStamped& m, const dds::Guid& writer) {
+    if (!closure_writer_.hears(writer))
+      return refusals_.add(channels_.closures_refused, [&] { return closure_writer_.refusal(writer); });
     const auto taken = localization_.loop_closure(m);
     if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
+    if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
     channels_.loop_closures = localization_.closures();
     channels_.map_from_odom.write(*localization_.map_from_odom());
   });
+  // What the next writer said was refused while this one was not known to be gone; it is said once.
+  if (closure_writer_.let_go(closures_.departed(), !commanding_, now_ns())) closures_.renew(waitset_);
 }
 
 // A writer that floods us is cut to what can be carried out, before it costs anything: else it would fill the mission's
@@ -112,11 +100,15 @@ void DdsFront::take_command(const dds::Command& m, const dds::Guid& writer) {
   c.waypoints = m.waypoints._length;
   for (std::size_t n = 0; n < std::min(c.waypoints, c.kMostWaypoints); ++n)
     c.waypoint[n] = {m.waypoints._buffer[n].x, m.waypoints._buffer[n].y, m.waypoints._buffer[n].z};
-  char line[320];
-  std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s", c.station.data(),
-                static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
-                c.position.z(), c.yaw, dds::text(writer).c_str());
-  recorder_.append(study::RecordKind::command, line);
+  ControlRecord record;
+  char* line = reinterpret_cast<char*>(record.bytes.data());
+  const int length =
+      std::snprintf(line, record.bytes.size(), "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer %s",
+                    c.station.data(), static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(),
+                    c.position.y(), c.position.z(), c.yaw, dds::text(writer).c_str());
+  const std::size_t size = std::min(static_cast<std::size_t>(std::max(length, 0)), record.bytes.size() - 1);
+  record.header = {now_ns(), study::RecordKind::command, static_cast<std::uint32_t>(size)};
+  channels_.command_log.push(record);
   if (channels_.commands.push(c)) return;
   if (stops) stop_ = c;
   refusals_.add(channels_.commands_refused, [] { return "a command: 64 others wait to be answered"; });
@@ -141,12 +133,27 @@ void DdsFront::take_commands() {
   tell_of_departed();
 }
 
+void DdsFront::look_for_other_daemons() {
+  const auto other = statuses_.first();
+  if (other == other_daemon_) return;
+  other_daemon_ = other;
+  Line line{};
+  if (other)
+    std::snprintf(line.data(), line.size(), "another daemon in this namespace, writer %s", dds::text(*other).c_str());
+  if (other)
+    spdlog::error("{}: it obeys the same commands; nothing is enabled here meanwhile", line.data());
+  else
+    spdlog::info("the other daemon in this namespace is gone");
+  channels_.other_daemon.write(line);
+}
+
 void DdsFront::run_readers() {
   if (priority_ > 0) set_fifo(priority_);
   while (!channels_.stop) {
     waitset_.wait(0.1);
     take_closures();  // before the odometry that it is about
     take_odometry();
+    look_for_other_daemons();
     take_commands();
     if (const auto writers = foreign_.take_new()) {
       channels_.foreign_writers += writers;
@@ -157,86 +164,10 @@ void DdsFront::run_readers() {
 
 void DdsFront::send(const CommandMessage& command, const Answer& answer) {
   const std::string station(command.station.data());
-  const dds::Ack ack{dds::c_string(station), command.session, command.sequence, answer.result,
-                     dds::c_string(answer.reason)};
+  dds::Ack ack{
+      dds::c_string(station), command.session, command.sequence, answer.result, dds::c_string(answer.reason), {}};
+  std::ranges::copy(command.writer, ack.writer);
   acks_.write(ack);
-  recorder_.append(study::RecordKind::ack, station + " " + std::to_string(command.sequence) + " result " +
-                                               std::to_string(answer.result) + ": " + answer.reason);
-}
-
-void DdsFront::run_status(const Vehicle& vehicle) {
-  ControlView view;
-  Line task{}, place{}, refused{};
-  const std::vector<std::string> names(kParameters.begin(), kParameters.end());
-  auto next = std::chrono::steady_clock::now();
-  while (!channels_.stop) {
-    next += std::chrono::milliseconds(100);
-    std::this_thread::sleep_until(next);
-    if (const auto newest = channels_.task.read_new()) task = *newest;
-    if (const auto newest = channels_.view_status.read_new()) view = *newest;
-    if (const auto newest = channels_.place.read_new()) place = *newest;
-    for (auto* line : {&channels_.refused, &channels_.refused_map})
-      if (const auto newest = line->read_new()) refused = *newest;
-    commanding_ = view.mode != track::Mode::passive && view.mode != track::Mode::quiet;
-    const std::string mode = to_string(view.mode), reason = to_string(view.reason);
-    const std::string mismatch = to_string(view.mismatch);
-    const std::string stop_switch(name(view.stop_switch));
-    dds::Status s{};
-    s.stamp = dds::wall_clock();
-    s.vehicle = dds::c_string(vehicle.name);
-    s.state = dds::c_string(mode);
-    s.reason = dds::c_string(reason);
-    s.task = task.data();
-    s.armed = view.armed;
-    s.offboard = view.offboard;
-    s.landed = view.landed;
-    s.moving = !view.finished;
-    s.frames_aligned = view.aligned;
-    s.position = point(view.state.p_W);
-    s.setpoint = point(view.command.p_W);
-    s.ticks = view.ticks;
-    s.ticks_missed = view.missed;
-    s.setpoints_sent = view.setpoints;
-    s.samples_inside = view.inside;
-    s.samples_outside = view.outside;
-    s.odometry_received = view.odometry_received;
-    s.odometry_rejected = view.odometry_rejected;
-    s.maps_accepted = channels_.maps_accepted;
-    s.maps_rejected = channels_.maps_rejected;
-    s.scans_accepted = channels_.scans_accepted;
-    s.scans_rejected = channels_.scans_rejected;
-    s.odometry_refused = channels_.odometry_refused;
-    s.loop_closures = channels_.loop_closures;
-    s.closures_refused = channels_.closures_refused;
-    s.foreign_writers = channels_.foreign_writers;
-    const std::int64_t map_ns = channels_.map_ns;
-    s.map_age = map_ns < 0 ? -1 : static_cast<double>(now_ns() - map_ns) * 1e-9;
-    s.commands_refused = channels_.commands_refused;
-    s.stop_switch = dds::c_string(stop_switch);
-    s.frames_bad = view.frames_bad;
-    s.frames_refused = view.frames_refused;
-    s.records_lost = channels_.control_log.lost() + recorder_.lost();
-    s.page_faults = view.page_faults;
-    s.frame_residual_m = view.residual_m;
-    s.frame_residual_rad = view.residual_rad;
-    s.odometry_age = view.odometry_age;
-    s.heartbeat_age = view.heartbeat_age;
-    s.clock_offset = view.clock ? 1e-9 * static_cast<double>(view.clock->offset_ns) : 0;
-    s.clock_delay = view.clock ? 0.5e-9 * static_cast<double>(view.clock->round_trip_ns) : -1;
-    s.mismatch = dds::c_string(mismatch);
-    s.place = place.data();
-    s.parts_filtered = dds::filtered_parts();
-    s.refused = refused.data();
-    std::array<dds::Parameter, kParameters.size()> parameters{};
-    std::uint32_t known = 0;
-    for (std::size_t n = 0; n < kParameters.size(); ++n)
-      if (view.parameters[n]) parameters[known++] = {dds::c_string(names[n]), *view.parameters[n]};
-    s.parameters = {known, known, parameters.data(), false};
-    s.tick = timing(view.tick);
-    s.lateness = timing(view.lateness);
-    s.odometry_to_wire = timing(view.odometry_to_wire);
-    status_.write(s);
-  }
 }
 
 }  // namespace backwash::daemon

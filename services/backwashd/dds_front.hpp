@@ -9,27 +9,30 @@
 
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/allowance.hpp"
+#include "services/backwashd/bound_writer.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/localization.hpp"
 #include "services/backwashd/mission.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/dds/topics.hpp"
+#include "services/dds/writers.hpp"
 
 namespace backwash::daemon {
 
 /// The daemon's side of the DDS topics that flight depends on: odometry, loop closures and commands in, answers and
-/// status out (docs/interfaces.md); those with large samples are MapFront's.
+/// status out (docs/interfaces.md); those with large samples are MapFront's. It has no Recorder, whose lock a thread of
+/// ordinary priority may hold: what is received goes to the raw log through Channels::command_log.
 class DdsFront {
  public:
   /// `priority`: SCHED_FIFO priority of the threads between the network and the control thread; 0: ordinary.
-  DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels, Recorder& recorder);
+  DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels);
 
-  /// Thread body. Odometry is taken from one writer: the first whose sample was good, until it is gone and nothing is
-  /// commanded any more; that of others is refused by its identity (docs/faults.md row 48).
+  /// Thread body. Odometry is taken from one writer, and loop closures from one: the first whose sample was good, until
+  /// it is gone and nothing is commanded any more; those of others are refused by identity (docs/faults.md row 48).
   void run_readers();
   /// Thread body: status out at 10 Hz.
-  void run_status(const Vehicle& vehicle);
+  void run_status(const Vehicle& vehicle, const Recorder& recorder);
   /// Called by the mission thread.
   void send(const CommandMessage& command, const Answer& answer);
 
@@ -39,14 +42,14 @@ class DdsFront {
   void take_commands();
   void take_command(const dds::Command& message, const dds::Guid& writer);
   void tell_of_departed();
+  void look_for_other_daemons();
 
   Channels& channels_;
-  Recorder& recorder_;
   int priority_;
   Localization localization_;
   Refusals refusals_;
-  std::optional<dds::Guid> bound_;                            // the odometry's writer
-  std::optional<std::int64_t> gone_ns_;                       // since when it is gone
+  BoundWriter odometry_writer_{"odometry"}, closure_writer_{"a loop closure"};
+  std::optional<dds::Guid> other_daemon_;                     // another writer of our status
   std::atomic<bool> commanding_{false};                       // status → reader
   std::map<dds::Guid, std::array<Allowance, 2>> allowances_;  // of writers of commands: for STOP, for the others
   std::optional<CommandMessage> stop_;                        // the newest STOP that the mission had no room for
@@ -59,6 +62,7 @@ class DdsFront {
   dds::ForeignWriters foreign_;
   dds::Writer<dds::Ack> acks_;
   dds::Writer<dds::Status> status_;
+  dds::OtherWriters statuses_;
   dds::WaitSet waitset_;
 };
 

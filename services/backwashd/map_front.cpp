@@ -3,18 +3,13 @@
 
 #include <spdlog/spdlog.h>
 
-#include <cmath>
 #include <utility>
 
 #include "services/backwashd/localization.hpp"
+#include "services/backwashd/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
 
 namespace backwash::daemon {
-namespace {
-
-geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
-
-}  // namespace
 
 MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
     : channels_(channels),
@@ -43,9 +38,12 @@ void MapFront::take_scans() {
   if (const auto* newest = channels_.worlds.reader.take())
     channels_.worlds.reader.give_back(std::exchange(world_, newest));
   take_poses();
-  scans_.take([&](const dds::PointCloud& m) {
+  scans_.take([&](const dds::PointCloud& m, const dds::Guid& writer) {
+    if (!scan_writer_.hears(writer))
+      return refusals_.add(channels_.scans_rejected, [&] { return scan_writer_.refusal(writer); });
     auto scan = placement_.scan(m, now_ns());
     if (!scan) return refusals_.add(channels_.scans_rejected, [&] { return scan.error(); });
+    if (scan_writer_.bind(writer)) spdlog::info("scans are taken from writer {}", dds::text(writer));
     std::size_t fresh = 0;
     if (world_) {
       const NewVoxels voxels = new_voxels(world_->world->grid, *scan, sensor_range_);
@@ -63,7 +61,12 @@ void MapFront::take_scans() {
 }
 
 void MapFront::take_maps() {
-  maps_.take([&](const dds::Octomap& m) {
+  // The map worker judges what is in a map.
+  if (const auto good = channels_.map_writer.read_new(); good && good->term == term_ && map_writer_.bind(good->writer))
+    spdlog::info("maps are taken from writer {}", dds::text(good->writer));
+  maps_.take([&](const dds::Octomap& m, const dds::Guid& writer) {
+    if (!map_writer_.hears(writer))
+      return refusals_.add(channels_.maps_rejected, [&] { return map_writer_.refusal(writer); });
     const std::string frame = m.header.frame_id ? m.header.frame_id : "";
     if (frame != map_frame_)
       return refusals_.add(channels_.maps_rejected,
@@ -73,6 +76,7 @@ void MapFront::take_maps() {
         return "a map of " + std::to_string(m.data._length) + " bytes, at most " + std::to_string(kMaxMapBytes);
       });
     MapMessage message;
+    message.from = {term_, writer};
     message.data.assign(reinterpret_cast<const std::int8_t*>(m.data._buffer),
                         reinterpret_cast<const std::int8_t*>(m.data._buffer) + m.data._length);
     message.resolution = m.resolution;
@@ -83,12 +87,21 @@ void MapFront::take_maps() {
   });
 }
 
+void MapFront::let_writers_go() {
+  scan_writer_.let_go(scans_.departed(), true, now_ns());
+  if (!map_writer_.let_go(maps_.departed(), true, now_ns())) return;
+  ++term_;
+  // What the next writer said was refused while this one was not known to be gone; a map may be said once.
+  maps_.renew(waitset_);
+}
+
 void MapFront::run_readers() {
   while (!channels_.stop) {
     waitset_.wait(0.1);
     take_poses();
     take_scans();
     take_maps();
+    let_writers_go();
     if (const auto writers = foreign_.take_new()) {
       channels_.foreign_writers += writers;
       spdlog::warn("{} writers of maps or scans have another type: they are not listened to", writers);
@@ -97,26 +110,9 @@ void MapFront::run_readers() {
 }
 
 void MapFront::send(const track::AcceptedSegment& segment) {
-  const std_msgs_msg_dds__Header_ header{dds::wall_clock(), dds::c_string(map_frame_)};
-  std::vector<dds::TubeStep> steps;
-  std::vector<dds::PoseStamped> poses;
-  for (const auto& s : segment.tube) {
-    dds::TubeStep step{s.t, point(s.center.p_W), {}};
-    std::copy(s.half_widths_interval.begin(), s.half_widths_interval.end(), step.half_widths);
-    steps.push_back(step);
-  }
-  for (const Setpoint& c : segment.commands)
-    poses.push_back({header, {point(c.p_W), {0, 0, std::sin(c.yaw / 2), std::cos(c.yaw / 2)}}});
-  dds::Tube tube{};
-  tube.header = header;
-  tube.steps = {static_cast<std::uint32_t>(steps.size()), static_cast<std::uint32_t>(steps.size()), steps.data(),
-                false};
-  tube_.write(tube);
-  dds::Path path{};
-  path.header = header;
-  path.poses = {static_cast<std::uint32_t>(poses.size()), static_cast<std::uint32_t>(poses.size()), poses.data(),
-                false};
-  trajectory_.write(path);
+  const ShownSegment shown(segment, map_frame_);
+  tube_.write(shown.tube());
+  trajectory_.write(shown.trajectory());
 }
 
 }  // namespace backwash::daemon

@@ -4,17 +4,22 @@
 #include <string>
 
 #include "core/config/daemon_config.hpp"
+#include "services/backwashd/bound_writer.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/backwashd/scan_placement.hpp"
 #include "services/dds/topics.hpp"
+#include "services/dds/writers.hpp"
 
 namespace backwash::daemon {
 
 /// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube and trajectory out. Its
 /// participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here, odometry and commands
 /// (DdsFront) do not wait for it (docs/faults.md row 46).
+///
+/// Maps are taken from one writer, and scans from one: the first whose sample was good, until it is gone (row 48). Its
+/// successor is listened to in flight too: without it what appears in the way would stay unseen.
 class MapFront {
  public:
   static constexpr std::size_t kMaxMapBytes = 48u << 20;  ///< larger maps are refused before they are copied
@@ -33,6 +38,7 @@ class MapFront {
   void take_poses();
   void take_maps();
   void take_scans();
+  void let_writers_go();
 
   Channels& channels_;
   Recorder& recorder_;
@@ -40,6 +46,8 @@ class MapFront {
   double sensor_range_;
   ScanPlacement placement_;
   Refusals refusals_;
+  BoundWriter map_writer_{"a map"}, scan_writer_{"a scan"};
+  std::uint32_t term_ = 0;           // rises when a map's writer is let go of
   const Snapshot* world_ = nullptr;  // the reader's
   dds::Participant participant_;
   dds::Reader<dds::Octomap> maps_;

@@ -13,6 +13,7 @@
 
 #include "core/map/octomap_message.hpp"
 #include "services/backwashd/scan_placement.hpp"
+#include "services/dds/dds.hpp"
 #include "services/parallel/parallel.hpp"
 
 namespace backwash::daemon {
@@ -91,6 +92,10 @@ void MapWorker::publish(std::shared_ptr<const plan::World> world, std::int64_t r
 
 void MapWorker::take_map(const MapMessage& message) {
   const auto begun = now_ns();
+  // It was sent before the reader knew whose maps are used.
+  if (writer_ && writer_->term == message.from.term && writer_->writer != message.from.writer)
+    return reject("it is of writer " + dds::text(message.from.writer) + ", that of " + dds::text(writer_->writer) +
+                  " is in use");
   const double cap = settings_.max_mib * (1 << 20);
   auto grid = map::decode_octomap(message.data, message.resolution, message.binary, message.id,
                                   static_cast<std::size_t>(cap / kBytesPerVoxel));
@@ -110,6 +115,8 @@ void MapWorker::take_map(const MapMessage& message) {
   }
   record(recorder_, message, wrong.empty());
   if (!wrong.empty()) return reject(wrong);
+  writer_ = message.from;
+  channels_.map_writer.write(*writer_);
 
   const Index3 size = grid->size();
   const bool update = world_ && same_place(world_->grid, *grid);

@@ -14,7 +14,8 @@ namespace backwash::daemon {
 
 /// Turns maps and scans into immutable worlds (grid, distance, field, bounds, hover map). A map that cannot be read,
 /// that has nothing free, another resolution than the one in use, or a snapshot above map.max_mib, is rejected whole
-/// and counted, and the old world stays (docs/faults.md rows 10 to 12). Scans that came meanwhile are taken in
+/// and counted, and the old world stays (docs/faults.md rows 10 to 12); so is one of another writer than the first good
+/// one of its term (row 48). Scans that came meanwhile are taken in
 /// together, and the world is updated where they changed something.
 class MapWorker {
  public:
@@ -39,6 +40,7 @@ class MapWorker {
   Model model_;
   Vehicle vehicle_;
   MapSettings settings_;
+  std::optional<MapWriter> writer_;  // of the maps in use
   std::optional<map::LiveMap> live_;
   std::shared_ptr<const plan::World> world_;
 };

@@ -33,6 +33,7 @@ bool flies(Mode mode) { return mode == Mode::tracking || mode == Mode::hold; }
 Decision Mission::observe(const MissionInput& in) {
   if (in.view) view_ = *in.view;
   if (in.world) world_ = *in.world;
+  if (in.other_daemon) other_daemon_ = in.other_daemon->data();
   for (const PlanOutcome& outcome : in.outcomes) {
     if (job_ != outcome.job) continue;  // a newer command took its place
     job_.reset();
@@ -117,18 +118,20 @@ Decision Mission::handle(const CommandMessage& command, double now_s) {
   // is. Only the repeat of a STOP is no new one.
   const bool stops = command.verb == backwash_msgs_msg_dds__COMMAND_STOP;
   if (command.station[0] == 0 || !command.position.allFinite() || !std::isfinite(command.yaw))
-    return stops ? stop() : only(kInvalid, "a command needs a station name and finite numbers");
+    return stops ? stop(command) : only(kInvalid, "a command needs a station name and finite numbers");
   if (const auto answered = session(command, now_s)) {
     const bool repeat = lease_ && lease_->session == command.session && lease_->writer == command.writer &&
                         lease_->sequence == command.sequence && lease_->verb == command.verb;
-    return stops && !repeat ? stop() : Decision{answered, {}, {}};
+    return stops && !repeat ? stop(command) : Decision{answered, {}, {}};
   }
   Decision decision = decide(command);
   lease_->sequence = command.sequence;
   lease_->verb = command.verb;
   lease_->until_s = now_s + kLease;
   lease_->last = *decision.answer;
-  if (command.verb == backwash_msgs_msg_dds__COMMAND_RELEASE) end_lease();
+  const bool releases = command.verb == backwash_msgs_msg_dds__COMMAND_RELEASE;
+  if (!releases && decision.answer->result == kAccepted) accepted_ = {command.session, command.sequence};
+  if (releases) end_lease();
   return decision;
 }
 
@@ -149,7 +152,7 @@ Decision Mission::decide(const CommandMessage& command) {
     case backwash_msgs_msg_dds__COMMAND_HOLD:
       return hold();
     case backwash_msgs_msg_dds__COMMAND_STOP:
-      return stop();
+      return stop(command);
     case backwash_msgs_msg_dds__COMMAND_LAND:
       return flies(view_.mode) || view_.mode == Mode::lifting ? order(Request::land, "landing")
                                                               : refused("not enabled");
@@ -182,6 +185,7 @@ Decision Mission::enable() {
   if (view_.mode != Mode::passive && view_.mode != Mode::quiet)
     return refused(std::string("already ") + to_string(view_.mode));
   if (!may_fly(view_.stop_switch)) return refused(refusal(view_.stop_switch));
+  if (!other_daemon_.empty()) return refused(other_daemon_);
   if (!world_) return refused("no map was received yet");
   if (view_.mismatch != track::Mismatch::none)
     return refused(std::string("map and autopilot disagree: ") + to_string(view_.mismatch));
@@ -190,6 +194,8 @@ Decision Mission::enable() {
   if (view_.pose_age > track::Supervisor::kPoseSilent)
     return refused("no pose from the autopilot: its estimator does not follow the VIO yet, or its stream is off");
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
+  const std::string forbids = firmware_bridge::forbidding_parameter(view_.autopilot, view_.parameters, vehicle_);
+  if (!forbids.empty()) return refused(forbids);
   return order(Request::enable, "enabling");
 }
 
@@ -238,7 +244,7 @@ Decision Mission::hold() {
 }
 
 /// Goes to the control thread in every mode: what is shown here may be a moment old, and an order to enable on its way.
-Decision Mission::stop() {
+Decision Mission::stop(const CommandMessage& command) {
   const bool idle = view_.mode == Mode::passive || view_.mode == Mode::quiet;
   const bool pending = order_under_way();
   const bool standing = view_.landed && !view_.armed;
@@ -246,6 +252,7 @@ Decision Mission::stop() {
   Decision decision = order(Request::stop, standing ? "disabling" : "stopping");
   if (mode == Mode::land) decision.answer = {kRefused, "landing: the autopilot lands, and ends that by itself"};
   if (idle && !pending) decision.answer = {kRefused, "not enabled"};
+  if (decision.answer->result == kAccepted) accepted_ = {command.session, command.sequence};
   return decision;
 }
 

@@ -32,6 +32,7 @@ struct MissionInput {
   double now_s = 0;                                         ///< monotonic
   std::optional<ControlView> view;                          ///< newest, if there is a new one
   std::optional<std::shared_ptr<const plan::World>> world;  ///< newest, if there is a new one
+  std::optional<Line> other_daemon;                         ///< newest, if there is a new one; "": there is none
   std::span<const PlanOutcome> outcomes;
 };
 
@@ -43,6 +44,9 @@ struct MissionInput {
 class Mission {
  public:
   static constexpr double kLease = 10.0;  ///< s after a station's last command until another may take over
+
+  /// `vehicle`: whose gains and limits the autopilot's parameters have to be.
+  explicit Mission(const Vehicle& vehicle) : vehicle_(vehicle) {}
 
   /// Takes what the other threads have said; a job, if the flight goes on by itself.
   Decision observe(const MissionInput& in);
@@ -56,6 +60,8 @@ class Mission {
   const ControlView& view() const noexcept { return view_; }
   /// What became of the last task: "", "planning", or "refused: why".
   const std::string& task() const noexcept { return task_; }
+  /// The newest command that was accepted; releases are none.
+  const CommandId& accepted() const noexcept { return accepted_; }
   /// "", or why the vehicle could not take off where it is; judged once a second.
   const std::string& place() const noexcept { return place_; }
 
@@ -72,7 +78,7 @@ class Mission {
   Decision go_to(const CommandMessage& command);
   Decision follow(const CommandMessage& command);
   Decision hold();
-  Decision stop();
+  Decision stop(const CommandMessage& command);
   Decision start(PlanJob::Kind kind, const Goal& goal = {});
   Decision order(track::Request request, std::string answer);
   std::optional<PlanJob> continue_route(double now_s);
@@ -81,7 +87,10 @@ class Mission {
   bool order_under_way() const noexcept { return view_.epoch.order < orders_; }
   void end_lease();
 
+  Vehicle vehicle_;
+  CommandId accepted_;
   ControlView view_;
+  std::string other_daemon_;  // in our namespace, "": none
   std::shared_ptr<const plan::World> world_;
   std::uint64_t orders_ = 0;
   track::Request last_request_ = track::Request::none;  // of the newest order

@@ -25,8 +25,11 @@ constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a 
 constexpr double kReserve = 0.1;        // m of clearance towards what may turn out to be a wall
 constexpr double kLeastReserve = 0.02;  // m, where there is no room for that: for the set, larger since the start
 
-plan::PlanOptions limits_of(const plan::World& world) {
+/// `apart_m`: at rest, the frame that the autopilot holds its position in is off the map by so much. Its controller does
+/// not see that error, so that no set shrinks it: clearance has to be left for it. In motion most of it is delay.
+plan::PlanOptions limits_of(const plan::World& world, double apart_m = 0) {
   plan::PlanOptions options{};
+  options.least_clearance_m = apart_m;
   options.v_max = world.reach.vehicle.limits.v_max;
   options.a_max = world.reach.vehicle.limits.a_max;
   return options;
@@ -36,7 +39,7 @@ const std::string kEnded = "a later command, or what happened meanwhile, ended i
 
 std::string not_clear(const std::string& what, double clearance) {
   char line[128];
-  std::snprintf(line, sizeof line, "%s is not clear: %.3f m", what.c_str(), clearance);
+  std::snprintf(line, sizeof line, "%s is not clear enough: %.3f m", what.c_str(), clearance);
   return line;
 }
 
@@ -139,7 +142,7 @@ std::optional<std::string> PlannerWorker::take_off(const PlanJob& job) {
   const std::uint32_t closures = view_.closures;
   Flying whole{{0, 0, 0, rise(here, target), {}, {}, closures}, view_.state, view_.command, {}, column->z_safe};
   verify(whole, *world_);
-  if (!(whole.segment.clearance > 0)) return not_clear("the way up", whole.segment.clearance);
+  if (!(whole.segment.clearance > view_.residual_m)) return not_clear("the way up", whole.segment.clearance);
   if (auto why = fly(rise(here, lift), {}, column->z_safe, closures, true)) return why;
   if (auto why = lift_off(flying_->segment.id)) return why;
   // From here on the sets hold: from the state in which the autopilot has come to fly.
@@ -171,7 +174,7 @@ std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
     if (!current()) return kEnded;
     const auto world = world_;  // a newer one may come while this is planned in
     const std::uint32_t closures = view_.closures;
-    const auto options = limits_of(*world);
+    const auto options = limits_of(*world, view_.residual_m);
     auto planned = plan::plan(*world, {view_.state, view_.command}, job.position, options);
     spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
                  plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
@@ -246,7 +249,7 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
     Flying next{{0, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
     next.segment.arms = lifts;
     verify(next, *world_);
-    if (!(next.segment.clearance > 0))
+    if (!(next.segment.clearance > view_.residual_m))
       return not_clear("the tube from the state estimated now", next.segment.clearance);
     add_guards(next, *world_);
     if (offer(std::move(next))) return std::nullopt;

@@ -55,6 +55,11 @@ Recorder::Recorder(const std::string& name) : name_(name), path_(name) {
                              "; give log.file a writable directory");
 }
 
+Recorder::~Recorder() {
+  const bool nothing = written_ == static_cast<std::int64_t>(std::string_view(study::kRawLogMagic).size());
+  if (nothing && file_.get() >= 0 && still_there()) ::unlink(path_.c_str());
+}
+
 bool Recorder::create() {
   const auto open_new = [this] {
     // Exclusive: an earlier flight's log, or a link, is never written to.
@@ -171,9 +176,10 @@ void Recorder::write_batch(std::uint64_t lost_in_ring) {
 
 void Recorder::drain(Channels& channels) {
   const auto when_full = [&] {
-    if (batch_.size() > kChunk) write_batch(channels.control_log.lost());
+    if (batch_.size() > kChunk) write_batch(channels.records_lost());
   };
   while (const auto record = channels.control_log.pop()) put_control(*record), when_full();
+  while (const auto record = channels.command_log.pop()) put_control(*record), when_full();
   std::vector<BulkRecord> bulk;
   {
     const std::lock_guard lock(mutex_);
@@ -186,7 +192,7 @@ void Recorder::drain(Channels& channels) {
     pending_bytes_ -= sizeof record.header + record.bytes.size();
     record.bytes = {};
   }
-  write_batch(channels.control_log.lost());
+  write_batch(channels.records_lost());
   if (std::exchange(sync_due_, false) && file_.get() >= 0 && ::fdatasync(file_.get()) != 0)
     spdlog::warn("{}: not on the disk yet: {}", path_, std::strerror(errno));
 }

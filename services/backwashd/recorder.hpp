@@ -13,10 +13,10 @@
 
 namespace backwash::daemon {
 
-/// Writes the raw log from its own thread: the control thread's ring, and what the other threads append. A full disk, a
-/// vanished directory or a disk that does not answer costs records and nothing else (docs/faults.md row 35): they are
-/// counted, a warning is given, and a file that can be written again goes on with a `lost` record. What waits for the
-/// disk is bounded by kMostPending. Whole batches are written or taken back, so that the file stays readable.
+/// Writes the raw log from its own thread: the real-time threads' rings, and what the other threads append. A full
+/// disk, a vanished directory or a disk that does not answer costs records and nothing else (docs/faults.md row 35):
+/// they are counted, a warning is given, and a file that can be written again goes on with a `lost` record. What waits
+/// for the disk is bounded by kMostPending. Whole batches are written or taken back, so that the file stays readable.
 ///
 /// A file that exists is never opened (row 45). `name` itself is taken if nothing has it, otherwise the next number
 /// above those in its directory: flight.bwlog, flight-2.bwlog, flight-3.bwlog … The file is 0640, and no link is
@@ -27,14 +27,19 @@ class Recorder {
 
   /// Makes the file. Throws std::runtime_error naming it if that fails.
   explicit Recorder(const std::string& name);
-  /// For every thread but the control thread's. Copies the bytes; waits for no disk.
+  /// Removes the file if nothing was recorded: a start that failed leaves none.
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+  /// For threads of ordinary priority alone, which share a lock here: what a real-time thread holds (ControlLoop,
+  /// DdsFront) has no Recorder. Copies the bytes; waits for no disk.
   void append(study::RecordKind kind, std::span<const std::uint8_t> bytes);
   void append(study::RecordKind kind, const std::string& text);
   /// Writes what has come since the last call.
   void drain(Channels& channels);
   /// Thread body: drains every 20 ms; returns after `end` and one last drain.
   void run(Channels& channels, const std::atomic<bool>& end);
-  /// Records that did not get room or that the disk did not take; those of the control thread's ring are its own.
+  /// Records that did not get room or that the disk did not take; those of the rings are their own.
   std::uint64_t lost() const noexcept { return lost_; }
   /// The file's name now; the recorder's thread may change it.
   const std::string& path() const noexcept { return path_; }

@@ -39,6 +39,7 @@ Decision observe(Channels& channels, Mission& mission) {
   }
   in.outcomes = outcomes;
   in.view = channels.view_mission.read_new();
+  in.other_daemon = channels.other_daemon.read_new();
   if (const auto* world = channels.worlds.mission.take()) {
     in.world = world->world;
     channels.worlds.mission.give_back(world);
@@ -61,6 +62,7 @@ void run_mission(Channels& channels, Mission& mission, const SendAnswer& answer)
       spdlog::info("command {} from {}: {}", command->verb, command->station.data(), a.reason);
       answer(*command, a);
     }
+    channels.accepted.write(mission.accepted());
     show(channels.task, mission.task());
     show(channels.place, mission.place());
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

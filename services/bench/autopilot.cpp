@@ -23,6 +23,19 @@ Eigen::Matrix3d yaw_matrix(double yaw) { return Eigen::AngleAxisd(yaw, Vec3::Uni
 
 }  // namespace
 
+std::map<std::string, double> gain_parameters(firmware_bridge::Autopilot autopilot, const Vehicle& vehicle) {
+  const auto& [kp, kd] = std::pair(vehicle.controller.kp, vehicle.controller.kd);
+  if (autopilot == firmware_bridge::Autopilot::kPx4)
+    return {{"MPC_XY_P", kp.horizontal / kd.horizontal},
+            {"MPC_XY_VEL_P_ACC", kd.horizontal},
+            {"MPC_Z_P", kp.vertical / kd.vertical},
+            {"MPC_Z_VEL_P_ACC", kd.vertical}};
+  return {{"PSC_POSXY_P", kp.horizontal / kd.horizontal},
+          {"PSC_VELXY_P", kd.horizontal},
+          {"PSC_POSZ_P", kp.vertical / kd.vertical},
+          {"PSC_VELZ_P", kd.vertical}};
+}
+
 Autopilot::Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, const Vec3& ground_W,
                      const LocalFrame& frame, std::uint64_t seed, std::uint8_t system, double airflow)
     : vehicle_(vehicle, State{ground_W, Vec3::Zero()}, ground_W.z()),
@@ -31,6 +44,7 @@ Autopilot::Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, con
       system_(system) {
   vehicle_.set_motors(false);
   target_.p_W = ground_W;
+  parameters.merge(gain_parameters(firmware_bridge::Autopilot::kPx4, vehicle));
 }
 
 void Autopilot::log_wire(const std::string& path) {
@@ -142,7 +156,7 @@ void Autopilot::on(const mavlink::ParamRequestRead& m, double) {
   const std::string name(m.param_id.begin(), std::ranges::find(m.param_id, char{0}));
   const auto found = parameters.find(name);
   if (found == parameters.end()) return;
-  const bool real = name.ends_with("_T");
+  const bool real = name.ends_with("_T") || name.starts_with("MPC_");
   mavlink::ParamValue answer{.param_count = 1, .param_id = m.param_id, .param_type = real ? kReal32 : kInt32};
   answer.param_value =
       real ? static_cast<float>(found->second) : std::bit_cast<float>(static_cast<std::int32_t>(found->second));

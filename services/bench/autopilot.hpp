@@ -14,6 +14,7 @@
 #include "core/sim/quadrotor.hpp"
 #include "firmware_bridge/mavlink/frame.hpp"
 #include "firmware_bridge/mavlink/messages.hpp"
+#include "firmware_bridge/telemetry.hpp"
 
 namespace backwash::bench {
 
@@ -22,6 +23,9 @@ struct LocalFrame {
   double yaw = 0;              ///< rad
   Vec3 origin = Vec3::Zero();  ///< m
 };
+
+/// The parameters that give a firmware the vehicle file's gains: k_p = P_pos·P_vel, k_d = P_vel.
+std::map<std::string, double> gain_parameters(firmware_bridge::Autopilot autopilot, const Vehicle& vehicle);
 
 /// An emulated PX4-like flight controller: MAVLink on one side, the simulated vehicle in the airflow truth on the
 /// other. It flies on the odometry it is sent (its own inertial sensors bridge the time since the sample's stamp),
@@ -57,12 +61,12 @@ class Autopilot {
   bool silent_pose = false, silent_attitude = false;
   /// The estimator takes its heading from the odometry too; otherwise from its own sensors, which are right.
   bool follows_yaw = false;
-  /// What PARAM_REQUEST_READ is answered from: safe indoors until changed. Those whose name ends in _T are floats.
-  std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5},
-                                           {"COM_OBL_RC_ACT", 4},
-                                           {"COM_RC_OVERRIDE", 3},
-                                           {"NAV_DLL_ACT", 3},
-                                           {"COM_LOW_BAT_ACT", 2}};
+  /// What PARAM_REQUEST_READ is answered from: safe indoors and the vehicle's gains until changed. Those whose name
+  /// ends in _T or begins with MPC_ are floats.
+  std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5}, {"COM_OBL_RC_ACT", 4},  {"COM_RC_OVERRIDE", 3},
+                                           {"NAV_DLL_ACT", 3},     {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},
+                                           {"EKF2_HGT_REF", 3},    {"MPC_XY_VEL_MAX", 12}, {"MPC_Z_VEL_MAX_UP", 3},
+                                           {"MPC_Z_VEL_MAX_DN", 3}};
   /// Remaining share, sent once a second as BATTERY_STATUS while set.
   std::optional<double> battery;
   /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.

@@ -118,20 +118,6 @@ class TruthLog {
   std::ofstream file_;
 };
 
-/// The parameters that give a profile the vehicle file's gains: k_p = P_pos·P_vel, k_d = P_vel.
-std::map<std::string, double> gains(const std::string& autopilot, const Vehicle& vehicle) {
-  const auto& [kp, kd] = std::pair(vehicle.controller.kp, vehicle.controller.kd);
-  if (autopilot == "px4")
-    return {{"MPC_XY_P", kp.horizontal / kd.horizontal},
-            {"MPC_XY_VEL_P_ACC", kd.horizontal},
-            {"MPC_Z_P", kp.vertical / kd.vertical},
-            {"MPC_Z_VEL_P_ACC", kd.vertical}};
-  return {{"PSC_POSXY_P", kp.horizontal / kd.horizontal},
-          {"PSC_VELXY_P", kd.horizontal},
-          {"PSC_POSZ_P", kp.vertical / kd.vertical},
-          {"PSC_VELZ_P", kd.vertical}};
-}
-
 std::unique_ptr<Autopilot> make_autopilot(const Options& o, const map::OccupancyGrid& grid, const Vehicle& vehicle) {
   constexpr double kUptime = 60;  // s: it was switched on before the bench
   const Vec3 ground = ground_below(grid, vehicle, o.start);
@@ -141,8 +127,10 @@ std::unique_ptr<Autopilot> make_autopilot(const Options& o, const map::Occupancy
   if (o.autopilot == "ardupilot") autopilot = make_arducopter(site);
   if (o.autopilot == "px4") autopilot = make_px4(site);
   if (!autopilot) autopilot = std::make_unique<Autopilot>(grid, vehicle, ground, o.frame, o.seed, std::uint8_t{1});
-  if (o.autopilot != "simple")
-    for (const auto& [name, value] : gains(o.autopilot, vehicle)) autopilot->parameters[name] = value;
+  const bool px4 = o.autopilot != "ardupilot";
+  for (const auto& [name, value] :
+       gain_parameters(px4 ? firmware_bridge::Autopilot::kPx4 : firmware_bridge::Autopilot::kArduPilot, vehicle))
+    autopilot->parameters[name] = value;
   for (const auto& [name, value] : o.parameters) autopilot->parameters[name] = value;
   return autopilot;
 }

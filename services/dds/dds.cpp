@@ -105,6 +105,11 @@ Participant::~Participant() {
   if (domain_ > 0) dds_delete(domain_);
 }
 
+Entity Participant::publications() const {
+  return checked(dds_create_reader(participant_, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr),
+                 "reader of the participants' writers");
+}
+
 std::string text(const Guid& guid) {
   std::string all;
   for (std::size_t n = 0; n < guid.size(); ++n) {
@@ -142,19 +147,33 @@ const Guid& ReaderBase::writer(std::uint64_t publication) {
 std::vector<Guid> ReaderBase::departed() {
   dds_subscription_matched_status_t status{};
   dds_get_subscription_matched_status(reader_, &status);
-  if (status.total_count_change == 0 && status.current_count_change == 0) return {};
+  dds_liveliness_changed_status_t alive{};
+  dds_get_liveliness_changed_status(reader_, &alive);
+  std::vector<Guid> gone;
+  if (alive.alive_count_change < 0 && alive.not_alive_count_change > 0)
+    gone.push_back(writer(alive.last_publication_handle));
+  if (status.total_count_change == 0 && status.current_count_change == 0) return gone;
   std::vector<dds_instance_handle_t> matched(status.current_count + 16);
   const dds_return_t count = dds_get_matched_publications(reader_, matched.data(), matched.size());
-  if (count < 0 || static_cast<std::size_t>(count) > matched.size()) return {};
+  if (count < 0 || static_cast<std::size_t>(count) > matched.size()) return gone;
   matched.resize(static_cast<std::size_t>(count));
   for (const auto publication : matched) writer(publication);
-  std::vector<Guid> gone;
   std::erase_if(writers_, [&](const auto& known) {
     if (std::ranges::find(matched, known.first) != matched.end()) return false;
     gone.push_back(known.second);
     return true;
   });
   return gone;
+}
+
+void ReaderBase::renew(WaitSet& waitset) {
+  dds_qos_t* qos = dds_create_qos();
+  dds_get_qos(reader_, qos);
+  const Entity fresh = dds_create_reader(dds_get_participant(reader_), dds_get_topic(reader_), qos, nullptr);
+  dds_delete_qos(qos);
+  if (fresh < 0) return;  // no memory: the old one goes on
+  dds_delete(std::exchange(reader_, fresh));
+  waitset.add(*this);
 }
 
 std::size_t ReaderBase::take(const std::function<void(const void*, const Guid&)>& each) {
@@ -179,6 +198,9 @@ WriterBase::WriterBase(const Participant& participant, const dds_topic_descripto
                        Delivery delivery) {
   const Entity handle = make_topic(participant.handle(), type, topic);
   dds_qos_t* qos = make_qos(delivery);
+  // Of readers nothing of the kind is asked: a writer without a lease is as welcome.
+  if (delivery == Delivery::reliable)
+    dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC, static_cast<dds_duration_t>(kLease_s * 1e9));
   const dds_return_t writer = dds_create_writer(participant.handle(), handle, qos, nullptr);
   dds_delete_qos(qos);
   writer_ = checked(writer, "writer of " + topic);
@@ -190,36 +212,17 @@ int WriterBase::matched() const {
                                                                                 : 0;
 }
 
+Guid WriterBase::guid() const {
+  dds_guid_t drawn{};
+  dds_get_guid(writer_, &drawn);
+  Guid guid;
+  std::copy_n(drawn.v, guid.size(), guid.begin());
+  return guid;
+}
+
 bool WriterBase::write(const void* sample) { return dds_write(writer_, sample) == DDS_RETCODE_OK; }
 
 }  // namespace detail
-
-ForeignWriters::ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers)
-    : publications_(
-          checked(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr),
-                  "reader of the participants' writers")) {
-  for (const auto* reader : readers) types_[reader->topic()] = reader->type();
-}
-
-std::size_t ForeignWriters::take_new() {
-  const std::size_t before = seen_.size();
-  void* sample = nullptr;
-  dds_sample_info_t info;
-  while (dds_take(publications_, &sample, &info, 1, 1) == 1) {
-    if (info.valid_data) {
-      const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
-      const auto ours = types_.find(writer.topic_name);
-      if (ours != types_.end() && ours->second != writer.type_name && seen_.size() < kMost) {
-        Guid guid;
-        std::copy_n(writer.key.v, guid.size(), guid.begin());
-        seen_.insert(guid);
-      }
-    }
-    dds_return_loan(publications_, &sample, 1);
-    sample = nullptr;
-  }
-  return seen_.size() - before;
-}
 
 Malformed::Malformed(Counters counters, Other other) : counters_(std::move(counters)), other_(std::move(other)) {
   dds_set_log_sink(

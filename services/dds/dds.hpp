@@ -5,9 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <initializer_list>
 #include <map>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -17,8 +15,8 @@
 
 struct dds_topic_descriptor;
 
-/// Thin ownership around Cyclone DDS's C binding: what the daemon, the ground station and the bench share. Only dds.cpp
-/// sees the middleware's own header.
+/// Thin ownership around Cyclone DDS's C binding: what the daemon, the ground station and the bench share. Only the
+/// sources here see the middleware's own header.
 namespace backwash::dds {
 
 /// A call into the middleware failed; the message names the call, the topic and the reason. Thrown at start-up only.
@@ -28,11 +26,13 @@ struct Error : std::runtime_error {
 
 using Entity = std::int32_t;
 
+constexpr double kLease_s = 2;
+
 /// Delivery of a topic.
 enum class Delivery {
   latest,    ///< best effort, keep last 1: odometry, status
   scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data
-  reliable,  ///< reliable, keep last 64: commands and acknowledgements
+  reliable,  ///< reliable, keep last 64, a writer's liveliness has a lease of kLease_s: commands and acknowledgements
   state,     ///< reliable, transient local, keep last 1: late joiners get the newest: map, trajectory, tube
 };
 
@@ -57,6 +57,8 @@ class Participant {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
   Entity handle() const noexcept { return participant_; }
+  /// Reader of the middleware's own topic of all writers in the domain, for writers.hpp. Throws Error.
+  Entity publications() const;
 
  private:
   Entity domain_ = 0, participant_ = 0;
@@ -68,6 +70,8 @@ using Guid = std::array<std::uint8_t, 16>;
 /// As the tools of DDS print it: 8 hexadecimal digits four times.
 std::string text(const Guid& guid);
 
+class WaitSet;
+
 namespace detail {
 
 class ReaderBase {
@@ -77,9 +81,13 @@ class ReaderBase {
   Entity handle() const noexcept { return reader_; }
   const std::string& topic() const noexcept { return topic_; }
   const std::string& type() const noexcept { return type_; }
-  /// Writers that were matched at the last call and are gone since: deleted, or silent for their lease (10 s) after a
-  /// crash. Cheap while none comes or goes. Call from the thread that takes.
+  /// Writers that are gone since the last call: deleted, or silent after a crash, for the lease of their liveliness if
+  /// they have one (kLease_s), else for that of their process (10 s). Cheap while none comes or goes. Call from the
+  /// thread that takes. Of several whose liveliness ends at once one is told now, the others after the longer lease.
   std::vector<Guid> departed();
+  /// Is replaced by one that begins anew, in the wait set too: of a topic of Delivery::state it gets from each writer
+  /// what that said last, even if it was taken already. Call from the thread that takes.
+  void renew(WaitSet& waitset);
 
  protected:
   /// Calls `each` with every valid sample received since the last call and its writer; returns how many.
@@ -98,6 +106,7 @@ class WriterBase {
              Delivery delivery);
   /// Readers matched now.
   int matched() const;
+  Guid guid() const;
 
  protected:
   /// False if the middleware refused the sample.
@@ -132,21 +141,6 @@ class Writer : public detail::WriterBase {
  public:
   using WriterBase::WriterBase;
   bool write(const T& sample) { return WriterBase::write(&sample); }
-};
-
-/// Counts the writers of other participants that use the topic of one of these readers with another type: the
-/// middleware does not connect them and tells nobody (docs/faults.md row 27).
-class ForeignWriters {
- public:
-  ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);
-  /// How many came since the last call; after kMost of them no more are counted. Call from one thread.
-  std::size_t take_new();
-
- private:
-  static constexpr std::size_t kMost = 1000;  // their identities are kept
-  Entity publications_;
-  std::map<std::string, std::string> types_;  // by topic
-  std::set<Guid> seen_;
 };
 
 /// Counts samples that the middleware drops because their bytes are none of their topic's type (docs/faults.md row 27).

@@ -58,14 +58,18 @@ daemon() {
 ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1; }
 must() { ctl "$@" || die "backwashctl $* failed: $(tail -n 1 "$log")"; }
 
-# The flight itself, after fly_real: enable, take off, go, land, judge.
-judge_flight() {
-  # Both refuse for a while: ArduCopter arms when its gyros have settled.
+# Both refuse for a while: ArduCopter arms when its gyros have settled.
+take_off() {
   for n in $(seq 30); do
     ctl enable --wait && ctl takeoff --height 1.2 --wait && break
     [[ $n != 30 ]] || die "no take-off: $(tail -n 1 "$log")"
     sleep 1
   done
+}
+
+# The flight itself, after fly_real: enable, take off, go, land, judge.
+judge_flight() {
+  take_off
   must goto "$goal" --wait
   sleep 3
   ctl status --json >/dev/null || true

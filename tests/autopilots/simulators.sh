@@ -30,10 +30,18 @@ start_ardupilot() {
   autopilot_pid=$! device=tcp:127.0.0.1:5760 truth=tcp:127.0.0.1:5762
   pids+=("$autopilot_pid")
   for _ in $(seq 100); do grep -q 'bind port 5762' "$work/autopilot.log" && break; sleep 0.1; done
-  # The pilot's sticks in the middle (16 channels of 1500 µs): a mode of the pilot's would otherwise get no throttle.
+  # The pilot's sticks in the middle (16 channels of 1500 µs): a mode of the pilot's would otherwise get no throttle. The fifth
+  # is the switch of modes, as $work/switch has it.
   local middle
-  middle=$(printf '\\xdc\\x05%.0s' $(seq 16))
-  (while printf "$middle" >/dev/udp/127.0.0.1/5501; do sleep 0.1; done) 2>/dev/null &
+  middle=$(printf '\\xdc\\x05%.0s' $(seq 11))
+  echo 1500 >"$work/switch"
+  (
+    while :; do
+      printf -v mode '\\x%02x\\x%02x' $(($(<"$work/switch") & 255)) $(($(<"$work/switch") >> 8))
+      printf '\xdc\x05\xdc\x05\xdc\x05\xdc\x05'"$mode$middle" >/dev/udp/127.0.0.1/5501 || break
+      sleep 0.1
+    done
+  ) 2>/dev/null &
   pids+=($!)
 }
 

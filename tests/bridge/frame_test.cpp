@@ -70,6 +70,8 @@ TEST(MavlinkCrc, CrcExtraFollowsFromTheDefinitions) {
   EXPECT_EQ(info<SimState>().base_length, 84U);
   EXPECT_EQ(info<SetGpsGlobalOrigin>().crc_extra, 41);
   EXPECT_EQ(info<SetGpsGlobalOrigin>().base_length, 13U);
+  EXPECT_EQ(info<GpsGlobalOrigin>().crc_extra, 39);
+  EXPECT_EQ(info<GpsGlobalOrigin>().base_length, 12U);
 }
 
 TEST(MavlinkFrame, EncodesAHeartbeatAsTheGuideLaysItOut) {

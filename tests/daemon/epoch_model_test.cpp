@@ -84,7 +84,7 @@ const Start kStarts[] = {{"on the ground", false, {}},
 struct Daemon {
   track::FlightTick tick{vehicle(), 0};
   track::Orders orders;
-  Mission mission;
+  Mission mission{vehicle()};
   PlanFront front;
   ControlView view;                      // as the control thread wrote it last
   bool unread = false;                   // by the mission

@@ -34,6 +34,7 @@ struct LongFlight {
 
   explicit LongFlight(std::size_t sets = 3000) {
     segment.id = 1;
+    segment.closures = closures;
     for (std::size_t k = 0; k <= sets; ++k) {
       const double t = 0.02 * static_cast<double>(k);
       reach::TubeStep s{};
@@ -54,6 +55,7 @@ struct LongFlight {
     tick(track::Request::enable);
     for (int n = 0; n < 60; ++n) tick();
     segment.epoch = flight.epoch();
+    segment.closures = closures;
     in.segment = &segment;
     tick();
     in.segment = nullptr;
@@ -63,14 +65,19 @@ struct LongFlight {
     in.now_ns += 20'000'000;
     OdometrySample s;
     s.received_ns = s.stamp_ns = in.now_ns;
-    s.state = segment.tube.front().center;
+    s.state = closure.state(segment.tube.front().center);
+    s.q = {std::cos(closure.yaw / 2), 0, 0, std::sin(closure.yaw / 2)};
+    s.closures = closures;
+    s.map_from_odom = closure;
     in.odometry = s;
     in.request = request;
     in.autopilot.heartbeat_age = 0;
     in.autopilot.offboard = true;
-    in.autopilot.pose = {in.now_ns, s.state, s.q, in.now_ns, Vec3::Zero()};
+    in.autopilot.pose = {in.now_ns, segment.tube.front().center, {1, 0, 0, 0}, in.now_ns, Vec3::Zero()};
     flight.step(in);
   }
+  std::uint32_t closures = 1;
+  track::RigidShift closure;  // map from odometry
 };
 
 NewVoxels one(const Vec3& p) {
@@ -109,6 +116,52 @@ TEST(Lookout, FindsAVoxelInTheWayExactlyWhereTheSetsDo) {
   EXPECT_GT(in_tube, 300u);
   EXPECT_GT(in_stop, 100u);
   EXPECT_GT(beside, 300u);
+}
+
+// After a loop closure that turned the map, the cubes that come are turned against the sets: every point of them
+// counts.
+TEST(Lookout, MissesNoPartOfAVoxelThatIsTurnedAgainstTheSets) {
+  LongFlight f;
+  f.closures = 2;
+  f.closure = {0.15, {0.1, -0.1, 0}};
+  f.tick();
+  ASSERT_EQ(f.flight.tracker().closures(), 2u);
+  const double taken = vehicle().body.radius + vehicle().estimation.position;
+  const auto sets = f.flight.tracker().ahead()[0];
+  const track::RigidShift back = f.flight.tracker().shift().inverse();
+  const auto in_way = [&](const Vec3& p_old, double edge) {
+    return reach::first_blocked(sets, 0, {p_old, edge}, taken) < sets.size();
+  };
+  std::mt19937_64 rng(2);
+  std::uniform_real_distribution<double> across(-1, 1);
+  constexpr double kEdge = 0.8;
+  int by_a_corner_alone = 0, clear = 0;
+  for (int n = 0; n < 400; ++n) {
+    const Vec3 centre = f.closure.point(Vec3(3 * across(rng), 2 + 3 * across(rng), 1.5 + across(rng)));
+    bool touches = false;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 half = kEdge / 2 * Vec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+      touches = touches || in_way(back.point(centre + half), 1e-9);
+    }
+    NewVoxels voxel = one(centre);
+    voxel.edge = kEdge;
+    f.channels->scan_voxels.push(voxel);
+    const bool seen = f.lookout.look(f.flight, f.in.now_ns).tube_blocked;
+    EXPECT_TRUE(seen || !touches) << centre.transpose();
+    by_a_corner_alone += touches && !in_way(back.point(centre), kEdge);
+    clear += !seen;
+  }
+  EXPECT_GT(by_a_corner_alone, 2);
+  EXPECT_GT(clear, 50);
+}
+
+TEST(Lookout, ALiveMapThatNeverCameIsLateFromTheClocksFirstSecondOn) {
+  LongFlight f;
+  MapSettings live;
+  live.live = true;
+  Lookout lookout(*f.channels, vehicle(), live);
+  ASSERT_EQ(f.channels->map_ns, -1);
+  for (const std::int64_t now : {std::int64_t{20'000'000}, f.in.now_ns}) EXPECT_TRUE(lookout.look(f.flight, now).late);
 }
 
 double processor_s() {

@@ -51,6 +51,27 @@ class MapWorkerTest : public testing::Test {
   }
 };
 
+TEST_F(MapWorkerTest, InOneTermMapsAreTakenOfTheFirstWriterWhoseMapWasGood) {
+  const auto send_from = [&](std::uint32_t term, std::uint8_t writer, std::vector<std::int8_t> data) {
+    auto message = MapMessage{std::move(data), grid_.resolution(), true, "OcTree", 1};
+    message.from = {term, {writer}};
+    channels_->maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+    EXPECT_TRUE(worker_.step());
+    return std::pair(channels_->maps_accepted.load(), channels_->maps_rejected.load());
+  };
+  const auto good = map::encode_octomap(grid_);
+  EXPECT_EQ(send_from(0, 7, {3, 0, 3}), std::pair(0ul, 1ul));
+  EXPECT_FALSE(channels_->map_writer.read_new()) << "a map that is refused binds nobody";
+  EXPECT_EQ(send_from(0, 1, good), std::pair(1ul, 1ul));
+  const auto bound = channels_->map_writer.read_new();
+  ASSERT_TRUE(bound);
+  EXPECT_EQ(bound->writer, WriterId{1});
+  EXPECT_EQ(send_from(0, 7, good), std::pair(1ul, 2ul));
+  EXPECT_EQ(send_from(0, 1, good), std::pair(2ul, 2ul));
+  EXPECT_EQ(send_from(1, 7, good), std::pair(3ul, 2ul)) << "the first writer is gone: a new term";
+  EXPECT_EQ(send_from(1, 1, good), std::pair(3ul, 3ul));
+}
+
 TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {
   EXPECT_FALSE(worker_.step());
   send(grid_);

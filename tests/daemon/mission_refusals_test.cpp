@@ -36,6 +36,8 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
                 {[&] { view_.odometry_age = 0.2; }, "no odometry"},
                 {[&] { view_.heartbeat_age = 2; }, "no heartbeat"},
                 {[&] { view_.pose_age = 0.32; }, "no pose from the autopilot"},
+                {[&] { view_.autopilot = firmware_bridge::Autopilot::kArduPilot; },
+                 "no value of GUID_TIMEOUT from the autopilot yet"},
                 {[&] { view_.state.p_W.x() = 99; }, "outside the map"}};
   for (const auto& [fault, why] : faults) {
     view_ = whole;
@@ -45,7 +47,7 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
   }
   view_ = whole;
   look();
-  Mission blind;
+  Mission blind{Vehicle{}};
   MissionInput in;
   in.now_s = now_s_;
   in.view = whole;
@@ -55,6 +57,27 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
   expect_nothing(mission_.handle(gcs_.next(kEnable), now_s_), kRefused, "last order");
   view_.epoch.order = 1;
   look();
+  EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
+}
+
+// Both would take control at one command. One that flies already goes on: it is in control.
+TEST_F(MissionRefusals, NothingIsEnabledWhileAnotherDaemonObeysTheSameCommands) {
+  const auto tell = [&](const char* who) {
+    MissionInput in;
+    in.now_s = now_s_;
+    in.other_daemon.emplace();
+    std::snprintf(in.other_daemon->data(), in.other_daemon->size(), "%s", who);
+    mission_.observe(in);
+  };
+  tell("another daemon in this namespace, writer 01");
+  EXPECT_EQ(result(give(gcs_.next(kGoto))), kAccepted);
+  EXPECT_EQ(result(give(gcs_.next(kStop))), kAccepted);
+  view_.mode = Mode::passive;
+  view_.armed = view_.offboard = false;
+  view_.landed = true;
+  look();
+  expect_nothing(give(gcs_.next(kEnable)), kRefused, "another daemon in this namespace, writer 01");
+  tell("");
   EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
 }
 

@@ -47,7 +47,7 @@ struct Station {
 /// A mission of a vehicle in the air; the test plays control thread, planner and ground stations.
 class MissionTest : public testing::Test {
  protected:
-  Mission mission_;
+  Mission mission_{Vehicle{}};
   ControlView view_;
   double now_s_ = 100;
   Station gcs_{1, 11}, other_{2, 22, "other"};

@@ -25,6 +25,22 @@ TEST_F(MissionTest, ARepeatedCommandIsAnsweredAgainAndNotDoneAgain) {
   EXPECT_FALSE(land_again.order);
 }
 
+// Whoever waits for an older one can tell that it waits in vain.
+TEST_F(MissionTest, TheNewestAcceptedCommandIsShownAndNoRefusedOneAndNoRelease) {
+  const auto newest = [this] { return std::pair(mission_.accepted().session, mission_.accepted().sequence); };
+  give(gcs_.next(kGoto));
+  EXPECT_EQ(newest(), std::pair(gcs_.session, 1u));
+  give(other_.next(kGoto));  // the other's session
+  EXPECT_EQ(newest(), std::pair(gcs_.session, 1u));
+  give(gcs_.next(kRelease));
+  EXPECT_EQ(newest(), std::pair(gcs_.session, 1u));
+  Station again{1, 12};
+  give(again.next(kHold));
+  EXPECT_EQ(newest(), std::pair(again.session, 1u));
+  give(other_.next(kStop));  // everybody's
+  EXPECT_EQ(newest(), std::pair(other_.session, other_.sequence));
+}
+
 TEST_F(MissionTest, AnOlderSequenceNumberIsInvalidAndDoesNothing) {
   give(gcs_.next(kGoto));
   give(gcs_.next(kStop));
@@ -188,7 +204,7 @@ TEST_F(MissionTest, AStopEndsTheRouteEvenIfTheVehicleRestsAtItsNextGoal) {
 
 TEST_F(MissionTest, ARouteGoesOnAtItsNextGoalAndAfterAnObstacleAndAfterNoOtherHold) {
   const auto begun = [&] {
-    mission_ = Mission();
+    mission_ = Mission(Vehicle{});
     gcs_ = {1, gcs_.session + 1};
     SetUp();
     CommandMessage follow = gcs_.next(kFollow);
@@ -285,7 +301,7 @@ TEST_F(MissionTest, AnOrderThatTheControlThreadDoesNotTakeIsNotAcknowledged) {
   channels.commands.push(gcs_.next(kStop));
   channels.commands.push(gcs_.next(kHold));
   std::vector<Answer> answers;
-  Mission mission;
+  Mission mission{Vehicle{}};
   std::thread thread([&] {
     run_mission(channels, mission, [&](const CommandMessage&, const Answer& a) {
       answers.push_back(a);

@@ -62,6 +62,25 @@ TEST_F(PlannerOffers, AFlightWithItsTubeClearanceStopsAndHoverThatDoesNotArm) {
   }
 }
 
+// Its controller does not see that error: what a set leaves to the walls has to be more.
+TEST_F(PlannerOffers, NoFlightThatIsClearByLessThanTheAutopilotsFrameIsOff) {
+  know(room());
+  stand({1.05, 2.05, 1.05});
+  ASSERT_EQ(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}), "");
+  ASSERT_GT(offers_.at(0).clearance, 0.1);
+  offers_.clear();
+  view_.segment = 0;
+  view_.residual_m = 0.9;  // more than from here to the floor
+  stand({1.05, 2.05, 1.05});
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}), "");
+  EXPECT_TRUE(offers_.empty());
+  view_.residual_m = 0.05;
+  stand({1.05, 2.05, 1.05});
+  EXPECT_EQ(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}), "");
+  ASSERT_EQ(offers_.size(), 1u);
+  EXPECT_GT(offers_[0].clearance, 0.05);
+}
+
 TEST_F(PlannerOffers, NothingForAGoalThatNoPlanReaches) {
   OccupancyGrid grid = room();
   fill(grid, {30, 0, 1}, {31, 39, 19});

@@ -13,8 +13,11 @@
 #include <filesystem>
 #include <fstream>
 #include <thread>
+#include <type_traits>
 
 #include "core/study/raw_log.hpp"
+#include "services/backwashd/control_loop.hpp"
+#include "services/backwashd/dds_front.hpp"
 #include "tests/daemon/traps.hpp"
 
 namespace backwash::daemon {
@@ -177,8 +180,9 @@ TEST_F(Row35Recorder, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) 
     std::ofstream(folder_ + "/" + file) << file;
   EXPECT_EQ(Recorder(path_).path(), path_);
   std::ofstream(path_) << "an earlier flight";
-  EXPECT_EQ(Recorder(path_).path(), folder_ + "/flight-8.bwlog");
-  EXPECT_EQ(Recorder(path_).path(), folder_ + "/flight-9.bwlog");
+  const Recorder eighth(path_), ninth(path_);
+  EXPECT_EQ(eighth.path(), folder_ + "/flight-8.bwlog");
+  EXPECT_EQ(ninth.path(), folder_ + "/flight-9.bwlog");
   EXPECT_EQ(content(path_), "an earlier flight");
   EXPECT_EQ(content(folder_ + "/flight-7.bwlog"), "flight-7.bwlog");
   EXPECT_EQ(content(folder_ + "/flight-8.bwlog"), study::kRawLogMagic);
@@ -188,6 +192,42 @@ TEST_F(Row35Recorder, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) 
   ::umask(mask);
   ASSERT_EQ(::stat(open_to_all.path().c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777, 0640u);
+}
+
+TEST_F(Row35Recorder, AStartThatFailsBeforeAnythingIsRecordedLeavesNoLogAndTouchesNoOther) {
+  std::ofstream(path_) << "an earlier flight";
+  { const Recorder failed(path_); }
+  EXPECT_FALSE(std::filesystem::exists(folder_ + "/flight-2.bwlog"));
+  {
+    const Recorder failed(path_);
+    std::filesystem::remove(failed.path());
+    std::ofstream(failed.path()) << "of somebody else";
+  }
+  EXPECT_EQ(content(folder_ + "/flight-2.bwlog"), "of somebody else");
+  {
+    Recorder recorder(path_);
+    put(1);
+    recorder.drain(*channels_);
+  }
+  EXPECT_EQ(study::read_raw_log(folder_ + "/flight-3.bwlog").value().records.size(), 1u);
+  EXPECT_EQ(content(path_), "an earlier flight");
+}
+
+// A thread of ordinary priority may hold the recorder's lock: what the real-time threads run has no way to it.
+static_assert(std::is_constructible_v<DdsFront, const config::Daemon&, int, const Vehicle&, Channels&>);
+static_assert(!std::is_constructible_v<DdsFront, const config::Daemon&, int, const Vehicle&, Channels&, Recorder&>);
+static_assert(!std::is_constructible_v<ControlLoop, Channels&, firmware_bridge::AutopilotLink&, const Vehicle&, double,
+                                       const MapSettings&, Recorder&>);
+
+TEST_F(Row35Recorder, CommandsComeThroughARingAndWhatItHadNoRoomForIsCounted) {
+  Recorder recorder(path_);
+  ControlRecord r;
+  r.header = {now_ns(), study::RecordKind::command, 10};
+  std::size_t sent = 0;
+  while (channels_->command_log.push(r)) ++sent;
+  EXPECT_EQ(channels_->records_lost(), 1u);
+  recorder.drain(*channels_);
+  EXPECT_EQ(read(), std::pair(sent + 1, std::uint64_t{1}));
 }
 
 TEST_F(Row35Recorder, ALinkInThePlaceOfTheLogIsNotFollowed) {

@@ -31,6 +31,36 @@ TEST(SenderClock, FindsWhenASampleOnAnotherClockWasTakenToTwoMillisecondsAndNeve
   }
 }
 
+// What is allowed for drift counts by time, whatever the rate. A clock that loses 80 ppm, each sample 1 ms on the way:
+// allowed for by the sample, 30 Hz would fall behind it by 20 us every second.
+TEST(SenderClock, FollowsADriftOf80PpmAtEveryRate) {
+  for (const std::int64_t rate : {30, 500}) {
+    SenderClock clock;
+    std::int64_t worst = 0;
+    for (std::int64_t n = 0; n < rate * 600; ++n) {
+      const std::int64_t taken = 1'000 * kMs / rate * n;
+      const std::int64_t stamp = 1'700'000'000'000'000'000 + taken - taken / 12'500;
+      worst = std::max(worst, std::abs(clock.taken_ns(stamp, taken + kMs) - taken));
+    }
+    EXPECT_LE(worst, 1.1 * kMs) << rate << " Hz";
+  }
+}
+
+// One sample in 5 s comes in 1 ms, the others in 20 ms: the fastest stands for its offset until the next. Allowed for
+// by the sample, 500 Hz would lose 5 ms meanwhile.
+TEST(SenderClock, KeepsTheFastestSamplesOffsetForSecondsAtEveryRate) {
+  for (const std::int64_t rate : {30, 500}) {
+    SenderClock clock;
+    std::int64_t worst = 0;
+    for (std::int64_t n = 0; n < rate * 60; ++n) {
+      const std::int64_t taken = 1'000 * kMs / rate * n, way = n % (5 * rate) == 0 ? kMs : 20 * kMs;
+      const std::int64_t found = clock.taken_ns(1'700'000'000'000'000'000 + taken, taken + way);
+      worst = std::max(worst, std::abs(found - taken));
+    }
+    EXPECT_LE(worst, 1.6 * kMs) << rate << " Hz";
+  }
+}
+
 TEST(SenderClock, FollowsAStepOfTheSendersClockInOneSampleInBothDirections) {
   SenderClock clock;
   const std::int64_t hour = 3'600'000 * kMs;

@@ -7,6 +7,8 @@
 
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <thread>
 
 namespace backwash::daemon {
 namespace {
@@ -27,6 +29,11 @@ class SigningTimeTest : public testing::Test {
     std::string name = (std::filesystem::temp_directory_path() / "backwash_signing_XXXXXX").string();
     return std::filesystem::path(::mkdtemp(name.data()));
   }();
+  SigningTime stored() const {
+    SigningTime time = 0;
+    std::ifstream(path_) >> time;
+    return time;
+  }
   std::string path_ = signing_time_path((folder_ / "flight.bwlog").string());
 };
 
@@ -54,9 +61,7 @@ TEST_F(SigningTimeTest, AtEachMomentTheFileHoldsATimeThatIsNotReached) {
   SigningTimeFile file(path_, kWall);
   for (SigningTime now = kThen; now < kThen + 60 * kSigningSecond; now += kSigningSecond / 10) {
     file.keep(now);
-    SigningTime stored = 0;
-    std::ifstream(path_) >> stored;
-    ASSERT_GT(stored, now);
+    ASSERT_GT(stored(), now);
   }
 }
 
@@ -72,10 +77,10 @@ TEST_F(SigningTimeTest, AnEndInOrderIsGoneOnFrom) {
 TEST_F(SigningTimeTest, AFileThatHoldsNoTimeIsWrittenAnew) {
   for (const char* bad : {"x", "12", "garbage garbage garbage", "999999999999999\n", "-00000000000001\n"}) {
     std::ofstream(path_) << bad;
+    EXPECT_EQ(SigningTimeFile(path_, Wall{}).start(), 0U) << bad << " is no time, not even an early one";
+    std::ofstream(path_) << bad;
     EXPECT_EQ(SigningTimeFile(path_, kWall).start(), kThen) << bad;
-    SigningTime stored = 0;
-    std::ifstream(path_) >> stored;
-    EXPECT_EQ(stored, kThen + SigningTimeFile::kReserve);
+    EXPECT_EQ(stored(), kThen + SigningTimeFile::kReserve);
   }
 }
 
@@ -83,6 +88,26 @@ TEST_F(SigningTimeTest, AStartWithoutAFileToWriteIsRefused) {
   EXPECT_THROW(SigningTimeFile((folder_ / "none" / "x").string(), kWall), std::runtime_error);
   std::filesystem::create_symlink(folder_ / "elsewhere", path_);
   EXPECT_THROW(SigningTimeFile(path_, kWall), std::runtime_error) << "no link is followed";
+  EXPECT_THROW(SigningTimeFile("/dev/full", kWall), std::runtime_error) << "a disk without room keeps no time";
+}
+
+TEST_F(SigningTimeTest, IsKeptAheadWhileTheLinkSignsAndNotPutBackByAnEndBeforeTheFirstSignature) {
+  const auto channels = std::make_unique<Channels>();
+  std::atomic<bool> end{true};
+  SigningTimeFile file(path_, kWall);
+  run_signing_time(file, *channels, end);
+  EXPECT_EQ(stored(), kThen + SigningTimeFile::kReserve) << "nothing was signed";
+
+  end = false;
+  std::thread keeper([&] { run_signing_time(file, *channels, end); });
+  const SigningTime later = kThen + 1000 * kSigningSecond;
+  channels->signing_time = later;
+  for (int i = 0; i < 1000 && stored() <= later; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_GT(stored(), later) << "while it runs";
+  channels->signing_time = later + 3;
+  end = true;
+  keeper.join();
+  EXPECT_EQ(stored(), later + 3) << "an end in order gives the rest back";
 }
 
 }  // namespace

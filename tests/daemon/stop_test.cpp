@@ -27,7 +27,7 @@ struct Flight {
   std::string log_ = std::filesystem::temp_directory_path() / ("backwash_stop." + std::to_string(getpid()));
   Lockstep rig_;
   Recorder recorder_{log_};
-  Mission mission_;
+  Mission mission_{vehicle_5in()};
   int pauses_ = 0, stop_after_ = -1;  // the planner's pauses until STOP is given; −1: never
   PlannerWorker planner_{*rig_.channels, recorder_, [](const auto&) {}, [this] { pause(); }};
   std::uint32_t sequence_ = 0;

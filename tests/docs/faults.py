@@ -10,7 +10,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 50
+ROWS = 52
 
 
 def known_tests(build: str) -> list[str]:

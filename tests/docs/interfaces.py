@@ -128,7 +128,11 @@ def check_programs(root: pathlib.Path, build: pathlib.Path, sections_of: dict[st
     for verb in verbs & {h.split()[1] for h in sections_of if h.startswith("backwash ")}:
         # Options stand in the tables' first column.
         cells = [c for c in rows(sections_of[f"backwash {verb}"]) if c[0].startswith("`-")]
-        _, options = help_of(str(services / "backwash"), verb)
+        inner, options = help_of(str(services / "backwash"), verb)
+        for below in inner:
+            options |= help_of(str(services / "backwash"), verb, below)[1]
+            if f"`backwash {verb} {below}`" not in sections_of[f"backwash {verb}"]:
+                wrong.append(f"backwash {verb}: {below} is not documented")
         expect(f"backwash {verb}", {o for c in cells for o in options_in(c[0])}, options)
     for program in ("backwashd", "backwash-bench"):
         _, options = help_of(str(services / program))

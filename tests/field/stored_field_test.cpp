@@ -197,11 +197,18 @@ TEST(StoredField, FollowsAChangeOfOneCubicMetreBitForBit) {
 }
 
 TEST(StoredField, FindsNoChangeBetweenEqualMapsAndAllOfItBetweenMapsOfOtherFrames) {
-  const OccupancyGrid room = scene::small_room(), moved(room.origin() + Vec3(0.1, 0, 0), 0.1, room.size(), Cell::free);
+  const OccupancyGrid room = scene::small_room();
   EXPECT_TRUE(changed_box(room, room).empty());
-  const auto all = changed_box(room, moved);
-  EXPECT_EQ(all.low, Index3::Zero());
-  EXPECT_EQ(all.high, Index3(room.size() - Index3::Ones()));
+  const Vec3 origin = room.origin();
+  const Index3 size = room.size();
+  OccupancyGrid moved(origin + Vec3(0.1, 0, 0), 0.1, size, Cell::free), finer(origin, 0.05, size, Cell::free);
+  for (std::size_t n = 0; n < room.cell_count(); ++n)
+    for (auto* same : {&moved, &finer}) same->set(room.voxel(n), room.at(n));
+  for (const OccupancyGrid& other : {moved, finer}) {
+    const auto all = changed_box(room, other);
+    EXPECT_EQ(all.low, Index3::Zero()) << "though each voxel holds the same";
+    EXPECT_EQ(all.high, Index3(size - Index3::Ones()));
+  }
 }
 
 TEST(StoredField, StoresNothingForAnEmptyList) {

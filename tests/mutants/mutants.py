@@ -5,36 +5,38 @@
   mutants.py check              the table still fits the sources (seconds; a test of ./check)
   mutants.py build [PROGRAM …]  all mutants as switches of one build, in build/mutants
   mutants.py run [ID|PATH …]    which are killed; exit 1 if the score is below 0.97
+  mutants.py draw COUNT         operators of the same sources at random, and their build; then run --drawn
 """
 import argparse
-import collections
 import concurrent.futures
+import dataclasses
+import json
 import os
 import pathlib
+import random
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 
+import drawn
+import suite
 import table
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORK = ROOT / "build" / "mutants"
 TREE = WORK / "tree"
+DRAWN = WORK / "drawn.json"
 BIN = TREE / "build" / "release" / "tests"
 COPIED = ["CMakeLists.txt", "CMakePresets.json", "README.md", "core", "firmware_bridge", "idl", "services", "tests"]
-# Those that a mutant must survive to count as living, the quickest first.
+# Those that a mutant must survive to count as living.
 PROGRAMS = ["test_config", "test_files", "test_track", "test_bridge", "test_map", "test_field", "test_reach", "test_daemon",
             "test_plan", "test_sim"]
 LEAST_SCORE = 0.97
 
 
-def build(mutants: list[table.Mutant], programs: list[str]) -> None:
-    """Copies what changed, rewrites, compiles. A file is written only if its content differs: little is compiled."""
-    wrong = table.check(mutants, ROOT)
-    if wrong:
-        sys.exit("\n".join(wrong))
+def prepare(mutants: list[table.Mutant]) -> None:
+    """Copies what changed and rewrites. A file is written only if its content differs: little is compiled."""
     files = table.by_file(mutants)
     wanted = {}
     for top in COPIED:
@@ -57,60 +59,46 @@ def build(mutants: list[table.Mutant], programs: list[str]) -> None:
     if (ROOT.parent / "shared").exists() and not shared.exists():
         shared.symlink_to(ROOT.parent / "shared")
     subprocess.run(["cmake", "--preset", "release"], cwd=TREE, check=True, stdout=subprocess.DEVNULL)
+
+
+def build(mutants: list[table.Mutant], programs: list[str]) -> None:
+    """All mutants as switches of one build."""
+    prepare(mutants)
     subprocess.run(["cmake", "--build", "--preset", "release", "--target", *programs, "--", "-k", "0"],
                    cwd=TREE, check=True)
 
 
-def run_test(spec: str, number: int, cpu_seconds: int) -> tuple[str, float]:
-    """'' if the tests pass, else what failed first; and the processor time that they took, s. More than `cpu_seconds`
-    of it is a hang, and so are ten times as many seconds of waiting: the machine's load does not look like one."""
-    program, _, chosen = spec.partition(" ")
-    command = [str(BIN / program), "--gtest_fail_fast", "--gtest_brief=1"]
-    if chosen:
-        command.append(f"--gtest_filter={chosen}")
-    with tempfile.TemporaryFile() as output, subprocess.Popen(
-            ["/bin/sh", "-c", f'ulimit -t {cpu_seconds}; exec "$@"', "sh", *command], stdout=output,
-            stderr=subprocess.DEVNULL, env=os.environ | {"BACKWASH_MUTANT": str(number)}) as process:
-        watchdog = threading.Timer(10 * cpu_seconds, process.kill)
-        watchdog.start()
-        _, status, used = os.wait4(process.pid, 0)
-        watchdog.cancel()
-        process.returncode = os.waitstatus_to_exitcode(status)
-        seconds = used.ru_utime + used.ru_stime
-        if process.returncode == 0:
-            return "", seconds
-        output.seek(0)
-        failed = [line for line in output.read().decode(errors="replace").splitlines() if "[  FAILED  ]" in line]
-    if failed:
-        return f"{program} {failed[0].split(']')[1].split()[0].rstrip(',')}", seconds
-    return f"{program} {chosen}: ended with {process.returncode}", seconds
+def draw(count: int, seed: int) -> list[table.Mutant]:
+    """So many random mutants that compile, of the sources that the table has rows of."""
+    rows = drawn.draw(ROOT, {m.file for m in table.load()}, random.Random(seed))
+    compiled: dict[str, list[str]] = {}
+    while True:
+        prepare(rows[:count])
+        refused: set[str] = set()
+        for file, mutants in table.by_file(rows[:count]).items():
+            ids = [m.id for m in mutants]
+            if compiled.get(file) == ids:
+                continue
+            lines = drawn.refused_lines(TREE, file)
+            wrong = {m.id for m in mutants if int(m.id.split("-")[-2]) in lines}
+            if lines and not wrong:
+                sys.exit(f"{file} does not compile, and no mutant is to blame")
+            refused |= wrong
+            compiled[file] = ids
+        if not refused:
+            return rows[:count]
+        rows = [m for m in rows if m.id not in refused]
 
 
-class Baseline:
-    """Processor time of each choice of tests without a mutant, s; it must pass. Measured when it is first asked for."""
+def judge(mutant: table.Mutant, test: suite.Test) -> str:
+    """How it killed the mutant, or ''. A failure counts if it comes twice: the machine's load may upset a test once."""
+    def ended() -> str:
+        return suite.run(BIN / test.program, test.name, test.limit, {"BACKWASH_MUTANT": str(mutant.number)})[0]
 
-    def __init__(self):
-        self.seconds: dict[str, float] = {}
-        self.locks = collections.defaultdict(threading.Lock)
-
-    def limit(self, spec: str) -> int:
-        """Of processor time, s: more is a hang."""
-        with self.locks[spec]:
-            if spec not in self.seconds:
-                failed, self.seconds[spec] = run_test(spec, 0, 600)
-                if failed:
-                    print(f"without a mutant: {failed}", flush=True)
-                    os._exit(1)  # from any thread: nothing that follows would mean anything
-        return 10 + int(8 * self.seconds[spec])
-
-
-def judge(mutant: table.Mutant, specs: list[str], baseline: Baseline) -> str:
-    """What killed it, or ''."""
-    for spec in specs:
-        failed, _ = run_test(spec, mutant.number, baseline.limit(spec))
-        if failed:
-            return failed
-    return ""
+    how = ended()
+    if how == "fails" and not ended():
+        return ""
+    return "" if not how else f"{test}" if how == "fails" else f"{test} {how}"
 
 
 def rows_of(result: pathlib.Path) -> dict[str, list[str]]:
@@ -120,44 +108,64 @@ def rows_of(result: pathlib.Path) -> dict[str, list[str]]:
 
 
 def killers(result: pathlib.Path) -> dict[str, list[str]]:
-    """The one test that killed each mutant of an earlier run, if a test did: if it is still there, the quickest proof."""
-    return {id: [row[3]] for id, row in rows_of(result).items() if row[2] == "killed" and len(row[3].split()) == 2}
+    """The test that killed each mutant of an earlier run: if it is still there, the quickest proof."""
+    return {id: [" ".join(row[3].split()[:2])] for id, row in rows_of(result).items() if row[2] == "killed"}
 
 
 def run(mutants: list[table.Mutant], jobs: int, quick: bool, result: pathlib.Path) -> int:
-    """First what killed it the last time, then the tests that each row names, then all programs for those that live."""
+    """Each mutant against the tests that pass its switch, until one fails: what killed it the last time and those that
+    its row names; then, of what lives, all others."""
     earlier = killers(result)
-    passes = [lambda m: earlier.get(m.id, []), lambda m: m.tests] + ([] if quick else [lambda _: PROGRAMS])
-    baseline = Baseline()
     killed: dict[str, str] = {}
-    for specs in passes:
-        todo = [m for m in mutants if m.id not in killed]
-        with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-            for mutant, by in zip(todo, pool.map(lambda m, s=specs: judge(m, s(m), baseline), todo)):
-                if by:
-                    killed[mutant.id] = by
-                if by or specs is passes[-1]:
-                    print(f"{mutant.id}: {by or 'lives'}", flush=True)
-    return report(mutants, killed, result)
+    tried: dict[str, set[tuple[str, str]]] = {m.id: set() for m in mutants}
+    tests = suite.Suite(BIN, PROGRAMS, WORK / "survey.json")
+    lock = threading.Lock()
+
+    def attempt(m: table.Mutant, specs: list[str], last: bool) -> None:
+        passed = 0
+        for program, name in [t for spec in specs for t in tests.chosen(spec)]:
+            if m.id in killed or (program, name) in tried[m.id]:
+                continue
+            tried[m.id].add((program, name))
+            test = tests.test(program, name)
+            if test and test.passes(m.number):
+                passed += 1
+                if by := judge(m, test):
+                    killed[m.id] = by
+        if m.id in killed or last:
+            print(f"{m.id}: {killed.get(m.id) or f'lives, of {passed} more tests that pass it'}", flush=True)
+            with lock:
+                write([m], killed, result)
+
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        list(pool.map(lambda m: attempt(m, earlier.get(m.id, []) + m.tests, quick), mutants))
+        if not quick:
+            list(pool.map(lambda m: attempt(m, PROGRAMS, True), [m for m in mutants if m.id not in killed]))
+    return report(mutants, killed)
 
 
-def report(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.Path) -> int:
-    """Rows to `result`, the score per folder to the terminal."""
-    def verdict(m: table.Mutant) -> str:
-        return "killed" if m.id in killed else "equivalent" if m.equivalent else "real" if m.real else "lived"
+def verdict(m: table.Mutant, killed: dict[str, str]) -> str:
+    """Of one mutant that was tried."""
+    return "killed" if m.id in killed else "equivalent" if m.equivalent else "real" if m.real else "lived"
 
-    rows = rows_of(result)  # those that were not tried this time stay
+
+def write(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.Path) -> None:
+    """Rows to `result`; those of mutants that were not tried this time stay."""
+    rows = rows_of(result)
     for m in mutants:
-        rows[m.id] = [m.id, m.file, verdict(m), killed.get(m.id) or m.equivalent or m.real, m.promise]
+        rows[m.id] = [m.id, m.file, verdict(m, killed), killed.get(m.id) or m.equivalent or m.real, m.promise]
     result.parent.mkdir(parents=True, exist_ok=True)
     result.write_text("\n".join("\t".join(row) for row in [["id", "file", "verdict", "by or why", "promise"],
                                                            *rows.values()]) + "\n")
 
+
+def report(mutants: list[table.Mutant], killed: dict[str, str]) -> int:
+    """The score per folder to the terminal, and what lives."""
     print(f"\n| {'sources':20} | mutants | killed | lived | equivalent | score |\n|---|---|---|---|---|---|")
     folders: dict[str, list[str]] = {}
     for m in mutants:
-        folders.setdefault(str(pathlib.PurePath(m.file).parent), []).append(verdict(m))
-    folders["all"] = [verdict(m) for m in mutants]
+        folders.setdefault(str(pathlib.PurePath(m.file).parent), []).append(verdict(m, killed))
+    folders["all"] = [verdict(m, killed) for m in mutants]
     score = 0.0
     for name, verdicts in folders.items():
         equivalent, dead = verdicts.count("equivalent"), verdicts.count("killed")
@@ -168,7 +176,7 @@ def report(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.
     for name in wrong:
         print(f"{name}: said to be equivalent, but killed: {killed[name]}")
     for m in mutants:
-        if verdict(m) in ("lived", "real"):
+        if verdict(m, killed) in ("lived", "real"):
             print(f"{m.id} lives: {m.promise} {m.real}")
     return 1 if score < LEAST_SCORE or wrong else 0
 
@@ -176,23 +184,29 @@ def report(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.
 def main() -> int:
     """Command line."""
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("what", choices=["check", "build", "run"])
+    arguments.add_argument("what", choices=["check", "build", "run", "draw"])
     arguments.add_argument("names", nargs="*", help="only these mutants, or those of these folders; programs to build")
     arguments.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments.add_argument("--quick", action="store_true", help="only the tests that the rows name")
-    arguments.add_argument("--result", type=pathlib.Path, default=WORK / "result.tsv")
+    arguments.add_argument("--drawn", action="store_true", help="those that were drawn, not the table")
+    arguments.add_argument("--seed", type=int, default=1, help="of draw")
     given = arguments.parse_intermixed_args()
-    mutants = table.load()
-    if given.what == "check":
-        wrong = table.check(mutants, ROOT)
+    if given.what == "draw":
+        mutants = draw(int(given.names[0]), given.seed)
+        DRAWN.write_text(json.dumps([dataclasses.asdict(m) for m in mutants], indent=1))
+        build(mutants, PROGRAMS)
+        return 0
+    mutants = [table.Mutant(**m) for m in json.loads(DRAWN.read_text())] if given.drawn else table.load()
+    wrong = [] if given.drawn else table.check(mutants, ROOT)
+    if given.what == "check" or wrong:
         print("\n".join(wrong) or f"{len(mutants)} mutants, each where the table says")
         return 1 if wrong else 0
     if given.what == "build":
         build(mutants, given.names or PROGRAMS)
         return 0
-    chosen = [m for m in mutants if not given.names or
+    wanted = [m for m in mutants if not given.names or
               any(m.id == name or m.file.startswith(name) for name in given.names)]
-    return run(chosen, given.jobs, given.quick, given.result)
+    return run(wanted, given.jobs, given.quick, WORK / ("drawn.tsv" if given.drawn else "result.tsv"))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The table of mutants: the *.toml files beside this one, checked against the sources, and the sources rewritten.
 
-A source's mutants are switches of one build: an expression E with the mutant M becomes `(on(17) ? (M) : (E))`, a
-statement (it ends with `;` or `}`) becomes `{ if (on(17)) { M } else { E } }`. Where a pattern has a part in «…», only
+A source's mutants are switches of one build: an expression E with the mutant M becomes `(backwash_mutant_on(17) ? (M) : (E))`, a
+statement (it ends with `;` or `}`) becomes `{ if (backwash_mutant_on(17)) { M } else { E } }`. Where a pattern has a part in «…», only
 this part is replaced and the rest says where it is. Mutants may lie within each other.
 """
 import pathlib
@@ -88,9 +88,9 @@ def switched(span: Span, original: str) -> str:
     statement = original[-1] in ";}"
     for m in span.mutants:
         if statement:
-            original = f"{{ if (::backwash_mutants::on({m.number})) {{ {m.replacement} }} else {{ {original} }} }}"
+            original = f"{{ if (backwash_mutant_on({m.number})) {{ {m.replacement} }} else {{ {original} }} }}"
         else:
-            original = f"(::backwash_mutants::on({m.number}) ? ({m.replacement}) : ({original}))"
+            original = f"(backwash_mutant_on({m.number}) ? ({m.replacement}) : ({original}))"
     return original
 
 
@@ -107,7 +107,9 @@ def rewritten(mutants: list[Mutant], text: str) -> str:
             at, first = span.end, following
         return out + text[at:end], first
 
-    return '#include "tests/mutants/switch.hpp"\n' + write(0, len(text), 0)[0]
+    # C knows no other folder than the file's own.
+    root = "../" * mutants[0].file.count("/") if mutants[0].file.endswith(".c") else ""
+    return f'#include "{root}tests/mutants/switch.h"\n' + write(0, len(text), 0)[0]
 
 
 def by_file(mutants: list[Mutant]) -> dict[str, list[Mutant]]:

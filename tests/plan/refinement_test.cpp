@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/kinodynamic_astar.hpp"
@@ -38,6 +40,29 @@ TEST(Refinement, WhatPlansReturnKeepsTheLimitsFromAnyMotionEvenHardlyOptimised) 
       EXPECT_LE(hardest, 1.0 + 1e-6) << v.transpose() << " to " << goal.transpose();
     }
   EXPECT_GT(flown, 5);
+}
+
+// A round that ends early may leave a curve that is worse than what was found before it.
+TEST(Refinement, PolishingReturnsNothingThatCostsMoreThanWhatWasFoundWithoutIt) {
+  const auto cost = [](const BSpline& s) { return s.jerk2() * std::pow(s.duration(), 5); };
+  int flown = 0, better = 0;
+  for (const Vec3& v : {Vec3(0, 0, 0), Vec3(0.8, 0.3, 0), Vec3(-0.5, 0.5, 0)})
+    for (const Vec3& goal : {Vec3(2, 0, 1.2), Vec3(1, 1.2, 1.6)}) {
+      const auto planned = [&](std::size_t polish) {
+        return plan(open_world(), moving({-1.5, 0, 1.2}, v), goal, {.v_max = 1.5, .a_max = 1.5, .polish = polish});
+      };
+      const Plan rough = planned(0);
+      if (rough.status != PlanStatus::ok) continue;
+      for (const std::size_t polish : {1U, 2U, 3U, 5U, 8U, 20U}) {
+        const Plan polished = planned(polish);
+        ASSERT_EQ(polished.status, PlanStatus::ok);
+        EXPECT_LE(cost(polished.trajectory), cost(rough.trajectory)) << goal.transpose() << " polished " << polish;
+        ++flown;
+        better += cost(polished.trajectory) < cost(rough.trajectory);
+      }
+    }
+  EXPECT_GT(flown, 20);
+  EXPECT_GT(better, 0);
 }
 
 TEST(Refinement, EndsAtItsDeadlineAndSaysSo) {

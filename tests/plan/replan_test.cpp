@@ -164,6 +164,20 @@ TEST(Replan, SaysThatNothingIsSafeWhereEvenTheStopIsTooLong) {
   EXPECT_LE(next.clearance_m, 0);
 }
 
+TEST(Replan, ANewPathMendsNothingOfWhatIsFlownBeforeItBegins) {
+  const Vec3 goal_W(5.05, 2.05, 0.95);
+  const auto c = changed(goal_W, [](OccupancyGrid&) {});
+  OccupancyGrid beside = c.before->grid;
+  const double x = c.route.commands[85].p_W.x();
+  fill(beside, {x - 0.05, 2.2, 0}, {x + 0.05, 2.4, 1.8}, Cell::occupied);
+  const auto after = world_of(beside);
+  const auto from_branch = replan(*after, c.route, 130, 131, goal_W, {{1.0, 1.5}, 7});
+  ASSERT_NE(from_branch.kind, Replan::Kind::unsafe) << "behind the obstacle all is well";
+  const auto next = replan(*after, c.route, 60, 130, goal_W, {{1.0, 1.5}, 7});
+  EXPECT_EQ(next.kind, Replan::Kind::unsafe);
+  EXPECT_LE(next.clearance_m, 0);
+}
+
 TEST(Replan, WhatWasFlownAlreadyIsNoReasonToStop) {
   const Vec3 goal_W(5.05, 2.05, 0.95);
   const auto c = changed(goal_W, [](OccupancyGrid& g) { fill(g, {0.9, 1.9, 0}, {1.2, 2.2, 1.8}, Cell::occupied); });

@@ -27,8 +27,12 @@ std::uint64_t seed() {
   return value;
 }
 
-std::filesystem::path folder() {
-  return std::filesystem::temp_directory_path() / ("study-test-" + std::to_string(::getpid()));
+const std::filesystem::path& folder() {
+  static const struct Folder {
+    std::filesystem::path path = std::filesystem::temp_directory_path() / ("study-test-" + std::to_string(::getpid()));
+    ~Folder() { std::filesystem::remove_all(path); }
+  } made;
+  return made.path;
 }
 
 Observations world_with(const std::vector<std::string>& causes, double size, int flights = 12, int number = 0) {

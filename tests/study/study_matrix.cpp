@@ -132,6 +132,7 @@ TEST(Study, TellsTrimAndDraftAsOneSetWhereNoFlightTurned) {
   const auto cell = std::find_if(cells().begin(), cells().end(), [](auto& c) { return c.name == "trim, no yaw turn"; });
   ASSERT_NE(cell, cells().end());
   const Outcome o = score(*cell, 4711, 1.5, 12, folder);
+  std::filesystem::remove_all(folder);
   EXPECT_TRUE(o.in_sets()) << told(o.sets, o.unknown);
   ASSERT_EQ(o.sets.size(), 1u);
   EXPECT_EQ(o.sets.front().size(), 2u) << told(o.sets, o.unknown);

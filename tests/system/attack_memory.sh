@@ -6,13 +6,18 @@
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
-start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv"
-start_daemon builtin:quad-5in "$work/flight.bwlog"
+# The map comes through the probe: the daemon listens to one writer of maps.
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv" --namespace bench
+"$build/tests/dds_probe" "$domain" backwash mapper &
+mapper=$!
+more_pids+=("$mapper")
+start_daemon builtin:quad-5in "$work/flight.bwlog" rt/bench/odometry
 enable
 sleep 0.5
 used=$(awk '$1 == "VmSize:" {print $2}' "/proc/$daemon_pid/status")
 prlimit --pid "$daemon_pid" --as=$((used * 1024))
-"$build/tests/dds_probe" "$domain" backwash roomy || die 'dds_probe failed'
+kill -USR1 "$mapper"
+wait "$mapper" || die 'dds_probe failed'
 code=0
 for _ in $(seq 100); do kill -0 "$daemon_pid" 2>/dev/null || break; sleep 0.1; done
 kill -0 "$daemon_pid" 2>/dev/null && die 'it goes on without memory'

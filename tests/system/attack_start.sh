@@ -107,7 +107,7 @@ port = Port()
 open(path, "w").write(configuration(port.path, interface="nowhere0"))
 code, said = start(path)
 assert code == 71 and "nowhere0" in said, (code, said)
-assert open(log, "rb").read() == b"an earlier flight"
+assert logs() == earlier, "a start that failed left a log"
 
 # A port that is missing at start is waited for, said once, and opened when it appears.
 later = work + "/later"

@@ -6,7 +6,7 @@
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
-check() { # check NAME: the preflight's lines and its exit code; it asks one parameter a second
+check() { # check NAME: the preflight's lines and its exit code, once the daemon has read all parameters
   sleep 7
   code=0
   "$bin/backwashctl" --domain "$domain" check >"$work/$1" 2>&1 || code=$?
@@ -24,6 +24,8 @@ for line in 'COM_OF_LOSS_T: 5 -> set COM_OF_LOSS_T to' 'COM_OBL_RC_ACT: 3 -> set
   grep -q "^FAIL  $line" "$work/unsafe" || die "check did not say: $line"
 done
 [[ $(grep -c ^FAIL "$work/unsafe") == 5 ]] || die "check found more than the five parameters"
+"$bin/backwashctl" --domain "$domain" enable >"$work/enable" 2>&1 && die "it was enabled with a time-out of 5 s"
+grep -q 'enable: refused: COM_OF_LOSS_T is 5: set COM_OF_LOSS_T to 0.5 s or less' "$work/enable" || die "$(cat "$work/enable")"
 "$bin/backwashctl" --domain "$domain" check --json >"$work/json" 2>>"$log" && die "check --json passed"
 python3 - "$work/json" <<'PYTHON'
 import json, sys

@@ -49,6 +49,14 @@ printf 'x_m,y_m,z_m\n1.5,0.8,1.2\n1.5,-0.8,1.4\n-1,0,1.2\n' >"$work/route.csv"
 ctl follow "$work/route.csv" --wait
 sleep 0.5
 status
+# Whoever waits for a flight that another station stopped is told so, and does not wait on.
+"$bin/backwashctl" --domain "$domain" goto 1.5,0.8,1.2 --wait >"$work/waiting" 2>&1 &
+waiting=$!
+sleep 1
+ctl stop --wait
+code=0
+wait "$waiting" || code=$?
+[[ $code == 69 ]] && grep -q 'goto: a later command took its place; the daemon is hold' "$work/waiting" || die "goto ended with $code: $(cat "$work/waiting")"
 ctl land --wait
 stop
 python3 - "$work/status.json" "$work/truth.csv" "$work/route.csv" <<'PYTHON'

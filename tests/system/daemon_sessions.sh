@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Who may command, and whose odometry is flown (docs/faults.md rows 28 and 48), with real processes: a second station
 # and a second writer under the holder's name are refused, replays too; a repeat is answered again and not done again; an
-# old sequence number counts for nothing; STOP is anybody's; a session ends with its process.
+# old sequence number counts for nothing; an answer is its writer's; STOP is anybody's; a session ends with its process,
+# however that ends; of two daemons in one name space none is enabled.
 #   daemon_sessions.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
-enable=1 disable=2 takeoff=3 hold=5 stop_now=8 # verbs of idl/backwash_msgs.idl
+enable=1 disable=2 takeoff=3 hold=5 release=7 stop_now=8 # verbs of idl/backwash_msgs.idl
 
 # open NAME: a station's process, one writer; ask NAME COMMAND…: the answer to its command is in $answer.
 open() {
@@ -65,8 +66,6 @@ expect '2 *alpha*' mallory alpha 1 $n $enable
 (($(refused) >= count + 3)) || die "what was refused was not counted"
 holds 's["state"] == "tracking" and not s["armed"]'
 
-n=$((n + 1)) # acknowledgements name no writer: the number that mallory used is not used again
-
 # A repeat is answered as before although the daemon would say something else by now; an old number is not answered so.
 expect '0 disabling' alpha alpha 1 $((++n)) $disable
 sleep 0.5
@@ -101,3 +100,27 @@ grep -v ' -> ' "$log" | grep -q $'\e' && die "an escape sequence reached the log
 holds 's["odometry_refused"] == 0'
 "$build/tests/dds_probe" "$domain" backwash second
 holds 's["odometry_refused"] > 20 and "is in use" in s["refused"] and abs(s["position"][0] + 2) < 0.1'
+
+# The holder is killed: STOP is taken at once, and 2 s later its session is over.
+open gamma
+expect '[01] *' mallory beta 9 6 $hold
+expect '2 *beta*' gamma gamma 5 1 $hold
+kill -KILL "$pid_mallory"
+expect '[01] *' gamma gamma 5 2 $stop_now
+sleep 4
+expect '1 not enabled' gamma gamma 5 3 $hold
+holds 's["state"] == "passive"'
+expect '0 session released' gamma gamma 5 4 $release
+
+# A second daemon in this name space, for a controller of its own: both would obey one enable. Neither does.
+sed -e "s#^device = .*#device = \"$work/absent\"#" -e "s#^file = .*#file = \"$work/rival.bwlog\"#" \
+  "$work/backwashd.toml" >"$work/rival.toml"
+"$bin/backwashd" --config "$work/rival.toml" >>"$log" 2>&1 &
+rival=$!
+more_pids+=("$rival")
+for _ in $(seq 100); do (($(grep -c 'another daemon in this namespace' "$log") == 2)) && break; sleep 0.1; done
+expect '1 another daemon in this namespace, writer *' gamma gamma 6 1 $enable
+kill -TERM "$rival"
+wait "$rival"
+for _ in $(seq 100); do grep -q 'the other daemon in this namespace is gone' "$log" && break; sleep 0.1; done
+expect '0 enabling' gamma gamma 6 2 $enable

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a confused or hostile participant sends, for the scripts beside it (docs/faults.md rows 2, 3, 12, 26, 27, 46,
 // 48).
-//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closures|large|roomy|elsewhere
+//   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closure|closures|elsewhere
 //   dds_probe DOMAIN NAMESPACE flood [SECONDS]
+//   dds_probe DOMAIN NAMESPACE roomy [SECONDS]  a good map, once; its writer stays for so long
+//   dds_probe DOMAIN NAMESPACE mapper        hands the map of the name space `bench` on; after SIGUSR1 the one writer
+//                                            that the daemon listens to sends the roomy one
+//   dds_probe DOMAIN NAMESPACE large BURSTS  the same, but then the largest maps and clouds
 //   dds_probe DOMAIN NAMESPACE nan|jump      hands the odometry of NAMESPACE on as rt/relay/odometry; after SIGUSR1
 //                                            the one writer that the daemon listens to fails
 #include <algorithm>
@@ -117,46 +121,6 @@ int relay(const dds::Participant& participant, const std::string& name_space, do
   return 0;
 }
 
-// For 6 s the largest that is allowed: maps of 40 MB at 5 Hz, clouds of 300,000 points at 10 Hz.
-int large(const dds::Participant& participant, const std::string& name_space) {
-  auto maps = dds::make_writer<dds::Octomap>(participant, name_space);
-  auto clouds_out = dds::make_writer<dds::PointCloud>(participant, name_space);
-  until_matched(maps);
-  until_matched(clouds_out);
-  char frame[] = "map", id[] = "OcTree", x[] = "x", y[] = "y", z[] = "z";
-  std::vector<std::uint8_t> tree(40'000'000, 0xff);
-  dds::Octomap map{};
-  map.header.frame_id = frame;
-  map.id = id;
-  map.binary = true;
-  map.resolution = 0.1;
-  map.data = {40'000'000, 40'000'000, reinterpret_cast<decltype(map.data._buffer)>(tree.data()), false};
-  dds::PointField fields[3] = {{x, 0, 7, 1}, {y, 4, 7, 1}, {z, 8, 7, 1}};
-  std::vector<float> points(4 * 300'000);
-  for (std::size_t n = 0; n < points.size(); ++n) points[n] = 0.001f * static_cast<float>(n % 1777);
-  dds::PointCloud cloud{};
-  cloud.header.frame_id = frame;
-  cloud.fields = {3, 3, fields, false};
-  cloud.height = 1;
-  cloud.width = 300'000;
-  cloud.point_step = 16;
-  cloud.row_step = 16 * 300'000;
-  cloud.data = {cloud.row_step, cloud.row_step, reinterpret_cast<std::uint8_t*>(points.data()), false};
-  int written = 0;
-  auto due = std::chrono::steady_clock::now();
-  const auto end = due + 6s;
-  for (int n = 0; due < end; ++n) {
-    if (n % 2 == 0) written += maps.write(map);
-    const auto t = std::chrono::steady_clock::now().time_since_epoch();
-    cloud.header.stamp = {static_cast<std::int32_t>(t / 1s), static_cast<std::uint32_t>((t % 1s).count())};
-    clouds_out.write(cloud);
-    due = std::max(due + 100ms, std::chrono::steady_clock::now() - 100ms);
-    std::this_thread::sleep_until(due);
-  }
-  std::printf("%d maps of 40 MB written\n", written);
-  return 0;
-}
-
 // Loop closures of frames that nobody has, with names that steer terminals, at 1 kHz.
 int closures(const dds::Participant& participant, const std::string& name_space) {
   auto writer = dds::make_writer<dds::TransformStamped>(participant, name_space);
@@ -196,10 +160,23 @@ int corrupt(const dds::Participant& participant, const std::string& name_space) 
   return 0;
 }
 
-// A good map of two free cubes of 6.4 m: a box of 128 x 128 x 128 voxels, whose snapshot needs 240 MB.
-int large_map(const dds::Participant& participant, const std::string& name_space, std::string frame = "map") {
-  auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
+// A good loop closure by half a metre.
+int closure(const dds::Participant& participant, const std::string& name_space) {
+  auto writer = dds::make_writer<dds::TransformStamped>(participant, name_space);
   until_matched(writer);
+  char frame[] = "map", child[] = "odom";
+  dds::TransformStamped m{};
+  m.header.frame_id = frame;
+  m.child_frame_id = child;
+  m.transform.translation.x = 0.5;
+  m.transform.rotation.w = 1;
+  writer.write(m);
+  std::this_thread::sleep_for(1s);
+  return 0;
+}
+
+// A good map of two free cubes of 6.4 m: a box of 128 x 128 x 128 voxels, whose snapshot needs 240 MB.
+void write_roomy(dds::Writer<dds::Octomap>& writer, std::string frame = "map") {
   std::vector<std::uint8_t> data{0x03, 0xc0};
   for (int n = 0; n < 8; ++n) data.insert(data.end(), {0x00, 0xc0});
   data.insert(data.end(), {0x00, 0x40});
@@ -214,7 +191,77 @@ int large_map(const dds::Participant& participant, const std::string& name_space
   const auto size = static_cast<std::uint32_t>(data.size());
   m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(data.data()), false};
   writer.write(m);
+}
+
+int roomy(const dds::Participant& participant, const std::string& name_space, const std::string& frame, int seconds) {
+  auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
+  until_matched(writer);
+  write_roomy(writer, frame);
+  std::this_thread::sleep_for(seconds * 1s);
+  return 0;
+}
+
+// The map of the name space `bench`, until SIGUSR1.
+void hand_map_on(const dds::Participant& participant, dds::Writer<dds::Octomap>& writer) {
+  std::signal(SIGUSR1, [](int) { failing = 1; });
+  auto reader = dds::make_reader<dds::Octomap>(participant, "bench");
+  for (; !failing; std::this_thread::sleep_for(50ms)) reader.take([&](const dds::Octomap& m) { writer.write(m); });
+}
+
+int mapper(const dds::Participant& participant, const std::string& name_space) {
+  auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
+  hand_map_on(participant, writer);
+  write_roomy(writer);
   std::this_thread::sleep_for(1s);
+  return 0;
+}
+
+// For 3 s the largest that is allowed: maps of 40 MB at 5 Hz, clouds of 300,000 points at 10 Hz. Prints from when to
+// when (s, monotonic).
+void large(dds::Writer<dds::Octomap>& maps, dds::Writer<dds::PointCloud>& clouds_out) {
+  char frame[] = "map", id[] = "OcTree", x[] = "x", y[] = "y", z[] = "z";
+  std::vector<std::uint8_t> tree(40'000'000, 0xff);
+  dds::Octomap map{};
+  map.header.frame_id = frame;
+  map.id = id;
+  map.binary = true;
+  map.resolution = 0.1;
+  map.data = {40'000'000, 40'000'000, reinterpret_cast<decltype(map.data._buffer)>(tree.data()), false};
+  dds::PointField fields[3] = {{x, 0, 7, 1}, {y, 4, 7, 1}, {z, 8, 7, 1}};
+  std::vector<float> points(4 * 300'000);
+  for (std::size_t n = 0; n < points.size(); ++n) points[n] = 0.001f * static_cast<float>(n % 1777);
+  dds::PointCloud cloud{};
+  cloud.header.frame_id = frame;
+  cloud.fields = {3, 3, fields, false};
+  cloud.height = 1;
+  cloud.width = 300'000;
+  cloud.point_step = 16;
+  cloud.row_step = 16 * 300'000;
+  cloud.data = {cloud.row_step, cloud.row_step, reinterpret_cast<std::uint8_t*>(points.data()), false};
+  const auto begun = std::chrono::steady_clock::now(), end = begun + 3s;
+  auto due = begun;
+  for (int n = 0; due < end; ++n) {
+    if (n % 2 == 0) maps.write(map);
+    const auto t = std::chrono::steady_clock::now().time_since_epoch();
+    cloud.header.stamp = {static_cast<std::int32_t>(t / 1s), static_cast<std::uint32_t>((t % 1s).count())};
+    clouds_out.write(cloud);
+    due = std::max(due + 100ms, std::chrono::steady_clock::now() - 100ms);
+    std::this_thread::sleep_until(due);
+  }
+  const auto s = [](auto t) { return std::chrono::duration<double>(t.time_since_epoch()).count(); };
+  std::printf("%.3f %.3f\n", s(begun), s(std::chrono::steady_clock::now()));
+  std::fflush(stdout);
+}
+
+// Bursts with as long a silence before each: what else the machine does is then the same with and without them.
+int bursts(const dds::Participant& participant, const std::string& name_space, int count) {
+  auto maps = dds::make_writer<dds::Octomap>(participant, name_space);
+  auto clouds_out = dds::make_writer<dds::PointCloud>(participant, name_space);
+  hand_map_on(participant, maps);
+  for (int n = 0; n < count; ++n) {
+    std::this_thread::sleep_for(4s);  // of which what the last burst left on its way takes the first
+    large(maps, clouds_out);
+  }
   return 0;
 }
 
@@ -234,9 +281,11 @@ int main(int argc, char** argv) {
   if (what == "closures") return closures(participant, name_space);
   if (what == "oversized") return clouds(participant, name_space, 400'000, 400'000);
   if (what == "lying") return clouds(participant, name_space, 1000, 1);
-  if (what == "large") return large(participant, name_space);
-  if (what == "roomy") return large_map(participant, name_space);
-  if (what == "elsewhere") return large_map(participant, name_space, "odom");
+  if (what == "large") return bursts(participant, name_space, argc == 5 ? std::atoi(argv[4]) : 1);
+  if (what == "closure") return closure(participant, name_space);
+  if (what == "roomy") return roomy(participant, name_space, "map", argc == 5 ? std::atoi(argv[4]) : 1);
+  if (what == "elsewhere") return roomy(participant, name_space, "odom", 1);
+  if (what == "mapper") return mapper(participant, name_space);
   if (what == "corrupt") return corrupt(participant, name_space);
   return 64;
 }

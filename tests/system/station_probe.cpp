@@ -7,6 +7,7 @@
 //                                                       question (s, monotonic) and until its answer (s)
 //   station_probe DOMAIN NAMESPACE stops N X            to and fro between -X and X, stopped on the way N times; prints
 //                                                       when each STOP was sent (s, monotonic)
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -56,7 +57,8 @@ class Station {
     while (!answer && now() - begun < patience_s) {
       waitset_.wait(0.01);
       acks_.take([&](const dds::Ack& ack) {
-        if (ack.session == command.session && ack.sequence_number == command.sequence_number)
+        if (std::ranges::equal(ack.writer, commands_.guid()) && ack.session == command.session &&
+            ack.sequence_number == command.sequence_number)
           answer = Answer{ack.result, ack.reason};
       });
     }
@@ -107,6 +109,7 @@ int answers(Station& station, double seconds) {
     ++c.sequence_number;
     const double asked = now();
     if (station.ask(c, "nobody", 1)) std::printf("%.6f %.6f\n", asked, now() - asked);
+    std::fflush(stdout);  // it may be ended before
     due += 50ms;
     std::this_thread::sleep_until(due);
   }

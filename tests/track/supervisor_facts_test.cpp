@@ -55,6 +55,9 @@ TEST(SupervisorFacts, EachEndsTrackingInItsOwnWay) {
       {Mode::passive, Reason::disarmed, [](auto& in) { in.armed = false; }},
       {Mode::land, Reason::land_requested, [](auto& in) { in.request = Request::land; }},
       {Mode::hold, Reason::odometry_jump, [](auto& in) { in.odometry_jump = true; }},
+      {Mode::hold, Reason::odometry_inconsistent, [](auto& in) { in.odometry_inconsistent = true; }},
+      {Mode::hold, Reason::pose_silent, [](auto& in) { in.pose_age = 0.31; }},
+      {Mode::hold, Reason::closure_refused, [](auto& in) { in.closure_refused = true; }},
       {Mode::hold, Reason::odometry_frozen, [](auto& in) { in.odometry_frozen = true; }},
       {Mode::hold, Reason::odometry_disorder, [](auto& in) { in.odometry_disorder = true; }},
       {Mode::hold, Reason::odometry_lost, [](auto& in) { in.odometry_age = 0.081; }},
@@ -76,6 +79,58 @@ TEST(SupervisorFacts, EachEndsTrackingInItsOwnWay) {
   }
 }
 
+/// A take-off was accepted a tick ago, and the motors run.
+Supervisor lifting() {
+  Supervisor s = flying();
+  SupervisorInput in = healthy();
+  in.armed = false;
+  EXPECT_EQ(s.step(in).mode, Mode::passive) << "nobody flies yet";
+  in.request = Request::enable;
+  s.step(in);
+  in.request = Request::none;
+  EXPECT_EQ(s.step(in).mode, Mode::tracking);
+  in.new_segment = in.takeoff = in.arming = true;
+  EXPECT_EQ(s.step(in).mode, Mode::lifting);
+  EXPECT_EQ(s.step(healthy()).mode, Mode::lifting);
+  return s;
+}
+
+// Below the lowest safe hover height no hold is verified: it lands, or belongs to somebody else, or is in the air.
+TEST(SupervisorFacts, EachEndsALiftOffInItsOwnWay) {
+  const struct {
+    Mode mode;
+    Reason reason;
+    Change change;
+  } rows[] = {
+      {Mode::quiet, Reason::port_lost, [](auto& in) { in.port_open = false; }},
+      {Mode::quiet, Reason::autopilot_silent, [](auto& in) { in.heartbeat_age = 1.51; }},
+      {Mode::passive, Reason::offboard_left, [](auto& in) { in.offboard = false; }},
+      {Mode::passive, Reason::disarmed, [](auto& in) { in.armed = false; }},
+      {Mode::land, Reason::land_requested, [](auto& in) { in.request = Request::land; }},
+      {Mode::land, Reason::stop_requested, [](auto& in) { in.request = Request::stop; }},
+      {Mode::land, Reason::stop_requested, [](auto& in) { in.request = Request::disable; }},
+      {Mode::land, Reason::pose_silent, [](auto& in) { in.pose_age = 0.31; }},
+      {Mode::land, Reason::odometry_jump, [](auto& in) { in.odometry_jump = true; }},
+      {Mode::land, Reason::odometry_inconsistent, [](auto& in) { in.odometry_inconsistent = true; }},
+      {Mode::land, Reason::odometry_disorder, [](auto& in) { in.odometry_disorder = true; }},
+      {Mode::land, Reason::odometry_lost, [](auto& in) { in.odometry_age = 0.081; }},
+      {Mode::land, Reason::frames_disagree, [](auto& in) { in.frames_agree = false; }},
+      {Mode::land, Reason::autopilot_reset, [](auto& in) { in.autopilot_reset = true; }},
+      {Mode::land, Reason::closure_refused, [](auto& in) { in.closure_refused = true; }},
+      {Mode::land, Reason::battery_low, [](auto& in) { in.battery_low = true; }},
+      {Mode::land, Reason::obstacle_ahead, [](auto& in) { in.obstacle_ahead = true; }},
+      {Mode::land, Reason::outside_map, [](auto& in) { in.outside_map = true; }},
+      {Mode::land, Reason::map_late, [](auto& in) { in.map_late = true; }},
+      {Mode::tracking, Reason::lifted_off, [](auto& in) { in.lifted = true; }},
+  };
+  EXPECT_EQ(after(lifting(), [](auto&) {}).mode, Mode::lifting);
+  for (const auto& row : rows) {
+    const auto out = after(lifting(), row.change);
+    EXPECT_EQ(out.mode, row.mode) << to_string(row.reason);
+    EXPECT_EQ(out.reason, row.reason) << to_string(row.reason);
+  }
+}
+
 TEST(SupervisorFacts, EachRefusesToEnableInItsOwnWay) {
   const struct {
     Reason reason;
@@ -83,6 +138,7 @@ TEST(SupervisorFacts, EachRefusesToEnableInItsOwnWay) {
   } rows[] = {
       {Reason::port_lost, [](auto& in) { in.port_open = false; }},
       {Reason::autopilot_silent, [](auto& in) { in.heartbeat_age = 1.51; }},
+      {Reason::pose_silent, [](auto& in) { in.pose_age = 0.31; }},
       {Reason::odometry_lost, [](auto& in) { in.odometry_age = 0.081; }},
       {Reason::map_missing, [](auto& in) { in.map_missing = true; }},
       {Reason::outside_map, [](auto& in) { in.outside_map = true; }},

@@ -75,7 +75,7 @@ void tell(const AutopilotLink& link) {
               R"("good": %llu, "unsigned": %llu, "wrong": %llu, "replayed": %llu})"
               "\n",
               link.vehicle().value_or(0), t.status && t.status->value.armed, p.x(), p.y(), p.z(),
-              t.attitude.has_value(), ack ? ack->value.result : -1, parameter ? parameter->value.value : -1,
+              t.attitude.has_value(), ack ? ack->value.result : -1, parameter ? parameter->value : -1,
               t.battery && t.battery->value.voltage ? *t.battery->value.voltage : -1, link.clock().has_value(),
               count(link.received().frames), count(link.received().bad_crc), count(link.received().skipped_bytes),
               count(link.transmit().sent()), count(counted.good), count(counted.unsigned_frames),

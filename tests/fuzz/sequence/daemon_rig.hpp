@@ -47,7 +47,7 @@ class DaemonRig {
     daemon::Recorder recorder;
     daemon::MapSettings settings;
     daemon::MapWorker map;
-    daemon::Mission mission;
+    daemon::Mission mission{daemon::test::vehicle_5in()};
     daemon::Localization localization{config::Daemon{}, daemon::test::vehicle_5in().estimation.position};
     daemon::PlannerWorker planner;
     std::shared_ptr<const plan::World> known;  // newest that the DDS reader has

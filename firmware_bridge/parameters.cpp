@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "firmware_bridge/parameters.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace backwash::firmware_bridge {
+namespace {
+
+enum class Kind : std::uint8_t {
+  at_most,  // above 0 and at most `bound`
+  one_of,   // an integer n with bit n of `bound`
+  bits,     // an integer with all bits of `bound`
+  // Against the vehicle file; `bound`: units of the parameter in one of ours.
+  k_d_horizontal,  // velocity gain
+  k_p_horizontal,  // position gain: k_p over the velocity gain
+  k_d_vertical,
+  k_p_vertical,
+  v_max,
+  a_max,
+};
+
+struct Rule {
+  std::string_view name;
+  bool required;
+  Kind kind;
+  double bound;
+  const char* advice;  // of the first three kinds
+};
+
+constexpr int any(std::initializer_list<int> allowed) {
+  int mask = 0;
+  for (const int n : allowed) mask |= 1 << n;
+  return mask;
+}
+
+constexpr Rule kPx4[] = {
+    {"COM_OF_LOSS_T", true, Kind::at_most, 0.5,
+     "set COM_OF_LOSS_T to 0.5 s or less: for so long the vehicle flies on when the set-points stop"},
+    {"COM_OBL_RC_ACT", true, Kind::one_of, any({4, 5}),
+     "set COM_OBL_RC_ACT to 4 (land) or 5 (hold): 0 to 2 drift, 3 climbs and returns, 6 and 7 drop the vehicle"},
+    {"MPC_XY_VEL_P_ACC", true, Kind::k_d_horizontal, 1, ""},
+    {"MPC_XY_P", true, Kind::k_p_horizontal, 1, ""},
+    {"MPC_Z_VEL_P_ACC", true, Kind::k_d_vertical, 1, ""},
+    {"MPC_Z_P", true, Kind::k_p_vertical, 1, ""},
+    {"MPC_XY_VEL_MAX", true, Kind::v_max, 1, ""},
+    {"MPC_Z_VEL_MAX_UP", true, Kind::v_max, 1, ""},
+    {"MPC_Z_VEL_MAX_DN", true, Kind::v_max, 1, ""},
+    {"COM_RC_OVERRIDE", false, Kind::bits, 2,
+     "add 2 to COM_RC_OVERRIDE: without it the pilot's sticks do not take over in offboard"},
+    {"NAV_DLL_ACT", false, Kind::one_of, any({0, 1, 3}),
+     "set NAV_DLL_ACT to 0 (none), 1 (hold) or 3 (land): 2 climbs and returns, 5 and 6 drop the vehicle"},
+    {"COM_LOW_BAT_ACT", false, Kind::one_of, any({0, 2}), "set COM_LOW_BAT_ACT to 2 (land): 1 and 3 climb and return"},
+    {"EKF2_EV_CTRL", false, Kind::bits, 1 + 2 + 8,
+     "set EKF2_EV_CTRL to 15: the estimator must take position, height and heading from the VIO"},
+    {"EKF2_HGT_REF", false, Kind::one_of, any({3}),
+     "set EKF2_HGT_REF to 3 (vision): rotor wash spoils the barometer indoors"},
+};
+
+constexpr Rule kArduPilot[] = {
+    {"GUID_TIMEOUT", true, Kind::at_most, 0.3,
+     "set GUID_TIMEOUT to 0.3 s or less: for so long the vehicle flies on when the set-points stop"},
+    {"PSC_VELXY_P", true, Kind::k_d_horizontal, 1, ""},
+    {"PSC_POSXY_P", true, Kind::k_p_horizontal, 1, ""},
+    {"PSC_VELZ_P", true, Kind::k_d_vertical, 1, ""},
+    {"PSC_POSZ_P", true, Kind::k_p_vertical, 1, ""},
+    {"WPNAV_SPEED", true, Kind::v_max, 100, ""},
+    {"WPNAV_SPEED_UP", true, Kind::v_max, 100, ""},
+    {"WPNAV_SPEED_DN", true, Kind::v_max, 100, ""},
+    {"WPNAV_ACCEL", true, Kind::a_max, 100, ""},
+    {"WPNAV_ACCEL_Z", true, Kind::a_max, 100, ""},
+    {"VISO_TYPE", false, Kind::one_of, any({1, 2, 3}),
+     "set VISO_TYPE to 1 (MAVLink) and restart it: without it ODOMETRY is not read"},
+    {"EK3_SRC1_POSXY", false, Kind::one_of, any({6}),
+     "set EK3_SRC1_POSXY to 6 (external navigation): the estimator must follow the VIO"},
+    {"EK3_SRC1_POSZ", false, Kind::one_of, any({6}),
+     "set EK3_SRC1_POSZ to 6 (external navigation): rotor wash spoils the barometer indoors"},
+    {"EK3_SRC1_YAW", false, Kind::one_of, any({6}),
+     "set EK3_SRC1_YAW to 6 (external navigation): a compass indoors turns the two frames apart"},
+    {"FS_EKF_ACTION", false, Kind::one_of, any({1, 3}),
+     "set FS_EKF_ACTION to 1 or 3 (land): without a position nothing else is left"},
+    {"FS_THR_ENABLE", false, Kind::one_of, any({0, 3}),
+     "set FS_THR_ENABLE to 3 (land), or to 0 without a remote control: the others may climb and return"},
+    {"FS_GCS_ENABLE", false, Kind::one_of, any({0, 5}),
+     "set FS_GCS_ENABLE to 0 (none) or 5 (land): the others may climb and return"},
+};
+
+static_assert(std::size(kPx4) <= kMostParameters && std::size(kArduPilot) <= kMostParameters);
+
+std::span<const Rule> rules(Autopilot autopilot) noexcept {
+  if (autopilot == Autopilot::kPx4) return kPx4;
+  if (autopilot == Autopilot::kArduPilot) return kArduPilot;
+  return {};
+}
+
+template <std::size_t kCount>
+constexpr std::array<std::string_view, kCount> names_of(const Rule (&all)[kCount]) {
+  std::array<std::string_view, kCount> names;
+  std::ranges::transform(all, names.begin(), &Rule::name);
+  return names;
+}
+constexpr auto kPx4Names = names_of(kPx4);
+constexpr auto kArduPilotNames = names_of(kArduPilot);
+
+// The value that `kind` asks of the parameter, for the vehicle; for gains what the product with the velocity gain asks.
+double wanted(const Rule& rule, const Vehicle& vehicle) {
+  const auto& [kp, kd] = std::pair(vehicle.controller.kp, vehicle.controller.kd);
+  switch (rule.kind) {
+    case Kind::k_d_horizontal:
+      return kd.horizontal;
+    case Kind::k_p_horizontal:
+      return kp.horizontal / kd.horizontal;
+    case Kind::k_d_vertical:
+      return kd.vertical;
+    case Kind::k_p_vertical:
+      return kp.vertical / kd.vertical;
+    case Kind::v_max:
+      return rule.bound * vehicle.limits.v_max;
+    case Kind::a_max:
+      return rule.bound * vehicle.limits.a_max;
+    default:
+      return rule.bound;
+  }
+}
+
+// k_p = P_position · P_velocity as both firmwares cascade them; `velocity`: its deviation from the vehicle file, as a
+// ratio.
+bool good(const Rule& rule, double value, double velocity, const Vehicle& vehicle) {
+  const double want = wanted(rule, vehicle);
+  // The link carries floats: 0.3 comes as 0.30000001, 1.3 as 1.29999995.
+  const auto [told, limit] = std::pair(static_cast<float>(value), static_cast<float>(want));
+  switch (rule.kind) {
+    case Kind::at_most:
+      return value > 0 && told <= limit;
+    case Kind::one_of:
+      return value >= 0 && value < 31 && value == std::floor(value) &&
+             (static_cast<int>(want) >> static_cast<int>(value) & 1) != 0;
+    case Kind::bits:
+      return value >= 0 && value < 1 << 30 &&
+             (static_cast<int>(value) & static_cast<int>(want)) == static_cast<int>(want);
+    case Kind::k_d_horizontal:
+    case Kind::k_d_vertical:
+      return std::abs(value / want - 1) <= kGainTolerance;
+    case Kind::k_p_horizontal:
+    case Kind::k_p_vertical:
+      return std::abs(value / want * velocity - 1) <= kGainTolerance;
+    case Kind::v_max:
+    case Kind::a_max:
+      return told >= limit;
+  }
+  return false;
+}
+
+std::string text(const char* format, auto... values) {
+  char line[192];
+  std::snprintf(line, sizeof line, format, values...);
+  return line;
+}
+
+std::string advice(const Rule& rule, const Vehicle& vehicle) {
+  const std::string name(rule.name);
+  switch (rule.kind) {
+    case Kind::at_most:
+    case Kind::one_of:
+    case Kind::bits:
+      return rule.advice;
+    case Kind::v_max:
+    case Kind::a_max:
+      return text("set %s to %.3g or more: the vehicle file's %s is planned with", name.c_str(), wanted(rule, vehicle),
+                  rule.kind == Kind::v_max ? "v_max" : "a_max");
+    default:
+      return text("set %s to %.3g, or the vehicle file to the gains that fly: its sets are computed for them",
+                  name.c_str(), wanted(rule, vehicle));
+  }
+}
+
+}  // namespace
+
+std::span<const std::string_view> parameter_names(Autopilot autopilot) noexcept {
+  if (autopilot == Autopilot::kPx4) return kPx4Names;
+  if (autopilot == Autopilot::kArduPilot) return kArduPilotNames;
+  return {};
+}
+
+std::vector<ParameterFinding> judge_parameters(Autopilot autopilot, const ParameterValues& values,
+                                               const Vehicle& vehicle) {
+  std::vector<ParameterFinding> findings;
+  double velocity = 1;  // of the last velocity gain, which stands before its position gain
+  for (const Rule& rule : rules(autopilot)) {
+    const auto value = values[findings.size()];
+    ParameterFinding finding{rule.name, rule.required, false, value, {}};
+    finding.good = value && good(rule, *value, velocity, vehicle);
+    if (rule.kind == Kind::k_d_horizontal || rule.kind == Kind::k_d_vertical)
+      velocity = value.value_or(0) / wanted(rule, vehicle);
+    if (!value)
+      finding.advice = "the autopilot has not answered: check the link, and that its firmware has this parameter";
+    else if (!finding.good)
+      finding.advice = advice(rule, vehicle);
+    findings.push_back(std::move(finding));
+  }
+  return findings;
+}
+
+std::string forbidding_parameter(Autopilot autopilot, const ParameterValues& values, const Vehicle& vehicle) {
+  for (const ParameterFinding& finding : judge_parameters(autopilot, values, vehicle)) {
+    if (finding.good || !finding.required) continue;
+    const std::string name(finding.name);
+    if (!finding.value) return "no value of " + name + " from the autopilot yet";
+    return text("%s is %g: %s", name.c_str(), *finding.value, finding.advice.c_str());
+  }
+  return "";
+}
+
+}  // namespace backwash::firmware_bridge

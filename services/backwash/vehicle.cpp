@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "core/study/gain_sweep.hpp"
+#include "core/study/raw_log.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/verb.hpp"
+#include "services/parallel/parallel.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct Options {
+  std::string map, model, vehicle, parameters, log;
+  std::optional<Vec3> start, goal;
+  bool json = false;
+};
+
+/// How a firmware names its gains: k_d is the velocity gain, k_p the product of the two.
+struct GainNames {
+  const char *xy_position, *xy_velocity, *z_position, *z_velocity;
+};
+constexpr GainNames kPx4{"MPC_XY_P", "MPC_XY_VEL_P_ACC", "MPC_Z_P", "MPC_Z_VEL_P_ACC"};
+constexpr GainNames kArduPilot{"PSC_POSXY_P", "PSC_VELXY_P", "PSC_POSZ_P", "PSC_VELZ_P"};
+
+/// NAME and number of each line of a parameter file: ArduPilot's (NAME,1 or NAME 1), PX4's (NAME=1), or a ground
+/// station's with NAME and value in the third and fourth column.
+std::map<std::string, double> read_parameters(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw Failure(kNoInput, path + ":1: cannot be read; name the autopilot's parameter file");
+  std::map<std::string, double> values;
+  for (std::string line; std::getline(file, line);) {
+    for (char& c : line)
+      if (c == '=' || c == ',' || c == '\t' || c == '\r') c = ' ';
+    std::istringstream words(line);
+    std::string name, before;
+    for (int n = 0; n < 3 && words >> name && std::isdigit(static_cast<unsigned char>(name[0])); ++n) before = name;
+    double value = 0;
+    if (!name.empty() && name[0] != '#' && words >> value) values[name] = value;
+  }
+  return values;
+}
+
+/// The gains that fly, in place of the vehicle file's; the firmware that they are of.
+GainNames take_gains(const std::string& path, Vehicle& vehicle) {
+  const auto values = read_parameters(path);
+  for (const GainNames& names : {kPx4, kArduPilot}) {
+    if (!values.contains(names.xy_velocity)) continue;
+    const auto gain = [&](const char* name) {
+      const auto found = values.find(name);
+      if (found == values.end() || !(found->second > 0))
+        throw Failure(kBadData,
+                      path + ":1: " + name + " is missing or not above 0; save all parameters of the autopilot");
+      return found->second;
+    };
+    vehicle.controller.kd = {gain(names.xy_velocity), gain(names.z_velocity)};
+    vehicle.controller.kp = {gain(names.xy_position) * gain(names.xy_velocity),
+                             gain(names.z_position) * gain(names.z_velocity)};
+    return names;
+  }
+  throw Failure(kBadData,
+                path + ":1: has neither MPC_XY_VEL_P_ACC nor PSC_VELXY_P; save all parameters of the autopilot");
+}
+
+/// Samples of a flight with the present gains, and how many of them lay in their set.
+struct Evidence {
+  std::size_t judged = 0, inside = 0;
+};
+
+Evidence evidence_of(const std::string& path) {
+  const auto log = study::read_raw_log(path);
+  if (!log)
+    throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  Evidence evidence;
+  for (const auto& record : log->records) {
+    study::TickRecord tick;
+    if (record.header.kind != study::RecordKind::tick || record.bytes.size() < sizeof tick) continue;
+    std::memcpy(&tick, record.bytes.data(), sizeof tick);
+    evidence.judged += tick.judged != 0;
+    evidence.inside += tick.judged != 0 && tick.inside != 0;
+  }
+  if (evidence.judged == 0)
+    throw Failure(kBadData, path + ":1: no sample of it was judged against a set; give a log of a flight");
+  return evidence;
+}
+
+std::array<double, 4> firmware_gains(const study::GainStep& s) {
+  return {s.kp.horizontal / s.kd.horizontal, s.kd.horizontal, s.kp.vertical / s.kd.vertical, s.kd.vertical};
+}
+
+Json to_json(const study::GainStep& s) {
+  Json json = {{"factor", s.factor},
+               {"kp", {{"horizontal", s.kp.horizontal}, {"vertical", s.kp.vertical}}},
+               {"kd", {{"horizontal", s.kd.horizontal}, {"vertical", s.kd.vertical}}},
+               {"stable", s.stable},
+               {"passable", s.passable()}};
+  json["tightest"] = nullptr;
+  if (s.way)
+    json["tightest"] = {{"p", services::to_json(s.way->place_W)},
+                        {"free_distance_m", s.way->free_distance_m},
+                        {"bounded", s.set.bounded},
+                        {"half_widths_m", s.set.bounded ? Json(s.set.half_widths) : Json()},
+                        {"clearance_m", s.set.bounded ? Json(s.set.clearance) : Json()}};
+  return json;
+}
+
+void print_text(const study::GainSweep& sweep, const GainNames& names, const std::optional<Evidence>& evidence) {
+  if (evidence)
+    std::printf(
+        "the log: %zu of %zu samples inside the sets of the gains it was flown with%s\n", evidence->inside,
+        evidence->judged,
+        evidence->inside == evidence->judged ? "" : "; calibrate the model first: the sets below are too small");
+  std::printf("%7s %8s %8s %8s %8s  tightest place of the way\n", "factor", names.xy_position, names.xy_velocity,
+              names.z_position, names.z_velocity);
+  for (const auto& s : sweep.steps) {
+    const auto g = firmware_gains(s);
+    std::printf("%7.2f %8.3g %8.3g %8.3g %8.3g  ", s.factor, g[0], g[1], g[2], g[3]);
+    if (!s.stable)
+      std::printf("the loop is unstable with this delay and lag\n");
+    else if (!s.way)
+      std::printf("no way through free voxels\n");
+    else if (!s.set.bounded)
+      std::printf("%s: the set grows without bound\n", to_text(s.way->place_W).c_str());
+    else
+      std::printf("%s: set ±%.3f, %.3f, %.3f m, %.3f m to spare%s\n", to_text(s.way->place_W).c_str(),
+                  s.set.half_widths[0], s.set.half_widths[1], s.set.half_widths[2], s.set.clearance,
+                  s.passable() ? "" : ": not passable");
+  }
+  if (!sweep.smallest) {
+    std::printf("no gains let this vehicle through: only a wider way, or calmer air, does\n");
+    return;
+  }
+  const auto g = firmware_gains(*sweep.smallest);
+  std::printf("smallest gains that let it through%s: %s %.3g, %s %.3g, %s %.3g, %s %.3g\n",
+              sweep.smallest->factor == sweep.steps.front().factor ? " (or smaller ones)" : "", names.xy_position, g[0],
+              names.xy_velocity, g[1], names.z_position, g[2], names.z_velocity, g[3]);
+}
+
+int run(const Options& options) {
+  auto vehicle = read_vehicle(options.vehicle);
+  const auto model = read_model(options.model);
+  GainNames names = kPx4;
+  if (!options.parameters.empty()) names = take_gains(options.parameters, vehicle);
+  std::optional<Evidence> evidence;
+  if (!options.log.empty()) evidence = evidence_of(options.log);
+  read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
+  progress("building the world");
+  const auto world = plan::build_world(read_map(options.map), model, vehicle, reach::Method::tight, -1, run_parallel);
+  // Half an octave apart, from half of what flies to four times as much.
+  const std::vector<double> factors{0.5, 0.71, 1, 1.41, 2, 2.83, 4};
+  const auto sweep = study::sweep_gains(*world, *options.start, *options.goal, factors, run_parallel);
+  if (options.json) {
+    Json steps = Json::array();
+    for (const auto& s : sweep.steps) steps.push_back(to_json(s));
+    Json json = {{"steps", std::move(steps)}, {"smallest", sweep.smallest ? to_json(*sweep.smallest) : Json()}};
+    json["log"] = nullptr;
+    if (evidence) json["log"] = {{"judged", evidence->judged}, {"inside", evidence->inside}};
+    print(json);
+  } else {
+    print_text(sweep, names, evidence);
+  }
+  return sweep.smallest ? kOk : kUnavailable;
+}
+
+}  // namespace
+
+Verb vehicle_verb(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  auto* group = app.add_subcommand("vehicle", "What a vehicle's gains make of its sets");
+  group->require_subcommand(1);
+  auto* command = group->add_subcommand("tune", "The smallest gains with which a way is passable");
+  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
+  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
+  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
+  add_point(*command, "--start", options->start, "one end of the way, on one side of the door, m")->required();
+  add_point(*command, "--goal", options->goal, "its other end, m")->required();
+  command->add_option("--parameters", options->parameters,
+                      "the autopilot's parameter file, whose gains are taken in place of the vehicle file's");
+  command->add_option("--log", options->log, "raw log of a flight with these gains: whether its sets held");
+  command->add_flag("--json", options->json, "one JSON object on stdout");
+  command->footer(
+      "Position and velocity gain are scaled together, so that damping stays. Faster gains need an attitude loop that "
+      "follows:\nmeasure controller.attitude_lag and feedback_delay first.\nExample:\n"
+      "  backwash vehicle tune --map builtin:apartment --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
+      "    --start 3,4.2,1.2 --goal 7.4,3,1.2");
+  return {group, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

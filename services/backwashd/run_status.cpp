@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The status's thread: what the other threads have said, as one message ten times a second.
+#include <algorithm>
+#include <limits>
+#include <thread>
+
+#include "services/backwashd/dds_front.hpp"
+#include "services/backwashd/text.hpp"
+#include "services/dds/packet_filter.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+dds::Timing timing(const TimingHistogram& h) {
+  return {static_cast<float>(h.quantile(0.5)), static_cast<float>(h.quantile(0.99)), static_cast<float>(h.max_us)};
+}
+
+constexpr std::string_view name(firmware_bridge::Autopilot autopilot) {
+  switch (autopilot) {
+    case firmware_bridge::Autopilot::kArduPilot:
+      return "ardupilot";
+    case firmware_bridge::Autopilot::kPx4:
+      return "px4";
+    case firmware_bridge::Autopilot::kPlain:
+      return "plain";
+    case firmware_bridge::Autopilot::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+/// Owns what a message only points to, until it is sent.
+struct StatusStrings {
+  std::string state, reason, mismatch, stop_switch, autopilot, warning;
+  std::vector<firmware_bridge::ParameterFinding> findings;
+  std::array<dds::Parameter, firmware_bridge::kMostParameters> parameters{};
+};
+
+StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
+  constexpr auto kWarningShown = std::chrono::seconds(10);
+  StatusStrings text{to_string(view.mode),
+                     to_string(view.reason),
+                     to_string(view.mismatch),
+                     std::string(name(view.stop_switch)),
+                     std::string(name(view.autopilot)),
+                     {},
+                     {},
+                     {}};
+  text.findings = firmware_bridge::judge_parameters(view.autopilot, view.parameters, vehicle);
+  std::ranges::transform(text.findings, text.parameters.begin(), [](const auto& finding) {
+    constexpr double kNotAnswered = std::numeric_limits<double>::quiet_NaN();
+    // Names are literals, and end.
+    return dds::Parameter{const_cast<char*>(finding.name.data()), finding.value.value_or(kNotAnswered),
+                          dds::c_string(finding.advice)};
+  });
+  if (view.warning && firmware_bridge::Time::clock::now() - view.warning->at < kWarningShown)
+    text.warning = printable(view.warning->value.text.data());
+  return text;
+}
+
+void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
+  s.state = dds::c_string(text.state);
+  s.reason = dds::c_string(text.reason);
+  s.armed = view.armed;
+  s.offboard = view.offboard;
+  s.landed = view.landed;
+  s.moving = !view.finished;
+  s.frames_aligned = view.aligned;
+  s.position = point(view.state.p_W);
+  s.setpoint = point(view.command.p_W);
+  s.ticks = view.ticks;
+  s.ticks_missed = view.missed;
+  s.setpoints_sent = view.setpoints;
+  s.samples_inside = view.inside;
+  s.samples_outside = view.outside;
+  s.odometry_received = view.odometry_received;
+  s.odometry_rejected = view.odometry_rejected;
+  s.frames_bad = view.frames_bad;
+  s.frames_refused = view.frames_refused;
+  s.page_faults = view.page_faults;
+  s.frame_residual_m = view.residual_m;
+  s.frame_residual_rad = view.residual_rad;
+  s.odometry_age = view.odometry_age;
+  s.heartbeat_age = view.heartbeat_age;
+  s.clock_offset = view.clock ? 1e-9 * static_cast<double>(view.clock->offset_ns) : 0;
+  s.clock_delay = view.clock ? 0.5e-9 * static_cast<double>(view.clock->round_trip_ns) : -1;
+  s.mismatch = dds::c_string(text.mismatch);
+  s.stop_switch = dds::c_string(text.stop_switch);
+  s.tick = timing(view.tick);
+  s.lateness = timing(view.lateness);
+  s.odometry_to_wire = timing(view.odometry_to_wire);
+  s.autopilot = dds::c_string(text.autopilot);
+  s.autopilot_says = dds::c_string(text.warning);
+  const auto parameters = static_cast<std::uint32_t>(text.findings.size());
+  s.parameters = {parameters, parameters, text.parameters.data(), false};
+}
+
+void set_counts(dds::Status& s, const Channels& channels) {
+  s.maps_accepted = channels.maps_accepted;
+  s.maps_rejected = channels.maps_rejected;
+  s.scans_accepted = channels.scans_accepted;
+  s.scans_rejected = channels.scans_rejected;
+  s.odometry_refused = channels.odometry_refused;
+  s.loop_closures = channels.loop_closures;
+  s.closures_refused = channels.closures_refused;
+  s.foreign_writers = channels.foreign_writers;
+  const std::int64_t map_ns = channels.map_ns;
+  s.map_age = map_ns < 0 ? -1 : static_cast<double>(now_ns() - map_ns) * 1e-9;
+  s.commands_refused = channels.commands_refused;
+  s.parts_filtered = dds::filtered_parts();
+}
+
+}  // namespace
+
+void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
+  ControlView view;
+  CommandId accepted;
+  Line task{}, place{}, refused{};
+  auto next = std::chrono::steady_clock::now();
+  while (!channels_.stop) {
+    next += std::chrono::milliseconds(100);
+    std::this_thread::sleep_until(next);
+    if (const auto newest = channels_.task.read_new()) task = *newest;
+    if (const auto newest = channels_.accepted.read_new()) accepted = *newest;
+    if (const auto newest = channels_.view_status.read_new()) view = *newest;
+    if (const auto newest = channels_.place.read_new()) place = *newest;
+    for (auto* line : {&channels_.refused, &channels_.refused_map})
+      if (const auto newest = line->read_new()) refused = *newest;
+    commanding_ = view.mode != track::Mode::passive && view.mode != track::Mode::quiet;
+    StatusStrings text = strings_of(view, vehicle);
+    dds::Status s{};
+    s.stamp = dds::wall_clock();
+    s.vehicle = dds::c_string(vehicle.name);
+    set_view(s, view, text);
+    set_counts(s, channels_);
+    s.records_lost = channels_.records_lost() + recorder.lost();
+    s.task = task.data();
+    s.place = place.data();
+    s.refused = refused.data();
+    s.session = accepted.session;
+    s.sequence_number = accepted.sequence;
+    status_.write(s);
+  }
+}
+
+}  // namespace backwash::daemon

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The autopilot's parameters reach the view that enabling is decided from, and are read again when it may have
+// restarted.
+#include <gtest/gtest.h>
+
+#include "tests/daemon/lockstep.hpp"
+
+namespace backwash::daemon::test {
+namespace {
+
+std::string forbids(const Lockstep& rig) {
+  return firmware_bridge::forbidding_parameter(rig.view().autopilot, rig.view().parameters, vehicle_5in());
+}
+
+struct ParameterReading : testing::Test {
+  Lockstep rig_;
+  std::size_t known() const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(rig_.view().parameters, [](const auto& value) { return value.has_value(); }));
+  }
+};
+
+TEST_F(ParameterReading, AllAreKnownSoonAndThoseThatForbidComeFirst) {
+  for (int n = 0; n < 60 && rig_.view().autopilot == firmware_bridge::Autopilot::kUnknown; ++n) rig_.tick();
+  EXPECT_TRUE(forbids(rig_).starts_with("no value of COM_OF_LOSS_T")) << forbids(rig_);
+  rig_.ticks(75);
+  EXPECT_EQ(forbids(rig_), "");
+  rig_.ticks(75);
+  EXPECT_EQ(known(), firmware_bridge::parameter_names(firmware_bridge::Autopilot::kPx4).size());
+}
+
+TEST_F(ParameterReading, AChangeByAStationIsSeenWhilePassive) {
+  rig_.ticks(150);
+  rig_.autopilot->parameters["COM_OF_LOSS_T"] = 5;
+  rig_.ticks(15 * 50);
+  EXPECT_TRUE(forbids(rig_).starts_with("COM_OF_LOSS_T is 5: set")) << forbids(rig_);
+}
+
+// It came back from a silence with other values: what it said before is not believed, and all is asked for anew.
+TEST_F(ParameterReading, AnAutopilotThatRestartedIsAskedAnew) {
+  rig_.ticks(150);
+  rig_.autopilot->parameters["COM_OBL_RC_ACT"] = 3;
+  rig_.autopilot->mute = true;
+  rig_.ticks(100);
+  rig_.autopilot->mute = false;
+  rig_.ticks(75);
+  EXPECT_EQ(forbids(rig_).substr(0, 19), "COM_OBL_RC_ACT is 3");
+}
+
+TEST_F(ParameterReading, NothingIsAskedWhileTheLineIsNeeded) {
+  rig_.ticks(150);
+  rig_.take_off();
+  rig_.autopilot->parameters["COM_OF_LOSS_T"] = 5;
+  rig_.ticks(15 * 50);
+  EXPECT_EQ(forbids(rig_), "");  // what counts is what it was enabled with
+}
+
+TEST_F(ParameterReading, OneThatItDoesNotKnowIsAskedForOnceASecondInTheEnd) {
+  rig_.autopilot->parameters.erase("EKF2_HGT_REF");
+  rig_.ticks(500);
+  EXPECT_EQ(forbids(rig_), "");
+  EXPECT_EQ(known() + 1, firmware_bridge::parameter_names(firmware_bridge::Autopilot::kPx4).size());
+}
+
+}  // namespace
+}  // namespace backwash::daemon::test
