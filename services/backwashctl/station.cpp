@@ -86,6 +86,7 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
                           text(s.task),
                           text(s.mismatch),
                           text(s.place),
+                          text(s.stop_switch),
                           text(s.refused),
                           text(s.autopilot),
                           text(s.autopilot_says),
@@ -96,8 +97,8 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
       for (std::uint32_t n = 0; n < s.advice._length; ++n)
         newest->advice.emplace_back(text(s.advice._buffer[n].name), text(s.advice._buffer[n].text));
       auto& own = newest->numbers;
-      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.refused = own.autopilot =
-          own.autopilot_says = nullptr;
+      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.stop_switch = own.refused =
+          own.autopilot = own.autopilot_says = nullptr;
       own.parameters = {};
       own.advice = {};
     });

@@ -40,7 +40,7 @@ Sequence sequence(std::vector<T>& values) {
 
 /// Owns what a message only points to, until it is sent.
 struct StatusStrings {
-  std::string state, reason, mismatch, autopilot, warning;
+  std::string state, reason, mismatch, stop_switch, autopilot, warning;
   std::vector<firmware_bridge::ParameterFinding> findings;
   std::vector<dds::Parameter> parameters;
   std::vector<dds::Advice> advice;
@@ -51,6 +51,7 @@ StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
   StatusStrings text{to_string(view.mode),
                      to_string(view.reason),
                      to_string(view.mismatch),
+                     std::string(name(view.stop_switch)),
                      std::string(name(view.autopilot)),
                      {},
                      {},
@@ -91,7 +92,10 @@ void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
   s.frame_residual_rad = view.residual_rad;
   s.odometry_age = view.odometry_age;
   s.heartbeat_age = view.heartbeat_age;
+  s.clock_offset = view.clock ? 1e-9 * static_cast<double>(view.clock->offset_ns) : 0;
+  s.clock_delay = view.clock ? 0.5e-9 * static_cast<double>(view.clock->round_trip_ns) : -1;
   s.mismatch = dds::c_string(text.mismatch);
+  s.stop_switch = dds::c_string(text.stop_switch);
   s.tick = timing(view.tick);
   s.lateness = timing(view.lateness);
   s.odometry_to_wire = timing(view.odometry_to_wire);
