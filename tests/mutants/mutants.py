@@ -155,8 +155,10 @@ def write(mutants: list[table.Mutant], killed: dict[str, str], result: pathlib.P
     for m in mutants:
         rows[m.id] = [m.id, m.file, verdict(m, killed), killed.get(m.id) or m.equivalent or m.real, m.promise]
     result.parent.mkdir(parents=True, exist_ok=True)
-    result.write_text("\n".join("\t".join(row) for row in [["id", "file", "verdict", "by or why", "promise"],
-                                                           *rows.values()]) + "\n")
+    whole = result.with_suffix(".new")  # in one step: another run may be reading it
+    whole.write_text("\n".join("\t".join(row) for row in [["id", "file", "verdict", "by or why", "promise"],
+                                                          *rows.values()]) + "\n")
+    whole.replace(result)
 
 
 def report(mutants: list[table.Mutant], killed: dict[str, str]) -> int:
