@@ -1,19 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashctl/status_output.hpp"
 
-#include <cmath>
 #include <cstdio>
 
 namespace backwash::ctl {
 namespace {
-
-// Those that the autopilot has told.
-nlohmann::json parameters(const StatusCopy& s) {
-  nlohmann::json told = nlohmann::json::array();
-  for (const auto& p : s.parameters)
-    if (std::isfinite(p.value)) told.push_back({p.name, p.value});
-  return told;
-}
 
 nlohmann::json timing(const dds::Timing& t) { return {{"p50", t.p50}, {"p99", t.p99}, {"max", t.max}}; }
 
@@ -66,7 +57,7 @@ nlohmann::json json_of(const StatusCopy& s) {
           {"refused", s.refused},
           {"autopilot", s.autopilot},
           {"autopilot_says", s.autopilot_says},
-          {"parameters", parameters(s)},
+          {"parameters", s.parameters},
           {"tick_us", timing(n.tick)},
           {"lateness_us", timing(n.lateness)},
           {"odometry_to_wire_us", timing(n.odometry_to_wire)}};

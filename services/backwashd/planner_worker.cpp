@@ -25,8 +25,8 @@ constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a 
 constexpr double kReserve = 0.1;        // m of clearance towards what may turn out to be a wall
 constexpr double kLeastReserve = 0.02;  // m, where there is no room for that: for the set, larger since the start
 
-/// `apart_m`: at rest, the frame that the autopilot holds its position in is off the map by so much. Its controller does
-/// not see that error, so that no set shrinks it: clearance has to be left for it. In motion most of it is delay.
+/// `apart_m`: at rest, the frame that the autopilot holds its position in is off the map by so much. Its controller
+/// does not see that error, so that no set shrinks it: clearance has to be left for it. In motion most of it is delay.
 plan::PlanOptions limits_of(const plan::World& world, double apart_m = 0) {
   plan::PlanOptions options{};
   options.least_clearance_m = apart_m;

@@ -90,7 +90,7 @@ TEST(CornerTerm, GatesAreWhereTheModelPutsThem) {
   EXPECT_GT(at(0.5, 0.51, 0.2), 0);  // tan φ̄_c = tan 1.2 = 2.5722
   EXPECT_EQ(at(0.5, 0.52, 0.2), 0);
   EXPECT_EQ(at(0.5, 0.2 * std::tan(1.2) * 1.00002, 0.2), 0);  // a hair outside the cone, where φ̄_c − φ is negative
-  EXPECT_EQ(at(0.5, 0.3, 0), 0);  // level with the corner: φ = π/2
+  EXPECT_EQ(at(0.5, 0.3, 0), 0);                              // level with the corner: φ = π/2
   EXPECT_EQ(at(0.5, 0.3, -0.2), 0);
   EXPECT_GT(at(0.5, 0.9, 1.199), 0);  // l̄_c = 1.5
   EXPECT_EQ(at(0.5, 0.9, 1.201), 0);

@@ -10,7 +10,6 @@ source ./setup.sh
 out=$PWD/build/nightly
 mkdir -p "$out"
 install_packages packages.txt
-install_packages tests/nightly/packages.txt
 
 # build DIR TARGET… -- CMAKE_OPTION…
 build() {
@@ -18,13 +17,14 @@ build() {
   shift
   while [[ $1 != -- ]]; do targets+=("$1"); shift; done
   shift
-  cmake -S . -B "$dir" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
+  cmake -S . -B "$dir" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' "$@" >"$out/build.log" 2>&1 &&
     cmake --build "$dir" --target "${targets[@]}" >>"$out/build.log" 2>&1 ||
     { tail -n 40 "$out/build.log" >&2; exit 70; }
 }
 
 rtsan() {
+  install_packages tests/nightly/packages.txt
   build build/rtsan test_daemon -- -DCMAKE_C_COMPILER=clang-22 -DCMAKE_CXX_COMPILER=clang++-22 \
     -DCMAKE_C_FLAGS='-fsanitize=realtime -w' -DCMAKE_CXX_FLAGS='-fsanitize=realtime -w'
   RTSAN_SYMBOLIZER_PATH=/usr/lib/llvm-22/bin/llvm-symbolizer \
@@ -55,7 +55,7 @@ asan_build() {
 }
 
 asan() {
-  local programs=(sync map field reach plan track sim study config bridge daemon) status=0
+  local programs=(sync files map field reach plan track sim study config bridge daemon) status=0
   asan_build "${programs[@]/#/test_}"
   for program in "${programs[@]}"; do build/asan/tests/test_"$program" --gtest_brief=1 || status=$?; done
   return "$status"
@@ -91,11 +91,13 @@ stops_beside() {
 
 # A daemon takes a twentieth of a processor.
 stops() {
+  install_packages tests/nightly/packages.txt
   build_preset release --target backwashd backwashctl bench station_probe
   local status=0
   stops_beside stops_quiet 4 || status=$?
   stress-ng --cpu "$(nproc)" --timeout 7200 >/dev/null 2>&1 &
   local load=$!
+  trap "kill $load 2>/dev/null || true" EXIT # also of a part that is ended from outside
   stops_beside stops_load 4 || status=$?
   kill "$load" 2>/dev/null || true
   wait "$load" 2>/dev/null || true
@@ -103,6 +105,7 @@ stops() {
 }
 
 stress() {
+  install_packages tests/nightly/packages.txt
   build_preset release --target backwashd backwashctl bench backwash
   stress-ng --cpu "$(nproc)" --timeout 120 >/dev/null 2>&1 &
   local load=$! status=0

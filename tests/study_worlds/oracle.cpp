@@ -18,9 +18,8 @@ namespace {
 std::optional<double> truth_of(const std::string& cause, const std::string& parameter, double s, double angle) {
   const std::string key = cause + "." + parameter;
   // Sizes that are defined at the same reference on both sides.
-  for (const char* same :
-       {"ground_thrust.A_mps2", "ceiling.A_mps2", "wall_attraction.A_mps2", "forward_speed.B_ln", "recirculation.B_ln",
-        "battery_sag.s", "thrust_slope.s", "command_latency.latency_s"})
+  for (const char* same : {"ground_thrust.A_mps2", "ceiling.A_mps2", "wall_attraction.A_mps2", "forward_speed.B_ln",
+                           "recirculation.B_ln", "battery_sag.s", "thrust_slope.s", "command_latency.latency_s"})
     if (key == same) return s;
   // Integrated in steps at whose beginning the lag hears the command already: b − r = h/(e^(h/τ) − 1) ṙ.
   if (key == "actuator_lag.tau_s") return kStep / std::expm1(kStep / s);

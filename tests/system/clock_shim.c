@@ -13,27 +13,27 @@
 #include <sys/time.h>
 #include <time.h>
 
-static const volatile int64_t *offset_s;
-static int (*real_gettime)(clockid_t, struct timespec *);
+static const volatile int64_t* offset_s;
+static int (*real_gettime)(clockid_t, struct timespec*);
 
 __attribute__((constructor)) static void map_offset(void) {
-  real_gettime = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, "clock_gettime");
-  const char *path = getenv("CLOCK_SHIM");
+  real_gettime = (int (*)(clockid_t, struct timespec*))dlsym(RTLD_NEXT, "clock_gettime");
+  const char* path = getenv("CLOCK_SHIM");
   const int fd = path ? open(path, O_RDONLY) : -1;
-  void *page = fd < 0 ? MAP_FAILED : mmap(NULL, sizeof(int64_t), PROT_READ, MAP_SHARED, fd, 0);
+  void* page = fd < 0 ? MAP_FAILED : mmap(NULL, sizeof(int64_t), PROT_READ, MAP_SHARED, fd, 0);
   if (page != MAP_FAILED) offset_s = page;
 }
 
 static int64_t offset(void) { return offset_s ? *offset_s : 0; }
 
-int clock_gettime(clockid_t id, struct timespec *t) {
+int clock_gettime(clockid_t id, struct timespec* t) {
   if (!real_gettime) map_offset();
   const int result = real_gettime(id, t);
   if (result == 0 && (id == CLOCK_REALTIME || id == CLOCK_REALTIME_COARSE)) t->tv_sec += offset();
   return result;
 }
 
-int gettimeofday(struct timeval *restrict t, void *restrict zone) {
+int gettimeofday(struct timeval* restrict t, void* restrict zone) {
   struct timespec now;
   (void)zone;
   const int result = clock_gettime(CLOCK_REALTIME, &now);
@@ -42,7 +42,7 @@ int gettimeofday(struct timeval *restrict t, void *restrict zone) {
   return result;
 }
 
-time_t time(time_t *t) {
+time_t time(time_t* t) {
   struct timespec now;
   clock_gettime(CLOCK_REALTIME, &now);
   if (t) *t = now.tv_sec;
@@ -50,23 +50,25 @@ time_t time(time_t *t) {
 }
 
 // A deadline by the monotonic clock counts from the machine's start, by the wall clock from 1970.
-static struct timespec unmoved(const struct timespec *deadline) {
+static struct timespec unmoved(const struct timespec* deadline) {
   struct timespec t = *deadline;
   if (t.tv_sec > 1000000000) t.tv_sec -= offset();
   return t;
 }
 
-int pthread_cond_timedwait(pthread_cond_t *restrict c, pthread_mutex_t *restrict m,
-                           const struct timespec *restrict deadline) {
-  static int (*real)(pthread_cond_t *, pthread_mutex_t *, const struct timespec *);
-  if (!real) real = (int (*)(pthread_cond_t *, pthread_mutex_t *, const struct timespec *))dlsym(RTLD_NEXT, "pthread_cond_timedwait");
+int pthread_cond_timedwait(pthread_cond_t* restrict c, pthread_mutex_t* restrict m,
+                           const struct timespec* restrict deadline) {
+  static int (*real)(pthread_cond_t*, pthread_mutex_t*, const struct timespec*);
+  if (!real)
+    real =
+        (int (*)(pthread_cond_t*, pthread_mutex_t*, const struct timespec*))dlsym(RTLD_NEXT, "pthread_cond_timedwait");
   const struct timespec t = unmoved(deadline);
   return real(c, m, &t);
 }
 
-int sem_timedwait(sem_t *restrict s, const struct timespec *restrict deadline) {
-  static int (*real)(sem_t *, const struct timespec *);
-  if (!real) real = (int (*)(sem_t *, const struct timespec *))dlsym(RTLD_NEXT, "sem_timedwait");
+int sem_timedwait(sem_t* restrict s, const struct timespec* restrict deadline) {
+  static int (*real)(sem_t*, const struct timespec*);
+  if (!real) real = (int (*)(sem_t*, const struct timespec*))dlsym(RTLD_NEXT, "sem_timedwait");
   const struct timespec t = unmoved(deadline);
   return real(s, &t);
 }
