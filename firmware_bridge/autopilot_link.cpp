@@ -102,7 +102,7 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   telemetry_ = {};
   queue_.clear();
   heard_.reset();
-  clock_.reset();
+  clock_ = {};
   timesync_asked_ns_ = 0;
   signed_rightly_ = false;
   return port;
@@ -183,9 +183,23 @@ void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
     } else if constexpr (std::is_same_v<Message, mavlink::CommandAck>) {
       if (for_us(m.target_system, m.target_component)) telemetry_.take(m, now);
     } else if constexpr (requires { telemetry_.take(m, now); }) {
-      telemetry_.take(m, now);
+      telemetry_.take(m, taken(m, now));
     }
   });
+}
+
+/// When the controller took what it says, by its own stamp; now, where it has none, or one that cannot be.
+template <class Message>
+Time AutopilotLink::taken(const Message& m, Time now) const noexcept {
+  if constexpr (requires { m.time_boot_ms; }) {
+    constexpr std::int64_t kLongestTrip_ns = 10'000'000, kOldest_ms = 200, kPerMillisecond = 1'000'000;
+    const auto clock = clock_.best();
+    if (!clock || clock->round_trip_ns > kLongestTrip_ns) return now;
+    const auto there_ms = static_cast<std::uint32_t>((nanoseconds_of(now) + clock->offset_ns) / kPerMillisecond);
+    const auto age_ms = static_cast<std::int32_t>(there_ms - m.time_boot_ms);  // its 32 bits wrap after 49 days
+    return age_ms > 0 && age_ms <= kOldest_ms ? now - milliseconds(age_ms) : now;
+  }
+  return now;
 }
 
 /// Older senders name no target: then both ids are 0.
@@ -203,7 +217,8 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
     if (m.tc1 < 0 || m.tc1 > kSane_ns) return;
     timesync_asked_ns_ = 0;
     const std::int64_t round_trip = now_ns - m.ts1;
-    clock_ = {ClockOffset{m.tc1 - (m.ts1 + round_trip / 2), round_trip}, now};
+    if (round_trip < 0) return;
+    clock_.add({m.tc1 - (m.ts1 + round_trip / 2), round_trip});
   }
 }
 

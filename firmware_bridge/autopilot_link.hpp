@@ -7,6 +7,7 @@
 #include <string_view>
 #include <variant>
 
+#include "firmware_bridge/clock_filter.hpp"
 #include "firmware_bridge/mavlink/signing.hpp"
 #include "firmware_bridge/plain_port.hpp"
 #include "firmware_bridge/serial_port.hpp"
@@ -37,12 +38,6 @@ enum class LinkFault : std::uint8_t {
   kTransmitStalled,    ///< row 20: two set-points in a row did not get out
 };
 std::string_view name(LinkFault fault) noexcept;
-
-/// Clock of the flight controller against ours, from TIMESYNC.
-struct ClockOffset {
-  std::int64_t offset_ns = 0;      ///< controller's time − our monotonic time
-  std::int64_t round_trip_ns = 0;  ///< of the exchange; the offset is good to half of it
-};
 
 /// A VIO sample to be forwarded. The VIO's frame O is z-up; sending it as one frame with the controller's local frame L
 /// means that a controller that follows it in position and yaw has L = O.
@@ -82,7 +77,9 @@ class AutopilotLink {
   tl::expected<void, PortError> poll(Time now) noexcept;
 
   const Telemetry& telemetry() const noexcept { return telemetry_; }
-  const std::optional<Received<ClockOffset>>& clock() const noexcept { return clock_; }
+  /// The controller's clock, as send_timesync() has measured it since the port was opened. While it is good to 5 ms,
+  /// what telemetry() says has the time at which the controller took it, otherwise that of its arrival.
+  std::optional<ClockOffset> clock() const noexcept { return clock_.best(); }
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
   /// Time since the vehicle's last heartbeat; absent: there was none.
@@ -139,6 +136,8 @@ class AutopilotLink {
   void take_frame(const mavlink::Frame& frame, Time now) noexcept;
   bool signature_good(const mavlink::Frame& frame, Time now) noexcept;
   void take_timesync(const mavlink::Timesync& m, Time now) noexcept;
+  template <class Message>
+  Time taken(const Message& m, Time now) const noexcept;
   bool for_us(std::uint8_t system, std::uint8_t component) const noexcept;
 
   Port port_;
@@ -149,7 +148,7 @@ class AutopilotLink {
   Telemetry telemetry_;
   TransmitQueue queue_;
   std::optional<std::uint8_t> heard_;
-  std::optional<Received<ClockOffset>> clock_;
+  ClockFilter clock_;
   std::int64_t timesync_asked_ns_ = 0;
   std::uint8_t sequence_ = 0;
   std::optional<mavlink::Signing> signing_;

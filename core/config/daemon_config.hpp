@@ -44,15 +44,19 @@ struct Daemon {
     int cpu = -1;             ///< processor that the control thread is bound to; −1: any
     double battery_land = 0;  ///< remaining share below which LAND is asked for, once; 0: never
   } control;
+  struct Gpio {
+    std::string chip;                      ///< device of the chip; empty: no line is used
+    std::string stop_switch, strobe, led;  ///< lines by name; empty: there is none
+  } gpio;
   struct {
     std::string file;  ///< raw log; a start that finds it makes the next of NAME-2, NAME-3 …
   } log;
 };
 
 /// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
-/// The tables frames and map, link.protocol and link.signing_key_file may be left out: their defaults are above. The
-/// key file is read here, so that a start with a bad one ends before any port opens. `builtin:backwashd` is the shipped
-/// example.
+/// The tables frames, map and gpio, link.protocol and link.signing_key_file may be left out: their defaults are above.
+/// The key file is read here, so that a start with a bad one ends before any port opens. `builtin:backwashd` is the
+/// shipped example.
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
 
 }  // namespace backwash::config

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <iterator>
 
 #include "core/config/daemon_config.hpp"
 #include "core/config/strict_table.hpp"
@@ -9,6 +10,7 @@ namespace {
 
 constexpr std::string_view kProtocol = "link.protocol";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
+constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
 bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool digit(char c) { return c >= '0' && c <= '9'; }
@@ -76,6 +78,25 @@ tl::expected<void, ConfigError> read_signing_key(const StrictTable& file, Daemon
   return {};
 }
 
+/// A chip and at least one of its lines, or nothing at all.
+tl::expected<void, ConfigError> read_gpio(const StrictTable& file, Daemon& d) {
+  const std::pair<std::string_view, std::string*> lines[] = {
+      {kGpio[0], &d.gpio.chip}, {kGpio[1], &d.gpio.stop_switch}, {kGpio[2], &d.gpio.strobe}, {kGpio[3], &d.gpio.led}};
+  std::size_t given = 0;
+  for (const auto& [key, target] : lines) {
+    if (!file.has(key)) continue;
+    auto text = file.text(key);
+    if (!text) return tl::unexpected(text.error());
+    for (const auto& [other, taken] : lines)
+      if (*taken == *text) return tl::unexpected(file.error(key, "needs another value than " + std::string(other)));
+    *target = std::move(*text);
+    ++given;
+  }
+  if (given > 0 && (d.gpio.chip.empty() || given == 1))
+    return tl::unexpected(file.error("gpio", "needs chip and at least one of stop_switch, strobe and led"));
+  return {};
+}
+
 }  // namespace
 
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
@@ -107,6 +128,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   const std::pair<std::string_view, std::string*> frames[] = {
       {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
   std::vector<std::string_view> text_keys{"map.live", kProtocol, kSigningKeyFile};
+  text_keys.insert(text_keys.end(), std::begin(kGpio), std::end(kGpio));
   for (const auto& [key, target] : texts) text_keys.push_back(key);
   for (const auto& [key, target] : frames) text_keys.push_back(key);
   if (auto read = file->read(numbers, text_keys); !read) return tl::unexpected(read.error());
@@ -130,6 +152,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
         "needs a path, or udp:, udpin: or tcp: with a numeric IPv4 address and a port, as udp:127.0.0.1:14580"));
   d.link.endpoint = *endpoint;
   if (auto good = read_protocol(*file, d); !good) return tl::unexpected(good.error());
+  if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
     return tl::unexpected(file->error("frames", "needs three different names"));
   if (file->has("map.live")) {

@@ -2,7 +2,6 @@
 #include "services/backwashctl/preflight.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 
 namespace backwash::ctl {
@@ -46,8 +45,13 @@ std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after
   add("map overlap", after.place.empty(), after.place.empty() ? "the vehicle stands in known free space" : after.place,
       "send the map of this place, or align the VIO with it, and put the vehicle where there is room to rise");
   add("map age", n.map_age >= 0, n.map_age < 0 ? "no map" : number("%.1f s", n.map_age), "send a map");
-  for (const auto& p : after.parameters)
-    add(p.name, p.advice.empty(), std::isnan(p.value) ? "not known" : number("%g", p.value), p.advice);
+  for (const auto& [name, value] : after.parameters) {
+    const auto advice = std::ranges::find(after.advice, name, &std::pair<std::string, std::string>::first);
+    add(name, advice == after.advice.end(), number("%g", value), advice == after.advice.end() ? "" : advice->second);
+  }
+  for (const auto& [name, advice] : after.advice)
+    if (std::ranges::find(after.parameters, name, &std::pair<std::string, double>::first) == after.parameters.end())
+      add(name, false, "not known", advice);
   return findings;
 }
 

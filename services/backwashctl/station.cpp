@@ -86,17 +86,21 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
                           text(s.task),
                           text(s.mismatch),
                           text(s.place),
+                          text(s.stop_switch),
                           text(s.refused),
                           text(s.autopilot),
                           text(s.autopilot_says),
+                          {},
                           {}};
       for (std::uint32_t n = 0; n < s.parameters._length; ++n)
-        newest->parameters.push_back(
-            {text(s.parameters._buffer[n].name), s.parameters._buffer[n].value, text(s.parameters._buffer[n].advice)});
+        newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
+      for (std::uint32_t n = 0; n < s.advice._length; ++n)
+        newest->advice.emplace_back(text(s.advice._buffer[n].name), text(s.advice._buffer[n].text));
       auto& own = newest->numbers;
-      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.refused = own.autopilot =
-          own.autopilot_says = nullptr;
+      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.stop_switch = own.refused =
+          own.autopilot = own.autopilot_says = nullptr;
       own.parameters = {};
+      own.advice = {};
     });
   }
   return newest;

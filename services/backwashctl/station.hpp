@@ -28,13 +28,9 @@ struct Options {
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its members that own memory are null
-  std::string vehicle, state, reason, task, mismatch, place, refused, autopilot, autopilot_says;
-  struct Parameter {
-    std::string name;
-    double value;  ///< NaN: the autopilot has not answered
-    std::string advice;
-  };
-  std::vector<Parameter> parameters;
+  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says;
+  std::vector<std::pair<std::string, double>> parameters;   ///< that the autopilot has told
+  std::vector<std::pair<std::string, std::string>> advice;  ///< on those that are not good
 };
 
 /// One ground station: sends commands, waits for their acknowledgement and watches the status.

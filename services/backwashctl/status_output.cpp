@@ -1,19 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashctl/status_output.hpp"
 
-#include <cmath>
 #include <cstdio>
 
 namespace backwash::ctl {
 namespace {
-
-// Those that the autopilot has told.
-nlohmann::json parameters(const StatusCopy& s) {
-  nlohmann::json told = nlohmann::json::array();
-  for (const auto& p : s.parameters)
-    if (std::isfinite(p.value)) told.push_back({p.name, p.value});
-  return told;
-}
 
 nlohmann::json timing(const dds::Timing& t) { return {{"p50", t.p50}, {"p99", t.p99}, {"max", t.max}}; }
 
@@ -52,18 +43,21 @@ nlohmann::json json_of(const StatusCopy& s) {
           {"commands_refused", n.commands_refused},
           {"frames_bad", n.frames_bad},
           {"frames_refused", n.frames_refused},
+          {"stop_switch", s.stop_switch},
           {"records_lost", n.records_lost},
           {"page_faults", n.page_faults},
           {"frame_residual_m", n.frame_residual_m},
           {"frame_residual_rad", n.frame_residual_rad},
           {"frame_mismatch", s.mismatch},
           {"heartbeat_age_s", n.heartbeat_age},
+          {"clock_offset_s", n.clock_offset},
+          {"clock_delay_s", n.clock_delay},
           {"place", s.place},
           {"parts_filtered", n.parts_filtered},
           {"refused", s.refused},
           {"autopilot", s.autopilot},
           {"autopilot_says", s.autopilot_says},
-          {"parameters", parameters(s)},
+          {"parameters", s.parameters},
           {"tick_us", timing(n.tick)},
           {"lateness_us", timing(n.lateness)},
           {"odometry_to_wire_us", timing(n.odometry_to_wire)}};

@@ -18,6 +18,7 @@
 #include "core/sync/record_ring.hpp"
 #include "core/track/flight_tick.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
+#include "firmware_bridge/gpio/stop_switch.hpp"
 #include "firmware_bridge/parameters.hpp"
 #include "services/backwashd/timing.hpp"
 
@@ -119,6 +120,7 @@ struct ControlView {
   track::Mode mode = track::Mode::passive;
   track::Reason reason = track::Reason::started;
   bool armed = false, offboard = false, landed = true, aligned = false;
+  std::optional<firmware_bridge::ClockOffset> clock;               ///< the autopilot's
   double odometry_age = 1e9, heartbeat_age = 1e9, pose_age = 1e9;  ///< s; pose: the autopilot's
   State state;                                                     ///< newest good odometry
   Setpoint command;                                                ///< sent or held this tick, map frame
@@ -136,6 +138,7 @@ struct ControlView {
   std::uint64_t frames_refused = 0;  ///< of the link, for their signature
   double residual_m = 0, residual_rad = 0;
   track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
+  firmware_bridge::SwitchState stop_switch = firmware_bridge::SwitchState::absent;
   firmware_bridge::Autopilot autopilot = firmware_bridge::Autopilot::kUnknown;
   firmware_bridge::ParameterValues parameters{};  ///< of parameter_names(autopilot)
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
@@ -186,6 +189,18 @@ struct PlanOutcome {
   std::array<char, 160> reason{};  ///< one line when not ok
 };
 
+/// What the stop switch says, and when it was looked at last: a thread that hangs in its driver says nothing new.
+struct SwitchReading {
+  std::atomic<firmware_bridge::SwitchState> state{firmware_bridge::SwitchState::absent};
+  std::atomic<std::int64_t> at_ns{0};
+};
+
+/// A sign of life of the control thread, for the strobe and the status LED.
+struct Pulse {
+  std::atomic<std::uint64_t> ticks{0};
+  std::atomic<firmware_bridge::Signal> signal{firmware_bridge::Signal::idle};
+};
+
 struct Channels {
   sync::LatestValue<OdometrySample> odometry;              // DDS reader → control
   sync::RecordRing<OdometrySample, 512> poses;             // DDS reader → map reader
@@ -218,6 +233,8 @@ struct Channels {
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
       closures_refused{0}, foreign_writers{0};
+  SwitchReading stop_switch;  // gpio → control
+  Pulse pulse;                // control → gpio
   std::atomic<bool> stop{false};
 
   /// Records of real-time threads that the raw log had no room for.

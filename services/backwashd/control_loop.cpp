@@ -14,8 +14,6 @@
 namespace backwash::daemon {
 namespace {
 
-constexpr std::uint32_t kLocalPositionNed = 32, kAttitudeQuaternion = 31, kExtendedSysState = 245, kOdometry = 331,
-                        kBatteryStatus = 147;
 constexpr float kGpsGlobalOrigin = 49;
 constexpr std::uint8_t kNotice = 5, kWarning = 4;  // severities of STATUSTEXT
 
@@ -28,6 +26,12 @@ std::uint64_t page_faults() noexcept {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);
   return static_cast<std::uint64_t>(usage.ru_minflt + usage.ru_majflt);
+}
+
+firmware_bridge::Signal signal_of(track::Mode mode) noexcept {
+  using firmware_bridge::Signal;
+  if (mode == track::Mode::quiet) return Signal::fault;
+  return mode == track::Mode::passive ? Signal::idle : Signal::commanding;
 }
 
 }  // namespace
@@ -53,6 +57,11 @@ void ControlLoop::on_frame(void* loop, bool outgoing, std::span<const std::uint8
               frame.size());
 }
 
+void ControlLoop::listen(std::int64_t now_ns) noexcept {
+  now_ns_ = now_ns;
+  (void)link_.poll(time_of(now_ns));  // a port that is lost says so in the next tick too
+}
+
 // What has arrived on the port. A lost one is replaced as soon as the link watch has opened it again: the modes stay as
 // they are, so that nothing is resumed.
 void ControlLoop::poll(std::int64_t now_ns) noexcept {
@@ -60,6 +69,7 @@ void ControlLoop::poll(std::int64_t now_ns) noexcept {
     fresh->port = link_.reconnect(std::move(fresh->port), time_of(now_ns));
     channels_.ports.give_back(fresh);
     port_open_ = true;
+    requests_.forget();
   }
   const bool open = link_.poll(time_of(now_ns)).has_value();
   if (std::exchange(port_open_, open) && !open) channels_.port_losses.fetch_add(1, std::memory_order_relaxed);
@@ -106,9 +116,11 @@ track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
   in.odometry = channels_.odometry.read_new();
   while (const auto order = channels_.orders.pop()) orders_.add(*order);
   const track::Order order = orders_.next();
-  in.request = order.request;
+  view_.stop_switch = SwitchReaction::read(channels_.stop_switch, now_ns);
+  in.request = switch_.request(view_.stop_switch, flight_.mode(), order.request, now_ns);
   in.order = order.number;
-  in.segment = channels_.segments.take();
+  // Beside a switch that says STOP no segment is taken; the STOP ends the epoch of one that waits meanwhile.
+  if (may_fly(view_.stop_switch)) in.segment = channels_.segments.take();
   in.autopilot = autopilot(now_ns);
   in.surroundings = lookout_.look(flight_, now_ns);
   const auto& said = link_.telemetry().position_sigma;
@@ -132,6 +144,14 @@ void ControlLoop::forward_odometry(std::uint8_t resets) noexcept {
   vio.velocity_variance_B = s.velocity_variance;
   vio.reset_counter = resets;
   if (link_.send_odometry(vio)) row_.sent |= 4;
+}
+
+void ControlLoop::ask_for_messages(std::int64_t now_ns) noexcept {
+  const firmware_bridge::Time now = time_of(now_ns);
+  const auto age = link_.heartbeat_age(now);
+  if (!age || *age > firmware_bridge::kHeartbeatTimeout) return requests_.forget();
+  const auto& answer = link_.telemetry().result_of(firmware_bridge::kCommandInterval);
+  if (const auto wish = requests_.next(answer, now)) link_.send_message_interval(wish->id, wish->rate_hz);
 }
 
 // ArduPilot arms with a home alone, and has none without GPS until it is told an origin. One that it has stays.
@@ -159,6 +179,7 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
     }
   }
   if (s.send_heartbeat && view_.ticks % kTicksPerSecond == 0 && link_.send_heartbeat()) row_.sent |= 2;
+  if (s.send_heartbeat && view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));
   if (out.forward_odometry) forward_odometry(out.odometry_resets);
   if (s.request_offboard) link_.send_follow_setpoints();
   if (s.request_land) link_.send_land();
@@ -173,15 +194,9 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   const bool passive = s.mode == track::Mode::passive;
   const bool restarted = s.mode == track::Mode::quiet && !in.autopilot.armed;
   parameters_.step(link_, passive || restarted, passive, view_);
-  // What the tick needs is asked for again every 2 s: an autopilot may have restarted.
-  if (s.send_heartbeat && view_.ticks % (2 * kTicksPerSecond) == 1) {
-    link_.send_message_interval(kLocalPositionNed, 50);
-    link_.send_message_interval(kAttitudeQuaternion, 50);
-    link_.send_message_interval(kExtendedSysState, 5);
-    link_.send_message_interval(kOdometry, 5);  // for its reset counter
-    link_.send_message_interval(kBatteryStatus, 1);
-    give_origin(in.autopilot);
-  }
+  if (!s.send_heartbeat) return;
+  ask_for_messages(in.now_ns);
+  if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);
 }
 
 void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& out) noexcept {
@@ -197,6 +212,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.mismatch = flight_.alignment().mismatch();
   view_.odometry_age = flight_.odometry_age();
   view_.heartbeat_age = in.autopilot.heartbeat_age;
+  view_.clock = link_.clock();
   view_.pose_age = in.autopilot.pose_age(in.now_ns);
   if (flight_.odometry()) view_.state = flight_.odometry()->state;
   view_.command = out.command;
@@ -272,6 +288,8 @@ void ControlLoop::tick(std::int64_t now_ns, int missed, double lateness_us) noex
   for (const auto* segment : out.released) channels_.segments.give_back(segment);
   if (link_.signing()) channels_.signing_time.store(link_.signing()->time(), std::memory_order_relaxed);
   ++view_.ticks;
+  channels_.pulse.signal.store(signal_of(view_.mode), std::memory_order_relaxed);
+  channels_.pulse.ticks.store(view_.ticks, std::memory_order_relaxed);
 }
 
 }  // namespace backwash::daemon

@@ -4,10 +4,12 @@
 #include "core/track/flight_tick.hpp"
 #include "core/track/orders.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
+#include "firmware_bridge/message_requests.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
 #include "services/backwashd/parameter_reader.hpp"
 #include "services/backwashd/sender_clock.hpp"
+#include "services/backwashd/switch_reaction.hpp"
 
 namespace backwash::daemon {
 
@@ -22,6 +24,9 @@ class ControlLoop {
   /// period began. Real-time: wait-free, no allocation; system calls: non-blocking reads and writes of the port,
   /// getrusage.
   void tick(std::int64_t now_ns, int missed, double lateness_us) noexcept;
+  /// Between ticks: takes what has arrived on the port, each message at its time, and answers TIMESYNC, which an
+  /// autopilot takes for useless after 10 ms (PX4: "RTT too high"). Decides nothing. Real-time as tick().
+  void listen(std::int64_t now_ns) noexcept;
   /// How long the last tick took, µs; recorded by the next one.
   void took(double compute_us) noexcept { compute_us_ = compute_us; }
   /// As of the last tick.
@@ -33,6 +38,7 @@ class ControlLoop {
   track::AutopilotFacts autopilot(std::int64_t now_ns) const noexcept;
   void send(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void forward_odometry(std::uint8_t resets) noexcept;
+  void ask_for_messages(std::int64_t now_ns) noexcept;
   void give_origin(const track::AutopilotFacts& autopilot) noexcept;
   void publish(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void report(const track::TickInput& in, const track::TickOutput& out) noexcept;
@@ -46,9 +52,11 @@ class ControlLoop {
   SenderClock sender_clock_;  // of the odometry's
   ParameterReader parameters_;
   bool port_open_ = true;
+  firmware_bridge::MessageRequests requests_;
   int origin_asked_ = 0;
   std::int64_t takeoff_asked_ns_ = 0;  ///< of the autopilot, for the first time in this lift-off; 0: not yet
   track::Orders orders_;
+  SwitchReaction switch_;
   double vio_sigma_ = 0;  ///< as the newest odometry that says it, m
   std::int64_t now_ns_ = 0;
   ControlView view_;
@@ -62,8 +70,9 @@ struct Scheduling {
   int cpu = -1;      ///< processor that it is bound to; −1: any
 };
 
-/// Thread body: ticks every 20 ms on the monotonic clock. Periods that an overrun has passed are skipped whole and
-/// counted; the phase is kept.
+/// Thread body: ticks every 20 ms on the monotonic clock, and listens every 2 ms between ticks. It does not wait for
+/// the port instead: poll() on a terminal waits for the same kernel worker as a read from an empty one
+/// (SerialPort::read). Periods that an overrun has passed are skipped whole and counted; the phase is kept.
 void run_control(Channels& channels, ControlLoop& loop);
 
 /// Locks the process's memory, what it has and what it will have. Where RLIMIT_MEMLOCK is finite (and CAP_IPC_LOCK is

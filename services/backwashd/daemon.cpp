@@ -10,6 +10,7 @@
 
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
+#include "services/backwashd/gpio_worker.hpp"
 #include "services/backwashd/link_watch.hpp"
 #include "services/backwashd/log_sink.hpp"
 #include "services/backwashd/map_front.hpp"
@@ -63,7 +64,8 @@ std::unique_ptr<SigningTimeFile> sign(const config::Daemon& daemon, firmware_bri
   return time;
 }
 
-// What carries odometry to the control thread comes right below it, before the middleware starts its threads.
+// What carries odometry and the stop switch to the control thread comes right below it, before the middleware starts
+// its threads.
 int reader_priority(const config::Daemon& daemon) {
   const int control = daemon.control.priority;
   return allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0));
@@ -134,6 +136,8 @@ void start(Flight& f) {
     });
   });
   f.threads.start("status", [&] { f.front->run_status(f.settings.vehicle, *f.recorder); });
+  if (!daemon.gpio.chip.empty())
+    f.threads.start("gpio", [&] { run_gpio(channels, daemon.gpio, reader_priority(daemon)); });
   f.threads.start("control", [&] {
     make_real_time({daemon.control.priority, daemon.control.cpu});
     run_control(channels, f.loop);

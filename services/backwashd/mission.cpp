@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/plan/planner.hpp"
+#include "services/backwashd/switch_reaction.hpp"
 #include "services/dds/topics.hpp"
 
 namespace backwash::daemon {
@@ -183,6 +184,7 @@ Decision Mission::enable() {
   if (order_under_way()) return refused("the last order is still being carried out: ask again");
   if (view_.mode != Mode::passive && view_.mode != Mode::quiet)
     return refused(std::string("already ") + to_string(view_.mode));
+  if (!may_fly(view_.stop_switch)) return refused(refusal(view_.stop_switch));
   if (!other_daemon_.empty()) return refused(other_daemon_);
   if (!world_) return refused("no map was received yet");
   if (view_.mismatch != track::Mismatch::none)
@@ -255,6 +257,7 @@ Decision Mission::stop(const CommandMessage& command) {
 }
 
 Decision Mission::start(PlanJob::Kind kind, const Goal& goal) {
+  if (!may_fly(view_.stop_switch)) return refused(refusal(view_.stop_switch));
   if (!world_) return refused("no map was received yet");
   if (kind != PlanJob::Kind::brake) {
     if (job_) return refused("still planning the last command");

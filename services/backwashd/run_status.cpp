@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The status's thread: what the other threads have said, as one message ten times a second.
 #include <algorithm>
-#include <limits>
 #include <thread>
+#include <vector>
 
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/text.hpp"
@@ -31,11 +31,19 @@ constexpr std::string_view name(firmware_bridge::Autopilot autopilot) {
   return "unknown";
 }
 
+/// A view of what the vector owns.
+template <typename Sequence, typename T>
+Sequence sequence(std::vector<T>& values) {
+  const auto count = static_cast<std::uint32_t>(values.size());
+  return {count, count, values.data(), false};
+}
+
 /// Owns what a message only points to, until it is sent.
 struct StatusStrings {
-  std::string state, reason, mismatch, autopilot, warning;
+  std::string state, reason, mismatch, stop_switch, autopilot, warning;
   std::vector<firmware_bridge::ParameterFinding> findings;
-  std::array<dds::Parameter, firmware_bridge::kMostParameters> parameters{};
+  std::vector<dds::Parameter> parameters;
+  std::vector<dds::Advice> advice;
 };
 
 StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
@@ -43,17 +51,18 @@ StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
   StatusStrings text{to_string(view.mode),
                      to_string(view.reason),
                      to_string(view.mismatch),
+                     std::string(name(view.stop_switch)),
                      std::string(name(view.autopilot)),
+                     {},
                      {},
                      {},
                      {}};
   text.findings = firmware_bridge::judge_parameters(view.autopilot, view.parameters, vehicle);
-  std::ranges::transform(text.findings, text.parameters.begin(), [](const auto& finding) {
-    constexpr double kNotAnswered = std::numeric_limits<double>::quiet_NaN();
-    // Names are literals, and end.
-    return dds::Parameter{const_cast<char*>(finding.name.data()), finding.value.value_or(kNotAnswered),
-                          dds::c_string(finding.advice)};
-  });
+  for (const auto& finding : text.findings) {
+    char* const name = const_cast<char*>(finding.name.data());  // a literal, which ends
+    if (finding.value) text.parameters.push_back({name, *finding.value});
+    if (!finding.good) text.advice.push_back({name, dds::c_string(finding.advice)});
+  }
   if (view.warning && firmware_bridge::Time::clock::now() - view.warning->at < kWarningShown)
     text.warning = printable(view.warning->value.text.data());
   return text;
@@ -83,14 +92,17 @@ void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
   s.frame_residual_rad = view.residual_rad;
   s.odometry_age = view.odometry_age;
   s.heartbeat_age = view.heartbeat_age;
+  s.clock_offset = view.clock ? 1e-9 * static_cast<double>(view.clock->offset_ns) : 0;
+  s.clock_delay = view.clock ? 0.5e-9 * static_cast<double>(view.clock->round_trip_ns) : -1;
   s.mismatch = dds::c_string(text.mismatch);
+  s.stop_switch = dds::c_string(text.stop_switch);
   s.tick = timing(view.tick);
   s.lateness = timing(view.lateness);
   s.odometry_to_wire = timing(view.odometry_to_wire);
   s.autopilot = dds::c_string(text.autopilot);
   s.autopilot_says = dds::c_string(text.warning);
-  const auto parameters = static_cast<std::uint32_t>(text.findings.size());
-  s.parameters = {parameters, parameters, text.parameters.data(), false};
+  s.parameters = sequence<decltype(s.parameters)>(text.parameters);
+  s.advice = sequence<decltype(s.advice)>(text.advice);
 }
 
 void set_counts(dds::Status& s, const Channels& channels) {

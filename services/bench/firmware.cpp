@@ -147,10 +147,12 @@ void Firmware::telemetry(double t, std::vector<std::uint8_t>& out) {
     send(m, out);
   }
   if (mute) return out.clear();
-  if (steps_ % 1000 == 0 || heartbeat_due_) send(heartbeat(), out);
+  const bool asked = profile_.intervals_ms.contains(mavlink::Heartbeat::kId);
+  if ((!asked && steps_ % 1000 == 0) || heartbeat_due_) send(heartbeat(), out);
   heartbeat_due_ = false;
   for (const auto& [id, every] : profile_.intervals_ms) {
     if (steps_ % every != 0) continue;
+    if (id == mavlink::Heartbeat::kId) send(heartbeat(), out);
     if (id == mavlink::AttitudeQuaternion::kId && !silent_attitude) send_attitude(out);
     if (id == mavlink::LocalPositionNed::kId && local_position_ && !silent_pose) send_position(out);
     if (id == mavlink::ExtendedSysState::kId) send(mavlink::ExtendedSysState{0, landed_state_}, out);

@@ -22,6 +22,7 @@ using Command = backwash_msgs_msg_dds__Command_;
 using Ack = backwash_msgs_msg_dds__Ack_;
 using Status = backwash_msgs_msg_dds__Status_;
 using Parameter = backwash_msgs_msg_dds__Parameter_;
+using Advice = backwash_msgs_msg_dds__Advice_;
 using Timing = backwash_msgs_msg_dds__Timing_;
 using Tube = backwash_msgs_msg_dds__ReachTube_;
 using TubeStep = backwash_msgs_msg_dds__ReachStep_;

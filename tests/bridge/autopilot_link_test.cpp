@@ -200,8 +200,8 @@ TEST_F(LinkTest, AnswersTimesyncAndMeasuresTheOffset) {
   }
   say_and_poll(mavlink::Timesync{.tc1 = 5'000'000, .ts1 = question.ts1}, kStart + 4ms);
   ASSERT_TRUE(link_.clock());
-  EXPECT_EQ(link_.clock()->value.round_trip_ns, 4'000'000);
-  EXPECT_EQ(link_.clock()->value.offset_ns, 5'000'000 - (1'000'000'000'000 + 2'000'000));
+  EXPECT_EQ(link_.clock()->round_trip_ns, 4'000'000);
+  EXPECT_EQ(link_.clock()->offset_ns, 5'000'000 - (1'000'000'000'000 + 2'000'000));
 }
 
 TEST_F(LinkTest, SendsATextOfAtMostFiftyCharacters) {

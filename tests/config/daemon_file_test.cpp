@@ -92,6 +92,31 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
     EXPECT_THAT(error_after(c.right, c.wrong), HasSubstr(".toml:" + std::to_string(c.line) + ": key '" + c.key + "'"));
 }
 
+/// What the shipped file says of itself with these lines as its [gpio] table.
+std::string with_gpio(const std::string& lines) { return error_after("# [gpio] ", "[gpio]\n" + lines + "\n#"); }
+
+TEST(DaemonFile, TakesAChipWithAnyOfItsLines) {
+  const std::string chip = "chip = \"/dev/gpiochip0\"";
+  for (const std::string line : {"stop_switch", "strobe", "led"})
+    EXPECT_EQ(with_gpio(chip + "\n" + line + " = \"A\""), "no error") << line;
+  EXPECT_EQ(with_gpio(chip + "\nstop_switch = \"A\"\nstrobe = \"B\"\nled = \"C\""), "no error");
+}
+
+TEST(DaemonFile, RefusesLinesWithoutAChipAndOneLineForTwoUses) {
+  const auto says = [](const std::string& lines, const std::string& what) {
+    const std::string message = with_gpio(lines);
+    return message.find(what) != std::string::npos ? "" : message;
+  };
+  const std::string chip = "chip = \"/dev/gpiochip0\"\n";
+  EXPECT_EQ(says(chip, "needs chip and at least one of"), "");
+  EXPECT_EQ(says("strobe = \"A\"", "needs chip and at least one of"), "");
+  EXPECT_EQ(says(chip + "strobe = \"A\"\nled = \"A\"", "key 'gpio.led' = 'A': needs another value than gpio.strobe"),
+            "");
+  EXPECT_EQ(says(chip + "strobe = \"\"", "key 'gpio.strobe'"), "");
+  EXPECT_EQ(says(chip + "strobe = 3", "key 'gpio.strobe'"), "");
+  EXPECT_EQ(says(chip + "horn = \"A\"", "key 'gpio.horn'"), "");
+}
+
 /// What the shipped file says of itself with this key file; "no error" if it is taken.
 std::string with_key(const std::string& content, std::filesystem::perms mode) {
   const auto path = std::filesystem::temp_directory_path() / "backwash_daemon_file_test.key";

@@ -97,6 +97,7 @@ stops() {
   stops_beside stops_quiet 4 || status=$?
   stress-ng --cpu "$(nproc)" --timeout 7200 >/dev/null 2>&1 &
   local load=$!
+  trap "kill $load 2>/dev/null || true" EXIT # also of a part that is ended from outside
   stops_beside stops_load 4 || status=$?
   kill "$load" 2>/dev/null || true
   wait "$load" 2>/dev/null || true

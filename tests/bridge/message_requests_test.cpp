@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "firmware_bridge/message_requests.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+namespace backwash::firmware_bridge::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::uint8_t kAccepted = 0, kTemporarilyRejected = 1, kDenied = 2, kUnsupported = 3, kFailed = 4;
+
+/// An autopilot that answers in the tick after the question, or never.
+class MessageRequestsTest : public testing::Test {
+ protected:
+  static constexpr std::uint16_t kInterval = 511;
+  void run(std::chrono::milliseconds time) {
+    for (const auto end = now_ + time; now_ < end; now_ += 20ms) {
+      const auto wish = requests_.next(answer_, now_);
+      if (!wish) continue;
+      ++asked_[wish->id];
+      if (!answers_) continue;
+      const auto given = results_.find(wish->id);
+      answer_ = {{kInterval, given == results_.end() ? kAccepted : given->second}, now_ + 10ms};
+    }
+  }
+  MessageRequests requests_;
+  std::map<std::uint32_t, std::uint8_t> results_;  // others are granted
+  std::map<std::uint32_t, int> asked_;
+  Latest<CommandResult> answer_;
+  bool answers_ = true;
+  Time now_{1000s};
+};
+
+TEST_F(MessageRequestsTest, EachIsAskedForAtOnceAndAgainEveryTwoSeconds) {
+  run(200ms);
+  ASSERT_EQ(asked_.size(), MessageRequests::kWishes.size());
+  run(19'500ms);
+  for (const auto& [id, times] : asked_) EXPECT_EQ(times, 10) << id;
+}
+
+TEST_F(MessageRequestsTest, WhatIsDeniedIsNotAskedForAgainUntilTheAutopilotIsAnotherOne) {
+  const auto odometry = mavlink::Odometry::kId;
+  for (const std::uint8_t denial : {kDenied, kUnsupported, kFailed}) {
+    asked_.clear();
+    results_[odometry] = denial;
+    requests_.forget();
+    run(60s);
+    EXPECT_EQ(asked_[odometry], 1) << int{denial};
+    EXPECT_GE(asked_[mavlink::LocalPositionNed::kId], 29);
+    requests_.forget();
+    run(10s);
+    EXPECT_EQ(asked_[odometry], 2) << int{denial};
+  }
+}
+
+TEST_F(MessageRequestsTest, ADenialIsOfTheMessageThatWasAskedForAndOfNoOther) {
+  for (const auto& denied : MessageRequests::kWishes) {
+    asked_.clear();
+    results_ = {{denied.id, kDenied}};
+    requests_.forget();
+    run(10s);
+    for (const auto& wish : MessageRequests::kWishes) EXPECT_EQ(asked_[wish.id] == 1, wish.id == denied.id) << wish.id;
+  }
+}
+
+TEST_F(MessageRequestsTest, WhatIsPutOffIsAskedForAgain) {
+  results_[mavlink::Odometry::kId] = kTemporarilyRejected;
+  run(20s);
+  EXPECT_GE(asked_[mavlink::Odometry::kId], 9);
+}
+
+TEST_F(MessageRequestsTest, SilenceDelaysTheOthersAndDeniesNothing) {
+  answers_ = false;
+  run(20s);
+  for (const auto& wish : MessageRequests::kWishes) EXPECT_GE(asked_[wish.id], 8) << wish.id;
+}
+
+TEST_F(MessageRequestsTest, AnAutopilotThatDeniesEverythingIsLeftInPeace) {
+  for (const auto& wish : MessageRequests::kWishes) results_[wish.id] = kDenied;
+  run(60s);
+  for (const auto& [id, times] : asked_) EXPECT_EQ(times, 1) << id;
+}
+
+}  // namespace
+}  // namespace backwash::firmware_bridge::test
