@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -9,6 +10,8 @@
 
 namespace backwash::config {
 namespace {
+
+using testing::HasSubstr;
 
 std::string shipped() {
   std::ifstream in(std::string(BACKWASH_SOURCE_DIR) + "/core/config/files/backwashd.daemon.toml");
@@ -68,22 +71,25 @@ TEST(DaemonFile, FramesAndMapMayBeLeftOut) {
 }
 
 TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
-  const auto names = [](const std::string& message, int line, const std::string& key) {
-    return message.find(".toml:" + std::to_string(line) + ": key '" + key + "'") != std::string::npos;
-  };
-  EXPECT_TRUE(names(error_after("domain = 0", "domain = 231"), 7, "dds.domain"));
-  EXPECT_TRUE(names(error_after("domain = 0", "domain = 1.5"), 7, "dds.domain"));
-  EXPECT_TRUE(names(error_after("baud = 921600", "baud = \"fast\""), 14, "link.baud"));
-  EXPECT_TRUE(names(error_after("\"/dev/ttyAMA0\"", "\"udp:there:14580\""), 13, "link.device"));
-  EXPECT_TRUE(names(error_after("baud = 921600", "bauds = 921600"), 14, "link.bauds"));
-  EXPECT_TRUE(names(error_after("device = \"/dev/ttyAMA0\"", "device = \"\""), 13, "link.device"));
-  EXPECT_TRUE(names(error_after("\nfile = ", "\npath = "), 25, "log.path"));
-  EXPECT_TRUE(names(error_after("cpu = -1", "cpu = 0.5"), 21, "control.cpu"));
-  EXPECT_TRUE(names(error_after("battery_land = 0.15", "battery_land = 15"), 22, "control.battery_land"));
-  EXPECT_TRUE(names(error_after("[control]", "[controls]"), 19, "controls"));
-  EXPECT_TRUE(names(error_after("live = false", "live = 0"), 33, "map.live"));
-  EXPECT_TRUE(names(error_after("max_mib = 512", "max_mib = 0"), 36, "map.max_mib"));
-  EXPECT_TRUE(names(error_after("body = \"base_link\"", "body = \"map\""), 27, "frames"));
+  const struct {
+    std::string right, wrong;
+    int line;
+    std::string key;
+  } cases[] = {{"domain = 0", "domain = 231", 7, "dds.domain"},
+               {"domain = 0", "domain = 1.5", 7, "dds.domain"},
+               {"baud = 921600", "baud = \"fast\"", 14, "link.baud"},
+               {"\"/dev/ttyAMA0\"", "\"udp:there:14580\"", 13, "link.device"},
+               {"baud = 921600", "bauds = 921600", 14, "link.bauds"},
+               {"device = \"/dev/ttyAMA0\"", "device = \"\"", 13, "link.device"},
+               {"\nfile = ", "\npath = ", 25, "log.path"},
+               {"cpu = -1", "cpu = 0.5", 21, "control.cpu"},
+               {"battery_land = 0.15", "battery_land = 15", 22, "control.battery_land"},
+               {"[control]", "[controls]", 19, "controls"},
+               {"live = false", "live = 0", 33, "map.live"},
+               {"max_mib = 512", "max_mib = 0", 36, "map.max_mib"},
+               {"body = \"base_link\"", "body = \"map\"", 27, "frames"}};
+  for (const auto& c : cases)
+    EXPECT_THAT(error_after(c.right, c.wrong), HasSubstr(".toml:" + std::to_string(c.line) + ": key '" + c.key + "'"));
 }
 
 /// What the shipped file says of itself with these lines as its [gpio] table.
