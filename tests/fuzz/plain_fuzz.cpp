@@ -69,6 +69,7 @@ Bytes state(Mutator& mutator, std::uint16_t sequence) {
   plain_state_t s{};
   s.sequence = sequence;
   s.time_ms = sequence;
+  s.pose_known = !mutator.one_in(8);
   for (auto* floats : {&s.position, &s.velocity, &s.rates})
     for (float& f : *floats) f = any_float(mutator);
   s.attitude[0] = mutator.one_in(8) ? any_float(mutator) : 1;
@@ -103,6 +104,7 @@ Bytes frame(Mutator& mutator) {
     }
     default: {
       plain_state_t s{};
+      s.pose_known = mutator.one_in(2);
       s.answered = static_cast<std::uint16_t>(mutator.bits());
       fill(s.position), fill(s.velocity), fill(s.attitude), fill(s.rates);
       plain_write_state(&s, wire.data());
