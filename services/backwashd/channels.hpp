@@ -228,8 +228,10 @@ struct Channels {
   std::atomic<mavlink::SigningTime> signing_time{0};  // control → signing time: of the newest signature; 0: none
   sync::LatestValue<Line> other_daemon;               // DDS reader → mission: "", or who else obeys our commands
   sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
-  sync::LatestValue<CommandId> accepted;              // mission → status: the newest command that was
-  sync::LatestValue<std::array<char, 192>> task;      // mission → status: of the last command
+  std::atomic<std::int64_t> enable_asked_ns =
+      INT64_MIN / 2;                              // mission → control: when an operator last asked to enable
+  sync::LatestValue<CommandId> accepted;          // mission → status: the newest command that was
+  sync::LatestValue<std::array<char, 192>> task;  // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
       closures_refused{0}, foreign_writers{0};

@@ -15,7 +15,8 @@ namespace backwash::daemon {
 namespace {
 
 constexpr float kGpsGlobalOrigin = 49;
-constexpr std::uint8_t kNotice = 5, kWarning = 4;  // severities of STATUSTEXT
+constexpr std::int64_t kEnableWish_ns = 3'000'000'000;  // in which the autopilot is asked what enabling needs
+constexpr std::uint8_t kNotice = 5, kWarning = 4;       // severities of STATUSTEXT
 
 firmware_bridge::Time time_of(std::int64_t ns) noexcept { return firmware_bridge::Time(std::chrono::nanoseconds(ns)); }
 std::int64_t ns_of(firmware_bridge::Time t) noexcept {
@@ -190,10 +191,12 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
     link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
                           to_string(s.reason));
-  // Only while nothing depends on the line's time. After a restart of the autopilot we are quiet, and it stands.
-  const bool passive = s.mode == track::Mode::passive;
-  const bool restarted = s.mode == track::Mode::quiet && !in.autopilot.armed;
-  parameters_.step(link_, passive || restarted, passive, view_);
+  // Only while nothing depends on the line's time, and nothing to an armed vehicle. Quiet ends by an operator's wish
+  // alone: the autopilot may have restarted since.
+  const bool passive = s.mode == track::Mode::passive && s.send_heartbeat;
+  const bool wished = s.mode == track::Mode::quiet && !in.autopilot.armed &&
+                      in.now_ns - channels_.enable_asked_ns.load(std::memory_order_relaxed) < kEnableWish_ns;
+  parameters_.step(link_, passive || wished, passive, view_);
   if (!s.send_heartbeat) return;
   ask_for_messages(in.now_ns);
   if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);

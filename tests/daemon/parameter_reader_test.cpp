@@ -47,6 +47,23 @@ TEST_F(ParameterReading, AnAutopilotThatRestartedIsAskedAnew) {
   EXPECT_EQ(forbids(rig_).substr(0, 19), "COM_OBL_RC_ACT is 3");
 }
 
+// Not a byte more than odometry after QUIET, until an operator asks to enable.
+TEST_F(ParameterReading, InQuietItIsAskedOnlyForAnOperatorWhoAsksToEnable) {
+  rig_.ticks(150);
+  rig_.take_off();
+  rig_.autopilot->mute = true;
+  ASSERT_GE(rig_.ticks_until(track::Mode::quiet, 200), 0);
+  rig_.ticks(50);
+  rig_.autopilot->mute = false;
+  rig_.autopilot->disarm();
+  rig_.ticks(200);
+  ASSERT_EQ(rig_.mode(), track::Mode::quiet);
+  EXPECT_TRUE(forbids(rig_).starts_with("no value of")) << forbids(rig_);
+  rig_.channels->enable_asked_ns = rig_.now_ns();
+  rig_.ticks(120);
+  EXPECT_EQ(forbids(rig_), "");
+}
+
 TEST_F(ParameterReading, NothingIsAskedWhileTheLineIsNeeded) {
   rig_.ticks(150);
   rig_.take_off();
