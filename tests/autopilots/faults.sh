@@ -28,7 +28,7 @@ if [[ ${BACKWASH_NETNS:-} != own ]]; then
 fi
 source "$root/tests/autopilots/flight.sh"
 # The pilot's switch brings a mode that holds the position: ArduCopter's sixth (LOITER).
-SETTINGS=${SETTINGS:-$([[ $kind == ardupilot ]] && echo FLTMODE6=5)}
+[[ $kind != ardupilot ]] || SETTINGS=${SETTINGS:-FLTMODE6=5}
 fly_real "$kind" "$path" "$build" "$out/$fault"
 take_off
 
