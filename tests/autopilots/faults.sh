@@ -55,7 +55,7 @@ case $fault in
     ;;
   pilot)
     if [[ $kind == px4 ]]; then
-      "$path/bin/px4-commander" mode posctl >>"$log" 2>&1
+      "$path/bin/px4-commander" mode auto:loiter >>"$log" 2>&1
     else
       echo 1900 >"$work/switch"
     fi
