@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "core/plan/stop.hpp"
@@ -33,22 +34,29 @@ inline reach::ReachTube tube_of(const std::vector<Setpoint>& commands) {
   return tube;
 }
 
-/// Along x for eight seconds, after half a second at 1 m/s, with a verified stop every ten commands.
-inline AcceptedSegment straight() {
+/// Half widths of 0.2 m around these commands; a verified stop every ten of them.
+inline AcceptedSegment segment_of(std::vector<Setpoint> commands) {
   AcceptedSegment s;
   s.id = 1;
-  for (int k = 0; k < 400; ++k) {
-    const double t = kControlPeriod * k, x = t < 0.5 ? t * t : t - 0.25;
-    s.commands.push_back({{x, 0, 1}, {std::min(1.0, 2 * t), 0, 0}, Vec3::Zero(), 0});
-  }
+  s.commands = std::move(commands);
   s.tube = tube_of(s.commands);
-  for (std::size_t branch = 0; branch < 400; branch += 10) {
+  for (std::size_t branch = 0; branch < s.commands.size(); branch += 10) {
     const auto stopped = plan::stop_along(s.commands, branch, 4);
     const auto tube = tube_of(stopped);
     const auto from = static_cast<std::ptrdiff_t>(branch);
     s.stops.push_back({branch, {stopped.begin() + from, stopped.end()}, {tube.begin() + from, tube.end()}});
   }
   return s;
+}
+
+/// Along x for eight seconds, after half a second at 1 m/s.
+inline AcceptedSegment straight() {
+  std::vector<Setpoint> commands;
+  for (int k = 0; k < 400; ++k) {
+    const double t = kControlPeriod * k, x = t < 0.5 ? t * t : t - 0.25;
+    commands.push_back({{x, 0, 1}, {std::min(1.0, 2 * t), 0, 0}, Vec3::Zero(), 0});
+  }
+  return segment_of(std::move(commands));
 }
 
 /// Two seconds into the flight unless told otherwise.
