@@ -14,12 +14,14 @@
 #include "services/backwashd/plan_front.hpp"
 #include "services/dds/topics.hpp"
 #include "tests/daemon/lockstep.hpp"
+#include "tests/track/flown.hpp"
 
 namespace backwash::daemon::test {
 namespace {
 
 using track::AcceptedSegment;
 using track::Mode;
+using track::test::tube_of;
 
 constexpr std::uint8_t kGoto = backwash_msgs_msg_dds__COMMAND_GOTO, kStop = backwash_msgs_msg_dds__COMMAND_STOP,
                        kLand = backwash_msgs_msg_dds__COMMAND_LAND, kHold = backwash_msgs_msg_dds__COMMAND_HOLD,
@@ -51,15 +53,6 @@ Vehicle vehicle() {
   Vehicle v = vehicle_5in();
   v.initial_error = {0.1, 0.5};
   return v;
-}
-
-reach::ReachTube tube_of(const std::vector<Setpoint>& commands) {
-  reach::ReachTube tube(commands.size() + 1);
-  for (std::size_t k = 0; k < tube.size(); ++k) {
-    tube[k].center.p_W = commands[std::min(k, commands.size() - 1)].p_W;
-    tube[k].half_widths.fill(0.2), tube[k].half_widths_interval.fill(0.2);
-  }
-  return tube;
 }
 
 /// Where the search begins: enabled and at rest, then these events.
