@@ -45,7 +45,7 @@ struct Daemon {
     double battery_land = 0;  ///< remaining share below which LAND is asked for, once; 0: never
   } control;
   struct Gpio {
-    std::string chip;                      ///< device of the chip; empty: no line is used
+    std::string chip;                      ///< device of the chip, or its label; empty: no line is used
     std::string stop_switch, strobe, led;  ///< lines by name; empty: there is none
   } gpio;
   struct {

@@ -23,7 +23,8 @@ class GpioLine {
   };
   using Error = std::string;  ///< one line: chip, line and the system's reason
 
-  /// `chip`: a device as /dev/gpiochip0; `name`: of the line, as the board's description has it.
+  /// `chip`: a device as /dev/gpiochip0, or the label of the first that has it; `name`: of the line, as the board's
+  /// description has it.
   static tl::expected<GpioLine, Error> open(const std::string& chip, const std::string& name, Use use);
 
   /// Waits at most so long for an edge of an input; true: next_edge() has one. Error: the line is gone.

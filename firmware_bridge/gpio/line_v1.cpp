@@ -32,7 +32,8 @@ void GpioLine::Release::operator()(Handle* handle) const noexcept {
 
 tl::expected<GpioLine, GpioLine::Error> GpioLine::open(const std::string& chip, const std::string& name, Use use) {
   const std::string what = chip + ", line " + name;
-  gpiod_chip* const opened = ::gpiod_chip_open(chip.c_str());
+  gpiod_chip* const opened =
+      chip.starts_with('/') ? ::gpiod_chip_open(chip.c_str()) : ::gpiod_chip_open_by_label(chip.c_str());
   if (!opened) return failed(chip, errno);
   std::unique_ptr<Handle, Release> handle(new Handle{opened, nullptr, what});
   handle->line = ::gpiod_chip_find_line(opened, name.c_str());

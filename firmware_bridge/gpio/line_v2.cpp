@@ -3,6 +3,7 @@
 #include <gpiod.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <system_error>
 
 #include "firmware_bridge/gpio/line.hpp"
@@ -23,6 +24,7 @@ struct With {
   }
 };
 using Chip = std::unique_ptr<gpiod_chip, With<::gpiod_chip_close>>;
+using Info = std::unique_ptr<gpiod_chip_info, With<::gpiod_chip_info_free>>;
 using Request = std::unique_ptr<gpiod_line_request, With<::gpiod_line_request_release>>;
 using Events = std::unique_ptr<gpiod_edge_event_buffer, With<::gpiod_edge_event_buffer_free>>;
 using Settings = std::unique_ptr<gpiod_line_settings, With<::gpiod_line_settings_free>>;
@@ -54,6 +56,20 @@ Request request(gpiod_chip* chip, unsigned offset, GpioLine::Use use) {
   return Request(::gpiod_chip_request_lines(chip, config.get(), lines.get()));
 }
 
+/// Null with errno set: there is none.
+Chip open_chip(const std::string& chip) {
+  if (chip.starts_with('/')) return Chip(::gpiod_chip_open(chip.c_str()));
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev", none)) {
+    if (!entry.path().filename().string().starts_with("gpiochip")) continue;
+    Chip opened(::gpiod_chip_open(entry.path().c_str()));
+    const Info info(opened ? ::gpiod_chip_get_info(opened.get()) : nullptr);
+    if (info && ::gpiod_chip_info_get_label(info.get()) == chip) return opened;
+  }
+  errno = ENOENT;
+  return nullptr;
+}
+
 }  // namespace
 
 struct GpioLine::Handle {
@@ -69,7 +85,7 @@ void GpioLine::Release::operator()(Handle* handle) const noexcept { delete handl
 
 tl::expected<GpioLine, GpioLine::Error> GpioLine::open(const std::string& chip, const std::string& name, Use use) {
   const std::string what = chip + ", line " + name;
-  const Chip opened(::gpiod_chip_open(chip.c_str()));
+  const Chip opened = open_chip(chip);
   if (!opened) return failed(chip, errno);
   const int offset = ::gpiod_chip_get_line_offset_from_name(opened.get(), name.c_str());
   if (offset < 0) return tl::unexpected(what + ": no line has that name");

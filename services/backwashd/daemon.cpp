@@ -99,7 +99,9 @@ struct Flight {
             [&] { return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels); })),
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
         mission(s.vehicle),
-        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {}
+        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {
+    if (!s.daemon.gpio.chip.empty()) gpio.emplace(*channels, s.daemon.gpio);
+  }
 
   const Settings& settings;
   std::unique_ptr<Channels> channels = std::make_unique<Channels>();
@@ -112,6 +114,7 @@ struct Flight {
   std::unique_ptr<MapFront> maps;  ///< after the front, which watches the middleware's log
   Mission mission;
   ControlLoop loop;
+  std::optional<GpioWorker> gpio;  ///< before the control thread: its switch is not absent in the first ticks
   Failure failure{channels->stop};
   CatchTheRest rest{failure};
   std::atomic<bool> recorded{false};
@@ -136,8 +139,7 @@ void start(Flight& f) {
     });
   });
   f.threads.start("status", [&] { f.front->run_status(f.settings.vehicle, *f.recorder); });
-  if (!daemon.gpio.chip.empty())
-    f.threads.start("gpio", [&] { run_gpio(channels, daemon.gpio, reader_priority(daemon)); });
+  if (f.gpio) f.threads.start("gpio", [&] { run_gpio(channels, *f.gpio, reader_priority(daemon)); });
   f.threads.start("control", [&] {
     make_real_time({daemon.control.priority, daemon.control.cpu});
     run_control(channels, f.loop);

@@ -28,10 +28,12 @@ GpioWorker::GpioWorker(Channels& channels, const config::Daemon::Gpio& names)
       chip_(names.chip),
       stop_switch_{"stop switch", names.stop_switch, GpioLine::Use::switch_input},
       strobe_{"strobe", names.strobe, GpioLine::Use::output},
-      led_{"status LED", names.led, GpioLine::Use::output} {}
+      led_{"status LED", names.led, GpioLine::Use::output} {
+  if (!names.stop_switch.empty()) channels_.stop_switch.state = SwitchState::lost;
+}
 
 void GpioWorker::lose(Wanted& wanted, const std::string& why) {
-  if (!std::exchange(wanted.told, true)) spdlog::error("{}: {}", wanted.what, why);
+  if (std::exchange(wanted.told, why) != why) spdlog::error("{}: {}", wanted.what, why);
   wanted.line.reset();
   if (&wanted == &stop_switch_) switch_.lose();
 }
@@ -47,7 +49,7 @@ void GpioWorker::open_missing(Time now) {
       continue;
     }
     wanted->line = std::move(*line);
-    wanted->told = false;
+    wanted->told.clear();
     spdlog::info("{}: {}, line {}", wanted->what, chip_, wanted->name);
   }
 }
@@ -98,9 +100,8 @@ void GpioWorker::step() {
   drive(led_, lit(fault ? Signal::fault : channels_.pulse.signal.load(std::memory_order_relaxed), now));
 }
 
-void run_gpio(Channels& channels, const config::Daemon::Gpio& names, int priority) {
+void run_gpio(Channels& channels, GpioWorker& worker, int priority) {
   if (priority > 0) set_fifo(priority);
-  GpioWorker worker(channels, names);
   while (!channels.stop) worker.step();
 }
 

@@ -15,9 +15,10 @@ namespace backwash::daemon {
 class GpioWorker {
  public:
   using Time = std::chrono::steady_clock::time_point;
+  /// From here on a named stop switch counts as lost until it is read.
   GpioWorker(Channels& channels, const config::Daemon::Gpio& names);
   /// Waits a few milliseconds for an edge, then takes the switch and sets the outputs. What cannot be had, or is lost,
-  /// is told once and tried again each second.
+  /// is told once for each reason and tried again each second.
   void step();
 
  private:
@@ -26,7 +27,7 @@ class GpioWorker {
     std::string name;
     firmware_bridge::GpioLine::Use use;
     std::optional<firmware_bridge::GpioLine> line{};
-    bool told = false;
+    std::string told{};  // the error that was told last
   };
   void open_missing(Time now);
   void lose(Wanted& wanted, const std::string& why);
@@ -45,6 +46,6 @@ class GpioWorker {
 };
 
 /// Thread body: step() until the daemon ends. `priority`: SCHED_FIFO, 0: none.
-void run_gpio(Channels& channels, const config::Daemon::Gpio& names, int priority);
+void run_gpio(Channels& channels, GpioWorker& worker, int priority);
 
 }  // namespace backwash::daemon

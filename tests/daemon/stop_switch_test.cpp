@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // docs/faults.md row 37: what the daemon makes of its stop switch, from the reading that the GPIO thread leaves to the
 // wire.
+#include "services/backwashd/gpio_worker.hpp"
 #include "tests/daemon/mission_rig.hpp"
 
 namespace backwash::daemon::test {
@@ -120,6 +121,19 @@ TEST(Row37StopSwitch, NeitherAPilotNorAnAutopilotThatLandsIsFought) {
         EXPECT_EQ(reaction.request(state, mode, Request::enable, t * 1'000'000'000), Request::none);
       }
     }
+}
+
+// The control thread ticks before the thread that reads the lines has opened them.
+TEST(Row37StopSwitch, ANamedSwitchIsLostAndNotAbsentBeforeItIsRead) {
+  Channels channels;
+  config::Daemon::Gpio names;
+  names.chip = "/dev/gpiochip0";
+  names.led = "LED";
+  const GpioWorker without_switch(channels, names);
+  EXPECT_EQ(SwitchReaction::read(channels.stop_switch, 0), SwitchState::absent);
+  names.stop_switch = "STOP";
+  const GpioWorker with_switch(channels, names);
+  EXPECT_EQ(SwitchReaction::read(channels.stop_switch, 0), SwitchState::lost);
 }
 
 class StopSwitchMission : public MissionTest {};

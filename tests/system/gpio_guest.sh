@@ -52,7 +52,7 @@ for program in backwashd backwashctl; do
   ldd "$build/services/$program" | grep -o '/[^ ]*' | while read -r library; do cp --parents -L -n "$library" "$guest/"; done
 done
 domain=3 device=/dev/autopilot more_tables='[gpio]
-chip = "/dev/gpiochip0"
+chip = "BENCH"
 stop_switch = "STOP"
 strobe = "WATCHDOG"
 led = "STATUS"'

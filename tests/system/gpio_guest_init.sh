@@ -13,12 +13,14 @@ end() {
   poweroff -f
 }
 failed() {
+  ls -l /dev/gpiochip* && dmesg | tail -n 5
   grep -v 'deadline missed' /tmp/log
   end "FAILED: $*"
 }
 bank=/config/gpio-sim/board/bank
 mkdir -p $bank/line0 $bank/line1 $bank/line2
 echo 8 >$bank/num_lines
+echo BENCH >$bank/label
 echo STOP >$bank/line0/name
 echo WATCHDOG >$bank/line1/name
 echo STATUS >$bank/line2/name
@@ -61,7 +63,7 @@ refused() {
 touch /tmp/log
 backwashd --config /etc/backwashd.toml 2>/tmp/log &
 daemon=$!
-said 'stop switch: /dev/gpiochip0, line STOP'
+said 'stop switch: BENCH, line STOP'
 said 'stop switch: not seen in both positions yet'
 [ "$(level 0)" = 1 ] || failed "the line is not pulled up"
 refused 'stop switch: not seen in both positions'
@@ -92,8 +94,8 @@ echo "gpio: edges of the strobe in 200 readings: $alive, $stopped with the daemo
 echo 0 >/config/gpio-sim/board/live
 said 'line STOP: No such device'
 refused 'stop switch: its line cannot be read'
-echo 1 >/config/gpio-sim/board/live
-said 'stop switch: /dev/gpiochip0, line STOP'
+echo 1 >/config/gpio-sim/board/live # with another number, for the daemon still held the old one
+said 'stop switch: BENCH, line STOP'
 said 'stop switch: not seen in both positions yet'
 kill -0 $daemon || failed "the daemon has ended"
 kill -TERM $daemon
