@@ -198,11 +198,13 @@ std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
 }
 
 /// From rest, the first segment of a flight whose way is not known yet; waits a little for scans that show more of it.
+/// A world that came while a plan was made is planned in once more, however long that took.
 std::optional<std::string> PlannerWorker::explore(const PlanJob& job) {
   const std::int64_t until_ns = view_.t_ns + static_cast<std::int64_t>(kPatience * 1e9);
   std::string why;
   while (!channels_.stop) {
     if (!current()) return kEnded;
+    const bool last = view_.t_ns >= until_ns;
     const auto world = world_;
     new_world_ = false;
     const std::uint32_t closures = view_.closures;
@@ -216,8 +218,8 @@ std::optional<std::string> PlannerWorker::explore(const PlanJob& job) {
       if (!refused) pursuit_ = Pursuit{job.position, job.yaw};
       return refused;
     }
-    while (!new_world_ && view_.t_ns < until_ns && !channels_.stop && current()) pause_();
-    if (view_.t_ns >= until_ns) break;
+    while (current() && !new_world_ && view_.t_ns < until_ns && !channels_.stop) pause_();
+    if (last || !new_world_) break;
   }
   return "nothing more of the way became known" + (why.empty() ? "" : ": " + why);
 }

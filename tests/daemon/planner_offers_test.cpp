@@ -91,6 +91,25 @@ TEST_F(PlannerOffers, NothingForAGoalThatNoPlanReaches) {
   EXPECT_TRUE(offers_.empty());
 }
 
+// A planner that is starved may see 3 s pass at once: the world that came meanwhile is not to be overlooked.
+TEST_F(PlannerOffers, AWayThatBecameKnownWhileThePlannerWasStarvedIsFlown) {
+  OccupancyGrid known = room();
+  const Vec3 here(1.55, 2.05, 1.05), goal(4.55, 2.05, 1.05);
+  for (std::size_t n = 0; n < known.cell_count(); ++n)
+    if (known.center(known.voxel(n)).x() > here.x() + 0.5) known.set(known.voxel(n), Cell::unknown);
+  stand(here);
+  know(known);
+  EXPECT_NE(ask(PlanJob::Kind::go_to, goal).find("nothing more of the way became known"), std::string::npos);
+  EXPECT_TRUE(offers_.empty());
+  pause_ns_ = 3'000'000'000;
+  meanwhile_ = [&] {
+    know(room());
+    meanwhile_ = [] {};
+  };
+  EXPECT_EQ(ask(PlanJob::Kind::go_to, goal), "");
+  EXPECT_FALSE(offers_.empty());
+}
+
 TEST_F(PlannerOffers, NothingThatIsEndedAlreadyOrWithoutControl) {
   know(room());
   stand({1.05, 2.05, 1.05});

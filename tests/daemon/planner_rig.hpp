@@ -42,6 +42,8 @@ class PlannerOffers : public testing::Test {
   Recorder recorder_{log_};
   ControlView view_;
   std::vector<track::AcceptedSegment> offers_;
+  std::int64_t pause_ns_ = 20'000'000;
+  std::function<void()> meanwhile_ = [] {};  ///< what else happens in a pause
   std::function<void(const track::AcceptedSegment&)> answer_ = [this](const auto& s) { view_.segment = s.id; };
   PlannerWorker planner_{*channels_, recorder_, [](const auto&) {}, [this] { control(); }};
   std::shared_ptr<const plan::World> world_;
@@ -80,7 +82,8 @@ class PlannerOffers : public testing::Test {
     } else if (!offers_.empty() && view_.segment == offers_.back().id && offers_.back().arms) {
       view_.mode = track::Mode::lifting;
     }
-    view_.t_ns += 20'000'000;
+    view_.t_ns += pause_ns_;
+    meanwhile_();
     show();
   }
   /// "", or why not.
