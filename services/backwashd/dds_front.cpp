@@ -52,6 +52,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
   waitset_.add(odometry_);
   waitset_.add(closures_);
   waitset_.add(commands_);
+  look_for_other_daemons();  // before the mission hears a command
 }
 
 void DdsFront::take_odometry() {
@@ -135,16 +136,15 @@ void DdsFront::take_commands() {
 
 void DdsFront::look_for_other_daemons() {
   const auto other = statuses_.first();
-  if (other == other_daemon_) return;
-  other_daemon_ = other;
+  const auto why = others_.look(other, now_ns());
+  if (!why) return;
   Line line{};
-  if (other)
-    std::snprintf(line.data(), line.size(), "another daemon in this namespace, writer %s", dds::text(*other).c_str());
-  if (other)
-    spdlog::error("{}: it obeys the same commands; nothing is enabled here meanwhile", line.data());
-  else
-    spdlog::info("the other daemon in this namespace is gone");
+  std::snprintf(line.data(), line.size(), "%s", why->c_str());
   channels_.other_daemon.write(line);
+  if (other)
+    spdlog::error("{}: it obeys the same commands; nothing is enabled here meanwhile", *why);
+  else if (why->empty())
+    spdlog::info("no other daemon in this namespace");
 }
 
 void DdsFront::run_readers() {

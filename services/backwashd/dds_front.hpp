@@ -13,6 +13,7 @@
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/localization.hpp"
 #include "services/backwashd/mission.hpp"
+#include "services/backwashd/other_daemons.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/dds/topics.hpp"
@@ -49,7 +50,7 @@ class DdsFront {
   Localization localization_;
   Refusals refusals_;
   BoundWriter odometry_writer_{"odometry"}, closure_writer_{"a loop closure"};
-  std::optional<dds::Guid> other_daemon_;                     // another writer of our status
+  OtherDaemons others_{now_ns()};
   std::atomic<bool> commanding_{false};                       // status → reader
   std::map<dds::Guid, std::array<Allowance, 2>> allowances_;  // of writers of commands: for STOP, for the others
   std::optional<CommandMessage> stop_;                        // the newest STOP that the mission had no room for
