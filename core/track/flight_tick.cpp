@@ -108,7 +108,7 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
 
 // Learns local ← map while nothing is commanded, watches it otherwise. Takes it anew when the controller's estimator
 // was reset: by its counter, or by its own samples, which jumped while the odometry passed its gate. The odometry is
-// brought to the moment at which the controller's pose arrived.
+// brought to the moments of the controller's position and attitude.
 void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   reset_ = false;
   const auto& pose = in.autopilot.pose;
@@ -119,9 +119,8 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   last_attitude_ns_ = pose->attitude_at_ns;
   const FramePose in_local = pose_of(*pose);
   FramePose in_map = pose_of(gate_.last()->state, gate_.last()->q);
-  const double age = seconds(in.now_ns - last_good_ns_);
-  in_map.p += age * in_map.v;
-  in_map.yaw += age * in_local.yaw_rate;
+  in_map.p += seconds(pose->at_ns - last_good_ns_) * in_map.v;
+  in_map.yaw += seconds(pose->attitude_at_ns - last_good_ns_) * in_local.yaw_rate;
   const bool counted = reset_counter_ && in.autopilot.reset_counter && *reset_counter_ != *in.autopilot.reset_counter;
   if (in.autopilot.reset_counter) reset_counter_ = in.autopilot.reset_counter;
   const bool may_move = mode() != Mode::land && !(mode() == Mode::hold && !supervisor_.pose_trusted());

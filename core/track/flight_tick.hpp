@@ -18,10 +18,10 @@ struct AutopilotFacts {
   bool takeoff_taken = false;                                      ///< and has acknowledged that one since it was asked
   double heartbeat_age = std::numeric_limits<double>::infinity();  ///< s
   struct Pose {
-    std::int64_t at_ns = 0;               ///< when the position arrived
-    State state;                          ///< in the controller's local frame, z-up
+    std::int64_t at_ns = 0;  ///< when the controller took the position; when it arrived, if its clock is not known
+    State state;             ///< in the controller's local frame, z-up
     std::array<double, 4> q{1, 0, 0, 0};  ///< body to local: w, x, y, z
-    std::int64_t attitude_at_ns = 0;      ///< when the attitude arrived
+    std::int64_t attitude_at_ns = 0;      ///< the same of the attitude
     Vec3 omega_B = Vec3::Zero();          ///< rad/s, as the gyros measure it
   };
   std::optional<Pose> pose;

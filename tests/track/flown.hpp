@@ -99,9 +99,10 @@ class Flown {
     }
     in.autopilot.heartbeat_age = 0.1;
     State local = truth_L;
-    local.p_W += local_off;
+    local.p_W += local_off - static_cast<double>(pose_age_ns) * 1e-9 * local.v_W;
+    const std::int64_t taken_ns = in.now_ns - pose_age_ns;
     in.autopilot.pose =
-        AutopilotFacts::Pose{in.now_ns, local, quaternion(kYaw), attitude_on ? in.now_ns : attitude_at_ns};
+        AutopilotFacts::Pose{taken_ns, local, quaternion(kYaw), attitude_on ? taken_ns : attitude_at_ns};
     attitude_at_ns = in.autopilot.pose->attitude_at_ns;
     out = tick.step(in);
     started_ = tick.mode() != Mode::passive && tick.mode() != Mode::quiet;
@@ -125,7 +126,8 @@ class Flown {
   std::uint32_t closures = 0;
   bool vio_on = true, attitude_on = true;
   std::int64_t attitude_at_ns = 0;
-  std::int64_t age_ns = 0;  ///< of a sample when the tick sees it
+  std::int64_t age_ns = 0;       ///< of a sample when the tick sees it
+  std::int64_t pose_age_ns = 0;  ///< the same of what the controller says
   std::function<void(OdometrySample&)> spoil;
 
  private:

@@ -51,14 +51,20 @@ TEST(TickReactions, ALowBatteryLands) {
   EXPECT_EQ(f.step().supervisor.mode, Mode::land);
 }
 
-// At 1 m/s a sample of 15 ms ago lies 1.5 cm behind the controller's position of now.
+// At 1 m/s a sample of 15 ms ago lies 1.5 cm behind the controller's position of now, and the controller's of 15 ms ago
+// as much behind a sample of now.
 TEST(TickReactions, TheOdometryIsComparedWithTheAutopilotAtOneMoment) {
-  Flown f(Flown::Until::tracking);
-  f.age_ns = 15'000'000;
-  f.offer(f.segment);
-  for (int n = 0; n < 100; ++n) f.step();
-  ASSERT_EQ(f.out.supervisor.mode, Mode::tracking);
-  EXPECT_LT(f.tick.alignment().position_residual(), 0.003);
+  constexpr std::int64_t kLate_ns = 15'000'000;
+  for (const auto& [vio, pose] :
+       {std::pair{kLate_ns, 0L}, std::pair{0L, kLate_ns}, std::pair{kLate_ns / 3, kLate_ns}}) {
+    Flown f(Flown::Until::tracking);
+    f.age_ns = vio;
+    f.pose_age_ns = pose;
+    f.offer(f.segment);
+    for (int n = 0; n < 100; ++n) f.step();
+    ASSERT_EQ(f.out.supervisor.mode, Mode::tracking);
+    EXPECT_LT(f.tick.alignment().position_residual(), 0.003) << vio << " and " << pose;
+  }
 }
 
 TEST(TickReactions, WhileNothingIsCommandedAVioMayStartAnewElsewhere) {
