@@ -8,6 +8,7 @@
 namespace backwash::config {
 namespace {
 
+constexpr std::string_view kLive = "map.live";
 constexpr std::string_view kProtocol = "link.protocol";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
@@ -97,6 +98,51 @@ tl::expected<void, ConfigError> read_gpio(const StrictTable& file, Daemon& d) {
   return {};
 }
 
+using TextKey = std::pair<std::string_view, std::string*>;
+
+tl::expected<void, ConfigError> read_texts(const StrictTable& file, std::span<const TextKey> keys, bool needed) {
+  for (const auto& [key, target] : keys) {
+    if (!needed && !file.has(key)) continue;
+    auto text = file.text(key);
+    if (!text) return tl::unexpected(text.error());
+    *target = std::move(*text);
+  }
+  return {};
+}
+
+tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {
+  if (auto good = read_signing_key(file, d); !good) return good;
+  const auto endpoint = link_device(d.link.device);
+  if (!endpoint)
+    return tl::unexpected(file.error(
+        "link.device",
+        "needs a path, or udp:, udpin: or tcp: with a numeric IPv4 address and a port, as udp:127.0.0.1:14580"));
+  d.link.endpoint = *endpoint;
+  return read_protocol(file, d);
+}
+
+tl::expected<void, ConfigError> read_live(const StrictTable& file, Daemon& d) {
+  if (!file.has(kLive)) return {};
+  const auto live = file.flag(kLive);
+  if (!live) return tl::unexpected(live.error());
+  d.map.live = *live;
+  return {};
+}
+
+struct WholeNumber {
+  std::string_view key;
+  double value;
+  int* target;
+};
+
+tl::expected<void, ConfigError> take_whole(const StrictTable& file, std::span<const WholeNumber> numbers) {
+  for (const auto& [key, value, target] : numbers) {
+    if (value != static_cast<int>(value)) return tl::unexpected(file.error(key, "needs a whole number"));
+    *target = static_cast<int>(value);
+  }
+  return {};
+}
+
 }  // namespace
 
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
@@ -116,7 +162,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"control.cpu", &cpu, {-1, 1023}},
       {"control.battery_land", &d.control.battery_land, {0, 1}},
   };
-  const std::pair<std::string_view, std::string*> texts[] = {
+  const TextKey texts[] = {
       {"vehicle", &d.vehicle},
       {"model", &d.model},
       {"dds.interface", &d.dds.interface},
@@ -125,50 +171,27 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"link.device", &d.link.device},
       {"log.file", &d.log.file},
   };
-  const std::pair<std::string_view, std::string*> frames[] = {
+  const TextKey frames[] = {
       {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
-  std::vector<std::string_view> text_keys{"map.live", kProtocol, kSigningKeyFile};
+  std::vector<std::string_view> text_keys{kLive, kProtocol, kSigningKeyFile};
   text_keys.insert(text_keys.end(), std::begin(kGpio), std::end(kGpio));
   for (const auto& [key, target] : texts) text_keys.push_back(key);
   for (const auto& [key, target] : frames) text_keys.push_back(key);
   if (auto read = file->read(numbers, text_keys); !read) return tl::unexpected(read.error());
-  for (const auto& [key, target] : texts) {
-    auto text = file->text(key);
-    if (!text) return tl::unexpected(text.error());
-    *target = std::move(*text);
-  }
+  if (auto read = read_texts(*file, texts, true); !read) return tl::unexpected(read.error());
   if (auto good = check_names(*file, d); !good) return tl::unexpected(good.error());
-  for (const auto& [key, target] : frames) {
-    if (!file->has(key)) continue;
-    auto text = file->text(key);
-    if (!text) return tl::unexpected(text.error());
-    *target = std::move(*text);
-  }
-  if (auto good = read_signing_key(*file, d); !good) return tl::unexpected(good.error());
-  const auto endpoint = link_device(d.link.device);
-  if (!endpoint)
-    return tl::unexpected(file->error(
-        "link.device",
-        "needs a path, or udp:, udpin: or tcp: with a numeric IPv4 address and a port, as udp:127.0.0.1:14580"));
-  d.link.endpoint = *endpoint;
-  if (auto good = read_protocol(*file, d); !good) return tl::unexpected(good.error());
+  if (auto read = read_texts(*file, frames, false); !read) return tl::unexpected(read.error());
+  if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
     return tl::unexpected(file->error("frames", "needs three different names"));
-  if (file->has("map.live")) {
-    const auto live = file->flag("map.live");
-    if (!live) return tl::unexpected(live.error());
-    d.map.live = *live;
-  }
-  for (const auto& [key, value] :
-       {std::pair{"dds.domain", domain}, std::pair{"link.baud", baud}, std::pair{"link.system", system},
-        std::pair{"control.priority", priority}, std::pair{"control.cpu", cpu}})
-    if (value != static_cast<int>(value)) return tl::unexpected(file->error(key, "needs a whole number"));
-  d.dds.domain = static_cast<int>(domain);
-  d.link.baud = static_cast<int>(baud);
-  d.link.system = static_cast<int>(system);
-  d.control.priority = static_cast<int>(priority);
-  d.control.cpu = static_cast<int>(cpu);
+  if (auto read = read_live(*file, d); !read) return tl::unexpected(read.error());
+  const WholeNumber whole[] = {{"dds.domain", domain, &d.dds.domain},
+                               {"link.baud", baud, &d.link.baud},
+                               {"link.system", system, &d.link.system},
+                               {"control.priority", priority, &d.control.priority},
+                               {"control.cpu", cpu, &d.control.cpu}};
+  if (auto good = take_whole(*file, whole); !good) return tl::unexpected(good.error());
   return d;
 }
 

@@ -14,9 +14,9 @@
 #include <thread>
 
 #include "core/map/distance_field.hpp"
-#include "core/map/octomap_message.hpp"
 #include "core/sim/vio.hpp"
 #include "services/bench/firmware.hpp"
+#include "services/bench/messages.hpp"
 #include "services/bench/pty.hpp"
 #include "services/bench/scans.hpp"
 #include "services/dds/topics.hpp"
@@ -44,19 +44,6 @@ Vec3 ground_below(const map::OccupancyGrid& grid, const Vehicle& vehicle, const 
   return {p.x(), p.y(), grid.center(v).z() + grid.resolution() / 2 + vehicle.body.radius};
 }
 
-dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& data) {
-  static const std::string frame = "map", id = "OcTree";
-  data = map::encode_octomap(grid);
-  dds::Octomap m{};
-  m.header.frame_id = dds::c_string(frame);
-  m.binary = true;
-  m.id = dds::c_string(id);
-  m.resolution = grid.resolution();
-  const auto size = static_cast<std::uint32_t>(data.size());
-  m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(data.data()), false};
-  return m;
-}
-
 /// What the mapper knows before the flight: the room without what lies in the box.
 map::OccupancyGrid without(map::OccupancyGrid room, const std::array<Vec3, 2>& box) {
   for (std::size_t n = 0; n < room.cell_count(); ++n) {
@@ -65,32 +52,6 @@ map::OccupancyGrid without(map::OccupancyGrid room, const std::array<Vec3, 2>& b
       room.set(room.voxel(n), map::Cell::unknown);
   }
   return room;
-}
-
-/// map <- odom, a translation.
-dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t) {
-  static const std::string frame = "map", child = "odom";
-  dds::TransformStamped m{};
-  m.header = {stamp(t), dds::c_string(frame)};
-  m.child_frame_id = dds::c_string(child);
-  m.transform.translation = {t_map_odom.x(), t_map_odom.y(), t_map_odom.z()};
-  m.transform.rotation = {0, 0, 0, 1};
-  return m;
-}
-
-dds::Odometry odometry(const VioSample& sample, bool drifting) {
-  const auto& [estimate, q, t] = sample;
-  static const std::string map_frame = "map", odom_frame = "odom", child = "base_link";
-  const std::string& frame = drifting ? odom_frame : map_frame;
-  dds::Odometry m{};
-  m.header.stamp = stamp(t);
-  m.header.frame_id = dds::c_string(frame);
-  m.child_frame_id = dds::c_string(child);
-  m.pose.pose.position = {estimate.p_W.x(), estimate.p_W.y(), estimate.p_W.z()};
-  m.pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
-  const Vec3 v_B = q.conjugate() * estimate.v_W;
-  m.twist.twist.linear = {v_B.x(), v_B.y(), v_B.z()};
-  return m;
 }
 
 /// The truth and the estimate, a row every 20 ms, with the flight log's column names.
@@ -202,81 +163,134 @@ class Faults {
 
 std::optional<Bytes> some(Bytes bytes) { return bytes.empty() ? std::nullopt : std::optional(std::move(bytes)); }
 
+/// The emulated controller, VIO and mapper, a millisecond a step.
+class Bench {
+ public:
+  Bench(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle)
+      : o_(options),
+        grid_(grid),
+        known_(options.hidden ? without(grid, *options.hidden) : grid),
+        autopilot_(make_autopilot(options, grid, vehicle)),
+        faults_(options.timeline, grid, vehicle, autopilot_->truth().p_W.z()),
+        log_(options.log),
+        vio_(kVioShare * vehicle.estimation.position, options.seed + 1),
+        priority_(allowed_fifo(kPriority)),
+        participant_(static_cast<std::uint32_t>(options.domain), options.interface, {.priority = priority_}),
+        noise_(options.seed) {
+    // It stands in for hardware: where it may, it runs before everything but the daemon's own real-time threads.
+    if (priority_ > 0) set_fifo(priority_);
+    if (!o_.wire.empty()) autopilot_->log_wire(o_.wire);
+    if (o_.drift) closure_writer_.write(loop_closure(Vec3::Zero(), 0));
+    send_map(MapMessage{known_}, o_.timeline.after_arming ? -1 : 0);
+    pty_.emplace(o_.link);
+  }
+
+  void run() {
+    begun_ = Clock::now();
+    auto due = begun_;
+    for (long n = 0; !stopped && seconds(due) - seconds(begun_) < o_.duration_s; ++n) {
+      due += std::chrono::milliseconds(1);
+      std::this_thread::sleep_until(due);
+      step(n, seconds(due));
+    }
+  }
+  const Autopilot& autopilot() const { return *autopilot_; }
+  /// Prints the expectations; true when each was kept.
+  bool report() const { return faults_.report(); }
+
+ private:
+  /// `t`: by the monotonic clock, s.
+  void step(long n, double t) {
+    const double since_begin = t - seconds(begun_);
+    const double timeline_t = !o_.timeline.after_arming ? since_begin : armed_at_ ? t - *armed_at_ : -1;
+    exchange(t, timeline_t);
+    if (faults_.spoils_map())
+      send_map(n % kMapEvery == 0 ? std::optional(MapMessage{known_}) : std::nullopt, timeline_t);
+    if (n % 10 == 0) faults_.watch(*autopilot_, timeline_t);
+    autopilot_->mute = passed(o_.stop_heartbeat_s, t);
+    State estimate = vio_.estimate(autopilot_->truth(), since_begin);
+    if (o_.drift) estimate.p_W -= *o_.drift;
+    event_ = event_ || (autopilot_->armed() && autopilot_->truth().p_W.x() > o_.event_x);
+    close_loop(t);
+    send_scans(n, t);
+    std::optional<VioSample> sample;
+    if (n % kOdometryEvery == 0 && !passed(o_.stop_odometry_s, t)) sample = {estimate, autopilot_->attitude(), t};
+    for (const VioSample& s : faults_.odometry.pass(sample, timeline_t))
+      odometry_writer_.write(odometry(s, o_.drift.has_value()));
+    if (n % 20 == 0) log_.row(t, *autopilot_, estimate);
+  }
+
+  /// Bytes of the link, both ways, through what the timeline does to them.
+  void exchange(double t, double timeline_t) {
+    for (const Bytes& bytes : faults_.up.pass(some(pty_->read()), timeline_t))
+      autopilot_->receive(bytes, seconds(Clock::now()));
+    out_.clear();
+    autopilot_->step(t, out_);
+    for (const Bytes& bytes : faults_.down.pass(some(out_), timeline_t)) pty_->write(bytes);
+    if (!armed_at_ && autopilot_->armed()) armed_at_ = t;
+  }
+
+  void send_map(std::optional<MapMessage> in, double timeline_t) {
+    for (const MapMessage& m : faults_.maps.pass(std::move(in), timeline_t)) {
+      std::vector<std::int8_t> data;
+      const dds::Octomap message = octomap(m.grid, data);
+      if (m.garbage) std::ranges::generate(data, [&] { return static_cast<std::int8_t>(noise_()); });
+      map_writer_.write(message);
+    }
+  }
+
+  void close_loop(double t) {
+    if (!o_.drift || !event_ || closed_) return;
+    closure_writer_.write(loop_closure(*o_.drift, t));
+    closed_ = true;
+  }
+
+  void send_scans(long n, double t) {
+    const Vec3& p = autopilot_->truth().p_W;
+    const auto seen = [&](const std::vector<Vec3>& points) {
+      scans_.send(points, autopilot_->truth(), autopilot_->attitude(), t);
+    };
+    if (n % 100 == 0 && o_.crate && event_) seen(seen_of_crate(*o_.crate, o_.crate_edge, p));
+    if (n % 250 == 0 && o_.hidden && autopilot_->armed()) seen(seen_of_room(grid_, p));
+  }
+
+  /// The vehicle has been armed for longer than `s`.
+  bool passed(const std::optional<double>& s, double t) const { return s && armed_at_ && t - *armed_at_ > *s; }
+
+  const Options& o_;
+  const map::OccupancyGrid& grid_;
+  const map::OccupancyGrid known_;
+  std::unique_ptr<Autopilot> autopilot_;
+  Faults faults_;
+  TruthLog log_;
+  sim::EmulatedVio vio_;
+  int priority_;
+  dds::Participant participant_;
+  dds::Writer<dds::Odometry> odometry_writer_ = dds::make_writer<dds::Odometry>(participant_, o_.name_space);
+  dds::Writer<dds::Octomap> map_writer_ = dds::make_writer<dds::Octomap>(participant_, o_.name_space);
+  dds::Writer<dds::TransformStamped> closure_writer_ =
+      dds::make_writer<dds::TransformStamped>(participant_, o_.name_space);
+  Scans scans_{participant_, o_.name_space};
+  std::mt19937_64 noise_;
+  std::optional<Pty> pty_;  ///< last: who opens the link finds everything else at work
+  Clock::time_point begun_{};
+  std::optional<double> armed_at_;
+  bool closed_ = false, event_ = false;
+  Bytes out_;
+};
+
 }  // namespace
 
 int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle) {
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });
-  const auto made = make_autopilot(options, grid, vehicle);
-  Autopilot& autopilot = *made;
-  Faults faults(options.timeline, grid, vehicle, autopilot.truth().p_W.z());
-  if (!options.wire.empty()) autopilot.log_wire(options.wire);
-  TruthLog log(options.log);
-  const sim::EmulatedVio vio(kVioShare * vehicle.estimation.position, options.seed + 1);
-  // The bench stands in for hardware: where it may, it runs before everything but the daemon's own real-time threads.
-  const int priority = allowed_fifo(kPriority);
-  dds::Participant participant(static_cast<std::uint32_t>(options.domain), options.interface, {.priority = priority});
-  if (priority > 0) set_fifo(priority);
-  auto odometry_writer = dds::make_writer<dds::Odometry>(participant, options.name_space);
-  auto map_writer = dds::make_writer<dds::Octomap>(participant, options.name_space);
-  auto closure_writer = dds::make_writer<dds::TransformStamped>(participant, options.name_space);
-  Scans scans(participant, options.name_space);
-  if (options.drift) closure_writer.write(loop_closure(Vec3::Zero(), 0));
-  bool closed = false, event = false;
-  const map::OccupancyGrid known = options.hidden ? without(grid, *options.hidden) : grid;
-  std::mt19937_64 noise(options.seed);
-  const auto send_map = [&](std::optional<MapMessage> in, double t) {
-    for (const MapMessage& m : faults.maps.pass(std::move(in), t)) {
-      std::vector<std::int8_t> data;
-      const dds::Octomap message = octomap(m.grid, data);
-      if (m.garbage) std::ranges::generate(data, [&] { return static_cast<std::int8_t>(noise()); });
-      map_writer.write(message);
-    }
-  };
-  send_map(MapMessage{known}, options.timeline.after_arming ? -1 : 0);
-  Pty pty(options.link);
+  Bench bench(options, grid, vehicle);
   spdlog::info("bench runs: {} in {}, controller on {}", vehicle.name, options.map, options.link);
-
-  const auto begun = Clock::now();
-  auto due = begun;
-  std::optional<double> armed_at;
-  std::vector<std::uint8_t> out;
-  for (long step = 0; !stopped && seconds(due) - seconds(begun) < options.duration_s; ++step) {
-    due += std::chrono::milliseconds(1);
-    std::this_thread::sleep_until(due);
-    const double t = seconds(due);
-    const double timeline_t = !options.timeline.after_arming ? t - seconds(begun) : armed_at ? t - *armed_at : -1;
-    for (const Bytes& bytes : faults.up.pass(some(pty.read()), timeline_t))
-      autopilot.receive(bytes, seconds(Clock::now()));
-    out.clear();
-    autopilot.step(t, out);
-    for (const Bytes& bytes : faults.down.pass(some(out), timeline_t)) pty.write(bytes);
-    if (!armed_at && autopilot.armed()) armed_at = t;
-    if (faults.spoils_map())
-      send_map(step % kMapEvery == 0 ? std::optional(MapMessage{known}) : std::nullopt, timeline_t);
-    if (step % 10 == 0) faults.watch(autopilot, timeline_t);
-    const auto passed = [&](const std::optional<double>& s) { return s && armed_at && t - *armed_at > *s; };
-    autopilot.mute = passed(options.stop_heartbeat_s);
-    State estimate = vio.estimate(autopilot.truth(), t - seconds(begun));
-    event = event || (autopilot.armed() && autopilot.truth().p_W.x() > options.event_x);
-    if (options.drift) estimate.p_W -= *options.drift;
-    if (options.drift && event && !closed) {
-      closure_writer.write(loop_closure(*options.drift, t));
-      closed = true;
-    }
-    const auto seen = [&](const std::vector<Vec3>& p) { scans.send(p, autopilot.truth(), autopilot.attitude(), t); };
-    if (step % 100 == 0 && options.crate && event)
-      seen(seen_of_crate(*options.crate, options.crate_edge, autopilot.truth().p_W));
-    if (step % 250 == 0 && options.hidden && autopilot.armed()) seen(seen_of_room(grid, autopilot.truth().p_W));
-    std::optional<VioSample> sample;
-    if (step % kOdometryEvery == 0 && !passed(options.stop_odometry_s)) sample = {estimate, autopilot.attitude(), t};
-    for (const VioSample& s : faults.odometry.pass(sample, timeline_t))
-      odometry_writer.write(odometry(s, options.drift.has_value()));
-    if (step % 20 == 0) log.row(t, autopilot, estimate);
-  }
-  spdlog::info("bench stopped: {}, {}, {} set-points received", autopilot.mode(),
-               autopilot.landed() ? "on the ground" : "in the air", autopilot.setpoints());
-  return faults.report() ? 0 : 1;
+  bench.run();
+  const Autopilot& a = bench.autopilot();
+  spdlog::info("bench stopped: {}, {}, {} set-points received", a.mode(), a.landed() ? "on the ground" : "in the air",
+               a.setpoints());
+  return bench.report() ? 0 : 1;
 }
 
 }  // namespace backwash::bench

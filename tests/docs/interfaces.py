@@ -63,10 +63,10 @@ def keys_of_code(source: str) -> dict[str, tuple[str, bool]]:
     keys = {}
     for key, spec, presence in re.findall(r'\{"([\w.]+)", &[\w.]+, (\{[^}]*\}|\w+)(?:, ([\w:]+))?\}', source):
         keys[key] = (interval(spec, constants), presence == "")
-    table = re.search(r"\*> texts\[\] = \{(.*?)\n  \};", source, re.S)
+    table = re.search(r"TextKey texts\[\] = \{(.*?)\n  \};", source, re.S)
     for key in re.findall(r'\{"([\w.]+)", &', table[1] if table else ""):
         keys[key] = ("", True)
-    for body in re.findall(r"\*> frames\[\] = \{(.*?)\};", source, re.S):
+    for body in re.findall(r"TextKey frames\[\] = \{(.*?)\};", source, re.S):
         keys.update({key: ("", False) for key in re.findall(r'\{"([\w.]+)", &', body)})
     for body in re.findall(r"std::string_view(?:> text_keys| k\w+\[\] =) ?\{([^}]*)\}", source):
         keys.update({key: ("", key == "name") for key in re.findall(r'"([\w.]+)"', body)})

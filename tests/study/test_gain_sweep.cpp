@@ -57,6 +57,22 @@ TEST(GainSweep, FasterGainsMakeSmallerSetsUntilDelayMakesTheLoopUnstable) {
   EXPECT_FALSE(with_gains(*world, kStart, kGoal, 10).passable());
 }
 
+// Without delay, gains (f² k_p, f k_d) are the same loop f times as fast, and its response to w is 1/f² as large: where
+// the air is the same everywhere, the set of a disturbance of any course within its bound is a quarter at f = 2.
+TEST(GainSweep, WithoutDelayTwiceAsFastIsAQuarterOfTheSet) {
+  Vehicle v = vehicle();
+  v.controller.latency = v.controller.feedback_delay = v.controller.attitude_lag = 0;
+  v.estimation.position = 0;
+  Model model;
+  model.base.horizontal = model.base.vertical = 0.01;
+  model.ground.l_max = model.ground.l_footprint_max = model.corner.l_max = model.wall.l_max = 0;
+  const auto world = plan::build_world(OccupancyGrid({0, 0, 0}, 0.1, {60, 30, 24}, Cell::free), model, v);
+  const GainStep slow = with_gains(*world, kStart, kGoal, 1), fast = with_gains(*world, kStart, kGoal, 2);
+  ASSERT_TRUE(slow.set.bounded && fast.set.bounded);
+  for (std::size_t d = 0; d < slow.set.half_widths.size(); ++d)
+    EXPECT_NEAR(fast.set.half_widths[d] / slow.set.half_widths[d], 0.25, 0.04) << d;
+}
+
 // At the smallest gains that pass, a little less does not.
 TEST(GainSweep, TheSmallestGainsAreFoundToOnePercent) {
   const auto world = room_with_door(0.6, 0.2);

@@ -217,7 +217,7 @@ TEST(Supervisor, IsDocumentedAsItIs) {
   const std::string readme{std::istreambuf_iterator<char>(in), {}};
   EXPECT_NE(readme.find(table()), std::string::npos) << "core/track/README.md should hold:\n" << table();
   for (const Reason reason : refusals())
-    EXPECT_NE(readme.find(std::string("- ") + to_string(reason) + "\n"), std::string::npos) << to_string(reason);
+    EXPECT_NE(readme.find(std::string("\n| ") + to_string(reason) + " |\n"), std::string::npos) << to_string(reason);
 }
 
 TEST(Supervisor, EveryModeAndReasonHasANameOfItsOwn) {

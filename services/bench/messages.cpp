@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/bench/messages.hpp"
+
+#include "core/map/octomap_message.hpp"
+#include "services/bench/scans.hpp"
+
+namespace backwash::bench {
+
+dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& data) {
+  static const std::string frame = "map", id = "OcTree";
+  data = map::encode_octomap(grid);
+  dds::Octomap m{};
+  m.header.frame_id = dds::c_string(frame);
+  m.binary = true;
+  m.id = dds::c_string(id);
+  m.resolution = grid.resolution();
+  const auto size = static_cast<std::uint32_t>(data.size());
+  m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(data.data()), false};
+  return m;
+}
+
+dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t) {
+  static const std::string frame = "map", child = "odom";
+  dds::TransformStamped m{};
+  m.header = {stamp(t), dds::c_string(frame)};
+  m.child_frame_id = dds::c_string(child);
+  m.transform.translation = {t_map_odom.x(), t_map_odom.y(), t_map_odom.z()};
+  m.transform.rotation = {0, 0, 0, 1};
+  return m;
+}
+
+dds::Odometry odometry(const VioSample& sample, bool drifting) {
+  const auto& [estimate, q, t] = sample;
+  static const std::string map_frame = "map", odom_frame = "odom", child = "base_link";
+  const std::string& frame = drifting ? odom_frame : map_frame;
+  dds::Odometry m{};
+  m.header.stamp = stamp(t);
+  m.header.frame_id = dds::c_string(frame);
+  m.child_frame_id = dds::c_string(child);
+  m.pose.pose.position = {estimate.p_W.x(), estimate.p_W.y(), estimate.p_W.z()};
+  m.pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
+  const Vec3 v_B = q.conjugate() * estimate.v_W;
+  m.twist.twist.linear = {v_B.x(), v_B.y(), v_B.z()};
+  return m;
+}
+
+}  // namespace backwash::bench

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/bench/faults.hpp"
+#include "services/dds/topics.hpp"
+
+namespace backwash::bench {
+
+// What the bench publishes. Strings are literals, and live as long as the program.
+
+/// A whole OcTree in frame `map`. `data` holds its bytes; the message points into it.
+dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& data);
+
+/// map <- odom, a translation (m) at `t` (s).
+dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t);
+
+/// Pose in `odom` if the VIO drifts, else in `map`; twist in the body.
+dds::Odometry odometry(const VioSample& sample, bool drifting);
+
+}  // namespace backwash::bench
