@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Whole flights in lockstep: what the tick must never do, and the rows of docs/faults.md that a good flight shows.
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <sys/mman.h>
 
 #include <cstdlib>
@@ -73,6 +74,24 @@ TEST(Tick, SendsOneFullSetpointEachTickWhileItCommandsAndAHeartbeatASecond) {
 }
 
 // Row 15, the planner is late: nothing new comes, the verified tail is finished and held.
+// The control thread frees nothing: what it has finished with has to come back to the planner.
+TEST(Tick, GivesEverySegmentBackToBeFreed) {
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "a sanitizer counts the memory";
+  Lockstep rig;
+  rig.take_off();
+  const auto offers = [&](int count) {
+    for (int n = 0; n < count; ++n) {
+      rig.offer(rig.rise());
+      rig.tick();
+      rig.log.clear();
+    }
+    return ::mallinfo2().uordblks;
+  };
+  const std::size_t early = offers(20), late = offers(40);
+  const std::size_t segment = rig.rise().size() * (sizeof(Setpoint) + sizeof(reach::TubeStep));
+  EXPECT_LT(late, early + 5 * segment) << segment << " bytes a segment";
+}
+
 TEST(Row15, WithoutANewTrajectoryTheVerifiedTailIsFlownAndItsEndIsHeld) {
   Lockstep rig;
   rig.take_off();

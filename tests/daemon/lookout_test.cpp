@@ -32,8 +32,9 @@ struct LongFlight {
   track::AcceptedSegment segment;
   track::TickInput in;
 
-  explicit LongFlight(std::size_t sets = 3000) {
+  explicit LongFlight(std::size_t sets = 3000, double clearance = 0) {
     segment.id = 1;
+    segment.clearance = clearance;
     segment.closures = closures;
     for (std::size_t k = 0; k <= sets; ++k) {
       const double t = 0.02 * static_cast<double>(k);
@@ -155,8 +156,27 @@ TEST(Lookout, MissesNoPartOfAVoxelThatIsTurnedAgainstTheSets) {
   EXPECT_GT(clear, 50);
 }
 
-TEST(Lookout, ALiveMapThatNeverCameIsLateFromTheClocksFirstSecondOn) {
+// What the planner or the tick was told of: the vehicle brakes on a stop that leads away from the flight.
+TEST(Lookout, WhileItBrakesTheStopIsWhatIsAheadAndTheBlockedFlightIsNoMore) {
   LongFlight f;
+  for (reach::TubeStep& s : f.segment.stops[0].tube) s.center.p_W.z() += 3;
+  f.channels->blocked_segment = f.segment.id;
+  EXPECT_TRUE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked);
+  f.in.surroundings.tube_blocked = true;
+  f.tick();
+  f.in.surroundings.tube_blocked = false;
+  ASSERT_TRUE(f.flight.tracker().braking());
+  EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked);
+  for (auto* ring : {&f.channels->scan_voxels, &f.channels->map_voxels}) {
+    ring->push(one(f.segment.tube[2000].center.p_W));
+    EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked) << "it does not come to that";
+    ring->push(one(f.segment.stops[0].tube[30].center.p_W));
+    EXPECT_TRUE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked);
+  }
+}
+
+TEST(Lookout, ALiveMapThatNeverCameIsLateFromTheClocksFirstSecondOn) {
+  LongFlight f(3000, 1);  // clear by more than anything could have come nearer
   MapSettings live;
   live.live = true;
   Lookout lookout(*f.channels, vehicle(), live);

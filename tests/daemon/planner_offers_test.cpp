@@ -121,6 +121,19 @@ TEST_F(PlannerOffers, NothingThatIsEndedAlreadyOrWithoutControl) {
   EXPECT_TRUE(offers_.empty());
 }
 
+// The control thread refuses the first offer, and by then the vehicle has drifted to where its first set touches the
+// wall.
+TEST_F(PlannerOffers, NoFlightWhoseTubeFromTheNewestStateIsNotClear) {
+  know(room());
+  stand({1.05, 2.05, 1.05});
+  answer_ = [&](const auto& s) {
+    view_.refused_segment = s.id;
+    view_.state.p_W.y() = 0.1;
+  };
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}), "");
+  EXPECT_EQ(offers_.size(), 1u);
+}
+
 // The control thread refuses the first offer: the next one is made only if nothing has ended the plan meanwhile.
 TEST_F(PlannerOffers, NothingMoreOnceALaterOrderOrALoopClosureCameBetweenTwoOffers) {
   for (const bool closure : {false, true}) {

@@ -17,6 +17,7 @@ struct LiftsItself : Lockstep {
       std::vector<std::uint8_t> out;
       mavlink::Parser parser;
       parser.feed(bytes, [&](const mavlink::Frame& f) {
+        if (unsupported(f)) return;  // the tests answer to a take-off
         if (f.id != mavlink::Heartbeat::kId) return void(out.insert(out.end(), f.bytes.begin(), f.bytes.end()));
         const mavlink::Heartbeat heartbeat{.custom_mode = 4,
                                            .type = 2,
@@ -30,6 +31,10 @@ struct LiftsItself : Lockstep {
       bytes = out;
     };
   }
+  /// What an autopilot without a take-off of its own says to one.
+  static bool unsupported(const mavlink::Frame& f) {
+    return f.id == mavlink::CommandAck::kId && mavlink::decode<mavlink::CommandAck>(f.payload).result == 3;
+  }
   /// Ticks, of so many, in which it was asked to take off.
   int asked_within(int count) {
     int asked = 0;
@@ -42,6 +47,15 @@ struct LiftsItself : Lockstep {
   void answer(std::uint8_t result) {
     say(mavlink::CommandAck{.command = kCommandTakeoff, .result = result, .target_system = 1, .target_component = 191});
   }
+  /// Enabled, asked to take off and armed, on the ground.
+  void lift() {
+    channels->orders.push({track::Request::enable});
+    ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
+    offer(rise(), true, true);
+    ASSERT_GT(ticks_until(track::Mode::lifting, 3), 0) << to_string(reason());
+    armed = true;
+    asked_within(60);  // until it says that it is armed
+  }
   bool armed = false;
 };
 
@@ -50,12 +64,8 @@ TEST(TakeoffCommand, IsRepeatedUntilTheAutopilotTakesThisOneWhateverItSaidToAnot
   rig.ticks(60);
   rig.answer(kAccepted);  // to somebody's take-off of before
   rig.ticks(10);
-  rig.channels->orders.push({track::Request::enable});
-  ASSERT_GT(rig.ticks_until(track::Mode::tracking, 250), 0) << to_string(rig.reason());
-  rig.offer(rig.rise(), true, true);
-  ASSERT_GT(rig.ticks_until(track::Mode::lifting, 3), 0) << to_string(rig.reason());
-  rig.armed = true;
-  rig.asked_within(60);  // until it says that it is armed
+  ASSERT_TRUE(rig.link().telemetry().result_of(kCommandTakeoff)) << "it was heard";
+  rig.lift();
   EXPECT_GE(rig.asked_within(100), 3) << "the answer of before says nothing";
   rig.answer(kFailed);
   rig.tick();
@@ -64,6 +74,27 @@ TEST(TakeoffCommand, IsRepeatedUntilTheAutopilotTakesThisOneWhateverItSaidToAnot
   rig.tick();
   EXPECT_EQ(rig.asked_within(100), 0);
   ASSERT_EQ(rig.mode(), track::Mode::lifting) << to_string(rig.reason());
+}
+
+// The order of a STOP reaches the wire: what the tick decides alone stops no motor.
+TEST(TakeoffCommand, AStopOnTheGroundAsksToDisarmUnforced) {
+  LiftsItself rig;
+  rig.ticks(60);
+  rig.lift();
+  ASSERT_EQ(rig.mode(), track::Mode::lifting) << to_string(rig.reason());
+  ASSERT_TRUE(rig.view().armed);
+  rig.channels->orders.push({track::Request::stop});
+  int asked = 0;
+  for (int n = 0; n < 50; ++n) {
+    rig.say(mavlink::ExtendedSysState{.landed_state = 1});
+    for (const auto& c : rig.tick().commands)
+      if (c.command == kCommandArm) {
+        EXPECT_EQ(c.param1, 0) << n;
+        EXPECT_EQ(c.param2, 0) << "forced, an autopilot obeys in the air too";
+        ++asked;
+      }
+  }
+  EXPECT_GT(asked, 0) << to_string(rig.mode());
 }
 
 }  // namespace

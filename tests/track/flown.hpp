@@ -85,13 +85,15 @@ class Flown {
     in.now_ns += 20'000'000;
     // Physically: where the last command was, in the controller's frame.
     if (started_) truth_L = {out.command_local.p_W, out.command_local.v_W};
+    turned += 0.02 * yaw_rate;
+    const auto turned_before = [&](std::int64_t ns) { return turned - 1e-9 * static_cast<double>(ns) * yaw_rate; };
     in.odometry.reset();
     if (vio_on) {
       OdometrySample s;
       s.received_ns = s.stamp_ns = in.now_ns - age_ns;
       s.state = frame_W.state(map_of(truth_L));
       s.state.p_W -= static_cast<double>(age_ns) * 1e-9 * s.state.v_W;
-      s.q = quaternion(frame_W.yaw);
+      s.q = quaternion(frame_W.yaw + turned_before(age_ns));
       s.closures = closures;
       s.map_from_odom = frame_W;
       if (spoil) spoil(s);
@@ -101,8 +103,8 @@ class Flown {
     State local = truth_L;
     local.p_W += local_off - static_cast<double>(pose_age_ns) * 1e-9 * local.v_W;
     const std::int64_t taken_ns = in.now_ns - pose_age_ns;
-    in.autopilot.pose =
-        AutopilotFacts::Pose{taken_ns, local, quaternion(kYaw), attitude_on ? taken_ns : attitude_at_ns};
+    in.autopilot.pose = AutopilotFacts::Pose{taken_ns, local, quaternion(kYaw + turned_before(pose_age_ns)),
+                                             attitude_on ? taken_ns : attitude_at_ns, Vec3(0, 0, yaw_rate)};
     attitude_at_ns = in.autopilot.pose->attitude_at_ns;
     out = tick.step(in);
     started_ = tick.mode() != Mode::passive && tick.mode() != Mode::quiet;
@@ -126,8 +128,9 @@ class Flown {
   std::uint32_t closures = 0;
   bool vio_on = true, attitude_on = true;
   std::int64_t attitude_at_ns = 0;
-  std::int64_t age_ns = 0;       ///< of a sample when the tick sees it
-  std::int64_t pose_age_ns = 0;  ///< the same of what the controller says
+  std::int64_t age_ns = 0;          ///< of a sample when the tick sees it
+  std::int64_t pose_age_ns = 0;     ///< the same of what the controller says
+  double yaw_rate = 0, turned = 0;  ///< of the vehicle, rad/s; by it, rad
   std::function<void(OdometrySample&)> spoil;
 
  private:

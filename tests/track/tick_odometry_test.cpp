@@ -51,8 +51,8 @@ TEST(TickReactions, ALowBatteryLands) {
   EXPECT_EQ(f.step().supervisor.mode, Mode::land);
 }
 
-// At 1 m/s a sample of 15 ms ago lies 1.5 cm behind the controller's position of now, and the controller's of 15 ms ago
-// as much behind a sample of now.
+// At 1 m/s and 1 rad/s a sample of 15 ms ago lies 1.5 cm and 0.9° behind the controller's pose of now, and the
+// controller's of 15 ms ago as much behind a sample of now.
 TEST(TickReactions, TheOdometryIsComparedWithTheAutopilotAtOneMoment) {
   constexpr std::int64_t kLate_ns = 15'000'000;
   for (const auto& [vio, pose] :
@@ -60,10 +60,12 @@ TEST(TickReactions, TheOdometryIsComparedWithTheAutopilotAtOneMoment) {
     Flown f(Flown::Until::tracking);
     f.age_ns = vio;
     f.pose_age_ns = pose;
+    f.yaw_rate = 1;
     f.offer(f.segment);
     for (int n = 0; n < 100; ++n) f.step();
     ASSERT_EQ(f.out.supervisor.mode, Mode::tracking);
     EXPECT_LT(f.tick.alignment().position_residual(), 0.003) << vio << " and " << pose;
+    EXPECT_LT(std::abs(f.tick.alignment().yaw_residual()), 0.003) << vio << " and " << pose;
   }
 }
 
