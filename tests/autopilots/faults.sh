@@ -63,6 +63,16 @@ left_tracking() {
   return 1
 }
 
+# CLOCK_MONOTONIC of the first change of mode since $from, which the log tells in local time.
+acted() {
+  python3 - "$log" "$from" <<'PYTHON'
+import datetime, re, sys, time
+lines = open(sys.argv[1]).read().splitlines()[int(sys.argv[2]):]
+said = next(m for m in (re.match(r"\[(.*?)\] \[info\] (?:passive|hold|land|quiet): ", line) for line in lines) if m)
+print(time.monotonic() - time.time() + datetime.datetime.fromisoformat(said[1]).timestamp())
+PYTHON
+}
+
 # On the ground, disarmed, under way with the daemon: off for 2 s, then a flight.
 reboot() {
   for _ in $(seq 30); do ctl enable --wait && break; sleep 1; done
@@ -126,8 +136,8 @@ slow() {
   fi
   must goto "$goal"
   case $kind/$fault in
+    ardupilot/gcs) sleep 3 ;;
     */battery) sleep 3 ;;
-    ardupilot/gcs) sleep 1 ;;
   esac
   case $kind/$fault in
     ardupilot/gcs) echo quiet >&8 ;;
@@ -138,7 +148,7 @@ slow() {
       ;;
   esac
   left_tracking || die "the autopilot did nothing"
-  at=$(now)
+  at=$(acted)
 }
 
 case $fault in
