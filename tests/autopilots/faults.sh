@@ -109,11 +109,12 @@ inject() {
       sleep 3
       daemon "$vehicle" "$out/again.bwlog"
       ;;
-    restart) # at once, and taken in hand again where that is possible
+    restart) # at once, and taken in hand again; the row begins there, that of `kill` tells what is before
       kill -KILL "$daemon_pid"
       daemon "$vehicle" "$out/again.bwlog"
       for _ in $(seq 5); do ctl enable --wait && break; sleep 0.5; done
-      ctl land --wait || true
+      at=$(now)
+      must land --wait
       ;;
     pilot)
       if [[ $kind == px4 ]]; then
