@@ -55,7 +55,10 @@ std::optional<double> share(std::int8_t percent) noexcept {
 void Telemetry::take(const mavlink::Heartbeat& m, Time now) noexcept {
   const VehicleStatus s{autopilot_of(m.autopilot), (m.base_mode & kSafetyArmed) != 0, follows_setpoints(m),
                         m.custom_mode, m.system_status};
-  if (status && now - status->at >= kHeartbeatTimeout) forget_parameters();
+  if (status && now - status->at >= kHeartbeatTimeout) {  // it may have restarted
+    forget_parameters();
+    has_origin = false;
+  }
   status = {s, now};
 }
 

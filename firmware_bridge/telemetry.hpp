@@ -84,7 +84,9 @@ class Telemetry {
   Latest<Battery> battery;
   Latest<LandedState> landed_state;
   Latest<StatusLine> text;
-  bool has_origin = false;         ///< its local frame lies somewhere on the globe, as ArduPilot asks for before arming
+  /// Its local frame lies somewhere on the globe, as ArduPilot asks for before arming; not known after a silence of
+  /// kHeartbeatTimeout.
+  bool has_origin = false;
   std::uint64_t broken = 0;        ///< messages with values that cannot be
   std::uint64_t out_of_order = 0;  ///< messages older than their predecessor
 

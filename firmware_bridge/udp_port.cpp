@@ -35,7 +35,8 @@ const sockaddr* generic(const sockaddr_in* a) noexcept { return reinterpret_cast
 
 }  // namespace
 
-tl::expected<UdpPort, PortError> UdpPort::open(const Endpoint& local, const std::optional<Endpoint>& peer) {
+tl::expected<UdpPort, PortError> UdpPort::open(const Endpoint& local, const std::optional<Endpoint>& peer,
+                                               Clock::duration patience) {
   const auto here = socket_address(local);
   if (!here) return error(Kind::kAddress, 0);
   FileDescriptor fd(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
@@ -49,7 +50,7 @@ tl::expected<UdpPort, PortError> UdpPort::open(const Endpoint& local, const std:
   sockaddr_in bound{};
   socklen_t size = sizeof(bound);
   if (::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&bound), &size) != 0) return error(Kind::kOpen, errno);
-  return UdpPort(std::move(fd), ntohs(bound.sin_port), peer.has_value());
+  return UdpPort(std::move(fd), ntohs(bound.sin_port), peer.has_value(), patience);
 }
 
 tl::expected<std::size_t, PortError> UdpPort::read(std::span<std::uint8_t> into) noexcept {
@@ -58,10 +59,10 @@ tl::expected<std::size_t, PortError> UdpPort::read(std::span<std::uint8_t> into)
   const auto n = ::recvfrom(fd_.get(), into.data(), into.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
   if (n < 0) {
     if (!nothing_now(errno)) return error(Kind::kLost, errno);
-    if (finds_peer_ && has_peer_ && ++silent_ >= kSilentReads) listen_to_anyone();
+    if (finds_peer_ && has_peer_ && Clock::now() - heard_ >= patience_) listen_to_anyone();
     return 0U;
   }
-  silent_ = 0;
+  if (finds_peer_) heard_ = Clock::now();
   const auto size_read = static_cast<std::size_t>(n);
   if (has_peer_) return size_read;
   if (!begins_frame(into.first(size_read))) return 0U;
@@ -74,7 +75,6 @@ void UdpPort::listen_to_anyone() noexcept {
   sockaddr nobody{};
   nobody.sa_family = AF_UNSPEC;
   has_peer_ = ::connect(fd_.get(), &nobody, sizeof nobody) != 0;
-  silent_ = 0;
 }
 
 tl::expected<std::size_t, PortError> UdpPort::write(std::span<const std::uint8_t> bytes) noexcept {

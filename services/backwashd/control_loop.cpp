@@ -191,13 +191,13 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
     link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
                           to_string(s.reason));
-  // Only while nothing depends on the line's time, and nothing to an armed vehicle. Quiet ends by an operator's wish
-  // alone: the autopilot may have restarted since.
+  // Only while nothing depends on the line's time. Quiet, and silence to an armed vehicle, end by an operator's wish
+  // alone: the autopilot, or we, may have restarted since.
   const bool passive = s.mode == track::Mode::passive && s.send_heartbeat;
-  const bool wished = s.mode == track::Mode::quiet && !in.autopilot.armed &&
+  const bool wished = (s.mode == track::Mode::quiet || s.mode == track::Mode::passive) &&
                       in.now_ns - channels_.enable_asked_ns.load(std::memory_order_relaxed) < kEnableWish_ns;
   parameters_.step(link_, passive || wished, passive, view_);
-  if (!s.send_heartbeat) return;
+  if (!s.send_heartbeat && !wished) return;
   ask_for_messages(in.now_ns);
   if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);
 }

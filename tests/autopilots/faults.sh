@@ -9,7 +9,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 kind=$1 path=$2 build=$3 out=$4
 shift 4
-all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill pilot)
+all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill restart pilot battery rc gcs link reboot)
 [[ $# -gt 0 ]] || set -- "${all[@]}"
 if [[ ! -e $path ]]; then
   echo "skipped: tests/autopilots/faults.sh needs the path of a build of $kind"
@@ -27,40 +27,143 @@ if [[ ${BACKWASH_NETNS:-} != own ]]; then
   BACKWASH_NETNS=own exec unshare -n -- bash "$0" "$kind" "$path" "$build" "$out" "$fault"
 fi
 source "$root/tests/autopilots/flight.sh"
-# The pilot's switch brings a mode that holds the position: ArduCopter's sixth (LOITER).
-[[ $kind != ardupilot ]] || SETTINGS=${SETTINGS:-FLTMODE6=5}
+
+# What the autopilot is set to for a fault. The pilot's switch brings a mode that holds the position: ArduCopter's sixth (LOITER),
+# PX4's POSCTL, which needs sticks (its AUTO.LOITER is refused without a global position).
+case $kind/$fault in
+  ardupilot/pilot) SETTINGS=${SETTINGS:-FLTMODE6=5} ;;
+  ardupilot/battery) SETTINGS=${SETTINGS:-BATT_LOW_VOLT=10.5 BATT_LOW_TIMER=1 BATT_FS_LOW_ACT=1} ;;
+  ardupilot/rc) SETTINGS=${SETTINGS:-FS_THR_ENABLE=3} ;;
+  ardupilot/gcs) SETTINGS=${SETTINGS:-FS_GCS_ENABLE=5 FS_GCS_TIMEOUT=2} ;;
+  px4/pilot) SETTINGS=${SETTINGS:-COM_RC_IN_MODE=1} ;;
+  px4/battery) SETTINGS=${SETTINGS:-COM_LOW_BAT_ACT=2} ;;
+  px4/rc) SETTINGS=${SETTINGS:-COM_RC_IN_MODE=1 COM_RCL_EXCEPT=0 NAV_RCL_ACT=3} ;;
+  px4/gcs) SETTINGS=${SETTINGS:-NAV_DLL_ACT=3 COM_DL_LOSS_T=5} ;;
+esac
+case $kind/$fault in
+  */link) RELAY=yes ;;
+  ardupilot/battery | ardupilot/gcs) STATION="tcp 5763" ;;
+  px4/gcs) STATION="udp 18570" ;;
+  px4/rc | px4/pilot) STATION="udp 18570 sticks" ;;
+esac
 fly_real "$kind" "$path" "$build" "$out/$fault"
-take_off
 
 state() { "$bin/backwashctl" --domain "$domain" status --json 2>>"$log"; }
 read_state() { python3 -c 'import json, sys; s = json.load(sys.stdin); print(s["state"], s["position"][0])'; }
-must goto "$goal"
-# At speed, before the door.
-for _ in $(seq 100); do
-  read -r mode x < <(state | read_state)
-  python3 -c "import sys; sys.exit(not $x > 4.0)" && break
-  sleep 0.05
-done
-[[ $mode == tracking ]] || die "the flight was in $mode before the fault"
-at=$(python3 -c "import time; print(time.monotonic())")
-from=$(wc -l <"$log")
+now() { python3 -c "import time; print(time.monotonic())"; }
+
+# Until the daemon follows its commands no longer.
+left_tracking() {
+  local mode x
+  for _ in $(seq 300); do
+    read -r mode x < <(state | read_state)
+    [[ $mode == tracking ]] || return 0
+    sleep 0.03
+  done
+  return 1
+}
+
+# CLOCK_MONOTONIC of the first change of mode since $from, which the log tells in local time.
+acted() {
+  python3 - "$log" "$from" <<'PYTHON'
+import datetime, re, sys, time
+lines = open(sys.argv[1]).read().splitlines()[int(sys.argv[2]):]
+said = next(m for m in (re.match(r"\[(.*?)\] \[info\] (?:passive|hold|land|quiet): ", line) for line in lines) if m)
+print(time.monotonic() - time.time() + datetime.datetime.fromisoformat(said[1]).timestamp())
+PYTHON
+}
+
+# On the ground, disarmed, under way with the daemon: off for 2 s, then a flight.
+reboot() {
+  for _ in $(seq 30); do ctl enable --wait && break; sleep 1; done
+  from=$(wc -l <"$log")
+  { kill -KILL "$autopilot_pid" && wait "$autopilot_pid"; } 2>/dev/null || true
+  sleep 2
+  "start_$kind" "$path"
+  take_off
+  at=$(now)
+  must land --wait
+}
+
+at_speed() {
+  local mode x
+  must goto "$goal"
+  # Before the door.
+  for _ in $(seq 100); do
+    read -r mode x < <(state | read_state)
+    python3 -c "import sys; sys.exit(not $x > 4.0)" && break
+    sleep 0.05
+  done
+  [[ $mode == tracking ]] || die "the flight was in $mode before the fault"
+  at=$(now)
+  from=$(wc -l <"$log")
+}
+
+inject() {
+  case $fault in
+    hold | stop | land) must "$fault" --wait ;;
+    vio_*) echo "$(sed 's/^vio_//; s/^jump$/jump 1 0.5 0/; s/^turn$/turn 1.57/' <<<"$fault")" >&7 ;;
+    sigstop) kill -STOP "$autopilot_pid" && sleep 3 && kill -CONT "$autopilot_pid" ;;
+    kill)
+      kill -KILL "$daemon_pid"
+      sleep 3
+      daemon "$vehicle" "$out/again.bwlog"
+      ;;
+    restart) # at once, and taken in hand again; the row begins there, that of `kill` tells what is before
+      kill -KILL "$daemon_pid"
+      daemon "$vehicle" "$out/again.bwlog"
+      for _ in $(seq 5); do ctl enable --wait && break; sleep 0.5; done
+      at=$(now)
+      must land --wait
+      ;;
+    pilot)
+      if [[ $kind == px4 ]]; then
+        "$path/bin/px4-commander" mode posctl >>"$log" 2>&1
+      else
+        echo 1900 >"$work/switch"
+      fi
+      ;;
+    link) echo cut >&8 && sleep 3 && echo go >&8 ;;
+    rc) if [[ $kind == px4 ]]; then echo sticks >&8; else echo 900 >"$work/throttle"; fi ;;
+    *) die "no fault $fault: ${all[*]}" ;;
+  esac
+}
+
+# What the autopilot acts on only after a while is begun so long before the vehicle is at speed; it counts from when it acts.
+slow() {
+  if [[ $kind/$fault == px4/gcs ]]; then
+    echo quiet >&8
+    sleep 2
+  fi
+  must goto "$goal"
+  case $kind/$fault in
+    ardupilot/gcs) sleep 3 ;;
+    */battery) sleep 3 ;;
+  esac
+  case $kind/$fault in
+    ardupilot/gcs) echo quiet >&8 ;;
+    ardupilot/battery) echo "set SIM_BATT_VOLTAGE 10" >&8 ;;
+    px4/battery)
+      "$path/bin/px4-param" set SIM_BAT_MIN_PCT 0 >>"$log" 2>&1
+      "$path/bin/px4-param" set SIM_BAT_DRAIN 1 >>"$log" 2>&1
+      ;;
+  esac
+  left_tracking || die "the autopilot did nothing"
+  at=$(acted)
+}
+
 case $fault in
-  hold | stop | land) must "$fault" --wait ;;
-  vio_*) echo "$(sed 's/^vio_//; s/^jump$/jump 1 0.5 0/; s/^turn$/turn 1.57/' <<<"$fault")" >&7 ;;
-  sigstop) kill -STOP "$autopilot_pid" && sleep 3 && kill -CONT "$autopilot_pid" ;;
-  kill)
-    kill -KILL "$daemon_pid"
-    sleep 3
-    daemon "$vehicle" "$out/again.bwlog"
+  reboot) reboot ;;
+  battery | gcs)
+    take_off
+    from=$(wc -l <"$log")
+    slow
     ;;
-  pilot)
-    if [[ $kind == px4 ]]; then
-      "$path/bin/px4-commander" mode auto:loiter >>"$log" 2>&1
-    else
-      echo 1900 >"$work/switch"
-    fi
+  *)
+    take_off
+    at_speed
+    inject
     ;;
-  *) die "no fault $fault: ${all[*]}" ;;
 esac
 sleep 15
 kill -TERM "$daemon_pid" "$vio_pid" 2>/dev/null || true

@@ -24,6 +24,8 @@ fly_real() {
   local settings=()
   [[ -z ${SETTINGS:-} ]] || read -ra settings <<<"$SETTINGS"
   "start_$name" "$path" "${settings[@]}"
+  [[ -z ${RELAY:-} ]] || relay
+  [[ -z ${STATION:-} ]] || helper ground_station.py $STATION
   vehicle=${VEHICLE:-$root/tests/autopilots/$name.vehicle.toml}
   mkfifo "$work/faults"
   exec 7<>"$work/faults"
@@ -35,6 +37,25 @@ fly_real() {
 
 }
 
+# helper SCRIPT [ARGUMENT …]: one of the Python helpers beside this file; it hears what is written to descriptor 8.
+helper() {
+  mkfifo "$work/helper"
+  exec 8<>"$work/helper"
+  fifo python3 "$here/$1" "${@:2}" <&8 >>"$log" 2>&1 &
+  pids+=($!)
+}
+
+# The daemon's line goes through relay.py.
+relay() {
+  if [[ $name == px4 ]]; then
+    helper relay.py udp 14540 14541
+    device=udpin:127.0.0.1:14541
+  else
+    helper relay.py tcp 5760 5770
+    device=tcp:127.0.0.1:5770
+  fi
+}
+
 die() {
   echo "flight: $*; see $log" >&2
   tail -n 20 "$log" >&2
@@ -44,11 +65,13 @@ die() {
 # daemon VEHICLE RAW_LOG: writes its configuration and starts it; the map may take a minute to be ready.
 daemon() {
   write_configuration "$1" "$2"
+  local before
+  before=$(wc -l <"$log")
   "$bin/backwashd" --config "$work/backwashd.toml" >>"$log" 2>&1 &
   daemon_pid=$!
   pids+=("$daemon_pid")
   for _ in $(seq 1200); do
-    grep -q 'map accepted' "$log" && return
+    tail -n +"$((before + 1))" "$log" | grep -q 'map accepted' && return
     kill -0 "$daemon_pid" 2>/dev/null || die "the daemon stopped"
     sleep 0.1
   done

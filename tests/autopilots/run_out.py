@@ -17,7 +17,9 @@ WITHIN = 12.0  # s
 SAYS = {"hold": "", "stop": "hold: operator asks to stop", "land": "land: operator asks to land", "vio_stop": "hold: odometry lost",
         "vio_freeze": "hold: odometry frozen|hold: map and autopilot", "vio_jump": "hold: odometry jumped", "vio_turn": "hold: odometry jumped",
         "sigstop": "quiet: no heartbeat|hold: autopilot's pose|quiet: port|hold: map and autopilot", "kill": "passive: started",
-        "pilot": "passive: autopilot left offboard"}
+        "restart": "land: operator asks to land", "pilot": "passive: autopilot left offboard",
+        "battery": "land: battery low|passive: autopilot left offboard", "rc": "passive: autopilot left offboard",
+        "gcs": "passive: autopilot left offboard", "link": "quiet: no heartbeat", "reboot": "tracking: lifted off"}
 
 
 def main() -> int:

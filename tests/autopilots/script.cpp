@@ -15,15 +15,17 @@
 namespace backwash::autopilots {
 namespace {
 
-int play(const std::string& device, const std::string& truth_at, const std::string& trace_path,
-         const Session::Options& options) {
+int play(const std::string& device, const std::string& truth_at, const std::string& trace_path, int pid,
+         Session::Options options) {
+  bool stopped = false;  // then its simulator answers nobody, and the time must go on
+  options.stopped = [&](bool stop) { stopped = stop, ::kill(pid, stop ? SIGSTOP : SIGCONT); };
   std::ofstream trace(trace_path);
   Session session(open_line(device), options, trace);
   const auto truth = truth_source(truth_at);
   for (auto due = std::chrono::steady_clock::now(); !session.done();) {
     due += std::chrono::milliseconds(1);
     std::this_thread::sleep_until(due);
-    if (!session.step(daemon::now_ns(), truth->newest())) return 1;
+    if (!session.step(daemon::now_ns(), stopped ? std::nullopt : truth->newest())) return 1;
   }
   session.finish();
   return 0;
@@ -45,10 +47,9 @@ int main(int argc, char** argv) {
   app.add_flag("--px4", o.px4, "integer parameters bytewise, as PX4 has them");
   app.add_option("--pid", pid, "of the autopilot, for `signal`");
   CLI11_PARSE(app, argc, argv);
-  o.stopped = [pid](bool stop) { ::kill(pid, stop ? SIGSTOP : SIGCONT); };
   try {
     backwash::set_fifo(backwash::allowed_fifo(70));
-    return backwash::autopilots::play(device, truth, trace, o);
+    return backwash::autopilots::play(device, truth, trace, pid, o);
   } catch (const std::exception& e) {
     std::cerr << "autopilot_script: " << e.what() << "\n";
     return 70;

@@ -74,7 +74,7 @@ class Vio {
     while (!stopped) {
       std::this_thread::sleep_for(std::chrono::microseconds(500));
       listen();
-      if (const auto truth = truth_->newest()) take(*truth);
+      if (const auto truth = newest()) take(*truth);
     }
     std::cout << "closest " << closest_ << " m at " << closest_at_.transpose() << ", contacts " << contacts_
               << ", samples " << samples_ << std::endl;
@@ -97,6 +97,18 @@ class Vio {
     const auto size = static_cast<std::uint32_t>(map_data_.size());
     m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(map_data_.data()), false};
     map_.write(m);
+  }
+
+  /// A simulator that has gone may come back with its autopilot, its vehicle where it first stood.
+  std::optional<Truth> newest() {
+    try {
+      if (!truth_) truth_ = truth_source(o_.truth);
+      return truth_->newest();
+    } catch (const std::runtime_error&) {
+      truth_.reset();
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      return std::nullopt;
+    }
   }
 
   Pose in_map(const Truth& t) const { return {start_ + R_ * t.p_E, R_ * t.v_E, R_ * t.q_EB}; }

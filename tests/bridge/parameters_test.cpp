@@ -163,16 +163,19 @@ TEST(Parameters, OnlyWhatWasAskedForIsKept) {
   EXPECT_FLOAT_EQ(static_cast<float>(t.parameter("COM_OF_LOSS_T")->value), 0.3F);
 }
 
-TEST(Parameters, AControllerThatWasSilentMayHaveRestartedWithOthers) {
+TEST(Parameters, AControllerThatWasSilentMayHaveRestartedWithOthersAndWithoutItsOrigin) {
   using namespace std::chrono_literals;
   Telemetry t;
   t.take(mavlink::Heartbeat{0, 2, 12, 0, 3}, kStart);
   ASSERT_TRUE(t.expect_parameter("COM_OF_LOSS_T"));
   t.take(answer("COM_OF_LOSS_T", 0.3F), kStart);
+  t.take(mavlink::GpsGlobalOrigin{}, kStart);
   t.take(mavlink::Heartbeat{0, 2, 12, 0, 3}, kStart + 1400ms);
   EXPECT_TRUE(t.parameter("COM_OF_LOSS_T"));
+  EXPECT_TRUE(t.has_origin);
   t.take(mavlink::Heartbeat{0, 2, 12, 0, 3}, kStart + 1400ms + kHeartbeatTimeout);
   EXPECT_FALSE(t.parameter("COM_OF_LOSS_T"));
+  EXPECT_FALSE(t.has_origin);
 }
 
 }  // namespace

@@ -14,6 +14,11 @@ std::string forbids(const Lockstep& rig) {
 
 struct ParameterReading : testing::Test {
   Lockstep rig_;
+  int commands_in(int ticks) {
+    int n = 0;
+    for (; ticks > 0; --ticks) n += static_cast<int>(rig_.tick().commands.size());
+    return n;
+  }
   std::size_t known() const {
     return static_cast<std::size_t>(
         std::ranges::count_if(rig_.view().parameters, [](const auto& value) { return value.has_value(); }));
@@ -56,12 +61,26 @@ TEST_F(ParameterReading, InQuietItIsAskedOnlyForAnOperatorWhoAsksToEnable) {
   rig_.ticks(50);
   rig_.autopilot->mute = false;
   rig_.autopilot->disarm();
-  rig_.ticks(200);
+  EXPECT_EQ(commands_in(200), 0);
   ASSERT_EQ(rig_.mode(), track::Mode::quiet);
   EXPECT_TRUE(forbids(rig_).starts_with("no value of")) << forbids(rig_);
   rig_.channels->enable_asked_ns = rig_.now_ns();
-  rig_.ticks(120);
+  EXPECT_GT(commands_in(120), 0) << "messages and origin are asked for too: without a pose nobody enables";
   EXPECT_EQ(forbids(rig_), "");
+}
+
+// Who was killed in flight and started again says nothing to the vehicle, until an operator wants it in hand again.
+TEST_F(ParameterReading, AfterARestartInTheAirItIsAskedForAnOperatorWhoAsksToEnable) {
+  rig_.ticks(150);
+  rig_.take_off();
+  rig_.restart();
+  rig_.ticks(55);  // the first heartbeat is among them
+  ASSERT_TRUE(rig_.autopilot->armed());
+  EXPECT_EQ(known(), 0U);
+  rig_.channels->enable_asked_ns = rig_.now_ns();
+  for (int n = 0; n < 75 && !forbids(rig_).empty(); ++n) rig_.tick();
+  EXPECT_EQ(forbids(rig_), "");
+  EXPECT_TRUE(rig_.autopilot->armed()) << "it was not in the air any more";
 }
 
 TEST_F(ParameterReading, NothingIsAskedWhileTheLineIsNeeded) {
