@@ -16,7 +16,9 @@ import table
 COMPARISONS = ["<", "<=", ">", ">=", "==", "!="]
 OTHERS = {"&&": ["||"], "||": ["&&"], "+": ["-"], "-": ["+"], "*": ["/"], "/": ["*"],
           **{c: [d for d in COMPARISONS if d != c] for c in COMPARISONS}}
-STRENGTH = {"||": 1, "&&": 2, **dict.fromkeys(COMPARISONS, 3), "+": 4, "-": 4, "*": 5, "/": 5}
+# How strongly each binds its operands; those that are not in OTHERS only end an operation.
+STRENGTH = {"||": 1, "&&": 2, "|": 2.3, "&": 2.6, **dict.fromkeys(COMPARISONS, 3), "<<": 3.5, ">>": 3.5,
+            "+": 4, "-": 4, "*": 5, "/": 5, "%": 5}
 TOKEN = re.compile(r" (\|\||&&|<=|>=|==|!=|<|>|\+|-|\*|/|\?|:|=|\+=|-=|\*=|/=|<<|>>|%|&|\|) |[()\[\]{},;]|\breturn\b")
 
 
@@ -53,7 +55,7 @@ def candidates(text: str) -> list[tuple[int, int, int, str]]:
     found = []
     for n, token in enumerate(tokens):
         operator = token[0].strip()
-        if operator not in STRENGTH:
+        if operator not in OTHERS:
             continue
         begin, end = (operand_end(tokens, n, step, STRENGTH[operator]) for step in (-1, 1))
         if begin is None or end is None:
