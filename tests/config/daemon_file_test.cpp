@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -18,13 +19,18 @@ std::string shipped() {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+/// Of this process alone: tests run side by side.
+std::filesystem::path temporary(const std::string& name) {
+  return std::filesystem::temp_directory_path() / ("backwash." + std::to_string(::getpid()) + "." + name);
+}
+
 // What the shipped file says of itself once `from` is replaced by `to`.
 std::string error_after(const std::string& from, const std::string& to) {
   std::string text = shipped();
   const auto at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   text.replace(at, from.size(), to);
-  const auto path = std::filesystem::temp_directory_path() / "backwash_daemon_file_test.toml";
+  const auto path = temporary("daemon_file_test.toml");
   std::ofstream(path) << text;
   const auto read = load_daemon(path);
   std::filesystem::remove(path);
@@ -61,7 +67,7 @@ TEST(DaemonFile, ReadsTheFormsOfALinkDevice) {
 TEST(DaemonFile, FramesAndMapMayBeLeftOut) {
   std::string text = shipped();
   text.resize(text.find("\n[frames]"));
-  const auto path = std::filesystem::temp_directory_path() / "backwash_daemon_file_short_test.toml";
+  const auto path = temporary("daemon_file_short_test.toml");
   std::ofstream(path) << text;
   const auto d = load_daemon(path);
   std::filesystem::remove(path);
@@ -119,7 +125,7 @@ TEST(DaemonFile, RefusesLinesWithoutAChipAndOneLineForTwoUses) {
 
 /// What the shipped file says of itself with this key file; "no error" if it is taken.
 std::string with_key(const std::string& content, std::filesystem::perms mode) {
-  const auto path = std::filesystem::temp_directory_path() / "backwash_daemon_file_test.key";
+  const auto path = temporary("daemon_file_test.key");
   std::ofstream(path, std::ios::binary) << content;
   std::filesystem::permissions(path, mode);
   const std::string said =
@@ -132,7 +138,7 @@ TEST(DaemonFile, TakesASigningKeyRawOrInHex) {
   using enum std::filesystem::perms;
   EXPECT_EQ(with_key(std::string(32, 'k'), owner_read | owner_write), "no error");
   EXPECT_EQ(with_key(std::string(64, 'a') + "\n", owner_read), "no error");
-  const auto path = std::filesystem::temp_directory_path() / "backwash_key_file_test.key";
+  const auto path = temporary("key_file_test.key");
   std::ofstream(path) << "000102030405060708090a0B0c0d0e0f101112131415161718191a1b1c1d1e1f\n";
   std::filesystem::permissions(path, owner_read | owner_write);
   const auto key = read_key_file(path);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the confusion matrix counts, and the study's steps that its figures led to.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -116,7 +117,7 @@ double height_answers_gusts(const discrepancy::Observations& seen) {
 }
 
 TEST(Observation, PlacesDoNotAnswerTheGustsThatTheResidualHolds) {
-  const auto folder = std::filesystem::temp_directory_path() / "study-places";
+  const auto folder = std::filesystem::temp_directory_path() / ("study-places." + std::to_string(::getpid()));
   const World world = draw_world({4711, {}, 1, 10, ""});
   auto flights = fly_all(world);
   EXPECT_LT(height_answers_gusts(observe(world, flights, folder)), 0.02);
@@ -128,7 +129,7 @@ TEST(Observation, PlacesDoNotAnswerTheGustsThatTheResidualHolds) {
 }
 
 TEST(Study, TellsTrimAndDraftAsOneSetWhereNoFlightTurned) {
-  const auto folder = std::filesystem::temp_directory_path() / "study-no-turn";
+  const auto folder = std::filesystem::temp_directory_path() / ("study-no-turn." + std::to_string(::getpid()));
   const auto cell = std::find_if(cells().begin(), cells().end(), [](auto& c) { return c.name == "trim, no yaw turn"; });
   ASSERT_NE(cell, cells().end());
   const Outcome o = score(*cell, 4711, 1.5, 12, folder);
