@@ -166,7 +166,8 @@ double FlightTick::apart(const TickInput& in) const noexcept {
 SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
   SupervisorInput facts;
   facts.request = in.request;
-  facts.odometry_age = odometry_age_;
+  // Forgotten in this tick: there is no pose, and no place to hold, however young the last one was.
+  facts.odometry_age = gate_.last() ? odometry_age_ : std::numeric_limits<double>::infinity();
   facts.odometry_jump = out.verdict == OdometryGate::Verdict::jump;
   facts.odometry_inconsistent = out.verdict == OdometryGate::Verdict::inconsistent;
   facts.odometry_frozen = out.verdict == OdometryGate::Verdict::frozen;
