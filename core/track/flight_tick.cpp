@@ -292,7 +292,8 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   const auto& s = out.supervisor;
   const bool goes_on = s.mode == Mode::tracking || s.mode == Mode::lifting ||
                        (s.mode == Mode::hold && s.reason == Reason::obstacle_ahead);
-  if (s.changed && !goes_on) ++epoch_.lapse;
+  // A stop switch gives no number with its STOP, and where the vehicle holds for one already the mode stays.
+  if ((s.changed && !goes_on) || in.request == Request::stop) ++epoch_.lapse;
   follow(in, before, out);
   was_commanding_ = commanding(out.supervisor.mode);
   odometry_distrusted_ =

@@ -30,5 +30,28 @@ TEST(Enabling, IsRefusedInTheTickInWhichThePoseIsForgotten) {
   }
 }
 
+// Row 37: it is one more operator, whose STOP has no number.
+TEST(StopOfTheSwitch, EndsAPlanUnderWayAlsoWhereTheVehicleHoldsForAStopAlready) {
+  Flown f;
+  f.in.request = Request::stop;
+  f.in.order = 5;
+  f.step();
+  f.in.order = 0;
+  for (int n = 0; n < 200; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.reason, Reason::stop_requested);
+  ASSERT_TRUE(f.tick.tracker().finished());
+  AcceptedSegment planned = segment_of(std::vector<Setpoint>(100, f.out.command));
+  planned.id = 77;
+  planned.epoch = f.tick.epoch();
+  f.in.request = Request::stop;  // pressed and released while it is planned
+  f.step();
+  f.in.segment = &planned;
+  f.step();
+  EXPECT_TRUE(f.out.refused);
+  EXPECT_EQ(f.out.supervisor.mode, Mode::hold);
+  f.offer(planned);
+  EXPECT_TRUE(f.out.accepted) << "what is planned later flies";
+}
+
 }  // namespace
 }  // namespace backwash::track::test
