@@ -108,11 +108,12 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
 
 // Learns local ← map while nothing is commanded, watches it otherwise. Takes it anew when the controller's estimator
 // was reset: by its counter, or by its own samples, which jumped while the odometry passed its gate. The odometry is
-// brought to the moments of the controller's position and attitude.
+// brought to the moments of the controller's position and attitude. What is told again, its stamp by now a little
+// earlier in our clock, is no new pair: as a step of no time it would end what the gyros have added up.
 void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   reset_ = false;
   const auto& pose = in.autopilot.pose;
-  if (!pose || !gate_.last() || !fresh || pose->at_ns == last_pose_ns_ || pose->attitude_at_ns == last_attitude_ns_)
+  if (!pose || !gate_.last() || !fresh || pose->at_ns <= last_pose_ns_ || pose->attitude_at_ns <= last_attitude_ns_)
     return;
   const double dt = seconds(pose->at_ns - last_pose_ns_);
   last_pose_ns_ = pose->at_ns;

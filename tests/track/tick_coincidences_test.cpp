@@ -53,5 +53,35 @@ TEST(StopOfTheSwitch, EndsAPlanUnderWayAlsoWhereTheVehicleHoldsForAStopAlready) 
   EXPECT_TRUE(f.out.accepted) << "what is planned later flies";
 }
 
+/// What an autopilot at half the rate tells again in between, its stamp by now a little earlier in our clock.
+enum class Again { nothing, position, both };
+/// Ticks until the frames are no longer trusted, of an autopilot that follows the VIO in yaw while that turns by 6°/s
+/// and its gyros say nothing.
+int ticks_trusted(Again again) {
+  Flown f(Flown::Until::tracking);
+  std::int64_t last_ns = 0;
+  double yaw = 0;
+  int n = 0;
+  for (; n < 300 && f.out.supervisor.mode == Mode::tracking; ++n) {
+    f.in.now_ns += 20'000'000;
+    yaw += 0.1 * 0.02;
+    f.in.odometry->received_ns = f.in.odometry->stamp_ns = f.in.now_ns;
+    f.in.odometry->state.p_W.x() += n % 2 == 0 ? 1e-6 : -1e-6;
+    f.in.odometry->q = Flown::quaternion(yaw);
+    f.in.autopilot.pose->q = Flown::quaternion(Flown::kYaw + yaw);
+    const std::int64_t told_ns = again != Again::nothing && n % 2 != 0 ? last_ns - 500'000 : f.in.now_ns;
+    f.in.autopilot.pose->at_ns = last_ns = told_ns;
+    f.in.autopilot.pose->attitude_at_ns = again == Again::both ? told_ns : f.in.now_ns;
+    f.out = f.tick.step(f.in);
+  }
+  return n;
+}
+
+TEST(GyrosAgainstTheVio, AreNotSilencedByAPoseThatIsToldAgain) {
+  const int plain = ticks_trusted(Again::nothing);
+  EXPECT_LT(plain, 60);
+  for (const Again again : {Again::position, Again::both}) EXPECT_LE(ticks_trusted(again), plain + 2);
+}
+
 }  // namespace
 }  // namespace backwash::track::test
