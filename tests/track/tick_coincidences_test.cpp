@@ -83,5 +83,23 @@ TEST(GyrosAgainstTheVio, AreNotSilencedByAPoseThatIsToldAgain) {
   for (const Again again : {Again::position, Again::both}) EXPECT_LE(ticks_trusted(again), plain + 2);
 }
 
+// Rows 22 and 25: frames that did not agree yet keep the vehicle from being followed; meanwhile the pilot takes it.
+TEST(Enabling, EndsWhenThePilotTakesTheVehicleOutOfOffboard) {
+  Flown f(Flown::Until::aligned);
+  f.in.request = Request::enable;
+  f.in.autopilot.armed = true;
+  f.local_off.z() = 0.12;
+  for (int n = 0; n < 20; ++n) f.step();
+  f.in.autopilot.offboard = true;
+  for (int n = 0; n < 10; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::enabling);
+  f.in.autopilot.offboard = false;
+  f.local_off.z() = 0;
+  for (int n = 0; n < 250; ++n) {
+    EXPECT_FALSE(f.step().supervisor.request_offboard) << n;
+    EXPECT_EQ(f.out.supervisor.mode, Mode::passive);
+  }
+}
+
 }  // namespace
 }  // namespace backwash::track::test
