@@ -101,5 +101,45 @@ TEST(Enabling, EndsWhenThePilotTakesTheVehicleOutOfOffboard) {
   }
 }
 
+// Row 4: an absurd one does not come in pieces.
+TEST(LoopClosures, AddUpInFlightToWhatIsNotFlown) {
+  for (const bool turns : {false, true}) {
+    Flown f;
+    f.closures = 1;  // the odometry came into the map by the first one
+    f.step();
+    for (std::uint32_t n = 1; n <= 3; ++n) {
+      (turns ? f.frame_W.yaw : f.frame_W.t.x()) += turns ? 4 * 3.14159265358979 / 180 : 0.45;
+      ++f.closures;
+      f.step();
+      EXPECT_EQ(f.out.supervisor.mode, n < 3 ? Mode::tracking : Mode::hold) << n << to_string(f.out.supervisor.reason);
+      for (int k = 0; k < 3; ++k) f.step();
+    }
+    EXPECT_EQ(f.out.supervisor.reason, Reason::closure_refused);
+  }
+}
+
+// Row 6: at rest in the air a pose that repeats to the last bit is no sensor's; where nothing says that it flies it may
+// be.
+TEST(FrozenPose, IsFoundAtRestInTheAir) {
+  for (const bool in_air : {true, false}) {
+    Flown f(Flown::Until::tracking);
+    if (in_air) f.in.autopilot.landed = false;
+    for (int n = 0; n < 10 && f.out.supervisor.mode == Mode::tracking; ++n) f.step();
+    EXPECT_EQ(f.out.supervisor.reason, in_air ? Reason::odometry_frozen : Reason::autopilot_follows);
+  }
+}
+
+// After a fault in flight the autopilot gets no odometry, in whose hands it may be, until it is disarmed.
+TEST(DistrustedOdometry, IsNotForwardedToAVehicleThatStillFlies) {
+  Flown f;
+  f.spoil = [](OdometrySample& s) { s.state.p_W.y() += 0.5; };
+  for (int n = 0; n < 60; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::quiet);
+  for (int n = 0; n < 100; ++n) EXPECT_FALSE(f.step().forward_odometry) << n;
+  EXPECT_TRUE(f.out.fresh) << "it looks good";
+  f.in.autopilot.armed = false;
+  EXPECT_TRUE(f.step().forward_odometry);
+}
+
 }  // namespace
 }  // namespace backwash::track::test
