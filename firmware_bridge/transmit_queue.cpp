@@ -19,6 +19,7 @@ void TransmitQueue::push(const mavlink::EncodedFrame& frame, Kind kind) noexcept
     if (missed) ++missed_setpoints_;
   }
   if (count_ == kCapacity) {
+    if (frames_[first_whole].kind == Kind::kSetpoint) ++missed_setpoints_;
     remove(first_whole);
     ++dropped_;
   }

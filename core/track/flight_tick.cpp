@@ -108,11 +108,12 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
 
 // Learns local ← map while nothing is commanded, watches it otherwise. Takes it anew when the controller's estimator
 // was reset: by its counter, or by its own samples, which jumped while the odometry passed its gate. The odometry is
-// brought to the moments of the controller's position and attitude.
+// brought to the moments of the controller's position and attitude. What is told again, its stamp by now a little
+// earlier in our clock, is no new pair: as a step of no time it would end what the gyros have added up.
 void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   reset_ = false;
   const auto& pose = in.autopilot.pose;
-  if (!pose || !gate_.last() || !fresh || pose->at_ns == last_pose_ns_ || pose->attitude_at_ns == last_attitude_ns_)
+  if (!pose || !gate_.last() || !fresh || pose->at_ns <= last_pose_ns_ || pose->attitude_at_ns <= last_attitude_ns_)
     return;
   const double dt = seconds(pose->at_ns - last_pose_ns_);
   last_pose_ns_ = pose->at_ns;
@@ -166,7 +167,8 @@ double FlightTick::apart(const TickInput& in) const noexcept {
 SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
   SupervisorInput facts;
   facts.request = in.request;
-  facts.odometry_age = odometry_age_;
+  // Forgotten in this tick: there is no pose, and no place to hold, however young the last one was.
+  facts.odometry_age = gate_.last() ? odometry_age_ : std::numeric_limits<double>::infinity();
   facts.odometry_jump = out.verdict == OdometryGate::Verdict::jump;
   facts.odometry_inconsistent = out.verdict == OdometryGate::Verdict::inconsistent;
   facts.odometry_frozen = out.verdict == OdometryGate::Verdict::frozen;
@@ -291,7 +293,8 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   const auto& s = out.supervisor;
   const bool goes_on = s.mode == Mode::tracking || s.mode == Mode::lifting ||
                        (s.mode == Mode::hold && s.reason == Reason::obstacle_ahead);
-  if (s.changed && !goes_on) ++epoch_.lapse;
+  // A stop switch gives no number with its STOP, and where the vehicle holds for one already the mode stays.
+  if ((s.changed && !goes_on) || in.request == Request::stop) ++epoch_.lapse;
   follow(in, before, out);
   was_commanding_ = commanding(out.supervisor.mode);
   odometry_distrusted_ =

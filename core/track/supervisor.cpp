@@ -21,6 +21,7 @@ constexpr Transition kTransitions[] = {
     {kCommanding, Reason::autopilot_silent, Mode::quiet},
     {kCommanding, Reason::clock_stopped, Mode::quiet},
     {kEnabling, Reason::operator_request, Mode::passive},
+    {kEnabling, Reason::offboard_left, Mode::passive},
     {kEnabling, Reason::odometry_lost, Mode::passive},
     {kEnabling, Reason::odometry_jump, Mode::passive},
     {kEnabling, Reason::odometry_inconsistent, Mode::passive},
@@ -214,7 +215,8 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::enable_timeout:
       return seconds_in_mode() > kEnableTimeout;
     case Reason::offboard_left:
-      return !in.offboard;  // rows 22, 25
+      // Rows 22 and 25; while enabling, of one that followed already and waited for the frames to agree.
+      return !in.offboard && (mode_ != Mode::enabling || reason_ == Reason::autopilot_follows);
     case Reason::disarmed:
       return was_armed_ && !in.armed;  // row 23
     case Reason::odometry_jump:
@@ -305,6 +307,7 @@ SupervisorOutput Supervisor::step(const SupervisorInput& in) noexcept {
       break;
     }
   }
+  if (mode_ == Mode::enabling && in.offboard) enter(Mode::enabling, Reason::autopilot_follows);
   if (mode_ == Mode::land && before != Mode::land && in.battery_low) battery_landed_ = true;
   was_armed_ = in.armed;
   return output(in);

@@ -24,17 +24,20 @@ std::string_view name(SwitchState state) noexcept {
 }
 
 void StopSwitch::see(bool open, Time at) noexcept {
+  const auto judge = [&] {
+    if (!level_ || at - since_ < kDebounce) return;
+    settled_ = true;
+    position_ = level_;
+    (*level_ ? was_open_ : was_closed_) = true;
+  };
   if (level_ != open) {
+    judge();  // of the level that ends: nobody may have looked while it was held
     if (!level_ || settled_) unsettled_ = at;
     settled_ = false;
     level_ = open;
     since_ = at;
   }
-  if (at - since_ >= kDebounce) {
-    settled_ = true;
-    position_ = open;
-    (open ? was_open_ : was_closed_) = true;
-  }
+  judge();
   chatters_ = !settled_ && at - unsettled_ >= kChatter;
 }
 

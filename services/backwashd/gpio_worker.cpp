@@ -16,7 +16,8 @@ using namespace firmware_bridge;
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kLook = 5ms;  // a quarter of the debounce time
+constexpr auto kLook = 5ms;       // a quarter of the debounce time
+constexpr auto kToldFor = 100ms;  // five ticks
 constexpr auto kTryAgain = 1s;
 constexpr auto kNoTicks = 500ms;  // the control thread has stopped
 constexpr int kEdgesAtOnce = 64;  // of a line that does not stop changing
@@ -61,6 +62,7 @@ void GpioWorker::take_switch() {
     const auto edge = stop_switch_.line->next_edge();
     if (!edge) return lose(stop_switch_, edge.error());
     switch_.see(edge->high, edge->at);
+    if (switch_.state() == SwitchState::pressed) pressed_ = steady_clock::now();
     waited = stop_switch_.line->wait(0ms);
   }
   if (!waited) return lose(stop_switch_, waited.error());
@@ -70,7 +72,9 @@ void GpioWorker::take_switch() {
 }
 
 void GpioWorker::tell_switch() {
-  const SwitchState state = switch_.state();
+  SwitchState state = switch_.state();
+  // Of a press that was over before this thread came to look the control thread must hear too.
+  if (state == SwitchState::released && steady_clock::now() - pressed_ < kToldFor) state = SwitchState::pressed;
   channels_.stop_switch.state.store(state, std::memory_order_relaxed);
   channels_.stop_switch.at_ns.store(now_ns(), std::memory_order_release);
   if (std::exchange(told_, state) == state || state == SwitchState::lost) return;

@@ -43,6 +43,7 @@ class GpioWorker {
   firmware_bridge::Strobe edges_;
   std::uint64_t ticks_ = 0;
   Time ticked_{}, tried_{};
+  Time pressed_{};  // when an edge last found the switch pressed
 };
 
 /// Thread body: step() until the daemon ends. `priority`: SCHED_FIFO, 0: none.

@@ -15,10 +15,12 @@ void ParameterReader::step(firmware_bridge::AutopilotLink& link, bool may_ask, b
   }
   const auto names = firmware_bridge::parameter_names(kind);
   if (names.empty()) return;
-  const std::size_t n = view.ticks % names.size();
-  const auto known = telemetry.parameter(names[n]);
-  if (!known && view.parameters[n]) asked_ = 0;  // it restarted
-  view.parameters[n] = known ? std::optional(known->value) : std::nullopt;
+  // All of them in each tick: what the link has forgotten must not be enabled on for a moment longer.
+  for (std::size_t n = 0; n < names.size(); ++n) {
+    const auto known = telemetry.parameter(names[n]);
+    if (!known && view.parameters[n]) asked_ = 0;  // it restarted
+    view.parameters[n] = known ? std::optional(known->value) : std::nullopt;
+  }
   const std::size_t every = asked_ < kRounds * names.size() ? kTicksPerSecond / 10 : kTicksPerSecond;
   if (!may_ask || view.ticks % every != 0) return;
   for (std::size_t skipped = 0; view.parameters[next_] && skipped < names.size(); ++skipped)

@@ -12,7 +12,7 @@ namespace backwash::daemon {
 /// known or was asked for three times, then one a second, for a station may have changed it.
 class ParameterReader {
  public:
-  /// Once a tick, after view.ticks: one value from the link into the view, and one question where `may_ask`. Without
+  /// Once a tick, after view.ticks: what the link knows into the view, and one question where `may_ask`. Without
   /// `may_repeat` only for what is not known. Real-time: wait-free, no allocation.
   void step(firmware_bridge::AutopilotLink& link, bool may_ask, bool may_repeat, ControlView& view) noexcept;
 

@@ -117,6 +117,17 @@ TEST_F(LinkTest, SendsNoOldSetpointAfterDiscarding) {
   EXPECT_EQ(mavlink::test::parse(far_.await()).size(), 1U) << "and the port works on";
 }
 
+// Row 20: an autopilot that asks for the time without end, on a line that takes little, keeps the set-points from it.
+TEST(TransmitQueue, ASetpointThatGivesWayToOtherFramesIsMissed) {
+  TransmitQueue queue;
+  const auto frame = mavlink::encode_frame({1, 191, 0}, mavlink::Heartbeat{});
+  for (int tick = 1; tick <= kMaxMissedSetpoints; ++tick) {
+    queue.push(frame, TransmitQueue::Kind::kSetpoint);
+    for (std::size_t n = 0; n < 2 * TransmitQueue::kCapacity; ++n) queue.push(frame, TransmitQueue::Kind::kOther);
+    EXPECT_EQ(queue.missed_setpoints(), tick);
+  }
+}
+
 TEST(TransmitQueue, FinishesAHalfWrittenFrameAndDropsTheOldestWholeOne) {
   TransmitQueue queue;
   const auto frame = [](std::uint8_t sequence) {

@@ -4,6 +4,7 @@
 #include <sys/ioctl.h>
 #include <termios.h>
 
+#include <bit>
 #include <cerrno>
 #include <limits>
 
@@ -41,11 +42,68 @@ TEST_F(LinkTest, NoticesAnUnpluggedPortWhereItWrites) {
   EXPECT_EQ(link_.fault(kStart), LinkFault::kPortLost);
 }
 
+/// ms of the controller's clock at 1 ms after kStart: its 32 bits wrap soon.
+constexpr std::int64_t kBoot_ms = (std::int64_t{1} << 32) - 50;
+
+struct StampTest : LinkTest {
+  /// One exchange of TIMESYNC that takes so long.
+  void measure(std::chrono::milliseconds round_trip) {
+    introduce_vehicle();
+    ASSERT_TRUE(link_.send_timesync(kStart));
+    const auto question = heard_one<mavlink::Timesync>();
+    say_and_poll(mavlink::Timesync{.tc1 = kBoot_ms * 1'000'000, .ts1 = question.ts1}, kStart + round_trip);
+    ASSERT_TRUE(link_.clock());
+  }
+  /// How old the position counts that comes 101 ms later and is `age_ms` old by the controller's clock, ms.
+  std::int64_t counted_ms(std::int64_t age_ms) {
+    const Time now = kStart + 102ms;
+    say_and_poll(mavlink::LocalPositionNed{.time_boot_ms = static_cast<std::uint32_t>(kBoot_ms + 101 - age_ms)}, now);
+    return std::chrono::duration_cast<std::chrono::milliseconds>(now - link_.telemetry().local_state->at).count();
+  }
+};
+
+// What cannot be is as if it had no stamp: of the future, or so late that the clock must be another one.
+TEST_F(StampTest, APositionIsAsOldAsItsStampSaysAlsoWhereThatWraps) {
+  measure(2ms);
+  for (const auto& [stamped, counted] : {std::pair(201, 0), std::pair(200, 200), std::pair(60, 60), std::pair(1, 1),
+                                         std::pair(0, 0), std::pair(-1, 0), std::pair(-300, 0)})
+    EXPECT_EQ(counted_ms(stamped), counted) << stamped;
+}
+
+TEST_F(StampTest, OfAClockThatIsNotKnownWellNoAgeIsTaken) {
+  measure(11ms);
+  EXPECT_EQ(counted_ms(60), 0);
+}
+
+TEST_F(StampTest, AnotherPortIsAnotherClock) {
+  measure(2ms);
+  PseudoTerminal replacement;
+  link_.reconnect(open(replacement.path()), kStart);
+  EXPECT_FALSE(link_.clock());
+}
+
+TEST_F(LinkTest, AnswersNoTimesyncThatAsksAnotherSystem) {
+  introduce_vehicle();
+  say_and_poll(mavlink::Timesync{.tc1 = 0, .ts1 = 1, .target_system = kVehicle + 1, .target_component = 191});
+  say_and_poll(mavlink::Timesync{.tc1 = 0, .ts1 = 2, .target_system = kVehicle, .target_component = 191});
+  EXPECT_EQ(heard_one<mavlink::Timesync>().ts1, 2);
+}
+
 TEST_F(LinkTest, AsksForNoRateThatIsNone) {
   introduce_vehicle();
   for (const double rate : {0.0, -1.0, static_cast<double>(kNan)})
     EXPECT_FALSE(link_.send_message_interval(32, rate)) << rate;
   EXPECT_EQ(link_.transmit().sent(), 0U);
+}
+
+TEST(Telemetry, Px4PutsTheBytesOfAnIntegerWhereTheFloatIs) {
+  mavlink::ParamValue four{.param_value = std::bit_cast<float>(4), .param_type = 6};
+  four.param_id[0] = 'X';
+  Telemetry t;
+  ASSERT_TRUE(t.expect_parameter("X"));
+  t.take(px4_heartbeat(false, 1), kStart);
+  t.take(four, kStart);
+  EXPECT_EQ(t.parameter("X")->value, 4);
 }
 
 TEST(Telemetry, DropsRatesAndParametersThatAreNoNumbers) {

@@ -62,6 +62,19 @@ TEST_F(StopSwitchTest, APulseBetweenTwoLooksIsNoPositionAndNoTest) {
   }
 }
 
+// The thread that looks was held up: both edges are read at once, each with its own time.
+TEST_F(StopSwitchTest, APressThatWasHeldCountsAlsoIfItIsOverBeforeAnybodyLooks) {
+  for (const auto& [held, counts] : {std::pair(19ms, false), std::pair(20ms, true), std::pair(80ms, true)}) {
+    switch_ = {};
+    test_it();
+    switch_.see(kOpen, now_ += 5ms);
+    switch_.see(kClosed, now_ += held);
+    EXPECT_EQ(switch_.state(), counts ? SwitchState::pressed : SwitchState::released) << held.count();
+    hold(kClosed, 25ms);
+    EXPECT_EQ(switch_.state(), SwitchState::released) << held.count();
+  }
+}
+
 TEST_F(StopSwitchTest, ALevelWhoseEdgeWasLostIsFoundAllTheSame) {
   test_it();
   hold(kOpen, 25ms);  // readings alone

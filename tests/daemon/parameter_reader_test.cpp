@@ -52,6 +52,24 @@ TEST_F(ParameterReading, AnAutopilotThatRestartedIsAskedAnew) {
   EXPECT_EQ(forbids(rig_).substr(0, 19), "COM_OBL_RC_ACT is 3");
 }
 
+// An operator may ask to enable in the very tick in which it is heard again.
+TEST_F(ParameterReading, NothingOfBeforeASilenceIsLeftInTheTickThatEndsIt) {
+  constexpr std::size_t kObl = 1;  // COM_OBL_RC_ACT
+  for (const int silent : {100, 103, 105}) {
+    rig_.autopilot->parameters["COM_OBL_RC_ACT"] = 4;
+    rig_.ticks(800);
+    ASSERT_EQ(rig_.view().parameters[kObl], 4);
+    rig_.autopilot->mute = true;
+    rig_.ticks(silent);
+    rig_.autopilot->parameters["COM_OBL_RC_ACT"] = 3;
+    ASSERT_GT(rig_.view().heartbeat_age, track::Supervisor::kHeartbeatLost);
+    rig_.autopilot->mute = false;
+    for (int n = 0; n < 100 && rig_.view().heartbeat_age > track::Supervisor::kHeartbeatLost; ++n) rig_.tick();
+    EXPECT_NE(rig_.view().parameters[kObl], 4) << silent;
+    EXPECT_NE(forbids(rig_), "") << silent;
+  }
+}
+
 // Not a byte more than odometry after QUIET, until an operator asks to enable.
 TEST_F(ParameterReading, InQuietItIsAskedOnlyForAnOperatorWhoAsksToEnable) {
   rig_.ticks(150);
@@ -81,6 +99,27 @@ TEST_F(ParameterReading, AfterARestartInTheAirItIsAskedForAnOperatorWhoAsksToEna
   for (int n = 0; n < 75 && !forbids(rig_).empty(); ++n) rig_.tick();
   EXPECT_EQ(forbids(rig_), "");
   EXPECT_TRUE(rig_.autopilot->armed()) << "it was not in the air any more";
+}
+
+// It belongs to somebody else, whether we were started anew or are quiet, until an operator asks to enable.
+TEST_F(ParameterReading, AnArmedVehicleIsAskedForNothing) {
+  for (const bool restarted : {true, false}) {
+    Lockstep rig;
+    rig.ticks(150);
+    rig.take_off();
+    if (restarted) {
+      rig.restart();
+    } else {
+      rig.autopilot->mute = true;
+      ASSERT_GE(rig.ticks_until(track::Mode::quiet, 200), 0);
+      rig.autopilot->mute = false;
+    }
+    rig.ticks(40);
+    ASSERT_TRUE(rig.autopilot->armed());
+    ASSERT_TRUE(rig.view().armed);
+    EXPECT_TRUE(forbids(rig).starts_with("no value of")) << forbids(rig);
+    for (const auto& value : rig.view().parameters) EXPECT_FALSE(value);
+  }
 }
 
 TEST_F(ParameterReading, NothingIsAskedWhileTheLineIsNeeded) {

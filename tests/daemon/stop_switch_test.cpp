@@ -20,6 +20,13 @@ struct Switched : Lockstep {
     channels->stop_switch.at_ns = now_ns() + 20'000'000;
     return tick();
   }
+  /// Half a metre along x from where it stands.
+  std::vector<Setpoint> route_from_here() const {
+    std::vector<Setpoint> commands;
+    for (int k = 0; k <= 100; ++k)
+      commands.push_back({view().command.p_W + Vec3(0.005 * k, 0, 0), {0.25, 0, 0}, Vec3::Zero(), view().command.yaw});
+    return commands;
+  }
   /// Ticks until LAND goes out, or −1 after `most`.
   int ticks_to_land(int most) {
     for (int n = 1; n <= most; ++n)
@@ -53,6 +60,21 @@ TEST(Row37StopSwitch, PressedInFlightItIsAStopInItsTickForAsLongAsItIsPressed) {
   rig.set(SwitchState::released);
   for (int n = 0; n < 50; ++n) rig.look_and_tick();
   EXPECT_EQ(rig.mode(), Mode::hold) << "released is no order to go on";
+}
+
+TEST(Row37StopSwitch, WhatIsOfferedInTheTickOfThePressIsNotFlown) {
+  Switched rig;
+  rig.channels->stop_switch.at_ns = INT64_MAX;
+  rig.take_off();
+  rig.set(SwitchState::pressed);
+  const auto moving = rig.offer(rig.route_from_here());
+  rig.look_and_tick();
+  EXPECT_NE(rig.view().segment, moving);
+  EXPECT_EQ(rig.reason(), Reason::stop_requested);
+  const Vec3 held = rig.view().command.p_W;
+  rig.set(SwitchState::released);
+  for (int n = 0; n < 100; ++n) rig.look_and_tick();
+  EXPECT_EQ(rig.view().command.p_W, held) << "nor after the release";
 }
 
 TEST(Row37StopSwitch, ABrokenOneStopsTheFlightAndLandsItThreeSecondsLater) {

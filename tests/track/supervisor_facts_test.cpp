@@ -79,6 +79,39 @@ TEST(SupervisorFacts, EachEndsTrackingInItsOwnWay) {
   }
 }
 
+// A set-point that goes on by a pose that is not trusted would be flown on it.
+TEST(SupervisorFacts, WhatSpeaksAgainstThePoseFreezesTheSetPointAndNothingElseDoes) {
+  const struct {
+    bool freezes;
+    Change change;
+  } rows[] = {
+      {true, [](auto& in) { in.odometry_jump = true; }},   {true, [](auto& in) { in.odometry_inconsistent = true; }},
+      {true, [](auto& in) { in.odometry_frozen = true; }}, {true, [](auto& in) { in.odometry_disorder = true; }},
+      {true, [](auto& in) { in.odometry_age = 0.081; }},   {true, [](auto& in) { in.frames_agree = false; }},
+      {false, [](auto& in) { in.frames_apart = true; }},   {false, [](auto& in) { in.request = Request::stop; }},
+      {false, [](auto& in) { in.obstacle_ahead = true; }}, {false, [](auto& in) { in.autopilot_reset = true; }},
+  };
+  for (const auto& row : rows) {
+    const auto out = after(flying(), row.change);
+    EXPECT_EQ(out.mode, Mode::hold);
+    EXPECT_EQ(out.freeze, row.freezes) << to_string(out.reason);
+  }
+}
+
+TEST(SupervisorFacts, AHoldLandsByOrderAndOnALowBattery) {
+  const std::pair<Reason, Change> rows[] = {{Reason::land_requested, [](auto& in) { in.request = Request::land; }},
+                                            {Reason::battery_low, [](auto& in) { in.battery_low = true; }}};
+  for (const auto& [reason, change] : rows) {
+    Supervisor s = flying();
+    SupervisorInput stop = healthy();
+    stop.request = Request::stop;
+    EXPECT_EQ(s.step(stop).mode, Mode::hold);
+    const auto out = after(s, change);
+    EXPECT_EQ(out.mode, Mode::land) << to_string(reason);
+    EXPECT_EQ(out.reason, reason);
+  }
+}
+
 /// A take-off was accepted a tick ago, and the motors run.
 Supervisor lifting() {
   Supervisor s = flying();
@@ -168,6 +201,9 @@ TEST(SupervisorFacts, WhatComesUpWhileEnablingEndsIt) {
       {Reason::operator_request, [](auto& in) { in.request = Request::stop, in.armed = true; }},
       {Reason::odometry_lost, [](auto& in) { in.odometry_age = 0.081; }},
       {Reason::odometry_jump, [](auto& in) { in.odometry_jump = true; }},
+      {Reason::odometry_inconsistent, [](auto& in) { in.odometry_inconsistent = true; }},
+      {Reason::pose_silent, [](auto& in) { in.pose_age = 0.31; }},
+      {Reason::closure_refused, [](auto& in) { in.closure_refused = true; }},
       {Reason::frame_mismatch_x, [](auto& in) { in.mismatch = Mismatch::x; }},
       {Reason::frame_mismatch_yaw, [](auto& in) { in.mismatch = Mismatch::yaw; }},
       {Reason::frame_mismatch_pitch, [](auto& in) { in.mismatch = Mismatch::pitch; }},

@@ -50,6 +50,7 @@ TEST(FlightTick, ArmsInTheTickThatAcceptsATakeoffAloneAndDisarmsOnTheGroundAlone
       Flight flight;
       flight.in.autopilot.armed = false;
       flight.step();  // disarmed: passive
+      flight.step();  // the vehicle was put elsewhere: its pose is believed again from the next tick on
       flight.in.request = Request::enable;
       flight.step();
       flight.step();
@@ -87,6 +88,7 @@ TEST(FlightTick, AStopDisarmsNoVehicleThatAPilotArmedOnTheGround) {
     flight.step();
     ASSERT_EQ(flight.out.supervisor.mode, Mode::passive);
     if (enabling) {
+      flight.step();  // the vehicle was put elsewhere: its pose is believed again from the next tick on
       flight.in.request = Request::enable;
       flight.step();
       ASSERT_EQ(flight.out.supervisor.mode, Mode::enabling);

@@ -95,5 +95,21 @@ TEST(TrackerLimits, AfterALoopClosureTheErrorIsJudgedAlongTheSetsOwnDirections) 
   EXPECT_EQ(tracker.held().v_W, Vec3::Zero());
 }
 
+// What is planned after a loop closure is in the map as it is now: it must not be moved by it once more.
+TEST(TrackerLimits, ASegmentOfTheNewMapFrameIsFlownWhereItWasPlanned) {
+  const AcceptedSegment before = along_x(1);
+  Tracker tracker({}, vehicle());
+  ASSERT_TRUE(tracker.accept(before, kStart));
+  const RigidShift D{0.5, {5, 6, 7}};
+  tracker.rebase(D, 1);
+  AcceptedSegment after = along_x(2);
+  after.continues = 1;
+  after.branch = 40;
+  after.closures = 1;
+  ASSERT_TRUE(tracker.accept(after, {}));
+  EXPECT_TRUE(tracker.shift().identity());
+  EXPECT_EQ(tracker.step().p_W, after.commands[0].p_W);
+}
+
 }  // namespace
 }  // namespace backwash::track
