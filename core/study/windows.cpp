@@ -179,7 +179,7 @@ tl::expected<FlightWindows, LogError> flight_windows(const FlightLog& log, const
   }
   flight.segments_from_log = log.has("segment");
   if (!log.has("thrust") && !log.has("motor1"))
-    flight.not_tested.push_back("saturated: no column 'thrust' or 'motor1' … 'motor4'");
+    flight.not_tested.emplace_back("saturated: no column 'thrust' or 'motor1' … 'motor4'");
 
   int next_segment = 0;
   for (const auto& rows : stretches) {
