@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace backwash::study {
-bool has_xyz(const FlightLog& log, const std::string& prefix, const std::string& unit) {
+bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit) {
   return log.has(prefix + "x" + unit) && log.has(prefix + "y" + unit) && log.has(prefix + "z" + unit);
 }
 
@@ -14,7 +14,7 @@ namespace {
 /// The rows of a log at even times.
 class Resampler {
  public:
-  Resampler(const FlightLog& log, Span rows, double rate) : log_(log) {
+  Resampler(const log::FlightLog& log, Span rows, double rate) : log_(log) {
     const auto& t = log.t_s;
     const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + 1e-6) + 1;
     std::size_t row = rows.begin;
@@ -46,7 +46,7 @@ class Resampler {
     std::size_t row, next;
     double share;
   };
-  const FlightLog& log_;
+  const log::FlightLog& log_;
   std::vector<At> at_;
 };
 
@@ -68,7 +68,8 @@ std::vector<Vec3> differentiated(const std::vector<Vec3>& x, double rate) {
 }
 
 /// a minus what the rotors produce on the commands, by the vehicle's gains, delays and lag.
-std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const FlightLog& log, const Vehicle& vehicle) {
+std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log::FlightLog& log,
+                                 const Vehicle& vehicle) {
   const auto& c = vehicle.controller;
   const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
   const auto cmd_p = rows.xyz("cmd_", "_m");
@@ -91,7 +92,7 @@ std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const Fli
 }
 
 /// Rows whose position is exactly that of the row before, at least four and 0.1 s in a row.
-std::vector<char> frozen_rows(const FlightLog& log, Span rows) {
+std::vector<char> frozen_rows(const log::FlightLog& log, Span rows) {
   const Rows &x = log.column("x_m"), &y = log.column("y_m"), &z = log.column("z_m");
   std::vector<char> frozen(rows.size());
   for (std::size_t i = rows.begin + 1; i < rows.end;) {
@@ -120,8 +121,8 @@ std::vector<int> found_segments(const std::vector<Vec3>& path, double rate, doub
 
 }  // namespace
 
-Even even_stretch(const FlightLog& log, Span raw, double rate, Signal signal, const std::optional<Vehicle>& vehicle,
-                  const WindowOptions& options, int& next_segment) {
+Even even_stretch(const log::FlightLog& log, Span raw, double rate, Signal signal,
+                  const std::optional<Vehicle>& vehicle, const WindowOptions& options, int& next_segment) {
   const Resampler rows(log, raw, rate);
   Even e{log.t_s[raw.begin], rate, rows.xyz("", "_m"), {}, rows.xyz("a", "_mps2"), {}, {}, {}, {}, {}, {}, {}};
   e.v = has_xyz(log, "v", "_mps") ? rows.xyz("v", "_mps") : differentiated(e.p, rate);

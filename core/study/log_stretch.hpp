@@ -29,11 +29,11 @@ struct Span {
   std::size_t size() const { return end - begin; }
 };
 
-bool has_xyz(const FlightLog& log, const std::string& prefix, const std::string& unit);
+bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit);
 
 /// Rows `raw` of a log (no gap inside) at even spacing 1/rate, with the disturbance as `signal` defines it
 /// (flight_windows() has the equation). New hover positions are numbered from `next_segment` on.
-Even even_stretch(const FlightLog& log, Span raw, double rate, Signal signal, const std::optional<Vehicle>& vehicle,
-                  const WindowOptions& options, int& next_segment);
+Even even_stretch(const log::FlightLog& log, Span raw, double rate, Signal signal,
+                  const std::optional<Vehicle>& vehicle, const WindowOptions& options, int& next_segment);
 
 }  // namespace backwash::study

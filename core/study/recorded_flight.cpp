@@ -11,17 +11,17 @@
 namespace backwash::study {
 namespace {
 
-tl::unexpected<LogError> bad(const std::string& what) {
-  return tl::make_unexpected(LogError{LogError::Kind::bad_data, "raw log: " + what});
+tl::unexpected<log::LogError> bad(const std::string& what) {
+  return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, "raw log: " + what});
 }
 
 struct Segment {
-  SegmentRecord head;
+  log::SegmentRecord head;
   Setpoint previous;
   std::vector<Setpoint> commands;
 };
 
-Segment segment_of(const RawRecord& record) {
+Segment segment_of(const log::RawRecord& record) {
   Segment s;
   std::memcpy(&s.head, record.bytes.data(), sizeof s.head);
   const std::size_t rows = (record.bytes.size() - sizeof s.head) / (10 * sizeof(double));
@@ -37,12 +37,12 @@ Segment segment_of(const RawRecord& record) {
   return s;
 }
 
-std::vector<const TickRecord*> ticks_of(std::span<const RawRecord> log, std::uint64_t id,
-                                        std::vector<std::int64_t>& times) {
-  std::vector<const TickRecord*> ticks;
-  for (const RawRecord& record : log) {
-    if (record.header.kind != RecordKind::tick) continue;
-    const auto* tick = payload<TickRecord>(record);
+std::vector<const log::TickRecord*> ticks_of(std::span<const log::RawRecord> log, std::uint64_t id,
+                                             std::vector<std::int64_t>& times) {
+  std::vector<const log::TickRecord*> ticks;
+  for (const log::RawRecord& record : log) {
+    if (record.header.kind != log::RecordKind::tick) continue;
+    const auto* tick = log::payload<log::TickRecord>(record);
     if (!tick || tick->segment != id) continue;
     ticks.push_back(tick);
     times.push_back(record.header.t_ns);
@@ -55,7 +55,7 @@ Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 /// Rows of the truth at a time, linear in between.
 class Truth {
  public:
-  explicit Truth(const FlightLog& log) : log_(log) {}
+  explicit Truth(const log::FlightLog& log) : log_(log) {}
   Vec3 at(double t, const char* x, const char* y, const char* z) const {
     const auto after = std::upper_bound(log_.t_s.begin(), log_.t_s.end(), t);
     const auto i = static_cast<std::size_t>(
@@ -69,12 +69,12 @@ class Truth {
   }
 
  private:
-  const FlightLog& log_;
+  const log::FlightLog& log_;
 };
 
-tl::expected<sim::FlightPiece, LogError> piece_of(std::span<const RawRecord> log, const Segment& segment,
-                                                  const Truth& truth, const plan::World& world, double t_zero,
-                                                  double z_safe) {
+tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawRecord> log, const Segment& segment,
+                                                       const Truth& truth, const plan::World& world, double t_zero,
+                                                       double z_safe) {
   sim::FlightPiece piece;
   piece.accepted.id = segment.head.id;
   piece.accepted.commands = segment.commands;
@@ -93,7 +93,7 @@ tl::expected<sim::FlightPiece, LogError> piece_of(std::span<const RawRecord> log
     piece.accepted.commands.push_back(piece.accepted.commands.back());
   }
   for (std::size_t k = 0; k < ticks.size(); ++k) {
-    const TickRecord& tick = *ticks[k];
+    const log::TickRecord& tick = *ticks[k];
     const reach::TubeStep& set = tube[k];
     if (tick.judged && (vec(tick.center) - set.center.p_W).norm() > 1e-6)
       return bad("tick " + std::to_string(tick.tick) + " was judged against another set than its commands give");
@@ -121,10 +121,10 @@ tl::expected<sim::FlightPiece, LogError> piece_of(std::span<const RawRecord> log
 
 }  // namespace
 
-tl::expected<map::OccupancyGrid, LogError> recorded_map(std::span<const RawRecord> log) {
+tl::expected<map::OccupancyGrid, log::LogError> recorded_map(std::span<const log::RawRecord> log) {
   for (auto record = log.rbegin(); record != log.rend(); ++record) {
-    if (record->header.kind != RecordKind::map) continue;
-    const auto* head = payload<MapRecord>(*record);
+    if (record->header.kind != log::RecordKind::map) continue;
+    const auto* head = log::payload<log::MapRecord>(*record);
     if (!head || !head->accepted) continue;
     const std::span data(reinterpret_cast<const std::int8_t*>(record->bytes.data()) + sizeof *head,
                          record->bytes.size() - sizeof *head);
@@ -135,14 +135,14 @@ tl::expected<map::OccupancyGrid, LogError> recorded_map(std::span<const RawRecor
   return bad("no map was accepted");
 }
 
-tl::expected<sim::Flight, LogError> recorded_flight(std::span<const RawRecord> log, const FlightLog& truth,
-                                                    const plan::World& world) {
+tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::RawRecord> log,
+                                                         const log::FlightLog& truth, const plan::World& world) {
   for (const char* name : {"x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "ax_mps2", "ay_mps2", "az_mps2"})
     if (!truth.has(name)) return bad(std::string("the truth has no column ") + name);
   if (truth.t_s.size() < 2) return bad("the truth has fewer than two rows");
   std::vector<Segment> segments;
-  for (const RawRecord& record : log)
-    if (record.header.kind == RecordKind::segment && record.bytes.size() >= sizeof(SegmentRecord))
+  for (const log::RawRecord& record : log)
+    if (record.header.kind == log::RecordKind::segment && record.bytes.size() >= sizeof(log::SegmentRecord))
       segments.push_back(segment_of(record));
   if (segments.size() != 2) return bad("needs one take-off and one route, has " + std::to_string(segments.size()));
   for (const Segment& s : segments)

@@ -129,10 +129,11 @@ const char* to_string(Gate gate) noexcept {
   return kNames[static_cast<std::size_t>(gate)];
 }
 
-tl::expected<FlightWindows, LogError> flight_windows(const FlightLog& log, const std::optional<Vehicle>& vehicle,
-                                                     const WindowOptions& options, const std::string& path) {
+tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& log,
+                                                          const std::optional<Vehicle>& vehicle,
+                                                          const WindowOptions& options, const std::string& path) {
   const auto bad = [&](const std::string& what) {
-    return tl::make_unexpected(LogError{LogError::Kind::bad_data, std::string(path).append(what)});
+    return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, std::string(path).append(what)});
   };
   for (const char* name : {"x_m", "y_m", "z_m", "ax_mps2", "ay_mps2", "az_mps2"}) {
     if (!log.has(name)) return bad(":1: no column '" + std::string(name) + "'; windows need position and acceleration");

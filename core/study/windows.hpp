@@ -8,8 +8,8 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "core/log/flight_log.hpp"
 #include "core/study/band.hpp"
-#include "core/study/flight_log.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -80,7 +80,8 @@ struct WindowOptions {
 /// neither each other nor a gated row; filters run over unbroken stretches of good windows alone. A gated window counts
 /// once, for the first of frozen, perched, saturated that holds. `path` names the log in errors: bad_data, with the
 /// column that is missing, time that does not rise, or a log shorter than a window. O(rows).
-tl::expected<FlightWindows, LogError> flight_windows(const FlightLog& log, const std::optional<Vehicle>& vehicle,
-                                                     const WindowOptions& options, const std::string& path);
+tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& log,
+                                                          const std::optional<Vehicle>& vehicle,
+                                                          const WindowOptions& options, const std::string& path);
 
 }  // namespace backwash::study

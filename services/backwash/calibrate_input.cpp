@@ -22,7 +22,7 @@ map::OccupancyGrid flat_floor() {
   return grid;
 }
 
-double value_of(const study::FlightLog& log, const std::string& column, double otherwise) {
+double value_of(const log::FlightLog& log, const std::string& column, double otherwise) {
   return log.has(column) && !log.column(column).empty() ? log.column(column).front() : otherwise;
 }
 

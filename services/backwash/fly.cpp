@@ -62,7 +62,7 @@ void write_log(const Options& options, const sim::Flight& flight) {
   auto samples = flight.take_off.samples;
   // The route's first sample is the take-off's last tick again.
   samples.insert(samples.end(), flight.route.samples.begin() + 1, flight.route.samples.end());
-  const auto written = study::write_csv(options.log, sim::to_log(samples), options.force);
+  const auto written = log::write_csv(options.log, sim::to_log(samples), options.force);
   if (!written) throw Failure(kCannotCreate, written.error().message);
 }
 

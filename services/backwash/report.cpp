@@ -16,17 +16,17 @@ struct Options {
 };
 
 template <typename T>
-T take(tl::expected<T, study::LogError> value) {
+T take(tl::expected<T, log::LogError> value) {
   if (value) return std::move(*value);
-  throw Failure(value.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, value.error().message);
+  throw Failure(value.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, value.error().message);
 }
 
 int run(const Options& options) {
   refuse_to_overwrite(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
-  const auto log = take(study::read_raw_log(options.log)).records;
-  const auto truth = take(study::read_csv(options.truth));
+  const auto log = take(log::read_raw_log(options.log)).records;
+  const auto truth = take(log::read_csv(options.truth));
   progress("building the world");
   const auto world =
       plan::build_world(take(study::recorded_map(log)), model, vehicle, reach::Method::tight, -1, run_parallel);

@@ -5,10 +5,10 @@
 #include <optional>
 #include <sstream>
 
+#include "core/log/ulog.hpp"
 #include "core/study/discrepancy/extend.hpp"
 #include "core/study/discrepancy/page.hpp"
 #include "core/study/discrepancy/rotor_reference.hpp"
-#include "core/study/ulog.hpp"
 #include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/study_output.hpp"
@@ -62,16 +62,16 @@ std::string earlier_terms(const std::string& path) {
 }
 
 /// A flight log: ULog by its name, else CSV.
-study::FlightLog read_flight(const std::string& path) {
+log::FlightLog read_flight(const std::string& path) {
   if (!path.ends_with(".ulg")) return read_table(path, "t_s");
-  auto log = study::read_ulog(path);
+  auto log = log::read_ulog(path);
   if (log) return std::move(*log);
-  throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
 }
 
 /// Flights, and the value of the column that they are grouped by in each one's first row; empty: none.
 struct Flights {
-  std::vector<study::FlightLog> logs;
+  std::vector<log::FlightLog> logs;
   std::vector<double> group;
 };
 

@@ -7,8 +7,8 @@
 #include <map>
 #include <sstream>
 
+#include "core/log/raw_log.hpp"
 #include "core/study/gain_sweep.hpp"
-#include "core/study/raw_log.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -75,13 +75,13 @@ struct Evidence {
 };
 
 Evidence evidence_of(const std::string& path) {
-  const auto log = study::read_raw_log(path);
+  const auto log = log::read_raw_log(path);
   if (!log)
-    throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+    throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
   Evidence evidence;
   for (const auto& record : log->records) {
-    study::TickRecord tick;
-    if (record.header.kind != study::RecordKind::tick || record.bytes.size() < sizeof tick) continue;
+    log::TickRecord tick;
+    if (record.header.kind != log::RecordKind::tick || record.bytes.size() < sizeof tick) continue;
     std::memcpy(&tick, record.bytes.data(), sizeof tick);
     evidence.judged += tick.judged != 0;
     evidence.inside += tick.judged != 0 && tick.inside != 0;

@@ -16,8 +16,8 @@ using namespace study::discrepancy;
 constexpr std::size_t kFlights = 11, kRows = 250;
 
 /// Hovers at three places of a room with lines between them, every column there is.
-study::FlightLog flown(Mutator& mutator) {
-  study::FlightLog log;
+log::FlightLog flown(Mutator& mutator) {
+  log::FlightLog log;
   const auto noise = [&](double size) { return size * (static_cast<double>(mutator.below(2001)) / 1000 - 1); };
   for (std::size_t k = 0; k < kRows; ++k) {
     const double t = 0.04 * static_cast<double>(k);
@@ -41,7 +41,7 @@ study::FlightLog flown(Mutator& mutator) {
 }
 
 /// A value, a stretch, a column, the clock or the end of one flight.
-void damage(study::FlightLog& log, Mutator& mutator) {
+void damage(log::FlightLog& log, Mutator& mutator) {
   constexpr double kExtreme[] = {0, -1, 1e-300, 1e6, -1e12, 1e150, -1.7e308, 0.1};
   const double value = kExtreme[mutator.below(std::size(kExtreme))];
   auto column = std::next(log.columns.begin(), static_cast<std::ptrdiff_t>(mutator.below(log.columns.size())));

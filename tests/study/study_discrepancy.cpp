@@ -9,14 +9,15 @@
 #include <fstream>
 
 #include "core/config/config.hpp"
+#include "core/log/import_crazypad.hpp"
 #include "core/map/load_map.hpp"
 #include "core/study/discrepancy/consequence.hpp"
 #include "core/study/discrepancy/extend.hpp"
-#include "core/study/import_crazypad.hpp"
 #include "tests/study_worlds/observe.hpp"
 
 namespace {
 
+using namespace backwash;
 using namespace backwash::study;
 using namespace backwash::study::discrepancy;
 
@@ -195,7 +196,7 @@ std::string crazypad(const std::string& name) { return std::string(BACKWASH_SHAR
 TEST(ImportCrazyPad, ConvertsUnitsAndNamesWhatIsMissing) {
   const std::string path = crazypad("normal__e8_log00.csv");
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
-  const auto log = import_crazypad(path);
+  const auto log = log::import_crazypad(path);
   ASSERT_TRUE(log) << log.error().message;
   for (const double u : log->column("motor3")) EXPECT_LE(u, 1.0);
   for (const double v : log->column("battery_v")) EXPECT_LT(std::abs(v - 3.8), 1.0);
@@ -206,8 +207,8 @@ TEST(ImportCrazyPad, TakesRecordingsWhoseYawIsNanAndInventsNoAttitude) {
   int without_yaw = 0;
   for (const auto& file : std::filesystem::directory_iterator(crazypad(""))) {
     if (file.path().extension() != ".csv") continue;
-    without_yaw += read_csv(file.path()) ? 0 : 1;
-    const auto log = import_crazypad(file.path());
+    without_yaw += log::read_csv(file.path()) ? 0 : 1;
+    const auto log = log::import_crazypad(file.path());
     ASSERT_TRUE(log) << log.error().message;
     for (const char* absent : {"qw", "yaw_deg", "roll_deg"}) EXPECT_FALSE(log->has(absent)) << absent;
   }
@@ -219,7 +220,7 @@ TEST(ImportCrazyPad, RefusesAColumnThatItNeedsAndThatIsNan) {
   const std::string path = (folder() / "nan.csv").string();
   std::ofstream(path) << "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_g,ay_g,az_g,roll_deg,yaw_deg,motor1,motor2,motor3,"
                          "motor4,battery_mV\n0,0,0,nan,0,0,0,0,0,0,0,nan,1,1,1,1,3800\n";
-  const auto log = import_crazypad(path);
+  const auto log = log::import_crazypad(path);
   ASSERT_FALSE(log);
   EXPECT_NE(log.error().message.find(":2: column 'z_m'"), std::string::npos) << log.error().message;
 }

@@ -17,8 +17,8 @@ using namespace backwash::study;
 using namespace backwash::study::discrepancy;
 
 /// 8 s at 50 Hz along x with a trembling that no gate should mind.
-FlightLog flown(double speed, double z) {
-  FlightLog log;
+log::FlightLog flown(double speed, double z) {
+  log::FlightLog log;
   std::mt19937 rng(1);
   std::normal_distribution<double> tremble(0, 0.002);
   for (int k = 0; k < 400; ++k) {
@@ -32,13 +32,13 @@ FlightLog flown(double speed, double z) {
   return log;
 }
 
-Observations observed(const FlightLog& log) {
+Observations observed(const log::FlightLog& log) {
   Observer observer(Vehicle{}, Model{}, nullptr);
   observer.add(log);
   return observer.finish();
 }
 
-void add_column(FlightLog& log, const std::string& name, double value) {
+void add_column(log::FlightLog& log, const std::string& name, double value) {
   log.columns[name].assign(log.t_s.size(), value);
 }
 

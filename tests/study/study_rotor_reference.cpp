@@ -10,8 +10,8 @@
 #include <map>
 #include <random>
 
+#include "core/log/import_crazypad.hpp"
 #include "core/study/discrepancy/rotor_reference.hpp"
-#include "core/study/import_crazypad.hpp"
 
 namespace {
 
@@ -138,7 +138,7 @@ std::map<std::string, std::vector<RotorContrasts>> recorded(const std::string& f
   vehicle.controller.kp = vehicle.controller.kd = {1, 1};
   for (const auto& file : std::filesystem::directory_iterator(folder)) {
     if (file.path().extension() != ".csv") continue;
-    const auto log = import_crazypad(file.path());
+    const auto log = log::import_crazypad(file.path());
     Observer observer(vehicle, Model{}, nullptr);
     observer.add(*log);
     const std::string name = file.path().stem().string();

@@ -152,8 +152,8 @@ std::vector<Hover> flown(const Corridors& corridors, std::size_t place, std::siz
   const sim::HoverFlight flight{{0, 0, 1}, seed, 0.35, sim::hover_points(points, seed)};
   const auto path =
       std::filesystem::temp_directory_path() / ("backwash_calibrate_" + std::to_string(::getpid()) + ".csv");
-  EXPECT_TRUE(write_csv(path, sim::to_log(sim::fly_hovers(grid, corridors.vehicle, flight)), true));
-  const auto log = read_csv(path);
+  EXPECT_TRUE(log::write_csv(path, sim::to_log(sim::fly_hovers(grid, corridors.vehicle, flight)), true));
+  const auto log = log::read_csv(path);
   std::filesystem::remove(path);
   const auto windows = flight_windows(*log, corridors.vehicle, {}, "log.csv");
   EXPECT_TRUE(windows);

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
+#include "core/log/import_airgarage.hpp"
 #include "core/study/calibrate/height_effect.hpp"
-#include "core/study/import_airgarage.hpp"
 
 namespace backwash::study::calibrate {
 namespace {
@@ -33,7 +33,7 @@ TEST(ImportAirgarage, DifferentiatesFramesThatArriveLateAndInBursts) {
       file << stamp << ",0,0," << 0.5 + 0.02 * std::sin(omega * t) << ",0,0,0,1\n";
     }
   }
-  const auto log = import_airgarage(path);
+  const auto log = log::import_airgarage(path);
   std::filesystem::remove(path);
   ASSERT_TRUE(log) << log.error().message;
   double power = 0;
@@ -134,7 +134,7 @@ std::vector<HeightRow> recorded(const std::filesystem::path& folder, double leng
   std::vector<HeightRow> rows;
   std::size_t number = 0;
   for (const auto& file : files) {
-    const auto log = import_airgarage(file);
+    const auto log = log::import_airgarage(file);
     if (!log) continue;
     const auto flight = flight_windows(*log, std::nullopt, options, file);
     if (!flight) continue;

@@ -16,7 +16,7 @@ namespace {
 
 Vehicle five_inch() { return config::load_vehicle("builtin:quad-5in").value(); }
 
-void add(FlightLog& log, const std::string& prefix, const std::string& unit, const Vec3& value) {
+void add(log::FlightLog& log, const std::string& prefix, const std::string& unit, const Vec3& value) {
   for (int axis = 0; axis < 3; ++axis)
     log.columns[prefix + std::string("xyz")[static_cast<std::size_t>(axis)] + unit].push_back(value[axis]);
 }
@@ -32,13 +32,13 @@ struct Tones {
 };
 
 /// A log of a real simulated vehicle that `push` shakes along x (and half as much along z), hovering at (1, 2, 1.5).
-FlightLog shaken(const Vehicle& vehicle, const Tones& push, double seconds, double steady = 0) {
+log::FlightLog shaken(const Vehicle& vehicle, const Tones& push, double seconds, double steady = 0) {
   const State start{Vec3(1, 2, 1.5), Vec3::Zero()};
   sim::Quadrotor quad(vehicle, start);
   const sim::EmulatedVio vio(0.015, 3);
   Setpoint hold;
   hold.p_W = start.p_W;
-  FlightLog log;
+  log::FlightLog log;
   State estimated = vio.estimate(start, 0);
   for (int k = 0; k * kControlPeriod < seconds; ++k) {
     log.t_s.push_back(k * kControlPeriod);
@@ -57,7 +57,7 @@ FlightLog shaken(const Vehicle& vehicle, const Tones& push, double seconds, doub
   return log;
 }
 
-void remove(FlightLog& log, const std::vector<std::string>& columns) {
+void remove(log::FlightLog& log, const std::vector<std::string>& columns) {
   for (const auto& name : columns) log.columns.erase(name);
 }
 
@@ -91,7 +91,7 @@ TEST(Windows, GiveTheDisturbanceThatShookTheVehicleBackFromItsSetPoints) {
 
 TEST(Windows, CountOnlyPowerWithinTheBand) {
   // Inside 2 Hz; below 0.05 Hz and, at 250 Hz rate, above 60 Hz: a thinned-out log would fold 60 Hz into the band.
-  FlightLog log;
+  log::FlightLog log;
   for (int k = 0; k < 250 * 61; ++k) {
     const double t = k / 250.0;
     log.t_s.push_back(t);
@@ -144,7 +144,7 @@ TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
   const auto w = autoregressive(std::exp(-0.001 / 0.2), 400000, 9);
   std::vector<double> logged;
   sim::Quadrotor quad(vehicle, {Vec3(0, 0, 1), Vec3::Zero()});
-  FlightLog log;
+  log::FlightLog log;
   for (std::size_t k = 0; k < w.size(); ++k) {
     quad.step({0.5 * w[k], 0, 0}, quad.state());
     if (k % 20 != 0) continue;
@@ -166,7 +166,7 @@ TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
 
 class Gates : public ::testing::Test {
  protected:
-  FlightLog log_ = shaken(five_inch(), {{{0.7, 0.4}, {3, 0.3}}}, 41);  // 1 s settling, 20 windows
+  log::FlightLog log_ = shaken(five_inch(), {{{0.7, 0.4}, {3, 0.3}}}, 41);  // 1 s settling, 20 windows
   FlightWindows cut() const {
     auto flight = flight_windows(log_, five_inch(), {}, "log.csv");
     EXPECT_TRUE(flight) << flight.error().message;
@@ -233,7 +233,7 @@ TEST_F(Gates, CountGapsAndTransit) {
 }
 
 TEST(Windows, FindHoverPositionsWithoutASegmentColumn) {
-  FlightLog log;
+  log::FlightLog log;
   std::mt19937_64 random(2);
   std::normal_distribution<double> noise;
   for (int k = 0; k < 3000; ++k) {  // hover at 0 for 20 s, 20 s at 0.3 m/s, hover at 6 m

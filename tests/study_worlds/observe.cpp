@@ -42,7 +42,7 @@ discrepancy::Observations observe(const World& world, const std::vector<Table>& 
   if (!last || last->key != key) last.emplace(key, folder / "map.bt", model);
   discrepancy::Observer observer(vehicle, last->surroundings);
   for (const Table& table : flights) {
-    backwash::study::FlightLog log;
+    backwash::log::FlightLog log;
     for (std::size_t c = 0; c < table.names.size(); ++c) {
       std::vector<double> column;
       for (const auto& row : table.rows) column.push_back(row[c]);

@@ -9,7 +9,7 @@ namespace backwash::study::discrepancy {
 namespace {
 
 /// Whether every rotor is told to stand still in some row: on the ground, or about to leave it.
-bool rotors_rest(const Series& s, const FlightLog& log, Stretch w) {
+bool rotors_rest(const Series& s, const log::FlightLog& log, Stretch w) {
   const auto [begin, end] = w;
   constexpr double kIdle = 0.05;  // of the full command
   std::array<const std::vector<double>*, 4> motors{};
@@ -24,7 +24,7 @@ bool rotors_rest(const Series& s, const FlightLog& log, Stretch w) {
 }
 
 /// Whether it stands on, or may touch, what it stood on at first (recordings that say where that is).
-bool touches(const Series& s, const FlightLog& log, Stretch w) {
+bool touches(const Series& s, const log::FlightLog& log, Stretch w) {
   const auto [begin, end] = w;
   constexpr double kClear = 0.005;  // m
   if (!log.has("stood_z_m")) return false;
@@ -48,7 +48,7 @@ bool under_way(const Series& s, Stretch w) {
 
 bool simulated(const Series& s) { return s.simulated_by_thrust || !s.a_nominal.empty(); }
 
-const char* gate(const Series& s, const FlightLog& log, Stretch w) {
+const char* gate(const Series& s, const log::FlightLog& log, Stretch w) {
   const auto [begin, end] = w;
   std::size_t repeated = 0, full = 0;
   for (std::size_t i = begin + 1; i < end; ++i)

@@ -77,7 +77,7 @@ Observer::Observer(const Vehicle& vehicle, Surroundings& surroundings)
   seen_.first.push_back(0);
 }
 
-void Observer::add(const FlightLog& log) {
+void Observer::add(const log::FlightLog& log) {
   const Series s = series_of(log, vehicle_);
   for (const auto& [name, column] : log.columns) ever_.insert(name);
   ++seen_.flights;
@@ -129,7 +129,7 @@ void Observer::put(std::size_t channel, double y, double weight) {
   seen_.y[channel].back() = y, seen_.weight[channel].back() = weight;
 }
 
-WindowRow Observer::placed(const FlightLog& log, const Series& s, Stretch w) {
+WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w) {
   WindowRow row{};
   const auto column_mean = [&](const char* name) {
     if (!log.has(name)) return 0.0;
@@ -201,7 +201,7 @@ void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_h
   }
 }
 
-void Observer::add_windows(const FlightLog& log, const Series& s, const RotorPhases& rotors,
+void Observer::add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
                            const std::vector<Stretch>& good) {
   std::vector<Residual> residuals;
   for (const Stretch w : good) {

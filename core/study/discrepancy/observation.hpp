@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/log/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/study/discrepancy/instrument.hpp"
 #include "core/study/discrepancy/rotor_channels.hpp"
@@ -15,7 +16,6 @@
 #include "core/study/discrepancy/stretch.hpp"
 #include "core/study/discrepancy/surroundings.hpp"
 #include "core/study/discrepancy/texture.hpp"
-#include "core/study/flight_log.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -113,14 +113,15 @@ class Observer {
   /// With surroundings that were looked at before, and are kept: studies of the same map share them.
   Observer(const Vehicle& vehicle, Surroundings& surroundings);
   Observer(const Observer&) = delete;
-  void add(const FlightLog& log);
+  void add(const log::FlightLog& log);
   Observations finish();
 
  private:
-  void add_windows(const FlightLog& log, const Series& s, const RotorPhases& rotors, const std::vector<Stretch>& good);
+  void add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
+                   const std::vector<Stretch>& good);
   /// Why the map leaves a window out: far outside of it, or in a solid (map and log contradict each other).
   const char* misplaced(const Series& s, Stretch w) const;
-  WindowRow placed(const FlightLog& log, const Series& s, Stretch w);
+  WindowRow placed(const log::FlightLog& log, const Series& s, Stretch w);
   void look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
   Residual put_means(const WindowRow& row, const Series& s, Stretch w);
   void put_delays(WindowRow& row, const Series& s, Stretch w);

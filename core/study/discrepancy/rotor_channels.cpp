@@ -22,7 +22,7 @@ double median(std::vector<double> x) {
 
 }  // namespace
 
-RotorPhases rotor_phases(const FlightLog& log, const Series& s) {
+RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
   RotorPhases phases;
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
     if (!log.has(name_of("rpm", rotor))) continue;
@@ -38,7 +38,7 @@ RotorPhases rotor_phases(const FlightLog& log, const Series& s) {
   return phases;
 }
 
-std::vector<RotorValue> rotor_values(const FlightLog& log, const Series& s, const RotorPhases& phases,
+std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
                                      std::size_t end) {
   std::vector<RotorValue> values;

@@ -11,7 +11,7 @@ namespace backwash::study::discrepancy {
 /// Phase of each rotor at every sample, rad: the integral of its rpm reading (median of three, so that a dropout does
 /// not turn it). Empty where the log has no such column.
 using RotorPhases = std::array<std::vector<double>, 4>;
-RotorPhases rotor_phases(const FlightLog& log, const Series& s);
+RotorPhases rotor_phases(const log::FlightLog& log, const Series& s);
 
 /// Value of a rotor channel (observation.hpp) in one window.
 struct RotorValue {
@@ -20,7 +20,7 @@ struct RotorValue {
 };
 /// Lines, motor shares, rpm against command and dropouts of the rows [begin, end). `residual`: detrended vertical
 /// residual of those rows, m/s².
-std::vector<RotorValue> rotor_values(const FlightLog& log, const Series& s, const RotorPhases& phases,
+std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
                                      std::size_t end);
 

@@ -9,11 +9,11 @@ namespace {
 
 using Rows = std::vector<std::size_t>;
 
-bool has3(const FlightLog& log, const char* x, const char* y, const char* z) {
+bool has3(const log::FlightLog& log, const char* x, const char* y, const char* z) {
   return log.has(x) && log.has(y) && log.has(z);
 }
 
-std::vector<Vec3> vectors(const FlightLog& log, const Rows& rows, const char* x, const char* y, const char* z) {
+std::vector<Vec3> vectors(const log::FlightLog& log, const Rows& rows, const char* x, const char* y, const char* z) {
   const auto &cx = log.column(x), &cy = log.column(y), &cz = log.column(z);
   std::vector<Vec3> out;
   out.reserve(rows.size());
@@ -36,7 +36,7 @@ struct Commands {
   std::vector<Vec3> p, v, a;
 };
 
-Commands commands_of(const FlightLog& log, const Rows& rows) {
+Commands commands_of(const log::FlightLog& log, const Rows& rows) {
   Commands c;
   c.p = vectors(log, rows, "cmd_x_m", "cmd_y_m", "cmd_z_m");
   c.v = has3(log, "cmd_vx_mps", "cmd_vy_mps", "cmd_vz_mps")
@@ -95,7 +95,7 @@ Rows rising_rows(const std::vector<double>& t) {
   return rows;
 }
 
-void read_motion(Series& s, const FlightLog& log, const Rows& rows) {
+void read_motion(Series& s, const log::FlightLog& log, const Rows& rows) {
   s.p = vectors(log, rows, "x_m", "y_m", "z_m");
   s.has_velocity = has3(log, "vx_mps", "vy_mps", "vz_mps");
   s.has_acceleration = has3(log, "ax_mps2", "ay_mps2", "az_mps2");
@@ -107,7 +107,7 @@ void read_motion(Series& s, const FlightLog& log, const Rows& rows) {
   s.a = s.has_acceleration ? vectors(log, rows, "ax_mps2", "ay_mps2", "az_mps2") : derivative(s.t, s.v, reach(0.06));
 }
 
-void read_attitude(Series& s, const FlightLog& log, const Rows& rows) {
+void read_attitude(Series& s, const log::FlightLog& log, const Rows& rows) {
   const auto &w = log.column("qw"), &x = log.column("qx"), &y = log.column("qy"), &z = log.column("qz");
   for (const auto i : rows) {
     Eigen::Quaterniond q(w[i], x[i], y[i], z[i]);
@@ -117,7 +117,7 @@ void read_attitude(Series& s, const FlightLog& log, const Rows& rows) {
 
 }  // namespace
 
-Series series_of(const FlightLog& log, const Vehicle& vehicle) {
+Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
   Series s;
   const Rows rows = rising_rows(log.t_s);
   for (const auto i : rows) s.t.push_back(log.t_s[i] - log.t_s[rows.front()]);

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -32,6 +32,6 @@ inline double thrust_share(const Vehicle& vehicle, double u) {
 }
 
 /// Reads a log. Rows must have growing stamps; those that do not are dropped. Positions must be there.
-Series series_of(const FlightLog& log, const Vehicle& vehicle);
+Series series_of(const log::FlightLog& log, const Vehicle& vehicle);
 
 }  // namespace backwash::study::discrepancy

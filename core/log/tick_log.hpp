@@ -5,11 +5,11 @@
 #include <memory>
 #include <span>
 
-#include "core/study/raw_log.hpp"
+#include "core/log/raw_log.hpp"
 #include "core/track/flight_tick.hpp"
 
 /// The control tick in the raw log: what went in, what came out, and the same again from the log alone.
-namespace backwash::study {
+namespace backwash::log {
 
 /// Bits of TickRecord::asked.
 enum Asked : std::uint32_t {
@@ -58,4 +58,4 @@ struct Replay {
 /// with the byte offset: no constants, an input without its tick, an offered segment that is not in the log.
 tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name);
 
-}  // namespace backwash::study
+}  // namespace backwash::log

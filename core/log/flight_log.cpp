@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 
 #include <charconv>
 #include <cmath>
@@ -11,9 +11,9 @@
 #include <string_view>
 #include <utility>
 
-#include "core/study/log_file.hpp"
+#include "core/log/log_file.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 std::string_view trimmed(std::string_view text) {
@@ -137,4 +137,4 @@ tl::expected<void, LogError> write_csv(const std::string& path, const FlightLog&
   return {};
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

@@ -7,11 +7,11 @@
 #include <iterator>
 #include <random>
 
-#include "core/study/ulog.hpp"
+#include "core/log/ulog.hpp"
 
 namespace {
 
-using namespace backwash::study;
+using namespace backwash::log;
 
 const std::string kFolder = std::string(BACKWASH_SHARED_DATA) + "/ulog/";
 

@@ -4,9 +4,9 @@
 #include <string>
 #include <tl/expected.hpp>
 
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 
 /// Reads one airgarage file (motion capture alone: t, x, y, z, qx … qw; 100 Hz frames, some missing, with the stamps of
 /// their arrival) as a flight log.
@@ -23,4 +23,4 @@ namespace backwash::study {
 /// date). Errors: missing file, columns or rows.
 tl::expected<FlightLog, LogError> import_airgarage(const std::string& path);
 
-}  // namespace backwash::study
+}  // namespace backwash::log

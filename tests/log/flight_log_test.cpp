@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 #include <fstream>
 #include <random>
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 using Kind = LogError::Kind;
@@ -126,4 +126,4 @@ TEST_F(FlightLogFile, NothingIsOverwrittenWithoutBeingTold) {
 }
 
 }  // namespace
-}  // namespace backwash::study
+}  // namespace backwash::log

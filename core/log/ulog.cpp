@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/ulog.hpp"
+#include "core/log/ulog.hpp"
 
 #include <algorithm>
 #include <cstring>
 #include <optional>
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 constexpr std::uint8_t kMagic[] = {0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35};
@@ -215,4 +215,4 @@ const ULog::Topic* ULog::find(const std::string& name, unsigned instance) const 
 
 tl::expected<ULog, std::string> decode_ulog(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/tick_log.hpp"
+#include "core/log/tick_log.hpp"
 
 #include <algorithm>
 #include <cstring>
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 enum Flag : std::uint32_t {
@@ -146,4 +146,4 @@ ConstantsRecord constants(const Vehicle& vehicle, double battery_land) noexcept 
           vehicle.initial_error.velocity, battery_land};
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

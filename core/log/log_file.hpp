@@ -2,12 +2,12 @@
 #pragma once
 
 #include "core/files/read_file.hpp"
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 
 /// The whole of a recorded file (files::read_file), its error as LogError: bad_data if it is too large, else not_found.
 tl::expected<std::string, LogError> read_log_file(const std::string& path, std::size_t most_bytes,
                                                   const std::string& wanted);
 
-}  // namespace backwash::study
+}  // namespace backwash::log

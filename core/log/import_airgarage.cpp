@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/import_airgarage.hpp"
+#include "core/log/import_airgarage.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 #include "core/types/geometry.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 constexpr double kFrame = 0.01;      // s
@@ -122,4 +122,4 @@ tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
   return log;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

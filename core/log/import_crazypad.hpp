@@ -4,9 +4,9 @@
 #include <string>
 #include <tl/expected.hpp>
 
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 
 /// Reads one CrazyPAD table (100 Hz; columns t_s, position, velocity, ax_g … acceleration of the state estimate in g
 /// with gravity removed, roll_deg, yaw_deg, motor1–4 of 0 … 65535, battery_mV) as a flight log: accelerations in m/s²,
@@ -15,4 +15,4 @@ namespace backwash::study {
 /// column, a cell of another column that is no finite number.
 tl::expected<FlightLog, LogError> import_crazypad(const std::string& path);
 
-}  // namespace backwash::study
+}  // namespace backwash::log

@@ -8,10 +8,10 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 #include "core/types/geometry.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 
 /// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is the line
 /// kRawLogMagic, then records: RecordHeader and `size` bytes, little-endian, no padding between records.
@@ -29,7 +29,7 @@ enum class RecordKind : std::uint32_t {
   segment = 9,      ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
   constants = 10,   ///< ConstantsRecord
   tick_input = 11,  ///< TickInputRecord: what the next tick record was decided from
-  offer = 12,       ///< OfferRecord …: a segment as it was offered to the control thread (core/study/tick_log.hpp)
+  offer = 12,       ///< OfferRecord …: a segment as it was offered to the control thread (core/log/tick_log.hpp)
   lost = 13,        ///< LostRecord: the disk did not take what came before
   scan = 14,        ///< text, one line: a scan was handed to the control thread and to the map worker
   world = 15,       ///< text, one line: a new snapshot was handed out
@@ -84,7 +84,7 @@ struct TickRecord {
   double cmd_p[3], cmd_v[3], cmd_a[3], cmd_yaw;          ///< command in the map frame
   double center[3], half_widths[kDirections];            ///< set predicted for this tick, m
   double local_p[3], local_v[3], local_a[3], local_yaw;  ///< command in the controller's frame
-  std::uint32_t asked;                                   ///< what was to be sent, bits as in study::Asked
+  std::uint32_t asked;                                   ///< what was to be sent, bits as in Asked
   std::uint32_t padding;
 };
 static_assert(sizeof(TickRecord) == 352);
@@ -108,7 +108,7 @@ struct TickInputRecord {
   double heartbeat_age, battery;
   double map_from_odom[4];  ///< yaw and translation of the newest loop closure
   std::int32_t missed_periods;
-  std::uint32_t request, flags, reset_counter;  ///< flags: core/study/tick_log.cpp
+  std::uint32_t request, flags, reset_counter;  ///< flags: core/log/tick_log.cpp
   std::uint32_t closures;
   float position_sigma;  ///< m; 0: not known
 };
@@ -135,4 +135,4 @@ const T* payload(const RawRecord& record) {
   return record.bytes.size() >= sizeof(T) ? reinterpret_cast<const T*>(record.bytes.data()) : nullptr;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/raw_log.hpp"
+#include "core/log/raw_log.hpp"
 
 #include <cstring>
 #include <string_view>
 
-#include "core/study/log_file.hpp"
+#include "core/log/log_file.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 
 tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
   constexpr std::uint32_t kLargest = 1u << 30;
@@ -37,4 +37,4 @@ tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
   return log;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

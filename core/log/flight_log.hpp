@@ -7,7 +7,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-namespace backwash::study {
+namespace backwash::log {
 
 /// A flight log by column (docs/interfaces.md, "Flight log, CSV"): SI units, world frame z-up. Columns that a log lacks
 /// are absent from the map, never zero.
@@ -33,4 +33,4 @@ tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::s
 /// Writes t_s first, then the columns in name order, with enough digits to read back bit for bit.
 tl::expected<void, LogError> write_csv(const std::string& path, const FlightLog& log, bool overwrite);
 
-}  // namespace backwash::study
+}  // namespace backwash::log

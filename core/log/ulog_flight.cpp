@@ -2,10 +2,10 @@
 #include <cmath>
 #include <span>
 
-#include "core/study/log_file.hpp"
-#include "core/study/ulog.hpp"
+#include "core/log/log_file.hpp"
+#include "core/log/ulog.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 /// Joins fields of other topics to the rows by the latest message before each.
@@ -122,4 +122,4 @@ tl::expected<FlightLog, LogError> read_ulog(const std::string& path) {
   return log;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

@@ -3,9 +3,9 @@
 #include <bit>
 #include <cstring>
 
-#include "core/study/tick_log.hpp"
+#include "core/log/tick_log.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 tl::unexpected<LogError> bad(const std::string& what) {
@@ -239,4 +239,4 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
   return result;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/import_crazypad.hpp"
+#include "core/log/import_crazypad.hpp"
 
 #include "core/types/geometry.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 namespace {
 
 constexpr struct {
@@ -46,4 +46,4 @@ tl::expected<FlightLog, LogError> import_crazypad(const std::string& path) {
   return log;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::log

@@ -8,9 +8,9 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "core/study/flight_log.hpp"
+#include "core/log/flight_log.hpp"
 
-namespace backwash::study {
+namespace backwash::log {
 
 /// A ULog file by topic. Values of every numeric field are kept as doubles; nested types and arrays become `name.field`
 /// and `name[3]`; padding is dropped.
@@ -41,4 +41,4 @@ tl::expected<ULog, std::string> decode_ulog(std::span<const std::uint8_t> bytes)
 /// is missing.
 tl::expected<FlightLog, LogError> read_ulog(const std::string& path);
 
-}  // namespace backwash::study
+}  // namespace backwash::log
