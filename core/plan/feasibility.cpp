@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/feasibility.hpp"
+#include "core/plan/feasibility.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,11 +9,11 @@
 
 #include "core/reach/clearance.hpp"
 
-namespace backwash::study {
+namespace backwash::plan {
 namespace {
 
 /// Clearance of the hover set at a voxel's centre, m.
-double clearance(const plan::World& world, const Index3& v) {
+double clearance(const World& world, const Index3& v) {
   const Vec3 p_W = world.grid.center(v);
   return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin).clearance;
 }
@@ -21,7 +21,7 @@ double clearance(const plan::World& world, const Index3& v) {
 const std::array<Index3, 6> kNeighbours = {Index3{1, 0, 0},  Index3{-1, 0, 0}, Index3{0, 1, 0},
                                            Index3{0, -1, 0}, Index3{0, 0, 1},  Index3{0, 0, -1}};
 
-Region flood(const plan::World& world, std::size_t seed, int number, std::vector<int>& of_voxel) {
+Region flood(const World& world, std::size_t seed, int number, std::vector<int>& of_voxel) {
   const auto& grid = world.grid;
   const Vec3 half = Vec3::Constant(grid.resolution() / 2);
   Region region;
@@ -58,14 +58,14 @@ struct Width {
   auto operator<=>(const Width&) const = default;
 };
 
-Width width(const plan::World& world, const Index3& v) {
+Width width(const World& world, const Index3& v) {
   if (world.hover.safe(v)) return {true, clearance(world, v)};
   return {false, world.distance.at(v)};
 }
 
 }  // namespace
 
-Regions hover_regions(const plan::World& world) {
+Regions hover_regions(const World& world) {
   Regions found{{}, std::vector<int>(world.grid.cell_count(), -1)};
   for (std::size_t i = 0; i < found.of_voxel.size(); ++i) {
     if (found.of_voxel[i] >= 0 || !world.hover.safe(world.grid.voxel(i))) continue;
@@ -88,7 +88,7 @@ Regions hover_regions(const plan::World& world) {
   return found;
 }
 
-std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_W, const Vec3& to_W) {
+std::optional<Bottleneck> widest_way(const World& world, const Vec3& from_W, const Vec3& to_W) {
   const auto& grid = world.grid;
   const Index3 from = grid.index(from_W), to = grid.index(to_W);
   if (!grid.free(from) || !grid.free(to)) return std::nullopt;
@@ -126,7 +126,7 @@ std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_
                     world.distance.exact(grid, place), length};
 }
 
-SetCost cost_of_set(const plan::World& world) {
+SetCost cost_of_set(const World& world) {
   const auto& [grid, reach] = std::tie(world.grid, world.reach);
   const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
   constexpr double kCap = 1.0;  // m, as hover_set's
@@ -153,7 +153,7 @@ SetCost cost_of_set(const plan::World& world) {
   return cost;
 }
 
-std::vector<AgainstMargin> set_against_margins(const plan::World& world, const std::vector<double>& margins_m) {
+std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m) {
   const auto& [grid, reach] = std::tie(world.grid, world.reach);
   const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
   std::vector<AgainstMargin> result;
@@ -179,7 +179,7 @@ std::vector<AgainstMargin> set_against_margins(const plan::World& world, const s
   return result;
 }
 
-std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions,
+std::optional<HoverPair> farthest_pair(const World& world, const Regions& regions,
                                        const std::function<bool(const Vec3&)>& can_take_off) {
   const auto& grid = world.grid;
   // One hover point a column: the voxel of the largest region with the largest clearance.
@@ -211,4 +211,4 @@ std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& 
   return HoverPair{start_W, candidates.front()};
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::plan

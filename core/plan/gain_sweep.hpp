@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
+#include "core/plan/feasibility.hpp"
 #include "core/plan/world.hpp"
-#include "core/study/feasibility.hpp"
 
-namespace backwash::study {
+namespace backwash::plan {
 
 /// A vehicle with other gains of its position loop, and what a way is for it.
 struct GainStep {
@@ -22,8 +22,8 @@ struct GainStep {
 
 /// The way from `start_W` to `goal_W` with the gains of `world`'s vehicle times `factor`, in the same airflow. Faster
 /// gains answer the wash sooner, until delay and lag make them answer too late. Cost: a hover map and a maximin search.
-GainStep with_gains(const plan::World& world, const Vec3& start_W, const Vec3& goal_W, double factor,
-                    const plan::Parallel& parallel = plan::run_serial);
+GainStep with_gains(const World& world, const Vec3& start_W, const Vec3& goal_W, double factor,
+                    const Parallel& parallel = run_serial);
 
 struct GainSweep {
   std::vector<GainStep> steps;       ///< in the order of `factors`
@@ -32,7 +32,7 @@ struct GainSweep {
 
 /// with_gains() for each factor (rising), and by bisection between the first that lets the vehicle through and the one
 /// before it the smallest that does.
-GainSweep sweep_gains(const plan::World& world, const Vec3& start_W, const Vec3& goal_W,
-                      const std::vector<double>& factors, const plan::Parallel& parallel = plan::run_serial);
+GainSweep sweep_gains(const World& world, const Vec3& start_W, const Vec3& goal_W, const std::vector<double>& factors,
+                      const Parallel& parallel = run_serial);
 
-}  // namespace backwash::study
+}  // namespace backwash::plan

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/gain_sweep.hpp"
+#include "core/plan/gain_sweep.hpp"
 
 #include <cmath>
 #include <stdexcept>
@@ -7,24 +7,24 @@
 
 #include "core/reach/hover_set.hpp"
 
-namespace backwash::study {
+namespace backwash::plan {
 
-GainStep with_gains(const plan::World& world, const Vec3& start_W, const Vec3& goal_W, double factor,
-                    const plan::Parallel& parallel) {
+GainStep with_gains(const World& world, const Vec3& start_W, const Vec3& goal_W, double factor,
+                    const Parallel& parallel) {
   Vehicle vehicle = world.reach.vehicle;
   auto& kp = vehicle.controller.kp;
   auto& kd = vehicle.controller.kd;
   kp = {factor * factor * kp.horizontal, factor * factor * kp.vertical};
   kd = {factor * kd.horizontal, factor * kd.vertical};
   GainStep step{factor, false, kp, kd, {}, {}};
-  plan::World faster = world;
+  World faster = world;
   try {
     faster.reach = reach::Reachability(vehicle, world.reach.method, world.reach.loop);
   } catch (const std::invalid_argument&) {
     return step;
   }
   step.stable = true;
-  faster = plan::with_clearance_by(std::move(faster), world.reach.method, world.constant_margin, parallel);
+  faster = with_clearance_by(std::move(faster), world.reach.method, world.constant_margin, parallel);
   step.way = widest_way(faster, start_W, goal_W);
   if (step.way)
     step.set = reach::hover_set(faster.reach, faster.grid, faster.distance, faster.bounds, step.way->place_W,
@@ -32,8 +32,8 @@ GainStep with_gains(const plan::World& world, const Vec3& start_W, const Vec3& g
   return step;
 }
 
-GainSweep sweep_gains(const plan::World& world, const Vec3& start_W, const Vec3& goal_W,
-                      const std::vector<double>& factors, const plan::Parallel& parallel) {
+GainSweep sweep_gains(const World& world, const Vec3& start_W, const Vec3& goal_W, const std::vector<double>& factors,
+                      const Parallel& parallel) {
   constexpr double kPrecision = 1.01;
   GainSweep sweep;
   for (const double factor : factors) {
@@ -55,4 +55,4 @@ GainSweep sweep_gains(const plan::World& world, const Vec3& start_W, const Vec3&
   return sweep;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::plan

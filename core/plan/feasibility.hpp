@@ -7,7 +7,7 @@
 
 #include "core/plan/world.hpp"
 
-namespace backwash::study {
+namespace backwash::plan {
 
 /// A set of hover-safe voxels joined through faces: from each of them a vehicle can, slowly, reach each other.
 struct Region {
@@ -25,7 +25,7 @@ struct Regions {
 };
 
 /// Connected components (6 neighbours) of the voxels where hovering is safe. O(cells).
-Regions hover_regions(const plan::World& world);
+Regions hover_regions(const World& world);
 
 /// The tightest place of the widest way between two points.
 struct Bottleneck {
@@ -39,7 +39,7 @@ struct Bottleneck {
 /// Maximin search (Dijkstra) over free voxels with 6 neighbours: the way whose tightest voxel is as wide as possible,
 /// hover-safe voxels before all others. Width is the clearance of the hover set, and the distance to obstacles where
 /// the set does not fit. Nothing if the points are not joined by free voxels. O(cells log cells).
-std::optional<Bottleneck> widest_way(const plan::World& world, const Vec3& from_W, const Vec3& to_W);
+std::optional<Bottleneck> widest_way(const World& world, const Vec3& from_W, const Vec3& to_W);
 
 /// What taking Σ over the set instead of at its centre costs (docs/model.md section 3).
 struct SetCost {
@@ -48,7 +48,7 @@ struct SetCost {
   double median_m = 0, quantile95_m = 0;  ///< clearance given up at the others with less than the cap, m
 };
 /// Precondition: method tight, no constant margin. O(voxels · prism_distance): offline.
-SetCost cost_of_set(const plan::World& world);
+SetCost cost_of_set(const World& world);
 
 /// The hover set against a ball of constant radius in its place, over the free voxels where body and estimation fit
 /// (distance > body.radius + estimation.position): where one holds the other, hovering safely with the larger implies
@@ -63,14 +63,14 @@ struct AgainstMargin {
   std::size_t only_set_safe = 0;    ///< and the other way round
 };
 /// One entry a margin. Precondition: no constant margin in the world. O(voxels · prism_distance): offline.
-std::vector<AgainstMargin> set_against_margins(const plan::World& world, const std::vector<double>& margins_m);
+std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m);
 
 /// Two hover points far apart in the largest region, one a column where its clearance is largest; the first one passes
 /// `can_take_off`. Deterministic for a world.
 struct HoverPair {
   Vec3 start_W, goal_W;
 };
-std::optional<HoverPair> farthest_pair(const plan::World& world, const Regions& regions,
+std::optional<HoverPair> farthest_pair(const World& world, const Regions& regions,
                                        const std::function<bool(const Vec3&)>& can_take_off);
 
-}  // namespace backwash::study
+}  // namespace backwash::plan

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/feasibility.hpp"
+#include "core/plan/feasibility.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,23 +10,22 @@
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
 
-namespace backwash::study {
+namespace backwash::plan {
 namespace {
 
 /// The narrow gap in coarse voxels: quick to build, and its only passage is known.
-const plan::World& narrow_gap() {
-  static const auto world =
-      plan::build_world(*map::builtin_scene("narrow-gap", 0.2), *config::load_model("builtin:quad-5in"),
-                        *config::load_vehicle("builtin:quad-5in"));
+const World& narrow_gap() {
+  static const auto world = build_world(*map::builtin_scene("narrow-gap", 0.2), *config::load_model("builtin:quad-5in"),
+                                        *config::load_vehicle("builtin:quad-5in"));
   return *world;
 }
 
-double clearance(const plan::World& world, const Index3& v) {
+double clearance(const World& world, const Index3& v) {
   return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v)).clearance;
 }
 
 /// Labels by repeated relaxation: slower than a flood, and nothing in common with it.
-std::vector<std::size_t> labels_where(const plan::World& world, double at_least) {
+std::vector<std::size_t> labels_where(const World& world, double at_least) {
   std::vector<std::size_t> label(world.grid.cell_count());
   std::iota(label.begin(), label.end(), std::size_t{0});
   const auto in = [&](const Index3& v) { return world.hover.safe(v) && clearance(world, v) >= at_least; };
@@ -112,4 +111,4 @@ TEST(FarthestPair, IsSafeAndFarApartAndStartsWhereOneCanTakeOff) {
 }
 
 }  // namespace
-}  // namespace backwash::study
+}  // namespace backwash::plan

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include "core/study/gain_sweep.hpp"
+#include "core/plan/gain_sweep.hpp"
 
-namespace backwash::study {
+namespace backwash::plan {
 namespace {
 
 using map::Cell;
@@ -23,7 +23,7 @@ Vehicle vehicle() {
 }
 
 /// A room 6 m long whose middle wall has a door of this width, and the same air everywhere.
-std::shared_ptr<const plan::World> room_with_door(double width, double variance) {
+std::shared_ptr<const World> room_with_door(double width, double variance) {
   constexpr double kVoxel = 0.1;
   OccupancyGrid grid({0, 0, 0}, kVoxel, {60, 30, 24}, Cell::free);
   const int half = static_cast<int>(std::lround(width / 2 / kVoxel));
@@ -32,7 +32,7 @@ std::shared_ptr<const plan::World> room_with_door(double width, double variance)
       if (j < 15 - half || j >= 15 + half) grid.set({30, j, k}, Cell::occupied);
   Model model;
   model.base.horizontal = model.base.vertical = variance;
-  return plan::build_world(std::move(grid), model, vehicle());
+  return build_world(std::move(grid), model, vehicle());
 }
 const Vec3 kStart(1.55, 1.55, 1.25), kGoal(4.55, 1.55, 1.25);
 
@@ -75,4 +75,4 @@ TEST(GainSweep, ADoorThatTheBodyAloneDoesNotPassIsPassedWithNoGains) {
 }
 
 }  // namespace
-}  // namespace backwash::study
+}  // namespace backwash::plan
