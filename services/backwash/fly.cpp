@@ -96,8 +96,8 @@ int run(const Options& options) {
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
   if (!options.log.empty()) write_log(options, *flight);
-  const study::ReportContext context{options.map,  options.model, options.vehicle, kVersion,
-                                     ends.start_W, ends.goal_W,   options.seed,    options.sigma_scale};
+  const report::ReportContext context{options.map,  options.model, options.vehicle, kVersion,
+                                      ends.start_W, ends.goal_W,   options.seed,    options.sigma_scale};
   return conclude({*flight, *world, context, sim::summarise(*flight, *world, ends.goal_W)}, options.report,
                   options.json, options.force);
 }

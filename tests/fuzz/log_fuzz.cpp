@@ -7,7 +7,7 @@
 
 #include "core/log/tick_log.hpp"
 #include "core/log/ulog.hpp"
-#include "core/study/recorded_flight.hpp"
+#include "core/report/recorded_flight.hpp"
 #include "tests/daemon/lockstep.hpp"
 #include "tests/fuzz/mutator.hpp"
 
@@ -82,7 +82,7 @@ TEST(Fuzz, ADamagedRawLogIsReplayedOrRefusedByItsByte) {
       const std::string& why = replayed.error().message;
       ASSERT_TRUE(why.find("byte ") != why.npos || why.find("no constants") != why.npos) << why;
     }
-    if (log) (void)study::recorded_map(log->records);
+    if (log) (void)report::recorded_map(log->records);
   }
   EXPECT_GT(outcome.taken, 0u);
 }
@@ -128,8 +128,8 @@ TEST(Fuzz, ADamagedFlightIsPutTogetherOrRefused) {
   truth.t_s = {0, 10};
   for (const char* c : {"x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "ax_mps2", "ay_mps2", "az_mps2"})
     truth.columns[c] = {0, 0};
-  ASSERT_TRUE(study::recorded_flight(whole, truth, *world))
-      << study::recorded_flight(whole, truth, *world).error().message;
+  ASSERT_TRUE(report::recorded_flight(whole, truth, *world))
+      << report::recorded_flight(whole, truth, *world).error().message;
   Outcome outcome;
   for (bool more = true; more;) {
     auto log = whole;
@@ -142,7 +142,7 @@ TEST(Fuzz, ADamagedFlightIsPutTogetherOrRefused) {
       bytes += log[at].bytes.size();
     }
     more = mutator.spend(bytes);
-    const auto flight = study::recorded_flight(log, truth, *world);
+    const auto flight = report::recorded_flight(log, truth, *world);
     ++(flight ? outcome.taken : outcome.refused);
     if (!flight) {
       ASSERT_FALSE(flight.error().message.empty());

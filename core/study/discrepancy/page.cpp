@@ -7,9 +7,9 @@
 #include <optional>
 #include <sstream>
 
+#include "core/report/page.hpp"
 #include "core/study/discrepancy/page_sections.hpp"
 #include "core/study/discrepancy/self_test.hpp"
-#include "core/study/page.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {
@@ -71,7 +71,7 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
 }
 
 /// Residual of the cause's first channel against its variable, before and after, with means of twelve groups.
-tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Observations& seen) {
+tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, const Observations& seen) {
   const auto& found = cause.found;
   const Channel channel = found.columns.front().parts.front().channel;
   const auto along = named_variable(found.form->cause);
@@ -113,7 +113,7 @@ tl::expected<std::string, PlotError> picture(const NamedCause& cause, const Obse
          << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
          << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
          << "$lines using 1:3 with linespoints lw 3 pt 7 lc rgb '#1f6f9f' title 'after'\n";
-  return draw(script.str(), Format::svg, 860, 380);
+  return report::draw(script.str(), report::Format::svg, 860, 380);
 }
 
 std::string figures(const NamedCause& cause) {
@@ -148,7 +148,8 @@ std::string consequence_section(const Consequence& c) {
       "<section><h2>What it changes for a flight</h2>\n<table>\n<tr><th></th><td style=\"width:22%\"><b>before</b></td>"
       "<td><b>after</b></td></tr>\n";
   const auto line = [&](const std::string& name, const std::string& before, const std::string& after) {
-    text += "<tr><th>" + escaped(name) + "</th><td>" + escaped(before) + "</td><td>" + escaped(after) + "</td></tr>\n";
+    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(before) + "</td><td>" +
+            report::escaped(after) + "</td></tr>\n";
   };
   line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
   line("Hover sets: centre off its set-point, median (95 %)",
@@ -180,24 +181,24 @@ std::string remaining_section(const std::vector<Dependence>& all) {
 
 }  // namespace
 
-tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
-                                                const PageContext& context) {
+tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
+                                                        const PageContext& context) {
   std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
   if (context.height) beside = height_sentence(*context.height);
   if (!beside.empty()) beside.insert(0, " ");
-  page += "<p class=\"context\">Map " + escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
-          escaped(context.vehicle) + ", model " + escaped(context.model) + "; backwash " + escaped(context.version) +
-          "</p>\n<p class=\"verdict " +
+  page += "<p class=\"context\">Map " + report::escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
+          report::escaped(context.vehicle) + ", model " + report::escaped(context.model) + "; backwash " +
+          report::escaped(context.version) + "</p>\n<p class=\"verdict " +
           (result.verdict == Verdict::cause_found || (result.verdict == Verdict::nothing_found && beside.empty())
                ? "passed"
                : "failed") +
-          "\">" + (context.rotors ? escaped(rotor_sentence(*context.rotors)) + " " : "") +
-          escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
+          "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
+          report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());
-    page += "<section><h2>" + escaped(spoken(cause.found.form->cause)) + "</h2>\n<p>" +
-            escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
+    page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause)) + "</h2>\n<p>" +
+            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
   }
   if (context.height) page += height_section(*context.height);
   if (context.rotors) {
@@ -231,7 +232,7 @@ tl::expected<std::string, PlotError> study_page(const StudyResult& result, const
     for (const auto& rival : cause.found.rivals) told.push_back(rival.name);
   }
   page += self_test_section(told);
-  return html_page("backwash study", page);
+  return report::html_page("backwash study", page);
 }
 
 }  // namespace backwash::study::discrepancy

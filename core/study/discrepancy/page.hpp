@@ -3,11 +3,11 @@
 
 #include <optional>
 
+#include "core/report/plot.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/study/discrepancy/consequence.hpp"
 #include "core/study/discrepancy/rotor_reference.hpp"
 #include "core/study/discrepancy/study.hpp"
-#include "core/study/plot.hpp"
 
 namespace backwash::study::discrepancy {
 
@@ -23,7 +23,7 @@ struct PageContext {
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,
 /// gain, what reach and plan make of it, rivals and the flight to fly next, what was not tested, smallest effects that
 /// would have been found. Error: a figure that could not be drawn.
-tl::expected<std::string, PlotError> study_page(const StudyResult& result, const Observations& seen,
-                                                const PageContext& context);
+tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
+                                                        const PageContext& context);
 
 }  // namespace backwash::study::discrepancy

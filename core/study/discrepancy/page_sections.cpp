@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <sstream>
 
+#include "core/report/page.hpp"
 #include "core/study/discrepancy/study.hpp"
-#include "core/study/page.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {
@@ -43,7 +43,7 @@ std::string number(double value) {
 }
 
 std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + escaped(name) + "</th><td>" + escaped(value) + "</td></tr>\n";
+  return "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value) + "</td></tr>\n";
 }
 
 std::string too_few(const Observations& seen) {
@@ -82,7 +82,7 @@ std::string rotor_sentence(const RotorVerdict& v) {
   }
 }
 
-tl::expected<std::string, PlotError> rotor_section(const RotorVerdict& v) {
+tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& v) {
   std::ostringstream script;
   script << "$each << EOD\n";
   for (std::size_t r = 0; r < v.each.size(); ++r)
@@ -92,10 +92,11 @@ tl::expected<std::string, PlotError> rotor_section(const RotorVerdict& v) {
             "1 lc rgb '#888888'\n"
          << "plot " << 100 * v.minimum << " with lines dt 2 lw 2 lc rgb '#c0561d' title 'named four times in five', "
          << "$each using 1:2:3:4 with yerrorbars lw 2 pt 7 lc rgb '#1f6f9f' title 'if this rotor alone, 95 %'\n";
-  const auto drawn = draw(script.str(), Format::svg, 860, 300);
+  const auto drawn = report::draw(script.str(), report::Format::svg, 860, 300);
   if (!drawn) return drawn;
-  return "<section><h2>Rotors against sound flights</h2>\n<p>" + escaped(rotor_sentence(v)) + "</p>\n" + *drawn +
-         "<table>\n" + row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
+  return "<section><h2>Rotors against sound flights</h2>\n<p>" + report::escaped(rotor_sentence(v)) + "</p>\n" +
+         *drawn + "<table>\n" +
+         row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
          row("Smallest that is named with 80 % power", percent(v.minimum)) +
          row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
          row("Twist, which a weight does not give, t", number(v.t_yaw)) +
@@ -120,8 +121,8 @@ std::string height_section(const calibrate::HeightEffects& effects) {
       "intervals by resampling flights. The variance of a pass holds its own acceleration: the hovers alone do "
       "not.</p>\n<table>\n<tr><th></th><td><b>hovers and passes</b></td><td><b>hovers</b></td></tr>\n";
   const auto line = [&](const std::string& name, auto value) {
-    text += "<tr><th>" + escaped(name) + "</th><td>" + escaped(value(all)) + "</td><td>" +
-            escaped(slow ? value(*slow) : "none") + "</td></tr>\n";
+    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value(all)) + "</td><td>" +
+            report::escaped(slow ? value(*slow) : "none") + "</td></tr>\n";
   };
   const std::string contrast = number(all.low_m) + " m over the surface against " + number(all.high_m) + " m";
   line(contrast + ", by a law of height", [](auto& h) { return ratio(h.low_over_high); });

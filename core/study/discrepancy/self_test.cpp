@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "core/report/page.hpp"
 #include "core/study/discrepancy/page_sections.hpp"
-#include "core/study/page.hpp"
 
 namespace backwash::study::discrepancy {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/figure_parts.hpp"
+#include "core/report/figure_parts.hpp"
 
 #include <algorithm>
 #include <sstream>
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 map::Cell column(const map::OccupancyGrid& grid, int i, int j, int k_low, int k_high) {
@@ -56,4 +56,4 @@ std::string plot_cells() {
          "$occupied with boxxyerror fillstyle solid noborder linecolor '#3c3c42' title 'occupied', ";
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

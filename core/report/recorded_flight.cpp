@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/recorded_flight.hpp"
+#include "core/report/recorded_flight.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include "core/map/octomap_message.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 tl::unexpected<log::LogError> bad(const std::string& what) {
@@ -177,4 +177,4 @@ tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::Ra
   return flight;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/page.hpp"
+#include "core/report/page.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 const char* const kStyle = R"(
@@ -45,4 +45,4 @@ std::string html_page(const std::string& title, const std::string& body) {
          "</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n<main>\n" + body + "</main>\n</body>\n</html>\n";
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

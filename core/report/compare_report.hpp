@@ -7,10 +7,10 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "core/report/plot.hpp"
 #include "core/sim/compare_statistics.hpp"
-#include "core/study/plot.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 
 /// Everything `backwash compare` found.
 struct Comparison {
@@ -36,4 +36,4 @@ tl::expected<std::string, PlotError> gap_figure(const sim::GapCampaign& gap);
 /// One self-contained HTML page: what was demanded, Table I, the ratios, the narrow gap, each scene.
 tl::expected<std::string, PlotError> comparison_report(const Comparison& comparison);
 
-}  // namespace backwash::study
+}  // namespace backwash::report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/plot.hpp"
+#include "core/report/plot.hpp"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -13,7 +13,7 @@
 
 extern char** environ;
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 /// A new folder that goes when this goes.
@@ -84,4 +84,4 @@ tl::expected<std::string, PlotError> draw(const std::string& script, Format form
   return drawn;
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
+#include "core/report/plot.hpp"
 #include "core/sim/flight.hpp"
-#include "core/study/plot.hpp"
 #include "core/types/disturbance.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 
 using Figure = tl::expected<std::string, PlotError>;
 
@@ -43,4 +43,4 @@ Figure clearance_figure(const sim::Flight& flight, const plan::World& world);
 /// Corners of {e : |unit(d)·e| ≤ h_d} seen from above, relative to its centre, counter-clockwise, m.
 std::vector<Vec3> octagon(const PerDirection& half_widths);
 
-}  // namespace backwash::study
+}  // namespace backwash::report

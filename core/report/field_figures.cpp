@@ -4,10 +4,10 @@
 #include <limits>
 #include <sstream>
 
-#include "core/study/figure_parts.hpp"
-#include "core/study/figures.hpp"
+#include "core/report/figure_parts.hpp"
+#include "core/report/figures.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
@@ -133,4 +133,4 @@ Figure flight_field_figure(const sim::Flight& flight, const plan::World& world) 
   return draw(script.str(), Format::svg, 1000, std::clamp(static_cast<int>(820 * ratio) + 130, 300, 1100));
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

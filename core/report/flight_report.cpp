@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/report.hpp"
+#include "core/report/flight_report.hpp"
 
 #include <cstdio>
 
-#include "core/study/page.hpp"
+#include "core/report/page.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 std::string number(double value, int decimals, const char* unit) {
@@ -102,4 +102,4 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
   return html_page("backwash flight", page + table(flight, summary));
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

@@ -3,11 +3,11 @@
 
 #include <string>
 
-namespace backwash::study {
+namespace backwash::report {
 
 /// A self-contained HTML page around a body of h1, p.context, p.verdict (passed, failed), sections, tables and figures.
 std::string html_page(const std::string& title, const std::string& body);
 /// Text that may stand inside HTML.
 std::string escaped(const std::string& text);
 
-}  // namespace backwash::study
+}  // namespace backwash::report

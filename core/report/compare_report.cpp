@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/compare_report.hpp"
+#include "core/report/compare_report.hpp"
 
 #include <cstdio>
 #include <sstream>
 
-#include "core/study/page.hpp"
+#include "core/report/page.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 std::string text(const char* format, auto... values) {
@@ -142,4 +142,4 @@ tl::expected<std::string, PlotError> comparison_report(const Comparison& c) {
   return html_page("backwash compare", body + by_scene(c));
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

@@ -5,7 +5,7 @@
 
 #include "core/map/occupancy_grid.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 
 /// Axes, tics and grid of every figure.
 inline constexpr const char* kAxes =
@@ -23,4 +23,4 @@ std::string view_from_above(const map::OccupancyGrid& grid, const Index3& first,
 /// The part of a plot command that draws those blocks, a comma at its end.
 std::string plot_cells();
 
-}  // namespace backwash::study
+}  // namespace backwash::report

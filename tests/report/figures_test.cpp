@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/figures.hpp"
+#include "core/report/figures.hpp"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <random>
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 TEST(Octagon, HasTheHalfWidthsAsItsSupports) {
@@ -82,4 +82,4 @@ TEST(FieldSliceFigure, ShowsThreePanelsWithUnits) {
 }
 
 }  // namespace
-}  // namespace backwash::study
+}  // namespace backwash::report

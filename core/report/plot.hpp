@@ -4,7 +4,7 @@
 #include <string>
 #include <tl/expected.hpp>
 
-namespace backwash::study {
+namespace backwash::report {
 
 /// Why a figure could not be drawn; one line that says what would be right (gnuplot missing, or its own words).
 struct PlotError {
@@ -17,4 +17,4 @@ enum class Format { svg, png };
 /// picture: SVG text without XML prolog, ready to stand inside HTML, or PNG bytes. Sizes in pixels. About 50 ms.
 tl::expected<std::string, PlotError> draw(const std::string& script, Format format, int width, int height);
 
-}  // namespace backwash::study
+}  // namespace backwash::report

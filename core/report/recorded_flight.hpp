@@ -8,7 +8,7 @@
 #include "core/plan/world.hpp"
 #include "core/sim/flight.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 
 /// The map that the daemon flew with: the last one it accepted. Error: bad_data if there is none or it cannot be read.
 tl::expected<map::OccupancyGrid, log::LogError> recorded_map(std::span<const log::RawRecord> log);
@@ -20,4 +20,4 @@ tl::expected<map::OccupancyGrid, log::LogError> recorded_map(std::span<const log
 tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::RawRecord> log,
                                                          const log::FlightLog& truth, const plan::World& world);
 
-}  // namespace backwash::study
+}  // namespace backwash::report

@@ -4,10 +4,10 @@
 #include <optional>
 #include <sstream>
 
-#include "core/study/compare_report.hpp"
-#include "core/study/figure_parts.hpp"
+#include "core/report/compare_report.hpp"
+#include "core/report/figure_parts.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 std::string short_metres(double value) {
@@ -90,4 +90,4 @@ tl::expected<std::string, PlotError> gap_figure(const sim::GapCampaign& gap) {
   return draw(script.str(), Format::svg, 1000, 720);
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

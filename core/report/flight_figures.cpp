@@ -4,10 +4,10 @@
 #include <limits>
 #include <sstream>
 
-#include "core/study/figure_parts.hpp"
-#include "core/study/figures.hpp"
+#include "core/report/figure_parts.hpp"
+#include "core/report/figures.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 namespace {
 
 const char* const kFlown = "linewidth 2 linecolor '#0b3d91'";
@@ -191,4 +191,4 @@ Figure clearance_figure(const sim::Flight& flight, const plan::World& world) {
   return draw(script.str(), Format::svg, 1000, 320);
 }
 
-}  // namespace backwash::study
+}  // namespace backwash::report

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/study/figures.hpp"
+#include "core/report/figures.hpp"
 
-namespace backwash::study {
+namespace backwash::report {
 
 /// What a report says beside the flight itself.
 struct ReportContext {
@@ -22,4 +22,4 @@ struct ReportContext {
 tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
                                                    const plan::World& world, const ReportContext& context);
 
-}  // namespace backwash::study
+}  // namespace backwash::report
