@@ -4,14 +4,14 @@
 
 #include <cmath>
 
-#include "core/study/discrepancy/page.hpp"
-#include "core/study/discrepancy/study.hpp"
+#include "core/study/findings/study.hpp"
+#include "core/study/findings/study_page.hpp"
 #include "tests/fuzz/mutator.hpp"
 
 namespace backwash::fuzz {
 namespace {
 
-using namespace study::discrepancy;
+using namespace study;
 
 constexpr std::size_t kFlights = 11, kRows = 250;
 
@@ -88,7 +88,7 @@ TEST(Fuzz, AStudyOfAnyFiniteNumbersEndsWithAVerdict) {
     StudyOptions options;
     options.minimum_detectable = false;
     options.search.flips = 40;
-    const auto result = study::discrepancy::study(seen, options);
+    const auto result = study::study(seen, options);
     for (const auto& cause : result.causes)
       for (const auto& p : cause.found.parameters)
         EXPECT_TRUE(std::isfinite(p.value) && std::isfinite(p.low) && std::isfinite(p.high))

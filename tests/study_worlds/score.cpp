@@ -78,9 +78,9 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   const auto tables = fly_all(world);
   const auto seen = observe(world, tables, folder);
   const double observed = cpu();
-  backwash::study::discrepancy::StudyOptions options;
+  backwash::study::StudyOptions options;
   options.minimum_detectable = options.dependence = false;
-  const auto result = backwash::study::discrepancy::study(seen, options);
+  const auto result = backwash::study::study(seen, options);
   out.world_s = observed - start, out.study_s = cpu() - observed;
   out.sets = sets_of(result);
   for (const auto& u : result.unknown) out.unknown.push_back(u.along);

@@ -7,7 +7,7 @@
 
 #include "core/log/flight_log.hpp"
 #include "core/study/calibrate/calibrate.hpp"
-#include "core/study/windows.hpp"
+#include "core/study/windows/hover_windows.hpp"
 
 namespace backwash::study::calibrate {
 
