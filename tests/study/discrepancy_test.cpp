@@ -128,7 +128,7 @@ TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
   const auto result = studied(seen);
   {
     std::FILE* file = std::fopen(path.c_str(), "w");
-    std::fputs(extended_model_text(model, result, seen, "builtin:quad-5in", "test").c_str(), file);
+    std::fputs(extended_model_text(model, result, seen, "it's \"my\" model.toml", "test").c_str(), file);
     std::fclose(file);
   }
   const auto read = backwash::config::load_model(path);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "core/config/model_table.hpp"
 #include "core/study/calibrate/model_text.hpp"
 
 namespace backwash::study {
@@ -50,46 +51,31 @@ ModelEffect flown_range(const Accepted& cause, const Observations& seen) {
           Vec3(0, 0, (*high - *low) / 2 + (size > 0 ? most * half_width(first) / size : 0)), 0};
 }
 
-const char* name_of(Kind kind) {
-  switch (kind) {
-    case Kind::push:
-      return "push";
-    case Kind::push_over_surface:
-      return "push_over_surface";
-    case Kind::push_under_surface:
-      return "push_under_surface";
-    case Kind::push_to_walls:
-      return "push_to_walls";
-    case Kind::push_against_velocity:
-      return "push_against_velocity";
-    case Kind::push_with_speed:
-      return "push_with_speed";
-    case Kind::ln_variance:
-      return "ln_variance";
-    case Kind::ln_variance_under_surface:
-      return "ln_variance_under_surface";
-    default:
-      return "ln_variance_with_speed";
-  }
+/// Numbers to eight significant digits.
+toml::array list(std::initializer_list<double> values) {
+  toml::array all;
+  for (const double v : values) all.push_back(config::rounded(v, 8));
+  return all;
 }
 
-/// Inline table of an effect, as config::load_model reads it; numbers within what it accepts.
-std::string text_of(const ModelEffect& e) {
-  std::ostringstream text;
-  text.precision(8);
-  text << std::showpoint;
-  const auto list = [&](const Vec3& v, double least) {
-    const int count = e.kind == Kind::push ? 3 : 1;
-    for (int i = 0; i < count; ++i) text << (i ? ", " : "[") << std::clamp(v[i], least, 10.0);
-    text << "]";
-  };
-  text << "{ kind = '" << name_of(e.kind) << "', value = ";
-  list(e.value, -10);
-  text << ", error = ";
-  list(e.error, 0);
-  if (e.scale > 0) text << ", scale = " << std::clamp(e.scale, 0.01, 10.0);
-  text << " }";
-  return text.str();
+/// A cause as an entry of [[extension.term]].
+toml::table table_of(const NamedCause& cause, const Observations& seen) {
+  const auto& f = cause.found;
+  toml::array theta, effects;
+  for (const double v : f.theta) theta.push_back(config::rounded(v, 8));
+  for (const auto& e : effects_of(cause, seen)) effects.push_back(config::effect_table(e));
+  toml::table term{{"cause", f.form->cause},
+                   {"form", f.form->formula},
+                   {"scale", config::rounded(f.scale, 8)},
+                   {"held_out_nats", config::rounded(cause.gain.held_out_nats, 8)},
+                   {"theta", theta},
+                   {"effect", effects}};
+  for (const auto& e : f.parameters) {
+    toml::table estimate{{"value", config::rounded(e.value, 8)}, {"ci95", list({e.low, e.high})}};
+    estimate.is_inline(true);
+    term.insert(e.name, std::move(estimate));
+  }
+  return term;
 }
 
 }  // namespace
@@ -165,26 +151,17 @@ Model extended(const Model& model, const StudyResult& result, const Observations
 
 std::string extended_model_text(const Model& model, const StudyResult& result, const Observations& seen,
                                 const std::string& base_name, const std::string& version, const std::string& earlier) {
+  const toml::table provenance{{"version", version},
+                               {"base_model", base_name},
+                               {"flights", static_cast<std::int64_t>(seen.flights)},
+                               {"verdict", to_string(result.verdict)}};
   std::ostringstream text;
-  text.precision(8);
   text << "# Extended by backwash study. Variances in (m/s²)², lengths in m, angles in rad.\n"
-       << calibrate::model_tables(model) << "[provenance]\nversion = '" << version << "'\nbase_model = '" << base_name
-       << "'\nflights = " << seen.flights << "\nverdict = '" << to_string(result.verdict) << "'\n";
-  if (!earlier.empty()) text << '\n' << earlier << '\n';
-  for (const auto& cause : result.causes) {
-    const auto& f = cause.found;
-    text << "\n[[extension.term]]\ncause = '" << f.form->cause << "'\nform = '" << f.form->formula
-         << "'\nscale = " << std::showpoint << f.scale << "\nheld_out_nats = " << cause.gain.held_out_nats
-         << "\ntheta = [";
-    for (Eigen::Index k = 0; k < f.theta.size(); ++k) text << (k ? ", " : "") << f.theta[k];
-    text << "]\neffect = [";
-    const char* between = "";
-    for (const auto& e : effects_of(cause, seen)) text << between << text_of(e), between = ", ";
-    text << "]\n";
-    for (const auto& e : f.parameters)
-      text << e.name << " = { value = " << e.value << ", ci95 = [" << e.low << ", " << e.high << "] }\n";
-    text << std::noshowpoint;
-  }
+       << calibrate::model_tables(model) << config::text_of(toml::table{{"provenance", provenance}}, {"provenance"});
+  if (!earlier.empty()) text << earlier << "\n\n";
+  toml::array terms;
+  for (const auto& cause : result.causes) terms.push_back(table_of(cause, seen));
+  if (!terms.empty()) text << config::text_of(toml::table{{"extension", toml::table{{"term", terms}}}}, {"extension"});
   return text.str();
 }
 
