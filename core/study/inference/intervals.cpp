@@ -4,14 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/windows/distributions.hpp"
+
 namespace backwash::study {
 
-double student_975(double n) {
-  // Cornish–Fisher about the normal quantile; below 0.2 % off from 5 degrees up.
-  const double z = 1.959964, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-  return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) +
-         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
-}
+double student_975(double degrees) { return student_quantile(0.975, degrees); }
 
 Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
   double total = 0, value = 0, low = guesses.front().value, high = low;

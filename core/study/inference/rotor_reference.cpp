@@ -7,21 +7,10 @@
 #include <numeric>
 
 #include "core/study/inference/estimate.hpp"
+#include "core/study/windows/distributions.hpp"
 
 namespace backwash::study {
 namespace {
-
-/// Quantile 1 − 0.05/4 of Student's t: Cornish–Fisher about the normal's, within 1 % from 4 degrees on.
-double student_of_four(double n) {
-  const double z = 2.2414027;
-  const double g1 = (std::pow(z, 3) + z) / 4;
-  const double g2 = (5 * std::pow(z, 5) + 16 * std::pow(z, 3) + 3 * z) / 96;
-  const double g3 = (3 * std::pow(z, 7) + 19 * std::pow(z, 5) + 17 * std::pow(z, 3) - 15 * z) / 384;
-  return z + g1 / n + g2 / (n * n) + g3 / (n * n * n);
-}
-
-/// Quantile 0.95 of F with 2 and n degrees: closed form.
-double f_of_two(double n) { return n / 2 * (std::pow(0.05, -2 / n) - 1); }
 
 double mean(const std::vector<double>& x) {
   return std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
@@ -76,7 +65,7 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
   const Contrast error = (square / (n - 1) * (1 + 1 / n)).sqrt();  // of one further flight
   const Contrast t = (mean_of(group) - centre) / error;
 
-  const double degrees = n - 1, t975 = student_975(degrees), needed = student_of_four(degrees);
+  const double degrees = n - 1, t975 = student_975(degrees), needed = student_quantile(1 - 0.05 / 4, degrees);
   using Kind = RotorVerdict::Kind;
   RotorVerdict v{Kind::as_sound, {"sound"}, 0, 0, 0, 0, {}, t[0], t[1], t[2], 0, needed, 0};
   double left = 0;
@@ -92,7 +81,7 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
     left = t.square().sum() - t_d * t_d;
   }
   constexpr double kOfInterest = 0.06;  // core/study/README.md, "Effect sizes"
-  const double f = f_of_two(degrees);
+  const double f = f_quantile(0.95, 2, degrees);
   const bool twisted = std::abs(t[0]) > t975, apart = t[1] * t[1] + t[2] * t[2] > 2 * f;
   const auto told = [&v](Kind kind, std::vector<std::string> set) { v.kind = kind, v.set = std::move(set); };
   if (v.t_d > needed && !twisted)

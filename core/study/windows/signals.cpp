@@ -9,25 +9,9 @@
 #include <limits>
 #include <numbers>
 
+#include "core/study/windows/distributions.hpp"
+
 namespace backwash::study {
-namespace {
-
-double digamma(double x) {
-  double sum = 0;
-  for (; x < 6; x += 1) sum -= 1 / x;
-  const double q = 1 / (x * x);
-  return sum + std::log(x) - 0.5 / x - q * (1.0 / 12 - q * (1.0 / 120 - q / 252));
-}
-
-double trigamma(double x) {
-  double sum = 0;
-  for (; x < 6; x += 1) sum += 1 / (x * x);
-  const double q = 1 / (x * x);
-  return sum + 1 / x + q / 2 + q / x * (1.0 / 6 - q * (1.0 / 30 - q / 42));
-}
-
-}  // namespace
-
 std::vector<double> detrended(std::span<const double> x) {
   const double n = static_cast<double>(x.size()), middle = (n - 1) / 2;
   double mean = 0, slope = 0, square = 0;
