@@ -39,8 +39,10 @@ std::vector<study::Term> read_terms(const std::string& path) {
     if (!table) continue;
     study::Term term{(*table)["cause"].value_or(std::string()),
                      (*table)["form"].value_or(std::string()),
-                     (*table)["scale"].value_or(0.0),
+                     {(*table)["scale"].value_or(0.0)},
                      {}};
+    if (const auto* offset = (*table)["offset_m"].as_array(); offset && offset->size() == 2)
+      term.scale.offset_W = {(*offset)[0].value_or(0.0), (*offset)[1].value_or(0.0), 0};
     if (const auto* theta = (*table)["theta"].as_array())
       for (const auto& value : *theta) term.theta.push_back(value.value_or(0.0));
     terms.push_back(std::move(term));
@@ -131,7 +133,7 @@ std::optional<study::RotorVerdict> against_reference(const Options& options, con
 /// stood on and under (`backwash import airgarage`).
 std::optional<study::calibrate::HeightEffects> height_effects(const Options& options, const Model& model,
                                                               const study::Observations& seen) {
-  if (!options.map.empty() || !seen.has("ceiling")) return std::nullopt;
+  if (!options.map.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
   return read_height_effects(options.logs, model, options.seed);
 }
 

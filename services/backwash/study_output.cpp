@@ -13,14 +13,14 @@ Json to_json(const study::NamedCause& cause) {
   const auto& found = cause.found;
   Json parameters = Json::object();
   for (const auto& e : found.parameters) parameters[e.name] = {{"value", e.value}, {"ci95", {e.low, e.high}}};
-  Json set = Json::array({found.form->cause});
+  Json set = Json::array({found.form->cause()});
   for (const auto& rival : found.rivals) set.push_back(rival.name);
   Json separate = Json::array();
   for (const auto& s : cause.separate_by)
     separate.push_back(
         {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
   const auto& g = cause.gain;
-  return {{"name", found.form->cause},
+  return {{"name", found.form->cause()},
           {"set", set},
           {"p", found.p},
           {"form", found.form->formula},
@@ -131,7 +131,7 @@ void print_text(const study::StudyResult& result, const study::Observations& see
   std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
   if (result.verdict == study::Verdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
   for (const auto& cause : result.causes) {
-    std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause.c_str(),
+    std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause().c_str(),
                 cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
     for (const auto& e : cause.found.parameters)
       std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);

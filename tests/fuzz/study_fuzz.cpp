@@ -92,7 +92,7 @@ TEST(Fuzz, AStudyOfAnyFiniteNumbersEndsWithAVerdict) {
     for (const auto& cause : result.causes)
       for (const auto& p : cause.found.parameters)
         EXPECT_TRUE(std::isfinite(p.value) && std::isfinite(p.low) && std::isfinite(p.high))
-            << cause.found.form->cause << ' ' << p.name;
+            << cause.found.form->cause() << ' ' << p.name;
     ++verdicts, named += result.verdict == Verdict::insufficient ? 0 : 1;
   }
   std::printf("%d verdicts, %d with flights enough\n", verdicts, named);

@@ -52,7 +52,7 @@ TEST_P(NamesTheHiddenCause, AtOneAndAHalfTimesTheTablesSize) {
   const auto result = studied(world_with({GetParam()}, 1.5));
   ASSERT_FALSE(result.causes.empty()) << "seed " << seed() << ": " << study_worlds::told(result);
   const auto& found = result.causes.front().found;
-  bool in_set = found.form->cause == GetParam();
+  bool in_set = found.form->cause() == GetParam();
   for (const auto& rival : found.rivals) in_set = in_set || rival.name == GetParam();
   EXPECT_TRUE(in_set) << "seed " << seed() << ": " << study_worlds::told(result);
   EXPECT_LE(found.p, SearchOptions{}.accept_p);
@@ -118,7 +118,7 @@ TEST(Study, FindsNoMoreOfACauseThatItsExtendedModelHolds) {
   const auto before = studied(seen);
   ASSERT_EQ(study_worlds::told(before).substr(0, 7), "ceiling");
   EXPECT_TRUE(study::apply(terms_of(before), seen).empty());
-  for (const auto& cause : studied(seen).causes) EXPECT_NE(cause.found.form->cause, "ceiling");
+  for (const auto& cause : studied(seen).causes) EXPECT_NE(cause.found.form->cause(), "ceiling");
 }
 
 TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
@@ -139,7 +139,7 @@ TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
   const auto& found = result.causes.front().found;
   EXPECT_EQ(effect.kind, backwash::ModelEffect::Kind::push_under_surface);
   EXPECT_NEAR(effect.value.x(), found.theta[0], 1e-6);
-  EXPECT_NEAR(effect.scale, found.scale, 1e-6);
+  EXPECT_NEAR(effect.scale, found.scale.value, 1e-6);
   EXPECT_GT(effect.error.x(), 0);
 }
 
@@ -167,8 +167,8 @@ TEST(Study, AnExtendedModelMovesHoverSetsUnderTheCeilingAndKeepsMoreSamplesInsid
 std::vector<Separation> between(const Observations& seen, const std::string& ours, const std::string& theirs,
                                 bool rotor_forms) {
   const auto form = [&](const std::string& name) {
-    for (const Form& f : catalogue())
-      if (f.cause == name && f.integer_scale == rotor_forms) return &f;
+    for (const Form* f : catalogue())
+      if (f->cause() == name && f->integer_scale == rotor_forms) return f;
     throw std::logic_error(name);
   };
   const Form *own = form(ours), *rival = form(theirs);

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "core/config/config.hpp"
-#include "core/study/effects/forms.hpp"
+#include "core/study/effects/columns.hpp"
 
 namespace {
 
@@ -32,7 +32,7 @@ Observations flights() {
   seen.first.push_back(seen.windows.size());
   for (auto& y : seen.y) y.assign(seen.windows.size(), 0);
   for (auto& weight : seen.weight) weight.assign(seen.windows.size(), 0);
-  seen.missing["attitude"] = "not flown";
+  seen.missing[Source::attitude] = "not flown";
   return seen;
 }
 
@@ -40,10 +40,10 @@ void measure(Observations& seen, Channel channel, std::size_t i, double value) {
   seen.y[channel][i] = value, seen.weight[channel][i] = 1;
 }
 
-Accepted refined(const Observations& seen, const std::string& cause, double scale) {
-  const auto form = std::find_if(catalogue().begin(), catalogue().end(), [&](auto& f) { return f.cause == cause; });
+Accepted refined(const Observations& seen, const std::string& cause, const Scale& scale) {
+  const Form* form = *std::ranges::find(catalogue(), cause, [](auto* f) { return f->cause(); });
   Evidence evidence(seen);
-  Accepted found{&*form, scale, form->columns(seen.windows, scale), {}, 0, 0, {}, {}};
+  Accepted found{form, scale, form->columns(seen.windows, scale), {}, 0, 0, {}, {}};
   evidence.whiten(found.columns);
   refine(evidence, found, {});
   return found;
@@ -109,10 +109,10 @@ TEST(Refine, FindsAPushWhereTheCraftWasPushedToAndNotWhereItWasTold) {
     int covered = 0;
     for (unsigned seed = 1; seed <= kWorlds; ++seed) {
       auto seen = over_a_floor(size, 4, seed);
-      const Estimate e = refined(seen, "ground_thrust", 0.3).parameters[0];
+      const Estimate e = refined(seen, "ground_thrust", {0.3}).parameters[0];
       aware += e.value / kWorlds, covered += covers(e, size);
       for (auto& w : seen.windows) w.give.setZero();
-      unaware += refined(seen, "ground_thrust", 0.3).parameters[0].value / kWorlds;
+      unaware += refined(seen, "ground_thrust", {0.3}).parameters[0].value / kWorlds;
     }
     EXPECT_NEAR(aware, size, 0.04 * std::abs(size));
     EXPECT_GE(covered, kWorlds - 1);
@@ -138,8 +138,8 @@ TEST(Refine, WidensTheIntervalWhereTheFlownGapsCannotTellTheForm) {
   const auto steep = [](double d) { return 0.1 * std::exp((0.4 - d) / 0.15); };
   const auto flat = [](double d) { return 0.1 * 0.4 / d; };
   for (const auto& push : {std::function<double(double)>(steep), std::function<double(double)>(flat)}) {
-    const auto two = refined(under_a_ceiling(true, push), "ceiling", 0.3).parameters[0];
-    const auto many = refined(under_a_ceiling(false, push), "ceiling", 0.3).parameters[0];
+    const auto two = refined(under_a_ceiling(true, push), "ceiling", {0.3}).parameters[0];
+    const auto many = refined(under_a_ceiling(false, push), "ceiling", {0.3}).parameters[0];
     EXPECT_TRUE(covers(two, steep(0.3)) && covers(two, flat(0.3))) << two.low << " " << two.high;
     EXPECT_NEAR(many.value, push(0.3), 0.1 * push(0.3));
     EXPECT_LT(3 * (many.high - many.low), two.high - two.low);
@@ -168,11 +168,11 @@ TEST(Refine, FindsAMapOffsetBetweenTheOnesTriedAndCoversBothOfItsCoordinates) {
       }
       for (const Channel c : kVariances) measure(seen, c, i, ln_sigma(x + kX, y + kY) - ln_sigma(x, y) + noise(rng));
     }
-    const auto found = refined(seen, "map_offset", offset_code({0.15, 0, 0}));
+    const auto found = refined(seen, "map_offset", {0, {0.15, 0, 0}});
     ASSERT_EQ(found.parameters.size(), 2u);
     covered += covers(found.parameters[0], kX) + covers(found.parameters[1], kY);
     error += std::hypot(found.parameters[0].value - kX, found.parameters[1].value - kY) / kWorlds;
-    EXPECT_LT((map_offset(found.scale) - Vec3(found.parameters[0].value, found.parameters[1].value, 0)).norm(), 1e-3);
+    EXPECT_LT((found.scale.offset_W - Vec3(found.parameters[0].value, found.parameters[1].value, 0)).norm(), 1e-3);
   }
   EXPECT_LT(error, 0.05);
   EXPECT_GE(covered, 0.87 * 2 * kWorlds);

@@ -143,7 +143,7 @@ Days days(std::mt19937& rng) {
     }
     made.seen.first.push_back(made.seen.windows.size());
   }
-  for (const char* name : {"attitude", "map"}) made.seen.missing[name] = "none";
+  for (const Source source : {Source::attitude, Source::map}) made.seen.missing[source] = "none";
   return made;
 }
 

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "core/study/effects/catalogue.hpp"
+#include "core/study/effects/table.hpp"
 #include "core/study/findings/self_test.hpp"
 
 namespace {
@@ -13,7 +13,8 @@ namespace {
 using namespace backwash::study;
 
 TEST(SelfTest, HasEveryCauseOfTheCatalogueAndWhatIsNone) {
-  auto names = cause_names();
+  std::vector<std::string> names;
+  for (const auto& effect : effects()) names.push_back(effect.name);
   names.insert(names.end(), {"unknown", "none"});
   EXPECT_EQ(self_test().rows.size(), names.size());
   for (const auto& name : names) {

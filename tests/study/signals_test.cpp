@@ -107,8 +107,9 @@ double estimate(const study_worlds::World& world, const std::string& cause) {
   const auto folder = std::filesystem::temp_directory_path() / ("study-signals-" + std::to_string(::getpid()));
   const auto seen = study_worlds::observe(world, folder);
   std::filesystem::remove_all(folder);
-  for (const Form& form : catalogue())
-    if (form.cause == cause) return Evidence(seen).normal(form.columns(seen.windows, form.scales.front()), {}).fit()[0];
+  for (const Form* form : catalogue())
+    if (form->cause() == cause)
+      return Evidence(seen).normal(form->columns(seen.windows, form->scales.front()), {}).fit()[0];
   throw std::logic_error(cause);
 }
 

@@ -56,7 +56,7 @@ study::Observations observe(const World& world, const std::vector<Table>& flight
 std::vector<std::vector<std::string>> sets_of(const study::StudyResult& result) {
   std::vector<std::vector<std::string>> sets;
   for (const auto& cause : result.causes) {
-    sets.push_back({cause.found.form->cause});
+    sets.push_back({cause.found.form->cause()});
     for (const auto& rival : cause.found.rivals) sets.back().push_back(rival.name);
   }
   return sets;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "core/study/effects/forms.hpp"
+#include "core/study/effects/columns.hpp"
 #include "tests/study_worlds/plan.hpp"
 
 namespace study_worlds {
@@ -70,7 +70,7 @@ double flown_tail(const std::vector<Table>& flights) {
 }  // namespace
 
 std::vector<Compared> compare(const World& world, const std::vector<Table>& flights, const study::Accepted& found) {
-  const std::string& cause = found.form->cause;
+  const std::string& cause = found.form->cause();
   std::vector<Compared> all;
   for (const auto& p : found.parameters)
     if (const auto truth = truth_of(cause, p.name, world.effects.of(cause), world.effects.shape_of(cause)))
@@ -120,7 +120,7 @@ std::vector<study::Column> seen_by(const study::Column& oracle, std::vector<stud
 
 void compare_with_oracle(Outcome& outcome, const study::Accepted& found, const study::Observations& seen,
                          const std::vector<Table>& flights) {
-  const double beyond = found.form->cause == "battery_sag" ? kBeyondOfBattery : 0;
+  const double beyond = found.form->cause() == "battery_sag" ? kBeyondOfBattery : 0;
   const study::Column column = oracle_column(seen, flights, beyond);
   if (column.parts.empty()) return;
   study::Evidence evidence(seen);
@@ -136,7 +136,7 @@ void compare_with_oracle(Outcome& outcome, const study::Accepted& found, const s
   if (oracle > 0) outcome.gain_share = gain(found.columns) / oracle;
 
   // An interval that is averaged over several shapes is about the size and not about one form's nearest value.
-  if (!study::shapes_of(*found.form).empty()) return;
+  if (!found.form->shapes.empty()) return;
   auto comparable = seen_by(column, found.columns);
   comparable.push_back(column);
   const auto A = evidence.normal(comparable, free).total;

@@ -15,8 +15,8 @@ std::optional<double> parameter_error(const std::vector<Compared>& compared);
 
 /// Compares with an oracle's column, the hidden effect's own value averaged over each window: sets `gain_share`, the
 /// held-out gain of the found cause over that of the oracle with one factor fitted, and of each compared parameter
-/// `best`, where the estimate is of one shape alone (shapes_of). Leaves them empty for effects that are neither a push
-/// nor a factor on the variance.
+/// `best`, where the estimate is of one shape alone (Form::shapes). Leaves them empty for effects that are neither a
+/// push nor a factor on the variance.
 void compare_with_oracle(Outcome& outcome, const backwash::study::Accepted& found,
                          const backwash::study::Observations& seen, const std::vector<Table>& flights);
 

@@ -86,7 +86,7 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   for (const auto& u : result.unknown) out.unknown.push_back(u.along);
   if (out.truth.size() != 1) return out;
   for (const auto& cause : result.causes) {
-    if (cause.found.form->cause != out.truth.front()) continue;
+    if (cause.found.form->cause() != out.truth.front()) continue;
     out.compared = compare(world, tables, cause.found);
     out.error = parameter_error(out.compared);
     compare_with_oracle(out, cause.found, seen, tables);

@@ -11,46 +11,6 @@
 namespace backwash::study {
 namespace {
 
-using Kind = ModelEffect::Kind;
-
-double half_width(const Estimate& e) { return std::max(0.0, (e.high - e.low) / 2); }
-
-/// Σ θ x of a cause in one channel, by window; empty if it does not move it.
-std::vector<double> added(const Accepted& cause, const Observations& seen, Channel channel) {
-  std::vector<double> sum;
-  for (std::size_t k = 0; k < cause.columns.size(); ++k)
-    for (const auto& part : cause.columns[k].parts) {
-      if (part.channel != channel) continue;
-      sum.resize(seen.windows.size(), 0);
-      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += cause.theta[static_cast<Eigen::Index>(k)] * part.x[i];
-    }
-  return sum;
-}
-
-/// Largest |Σ θ x| flown, level and vertical, with the first parameter at the far end of its interval.
-ModelEffect unknown_push(const Accepted& cause, const Observations& seen) {
-  const auto x = added(cause, seen, kMeanX), y = added(cause, seen, kMeanY), z = added(cause, seen, kMeanZ);
-  ModelEffect e{Kind::push, Vec3::Zero(), Vec3::Zero(), 0};
-  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
-    e.error.x() = std::max(e.error.x(), std::hypot(x.empty() ? 0 : x[i], y.empty() ? 0 : y[i]));
-    e.error.z() = std::max(e.error.z(), z.empty() ? 0 : std::abs(z[i]));
-  }
-  const Estimate& first = cause.parameters.front();
-  const double size = std::abs(first.value);
-  if (size > 0) e.error *= 1 + half_width(first) / size;
-  return e;
-}
-
-/// Vertical push over the range that was flown: its middle, and half of it with the parameter's own error.
-ModelEffect flown_range(const Accepted& cause, const Observations& seen) {
-  const auto z = added(cause, seen, kMeanZ);
-  const auto [low, high] = std::minmax_element(z.begin(), z.end());
-  const Estimate& first = cause.parameters.front();
-  const double size = std::abs(first.value), most = std::max(std::abs(*low), std::abs(*high));
-  return {Kind::push, Vec3(0, 0, (*low + *high) / 2),
-          Vec3(0, 0, (*high - *low) / 2 + (size > 0 ? most * half_width(first) / size : 0)), 0};
-}
-
 /// Numbers to eight significant digits.
 toml::array list(std::initializer_list<double> values) {
   toml::array all;
@@ -64,12 +24,15 @@ toml::table table_of(const NamedCause& cause, const Observations& seen) {
   toml::array theta, effects;
   for (const double v : f.theta) theta.push_back(config::rounded(v, 8));
   for (const auto& e : effects_of(cause, seen)) effects.push_back(config::effect_table(e));
-  toml::table term{{"cause", f.form->cause},
+  toml::table term{{"cause", f.form->cause()},
                    {"form", f.form->formula},
-                   {"scale", config::rounded(f.scale, 8)},
                    {"held_out_nats", config::rounded(cause.gain.held_out_nats, 8)},
                    {"theta", theta},
                    {"effect", effects}};
+  if (f.form->displaces_map)
+    term.insert("offset_m", list({f.scale.offset_W.x(), f.scale.offset_W.y()}));
+  else
+    term.insert("scale", config::rounded(f.scale.value, 8));
   for (const auto& e : f.parameters) {
     toml::table estimate{{"value", config::rounded(e.value, 8)}, {"ci95", list({e.low, e.high})}};
     estimate.is_inline(true);
@@ -84,7 +47,7 @@ std::vector<Term> terms_of(const StudyResult& result) {
   std::vector<Term> terms;
   for (const auto& cause : result.causes) {
     const auto& f = cause.found;
-    terms.push_back({f.form->cause, f.form->formula, f.scale, {f.theta.data(), f.theta.data() + f.theta.size()}});
+    terms.push_back({f.form->cause(), f.form->formula, f.scale, {f.theta.data(), f.theta.data() + f.theta.size()}});
   }
   return terms;
 }
@@ -92,16 +55,19 @@ std::vector<Term> terms_of(const StudyResult& result) {
 std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen) {
   std::vector<Term> left;
   for (const Term& term : terms) {
-    const auto form = std::find_if(catalogue().begin(), catalogue().end(), [&](const Form& f) {
-      return f.cause == term.cause && f.formula == term.formula && f.parameters.size() == term.theta.size();
+    const auto known = std::find_if(catalogue().begin(), catalogue().end(), [&](const Form* f) {
+      return f->cause() == term.cause && f->formula == term.formula && f->parameters.size() == term.theta.size();
     });
-    if (form == catalogue().end() || why_not_tested(*form, seen)) {
+    // An offset of zero displaces nothing: a file of before offsets were written as such.
+    const bool no_offset = known != catalogue().end() && (*known)->displaces_map && term.scale.offset_W.isZero();
+    if (known == catalogue().end() || no_offset || why_not_tested(**known, seen)) {
       left.push_back(term);
       continue;
     }
-    const auto columns = form->columns(
+    const Form& form = **known;
+    const auto columns = form.columns(
         moved_by_itself(
-            *form, seen.windows, term.scale,
+            form, seen.windows, term.scale,
             Eigen::Map<const Eigen::VectorXd>(term.theta.data(), static_cast<Eigen::Index>(term.theta.size()))),
         term.scale);
     for (std::size_t k = 0; k < columns.size(); ++k)
@@ -113,33 +79,9 @@ std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen) {
 
 std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen) {
   const Accepted& f = cause.found;
-  const std::string &name = f.form->cause, &first = f.form->parameters.front();
-  const bool variance = first == "B_ln";
-  // The form's own fit, which holds where it was flown; the interval is of all shapes at the reference.
-  const auto with = [&](Kind kind) {
-    const Estimate& e = f.parameters.front();
-    const double value = f.theta[0], error = std::max({0.0, e.high - value, value - e.low});
-    return std::vector{ModelEffect{kind, Vec3(value, 0, 0), Vec3(error, 0, 0), f.scale}};
-  };
-  if (name == "ground_thrust") return with(Kind::push_over_surface);
-  if (name == "ceiling") return with(variance ? Kind::ln_variance_under_surface : Kind::push_under_surface);
-  if (name == "wall_attraction") return with(Kind::push_to_walls);
-  if (name == "rotor_drag") return with(Kind::push_against_velocity);
-  if (name == "forward_speed") return with(variance ? Kind::ln_variance_with_speed : Kind::push_with_speed);
-  if (name == "draft") {
-    const auto &x = f.parameters[0], &y = f.parameters[1];
-    return {{Kind::push, Vec3(x.value, y.value, 0), Vec3(half_width(x), half_width(y), 0), 0}};
-  }
-  if ((name == "payload" && !f.form->integer_scale) || name == "battery_sag") return {flown_range(f, seen)};
-  if (name == "trim" || name == "imu_drift") return {unknown_push(f, seen)};
-  if (name == "recirculation") {
-    const auto ln = added(f, seen, kVarZ);
-    const double most = std::max(0.0, *std::max_element(ln.begin(), ln.end()));
-    const Estimate& e = f.parameters.front();
-    const double share = std::abs(e.value) > 0 ? half_width(e) / std::abs(e.value) : 0;
-    return {{Kind::ln_variance, Vec3(most, 0, 0), Vec3(most * share, 0, 0), 0}};
-  }
-  return {};
+  const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
+  if (!f.form->extend) return {};
+  return f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters}, seen);
 }
 
 Model extended(const Model& model, const StudyResult& result, const Observations& seen) {

@@ -11,7 +11,7 @@ namespace backwash::study {
 /// An accepted cause as it is stored in a model file, [[extension.term]].
 struct Term {
   std::string cause, formula;  ///< name the catalogue's form
-  double scale;
+  Scale scale;
   std::vector<double> theta;  ///< its parameters, in their order
 };
 

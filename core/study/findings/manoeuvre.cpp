@@ -7,59 +7,6 @@
 namespace backwash::study {
 namespace {
 
-/// A flight that could be flown next: the windows it would give, made from a median window of the flights at hand.
-struct Manoeuvre {
-  const char* name;
-  void (*set)(WindowRow&, double s);  ///< s: 0 … 1 along the flight
-};
-
-const Manoeuvre kManoeuvres[] = {
-    {"hover at three heights, 0.3, 0.8 and 1.3 m over the floor, away from walls and ceiling",
-     [](WindowRow& w, double s) {
-       w.around = {0.3 + 0.5 * std::floor(2.999 * s), 2.0, {}};
-       w.p_W.z() = w.around.height;
-     }},
-    {"hover 0.25, 0.5 and 1 m below the ceiling, high above the floor",
-     [](WindowRow& w, double s) {
-       w.around = {2.0, 0.25 * std::pow(2, std::floor(2.999 * s)), {}};
-     }},
-    {"a spot without ceiling, then the same height under one",
-     [](WindowRow& w, double s) { w.around.ceiling_gap = s < 0.5 ? kNoSurface : 0.3; }},
-    {"turn a full yaw turn on the spot, far from walls",
-     [](WindowRow& w, double s) {
-       w.yaw = 2 * M_PI * s;
-       w.R_WB = Eigen::AngleAxisd(w.yaw, Vec3::UnitZ()).toRotationMatrix();
-       w.around.walls.clear();
-     }},
-    {"approach a wall to 0.35 m from both sides",
-     [](WindowRow& w, double s) {
-       const double d = 0.35 + 1.2 * std::abs(std::fmod(2 * s, 1.0) - 0.5) * 2;
-       w.around.walls = {{d, s < 0.5 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX())}};
-     }},
-    {"hover on a fresh battery and on a used one, the same spot and time of flight",
-     [](WindowRow& w, double s) {
-       w.voltage *= s < 0.5 ? 1.0 : 0.9;
-       w.t = 30;
-     }},
-    {"hover for five minutes in one spot, motors never stopped", [](WindowRow& w, double s) { w.t = 300 * s; }},
-    {"start warm and start cold, the same spot and battery",
-     [](WindowRow& w, double s) {
-       w.temperature += s < 0.5 ? 0.0 : 12.0;
-       w.t = 30;
-     }},
-    {"fly fast and slow on one line at one height",
-     [](WindowRow& w, double s) {
-       w.speed = 1.5 * s, w.speeds.fill(w.speed);
-       w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
-     }},
-    {"thrust pulses: climb and sink with 2 m/s² in turn",
-     [](WindowRow& w, double) {
-       w.delay_gain = {-60, 0}, w.slope_gain = {0, 14};
-     }},
-    {"sideways steps of the set-point, hard", [](WindowRow& w, double) {
-       w.command_gain = {60, -10};
-     }}};
-
 constexpr std::size_t kWindows = 45, kFlights = 12;
 /// Nats that a manoeuvre must bring to be proposed.
 constexpr double kLeastNats = 0.5;
@@ -119,16 +66,18 @@ std::vector<Separation> separations(const Evidence& evidence, const Accepted& ca
   const WindowRow& median = evidence.seen().windows[evidence.seen().windows.size() / 2];
   const double standing = nats_apart(evidence, cause, rival, flown(median, nullptr));
   std::vector<Separation> all;
-  for (const Manoeuvre& m : kManoeuvres) {
-    const double nats = nats_apart(evidence, cause, rival, flown(median, &m)) - standing;
-    if (nats >= kLeastNats) all.push_back({rival.name, m.name, nats});
-  }
+  for (const Effect& effect : effects())
+    for (const Manoeuvre& m : effect.manoeuvres) {
+      const double nats = nats_apart(evidence, cause, rival, flown(median, &m)) - standing;
+      if (nats >= kLeastNats) all.push_back({rival.name, m.name, nats});
+    }
   std::sort(all.begin(), all.end(), [](auto& a, auto& b) { return a.expected_nats > b.expected_nats; });
   if (all.empty())
     all.push_back({rival.name,
-                   evidence.seen().has("rpm") ? "none of the list: the two forms do not differ in any"
-                                              : "none of the list: the two forms do not differ in any; log the rotors' "
-                                                "rpm on the same flights",
+                   evidence.seen().has(Source::rpm)
+                       ? "none of the list: the two forms do not differ in any"
+                       : "none of the list: the two forms do not differ in any; log the rotors' "
+                         "rpm on the same flights",
                    std::nullopt});
   return all;
 }

@@ -97,16 +97,15 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
 
 std::vector<std::pair<std::string, std::string>> untested(const Observations& seen) {
   std::vector<std::pair<std::string, std::string>> all;
-  for (const auto& name : cause_names()) {
+  for (const Effect& effect : effects()) {
     std::string why;
     bool tested = false;
-    for (const Form& form : catalogue()) {
-      if (form.cause != name) continue;
+    for (const Form& form : effect.forms) {
       const auto reason = why_not_tested(form, seen);
       if (!reason) tested = true;
       if (reason && why.empty()) why = *reason;
     }
-    if (!tested) all.emplace_back(name, why);
+    if (!tested) all.emplace_back(effect.name, why);
   }
   return all;
 }

@@ -16,9 +16,9 @@ namespace {
 
 /// What the picture of a cause shows of a window: the residual of its first channel, or, for walls, its part towards
 /// the nearest one. Nothing where it was not measured.
-std::optional<double> shown(const std::string& cause, const WindowRow& w, const Observations& seen, std::size_t i,
+std::optional<double> shown(const Effect& effect, const WindowRow& w, const Observations& seen, std::size_t i,
                             Channel channel, const std::array<double, 2>& taken) {
-  if (cause != "wall_attraction") {
+  if (!effect.towards_walls) {
     if (!(seen.weight[channel][i] > 0)) return std::nullopt;
     return seen.y[channel][i] - taken[channel == kMeanY ? 1 : 0];
   }
@@ -28,27 +28,10 @@ std::optional<double> shown(const std::string& cause, const WindowRow& w, const 
   return (seen.y[kMeanX][i] - taken[0]) * nearest->second.x() + (seen.y[kMeanY][i] - taken[1]) * nearest->second.y();
 }
 
-/// The variable that a cause is drawn over.
-Regressor named_variable(const std::string& cause) {
-  if (cause == "ground_thrust") return {"height over the surface, m", false, [](auto& w) { return w.around.height; }};
-  if (cause == "ceiling") return {"gap to the ceiling, m", false, [](auto& w) { return w.around.ceiling_gap; }};
-  if (cause == "wall_attraction")
-    return {"distance to the nearest wall, m", false, [](auto& w) {
-              double least = kNoSurface;
-              for (const auto& [distance, direction] : w.around.walls) least = std::min(least, distance);
-              return least;
-            }};
-  if (cause == "forward_speed") return {"speed, m/s", false, [](auto& w) { return w.speed; }};
-  if (cause == "rotor_drag") return {"velocity along x, m/s", false, [](auto& w) { return w.v_W.x(); }};
-  if (cause == "battery_sag") return {"battery, V", false, [](auto& w) { return w.voltage; }};
-  if (cause == "trim" || cause == "draft") return {"yaw, rad", false, [](auto& w) { return w.yaw; }};
-  return {"time since the flight began, s", false, [](auto& w) { return w.t; }};
-}
-
 std::string verdict_sentence(const StudyResult& result, const Observations& seen) {
   std::string names;
   for (const auto& cause : result.causes) {
-    names += (names.empty() ? "" : ", ") + spoken(cause.found.form->cause);
+    names += (names.empty() ? "" : ", ") + spoken(cause.found.form->cause());
     for (const auto& rival : cause.found.rivals) names += " or " + spoken(rival.name);
   }
   const std::string of =
@@ -65,7 +48,7 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
       return "Too little to name a cause: " + too_few(seen);
     default:
       return "Nothing found that the simulation gets wrong" + of + ", with " +
-             std::to_string(result.not_tested.size()) + " of " + std::to_string(cause_names().size()) +
+             std::to_string(result.not_tested.size()) + " of " + std::to_string(effects().size()) +
              " causes not tested.";
   }
 }
@@ -74,7 +57,7 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
 tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, const Observations& seen) {
   const auto& found = cause.found;
   const Channel channel = found.columns.front().parts.front().channel;
-  const auto along = named_variable(found.form->cause);
+  const Regressor& along = found.form->effect->axis;
   struct Point {
     double x, before, after;
   };
@@ -88,8 +71,8 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
         if (part.channel == channel || (channel == kMeanX && part.channel == kMeanY))
           added[part.channel == kMeanY ? 1 : 0] += found.theta[static_cast<Eigen::Index>(k)] * part.x[i];
     const auto& w = seen.windows[i];
-    const auto before = shown(found.form->cause, w, seen, i, channel, {});
-    if (before) points.push_back({x, *before, *shown(found.form->cause, w, seen, i, channel, added)});
+    const auto before = shown(*found.form->effect, w, seen, i, channel, {});
+    if (before) points.push_back({x, *before, *shown(*found.form->effect, w, seen, i, channel, added)});
   }
   std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
   std::ostringstream script, dots, lines;
@@ -107,7 +90,7 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
   script << "$dots << EOD\n"
          << dots.str() << "EOD\n$lines << EOD\n"
          << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel 'missed: "
-         << (found.form->cause == "wall_attraction" ? "mean towards that wall" : channel_name(channel))
+         << (found.form->effect->towards_walls ? "mean towards that wall" : channel_name(channel))
          << (channel <= kMeanZ ? ", m/s²" : "") << "'\nset key top right\nset grid\n"
          << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
          << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
@@ -197,7 +180,7 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());
-    page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause)) + "</h2>\n<p>" +
+    page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause())) + "</h2>\n<p>" +
             report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
   }
   if (context.height) page += height_section(*context.height);
@@ -228,7 +211,7 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
   page += "</table>\n</section>\n";
   std::vector<std::string> told;
   for (const auto& cause : result.causes) {
-    told.push_back(cause.found.form->cause);
+    told.push_back(cause.found.form->cause());
     for (const auto& rival : cause.found.rivals) told.push_back(rival.name);
   }
   page += self_test_section(told);

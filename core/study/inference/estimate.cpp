@@ -6,7 +6,7 @@
 #include <functional>
 #include <nlopt.hpp>
 
-#include "core/study/effects/forms.hpp"
+#include "core/study/effects/columns.hpp"
 
 namespace backwash::study {
 namespace {
@@ -18,17 +18,18 @@ constexpr double kNormal975 = 1.959964;
 /// A shape of the cause at a scale, fitted to all flights, with its error by leaving each out.
 struct Member {
   const Form* shape;
-  double scale, prior;
+  Scale scale;
+  double prior;
   Normal normal;
   SmallVector theta, error;
   double height;  ///< ln likelihood over that without the cause
 };
 
-std::vector<double> fine_scales(const Form& form, double at) {
+std::vector<Scale> fine_scales(const Form& form, const Scale& at) {
   if (form.integer_scale || form.scales.size() < 2) return {at};
-  const double low = std::log(form.scales.front() / 1.5), high = std::log(form.scales.back() * 1.5);
-  std::vector<double> scales;
-  for (int i = 0; i < kFine; ++i) scales.push_back(std::exp(low + (high - low) * i / (kFine - 1)));
+  const double low = std::log(form.scales.front().value / 1.5), high = std::log(form.scales.back().value * 1.5);
+  std::vector<Scale> scales;
+  for (int i = 0; i < kFine; ++i) scales.push_back({std::exp(low + (high - low) * i / (kFine - 1))});
   return scales;
 }
 
@@ -40,7 +41,7 @@ Eigen::VectorXd jackknife(const Eigen::MatrixXd& left) {
 
 bool lower(const Member& a, const Member& b) { return a.height < b.height; }
 
-Member fitted(Normal normal, const Form* shape, double scale, double prior) {
+Member fitted(Normal normal, const Form* shape, const Scale& scale, double prior) {
   Eigen::MatrixXd left(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size()));
   SmallVector sum = SmallVector::Zero(normal.total.rows());
   for (std::size_t f = 0; f < normal.b.size(); ++f) {
@@ -86,15 +87,8 @@ double built_error(const Column& column) {
   return square > 0 ? built_scatter(c) / std::sqrt(square) : 0;
 }
 
-/// ln Σ with the map moved, less that as it is.
-Column with_map_moved(const Windows& windows, double x, double y) {
-  Column moved;
-  for (const Channel c : kVariances)
-    moved.parts.push_back({c, values(windows, [&](auto& w) {
-                             return w.ln_sigma_at({x, y, 0})[static_cast<int>(c - kVarX)];
-                           })});
-  return moved;
-}
+/// The form at a level offset.
+Column with_map_moved(const Windows& windows, double x, double y) { return displaced(windows, {x, y, 0}).front(); }
 
 /// Standard errors of the offset (x, y) that fits best: jackknife of the fit's linearisation there.
 Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>& nuisance, double x, double y) {
@@ -132,10 +126,10 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
     for (std::size_t f = 0; f < n.b.size(); ++f) sum += n.b[f][0] - 0.5 * n.A[f](0, 0);
     return sum;
   };
-  const Vec3 start = map_offset(cause.scale);
+  const Vec3 start = cause.scale.offset_W;
   const double far = kOffsetStep * (kOffsetsAside - 1) / 2;
   const auto best = polished({start.x(), start.y()}, 0.1, {-far, -far}, {far, far}, height);
-  cause.scale = offset_code({best[0], best[1], 0});
+  cause.scale.offset_W = whole_millimetres({best[0], best[1], 0});
   cause.columns = cause.form->columns(windows, cause.scale);
   cause.theta = SmallVector::Ones(1);
   const Normal own = evidence.normal(cause.columns, nuisance);
@@ -150,12 +144,12 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
 struct Family {
   const Evidence& evidence;
   const std::vector<Column>& others;
-  double scale;              ///< of a form without a grid of scales
+  Scale scale;               ///< of a form without a grid of scales
   std::vector<Form> shapes;  ///< the form itself first
   Windows windows;
   std::vector<Member> members = {};  ///< in the order of shapes and scales
 
-  Normal normal_at(const Form& shape, double at) const {
+  Normal normal_at(const Form& shape, const Scale& at) const {
     const auto columns = shape.columns(windows, at);
     auto nuisance = shape.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
     nuisance.insert(nuisance.end(), others.begin(), others.end());
@@ -166,7 +160,7 @@ struct Family {
     members.clear();
     for (const Form& shape : shapes) {
       const auto scales = fine_scales(shape, scale);
-      for (const double at : scales) {
+      for (const Scale& at : scales) {
         Normal n = normal_at(shape, at);
         if (n.solvable) members.push_back(fitted(std::move(n), &shape, at, 1.0 / static_cast<double>(scales.size())));
       }
@@ -196,13 +190,14 @@ struct Family {
     const auto n = static_cast<std::ptrdiff_t>(own());
     const Member& start = *std::max_element(members.begin(), members.begin() + n, lower);
     if (n == 1) return start;
-    const double low = std::log(members.front().scale), high = std::log(members[own() - 1].scale);
+    const double low = std::log(members.front().scale.value), high = std::log(members[own() - 1].scale.value);
     const auto height = [&](const std::vector<double>& ln) {
-      Normal normal = normal_at(shapes[0], std::exp(ln[0]));
-      return normal.solvable ? fitted(std::move(normal), nullptr, 0, 0).height : -1.0;  // no height is negative
+      Normal normal = normal_at(shapes[0], {std::exp(ln[0])});
+      return normal.solvable ? fitted(std::move(normal), nullptr, {}, 0).height : -1.0;  // no height is negative
     };
-    const double at = std::exp(polished({std::log(start.scale)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
-    return fitted(normal_at(shapes[0], at), &shapes[0], at, 0);
+    const double at =
+        std::exp(polished({std::log(start.scale.value)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
+    return fitted(normal_at(shapes[0], {at}), &shapes[0], {at}, 0);
   }
 
   /// Each parameter, averaged over the members. `columns`: of the form itself.
@@ -227,11 +222,11 @@ struct Family {
   /// Interval of the form's own scale, by likelihood over its grid.
   Estimate scale_interval(const Member& best) const {
     std::vector<Guess> guesses;
-    const double step = std::log(members[1].scale / members[0].scale);
+    const double step = std::log(members[1].scale.value / members[0].scale.value);
     for (std::size_t i = 0; i < own(); ++i)
-      guesses.push_back({std::exp(members[i].height - best.height), std::log(members[i].scale), step / 2});
+      guesses.push_back({std::exp(members[i].height - best.height), std::log(members[i].scale.value), step / 2});
     const Estimate ln = averaged(shapes[0].scale_name, guesses);
-    return {ln.name, best.scale, std::exp(ln.low), std::exp(ln.high)};
+    return {ln.name, best.scale.value, std::exp(ln.low), std::exp(ln.high)};
   }
 };
 
@@ -239,8 +234,8 @@ struct Family {
 
 void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
   const Form& form = *cause.form;
-  if (form.cause == "map_offset") return refine_offset(evidence, cause, others);
-  Family family{evidence, others, cause.scale, shapes_of(form), evidence.seen().windows};
+  if (form.displaces_map) return refine_offset(evidence, cause, others);
+  Family family{evidence, others, cause.scale, form.shapes, evidence.seen().windows};
   family.shapes.insert(family.shapes.begin(), form);
   family.fit();
   if (form.by_place) family.follow_push();
@@ -252,14 +247,14 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
   if (family.own() > 1) {
     cause.parameters.push_back(family.scale_interval(best));
   } else if (!form.scale_name.empty()) {
-    const double value = cause.scale + (form.integer_scale ? 1 : 0);  // rotors count from 1
+    const double value = cause.scale.value + (form.integer_scale ? 1 : 0);  // rotors count from 1
     cause.parameters.push_back({form.scale_name, value, value, value});
   }
 }
 
 bool excludes_zero(const Normal& normal, const std::vector<Column>& columns) {
   const double t = student_975(static_cast<double>(normal.b.size()) - 1);
-  const Member fit = fitted(normal, nullptr, 0, 0);
+  const Member fit = fitted(normal, nullptr, {}, 0);
   for (Eigen::Index k = 0; k < fit.theta.size(); ++k)
     if (std::abs(fit.theta[k]) > t * std::hypot(fit.error[k], built_error(columns[static_cast<std::size_t>(k)])))
       return true;

@@ -8,8 +8,8 @@ namespace backwash::study {
 
 /// Fits an accepted cause given the others' columns. Sets the scale (the likelihood's maximum: best point of a grid,
 /// then NLopt), columns, theta and gain of the cause's own form, which field, reach and plan evaluate; and the
-/// parameters with their intervals, which are averaged over every shape of the cause (shapes_of) and every scale that
-/// the data do not reject. A map offset is fitted along x and y.
+/// parameters with their intervals, which are averaged over every shape of the cause (Form::shapes) and every scale
+/// that the data do not reject. A map offset is fitted along x and y.
 void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others);
 
 /// Whether the 95 % interval of some parameter, by leaving flights out at this scale, excludes 0. The scale's own error

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/study/effects/catalogue.hpp"
+#include "core/study/effects/smooths.hpp"
 
 namespace backwash::study {
 

@@ -4,13 +4,9 @@
 #include <string>
 #include <vector>
 
-namespace backwash::study {
+#include "core/study/effects/effect.hpp"
 
-/// A parameter with its interval at 95 %.
-struct Estimate {
-  std::string name;
-  double value, low, high;
-};
+namespace backwash::study {
 
 /// What one model says of a quantity: its weight among the models, value and standard error.
 struct Guess {

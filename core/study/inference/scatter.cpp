@@ -56,7 +56,7 @@ Evidence::Evidence(const Observations& seen)
     const double mean = whole ? 3 / (1 / w[kVarX][i] + 1 / w[kVarY][i] + 1 / w[kVarZ][i]) : 0;
     for (const Channel c : {kVarX, kVarY, kVarZ}) weight_[c][i] = mean;
   }
-  if (seen.has("attitude")) {
+  if (seen.has(Source::attitude)) {
     for (int k = 0; k < 2; ++k) {
       Column tilt{{{kMeanX, {}}, {kMeanY, {}}}};
       for (const auto& w : seen.windows)

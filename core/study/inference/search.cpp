@@ -125,10 +125,11 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
   Accepted& own = accepted[which];
   const auto others = columns_of(accepted, evidence.seen(), which);
   std::vector<Rival> found;
-  for (const Form& form : catalogue()) {
-    if (form.cause == own.form->cause || why_not_tested(form, evidence.seen())) continue;
-    if (std::any_of(accepted.begin(), accepted.end(), [&](auto& a) { return a.form->cause == form.cause; })) continue;
-    for (const double scale : form.scales) {
+  for (const Form* each : catalogue()) {
+    const Form& form = *each;
+    if (form.effect == own.form->effect || why_not_tested(form, evidence.seen())) continue;
+    if (std::any_of(accepted.begin(), accepted.end(), [&](auto& a) { return a.form->effect == form.effect; })) continue;
+    for (const Scale& scale : form.scales) {
       const auto columns = form.columns(evidence.seen().windows, scale);
       // Both with the same free offsets, unless one of them is an offset itself.
       std::vector<Column> both = own.columns;
@@ -140,7 +141,7 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       }
       const Normal theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);
       if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, 0.5 * ours.gain())) continue;
-      const Candidate rival{&form, form.cause, scale, {}, {}, 0, evidence.size(columns)};
+      const Candidate rival{&form, form.cause(), scale, {}, {}, 0, evidence.size(columns)};
       if (!rival.effect(theirs.fit())) continue;
       // Two causes that explain different data are two causes, not rivals: a rival gains less once ours is known.
       std::vector<Column> with_ours = nuisance;
@@ -150,16 +151,13 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       const auto [lead, error] = difference(ours, theirs);
       // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
       // its rate does.
-      const auto motors_alone = [](const Form& f) {
-        return (f.cause == "propeller_damage" && f.parameters.size() == 1) || (f.cause == "payload" && f.integer_scale);
-      };
-      if (motors_alone(*own.form) && motors_alone(form)) {
-        found.push_back({form.cause, &form, scale, lead});
+      if (own.form->motors_alone && form.motors_alone) {
+        found.push_back({form.cause(), &form, scale, lead});
         continue;
       }
       if (lead > kRivalNats && lead > kRivalErrors * error) continue;
       if (lead > 4 * kRivalNats) continue;
-      found.push_back({form.cause, &form, scale, lead});
+      found.push_back({form.cause(), &form, scale, lead});
     }
   }
   std::sort(found.begin(), found.end(), [](auto& a, auto& b) { return a.behind_nats < b.behind_nats; });
@@ -219,10 +217,11 @@ std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Co
     c.size = evidence.size(c.columns);
     all.push_back(std::move(c));
   };
-  for (const Form& form : catalogue()) {
+  for (const Form* each : catalogue()) {
+    const Form& form = *each;
     if (why_not_tested(form, seen)) continue;
-    for (const double scale : form.scales) {
-      Candidate c{&form, form.cause, scale, form.columns(seen.windows, scale), {}, 0, {}};
+    for (const Scale& scale : form.scales) {
+      Candidate c{&form, form.cause(), scale, form.columns(seen.windows, scale), {}, 0, {}};
       const auto nuisance = nuisance_of(form, c.columns, accepted, seen);
       add(std::move(c), nuisance);
     }
@@ -230,7 +229,7 @@ std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Co
   if (!smooths) return all;
   for (const auto& along : regressors(seen)) {
     for (const auto& [name, channels] : channel_groups()) {
-      Candidate c{nullptr, along.name, 0, smooth_columns(along, seen.windows, channels), {}, 0, {}};
+      Candidate c{nullptr, along.name, {}, smooth_columns(along, seen.windows, channels), {}, 0, {}};
       auto nuisance = offsets(c.columns, seen);
       nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
       add(std::move(c), nuisance);
@@ -257,7 +256,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     const Candidate *cause = nullptr, *smooth = nullptr;
     for (const auto& c : all) {
       const bool known = std::any_of(result.accepted.begin(), result.accepted.end(),
-                                     [&](auto& a) { return c.form && a.form->cause == c.name; });
+                                     [&](auto& a) { return c.form && a.form->effect == c.form->effect; });
       if (known) continue;
       if (c.gain < needed_gain(c, result.accepted, result.threshold) || !c.effect(c.normal.fit())) continue;
       if (c.form && !excludes_zero(c.normal, c.columns)) continue;

@@ -22,7 +22,7 @@ struct SearchOptions {
 struct Candidate {
   const Form* form = nullptr;  ///< null for a smooth
   std::string name;            ///< of the cause or of the regressor
-  double scale = 0;
+  Scale scale;
   std::vector<Column> columns;
   Normal normal;
   double gain = 0;   ///< held out, nats
@@ -35,13 +35,13 @@ struct Candidate {
 struct Rival {
   std::string name;
   const Form* form;
-  double scale;
+  Scale scale;
   double behind_nats;  ///< gain of the accepted cause less the rival's
 };
 
 struct Accepted {
   const Form* form;
-  double scale;
+  Scale scale;
   std::vector<Column> columns;
   SmallVector theta;
   double p;

@@ -225,19 +225,19 @@ Observations Observer::finish() {
   follow_thrust();
   settle_commands();
   put_tails();
-  const auto need = [&](const std::string& name, std::initializer_list<const char*> columns) {
+  const auto need = [&](Source source, std::initializer_list<const char*> columns) {
     for (const char* column : columns)
-      if (!ever_.contains(column)) seen_.missing.emplace(name, std::string("no ") + column + " column");
+      if (!ever_.contains(column)) seen_.missing.emplace(source, std::string("no ") + column + " column");
   };
-  need("battery", {"battery_v"});
-  need("temperature", {"temperature_c"});
-  need("attitude", {"qw", "qx", "qy", "qz"});
-  need("thrust", {"thrust"});
-  need("setpoints", {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
-  need("rpm", {"rpm1", "rpm2", "rpm3", "rpm4"});
-  need("motors", {"motor1", "motor2", "motor3", "motor4"});
-  if (!surroundings_.has_map() && !ever_.contains("ceiling")) seen_.missing.emplace("ceiling", "no map given");
-  if (!surroundings_.has_map()) seen_.missing.emplace("map", "no map given");
+  need(Source::battery, {"battery_v"});
+  need(Source::temperature, {"temperature_c"});
+  need(Source::attitude, {"qw", "qx", "qy", "qz"});
+  need(Source::thrust, {"thrust"});
+  need(Source::setpoints, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
+  need(Source::rpm, {"rpm1", "rpm2", "rpm3", "rpm4"});
+  need(Source::motors, {"motor1", "motor2", "motor3", "motor4"});
+  if (!surroundings_.has_map() && !ever_.contains("ceiling")) seen_.missing.emplace(Source::ceiling, "no map given");
+  if (!surroundings_.has_map()) seen_.missing.emplace(Source::map, "no map given");
   return std::move(seen_);
 }
 

@@ -57,6 +57,9 @@ enum Channel : std::size_t {
 };
 const char* channel_name(Channel c);
 
+/// What flights must hold for an effect to be tested: a map, or something above said by map or log; columns of the log.
+enum class Source : std::size_t { map, ceiling, battery, temperature, attitude, thrust, setpoints, rpm, motors };
+
 /// Level offsets of the map at which Σ is looked up: a square of so many points, and their spacing.
 inline constexpr std::size_t kOffsetsAside = 9;
 inline constexpr double kOffsetStep = 0.1;  ///< m
@@ -100,8 +103,8 @@ struct Observations {
   double row_period = 0;                                 ///< s, longest of the flights' mean
   std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
   std::map<std::string, std::size_t> gated_out;          ///< windows by reason: gates.hpp, outside (of the map)
-  std::map<std::string, std::string> missing;            ///< what no flight had: "battery_v" → "no battery_v column"
-  bool has(const std::string& what) const { return !missing.contains(what); }
+  std::map<Source, std::string> missing;                 ///< what no flight had, and why: "no battery_v column"
+  bool has(Source what) const { return !missing.contains(what); }
   bool measured(Channel c) const;
 };
 

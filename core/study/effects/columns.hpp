@@ -2,23 +2,13 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
-#include "core/study/effects/catalogue.hpp"
+#include "core/study/effects/effect.hpp"
 
+/// What forms are made of: columns with one value per window.
 namespace backwash::study {
 
-/// The catalogue's rows, by what they are about.
-std::vector<Form> surface_forms();   ///< floor, ceiling, walls
-std::vector<Form> vehicle_forms();   ///< thrust, mass, delays, speed
-std::vector<Form> push_forms();      ///< fixed to the body or the world
-std::vector<Form> variance_forms();  ///< of the disturbance and its tail
-std::vector<Form> rotor_forms();     ///< single rotors
-
-/// Other shapes of an effect's form, in the literature as good as its own: the same parameters, at the same reference.
-/// They take no part in the search; estimates are averaged over them (estimate.hpp).
-std::vector<Form> shapes_of(const Form& form);
-
-/// What columns are built of: one value per window in one channel, in both level means, in ln variance along all axes.
 inline constexpr std::array<Channel, 3> kVariances = {kVarX, kVarY, kVarZ};
 
 template <typename F>
@@ -49,11 +39,6 @@ Column in_variance(const Windows& windows, F value) {
   return column;
 }
 
-/// A level offset of the map, m (less than 0.5 along each axis), as one number, the scale of its form: millimetres +
-/// 500 along x, times 1,000, and along y.
-double offset_code(const Vec3& offset_W);
-Vec3 map_offset(double code);
-
 /// Mean of value(place) along the window.
 template <typename F>
 auto along(const WindowRow& w, F value) {
@@ -72,10 +57,31 @@ Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {
   return sum;
 }
 
+/// (reference/distance)^n, nowhere nearer than field::near_surface goes; 0 where there is no surface.
+double power_of_distance(double distance, double reference, double n);
+
 /// A vector of the body, growing with `amount`, in all mean channels.
 std::vector<Column> body_drift(const Windows& windows, const std::function<double(const WindowRow&)>& amount);
 
 /// −x T/m: a share of the thrust that is missing, seen in the mean and in what a change of the command is worth.
 Column missing_thrust(const Windows& windows, const std::function<double(const WindowRow&)>& share);
+
+/// An offset to whole millimetres, level.
+Vec3 whole_millimetres(const Vec3& offset_W);
+/// ln Σ with the map moved by an offset, less that as it is.
+std::vector<Column> displaced(const Windows& windows, const Vec3& offset_W);
+
+/// The numbers of the rotors, from 0.
+std::vector<Scale> rotors();
+/// 1 in the channel of one of four rotors, from `first` on; contrast: less the mean of the four.
+Column one_rotor(Channel first, const Windows& windows, const Scale& rotor, bool contrast);
+
+/// Whether any window passes a test.
+template <typename F>
+bool any(const Observations& seen, F test) {
+  for (const auto& w : seen.windows)
+    if (test(w)) return true;
+  return false;
+}
 
 }  // namespace backwash::study

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/effects/catalogue.hpp"
+#include "core/study/effects/smooths.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/study/effects/forms.hpp"
+#include "core/study/effects/columns.hpp"
 
 namespace backwash::study {
 namespace {
@@ -13,90 +13,13 @@ constexpr double kStrayed = 0.1;  // m: a push that moves the craft farther is n
 
 }  // namespace
 
-const std::vector<std::string>& cause_names() {
-  static const std::vector<std::string> names = {"ground_thrust",
-                                                 "ceiling",
-                                                 "wall_attraction",
-                                                 "recirculation",
-                                                 "forward_speed",
-                                                 "battery_sag",
-                                                 "thrust_slope",
-                                                 "payload",
-                                                 "trim",
-                                                 "draft",
-                                                 "rotor_drag",
-                                                 "actuator_lag",
-                                                 "command_latency",
-                                                 "imu_drift",
-                                                 "vibration",
-                                                 "map_offset",
-                                                 "heavy_tails",
-                                                 "propeller_damage",
-                                                 "rotor_sensor_fault"};
-  return names;
-}
-
-const std::vector<Form>& catalogue() {
-  static const std::vector<Form> all = [] {
-    std::vector<Form> forms;
-    for (auto part : {surface_forms(), vehicle_forms(), push_forms(), variance_forms(), rotor_forms()})
-      forms.insert(forms.end(), part.begin(), part.end());
-    return forms;
-  }();
-  return all;
-}
-
-std::optional<std::string> why_not_tested(const Form& form, const Observations& seen) {
-  const auto need = [&](const char* what) -> std::optional<std::string> {
-    return seen.has(what) ? std::nullopt : std::optional(seen.missing.at(what));
-  };
-  const std::string& c = form.cause;
-  const auto any = [&](auto test) { return std::any_of(seen.windows.begin(), seen.windows.end(), test); };
-  if (c == "wall_attraction" || c == "map_offset")
-    if (auto why = need("map")) return why;
-  if (c == "ceiling")
-    if (auto why = need("ceiling")) return why;
-  if (c == "ceiling" && !any([](auto& w) { return w.around.ceiling_gap < 1.5; }))
-    return "no ceiling within 1.5 m of the flights";
-  if (c == "wall_attraction" && !any([](auto& w) { return !w.around.walls.empty(); }))
-    return "no wall within 3 m of the flights";
-  if (c == "recirculation" && seen.has("map") && !any([](auto& w) { return std::isfinite(w.around.ceiling_gap); }))
-    return "the map shows no closed room";
-  if (c == "battery_sag") {
-    if (auto why = need("battery")) return why;
-    if (!seen.has("thrust")) return seen.missing.at("thrust");
-  }
-  if (form.parameters[0] == "x_mps2_per_10c")
-    if (auto why = need("temperature")) return why;
-  if (c == "trim" || c == "imu_drift" || c == "thrust_slope" || c == "actuator_lag")
-    if (auto why = need("attitude")) return why;
-  const bool off_centre = c == "payload" && form.integer_scale;
-  if (off_centre)
-    if (auto why = need("motors")) return why;
-  if (c == "thrust_slope" || c == "actuator_lag" || (c == "payload" && !off_centre))
-    if (auto why = need("thrust")) return why;
-  if (c == "thrust_slope" || c == "actuator_lag" || c == "command_latency")
-    if (auto why = need("setpoints")) return why;
-  if (c == "vibration" || c == "rotor_sensor_fault" || (form.parameters.size() == 2 && c == "propeller_damage"))
-    if (auto why = need("rpm")) return why;
-  if (c == "propeller_damage")
-    if (auto why = need("motors")) return why;
-  if (seen.windows.empty()) return "no good window";
-  for (const auto& column : form.columns(seen.windows, form.scales.front()))
-    if (std::any_of(column.parts.begin(), column.parts.end(), [&](auto& p) { return seen.measured(p.channel); }))
-      return std::nullopt;
-  if (!(seen.has("thrust") && seen.has("attitude")) && !seen.has("setpoints"))
-    return "without thrust and attitude or set-points no push shows, and other effects in hover only";
-  return "no window measures it";
-}
-
 std::vector<Regressor> regressors(const Observations& seen) {
   std::vector<Regressor> all = {{"z_m", false, [](const WindowRow& w) { return w.around.height; }},
                                 {"x_m", false, [](const WindowRow& w) { return w.p_W.x(); }},
                                 {"y_m", false, [](const WindowRow& w) { return w.p_W.y(); }},
                                 {"speed_mps", false, [](const WindowRow& w) { return w.speed; }},
                                 {"t_s", false, [](const WindowRow& w) { return w.t; }}};
-  if (seen.has("map")) {
+  if (seen.has(Source::map)) {
     all.push_back({"ceiling_gap_m", false, [](const WindowRow& w) { return std::min(w.around.ceiling_gap, 9.0); }});
     all.push_back({"wall_distance_m", false, [](const WindowRow& w) {
                      double least = 9;
@@ -104,10 +27,10 @@ std::vector<Regressor> regressors(const Observations& seen) {
                      return least;
                    }});
   }
-  if (seen.has("battery")) all.push_back({"battery_v", false, [](const WindowRow& w) { return w.voltage; }});
-  if (seen.has("temperature"))
+  if (seen.has(Source::battery)) all.push_back({"battery_v", false, [](const WindowRow& w) { return w.voltage; }});
+  if (seen.has(Source::temperature))
     all.push_back({"temperature_c", false, [](const WindowRow& w) { return w.temperature; }});
-  if (seen.has("attitude")) all.push_back({"yaw_rad", true, [](const WindowRow& w) { return w.yaw; }});
+  if (seen.has(Source::attitude)) all.push_back({"yaw_rad", true, [](const WindowRow& w) { return w.yaw; }});
   return all;
 }
 
@@ -150,13 +73,7 @@ std::vector<Column> smooth_columns(const Regressor& along, const Windows& window
 }
 
 std::vector<Column> companions(const Form& form, const Observations& seen) {
-  const Windows& ws = seen.windows;
-  if (form.cause == "battery_sag") return {missing_thrust(ws, [](auto&) { return 1.0; })};
-  if (form.cause == "imu_drift") {
-    return {level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
-            level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
-  }
-  return {};
+  return form.companions ? form.companions(seen.windows) : std::vector<Column>{};
 }
 
 Windows moved_by(const Windows& windows, const std::vector<Column>& columns, const Eigen::VectorXd& theta) {
@@ -179,7 +96,7 @@ Windows moved_by(const Windows& windows, const std::vector<Column>& columns, con
   return moved;
 }
 
-Windows moved_by_itself(const Form& form, const Windows& windows, double scale, const Eigen::VectorXd& theta) {
+Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& scale, const Eigen::VectorXd& theta) {
   constexpr int kTurns = 4;
   Windows moved = windows;
   for (int i = 0; i < kTurns && form.by_place; ++i) moved = moved_by(windows, form.columns(moved, scale), theta);
@@ -195,7 +112,7 @@ std::vector<Column> offsets(const std::vector<Column>& columns, const Observatio
   if (used[kMeanX] || used[kMeanY]) {
     free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitX(); }));
     free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); }));
-    if (seen.has("attitude"))
+    if (seen.has(Source::attitude))
       for (int i = 0; i < 2; ++i) free.push_back(level(ws, [i](auto& w) -> Vec3 { return w.R_WB.col(i); }));
   }
   if (used[kMeanZ]) free.push_back(in(kMeanZ, ws, [](auto&) { return 1.0; }));
