@@ -80,7 +80,7 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
       throw Failure(kBadData, file.path + ":1: has " + (flight->signal == study::Signal::commanded ? "" : "no ") +
                                   "set-points, unlike the logs before it; calibrate them apart");
     signal = flight->signal;
-    for (std::size_t g = 0; g < study::kGates; ++g) campaign.gated[g] += flight->gated[g];
+    for (std::size_t g = 0; g < study::kHoverGates; ++g) campaign.gated[g] += flight->gated[g];
     for (const auto& what : flight->not_tested) {
       if (std::find(campaign.not_tested.begin(), campaign.not_tested.end(), what) == campaign.not_tested.end())
         campaign.not_tested.push_back(what);

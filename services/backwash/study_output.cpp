@@ -71,7 +71,7 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen) 
                {"not_tested", Json::array()},
                {"remaining_dependence", Json::array()},
                {"minimum_detectable", Json::object()}};
-  for (const auto& [gate, count] : seen.gated_out) json["gated_out"][gate] = count;
+  for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
   for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause));
   for (const auto& u : result.unknown)
     json["unknown"].push_back({{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}});

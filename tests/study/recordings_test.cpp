@@ -48,10 +48,10 @@ TEST(StudyGates, LeaveOutRotorsAtRestAndFeetThatMayTouch) {
     for (std::size_t i = 0; i < 200; ++i) idle.columns[motor][i] = 0;
   }
   EXPECT_EQ(observed(turning).gated_out.size(), 0u);
-  EXPECT_EQ(observed(idle).gated_out["perched"], 2u);
+  EXPECT_EQ(observed(idle).gated_out[Gate::perched], 2u);
   auto low = flown(0, 0.503), clear = flown(0, 0.508);
   add_column(low, "stood_z_m", 0.5), add_column(clear, "stood_z_m", 0.5);
-  EXPECT_EQ(observed(low).gated_out["perched"], 4u);
+  EXPECT_EQ(observed(low).gated_out[Gate::perched], 4u);
   EXPECT_EQ(observed(clear).windows.size(), 4u);
 }
 
@@ -59,7 +59,7 @@ TEST(StudyGates, CompareAPassOnlyWhereSomethingSimulatesIt) {
   const auto hover = observed(flown(0.02, 0.5));
   EXPECT_TRUE(hover.measured(kVarZ));
   EXPECT_FALSE(hover.measured(kMeanX)) << "a change of velocity is no push";
-  EXPECT_EQ(observed(flown(0.4, 0.5)).gated_out["transit"], 4u);
+  EXPECT_EQ(observed(flown(0.4, 0.5)).gated_out[Gate::transit], 4u);
   auto told = flown(0.4, 0.5);
   for (std::size_t i = 0; i < told.t_s.size(); ++i) {
     told.columns["cmd_x_m"].push_back(0.4 * told.t_s[i]);
@@ -99,7 +99,7 @@ TEST(StudyGates, LeaveOutWhatIsFarOutsideTheMapHoweverFar) {
     Observer observer(Vehicle{}, Model{}, &room);
     observer.add(log);
     const auto seen = observer.finish();
-    EXPECT_EQ(seen.gated_out.at("outside"), 1u) << away;
+    EXPECT_EQ(seen.gated_out.at(Gate::outside), 1u) << away;
     EXPECT_EQ(seen.windows.size(), 3u) << away;
   }
 }

@@ -54,7 +54,7 @@ toml::table provenance(const Calibration& c, const Provenance& p) {
   for (std::size_t i = 0; i < kParameters; ++i)
     if (!c.determined[i]) kept.emplace_back(key(static_cast<Parameter>(i)));
   toml::table gated;
-  for (std::size_t g = 0; g < kGates; ++g)
+  for (std::size_t g = 0; g < kHoverGates; ++g)
     gated.insert(to_string(static_cast<Gate>(g)), static_cast<std::int64_t>(p.gated[g]));
   return toml::table{{"version", p.version},
                      {"vehicle", p.vehicle},

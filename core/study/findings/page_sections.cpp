@@ -56,7 +56,7 @@ std::string too_few(const Observations& seen) {
                      std::to_string(needed - good) + " more";
   std::string out;
   for (const auto& [gate, count] : seen.gated_out)
-    out += (out.empty() ? "" : ", ") + std::to_string(count) + " " + gate;
+    out += (out.empty() ? "" : ", ") + std::to_string(count) + " " + to_string(gate);
   return text + (out.empty() ? "." : " (windows left out: " + out + ").");
 }
 

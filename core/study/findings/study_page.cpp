@@ -207,7 +207,7 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
   for (const auto& [cause, sizes] : result.minimum_detectable)
     for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
   page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
-  for (const auto& [gate, count] : seen.gated_out) page += row(gate, std::to_string(count) + " windows");
+  for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
   page += "</table>\n</section>\n";
   std::vector<std::string> told;
   for (const auto& cause : result.causes) {

@@ -124,11 +124,6 @@ const char* to_string(Signal signal) noexcept {
   }
 }
 
-const char* to_string(Gate gate) noexcept {
-  constexpr const char* kNames[kGates] = {"frozen", "perched", "saturated", "transit", "gap"};
-  return kNames[static_cast<std::size_t>(gate)];
-}
-
 tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& log,
                                                           const std::optional<Vehicle>& vehicle,
                                                           const WindowOptions& options, const std::string& path) {

@@ -10,6 +10,7 @@
 
 #include "core/log/flight_log.hpp"
 #include "core/study/windows/band.hpp"
+#include "core/study/windows/gate.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -22,17 +23,6 @@ enum class Signal {
   raw,        ///< raw acceleration as it is: no vehicle known, so no attenuation either
 };
 const char* to_string(Signal signal) noexcept;
-
-/// Why a window was left out.
-enum class Gate : std::size_t {
-  frozen,     ///< measurements repeat themselves: a tracker or estimator that has stopped
-  perched,    ///< standing on something: no motion at all, or thrust far below the weight
-  saturated,  ///< rotors at a limit: the acceleration is then not the command's and the air's alone
-  transit,    ///< on the way between hover positions, or settling after it
-  gap,        ///< rows are missing
-};
-inline constexpr std::size_t kGates = 5;
-const char* to_string(Gate gate) noexcept;
 
 /// The disturbance during one stretch of hover. Vectors hold one number per axis of W.
 struct Window {
@@ -54,8 +44,8 @@ struct FlightWindows {
   double rate_hz{};  ///< mean rate of the rows
   Vec3 attenuation;  ///< var(a)/var(w) that was divided out, per axis; 1 for Signal::commanded and raw
   bool segments_from_log = false;
-  std::array<std::size_t, kGates> gated{};  ///< windows left out, by Gate
-  std::vector<std::string> not_tested;      ///< gates without the columns they need, and which those are
+  std::array<std::size_t, kHoverGates> gated{};  ///< windows left out, by Gate
+  std::vector<std::string> not_tested;           ///< gates without the columns they need, and which those are
   std::vector<Window> windows;
 };
 

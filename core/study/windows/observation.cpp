@@ -85,26 +85,24 @@ void Observer::add(const log::FlightLog& log) {
     const auto rotors = rotor_phases(log, s);
     std::vector<Stretch> good;
     for (const Stretch w : cut(s)) {
-      if (const char* why = gate(s, log, w)) {
-        ++seen_.gated_out[why];
-        continue;
-      }
-      if (const char* why = misplaced(s, w)) {
-        ++seen_.gated_out[why];
-        continue;
-      }
-      good.push_back(w);
+      auto why = gate(s, log, w);
+      if (!why) why = misplaced(s, w);
+      if (why)
+        ++seen_.gated_out[*why];
+      else
+        good.push_back(w);
     }
     add_windows(log, s, rotors, good);
   }
   seen_.first.push_back(seen_.windows.size());
 }
 
-const char* Observer::misplaced(const Series& s, Stretch w) const {
+std::optional<Gate> Observer::misplaced(const Series& s, Stretch w) const {
   for (const auto* x : {&s.p, &s.p_nominal})
     for (std::size_t i = w.begin; i < w.end && !x->empty(); ++i)
-      if (!surroundings_.near((*x)[i])) return "outside";
-  return surroundings_.inside_solid(s.p[(w.begin + w.end) / 2]) ? "inconsistent" : nullptr;
+      if (!surroundings_.near((*x)[i])) return Gate::outside;
+  if (surroundings_.inside_solid(s.p[(w.begin + w.end) / 2])) return Gate::inconsistent;
+  return std::nullopt;
 }
 
 void Observer::smooth_voltage() {

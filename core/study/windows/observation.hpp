@@ -10,6 +10,7 @@
 
 #include "core/log/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/study/windows/gate.hpp"
 #include "core/study/windows/instrument.hpp"
 #include "core/study/windows/rotor_channels.hpp"
 #include "core/study/windows/series.hpp"
@@ -102,7 +103,7 @@ struct Observations {
   std::vector<std::size_t> first;                        ///< window at which each flight begins; one more at the end
   double row_period = 0;                                 ///< s, longest of the flights' mean
   std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
-  std::map<std::string, std::size_t> gated_out;          ///< windows by reason: gates.hpp, outside (of the map)
+  std::map<Gate, std::size_t, ByName> gated_out;         ///< windows by reason
   std::map<Source, std::string> missing;                 ///< what no flight had, and why: "no battery_v column"
   bool has(Source what) const { return !missing.contains(what); }
   bool measured(Channel c) const;
@@ -123,7 +124,7 @@ class Observer {
   void add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
                    const std::vector<Stretch>& good);
   /// Why the map leaves a window out: far outside of it, or in a solid (map and log contradict each other).
-  const char* misplaced(const Series& s, Stretch w) const;
+  std::optional<Gate> misplaced(const Series& s, Stretch w) const;
   WindowRow placed(const log::FlightLog& log, const Series& s, Stretch w);
   void look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
   Residual put_means(const WindowRow& row, const Series& s, Stretch w);
