@@ -24,7 +24,7 @@ tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path);
 /// Reads a model file; `builtin:quad-5in` and `builtin:quad-7in` ship. `[bound] mean` (default 0), `tau_w` and
 /// `ground.r0` are optional; `[confidence]` and `[provenance]` are accepted and not read.
 /// Of the study's `[[extension.term]]` the `effect` list is read ({ kind, value, error, scale }, ModelEffect; README.md
-/// of core/study/discrepancy); the rest of a term is the study's own.
+/// of core/study); the rest of a term is the study's own.
 tl::expected<Model, ConfigError> load_model(const std::string& path);
 
 }  // namespace backwash::config

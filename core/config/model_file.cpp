@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <optional>
+#include <sstream>
 
+#include "core/config/model_table.hpp"
 #include "core/config/strict_table.hpp"
 
 namespace backwash::config {
@@ -11,6 +15,8 @@ constexpr Range kVariance{0, 100};       // (m/s²)², amplitudes too
 constexpr Range kLength{0, 20, true};    // m
 constexpr Range kAngle{0, 1.571, true};  // rad, up to π/2 as people round it
 constexpr Range kDecay{0, 1000, true};   // 1/m²
+constexpr double kMost = 10;             // of an effect's numbers
+constexpr double kLeastScale = 0.01;     // m
 
 std::vector<NumberKey> model_keys(Model& m) {
   using enum NumberKey::Presence;
@@ -75,7 +81,7 @@ std::optional<Vec3> numbers(const toml::table& table, const char* key, std::size
   Vec3 v = Vec3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
     const auto number = list->get(i)->value<double>();
-    if (!number || !(*number >= least) || !(*number <= 10)) return std::nullopt;
+    if (!number || !(*number >= least) || !(*number <= kMost)) return std::nullopt;
     v[static_cast<Eigen::Index>(i)] = *number;
   }
   return v;
@@ -101,7 +107,7 @@ tl::expected<ModelEffect, std::string> read_effect(const toml::node& node) {
   if (!error) return wrong(name + ": error needs a list of " + count + " in [0, 10]");
   effect.error = *error;
   if (kind->scaled) effect.scale = (*table)["scale"].value_or(0.0);
-  if (kind->scaled && !(effect.scale >= 0.01 && effect.scale <= 10))
+  if (kind->scaled && !(effect.scale >= kLeastScale && effect.scale <= kMost))
     return wrong(name + ": scale needs a number in [0.01, 10]");
   return effect;
 }
@@ -120,6 +126,50 @@ tl::expected<Model, ConfigError> load_model(const std::string& path) {
     model.extension.push_back(*read);
   }
   return model;
+}
+
+double rounded(double value, int digits) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+  return std::strtod(text.data(), nullptr);
+}
+
+toml::table model_table(const Model& model) {
+  Model copy = model;
+  toml::table whole;
+  for (const auto& [path, target, range, presence] : model_keys(copy)) {
+    toml::table* table = &whole;
+    std::string_view rest = path;
+    for (auto dot = rest.find('.'); dot != std::string_view::npos; dot = rest.find('.')) {
+      auto& inner = *table->emplace<toml::table>(rest.substr(0, dot)).first->second.as_table();
+      inner.is_inline(table != &whole);
+      table = &inner, rest.remove_prefix(dot + 1);
+    }
+    table->insert_or_assign(rest, rounded(*target, 6));
+  }
+  return whole;
+}
+
+toml::table effect_table(const ModelEffect& effect) {
+  const auto kind = std::ranges::find(kEffects, effect.kind, &EffectKind::kind);
+  const auto list = [&](const Vec3& v, double least) {
+    toml::array numbers;
+    for (std::size_t i = 0; i < kind->values; ++i)
+      numbers.push_back(rounded(std::clamp(v[static_cast<Eigen::Index>(i)], least, kMost), 8));
+    return numbers;
+  };
+  toml::table table{{"kind", kind->name}, {"value", list(effect.value, -kMost)}, {"error", list(effect.error, 0)}};
+  if (kind->scaled) table.insert("scale", rounded(std::clamp(effect.scale, kLeastScale, kMost), 8));
+  table.is_inline(true);
+  return table;
+}
+
+std::string text_of(const toml::table& tables, const std::vector<std::string>& order) {
+  std::ostringstream text;
+  for (const auto& name : order)
+    if (const auto* table = tables[name].as_table())
+      text << toml::toml_formatter{toml::table{{name, *table}}} << "\n\n";
+  return text.str();
 }
 
 }  // namespace backwash::config

@@ -54,8 +54,8 @@ std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds) {
   return std::vector<Setpoint>(static_cast<std::size_t>(std::lround(seconds / kControlPeriod)), hold);
 }
 
-study::FlightLog to_log(const std::vector<FlightSample>& samples) {
-  study::FlightLog log;
+log::FlightLog to_log(const std::vector<FlightSample>& samples) {
+  log::FlightLog log;
   const auto add = [&](const std::string& prefix, const std::string& unit, const Vec3& value) {
     for (int axis = 0; axis < 3; ++axis) {
       log.columns[prefix + std::string("xyz")[static_cast<std::size_t>(axis)] + unit].push_back(value[axis]);

@@ -6,11 +6,11 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "core/log/flight_log.hpp"
 #include "core/plan/planner.hpp"
 #include "core/sim/airflow_truth.hpp"
 #include "core/sim/quadrotor.hpp"
 #include "core/sim/vio.hpp"
-#include "core/study/flight_log.hpp"
 #include "core/track/tracker.hpp"
 
 namespace backwash::sim {
@@ -53,7 +53,7 @@ std::vector<Setpoint> straight_commands(const Vec3& from_W, const Vec3& to_W, do
 std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds);
 
 /// Columns of docs/interfaces.md, "Flight log, CSV"; position, velocity and attitude as estimated on board.
-study::FlightLog to_log(const std::vector<FlightSample>& samples);
+log::FlightLog to_log(const std::vector<FlightSample>& samples);
 
 struct FlightOptions {
   Vec3 start_W, goal_W;    ///< hover points, m

@@ -7,7 +7,7 @@
 
 namespace backwash {
 
-/// What an accepted cause of the study adds to the model (core/study/discrepancy/README.md, "Extension"): an entry of
+/// What an accepted cause of the study adds to the model (core/study/README.md, "Extension"): an entry of
 /// [[extension.term]].effect. `error`: half width of the value's 95 % interval, what stays unknown.
 struct ModelEffect {
   enum class Kind {

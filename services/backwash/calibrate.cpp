@@ -67,7 +67,7 @@ Json to_json(const std::vector<Refusal>& refused) {
 
 Json to_json(const Campaign& campaign, const Options& options) {
   Json gated, signals = Json::array();
-  for (std::size_t g = 0; g < study::kGates; ++g)
+  for (std::size_t g = 0; g < study::kHoverGates; ++g)
     gated[study::to_string(static_cast<study::Gate>(g))] = campaign.gated[g];
   Json json{{"quantile", options.quantile}, {"flights", campaign.logs.size()}, {"windows", campaign.windows}};
   json["gated_out"] = gated, json["signal"] = campaign.signal, json["not_tested"] = campaign.not_tested;

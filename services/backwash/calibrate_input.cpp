@@ -22,7 +22,7 @@ map::OccupancyGrid flat_floor() {
   return grid;
 }
 
-double value_of(const study::FlightLog& log, const std::string& column, double otherwise) {
+double value_of(const log::FlightLog& log, const std::string& column, double otherwise) {
   return log.has(column) && !log.column(column).empty() ? log.column(column).front() : otherwise;
 }
 
@@ -80,7 +80,7 @@ Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>&
       throw Failure(kBadData, file.path + ":1: has " + (flight->signal == study::Signal::commanded ? "" : "no ") +
                                   "set-points, unlike the logs before it; calibrate them apart");
     signal = flight->signal;
-    for (std::size_t g = 0; g < study::kGates; ++g) campaign.gated[g] += flight->gated[g];
+    for (std::size_t g = 0; g < study::kHoverGates; ++g) campaign.gated[g] += flight->gated[g];
     for (const auto& what : flight->not_tested) {
       if (std::find(campaign.not_tested.begin(), campaign.not_tested.end(), what) == campaign.not_tested.end())
         campaign.not_tested.push_back(what);

@@ -30,7 +30,7 @@ struct Campaign {
   std::vector<std::string> map_names, logs;
   std::string signal;  ///< of all flights
   bool pushes;         ///< all flights have set-points
-  std::array<std::size_t, study::kGates> gated{};
+  std::array<std::size_t, study::kHoverGates> gated{};
   std::vector<std::string> not_tested;
   std::size_t windows = 0;
   std::optional<study::calibrate::HeightEffect> height;  ///< without a map: what the logs say of height and ceiling

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "core/study/compare_report.hpp"
+#include "core/report/compare_report.hpp"
 #include "services/backwash/compare_output.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/verb.hpp"
@@ -59,9 +59,9 @@ std::vector<std::string> models_of(const Options& options) {
   return options.models;
 }
 
-study::Comparison compare(const Options& options, const std::vector<std::string>& maps,
-                          const std::vector<std::string>& models) {
-  study::Comparison c{sim::compare_methods(), {}, {}, {}, {}, options.seed, options.flights, kVersion};
+report::Comparison compare(const Options& options, const std::vector<std::string>& maps,
+                           const std::vector<std::string>& models) {
+  report::Comparison c{sim::compare_methods(), {}, {}, {}, {}, options.seed, options.flights, kVersion};
   for (const auto& map : maps) {
     const std::string scene = map.starts_with("builtin:") ? map : std::filesystem::path(map).filename().string();
     for (std::size_t n = 0; n < options.vehicles.size(); ++n) {
@@ -100,7 +100,7 @@ int run(const Options& options) {
   if (!options.out.empty()) write_file(options.out, to_csv(comparison), options.force);
   if (!options.report.empty()) {
     progress("drawing the report");
-    const auto page = study::comparison_report(comparison);
+    const auto page = report::comparison_report(comparison);
     if (!page) throw Failure(kUnavailable, options.report + ":1: " + page.error().message);
     write_file(options.report, *page, options.force);
   }

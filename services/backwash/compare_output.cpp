@@ -28,7 +28,7 @@ Json to_json(const sim::MethodRatio& ratio) {
 Json to_json(const sim::MethodRow& row, const sim::CompareMethod& method) {
   Json common;
   for (std::size_t i = 0; i < sim::kMeasures; ++i) common[sim::name(static_cast<sim::Measure>(i))] = row.common[i];
-  const auto paper = study::paper_jerk2_ratio(method);
+  const auto paper = report::paper_jerk2_ratio(method);
   const bool flew = row.solved > 0, sets = method.margin < 0;
   return {{"method", row.method},
           {"margin_m", sets ? Json() : Json(method.margin)},
@@ -66,7 +66,7 @@ std::string interval(const sim::Interval& r) {
 
 }  // namespace
 
-Json to_json(const study::Comparison& c) {
+Json to_json(const report::Comparison& c) {
   Json methods = Json::array(), scenes = Json::array(), demands = Json::array(), gaps = Json::array();
   for (std::size_t m = 0; m < c.methods.size(); ++m) methods.push_back(to_json(c.table.rows[m], c.methods[m]));
   for (const auto& scene : c.scenes) {
@@ -90,7 +90,7 @@ Json to_json(const study::Comparison& c) {
           {"narrow_gap", std::move(gaps)}};
 }
 
-void print_text(const study::Comparison& c) {
+void print_text(const report::Comparison& c) {
   std::printf("%zu pairs that all methods solve: totals of length, time, jerk2, energy; the rest counts all pairs\n",
               c.table.common_pairs);
   std::printf("%-12s %9s %8s %10s %9s %9s %8s %9s %9s %8s %12s\n", "method", "length m", "time s", "jerk2", "energy kJ",
@@ -103,7 +103,7 @@ void print_text(const study::Comparison& c) {
   }
   for (std::size_t m = 1; m < c.methods.size(); ++m) {
     const auto& row = c.table.rows[m];
-    const auto paper = study::paper_jerk2_ratio(c.methods[m]);
+    const auto paper = report::paper_jerk2_ratio(c.methods[m]);
     for (const auto& [name, ratio] : {std::pair{"all", &row.on_common}, {"both", &row.pairwise}}) {
       if (ratio->pairs == 0) continue;
       std::printf("%s over %s, %zu pairs that %s solve: jerk2 %s%s, at equal time %s, length %s, time %s, energy %s\n",
@@ -123,7 +123,7 @@ void print_text(const study::Comparison& c) {
   for (const auto& demand : c.demands) std::printf("%-7s %s\n", demand.met ? "met" : "MISSED", demand.text.c_str());
 }
 
-std::string to_csv(const study::Comparison& c) {
+std::string to_csv(const report::Comparison& c) {
   std::ostringstream csv;
   csv.precision(9);
   csv << "scene,vehicle,method,pair,seed,start_x_m,start_y_m,start_z_m,goal_x_m,goal_y_m,goal_z_m,status,length_m,time_"

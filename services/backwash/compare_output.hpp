@@ -3,16 +3,16 @@
 
 #include <string>
 
-#include "core/study/compare_report.hpp"
+#include "core/report/compare_report.hpp"
 #include "services/backwash/json.hpp"
 
 namespace backwash::services {
 
 /// What `compare` prints with --json (README.md, "compare").
-Json to_json(const study::Comparison& comparison);
+Json to_json(const report::Comparison& comparison);
 /// The same as a table for people.
-void print_text(const study::Comparison& comparison);
+void print_text(const report::Comparison& comparison);
 /// One line a pair and method (README.md, "compare").
-std::string to_csv(const study::Comparison& comparison);
+std::string to_csv(const report::Comparison& comparison);
 
 }  // namespace backwash::services

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/feasibility.hpp"
+#include "core/plan/feasibility.hpp"
 
 #include <cstdio>
 
@@ -20,22 +20,22 @@ struct Options {
 
 /// What only the sets of method tight are asked.
 struct Sets {
-  study::SetCost cost;
-  std::vector<study::AgainstMargin> against;
+  plan::SetCost cost;
+  std::vector<plan::AgainstMargin> against;
 };
 
 /// The question about one way: its ends' regions and its tightest place.
 struct Way {
   int start_region, goal_region;
-  std::optional<study::Bottleneck> bottleneck;
+  std::optional<plan::Bottleneck> bottleneck;
 };
 
-int region_of(const plan::World& world, const study::Regions& regions, const Vec3& p) {
+int region_of(const plan::World& world, const plan::Regions& regions, const Vec3& p) {
   const auto v = world.grid.index(p);
   return world.grid.inside(v) ? regions.of_voxel[world.grid.linear(v)] : -1;
 }
 
-Json to_json(const study::Region& r, const plan::World&) {
+Json to_json(const plan::Region& r, const plan::World&) {
   return {{"voxels", r.voxels},
           {"volume_m3", r.volume_m3},
           {"low", services::to_json(r.low_W)},
@@ -43,7 +43,7 @@ Json to_json(const study::Region& r, const plan::World&) {
           {"widest", {{"p", services::to_json(r.widest_W)}, {"clearance_m", r.widest_clearance_m}}}};
 }
 
-void print_json(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way,
+void print_json(const plan::World& world, const plan::Regions& regions, const std::optional<Way>& way,
                 const std::optional<Sets>& sets) {
   Json list = Json::array();
   std::size_t voxels = 0;
@@ -86,7 +86,7 @@ void print_json(const plan::World& world, const study::Regions& regions, const s
   print(json);
 }
 
-void print_text(const plan::World& world, const study::Regions& regions, const std::optional<Way>& way,
+void print_text(const plan::World& world, const plan::Regions& regions, const std::optional<Way>& way,
                 const std::optional<Sets>& sets) {
   std::printf("%zu hover-safe regions, voxels of %.3f m\n", regions.regions.size(), world.grid.resolution());
   constexpr std::size_t kShown = 10;
@@ -132,15 +132,15 @@ int run(const Options& options) {
   progress("building the world");
   const auto world = plan::build_world(std::move(grid), model, vehicle, read_method(options.method),
                                        options.margin.value_or(-1), run_parallel);
-  const auto regions = study::hover_regions(*world);
+  const auto regions = plan::hover_regions(*world);
   std::optional<Way> way;
   if (options.start) {
     way = Way{region_of(*world, regions, *options.start), region_of(*world, regions, *options.goal),
-              study::widest_way(*world, *options.start, *options.goal)};
+              plan::widest_way(*world, *options.start, *options.goal)};
   }
   std::optional<Sets> sets;
   if (options.method == "tight" && !options.margin)
-    sets = Sets{study::cost_of_set(*world), study::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4})};
+    sets = Sets{plan::cost_of_set(*world), plan::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4})};
   options.json ? print_json(*world, regions, way, sets) : print_text(*world, regions, way, sets);
   return kOk;
 }

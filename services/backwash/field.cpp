@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "core/field/disturbance_field.hpp"
-#include "core/study/figures.hpp"
+#include "core/report/figures.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -38,9 +38,9 @@ std::vector<Vec3> read_points(const std::string& path) {
   return points;
 }
 
-study::Slice read_slice(const std::string& text) {
+report::Slice read_slice(const std::string& text) {
   char axis = 0, rest = 0;
-  study::Slice slice{};
+  report::Slice slice{};
   if (std::sscanf(text.c_str(), "%c=%lf%c", &axis, &slice.coordinate, &rest) != 2 || axis < 'x' || axis > 'z') {
     throw Failure(kUsage, "--slice: '" + text + "' must be x=, y= or z= and a number in metres, as in z=0.5");
   }
@@ -49,7 +49,7 @@ study::Slice read_slice(const std::string& text) {
 }
 
 /// Centres of the free voxels that a slice cuts, moved into its plane.
-std::vector<Vec3> slice_points(const map::OccupancyGrid& grid, const study::Slice& slice) {
+std::vector<Vec3> slice_points(const map::OccupancyGrid& grid, const report::Slice& slice) {
   Vec3 on_plane = grid.origin();
   on_plane[slice.axis] = slice.coordinate;
   const int layer = grid.index(on_plane)[slice.axis];
@@ -155,14 +155,14 @@ void print_table(const std::vector<Value>& values) {
   }
 }
 
-void write_picture(const Options& options, const map::OccupancyGrid& grid, const study::Slice& slice,
+void write_picture(const Options& options, const map::OccupancyGrid& grid, const report::Slice& slice,
                    const std::vector<Value>& values) {
-  std::vector<study::FieldSample> samples;
+  std::vector<report::FieldSample> samples;
   for (const auto& value : values) {
     if (value.sigma) samples.push_back({value.p_W, *value.sigma});
   }
-  const auto format = options.out.ends_with(".png") ? study::Format::png : study::Format::svg;
-  const auto picture = study::field_slice_figure(grid, slice, samples, format);
+  const auto format = options.out.ends_with(".png") ? report::Format::png : report::Format::svg;
+  const auto picture = report::field_slice_figure(grid, slice, samples, format);
   if (!picture) throw Failure(kUnavailable, options.out + ":1: " + picture.error().message);
   write_file(options.out, *picture, options.force);
 }
@@ -173,7 +173,7 @@ int run(const Options& options) {
   }
   if (!options.out.empty() && options.slice.empty()) throw Failure(kUsage, "--out is a picture of a --slice; give one");
   refuse_to_overwrite(options.out, options.force);
-  std::optional<study::Slice> slice;
+  std::optional<report::Slice> slice;
   if (!options.slice.empty()) slice = read_slice(options.slice);
   const auto grid = read_map(options.map);
   auto model = read_model(options.model);

@@ -33,10 +33,10 @@ T read_configuration(tl::expected<T, config::ConfigError> value) {
 Model read_model(const std::string& path) { return read_configuration(config::load_model(path)); }
 Vehicle read_vehicle(const std::string& path) { return read_configuration(config::load_vehicle(path)); }
 
-study::FlightLog read_table(const std::string& path, const std::string& time_column) {
-  auto table = study::read_csv(path, time_column);
+log::FlightLog read_table(const std::string& path, const std::string& time_column) {
+  auto table = log::read_csv(path, time_column);
   if (table) return std::move(*table);
-  throw Failure(table.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, table.error().message);
+  throw Failure(table.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, table.error().message);
 }
 
 reach::Method read_method(const std::string& name) {

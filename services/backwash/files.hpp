@@ -3,10 +3,10 @@
 
 #include <string>
 
+#include "core/log/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/plan/world.hpp"
 #include "core/reach/reach_tube.hpp"
-#include "core/study/flight_log.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -17,7 +17,7 @@ namespace backwash::services {
 map::OccupancyGrid read_map(const std::string& path);
 Model read_model(const std::string& path);
 Vehicle read_vehicle(const std::string& path);
-study::FlightLog read_table(const std::string& path, const std::string& time_column);
+log::FlightLog read_table(const std::string& path, const std::string& time_column);
 
 /// `tight` or `paper`.
 reach::Method read_method(const std::string& name);

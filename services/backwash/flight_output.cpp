@@ -25,7 +25,7 @@ std::string failures(const sim::FlightSummary& s) {
   return line;
 }
 
-Json to_json(const sim::Flight& flight, const sim::FlightSummary& s, const study::ReportContext& context) {
+Json to_json(const sim::Flight& flight, const sim::FlightSummary& s, const report::ReportContext& context) {
   const auto axes = [](const Vec3& v) { return Json{{"x", v.x()}, {"y", v.y()}, {"z", v.z()}}; };
   const auto method = [](const sim::MethodTube& m) {
     return Json{{"largest_half_axis_m", m.largest_half_axis_m},
@@ -55,7 +55,7 @@ Json to_json(const sim::Flight& flight, const sim::FlightSummary& s, const study
           {"paper", method(flight.paper)}};
 }
 
-void print_text(const sim::Flight& flight, const sim::FlightSummary& s, const study::ReportContext& context) {
+void print_text(const sim::Flight& flight, const sim::FlightSummary& s, const report::ReportContext& context) {
   const auto& m = flight.plan.metrics;
   std::printf("flight               %s, %s to %s, %s\n", context.map.c_str(), to_text(context.start_W).c_str(),
               to_text(context.goal_W).c_str(),
@@ -83,7 +83,7 @@ int conclude(const JudgedFlight& judged, const std::string& report, bool json, b
   const auto& [flight, world, context, summary] = judged;
   if (!report.empty()) {
     progress("drawing the report");
-    const auto page = study::flight_report(flight, summary, world, context);
+    const auto page = report::flight_report(flight, summary, world, context);
     if (!page) throw Failure(kUnavailable, report + ":1: " + page.error().message);
     write_file(report, *page, force);
   }

@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "core/report/flight_report.hpp"
 #include "core/sim/flight.hpp"
-#include "core/study/report.hpp"
 
 namespace backwash::services {
 
@@ -12,7 +12,7 @@ namespace backwash::services {
 struct JudgedFlight {
   const sim::Flight& flight;
   const plan::World& world;
-  const study::ReportContext& context;
+  const report::ReportContext& context;
   sim::FlightSummary summary;
 };
 

@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "core/plan/feasibility.hpp"
 #include "core/sim/flight.hpp"
-#include "core/study/feasibility.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/flight_output.hpp"
 #include "services/backwash/json.hpp"
@@ -33,18 +33,18 @@ const DefaultFlight kDefaultFlights[] = {
 };
 
 /// Start and goal that need no search: those given, or the map's own.
-std::optional<study::HoverPair> known_ends(const Options& options) {
-  if (options.start) return study::HoverPair{*options.start, *options.goal};
+std::optional<plan::HoverPair> known_ends(const Options& options) {
+  if (options.start) return plan::HoverPair{*options.start, *options.goal};
   for (const auto& known : kDefaultFlights) {
     if (options.map == known.map || std::filesystem::path(options.map).filename() == known.map)
-      return study::HoverPair{known.start_W, known.goal_W};
+      return plan::HoverPair{known.start_W, known.goal_W};
   }
   return std::nullopt;
 }
 
-study::HoverPair choose_ends(const Options& options, const plan::World& world, sim::FlightOptions flight) {
+plan::HoverPair choose_ends(const Options& options, const plan::World& world, sim::FlightOptions flight) {
   if (const auto known = known_ends(options)) return *known;
-  const auto pair = study::farthest_pair(world, study::hover_regions(world), [&](const Vec3& start_W) {
+  const auto pair = plan::farthest_pair(world, plan::hover_regions(world), [&](const Vec3& start_W) {
     flight.start_W = start_W;
     // The vehicle will not believe itself exactly there: the estimate may be off by this much.
     const auto rise = sim::take_off(world, flight);
@@ -62,11 +62,11 @@ void write_log(const Options& options, const sim::Flight& flight) {
   auto samples = flight.take_off.samples;
   // The route's first sample is the take-off's last tick again.
   samples.insert(samples.end(), flight.route.samples.begin() + 1, flight.route.samples.end());
-  const auto written = study::write_csv(options.log, sim::to_log(samples), options.force);
+  const auto written = log::write_csv(options.log, sim::to_log(samples), options.force);
   if (!written) throw Failure(kCannotCreate, written.error().message);
 }
 
-int print_ends(const study::HoverPair& ends) {
+int print_ends(const plan::HoverPair& ends) {
   for (const Vec3& p : {ends.start_W, ends.goal_W}) std::printf("%.3f,%.3f,%.3f\n", p.x(), p.y(), p.z());
   return kOk;
 }
@@ -96,8 +96,8 @@ int run(const Options& options) {
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
   if (!options.log.empty()) write_log(options, *flight);
-  const study::ReportContext context{options.map,  options.model, options.vehicle, kVersion,
-                                     ends.start_W, ends.goal_W,   options.seed,    options.sigma_scale};
+  const report::ReportContext context{options.map,  options.model, options.vehicle, kVersion,
+                                      ends.start_W, ends.goal_W,   options.seed,    options.sigma_scale};
   return conclude({*flight, *world, context, sim::summarise(*flight, *world, ends.goal_W)}, options.report,
                   options.json, options.force);
 }

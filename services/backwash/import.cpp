@@ -2,9 +2,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "core/study/import_airgarage.hpp"
-#include "core/study/import_crazypad.hpp"
-#include "core/study/ulog.hpp"
+#include "core/log/import_airgarage.hpp"
+#include "core/log/import_crazypad.hpp"
+#include "core/log/ulog.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -12,16 +12,16 @@
 namespace backwash::services {
 namespace {
 
-using Importer = tl::expected<study::FlightLog, study::LogError> (*)(const std::string& path);
+using Importer = tl::expected<log::FlightLog, log::LogError> (*)(const std::string& path);
 
 /// Kinds of recordings; add a line for a new one.
 constexpr struct {
   const char* kind;
   Importer import;
 } kImporters[] = {
-    {"airgarage", study::import_airgarage},
-    {"crazypad", study::import_crazypad},
-    {"ulog", study::read_ulog},
+    {"airgarage", log::import_airgarage},
+    {"crazypad", log::import_crazypad},
+    {"ulog", log::read_ulog},
 };
 
 struct Options {
@@ -54,12 +54,12 @@ int run(const Options& options) {
     const auto log = read(file);
     if (!log) {
       // A recording without rows is not the end of a hundred others; alone it is an error.
-      if (options.files.size() == 1 || log.error().kind == study::LogError::Kind::not_found)
-        throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+      if (options.files.size() == 1 || log.error().kind == log::LogError::Kind::not_found)
+        throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
       refused.push_back(log.error().message);
       continue;
     }
-    const auto written = study::write_csv(target(file), *log, options.force);
+    const auto written = log::write_csv(target(file), *log, options.force);
     if (!written) throw Failure(kCannotCreate, written.error().message);
     logs.push_back(Json{{"log", target(file)}, {"rows", log->t_s.size()}});
   }

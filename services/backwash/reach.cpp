@@ -28,7 +28,7 @@ std::string at_row(const std::string& path, std::size_t row) {
   return path + ":" + std::to_string(row + 2) + ": row " + std::to_string(row + 1) + ": ";
 }
 
-void check_times(const std::string& path, const study::FlightLog& track) {
+void check_times(const std::string& path, const log::FlightLog& track) {
   if (track.t_s.empty()) throw Failure(kBadData, path + ":2: no rows; give one command per 20 ms");
   for (std::size_t i = 1; i < track.t_s.size(); ++i) {
     if (std::abs(track.t_s[i] - track.t_s[i - 1] - kControlPeriod) > 1e-4) {
@@ -38,7 +38,7 @@ void check_times(const std::string& path, const study::FlightLog& track) {
   }
 }
 
-std::vector<Setpoint> read_commands(const std::string& path, const study::FlightLog& track) {
+std::vector<Setpoint> read_commands(const std::string& path, const log::FlightLog& track) {
   for (const char* name : {"cmd_x_m", "cmd_y_m", "cmd_z_m"}) {
     if (!track.has(name))
       throw Failure(kBadData, path + ":1: no column '" + name + "'; commands need cmd_x_m,cmd_y_m,cmd_z_m");
@@ -59,7 +59,7 @@ std::vector<Setpoint> read_commands(const std::string& path, const study::Flight
   return commands;
 }
 
-bool has_variances(const std::string& path, const study::FlightLog& track) {
+bool has_variances(const std::string& path, const log::FlightLog& track) {
   const auto present = std::count_if(std::begin(kSigmaColumns), std::end(kSigmaColumns),
                                      [&](const char* name) { return track.has(name); });
   if (present != 0 && present != 6) {
@@ -70,7 +70,7 @@ bool has_variances(const std::string& path, const study::FlightLog& track) {
   return present == 6;
 }
 
-std::vector<Variance> read_variances(const std::string& path, const study::FlightLog& track) {
+std::vector<Variance> read_variances(const std::string& path, const log::FlightLog& track) {
   std::vector<Variance> variances;
   for (std::size_t i = 0; i < track.t_s.size(); ++i) {
     double s[6];

@@ -2,7 +2,7 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "core/study/tick_log.hpp"
+#include "core/log/tick_log.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
 
@@ -22,7 +22,7 @@ std::string hex(std::uint64_t value) {
   return text;
 }
 
-Json to_json(const study::Replay& r, bool equal) {
+Json to_json(const log::Replay& r, bool equal) {
   Json json = {{"equal", equal},
                {"ticks", r.ticks},
                {"ticks_missing", r.ticks_missing},
@@ -40,15 +40,15 @@ Json to_json(const study::Replay& r, bool equal) {
 }
 
 int run(const Options& options) {
-  const auto log = study::read_raw_log(options.log);
+  const auto log = log::read_raw_log(options.log);
   if (!log)
-    throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+    throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
   if (log->cut_at)
     throw Failure(kBadData, options.log + ": byte " + std::to_string(*log->cut_at) +
                                 ": the last record is cut short; cut the file there to replay what is before it");
-  const auto replay = study::replay(*log, options.log);
+  const auto replay = log::replay(*log, options.log);
   if (!replay) throw Failure(kBadData, replay.error().message);
-  const study::Replay& r = *replay;
+  const log::Replay& r = *replay;
   const bool equal = r.differing == 0 && r.ticks_missing == 0;
   if (options.json) {
     print(to_json(r, equal));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/recorded_flight.hpp"
+#include "core/report/recorded_flight.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/flight_output.hpp"
 #include "services/backwash/json.hpp"
@@ -16,23 +16,23 @@ struct Options {
 };
 
 template <typename T>
-T take(tl::expected<T, study::LogError> value) {
+T take(tl::expected<T, log::LogError> value) {
   if (value) return std::move(*value);
-  throw Failure(value.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, value.error().message);
+  throw Failure(value.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, value.error().message);
 }
 
 int run(const Options& options) {
   refuse_to_overwrite(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
-  const auto log = take(study::read_raw_log(options.log)).records;
-  const auto truth = take(study::read_csv(options.truth));
+  const auto log = take(log::read_raw_log(options.log)).records;
+  const auto truth = take(log::read_csv(options.truth));
   progress("building the world");
   const auto world =
-      plan::build_world(take(study::recorded_map(log)), model, vehicle, reach::Method::tight, -1, run_parallel);
-  const auto flight = take(study::recorded_flight(log, truth, *world));
+      plan::build_world(take(report::recorded_map(log)), model, vehicle, reach::Method::tight, -1, run_parallel);
+  const auto flight = take(report::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
-  const study::ReportContext context{options.log, options.model, options.vehicle, kVersion, start, goal, {}, 1};
+  const report::ReportContext context{options.log, options.model, options.vehicle, kVersion, start, goal, {}, 1};
   return conclude({flight, *world, context, sim::summarise(flight, *world, goal)}, options.out, options.json,
                   options.force);
 }

@@ -45,7 +45,7 @@ int run(const Options& options) {
   }
   progress("flying");
   const auto samples = sim::fly_hovers(grid, vehicle, spec);
-  const auto written = study::write_csv(options.out, sim::to_log(samples), options.force);
+  const auto written = log::write_csv(options.out, sim::to_log(samples), options.force);
   if (!written) throw Failure(kCannotCreate, written.error().message);
   if (options.json) {
     print(Json{{"log", options.out}, {"rows", samples.size()}, {"time_s", samples.back().t}, {"seed", spec.seed}});

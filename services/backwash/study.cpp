@@ -5,10 +5,10 @@
 #include <optional>
 #include <sstream>
 
-#include "core/study/discrepancy/extend.hpp"
-#include "core/study/discrepancy/page.hpp"
-#include "core/study/discrepancy/rotor_reference.hpp"
-#include "core/study/ulog.hpp"
+#include "core/log/ulog.hpp"
+#include "core/study/findings/extend.hpp"
+#include "core/study/findings/study_page.hpp"
+#include "core/study/inference/rotor_reference.hpp"
 #include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/study_output.hpp"
@@ -19,8 +19,6 @@
 namespace backwash::services {
 namespace {
 
-namespace discrepancy = study::discrepancy;
-
 struct Options {
   std::string map, model = "builtin:quad-5in", vehicle, report, out;
   std::vector<std::string> logs, reference;
@@ -30,8 +28,8 @@ struct Options {
 };
 
 /// The study's own terms of a model file that it has extended before; none in others.
-std::vector<discrepancy::Term> read_terms(const std::string& path) {
-  std::vector<discrepancy::Term> terms;
+std::vector<study::Term> read_terms(const std::string& path) {
+  std::vector<study::Term> terms;
   if (path.starts_with("builtin:")) return terms;
   const auto file = toml::parse_file(path);  // load_model has accepted it
   const auto* list = file.at_path("extension.term").as_array();
@@ -39,10 +37,12 @@ std::vector<discrepancy::Term> read_terms(const std::string& path) {
   for (const auto& entry : *list) {
     const auto* table = entry.as_table();
     if (!table) continue;
-    discrepancy::Term term{(*table)["cause"].value_or(std::string()),
-                           (*table)["form"].value_or(std::string()),
-                           (*table)["scale"].value_or(0.0),
-                           {}};
+    study::Term term{(*table)["cause"].value_or(std::string()),
+                     (*table)["form"].value_or(std::string()),
+                     {(*table)["scale"].value_or(0.0)},
+                     {}};
+    if (const auto* offset = (*table)["offset_m"].as_array(); offset && offset->size() == 2)
+      term.scale.offset_W = {(*offset)[0].value_or(0.0), (*offset)[1].value_or(0.0), 0};
     if (const auto* theta = (*table)["theta"].as_array())
       for (const auto& value : *theta) term.theta.push_back(value.value_or(0.0));
     terms.push_back(std::move(term));
@@ -62,16 +62,16 @@ std::string earlier_terms(const std::string& path) {
 }
 
 /// A flight log: ULog by its name, else CSV.
-study::FlightLog read_flight(const std::string& path) {
+log::FlightLog read_flight(const std::string& path) {
   if (!path.ends_with(".ulg")) return read_table(path, "t_s");
-  auto log = study::read_ulog(path);
+  auto log = log::read_ulog(path);
   if (log) return std::move(*log);
-  throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
 }
 
 /// Flights, and the value of the column that they are grouped by in each one's first row; empty: none.
 struct Flights {
-  std::vector<study::FlightLog> logs;
+  std::vector<log::FlightLog> logs;
   std::vector<double> group;
 };
 
@@ -93,15 +93,15 @@ Flights read_flights(const Options& options) {
   return flights;
 }
 
-discrepancy::Observations observe(const Options& options, const Vehicle& vehicle, const Model& model,
-                                  const map::OccupancyGrid* grid) {
+study::Observations observe(const Options& options, const Vehicle& vehicle, const Model& model,
+                            const map::OccupancyGrid* grid) {
   const Flights flights = read_flights(options);
   std::vector<std::size_t> order(flights.logs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (!flights.group.empty())
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return flights.group[a] < flights.group[b]; });
-  discrepancy::Observer observer(vehicle, model, grid);
+  study::Observer observer(vehicle, model, grid);
   for (const std::size_t k : order) observer.add(flights.logs[k]);
   auto seen = observer.finish();
   if (flights.group.empty()) return seen;
@@ -115,13 +115,13 @@ discrepancy::Observations observe(const Options& options, const Vehicle& vehicle
 }
 
 /// Motor shares of the flights against those of the reference flights.
-std::optional<discrepancy::RotorVerdict> against_reference(const Options& options, const Vehicle& vehicle,
-                                                           const Model& model, const discrepancy::Observations& seen) {
-  discrepancy::Observer observer(vehicle, model, nullptr);
+std::optional<study::RotorVerdict> against_reference(const Options& options, const Vehicle& vehicle, const Model& model,
+                                                     const study::Observations& seen) {
+  study::Observer observer(vehicle, model, nullptr);
   for (const auto& path : options.reference) observer.add(read_flight(path));
-  const auto sound = discrepancy::rotor_contrasts(observer.finish());
-  const auto group = discrepancy::rotor_contrasts(seen);
-  const auto verdict = discrepancy::judge_rotors(sound, group);
+  const auto sound = study::rotor_contrasts(observer.finish());
+  const auto group = study::rotor_contrasts(seen);
+  const auto verdict = study::judge_rotors(sound, group);
   if (!verdict)
     throw Failure(kBadData,
                   options.reference.front() +
@@ -132,8 +132,8 @@ std::optional<discrepancy::RotorVerdict> against_reference(const Options& option
 /// Ratios of the vertical variance by height and plate, day and speed held fixed, of recordings that say what they
 /// stood on and under (`backwash import airgarage`).
 std::optional<study::calibrate::HeightEffects> height_effects(const Options& options, const Model& model,
-                                                              const discrepancy::Observations& seen) {
-  if (!options.map.empty() || !seen.has("ceiling")) return std::nullopt;
+                                                              const study::Observations& seen) {
+  if (!options.map.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
   return read_height_effects(options.logs, model, options.seed);
 }
 
@@ -146,39 +146,38 @@ int run(const Options& options) {
   std::optional<map::OccupancyGrid> grid;
   if (!options.map.empty()) grid = read_map(options.map);
   auto seen = observe(options, vehicle, model, grid ? &*grid : nullptr);
-  const auto left = discrepancy::apply(read_terms(options.model), seen);
-  discrepancy::StudyOptions study_options;
+  const auto left = study::apply(read_terms(options.model), seen);
+  study::StudyOptions study_options;
   study_options.search.seed = options.seed;
   study_options.search.progress = [](const std::string& line) { progress(line); };
   study_options.minimum_detectable = !options.quick;
-  const auto result = discrepancy::study(seen, study_options);
+  const auto result = study::study(seen, study_options);
   Json json = to_json(result, seen);
   if (!left.empty())
     for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
-  std::optional<discrepancy::RotorVerdict> rotors;
+  std::optional<study::RotorVerdict> rotors;
   if (!options.reference.empty()) {
     rotors = against_reference(options, vehicle, model, seen);
     json["rotors_against_reference"] = to_json(*rotors);
   }
-  std::optional<discrepancy::Consequence> consequence;
+  std::optional<study::Consequence> consequence;
   if (!result.causes.empty()) {
     progress("hover sets and a plan, before and after");
-    consequence = discrepancy::consequence(result, seen, model, vehicle, grid ? &*grid : nullptr, run_parallel);
+    consequence = study::consequence(result, seen, model, vehicle, grid ? &*grid : nullptr, run_parallel);
     json["consequence"] = to_json(*consequence);
   }
   if (!options.out.empty()) {
-    write_file(
-        options.out,
-        discrepancy::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model)),
-        options.force);
+    write_file(options.out,
+               study::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model)),
+               options.force);
     json["extended_model"] = options.out;
   }
   if (!options.report.empty()) {
     progress("drawing");
-    const auto page = discrepancy::study_page(
+    const auto page = study::study_page(
         result, seen, {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height});
     if (!page) throw Failure(kUnavailable, page.error().message);
     write_file(options.report, *page, options.force);

@@ -3,26 +3,24 @@
 
 #include <cstdio>
 
-#include "core/study/discrepancy/page_sections.hpp"
+#include "core/study/findings/page_sections.hpp"
 
 namespace backwash::services {
 
-namespace discrepancy = study::discrepancy;
-
 namespace {
 
-Json to_json(const discrepancy::NamedCause& cause) {
+Json to_json(const study::NamedCause& cause) {
   const auto& found = cause.found;
   Json parameters = Json::object();
   for (const auto& e : found.parameters) parameters[e.name] = {{"value", e.value}, {"ci95", {e.low, e.high}}};
-  Json set = Json::array({found.form->cause});
+  Json set = Json::array({found.form->cause()});
   for (const auto& rival : found.rivals) set.push_back(rival.name);
   Json separate = Json::array();
   for (const auto& s : cause.separate_by)
     separate.push_back(
         {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
   const auto& g = cause.gain;
-  return {{"name", found.form->cause},
+  return {{"name", found.form->cause()},
           {"set", set},
           {"p", found.p},
           {"form", found.form->formula},
@@ -48,7 +46,7 @@ void print_text(const char* of, const study::calibrate::HeightEffect& h) {
   ratio("under a plate against without", h.ceiling);
 }
 
-Json to_json(const discrepancy::Outcome& o) {
+Json to_json(const study::Outcome& o) {
   Json json = {{"samples_inside_bound", o.inside},
                {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
                {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
@@ -63,8 +61,8 @@ Json to_json(const discrepancy::Outcome& o) {
 
 }  // namespace
 
-Json to_json(const discrepancy::StudyResult& result, const discrepancy::Observations& seen) {
-  Json json = {{"verdict", discrepancy::to_string(result.verdict)},
+Json to_json(const study::StudyResult& result, const study::Observations& seen) {
+  Json json = {{"verdict", study::to_string(result.verdict)},
                {"flights", seen.flights},
                {"windows", seen.windows.size()},
                {"gated_out", Json::object()},
@@ -73,7 +71,7 @@ Json to_json(const discrepancy::StudyResult& result, const discrepancy::Observat
                {"not_tested", Json::array()},
                {"remaining_dependence", Json::array()},
                {"minimum_detectable", Json::object()}};
-  for (const auto& [gate, count] : seen.gated_out) json["gated_out"][gate] = count;
+  for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
   for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause));
   for (const auto& u : result.unknown)
     json["unknown"].push_back({{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}});
@@ -88,14 +86,14 @@ Json to_json(const discrepancy::StudyResult& result, const discrepancy::Observat
   return json;
 }
 
-Json to_json(const discrepancy::Consequence& c) {
+Json to_json(const study::Consequence& c) {
   Json json = {{"places", c.places}, {"before", to_json(c.before)}, {"after", to_json(c.after)}};
   if (!c.before.plan.empty()) json.update({{"start", to_json(c.start_W)}, {"goal", to_json(c.goal_W)}});
   return json;
 }
 
-Json to_json(const discrepancy::RotorVerdict& v) {
-  return {{"verdict", discrepancy::to_string(v.kind)},
+Json to_json(const study::RotorVerdict& v) {
+  return {{"verdict", study::to_string(v.kind)},
           {"set", v.set},
           {"rotor", v.rotor},
           {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}},
@@ -127,14 +125,13 @@ Json to_json(const study::calibrate::HeightEffects& effects) {
   return json;
 }
 
-void print_text(const discrepancy::StudyResult& result, const discrepancy::Observations& seen,
-                const std::optional<discrepancy::RotorVerdict>& rotors,
+void print_text(const study::StudyResult& result, const study::Observations& seen,
+                const std::optional<study::RotorVerdict>& rotors,
                 const std::optional<study::calibrate::HeightEffects>& height) {
-  std::printf("%s: %zu flights, %zu windows\n", discrepancy::to_string(result.verdict), seen.flights,
-              seen.windows.size());
-  if (result.verdict == discrepancy::Verdict::insufficient) std::printf("%s\n", discrepancy::too_few(seen).c_str());
+  std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
+  if (result.verdict == study::Verdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
   for (const auto& cause : result.causes) {
-    std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause.c_str(),
+    std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause().c_str(),
                 cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
     for (const auto& e : cause.found.parameters)
       std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
@@ -152,7 +149,7 @@ void print_text(const discrepancy::StudyResult& result, const discrepancy::Obser
   if (height) print_text("hovers and passes", height->all);
   if (height && height->hovers) print_text("hovers", *height->hovers);
   if (rotors) {
-    std::printf("rotors against the reference flights: %s\n", discrepancy::rotor_sentence(*rotors).c_str());
+    std::printf("rotors against the reference flights: %s\n", study::rotor_sentence(*rotors).c_str());
     std::printf("  t of damage %.1f, needed %.1f; of yaw %.1f\n", rotors->t_d, rotors->needed, rotors->t_yaw);
   }
 }

@@ -7,8 +7,8 @@
 #include <map>
 #include <sstream>
 
-#include "core/study/gain_sweep.hpp"
-#include "core/study/raw_log.hpp"
+#include "core/log/raw_log.hpp"
+#include "core/plan/gain_sweep.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -75,13 +75,13 @@ struct Evidence {
 };
 
 Evidence evidence_of(const std::string& path) {
-  const auto log = study::read_raw_log(path);
+  const auto log = log::read_raw_log(path);
   if (!log)
-    throw Failure(log.error().kind == study::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+    throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
   Evidence evidence;
   for (const auto& record : log->records) {
-    study::TickRecord tick;
-    if (record.header.kind != study::RecordKind::tick || record.bytes.size() < sizeof tick) continue;
+    log::TickRecord tick;
+    if (record.header.kind != log::RecordKind::tick || record.bytes.size() < sizeof tick) continue;
     std::memcpy(&tick, record.bytes.data(), sizeof tick);
     evidence.judged += tick.judged != 0;
     evidence.inside += tick.judged != 0 && tick.inside != 0;
@@ -91,11 +91,11 @@ Evidence evidence_of(const std::string& path) {
   return evidence;
 }
 
-std::array<double, 4> firmware_gains(const study::GainStep& s) {
+std::array<double, 4> firmware_gains(const plan::GainStep& s) {
   return {s.kp.horizontal / s.kd.horizontal, s.kd.horizontal, s.kp.vertical / s.kd.vertical, s.kd.vertical};
 }
 
-Json to_json(const study::GainStep& s) {
+Json to_json(const plan::GainStep& s) {
   Json json = {{"factor", s.factor},
                {"kp", {{"horizontal", s.kp.horizontal}, {"vertical", s.kp.vertical}}},
                {"kd", {{"horizontal", s.kd.horizontal}, {"vertical", s.kd.vertical}}},
@@ -111,7 +111,7 @@ Json to_json(const study::GainStep& s) {
   return json;
 }
 
-void print_text(const study::GainSweep& sweep, const GainNames& names, const std::optional<Evidence>& evidence) {
+void print_text(const plan::GainSweep& sweep, const GainNames& names, const std::optional<Evidence>& evidence) {
   if (evidence)
     std::printf(
         "the log: %zu of %zu samples inside the sets of the gains it was flown with%s\n", evidence->inside,
@@ -155,7 +155,7 @@ int run(const Options& options) {
   const auto world = plan::build_world(read_map(options.map), model, vehicle, reach::Method::tight, -1, run_parallel);
   // Half an octave apart, from half of what flies to four times as much.
   const std::vector<double> factors{0.5, 0.71, 1, 1.41, 2, 2.83, 4};
-  const auto sweep = study::sweep_gains(*world, *options.start, *options.goal, factors, run_parallel);
+  const auto sweep = plan::sweep_gains(*world, *options.start, *options.goal, factors, run_parallel);
   if (options.json) {
     Json steps = Json::array();
     for (const auto& s : sweep.steps) steps.push_back(to_json(s));

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/log/raw_log.hpp"
 #include "core/plan/world.hpp"
-#include "core/study/raw_log.hpp"
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
 #include "core/sync/record_ring.hpp"
@@ -149,7 +149,7 @@ struct ControlView {
 
 /// One record of a real-time thread for the raw log.
 struct ControlRecord {
-  study::RecordHeader header{};
+  log::RecordHeader header{};
   std::array<std::uint8_t, 512> bytes{};
 };
 
@@ -169,7 +169,7 @@ struct FreshPort {
 
 /// Anything else for the raw log.
 struct BulkRecord {
-  study::RecordHeader header{};
+  log::RecordHeader header{};
   std::vector<std::uint8_t> bytes;
 };
 

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "core/study/tick_log.hpp"
+#include "core/log/tick_log.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -41,11 +41,11 @@ ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& lin
                          double battery_land, const MapSettings& map)
     : channels_(channels), link_(link), flight_(vehicle, battery_land), lookout_(channels, vehicle, map) {
   link_.tap(&ControlLoop::on_frame, this);
-  const auto constants = study::constants(vehicle, battery_land);
-  record(study::RecordKind::constants, now_ns(), &constants, sizeof constants);
+  const auto constants = log::constants(vehicle, battery_land);
+  record(log::RecordKind::constants, now_ns(), &constants, sizeof constants);
 }
 
-void ControlLoop::record(study::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept {
+void ControlLoop::record(log::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept {
   ControlRecord r;
   r.header = {t_ns, kind, static_cast<std::uint32_t>(std::min(size, r.bytes.size()))};
   std::memcpy(r.bytes.data(), bytes, r.header.size);
@@ -54,7 +54,7 @@ void ControlLoop::record(study::RecordKind kind, std::int64_t t_ns, const void* 
 
 void ControlLoop::on_frame(void* loop, bool outgoing, std::span<const std::uint8_t> frame) noexcept {
   auto& self = *static_cast<ControlLoop*>(loop);
-  self.record(outgoing ? study::RecordKind::frame_out : study::RecordKind::frame_in, self.now_ns_, frame.data(),
+  self.record(outgoing ? log::RecordKind::frame_out : log::RecordKind::frame_in, self.now_ns_, frame.data(),
               frame.size());
 }
 
@@ -255,8 +255,8 @@ void ControlLoop::report(const track::TickInput& in, const track::TickOutput& ou
   row_.tick = view_.ticks;
   row_.missed_periods = static_cast<std::uint32_t>(in.missed_periods);
   row_.page_faults = static_cast<std::uint32_t>(faults);
-  study::decided(flight_, out, row_);
-  record(study::RecordKind::tick, in.now_ns, &row_, sizeof row_);
+  log::decided(flight_, out, row_);
+  record(log::RecordKind::tick, in.now_ns, &row_, sizeof row_);
   channels_.view_mission.write(view_);
   channels_.view_planner.write(view_);
   channels_.view_status.write(view_);
@@ -275,15 +275,15 @@ void ControlLoop::tick(std::int64_t now_ns, int missed, double lateness_us) noex
   const track::TickInput in = gather(now_ns, missed);
   if (in.odometry) {
     const auto& s = *in.odometry;
-    study::OdometryRecord r{};
+    log::OdometryRecord r{};
     r.stamp_ns = s.stamp_ns;
     std::copy_n(s.state.p_W.data(), 3, r.p);
     std::copy_n(s.state.v_W.data(), 3, r.v);
     std::copy_n(s.q.data(), 4, r.q);
-    record(study::RecordKind::odometry, s.received_ns, &r, sizeof r);
+    record(log::RecordKind::odometry, s.received_ns, &r, sizeof r);
   }
-  const auto logged = study::encode(in);
-  record(study::RecordKind::tick_input, now_ns, &logged, sizeof logged);
+  const auto logged = log::encode(in);
+  record(log::RecordKind::tick_input, now_ns, &logged, sizeof logged);
   const track::TickOutput out = flight_.step(in);
   send(in, out);
   publish(in, out);

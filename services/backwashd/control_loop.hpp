@@ -42,7 +42,7 @@ class ControlLoop {
   void give_origin(const track::AutopilotFacts& autopilot) noexcept;
   void publish(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void report(const track::TickInput& in, const track::TickOutput& out) noexcept;
-  void record(study::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept;
+  void record(log::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept;
   static void on_frame(void* loop, bool outgoing, std::span<const std::uint8_t> frame) noexcept;
 
   Channels& channels_;
@@ -60,7 +60,7 @@ class ControlLoop {
   double vio_sigma_ = 0;  ///< as the newest odometry that says it, m
   std::int64_t now_ns_ = 0;
   ControlView view_;
-  study::TickRecord row_{};
+  log::TickRecord row_{};
   double compute_us_ = 0;
 };
 

@@ -134,8 +134,8 @@ void start(Flight& f) {
   f.threads.start("mission", [&] {
     run_mission(channels, f.mission, [&](const CommandMessage& c, const Answer& a) {
       f.front->send(c, a);
-      f.recorder->append(study::RecordKind::ack, std::string(c.station.data()) + " " + std::to_string(c.sequence) +
-                                                     " result " + std::to_string(a.result) + ": " + a.reason);
+      f.recorder->append(log::RecordKind::ack, std::string(c.station.data()) + " " + std::to_string(c.sequence) +
+                                                   " result " + std::to_string(a.result) + ": " + a.reason);
     });
   });
   f.threads.start("status", [&] { f.front->run_status(f.settings.vehicle, *f.recorder); });
@@ -156,7 +156,7 @@ bool end(Flight& f) {
   const bool ended = f.threads.join(f.failure.happened() ? kToFail : kToEnd);
   if (!ended) f.link.discard_unsent();  // of a control thread that hangs
   try {
-    if (f.failure.happened()) f.recorder->append(study::RecordKind::failure, f.failure.text());
+    if (f.failure.happened()) f.recorder->append(log::RecordKind::failure, f.failure.text());
   } catch (const std::bad_alloc&) {
   }
   f.recorded = true;

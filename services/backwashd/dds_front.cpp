@@ -108,7 +108,7 @@ void DdsFront::take_command(const dds::Command& m, const dds::Guid& writer) {
                     c.station.data(), static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(),
                     c.position.y(), c.position.z(), c.yaw, dds::text(writer).c_str());
   const std::size_t size = std::min(static_cast<std::size_t>(std::max(length, 0)), record.bytes.size() - 1);
-  record.header = {now_ns(), study::RecordKind::command, static_cast<std::uint32_t>(size)};
+  record.header = {now_ns(), log::RecordKind::command, static_cast<std::uint32_t>(size)};
   channels_.command_log.push(record);
   if (channels_.commands.push(c)) return;
   if (stops) stop_ = c;

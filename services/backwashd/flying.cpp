@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/study/raw_log.hpp"
+#include "core/log/raw_log.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -52,7 +52,7 @@ std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::si
 
 std::vector<std::uint8_t> segment_record(const Flying& flying) {
   const auto& s = flying.segment;
-  study::SegmentRecord head{};
+  log::SegmentRecord head{};
   head.id = s.id;
   head.continues = s.continues;
   head.commands = s.commands.size();

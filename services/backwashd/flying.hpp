@@ -36,7 +36,7 @@ void add_guards(Flying& flying, const plan::World& world, std::size_t now = 0);
 /// The commands as they are flown: those of the segment, or, braking, of its stop that leaves at `stop_branch`.
 std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch);
 
-/// The segment as the raw log's record (study::SegmentRecord, then the commands).
+/// The segment as the raw log's record (log::SegmentRecord, then the commands).
 std::vector<std::uint8_t> segment_record(const Flying& flying);
 
 }  // namespace backwash::daemon

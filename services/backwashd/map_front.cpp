@@ -50,8 +50,8 @@ void MapFront::take_scans() {
       fresh = voxels.count;
       if (fresh > 0) channels_.scan_voxels.push(voxels);
     }
-    recorder_.append(study::RecordKind::scan, "scan of " + std::to_string(scan->points_W.size()) + " points, " +
-                                                  std::to_string(fresh) + " new voxels");
+    recorder_.append(log::RecordKind::scan, "scan of " + std::to_string(scan->points_W.size()) + " points, " +
+                                                std::to_string(fresh) + " new voxels");
     auto owned = std::make_unique<Scan>(std::move(*scan));
     if (channels_.scans.push(owned.get()))
       owned.release();

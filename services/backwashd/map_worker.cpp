@@ -34,14 +34,14 @@ std::uint64_t hash(const std::vector<std::int8_t>& data) {
 
 // A rejected map is told apart by its hash: whoever sends 40 MB of anything does not fill the disk with it.
 void record(Recorder& recorder, const MapMessage& message, bool accepted) {
-  const study::MapRecord head{message.resolution, message.binary, accepted};
-  const study::RejectedMap rejected{message.data.size(), accepted ? 0 : hash(message.data)};
+  const log::MapRecord head{message.resolution, message.binary, accepted};
+  const log::RejectedMap rejected{message.data.size(), accepted ? 0 : hash(message.data)};
   const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
   const auto rest = accepted ? std::as_bytes(std::span(message.data)) : bytes_of(rejected);
   std::vector<std::uint8_t> bytes(sizeof head + rest.size());
   std::memcpy(bytes.data(), &head, sizeof head);
   if (!rest.empty()) std::memcpy(bytes.data() + sizeof head, rest.data(), rest.size());
-  recorder.append(study::RecordKind::map, bytes);
+  recorder.append(log::RecordKind::map, bytes);
 }
 
 bool same_place(const map::OccupancyGrid& a, const map::OccupancyGrid& b) {
@@ -87,7 +87,7 @@ void MapWorker::publish(std::shared_ptr<const plan::World> world, std::int64_t r
   channels_.map_ns.store(received_ns, std::memory_order_relaxed);
   channels_.worlds.offer({world_, received_ns});
   const double age = static_cast<double>(now_ns() - received_ns) * 1e-6;
-  recorder_.append(study::RecordKind::world, "snapshot " + std::to_string(age) + " ms after its newest data");
+  recorder_.append(log::RecordKind::world, "snapshot " + std::to_string(age) + " ms after its newest data");
 }
 
 void MapWorker::take_map(const MapMessage& message) {

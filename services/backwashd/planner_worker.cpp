@@ -9,8 +9,8 @@
 #include <thread>
 #include <utility>
 
+#include "core/log/tick_log.hpp"
 #include "core/plan/stop.hpp"
-#include "core/study/tick_log.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -273,7 +273,7 @@ Flying PlannerWorker::continued(std::size_t branch, std::vector<Setpoint> comman
 bool PlannerWorker::offer(Flying next) {
   front_.stamp(next.segment);
   next.segment.seen_ns = seen_ns_;  // every caller verified it in the newest world
-  recorder_.append(study::RecordKind::offer, study::encode(next.segment));
+  recorder_.append(log::RecordKind::offer, log::encode(next.segment));
   channels_.segments.offer(std::make_unique<const track::AcceptedSegment>(next.segment));
   for (std::size_t wait = 0; wait < kAnswerPauses && !channels_.stop; ++wait) {
     pause_();
@@ -281,7 +281,7 @@ bool PlannerWorker::offer(Flying next) {
     const auto fate = front_.fate(view_);
     if (fate == PlanFront::Fate::accepted) {
       // The flight is judged from where its sets hold: a lift-off is an offer in the log, and no segment of it.
-      if (!next.segment.arms) recorder_.append(study::RecordKind::segment, segment_record(next));
+      if (!next.segment.arms) recorder_.append(log::RecordKind::segment, segment_record(next));
       accepted_(next.segment);
       flying_ = std::move(next);
       return true;

@@ -56,7 +56,7 @@ Recorder::Recorder(const std::string& name) : name_(name), path_(name) {
 }
 
 Recorder::~Recorder() {
-  const bool nothing = written_ == static_cast<std::int64_t>(std::string_view(study::kRawLogMagic).size());
+  const bool nothing = written_ == static_cast<std::int64_t>(std::string_view(log::kRawLogMagic).size());
   if (nothing && file_.get() >= 0 && still_there()) ::unlink(path_.c_str());
 }
 
@@ -75,7 +75,7 @@ bool Recorder::create() {
   file_ = firmware_bridge::FileDescriptor(fd);
   written_ = 0;
   told_lost_ = 0;
-  const std::string_view magic(study::kRawLogMagic);
+  const std::string_view magic(log::kRawLogMagic);
   return fd >= 0 && write({magic.begin(), magic.end()});
 }
 
@@ -105,8 +105,8 @@ bool Recorder::write(const std::vector<std::uint8_t>& bytes) {
   return true;
 }
 
-void Recorder::append(study::RecordKind kind, std::span<const std::uint8_t> bytes) {
-  const std::size_t size = sizeof(study::RecordHeader) + bytes.size();
+void Recorder::append(log::RecordKind kind, std::span<const std::uint8_t> bytes) {
+  const std::size_t size = sizeof(log::RecordHeader) + bytes.size();
   if (pending_bytes_.fetch_add(size) + size > kMostPending) {
     pending_bytes_ -= size;
     ++lost_;
@@ -118,11 +118,11 @@ void Recorder::append(study::RecordKind kind, std::span<const std::uint8_t> byte
   pending_.push_back(std::move(record));
 }
 
-void Recorder::append(study::RecordKind kind, const std::string& text) {
+void Recorder::append(log::RecordKind kind, const std::string& text) {
   append(kind, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
-void Recorder::put(const study::RecordHeader& header, const std::uint8_t* bytes) {
+void Recorder::put(const log::RecordHeader& header, const std::uint8_t* bytes) {
   const auto* head = reinterpret_cast<const std::uint8_t*>(&header);
   batch_.insert(batch_.end(), head, head + sizeof header);
   batch_.insert(batch_.end(), bytes, bytes + header.size);
@@ -131,8 +131,8 @@ void Recorder::put(const study::RecordHeader& header, const std::uint8_t* bytes)
 void Recorder::put_control(const ControlRecord& record) {
   put(record.header, record.bytes.data());
   ++in_batch_;
-  if (record.header.kind != study::RecordKind::tick) return;
-  study::TickRecord tick;
+  if (record.header.kind != log::RecordKind::tick) return;
+  log::TickRecord tick;
   std::memcpy(&tick, record.bytes.data(), sizeof tick);
   if (std::exchange(mode_, tick.mode) != tick.mode) sync_due_ = true;
 }
@@ -161,10 +161,10 @@ void Recorder::write_batch(std::uint64_t lost_in_ring) {
   if (in_batch_ == 0) return;
   const std::int64_t now = now_ns();
   if (!open_again(now)) return fail("is gone");
-  const study::LostRecord lost{lost_ + lost_in_ring};
+  const log::LostRecord lost{lost_ + lost_in_ring};
   if (lost.records != told_lost_) {
     const std::vector<std::uint8_t> rest = std::exchange(batch_, {});
-    put({now, study::RecordKind::lost, sizeof lost}, reinterpret_cast<const std::uint8_t*>(&lost));
+    put({now, log::RecordKind::lost, sizeof lost}, reinterpret_cast<const std::uint8_t*>(&lost));
     batch_.insert(batch_.end(), rest.begin(), rest.end());
   }
   if (!write(batch_)) return fail(std::strerror(errno));

@@ -33,8 +33,8 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
   /// For threads of ordinary priority alone, which share a lock here: what a real-time thread holds (ControlLoop,
   /// DdsFront) has no Recorder. Copies the bytes; waits for no disk.
-  void append(study::RecordKind kind, std::span<const std::uint8_t> bytes);
-  void append(study::RecordKind kind, const std::string& text);
+  void append(log::RecordKind kind, std::span<const std::uint8_t> bytes);
+  void append(log::RecordKind kind, const std::string& text);
   /// Writes what has come since the last call.
   void drain(Channels& channels);
   /// Thread body: drains every 20 ms; returns after `end` and one last drain.
@@ -50,7 +50,7 @@ class Recorder {
   bool open_again(std::int64_t now);
   bool write(const std::vector<std::uint8_t>& bytes);
   void write_batch(std::uint64_t lost_in_ring);
-  void put(const study::RecordHeader& header, const std::uint8_t* bytes);
+  void put(const log::RecordHeader& header, const std::uint8_t* bytes);
   void put_control(const ControlRecord& record);
   void fail(const char* why);
 

@@ -32,7 +32,7 @@ int frames_out(const Lockstep& rig, std::size_t from) {
   for (std::size_t i = from; i < rig.log.size(); ++i) {
     const auto& r = rig.log[i];
     const auto id = [&] { return r.bytes[7] | r.bytes[8] << 8 | r.bytes[9] << 16; };
-    count += r.header.kind == study::RecordKind::frame_out && id() != mavlink::Odometry::kId;
+    count += r.header.kind == log::RecordKind::frame_out && id() != mavlink::Odometry::kId;
   }
   return count;
 }
@@ -147,7 +147,7 @@ TEST(Row18, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
   };
   const auto accepted = [&](std::size_t from) {
     std::size_t n = 0;
-    for (; from < rig.log.size(); ++from) n += rig.log[from].header.kind == study::RecordKind::frame_in;
+    for (; from < rig.log.size(); ++from) n += rig.log[from].header.kind == log::RecordKind::frame_in;
     return n;
   };
   const std::size_t from = rig.log.size();

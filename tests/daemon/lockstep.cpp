@@ -11,10 +11,10 @@
 #include <fstream>
 
 #include "core/config/config.hpp"
+#include "core/log/tick_log.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
 #include "core/sim/flight.hpp"
-#include "core/study/tick_log.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
 #include "tests/bridge/pseudo_terminal.hpp"
 #include "tests/daemon/traps.hpp"
@@ -272,7 +272,7 @@ const Wire& Lockstep::tick(int missed) {
   const std::size_t from = log.size();
   drain_log();
   for (std::size_t i = from; i < log.size(); ++i)
-    if (log[i].header.kind == study::RecordKind::frame_out) sent += log[i].header.size;
+    if (log[i].header.kind == log::RecordKind::frame_out) sent += log[i].header.size;
   read_wire(sent);
   return wire_;
 }
@@ -302,8 +302,8 @@ std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops, b
     segment->stops = plan::verified_stops(*world_, start, view().command, commands, 0, 10,
                                           [&](const auto& tube) { return plan::lateral_clearance(*world_, tube); });
   segment->commands = std::move(commands);
-  const auto bytes = study::encode(*segment);
-  log.push_back({{now_ns_, study::RecordKind::offer, static_cast<std::uint32_t>(bytes.size())}, bytes});
+  const auto bytes = log::encode(*segment);
+  log.push_back({{now_ns_, log::RecordKind::offer, static_cast<std::uint32_t>(bytes.size())}, bytes});
   channels->segments.offer(std::move(segment));
   return last_segment_;
 }
@@ -355,7 +355,7 @@ Setpoint Lockstep::in_map(const SetPositionTargetLocalNed& m) const {
 
 void Lockstep::save(const std::string& path) const {
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out << study::kRawLogMagic;
+  out << log::kRawLogMagic;
   for (const auto& r : log) {
     out.write(reinterpret_cast<const char*>(&r.header), sizeof r.header);
     out.write(reinterpret_cast<const char*>(r.bytes.data()), static_cast<std::streamsize>(r.bytes.size()));

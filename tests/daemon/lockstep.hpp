@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/log/raw_log.hpp"
 #include "core/sim/vio.hpp"
-#include "core/study/raw_log.hpp"
 #include "firmware_bridge/mavlink/messages.hpp"
 #include "services/backwashd/control_loop.hpp"
 #include "services/bench/autopilot.hpp"
@@ -106,7 +106,7 @@ class Lockstep {
   std::unique_ptr<Channels, Unmap> channels;
   /// The next touch of the channels' memory takes a page fault.
   void forget_pages();
-  std::vector<study::RawRecord> log;  ///< everything recorded so far
+  std::vector<log::RawRecord> log;  ///< everything recorded so far
   long page_faults_in_flight = 0;
 
   /// Writes `log` as a raw log.

@@ -96,13 +96,13 @@ TEST_F(MapWorkerTest, ARejectedMapCostsTheRawLogAFewBytesThatTellItApart) {
   EXPECT_EQ(channels_->maps_rejected, 3u);
   recorder_.drain(*channels_);
   EXPECT_LT(std::filesystem::file_size(log_) - before, 300u);
-  std::vector<study::RejectedMap> seen;
-  const auto log = study::read_raw_log(log_);
+  std::vector<log::RejectedMap> seen;
+  const auto log = log::read_raw_log(log_);
   ASSERT_TRUE(log);
   for (const auto& record : log->records)
-    if (record.header.kind == study::RecordKind::map) {
-      ASSERT_EQ(record.bytes.size(), sizeof(study::MapRecord) + sizeof(study::RejectedMap));
-      std::memcpy(&seen.emplace_back(), record.bytes.data() + sizeof(study::MapRecord), sizeof(study::RejectedMap));
+    if (record.header.kind == log::RecordKind::map) {
+      ASSERT_EQ(record.bytes.size(), sizeof(log::MapRecord) + sizeof(log::RejectedMap));
+      std::memcpy(&seen.emplace_back(), record.bytes.data() + sizeof(log::MapRecord), sizeof(log::RejectedMap));
     }
   ASSERT_EQ(seen.size(), 3u);
   EXPECT_EQ(seen[0].bytes, 1u << 20);

@@ -15,7 +15,7 @@
 #include <thread>
 #include <type_traits>
 
-#include "core/study/raw_log.hpp"
+#include "core/log/raw_log.hpp"
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
 #include "tests/daemon/traps.hpp"
@@ -34,16 +34,16 @@ class Row35Recorder : public testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
   void put(int records) {
     ControlRecord r;
-    r.header = {now_ns(), study::RecordKind::frame_out, 100};
+    r.header = {now_ns(), log::RecordKind::frame_out, 100};
     for (int n = 0; n < records; ++n) channels_->control_log.push(r);
   }
   /// Number of records in the file, and what its last `lost` record says.
   std::pair<std::size_t, std::uint64_t> read() const {
-    const auto log = study::read_raw_log(path_).value();
+    const auto log = log::read_raw_log(path_).value();
     EXPECT_FALSE(log.cut_at) << "a record was cut";
     std::uint64_t lost = 0;
     for (const auto& r : log.records)
-      if (r.header.kind == study::RecordKind::lost) lost = study::payload<study::LostRecord>(r)->records;
+      if (r.header.kind == log::RecordKind::lost) lost = log::payload<log::LostRecord>(r)->records;
     return {log.records.size(), lost};
   }
 
@@ -136,8 +136,8 @@ TEST_F(Row35Recorder, ADiskThatHangsDelaysNobodyAndHoldsNoMoreThanItsShareOfMemo
   put(10);
   while (backwash::test::hanging_writes() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   const std::vector<std::uint8_t> map(kMiB);
-  for (int n = 0; n < 100; ++n) recorder.append(study::RecordKind::map, map);  // would wait for ever
-  put(3000);                                                                   // the ring holds 2048
+  for (int n = 0; n < 100; ++n) recorder.append(log::RecordKind::map, map);  // would wait for ever
+  put(3000);                                                                 // the ring holds 2048
   EXPECT_GE(recorder.lost(), 100 - Recorder::kMostPending / kMiB);
   EXPECT_LE(recorder.lost(), 100 - Recorder::kMostPending / kMiB + 1);
   EXPECT_GE(channels_->control_log.lost(), 900u);
@@ -154,10 +154,10 @@ TEST_F(Row35Recorder, EachChangeOfTheModeIsPutOnTheDiskByTheRecordersThread) {
   if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns fdatasync()";
   Recorder recorder(path_);
   const auto tick = [&](std::uint32_t mode) {
-    study::TickRecord row{};
+    log::TickRecord row{};
     row.mode = mode;
     ControlRecord r;
-    r.header = {now_ns(), study::RecordKind::tick, sizeof row};
+    r.header = {now_ns(), log::RecordKind::tick, sizeof row};
     std::memcpy(r.bytes.data(), &row, sizeof row);
     channels_->control_log.push(r);
     recorder.drain(*channels_);
@@ -185,7 +185,7 @@ TEST_F(Row35Recorder, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) 
   EXPECT_EQ(ninth.path(), folder_ + "/flight-9.bwlog");
   EXPECT_EQ(content(path_), "an earlier flight");
   EXPECT_EQ(content(folder_ + "/flight-7.bwlog"), "flight-7.bwlog");
-  EXPECT_EQ(content(folder_ + "/flight-8.bwlog"), study::kRawLogMagic);
+  EXPECT_EQ(content(folder_ + "/flight-8.bwlog"), log::kRawLogMagic);
   struct stat status {};
   const mode_t mask = ::umask(0);
   const Recorder open_to_all(path_);
@@ -209,7 +209,7 @@ TEST_F(Row35Recorder, AStartThatFailsBeforeAnythingIsRecordedLeavesNoLogAndTouch
     put(1);
     recorder.drain(*channels_);
   }
-  EXPECT_EQ(study::read_raw_log(folder_ + "/flight-3.bwlog").value().records.size(), 1u);
+  EXPECT_EQ(log::read_raw_log(folder_ + "/flight-3.bwlog").value().records.size(), 1u);
   EXPECT_EQ(content(path_), "an earlier flight");
 }
 
@@ -222,7 +222,7 @@ static_assert(!std::is_constructible_v<ControlLoop, Channels&, firmware_bridge::
 TEST_F(Row35Recorder, CommandsComeThroughARingAndWhatItHadNoRoomForIsCounted) {
   Recorder recorder(path_);
   ControlRecord r;
-  r.header = {now_ns(), study::RecordKind::command, 10};
+  r.header = {now_ns(), log::RecordKind::command, 10};
   std::size_t sent = 0;
   while (channels_->command_log.push(r)) ++sent;
   EXPECT_EQ(channels_->records_lost(), 1u);
@@ -250,7 +250,7 @@ TEST_F(Row35Recorder, AFileThatWasReplacedInFlightIsLeftAndTheNextOneMade) {
   recorder.drain(*channels_);
   EXPECT_EQ(content(path_), "of somebody else");
   EXPECT_EQ(recorder.path(), folder_ + "/flight-2.bwlog");
-  EXPECT_EQ(study::read_raw_log(recorder.path()).value().records.size(), 4u);
+  EXPECT_EQ(log::read_raw_log(recorder.path()).value().records.size(), 4u);
 }
 
 }  // namespace

@@ -6,13 +6,13 @@
 #include <fstream>
 #include <iterator>
 
-#include "core/study/tick_log.hpp"
+#include "core/log/tick_log.hpp"
 #include "tests/daemon/lockstep.hpp"
 
 namespace backwash::daemon::test {
 namespace {
 
-using study::RecordKind;
+using log::RecordKind;
 
 /// A raw log of a flight in lockstep with a hold and a landing, in a file of its own.
 class Replay : public testing::Test {
@@ -31,7 +31,7 @@ class Replay : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove(path_); }
 
-  study::RawLog read() const { return study::read_raw_log(path_).value(); }
+  log::RawLog read() const { return log::read_raw_log(path_).value(); }
   /// Changes one byte of the file.
   void flip(std::uint64_t offset) const {
     std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
@@ -40,7 +40,7 @@ class Replay : public testing::Test {
     file.seekp(static_cast<std::streamoff>(offset));
     file.put(byte);
   }
-  static const study::RawRecord& nth(const study::RawLog& log, RecordKind kind, std::size_t n) {
+  static const log::RawRecord& nth(const log::RawLog& log, RecordKind kind, std::size_t n) {
     for (const auto& r : log.records)
       if (r.header.kind == kind && n-- == 0) return r;
     throw std::out_of_range("no such record");
@@ -51,39 +51,39 @@ class Replay : public testing::Test {
 };
 
 TEST_F(Replay, OfAFlightIsBitForBitEqualEachTime) {
-  const auto first = study::replay(read(), path_);
+  const auto first = log::replay(read(), path_);
   ASSERT_TRUE(first) << first.error().message;
   EXPECT_EQ(first->ticks, ticks_);
   EXPECT_EQ(first->ticks_missing, 0u);
   EXPECT_EQ(first->segments, 3u);  // lift-off, the rest of the way up, the route
   EXPECT_GT(first->setpoints, 400u);
   EXPECT_EQ(first->differing, 0u) << first->first->field << " of tick " << first->first->tick;
-  EXPECT_EQ(study::replay(read(), path_)->state_hash, first->state_hash);
+  EXPECT_EQ(log::replay(read(), path_)->state_hash, first->state_hash);
 }
 
 // Inputs of every kind: where the replay first differs is where the input was read.
 TEST_F(Replay, NamesTheTickAndFieldThatAChangedInputMakesDiffer) {
   const auto log = read();
   const auto& input = nth(log, RecordKind::tick_input, 400);
-  const std::uint64_t body = input.offset + sizeof(study::RecordHeader);
-  for (const std::size_t at : {offsetof(study::TickInputRecord, p) + 6, offsetof(study::TickInputRecord, v) + 6,
-                               offsetof(study::TickInputRecord, flags)}) {
+  const std::uint64_t body = input.offset + sizeof(log::RecordHeader);
+  for (const std::size_t at : {offsetof(log::TickInputRecord, p) + 6, offsetof(log::TickInputRecord, v) + 6,
+                               offsetof(log::TickInputRecord, flags)}) {
     flip(body + at);
-    const auto replayed = study::replay(read(), path_);
+    const auto replayed = log::replay(read(), path_);
     ASSERT_TRUE(replayed) << replayed.error().message;
     ASSERT_TRUE(replayed->first) << at;
     EXPECT_EQ(replayed->first->tick, 400u) << at;
     EXPECT_GT(replayed->first->offset, body);
     flip(body + at);
   }
-  EXPECT_EQ(study::replay(read(), path_)->differing, 0u);
+  EXPECT_EQ(log::replay(read(), path_)->differing, 0u);
 }
 
 TEST_F(Replay, NamesADecisionThatTheLogTellsOtherwise) {
   const auto log = read();
   const auto& tick = nth(log, RecordKind::tick, 500);
-  flip(tick.offset + sizeof(study::RecordHeader) + offsetof(study::TickRecord, local_v));
-  const auto replayed = study::replay(read(), path_);
+  flip(tick.offset + sizeof(log::RecordHeader) + offsetof(log::TickRecord, local_v));
+  const auto replayed = log::replay(read(), path_);
   ASSERT_TRUE(replayed && replayed->first);
   EXPECT_EQ(replayed->differing, 1u);
   EXPECT_EQ(replayed->first->tick, 500u);
@@ -95,19 +95,19 @@ TEST_F(Replay, NamesTheByteOfWhatIsDamaged) {
   const auto log = read();
   const auto expect_named = [&](const auto& result, std::uint64_t offset) {
     ASSERT_FALSE(result);
-    EXPECT_EQ(result.error().kind, study::LogError::Kind::bad_data);
+    EXPECT_EQ(result.error().kind, log::LogError::Kind::bad_data);
     EXPECT_NE(result.error().message.find(path_ + ": byte " + std::to_string(offset) + ": "), std::string::npos)
         << result.error().message;
   };
   const auto& record = nth(log, RecordKind::tick, 100);
   flip(record.offset + 8);  // the kind
-  expect_named(study::read_raw_log(path_), record.offset);
+  expect_named(log::read_raw_log(path_), record.offset);
   flip(record.offset + 8);
 
   const auto& offer = nth(log, RecordKind::offer, 1);
-  flip(offer.offset + sizeof(study::RecordHeader) + 7 * 8 + 6);  // the number of its commands
-  expect_named(study::replay(read(), path_), offer.offset);
-  flip(offer.offset + sizeof(study::RecordHeader) + 7 * 8 + 6);
+  flip(offer.offset + sizeof(log::RecordHeader) + 7 * 8 + 6);  // the number of its commands
+  expect_named(log::replay(read(), path_), offer.offset);
+  flip(offer.offset + sizeof(log::RecordHeader) + 7 * 8 + 6);
 
   const std::uint64_t last = log.records.back().offset;
   std::filesystem::resize_file(path_, std::filesystem::file_size(path_) - 5);
@@ -120,7 +120,7 @@ TEST_F(Replay, CountsTicksThatTheLogHasLost) {
   auto log = read();
   std::size_t seen = 0;
   std::erase_if(log.records, [&](const auto& r) { return r.header.kind == RecordKind::tick_input && seen++ == 300; });
-  const auto replayed = study::replay(log, path_);
+  const auto replayed = log::replay(log, path_);
   ASSERT_TRUE(replayed);
   EXPECT_EQ(replayed->ticks_missing, 1u);
 }
@@ -138,14 +138,14 @@ TEST(Offer, ComesBackAsItWentIn) {
   s.tube[3].half_widths_interval = {6, 7, 8, 9, 10};
   s.stops.resize(1);
   s.stops[0] = {1, {s.commands[1]}, {s.tube[2], s.tube[3]}};
-  const auto bytes = study::encode(s);
-  const auto back = study::decode_offer(bytes);
+  const auto bytes = log::encode(s);
+  const auto back = log::decode_offer(bytes);
   ASSERT_TRUE(back);
-  EXPECT_EQ(study::encode(**back), bytes);
+  EXPECT_EQ(log::encode(**back), bytes);
   EXPECT_EQ((*back)->stops[0].branch, 1u);
   EXPECT_EQ((*back)->commands[1].a_W, Vec3(7, 8, 9));
   for (std::size_t n = 0; n < bytes.size(); n += 8)
-    EXPECT_FALSE(study::decode_offer(std::span(bytes).first(n))) << "cut at " << n;
+    EXPECT_FALSE(log::decode_offer(std::span(bytes).first(n))) << "cut at " << n;
 }
 
 }  // namespace

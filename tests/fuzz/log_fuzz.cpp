@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/study/recorded_flight.hpp"
-#include "core/study/tick_log.hpp"
-#include "core/study/ulog.hpp"
+#include "core/log/tick_log.hpp"
+#include "core/log/ulog.hpp"
+#include "core/report/recorded_flight.hpp"
 #include "tests/daemon/lockstep.hpp"
 #include "tests/fuzz/mutator.hpp"
 
@@ -15,7 +15,7 @@ namespace backwash::fuzz {
 namespace {
 
 using daemon::test::Lockstep;
-using study::RecordKind;
+using log::RecordKind;
 
 const std::string kPath = testing::TempDir() + "fuzz_log_" + std::to_string(::getpid());
 
@@ -52,7 +52,7 @@ Bytes raw_log() {
   rig.offer(std::vector<Setpoint>(10, Setpoint{rig.view().state.p_W, Vec3::Zero(), Vec3::Zero(), 0}));
   rig.ticks(12);
   Bytes log;
-  append(log, study::kRawLogMagic, sizeof study::kRawLogMagic - 1);
+  append(log, log::kRawLogMagic, sizeof log::kRawLogMagic - 1);
   std::uint64_t tick = 0;
   for (const auto& r : rig.log) {
     const auto kind = r.header.kind;
@@ -75,28 +75,28 @@ TEST(Fuzz, ADamagedRawLogIsReplayedOrRefusedByItsByte) {
     const Bytes bytes = mutator.damaged(whole);
     more = mutator.spend(bytes.size());
     write(bytes);
-    const auto log = study::read_raw_log(kPath);
-    const auto replayed = log ? study::replay(*log, "log") : tl::unexpected(log.error());
+    const auto log = log::read_raw_log(kPath);
+    const auto replayed = log ? log::replay(*log, "log") : tl::unexpected(log.error());
     ++(replayed ? outcome.taken : outcome.refused);
     if (!replayed) {
       const std::string& why = replayed.error().message;
       ASSERT_TRUE(why.find("byte ") != why.npos || why.find("no constants") != why.npos) << why;
     }
-    if (log) (void)study::recorded_map(log->records);
+    if (log) (void)report::recorded_map(log->records);
   }
   EXPECT_GT(outcome.taken, 0u);
 }
 
 /// Records of a take-off and a route as the planner writes them, with ticks that agree, and two rows of truth.
-std::vector<study::RawRecord> flown(const plan::World& world) {
-  std::vector<study::RawRecord> log;
+std::vector<log::RawRecord> flown(const plan::World& world) {
+  std::vector<log::RawRecord> log;
   const auto record = [&](RecordKind kind, std::int64_t t_ns, const Bytes& bytes) {
     log.push_back({{t_ns, kind, static_cast<std::uint32_t>(bytes.size())}, bytes});
   };
   for (std::uint64_t id = 1; id <= 2; ++id) {
     const State start{Vec3(-2, 0, 1.2), Vec3::Zero()};
     const std::vector<Setpoint> rows(20, Setpoint{start.p_W, Vec3::Zero(), Vec3::Zero(), 0});
-    study::SegmentRecord head{};
+    log::SegmentRecord head{};
     head.id = id, head.commands = rows.size() - 1;
     std::copy_n(start.p_W.data(), 3, head.start_p);
     Bytes segment;
@@ -109,7 +109,7 @@ std::vector<study::RawRecord> flown(const plan::World& world) {
     const std::span commands(rows.begin() + 1, rows.end());
     const auto tube = reach::tube_over_field(world.reach, start, rows[0], commands, world.bounds);
     for (std::size_t k = 0; k < 22; ++k) {
-      study::TickRecord tick{};
+      log::TickRecord tick{};
       tick.segment = id, tick.index = k, tick.judged = 1;
       std::copy_n(tube[std::min(k, tube.size() - 1)].center.p_W.data(), 3, tick.center);
       Bytes bytes;
@@ -124,12 +124,12 @@ TEST(Fuzz, ADamagedFlightIsPutTogetherOrRefused) {
   Mutator mutator("recorded flight", 0.02);
   const auto world = daemon::test::corridor();
   const auto whole = flown(*world);
-  study::FlightLog truth;
+  log::FlightLog truth;
   truth.t_s = {0, 10};
   for (const char* c : {"x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "ax_mps2", "ay_mps2", "az_mps2"})
     truth.columns[c] = {0, 0};
-  ASSERT_TRUE(study::recorded_flight(whole, truth, *world))
-      << study::recorded_flight(whole, truth, *world).error().message;
+  ASSERT_TRUE(report::recorded_flight(whole, truth, *world))
+      << report::recorded_flight(whole, truth, *world).error().message;
   Outcome outcome;
   for (bool more = true; more;) {
     auto log = whole;
@@ -142,7 +142,7 @@ TEST(Fuzz, ADamagedFlightIsPutTogetherOrRefused) {
       bytes += log[at].bytes.size();
     }
     more = mutator.spend(bytes);
-    const auto flight = study::recorded_flight(log, truth, *world);
+    const auto flight = report::recorded_flight(log, truth, *world);
     ++(flight ? outcome.taken : outcome.refused);
     if (!flight) {
       ASSERT_FALSE(flight.error().message.empty());
@@ -162,7 +162,7 @@ TEST(Fuzz, ADamagedULogIsReadOrRefusedByItsByte) {
     Bytes bytes = whole;
     bytes = mutator.damaged(std::move(bytes));
     more = mutator.spend(bytes.size());
-    const auto log = study::decode_ulog(bytes);
+    const auto log = log::decode_ulog(bytes);
     ++(log ? outcome.taken : outcome.refused);
     if (!log) {
       ASSERT_TRUE(log.error().starts_with("byte ")) << log.error();
@@ -170,7 +170,7 @@ TEST(Fuzz, ADamagedULogIsReadOrRefusedByItsByte) {
     }
     if (!mutator.one_in(8)) continue;
     write(bytes);
-    const auto flight = study::read_ulog(kPath);  // the whole way to a flight log
+    const auto flight = log::read_ulog(kPath);  // the whole way to a flight log
     if (!flight) {
       ASSERT_FALSE(flight.error().message.empty());
     }
@@ -187,7 +187,7 @@ TEST(Fuzz, ADamagedFlightLogHoldsFiniteNumbersOrIsRefusedByItsLine) {
     const Bytes bytes = mutator.damaged({text.begin(), text.end()});
     more = mutator.spend(bytes.size());
     write(bytes);
-    const auto log = study::read_csv(kPath);
+    const auto log = log::read_csv(kPath);
     ++(log ? outcome.taken : outcome.refused);
     if (!log) {
       ASSERT_NE(log.error().message.find(kPath), std::string::npos);

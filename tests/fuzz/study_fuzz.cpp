@@ -4,20 +4,20 @@
 
 #include <cmath>
 
-#include "core/study/discrepancy/page.hpp"
-#include "core/study/discrepancy/study.hpp"
+#include "core/study/findings/study.hpp"
+#include "core/study/findings/study_page.hpp"
 #include "tests/fuzz/mutator.hpp"
 
 namespace backwash::fuzz {
 namespace {
 
-using namespace study::discrepancy;
+using namespace study;
 
 constexpr std::size_t kFlights = 11, kRows = 250;
 
 /// Hovers at three places of a room with lines between them, every column there is.
-study::FlightLog flown(Mutator& mutator) {
-  study::FlightLog log;
+log::FlightLog flown(Mutator& mutator) {
+  log::FlightLog log;
   const auto noise = [&](double size) { return size * (static_cast<double>(mutator.below(2001)) / 1000 - 1); };
   for (std::size_t k = 0; k < kRows; ++k) {
     const double t = 0.04 * static_cast<double>(k);
@@ -41,7 +41,7 @@ study::FlightLog flown(Mutator& mutator) {
 }
 
 /// A value, a stretch, a column, the clock or the end of one flight.
-void damage(study::FlightLog& log, Mutator& mutator) {
+void damage(log::FlightLog& log, Mutator& mutator) {
   constexpr double kExtreme[] = {0, -1, 1e-300, 1e6, -1e12, 1e150, -1.7e308, 0.1};
   const double value = kExtreme[mutator.below(std::size(kExtreme))];
   auto column = std::next(log.columns.begin(), static_cast<std::ptrdiff_t>(mutator.below(log.columns.size())));
@@ -88,11 +88,11 @@ TEST(Fuzz, AStudyOfAnyFiniteNumbersEndsWithAVerdict) {
     StudyOptions options;
     options.minimum_detectable = false;
     options.search.flips = 40;
-    const auto result = study::discrepancy::study(seen, options);
+    const auto result = study::study(seen, options);
     for (const auto& cause : result.causes)
       for (const auto& p : cause.found.parameters)
         EXPECT_TRUE(std::isfinite(p.value) && std::isfinite(p.low) && std::isfinite(p.high))
-            << cause.found.form->cause << ' ' << p.name;
+            << cause.found.form->cause() << ' ' << p.name;
     ++verdicts, named += result.verdict == Verdict::insufficient ? 0 : 1;
   }
   std::printf("%d verdicts, %d with flights enough\n", verdicts, named);

@@ -17,7 +17,7 @@ double between(Rng& rng, double low, double high) { return std::uniform_real_dis
 
 double to_decimetre(double x) { return std::round(10 * x) / 10; }
 
-/// The table of the docs: the size that must be found at 12 flights, in its unit (core/study/discrepancy/confusion.md).
+/// The table of the docs: the size that must be found at 12 flights, in its unit (core/study/confusion.md).
 const std::map<std::string, double>& table() {
   static const std::map<std::string, double> sizes = {
       {"ground_thrust", 0.12},       // m/s² 0.4 m above the ground

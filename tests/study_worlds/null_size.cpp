@@ -3,18 +3,18 @@
 
 #include <cmath>
 
-#include "core/study/discrepancy/dependence.hpp"
+#include "core/study/inference/dependence.hpp"
 #include "tests/study_worlds/observe.hpp"
 
 namespace study_worlds {
 
-namespace discrepancy = backwash::study::discrepancy;
+namespace study = backwash::study;
 
 namespace {
 
 constexpr int kDraws = 4, kFlips = 400;
 
-std::vector<double> per_dwell(const discrepancy::Windows& windows, std::mt19937_64& rng) {
+std::vector<double> per_dwell(const study::Windows& windows, std::mt19937_64& rng) {
   std::map<std::pair<std::size_t, int>, double> drawn;
   std::vector<double> x;
   for (const auto& w : windows) {
@@ -25,7 +25,7 @@ std::vector<double> per_dwell(const discrepancy::Windows& windows, std::mt19937_
   return x;
 }
 
-std::vector<double> per_flight(const discrepancy::Windows& windows, std::mt19937_64& rng) {
+std::vector<double> per_flight(const study::Windows& windows, std::mt19937_64& rng) {
   std::map<std::size_t, double> drawn;
   std::vector<double> x;
   for (const auto& w : windows) {
@@ -36,7 +36,7 @@ std::vector<double> per_flight(const discrepancy::Windows& windows, std::mt19937
   return x;
 }
 
-std::vector<double> course_of_time(const discrepancy::Windows& windows, std::mt19937_64& rng) {
+std::vector<double> course_of_time(const study::Windows& windows, std::mt19937_64& rng) {
   std::uniform_real_distribution turn(0.0, 2 * M_PI);
   const double a = turn(rng), b = turn(rng), c = turn(rng);
   std::vector<double> x;
@@ -45,7 +45,7 @@ std::vector<double> course_of_time(const discrepancy::Windows& windows, std::mt1
 }
 
 /// Share of flipped gains at least as large as the true one.
-double p_value(const discrepancy::Normal& normal, const std::vector<std::vector<int>>& draws) {
+double p_value(const study::Normal& normal, const std::vector<std::vector<int>>& draws) {
   const double gain = normal.gain();
   int above = 0;
   for (const auto& signs : draws) above += normal.gain(signs) >= gain ? 1 : 0;
@@ -56,15 +56,15 @@ double p_value(const discrepancy::Normal& normal, const std::vector<std::vector<
 
 NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path& folder) {
   const auto seen = observe(draw_world({seed, {}, 1, flights, ""}), folder);
-  const discrepancy::Evidence evidence(seen);
-  const auto draws = discrepancy::sign_draws(seen.first.size() - 1, kFlips, static_cast<unsigned>(seed));
+  const study::Evidence evidence(seen);
+  const auto draws = study::sign_draws(seen.first.size() - 1, kFlips, static_cast<unsigned>(seed));
   std::mt19937_64 rng(seed + 4242);
   NullSize sizes;
-  const auto test = [&](const std::string& name, const char* kind, const std::vector<discrepancy::Channel>& channels,
+  const auto test = [&](const std::string& name, const char* kind, const std::vector<study::Channel>& channels,
                         const std::vector<double>& x) {
-    discrepancy::Column column;
+    study::Column column;
     for (const auto c : channels) column.parts.push_back({c, x});
-    std::vector<discrepancy::Column> free = discrepancy::offsets({column}, seen);
+    std::vector<study::Column> free = study::offsets({column}, seen);
     if (free.empty())
       for (const auto c : channels) free.push_back({{{c, std::vector<double>(seen.windows.size(), 1.0)}}});
     const auto normal = evidence.normal({column}, free);
@@ -75,20 +75,20 @@ NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path&
   for (int draw = 0; draw < kDraws; ++draw) {
     const auto dwell = per_dwell(seen.windows, rng), course = course_of_time(seen.windows, rng),
                flight = per_flight(seen.windows, rng);
-    for (std::size_t c = 0; c < discrepancy::kChannels; ++c) {
-      const auto channel = static_cast<discrepancy::Channel>(c);
+    for (std::size_t c = 0; c < study::kChannels; ++c) {
+      const auto channel = static_cast<study::Channel>(c);
       if (!seen.measured(channel)) continue;
-      std::string family = discrepancy::channel_name(channel);
+      std::string family = study::channel_name(channel);
       if (const auto digit = family.find_last_of("1234"); digit + 1 == family.size()) family.pop_back();
       test(family, "dwell", {channel}, dwell), test(family, "time", {channel}, course);
       test(family, "flight", {channel}, flight);
     }
-    const std::vector<discrepancy::Channel> variances = {discrepancy::kVarX, discrepancy::kVarY, discrepancy::kVarZ};
+    const std::vector<study::Channel> variances = {study::kVarX, study::kVarY, study::kVarZ};
     test("ln variance, all axes", "dwell", variances, dwell), test("ln variance, all axes", "time", variances, course);
     test("ln variance, all axes", "flight", variances, flight);
   }
   // Family-wise: the smallest p, corrected, of all pairs of what remains.
-  const auto remaining = discrepancy::remaining_dependence(evidence, {}, static_cast<unsigned>(seed));
+  const auto remaining = study::remaining_dependence(evidence, {}, static_cast<unsigned>(seed));
   const double least = remaining.empty() ? 1 : remaining.front().p_holm;
   auto& left = sizes[{"what remains (HSIC, Holm)", "all"}];
   left.first.count(least <= 0.05), left.second.count(least <= 0.03);

@@ -9,7 +9,7 @@
 
 namespace study_worlds {
 
-namespace discrepancy = backwash::study::discrepancy;
+namespace study = backwash::study;
 
 namespace {
 
@@ -18,7 +18,7 @@ using MapKey = std::tuple<std::uint64_t, bool, double>;  // seed, empty room, of
 struct MapSeen {
   MapKey key;
   backwash::map::OccupancyGrid grid;
-  discrepancy::Surroundings surroundings;
+  study::Surroundings surroundings;
   MapSeen(const MapKey& of, const std::filesystem::path& file, const backwash::Model& model)
       : key(of), grid(backwash::map::load_map(file.string()).value()), surroundings(&grid, model) {}
   MapSeen(const MapSeen&) = delete;
@@ -26,12 +26,12 @@ struct MapSeen {
 
 }  // namespace
 
-discrepancy::Observations observe(const World& world, const std::filesystem::path& folder) {
+study::Observations observe(const World& world, const std::filesystem::path& folder) {
   return observe(world, fly_all(world), folder);
 }
 
-discrepancy::Observations observe(const World& world, const std::vector<Table>& flights,
-                                  const std::filesystem::path& folder) {
+study::Observations observe(const World& world, const std::vector<Table>& flights,
+                            const std::filesystem::path& folder) {
   write_world_files(world, folder);
   const auto vehicle = backwash::config::load_vehicle((folder / "vehicle.toml").string()).value();
   auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
@@ -40,9 +40,9 @@ discrepancy::Observations observe(const World& world, const std::vector<Table>& 
   thread_local std::optional<MapSeen> last;
   const MapKey key{world.request.seed, world.request.confound == "height", world.effects.of("map_offset")};
   if (!last || last->key != key) last.emplace(key, folder / "map.bt", model);
-  discrepancy::Observer observer(vehicle, last->surroundings);
+  study::Observer observer(vehicle, last->surroundings);
   for (const Table& table : flights) {
-    backwash::study::FlightLog log;
+    backwash::log::FlightLog log;
     for (std::size_t c = 0; c < table.names.size(); ++c) {
       std::vector<double> column;
       for (const auto& row : table.rows) column.push_back(row[c]);
@@ -53,10 +53,10 @@ discrepancy::Observations observe(const World& world, const std::vector<Table>& 
   return observer.finish();
 }
 
-std::vector<std::vector<std::string>> sets_of(const discrepancy::StudyResult& result) {
+std::vector<std::vector<std::string>> sets_of(const study::StudyResult& result) {
   std::vector<std::vector<std::string>> sets;
   for (const auto& cause : result.causes) {
-    sets.push_back({cause.found.form->cause});
+    sets.push_back({cause.found.form->cause()});
     for (const auto& rival : cause.found.rivals) sets.back().push_back(rival.name);
   }
   return sets;
@@ -72,7 +72,7 @@ std::string told(const std::vector<std::vector<std::string>>& sets, const std::v
   return text.empty() ? "nothing" : text;
 }
 
-std::string told(const discrepancy::StudyResult& result) {
+std::string told(const study::StudyResult& result) {
   std::vector<std::string> unknown;
   for (const auto& u : result.unknown) unknown.push_back(u.along);
   return told(sets_of(result), unknown);

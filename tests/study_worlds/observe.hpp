@@ -3,21 +3,21 @@
 
 #include <filesystem>
 
-#include "core/study/discrepancy/study.hpp"
+#include "core/study/findings/study.hpp"
 #include "tests/study_worlds/world.hpp"
 
 namespace study_worlds {
 
 /// What the study sees of a world: its logs (never written), its map and vehicle files (in `folder`), the model's name.
-backwash::study::discrepancy::Observations observe(const World& world, const std::filesystem::path& folder);
+backwash::study::Observations observe(const World& world, const std::filesystem::path& folder);
 
-backwash::study::discrepancy::Observations observe(const World& world, const std::vector<Table>& flights,
-                                                   const std::filesystem::path& folder);
+backwash::study::Observations observe(const World& world, const std::vector<Table>& flights,
+                                      const std::filesystem::path& folder);
 
 /// Per told cause its name, then its rivals.
-std::vector<std::vector<std::string>> sets_of(const backwash::study::discrepancy::StudyResult& result);
+std::vector<std::vector<std::string>> sets_of(const backwash::study::StudyResult& result);
 /// "ceiling", "trim|draft" for a set, "a + b" for two causes, "?z_m" for unknown structure, "nothing".
 std::string told(const std::vector<std::vector<std::string>>& sets, const std::vector<std::string>& unknown);
-std::string told(const backwash::study::discrepancy::StudyResult& result);
+std::string told(const backwash::study::StudyResult& result);
 
 }  // namespace study_worlds

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <functional>
 
-#include "core/study/discrepancy/forms.hpp"
+#include "core/study/effects/columns.hpp"
 #include "tests/study_worlds/plan.hpp"
 
 namespace study_worlds {
 
-namespace discrepancy = backwash::study::discrepancy;
+namespace study = backwash::study;
 
 namespace {
 
@@ -43,7 +43,7 @@ std::optional<double> truth_of(const std::string& cause, const std::string& para
 }
 
 /// Mean over each window, and `beyond` seconds on both sides, of what is hidden at its flight's rows.
-std::vector<double> window_means(const discrepancy::Observations& seen, const std::vector<Table>& flights,
+std::vector<double> window_means(const study::Observations& seen, const std::vector<Table>& flights,
                                  const std::function<double(const Hidden&)>& value, double beyond) {
   std::vector<double> means;
   for (const auto& w : seen.windows) {
@@ -69,9 +69,8 @@ double flown_tail(const std::vector<Table>& flights) {
 
 }  // namespace
 
-std::vector<Compared> compare(const World& world, const std::vector<Table>& flights,
-                              const discrepancy::Accepted& found) {
-  const std::string& cause = found.form->cause;
+std::vector<Compared> compare(const World& world, const std::vector<Table>& flights, const study::Accepted& found) {
+  const std::string& cause = found.form->cause();
   std::vector<Compared> all;
   for (const auto& p : found.parameters)
     if (const auto truth = truth_of(cause, p.name, world.effects.of(cause), world.effects.shape_of(cause)))
@@ -95,23 +94,21 @@ namespace {
 /// column is a mean over 18 s.
 constexpr double kBeyondOfBattery = 8;  // s
 
-discrepancy::Column oracle_column(const discrepancy::Observations& seen, const std::vector<Table>& flights,
-                                  double beyond) {
-  discrepancy::Column column;
-  const auto add = [&](discrepancy::Channel channel, const std::function<double(const Hidden&)>& value) {
+study::Column oracle_column(const study::Observations& seen, const std::vector<Table>& flights, double beyond) {
+  study::Column column;
+  const auto add = [&](study::Channel channel, const std::function<double(const Hidden&)>& value) {
     auto x = window_means(seen, flights, value, beyond);
     if (std::any_of(x.begin(), x.end(), [](double v) { return std::abs(v) > 1e-9; }))
       column.parts.push_back({channel, std::move(x)});
   };
   for (int i = 0; i < 3; ++i)
-    add(static_cast<discrepancy::Channel>(discrepancy::kMeanX + i), [i](const Hidden& h) { return h.push[i]; });
-  for (const auto c : {discrepancy::kVarX, discrepancy::kVarY, discrepancy::kVarZ})
-    add(c, [](const Hidden& h) { return h.ln_variance; });
+    add(static_cast<study::Channel>(study::kMeanX + i), [i](const Hidden& h) { return h.push[i]; });
+  for (const auto c : {study::kVarX, study::kVarY, study::kVarZ}) add(c, [](const Hidden& h) { return h.ln_variance; });
   return column;
 }
 
 /// The columns in those channels alone that the oracle moves.
-std::vector<discrepancy::Column> seen_by(const discrepancy::Column& oracle, std::vector<discrepancy::Column> columns) {
+std::vector<study::Column> seen_by(const study::Column& oracle, std::vector<study::Column> columns) {
   for (auto& column : columns)
     std::erase_if(column.parts, [&](const auto& part) {
       return std::none_of(oracle.parts.begin(), oracle.parts.end(), [&](auto& o) { return o.channel == part.channel; });
@@ -121,17 +118,17 @@ std::vector<discrepancy::Column> seen_by(const discrepancy::Column& oracle, std:
 
 }  // namespace
 
-void compare_with_oracle(Outcome& outcome, const discrepancy::Accepted& found, const discrepancy::Observations& seen,
+void compare_with_oracle(Outcome& outcome, const study::Accepted& found, const study::Observations& seen,
                          const std::vector<Table>& flights) {
-  const double beyond = found.form->cause == "battery_sag" ? kBeyondOfBattery : 0;
-  const discrepancy::Column column = oracle_column(seen, flights, beyond);
+  const double beyond = found.form->cause() == "battery_sag" ? kBeyondOfBattery : 0;
+  const study::Column column = oracle_column(seen, flights, beyond);
   if (column.parts.empty()) return;
-  discrepancy::Evidence evidence(seen);
+  study::Evidence evidence(seen);
   evidence.whiten({column});
-  std::vector<discrepancy::Column> both = found.columns, free;
+  std::vector<study::Column> both = found.columns, free;
   both.push_back(column);
-  if (!found.form->constant) free = discrepancy::offsets(both, seen);
-  const auto gain = [&](const std::vector<discrepancy::Column>& columns) {
+  if (!found.form->constant) free = study::offsets(both, seen);
+  const auto gain = [&](const std::vector<study::Column>& columns) {
     const auto normal = evidence.normal(columns, free);
     return normal.solvable ? normal.gain() : 0.0;
   };
@@ -139,7 +136,7 @@ void compare_with_oracle(Outcome& outcome, const discrepancy::Accepted& found, c
   if (oracle > 0) outcome.gain_share = gain(found.columns) / oracle;
 
   // An interval that is averaged over several shapes is about the size and not about one form's nearest value.
-  if (!discrepancy::shapes_of(*found.form).empty()) return;
+  if (!found.form->shapes.empty()) return;
   auto comparable = seen_by(column, found.columns);
   comparable.push_back(column);
   const auto A = evidence.normal(comparable, free).total;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "core/study/discrepancy/search.hpp"
+#include "core/study/inference/search.hpp"
 #include "tests/study_worlds/score.hpp"
 
 namespace study_worlds {
@@ -9,15 +9,15 @@ namespace study_worlds {
 /// The estimated parameters of which the generator knows the value in the same unit (README.md of the study lists
 /// them); empty for a cause without one.
 std::vector<Compared> compare(const World& world, const std::vector<Table>& flights,
-                              const backwash::study::discrepancy::Accepted& found);
+                              const backwash::study::Accepted& found);
 /// |value − truth|/|truth| over all of them as one vector.
 std::optional<double> parameter_error(const std::vector<Compared>& compared);
 
 /// Compares with an oracle's column, the hidden effect's own value averaged over each window: sets `gain_share`, the
 /// held-out gain of the found cause over that of the oracle with one factor fitted, and of each compared parameter
-/// `best`, where the estimate is of one shape alone (shapes_of). Leaves them empty for effects that are neither a push
-/// nor a factor on the variance.
-void compare_with_oracle(Outcome& outcome, const backwash::study::discrepancy::Accepted& found,
-                         const backwash::study::discrepancy::Observations& seen, const std::vector<Table>& flights);
+/// `best`, where the estimate is of one shape alone (Form::shapes). Leaves them empty for effects that are neither a
+/// push nor a factor on the variance.
+void compare_with_oracle(Outcome& outcome, const backwash::study::Accepted& found,
+                         const backwash::study::Observations& seen, const std::vector<Table>& flights);
 
 }  // namespace study_worlds

@@ -78,15 +78,15 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   const auto tables = fly_all(world);
   const auto seen = observe(world, tables, folder);
   const double observed = cpu();
-  backwash::study::discrepancy::StudyOptions options;
+  backwash::study::StudyOptions options;
   options.minimum_detectable = options.dependence = false;
-  const auto result = backwash::study::discrepancy::study(seen, options);
+  const auto result = backwash::study::study(seen, options);
   out.world_s = observed - start, out.study_s = cpu() - observed;
   out.sets = sets_of(result);
   for (const auto& u : result.unknown) out.unknown.push_back(u.along);
   if (out.truth.size() != 1) return out;
   for (const auto& cause : result.causes) {
-    if (cause.found.form->cause != out.truth.front()) continue;
+    if (cause.found.form->cause() != out.truth.front()) continue;
     out.compared = compare(world, tables, cause.found);
     out.error = parameter_error(out.compared);
     compare_with_oracle(out, cause.found, seen, tables);

@@ -55,8 +55,8 @@ std::string surface(const Extent& e, const map::OccupancyGrid& grid, const Model
 
 }  // namespace
 
-tl::expected<std::string, PlotError> bound_figure(const Data& data, const Model& model, int axis,
-                                                  std::span<const FigurePlace> places) {
+tl::expected<std::string, report::PlotError> bound_figure(const Data& data, const Model& model, int axis,
+                                                          std::span<const FigurePlace> places) {
   std::ostringstream script, plots;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Extent e = extent(data, places[i].place);
@@ -73,7 +73,8 @@ tl::expected<std::string, PlotError> bound_figure(const Data& data, const Model&
             "set logscale z\nset logscale cb\nset view 62, 305\nset xyplane 0\nset multiplot layout 1,"
          << std::max<std::size_t>(1, places.size()) << "\n"
          << plots.str() << "unset multiplot\n";
-  return draw(script.str(), Format::svg, 480 * static_cast<int>(std::max<std::size_t>(1, places.size())), 460);
+  return report::draw(script.str(), report::Format::svg,
+                      480 * static_cast<int>(std::max<std::size_t>(1, places.size())), 460);
 }
 
 }  // namespace backwash::study::calibrate

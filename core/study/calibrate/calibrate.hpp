@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/study/calibrate/assess.hpp"
-#include "core/study/windows.hpp"
+#include "core/study/windows/hover_windows.hpp"
 
 namespace backwash::study::calibrate {
 

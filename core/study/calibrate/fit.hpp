@@ -58,8 +58,8 @@ struct FitOptions {
 /// all amplitudes of a group are scaled together, so that the share below Σ of N(0, σ_b²) + the residuals about their
 /// flight's level is exactly q: the bound holds for a flight that was not fitted.
 ///
-/// `flight_weights`: how often each flight counts (a bootstrap's draw). Deterministic. About 1 µs per window and
-/// evaluation, a few hundred evaluations.
+/// `flight_weights`: how often each flight counts (a bootstrap's draw). Deterministic. About 1 µs per window
+/// and evaluation, a few hundred evaluations.
 Fit fit(const Data& data, std::span<const double> flight_weights, const Parameters& start, const FitOptions& options);
 
 /// Σ_aa(p; θ) per axis, (m/s²)².

@@ -131,7 +131,7 @@ bool within_two(double height, double of) { return height >= of / 2 && height < 
 
 }  // namespace
 
-std::vector<HeightRow> height_rows(const FlightWindows& windows, const FlightLog& log, std::size_t flight) {
+std::vector<HeightRow> height_rows(const FlightWindows& windows, const log::FlightLog& log, std::size_t flight) {
   const auto first = [&](const char* column, double otherwise) {
     return log.has(column) && !log.column(column).empty() ? log.column(column).front() : otherwise;
   };

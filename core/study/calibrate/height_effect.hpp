@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/log/flight_log.hpp"
 #include "core/study/calibrate/calibrate.hpp"
-#include "core/study/flight_log.hpp"
-#include "core/study/windows.hpp"
+#include "core/study/windows/hover_windows.hpp"
 
 namespace backwash::study::calibrate {
 
@@ -25,7 +25,7 @@ struct HeightRow {
 
 /// Rows of a flight's windows: recordings of `backwash import airgarage` (columns stood_z_m, ceiling, day). Windows
 /// less than 5 mm above where it stood may touch the ground and are left out.
-std::vector<HeightRow> height_rows(const FlightWindows& windows, const FlightLog& log, std::size_t flight);
+std::vector<HeightRow> height_rows(const FlightWindows& windows, const log::FlightLog& log, std::size_t flight);
 
 /// Ratios of the vertical variance, day and speed held fixed. A ratio has the value 0 where no day or flight shows it.
 struct HeightEffect {

@@ -14,7 +14,7 @@ struct Provenance {
   std::vector<std::string> maps, logs;
   std::string signal;  ///< what stood for the disturbance
   std::size_t windows = 0;
-  std::array<std::size_t, kGates> gated{};
+  std::array<std::size_t, kHoverGates> gated{};
   std::uint64_t seed = 0;
   int bootstraps = 0;
   double quantile = 0;

@@ -7,9 +7,9 @@
 
 #include <filesystem>
 
+#include "core/log/tick_log.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap_message.hpp"
-#include "core/study/tick_log.hpp"
 
 namespace backwash::fuzz {
 namespace {
@@ -182,11 +182,11 @@ const Event* DaemonRig::lasting(Kind kind) const {
 // The replay needs every segment that was offered: those are in the recorder's file.
 std::optional<std::string> DaemonRig::replayed() {
   threads_->recorder.drain(*lock_.channels);
-  auto log = study::read_raw_log(log_);
+  auto log = log::read_raw_log(log_);
   if (!log) return log.error().message;
-  std::erase_if(log->records, [](const auto& r) { return r.header.kind != study::RecordKind::offer; });
+  std::erase_if(log->records, [](const auto& r) { return r.header.kind != log::RecordKind::offer; });
   log->records.insert(log->records.end(), lock_.log.begin(), lock_.log.end());
-  const auto replay = study::replay(*log, "log");
+  const auto replay = log::replay(*log, "log");
   if (!replay) return replay.error().message;
   if (replay->ticks_missing > 0) return std::to_string(replay->ticks_missing) + " ticks are missing in the log";
   if (!replay->first) return std::nullopt;

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+namespace backwash::log {
+
+/// A flight log by column (docs/interfaces.md, "Flight log, CSV"): SI units, world frame z-up. Columns that a log lacks
+/// are absent from the map, never zero.
+struct FlightLog {
+  std::vector<double> t_s;
+  std::map<std::string, std::vector<double>> columns;  ///< name as in the file → one value per row
+  bool has(const std::string& name) const { return columns.contains(name); }
+  const std::vector<double>& column(const std::string& name) const { return columns.at(name); }
+};
+
+/// One line: FILE:LINE: what is wrong and what would be right.
+struct LogError {
+  enum class Kind { not_found, bad_data, cannot_create } kind;
+  std::string message;
+};
+
+/// Reads comma-separated numbers under a line of column names. Errors: missing file, no t_s column (unless
+/// `time_column` names another or is empty), a duplicated name, a row with too few or too many cells, a cell that is
+/// not a finite number. Columns named in `unread` are left out, whatever their cells hold.
+tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column = "t_s",
+                                           const std::set<std::string>& unread = {});
+
+/// Writes t_s first, then the columns in name order, with enough digits to read back bit for bit.
+tl::expected<void, LogError> write_csv(const std::string& path, const FlightLog& log, bool overwrite);
+
+}  // namespace backwash::log

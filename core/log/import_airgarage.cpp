@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/log/import_airgarage.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <set>
+
+#include "core/types/geometry.hpp"
+
+namespace backwash::log {
+namespace {
+
+constexpr double kFrame = 0.01;      // s
+constexpr double kHalfWidth = 0.12;  // s, of the fitted cubic
+constexpr std::size_t kLeastFrames = 6;
+constexpr double kMarkerHeight = 0.027;  // m, marker above the feet
+
+/// What the notes that accompany the data say of a flight: hovers under a plate (1), nothing above (0), or a pass
+/// through a tunnel or no note at all (−1).
+double plate_above(const std::string& name) {
+  static const std::set<std::string> under = {
+      "20240822_21_32_29", "20240822_22_02_30", "20240822_22_17_21", "20240823_17_35_08", "20240823_17_47_21",
+      "20240823_19_37_29", "20240827_18_45_10", "20240827_18_48_44", "20240827_18_56_52", "20240827_19_51_43",
+      "20240827_19_56_47", "20240907_15_52_28", "20240907_16_06_12", "20240907_22_27_02", "20240907_23_24_55",
+      "20240907_23_32_12", "20240907_23_43_25", "20240907_23_47_39"};
+  static const std::set<std::string> open = {
+      "20240814_23_40_43", "20240814_23_52_49", "20240815_00_29_10", "20240815_00_45_16", "20240815_19_57_56",
+      "20240815_20_00_27", "20240815_20_09_19", "20240815_22_05_06", "20240816_00_03_47", "20240816_00_22_16",
+      "20240821_16_44_07", "20240821_17_23_10", "20240821_17_48_25", "20240821_18_01_45", "20240822_17_29_40",
+      "20240822_17_48_07", "20240822_17_56_30", "20240822_18_03_19", "20240822_18_23_29", "20240822_21_49_06",
+      "20240822_22_22_43", "20240823_16_23_49", "20240823_16_48_25", "20240823_17_17_04", "20240827_16_07_17",
+      "20240827_16_23_24", "20240827_16_41_48", "20240906_16_04_39", "20240907_15_21_48"};
+  return under.contains(name) ? 1 : open.contains(name) ? 0 : -1;
+}
+
+/// Times of the frames behind the stamps, from 0.
+std::vector<double> frame_times(const std::vector<double>& stamps) {
+  // Phase of the grid: the circular mean of the stamps within a frame.
+  double c = 0, s = 0;
+  for (const double t : stamps) {
+    const double angle = 2 * std::numbers::pi * (t - stamps.front()) / kFrame;
+    c += std::cos(angle), s += std::sin(angle);
+  }
+  const double phase = std::atan2(s, c) / (2 * std::numbers::pi) * kFrame;
+  std::vector<double> frames;
+  for (const double t : stamps) frames.push_back(std::round((t - stamps.front() - phase) / kFrame));
+  for (std::size_t i = frames.size() - 1; i-- > 0;) frames[i] = std::min(frames[i], frames[i + 1] - 1);
+  const double first = frames.front();
+  for (double& frame : frames) frame = (frame - first) * kFrame;
+  return frames;
+}
+
+struct Fitted {
+  Vec3 p, v, a;
+};
+/// Cubic through the rows [first, last) around time t.
+Fitted cubic(const std::vector<double>& t, const std::vector<Vec3>& p, std::size_t first, std::size_t last, double at) {
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Matrix<double, 4, 3> right = Eigen::Matrix<double, 4, 3>::Zero();
+  for (std::size_t i = first; i < last; ++i) {
+    const double u = (t[i] - at) / kHalfWidth;
+    const Eigen::Vector4d basis(1, u, u * u, u * u * u);
+    normal += basis * basis.transpose(), right += basis * p[i].transpose();
+  }
+  const Eigen::Matrix<double, 4, 3> c = normal.ldlt().solve(right);
+  return {c.row(0), c.row(1) / kHalfWidth, 2 * c.row(2) / (kHalfWidth * kHalfWidth)};
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void add(FlightLog& log, const std::string& prefix, const std::string& unit, const Vec3& value) {
+  for (int axis = 0; axis < 3; ++axis)
+    log.columns[prefix + std::string("xyz")[static_cast<std::size_t>(axis)] + unit].push_back(value[axis]);
+}
+
+}  // namespace
+
+tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
+  auto raw = read_csv(path, "t");
+  if (!raw) return tl::make_unexpected(raw.error());
+  for (const char* name : {"x", "y", "z", "qx", "qy", "qz", "qw"}) {
+    if (!raw->has(name))
+      return tl::make_unexpected(LogError{
+          LogError::Kind::bad_data, path + ":1: no column '" + name + "'; airgarage files hold t,x,y,z,qx,qy,qz,qw"});
+  }
+  if (raw->t_s.size() < 100)
+    return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: fewer than 100 frames; give a flight"});
+  const auto t = frame_times(raw->t_s);
+  std::vector<Vec3> p;
+  for (std::size_t i = 0; i < t.size(); ++i)
+    p.emplace_back(raw->column("x")[i], raw->column("y")[i], raw->column("z")[i]);
+  const std::vector<double> at_first(raw->column("z").begin(), raw->column("z").begin() + 50);
+  const double stood = median(at_first);
+  const std::string name = std::filesystem::path(path).stem().string();
+  const double ceiling = plate_above(name);
+  const double day =
+      name.size() >= 8 && std::all_of(name.begin(), name.begin() + 8, ::isdigit) ? std::stod(name.substr(0, 8)) : 0;
+
+  FlightLog log;
+  std::size_t first = 0, last = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    while (t[first] < t[i] - kHalfWidth - 1e-9) ++first;
+    while (last < t.size() && t[last] <= t[i] + kHalfWidth + 1e-9) ++last;
+    const bool both_sides = t[i] - t[first] > 0.5 * kHalfWidth && t[last - 1] - t[i] > 0.5 * kHalfWidth;
+    if (last - first < kLeastFrames || !both_sides) continue;
+    const Fitted f = cubic(t, p, first, last, t[i]);
+    log.t_s.push_back(t[i]);
+    add(log, "", "_m", p[i]), add(log, "v", "_mps", f.v), add(log, "a", "_mps2", f.a);
+    for (const char* q : {"qw", "qx", "qy", "qz"}) log.columns[q].push_back(raw->column(q)[i]);
+    log.columns["stood_z_m"].push_back(stood);
+    log.columns["surface_z_m"].push_back(stood - kMarkerHeight);
+    log.columns["ceiling"].push_back(ceiling);
+    log.columns["day"].push_back(day);
+  }
+  return log;
+}
+
+}  // namespace backwash::log

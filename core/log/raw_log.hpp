@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/log/flight_log.hpp"
+#include "core/types/geometry.hpp"
+
+namespace backwash::log {
+
+/// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is the line
+/// kRawLogMagic, then records: RecordHeader and `size` bytes, little-endian, no padding between records.
+inline constexpr char kRawLogMagic[] = "backwash raw log 3\n";
+
+enum class RecordKind : std::uint32_t {
+  configuration = 1,  ///< text: the vehicle, model and daemon files as given
+  odometry = 2,       ///< OdometryRecord
+  map = 3,            ///< MapRecord, then the octomap data, or RejectedMap
+  command = 4,        ///< text, one line
+  ack = 5,            ///< text, one line
+  frame_in = 6,       ///< one MAVLink frame received
+  frame_out = 7,      ///< one MAVLink frame handed to the port
+  tick = 8,           ///< TickRecord
+  segment = 9,      ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
+  constants = 10,   ///< ConstantsRecord
+  tick_input = 11,  ///< TickInputRecord: what the next tick record was decided from
+  offer = 12,       ///< OfferRecord …: a segment as it was offered to the control thread (core/log/tick_log.hpp)
+  lost = 13,        ///< LostRecord: the disk did not take what came before
+  scan = 14,        ///< text, one line: a scan was handed to the control thread and to the map worker
+  world = 15,       ///< text, one line: a new snapshot was handed out
+  failure = 16,     ///< text, one line: an exception in a thread, which ended the daemon
+};
+inline constexpr auto kLastKind = RecordKind::failure;
+
+struct RecordHeader {
+  std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
+  RecordKind kind;
+  std::uint32_t size;  ///< bytes that follow
+};
+static_assert(sizeof(RecordHeader) == 16);
+
+struct OdometryRecord {
+  std::int64_t stamp_ns;  ///< the sender's stamp
+  double p[3], v[3];      ///< m, m/s, map frame
+  double q[4];            ///< body to map: w, x, y, z
+};
+
+struct MapRecord {
+  double resolution;     ///< m
+  std::uint32_t binary;  ///< octomap_msgs/Octomap.binary
+  std::uint32_t accepted;
+};
+
+/// In place of the data of a map that was not accepted.
+struct RejectedMap {
+  std::uint64_t bytes;  ///< that the map had
+  std::uint64_t hash;   ///< of them: 64-bit FNV-1a
+};
+
+struct SegmentRecord {
+  std::uint64_t id, continues, commands;
+  double start_p[3], start_v[3];  ///< state from which the tube was propagated, map frame
+  double search_ms, optimise_ms, verify_ms;
+};
+
+/// One control tick.
+struct TickRecord {
+  std::uint64_t tick;
+  std::uint64_t segment, index;  ///< accepted segment and the command of it that this tick sent; 0 before the first
+  std::uint32_t mode, reason;    ///< track::Mode, track::Reason
+  std::uint32_t sent;            ///< bit 0: set-point, bit 1: heartbeat, bit 2: odometry forwarded
+  std::uint32_t judged, inside;  ///< whether the error was judged this tick, and the verdict
+  std::uint32_t missed_periods;
+  float compute_us, lateness_us;  ///< of the tick before this one
+  float odometry_to_wire_us;      ///< from the reception of a sample to the set-point that first used it; < 0: none new
+  float frame_residual_m, frame_residual_rad;
+  std::uint32_t page_faults;                             ///< of the control thread since start
+  double p[3], v[3];                                     ///< newest odometry, map frame
+  double cmd_p[3], cmd_v[3], cmd_a[3], cmd_yaw;          ///< command in the map frame
+  double center[3], half_widths[kDirections];            ///< set predicted for this tick, m
+  double local_p[3], local_v[3], local_a[3], local_yaw;  ///< command in the controller's frame
+  std::uint32_t asked;                                   ///< what was to be sent, bits as in Asked
+  std::uint32_t padding;
+};
+static_assert(sizeof(TickRecord) == 352);
+
+/// What the decisions of a flight depend on beside their inputs (core/track/flight_tick.hpp).
+struct ConstantsRecord {
+  double v_max, estimation_position, initial_position, initial_velocity, battery_land;
+};
+
+struct LostRecord {
+  std::uint64_t records;  ///< lost since the start of the log
+};
+
+/// track::TickInput, flat.
+struct TickInputRecord {
+  std::int64_t now_ns, odometry_received_ns, odometry_stamp_ns, pose_at_ns, attitude_at_ns;
+  std::uint64_t segment;                                  ///< id of the segment offered, 0: none
+  std::uint64_t order;                                    ///< number of the newest order, 0: none new
+  double p[3], v[3], q[4];                                ///< odometry
+  double pose_p[3], pose_v[3], pose_q[4], pose_omega[3];  ///< the autopilot's
+  double heartbeat_age, battery;
+  double map_from_odom[4];  ///< yaw and translation of the newest loop closure
+  std::int32_t missed_periods;
+  std::uint32_t request, flags, reset_counter;  ///< flags: core/log/tick_log.cpp
+  std::uint32_t closures;
+  float position_sigma;  ///< m; 0: not known
+};
+static_assert(sizeof(TickInputRecord) == 312);
+
+/// A record as read back.
+struct RawRecord {
+  RecordHeader header;
+  std::vector<std::uint8_t> bytes;
+  std::uint64_t offset = 0;  ///< of its header in the file
+};
+
+struct RawLog {
+  std::vector<RawRecord> records;
+  std::optional<std::uint64_t> cut_at;  ///< offset of a last record that a crash cut short; it is not in `records`
+};
+
+/// Reads a raw log. Errors: not_found; bad_data with the byte offset.
+tl::expected<RawLog, LogError> read_raw_log(const std::string& path);
+
+/// The payload as T, or nothing if it is shorter.
+template <typename T>
+const T* payload(const RawRecord& record) {
+  return record.bytes.size() >= sizeof(T) ? reinterpret_cast<const T*>(record.bytes.data()) : nullptr;
+}
+
+}  // namespace backwash::log

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/plan/feasibility.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <queue>
+#include <tuple>
+
+#include "core/reach/clearance.hpp"
+
+namespace backwash::plan {
+namespace {
+
+/// Clearance of the hover set at a voxel's centre, m.
+double clearance(const World& world, const Index3& v) {
+  const Vec3 p_W = world.grid.center(v);
+  return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin).clearance;
+}
+
+const std::array<Index3, 6> kNeighbours = {Index3{1, 0, 0},  Index3{-1, 0, 0}, Index3{0, 1, 0},
+                                           Index3{0, -1, 0}, Index3{0, 0, 1},  Index3{0, 0, -1}};
+
+Region flood(const World& world, std::size_t seed, int number, std::vector<int>& of_voxel) {
+  const auto& grid = world.grid;
+  const Vec3 half = Vec3::Constant(grid.resolution() / 2);
+  Region region;
+  region.first_voxel = seed;
+  region.low_W = region.high_W = region.widest_W = grid.center(grid.voxel(seed));
+  region.widest_clearance_m = -1;
+  std::vector<std::size_t> open = {seed};
+  of_voxel[seed] = number;
+  while (!open.empty()) {
+    const Index3 v = grid.voxel(open.back());
+    open.pop_back();
+    const Vec3 p = grid.center(v);
+    region.voxels += 1;
+    region.low_W = region.low_W.cwiseMin(p - half), region.high_W = region.high_W.cwiseMax(p + half);
+    if (const double c = clearance(world, v); c > region.widest_clearance_m) {
+      region.widest_clearance_m = c;
+      region.widest_W = p;
+    }
+    for (const auto& step : kNeighbours) {
+      const Index3 next = v + step;
+      if (!world.hover.safe(next) || of_voxel[grid.linear(next)] >= 0) continue;
+      of_voxel[grid.linear(next)] = number;
+      open.push_back(grid.linear(next));
+    }
+  }
+  region.volume_m3 = static_cast<double>(region.voxels) * std::pow(grid.resolution(), 3);
+  return region;
+}
+
+/// Width of a voxel on a way: hover-safe ones by the clearance of their set, all others below every safe one.
+struct Width {
+  bool safe;
+  double metres;
+  auto operator<=>(const Width&) const = default;
+};
+
+Width width(const World& world, const Index3& v) {
+  if (world.hover.safe(v)) return {true, clearance(world, v)};
+  return {false, world.distance.at(v)};
+}
+
+}  // namespace
+
+Regions hover_regions(const World& world) {
+  Regions found{{}, std::vector<int>(world.grid.cell_count(), -1)};
+  for (std::size_t i = 0; i < found.of_voxel.size(); ++i) {
+    if (found.of_voxel[i] >= 0 || !world.hover.safe(world.grid.voxel(i))) continue;
+    found.regions.push_back(flood(world, i, static_cast<int>(found.regions.size()), found.of_voxel));
+  }
+  std::vector<int> order(found.regions.size()), rank(order.size());
+  for (std::size_t n = 0; n < order.size(); ++n) order[n] = static_cast<int>(n);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return found.regions[static_cast<std::size_t>(a)].voxels > found.regions[static_cast<std::size_t>(b)].voxels;
+  });
+  std::vector<Region> sorted;
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    sorted.push_back(found.regions[static_cast<std::size_t>(order[n])]);
+    rank[static_cast<std::size_t>(order[n])] = static_cast<int>(n);
+  }
+  for (int& region : found.of_voxel) {
+    if (region >= 0) region = rank[static_cast<std::size_t>(region)];
+  }
+  found.regions = std::move(sorted);
+  return found;
+}
+
+std::optional<Bottleneck> widest_way(const World& world, const Vec3& from_W, const Vec3& to_W) {
+  const auto& grid = world.grid;
+  const Index3 from = grid.index(from_W), to = grid.index(to_W);
+  if (!grid.free(from) || !grid.free(to)) return std::nullopt;
+  constexpr auto kNone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> parent(grid.cell_count(), kNone);
+  std::vector<char> closed(grid.cell_count());
+  using Entry = std::pair<Width, std::size_t>;
+  std::priority_queue<Entry> open;
+  open.push({width(world, from), grid.linear(from)});
+  parent[grid.linear(from)] = grid.linear(from);
+  const std::size_t goal = grid.linear(to);
+  while (!open.empty() && !closed[goal]) {
+    const auto [widest, i] = open.top();
+    open.pop();
+    if (closed[i]) continue;
+    closed[i] = 1;
+    for (const auto& step : kNeighbours) {
+      const Index3 next = grid.voxel(i) + step;
+      if (!grid.free(next) || parent[grid.linear(next)] != kNone) continue;
+      // The first parent popped is the widest one, so a voxel need not be pushed twice.
+      parent[grid.linear(next)] = i;
+      open.push({std::min(widest, width(world, next)), grid.linear(next)});
+    }
+  }
+  if (!closed[goal]) return std::nullopt;
+  std::size_t tightest = goal;
+  double length = 0;
+  for (std::size_t i = goal;; i = parent[i]) {
+    if (width(world, grid.voxel(i)) < width(world, grid.voxel(tightest))) tightest = i;
+    if (parent[i] == i) break;
+    length += grid.resolution();
+  }
+  const Vec3 place = grid.center(grid.voxel(tightest));
+  return Bottleneck{world.hover.safe(grid.voxel(tightest)), place, clearance(world, grid.voxel(tightest)),
+                    world.distance.exact(grid, place), length};
+}
+
+SetCost cost_of_set(const World& world) {
+  const auto& [grid, reach] = std::tie(world.grid, world.reach);
+  const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
+  constexpr double kCap = 1.0;  // m, as hover_set's
+  SetCost cost;
+  std::vector<double> given_up;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    if (grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
+    const Index3 v = grid.voxel(n);
+    PerDirection h = world.bounds.at(v).w;
+    for (std::size_t d = 0; d < kDirections; ++d) h[d] *= d == kZ ? reach.vertical.h_inf : reach.horizontal.h_inf;
+    const double at_centre = reach::prism_distance(grid, grid.center(v), h, kCap + taken) - taken;
+    if (!(at_centre > 0)) continue;
+    ++cost.safe_at_centre;
+    if (!world.hover.safe(v)) {
+      ++cost.lost;
+    } else if (at_centre < kCap) {
+      given_up.push_back(at_centre - clearance(world, v));
+    }
+  }
+  if (given_up.empty()) return cost;
+  std::sort(given_up.begin(), given_up.end());
+  cost.median_m = given_up[given_up.size() / 2];
+  cost.quantile95_m = given_up[given_up.size() * 95 / 100];
+  return cost;
+}
+
+std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m) {
+  const auto& [grid, reach] = std::tie(world.grid, world.reach);
+  const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
+  std::vector<AgainstMargin> result;
+  for (const double margin : margins_m) result.push_back({margin});
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    if (grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
+    const auto set = reach::hover_set(reach, grid, world.distance, world.bounds, grid.center(grid.voxel(n)));
+    const auto& h = set.half_widths;
+    const double nearest = std::ranges::min(h), corner = Vec3(h[kX], h[kY], h[kZ]).norm();  // at least the farthest
+    for (auto& against : result) {
+      ++against.voxels;
+      const bool ball_safe = world.distance.at(n) > taken + against.margin_m;
+      against.only_ball_safe += ball_safe && !set.safe();
+      against.only_set_safe += set.safe() && !ball_safe;
+      if (!set.bounded) {
+        ++against.unbounded;
+      } else {
+        against.ball_inside_set += nearest >= against.margin_m;
+        against.set_inside_ball += corner <= against.margin_m;
+      }
+    }
+  }
+  return result;
+}
+
+std::optional<HoverPair> farthest_pair(const World& world, const Regions& regions,
+                                       const std::function<bool(const Vec3&)>& can_take_off) {
+  const auto& grid = world.grid;
+  // One hover point a column: the voxel of the largest region with the largest clearance.
+  std::vector<Vec3> candidates;
+  for (int j = 0; j < grid.size().y(); ++j) {
+    for (int i = 0; i < grid.size().x(); ++i) {
+      double widest = 0;
+      std::optional<Vec3> best;
+      for (int k = 0; k < grid.size().z(); ++k) {
+        const Index3 v(i, j, k);
+        if (regions.of_voxel[grid.linear(v)] != 0) continue;
+        const double c = clearance(world, v);
+        if (!best || c > widest) widest = c, best = grid.center(v);
+      }
+      if (best) candidates.push_back(*best);
+    }
+  }
+  const auto farthest_first = [&candidates](const Vec3& from) {
+    std::stable_sort(candidates.begin(), candidates.end(), [&from](const Vec3& a, const Vec3& b) {
+      return (a - from).squaredNorm() > (b - from).squaredNorm();
+    });
+  };
+  if (candidates.empty()) return std::nullopt;
+  farthest_first(Vec3(candidates.front()));
+  const auto start = std::find_if(candidates.begin(), candidates.end(), can_take_off);
+  if (start == candidates.end()) return std::nullopt;
+  const Vec3 start_W = *start;
+  farthest_first(start_W);
+  return HoverPair{start_W, candidates.front()};
+}
+
+}  // namespace backwash::plan

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/report/compare_report.hpp"
+
+#include <cstdio>
+#include <sstream>
+
+#include "core/report/page.hpp"
+
+namespace backwash::report {
+namespace {
+
+std::string text(const char* format, auto... values) {
+  char line[320];
+  std::snprintf(line, sizeof line, format, values...);
+  return line;
+}
+
+std::string table_row(const char* cell, const std::vector<std::string>& cells) {
+  std::string row = "<tr>";
+  for (const auto& c : cells) row += std::string("<") + cell + ">" + c + "</" + cell + ">";
+  return row + "</tr>\n";
+}
+
+std::string table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
+  std::string html = "<table class=\"wide\">\n<thead>" + table_row("th", head) + "</thead>\n";
+  for (const auto& row : rows) html += table_row("td", row);
+  return html + "</table>\n";
+}
+
+std::string section(const std::string& title, const std::string& words, const std::string& content) {
+  return "<section><h2>" + title + "</h2>\n<p>" + words + "</p>\n" + content + "</section>\n";
+}
+
+/// "12 (start 3, no path 9)": pairs without a flight, by reason.
+std::string no_path(const sim::MethodRow& row) {
+  std::string reasons;
+  for (const auto& [status, count] : row.status) {
+    if (status != "ok") reasons += (reasons.empty() ? "" : ", ") + status + " " + std::to_string(count);
+  }
+  return std::to_string(row.pairs - row.solved) + (reasons.empty() ? "" : " (" + reasons + ")");
+}
+
+std::string with_interval(const sim::Interval& r) { return text("%.2f (%.2f to %.2f)", r.value, r.low, r.high); }
+
+std::string table_one(const Comparison& c) {
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& row : c.table.rows) {
+    rows.push_back({row.method, text("%.1f", row.common[sim::kLength]), text("%.1f", row.common[sim::kTime]),
+                    text("%.1f", row.common[sim::kJerk2]), text("%.2f", row.common[sim::kEnergy] / 1000),
+                    text("%zu", row.contacts), no_path(row), text("%zu of %zu", row.solved_of_eligible, row.eligible),
+                    text("%zu of %zu", row.outside, row.samples), text("%.0f", row.flown_m),
+                    text("%.0f / %.0f", row.planning_ms_median, row.planning_ms_p95)});
+  }
+  const auto head = {std::string("method"),
+                     std::string("length, m"),
+                     std::string("time, s"),
+                     std::string("jerk², (m/s³)² s"),
+                     std::string("energy, kJ"),
+                     std::string("flights with contact"),
+                     std::string("no path"),
+                     std::string("solved where the first method’s ends are safe"),
+                     std::string("samples outside"),
+                     std::string("flown, m"),
+                     std::string("planning, ms, median / 95 %")};
+  return section("Table I",
+                 text("Length, time, jerk² and energy are totals over the %zu start–goal pairs that all methods solve; "
+                      "everything else counts all %zu pairs.",
+                      c.table.common_pairs, c.table.rows.front().pairs),
+                 table(head, rows));
+}
+
+std::string ratios(const Comparison& c) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t m = 1; m < c.methods.size(); ++m) {
+    const auto& row = c.table.rows[m];
+    const auto paper = paper_jerk2_ratio(c.methods[m]);
+    for (const auto& [name, ratio] : {std::pair{"all solve", &row.on_common}, {"both solve", &row.pairwise}}) {
+      if (ratio->pairs == 0) continue;
+      rows.push_back({row.method, text("%zu that %s", ratio->pairs, name), with_interval(ratio->total[sim::kJerk2]),
+                      paper ? text("%.2f", *paper) : "", with_interval(ratio->mean[sim::kJerk2]),
+                      with_interval(ratio->mean[sim::kShape]), with_interval(ratio->total[sim::kLength]),
+                      with_interval(ratio->total[sim::kTime]), with_interval(ratio->total[sim::kEnergy])});
+    }
+  }
+  return table({"over", "pairs", "jerk², totals", "the paper’s", "jerk², geometric mean",
+                "jerk²·time⁵/length², geometric mean", "length", "time", "energy"},
+               rows);
+}
+
+std::string by_scene(const Comparison& c) {
+  std::vector<std::string> head = {"scene", "vehicle", "pairs"};
+  for (const auto& method : c.methods) head.push_back(method.name);
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& scene : c.scenes) {
+    const auto part = sim::tabulate(std::span(&scene, 1), c.methods, c.seed);
+    std::vector<std::string> row = {escaped(scene.scene), escaped(scene.vehicle), std::to_string(scene.pairs.size())};
+    for (const auto& r : part.rows)
+      row.push_back(std::to_string(r.solved) + (r.contacts > 0 ? text(" (%zu with contact)", r.contacts) : ""));
+    rows.push_back(std::move(row));
+  }
+  return section("Pairs solved, by scene", "A pair that a method does not solve counts as no path.", table(head, rows));
+}
+
+std::string demanded(const Comparison& c) {
+  std::string html = "<table class=\"wide\">\n";
+  for (const auto& demand : c.demands)
+    html += std::string("<tr><td class=\"") + (demand.met ? "passed\">met" : "failed\">missed") + "</td><td>" +
+            escaped(demand.text) + "</td></tr>\n";
+  return section(
+      "Demanded of the proposed method",
+      "Jerk² counts as below when its whole interval is; margins with more contacts are not held against it.",
+      html + "</table>\n");
+}
+
+}  // namespace
+
+tl::expected<std::string, PlotError> comparison_report(const Comparison& c) {
+  std::string body = "<h1>The same routes with other clearances</h1>\n<p class=\"context\">" +
+                     text("%zu start–goal pairs a scene and vehicle, seed %llu; backwash ", c.flights,
+                          static_cast<unsigned long long>(c.seed)) +
+                     escaped(c.version) + "</p>\n" + demanded(c) + table_one(c);
+  if (c.table.common_pairs > 0) {
+    const auto figure = ratio_figure(c);
+    if (!figure) return tl::make_unexpected(figure.error());
+    body += section(
+        "The proposed method over the others",
+        "Below 1 the proposed method needs less. Bars are paired 95 % intervals from 2,000 bootstrap samples of "
+        "the pairs; squares are the paper’s ratios. A slower plan has less jerk: jerk²·time⁵/length² takes that out.",
+        *figure + ratios(c));
+  }
+  for (const auto& gap : c.gaps) {
+    const auto figure = gap_figure(gap);
+    if (!figure) return tl::make_unexpected(figure.error());
+    body +=
+        section("Through the narrow gap: " + escaped(gap.vehicle),
+                text("Measured position minus the predicted centre, first of %zu flights. Largest error over bound of "
+                     "all of them: x %.2f, y %.2f, z %.2f; %zu of %zu samples outside; %zu flights with contact.",
+                     gap.flights, gap.largest_ratio.x(), gap.largest_ratio.y(), gap.largest_ratio.z(), gap.outside,
+                     gap.samples, gap.contacts),
+                *figure);
+  }
+  return html_page("backwash compare", body + by_scene(c));
+}
+
+}  // namespace backwash::report

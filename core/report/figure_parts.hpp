@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "core/map/occupancy_grid.hpp"
+
+namespace backwash::report {
+
+/// Axes, tics and grid of every figure.
+inline constexpr const char* kAxes =
+    "set tics out nomirror\nset border 3 linecolor '#444444'\nset grid linecolor '#e4e4e4' linetype 1\n";
+
+/// gnuplot data blocks $occupied and $unknown with the cells between two voxels (inclusive) seen from above: a column
+/// is occupied if it is so anywhere between the heights z_low and z_high (m), else unknown if it is so anywhere. Runs
+/// along x are merged into one rectangle (x, y, x_low, x_high, y_low, y_high).
+std::string cell_blocks(const map::OccupancyGrid& grid, const Index3& first, const Index3& last, double z_low,
+                        double z_high);
+
+/// Ranges and scale of a figure that shows those cells from above: metres equal on both axes.
+std::string view_from_above(const map::OccupancyGrid& grid, const Index3& first, const Index3& last);
+
+/// The part of a plot command that draws those blocks, a comma at its end.
+std::string plot_cells();
+
+}  // namespace backwash::report

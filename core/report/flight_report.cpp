@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/report/flight_report.hpp"
+
+#include <cstdio>
+
+#include "core/report/page.hpp"
+
+namespace backwash::report {
+namespace {
+
+std::string number(double value, int decimals, const char* unit) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f%s%s", decimals, value, *unit ? "\u00a0" : "", unit);
+  return text;
+}
+
+std::string row(const std::string& name, const std::string& value) {
+  return "<tr><th>" + name + "</th><td>" + value + "</td></tr>\n";
+}
+
+std::string point(const Vec3& p) {
+  char text[96];
+  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)\u00a0m", p.x(), p.y(), p.z());
+  return text;
+}
+
+std::string verdict(const sim::FlightSummary& s) {
+  const std::string samples = std::to_string(s.inside) + " of " + std::to_string(s.samples);
+  std::string line = s.goal_reached ? "Goal reached. " : "Goal missed by " + number(s.goal_error_m, 2, "m") + ". ";
+  line += s.touched ? "An obstacle was touched. " : "Nothing touched. ";
+  line += samples + " measured positions inside the reachable set predicted for them.";
+  return std::string("<p class=\"verdict ") + (s.ok() ? "passed" : "failed") + "\">" + line + "</p>\n";
+}
+
+std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
+  const auto& m = flight.plan.metrics;
+  std::string text = "<section><h2>In figures</h2>\n<table>\n";
+  text += row("Path flown, take-off to hold", number(s.length_m, 2, "m"));
+  text += row("Time", number(s.time_s, 2, "s"));
+  text += row("Smallest true clearance on the route, body to obstacle", number(s.clearance_m, 3, "m"));
+  text += row("Smallest true clearance during take-off and settling", number(s.take_off_clearance_m, 3, "m"));
+  text += row("Smallest clearance left over by the reachable set", number(flight.tight.clearance_m, 3, "m"));
+  text += row("Largest error over bound, x / y / z", number(s.largest_ratio.x(), 2, "") + " / " +
+                                                         number(s.largest_ratio.y(), 2, "") + " / " +
+                                                         number(s.largest_ratio.z(), 2, ""));
+  text += row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.samples));
+  text +=
+      row("Planning: search / optimisation / verification",
+          number(m.search_ms, 0, "ms") + " / " + number(m.optimise_ms, 0, "ms") + " / " + number(m.verify_ms, 0, "ms"));
+  text +=
+      "</table>\n</section>\n<section><h2>Both methods on the same commands</h2>\n"
+      "<p>Exact supports were flown; the ellipsoids of the second-order loop were propagated beside them.</p>\n"
+      "<table>\n<thead><tr><th></th><th>exact supports</th><th>ellipsoids</th></tr></thead>\n";
+  const auto pair = [](const std::string& name, const std::string& a, const std::string& b) {
+    return "<tr><th>" + name + "</th><td>" + a + "</td><td>" + b + "</td></tr>\n";
+  };
+  text += pair("Largest half axis", number(flight.tight.largest_half_axis_m, 3, "m"),
+               number(flight.paper.largest_half_axis_m, 3, "m"));
+  text += pair("Clearance of the swept tube", number(flight.tight.clearance_m, 3, "m"),
+               number(flight.paper.clearance_m, 3, "m"));
+  text += pair("Clear", flight.tight.clearance_m > 0 ? "yes" : "no", flight.paper.clearance_m > 0 ? "yes" : "no");
+  text += pair("Propagation of the tube", number(flight.tight.tube_ms, 1, "ms"), number(flight.paper.tube_ms, 1, "ms"));
+  return text + "</table>\n</section>\n";
+}
+
+struct Section {
+  const char *title, *text;
+  Figure figure;
+};
+
+}  // namespace
+
+tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
+                                                   const plan::World& world, const ReportContext& context) {
+  const Section sections[] = {
+      {"From above",
+       "Obstacles are those that the tube meets in height, body included. The tube was propagated once, when the "
+       "trajectory was accepted.",
+       map_figure(flight, world)},
+      {"Height along the route", "Floor and ceiling at the commanded position.", height_figure(flight, world)},
+      {"Disturbance at flight height",
+       "Vertical standard deviation of the modelled disturbance; white where the vehicle's "
+       "centre cannot be.",
+       flight_field_figure(flight, world)},
+      {"Error between its bounds",
+       "Measured position minus the predicted centre. The dotted line is the moment at which the "
+       "route was accepted.",
+       error_figure(flight)},
+      {"Clearance", "During take-off only what stands beside the vehicle counts.", clearance_figure(flight, world)},
+  };
+  std::string page = "<h1>One flight, and the sets it was planned with</h1>\n";
+  page += "<p class=\"context\">Map " + escaped(context.map) + ", vehicle " + escaped(context.vehicle) + ", model " +
+          escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) +
+          (context.seed ? "; seed " + std::to_string(*context.seed) : "; recorded");
+  if (context.sigma_scale != 1) page += "; judged with sets of \u03a3 \u00d7 " + number(context.sigma_scale, 3, "");
+  page += "; backwash " + escaped(context.version) + "</p>\n" + verdict(summary);
+  for (const auto& section : sections) {
+    if (!section.figure) return tl::make_unexpected(section.figure.error());
+    page += std::string("<section><h2>") + section.title + "</h2>\n<p>" + section.text + "</p>\n" + *section.figure +
+            "</section>\n";
+  }
+  return html_page("backwash flight", page + table(flight, summary));
+}
+
+}  // namespace backwash::report

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+
+namespace backwash::report {
+
+/// Why a figure could not be drawn; one line that says what would be right (gnuplot missing, or its own words).
+struct PlotError {
+  std::string message;
+};
+
+enum class Format { svg, png };
+
+/// Runs gnuplot (Debian: gnuplot-nox) as a subprocess on a script that has neither terminal nor output, and returns the
+/// picture: SVG text without XML prolog, ready to stand inside HTML, or PNG bytes. Sizes in pixels. About 50 ms.
+tl::expected<std::string, PlotError> draw(const std::string& script, Format format, int width, int height);
+
+}  // namespace backwash::report

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/report/recorded_flight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "core/map/octomap_message.hpp"
+
+namespace backwash::report {
+namespace {
+
+tl::unexpected<log::LogError> bad(const std::string& what) {
+  return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, "raw log: " + what});
+}
+
+struct Segment {
+  log::SegmentRecord head;
+  Setpoint previous;
+  std::vector<Setpoint> commands;
+};
+
+Segment segment_of(const log::RawRecord& record) {
+  Segment s;
+  std::memcpy(&s.head, record.bytes.data(), sizeof s.head);
+  const std::size_t rows = (record.bytes.size() - sizeof s.head) / (10 * sizeof(double));
+  for (std::size_t r = 0; r < rows; ++r) {
+    double v[10];
+    std::memcpy(v, record.bytes.data() + sizeof s.head + r * sizeof v, sizeof v);
+    const Setpoint c{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, {v[6], v[7], v[8]}, v[9]};
+    if (r == 0)
+      s.previous = c;
+    else
+      s.commands.push_back(c);
+  }
+  return s;
+}
+
+std::vector<const log::TickRecord*> ticks_of(std::span<const log::RawRecord> log, std::uint64_t id,
+                                             std::vector<std::int64_t>& times) {
+  std::vector<const log::TickRecord*> ticks;
+  for (const log::RawRecord& record : log) {
+    if (record.header.kind != log::RecordKind::tick) continue;
+    const auto* tick = log::payload<log::TickRecord>(record);
+    if (!tick || tick->segment != id) continue;
+    ticks.push_back(tick);
+    times.push_back(record.header.t_ns);
+  }
+  return ticks;
+}
+
+Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
+
+/// Rows of the truth at a time, linear in between.
+class Truth {
+ public:
+  explicit Truth(const log::FlightLog& log) : log_(log) {}
+  Vec3 at(double t, const char* x, const char* y, const char* z) const {
+    const auto after = std::upper_bound(log_.t_s.begin(), log_.t_s.end(), t);
+    const auto i = static_cast<std::size_t>(
+        std::clamp<std::ptrdiff_t>(after - log_.t_s.begin(), 1, static_cast<std::ptrdiff_t>(log_.t_s.size()) - 1));
+    const double f = std::clamp((t - log_.t_s[i - 1]) / (log_.t_s[i] - log_.t_s[i - 1]), 0.0, 1.0);
+    const auto value = [&](const char* name) {
+      const auto& column = log_.column(name);
+      return (1 - f) * column[i - 1] + f * column[i];
+    };
+    return {value(x), value(y), value(z)};
+  }
+
+ private:
+  const log::FlightLog& log_;
+};
+
+tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawRecord> log, const Segment& segment,
+                                                       const Truth& truth, const plan::World& world, double t_zero,
+                                                       double z_safe) {
+  sim::FlightPiece piece;
+  piece.accepted.id = segment.head.id;
+  piece.accepted.commands = segment.commands;
+  const State start{vec(segment.head.start_p), vec(segment.head.start_v)};
+  auto& tube = piece.accepted.tube;
+  tube = reach::tube_over_field(world.reach, start, segment.previous, segment.commands, world.bounds);
+  std::vector<std::int64_t> times;
+  const auto ticks = ticks_of(log, segment.head.id, times);
+  if (ticks.empty()) return bad("no tick of segment " + std::to_string(segment.head.id));
+  // Past the end the last set holds.
+  reach::TubeStep last = tube.back();
+  last.half_widths = last.half_widths_interval;
+  while (tube.size() < ticks.size()) {
+    last.t += kControlPeriod;
+    tube.push_back(last);
+    piece.accepted.commands.push_back(piece.accepted.commands.back());
+  }
+  for (std::size_t k = 0; k < ticks.size(); ++k) {
+    const log::TickRecord& tick = *ticks[k];
+    const reach::TubeStep& set = tube[k];
+    if (tick.judged && (vec(tick.center) - set.center.p_W).norm() > 1e-6)
+      return bad("tick " + std::to_string(tick.tick) + " was judged against another set than its commands give");
+    const double t = static_cast<double>(times[k]) * 1e-9;
+    track::Inside judged{true, true, {}, set.half_widths, set.center.p_W};
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      judged.error[d] = unit(static_cast<Direction>(d)).dot(vec(tick.p) - set.center.p_W);
+      if (!(std::abs(judged.error[d]) <= set.half_widths[d])) judged.inside = false;
+    }
+    sim::FlightSample s{};
+    s.t = t - t_zero;
+    s.segment = -1;
+    s.truth = {truth.at(t, "x_m", "y_m", "z_m"), truth.at(t, "vx_mps", "vy_mps", "vz_mps")};
+    s.estimated = {vec(tick.p), vec(tick.v)};
+    s.acceleration = truth.at(t, "ax_mps2", "ay_mps2", "az_mps2");
+    s.attitude = Eigen::Quaterniond::Identity();
+    s.command = {vec(tick.cmd_p), vec(tick.cmd_v), vec(tick.cmd_a), tick.cmd_yaw};
+    piece.samples.push_back(s);
+    piece.judged.push_back(judged);
+    piece.clearance_m.push_back(sim::true_clearance(world, s.truth.p_W, z_safe));
+  }
+  tube.resize(ticks.size(), last);
+  return piece;
+}
+
+}  // namespace
+
+tl::expected<map::OccupancyGrid, log::LogError> recorded_map(std::span<const log::RawRecord> log) {
+  for (auto record = log.rbegin(); record != log.rend(); ++record) {
+    if (record->header.kind != log::RecordKind::map) continue;
+    const auto* head = log::payload<log::MapRecord>(*record);
+    if (!head || !head->accepted) continue;
+    const std::span data(reinterpret_cast<const std::int8_t*>(record->bytes.data()) + sizeof *head,
+                         record->bytes.size() - sizeof *head);
+    auto grid = map::decode_octomap(data, head->resolution, head->binary, "OcTree");
+    if (!grid) return bad(grid.error().message);
+    return std::move(*grid);
+  }
+  return bad("no map was accepted");
+}
+
+tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::RawRecord> log,
+                                                         const log::FlightLog& truth, const plan::World& world) {
+  for (const char* name : {"x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "ax_mps2", "ay_mps2", "az_mps2"})
+    if (!truth.has(name)) return bad(std::string("the truth has no column ") + name);
+  if (truth.t_s.size() < 2) return bad("the truth has fewer than two rows");
+  std::vector<Segment> segments;
+  for (const log::RawRecord& record : log)
+    if (record.header.kind == log::RecordKind::segment && record.bytes.size() >= sizeof(log::SegmentRecord))
+      segments.push_back(segment_of(record));
+  if (segments.size() != 2) return bad("needs one take-off and one route, has " + std::to_string(segments.size()));
+  for (const Segment& s : segments)
+    if (s.commands.empty() || s.commands.size() != s.head.commands)
+      return bad("segment " + std::to_string(s.head.id) + " holds " + std::to_string(s.commands.size()) +
+                 " commands, its head says " + std::to_string(s.head.commands));
+  const Segment &up = segments[0], &route = segments[1];
+
+  const auto column = plan::takeoff_column(world, up.commands.back().p_W);
+  if (!column) return bad("the map has no floor below the take-off");
+  std::vector<std::int64_t> times;
+  if (ticks_of(log, up.head.id, times).empty()) return bad("no tick of the take-off");
+  const double t_zero = static_cast<double>(times.front()) * 1e-9;
+
+  sim::Flight flight{};
+  flight.column = *column;
+  const Truth rows(truth);
+  auto take_off = piece_of(log, up, rows, world, t_zero, column->z_safe);
+  if (!take_off) return tl::unexpected(take_off.error());
+  flight.take_off = std::move(*take_off);
+  auto flown = piece_of(log, route, rows, world, t_zero, -std::numeric_limits<double>::infinity());
+  if (!flown) return tl::unexpected(flown.error());
+  flight.route = std::move(*flown);
+  flight.plan.status = plan::PlanStatus::ok;
+  flight.plan.metrics.search_ms = route.head.search_ms;
+  flight.plan.metrics.optimise_ms = route.head.optimise_ms;
+  flight.plan.metrics.verify_ms = route.head.verify_ms;
+  const State start{vec(route.head.start_p), vec(route.head.start_v)};
+  flight.tight = sim::method_tube(world, world.reach, start, route.previous, route.commands);
+  const reach::Reachability paper(world.reach.vehicle, reach::Method::paper, reach::Loop::continuous);
+  flight.paper = sim::method_tube(world, paper, start, route.previous, route.commands);
+  return flight;
+}
+
+}  // namespace backwash::report

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/field/extension.hpp"
+#include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
+
+namespace backwash::study {
+namespace {
+
+using field::kCeilingReference, field::near_surface;
+
+std::optional<std::string> not_under_one(const Observations& seen) {
+  if (any(seen, [](auto& w) { return w.around.ceiling_gap < 1.5; })) return std::nullopt;
+  return "no ceiling within 1.5 m of the flights";
+}
+
+double near_ceiling(double gap, double length) { return near_surface(gap, kCeilingReference, length); }
+
+/// Mean of amount(gap, scale) along the window.
+template <typename F>
+double by_gap(const WindowRow& w, const Scale& scale, F amount) {
+  return along(w, [&](auto& at) { return amount(at.ceiling_gap, scale.value); });
+}
+
+Form pull() {
+  return {.formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
+          .parameters = {"A_mps2"},
+          .scale_name = "L_m",
+          .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
+          .by_place = true,
+          .floor = 0.02,
+          .needs = {Source::ceiling},
+          .not_flown = not_under_one,
+          .columns =
+              [](const Windows& ws, const Scale& length) {
+                return std::vector{in(kMeanZ, ws, [&](auto& w) { return by_gap(w, length, near_ceiling); })};
+              },
+          .shapes = {{.formula = "z push A (0.3 m/d)^n",
+                      .parameters = {},
+                      .scale_name = "n",
+                      .scales = scales_of({1.0, 3.0}),
+                      .columns =
+                          [](const Windows& ws, const Scale& exponent) {
+                            return std::vector{in(kMeanZ, ws, [&](auto& w) {
+                              return by_gap(w, exponent, [](double d, double n) {
+                                return power_of_distance(d, kCeilingReference, n);
+                              });
+                            })};
+                          }}},
+          .extend = extends(ModelEffect::Kind::push_under_surface)};
+}
+
+Form gusts() {
+  return {.formula = "ln variance + B exp(-(d - 0.3 m)/L), d the gap to the surface above",
+          .parameters = {"B_ln"},
+          .scale_name = "L_m",
+          .scales = scales_of({0.15, 0.3, 0.6}),
+          .floor = 0.12,
+          .needs = {Source::ceiling},
+          .not_flown = not_under_one,
+          .columns =
+              [](const Windows& ws, const Scale& length) {
+                return std::vector{in_variance(ws, [&](auto& w) { return by_gap(w, length, near_ceiling); })};
+              },
+          .extend = extends(ModelEffect::Kind::ln_variance_under_surface)};
+}
+
+}  // namespace
+
+/// A surface above pulls, and makes the wash gustier.
+Effect ceiling() {
+  return {.name = "ceiling",
+          .forms = {pull(), gusts()},
+          .axis = {"gap to the ceiling, m", false, [](auto& w) { return w.around.ceiling_gap; }},
+          .manoeuvres = {{"hover 0.25, 0.5 and 1 m below the ceiling, high above the floor",
+                          [](WindowRow& w, double s) {
+                            w.around = {2.0, 0.25 * std::pow(2, std::floor(2.999 * s)), {}};
+                          }},
+                         {"a spot without ceiling, then the same height under one",
+                          [](WindowRow& w, double s) { w.around.ceiling_gap = s < 0.5 ? kNoSurface : 0.3; }}}};
+}
+
+}  // namespace backwash::study

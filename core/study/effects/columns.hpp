@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "core/study/effects/effect.hpp"
+
+/// What forms are made of: columns with one value per window.
+namespace backwash::study {
+
+inline constexpr std::array<Channel, 3> kVariances = {kVarX, kVarY, kVarZ};
+
+template <typename F>
+std::vector<double> values(const Windows& windows, F value) {
+  std::vector<double> x;
+  x.reserve(windows.size());
+  for (const auto& w : windows) x.push_back(value(w));
+  return x;
+}
+
+template <typename F>
+Column in(Channel channel, const Windows& windows, F value) {
+  return {{{channel, values(windows, value)}}};
+}
+
+/// A level vector: its x and y in the mean channels.
+template <typename F>
+Column level(const Windows& windows, F vector) {
+  return {{{kMeanX, values(windows, [&](const WindowRow& w) { return vector(w).x(); })},
+           {kMeanY, values(windows, [&](const WindowRow& w) { return vector(w).y(); })}}};
+}
+
+/// The same in ln variance along all axes.
+template <typename F>
+Column in_variance(const Windows& windows, F value) {
+  Column column;
+  for (const Channel c : kVariances) column.parts.push_back({c, values(windows, value)});
+  return column;
+}
+
+/// Mean of value(place) along the window.
+template <typename F>
+auto along(const WindowRow& w, F value) {
+  if (w.path.empty()) return value(w.around);
+  auto sum = value(w.path.front());
+  for (std::size_t k = 1; k < w.path.size(); ++k) sum += value(w.path[k]);
+  sum /= static_cast<double>(w.path.size());
+  return sum;
+}
+
+/// Σ amount(d) over walls, towards each.
+template <typename F>
+Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {
+  Vec3 sum = Vec3::Zero();
+  for (const auto& [distance, direction] : walls) sum += amount(distance) * direction;
+  return sum;
+}
+
+/// (reference/distance)^n, nowhere nearer than field::near_surface goes; 0 where there is no surface.
+double power_of_distance(double distance, double reference, double n);
+
+/// A vector of the body, growing with `amount`, in all mean channels.
+std::vector<Column> body_drift(const Windows& windows, const std::function<double(const WindowRow&)>& amount);
+
+/// −x T/m: a share of the thrust that is missing, seen in the mean and in what a change of the command is worth.
+Column missing_thrust(const Windows& windows, const std::function<double(const WindowRow&)>& share);
+
+/// An offset to whole millimetres, level.
+Vec3 whole_millimetres(const Vec3& offset_W);
+/// ln Σ with the map moved by an offset, less that as it is.
+std::vector<Column> displaced(const Windows& windows, const Vec3& offset_W);
+
+/// The numbers of the rotors, from 0.
+std::vector<Scale> rotors();
+/// 1 in the channel of one of four rotors, from `first` on; contrast: less the mean of the four.
+Column one_rotor(Channel first, const Windows& windows, const Scale& rotor, bool contrast);
+
+/// Whether any window passes a test.
+template <typename F>
+bool any(const Observations& seen, F test) {
+  for (const auto& w : seen.windows)
+    if (test(w)) return true;
+  return false;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/columns.hpp"
+
+namespace backwash::study {
+
+/// The controller acts on set-points later than the vehicle file says.
+Effect command_latency() {
+  return {.name = "command_latency",
+          .forms = {{.formula = "set-points act later by this, level axes",
+                     .parameters = {"latency_s"},
+                     .constant = true,
+                     .least = 0.015,
+                     .needs = {Source::setpoints},
+                     .unknowable = [](const Observations& seen) { return seen.row_period / 4; },
+                     .columns =
+                         [](const Windows& ws, const Scale&) {
+                           return std::vector{in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; })};
+                         }}},
+          .manoeuvres = {{"sideways steps of the set-point, hard", [](WindowRow& w, double) {
+                            w.command_gain = {60, -10};
+                          }}}};
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/study/windows/observation.hpp"
+#include "core/types/model.hpp"
+
+namespace backwash::study {
+
+/// One regressor: its value on each window, in the channels that it moves.
+struct Column {
+  struct Part {
+    Channel channel;
+    std::vector<double> x;
+  };
+  std::vector<Part> parts;
+};
+
+using Windows = std::vector<WindowRow>;
+
+/// A parameter with its interval at 95 %.
+struct Estimate {
+  std::string name;
+  double value, low, high;
+};
+
+/// A variable that a cause is told or drawn along; circular: an angle, rad.
+struct Regressor {
+  std::string name;
+  bool circular = false;
+  std::function<double(const WindowRow&)> value;
+};
+
+/// What a form takes that it is not linear in: a length, a time, the number of a rotor; for a displaced map the level
+/// offset instead.
+struct Scale {
+  double value = 0;
+  Vec3 offset_W = Vec3::Zero();  ///< m
+};
+/// Scales without an offset.
+std::vector<Scale> scales_of(std::initializer_list<double> values);
+
+/// A flight that could be flown next: the windows it would give, made from a median window of the flights at hand.
+struct Manoeuvre {
+  std::string name;
+  std::function<void(WindowRow&, double s)> set;  ///< s: 0 … 1 along the flight
+};
+
+struct Effect;
+struct Form;
+
+/// An accepted form as it was fitted.
+struct FittedForm {
+  const Form& form;
+  Scale scale;
+  const std::vector<Column>& columns;
+  std::span<const double> theta;            ///< one per column
+  const std::vector<Estimate>& parameters;  ///< of all shapes, at the form's reference
+};
+
+/// One physical form of an effect, linear in its parameters at a given scale.
+struct Form {
+  std::string formula;                  ///< what is added to which channel
+  std::vector<std::string> parameters;  ///< one per column, unit in the name
+  std::string scale_name = {};          ///< "L_m" …; empty without a scale
+  std::vector<Scale> scales = {Scale()};
+  bool integer_scale = false;      ///< a rotor's number: not polished
+  bool displaces_map = false;      ///< its scale is an offset, fitted along x and y
+  bool motors_alone = false;       ///< seen in motor commands alone: which of such forms it is they do not tell
+  bool constant = false;           ///< is itself what a free offset would be: tested without one
+  bool by_place = false;           ///< a push that differs by place: it moves the craft in itself
+  double floor = 0;                ///< least root mean square over the flown windows that is called an effect
+  double least = 0;                ///< least magnitude of the first parameter that is called an effect
+  bool one_sided = false;          ///< the first parameter cannot be negative
+  std::vector<Source> needs = {};  ///< what the logs must hold, in the order in which a lack is told
+  /// Why these flights cannot show it though the logs hold all that it needs; nothing if they can.
+  std::function<std::optional<std::string>(const Observations&)> not_flown = {};
+  /// Half the range, in the first parameter's unit, in which the logs alone cannot tell the value.
+  std::function<double(const Observations&)> unknowable = [](const Observations&) { return 0.0; };
+  std::function<std::vector<Column>(const Windows&, const Scale&)> columns = {};
+  /// What it leaves open and no other cause may claim: the voltage at which the thrust is as modelled, the bias at
+  /// which a drift begins.
+  std::function<std::vector<Column>(const Windows&)> companions = {};
+  /// Other shapes, in the literature as good as this one: the same parameters at the same reference. They take no part
+  /// in the search; estimates are averaged over them (estimate.hpp).
+  std::vector<Form> shapes = {};
+  /// What it adds to the model for field, reach and plan (core/study/README.md, "Extension"); without it nothing.
+  std::function<std::vector<ModelEffect>(const FittedForm&, const Observations&)> extend = {};
+  const Effect* effect = nullptr;  ///< whose form it is; set by the table
+
+  const std::string& cause() const;  ///< the effect's name
+};
+
+/// Something physical that a simulation may lack: all that other code must know of it. One file each, and its line in
+/// table.cpp.
+struct Effect {
+  std::string name;         ///< of docs/interfaces.md
+  std::vector<Form> forms;  ///< in the order in which they are tried
+  Regressor axis = {"time since the flight began, s", false,
+                    [](const WindowRow& w) { return w.t; }};  ///< of its picture
+  bool towards_walls = false;                                 ///< its picture shows the part towards the nearest wall
+  std::vector<Manoeuvre> manoeuvres = {};                     ///< that set it apart from others
+};
+
+}  // namespace backwash::study

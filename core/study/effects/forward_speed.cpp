@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
+
+namespace backwash::study {
+namespace {
+
+/// Mean of the power, not the power of the mean: a window holds a start or a stop.
+double speed_power(const WindowRow& w, double power) {
+  double sum = 0;
+  for (const double v : w.speeds) sum += std::pow(v, power) / kPoints;
+  return sum;
+}
+
+/// The same where the gusts are: a window that climbs away from the floor has most of its variance while it is slow.
+double gusts_speed_power(const WindowRow& w, double power) {
+  double sum = 0;
+  for (std::size_t k = 0; k < kPoints; ++k) sum += w.shares[k] * std::pow(w.speeds[k], power);
+  return sum;
+}
+
+}  // namespace
+
+/// Thrust and gusts change with the speed.
+Effect forward_speed() {
+  return {.name = "forward_speed",
+          .forms = {{.formula = "z push C (v/1 m/s)^2",
+                     .parameters = {"C_mps2"},
+                     .floor = 0.02,
+                     .columns =
+                         [](const Windows& ws, const Scale&) {
+                           return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })};
+                         },
+                     .extend = extends(ModelEffect::Kind::push_with_speed)},
+                    {.formula = "ln variance + B (v/1 m/s)^n",
+                     .parameters = {"B_ln"},
+                     .scale_name = "n",
+                     .scales = scales_of({1, 2}),
+                     .floor = 0.12,
+                     .columns =
+                         [](const Windows& ws, const Scale& n) {
+                           return std::vector{in_variance(ws, [&](auto& w) { return gusts_speed_power(w, n.value); })};
+                         },
+                     .extend = extends(ModelEffect::Kind::ln_variance_with_speed)}},
+          .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},
+          .manoeuvres = {{"fly fast and slow on one line at one height", [](WindowRow& w, double s) {
+                            w.speed = 1.5 * s, w.speeds.fill(w.speed);
+                            w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
+                          }}}};
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/field/extension.hpp"
+#include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
+
+namespace backwash::study {
+
+using field::kSurfaceReference, field::near_surface;
+
+/// The wash that comes back from the surface below lifts.
+Effect ground_thrust() {
+  const auto lift = [](auto amount) {
+    return [amount](const Windows& ws, const Scale& scale) {
+      return std::vector{
+          in(kMeanZ, ws, [&](auto& w) { return along(w, [&](auto& at) { return amount(at.height, scale.value); }); })};
+    };
+  };
+  return {
+      .name = "ground_thrust",
+      .forms = {{.formula = "z push A exp(-(h - 0.4 m)/L), h the height over the surface below",
+                 .parameters = {"A_mps2"},
+                 .scale_name = "L_m",
+                 .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
+                 .by_place = true,
+                 .floor = 0.02,
+                 .columns = lift([](double h, double length) { return near_surface(h, kSurfaceReference, length); }),
+                 .shapes = {{.formula = "z push A (0.4 m/h)^n",
+                             .parameters = {},
+                             .scale_name = "n",
+                             .scales = scales_of({1.0, 3.0}),
+                             .columns =
+                                 lift([](double h, double n) { return power_of_distance(h, kSurfaceReference, n); })}},
+                 .extend = extends(ModelEffect::Kind::push_over_surface)}},
+      .axis = {"height over the surface, m", false, [](auto& w) { return w.around.height; }},
+      .manoeuvres = {{"hover at three heights, 0.3, 0.8 and 1.3 m over the floor, away from walls and ceiling",
+                      [](WindowRow& w, double s) {
+                        w.around = {0.3 + 0.5 * std::floor(2.999 * s), 2.0, {}};
+                        w.p_W.z() = w.around.height;
+                      }}}};
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/columns.hpp"
+
+namespace backwash::study {
+
+/// Bursts: the gusts are larger now and then than a Gaussian's.
+Effect heavy_tails() {
+  return {.name = "heavy_tails",
+          .forms = {
+              {.formula = "ln kurtosis + K",
+               .parameters = {"K_ln"},
+               .constant = true,
+               .floor = 0.15,
+               .one_sided = true,
+               .unknowable = [](const Observations&) { return kScatter2 / 2; },  // how much of the wander is within 1 s
+               .columns = [](const Windows& ws,
+                             const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; }}}};
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
+
+namespace backwash::study {
+namespace {
+
+/// The bias with which a drift begins.
+std::vector<Column> first_bias(const Windows& ws) {
+  return {level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
+          level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
+}
+
+Form with_time() {
+  return {.formula = "accelerometer bias b t/100 s, fixed to the body",
+          .parameters = {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
+          .floor = 0.015,
+          .needs = {Source::attitude},
+          .columns = [](const Windows& ws, const Scale&) { return body_drift(ws, [](auto& w) { return w.t / 100; }); },
+          .companions = first_bias,
+          .shapes = {{.formula = "accelerometer bias b (t/100 s)^n, fixed to the body",
+                      .parameters = {},
+                      .scale_name = "n",
+                      .scales = scales_of({0.75, 4.0 / 3}),
+                      .columns =
+                          [](const Windows& ws, const Scale& n) {
+                            return body_drift(ws, [&](auto& w) { return std::pow(std::max(w.t, 0.0) / 100, n.value); });
+                          }}},
+          .extend = unknown_push};
+}
+
+Form with_temperature() {
+  return {.formula = "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
+          .parameters = {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
+          .floor = 0.015,
+          .needs = {Source::temperature, Source::attitude},
+          .columns = [](const Windows& ws,
+                        const Scale&) { return body_drift(ws, [](auto& w) { return (w.temperature - 25) / 10; }); },
+          .companions = first_bias,
+          .extend = unknown_push};
+}
+
+}  // namespace
+
+/// The accelerometer's bias wanders with the time of flight or with its temperature.
+Effect imu_drift() {
+  return {.name = "imu_drift",
+          .forms = {with_time(), with_temperature()},
+          .manoeuvres = {{"start warm and start cold, the same spot and battery", [](WindowRow& w, double s) {
+                            w.temperature += s < 0.5 ? 0.0 : 12.0;
+                            w.t = 30;
+                          }}}};
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/columns.hpp"
+
+namespace backwash::study {
+namespace {
+
+/// Eight directions, 0.15 and 0.3 m.
+std::vector<Scale> tried_offsets() {
+  std::vector<Scale> offsets;
+  for (const double length : {0.15, 0.3})
+    for (int k = 0; k < 8; ++k)
+      offsets.push_back({0, whole_millimetres(length * Vec3(std::cos(M_PI * k / 4), std::sin(M_PI * k / 4), 0))});
+  return offsets;
+}
+
+}  // namespace
+
+Vec3 whole_millimetres(const Vec3& offset_W) {
+  return {(std::round(500 + 1000 * offset_W.x()) - 500) / 1000, (std::round(500 + 1000 * offset_W.y()) - 500) / 1000,
+          0};
+}
+
+std::vector<Column> displaced(const Windows& ws, const Vec3& offset_W) {
+  Column column;
+  for (const Channel c : kVariances)
+    column.parts.push_back(
+        {c, values(ws, [&](auto& w) { return w.ln_sigma_at(offset_W)[static_cast<int>(c - kVarX)]; })});
+  return {column};
+}
+
+/// The map lies beside where it says: gusts are where the vehicle believes that no surface is.
+Effect map_offset() {
+  return {.name = "map_offset",
+          .forms = {{.formula = "ln variance as modelled at the position plus a level offset",
+                     .parameters = {"share"},
+                     .scale_name = "offset",
+                     .scales = tried_offsets(),
+                     .integer_scale = true,
+                     .displaces_map = true,
+                     .floor = 0.12,
+                     .one_sided = true,
+                     .needs = {Source::map},
+                     .columns = [](const Windows& ws, const Scale& scale) { return displaced(ws, scale.offset_W); }}}};
+}
+
+}  // namespace backwash::study

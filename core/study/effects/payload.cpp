@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
+
+namespace backwash::study {
+namespace {
+
+/// Which rotors face each other depends on the autopilot: 1-2 and 3-4, 1-3 and 2-4, or 1-4 and 2-3.
+std::vector<Column> facing_rotors(const Windows& ws, const Scale& pairing) {
+  constexpr std::size_t kFacing[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
+  const auto& pair = kFacing[static_cast<std::size_t>(pairing.value)];
+  std::vector<Column> columns;
+  for (const std::size_t k : {std::size_t{0}, std::size_t{2}}) {
+    const auto first = static_cast<Channel>(kMotor1 + pair[k]), second = static_cast<Channel>(kMotor1 + pair[k + 1]);
+    columns.push_back({{{first, std::vector<double>(ws.size(), 1.0)}, {second, std::vector<double>(ws.size(), -1.0)}}});
+  }
+  return columns;
+}
+
+}  // namespace
+
+/// A mass that the vehicle file does not hold, above the middle or beside it.
+Effect payload() {
+  return {
+      .name = "payload",
+      .forms = {{.formula = "thrust per mass (1 - m), m the relative excess of mass",
+                 .parameters = {"m"},
+                 .constant = true,
+                 .floor = 0.01,
+                 .needs = {Source::thrust},
+                 .columns = [](const Windows& ws,
+                               const Scale&) { return std::vector{missing_thrust(ws, [](auto&) { return 1.0; })}; },
+                 .extend = flown_range},
+                {.formula = "an off-centre weight: rotors that face each other need (1 + m) and (1 - m) of the mean",
+                 .parameters = {"m_first", "m_second"},
+                 .scale_name = "pairing",
+                 .scales = scales_of({0, 1, 2}),
+                 .integer_scale = true,
+                 .motors_alone = true,
+                 .constant = true,
+                 .floor = 0.02,
+                 .needs = {Source::motors},
+                 .columns = facing_rotors}}};
+}
+
+}  // namespace backwash::study

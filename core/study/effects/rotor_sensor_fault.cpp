@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/columns.hpp"
+
+namespace backwash::study {
+
+/// One rotor's rpm reading is wrong, or fails now and then.
+Effect rotor_sensor_fault() {
+  return {.name = "rotor_sensor_fault",
+          .forms = {{.formula = "one rotor's rpm^2 reads (1 + e) of what its command gives",
+                     .parameters = {"e"},
+                     .scale_name = "rotor",
+                     .scales = rotors(),
+                     .integer_scale = true,
+                     .constant = true,
+                     .least = 0.06,
+                     .needs = {Source::rpm},
+                     .columns = [](const Windows& ws,
+                                   const Scale& rotor) { return std::vector{one_rotor(kRpm1, ws, rotor, true)}; }},
+                    {.formula = "a share of one rotor's rpm readings is stuck or missing",
+                     .parameters = {"share"},
+                     .scale_name = "rotor",
+                     .scales = rotors(),
+                     .integer_scale = true,
+                     .constant = true,
+                     .least = 0.01,
+                     .one_sided = true,
+                     .needs = {Source::rpm},
+                     .columns = [](const Windows& ws, const Scale& rotor) {
+                       return std::vector{one_rotor(kDropout1, ws, rotor, false)};
+                     }}}};
+}
+
+}  // namespace backwash::study

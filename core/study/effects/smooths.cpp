@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/smooths.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/study/effects/columns.hpp"
+
+namespace backwash::study {
+namespace {
+
+constexpr double kStrayed = 0.1;  // m: a push that moves the craft farther is not believed
+
+}  // namespace
+
+std::vector<Regressor> regressors(const Observations& seen) {
+  std::vector<Regressor> all = {{"z_m", false, [](const WindowRow& w) { return w.around.height; }},
+                                {"x_m", false, [](const WindowRow& w) { return w.p_W.x(); }},
+                                {"y_m", false, [](const WindowRow& w) { return w.p_W.y(); }},
+                                {"speed_mps", false, [](const WindowRow& w) { return w.speed; }},
+                                {"t_s", false, [](const WindowRow& w) { return w.t; }}};
+  if (seen.has(Source::map)) {
+    all.push_back({"ceiling_gap_m", false, [](const WindowRow& w) { return std::min(w.around.ceiling_gap, 9.0); }});
+    all.push_back({"wall_distance_m", false, [](const WindowRow& w) {
+                     double least = 9;
+                     for (const auto& [distance, direction] : w.around.walls) least = std::min(least, distance);
+                     return least;
+                   }});
+  }
+  if (seen.has(Source::battery)) all.push_back({"battery_v", false, [](const WindowRow& w) { return w.voltage; }});
+  if (seen.has(Source::temperature))
+    all.push_back({"temperature_c", false, [](const WindowRow& w) { return w.temperature; }});
+  if (seen.has(Source::attitude)) all.push_back({"yaw_rad", true, [](const WindowRow& w) { return w.yaw; }});
+  return all;
+}
+
+std::vector<double> ranks(const Regressor& along, const Windows& windows) {
+  std::vector<double> u = values(windows, along.value);
+  if (along.circular) return u;
+  std::vector<double> sorted = u;
+  std::sort(sorted.begin(), sorted.end());
+  for (double& x : u) {
+    const auto [low, high] = std::equal_range(sorted.begin(), sorted.end(), x);
+    x = 0.5 * static_cast<double>((low - sorted.begin()) + (high - sorted.begin())) / static_cast<double>(u.size());
+  }
+  return u;
+}
+
+const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups() {
+  static const std::vector<std::pair<std::string, std::vector<Channel>>> all = {
+      {"mean x, y", {kMeanX, kMeanY}}, {"mean z", {kMeanZ}}, {"ln variance", {kVarX, kVarY, kVarZ}}};
+  return all;
+}
+
+std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group) {
+  const std::vector<double> u = ranks(along, windows);
+  std::vector<Column> columns;
+  for (int k = 1; k <= 4; ++k) {
+    std::vector<double> x;
+    for (const double q : u) {
+      const int turns = (k + 1) / 2;
+      x.push_back(!along.circular ? std::cos(M_PI * k * q) : k % 2 ? std::cos(turns * q) : std::sin(turns * q));
+    }
+    // A push may point anywhere in the plane: x and y have coefficients of their own. ln variance moves as one.
+    if (group.front() == kVarX) {
+      columns.emplace_back();
+      for (const Channel c : group) columns.back().parts.push_back({c, x});
+    } else {
+      for (const Channel c : group) columns.push_back({{{c, x}}});
+    }
+  }
+  return columns;
+}
+
+std::vector<Column> companions(const Form& form, const Observations& seen) {
+  return form.companions ? form.companions(seen.windows) : std::vector<Column>{};
+}
+
+Windows moved_by(const Windows& windows, const std::vector<Column>& columns, const Eigen::VectorXd& theta) {
+  Windows moved = windows;
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    Vec3 push = Vec3::Zero();
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      for (const auto& part : columns[k].parts)
+        if (part.channel <= kMeanZ)
+          push[static_cast<Eigen::Index>(part.channel)] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
+    const Vec3 by = push.cwiseProduct(moved[i].give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
+    const auto move = [&](Place& place) {
+      place.height += by.z(), place.ceiling_gap -= by.z();
+      for (auto* walls : {&place.walls, &place.whole_walls})
+        for (auto& [distance, direction] : *walls) distance -= by.dot(direction);
+    };
+    move(moved[i].around);
+    for (auto& place : moved[i].path) move(place);
+  }
+  return moved;
+}
+
+Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& scale, const Eigen::VectorXd& theta) {
+  constexpr int kTurns = 4;
+  Windows moved = windows;
+  for (int i = 0; i < kTurns && form.by_place; ++i) moved = moved_by(windows, form.columns(moved, scale), theta);
+  return moved;
+}
+
+std::vector<Column> offsets(const std::vector<Column>& columns, const Observations& seen) {
+  std::array<bool, kChannels> used{};
+  for (const auto& column : columns)
+    for (const auto& part : column.parts) used[part.channel] = true;
+  const Windows& ws = seen.windows;
+  std::vector<Column> free;
+  if (used[kMeanX] || used[kMeanY]) {
+    free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitX(); }));
+    free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); }));
+    if (seen.has(Source::attitude))
+      for (int i = 0; i < 2; ++i) free.push_back(level(ws, [i](auto& w) -> Vec3 { return w.R_WB.col(i); }));
+  }
+  if (used[kMeanZ]) free.push_back(in(kMeanZ, ws, [](auto&) { return 1.0; }));
+  if (used[kVarX] || used[kVarY] || used[kVarZ]) {
+    for (const Channel c : kVariances) free.push_back(in(c, ws, [](auto&) { return 1.0; }));
+    Column noise;
+    for (const Channel c : kVariances)
+      noise.parts.push_back({c, values(ws, [&](auto& w) { return 0.005 / w.sigma[static_cast<int>(c - kVarX)]; })});
+    free.push_back(std::move(noise));
+  }
+  return free;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/study/effects/table.hpp"
+
+/// What competes with the effects, and what stands beside them: smooths of a regressor, free offsets, companions.
+namespace backwash::study {
+
+/// Regressors of which any smooth function competes with the catalogue.
+std::vector<Regressor> regressors(const Observations& seen);
+/// Each window's rank q in [0, 1] along a regressor (ties share theirs); circular: the angle itself, rad.
+std::vector<double> ranks(const Regressor& along, const Windows& windows);
+/// The channels that a smooth moves together, with their name.
+const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups();
+/// cos(π k q), k = 1 … 4, of the regressor's rank q in [0, 1] (circular: sin and cos of one and two turns), in the
+/// channels of one group: level means each for themselves, ln variance along all axes as one.
+std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group);
+
+/// What an accepted form leaves open (Form::companions).
+std::vector<Column> companions(const Form& form, const Observations& seen);
+
+/// Windows where a push Σ θ x, in the mean channels, has moved the craft: the loop gives way by push/k_p (e = w/k_p at
+/// rest), so that the craft is not where the set-points alone lead.
+Windows moved_by(const Windows& windows, const std::vector<Column>& columns, const Eigen::VectorXd& theta);
+/// The same by a form's own push, where it is one by place: push and place found in turns.
+Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& scale, const Eigen::VectorXd& theta);
+
+/// Free offsets of the channels that columns move: constants, and for level means those fixed to the body too; in
+/// variance channels also the noise of the accelerometer, a constant over Σ.
+std::vector<Column> offsets(const std::vector<Column>& columns, const Observations& seen);
+
+}  // namespace backwash::study

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
+
+namespace backwash::study {
+
+/// A push fixed to the body: an attitude estimate or a rotor plane that is not level.
+Effect trim() {
+  return {.name = "trim",
+          .forms = {{.formula = "constant push fixed to the body",
+                     .parameters = {"body_x_mps2", "body_y_mps2"},
+                     .constant = true,
+                     .floor = 0.02,
+                     .needs = {Source::attitude},
+                     .columns =
+                         [](const Windows& ws, const Scale&) {
+                           return std::vector{level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
+                                              level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); })};
+                         },
+                     .extend = unknown_push}},
+          .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }},
+          .manoeuvres = {{"turn a full yaw turn on the spot, far from walls", [](WindowRow& w, double s) {
+                            w.yaw = 2 * M_PI * s;
+                            w.R_WB = Eigen::AngleAxisd(w.yaw, Vec3::UnitZ()).toRotationMatrix();
+                            w.around.walls.clear();
+                          }}}};
+}
+
+}  // namespace backwash::study

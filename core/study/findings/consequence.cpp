@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/consequence.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+#include <vector>
+
+#include "core/plan/planner.hpp"
+#include "core/study/findings/extend.hpp"
+
+namespace backwash::study {
+namespace {
+
+constexpr std::size_t kPlaces = 60;
+
+double quantile(std::vector<double> x, double q) {
+  if (x.empty()) return 0;
+  std::sort(x.begin(), x.end());
+  return x[static_cast<std::size_t>(q * static_cast<double>(x.size() - 1) + 0.5)];
+}
+
+/// What all causes add to the means and the ln variances of a window, fitted without its flight.
+struct Added {
+  std::array<std::vector<double>, 3> mean, ln_variance;
+};
+Added held_out(const StudyResult& result, const Observations& seen) {
+  Added added;
+  for (auto* part : {&added.mean, &added.ln_variance})
+    for (auto& axis : *part) axis.assign(seen.windows.size(), 0);
+  Evidence evidence(seen);
+  std::vector<Column> all;
+  for (const auto& cause : result.causes) all.insert(all.end(), cause.found.columns.begin(), cause.found.columns.end());
+  evidence.whiten(all);
+  for (const auto& cause : result.causes) {
+    const auto& columns = cause.found.columns;
+    const auto nuisance = cause.found.form->constant ? std::vector<Column>{} : offsets(columns, seen);
+    const Normal normal = evidence.normal(columns, nuisance);
+    if (!normal.solvable) continue;
+    for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+      const SmallVector theta = normal.fit_without(f);
+      for (std::size_t k = 0; k < columns.size(); ++k)
+        for (const auto& part : columns[k].parts) {
+          if (part.channel > kVarZ) continue;
+          auto& to = part.channel <= kMeanZ ? added.mean[part.channel] : added.ln_variance[part.channel - kVarX];
+          for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+            to[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
+        }
+    }
+  }
+  return added;
+}
+
+/// Share of a Gaussian's samples within ± limit.
+double share_within(double mean, double variance, double limit) {
+  const double s = std::sqrt(2 * std::max(variance, 1e-12));
+  return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
+}
+
+/// Share of the samples within push ± w̄, w̄ = mean + κ√Σ; `added`: what a model says beside Σ and mean, or null.
+double inside(const Observations& seen, const BoundModel& bound, const Added* added) {
+  double sum = 0, count = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+      if (!(seen.weight[kVarX + axis][i] > 0) || !(seen.weight[kMeanX + axis][i] > 0)) continue;
+      const auto& w = seen.windows[i];
+      const auto a = static_cast<Eigen::Index>(axis);
+      const double mean = seen.y[kMeanX + axis][i] - (added ? added->mean[axis][i] : 0);
+      const double sigma = w.sigma[a] * (added ? std::exp(added->ln_variance[axis][i]) : 1);
+      const double limit = (axis == 2 ? bound.mean_vertical : bound.mean_horizontal) + bound.kappa * std::sqrt(sigma);
+      sum += share_within(mean, w.measured_variance[a], limit), count += 1;
+    }
+  return count > 0 ? sum / count : 0;
+}
+
+std::vector<Vec3> places_of(const Observations& seen) {
+  std::vector<Vec3> places;
+  const std::size_t every = seen.windows.size() / kPlaces + 1;
+  for (std::size_t i = 0; i < seen.windows.size(); i += every) places.push_back(seen.windows[i].p_W);
+  return places;
+}
+
+void describe(Outcome& outcome, const std::vector<reach::HoverSet>& sets) {
+  std::vector<double> extent, shift;
+  for (const auto& set : sets) {
+    if (!set.bounded) continue;
+    const auto& h = set.half_widths;
+    extent.push_back(std::max({h[kX], h[kY], h[kZ]}));
+    shift.push_back(set.shift.norm());
+    if (set.safe()) outcome.safe += 1 / static_cast<double>(sets.size());
+  }
+  outcome.extent_median = quantile(extent, 0.5), outcome.extent_95 = quantile(extent, 0.95);
+  outcome.shift_median = quantile(shift, 0.5), outcome.shift_95 = quantile(shift, 0.95);
+}
+
+std::vector<reach::HoverSet> sets_at(const plan::World& world, const std::vector<Vec3>& places) {
+  std::vector<reach::HoverSet> sets;
+  for (const Vec3& p : places)
+    sets.push_back(reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p));
+  return sets;
+}
+
+/// Without a map: Σ_0, and what the extension says of open air.
+std::vector<reach::HoverSet> sets_in_the_open(const Model& model, const Vehicle& vehicle) {
+  const reach::Reachability reach(vehicle);
+  const field::Air air = field::air_moving(model.extension, Vec3::Zero());
+  const auto sigma =
+      std::exp(air.ln_variance) * Variance::horizontal_vertical(model.base.horizontal, model.base.vertical);
+  reach::HoverSet set;
+  const auto w = bound(sigma, model.bound);
+  for (std::size_t d = 0; d < kDirections; ++d)
+    set.half_widths[d] =
+        d == kZ ? reach.vertical.h_inf * (w.w[d] + air.vertical) : reach.horizontal.h_inf * (w.w[d] + air.level);
+  const auto& kp = vehicle.controller.kp;
+  set.shift = air.push_W.cwiseQuotient(Vec3(kp.horizontal, kp.horizontal, kp.vertical));
+  set.bounded = true;
+  return {set};
+}
+
+void try_plan(Outcome& outcome, const plan::World& world, const Vec3& start_W, const Vec3& goal_W) {
+  Setpoint hover;
+  hover.p_W = start_W;
+  const auto& limits = world.reach.vehicle.limits;
+  const plan::PlanOptions options{.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = 3};
+  const auto plan = plan::plan(world, {{start_W, Vec3::Zero()}, hover}, goal_W, options);
+  outcome.plan = plan::to_string(plan.status);
+  if (plan.status != plan::PlanStatus::ok) return;
+  outcome.length_m = plan.metrics.length_m, outcome.time_s = plan.metrics.time_s;
+  outcome.clearance_m = plan.metrics.min_clearance_m;
+}
+
+/// The two safe places farthest apart.
+std::pair<Vec3, Vec3> farthest(const std::vector<Vec3>& places, const std::vector<reach::HoverSet>& sets) {
+  std::pair<Vec3, Vec3> ends{places.front(), places.front()};
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (sets[i].safe() && sets[j].safe() && (places[i] - places[j]).norm() > (ends.first - ends.second).norm())
+        ends = {places[j], places[i]};
+  return ends;
+}
+
+}  // namespace
+
+Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
+                        const map::OccupancyGrid* grid, const plan::Parallel& parallel) {
+  Consequence c;
+  const Added added = held_out(result, seen);
+  c.before.inside = inside(seen, model.bound, nullptr);
+  c.after.inside = inside(seen, model.bound, &added);
+  const Model after = extended(model, result, seen);
+  const auto places = places_of(seen);
+  c.places = places.size();
+  if (!grid || places.empty()) {
+    describe(c.before, sets_in_the_open(model, vehicle));
+    describe(c.after, sets_in_the_open(after, vehicle));
+    c.before.safe = c.after.safe = 0;
+    return c;
+  }
+  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, -1, parallel);
+  const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, -1, parallel);
+  const auto sets = sets_at(*world, places);
+  describe(c.before, sets);
+  describe(c.after, sets_at(*extended_world, places));
+  std::tie(c.start_W, c.goal_W) = farthest(places, sets);
+  if ((c.goal_W - c.start_W).norm() > 0.3) {
+    try_plan(c.before, *world, c.start_W, c.goal_W);
+    try_plan(c.after, *extended_world, c.start_W, c.goal_W);
+  }
+  return c;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/plan/world.hpp"
+#include "core/study/findings/study.hpp"
+
+namespace backwash::study {
+
+/// What a model makes of the places that were flown, and of one plan between two of them.
+struct Outcome {
+  double inside = 0;                        ///< share of samples of a − a_sim within push ± w̄, all axes together
+  double extent_median = 0, extent_95 = 0;  ///< largest half width of the hover sets at flown places, m
+  double shift_median = 0, shift_95 = 0;    ///< of those sets' centres, m
+  double safe = 0;                          ///< share of the places where hovering is safe; 0 without a map
+  std::string plan;                         ///< status of the plan; empty: none was tried
+  double length_m = 0, time_s = 0, clearance_m = 0;  ///< of the plan, if ok
+};
+
+struct Consequence {
+  Outcome before, after;
+  std::size_t places = 0;
+  Vec3 start_W = Vec3::Zero(), goal_W = Vec3::Zero();  ///< of the plan
+};
+
+/// Before and after the accepted causes joined the model. `inside` after: with parameters fitted without the window's
+/// flight. Hover sets: at up to 60 of the flown places, of worlds with the map, or without one from Σ_0 alone. The
+/// plan: between the two places farthest apart that are safe in the world before. Two worlds are built: seconds on a
+/// large map.
+Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
+                        const map::OccupancyGrid* grid, const plan::Parallel& parallel = plan::run_serial);
+
+}  // namespace backwash::study

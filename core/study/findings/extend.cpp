@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/extend.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "core/config/model_table.hpp"
+#include "core/study/calibrate/model_text.hpp"
+
+namespace backwash::study {
+namespace {
+
+/// Numbers to eight significant digits.
+toml::array list(std::initializer_list<double> values) {
+  toml::array all;
+  for (const double v : values) all.push_back(config::rounded(v, 8));
+  return all;
+}
+
+/// A cause as an entry of [[extension.term]].
+toml::table table_of(const NamedCause& cause, const Observations& seen) {
+  const auto& f = cause.found;
+  toml::array theta, effects;
+  for (const double v : f.theta) theta.push_back(config::rounded(v, 8));
+  for (const auto& e : effects_of(cause, seen)) effects.push_back(config::effect_table(e));
+  toml::table term{{"cause", f.form->cause()},
+                   {"form", f.form->formula},
+                   {"held_out_nats", config::rounded(cause.gain.held_out_nats, 8)},
+                   {"theta", theta},
+                   {"effect", effects}};
+  if (f.form->displaces_map)
+    term.insert("offset_m", list({f.scale.offset_W.x(), f.scale.offset_W.y()}));
+  else
+    term.insert("scale", config::rounded(f.scale.value, 8));
+  for (const auto& e : f.parameters) {
+    toml::table estimate{{"value", config::rounded(e.value, 8)}, {"ci95", list({e.low, e.high})}};
+    estimate.is_inline(true);
+    term.insert(e.name, std::move(estimate));
+  }
+  return term;
+}
+
+}  // namespace
+
+std::vector<Term> terms_of(const StudyResult& result) {
+  std::vector<Term> terms;
+  for (const auto& cause : result.causes) {
+    const auto& f = cause.found;
+    terms.push_back({f.form->cause(), f.form->formula, f.scale, {f.theta.data(), f.theta.data() + f.theta.size()}});
+  }
+  return terms;
+}
+
+std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen) {
+  std::vector<Term> left;
+  for (const Term& term : terms) {
+    const auto known = std::find_if(catalogue().begin(), catalogue().end(), [&](const Form* f) {
+      return f->cause() == term.cause && f->formula == term.formula && f->parameters.size() == term.theta.size();
+    });
+    // An offset of zero displaces nothing: a file of before offsets were written as such.
+    const bool no_offset = known != catalogue().end() && (*known)->displaces_map && term.scale.offset_W.isZero();
+    if (known == catalogue().end() || no_offset || why_not_tested(**known, seen)) {
+      left.push_back(term);
+      continue;
+    }
+    const Form& form = **known;
+    const auto columns = form.columns(
+        moved_by_itself(
+            form, seen.windows, term.scale,
+            Eigen::Map<const Eigen::VectorXd>(term.theta.data(), static_cast<Eigen::Index>(term.theta.size()))),
+        term.scale);
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      for (const auto& part : columns[k].parts)
+        for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] -= term.theta[k] * part.x[i];
+  }
+  return left;
+}
+
+std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen) {
+  const Accepted& f = cause.found;
+  const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
+  if (!f.form->extend) return {};
+  return f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters}, seen);
+}
+
+Model extended(const Model& model, const StudyResult& result, const Observations& seen) {
+  Model m = model;
+  for (const auto& cause : result.causes)
+    for (const auto& effect : effects_of(cause, seen)) m.extension.push_back(effect);
+  return m;
+}
+
+std::string extended_model_text(const Model& model, const StudyResult& result, const Observations& seen,
+                                const std::string& base_name, const std::string& version, const std::string& earlier) {
+  const toml::table provenance{{"version", version},
+                               {"base_model", base_name},
+                               {"flights", static_cast<std::int64_t>(seen.flights)},
+                               {"verdict", to_string(result.verdict)}};
+  std::ostringstream text;
+  text << "# Extended by backwash study. Variances in (m/s²)², lengths in m, angles in rad.\n"
+       << calibrate::model_tables(model) << config::text_of(toml::table{{"provenance", provenance}}, {"provenance"});
+  if (!earlier.empty()) text << earlier << "\n\n";
+  toml::array terms;
+  for (const auto& cause : result.causes) terms.push_back(table_of(cause, seen));
+  if (!terms.empty()) text << config::text_of(toml::table{{"extension", toml::table{{"term", terms}}}}, {"extension"});
+  return text.str();
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/study/findings/study.hpp"
+
+namespace backwash::study {
+
+/// An accepted cause as it is stored in a model file, [[extension.term]].
+struct Term {
+  std::string cause, formula;  ///< name the catalogue's form
+  Scale scale;
+  std::vector<double> theta;  ///< its parameters, in their order
+};
+
+std::vector<Term> terms_of(const StudyResult& result);
+
+/// Takes the terms out of the observations: the simulation is then the extended model's. A term whose form or columns
+/// are unknown here is returned.
+std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen);
+
+/// What a cause adds to the model for field, reach and plan (core/study/README.md, "Extension"): pushes and factors of
+/// Σ by place and velocity; what depends on things that a plan does not know (battery, time, heading) by its range over
+/// the flown windows. Empty for causes that move neither.
+std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen);
+/// The model with the effects of all causes behind its own.
+Model extended(const Model& model, const StudyResult& result, const Observations& seen);
+
+/// Model file: the model's own tables, then a [[extension.term]] per cause, with its effects. `earlier`: the text of
+/// the terms that the model has already.
+std::string extended_model_text(const Model& model, const StudyResult& result, const Observations& seen,
+                                const std::string& base_name, const std::string& version,
+                                const std::string& earlier = "");
+
+}  // namespace backwash::study

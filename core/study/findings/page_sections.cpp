@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/page_sections.hpp"
+
+#include <cstdio>
+#include <sstream>
+
+#include "core/report/page.hpp"
+#include "core/study/findings/study.hpp"
+
+namespace backwash::study {
+namespace {
+
+std::string percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f %%", 100 * share);
+  return text;
+}
+
+std::string interval(const RotorVerdict& v) {
+  return percent(v.d) + " [" + percent(v.low) + ", " + percent(v.high) + "]";
+}
+
+std::string ratio(const calibrate::Estimate& e) {
+  if (!(e.value > 0)) return "not shown by these flights";
+  return "×" + number(e.value) + "  [" + number(e.ci95.low) + ", " + number(e.ci95.high) + "]";
+}
+
+}  // namespace
+
+std::string spoken(std::string name) {
+  constexpr std::pair<const char*, const char*> kUnits[] = {
+      {"_mps2", ", m/s²"}, {"_per_s", ", 1/s"}, {"_ln", ", ln"}, {"_m", ", m"}, {"_s", ", s"}};
+  for (const auto& [suffix, unit] : kUnits)
+    if (name.ends_with(suffix)) return name.substr(0, name.size() - std::string(suffix).size()) + unit;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+std::string row(const std::string& name, const std::string& value) {
+  return "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value) + "</td></tr>\n";
+}
+
+std::string too_few(const Observations& seen) {
+  std::size_t good = 0;
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) good += seen.first[f + 1] > seen.first[f] ? 1u : 0u;
+  const std::size_t needed = StudyOptions{}.fewest_flights;
+  const bool grouped = seen.first.size() - 1 != seen.flights;
+  std::string text = std::to_string(good) + (grouped ? " group" : " flight") + (good == 1 ? "" : "s") +
+                     " with good windows, " + std::to_string(needed) + " are needed to warrant a name: fly " +
+                     std::to_string(needed - good) + " more";
+  std::string out;
+  for (const auto& [gate, count] : seen.gated_out)
+    out += (out.empty() ? "" : ", ") + std::to_string(count) + " " + to_string(gate);
+  return text + (out.empty() ? "." : " (windows left out: " + out + ").");
+}
+
+std::string rotor_sentence(const RotorVerdict& v) {
+  using Kind = RotorVerdict::Kind;
+  const std::string rotor = "rotor " + std::to_string(v.rotor);
+  switch (v.kind) {
+    case Kind::as_sound:
+      return "As the sound flights: a propeller that needs " + percent(v.minimum) +
+             " more of its command would have been named.";
+    case Kind::propeller_damage:
+      return "The propeller of " + rotor + " is damaged: it needs " + interval(v) + " more of its command.";
+    case Kind::payload:
+      return "An off-centre weight, no damaged propeller.";
+    case Kind::cannot_distinguish:
+      if (v.set.front() != "sound")
+        return "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
+      return "Not told from the sound flights, nor from a small damage or weight: " + rotor + " differs most, by " +
+             interval(v) + " of its command, and only a propeller that needs " + percent(v.minimum) +
+             " more would be named four times in five.";
+    default:
+      return "Differs from the sound flights as neither a damaged propeller nor a weight does.";
+  }
+}
+
+tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& v) {
+  std::ostringstream script;
+  script << "$each << EOD\n";
+  for (std::size_t r = 0; r < v.each.size(); ++r)
+    script << r + 1 << ' ' << 100 * v.each[r].d << ' ' << 100 * v.each[r].low << ' ' << 100 * v.each[r].high << '\n';
+  script << "EOD\nset xrange [0.5:4.5]\nset xtics ('rotor 1' 1, 'rotor 2' 2, 'rotor 3' 3, 'rotor 4' 4)\n"
+         << "set ylabel 'command needed more, %'\nset grid y\nset key outside top center horizontal\nset xzeroaxis lt "
+            "1 lc rgb '#888888'\n"
+         << "plot " << 100 * v.minimum << " with lines dt 2 lw 2 lc rgb '#c0561d' title 'named four times in five', "
+         << "$each using 1:2:3:4 with yerrorbars lw 2 pt 7 lc rgb '#1f6f9f' title 'if this rotor alone, 95 %'\n";
+  const auto drawn = report::draw(script.str(), report::Format::svg, 860, 300);
+  if (!drawn) return drawn;
+  return "<section><h2>Rotors against sound flights</h2>\n<p>" + report::escaped(rotor_sentence(v)) + "</p>\n" +
+         *drawn + "<table>\n" +
+         row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
+         row("Smallest that is named with 80 % power", percent(v.minimum)) +
+         row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
+         row("Twist, which a weight does not give, t", number(v.t_yaw)) +
+         row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
+         "</table>\n</section>\n";
+}
+
+std::string height_sentence(const calibrate::HeightEffects& effects) {
+  const auto& h = effects.hovers ? *effects.hovers : effects.all;
+  std::string text;
+  const auto differs = [](const calibrate::Estimate& e) { return e.value > 0 && (e.ci95.low > 1 || e.ci95.high < 1); };
+  if (differs(h.bins)) text += " near the surface " + ratio(h.bins);
+  if (differs(h.ceiling)) text += std::string(text.empty() ? "" : ",") + " under a plate " + ratio(h.ceiling);
+  return text.empty() ? text : "Vertical variance of hovers, day and speed held fixed:" + text + ".";
+}
+
+std::string height_section(const calibrate::HeightEffects& effects) {
+  const auto& all = effects.all;
+  const auto& slow = effects.hovers;
+  std::string text =
+      "<section><h2>Vertical variance by height and plate</h2>\n<p>Day and speed held fixed, flights random, 95 % "
+      "intervals by resampling flights. The variance of a pass holds its own acceleration: the hovers alone do "
+      "not.</p>\n<table>\n<tr><th></th><td><b>hovers and passes</b></td><td><b>hovers</b></td></tr>\n";
+  const auto line = [&](const std::string& name, auto value) {
+    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value(all)) + "</td><td>" +
+            report::escaped(slow ? value(*slow) : "none") + "</td></tr>\n";
+  };
+  const std::string contrast = number(all.low_m) + " m over the surface against " + number(all.high_m) + " m";
+  line(contrast + ", by a law of height", [](auto& h) { return ratio(h.low_over_high); });
+  line(contrast + ", within a factor of two, no law", [](auto& h) { return ratio(h.bins); });
+  line("Under a plate against without", [](auto& h) { return ratio(h.ceiling); });
+  line("Flights that were that low, that high",
+       [](auto& h) { return std::to_string(h.low_flights) + ", " + std::to_string(h.high_flights); });
+  line("From", [](auto& h) {
+    return std::to_string(h.windows) + " windows of " + std::to_string(h.flights) + " flights on " +
+           std::to_string(h.days) + " days";
+  });
+  return text + "</table>\n</section>\n";
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/self_test.hpp"
+
+#include <algorithm>
+
+#include "core/report/page.hpp"
+#include "core/study/findings/page_sections.hpp"
+
+namespace backwash::study {
+namespace {
+
+std::string of_worlds(int count, const SelfTestRow& r) {
+  return std::to_string(count) + " of " + std::to_string(r.worlds);
+}
+
+std::string sentence(const SelfTestRow& r) {
+  const std::string hidden = r.hidden;
+  if (hidden == "none") return "something was named, or called unknown, in " + of_worlds(r.worlds - r.alone, r);
+  std::string text = (hidden == "unknown" ? "called unknown in " : "named alone in ") + of_worlds(r.alone, r) +
+                     ", in what was told in " + of_worlds(r.in_set, r) + ", a wrong name in " + of_worlds(r.wrong, r);
+  if (*r.other) text += "; otherwise mostly: " + std::string(r.other);
+  return text;
+}
+
+std::string shown(const SelfTestRow& r) {
+  const std::string hidden = r.hidden;
+  return row(hidden == "none"      ? "Nothing hidden"
+             : hidden == "unknown" ? "Something outside the catalogue hidden"
+                                   : spoken(hidden) + " hidden",
+             sentence(r));
+}
+
+}  // namespace
+
+const SelfTestRow* SelfTest::of(const std::string& hidden) const {
+  const auto at = std::find_if(rows.begin(), rows.end(), [&](const SelfTestRow& r) { return r.hidden == hidden; });
+  return at == rows.end() ? nullptr : &*at;
+}
+
+const SelfTest& self_test() {
+#include "core/study/findings/self_test_rows.inc"
+  static const SelfTest all{kSeed, kFlights, kRows};
+  return all;
+}
+
+std::string self_test_section(const std::vector<std::string>& names) {
+  const SelfTest& test = self_test();
+  std::string text = "<section><h2>How often the method is right</h2>\n<p>" + std::to_string(test.flights) +
+                     " made flights each, by a generator with other formulas, effects of the size of the table in "
+                     "core/study/confusion.md, seed " +
+                     std::to_string(test.seed) + ".</p>\n<table>\n";
+  std::vector<std::string> told = names;
+  told.insert(told.end(), {"none", "unknown"});
+  for (const auto& name : told)
+    if (const auto* r = test.of(name)) text += shown(*r);
+  text += "</table>\n<details><summary>Every cause</summary>\n<table>\n";
+  for (const auto& r : test.rows) text += shown(r);
+  return text + "</table>\n</details>\n</section>\n";
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace backwash::study {
+
+/// How worlds with one hidden cause, at the size of confusion.md, were told: a row of its table.
+struct SelfTestRow {
+  const char* hidden;  ///< cause, "unknown" (outside the catalogue) or "none"
+  int worlds;
+  int alone;          ///< exactly what was hidden was told
+  int in_set;         ///< what was hidden was in what was told
+  int wrong;          ///< something else was named, alone or beside it
+  const char* other;  ///< what was told most often instead; empty: nothing else was
+};
+
+/// The engine's published campaign (confusion.md), as `study_matrix --self-test` writes it.
+struct SelfTest {
+  std::uint64_t seed;
+  int flights;
+  std::span<const SelfTestRow> rows;
+  const SelfTestRow* of(const std::string& hidden) const;  ///< null: not tested
+};
+const SelfTest& self_test();
+
+/// Section of the page: how often each of `names` was told when it was hidden, how often something was told where
+/// nothing was hidden, and the whole table folded away.
+std::string self_test_section(const std::vector<std::string>& names);
+
+}  // namespace backwash::study

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/study.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/study/inference/estimate.hpp"
+
+namespace backwash::study {
+namespace {
+
+std::vector<Column> others_of(const std::vector<Accepted>& all, std::size_t but, const Observations& seen) {
+  std::vector<Column> columns;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (i == but) continue;
+    columns.insert(columns.end(), all[i].columns.begin(), all[i].columns.end());
+    const auto open = companions(*all[i].form, seen);
+    columns.insert(columns.end(), open.begin(), open.end());
+  }
+  return columns;
+}
+
+/// What the cause adds to a channel in each window, its parameters fitted without the window's flight.
+std::vector<double> held_out(const Accepted& cause, const Normal& normal, const Observations& seen, Channel channel) {
+  std::vector<double> sum(seen.windows.size(), 0);
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+    const SmallVector theta = normal.fit_without(f);
+    for (std::size_t k = 0; k < cause.columns.size(); ++k)
+      for (const auto& part : cause.columns[k].parts)
+        if (part.channel == channel)
+          for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+            sum[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
+  }
+  return sum;
+}
+
+/// P(|N(mean, variance)| ≤ 1.645 √model).
+double within_interval(double mean, double variance, double model) {
+  const double limit = 1.644854 * std::sqrt(model), s = std::sqrt(2 * std::max(variance, 1e-12));
+  return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
+}
+
+/// `total`: of all accepted causes; `own`: of this one. Residuals y − (total − own) before, y − total after.
+Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::size_t which) {
+  const Observations& seen = evidence.seen();
+  const Accepted& cause = all[which];
+  auto nuisance = cause.form->constant ? std::vector<Column>{} : offsets(cause.columns, seen);
+  const auto others = others_of(all, which, seen);
+  nuisance.insert(nuisance.end(), others.begin(), others.end());
+  const Normal normal = evidence.normal(cause.columns, nuisance);
+  Gain gain;
+  if (!normal.solvable) return gain;
+  const auto per_flight = normal.gain_per_flight();
+  const double n = static_cast<double>(per_flight.size());
+  double square = 0;
+  for (const double g : per_flight) gain.held_out_nats += g;
+  for (const double g : per_flight) square += std::pow(g - gain.held_out_nats / n, 2);
+  const double error = student_975(n - 1) * std::sqrt(square * n / (n - 1));
+  gain.low_nats = gain.held_out_nats - error, gain.high_nats = gain.held_out_nats + error;
+
+  double before = 0, after = 0, count = 0;
+  std::array<std::vector<double>, kChannels> moved;
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    const auto x = held_out(cause, normal, seen, static_cast<Channel>(c));
+    if (std::none_of(x.begin(), x.end(), [](double v) { return v != 0; })) continue;
+    // Offsets that the cause does not claim are taken out of both.
+    double offset_before = 0, offset_after = 0, weight = 0;
+    for (std::size_t i = 0; i < x.size() && !cause.form->constant; ++i) {
+      const double w = seen.weight[c][i];
+      offset_before += w * seen.y[c][i], offset_after += w * (seen.y[c][i] - x[i]), weight += w;
+    }
+    if (weight > 0) offset_before /= weight, offset_after /= weight;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const double w = seen.weight[c][i];
+      before += w * std::pow(seen.y[c][i] - offset_before, 2);
+      after += w * std::pow(seen.y[c][i] - offset_after - x[i], 2), count += w;
+    }
+    moved[c] = x;
+  }
+  if (count > 0) gain.rmse_before = std::sqrt(before / count), gain.rmse_after = std::sqrt(after / count);
+  double covered_before = 0, covered_after = 0, samples = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t mean = kMeanX + static_cast<std::size_t>(axis), variance = kVarX + static_cast<std::size_t>(axis);
+    for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+      const auto& w = seen.windows[i];
+      if (!(seen.weight[variance][i] > 0)) continue;
+      const double m = seen.y[mean][i], x_m = moved[mean].empty() ? 0 : moved[mean][i];
+      const double factor = moved[variance].empty() ? 1 : std::exp(moved[variance][i]);
+      covered_before += within_interval(m, w.measured_variance[axis], w.sigma[axis]);
+      covered_after += within_interval(m - x_m, w.measured_variance[axis], w.sigma[axis] * factor);
+      samples += 1;
+    }
+  }
+  if (samples > 0) gain.coverage_before = covered_before / samples, gain.coverage_after = covered_after / samples;
+  return gain;
+}
+
+std::vector<std::pair<std::string, std::string>> untested(const Observations& seen) {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const Effect& effect : effects()) {
+    std::string why;
+    bool tested = false;
+    for (const Form& form : effect.forms) {
+      const auto reason = why_not_tested(form, seen);
+      if (!reason) tested = true;
+      if (reason && why.empty()) why = *reason;
+    }
+    if (!tested) all.emplace_back(effect.name, why);
+  }
+  return all;
+}
+
+}  // namespace
+
+const char* to_string(Verdict verdict) {
+  static const char* const kNames[] = {"cause_found", "cannot_distinguish", "unknown_structure", "nothing_found",
+                                       "insufficient"};
+  return kNames[static_cast<std::size_t>(verdict)];
+}
+
+StudyResult study(const Observations& seen, const StudyOptions& options) {
+  StudyResult result;
+  result.not_tested = untested(seen);
+  std::size_t flown = 0;
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) flown += seen.first[f + 1] > seen.first[f] ? 1u : 0u;
+  if (flown < options.fewest_flights) {
+    result.verdict = Verdict::insufficient;
+    return result;
+  }
+  const Evidence start(seen);
+  const SearchResult found = search(start, options.search);
+  result.threshold = found.threshold;
+  result.unknown = found.unknown;
+  Evidence evidence = start;
+  evidence.whiten(others_of(found.accepted, SIZE_MAX, seen));
+  bool ambiguous = false;
+  for (std::size_t i = 0; i < found.accepted.size(); ++i) {
+    NamedCause cause{found.accepted[i], gain_of(evidence, found.accepted, i), {}};
+    for (const Rival& rival : cause.found.rivals)
+      cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
+    ambiguous = ambiguous || !cause.found.rivals.empty();
+    result.causes.push_back(std::move(cause));
+  }
+  result.verdict = !result.causes.empty()    ? (ambiguous ? Verdict::cannot_distinguish : Verdict::cause_found)
+                   : !result.unknown.empty() ? Verdict::unknown_structure
+                                             : Verdict::nothing_found;
+  if (options.dependence) {
+    options.search.progress("whether what remains depends on something");
+    result.remaining = remaining_dependence(evidence, others_of(found.accepted, SIZE_MAX, seen), options.search.seed);
+  }
+  if (options.minimum_detectable) {
+    options.search.progress("smallest effects that these flights would show");
+    result.minimum_detectable = minimum_detectable(evidence, options.search, std::max(found.threshold, 0.5));
+  }
+  return result;
+}
+
+std::map<std::string, std::map<std::string, double>> minimum_detectable(const Evidence& evidence,
+                                                                        const SearchOptions& options,
+                                                                        double threshold) {
+  constexpr int kFlips = 50, kHalvings = 14;
+  const auto draws = sign_draws(evidence.seen().first.size() - 1, kFlips, options.seed + 1);
+  std::map<std::string, std::map<std::string, double>> least;
+  for (const auto& c : candidates(evidence, {}, false)) {
+    if (least.contains(c.name) && !least[c.name].contains(c.form->parameters[0])) continue;
+    const auto power = [&](double size) {
+      int found = 0;
+      for (const auto& signs : draws) {
+        Normal injected = c.normal;
+        for (std::size_t f = 0; f < injected.b.size(); ++f)
+          injected.b[f] = signs[f] * c.normal.b[f] + size * c.normal.A[f].col(0);
+        if (injected.gain() >= threshold && c.effect(injected.fit())) ++found;
+      }
+      return static_cast<double>(found) / kFlips;
+    };
+    double low = -9.2, high = 4.6;  // ln of the parameter
+    if (power(std::exp(high)) < 0.8) continue;
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = (low + high) / 2;
+      (power(std::exp(middle)) >= 0.8 ? high : low) = middle;
+    }
+    auto& entry = least[c.name];
+    const double size = std::exp(high);
+    const auto [at, fresh] = entry.emplace(c.form->parameters[0], size);
+    if (!fresh) at->second = std::min(at->second, size);
+  }
+  return least;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/study/inference/dependence.hpp"
+#include "core/study/inference/search.hpp"
+
+namespace backwash::study {
+
+enum class Verdict { cause_found, cannot_distinguish, unknown_structure, nothing_found, insufficient };
+const char* to_string(Verdict verdict);
+
+/// What a cause is worth on flights that its parameters were not fitted to.
+struct Gain {
+  double held_out_nats = 0;
+  double rmse_before = 0, rmse_after = 0;          ///< of the window values in the cause's channels, m/s² or ln
+  double low_nats = 0, high_nats = 0;              ///< 95 %, over flights
+  double coverage_before = 0, coverage_after = 0;  ///< share of samples in the model's central 90 % interval
+};
+
+struct Separation {
+  std::string rival, manoeuvre;
+  std::optional<double> expected_nats;  ///< none: no manoeuvre of the list separates the two
+};
+
+struct NamedCause {
+  Accepted found;
+  Gain gain;
+  std::vector<Separation> separate_by;
+};
+
+struct StudyOptions {
+  SearchOptions search;
+  bool minimum_detectable = true;
+  bool dependence = true;           ///< whether what remains depends on something: no part of the verdict
+  std::size_t fewest_flights = 10;  ///< fewer do not warrant a name (core/study/README.md)
+};
+
+struct StudyResult {
+  Verdict verdict = Verdict::nothing_found;
+  std::vector<NamedCause> causes;
+  std::vector<UnknownStructure> unknown;
+  std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
+  /// Per cause and parameter: least size found with 80 % power.
+  std::map<std::string, std::map<std::string, double>> minimum_detectable;
+  double threshold = 0;  ///< nats
+  /// Every pair tested, ascending in p_holm; says nothing about the verdict. Empty with too few flights.
+  std::vector<Dependence> remaining;
+};
+
+/// The whole procedure on observed flights. About 0.3 s for 12 flights of 100 s, more with the minimum detectable
+/// effects.
+StudyResult study(const Observations& seen, const StudyOptions& options);
+
+/// Expected nats by which 12 further flights of a manoeuvre would separate a cause from its rival beyond what as many
+/// hovers on one spot would, for each manoeuvre of the list that brings 0.5 nats; best first. Never empty: where none
+/// does, one entry without a number says so.
+std::vector<Separation> separations(const Evidence& evidence, const Accepted& cause, const Rival& rival);
+
+/// Least first parameter of each testable cause that is found with 80 % power, by injection into sign-flipped
+/// residuals.
+std::map<std::string, std::map<std::string, double>> minimum_detectable(const Evidence& evidence,
+                                                                        const SearchOptions& options, double threshold);
+
+}  // namespace backwash::study

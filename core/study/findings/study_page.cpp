@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/study_page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+#include "core/report/page.hpp"
+#include "core/study/findings/page_sections.hpp"
+#include "core/study/findings/self_test.hpp"
+
+namespace backwash::study {
+namespace {
+
+/// What the picture of a cause shows of a window: the residual of its first channel, or, for walls, its part towards
+/// the nearest one. Nothing where it was not measured.
+std::optional<double> shown(const Effect& effect, const WindowRow& w, const Observations& seen, std::size_t i,
+                            Channel channel, const std::array<double, 2>& taken) {
+  if (!effect.towards_walls) {
+    if (!(seen.weight[channel][i] > 0)) return std::nullopt;
+    return seen.y[channel][i] - taken[channel == kMeanY ? 1 : 0];
+  }
+  if (w.around.walls.empty() || !(seen.weight[kMeanX][i] > 0)) return std::nullopt;
+  const auto nearest = std::min_element(w.around.walls.begin(), w.around.walls.end(),
+                                        [](auto& a, auto& b) { return a.first < b.first; });
+  return (seen.y[kMeanX][i] - taken[0]) * nearest->second.x() + (seen.y[kMeanY][i] - taken[1]) * nearest->second.y();
+}
+
+std::string verdict_sentence(const StudyResult& result, const Observations& seen) {
+  std::string names;
+  for (const auto& cause : result.causes) {
+    names += (names.empty() ? "" : ", ") + spoken(cause.found.form->cause());
+    for (const auto& rival : cause.found.rivals) names += " or " + spoken(rival.name);
+  }
+  const std::string of =
+      " (" + std::to_string(seen.flights) + " flights, " + std::to_string(seen.windows.size()) + " windows of 2 s)";
+  switch (result.verdict) {
+    case Verdict::cause_found:
+      return "The simulation misses " + names + of + "; with it, flights that were not fitted are likelier by " +
+             number(result.causes.front().gain.held_out_nats) + " nats.";
+    case Verdict::cannot_distinguish:
+      return "The simulation misses something that these flights cannot tell apart: " + names + of + ".";
+    case Verdict::unknown_structure:
+      return "The simulation is wrong along " + result.unknown.front().along + ", and no known cause fits" + of + ".";
+    case Verdict::insufficient:
+      return "Too little to name a cause: " + too_few(seen);
+    default:
+      return "Nothing found that the simulation gets wrong" + of + ", with " +
+             std::to_string(result.not_tested.size()) + " of " + std::to_string(effects().size()) +
+             " causes not tested.";
+  }
+}
+
+/// Residual of the cause's first channel against its variable, before and after, with means of twelve groups.
+tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, const Observations& seen) {
+  const auto& found = cause.found;
+  const Channel channel = found.columns.front().parts.front().channel;
+  const Regressor& along = found.form->effect->axis;
+  struct Point {
+    double x, before, after;
+  };
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    const double x = along.value(seen.windows[i]);
+    if (!std::isfinite(x)) continue;
+    std::array<double, 2> added{};  // to the channel; of a level push to y too
+    for (std::size_t k = 0; k < found.columns.size(); ++k)
+      for (const auto& part : found.columns[k].parts)
+        if (part.channel == channel || (channel == kMeanX && part.channel == kMeanY))
+          added[part.channel == kMeanY ? 1 : 0] += found.theta[static_cast<Eigen::Index>(k)] * part.x[i];
+    const auto& w = seen.windows[i];
+    const auto before = shown(*found.form->effect, w, seen, i, channel, {});
+    if (before) points.push_back({x, *before, *shown(*found.form->effect, w, seen, i, channel, added)});
+  }
+  std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
+  std::ostringstream script, dots, lines;
+  for (const auto& p : points) dots << p.x << ' ' << p.before << ' ' << p.after << '\n';
+  const std::size_t groups = std::min<std::size_t>(12, points.size());
+  for (std::size_t g = 0; g < groups; ++g) {
+    const std::size_t a = g * points.size() / groups, b = (g + 1) * points.size() / groups;
+    Point mean{0, 0, 0};
+    for (std::size_t i = a; i < b; ++i) {
+      const double n = static_cast<double>(b - a);
+      mean.x += points[i].x / n, mean.before += points[i].before / n, mean.after += points[i].after / n;
+    }
+    lines << mean.x << ' ' << mean.before << ' ' << mean.after << '\n';
+  }
+  script << "$dots << EOD\n"
+         << dots.str() << "EOD\n$lines << EOD\n"
+         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel 'missed: "
+         << (found.form->effect->towards_walls ? "mean towards that wall" : channel_name(channel))
+         << (channel <= kMeanZ ? ", m/s²" : "") << "'\nset key top right\nset grid\n"
+         << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
+         << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
+         << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
+         << "$lines using 1:3 with linespoints lw 3 pt 7 lc rgb '#1f6f9f' title 'after'\n";
+  return report::draw(script.str(), report::Format::svg, 860, 380);
+}
+
+std::string figures(const NamedCause& cause) {
+  const auto& g = cause.gain;
+  std::string text = "<table>\n";
+  for (const auto& e : cause.found.parameters)
+    text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
+  text += row("Probability of as much by chance, over everything tried", number(cause.found.p));
+  text += row("Gain on flights not fitted",
+              number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " + number(g.high_nats) + "]");
+  text += row("Error of the windows, before and after", number(g.rmse_before) + " → " + number(g.rmse_after));
+  text += row("Samples in the model's central 90 %, before and after",
+              number(g.coverage_before) + " → " + number(g.coverage_after));
+  for (const auto& s : cause.separate_by)
+    text += row("Not told from " + spoken(s.rival),
+                "fly next: " + s.manoeuvre +
+                    (s.expected_nats ? " (" + number(*s.expected_nats) + " nats expected from 12 flights)" : ""));
+  return text + "</table>\n";
+}
+
+std::string share(double value) { return number(100 * value) + " %"; }
+
+std::string plan_text(const Outcome& o) {
+  if (o.plan != "ok") return o.plan;
+  return number(o.length_m) + " m in " + number(o.time_s) + " s, " + number(100 * o.clearance_m) + " cm clear";
+}
+
+/// What field, reach and plan make of the causes.
+std::string consequence_section(const Consequence& c) {
+  const Outcome &b = c.before, &a = c.after;
+  std::string text =
+      "<section><h2>What it changes for a flight</h2>\n<table>\n<tr><th></th><td style=\"width:22%\"><b>before</b></td>"
+      "<td><b>after</b></td></tr>\n";
+  const auto line = [&](const std::string& name, const std::string& before, const std::string& after) {
+    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(before) + "</td><td>" +
+            report::escaped(after) + "</td></tr>\n";
+  };
+  line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
+  line("Hover sets: centre off its set-point, median (95 %)",
+       number(100 * b.shift_median) + " (" + number(100 * b.shift_95) + ") cm",
+       number(100 * a.shift_median) + " (" + number(100 * a.shift_95) + ") cm");
+  line("Hover sets: largest half width, median (95 %)",
+       number(100 * b.extent_median) + " (" + number(100 * b.extent_95) + ") cm",
+       number(100 * a.extent_median) + " (" + number(100 * a.extent_95) + ") cm");
+  if (b.safe + a.safe > 0) line("Flown places where hovering is safe", share(b.safe), share(a.safe));
+  if (!b.plan.empty()) {
+    const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
+    line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
+  }
+  return text + "</table>\n</section>\n";
+}
+
+/// Whether what the accepted causes leave depends on something.
+std::string remaining_section(const std::vector<Dependence>& all) {
+  if (all.empty()) return "";
+  std::string text = "<section><h2>What remains</h2>\n";
+  if (!all.front().found())
+    return text + "<p>No dependence left was found (smallest corrected p " + number(all.front().p_holm) + " of " +
+           std::to_string(all.size()) + " tested).</p>\n</section>\n";
+  text += "<p>What remains depends on the following; the verdict does not count it.</p>\n<table>\n";
+  for (const auto& d : all)
+    if (d.found()) text += row(d.group + " on " + d.regressor, "p " + number(d.p_holm) + ", corrected (Holm)");
+  return text + "</table>\n</section>\n";
+}
+
+}  // namespace
+
+tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
+                                                        const PageContext& context) {
+  std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
+  if (context.height) beside = height_sentence(*context.height);
+  if (!beside.empty()) beside.insert(0, " ");
+  page += "<p class=\"context\">Map " + report::escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
+          report::escaped(context.vehicle) + ", model " + report::escaped(context.model) + "; backwash " +
+          report::escaped(context.version) + "</p>\n<p class=\"verdict " +
+          (result.verdict == Verdict::cause_found || (result.verdict == Verdict::nothing_found && beside.empty())
+               ? "passed"
+               : "failed") +
+          "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
+          report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
+  for (const auto& cause : result.causes) {
+    const auto drawn = picture(cause, seen);
+    if (!drawn) return tl::make_unexpected(drawn.error());
+    page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause())) + "</h2>\n<p>" +
+            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
+  }
+  if (context.height) page += height_section(*context.height);
+  if (context.rotors) {
+    const auto section = rotor_section(*context.rotors);
+    if (!section) return tl::make_unexpected(section.error());
+    page += *section;
+  }
+  if (context.consequence) page += consequence_section(*context.consequence);
+  if (!result.unknown.empty()) {
+    page += "<section><h2>Without a name</h2>\n<table>\n";
+    for (const auto& u : result.unknown)
+      page += row(u.group + " along " + u.along, "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
+    page += "</table>\n</section>\n";
+  }
+  page += remaining_section(result.remaining);
+  page += "<section><h2>What was not tested, and why</h2>\n<table>\n";
+  for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
+  if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
+  page +=
+      "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
+      "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
+  if (result.minimum_detectable.empty()) page += row("Not computed, or none would show", "");
+  for (const auto& [cause, sizes] : result.minimum_detectable)
+    for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
+  page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
+  for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
+  page += "</table>\n</section>\n";
+  std::vector<std::string> told;
+  for (const auto& cause : result.causes) {
+    told.push_back(cause.found.form->cause());
+    for (const auto& rival : cause.found.rivals) told.push_back(rival.name);
+  }
+  page += self_test_section(told);
+  return report::html_page("backwash study", page);
+}
+
+}  // namespace backwash::study

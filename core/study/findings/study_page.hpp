@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+
+#include "core/report/plot.hpp"
+#include "core/study/calibrate/height_effect.hpp"
+#include "core/study/findings/consequence.hpp"
+#include "core/study/findings/study.hpp"
+#include "core/study/inference/rotor_reference.hpp"
+
+namespace backwash::study {
+
+/// What the page says beside the result.
+struct PageContext {
+  std::string map, model, vehicle;  ///< as given on the command line
+  std::string version;
+  std::optional<Consequence> consequence;  ///< of the accepted causes
+  std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
+  std::optional<calibrate::HeightEffects> height;
+};
+
+/// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,
+/// gain, what reach and plan make of it, rivals and the flight to fly next, what was not tested, smallest effects that
+/// would have been found. Error: a figure that could not be drawn.
+tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
+                                                        const PageContext& context);
+
+}  // namespace backwash::study

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "core/study/inference/evidence.hpp"
+
+namespace backwash::study {
+namespace {
+
+struct Member {
+  std::size_t group;
+  double weight, mean;
+};
+/// σ² of the members' means about those of their groups, by moments: Σw(m − m̄)² = (members − groups) s² + σ² (Σw −
+/// Σ_g Σw²/W_g), s²/w the error of a mean. Nothing where each group has one member.
+std::optional<double> between_by_moments(const std::vector<Member>& members, double s2) {
+  std::map<std::size_t, Eigen::Array4d> groups;  // Σw, Σwm, Σwm², Σw²
+  for (const auto& [group, w, m] : members)
+    groups.try_emplace(group, Eigen::Array4d::Zero()).first->second += Eigen::Array4d(w, w * m, w * m * m, w * w);
+  if (groups.size() == members.size()) return std::nullopt;
+  double square = 0, spread = 0;
+  for (const auto& [group, sum] : groups)
+    square += sum[2] - sum[1] * sum[1] / sum[0], spread += sum[0] - sum[3] / sum[0];
+  return (square - static_cast<double>(members.size() - groups.size()) * s2) / spread;
+}
+
+}  // namespace
+
+void Evidence::anova(Channel c, const std::vector<double>& r) {
+  double sse = 0, n = 0;
+  std::vector<Member> flights;
+  for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
+    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1];) {
+      double weight = 0, sum = 0, square = 0, count = 0;
+      for (const std::size_t end = flight_end_[i]; i < end; ++i) {
+        const double w = weight_[c][i];
+        weight += w, sum += w * r[i], square += w * r[i] * r[i], count += w > 0 ? 1 : 0;
+      }
+      if (count == 0) continue;
+      sse += square - sum * sum / weight, n += count;
+      flights.push_back({f, weight, sum / weight});
+    }
+  }
+  // A channel that is exact in every window (no dropout at all) keeps a least scatter.
+  const double least = c >= kMotor1 ? 1e-6 : 1e-8, groups = static_cast<double>(flights.size());
+  within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
+  const double built = built_scatter(c);
+  const auto inside = between_by_moments(flights, within_[c]);  // units of several flights: days
+  std::vector<Member> units;
+  if (!inside)
+    units = std::exchange(flights, {});
+  else
+    between_[c] = std::max(built * built, *inside);
+  for (const auto& f : flights) {
+    const double w = 1 / (within_[c] / f.weight + between_[c]);
+    if (units.empty() || units.back().group != f.group) units.push_back({f.group, 0, 0});
+    auto& unit = units.back();
+    unit.mean += w / (unit.weight + w) * (f.mean - unit.mean), unit.weight += w;
+  }
+  for (auto& unit : units) unit.group = 0;
+  const double across = between_by_moments(units, inside ? 1 : within_[c]).value_or(0);
+  if (inside)
+    unit_[c] = std::max(0.0, across);
+  else
+    between_[c] = std::max(built * built, across), unit_[c] = 0;
+}
+
+}  // namespace backwash::study

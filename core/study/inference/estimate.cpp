@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/inference/estimate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <nlopt.hpp>
+
+#include "core/study/effects/columns.hpp"
+
+namespace backwash::study {
+namespace {
+
+constexpr int kFine = 12;               // points of the finer grid of scales
+constexpr int kRounds = 2, kTurns = 4;  // of the likeliest shape; of where the craft is and how it is pushed there
+constexpr double kNormal975 = 1.959964;
+
+/// A shape of the cause at a scale, fitted to all flights, with its error by leaving each out.
+struct Member {
+  const Form* shape;
+  Scale scale;
+  double prior;
+  Normal normal;
+  SmallVector theta, error;
+  double height;  ///< ln likelihood over that without the cause
+};
+
+std::vector<Scale> fine_scales(const Form& form, const Scale& at) {
+  if (form.integer_scale || form.scales.size() < 2) return {at};
+  const double low = std::log(form.scales.front().value / 1.5), high = std::log(form.scales.back().value * 1.5);
+  std::vector<Scale> scales;
+  for (int i = 0; i < kFine; ++i) scales.push_back({std::exp(low + (high - low) * i / (kFine - 1))});
+  return scales;
+}
+
+/// Standard errors by the jackknife: √((n − 1)/n Σ (θ₋f − θ̄)²), one column of `left` per flight.
+Eigen::VectorXd jackknife(const Eigen::MatrixXd& left) {
+  const double n = static_cast<double>(left.cols());
+  return ((n - 1) / n * (left.colwise() - left.rowwise().mean()).rowwise().squaredNorm()).cwiseSqrt();
+}
+
+bool lower(const Member& a, const Member& b) { return a.height < b.height; }
+
+Member fitted(Normal normal, const Form* shape, const Scale& scale, double prior) {
+  Eigen::MatrixXd left(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size()));
+  SmallVector sum = SmallVector::Zero(normal.total.rows());
+  for (std::size_t f = 0; f < normal.b.size(); ++f) {
+    left.col(static_cast<Eigen::Index>(f)) = normal.fit_without(f);
+    sum += normal.b[f];
+  }
+  SmallVector theta = normal.fit();
+  const double height = 0.5 * theta.dot(sum);
+  return {shape, scale, prior, std::move(normal), theta, SmallVector(jackknife(left)), height};
+}
+
+using Objective = std::function<double(const std::vector<double>&)>;
+
+double evaluate(const std::vector<double>& x, std::vector<double>&, void* objective) {
+  return (*static_cast<Objective*>(objective))(x);
+}
+
+/// Where the objective is largest between the bounds; the start if the solver fails.
+std::vector<double> polished(const std::vector<double>& start, double step, const std::vector<double>& low,
+                             const std::vector<double>& high, Objective objective) {
+  nlopt::opt solver(nlopt::LN_NELDERMEAD, static_cast<unsigned>(start.size()));
+  solver.set_max_objective(evaluate, &objective);
+  solver.set_lower_bounds(low), solver.set_upper_bounds(high);
+  solver.set_initial_step(step);
+  solver.set_xtol_abs(step / 100);
+  solver.set_maxeval(60);
+  std::vector<double> best = start;
+  try {
+    double f = 0;
+    solver.optimize(best, f);
+  } catch (const std::exception&) {
+    return start;
+  }
+  return best;
+}
+
+/// What of a rotor's deviation is how the craft was built, the same in each of its flights: of θ = Σ x y / Σ x².
+double built_error(const Column& column) {
+  const Channel c = column.parts.front().channel;
+  double square = 0;
+  for (const auto& part : column.parts)
+    if (!part.x.empty() && built_scatter(part.channel) == built_scatter(c)) square += part.x.front() * part.x.front();
+  return square > 0 ? built_scatter(c) / std::sqrt(square) : 0;
+}
+
+/// The form at a level offset.
+Column with_map_moved(const Windows& windows, double x, double y) { return displaced(windows, {x, y, 0}).front(); }
+
+/// Standard errors of the offset (x, y) that fits best: jackknife of the fit's linearisation there.
+Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>& nuisance, double x, double y) {
+  constexpr double kDifference = 0.05;  // m
+  const auto& windows = evidence.seen().windows;
+  const auto slope = [&](double dx, double dy) {
+    Column high = with_map_moved(windows, x + dx, y + dy);
+    const Column low = with_map_moved(windows, x - dx, y - dy);
+    for (std::size_t k = 0; k < high.parts.size(); ++k)
+      for (std::size_t i = 0; i < windows.size(); ++i)
+        high.parts[k].x[i] = (high.parts[k].x[i] - low.parts[k].x[i]) / (2 * kDifference);
+    return high;
+  };
+  const Normal n =
+      evidence.normal({slope(kDifference, 0), slope(0, kDifference), with_map_moved(windows, x, y)}, nuisance);
+  Eigen::MatrixXd left(2, static_cast<Eigen::Index>(n.b.size()));
+  for (std::size_t out = 0; out < n.b.size(); ++out) {
+    Eigen::Matrix2d A = 1e-9 * Eigen::Matrix2d::Identity();
+    Eigen::Vector2d b = Eigen::Vector2d::Zero();
+    for (std::size_t f = 0; f < n.b.size(); ++f)
+      if (f != out) A += n.A[f].topLeftCorner(2, 2), b += n.b[f].head(2) - n.A[f].col(2).head(2);
+    left.col(static_cast<Eigen::Index>(out)) = A.ldlt().solve(b);
+  }
+  return jackknife(left);
+}
+
+/// The offset o at which ln Σ(p + o) − ln Σ(p), share 1, is likeliest.
+void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
+  const auto& windows = evidence.seen().windows;
+  auto nuisance = offsets(cause.columns, evidence.seen());
+  nuisance.insert(nuisance.end(), others.begin(), others.end());
+  const auto height = [&](const std::vector<double>& o) {
+    const Normal n = evidence.normal({with_map_moved(windows, o[0], o[1])}, nuisance);
+    double sum = 0;
+    for (std::size_t f = 0; f < n.b.size(); ++f) sum += n.b[f][0] - 0.5 * n.A[f](0, 0);
+    return sum;
+  };
+  const Vec3 start = cause.scale.offset_W;
+  const double far = kOffsetStep * (kOffsetsAside - 1) / 2;
+  const auto best = polished({start.x(), start.y()}, 0.1, {-far, -far}, {far, far}, height);
+  cause.scale.offset_W = whole_millimetres({best[0], best[1], 0});
+  cause.columns = cause.form->columns(windows, cause.scale);
+  cause.theta = SmallVector::Ones(1);
+  const Normal own = evidence.normal(cause.columns, nuisance);
+  if (own.solvable) cause.gain = own.gain();
+  const Eigen::VectorXd error =
+      student_975(static_cast<double>(own.b.size()) - 1) * offset_error(evidence, nuisance, best[0], best[1]);
+  cause.parameters = {{"x_m", best[0], best[0] - error[0], best[0] + error[0]},
+                      {"y_m", best[1], best[1] - error[1], best[1] + error[1]}};
+}
+
+/// All shapes of a form at all scales, fitted where the craft was.
+struct Family {
+  const Evidence& evidence;
+  const std::vector<Column>& others;
+  Scale scale;               ///< of a form without a grid of scales
+  std::vector<Form> shapes;  ///< the form itself first
+  Windows windows;
+  std::vector<Member> members = {};  ///< in the order of shapes and scales
+
+  Normal normal_at(const Form& shape, const Scale& at) const {
+    const auto columns = shape.columns(windows, at);
+    auto nuisance = shape.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
+    nuisance.insert(nuisance.end(), others.begin(), others.end());
+    return evidence.normal(columns, nuisance);
+  }
+
+  void fit() {
+    members.clear();
+    for (const Form& shape : shapes) {
+      const auto scales = fine_scales(shape, scale);
+      for (const Scale& at : scales) {
+        Normal n = normal_at(shape, at);
+        if (n.solvable) members.push_back(fitted(std::move(n), &shape, at, 1.0 / static_cast<double>(scales.size())));
+      }
+    }
+  }
+
+  /// Moves the craft to where the likeliest shape pushes it, and fits again there.
+  void follow_push() {
+    for (int i = 0; i < kRounds && !members.empty(); ++i) {
+      Member now = *std::max_element(members.begin(), members.end(), lower);
+      for (int k = 0; k < kTurns; ++k) {
+        windows = moved_by(evidence.seen().windows, now.shape->columns(windows, now.scale), now.theta);
+        now.theta = normal_at(*now.shape, now.scale).fit();
+      }
+      fit();
+    }
+  }
+
+  /// How many members are of the form itself.
+  std::size_t own() const {
+    return static_cast<std::size_t>(
+        std::count_if(members.begin(), members.end(), [&](auto& m) { return m.shape == &shapes[0]; }));
+  }
+
+  /// The form itself at its likeliest scale. Precondition: own() > 0.
+  Member best_own() const {
+    const auto n = static_cast<std::ptrdiff_t>(own());
+    const Member& start = *std::max_element(members.begin(), members.begin() + n, lower);
+    if (n == 1) return start;
+    const double low = std::log(members.front().scale.value), high = std::log(members[own() - 1].scale.value);
+    const auto height = [&](const std::vector<double>& ln) {
+      Normal normal = normal_at(shapes[0], {std::exp(ln[0])});
+      return normal.solvable ? fitted(std::move(normal), nullptr, {}, 0).height : -1.0;  // no height is negative
+    };
+    const double at =
+        std::exp(polished({std::log(start.scale.value)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
+    return fitted(normal_at(shapes[0], {at}), &shapes[0], {at}, 0);
+  }
+
+  /// Each parameter, averaged over the members. `columns`: of the form itself.
+  std::vector<Estimate> parameters(const std::vector<Column>& columns) const {
+    const double highest = std::max_element(members.begin(), members.end(), lower)->height;
+    const double wide = student_975(static_cast<double>(members.front().normal.b.size()) - 1) / kNormal975;
+    std::vector<Estimate> all;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const double unknowable =
+          k == 0 ? shapes[0].unknowable(evidence.seen()) / std::sqrt(3.0) : 0.0;  // any value alike
+      std::vector<Guess> guesses;
+      for (const auto& m : members) {
+        const auto i = static_cast<Eigen::Index>(k);
+        guesses.push_back({m.prior * std::exp(m.height - highest), m.theta[i],
+                           wide * std::hypot(m.error[i], built_error(columns[k]), unknowable)});
+      }
+      all.push_back(averaged(shapes[0].parameters[k], guesses));
+    }
+    return all;
+  }
+
+  /// Interval of the form's own scale, by likelihood over its grid.
+  Estimate scale_interval(const Member& best) const {
+    std::vector<Guess> guesses;
+    const double step = std::log(members[1].scale.value / members[0].scale.value);
+    for (std::size_t i = 0; i < own(); ++i)
+      guesses.push_back({std::exp(members[i].height - best.height), std::log(members[i].scale.value), step / 2});
+    const Estimate ln = averaged(shapes[0].scale_name, guesses);
+    return {ln.name, best.scale.value, std::exp(ln.low), std::exp(ln.high)};
+  }
+};
+
+}  // namespace
+
+void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
+  const Form& form = *cause.form;
+  if (form.displaces_map) return refine_offset(evidence, cause, others);
+  Family family{evidence, others, cause.scale, form.shapes, evidence.seen().windows};
+  family.shapes.insert(family.shapes.begin(), form);
+  family.fit();
+  if (form.by_place) family.follow_push();
+  if (family.own() == 0) return;
+  const Member best = family.best_own();
+  cause.scale = best.scale, cause.theta = best.theta, cause.gain = best.normal.gain();
+  cause.columns = form.columns(family.windows, cause.scale);
+  cause.parameters = family.parameters(cause.columns);
+  if (family.own() > 1) {
+    cause.parameters.push_back(family.scale_interval(best));
+  } else if (!form.scale_name.empty()) {
+    const double value = cause.scale.value + (form.integer_scale ? 1 : 0);  // rotors count from 1
+    cause.parameters.push_back({form.scale_name, value, value, value});
+  }
+}
+
+bool excludes_zero(const Normal& normal, const std::vector<Column>& columns) {
+  const double t = student_975(static_cast<double>(normal.b.size()) - 1);
+  const Member fit = fitted(normal, nullptr, {}, 0);
+  for (Eigen::Index k = 0; k < fit.theta.size(); ++k)
+    if (std::abs(fit.theta[k]) > t * std::hypot(fit.error[k], built_error(columns[static_cast<std::size_t>(k)])))
+      return true;
+  return false;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "core/study/effects/smooths.hpp"
+
+namespace backwash::study {
+
+inline constexpr int kMostColumns = 16;
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
+
+/// Normal equations of some columns per flight, with nuisance columns projected out of them and of the data:
+/// A_f = X̃ᵀV⁻¹X̃, b_f = X̃ᵀV⁻¹ỹ over the windows of flight f.
+struct Normal {
+  std::vector<SmallMatrix> A;
+  std::vector<SmallVector> b;
+  std::vector<SmallMatrix> left_out;  ///< (ΣA − A_f)⁻¹
+  SmallMatrix total;                  ///< ΣA
+  bool solvable = false;              ///< every flight may be left out
+
+  /// θ = (ΣA)⁻¹ Σ s_f b_f.
+  SmallVector fit(const std::vector<int>& signs = {}) const;
+  /// θ₋f.
+  SmallVector fit_without(std::size_t flight) const;
+  /// Held-out gain in nats: Σ_f θ₋fᵀ s_f b_f − ½ θ₋fᵀ A_f θ₋f, flights' residuals multiplied by signs ±1.
+  double gain(const std::vector<int>& signs = {}) const;
+  std::vector<double> gain_per_flight() const;
+};
+
+/// Scatter between the rotors and sensors of a craft that is no effect and that no number of flights averages out.
+double built_scatter(Channel c);
+
+/// A column seen in axes of which the scatter is independent: ln variance along x, y and z wanders as one (gusts are
+/// strong or weak along all axes), so its three channels become √3 times their mean, (x − y)/√2 and (x + y − 2z)/√6.
+Column decorrelated(const Column& column);
+
+/// Observations with the scatter of each channel (after `decorrelated`): within flights (σ_w²) and between them (σ_b²,
+/// a random intercept), by analysis of variance of what the accepted columns leave. V = diag(σ_w²/weight) + σ_b² 11ᵀ
+/// per flight and channel, and in the level means + σ_t² ZZᵀ, Z the body's two level axes: craft are trimmed anew
+/// before each flight. Where several flights make one unit (`Observations::first` of days), flights of a unit have
+/// σ_b², and units σ_u² beside it. A window's mean weighs more where its own variance, shrunk towards its flight's, is
+/// small.
+class Evidence {
+ public:
+  explicit Evidence(const Observations& seen);
+  const Observations& seen() const noexcept { return *seen_; }
+
+  /// Takes the accepted columns (with the offsets of their channels) out and estimates the scatter of what is left.
+  void whiten(const std::vector<Column>& accepted);
+
+  /// Normal equations of `columns`, `nuisance` projected out (columns of it that others span are ignored).
+  Normal normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const;
+  /// Mean of x xᵀ, by weight, over the measured windows of the channels that the columns move: √(θᵀ size θ) is the root
+  /// mean square of Σ θ x.
+  SmallMatrix size(const std::vector<Column>& columns) const;
+  /// What `columns`, fitted to all flights, leave of each channel (decorrelated), in units of its scatter within
+  /// flights: each flight's own mean and, in the level means, its own trim (shrunk by σ_t²) taken out; 0 where not
+  /// measured.
+  Column whitened(const std::vector<Column>& columns) const;
+  /// Whether a window measures a channel (decorrelated).
+  bool measured(Channel c, std::size_t window) const { return weight_[c][window] > 0; }
+  double within(Channel c) const { return within_[c]; }
+  double between(Channel c) const { return between_[c]; }
+  double between_units(Channel c) const { return unit_[c]; }  ///< of several flights each; 0 where a unit is a flight
+
+ private:
+  /// XᵀV⁻¹X of each flight, X the columns and last y.
+  std::vector<Eigen::MatrixXd> grams(const std::vector<const Column*>& columns) const;
+  Column residual(const std::vector<Column>& columns) const;
+  void take_flights_out(Column& residual) const;
+  void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const;
+  void anova(Channel c, const std::vector<double>& residual);
+  void weigh_means(const std::vector<double>& ln_variance);
+  double trim_scatter(const Column& residual) const;
+
+  const Observations* seen_;
+  Column y_;  // every channel, decorrelated
+  std::array<std::vector<double>, kChannels> weight_;
+  std::vector<Column> tilts_;            // Z; empty without attitude
+  std::vector<std::size_t> flight_end_;  // per window, where its flight ends
+  std::array<double, kChannels> within_{}, between_{}, unit_{};
+  double tilt_ = 0;  // σ_t²
+};
+
+}  // namespace backwash::study

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/inference/intervals.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/study/windows/distributions.hpp"
+
+namespace backwash::study {
+
+double student_975(double degrees) { return student_quantile(0.975, degrees); }
+
+Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
+  double total = 0, value = 0, low = guesses.front().value, high = low;
+  for (const auto& g : guesses) {
+    total += g.weight, value += g.weight * g.value;
+    low = std::min(low, g.value - 6 * g.error), high = std::max(high, g.value + 6 * g.error);
+  }
+  value /= total;
+  const auto quantile = [&](double p) {
+    double a = low, b = high;
+    for (int i = 0; i < 60; ++i) {
+      const double q = (a + b) / 2;
+      double below = 0;
+      for (const auto& g : guesses)
+        below +=
+            g.weight / total * (g.error > 0 ? 0.5 * std::erfc((g.value - q) / g.error / std::sqrt(2.0)) : q >= g.value);
+      (below < p ? a : b) = q;
+    }
+    return (a + b) / 2;
+  };
+  return {name, value, quantile(0.025), quantile(0.975)};
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+/// Distributions of small samples and special functions, by Boost.Math; NaN where they are not defined.
+namespace backwash::study {
+
+/// Quantile p of Student's t with `degrees` of freedom.
+double student_quantile(double p, double degrees);
+/// Quantile p of the F distribution with `above` and `below` degrees of freedom.
+double f_quantile(double p, double above, double below);
+/// ψ(x) = d ln Γ(x)/dx, and its derivative ψ'(x).
+double digamma(double x);
+double trigamma(double x);
+
+}  // namespace backwash::study

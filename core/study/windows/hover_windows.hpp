@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/log/flight_log.hpp"
+#include "core/study/windows/band.hpp"
+#include "core/study/windows/gate.hpp"
+#include "core/types/geometry.hpp"
+#include "core/types/vehicle.hpp"
+
+namespace backwash::study {
+
+/// What stands for the disturbance w (docs/model.md section 3).
+enum class Signal {
+  commanded,  ///< w = a − what the rotors were told to give: set-points in the log, gains in the vehicle file
+  divided,    ///< raw acceleration; the closed loop's attenuation divided out of the variance
+  raw,        ///< raw acceleration as it is: no vehicle known, so no attenuation either
+};
+const char* to_string(Signal signal) noexcept;
+
+/// The disturbance during one stretch of hover. Vectors hold one number per axis of W.
+struct Window {
+  double t_s;                                  ///< of its first row
+  int segment;                                 ///< hover position: the log's column, or numbered from 0 as found
+  Vec3 p_W;                                    ///< mean position, m
+  std::optional<Eigen::Quaterniond> attitude;  ///< mean, body to world; nothing without qw … qz
+  double speed_mps;                            ///< root mean square of the velocity
+  Vec3 mean;                                   ///< of the disturbance, m/s²
+  Vec3 variance;           ///< of the disturbance within the band, (m/s²)²; mean square of the filtered signal
+  Vec3 effective_samples;  ///< independent samples that this variance is worth, from the autocorrelation
+  Vec3 tau_w;              ///< correlation time, s, of the stretch of windows it belongs to
+};
+
+/// A flight, cut into windows.
+struct FlightWindows {
+  Signal signal = Signal::raw;
+  Band band;         ///< that the log's rate allows
+  double rate_hz{};  ///< mean rate of the rows
+  Vec3 attenuation;  ///< var(a)/var(w) that was divided out, per axis; 1 for Signal::commanded and raw
+  bool segments_from_log = false;
+  std::array<std::size_t, kHoverGates> gated{};  ///< windows left out, by Gate
+  std::vector<std::string> not_tested;           ///< gates without the columns they need, and which those are
+  std::vector<Window> windows;
+};
+
+struct WindowOptions {
+  double length_s = 2;            ///< of a window
+  Band band;                      ///< of the variance
+  double tau_w = 0.15;            ///< s, assumed when an attenuation is divided out (Model::bound.tau_w)
+  double settle_s = 1;            ///< at the start of each hover, counted as transit
+  double still_mps = 0.12;        ///< hovers found by themselves are slower than this, averaged over half a second
+  double perched_m = 0.0003;      ///< largest standard deviation of the position of a vehicle that stands
+  double perched_thrust = 0.7;    ///< of the weight
+  double saturated_share = 0.02;  ///< of a window's rows
+};
+
+/// Cuts a flight into gated windows (docs/model.md section 3). Needs x_m y_m z_m and ax_mps2 ay_mps2 az_mps2.
+///
+///   w = a − r,  lag·ṙ = u − r,  u = a_cmd(t − latency) + k_p (p_cmd(t − latency) − p(t − delay)) + k_d (v_cmd … − v …)
+///
+/// with lag, latency and feedback delay of the vehicle file; all zero, this is w = a + k_p e + k_d ė − a_cmd. Rows are
+/// brought to even spacing by linear interpolation between gaps (more than 5 mean periods and 50 ms). Segments come
+/// from the column `segment`, else from the speed of the command (with set-points) or of the vehicle. Windows touch
+/// neither each other nor a gated row; filters run over unbroken stretches of good windows alone. A gated window counts
+/// once, for the first of frozen, perched, saturated that holds. `path` names the log in errors: bad_data, with the
+/// column that is missing, time that does not rise, or a log shorter than a window. O(rows).
+tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& log,
+                                                          const std::optional<Vehicle>& vehicle,
+                                                          const WindowOptions& options, const std::string& path);
+
+}  // namespace backwash::study

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "core/study/windows/signals.hpp"
+#include "core/study/windows/stretch.hpp"
+
+namespace backwash::study {
+
+template <typename F>
+std::vector<double> detrended_values(Stretch w, F value) {
+  std::vector<double> x;
+  for (std::size_t i = w.begin; i < w.end; ++i) x.push_back(value(i));
+  return detrended(x);
+}
+
+/// Slope over the neighbours.
+template <typename F>
+std::vector<double> rates(const Series& s, Stretch w, F value) {
+  std::vector<double> x;
+  for (std::size_t i = w.begin; i < w.end; ++i) {
+    const std::size_t a = i > 0 ? i - 1 : 0, b = std::min(i + 1, s.size() - 1);
+    x.push_back((value(b) - value(a)) / (s.t[b] - s.t[a]));
+  }
+  return detrended(x);
+}
+
+/// Σ z·y and Σ z·x of detrended z over √Σz²: one row of an instrumental regression; nothing without excitation.
+struct Moment {
+  double y = 0, square = 0;
+  std::vector<double> z;
+  explicit Moment(std::vector<double> instrument) : z(std::move(instrument)) {
+    for (const double v : z) square += v * v;
+  }
+  double with(const std::vector<double>& x) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < z.size(); ++i) sum += z[i] * x[i];
+    return sum / std::sqrt(square);
+  }
+  bool excited(double least_rms) const { return square > least_rms * least_rms * static_cast<double>(z.size()); }
+};
+
+/// First stage of the thrust's instrumental regression: how the commanded thrust T/m − g and the rate ȧ of the
+/// acceleration along it follow z, the set-points' own vertical acceleration and its rate. In a closed loop neither is
+/// the nominal one: the feedback commands less of a steeper thrust, and earlier of a late one. Sums of z zᵀ and
+/// z (T/m, ȧ) over all windows, in which the gusts' part averages out.
+struct FirstStage {
+  Eigen::Matrix2d instruments = Eigen::Matrix2d::Zero(), followed = Eigen::Matrix2d::Zero();
+  void add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust);
+  /// Columns: T/m − g and ȧ as combinations of z = (level, rate); the nominal itself where nothing was excited.
+  Eigen::Matrix2d coefficients() const;
+};
+
+/// A delay of set-points by τ makes a difference a(t − τ) − a(t) that is proportional to τ only while it is short
+/// against what the set-points do (at 0.06 s, 13 % less). So the design is the difference per second at the delay that
+/// the windows together show: its fixed point τ = Σ g(τ) y/Σ g(τ)².
+inline constexpr std::array<double, 8> kShifts = {-0.06, -0.03, 0, 0.03, 0.06, 0.1, 0.15, 0.2};  // s
+class DelayStage {
+ public:
+  using PerSecond = std::array<double, kShifts.size()>;  ///< design at each shift; at 0 its limit
+  void add(std::size_t window, double y, const PerSecond& design) { seen_.push_back({window, y, design}); }
+  /// Window and design at the fixed point.
+  std::vector<std::pair<std::size_t, double>> designs() const;
+
+ private:
+  struct Seen {
+    std::size_t window;
+    double y;
+    PerSecond design;
+  };
+  std::vector<Seen> seen_;
+};
+
+}  // namespace backwash::study

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/log_stretch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace backwash::study {
+bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit) {
+  return log.has(prefix + "x" + unit) && log.has(prefix + "y" + unit) && log.has(prefix + "z" + unit);
+}
+
+namespace {
+
+/// The rows of a log at even times.
+class Resampler {
+ public:
+  Resampler(const log::FlightLog& log, Span rows, double rate) : log_(log) {
+    const auto& t = log.t_s;
+    const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + 1e-6) + 1;
+    std::size_t row = rows.begin;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double time = t[rows.begin] + static_cast<double>(k) / rate;
+      while (row + 2 < rows.end && t[row + 1] <= time) ++row;
+      const std::size_t next = std::min(row + 1, rows.end - 1);
+      const double share = next > row ? std::clamp((time - t[row]) / (t[next] - t[row]), 0.0, 1.0) : 0;
+      at_.push_back({row, next, share});
+    }
+  }
+  std::size_t size() const { return at_.size(); }
+  std::size_t nearest(std::size_t k) const { return at_[k].share < 0.5 ? at_[k].row : at_[k].next; }
+  Rows column(const std::string& name) const {
+    Rows even;
+    const auto& c = log_.column(name);
+    for (const auto& [row, next, share] : at_) even.push_back((1 - share) * c[row] + share * c[next]);
+    return even;
+  }
+  std::vector<Vec3> xyz(const std::string& prefix, const std::string& unit) const {
+    const Rows x = column(prefix + "x" + unit), y = column(prefix + "y" + unit), z = column(prefix + "z" + unit);
+    std::vector<Vec3> even;
+    for (std::size_t k = 0; k < size(); ++k) even.emplace_back(x[k], y[k], z[k]);
+    return even;
+  }
+
+ private:
+  struct At {
+    std::size_t row, next;
+    double share;
+  };
+  const log::FlightLog& log_;
+  std::vector<At> at_;
+};
+
+/// Value `delay` seconds before row k; the first row's before the stretch begins.
+Vec3 before(const std::vector<Vec3>& x, std::size_t k, double delay_s, double rate) {
+  const double at = std::max(0.0, static_cast<double>(k) - delay_s * rate);
+  const auto low = std::min(static_cast<std::size_t>(at), x.size() - 1), high = std::min(low + 1, x.size() - 1);
+  const double share = at - static_cast<double>(low);
+  return (1 - share) * x[low] + share * x[high];
+}
+
+std::vector<Vec3> differentiated(const std::vector<Vec3>& x, double rate) {
+  std::vector<Vec3> rates;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const std::size_t low = k > 0 ? k - 1 : 0, high = std::min(k + 1, x.size() - 1);
+    rates.push_back(high > low ? Vec3((x[high] - x[low]) * rate / static_cast<double>(high - low)) : Vec3::Zero());
+  }
+  return rates;
+}
+
+/// a minus what the rotors produce on the commands, by the vehicle's gains, delays and lag.
+std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log::FlightLog& log,
+                                 const Vehicle& vehicle) {
+  const auto& c = vehicle.controller;
+  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
+  const auto cmd_p = rows.xyz("cmd_", "_m");
+  const auto cmd_v = has_xyz(log, "cmd_v", "_mps") ? rows.xyz("cmd_v", "_mps") : differentiated(cmd_p, e.rate);
+  const auto cmd_a =
+      has_xyz(log, "cmd_a", "_mps2") ? rows.xyz("cmd_a", "_mps2") : std::vector<Vec3>(e.size(), Vec3::Zero());
+  const double follows = c.attitude_lag > 0 ? 1 - std::exp(-1 / (c.attitude_lag * e.rate)) : 1;
+  std::vector<Vec3> w;
+  Vec3 rotors = Vec3::Zero(), last = Vec3::Zero();
+  for (std::size_t k = 0; k < e.size(); ++k) {
+    const Vec3 u = before(cmd_a, k, c.latency, e.rate) +
+                   kp.cwiseProduct(before(cmd_p, k, c.latency, e.rate) - before(e.p, k, c.feedback_delay, e.rate)) +
+                   kd.cwiseProduct(before(cmd_v, k, c.latency, e.rate) - before(e.v, k, c.feedback_delay, e.rate));
+    const Vec3 driven = c.attitude_lag > 0 ? Vec3(0.5 * (last + u)) : u;
+    rotors = k == 0 ? u : Vec3(rotors + follows * (driven - rotors));
+    last = u;
+    w.push_back(e.a[k] - rotors);
+  }
+  return w;
+}
+
+/// Rows whose position is exactly that of the row before, at least four and 0.1 s in a row.
+std::vector<char> frozen_rows(const log::FlightLog& log, Span rows) {
+  const Rows &x = log.column("x_m"), &y = log.column("y_m"), &z = log.column("z_m");
+  std::vector<char> frozen(rows.size());
+  for (std::size_t i = rows.begin + 1; i < rows.end;) {
+    std::size_t end = i;
+    while (end < rows.end && x[end] == x[end - 1] && y[end] == y[end - 1] && z[end] == z[end - 1]) ++end;
+    if (end - i >= 3 && log.t_s[end - 1] - log.t_s[i - 1] >= 0.1)
+      std::fill(frozen.begin() + static_cast<std::ptrdiff_t>(i - 1 - rows.begin),
+                frozen.begin() + static_cast<std::ptrdiff_t>(end - rows.begin), char{1});
+    i = std::max(end, i + 1);
+  }
+  return frozen;
+}
+
+/// Hover positions found by the speed, averaged over half a second.
+std::vector<int> found_segments(const std::vector<Vec3>& path, double rate, double still_mps, int& next) {
+  const auto half = static_cast<std::size_t>(std::max(1.0, std::round(0.25 * rate)));
+  std::vector<int> segment(path.size(), -1);
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const std::size_t low = k > half ? k - half : 0, high = std::min(k + half, path.size() - 1);
+    const double seconds = static_cast<double>(high - low) / rate;
+    const bool still = seconds > 0 && (path[high] - path[low]).norm() < still_mps * seconds;
+    if (still) segment[k] = k > 0 && segment[k - 1] >= 0 ? segment[k - 1] : next++;
+  }
+  return segment;
+}
+
+}  // namespace
+
+Even even_stretch(const log::FlightLog& log, Span raw, double rate, Signal signal,
+                  const std::optional<Vehicle>& vehicle, const WindowOptions& options, int& next_segment) {
+  const Resampler rows(log, raw, rate);
+  Even e{log.t_s[raw.begin], rate, rows.xyz("", "_m"), {}, rows.xyz("a", "_mps2"), {}, {}, {}, {}, {}, {}, {}};
+  e.v = has_xyz(log, "v", "_mps") ? rows.xyz("v", "_mps") : differentiated(e.p, rate);
+  if (log.has("qw") && log.has("qx") && log.has("qy") && log.has("qz")) {
+    for (std::size_t k = 0; k < e.size(); ++k) {
+      const auto i = rows.nearest(k);
+      e.q.emplace_back(log.column("qw")[i], log.column("qx")[i], log.column("qy")[i], log.column("qz")[i]);
+    }
+  }
+  if (log.has("thrust")) e.thrust = rows.column("thrust");
+  for (const char* name : {"thrust", "motor1", "motor2", "motor3", "motor4"}) {
+    if (!log.has(name)) continue;
+    const Rows command = rows.column(name);
+    if (e.fullest.empty()) e.fullest = e.emptiest = command;
+    for (std::size_t k = 0; k < e.size(); ++k) {
+      e.fullest[k] = std::max(e.fullest[k], command[k]);
+      e.emptiest[k] = std::min(e.emptiest[k], command[k]);
+    }
+  }
+  const auto frozen = frozen_rows(log, raw);
+  for (std::size_t k = 0; k < e.size(); ++k) e.frozen.push_back(frozen[rows.nearest(k) - raw.begin]);
+  if (log.has("segment")) {
+    for (std::size_t k = 0; k < e.size(); ++k)
+      e.segment.push_back(static_cast<int>(std::lround(log.column("segment")[rows.nearest(k)])));
+  } else {
+    const bool commanded = has_xyz(log, "cmd_", "_m");
+    e.segment = found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate, commanded ? 0.01 : options.still_mps,
+                               next_segment);
+  }
+  e.w = signal == Signal::commanded ? beyond_command(e, rows, log, *vehicle) : e.a;
+  return e;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/observation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "core/study/windows/gates.hpp"
+#include "core/study/windows/instrument.hpp"
+#include "core/study/windows/rotor_channels.hpp"
+#include "core/study/windows/series.hpp"
+#include "core/study/windows/signals.hpp"
+#include "core/study/windows/stretch.hpp"
+#include "core/study/windows/texture.hpp"
+
+namespace backwash::study {
+namespace {
+
+constexpr double kLeastGusts = 0.2;  // share of a window's variance that is left when noise is taken out
+constexpr double kStray = 0.3;       // m: a craft farther from where its set-points lead does not follow them
+
+template <typename T, typename F>
+T mean(Stretch w, T sum, F value) {
+  for (std::size_t i = w.begin; i < w.end; ++i) sum += value(i) / static_cast<double>(w.size());
+  return sum;
+}
+
+/// The attitude without its tilt, which answers the gusts as the thrust does.
+Mat3 heading(const Mat3& R_WB) {
+  return Eigen::AngleAxisd(std::atan2(R_WB(1, 0), R_WB(0, 0)), Vec3::UnitZ()).toRotationMatrix();
+}
+
+}  // namespace
+
+const char* channel_name(Channel c) {
+  static const char* const kNames[] = {"mean x",
+                                       "mean y",
+                                       "mean z",
+                                       "ln variance x",
+                                       "ln variance y",
+                                       "ln variance z",
+                                       "tail",
+                                       "thrust delay",
+                                       "thrust slope",
+                                       "command delay, level",
+                                       "command delay, z",
+                                       "line 1",
+                                       "line 2",
+                                       "line 3",
+                                       "line 4",
+                                       "motor 1",
+                                       "motor 2",
+                                       "motor 3",
+                                       "motor 4",
+                                       "rpm 1",
+                                       "rpm 2",
+                                       "rpm 3",
+                                       "rpm 4",
+                                       "dropout 1",
+                                       "dropout 2",
+                                       "dropout 3",
+                                       "dropout 4"};
+  return kNames[c];
+}
+
+bool Observations::measured(Channel c) const {
+  return std::any_of(weight[c].begin(), weight[c].end(), [](double w) { return w > 0; });
+}
+
+Observer::Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid)
+    : vehicle_(vehicle), own_(std::in_place, grid, model), surroundings_(*own_) {
+  seen_.first.push_back(0);
+}
+
+Observer::Observer(const Vehicle& vehicle, Surroundings& surroundings)
+    : vehicle_(vehicle), surroundings_(surroundings) {
+  seen_.first.push_back(0);
+}
+
+void Observer::add(const log::FlightLog& log) {
+  const Series s = series_of(log, vehicle_);
+  for (const auto& [name, column] : log.columns) ever_.insert(name);
+  ++seen_.flights;
+  if (s.size() >= kFewest) {
+    const auto rotors = rotor_phases(log, s);
+    std::vector<Stretch> good;
+    for (const Stretch w : cut(s)) {
+      auto why = gate(s, log, w);
+      if (!why) why = misplaced(s, w);
+      if (why)
+        ++seen_.gated_out[*why];
+      else
+        good.push_back(w);
+    }
+    add_windows(log, s, rotors, good);
+  }
+  seen_.first.push_back(seen_.windows.size());
+}
+
+std::optional<Gate> Observer::misplaced(const Series& s, Stretch w) const {
+  for (const auto* x : {&s.p, &s.p_nominal})
+    for (std::size_t i = w.begin; i < w.end && !x->empty(); ++i)
+      if (!surroundings_.near((*x)[i])) return Gate::outside;
+  if (surroundings_.inside_solid(s.p[(w.begin + w.end) / 2])) return Gate::inconsistent;
+  return std::nullopt;
+}
+
+void Observer::smooth_voltage() {
+  const auto windows = std::span(seen_.windows).subspan(seen_.first.back());
+  std::vector<double> t, volts;
+  for (const auto& w : windows) t.push_back(w.t), volts.push_back(w.voltage);
+  const auto course = slow_course(t, volts);
+  for (std::size_t i = 0; i < windows.size(); ++i) windows[i].voltage = course[i];
+}
+
+void Observer::put_tails() {
+  std::vector<Fourth> whole;
+  std::vector<std::size_t> of;
+  for (std::size_t i = 0; i < tails_.size(); ++i)
+    if (tails_[i].at_once > 0) whole.push_back(tails_[i]), of.push_back(i);
+  const auto y = tails(whole);
+  for (std::size_t i = 0; i < y.size(); ++i) seen_.y[kTail][of[i]] = y[i], seen_.weight[kTail][of[i]] = 1;
+}
+
+void Observer::put(std::size_t channel, double y, double weight) {
+  if (!std::isfinite(y) || !(weight > 0)) return;
+  seen_.y[channel].back() = y, seen_.weight[channel].back() = weight;
+}
+
+WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w) {
+  WindowRow row{};
+  const auto column_mean = [&](const char* name) {
+    if (!log.has(name)) return 0.0;
+    const auto& column = log.column(name);
+    return mean(w, 0.0, [&](std::size_t i) { return column[s.row[i]]; });
+  };
+  const auto mean_of = [&](const std::vector<Vec3>& x) -> Vec3 {
+    return mean(w, Vec3(Vec3::Zero()), [&](std::size_t i) -> Vec3 { return x[i]; });
+  };
+  row.segment = s.segment[w.begin];
+  row.t = 0.5 * (s.t[w.begin] + s.t[w.end - 1]);
+  row.duration = s.t[w.end - 1] - s.t[w.begin];
+  // A gust that pushes the craft up is in its mean residual and in its measured height: a place that answers the gusts
+  // would explain them. Where the set-points lead is known without them, unless the craft flies elsewhere.
+  const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kStray;
+  const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
+  row.p_W = mean_of(p), row.v_W = mean_of(v);
+  const auto& kp = vehicle_.controller.kp;
+  row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
+  // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
+  row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
+  row.R_WB = Mat3::Zero();
+  if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
+  row.yaw = std::atan2(row.R_WB(1, 0), row.R_WB(0, 0));
+  row.thrust_acc = s.thrust_acc.empty() ? kGravity : mean(w, 0.0, [&](std::size_t i) { return s.thrust_acc[i]; });
+  row.voltage = column_mean("battery_v"), row.temperature = column_mean("temperature_c");
+  row.around = surroundings_.around(row.p_W);
+  if (!surroundings_.has_map()) {  // imported recordings say what stood below and above (backwash import)
+    if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
+    if (log.has("ceiling") && column_mean("ceiling") > 0.5) row.around.ceiling_gap = 0.3;
+  }
+  look_along(row, w, p, v);
+  if (!as_told) row.speeds.fill(row.speed);
+  return row;
+}
+
+/// Means; returns the detrended residuals.
+Residual Observer::put_means(const WindowRow& row, const Series& s, Stretch w) {
+  Residual rest{{}, row.sigma, simulated(s) || !under_way(s, w)};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
+    // Unsimulated, a mean would be the velocity's change and no push. It scatters with the modelled variance; the
+    // constant stands for the accelerometer's noise.
+    if (simulated(s))
+      put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
+    rest.x[a] = detrended_values(w, residual);
+  }
+  return rest;
+}
+
+/// ln variances of the last windows, the accelerometer's noise taken out, and what their tails are made of.
+void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_hz) {
+  const Texture texture = texture_of(residuals, rate_hz);
+  const std::size_t first = seen_.windows.size() - residuals.size();
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    WindowRow& row = seen_.windows[first + i];
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      const auto [variance, samples] = spread(residuals[i].x[a]);
+      row.measured_variance[axis] = variance;
+      if (!residuals[i].comparable || !(variance > 0) || !(samples > 2)) continue;
+      const double gusts = std::max(variance - texture.white[axis], kLeastGusts * variance);
+      const double own = ln_variance(samples) * std::pow(variance / gusts, 2);
+      seen_.y[kVarX + a][first + i] = std::log(gusts / row.sigma[axis]) - ln_bias(samples);
+      seen_.weight[kVarX + a][first + i] = 1 / (own + kScatter2);
+    }
+    tails_.push_back(residuals[i].comparable ? fourth_moments(residuals[i], texture) : Fourth{});
+  }
+}
+
+void Observer::add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
+                           const std::vector<Stretch>& good) {
+  std::vector<Residual> residuals;
+  for (const Stretch w : good) {
+    for (std::size_t c = 0; c < kChannels; ++c) seen_.y[c].push_back(0), seen_.weight[c].push_back(0);
+    seen_.windows.push_back(placed(log, s, w));
+    WindowRow& row = seen_.windows.back();
+    row.flight = seen_.flights - 1;
+    residuals.push_back(put_means(row, s, w));
+    if (!s.a_nominal.empty()) put_delays(row, s, w);
+    for (const auto& [channel, value, weight] :
+         rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end))
+      put(channel, value, weight);
+  }
+  const double period = s.t.back() / static_cast<double>(s.size() - 1);
+  seen_.row_period = std::max(seen_.row_period, period);
+  put_spreads(residuals, 1 / period);
+  smooth_voltage();
+}
+
+Observations Observer::finish() {
+  follow_thrust();
+  settle_commands();
+  put_tails();
+  const auto need = [&](Source source, std::initializer_list<const char*> columns) {
+    for (const char* column : columns)
+      if (!ever_.contains(column)) seen_.missing.emplace(source, std::string("no ") + column + " column");
+  };
+  need(Source::battery, {"battery_v"});
+  need(Source::temperature, {"temperature_c"});
+  need(Source::attitude, {"qw", "qx", "qy", "qz"});
+  need(Source::thrust, {"thrust"});
+  need(Source::setpoints, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
+  need(Source::rpm, {"rpm1", "rpm2", "rpm3", "rpm4"});
+  need(Source::motors, {"motor1", "motor2", "motor3", "motor4"});
+  if (!surroundings_.has_map() && !ever_.contains("ceiling")) seen_.missing.emplace(Source::ceiling, "no map given");
+  if (!surroundings_.has_map()) seen_.missing.emplace(Source::map, "no map given");
+  return std::move(seen_);
+}
+
+}  // namespace backwash::study

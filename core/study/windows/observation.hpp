@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/log/flight_log.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/study/windows/gate.hpp"
+#include "core/study/windows/instrument.hpp"
+#include "core/study/windows/rotor_channels.hpp"
+#include "core/study/windows/series.hpp"
+#include "core/study/windows/stretch.hpp"
+#include "core/study/windows/surroundings.hpp"
+#include "core/study/windows/texture.hpp"
+#include "core/types/model.hpp"
+#include "core/types/vehicle.hpp"
+
+namespace backwash::study {
+
+/// Variance of ln variance between windows beside its estimate's own; and, (m/s²)², what a mean scatters by beside Σ.
+inline constexpr double kScatter2 = 0.16, kMeanNoise = 0.002;
+
+/// What is measured on every 2 s window: each channel has one number per window and a weight (0: not measured).
+enum Channel : std::size_t {
+  kMeanX,  ///< mean of a − a_sim along W, m/s²
+  kMeanY,
+  kMeanZ,
+  kVarX,  ///< ln of measured (less the accelerometer's noise) over modelled variance of a − a_sim, its bias removed
+  kVarY,
+  kVarZ,
+  kTail,           ///< ln kurtosis of a − a_sim over a Gaussian's, `tails`
+  kThrustDelay,    ///< Σ z (a − a_sim)·b_z/√Σz², z the set-points' own thrust rate: how late the thrust comes
+  kThrustSlope,    ///< the same with the set-points' own vertical acceleration: how steep the thrust curve is
+  kCommandDelayH,  ///< Σ x (a − a_nominal)/√Σx², x = −ȧ_nominal of the closed loop that hears set-points alone
+  kCommandDelayZ,
+  kLine1,  ///< ln power of the rotors' line over that of its neighbours, expectation without a line removed
+  kLine2,
+  kLine3,
+  kLine4,
+  kMotor1,  ///< ln thrust commanded of a rotor, less the mean of the four
+  kMotor2,
+  kMotor3,
+  kMotor4,
+  kRpm1,  ///< ln rpm² over commanded thrust of a rotor, less the mean of the four
+  kRpm2,
+  kRpm3,
+  kRpm4,
+  kDropout1,  ///< share of samples whose rpm reading is stuck or below 0.3 of its median
+  kDropout2,
+  kDropout3,
+  kDropout4,
+  kChannels
+};
+const char* channel_name(Channel c);
+
+/// What flights must hold for an effect to be tested: a map, or something above said by map or log; columns of the log.
+enum class Source : std::size_t { map, ceiling, battery, temperature, attitude, thrust, setpoints, rpm, motors };
+
+/// Level offsets of the map at which Σ is looked up: a square of so many points, and their spacing.
+inline constexpr std::size_t kOffsetsAside = 9;
+inline constexpr double kOffsetStep = 0.1;  ///< m
+
+/// Places along a window: a moving vehicle crosses different air at different speeds.
+inline constexpr std::size_t kPoints = 7;
+
+/// One window: where and how it was flown, and what the catalogue's columns are made of.
+struct WindowRow {
+  std::size_t flight;
+  int segment;      ///< −1 in transit or unknown
+  double t;         ///< s since the flight's first row, middle of the window
+  double duration;  ///< s
+  Vec3 p_W, v_W;    ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
+  double speed;     ///< m/s, mean of the norm
+  std::array<double, kPoints> speeds{}, shares{};  ///< m/s, along the window; of the modelled variance, sum 1
+  Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
+  double yaw;         ///< rad
+  double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
+  double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
+  double temperature;
+  Place around;             ///< of p_W
+  std::vector<Place> path;  ///< of points along the window; empty where it is one place
+  Vec3 give;                ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  Vec3 sigma;               ///< modelled variance per axis, (m/s²)²
+  /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
+  std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
+  /// Design of kThrustDelay and kThrustSlope: of (delay, slope).
+  std::array<double, 2> delay_gain{}, slope_gain{};
+  std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
+  Vec3 measured_variance;                ///< (m/s²)²
+  /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
+  Vec3 ln_sigma_at(const Vec3& offset_W) const;
+};
+
+/// All flights of a study as rows of windows, in flight order.
+struct Observations {
+  std::size_t flights = 0;
+  std::vector<WindowRow> windows;
+  std::vector<std::size_t> first;                        ///< window at which each flight begins; one more at the end
+  double row_period = 0;                                 ///< s, longest of the flights' mean
+  std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
+  std::map<Gate, std::size_t, ByName> gated_out;         ///< windows by reason
+  std::map<Source, std::string> missing;                 ///< what no flight had, and why: "no battery_v column"
+  bool has(Source what) const { return !missing.contains(what); }
+  bool measured(Channel c) const;
+};
+
+/// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
+/// known but the floor at z = 0, and Σ = Σ_0. Real-time status: offline.
+class Observer {
+ public:
+  Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);
+  /// With surroundings that were looked at before, and are kept: studies of the same map share them.
+  Observer(const Vehicle& vehicle, Surroundings& surroundings);
+  Observer(const Observer&) = delete;
+  void add(const log::FlightLog& log);
+  Observations finish();
+
+ private:
+  void add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
+                   const std::vector<Stretch>& good);
+  /// Why the map leaves a window out: far outside of it, or in a solid (map and log contradict each other).
+  std::optional<Gate> misplaced(const Series& s, Stretch w) const;
+  WindowRow placed(const log::FlightLog& log, const Series& s, Stretch w);
+  void look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
+  Residual put_means(const WindowRow& row, const Series& s, Stretch w);
+  void put_delays(WindowRow& row, const Series& s, Stretch w);
+  void put_command_delay(const Series& s, Stretch w, int from, int to);
+  void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
+  void put(std::size_t channel, double y, double weight);
+  void smooth_voltage();
+  void follow_thrust();
+  void settle_commands();
+  void put_tails();
+
+  const Vehicle vehicle_;
+  Observations seen_;
+  FirstStage thrust_stage_;
+  std::array<DelayStage, 2> command_stage_;  // level, vertical
+  std::vector<Fourth> tails_;                // of every window
+  std::set<std::string> ever_;               // columns that some flight had
+  std::optional<Surroundings> own_;
+  Surroundings& surroundings_;
+};
+
+}  // namespace backwash::study

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/series.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace backwash::study {
+namespace {
+
+using Rows = std::vector<std::size_t>;
+
+bool has3(const log::FlightLog& log, const char* x, const char* y, const char* z) {
+  return log.has(x) && log.has(y) && log.has(z);
+}
+
+std::vector<Vec3> vectors(const log::FlightLog& log, const Rows& rows, const char* x, const char* y, const char* z) {
+  const auto &cx = log.column(x), &cy = log.column(y), &cz = log.column(z);
+  std::vector<Vec3> out;
+  out.reserve(rows.size());
+  for (const auto i : rows) out.emplace_back(cx[i], cy[i], cz[i]);
+  return out;
+}
+
+/// Slope of the parabola through a sample and its neighbours `reach` rows away.
+std::vector<Vec3> derivative(const std::vector<double>& t, const std::vector<Vec3>& x, std::size_t reach) {
+  std::vector<Vec3> d(x.size(), Vec3::Zero());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const std::size_t a = i >= reach ? i - reach : 0, b = std::min(x.size() - 1, i + reach);
+    if (t[b] > t[a]) d[i] = (x[b] - x[a]) / (t[b] - t[a]);
+  }
+  return d;
+}
+
+/// The set-points of a flight: absent velocities and accelerations are zero (docs/interfaces.md).
+struct Commands {
+  std::vector<Vec3> p, v, a;
+};
+
+Commands commands_of(const log::FlightLog& log, const Rows& rows) {
+  Commands c;
+  c.p = vectors(log, rows, "cmd_x_m", "cmd_y_m", "cmd_z_m");
+  c.v = has3(log, "cmd_vx_mps", "cmd_vy_mps", "cmd_vz_mps")
+            ? vectors(log, rows, "cmd_vx_mps", "cmd_vy_mps", "cmd_vz_mps")
+            : std::vector<Vec3>(rows.size(), Vec3::Zero());
+  c.a = has3(log, "cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2")
+            ? vectors(log, rows, "cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2")
+            : std::vector<Vec3>(rows.size(), Vec3::Zero());
+  return c;
+}
+
+struct Loop {
+  std::vector<Vec3> p, v, a;
+};
+
+/// The controller's loop at each row: fed with the logged state, or (`closed`) with its own.
+Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed) {
+  const auto& c = vehicle.controller;
+  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
+  Loop out;
+  Vec3 p = cmd.p.front(), v = Vec3::Zero(), produced = Vec3::Zero();
+  std::size_t heard = 0, felt = 0;
+  // A command acts from some time in the period before its row on (held) or all along it (streamed): a quarter between.
+  const double period = s.t.back() / static_cast<double>(s.size() - 1), age = c.latency + period / 4;
+  const auto at_time = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
+    if (heard + 1 >= s.size() || s.t[heard + 1] - s.t[heard] > 0.1) return x[heard];
+    const double share = std::clamp((t - s.t[heard]) / (s.t[heard + 1] - s.t[heard]), 0.0, 1.0);
+    return x[heard] + share * (x[heard + 1] - x[heard]);
+  };
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
+    if (dt > 0.2) p = s.p[i], v = s.v[i];  // a gap: start again where the vehicle is
+    const int steps = dt > 0.2 ? 1 : std::max(1, static_cast<int>(std::ceil(dt / 0.005)));
+    for (int k = 0; k < steps; ++k) {
+      const double h = dt > 0.2 ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
+      while (heard + 1 < s.size() && s.t[heard + 1] <= now - age + 1e-9) ++heard;
+      while (felt + 1 < s.size() && s.t[felt + 1] <= now - c.feedback_delay + 1e-9) ++felt;
+      const Vec3 at = closed ? p : s.p[felt], moving = closed ? v : s.v[felt];
+      const double sent = now - age;
+      const Vec3 wanted = at_time(cmd.a, sent) + kp.cwiseProduct(at_time(cmd.p, sent) - at) +
+                          kd.cwiseProduct(at_time(cmd.v, sent) - moving);
+      const double rate = c.attitude_lag > 0 ? 1 - std::exp(-h / c.attitude_lag) : 1;
+      produced += rate * (wanted - produced);
+      v += h * produced;
+      p += h * v;
+    }
+    out.p.push_back(p), out.v.push_back(v), out.a.push_back(produced);
+  }
+  return out;
+}
+
+Rows rising_rows(const std::vector<double>& t) {
+  Rows rows;
+  for (std::size_t i = 0; i < t.size(); ++i)
+    if (rows.empty() || t[i] > t[rows.back()]) rows.push_back(i);
+  return rows;
+}
+
+void read_motion(Series& s, const log::FlightLog& log, const Rows& rows) {
+  s.p = vectors(log, rows, "x_m", "y_m", "z_m");
+  s.has_velocity = has3(log, "vx_mps", "vy_mps", "vz_mps");
+  s.has_acceleration = has3(log, "ax_mps2", "ay_mps2", "az_mps2");
+  const double rate = s.size() > 1 ? static_cast<double>(s.size() - 1) / (s.t.back() - s.t.front()) : 1;
+  const auto reach = [&](double seconds) {
+    return static_cast<std::size_t>(std::lround(std::clamp(seconds * rate / 2, 1.0, 1000.0)));
+  };
+  s.v = s.has_velocity ? vectors(log, rows, "vx_mps", "vy_mps", "vz_mps") : derivative(s.t, s.p, reach(0.06));
+  s.a = s.has_acceleration ? vectors(log, rows, "ax_mps2", "ay_mps2", "az_mps2") : derivative(s.t, s.v, reach(0.06));
+}
+
+void read_attitude(Series& s, const log::FlightLog& log, const Rows& rows) {
+  const auto &w = log.column("qw"), &x = log.column("qx"), &y = log.column("qy"), &z = log.column("qz");
+  for (const auto i : rows) {
+    Eigen::Quaterniond q(w[i], x[i], y[i], z[i]);
+    s.R_WB.push_back(q.norm() > 1e-6 ? q.normalized().toRotationMatrix() : Mat3(Mat3::Identity()));
+  }
+}
+
+}  // namespace
+
+Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
+  Series s;
+  const Rows rows = rising_rows(log.t_s);
+  for (const auto i : rows) s.t.push_back(log.t_s[i] - log.t_s[rows.front()]);
+  s.row = rows;
+  if (s.size() < 2) return s;
+  read_motion(s, log, rows);
+  if (log.has("qw") && log.has("qx") && log.has("qy") && log.has("qz")) read_attitude(s, log, rows);
+  if (log.has("thrust")) {
+    const auto& u = log.column("thrust");
+    for (const auto i : rows)
+      s.thrust_acc.push_back(vehicle.propulsion.max_thrust / vehicle.body.mass * thrust_share(vehicle, u[i]));
+  }
+  s.segment.assign(s.size(), -1);
+  if (log.has("segment"))
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      s.segment[k] = static_cast<int>(std::clamp(log.column("segment")[rows[k]], -1.0, 1e9));
+  s.simulated_by_thrust = !s.thrust_acc.empty() && !s.R_WB.empty();
+  const bool commanded = has3(log, "cmd_x_m", "cmd_y_m", "cmd_z_m");
+  if (s.simulated_by_thrust) {
+    for (std::size_t i = 0; i < s.size(); ++i)
+      s.a_sim.push_back(s.R_WB[i].col(2) * s.thrust_acc[i] - kGravity * Vec3::UnitZ());
+  }
+  if (commanded) {
+    const Commands cmd = commands_of(log, rows);
+    if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
+    Loop nominal = loop_of(s, cmd, vehicle, true);
+    s.p_nominal = std::move(nominal.p), s.v_nominal = std::move(nominal.v), s.a_nominal = std::move(nominal.a);
+  }
+  if (s.a_sim.empty()) s.a_sim.assign(s.size(), Vec3::Zero());
+  return s;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "core/log/flight_log.hpp"
+#include "core/types/geometry.hpp"
+#include "core/types/vehicle.hpp"
+
+namespace backwash::study {
+
+/// A flight by sample, with what the simulation says of it (docs/interfaces.md, "Flight log, CSV").
+struct Series {
+  std::vector<double> t;           ///< s, from 0
+  std::vector<std::size_t> row;    ///< the log's row of each sample
+  std::vector<Vec3> p, v, a;       ///< W; a is differentiated where it is not logged
+  std::vector<Vec3> a_sim;         ///< R_WB e_z T(thrust)/m − g e_z, or the closed loop's where thrust is missing
+  std::vector<Mat3> R_WB;          ///< empty without attitude
+  std::vector<double> thrust_acc;  ///< T/m, m/s²; empty without thrust
+  /// Closed loop fed with the set-points alone; empty without set-points.
+  std::vector<Vec3> p_nominal, v_nominal, a_nominal;
+  std::vector<int> segment;  ///< −1 without the column
+  bool simulated_by_thrust = false, has_velocity = false, has_acceleration = false;
+  std::size_t size() const { return t.size(); }
+};
+
+/// Rotor thrust share T(u)/max_thrust = f u² + (1 − f) u, of a command u.
+inline double thrust_share(const Vehicle& vehicle, double u) {
+  const double f = vehicle.propulsion.thr_mdl_fac;
+  return f * u * u + (1 - f) * u;
+}
+
+/// Reads a log. Rows must have growing stamps; those that do not are dropped. Positions must be there.
+Series series_of(const log::FlightLog& log, const Vehicle& vehicle);
+
+}  // namespace backwash::study

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <vector>
+
+namespace backwash::study {
+
+/// Removes the straight line that fits best.
+std::vector<double> detrended(std::span<const double> x);
+
+/// The parabola (fewer than 8 points: the line; fewer than 4: the mean) through x that fits best: a slow course without
+/// what answers the moment.
+std::vector<double> slow_course(std::span<const double> t, std::span<const double> x);
+
+/// Variance of a detrended stretch, and how many independent samples it is worth: n (1 − ρ²)/(1 + ρ²) with ρ the
+/// correlation of neighbours (a first-order process).
+struct Spread {
+  double variance, samples;
+};
+Spread spread(std::span<const double> detrended);
+
+/// E[ln(χ²_n/n)] = ψ(n/2) − ln(n/2), and its variance ψ'(n/2): what the logarithm of a variance estimate of n samples
+/// adds to the logarithm of the variance.
+double ln_bias(double n);
+double ln_variance(double n);
+
+/// ln of the power at a rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz, less
+/// its expectation for noise; twice the rotor's rate (two blades) is summed in; NaN where sampling folds both
+/// next to 0 or half the rate. `phase`: rad at each sample, `t`: s.
+double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
+
+}  // namespace backwash::study

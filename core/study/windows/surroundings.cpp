@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/surroundings.hpp"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace backwash::study {
+
+Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
+    : grid_(grid), base_(model.base.horizontal, model.base.horizontal, model.base.vertical) {
+  if (!grid_) return;
+  field_.emplace(*grid_, model);
+  low_ = grid_->origin();
+  const Vec3 extent = grid_->resolution() * grid_->size().cast<double>();
+  size_ = (extent / kLattice).array().ceil().cast<int>() + 2;
+  lattice_.resize(static_cast<std::size_t>(size_.prod()));
+}
+
+bool Surroundings::near(const Vec3& p_W) const {
+  if (!grid_) return (p_W.array().abs() < 1e5).all();
+  const Vec3 high = low_ + grid_->resolution() * grid_->size().cast<double>();
+  return (p_W.array() > low_.array() - kSight).all() && (p_W.array() < high.array() + kSight).all();
+}
+
+Place Surroundings::around(const Vec3& p_W) const {
+  if (!grid_) return {{p_W.z(), kNoSurface, {}}, {}};
+  Place place{field::around(*grid_, p_W, {20, 20, kSight}), {}};
+  for (const auto& wall : place.walls)
+    if (whole(p_W, place, wall)) place.whole_walls.push_back(wall);
+  return place;
+}
+
+bool Surroundings::whole(const Vec3& p_W, const field::Around& around, const std::pair<double, Vec3>& wall) const {
+  constexpr double kOpen = 1;  // m: how far it must reach where nothing is below or above
+  const double a = grid_->resolution();
+  const double down = std::isfinite(around.height) ? around.height : kOpen;
+  const double up = std::isfinite(around.ceiling_gap) ? around.ceiling_gap : kOpen;
+  const Vec3 inside = p_W + (wall.first + 0.5 * a) * wall.second;
+  for (double z = p_W.z() - down + 0.5 * a; z < p_W.z() + up; z += a)
+    if (!grid_->occupied(grid_->index(Vec3(inside.x(), inside.y(), z)))) return false;
+  return true;
+}
+
+const Vec3& Surroundings::lattice_ln_sigma(const Index3& at) {
+  auto& stored = lattice_[static_cast<std::size_t>(at.x() + size_.x() * (at.y() + size_.y() * at.z()))];
+  if (!stored) {
+    const Variance s = field_->at(low_ + kLattice * at.cast<double>()).sigma();
+    stored = Vec3(s.xx, s.yy, s.zz).array().max(1e-9).log().matrix();
+  }
+  return *stored;
+}
+
+Vec3 Surroundings::sigma(const Vec3& p_W) {
+  if (!field_) return base_;
+  const Vec3 q = (p_W - low_) / kLattice;
+  const Index3 corner = q.array().floor().cast<int>();
+  if ((corner.array() < 0).any() || ((corner + Index3::Ones()).array() >= size_.array()).any()) {
+    const Variance s = field_->at(p_W).sigma();
+    return {s.xx, s.yy, s.zz};
+  }
+  const Vec3 f = q - corner.cast<double>();
+  Vec3 ln = Vec3::Zero();
+  for (int n = 0; n < 8; ++n) {
+    const Index3 bit(n & 1, (n >> 1) & 1, n >> 2);
+    double weight = 1;
+    for (int i = 0; i < 3; ++i) weight *= bit[i] ? f[i] : 1 - f[i];
+    if (weight > 1e-9) ln += weight * lattice_ln_sigma(corner + bit);
+  }
+  return ln.array().exp();
+}
+
+}  // namespace backwash::study

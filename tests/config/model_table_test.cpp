@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/config/model_table.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/config/config.hpp"
+
+namespace backwash::config {
+namespace {
+
+/// Reads a model file of this text.
+tl::expected<Model, ConfigError> read(const std::string& text) {
+  const auto path = testing::TempDir() + "backwash_model_table_" + std::to_string(getpid()) + ".toml";
+  std::ofstream(path) << text;
+  auto model = load_model(path);
+  std::filesystem::remove(path);
+  return model;
+}
+
+std::string written(const Model& model, const std::string& name = "none", toml::table beside = toml::table()) {
+  toml::table whole = model_table(model);
+  whole.insert(name, std::move(beside));
+  return text_of(whole, {"base", "ground", "corner", "wall", "bound", "provenance", "extension"});
+}
+
+/// The model that a file with this effect holds.
+tl::expected<Model, ConfigError> extended(const ModelEffect& e) {
+  toml::table term, extension;
+  term.insert("effect", toml::array(effect_table(e)));
+  extension.insert("term", toml::array(term));
+  return read(written({}, "extension", extension));
+}
+
+TEST(ModelTable, EveryConstantIsReadBackAsItWasWritten) {
+  Model m;
+  m.base = {0.011, 0.012};
+  m.ground.theta_max = 1.013, m.ground.l_max = 1.014, m.ground.l_footprint_max = 1.015, m.ground.r0 = 0.016;
+  m.ground.lambda = {0.017, 0.018}, m.ground.k1 = {0.019, 0.020}, m.ground.k2 = 1.021;
+  m.corner.phi_max = 1.022, m.corner.l_max = 1.023, m.corner.lambda = {0.024, 0.025, 0.026};
+  m.wall.theta_min = 1.027, m.wall.l_max = 1.028, m.wall.k1 = {0.029, 0.030, 0.031}, m.wall.k2 = 1.032;
+  m.bound.kappa = 1.033, m.bound.mean_horizontal = 0.034, m.bound.mean_vertical = 0.035, m.bound.tau_w = 0.036;
+  const auto found = read(written(m));
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->base.horizontal, 0.011);
+  EXPECT_EQ(found->ground.r0, 0.016);
+  EXPECT_EQ(found->ground.k1.vertical, 0.020);
+  EXPECT_EQ(found->corner.lambda.tangential, 0.025);
+  EXPECT_EQ(found->wall.k2, 1.032);
+  EXPECT_EQ(found->bound.mean_vertical, 0.035);
+  EXPECT_EQ(model_table(*found), model_table(m));
+}
+
+TEST(ModelTable, EveryKindOfEffectIsReadBackAsItWasWritten) {
+  for (int k = 0; k <= static_cast<int>(ModelEffect::Kind::ln_variance_with_speed); ++k) {
+    const ModelEffect e{static_cast<ModelEffect::Kind>(k), Vec3(-0.125, 0.25, 0.5), Vec3(0.5, 0.25, 0.125), 0.75};
+    const auto found = extended(e);
+    ASSERT_TRUE(found) << k << ": " << found.error().message;
+    ASSERT_EQ(found->extension.size(), 1u) << k;
+    EXPECT_EQ(found->extension[0].kind, e.kind);
+    EXPECT_EQ(found->extension[0].value.x(), -0.125) << k;
+    EXPECT_EQ(found->extension[0].error.x(), 0.5) << k;
+    EXPECT_EQ(effect_table(found->extension[0]), effect_table(e)) << k;
+  }
+}
+
+// What a study found may lie beyond what a file may hold; the file is readable all the same.
+TEST(ModelTable, NumbersOfAnEffectBeyondTheReadersRangeAreWrittenAtItsEnd) {
+  const auto found = extended({ModelEffect::Kind::push_to_walls, Vec3(-80, 0, 0), Vec3(70, 0, 0), 1e-4});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->extension.at(0).value.x(), -10);
+  EXPECT_EQ(found->extension.at(0).error.x(), 10);
+  EXPECT_EQ(found->extension.at(0).scale, 0.01);
+}
+
+TEST(ModelTable, AnyTextIsReadable) {
+  for (const char* name : {"it's.csv", "a \"b\".csv", "back\\slash", "new\nline", "''' \"\"\"", "\x01"}) {
+    toml::table provenance;
+    provenance.insert("logs", toml::array(name));
+    EXPECT_TRUE(read(written({}, "provenance", provenance))) << name;
+  }
+}
+
+}  // namespace
+}  // namespace backwash::config

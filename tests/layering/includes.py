@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The layers of the code, from its include lines: each folder includes itself and only the folders named for it here.
+
+includes.py SOURCE_DIR
+
+A source file below core, services or firmware_bridge that no folder of the table holds belongs to no layer, and fails. So does
+a folder of the table that is not there, or one that the table lets include a folder above it.
+"""
+import pathlib
+import re
+import sys
+
+# From the ground up: a folder sees only folders above its own line.
+STUDY = "core/study/"
+FLIGHT = ["core/types", "core/map", "core/field", "core/reach", "core/plan", "core/track"]
+MAY = {
+    "core/types": [],
+    "core/files": [],
+    "core/sync": ["core/types"],
+    "core/config": ["core/types", "core/files"],
+    "core/map": ["core/types", "core/files"],
+    "core/field": FLIGHT[:2],
+    "core/reach": FLIGHT[:3],
+    "core/plan": FLIGHT[:4],
+    "core/track": FLIGHT[:5],
+    "core/log": ["core/files", *FLIGHT],
+    "core/sim": ["core/log", *FLIGHT],
+    "core/report": ["core/log", "core/sim", *FLIGHT],
+    STUDY + "windows": ["core/types", "core/map", "core/field", "core/log"],
+    STUDY + "calibrate": ["core/types", "core/config", "core/map", "core/field", "core/log", "core/report", STUDY + "windows"],
+    STUDY + "effects": ["core/types", "core/map", "core/field", STUDY + "windows"],
+    STUDY + "inference": ["core/types", STUDY + "windows", STUDY + "effects"],
+    STUDY + "findings": ["core/types", "core/config", "core/map", "core/field", "core/plan", "core/report",
+                         STUDY + "windows", STUDY + "calibrate", STUDY + "effects", STUDY + "inference"],
+    "firmware_bridge": ["core/types"],
+    "services/parallel": [],
+    "services/dds": ["idl"],
+    # What flies sees neither the simulation nor what judges flights afterwards.
+    "services/backwashd": ["core/sync", "core/config", "core/log", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel"],
+    "services/backwashctl": ["core/types", "core/files", "services/dds"],
+    "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel"],
+    "services/backwash": ["core", "services/parallel"],
+}
+# The worlds with hidden effects share no code with what looks for them, but for the two that ask it.
+WORLDS = {"draw", "effects", "fly", "main", "plan", "world"}
+FORBIDDEN = re.compile(r'^\s*#\s*include\s*[<"](dds|gpiod|systemd|mavlink|thread|pthread)')
+INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
+SOURCES = {".cpp", ".hpp", ".c", ".h"}
+
+
+def below(path: str, folder: str) -> bool:
+    return path.startswith(folder + "/")
+
+
+def folder_of(path: str) -> str | None:
+    return next((folder for folder in MAY if below(path, folder)), None)
+
+
+def table_errors(root: pathlib.Path) -> list[str]:
+    order = list(MAY)
+    wrong = [f"the table of layers: there is no {folder}" for folder in order if not (root / folder).is_dir()]
+    for n, folder in enumerate(order):
+        wrong += [f"the table of layers: {folder} is below {seen}" for seen in MAY[folder] if seen in order[n:]]
+    return wrong
+
+
+def file_errors(root: pathlib.Path, path: pathlib.Path) -> list[str]:
+    name, wrong = path.relative_to(root).as_posix(), []
+    folder = folder_of(name)
+    for n, line in enumerate(path.read_text().splitlines(), 1):
+        if below(name, "core") and FORBIDDEN.match(line):
+            wrong.append(f"{name}:{n}: core may not include DDS, MAVLink, GPIO, systemd or thread headers")
+        included = INCLUDE.match(line)
+        # Generated headers (IDL, embedded configuration) have no folder of ours in their name.
+        if not included or not below(included[1], "core") and not folder_of(included[1]) and not below(included[1], "services"):
+            continue
+        if name.startswith("tests/") and below(included[1], "core/study"):
+            wrong.append(f"{name}:{n}: a world with a hidden effect may not include {included[1]}, which looks for it")
+        elif folder and not any(below(included[1], seen) for seen in [folder, *MAY[folder]]):
+            wrong.append(f"{name}:{n}: {folder} may not include {included[1]} (allowed: {' '.join(MAY[folder]) or 'itself'})")
+    return wrong
+
+
+def main() -> int:
+    root = pathlib.Path(sys.argv[1]).resolve()
+    wrong, seen = table_errors(root), 0
+    for top in ("core", "firmware_bridge", "services"):
+        for path in sorted(p for p in (root / top).rglob("*") if p.suffix in SOURCES):
+            if not folder_of(path.relative_to(root).as_posix()):
+                wrong.append(f"{path.relative_to(root)}: belongs to no layer")
+            wrong += file_errors(root, path)
+            seen += 1
+    for path in sorted((root / "tests/study_worlds").glob("*pp")):
+        wrong += file_errors(root, path) if path.stem in WORLDS else []
+    if seen < 200:
+        wrong.append(f"only {seen} source files were found")
+    print(*wrong, sep="\n", end="\n" if wrong else "")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/plan/feasibility.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <set>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+#include "core/plan/planner.hpp"
+
+namespace backwash::plan {
+namespace {
+
+/// The narrow gap in coarse voxels: quick to build, and its only passage is known.
+const World& narrow_gap() {
+  static const auto world = build_world(*map::builtin_scene("narrow-gap", 0.2), *config::load_model("builtin:quad-5in"),
+                                        *config::load_vehicle("builtin:quad-5in"));
+  return *world;
+}
+
+double clearance(const World& world, const Index3& v) {
+  return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v)).clearance;
+}
+
+/// Labels by repeated relaxation: slower than a flood, and nothing in common with it.
+std::vector<std::size_t> labels_where(const World& world, double at_least) {
+  std::vector<std::size_t> label(world.grid.cell_count());
+  std::iota(label.begin(), label.end(), std::size_t{0});
+  const auto in = [&](const Index3& v) { return world.hover.safe(v) && clearance(world, v) >= at_least; };
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t i = 0; i < label.size(); ++i) {
+      const Index3 v = world.grid.voxel(i);
+      if (!in(v)) continue;
+      for (int axis = 0; axis < 3; ++axis) {
+        Index3 next = v;
+        next[axis] += 1;
+        if (!in(next)) continue;
+        auto &a = label[i], &b = label[world.grid.linear(next)];
+        changed |= a != b;
+        a = b = std::min(a, b);
+      }
+    }
+  }
+  return label;
+}
+
+TEST(HoverRegions, AreTheConnectedComponentsOfTheSafeVoxels) {
+  const auto& world = narrow_gap();
+  const auto found = hover_regions(world);
+  const auto label = labels_where(world, -1);
+  std::set<std::pair<int, std::size_t>> pairs;
+  std::vector<std::size_t> count(found.regions.size());
+  for (std::size_t i = 0; i < label.size(); ++i) {
+    const Index3 v = world.grid.voxel(i);
+    ASSERT_EQ(found.of_voxel[i] >= 0, world.hover.safe(v));
+    if (found.of_voxel[i] < 0) continue;
+    const auto n = static_cast<std::size_t>(found.of_voxel[i]);
+    pairs.insert({found.of_voxel[i], label[i]});
+    ++count[n];
+    const Vec3 p = world.grid.center(v);
+    EXPECT_TRUE((p.array() > found.regions[n].low_W.array()).all() &&
+                (p.array() < found.regions[n].high_W.array()).all());
+    EXPECT_LE(clearance(world, v), found.regions[n].widest_clearance_m);
+  }
+  EXPECT_EQ(pairs.size(), found.regions.size()) << "regions and labels must name the same sets";
+  ASSERT_FALSE(found.regions.empty());
+  for (std::size_t n = 0; n < count.size(); ++n) {
+    EXPECT_EQ(count[n], found.regions[n].voxels);
+    EXPECT_NEAR(found.regions[n].volume_m3, static_cast<double>(count[n]) * 0.008, 1e-9);
+    EXPECT_LE(found.regions[n].voxels, found.regions.front().voxels);
+  }
+}
+
+TEST(WidestWay, HasTheLargestClearanceAtWhichItsEndsAreStillConnected) {
+  const auto& world = narrow_gap();
+  const Vec3 from(1, 0, 1), to(5, 0, 1);
+  const auto way = widest_way(world, from, to);
+  ASSERT_TRUE(way);
+  ASSERT_TRUE(way->passable);
+  EXPECT_NEAR(way->place_W.x(), 3.05, 0.35) << "the gap is at x = 2.9 … 3.2 m";
+  const auto joined = [&](double at_least) {
+    const auto label = labels_where(world, at_least);
+    return label[world.grid.linear(world.grid.index(from))] == label[world.grid.linear(world.grid.index(to))];
+  };
+  const double stored = clearance(world, world.grid.index(way->place_W));
+  EXPECT_TRUE(joined(stored - 1e-9));
+  EXPECT_FALSE(joined(stored + 1e-6));
+  EXPECT_GE(way->length_m, 4.0 - 0.4);
+}
+
+TEST(WidestWay, DoesNotExistThroughAWall) {
+  const auto& world = narrow_gap();
+  EXPECT_FALSE(widest_way(world, {1, 0, 1}, {3, 1.5, 1}));
+  EXPECT_FALSE(widest_way(world, {1, 0, 1}, {30, 0, 1}));
+}
+
+TEST(FarthestPair, IsSafeAndFarApartAndStartsWhereOneCanTakeOff) {
+  const auto& world = narrow_gap();
+  const auto regions = hover_regions(world);
+  const auto pair = farthest_pair(world, regions, [](const Vec3& p) { return p.x() < 5; });
+  ASSERT_TRUE(pair);
+  for (const Vec3& p : {pair->start_W, pair->goal_W}) {
+    EXPECT_EQ(regions.of_voxel[world.grid.linear(world.grid.index(p))], 0);
+  }
+  EXPECT_LT(pair->start_W.x(), 5) << "the start must pass the test of its take-off";
+  EXPECT_FALSE(farthest_pair(world, regions, [](const Vec3&) { return false; }));
+  EXPECT_GT((pair->start_W - pair->goal_W).norm(), 4.5) << "the room is 6 m long";
+}
+
+}  // namespace
+}  // namespace backwash::plan

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Estimates of the study on made windows: the truth is sampled or integrated here, not by the forms of the catalogue.
+#include "core/study/inference/estimate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/config/config.hpp"
+#include "core/study/effects/columns.hpp"
+
+namespace {
+
+using namespace backwash::study;
+using backwash::Vec3;
+
+constexpr std::size_t kFlights = 12, kOfFlight = 24;
+
+bool covers(const Estimate& e, double truth) { return e.low <= truth && truth <= e.high; }
+
+/// Flights of which nothing is measured yet.
+Observations flights() {
+  Observations seen;
+  seen.flights = kFlights;
+  seen.windows.resize(kFlights * kOfFlight, WindowRow{});
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    auto& w = seen.windows[i];
+    w.flight = i / kOfFlight, w.sigma.setConstant(0.04), w.R_WB.setZero(), w.give.setZero();
+    if (i % kOfFlight == 0) seen.first.push_back(i);
+  }
+  seen.first.push_back(seen.windows.size());
+  for (auto& y : seen.y) y.assign(seen.windows.size(), 0);
+  for (auto& weight : seen.weight) weight.assign(seen.windows.size(), 0);
+  seen.missing[Source::attitude] = "not flown";
+  return seen;
+}
+
+void measure(Observations& seen, Channel channel, std::size_t i, double value) {
+  seen.y[channel][i] = value, seen.weight[channel][i] = 1;
+}
+
+Accepted refined(const Observations& seen, const std::string& cause, const Scale& scale) {
+  const Form* form = *std::ranges::find(catalogue(), cause, [](auto* f) { return f->cause(); });
+  Evidence evidence(seen);
+  Accepted found{form, scale, form->columns(seen.windows, scale), {}, 0, 0, {}, {}};
+  evidence.whiten(found.columns);
+  refine(evidence, found, {});
+  return found;
+}
+
+TEST(AveragedEstimate, OfOneModelIsItsNormalInterval) {
+  const Estimate e = averaged("x", {{3, 1.2, 0.5}});
+  EXPECT_NEAR(e.value, 1.2, 1e-12);
+  EXPECT_NEAR(e.low, 1.2 - 0.97998, 1e-4);
+  EXPECT_NEAR(e.high, 1.2 + 0.97998, 1e-4);
+}
+
+TEST(AveragedEstimate, LeavesAFortiethOfTheModelsDrawsBeyondEachEnd) {
+  const std::vector<Guess> guesses = {{2, 0.1, 0.02}, {1, 0.2, 0.05}, {0.2, 0.5, 0.01}};
+  const Estimate e = averaged("x", guesses);
+  std::mt19937 rng(3);
+  std::discrete_distribution<std::size_t> which{2, 1, 0.2};
+  std::normal_distribution normal;
+  int below = 0, above = 0;
+  double sum = 0;
+  constexpr int kDraws = 200000;
+  for (int i = 0; i < kDraws; ++i) {
+    const Guess& g = guesses[which(rng)];
+    const double x = g.value + g.error * normal(rng);
+    below += x<e.low, above += x> e.high, sum += x;
+  }
+  EXPECT_NEAR(below / double{kDraws}, 0.025, 0.0015);
+  EXPECT_NEAR(above / double{kDraws}, 0.025, 0.0015);
+  EXPECT_NEAR(sum / kDraws, e.value, 0.002);
+}
+
+/// Where a hover that is told to hold `height` ends and how it is pushed there: ë = −k_p e − k_d ė + push(height + e),
+/// integrated until it rests.
+std::pair<double, double> at_rest(double height, double kp, const std::function<double(double)>& push) {
+  double e = 0, v = 0;
+  for (int i = 0; i < 8000; ++i) {
+    v += 1e-3 * (-kp * e - 4 * v + push(height + e));
+    e += 1e-3 * v;
+  }
+  return {height + e, push(height + e)};
+}
+
+/// Hovers over a floor that pushes by size (0.4 m/h)².
+Observations over_a_floor(double size, double kp, unsigned seed) {
+  auto seen = flights();
+  std::mt19937 rng(seed);
+  std::normal_distribution noise(0.0, 0.03);
+  std::uniform_real_distribution told(0.35, 1.4);
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    const double height = told(rng);
+    const auto [at, push] = at_rest(height, kp, [size](double h) { return size * 0.16 / (h * h); });
+    seen.windows[i].around.height = height;
+    seen.windows[i].give = Vec3::Constant(1 / kp);
+    measure(seen, kMeanZ, i, push + noise(rng));
+  }
+  return seen;
+}
+
+TEST(Refine, FindsAPushWhereTheCraftWasPushedToAndNotWhereItWasTold) {
+  for (const double size : {-0.12, 0.12}) {
+    constexpr int kWorlds = 5;
+    double aware = 0, unaware = 0;
+    int covered = 0;
+    for (unsigned seed = 1; seed <= kWorlds; ++seed) {
+      auto seen = over_a_floor(size, 4, seed);
+      const Estimate e = refined(seen, "ground_thrust", {0.3}).parameters[0];
+      aware += e.value / kWorlds, covered += covers(e, size);
+      for (auto& w : seen.windows) w.give.setZero();
+      unaware += refined(seen, "ground_thrust", {0.3}).parameters[0].value / kWorlds;
+    }
+    EXPECT_NEAR(aware, size, 0.04 * std::abs(size));
+    EXPECT_GE(covered, kWorlds - 1);
+    EXPECT_GT(std::abs(unaware - size), 0.08 * std::abs(size));
+  }
+}
+
+/// Pushed by 0.1 m/s² at a gap of 0.4 m and hardly far away, hovering at those two gaps or at many between.
+Observations under_a_ceiling(bool two_gaps, const std::function<double(double)>& push) {
+  auto seen = flights();
+  std::mt19937 rng(11);
+  std::normal_distribution noise(0.0, 0.01);
+  std::uniform_real_distribution any(0.22, 1.9);
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    const double gap = two_gaps ? (i % 2 ? 0.4 : 1.9) : any(rng);
+    seen.windows[i].around.ceiling_gap = gap;
+    measure(seen, kMeanZ, i, push(gap) + noise(rng));
+  }
+  return seen;
+}
+
+TEST(Refine, WidensTheIntervalWhereTheFlownGapsCannotTellTheForm) {
+  const auto steep = [](double d) { return 0.1 * std::exp((0.4 - d) / 0.15); };
+  const auto flat = [](double d) { return 0.1 * 0.4 / d; };
+  for (const auto& push : {std::function<double(double)>(steep), std::function<double(double)>(flat)}) {
+    const auto two = refined(under_a_ceiling(true, push), "ceiling", {0.3}).parameters[0];
+    const auto many = refined(under_a_ceiling(false, push), "ceiling", {0.3}).parameters[0];
+    EXPECT_TRUE(covers(two, steep(0.3)) && covers(two, flat(0.3))) << two.low << " " << two.high;
+    EXPECT_NEAR(many.value, push(0.3), 0.1 * push(0.3));
+    EXPECT_LT(3 * (many.high - many.low), two.high - two.low);
+  }
+}
+
+/// ln Σ of a made room, axes alike: stronger towards x = 0 and along a ridge.
+double ln_sigma(double x, double y) { return 2 * std::exp(-x / 0.6) + 1.5 * std::exp(-std::pow((y - 1.5) / 0.7, 2)); }
+
+TEST(Refine, FindsAMapOffsetBetweenTheOnesTriedAndCoversBothOfItsCoordinates) {
+  constexpr double kX = 0.21, kY = -0.08;
+  constexpr int kWorlds = 40;
+  int covered = 0;
+  double error = 0;
+  std::mt19937 rng(17);
+  std::normal_distribution noise(0.0, 0.4);
+  std::uniform_real_distribution place(0.5, 3.0);
+  for (int world = 0; world < kWorlds; ++world) {
+    auto seen = flights();
+    for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+      const double x = place(rng), y = place(rng);
+      for (std::size_t n = 0; n < seen.windows[i].ln_sigma_moved.size(); ++n) {
+        const double dx = kOffsetStep * (static_cast<double>(n / kOffsetsAside) - (kOffsetsAside - 1) / 2.0),
+                     dy = kOffsetStep * (static_cast<double>(n % kOffsetsAside) - (kOffsetsAside - 1) / 2.0);
+        seen.windows[i].ln_sigma_moved[n].setConstant(ln_sigma(x + dx, y + dy) - ln_sigma(x, y));
+      }
+      for (const Channel c : kVariances) measure(seen, c, i, ln_sigma(x + kX, y + kY) - ln_sigma(x, y) + noise(rng));
+    }
+    const auto found = refined(seen, "map_offset", {0, {0.15, 0, 0}});
+    ASSERT_EQ(found.parameters.size(), 2u);
+    covered += covers(found.parameters[0], kX) + covers(found.parameters[1], kY);
+    error += std::hypot(found.parameters[0].value - kX, found.parameters[1].value - kY) / kWorlds;
+    EXPECT_LT((found.scale.offset_W - Vec3(found.parameters[0].value, found.parameters[1].value, 0)).norm(), 1e-3);
+  }
+  EXPECT_LT(error, 0.05);
+  EXPECT_GE(covered, 0.87 * 2 * kWorlds);
+}
+
+TEST(Surroundings, TheSideOfALoweredCeilingIsAWallButNotFromFloorToCeiling) {
+  using backwash::map::Cell;
+  backwash::map::OccupancyGrid grid(Vec3::Zero(), 0.1, {30, 30, 26}, Cell::free);
+  for (int i = 0; i < 30; ++i)
+    for (int j = 0; j < 30; ++j)
+      for (int k = 0; k < 26; ++k)
+        if (i == 0 || j == 0 || i == 29 || j == 29 || k == 0 || k == 25 || (i < 12 && k >= 18))
+          grid.set({i, j, k}, Cell::occupied);
+  Surroundings around(&grid, backwash::config::load_model("builtin:quad-5in").value());
+  const Place high = around.around({1.55, 1.05, 2.15}), low = around.around({1.55, 1.05, 1.0});
+  const auto nearest_along = [](const auto& walls, const Vec3& direction) {
+    double least = kNoSurface;
+    for (const auto& [distance, towards_it] : walls)
+      if (towards_it.dot(direction) > 0.9) least = std::min(least, distance);
+    return least;
+  };
+  EXPECT_NEAR(nearest_along(high.walls, -Vec3::UnitX()), 0.35, 1e-6);
+  EXPECT_EQ(nearest_along(high.whole_walls, -Vec3::UnitX()), kNoSurface);
+  EXPECT_NEAR(nearest_along(low.whole_walls, -Vec3::UnitX()), 1.45, 1e-6);
+  EXPECT_NEAR(nearest_along(high.whole_walls, -Vec3::UnitY()), 0.95, 1e-6);
+}
+
+}  // namespace

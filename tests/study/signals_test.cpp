@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the study measures on made signals whose truth is known, and on worlds of the independent generator.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "core/study/inference/evidence.hpp"
+#include "core/study/windows/instrument.hpp"
+#include "core/study/windows/signals.hpp"
+#include "core/study/windows/texture.hpp"
+#include "tests/study_worlds/observe.hpp"
+#include "tests/study_worlds/score.hpp"
+
+namespace {
+
+using namespace backwash::study;
+
+constexpr double kRate = 50, kGusts = 0.04, kCorrelation = 0.17;  // Hz, (m/s²)², s
+
+/// Windows of 2 s of Gaussian gusts with an exponential correlation; with bursts of 0.1 s three times as strong, one in
+/// five tenths of a second (drawn anew each); white noise of the given deviation on top.
+std::vector<Residual> made(std::size_t windows, bool bursts, double noise, unsigned seed) {
+  std::mt19937_64 rng(seed);
+  std::normal_distribution draw;
+  const double phi = std::exp(-1 / (kRate * kCorrelation));
+  std::vector<Residual> all;
+  for (std::size_t w = 0; w < windows; ++w) {
+    Residual r{{}, backwash::Vec3::Constant(kGusts)};
+    for (auto& x : r.x) {
+      double gust = draw(rng), factor = 1;
+      for (int i = 0; i < 100; ++i) {
+        if (i % 5 == 0) factor = bursts && rng() % 5 == 0 ? 3 : 1;
+        gust = phi * gust + std::sqrt(1 - phi * phi) * draw(rng);
+        x.push_back(std::sqrt(kGusts) * factor * gust + noise * draw(rng));
+      }
+    }
+    all.push_back(std::move(r));
+  }
+  return all;
+}
+
+double tail_of(const std::vector<Residual>& windows) {
+  const Texture texture = texture_of(windows, kRate);
+  std::vector<Fourth> fourth;
+  for (const auto& w : windows) fourth.push_back(fourth_moments(w, texture));
+  double mean = 0;
+  for (const double y : tails(fourth)) mean += y / static_cast<double>(windows.size());
+  return mean;
+}
+
+TEST(Texture, WhitePartIsTheNoiseOnGustsAndNothingOnSmoothSignals) {
+  const Texture noisy = texture_of(made(200, false, 0.06, 1), kRate);
+  for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(noisy.white[axis], 0.0036, 0.0008);
+  EXPECT_NEAR(noisy.scale, 1, 0.1);
+  auto smooth = made(200, false, 0.06, 2);
+  for (auto& w : smooth)
+    for (auto& x : w.x) {  // as a filter of eight samples leaves it
+      std::vector<double> filtered;
+      for (std::size_t i = 7; i < x.size(); ++i)
+        filtered.push_back(
+            std::accumulate(x.begin() + static_cast<long>(i) - 7, x.begin() + static_cast<long>(i) + 1, 0.0) / 8);
+      x = filtered;
+    }
+  const Texture none = texture_of(smooth, kRate);
+  for (int axis = 0; axis < 3; ++axis) EXPECT_LT(none.white[axis], 0.0002);
+}
+
+TEST(Tails, AreZeroForGaussianGustsAndTheBurstsKurtosisInShortNoisyWindows) {
+  // E m⁴/(E m²)² of a factor that is 3 in one of five tenths of a second, else 1.
+  const double truth = std::log((0.2 * 81 + 0.8) / std::pow(0.2 * 9 + 0.8, 2));
+  EXPECT_NEAR(tail_of(made(1500, false, 0.05, 3)), 0, 0.05);
+  EXPECT_NEAR(tail_of(made(1500, true, 0.05, 4)), truth, 0.08);
+}
+
+TEST(SlowCourse, KeepsADischargeAndDropsWhatAlternates) {
+  std::vector<double> t, discharge, logged;
+  for (int i = 0; i < 40; ++i) {
+    t.push_back(2 * i), discharge.push_back(16.4 - 0.012 * t.back() + 2e-5 * t.back() * t.back());
+    logged.push_back(discharge.back() + (i % 2 ? 0.05 : -0.05));
+  }
+  const auto course = slow_course(t, logged);
+  for (std::size_t i = 0; i < t.size(); ++i) EXPECT_NEAR(course[i], discharge[i], 0.012);
+  EXPECT_EQ(slow_course(std::vector{3.0}, std::vector{11.1}), std::vector{11.1});
+}
+
+TEST(DelayStage, FindsADelayThatIsNotShortAgainstTheSetPoints) {
+  // Set-points along sin ωt, heard τ later: Σ cos ωt (sin ω(t − τ) − sin ωt) = −sin(ωτ) Σ cos².
+  const double omega = 15, tau = 0.06;
+  DelayStage stage;
+  for (std::size_t w = 0; w < 20; ++w) {
+    DelayStage::PerSecond design;
+    const double strength = 1 + 0.1 * static_cast<double>(w);
+    for (std::size_t k = 0; k < kShifts.size(); ++k)
+      design[k] = strength * (kShifts[k] == 0 ? omega : std::sin(omega * kShifts[k]) / kShifts[k]);
+    stage.add(w, strength * std::sin(omega * tau), design);
+  }
+  for (const auto& [window, design] : stage.designs())
+    EXPECT_NEAR((1 + 0.1 * static_cast<double>(window)) * std::sin(omega * tau) / design, tau, 0.001);
+  EXPECT_LT(std::sin(omega * tau) / omega, 0.9 * tau);  // what the tangent would tell
+}
+
+/// Estimate of a cause by its first form with all flights of a world.
+double estimate(const study_worlds::World& world, const std::string& cause) {
+  const auto folder = std::filesystem::temp_directory_path() / ("study-signals-" + std::to_string(::getpid()));
+  const auto seen = study_worlds::observe(world, folder);
+  std::filesystem::remove_all(folder);
+  for (const Form* form : catalogue())
+    if (form->cause() == cause)
+      return Evidence(seen).normal(form->columns(seen.windows, form->scales.front()), {}).fit()[0];
+  throw std::logic_error(cause);
+}
+
+TEST(ThrustSlope, IsTheSameShareOfASteeperAndOfAShallowerCurve) {
+  // A closed loop commands 1/(1 + s) of the nominal thrust: told from that, +0.25 would be 0.20 and −0.25 be −0.33.
+  auto world = study_worlds::draw_world({4711, {"thrust_slope"}, 1, 10, ""});
+  for (const double s : {0.25, -0.25}) {
+    world.effects.size["thrust_slope"] = s;
+    EXPECT_NEAR(estimate(world, "thrust_slope") / s, 1, 0.15) << s;
+  }
+}
+
+TEST(StudyWorlds, IntervalsHoldTheTailThatWasFlown) {
+  const auto folder = std::filesystem::temp_directory_path() / ("study-tail-" + std::to_string(::getpid()));
+  const auto o = study_worlds::score({"heavy_tails", {"heavy_tails"}}, 4711, 1, 12, folder);
+  std::filesystem::remove_all(folder);
+  ASSERT_EQ(o.compared.size(), 1u) << study_worlds::told(o.sets, o.unknown);
+  EXPECT_NEAR(o.compared[0].value, o.compared[0].truth, 0.15 * o.compared[0].truth);
+}
+
+TEST(Study, TellsASaggingBatteryFromEqualStartsWithoutAFalseNameBesideIt) {
+  const auto folder = std::filesystem::temp_directory_path() / ("study-battery-" + std::to_string(::getpid()));
+  const study_worlds::Cell cell{"battery_sag, equal batteries", {"battery_sag"}, "battery"};
+  const auto o = study_worlds::score(cell, 4711, 1, 12, folder);
+  std::filesystem::remove_all(folder);
+  EXPECT_TRUE(o.in_sets()) << study_worlds::told(o.sets, o.unknown);
+  EXPECT_FALSE(o.wrong_name()) << study_worlds::told(o.sets, o.unknown);
+}
+
+}  // namespace
