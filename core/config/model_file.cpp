@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
@@ -164,12 +167,46 @@ toml::table effect_table(const ModelEffect& effect) {
   return table;
 }
 
+namespace {
+
+/// The library prints 17 digits of each number; here the fewest that are read as the same one.
+std::string with_short_numbers(const std::string& text) {
+  std::string result;
+  char quote = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_not_of("+-.0123456789e", at), text.size());
+    const bool word = at > 0 && (std::isalnum(static_cast<unsigned char>(text[at - 1])) || text[at - 1] == '_');
+    const std::string token = text.substr(at, end - at);
+    if (quote == 0 && !word && token.find('.') != token.npos) {
+      std::array<char, 40> number{};
+      char* const last =
+          std::to_chars(number.data(), number.data() + number.size(), std::strtod(token.c_str(), nullptr)).ptr;
+      std::string shortest(number.data(), last);
+      if (shortest.find_first_of(".e") == shortest.npos) shortest += ".0";
+      result += shortest;
+      at = end;
+      continue;
+    }
+    const char c = text[at++];
+    result += c;
+    if (quote == '"' && c == '\\' && at < text.size())
+      result += text[at++];
+    else if (quote == 0 && (c == '"' || c == '\''))
+      quote = c;
+    else if (c == quote)
+      quote = 0;
+  }
+  return result;
+}
+
+}  // namespace
+
 std::string text_of(const toml::table& tables, const std::vector<std::string>& order) {
   std::ostringstream text;
   for (const auto& name : order)
     if (const auto* table = tables[name].as_table())
       text << toml::toml_formatter{toml::table{{name, *table}}} << "\n\n";
-  return text.str();
+  return with_short_numbers(text.str());
 }
 
 }  // namespace backwash::config

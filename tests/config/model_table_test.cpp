@@ -54,6 +54,20 @@ TEST(ModelTable, EveryConstantIsReadBackAsItWasWritten) {
   EXPECT_EQ(model_table(*found), model_table(m));
 }
 
+TEST(ModelTable, NumbersAreAsShortAsTheyMayBeAndTextStaysAsItIs) {
+  Model m;
+  m.base = {0.05, 1};
+  m.ground.k2 = 1e-7;
+  const std::string said = "0.050000000000000003 of 'log 1.10.csv' and \"2.50\"";
+  const std::string text = written(m, "provenance", toml::table{{"said", said}, {"count", 12}});
+  EXPECT_NE(text.find("horizontal = 0.05"), std::string::npos) << text;
+  EXPECT_NE(text.find("vertical = 1.0"), std::string::npos) << text;
+  EXPECT_NE(text.find("k2 = 1e-07"), std::string::npos) << text;
+  EXPECT_NE(text.find("count = 12"), std::string::npos) << text;
+  EXPECT_EQ(toml::parse(text)["provenance"]["said"].value<std::string>(), said);
+  EXPECT_EQ(toml::parse(text)["ground"]["k2"].value<double>(), 1e-7);
+}
+
 TEST(ModelTable, EveryKindOfEffectIsReadBackAsItWasWritten) {
   for (int k = 0; k <= static_cast<int>(ModelEffect::Kind::ln_variance_with_speed); ++k) {
     const ModelEffect e{static_cast<ModelEffect::Kind>(k), Vec3(-0.125, 0.25, 0.5), Vec3(0.5, 0.25, 0.125), 0.75};
