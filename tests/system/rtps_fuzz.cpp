@@ -138,10 +138,12 @@ std::vector<Socket> sockets() {
   return open;
 }
 
-/// In the fullest of them.
+/// In the fullest of those that are attacked. Others are left out: a damaged packet can make a receiver answer the
+/// socket that sent it, and nobody reads there.
 unsigned waiting() {
   unsigned most = 0;
-  for (const Socket& s : sockets()) most = std::max(most, s.waiting);
+  for (const Socket& s : sockets())
+    if (targets.contains(static_cast<std::uint16_t>(s.port))) most = std::max(most, s.waiting);
   return most;
 }
 
