@@ -47,6 +47,42 @@ void keep_whole(FlightLog& log, std::initializer_list<const char*> names) {
     }
 }
 
+void join_motors(const ULog& ulog, Rows& rows, FlightLog& log) {
+  const auto* motors = ulog.find("actuator_motors");
+  const ULog::Topic* outputs = nullptr;
+  for (unsigned instance = 0; instance < 4 && !outputs; ++instance)  // of the output board that is there
+    outputs = ulog.find("actuator_outputs", instance);
+  for (int i = 0; i < 4; ++i) {
+    const std::string to = std::string("motor").append(std::to_string(i + 1));
+    const std::string index = std::string("[").append(std::to_string(i)).append("]");
+    rows.join(motors, std::string("control").append(index), to, 1);
+    rows.join(outputs, std::string("output").append(index), to,
+              1e-3);  // PWM in µs: 1000 … 2000; the offset is taken out below
+    if (!motors && log.has(to))
+      for (double& v : log.columns[to]) v -= 1;
+  }
+}
+
+/// Body FRD → NED into body FLU → ENU.
+void join_attitude(const ULog& ulog, const ULog::Topic& position, FlightLog& log) {
+  const auto* attitude = ulog.find("vehicle_attitude");
+  if (!attitude) return;
+  FlightLog q;
+  Rows turned(position, q);
+  for (int i = 0; i < 4; ++i) {
+    const std::string name = std::string("q[").append(std::to_string(i)).append("]");
+    turned.join(attitude, name, name, 1);
+  }
+  if (q.columns.size() != 4) return;
+  for (std::size_t row = 0; row < position.t_s.size(); ++row) {
+    const double w = q.column("q[0]")[row], x = q.column("q[1]")[row], y = q.column("q[2]")[row],
+                 z = q.column("q[3]")[row], s = std::sqrt(0.5);
+    // (0, s, s, 0) ⊗ q ⊗ (0, 1, 0, 0)
+    log.columns["qw"].push_back(-s * (w + z)), log.columns["qx"].push_back(-s * (x + y));
+    log.columns["qy"].push_back(s * (y - x)), log.columns["qz"].push_back(s * (z - w));
+  }
+}
+
 FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
   FlightLog log;
   for (const double t : position.t_s) log.t_s.push_back(t - position.t_s.front());
@@ -67,39 +103,10 @@ FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
   const auto* battery = ulog.find("battery_status");
   rows.join(battery, "voltage_v", "battery_v", 1);
   rows.join(battery, "temperature", "temperature_c", 1);
-  const auto* motors = ulog.find("actuator_motors");
-  const ULog::Topic* outputs = nullptr;
-  for (unsigned instance = 0; instance < 4 && !outputs; ++instance)  // of the output board that is there
-    outputs = ulog.find("actuator_outputs", instance);
-  for (int i = 0; i < 4; ++i) {
-    const std::string to = std::string("motor").append(std::to_string(i + 1));
-    const std::string index = std::string("[").append(std::to_string(i)).append("]");
-    rows.join(motors, std::string("control").append(index), to, 1);
-    rows.join(outputs, std::string("output").append(index), to,
-              1e-3);  // PWM in µs: 1000 … 2000; the offset is taken out below
-    if (!motors && log.has(to))
-      for (double& v : log.columns[to]) v -= 1;
-  }
+  join_motors(ulog, rows, log);
   rows.join(ulog.find("vehicle_thrust_setpoint"), "xyz[2]", "thrust", -1);
   rows.join(ulog.find("vehicle_attitude_setpoint"), "thrust_body[2]", "thrust", -1);  // before PX4 1.14
-  // Body FRD → NED into body FLU → ENU.
-  if (const auto* attitude = ulog.find("vehicle_attitude")) {
-    FlightLog q;
-    Rows turned(position, q);
-    for (int i = 0; i < 4; ++i) {
-      const std::string name = std::string("q[").append(std::to_string(i)).append("]");
-      turned.join(attitude, name, name, 1);
-    }
-    if (q.columns.size() == 4) {
-      for (std::size_t row = 0; row < position.t_s.size(); ++row) {
-        const double w = q.column("q[0]")[row], x = q.column("q[1]")[row], y = q.column("q[2]")[row],
-                     z = q.column("q[3]")[row], s = std::sqrt(0.5);
-        // (0, s, s, 0) ⊗ q ⊗ (0, 1, 0, 0)
-        log.columns["qw"].push_back(-s * (w + z)), log.columns["qx"].push_back(-s * (x + y));
-        log.columns["qy"].push_back(s * (y - x)), log.columns["qz"].push_back(s * (z - w));
-      }
-    }
-  }
+  join_attitude(ulog, position, log);
   return log;
 }
 

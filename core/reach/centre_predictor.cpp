@@ -54,6 +54,27 @@ CentrePredictor::CentrePredictor(const Vehicle& vehicle, Loop loop, const State&
   add_segments(horizontal, vertical, latency.rest);
 }
 
+namespace {
+
+/// Where the pieces of a period begin, cut at two instants and nowhere longer than `longest`, s; its end comes last.
+std::vector<double> pieces_of_period(double switch_time, double measured_at, double longest) {
+  std::vector<double> knots{0, kControlPeriod};
+  for (const double t : {switch_time, measured_at})
+    if (t > kSameInstant && t < kControlPeriod - kSameInstant) knots.push_back(t);
+  std::sort(knots.begin(), knots.end());
+  std::vector<double> starts;
+  for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
+    const double length = knots[i + 1] - knots[i];
+    if (length < kSameInstant) continue;
+    const int pieces = static_cast<int>(std::ceil(length / longest - 1e-9));
+    for (int k = 0; k < pieces; ++k) starts.push_back(knots[i] + length * k / pieces);
+  }
+  starts.push_back(kControlPeriod);
+  return starts;
+}
+
+}  // namespace
+
 // Cuts the period at the switch of the command and, as the kind of feedback needs it, at the instant of measurement or
 // into short pieces.
 void CentrePredictor::add_segments(const AxisLoop& horizontal, const AxisLoop& vertical, double switch_time) {
@@ -64,20 +85,8 @@ void CentrePredictor::add_segments(const AxisLoop& horizontal, const AxisLoop& v
     sample_delay_ = d.whole + (d.rest > 0 ? 1 : 0);
     measured_at = d.rest > 0 ? kControlPeriod - d.rest : 0.0;
   }
-  std::vector<double> knots{0, kControlPeriod};
-  for (const double t : {switch_time, measured_at})
-    if (t > kSameInstant && t < kControlPeriod - kSameInstant) knots.push_back(t);
-  std::sort(knots.begin(), knots.end());
-
-  std::vector<double> starts;
-  for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
-    const double length = knots[i + 1] - knots[i];
-    if (length < kSameInstant) continue;
-    const double longest = kind_ == Feedback::delayed ? std::min(kLongestSegment, delay) : kControlPeriod;
-    const int pieces = static_cast<int>(std::ceil(length / longest - 1e-9));
-    for (int k = 0; k < pieces; ++k) starts.push_back(knots[i] + length * k / pieces);
-  }
-  starts.push_back(kControlPeriod);
+  const double longest = kind_ == Feedback::delayed ? std::min(kLongestSegment, delay) : kControlPeriod;
+  const auto starts = pieces_of_period(switch_time, measured_at, longest);
   for (std::size_t i = 0; i + 1 < starts.size(); ++i) {
     const double length = starts[i + 1] - starts[i];
     const bool closed = kind_ == Feedback::immediate;

@@ -54,6 +54,17 @@ struct Axis {
 };
 Axis axis_of(double kp, double kd) { return {(error_matrix(kp, kd) * kControlPeriod).exp(), step_gramian(kp, kd)}; }
 
+/// Last of 0 … high at which a growing function is below a value, to high/2⁵⁰: bisection.
+template <typename F>
+double last_below(double value, double high, F growing) {
+  double low = 0;
+  for (int i = 0; i < 50; ++i) {
+    const double middle = (low + high) / 2;
+    (growing(middle) < value ? low : high) = middle;
+  }
+  return low;
+}
+
 }  // namespace
 
 Matrix2d step_gramian(double kp, double kd) {
@@ -117,12 +128,8 @@ Mat3 hover_ellipsoid(const Vehicle& vehicle, const Vec3& w_bar) {
     return Q;
   };
   // r² tr Q(r) grows with r, from 0 to infinity at (1 + r) e^{2 slowest dt} = 1.
-  double low = 0, high = std::expm1(-2 * slowest * kControlPeriod);
-  for (int i = 0; i < 50; ++i) {
-    const double r = (low + high) / 2;
-    (r * r * trace(solution(r)) < trace_d ? low : high) = r;
-  }
-  const Blocks Q = solution(low);
+  const Blocks Q = solution(last_below(trace_d, std::expm1(-2 * slowest * kControlPeriod),
+                                       [&](double r) { return r * r * trace(solution(r)); }));
   constexpr double kRoundUp = 1 + 1e-6;  // covers the root's width
   return kRoundUp * Mat3(Vec3(Q[0](0, 0), Q[1](0, 0), Q[2](0, 0)).asDiagonal());
 }
@@ -142,13 +149,10 @@ HoverEllipsoid::HoverEllipsoid(const Vehicle& vehicle) : vehicle_(vehicle) {
   };
   for (int n = 0; n <= kShares; ++n) {
     const double share = std::pow(std::sin(std::numbers::pi / 2 * n / kShares), 2);
-    double low = 0, high = std::expm1(-2 * slowest * kControlPeriod);
-    for (int i = 0; i < 50; ++i) {
-      const double r = (low + high) / 2;
-      const double trace = (1 - share) * solution(h, r).trace() + share * solution(v, r).trace();
-      (r * r * trace < 1 ? low : high) = r;
-    }
-    square_.emplace_back(solution(h, low)(0, 0), solution(v, low)(0, 0));
+    const double at = last_below(1, std::expm1(-2 * slowest * kControlPeriod), [&](double r) {
+      return r * r * ((1 - share) * solution(h, r).trace() + share * solution(v, r).trace());
+    });
+    square_.emplace_back(solution(h, at)(0, 0), solution(v, at)(0, 0));
   }
 }
 

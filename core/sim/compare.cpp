@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/types/thrust.hpp"
+
 namespace backwash::sim {
 namespace {
 
@@ -61,12 +63,6 @@ std::vector<Vec3> hover_points(const map::OccupancyGrid& grid, const map::Distan
     if (above >= kLowest && above <= kHighest) points.push_back(grid.center(v));
   }
   return points;
-}
-
-/// Thrust that a normalised command gives, N.
-double newtons(const Vehicle& vehicle, double u) {
-  const double f = vehicle.propulsion.thr_mdl_fac;
-  return vehicle.propulsion.max_thrust * (f * u * u + (1 - f) * u);
 }
 
 double induced_power(const Vehicle& vehicle, double thrust_N) {
@@ -140,7 +136,8 @@ RouteOutcome measure(const Route& route, const plan::World& world, const Vehicle
   Vec3 before = Vec3::Zero();
   for (std::size_t k = 0; k < outcome.samples; ++k) {
     const auto& sample = piece.samples[k];
-    const double thrust = newtons(vehicle, sample.thrust), clearance = piece.clearance_m[k] - larger;
+    const double thrust = vehicle.propulsion.max_thrust * thrust_share(vehicle, sample.thrust),
+                 clearance = piece.clearance_m[k] - larger;
     const Vec3 produced = thrust / vehicle.body.mass * (sample.attitude * Vec3::UnitZ());
     outcome.clearance_m = std::min(outcome.clearance_m, clearance);
     outcome.contacts += clearance < 0 ? 1 : 0;

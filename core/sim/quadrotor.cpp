@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/types/thrust.hpp"
+
 namespace backwash::sim {
 namespace {
 
@@ -84,9 +86,7 @@ Eigen::Quaterniond Quadrotor::attitude() const {
 
 double Quadrotor::thrust() const noexcept {
   const double share = vehicle_.body.mass * (produced_ + kGravityUp).norm() / vehicle_.propulsion.max_thrust;
-  const double f = vehicle_.propulsion.thr_mdl_fac;
-  const double u = f > 0 ? (std::sqrt((1 - f) * (1 - f) + 4 * f * share) - (1 - f)) / (2 * f) : share;
-  return std::clamp(u, 0.0, 1.0);
+  return std::clamp(thrust_command(vehicle_, share), 0.0, 1.0);
 }
 
 }  // namespace backwash::sim

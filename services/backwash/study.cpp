@@ -24,7 +24,7 @@ struct Options {
   std::vector<std::string> logs, reference;
   std::string group;
   unsigned seed = 1;
-  bool json = false, force = false, quick = false;
+  bool json = false, force = false, quick = false, rules = false;
 };
 
 /// The study's own terms of a model file that it has extended before; none in others.
@@ -138,6 +138,11 @@ std::optional<study::calibrate::HeightEffects> height_effects(const Options& opt
 }
 
 int run(const Options& options) {
+  if (options.rules) {
+    print_rules(options.json);
+    return kOk;
+  }
+  if (options.vehicle.empty() || options.logs.empty()) throw Failure(kUsage, "study needs --vehicle and --log");
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
@@ -197,8 +202,8 @@ Verb study_verb(CLI::App& app) {
   command->add_option("--map", options->map,
                       "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
   command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  command->add_option("--log", options->logs, "flight logs, one flight each: CSV or ULog (.ulg)")->required();
+  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
+  command->add_option("--log", options->logs, "flight logs, one flight each: CSV or ULog (.ulg)");
   command->add_option(
       "--reference", options->reference,
       "flights of the same vehicle known to be sound, 4 or more: the --log flights' motor shares are judged against "
@@ -209,6 +214,8 @@ Verb study_verb(CLI::App& app) {
   command->add_option("--out", options->out, "extended model file to write");
   command->add_option("--seed", options->seed, "of the null's sign draws")->capture_default_str();
   command->add_flag("--quick", options->quick, "without the smallest effects that could have been found");
+  command->add_flag("--rules", options->rules,
+                    "prints every constant of the inference with unit and reason, and nothing else");
   command->add_flag("--json", options->json, "one JSON object on stdout");
   command->add_flag("--force", options->force, "overwrite --report and --out");
   command->footer(

@@ -154,4 +154,22 @@ void print_text(const study::StudyResult& result, const study::Observations& see
   }
 }
 
+void print_rules(bool json) {
+  if (json) {
+    Json all;
+    for (const auto& r : study::rules())
+      all["rules"].push_back({{"name", r.name}, {"value", r.value}, {"unit", r.unit}, {"reason", r.reason}});
+    for (const study::Form* f : study::catalogue())
+      all["forms"].push_back(
+          {{"effect", f->cause()}, {"form", f->formula}, {"least_rms", f->floor}, {"least_parameter", f->least}});
+    return print(all);
+  }
+  for (const auto& [name, value, unit, reason] : study::rules())
+    std::printf("%-20.*s %10.7g  %-22.*s %.*s\n", static_cast<int>(name.size()), name.data(), value,
+                static_cast<int>(unit.size()), unit.data(), static_cast<int>(reason.size()), reason.data());
+  std::printf("\nleast root mean square over the flown windows, least first parameter, of each form:\n");
+  for (const study::Form* f : study::catalogue())
+    std::printf("%-20s %7.3g %7.3g  %s\n", f->cause().c_str(), f->floor, f->least, f->formula.c_str());
+}
+
 }  // namespace backwash::services

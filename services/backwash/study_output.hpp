@@ -21,4 +21,7 @@ void print_text(const study::StudyResult& result, const study::Observations& see
                 const std::optional<study::RotorVerdict>& rotors,
                 const std::optional<study::calibrate::HeightEffects>& height);
 
+/// Every constant of the inference with unit and reason, and of each form the size from which on it is an effect.
+void print_rules(bool json);
+
 }  // namespace backwash::services

@@ -6,7 +6,7 @@
 #include <limits>
 #include <sstream>
 
-#include "tests/study_worlds/world.hpp"
+#include "tests/study_worlds/effects.hpp"
 
 namespace study_worlds {
 namespace {
@@ -16,32 +16,6 @@ using Rng = std::mt19937_64;
 double between(Rng& rng, double low, double high) { return std::uniform_real_distribution(low, high)(rng); }
 
 double to_decimetre(double x) { return std::round(10 * x) / 10; }
-
-/// The table of the docs: the size that must be found at 12 flights, in its unit (core/study/confusion.md).
-const std::map<std::string, double>& table() {
-  static const std::map<std::string, double> sizes = {
-      {"ground_thrust", 0.12},       // m/s² 0.4 m above the ground
-      {"ceiling", 0.12},             // m/s² 0.3 m below the ceiling
-      {"wall_attraction", 0.12},     // m/s² 0.4 m from the wall
-      {"recirculation", 0.8},        // ln variance in the end
-      {"forward_speed", 1.0},        // ln variance at 1 m/s
-      {"battery_sag", 0.4},          // relative thrust per relative voltage
-      {"thrust_slope", 0.12},        // relative slope of the thrust curve at hover
-      {"payload", 0.02},             // relative mass
-      {"trim", 0.12},                // m/s² in the body's horizontal plane
-      {"draft", 0.12},               // m/s² in the world's horizontal plane
-      {"rotor_drag", 0.2},           // 1/s
-      {"actuator_lag", 0.05},        // s
-      {"command_latency", 0.06},     // s
-      {"imu_drift", 0.2},            // m/s² per 100 s
-      {"vibration", 0.25},           // m/s², amplitude of the rotors' line
-      {"map_offset", 0.25},          // m
-      {"heavy_tails", 1.0},          // ln of the kurtosis over 3
-      {"propeller_damage", 0.06},    // relative thrust of one rotor
-      {"rotor_sensor_fault", 0.05},  // relative reading of one rotor, or share of dropouts
-      {"unknown", 0.15}};            // m/s²
-  return sizes;
-}
 
 Room draw_room(Rng& rng, bool empty) {
   Room room;
@@ -65,34 +39,17 @@ Craft draw_craft(Rng& rng) {
   return c;
 }
 
-bool one_signed(const std::string& cause) {
-  static const std::vector<std::string> names = {"battery_sag", "rotor_drag", "actuator_lag", "command_latency",
-                                                 "vibration",   "map_offset", "heavy_tails",  "propeller_damage"};
-  return std::find(names.begin(), names.end(), cause) != names.end();
-}
-
-double draw_shape(Rng& rng, const std::string& cause) {
-  if (cause == "ground_thrust" || cause == "ceiling") return between(rng, 0.3, 0.7);  // effective radius, m
-  if (cause == "wall_attraction") return between(rng, 0.15, 0.4);                     // length of the potential, m
-  if (cause == "recirculation") return between(rng, 15, 50);                          // s
-  if (cause == "propeller_damage" || cause == "rotor_sensor_fault") return std::floor(between(rng, 0, 4));  // rotor
-  if (cause == "unknown") return std::floor(between(rng, 0, 4));                                            // which
-  return between(rng, -M_PI, M_PI);  // a direction
-}
-
 }  // namespace
 
 const std::vector<std::string>& cause_names() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;
-    for (const auto& [name, size] : table())
+    for (const auto& [name, cause] : causes())
       if (name != "unknown") all.push_back(name);
     return all;
   }();
   return names;
 }
-
-double table_size(const std::string& cause) { return table().at(cause); }
 
 double Room::height_above_solid(const Vec3& p) const {
   double top = inside.low.z();
@@ -123,10 +80,11 @@ World draw_world(const Request& request) {
   world.rate_hz = between(rng, 0, 1) < 0.7 ? 50 : between(rng, 0, 1) < 0.5 ? 100 : 40;
   world.jitter = between(rng, 0, 0.3);
   world.ln_var_vehicle = 0.55 * std::normal_distribution()(rng);
-  for (const auto& cause : request.causes) {
-    const double sign = !one_signed(cause) && between(rng, 0, 1) < 0.5 ? -1 : 1;
-    world.effects.size[cause] = sign * request.size * table().at(cause);
-    world.effects.shape[cause] = draw_shape(rng, cause);
+  for (const auto& name : request.causes) {
+    const Cause& cause = causes().at(name);
+    const double sign = !cause.one_signed && between(rng, 0, 1) < 0.5 ? -1 : 1;
+    world.effects.size[name] = sign * request.size * cause.size;
+    world.effects.shape[name] = cause.shape ? cause.shape(rng) : between(rng, -M_PI, M_PI);
   }
   return world;
 }

@@ -3,8 +3,23 @@
 
 #include <cmath>
 
+#include "tests/study_worlds/plan.hpp"
+
 namespace study_worlds {
 namespace {
+
+auto between(double low, double high) {
+  return [low, high](std::mt19937_64& rng) { return std::uniform_real_distribution(low, high)(rng); };
+}
+double one_of_four(std::mt19937_64& rng) { return std::floor(between(0, 4)(rng)); }
+
+Vec3 level(double direction) { return {std::cos(direction), std::sin(direction), 0}; }
+Vec3 up(double push) { return {0, 0, push}; }
+
+/// Defined at the same reference on both sides.
+std::optional<double> same(double s, double) { return s; }
+std::optional<double> along_x(double s, double direction) { return s * std::cos(direction); }
+std::optional<double> along_y(double s, double direction) { return s * std::sin(direction); }
 
 /// 1/(1 − (R/4d)²) − 1, the source doublet's image, scaled to 1 at d_ref.
 double image_doublet(double radius, double d, double d_ref) {
@@ -27,54 +42,137 @@ Vec3 wall_pull(const Room& room, const Vec3& p, double length) {
 }
 
 /// Causes that no name of the catalogue covers.
-Vec3 outside_the_catalogue(const World& world, const Instant& now) {
-  const double s = world.effects.of("unknown");
-  switch (static_cast<int>(world.effects.shape_of("unknown"))) {
+Vec3 outside_the_catalogue(const Acting& a) {
+  switch (static_cast<int>(a.shape)) {
     case 0:  // a standing wave of pressure along the room
-      return {0, 0, s * std::sqrt(2.0) * std::sin(2 * M_PI * now.p.y() / 1.9)};
+      return up(a.s * std::sqrt(2.0) * std::sin(2 * M_PI * a.now.p.y() / 1.9));
     case 1:  // the vehicle's heading disturbs its height
-      return {0, 0, s * std::sqrt(2.0) * std::cos(2 * now.yaw)};
+      return up(a.s * std::sqrt(2.0) * std::cos(2 * a.now.yaw));
     case 2:  // a jet at one height
-      return Vec3(s, s, 0) * 1.5 * std::exp(-std::pow((now.p.z() - 1.1) / 0.18, 2));
+      return Vec3(a.s, a.s, 0) * 1.5 * std::exp(-std::pow((a.now.p.z() - 1.1) / 0.18, 2));
     default:  // warmth in the middle of the range
-      return {0, 0, 2 * s * std::exp(-std::pow((now.temperature - 31) / 2.0, 2))};
+      return up(2 * a.s * std::exp(-std::pow((a.now.temperature - 31) / 2.0, 2)));
   }
+}
+
+Vec3 ceiling_push(const Acting& a) {
+  const double gap = a.world.room.gap_to_ceiling(a.now.p);
+  return std::isfinite(gap) ? up(a.s * image_doublet(a.shape, gap, 0.3)) : Vec3(Vec3::Zero());
+}
+
+/// Causes that push.
+std::map<std::string, Cause> pushes() {
+  const auto after_100_s = [](double share) -> Truth {
+    return [share](double s, double) { return 1.6 * (1 - std::exp(-1.0)) * s * share; };
+  };
+  return {
+      {"ground_thrust",  // m/s² 0.4 m above the ground; effective radius, m
+       {.size = 0.12,
+        .shape = between(0.3, 0.7),
+        .push = [](auto& a) { return up(a.s * image_doublet(a.shape, a.world.room.height_above_solid(a.now.p), 0.4)); },
+        .truth = {{"A_mps2", same}}}},
+      {"ceiling",  // m/s² 0.3 m below the ceiling; effective radius, m
+       {.size = 0.12, .shape = between(0.3, 0.7), .push = ceiling_push, .truth = {{"A_mps2", same}}}},
+      {"wall_attraction",  // m/s² 0.4 m from the wall; length of the potential, m
+       {.size = 0.12,
+        .shape = between(0.15, 0.4),
+        .push = [](auto& a) -> Vec3 { return a.s * wall_pull(a.world.room, a.now.p, a.shape); },
+        .truth = {{"A_mps2", same}}}},
+      {"battery_sag",  // relative thrust per relative voltage: thrust goes with a power of the loaded voltage
+       {.size = 0.4,
+        .one_signed = true,
+        .push = [](auto& a) { return up(a.now.thrust_acc * (std::pow(1 - a.now.voltage_drop, a.s) - 1)); },
+        .truth = {{"s", same}}}},
+      {"payload",  // relative mass
+       {.size = 0.02,
+        .push = [](auto& a) { return up(a.now.thrust_acc * (1 / (1 + a.s) - 1)); },
+        .truth = {{"m", [](double s, double) { return 1 - 1 / (1 + s); }}}}},
+      {"trim",  // m/s² in the body's horizontal plane
+       {.size = 0.12,
+        .push = [](auto& a) -> Vec3 { return a.s * level(a.shape + a.now.yaw); },
+        .truth = {{"body_x_mps2", along_x}, {"body_y_mps2", along_y}}}},
+      {"draft",  // m/s² in the world's horizontal plane
+       {.size = 0.12,
+        .push = [](auto& a) -> Vec3 { return a.s * (1 + 0.3 * std::sin(2 * M_PI * a.now.t / 23)) * level(a.shape); },
+        .truth = {{"x_mps2", along_x}, {"y_mps2", along_y}}}},
+      {"rotor_drag",  // 1/s at rest; the study's linear drag is defined at 1 m/s
+       {.size = 0.2,
+        .one_signed = true,
+        .push = [](auto& a) -> Vec3 {
+          return -a.s * Vec3(a.now.v.x(), a.now.v.y(), 0) * (1 + 0.15 * a.now.v.template head<2>().norm());
+        },
+        .truth = {{"k_per_s", [](double s, double) { return s * (1 + 0.15); }}}}},
+      {"imu_drift",  // m/s² per 100 s; a push that the accelerometer alone feels
+       {.size = 0.2,
+        .truth = {{"x_mps2_per_100s", [=](double s, double d) { return after_100_s(std::cos(d))(s, d); }},
+                  {"y_mps2_per_100s", [=](double s, double d) { return after_100_s(std::sin(d))(s, d); }},
+                  {"z_mps2_per_100s", after_100_s(0.3)}}}},
+      {"unknown", {.size = 0.15, .shape = one_of_four, .push = outside_the_catalogue}}};  // m/s²; which
+}
+
+/// All others.
+std::map<std::string, Cause> others() {
+  // All surfaces are at whole decimetres and so are the map's voxels: it shows the offset to the nearest of them.
+  const auto shown = [](double offset) { return 0.1 * std::round(offset / 0.1); };
+  return {{"recirculation",  // ln variance in the end; s
+           {.size = 0.8,
+            .shape = between(15, 50),
+            .ln_variance = [](auto& a) { return a.s * std::tanh(a.now.t / a.shape); },
+            .truth = {{"B_ln", same}}}},
+          {"forward_speed",  // ln variance at 1 m/s
+           {.size = 1.0,
+            .ln_variance = [](auto& a) { return a.s * std::log1p(std::pow(a.now.v.norm(), 1.5)) / std::log(2.0); },
+            .truth = {{"B_ln", same}}}},
+          {"thrust_slope", {.size = 0.12, .truth = {{"s", same}}}},  // relative slope of the thrust curve at hover
+          // s; integrated in steps at whose beginning the lag hears the command already: b − r = h/(e^(h/τ) − 1) ṙ.
+          {"actuator_lag",
+           {.size = 0.05,
+            .one_signed = true,
+            .truth = {{"tau_s", [](double s, double) { return kStep / std::expm1(kStep / s); }}}}},
+          {"command_latency", {.size = 0.06, .one_signed = true, .truth = {{"latency_s", same}}}},  // s
+          {"vibration", {.size = 0.25, .one_signed = true}},  // m/s², amplitude of the rotors' line
+          {"map_offset",                                      // m
+           {.size = 0.25,
+            .one_signed = true,
+            .truth = {{"x_m", [=](double s, double d) { return shown(s * std::cos(d)); }},
+                      {"y_m", [=](double s, double d) { return shown(s * std::sin(d)); }}}}},
+          {"heavy_tails", {.size = 1.0, .one_signed = true}},  // ln of the kurtosis over 3
+          {"propeller_damage",                                 // relative thrust of one rotor; which
+           {.size = 0.06,
+            .one_signed = true,
+            .shape = one_of_four,
+            .truth = {{"d", [](double s, double) { return -std::log(1 - s); }}}}},
+          {"rotor_sensor_fault",  // relative reading of one rotor, or share of dropouts; which
+           {.size = 0.05,
+            .shape = one_of_four,
+            .truth = {{"e", [](double s, double) { return s > 0 ? std::optional(2 * std::log(1 + s)) : std::nullopt; }},
+                      {"share", [](double s, double) { return s < 0 ? std::optional(-s) : std::nullopt; }}}}}};
 }
 
 }  // namespace
 
+const std::map<std::string, Cause>& causes() {
+  static const std::map<std::string, Cause> all = [] {
+    auto each = pushes();
+    each.merge(others());
+    return each;
+  }();
+  return all;
+}
+
 Vec3 hidden_push(const World& world, const Instant& now) {
-  const Effects& e = world.effects;
-  const Vec3 down(0, 0, -1), up(0, 0, 1);
   Vec3 push = Vec3::Zero();
-  if (const double s = e.of("ground_thrust"); s != 0)
-    push += s * up * image_doublet(e.shape_of("ground_thrust"), world.room.height_above_solid(now.p), 0.4);
-  if (const double s = e.of("ceiling"); s != 0 && std::isfinite(world.room.gap_to_ceiling(now.p)))
-    push += s * up * image_doublet(e.shape_of("ceiling"), world.room.gap_to_ceiling(now.p), 0.3);
-  if (const double s = e.of("wall_attraction"); s != 0)
-    push += s * wall_pull(world.room, now.p, e.shape_of("wall_attraction"));
-  if (const double s = e.of("battery_sag"); s != 0)  // thrust goes with a power of the loaded voltage
-    push += now.thrust_acc * up * (std::pow(1 - now.voltage_drop, s) - 1);
-  if (const double s = e.of("payload"); s != 0) push += now.thrust_acc * up * (1 / (1 + s) - 1);
-  if (const double s = e.of("trim"); s != 0) {
-    const double direction = e.shape_of("trim") + now.yaw;
-    push += s * Vec3(std::cos(direction), std::sin(direction), 0);
-  }
-  if (const double s = e.of("draft"); s != 0) {
-    const double direction = e.shape_of("draft");
-    push += s * (1 + 0.3 * std::sin(2 * M_PI * now.t / 23)) * Vec3(std::cos(direction), std::sin(direction), 0);
-  }
-  if (const double s = e.of("rotor_drag"); s != 0)
-    push -= s * Vec3(now.v.x(), now.v.y(), 0) * (1 + 0.15 * now.v.head<2>().norm());
-  if (e.of("unknown") != 0) push += outside_the_catalogue(world, now);
+  for (const auto& [name, s] : world.effects.size)
+    if (const auto& cause = causes().at(name); cause.push && s != 0)
+      push += cause.push({world, now, s, world.effects.shape_of(name)});
   return push;
 }
 
 double hidden_ln_variance(const World& world, const Instant& now) {
-  const Effects& e = world.effects;
   double ln = 0;
-  if (const double s = e.of("recirculation"); s != 0) ln += s * std::tanh(now.t / e.shape_of("recirculation"));
-  if (const double s = e.of("forward_speed"); s != 0) ln += s * std::log1p(std::pow(now.v.norm(), 1.5)) / std::log(2.0);
+  for (const auto& [name, s] : world.effects.size)
+    if (const auto& cause = causes().at(name); cause.ln_variance && s != 0)
+      ln += cause.ln_variance({world, now, s, world.effects.shape_of(name)});
   return ln;
 }
 

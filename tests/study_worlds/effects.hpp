@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
+#include <optional>
+
 #include "tests/study_worlds/world.hpp"
 
 namespace study_worlds {
@@ -15,9 +18,31 @@ struct Instant {
   double temperature;   ///< °C
 };
 
+/// A cause with its size s (signed, in its unit) and its drawn shape in a world, and when it acts.
+struct Acting {
+  const World& world;
+  const Instant& now;
+  double s, shape;
+};
+
+/// The value that a parameter of the study has in truth, of size and shape; nothing where the units differ.
+using Truth = std::function<std::optional<double>(double s, double shape)>;
+
+/// All that the generator knows of a cause. One that is no push and no factor on the variance acts in fly.cpp.
+struct Cause {
+  double size;              ///< that must be found at 12 flights; table and units: core/study/confusion.md
+  bool one_signed = false;  ///< else its sign is drawn
+  std::function<double(std::mt19937_64&)> shape = {};     ///< draws the second number; without it a direction, rad
+  std::function<Vec3(const Acting&)> push = {};           ///< on the craft, m/s² in W
+  std::function<double(const Acting&)> ln_variance = {};  ///< ln of the factor on the disturbance's variance
+  std::map<std::string, Truth> truth = {};                ///< by the study's name of the parameter
+};
+/// By name; "unknown" is one that no name of the catalogue covers.
+const std::map<std::string, Cause>& causes();
+
 /// Push on the craft, m/s² in W, by every effect of the mean.
 Vec3 hidden_push(const World& world, const Instant& now);
-/// ln of the factor on the disturbance's variance, and its long-time mean removed: nothing.
+/// ln of the factor on the disturbance's variance, by every effect of it.
 double hidden_ln_variance(const World& world, const Instant& now);
 
 }  // namespace study_worlds

@@ -24,7 +24,7 @@ struct Options {
   std::uint64_t seed = static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
   std::vector<double> sizes = {1};
   std::vector<std::string> cells, from;
-  std::string out, markdown, self_test;
+  std::string out, markdown;
   bool gate = false, null_size = false;
 };
 
@@ -92,8 +92,6 @@ int report(const Options& options) {
   const std::string page = markdown(summary, outcomes);
   std::fputs(page.c_str(), stdout);
   if (!options.markdown.empty()) std::ofstream(options.markdown) << page;
-  if (!options.self_test.empty())
-    std::ofstream(options.self_test) << self_test_rows(summary, outcomes, options.flights);
   if (!options.gate) return 0;
   const auto all = gates(summary);
   return std::all_of(all.begin(), all.end(), [](auto& g) { return g.held; }) ? 0 : 1;
@@ -114,7 +112,6 @@ int main(int argc, char** argv) {
   app.add_option("--out", options.out, "JSON lines, appended to");
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
   app.add_option("--markdown", options.markdown, "writes the tables there too");
-  app.add_option("--self-test", options.self_test, "writes the rows that the study's page shows there");
   app.add_flag("--gate", options.gate, "exit 1 when a gate is missed");
   app.add_flag("--null-size", options.null_size, "instead: how often each channel rejects regressors without effect");
   CLI11_PARSE(app, argc, argv);

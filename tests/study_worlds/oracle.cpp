@@ -6,41 +6,13 @@
 #include <functional>
 
 #include "core/study/effects/columns.hpp"
-#include "tests/study_worlds/plan.hpp"
+#include "tests/study_worlds/effects.hpp"
 
 namespace study_worlds {
 
 namespace study = backwash::study;
 
 namespace {
-
-/// The generator's own value of the study's parameter, by name of cause and parameter; `s` the size, `angle` the shape.
-std::optional<double> truth_of(const std::string& cause, const std::string& parameter, double s, double angle) {
-  const std::string key = cause + "." + parameter;
-  // Sizes that are defined at the same reference on both sides.
-  for (const char* same : {"ground_thrust.A_mps2", "ceiling.A_mps2", "wall_attraction.A_mps2", "forward_speed.B_ln",
-                           "recirculation.B_ln", "battery_sag.s", "thrust_slope.s", "command_latency.latency_s"})
-    if (key == same) return s;
-  // Integrated in steps at whose beginning the lag hears the command already: b − r = h/(e^(h/τ) − 1) ṙ.
-  if (key == "actuator_lag.tau_s") return kStep / std::expm1(kStep / s);
-  if (key == "payload.m") return 1 - 1 / (1 + s);
-  if (key == "trim.body_x_mps2" || key == "draft.x_mps2") return s * std::cos(angle);
-  if (key == "trim.body_y_mps2" || key == "draft.y_mps2") return s * std::sin(angle);
-  // Drag per speed at 1 m/s, where the study's linear drag is defined; s is the slope at rest.
-  if (key == "rotor_drag.k_per_s") return s * (1 + 0.15);
-  // All surfaces are at whole decimetres and so are the map's voxels: it shows the offset to the nearest of them.
-  const auto shown = [](double offset) { return 0.1 * std::round(offset / 0.1); };
-  if (key == "map_offset.x_m") return shown(s * std::cos(angle));
-  if (key == "map_offset.y_m") return shown(s * std::sin(angle));
-  const double after_100_s = 1.6 * (1 - std::exp(-1.0)) * s;
-  if (key == "imu_drift.x_mps2_per_100s") return after_100_s * std::cos(angle);
-  if (key == "imu_drift.y_mps2_per_100s") return after_100_s * std::sin(angle);
-  if (key == "imu_drift.z_mps2_per_100s") return after_100_s * 0.3;
-  if (key == "propeller_damage.d") return -std::log(1 - s);
-  if (key == "rotor_sensor_fault.e" && s > 0) return 2 * std::log(1 + s);
-  if (key == "rotor_sensor_fault.share" && s < 0) return -s;
-  return std::nullopt;
-}
 
 /// Mean over each window, and `beyond` seconds on both sides, of what is hidden at its flight's rows.
 std::vector<double> window_means(const study::Observations& seen, const std::vector<Table>& flights,
@@ -72,9 +44,13 @@ double flown_tail(const std::vector<Table>& flights) {
 std::vector<Compared> compare(const World& world, const std::vector<Table>& flights, const study::Accepted& found) {
   const std::string& cause = found.form->cause();
   std::vector<Compared> all;
-  for (const auto& p : found.parameters)
-    if (const auto truth = truth_of(cause, p.name, world.effects.of(cause), world.effects.shape_of(cause)))
+  for (const auto& p : found.parameters) {
+    const auto& known = causes().at(cause).truth;
+    const auto at = known.find(p.name);
+    if (at == known.end()) continue;
+    if (const auto truth = at->second(world.effects.of(cause), world.effects.shape_of(cause)))
       all.push_back({p.name, p.value, p.low, p.high, *truth, {}});
+  }
   if (cause == "heavy_tails")
     for (const auto& p : found.parameters) all.push_back({p.name, p.value, p.low, p.high, flown_tail(flights), {}});
   return all;

@@ -60,6 +60,24 @@ Gate over(const std::string& name, const std::vector<CellSummary>& cells, Chosen
   return {name, missed.empty() ? all : all + "; missed: " + names_of(missed), missed.empty()};
 }
 
+/// What was told most often; at the end of it the most frequent that is not what was hidden (self_test_rows.cmake).
+std::string told_list(const CellSummary& c) {
+  constexpr std::size_t kShown = 4;
+  const auto as_hidden = [&](const std::string& told) {
+    return told == c.cell || (c.cell == "none" && told == "nothing") || (c.cell == "unknown" && told[0] == '?');
+  };
+  const auto other = static_cast<std::size_t>(
+      std::find_if(c.told.begin(), c.told.end(), [&](auto& t) { return !as_hidden(t.second); }) - c.told.begin());
+  std::string list;
+  for (std::size_t i = 0; i < c.told.size(); ++i) {
+    if (i >= kShown && i != other) continue;
+    list += (list.empty() ? "" : ", ") + std::to_string(c.told[i].first) + " `";
+    for (const char letter : c.told[i].second) list += letter == '|' ? std::string("\\|") : std::string(1, letter);
+    list += '`';
+  }
+  return list + (c.told.size() > kShown ? ", …" : "");
+}
+
 }  // namespace
 
 double Rate::low() const { return std::max(0.0, wilson(*this).first - wilson(*this).second); }
@@ -140,19 +158,10 @@ std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Ou
       "form "
       "| gain / oracle | told |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
   for (const auto& c : cells) {
-    std::string told_list;
-    for (std::size_t i = 0; i < std::min<std::size_t>(4, c.told.size()); ++i) {
-      if (i > 0) told_list += ", ";
-      told_list += std::to_string(c.told[i].first) + " `";
-      for (const char letter : c.told[i].second)
-        told_list += letter == '|' ? std::string("\\|") : std::string(1, letter);
-      told_list += '`';
-    }
-    if (c.told.size() > 4) told_list += ", …";
     page += "| " + c.cell + " | " + text(c.right) + " | " + text(c.in_sets) + " | " + text(c.wrong_name) + " | " +
             (c.errors.empty() ? "–" : text("%.2f", median(c.errors))) + " | " + text(c.covered) + " | " +
             text(c.covered_best) + " | " + (c.gain_shares.empty() ? "–" : text("%.2f", median(c.gain_shares))) + " | " +
-            told_list + " |\n";
+            told_list(c) + " |\n";
   }
   page += "\n| gate | figure | held |\n| --- | --- | --- |\n";
   for (const auto& g : gates(cells))
@@ -163,25 +172,6 @@ std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Ou
   std::sort(search.begin(), search.end()), std::sort(world.begin(), world.end());
   return page + text("\nCPU a study, median and slowest: %.2f s and %.2f s; flying and observing its world %.2f s.\n",
                      median(search), search.back(), median(world));
-}
-
-std::string self_test_rows(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes, int flights) {
-  std::uint64_t seed = UINT64_MAX;
-  for (const auto& o : outcomes) seed = std::min(seed, o.seed);
-  std::string rows =
-      "// Written by study_matrix --self-test. confusion.md has the whole campaign.\n// clang-format off\n";
-  rows += "constexpr std::uint64_t kSeed = " + std::to_string(seed) +
-          ";\nconstexpr int kFlights = " + std::to_string(flights) + ";\nstatic constexpr SelfTestRow kRows[] = {\n";
-  for (const auto& c : cells) {
-    if (!plain(c) && c.cell != "unknown" && c.cell != "none") continue;
-    const auto as_hidden = [&](const std::string& told) {
-      return told == c.cell || (c.cell == "none" && told == "nothing") || (c.cell == "unknown" && told[0] == '?');
-    };
-    const auto other = std::find_if(c.told.begin(), c.told.end(), [&](auto& t) { return !as_hidden(t.second); });
-    rows += text("    {\"%s\", %d, %d, %d, %d, \"%s\"},\n", c.cell.c_str(), c.right.n, c.right.hits, c.in_sets.hits,
-                 c.wrong_name.hits, other == c.told.end() ? "" : other->second.c_str());
-  }
-  return rows + "};\n// clang-format on\n";
 }
 
 }  // namespace study_worlds

@@ -39,8 +39,4 @@ std::vector<Gate> gates(const std::vector<CellSummary>& cells);
 /// Tables of confusion.md: confusion, figures, gates.
 std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes);
 
-/// The cells of one cause, of the unknown and of none as the rows that the study's page shows
-/// (core/study/findings/self_test_rows.inc).
-std::string self_test_rows(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes, int flights);
-
 }  // namespace study_worlds

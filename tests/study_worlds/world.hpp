@@ -18,7 +18,7 @@ using Vec3 = Eigen::Vector3d;
 /// What to make. Unset names are drawn from the seed.
 struct Request {
   std::uint64_t seed = 1;
-  std::vector<std::string> causes;  ///< names of docs/interfaces.md, or "unknown"; empty: none
+  std::vector<std::string> causes;  ///< cause_names(), or "unknown"; empty: none
   double size = 1;                  ///< in units of the effect-size table (core/study/confusion.md)
   int flights = 12;
   /// "yaw": never turns; "battery": all flights start full and equal; "height": an empty room, hovers at two heights
@@ -84,8 +84,7 @@ std::vector<std::filesystem::path> write_world(const World& world, const std::fi
 /// The answer, one line of JSON; never written beside the flights.
 std::string truth_line(const World& world);
 
+/// Those of the catalogue (causes() in effects.hpp).
 const std::vector<std::string>& cause_names();
-/// The table of the docs: the size that must be found at 12 flights, in its unit (core/study/confusion.md).
-double table_size(const std::string& cause);
 
 }  // namespace study_worlds

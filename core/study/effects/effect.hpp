@@ -99,7 +99,7 @@ struct Form {
 /// Something physical that a simulation may lack: all that other code must know of it. One file each, and its line in
 /// table.cpp.
 struct Effect {
-  std::string name;         ///< of docs/interfaces.md
+  std::string name;         ///< of the JSON; its file's, too
   std::vector<Form> forms;  ///< in the order in which they are tried
   Regressor axis = {"time since the flight began, s", false,
                     [](const WindowRow& w) { return w.t; }};  ///< of its picture

@@ -5,7 +5,7 @@
 
 namespace backwash::study {
 
-/// Every effect; their names are those of docs/interfaces.md.
+/// Every effect.
 const std::vector<Effect>& effects();
 /// Every form of every effect.
 const std::vector<const Form*>& catalogue();

@@ -7,9 +7,7 @@
 namespace backwash::study {
 namespace {
 
-constexpr std::size_t kWindows = 45, kFlights = 12;
-/// Nats that a manoeuvre must bring to be proposed.
-constexpr double kLeastNats = 0.5;
+constexpr auto kWindows = static_cast<std::size_t>(kRules.manoeuvre_windows);
 
 /// Windows of a hover where the median window was flown, changed by a manoeuvre if there is one.
 Windows flown(const WindowRow& median, const Manoeuvre* manoeuvre) {
@@ -57,7 +55,7 @@ double nats_apart(const Evidence& evidence, const Accepted& cause, const Rival& 
   Eigen::VectorXd target = Eigen::VectorXd::Zero(rows);
   for (std::size_t k = 0; k < ours.size(); ++k) target += cause.theta[static_cast<Eigen::Index>(k)] * weighted(ours[k]);
   const Eigen::VectorXd left = target - X * X.completeOrthogonalDecomposition().solve(target);
-  return 0.5 * kFlights * left.squaredNorm();
+  return 0.5 * kRules.manoeuvre_flights * left.squaredNorm();
 }
 
 }  // namespace
@@ -69,7 +67,7 @@ std::vector<Separation> separations(const Evidence& evidence, const Accepted& ca
   for (const Effect& effect : effects())
     for (const Manoeuvre& m : effect.manoeuvres) {
       const double nats = nats_apart(evidence, cause, rival, flown(median, &m)) - standing;
-      if (nats >= kLeastNats) all.push_back({rival.name, m.name, nats});
+      if (nats >= kRules.manoeuvre_nats) all.push_back({rival.name, m.name, nats});
     }
   std::sort(all.begin(), all.end(), [](auto& a, auto& b) { return a.expected_nats > b.expected_nats; });
   if (all.empty())

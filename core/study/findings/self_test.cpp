@@ -38,7 +38,7 @@ const SelfTestRow* SelfTest::of(const std::string& hidden) const {
 }
 
 const SelfTest& self_test() {
-#include "core/study/findings/self_test_rows.inc"
+#include "self_test_rows.inc"
   static const SelfTest all{kSeed, kFlights, kRows};
   return all;
 }

@@ -18,7 +18,7 @@ struct SelfTestRow {
   const char* other;  ///< what was told most often instead; empty: nothing else was
 };
 
-/// The engine's published campaign (confusion.md), as `study_matrix --self-test` writes it.
+/// The engine's published campaign: the rows of confusion.md as the library was built (self_test_rows.cmake).
 struct SelfTest {
   std::uint64_t seed;
   int flights;

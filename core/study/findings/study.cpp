@@ -36,7 +36,8 @@ std::vector<double> held_out(const Accepted& cause, const Normal& normal, const 
 
 /// P(|N(mean, variance)| ≤ 1.645 √model).
 double within_interval(double mean, double variance, double model) {
-  const double limit = 1.644854 * std::sqrt(model), s = std::sqrt(2 * std::max(variance, 1e-12));
+  const double limit = kRules.normal_95 * std::sqrt(model);
+  const double s = std::sqrt(2 * std::max(variance, kRules.least_variance.value));
   return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
 }
 
@@ -150,7 +151,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   }
   if (options.minimum_detectable) {
     options.search.progress("smallest effects that these flights would show");
-    result.minimum_detectable = minimum_detectable(evidence, options.search, std::max(found.threshold, 0.5));
+    result.minimum_detectable =
+        minimum_detectable(evidence, options.search, std::max(found.threshold, kRules.least_threshold.value));
   }
   return result;
 }
@@ -158,7 +160,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
 std::map<std::string, std::map<std::string, double>> minimum_detectable(const Evidence& evidence,
                                                                         const SearchOptions& options,
                                                                         double threshold) {
-  constexpr int kFlips = 50, kHalvings = 14;
+  constexpr int kFlips = static_cast<int>(kRules.power_flips);
   const auto draws = sign_draws(evidence.seen().first.size() - 1, kFlips, options.seed + 1);
   std::map<std::string, std::map<std::string, double>> least;
   for (const auto& c : candidates(evidence, {}, false)) {
@@ -173,11 +175,11 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
       }
       return static_cast<double>(found) / kFlips;
     };
-    double low = -9.2, high = 4.6;  // ln of the parameter
-    if (power(std::exp(high)) < 0.8) continue;
-    for (int i = 0; i < kHalvings; ++i) {
+    double low = kRules.power_low, high = kRules.power_high;  // ln of the parameter
+    if (power(std::exp(high)) < kRules.power) continue;
+    for (int i = 0; i < kRules.power_halvings; ++i) {
       const double middle = (low + high) / 2;
-      (power(std::exp(middle)) >= 0.8 ? high : low) = middle;
+      (power(std::exp(middle)) >= kRules.power ? high : low) = middle;
     }
     auto& entry = least[c.name];
     const double size = std::exp(high);

@@ -36,8 +36,9 @@ struct NamedCause {
 struct StudyOptions {
   SearchOptions search;
   bool minimum_detectable = true;
-  bool dependence = true;           ///< whether what remains depends on something: no part of the verdict
-  std::size_t fewest_flights = 10;  ///< fewer do not warrant a name (core/study/README.md)
+  bool dependence = true;  ///< whether what remains depends on something: no part of the verdict
+  std::size_t fewest_flights =
+      static_cast<std::size_t>(kRules.fewest_flights);  ///< fewer do not warrant a name (core/study/README.md)
 };
 
 struct StudyResult {

@@ -162,6 +162,31 @@ std::string remaining_section(const std::vector<Dependence>& all) {
   return text + "</table>\n</section>\n";
 }
 
+std::string unknown_section(const std::vector<UnknownStructure>& unknown) {
+  if (unknown.empty()) return "";
+  std::string text = "<section><h2>Without a name</h2>\n<table>\n";
+  for (const auto& u : unknown)
+    text += row(u.group + " along " + u.along, "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
+  return text + "</table>\n</section>\n";
+}
+
+/// What was not tested, what would not have been found, which windows were left out.
+std::string limits_sections(const StudyResult& result, const Observations& seen) {
+  std::string page = "<section><h2>What was not tested, and why</h2>\n<table>\n";
+  for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
+  if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
+  page +=
+      "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
+      "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
+  if (result.minimum_detectable.empty()) page += row("Not computed, or none would show", "");
+  for (const auto& [cause, sizes] : result.minimum_detectable)
+    for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
+  page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
+  for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
+  page += "</table>\n</section>\n";
+  return page;
+}
+
 }  // namespace
 
 tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
@@ -190,25 +215,9 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
     page += *section;
   }
   if (context.consequence) page += consequence_section(*context.consequence);
-  if (!result.unknown.empty()) {
-    page += "<section><h2>Without a name</h2>\n<table>\n";
-    for (const auto& u : result.unknown)
-      page += row(u.group + " along " + u.along, "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
-    page += "</table>\n</section>\n";
-  }
+  page += unknown_section(result.unknown);
   page += remaining_section(result.remaining);
-  page += "<section><h2>What was not tested, and why</h2>\n<table>\n";
-  for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
-  if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
-  page +=
-      "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
-      "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
-  if (result.minimum_detectable.empty()) page += row("Not computed, or none would show", "");
-  for (const auto& [cause, sizes] : result.minimum_detectable)
-    for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
-  page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
-  for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
-  page += "</table>\n</section>\n";
+  page += limits_sections(result, seen);
   std::vector<std::string> told;
   for (const auto& cause : result.causes) {
     told.push_back(cause.found.form->cause());

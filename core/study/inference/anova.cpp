@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/study/inference/evidence.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 namespace {
@@ -44,7 +45,8 @@ void Evidence::anova(Channel c, const std::vector<double>& r) {
     }
   }
   // A channel that is exact in every window (no dropout at all) keeps a least scatter.
-  const double least = c >= kMotor1 ? 1e-6 : 1e-8, groups = static_cast<double>(flights.size());
+  const double least = c >= kMotor1 ? kRules.least_rotor_scatter : kRules.least_scatter,
+               groups = static_cast<double>(flights.size());
   within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
   const double built = built_scatter(c);
   const auto inside = between_by_moments(flights, within_[c]);  // units of several flights: days

@@ -12,26 +12,23 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// 30 pairs need a p of 0.05/30 to pass Holm at all: 1999 shifts resolve a third of that.
-constexpr int kShiftDraws = 1999;
-/// Of a flight, at most so many turns are drawn from, evenly spaced.
-constexpr Index kMostTurns = 64;
-constexpr Index kMedianOf = 400, kMostFeatures = 100;
-constexpr double kKernelError = 1e-5;
+constexpr auto kMedianOf = static_cast<Index>(kRules.median_of),
+               kMostFeatures = static_cast<Index>(kRules.most_features),
+               kMostTurns = static_cast<Index>(kRules.most_turns);
 
 double median_distance(const MatrixXd& points) {
   const Index step = 1 + (points.rows() - 1) / kMedianOf;
   std::vector<double> distances;
   for (Index i = 0; i < points.rows(); i += step)
     for (Index j = 0; j < i; j += step)
-      if (const double d = (points.row(i) - points.row(j)).norm(); d > 1e-9) distances.push_back(d);
+      if (const double d = (points.row(i) - points.row(j)).norm(); d > kRules.least_square) distances.push_back(d);
   if (distances.empty()) return 1;
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
   return *middle;
 }
 
-/// Φ, n × r: ΦΦᵀ is the Gaussian kernel of the points but for `kKernelError`.
+/// Φ, n × r: ΦΦᵀ is the Gaussian kernel of the points but for kRules.kernel_error.
 MatrixXd features(const MatrixXd& points) {
   const Index n = points.rows(), most = std::min(n, kMostFeatures);
   const double scale = -0.5 / std::pow(median_distance(points), 2);
@@ -40,7 +37,7 @@ MatrixXd features(const MatrixXd& points) {
   for (Index k = 0; k < most; ++k) {
     Index pivot = 0;
     const double largest = left.maxCoeff(&pivot);
-    if (largest < kKernelError) return phi.leftCols(k);
+    if (largest < kRules.kernel_error) return phi.leftCols(k);
     const Eigen::VectorXd kernel =
         (scale * (points.rowwise() - points.row(pivot)).rowwise().squaredNorm()).array().exp();
     phi.col(k) = (kernel - phi.leftCols(k) * phi.row(pivot).head(k).transpose()) / std::sqrt(largest);
@@ -88,7 +85,7 @@ Independence turn_test(const MatrixXd& phi, const MatrixXd& psi, const std::vect
     sum.setZero();
     for (const auto& p : products)
       sum += p.col(static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(p.cols())));
-    above += sum.squaredNorm() / n2 >= hsic * (1 - 1e-12) ? 1 : 0;
+    above += sum.squaredNorm() / n2 >= hsic * (1 - kRules.same) ? 1 : 0;
   }
   return {hsic, above / (1.0 + shifts)};
 }
@@ -172,8 +169,8 @@ std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std
     const MatrixXd psi = features(remainder(whitened, channels, rows));
     for (const auto& along : regressors(seen)) {
       const MatrixXd phi = centred(features(points_of(along, seen.windows, rows)), rows.first);
-      if (!(phi.squaredNorm() > 1e-3)) continue;  // constant within every flight
-      const auto test = turn_test(phi, psi, rows.first, kShiftDraws, seed);
+      if (!(phi.squaredNorm() > kRules.constant_regressor)) continue;  // constant within every flight
+      const auto test = turn_test(phi, psi, rows.first, static_cast<int>(kRules.shift_draws), seed);
       all.push_back({along.name, name, test.hsic, test.p, 1}), p.push_back(test.p);
     }
   }

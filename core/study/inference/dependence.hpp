@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/study/inference/evidence.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 
@@ -29,7 +30,7 @@ std::vector<double> holm(const std::vector<double>& p);
 struct Dependence {
   std::string regressor, group;
   double hsic, p, p_holm;
-  bool found() const { return p_holm <= 0.05; }
+  bool found() const { return p_holm <= kRules.dependence_level; }
 };
 
 /// Each regressor of the smooths (ranks; circular ones as points of the circle) against what the accepted columns and

@@ -11,9 +11,7 @@
 namespace backwash::study {
 namespace {
 
-constexpr int kFine = 12;               // points of the finer grid of scales
-constexpr int kRounds = 2, kTurns = 4;  // of the likeliest shape; of where the craft is and how it is pushed there
-constexpr double kNormal975 = 1.959964;
+constexpr int kFine = static_cast<int>(kRules.fine_scales);
 
 /// A shape of the cause at a scale, fitted to all flights, with its error by leaving each out.
 struct Member {
@@ -27,7 +25,8 @@ struct Member {
 
 std::vector<Scale> fine_scales(const Form& form, const Scale& at) {
   if (form.integer_scale || form.scales.size() < 2) return {at};
-  const double low = std::log(form.scales.front().value / 1.5), high = std::log(form.scales.back().value * 1.5);
+  const double beyond = kRules.beyond_scales;
+  const double low = std::log(form.scales.front().value / beyond), high = std::log(form.scales.back().value * beyond);
   std::vector<Scale> scales;
   for (int i = 0; i < kFine; ++i) scales.push_back({std::exp(low + (high - low) * i / (kFine - 1))});
   return scales;
@@ -66,8 +65,8 @@ std::vector<double> polished(const std::vector<double>& start, double step, cons
   solver.set_max_objective(evaluate, &objective);
   solver.set_lower_bounds(low), solver.set_upper_bounds(high);
   solver.set_initial_step(step);
-  solver.set_xtol_abs(step / 100);
-  solver.set_maxeval(60);
+  solver.set_xtol_abs(step / kRules.polish_divisor);
+  solver.set_maxeval(static_cast<int>(kRules.polish_evaluations));
   std::vector<double> best = start;
   try {
     double f = 0;
@@ -92,7 +91,7 @@ Column with_map_moved(const Windows& windows, double x, double y) { return displ
 
 /// Standard errors of the offset (x, y) that fits best: jackknife of the fit's linearisation there.
 Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>& nuisance, double x, double y) {
-  constexpr double kDifference = 0.05;  // m
+  constexpr double kDifference = kRules.offset_difference;
   const auto& windows = evidence.seen().windows;
   const auto slope = [&](double dx, double dy) {
     Column high = with_map_moved(windows, x + dx, y + dy);
@@ -106,7 +105,7 @@ Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>
       evidence.normal({slope(kDifference, 0), slope(0, kDifference), with_map_moved(windows, x, y)}, nuisance);
   Eigen::MatrixXd left(2, static_cast<Eigen::Index>(n.b.size()));
   for (std::size_t out = 0; out < n.b.size(); ++out) {
-    Eigen::Matrix2d A = 1e-9 * Eigen::Matrix2d::Identity();
+    Eigen::Matrix2d A = kRules.ridge * Eigen::Matrix2d::Identity();
     Eigen::Vector2d b = Eigen::Vector2d::Zero();
     for (std::size_t f = 0; f < n.b.size(); ++f)
       if (f != out) A += n.A[f].topLeftCorner(2, 2), b += n.b[f].head(2) - n.A[f].col(2).head(2);
@@ -128,7 +127,7 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
   };
   const Vec3 start = cause.scale.offset_W;
   const double far = kOffsetStep * (kOffsetsAside - 1) / 2;
-  const auto best = polished({start.x(), start.y()}, 0.1, {-far, -far}, {far, far}, height);
+  const auto best = polished({start.x(), start.y()}, kOffsetStep, {-far, -far}, {far, far}, height);
   cause.scale.offset_W = whole_millimetres({best[0], best[1], 0});
   cause.columns = cause.form->columns(windows, cause.scale);
   cause.theta = SmallVector::Ones(1);
@@ -169,9 +168,9 @@ struct Family {
 
   /// Moves the craft to where the likeliest shape pushes it, and fits again there.
   void follow_push() {
-    for (int i = 0; i < kRounds && !members.empty(); ++i) {
+    for (int i = 0; i < kRules.rounds && !members.empty(); ++i) {
       Member now = *std::max_element(members.begin(), members.end(), lower);
-      for (int k = 0; k < kTurns; ++k) {
+      for (int k = 0; k < kRules.turns; ++k) {
         windows = moved_by(evidence.seen().windows, now.shape->columns(windows, now.scale), now.theta);
         now.theta = normal_at(*now.shape, now.scale).fit();
       }
@@ -193,7 +192,7 @@ struct Family {
     const double low = std::log(members.front().scale.value), high = std::log(members[own() - 1].scale.value);
     const auto height = [&](const std::vector<double>& ln) {
       Normal normal = normal_at(shapes[0], {std::exp(ln[0])});
-      return normal.solvable ? fitted(std::move(normal), nullptr, {}, 0).height : -1.0;  // no height is negative
+      return normal.solvable ? fitted(std::move(normal), nullptr, {}, 0).height : -HUGE_VAL;
     };
     const double at =
         std::exp(polished({std::log(start.scale.value)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
@@ -203,7 +202,7 @@ struct Family {
   /// Each parameter, averaged over the members. `columns`: of the form itself.
   std::vector<Estimate> parameters(const std::vector<Column>& columns) const {
     const double highest = std::max_element(members.begin(), members.end(), lower)->height;
-    const double wide = student_975(static_cast<double>(members.front().normal.b.size()) - 1) / kNormal975;
+    const double wide = student_975(static_cast<double>(members.front().normal.b.size()) - 1) / kRules.normal_975;
     std::vector<Estimate> all;
     for (std::size_t k = 0; k < columns.size(); ++k) {
       const double unknowable =

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "core/study/inference/rules.hpp"
+
 namespace backwash::study {
 
 SmallVector Normal::fit(const std::vector<int>& signs) const {
@@ -64,12 +66,13 @@ Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Co
   }
   normal.solvable = true;
   for (Eigen::Index k = 0; k < p; ++k)  // all but a trace of the column explained by the nuisance: nothing to learn
-    if (!(normal.total(k, k) > 1e-4 * sum(q + k, q + k)) || !(normal.total(k, k) > 1e-9)) normal.solvable = false;
+    if (!(normal.total(k, k) > kRules.spanned * sum(q + k, q + k)) || !(normal.total(k, k) > kRules.least_square))
+      normal.solvable = false;
   for (const auto& a : normal.A) {
     SmallMatrix rest = normal.total - a;
-    rest.diagonal() *= 1 + 1e-9;
+    rest.diagonal() *= 1 + kRules.ridge;
     for (Eigen::Index k = 0; k < p; ++k)
-      if (!(rest(k, k) > 0.02 * normal.total(k, k)) || !(rest(k, k) > 0)) normal.solvable = false;
+      if (!(rest(k, k) > kRules.left_out_share * normal.total(k, k)) || !(rest(k, k) > 0)) normal.solvable = false;
     if (!normal.solvable) break;
     normal.left_out.push_back(rest.inverse());
     if (!normal.left_out.back().allFinite()) normal.solvable = false;

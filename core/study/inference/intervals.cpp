@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/inference/rules.hpp"
 #include "core/study/windows/distributions.hpp"
 
 namespace backwash::study {
 
-double student_975(double degrees) { return student_quantile(0.975, degrees); }
+double student_975(double degrees) { return student_quantile(1 - kRules.tail, degrees); }
 
 Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
   double total = 0, value = 0, low = guesses.front().value, high = low;
@@ -29,7 +30,7 @@ Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
     }
     return (a + b) / 2;
   };
-  return {name, value, quantile(0.025), quantile(0.975)};
+  return {name, value, quantile(kRules.tail), quantile(1 - kRules.tail)};
 }
 
 }  // namespace backwash::study

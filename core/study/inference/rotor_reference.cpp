@@ -17,7 +17,7 @@ double mean(const std::vector<double>& x) {
 }
 
 /// Effect in standard errors that passes t with 80 % power.
-double powerful(double t, double degrees) { return t + 0.8416212 * std::sqrt(1 + t * t / (2 * degrees)); }
+double powerful(double t, double degrees) { return t + kRules.normal_80 * std::sqrt(1 + t * t / (2 * degrees)); }
 
 using Contrast = Eigen::Array3d;  // yaw, a, b
 
@@ -57,7 +57,7 @@ std::vector<RotorContrasts> rotor_contrasts(const Observations& seen) {
 
 std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& sound,
                                          const std::vector<RotorContrasts>& group) {
-  if (sound.size() < 4 || group.empty()) return std::nullopt;
+  if (static_cast<double>(sound.size()) < kRules.fewest_sound || group.empty()) return std::nullopt;
   const double n = static_cast<double>(sound.size());
   const Contrast centre = mean_of(sound);
   Contrast square = Contrast::Zero();
@@ -65,7 +65,8 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
   const Contrast error = (square / (n - 1) * (1 + 1 / n)).sqrt();  // of one further flight
   const Contrast t = (mean_of(group) - centre) / error;
 
-  const double degrees = n - 1, t975 = student_975(degrees), needed = student_quantile(1 - 0.05 / 4, degrees);
+  const double degrees = n - 1, t975 = student_975(degrees),
+               needed = student_quantile(1 - kRules.rotor_level / 4, degrees);
   using Kind = RotorVerdict::Kind;
   RotorVerdict v{Kind::as_sound, {"sound"}, 0, 0, 0, 0, {}, t[0], t[1], t[2], 0, needed, 0};
   double left = 0;
@@ -80,8 +81,7 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
     v.rotor = rotor + 1, v.t_d = t_d, v.d = v.each[rotor].d, v.low = v.each[rotor].low, v.high = v.each[rotor].high;
     left = t.square().sum() - t_d * t_d;
   }
-  constexpr double kOfInterest = 0.06;  // core/study/README.md, "Effect sizes"
-  const double f = f_quantile(0.95, 2, degrees);
+  const double f = f_quantile(1 - kRules.rotor_level, 2, degrees);
   const bool twisted = std::abs(t[0]) > t975, apart = t[1] * t[1] + t[2] * t[2] > 2 * f;
   const auto told = [&v](Kind kind, std::vector<std::string> set) { v.kind = kind, v.set = std::move(set); };
   if (v.t_d > needed && !twisted)
@@ -92,7 +92,7 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
     told(Kind::neither, {});
   else if (apart)
     told(Kind::payload, {"payload"});
-  else if (v.minimum > kOfInterest)
+  else if (v.minimum > kRules.rotor_of_interest)
     told(Kind::cannot_distinguish, {"sound", "propeller_damage", "payload"});
   return v;
 }

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "core/study/inference/evidence.hpp"
+#include "core/study/inference/rules.hpp"
 #include "core/study/windows/signals.hpp"
 
 namespace backwash::study {
@@ -13,7 +14,9 @@ bool is_ln_variance(Channel c) { return c == kVarX || c == kVarY || c == kVarZ; 
 
 }  // namespace
 
-double built_scatter(Channel c) { return c >= kDropout1 ? 0.003 : c >= kMotor1 ? 0.01 : 0; }
+double built_scatter(Channel c) {
+  return c >= kDropout1 ? kRules.dropout_scatter : c >= kMotor1 ? kRules.motor_scatter.value : 0;
+}
 
 Column decorrelated(const Column& column) {
   Column turned;
@@ -145,15 +148,15 @@ double Evidence::trim_scatter(const Column& residual) const {
   double flights = 0;
   for (const auto& g : grams) {
     const Eigen::Matrix2d G = g.topLeftCorner<2, 2>();
-    if (!(G.determinant() > 1e-9 * G.trace() * G.trace())) continue;
+    if (!(G.determinant() > kRules.no_turn * G.trace() * G.trace())) continue;
     sum += G, square += G * G, moved += g.topRightCorner<2, 1>(), flights += 1;
   }
-  if (flights < 3) return 0;
+  if (flights < kRules.fewest_trimmed) return 0;
   const Eigen::Vector2d mean = sum.ldlt().solve(moved);
   double spread = 0;
   for (const auto& g : grams) {
     const Eigen::Matrix2d G = g.topLeftCorner<2, 2>();
-    if (!(G.determinant() > 1e-9 * G.trace() * G.trace())) continue;
+    if (!(G.determinant() > kRules.no_turn * G.trace() * G.trace())) continue;
     const Eigen::Vector2d off = G.ldlt().solve(g.topRightCorner<2, 1>()) - mean;
     spread += off.dot(G * off);
   }
@@ -169,6 +172,7 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
   if (count == 0) return;
   const double typical =
       static_cast<double>(count) / std::accumulate(weight_[kVarX].begin(), weight_[kVarX].end(), 0.0);
+  const double most = kRules.ln_variance_limit;
   const double share = std::clamp(1 - error / count / (within_[kVarX] * typical), 0.0, 1.0);
   for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
     double mean = 0, weight = 0;
@@ -177,7 +181,7 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
     if (weight > 0) mean /= weight;
     for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
       const double own = weight_[kVarX][i] > 0 ? share * (ln_variance[i] - mean) : 0;
-      const double ln = std::clamp((mean + own) / std::sqrt(3.0), -2.0, 2.0);
+      const double ln = std::clamp((mean + own) / std::sqrt(3.0), -most, most);
       for (std::size_t k = 0; k < 3; ++k) {
         const double modelled = seen_->windows[i].sigma[static_cast<Eigen::Index>(k)];
         weight_[kMeanX + k][i] =

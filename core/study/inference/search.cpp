@@ -11,17 +11,6 @@
 namespace backwash::study {
 namespace {
 
-/// Nats by which a smooth must beat the best cause, and the share of the cause's own gain.
-constexpr double kSmoothLead = 3, kSmoothShare = 0.6;
-/// A further cause that an accepted one's form could leave over explains at least this share of its gain.
-constexpr double kLeastShare = 0.08, kRepairShare = 0.25;
-/// And a smooth left over in a cause's channels more than the cause itself, than half of it if the cause is a constant:
-/// less is the error of the cause's form.
-constexpr double kLeftShare = 1, kLeftOfConstant = 0.5;
-/// Level of a further cause over that of the first: a false name beside a true one is as wrong as one alone.
-constexpr double kFurtherLevel = 1.0 / 3;
-constexpr double kRivalNats = 3, kRivalErrors = 2;
-
 /// Everything accepted but one, with what it leaves open, as columns.
 std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen,
                                std::size_t but = SIZE_MAX) {
@@ -69,7 +58,7 @@ double needed_gain(const Candidate& candidate, const std::vector<Accepted>& acce
       const Channel c = columns.front().parts.front().channel;
       return c >= kThrustDelay && c <= kCommandDelayZ;
     };
-    const double share = dynamic(a.columns) && dynamic(candidate.columns) ? kRepairShare : kLeastShare;
+    const double share = dynamic(a.columns) && dynamic(candidate.columns) ? kRules.repair_share : kRules.least_share;
     needed = std::max(needed, share * a.gain);
   }
   return needed;
@@ -89,7 +78,7 @@ double needed_structure(const Candidate& smooth, const std::vector<Accepted>& ac
   double needed = 0;
   for (const auto& a : accepted)
     if (share_a_channel(smooth.columns, a.columns))
-      needed = std::max(needed, (a.form->constant ? kLeftOfConstant : kLeftShare) * a.gain);
+      needed = std::max(needed, (a.form->constant ? kRules.left_of_constant : kRules.left_share) * a.gain);
   return needed;
 }
 
@@ -140,14 +129,15 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
         nuisance.insert(nuisance.end(), free.begin(), free.end());
       }
       const Normal theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);
-      if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, 0.5 * ours.gain())) continue;
+      if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, kRules.rival_rest * ours.gain()))
+        continue;
       const Candidate rival{&form, form.cause(), scale, {}, {}, 0, evidence.size(columns)};
       if (!rival.effect(theirs.fit())) continue;
       // Two causes that explain different data are two causes, not rivals: a rival gains less once ours is known.
       std::vector<Column> with_ours = nuisance;
       with_ours.insert(with_ours.end(), own.columns.begin(), own.columns.end());
       const Normal rest = evidence.normal(columns, with_ours);
-      if (rest.solvable && rest.gain() > 0.5 * theirs.gain()) continue;
+      if (rest.solvable && rest.gain() > kRules.rival_rest * theirs.gain()) continue;
       const auto [lead, error] = difference(ours, theirs);
       // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
       // its rate does.
@@ -155,8 +145,8 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
         found.push_back({form.cause(), &form, scale, lead});
         continue;
       }
-      if (lead > kRivalNats && lead > kRivalErrors * error) continue;
-      if (lead > 4 * kRivalNats) continue;
+      if (lead > kRules.rival_nats && lead > kRules.rival_errors * error) continue;
+      if (lead > kRules.rival_most_nats) continue;
       found.push_back({form.cause(), &form, scale, lead});
     }
   }
@@ -191,8 +181,10 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
 }  // namespace
 
 bool Candidate::effect(const SmallVector& theta) const {
-  // Least root mean square of a smooth: as in the catalogue, m/s² and ln variance.
-  if (!form) return theta.dot(size * theta) >= std::pow(columns.front().parts.front().channel == kVarX ? 0.2 : 0.03, 2);
+  const auto floor_of_smooth = [&] {
+    return columns.front().parts.front().channel == kVarX ? kRules.smooth_floor_ln : kRules.smooth_floor_mean;
+  };
+  if (!form) return theta.dot(size * theta) >= std::pow(floor_of_smooth().value, 2);
   if (std::abs(theta[0]) < form->least || (form->one_sided && theta[0] < 0)) return false;
   const double square =
       form->integer_scale && form->one_sided ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
@@ -249,9 +241,9 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     auto all = candidates(evidence, accepted, true);
     if (all.empty()) break;
     result.null_gain = null_maxima(all, draws);
-    const double level = options.accept_p * (result.accepted.empty() ? 1 : kFurtherLevel);
+    const double level = options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value);
     const auto index = static_cast<std::size_t>((1 - level) * static_cast<double>(draws.size()));
-    result.threshold = std::max(0.5, result.null_gain[std::min(index, draws.size() - 1)]);
+    result.threshold = std::max(kRules.least_threshold.value, result.null_gain[std::min(index, draws.size() - 1)]);
 
     const Candidate *cause = nullptr, *smooth = nullptr;
     for (const auto& c : all) {
@@ -264,7 +256,8 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
       if (c.form && (!cause || c.gain > cause->gain)) cause = &c;
     }
     if (smooth && smooth->gain >= needed_structure(*smooth, result.accepted) &&
-        (!cause || smooth->gain - cause->gain > std::max(kSmoothLead, kSmoothShare * cause->gain))) {
+        (!cause ||
+         smooth->gain - cause->gain > std::max(kRules.smooth_lead.value, kRules.smooth_share * cause->gain))) {
       const auto group = std::find_if(channel_groups().begin(), channel_groups().end(), [&](auto& g) {
         return g.second.front() == smooth->columns.front().parts.front().channel;
       });

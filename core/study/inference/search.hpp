@@ -7,14 +7,15 @@
 
 #include "core/study/inference/evidence.hpp"
 #include "core/study/inference/intervals.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 
 struct SearchOptions {
-  int flips = 400;          ///< sign draws of the null
-  double accept_p = 0.015;  ///< family-wise, nominal; confusion.md says what it comes to
+  int flips = static_cast<int>(kRules.flips);  ///< sign draws of the null
+  double accept_p = kRules.accept_p;           ///< family-wise, nominal; confusion.md says what it comes to
   unsigned seed = 1;
-  std::size_t most_causes = 4;
+  std::size_t most_causes = static_cast<std::size_t>(kRules.most_causes);
   std::function<void(const std::string&)> progress = [](const std::string&) {};
 };
 

@@ -6,7 +6,7 @@
 
 #include "core/log/flight_log.hpp"
 #include "core/types/geometry.hpp"
-#include "core/types/vehicle.hpp"
+#include "core/types/thrust.hpp"
 
 namespace backwash::study {
 
@@ -24,12 +24,6 @@ struct Series {
   bool simulated_by_thrust = false, has_velocity = false, has_acceleration = false;
   std::size_t size() const { return t.size(); }
 };
-
-/// Rotor thrust share T(u)/max_thrust = f u² + (1 − f) u, of a command u.
-inline double thrust_share(const Vehicle& vehicle, double u) {
-  const double f = vehicle.propulsion.thr_mdl_fac;
-  return f * u * u + (1 - f) * u;
-}
 
 /// Reads a log. Rows must have growing stamps; those that do not are dropped. Positions must be there.
 Series series_of(const log::FlightLog& log, const Vehicle& vehicle);

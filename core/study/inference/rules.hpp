@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+namespace backwash::study {
+
+/// A constant of the inference with its unit and why it is that: derived, measured (where) or chosen.
+struct Rule {
+  std::string_view name;
+  double value;
+  std::string_view unit, reason;
+  constexpr operator double() const { return value; }
+};
+
+/// Every constant that decides what a study says (`backwash study --rules`). Members are rules and nothing else: the
+/// printed list is the struct itself. Floors of single effects are in their files.
+struct Rules {
+  // Search
+  Rule flips{"flips", 400, "draws", "chosen: the least p is 1/401, half of the level of a further cause"};
+  Rule accept_p{"accept_p", 0.015, "1",
+                "measured: at 0.03 worlds without an effect raised alarms twice as often (confusion.md)"};
+  Rule further_level{"further_level", 1.0 / 3, "of accept_p",
+                     "chosen: up to 3 further names beside a true one share the level of the first"};
+  Rule most_causes{"most_causes", 4, "causes", "chosen: worlds with more than two were never tried"};
+  Rule least_threshold{"least_threshold", 0.5, "nats", "derived: what one parameter without effect gains on average"};
+  Rule smooth_lead{"smooth_lead", 3, "nats", "derived: a likelihood ratio of 20"};
+  Rule smooth_share{"smooth_share", 0.6, "of the cause's gain",
+                    "chosen: a smooth has 4 columns and bends to where a form is wrong"};
+  Rule least_share{"least_share", 0.08, "of an accepted gain",
+                   "chosen: the error of an accepted form gains less (confusion.md, two causes, has the price)"};
+  Rule repair_share{"repair_share", 0.25, "of an accepted gain",
+                    "chosen: delays and slopes share one moment, so a form's error is larger there"};
+  Rule left_share{"left_share", 1, "of an accepted gain",
+                  "derived: the error of a form is smaller than what it explains"};
+  Rule left_of_constant{"left_of_constant", 0.5, "of an accepted gain",
+                        "chosen: a constant beside a structure half as strong is the structure's mean"};
+  Rule smooth_floor_mean{"smooth_floor_mean", 0.03, "m/s²", "chosen: 1.5 floors of the pushes of the catalogue"};
+  Rule smooth_floor_ln{"smooth_floor_ln", 0.2, "ln variance", "chosen: 1.7 floors of the variances of the catalogue"};
+  // Rivals
+  Rule rival_nats{"rival_nats", 3, "nats", "derived: a likelihood ratio of 20"};
+  Rule rival_errors{"rival_errors", 2, "standard errors", "derived: 95 % of the flights' difference"};
+  Rule rival_most_nats{"rival_most_nats", 12, "nats", "chosen: four times rival_nats, however much flights differ"};
+  Rule rival_rest{"rival_rest", 0.5, "of a gain", "chosen: what keeps more than half of its gain is a second cause"};
+  // Scatter
+  Rule motor_scatter{"motor_scatter", 0.01, "1", "chosen: rotors of one craft differ by 1 % (README.md, Scatter)"};
+  Rule dropout_scatter{"dropout_scatter", 0.003, "1", "chosen: of readings, lost by a sound sensor"};
+  Rule least_scatter{"least_scatter", 1e-8, "channel²", "derived: so that an exact channel can be divided by"};
+  Rule least_rotor_scatter{"least_rotor_scatter", 1e-6, "1", "derived: the same for counted dropouts"};
+  Rule ln_variance_limit{"ln_variance_limit", 2, "ln variance",
+                         "chosen: no window weighs more than 7 times as much as its modelled variance says"};
+  Rule fewest_trimmed{"fewest_trimmed", 3, "flights", "derived: two parameters and a scatter"};
+  Rule no_turn{"no_turn", 1e-9, "1", "derived: a determinant that rounding made"};
+  // Normal equations
+  Rule spanned{"spanned", 1e-4, "of a column's square", "chosen: what the nuisance explains up to 1 % has no say"};
+  Rule least_square{"least_square", 1e-9, "1", "derived: a sum of squares that rounding made"};
+  Rule left_out_share{"left_out_share", 0.02, "of a column's square",
+                      "chosen: a column that one flight alone shows cannot be held out"};
+  Rule ridge{"ridge", 1e-9, "1", "derived: keeps an inverse finite, changes no digit that is told"};
+  // Estimates
+  Rule tail{"tail", 0.025, "1", "chosen: an interval of 95 % leaves so much beyond each end"};
+  Rule normal_975{"normal_975", 1.959964, "1", "derived: its quantile of the normal distribution"};
+  Rule fine_scales{"fine_scales", 12, "scales", "chosen: the likelihood is averaged over so many"};
+  Rule beyond_scales{"beyond_scales", 1.5, "1", "chosen: the finer grid goes so far beyond the searched scales"};
+  Rule rounds{"rounds", 2, "rounds", "chosen: of the likeliest shape and where it pushes the craft"};
+  Rule turns{"turns", 4, "turns", "chosen: of place and push; each takes 1/k_p of the slope off the error"};
+  Rule offset_difference{"offset_difference", 0.05, "m", "derived: half the spacing at which Σ is looked up"};
+  Rule polish_evaluations{"polish_evaluations", 60, "evaluations", "chosen: of NLopt, in one or two dimensions"};
+  Rule polish_divisor{"polish_divisor", 100, "1", "chosen: first step of NLopt over its tolerance"};
+  // What remains
+  Rule shift_draws{"shift_draws", 1999, "draws", "derived: resolves a third of 0.05/30, which Holm asks of 30 pairs"};
+  Rule most_turns{"most_turns", 64, "turns a flight", "chosen: of 12 flights, 64^12 draws differ"};
+  Rule median_of{"median_of", 400, "windows", "chosen: of which the kernel's width is the median distance"};
+  Rule most_features{"most_features", 100, "features", "chosen: rank of a kernel; 30 suffice for a smooth one"};
+  Rule kernel_error{"kernel_error", 1e-5, "1", "chosen: of each entry of a kernel whose diagonal is 1"};
+  Rule constant_regressor{"constant_regressor", 1e-3, "1", "chosen: sum of squares within flights"};
+  Rule same{"same", 1e-12, "1", "derived: draws that turn no flight differ by rounding alone"};
+  Rule dependence_level{"dependence_level", 0.05, "1", "chosen: family-wise, by Holm; the verdict does not hear of it"};
+  // Rotors against sound flights
+  Rule rotor_level{"rotor_level", 0.05, "1", "chosen: over the four rotors"};
+  Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust", "derived: the size of confusion.md"};
+  Rule normal_80{"normal_80", 0.8416212, "1", "derived: quantile of the normal distribution at `power`"};
+  Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
+  // What is told of it
+  Rule fewest_flights{"fewest_flights", 10, "flights",
+                      "chosen: the campaigns have 12; with fewer no name is warranted"};
+  Rule power{"power", 0.8, "1", "chosen: at which a minimum detectable effect is told"};
+  Rule power_flips{"power_flips", 50, "draws", "chosen: a power of 0.8 is known to 0.06"};
+  Rule power_halvings{"power_halvings", 14, "1", "derived: the size is known to e^(13.8/2^14), 0.1 %"};
+  Rule power_low{"power_low", -9.2, "ln of a parameter", "derived: 1e-4 of its unit, below every floor"};
+  Rule power_high{"power_high", 4.6, "ln of a parameter", "derived: 100 of its unit, above every cause"};
+  Rule normal_95{"normal_95", 1.644854, "1", "derived: of the central 90 %, whose share of samples is told"};
+  Rule least_variance{"least_variance", 1e-12, "(m/s²)²", "derived: so that a still window can be divided by"};
+  Rule manoeuvre_windows{"manoeuvre_windows", 45, "windows", "derived: a flight of 90 s"};
+  Rule manoeuvre_flights{"manoeuvre_flights", 12, "flights", "chosen: as many as the campaigns have"};
+  Rule manoeuvre_nats{"manoeuvre_nats", 0.5, "nats", "derived: as least_threshold"};
+};
+inline constexpr Rules kRules;
+
+/// All of them, in the order of the struct.
+std::vector<Rule> rules();
+
+}  // namespace backwash::study
