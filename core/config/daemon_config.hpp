@@ -8,6 +8,8 @@
 #include "core/config/config.hpp"
 #include "core/config/key_file.hpp"
 #include "core/config/link_device.hpp"
+#include "core/config/odometry_profile.hpp"
+#include "core/types/state.hpp"
 
 namespace backwash::config {
 
@@ -25,6 +27,12 @@ struct Daemon {
     std::string odometry = "odom";   ///< of odometry and clouds of a VIO whose loop closures come as map ← odom
     std::string body = "base_link";  ///< child frame of odometry; clouds
   } frames;
+  struct Odometry {
+    Twist twist = Twist::body;          ///< of the profile, or of a custom one
+    std::string child;                  ///< child frame of odometry; empty: frames.body
+    Vec3 sensor_B = Vec3::Zero();       ///< origin of what the estimator tells the pose of, in the body, m
+    Vec3 sensor_turned = Vec3::Zero();  ///< its axes in the body: roll, pitch, yaw about fixed axes, rad
+  } odometry;
   struct {
     bool live = false;           ///< a mapper is declared: a late map is a fault (docs/faults.md row 13)
     double closing_speed = 0.2;  ///< by which the age of a live map shrinks the trusted clearance, m/s
@@ -54,9 +62,9 @@ struct Daemon {
 };
 
 /// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
-/// The tables frames, map and gpio, link.protocol and link.signing_key_file may be left out: their defaults are above.
-/// The key file is read here, so that a start with a bad one ends before any port opens. `builtin:backwashd` is the
-/// shipped example.
+/// The tables frames, odometry, map and gpio, link.protocol and link.signing_key_file may be left out: their defaults
+/// are above. The key file is read here, so that a start with a bad one ends before any port opens. `builtin:backwashd`
+/// is the shipped example.
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
 
 }  // namespace backwash::config

@@ -11,6 +11,8 @@ namespace {
 constexpr std::string_view kLive = "map.live";
 constexpr std::string_view kProtocol = "link.protocol";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
+constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", "odometry.child"};
+constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2];
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
 bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
@@ -110,6 +112,33 @@ tl::expected<void, ConfigError> read_texts(const StrictTable& file, std::span<co
   return {};
 }
 
+/// The profile's frames where none are given, and its twist; a custom one's own.
+tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d) {
+  std::string name = "ros", twist;
+  const TextKey own[] = {{kProfile, &name}, {kTwist, &twist}, {kChild, &d.odometry.child}};
+  if (auto read = read_texts(file, own, false); !read) return read;
+  const auto profiles = odometry_profiles();
+  const auto profile = std::ranges::find(profiles, name, &OdometryProfile::name);
+  if (profile == profiles.end()) {
+    std::string all;
+    for (const auto& p : profiles) all += (all.empty() ? "\"" : ", \"") + std::string(p.name) + '"';
+    return tl::unexpected(file.error(kProfile, "needs one of " + all));
+  }
+  if (name != "custom") {
+    for (const auto key : {kTwist, kChild})
+      if (file.has(key)) return tl::unexpected(file.error(key, "needs profile = \"custom\""));
+    d.odometry.child = profile->child;
+  }
+  if (!file.has("frames.odometry") && d.frames.map != profile->frame) d.frames.odometry = profile->frame;
+  d.odometry.twist = profile->twist;
+  if (twist.empty()) return {};
+  for (const Twist t : {Twist::body, Twist::world, Twist::none}) {
+    d.odometry.twist = t;
+    if (twist == config::name(t)) return {};
+  }
+  return tl::unexpected(file.error(kTwist, "needs \"body\", \"world\" or \"none\""));
+}
+
 tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {
   if (auto good = read_signing_key(file, d); !good) return good;
   const auto endpoint = link_device(d.link.device);
@@ -159,6 +188,12 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"map.closing_speed", &d.map.closing_speed, {0, 5}, NumberKey::Presence::optional},
       {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, NumberKey::Presence::optional},
       {"map.max_mib", &d.map.max_mib, {1, 65536}, NumberKey::Presence::optional},
+      {"odometry.sensor_x", &d.odometry.sensor_B.x(), {-5, 5}, NumberKey::Presence::optional},
+      {"odometry.sensor_y", &d.odometry.sensor_B.y(), {-5, 5}, NumberKey::Presence::optional},
+      {"odometry.sensor_z", &d.odometry.sensor_B.z(), {-5, 5}, NumberKey::Presence::optional},
+      {"odometry.sensor_roll", &d.odometry.sensor_turned.x(), {-3.15, 3.15}, NumberKey::Presence::optional},
+      {"odometry.sensor_pitch", &d.odometry.sensor_turned.y(), {-3.15, 3.15}, NumberKey::Presence::optional},
+      {"odometry.sensor_yaw", &d.odometry.sensor_turned.z(), {-3.15, 3.15}, NumberKey::Presence::optional},
       {"control.cpu", &cpu, {-1, 1023}},
       {"control.battery_land", &d.control.battery_land, {0, 1}},
   };
@@ -174,6 +209,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   const TextKey frames[] = {
       {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
   std::vector<std::string_view> text_keys{kLive, kProtocol, kSigningKeyFile};
+  text_keys.insert(text_keys.end(), std::begin(kOdometry), std::end(kOdometry));
   text_keys.insert(text_keys.end(), std::begin(kGpio), std::end(kGpio));
   for (const auto& [key, target] : texts) text_keys.push_back(key);
   for (const auto& [key, target] : frames) text_keys.push_back(key);
@@ -181,6 +217,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (auto read = read_texts(*file, texts, true); !read) return tl::unexpected(read.error());
   if (auto good = check_names(*file, d); !good) return tl::unexpected(good.error());
   if (auto read = read_texts(*file, frames, false); !read) return tl::unexpected(read.error());
+  if (auto read = read_odometry(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)

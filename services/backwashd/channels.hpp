@@ -226,6 +226,7 @@ struct Channels {
   std::atomic<std::uint8_t> link_fault{0};            // control → link watch: 1 + LinkFault, 0: none
   std::atomic<std::uint32_t> port_losses{0};          // control → link watch: times that a good port was lost
   std::atomic<mavlink::SigningTime> signing_time{0};  // control → signing time: of the newest signature; 0: none
+  sync::LatestValue<Line> odometry_doubt;             // DDS reader → mission: "", or why it is not what we were told
   sync::LatestValue<Line> other_daemon;               // DDS reader → mission: "", or who else obeys our commands
   sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
   std::atomic<std::int64_t> enable_asked_ns =

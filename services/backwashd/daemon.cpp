@@ -78,6 +78,9 @@ tl::expected<Settings, std::string> load_settings(const std::string& path) {
   if (!daemon) return tl::unexpected(daemon.error().message);
   auto vehicle = config::load_vehicle(daemon->vehicle);
   if (!vehicle) return tl::unexpected(vehicle.error().message);
+  // What a velocity from poses may be off is in the first set of every tube.
+  if (daemon->odometry.twist == config::Twist::none)
+    vehicle->initial_error.velocity += track::PoseVelocity::error(OdometryCheck::kLeastRate);
   auto model = config::load_model(daemon->model);
   if (!model) return tl::unexpected(model.error().message);
   return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model)};

@@ -29,6 +29,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
     : channels_(channels),
       priority_(priority),
       localization_(config, vehicle.estimation.position),
+      check_(config.odometry.twist),
       refusals_(channels.refused),
       malformed_({{config.dds.odometry_topic, &channels.odometry_refused},
                   {topic_of<dds::Octomap>(config), &channels.maps_rejected},
@@ -55,10 +56,25 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
   look_for_other_daemons();  // before the mission hears a command
 }
 
+// As it came, also where it is refused: a doubt says why, and what to set.
+void DdsFront::look_at_odometry(const dds::Odometry& m) {
+  const auto& p = m.pose.pose.position;
+  const auto& q = m.pose.pose.orientation;
+  const auto& v = m.twist.twist.linear;
+  const auto why =
+      check_.look(dds::nanoseconds(m.header.stamp), {p.x, p.y, p.z}, {q.w, q.x, q.y, q.z}, {v.x, v.y, v.z});
+  if (!why) return;
+  Line line{};
+  std::snprintf(line.data(), line.size(), "%s", why->c_str());
+  channels_.odometry_doubt.write(line);
+  if (!why->empty()) spdlog::warn("{}; nothing is enabled meanwhile", *why);
+}
+
 void DdsFront::take_odometry() {
   odometry_.take([&](const dds::Odometry& m, const dds::Guid& writer) {
     if (!odometry_writer_.hears(writer))
       return refusals_.add(channels_.odometry_refused, [&] { return odometry_writer_.refusal(writer); });
+    look_at_odometry(m);
     const auto sample = localization_.odometry(m, now_ns());
     if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
     if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));

@@ -13,6 +13,7 @@
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/localization.hpp"
 #include "services/backwashd/mission.hpp"
+#include "services/backwashd/odometry_check.hpp"
 #include "services/backwashd/other_daemons.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
@@ -39,6 +40,7 @@ class DdsFront {
 
  private:
   void take_odometry();
+  void look_at_odometry(const dds::Odometry& message);
   void take_closures();
   void take_commands();
   void take_command(const dds::Command& message, const dds::Guid& writer);
@@ -48,6 +50,7 @@ class DdsFront {
   Channels& channels_;
   int priority_;
   Localization localization_;
+  OdometryCheck check_;
   Refusals refusals_;
   BoundWriter odometry_writer_{"odometry"}, closure_writer_{"a loop closure"};
   OtherDaemons others_{now_ns()};

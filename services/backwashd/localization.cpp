@@ -16,10 +16,6 @@ constexpr double kUnit = 1e-2;  // of a quaternion's norm
 constexpr double kFarthest = 10'000, kFastest = 100;       // m, m/s
 constexpr double kMaxTilt = 1.0 * 3.14159265358979 / 180;  // rad
 
-std::int64_t nanoseconds(const builtin_interfaces_msg_dds__Time_& t) {
-  return std::int64_t{t.sec} * 1'000'000'000 + t.nanosec;
-}
-
 // Written so that what is no number is not within.
 bool within(const Vec3& v, double most) { return v.norm() <= most; }
 
@@ -40,9 +36,19 @@ tl::unexpected<std::string> wrong_frame(const std::string& what, const std::stri
                         "; see [frames] of the configuration");
 }
 
+Localization::Localization(const config::Daemon& config, double max_sigma)
+    : frames_(config.frames),
+      told_(config.odometry),
+      body_from_sensor_(Eigen::AngleAxisd(told_.sensor_turned.z(), Vec3::UnitZ()) *
+                        Eigen::AngleAxisd(told_.sensor_turned.y(), Vec3::UnitY()) *
+                        Eigen::AngleAxisd(told_.sensor_turned.x(), Vec3::UnitX())),
+      max_sigma_(max_sigma) {
+  if (told_.child.empty()) told_.child = frames_.body;
+}
+
 tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odometry& m, std::int64_t received_ns) {
   const std::string frame = text(m.header.frame_id), child = text(m.child_frame_id);
-  if (child != frames_.body) return wrong_frame("the twist of the odometry", child, "'" + frames_.body + "'");
+  if (child != told_.child) return wrong_frame("the twist of the odometry", child, "'" + told_.child + "'");
   if (frame != frames_.map && frame != frames_.odometry)
     return wrong_frame("the odometry", frame, "'" + frames_.map + "' or '" + frames_.odometry + "'");
   if (frame == frames_.odometry && !map_from_odom_)
@@ -60,18 +66,31 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
   const auto& p = m.pose.pose.position;
   const auto& q = m.pose.pose.orientation;
   const auto& v = m.twist.twist.linear;
+  const auto& w = m.twist.twist.angular;
   OdometrySample s;
   s.received_ns = received_ns;
-  s.stamp_ns = nanoseconds(m.header.stamp);
+  s.stamp_ns = dds::nanoseconds(m.header.stamp);
   s.position_variance = variances(m.pose.covariance, 0);
   s.attitude_variance = variances(m.pose.covariance, 3);
   s.velocity_variance = variances(m.twist.covariance, 0);
-  // nav_msgs/Odometry: the twist is in the child (body) frame.
-  Eigen::Quaterniond attitude(q.w, q.x, q.y, q.z);
-  s.state = {{p.x, p.y, p.z}, attitude * Vec3(v.x, v.y, v.z)};
+  const Eigen::Quaterniond sensor(q.w, q.x, q.y, q.z);
   // The gate would reject what is refused here too, but here it takes no good sample's place, and places no scan.
-  if (!(std::abs(attitude.norm() - 1) < kUnit))
+  if (!(std::abs(sensor.norm() - 1) < kUnit))
     return tl::unexpected<std::string>("the odometry's quaternion is not of unit length");
+  Eigen::Quaterniond attitude = sensor * body_from_sensor_.conjugate();
+  const Vec3 lever = attitude * told_.sensor_B;
+  s.state.p_W = Vec3(p.x, p.y, p.z) - lever;
+  if (told_.twist == config::Twist::none) {
+    const auto velocity = within(s.state.p_W, kFarthest) ? velocity_.add(s.stamp_ns, s.state.p_W) : Vec3::Zero();
+    if (!velocity)
+      return tl::unexpected<std::string>("the velocity is not known yet: it comes from the poses of the last 0.2 s");
+    s.state.v_W = *velocity;
+  } else {
+    const bool in_body = told_.twist == config::Twist::body;
+    const Vec3 linear(v.x, v.y, v.z), angular(w.x, w.y, w.z);
+    s.state.v_W = in_body ? sensor * linear : linear;
+    if (!lever.isZero(0)) s.state.v_W -= (in_body ? sensor * angular : angular).cross(lever);
+  }
   if (frame == frames_.odometry) {
     s.map_from_odom = *map_from_odom_;
     s.closures = closures_;

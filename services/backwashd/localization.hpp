@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
 #include <optional>
 #include <string>
 #include <tl/expected.hpp>
 
 #include "core/config/daemon_config.hpp"
+#include "core/track/pose_velocity.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/dds/topics.hpp"
 
@@ -17,11 +19,13 @@ namespace backwash::daemon {
 class Localization {
  public:
   /// `max_sigma`: estimation.position of the vehicle, m.
-  Localization(const config::Daemon& config, double max_sigma) : frames_(config.frames), max_sigma_(max_sigma) {}
+  Localization(const config::Daemon& config, double max_sigma);
 
-  /// Checks frames and covariance: a position that the VIO itself holds for worse than max_sigma is a bad one. A
-  /// covariance of zeros, or whose first number is −1, is not known. A pose that is not finite, beyond 10 km or 100
-  /// m/s, or no rotation is refused; whether it is credible is for the odometry gate.
+  /// The body's pose and velocity, from those of the sensor, in the frames of the configured profile; without a twist
+  /// the velocity is PoseVelocity's, and a sample before it is known is refused. Checks frames and covariance: a
+  /// position that the VIO itself holds for worse than max_sigma is a bad one. A covariance of zeros, or whose first
+  /// number is −1, is not known. A pose that is not finite, beyond 10 km or 100 m/s, or no rotation is refused; whether
+  /// it is credible is for the odometry gate.
   tl::expected<OdometrySample, std::string> odometry(const dds::Odometry& message, std::int64_t received_ns);
   /// From now on, odometry is brought into the map by this transform; it turns about z only. A message that repeats the
   /// last transform changes nothing.
@@ -32,7 +36,10 @@ class Localization {
 
  private:
   decltype(config::Daemon::frames) frames_;
+  config::Daemon::Odometry told_;
+  Eigen::Quaterniond body_from_sensor_;
   double max_sigma_;
+  track::PoseVelocity velocity_;  // in the VIO's own frame: no loop closure moves it
   std::optional<track::RigidShift> map_from_odom_;
   std::uint32_t closures_ = 0;
 };

@@ -34,6 +34,7 @@ Decision Mission::observe(const MissionInput& in) {
   if (in.view) view_ = *in.view;
   if (in.world) world_ = *in.world;
   if (in.other_daemon) other_daemon_ = in.other_daemon->data();
+  if (in.odometry_doubt) odometry_doubt_ = in.odometry_doubt->data();
   for (const PlanOutcome& outcome : in.outcomes) {
     if (job_ != outcome.job) continue;  // a newer command took its place
     job_.reset();
@@ -186,6 +187,7 @@ Decision Mission::enable() {
     return refused(std::string("already ") + to_string(view_.mode));
   if (!may_fly(view_.stop_switch)) return refused(refusal(view_.stop_switch));
   if (!other_daemon_.empty()) return refused(other_daemon_);
+  if (!odometry_doubt_.empty()) return refused(odometry_doubt_);
   if (!world_) return refused("no map was received yet");
   if (view_.mismatch != track::Mismatch::none)
     return refused(std::string("map and autopilot disagree: ") + to_string(view_.mismatch));

@@ -33,6 +33,7 @@ struct MissionInput {
   std::optional<ControlView> view;                          ///< newest, if there is a new one
   std::optional<std::shared_ptr<const plan::World>> world;  ///< newest, if there is a new one
   std::optional<Line> other_daemon;                         ///< newest, if there is a new one; "": there is none
+  std::optional<Line> odometry_doubt;                       ///< the same, of what an OdometryCheck says
   std::span<const PlanOutcome> outcomes;
 };
 
@@ -91,6 +92,7 @@ class Mission {
   CommandId accepted_;
   ControlView view_;
   std::string other_daemon_;  // in our namespace, "": none
+  std::string odometry_doubt_;
   std::shared_ptr<const plan::World> world_;
   std::uint64_t orders_ = 0;
   track::Request last_request_ = track::Request::none;  // of the newest order

@@ -40,6 +40,7 @@ Decision observe(Channels& channels, Mission& mission) {
   in.outcomes = outcomes;
   in.view = channels.view_mission.read_new();
   in.other_daemon = channels.other_daemon.read_new();
+  in.odometry_doubt = channels.odometry_doubt.read_new();
   if (const auto* world = channels.worlds.mission.take()) {
     in.world = world->world;
     channels.worlds.mission.give_back(world);

@@ -13,10 +13,6 @@ namespace {
 constexpr std::int64_t kHistory_ns = 1'000'000'000, kSlack_ns = 50'000'000;
 constexpr std::size_t kMostPoses = 2048;  // of a flood
 
-std::int64_t nanoseconds(const builtin_interfaces_msg_dds__Time_& t) {
-  return std::int64_t{t.sec} * 1'000'000'000 + t.nanosec;
-}
-
 Eigen::Quaterniond quaternion(const std::array<double, 4>& q) { return {q[0], q[1], q[2], q[3]}; }
 
 }  // namespace
@@ -58,7 +54,7 @@ tl::expected<Scan, std::string> ScanPlacement::scan(const dds::PointCloud& m, st
                        "'" + frames_.body + "', '" + frames_.odometry + "' or '" + frames_.map + "'");
   auto cloud = decode_cloud(m);
   if (!cloud) return tl::unexpected(std::move(cloud.error()));
-  const auto pose = pose_at(nanoseconds(m.header.stamp));
+  const auto pose = pose_at(dds::nanoseconds(m.header.stamp));
   if (!pose) return tl::unexpected(std::string("a point cloud whose stamp is not within that of the odometry"));
   if (frame == frames_.odometry && !map_from_odom_)
     return tl::unexpected<std::string>("a point cloud in frame '" + frame + "' before the first loop closure");

@@ -32,6 +32,11 @@ inline std::string topic(const std::string& name_space, const std::string& name)
   return "rt/" + name_space + "/" + name;
 }
 
+/// A stamp in nanoseconds.
+inline std::int64_t nanoseconds(const builtin_interfaces_msg_dds__Time_& t) {
+  return std::int64_t{t.sec} * 1'000'000'000 + t.nanosec;
+}
+
 /// Now, as ROS 2 stamps messages.
 inline builtin_interfaces_msg_dds__Time_ wall_clock() {
   const auto since = std::chrono::system_clock::now().time_since_epoch();

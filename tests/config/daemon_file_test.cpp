@@ -48,6 +48,57 @@ TEST(DaemonFile, ReadsTheShippedExample) {
   EXPECT_DOUBLE_EQ(d->control.battery_land, 0.15);
 }
 
+/// The shipped file with these lines instead of its [odometry] and [frames].
+std::optional<Daemon> with_odometry(const std::string& lines, const std::string& map = "map") {
+  std::string text = shipped();
+  const auto frames = text.find("\n[frames]"), odometry = text.find("\n[odometry]"), next = text.find("\n[map]");
+  EXPECT_TRUE(frames < odometry && odometry < next && next != std::string::npos);
+  text.replace(frames, next - frames, "\n[frames]\nmap = \"" + map + "\"\n[odometry]\n" + lines + "\n");
+  const auto path = temporary("odometry_test.toml");
+  std::ofstream(path) << text;
+  const auto read = load_daemon(path);
+  std::filesystem::remove(path);
+  if (!read) ADD_FAILURE() << read.error().message;
+  return read ? std::optional(*read) : std::nullopt;
+}
+
+TEST(DaemonFile, AnEstimatorsProfileSetsItsFramesAndItsTwist) {
+  const auto vins = with_odometry("profile = \"vins_fusion\"");
+  ASSERT_TRUE(vins);
+  EXPECT_EQ(vins->odometry.twist, Twist::world);
+  EXPECT_EQ(vins->frames.odometry, "world");
+  EXPECT_EQ(vins->odometry.child, "world");
+  const auto fast_lio = with_odometry("profile = \"fast_lio\"\nsensor_roll = 3.14159\nsensor_x = 0.1");
+  ASSERT_TRUE(fast_lio);
+  EXPECT_EQ(fast_lio->odometry.twist, Twist::none);
+  EXPECT_EQ(fast_lio->frames.odometry, "camera_init");
+  EXPECT_EQ(fast_lio->odometry.child, "body");
+  EXPECT_DOUBLE_EQ(fast_lio->odometry.sensor_B.x(), 0.1);
+  EXPECT_DOUBLE_EQ(fast_lio->odometry.sensor_turned.x(), 3.14159);
+  const auto same = with_odometry("profile = \"openvins\"", "global");
+  ASSERT_TRUE(same) << "a map in the estimator's own frame";
+  EXPECT_EQ(same->frames.map, "global");
+  EXPECT_EQ(same->odometry.child, "imu");
+  const auto custom = with_odometry("profile = \"custom\"\ntwist = \"world\"\nchild = \"lidar\"");
+  ASSERT_TRUE(custom);
+  EXPECT_EQ(custom->odometry.twist, Twist::world);
+  EXPECT_EQ(custom->odometry.child, "lidar");
+  const auto none = with_odometry("");
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->odometry.twist, Twist::body);
+  EXPECT_EQ(none->frames.odometry, "odom");
+}
+
+TEST(DaemonFile, AProfileThatIsNoneAndKeysThatItDoesNotTakeAreNamed) {
+  EXPECT_THAT(error_after("profile = \"ros\"", "profile = \"fastlio\""),
+              testing::AllOf(HasSubstr("odometry.profile"), HasSubstr("\"fast_lio\"")));
+  EXPECT_THAT(error_after("profile = \"ros\"", "twist = \"none\""),
+              testing::AllOf(HasSubstr("odometry.twist"), HasSubstr("profile = \"custom\"")));
+  EXPECT_THAT(error_after("profile = \"ros\"", "profile = \"custom\"\ntwist = \"map\""),
+              HasSubstr("\"body\", \"world\" or \"none\""));
+  EXPECT_THAT(error_after("profile = \"ros\"", "sensor_x = 6.0"), HasSubstr("odometry.sensor_x"));
+}
+
 TEST(DaemonFile, ReadsTheFormsOfALinkDevice) {
   using Kind = LinkDevice::Kind;
   const auto read = [](const char* text) {
@@ -91,8 +142,8 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
                {"cpu = -1", "cpu = 0.5", 21, "control.cpu"},
                {"battery_land = 0.15", "battery_land = 15", 22, "control.battery_land"},
                {"[control]", "[controls]", 19, "controls"},
-               {"live = false", "live = 0", 33, "map.live"},
-               {"max_mib = 512", "max_mib = 0", 36, "map.max_mib"},
+               {"live = false", "live = 0", 40, "map.live"},
+               {"max_mib = 512", "max_mib = 0", 43, "map.max_mib"},
                {"body = \"base_link\"", "body = \"map\"", 27, "frames"}};
   for (const auto& c : cases)
     EXPECT_THAT(error_after(c.right, c.wrong), HasSubstr(".toml:" + std::to_string(c.line) + ": key '" + c.key + "'"));

@@ -116,6 +116,59 @@ TEST(Localization, ALoopClosureThatTiltsOrIsNoTransformIsRefused) {
   EXPECT_EQ(l.closures(), 0u);
 }
 
+/// A configuration with this estimator.
+config::Daemon told(config::Twist twist, const Vec3& sensor_B = kZero, const Vec3& turned = kZero) {
+  config::Daemon d;
+  d.odometry.twist = twist;
+  d.odometry.sensor_B = sensor_B;
+  d.odometry.sensor_turned = turned;
+  return d;
+}
+
+TEST(Localization, ATwistInTheFrameOfThePoseIsNotTurned) {
+  Localization l(told(config::Twist::world), 0.02);
+  ASSERT_TRUE(l.loop_closure(closure(about_z(0.3), {5, 6, 7})));
+  const auto s = l.odometry(odometry(kOdom, {1, 2, 3}, about_z(1.5), {0, 1, 0}), 0);
+  ASSERT_TRUE(s) << s.error();
+  EXPECT_LT((s->state.v_W - about_z(0.3) * Vec3(0, 1, 0)).norm(), 1e-12) << "by the loop closure alone";
+}
+
+TEST(Localization, WithoutATwistTheVelocityComesFromThePoses) {
+  Localization l(told(config::Twist::none), 0.02);
+  std::string refused;
+  for (int n = 0; n < 40; ++n) {
+    const double t = 1 + 0.02 * n;
+    const auto s = l.odometry(odometry(kMap, {0.4 * t, 0, 1}, about_z(1), kZero, t), 0);
+    if (n < 10) {
+      ASSERT_FALSE(s) << n;
+      refused = s.error();
+    } else {
+      ASSERT_TRUE(s) << n;
+      EXPECT_NEAR(s->state.v_W.x(), 0.4, 1e-6);
+    }
+  }
+  EXPECT_NE(refused.find("velocity is not known yet"), std::string::npos) << refused;
+}
+
+// A lidar upside down, 0.1 m ahead of and 0.05 m above the body's origin, on a vehicle that turns at 2 rad/s.
+TEST(Localization, ASensorBesideTheBodyTellsTheBodysPoseAndVelocity) {
+  const Vec3 at(0.1, 0, 0.05), v_W(0.3, -0.2, 0.1), w_W(0, 0, 2), p(1, 2, 3);
+  const Quaternion body = about_z(0.7), mounted(Eigen::AngleAxisd(M_PI, Vec3::UnitX())), sensor = body * mounted;
+  const Vec3 lever = body * at, sensor_v = v_W + w_W.cross(lever);
+  for (const config::Twist twist : {config::Twist::body, config::Twist::world}) {
+    Localization l(told(twist, at, {M_PI, 0, 0}), 0.02);
+    const bool in_body = twist == config::Twist::body;
+    auto m = odometry(kMap, p + lever, sensor, in_body ? Vec3(sensor.conjugate() * sensor_v) : sensor_v);
+    const Vec3 w = in_body ? Vec3(sensor.conjugate() * w_W) : w_W;
+    m.twist.twist.angular = {w.x(), w.y(), w.z()};
+    const auto s = l.odometry(m, 0);
+    ASSERT_TRUE(s) << s.error();
+    EXPECT_LT((s->state.p_W - p).norm(), 1e-9);
+    EXPECT_LT((s->state.v_W - v_W).norm(), 1e-9);
+    EXPECT_LT(Quaternion(s->q[0], s->q[1], s->q[2], s->q[3]).angularDistance(body), 1e-9);
+  }
+}
+
 // docs/faults.md row 2: it takes no good sample's place.
 TEST(Localization, RefusesABrokenPose) {
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -81,6 +81,24 @@ TEST_F(MissionRefusals, NothingIsEnabledWhileAnotherDaemonObeysTheSameCommands) 
   EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
 }
 
+TEST_F(MissionRefusals, NothingIsEnabledWhileTheOdometryIsDoubted) {
+  const auto tell = [&](const char* doubt) {
+    MissionInput in;
+    in.now_s = now_s_;
+    in.odometry_doubt.emplace();
+    std::snprintf(in.odometry_doubt->data(), in.odometry_doubt->size(), "%s", doubt);
+    mission_.observe(in);
+  };
+  view_.mode = Mode::passive;
+  view_.armed = view_.offboard = false;
+  view_.landed = true;
+  look();
+  tell("the twist is all zero");
+  expect_nothing(give(gcs_.next(kEnable)), kRefused, "the twist is all zero");
+  tell("");
+  EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
+}
+
 TEST_F(MissionRefusals, ACommandWithoutANameOrWithANumberThatIsNoneIsInvalidAndTakesNoLease) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const std::function<void(CommandMessage&)> faults[] = {

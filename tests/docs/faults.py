@@ -10,7 +10,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 52
+ROWS = 53
 
 
 def known_tests(build: str) -> list[str]:

@@ -61,7 +61,7 @@ def keys_of_code(source: str) -> dict[str, tuple[str, bool]]:
     """Key → (range, needed) of a file of core/config; texts and flags have no range."""
     constants = dict(re.findall(r"constexpr Range (\w+)(\{[^}]*\})", source))
     keys = {}
-    for key, spec, presence in re.findall(r'\{"([\w.]+)", &[\w.]+, (\{[^}]*\}|\w+)(?:, ([\w:]+))?\}', source):
+    for key, spec, presence in re.findall(r'\{"([\w.]+)", &[\w.()]+, (\{[^}]*\}|\w+)(?:, ([\w:]+))?\}', source):
         keys[key] = (interval(spec, constants), presence == "")
     table = re.search(r"TextKey texts\[\] = \{(.*?)\n  \};", source, re.S)
     for key in re.findall(r'\{"([\w.]+)", &', table[1] if table else ""):

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/odometry_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace backwash::daemon {
+namespace {
+
+using config::Twist;
+
+constexpr double kLongestGap = 0.5;  // s: after a longer one the comparison begins anew
+constexpr int kIntervals = 20;       // messages until their rate is known
+constexpr double kSmooth = 0.1;      // share of the newest interval
+
+std::string line(const char* format, auto... values) {
+  char text[192];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+}  // namespace
+
+std::optional<std::string> OdometryCheck::look(std::int64_t stamp_ns, const Vec3& p, const Eigen::Quaterniond& q,
+                                               const Vec3& v) {
+  if (!p.allFinite() || !v.allFinite() || !q.coeffs().allFinite()) return std::nullopt;
+  const double dt = stamp_ns_ ? static_cast<double>(stamp_ns - *stamp_ns_) * 1e-9 : 0;
+  const bool goes_on = stamp_ns_ && dt > 0 && dt < kLongestGap;
+  if (stamp_ns_ && dt == 0) return std::nullopt;
+  stamp_ns_ = stamp_ns;
+  if (goes_on) {
+    interval_ = intervals_ == 0 ? dt : (1 - kSmooth) * interval_ + kSmooth * dt;
+    intervals_ = std::min(intervals_ + 1, kIntervals);
+    compare(dt, p, q, v);
+  } else {
+    intervals_ = 0;
+    zero_from_.reset();
+    zero_way_ = 0, count_ = 0;
+    from_ = p, by_body_ = by_world_ = Vec3::Zero(), lasted_ = 0;
+  }
+  std::string now = doubt();
+  if (now == told_) return std::nullopt;
+  return told_ = std::move(now);
+}
+
+void OdometryCheck::compare(double dt, const Vec3& p, const Eigen::Quaterniond& q, const Vec3& v) {
+  if (!v.isZero(0))
+    zero_from_.reset();
+  else if (!zero_from_)
+    zero_from_ = p;
+  zero_way_ = zero_from_ ? (p - *zero_from_).norm() : 0;
+  by_body_ += dt * (q * v);
+  by_world_ += dt * v;
+  lasted_ += dt;
+  const Vec3 way = p - from_;
+  const bool long_enough = way.norm() >= kStretch;
+  if (long_enough) stretches_[count_++ % kStretches] = {way.norm(), (way - by_body_).norm(), (way - by_world_).norm()};
+  if (long_enough || lasted_ > kLongest) from_ = p, by_body_ = by_world_ = Vec3::Zero(), lasted_ = 0;
+}
+
+std::string OdometryCheck::doubt() const {
+  if (intervals_ == kIntervals && 1 / interval_ < kLeastRate)
+    return line("odometry comes at less than %.0f Hz: each gap would be a HOLD; raise the rate of the estimator",
+                kLeastRate);
+  return twist_ == Twist::none ? "" : twist_doubt();
+}
+
+std::string OdometryCheck::twist_doubt() const {
+  if (zero_way_ >= kZeroWay)
+    return line(
+        "odometry: the twist is all zero while the pose moved %.1f m: this looks like FAST-LIO; set "
+        "odometry.profile = \"fast_lio\", or \"custom\" with twist = \"none\"",
+        kZeroWay);
+  if (count_ < kStretches) return "";
+  Stretch sum{};
+  for (const Stretch& s : stretches_) sum = {sum.way + s.way, sum.in_body + s.in_body, sum.in_world + s.in_world};
+  const double claimed = twist_ == Twist::body ? sum.in_body : sum.in_world;
+  const double other = twist_ == Twist::body ? sum.in_world : sum.in_body;
+  if (claimed < kOff * sum.way) return "";
+  if (other > kFits * sum.way)
+    return "odometry: twist and pose contradict each other, in the body's frame as in the pose's: look at the "
+           "estimator's frames and units";
+  return twist_ == Twist::body
+             ? "odometry: the twist fits the pose in the pose's frame, not in the body's: this looks like VINS-Fusion; "
+               "set odometry.profile = \"vins_fusion\", or \"custom\" with twist = \"world\""
+             : "odometry: the twist fits the pose in the body's frame, not in the pose's: set odometry.profile = "
+               "\"ros\", or \"custom\" with twist = \"body\"";
+}
+
+}  // namespace backwash::daemon
