@@ -31,7 +31,12 @@ void add_world(CLI::App& app, Given& given) {
       ->required()
       ->delimiter(',')
       ->expected(3);
-  app.add_option("--link", given.options.link, "symbolic link to make to the controller's serial port")->required();
+  auto* const line = app.add_option_group("controller");
+  line->add_option("--link", given.options.link, "symbolic link to make to the controller's serial port");
+  line->add_option(
+      "--in-loop", given.options.in_loop,
+      "a real controller, simulated for: tcpin:ADDRESS:PORT (PX4's simulator_mavlink) or a serial port (HITL)");
+  line->require_option(1);
   app.add_option("--seed", given.options.seed, "of the airflow and of the VIO's drift")->capture_default_str();
   app.add_option("--local-yaw", given.options.frame.yaw, "yaw of the controller's own frame, rad")
       ->capture_default_str();
