@@ -8,7 +8,9 @@
 #include <variant>
 
 #include "firmware_bridge/clock_filter.hpp"
+#include "firmware_bridge/line_budget.hpp"
 #include "firmware_bridge/mavlink/signing.hpp"
+#include "firmware_bridge/outgoing.hpp"
 #include "firmware_bridge/plain_port.hpp"
 #include "firmware_bridge/serial_port.hpp"
 #include "firmware_bridge/tcp_port.hpp"
@@ -39,19 +41,6 @@ enum class LinkFault : std::uint8_t {
 };
 std::string_view name(LinkFault fault) noexcept;
 
-/// A VIO sample to be forwarded. The VIO's frame O is z-up; sending it as one frame with the controller's local frame L
-/// means that a controller that follows it in position and yaw has L = O.
-struct VioSample {
-  std::uint64_t time_us = 0;                                     ///< monotonic
-  Vec3 p_O;                                                      ///< m
-  Eigen::Quaterniond q_OB;                                       ///< body FLU to O
-  Vec3 v_B;                                                      ///< velocity of the body, in body FLU, m/s
-  std::optional<Vec3> omega_B;                                   ///< rad/s, FLU; absent: not known
-  std::optional<Vec3> position_variance_O, attitude_variance_O;  ///< per axis of O, m², rad²
-  std::optional<Vec3> velocity_variance_B;                       ///< per axis of B, (m/s)²
-  std::uint8_t reset_counter = 0;                                ///< counts jumps of O, as loop closures make them
-};
-
 /// The MAVLink connection to one flight controller. Owned and called by the control thread alone: one thread sends both
 /// set-points and heartbeat, so that both stop when it does.
 ///
@@ -68,6 +57,9 @@ class AutopilotLink {
   void require_signatures(const mavlink::Signing& signing, Time now) noexcept;
   /// As it stands; absent: frames are not signed, and signatures are not looked at.
   const std::optional<mavlink::Signing>& signing() const noexcept { return signing_; }
+
+  /// From now on ODOMETRY is thinned to what such a line carries; until then it carries everything.
+  void pace(const LineRate& line) noexcept { budget_ = LineBudget(line); }
 
   /// Takes a newly opened port after a loss and returns the lost one (closing it may wait for the line). All that was
   /// known of the vehicle is forgotten; nothing waits to be sent.
@@ -92,6 +84,8 @@ class AutopilotLink {
   void tap(Tap each, void* context) noexcept { tap_ = each, tap_context_ = context; }
   const mavlink::ParserCounters& received() const noexcept { return parser_.counters(); }
   const TransmitQueue& transmit() const noexcept { return queue_; }
+  /// ODOMETRY that the line had no room for.
+  std::uint64_t thinned() const noexcept { return thinned_; }
 
   /// Each of these encodes one frame and hands it to the port, or keeps it for poll(). False: refused, because no
   /// vehicle is known, the port is lost, or a value is not finite as the float that it would be on the wire. ODOMETRY
@@ -101,6 +95,7 @@ class AutopilotLink {
   /// acceleration and yaw; the yaw rate is left to the controller.
   bool send_setpoint(const Setpoint& setpoint_L, Time now) noexcept;
   bool send_heartbeat() noexcept;
+  /// As of the last poll(); false also for one that the line has no room for: see pace().
   bool send_odometry(const VioSample& sample) noexcept;
   /// At most 50 characters are sent. Severity as syslog.
   bool send_statustext(std::uint8_t severity, std::string_view text) noexcept;
@@ -147,6 +142,9 @@ class AutopilotLink {
   mavlink::Parser parser_;
   Telemetry telemetry_;
   TransmitQueue queue_;
+  LineBudget budget_;
+  Time now_{};  // of the last poll()
+  std::uint64_t thinned_ = 0;
   std::optional<std::uint8_t> heard_;
   ClockFilter clock_;
   std::int64_t timesync_asked_ns_ = 0;
