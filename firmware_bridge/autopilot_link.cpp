@@ -139,16 +139,17 @@ void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
   });
 }
 
-/// When the controller took what it says, by its own stamp; now, where it has none, or one that cannot be.
+/// When the controller took what it says, by its own stamp, however long ago; now, where it has none, or one of the
+/// future. After a restart its stamps count as old until TIMESYNC has found its new clock.
 template <class Message>
 Time AutopilotLink::taken(const Message& m, Time now) const noexcept {
   if constexpr (requires { m.time_boot_ms; }) {
-    constexpr std::int64_t kLongestTrip_ns = 10'000'000, kOldest_ms = 200, kPerMillisecond = 1'000'000;
+    constexpr std::int64_t kLongestTrip_ns = 10'000'000, kPerMillisecond = 1'000'000;
     const auto clock = clock_.best();
     if (!clock || clock->round_trip_ns > kLongestTrip_ns) return now;
     const auto there_ms = static_cast<std::uint32_t>((nanoseconds_of(now) + clock->offset_ns) / kPerMillisecond);
     const auto age_ms = static_cast<std::int32_t>(there_ms - m.time_boot_ms);  // its 32 bits wrap after 49 days
-    return age_ms > 0 && age_ms <= kOldest_ms ? now - milliseconds(age_ms) : now;
+    return age_ms > 0 ? now - milliseconds(age_ms) : now;
   }
   return now;
 }

@@ -70,7 +70,7 @@ class AutopilotLink {
 
   const Telemetry& telemetry() const noexcept { return telemetry_; }
   /// The controller's clock, as send_timesync() has measured it since the port was opened. While it is good to 5 ms,
-  /// what telemetry() says has the time at which the controller took it, otherwise that of its arrival.
+  /// what telemetry() says has the time at which the controller took it, however old, otherwise that of its arrival.
   std::optional<ClockOffset> clock() const noexcept { return clock_.best(); }
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }

@@ -180,7 +180,6 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
     }
   }
   if (s.send_heartbeat && view_.ticks % kTicksPerSecond == 0 && link_.send_heartbeat()) row_.sent |= 2;
-  if (s.send_heartbeat && view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));
   if (out.forward_odometry) forward_odometry(out.odometry_resets);
   if (s.request_offboard) link_.send_follow_setpoints();
   if (s.request_land) link_.send_land();
@@ -199,6 +198,7 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   parameters_.step(link_, passive || wished, passive, view_);
   if (!s.send_heartbeat && !wished) return;
   ask_for_messages(in.now_ns);
+  if (view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));
   if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);
 }
 
