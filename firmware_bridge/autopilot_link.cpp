@@ -49,6 +49,7 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   parser_ = {};
   telemetry_ = {};
   queue_.clear();
+  blocked_.reset();
   budget_.forget();
   heard_.reset();
   clock_ = {};
@@ -85,14 +86,20 @@ tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {
 
 void AutopilotLink::flush() noexcept {
   if (lost_) return;
+  bool took = false;
   const auto done = queue_.flush([&](std::span<const std::uint8_t> bytes) noexcept {
-    return std::visit([&](auto& port) { return port.write(bytes); }, port_);
+    const auto taken = std::visit([&](auto& port) { return port.write(bytes); }, port_);
+    took = took || (taken && *taken > 0);
+    return taken;
   });
   if (!done) lost_ = done.error();
+  if (took || queue_.waiting() == 0) blocked_.reset();
+  if (queue_.waiting() > 0 && !blocked_) blocked_ = now_;
 }
 
 void AutopilotLink::discard_unsent() noexcept {
   queue_.clear();
+  blocked_.reset();
   budget_.forget();
   std::visit([](auto& port) { port.discard_output(); }, port_);
 }
@@ -188,8 +195,12 @@ std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
     return signing_ && !signed_rightly_ ? LinkFault::kNoneSignedRightly : LinkFault::kHeartbeatLost;
   }
   if (age && *age >= kHeartbeatTimeout) return LinkFault::kHeartbeatLost;
-  if (queue_.missed_setpoints() >= kMaxMissedSetpoints) return LinkFault::kTransmitStalled;
+  if (transmit_stalled(now)) return LinkFault::kTransmitStalled;
   return std::nullopt;
+}
+
+bool AutopilotLink::transmit_stalled(Time now) const noexcept {
+  return queue_.missed_setpoints() >= kMaxMissedSetpoints || (blocked_ && now - *blocked_ >= kTransmitStall);
 }
 
 template <class Message>

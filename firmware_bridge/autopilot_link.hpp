@@ -22,9 +22,10 @@ namespace backwash::firmware_bridge {
 
 using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort, PlainPort>;
 
-inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);  ///< docs/faults.md row 19
-inline constexpr int kMaxMissedSetpoints = 2;                        ///< docs/faults.md row 20
-inline constexpr std::uint8_t kOnboardComputer = 191;                ///< our component id
+inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);     ///< docs/faults.md row 19
+inline constexpr int kMaxMissedSetpoints = 2;                           ///< docs/faults.md row 20
+inline constexpr auto kTransmitStall = std::chrono::milliseconds(200);  ///< the same, where there are no set-points
+inline constexpr std::uint8_t kOnboardComputer = 191;                   ///< our component id
 
 /// Commands that the link sends (MAV_CMD), to ask telemetry().result_of() for their answers.
 inline constexpr std::uint16_t kCommandMessage = 512, kCommandLand = 21, kCommandTakeoff = 22, kCommandSetMode = 176,
@@ -37,7 +38,7 @@ enum class LinkFault : std::uint8_t {
   kNoValidFrame,       ///< row 19: bytes, but no frame within 2 s: wrong baud rate or no MAVLink
   kNoneSignedRightly,  ///< row 29: frames, but none within 2 s whose signature is good: another key, or signing is off
   kHeartbeatLost,      ///< row 21: none from the flight controller for 1.5 s
-  kTransmitStalled,    ///< row 20: two set-points in a row did not get out
+  kTransmitStalled,    ///< row 20: transmit_stalled()
 };
 std::string_view name(LinkFault fault) noexcept;
 
@@ -82,6 +83,9 @@ class AutopilotLink {
   /// log. Must itself be real-time. Null: none.
   using Tap = void (*)(void* context, bool outgoing, std::span<const std::uint8_t> frame) noexcept;
   void tap(Tap each, void* context) noexcept { tap_ = each, tap_context_ = context; }
+  /// Two set-points in a row did not get out, or the port has taken nothing for 0.2 s of what waits: set-points are not
+  /// all that must get out (ArduPilot takes off without).
+  bool transmit_stalled(Time now) const noexcept;
   const mavlink::ParserCounters& received() const noexcept { return parser_.counters(); }
   const TransmitQueue& transmit() const noexcept { return queue_; }
   /// ODOMETRY that the line had no room for.
@@ -145,6 +149,7 @@ class AutopilotLink {
   LineBudget budget_;
   Time now_{};  // of the last poll()
   std::uint64_t thinned_ = 0;
+  std::optional<Time> blocked_;  // since when the port has taken nothing of what waits
   std::optional<std::uint8_t> heard_;
   ClockFilter clock_;
   std::int64_t timesync_asked_ns_ = 0;

@@ -83,7 +83,7 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   const auto& telemetry = link_.telemetry();
   track::AutopilotFacts facts;
   facts.port_open = port_open_;
-  facts.transmit_failed = link_.transmit().missed_setpoints() >= firmware_bridge::kMaxMissedSetpoints;
+  facts.transmit_failed = link_.transmit_stalled(time_of(now_ns));
   facts.armed = telemetry.status && telemetry.status->value.armed;
   facts.offboard = telemetry.status && telemetry.status->value.follows_setpoints;
   using firmware_bridge::LandedState;

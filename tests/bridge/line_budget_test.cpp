@@ -178,5 +178,22 @@ TEST_F(LinkTest, ThinsOdometryAloneAndCountsIt) {
   EXPECT_TRUE(link_.send_odometry(vio)) << "nothing is under way";
 }
 
+TEST_F(LinkTest, TellsALineThatTakesNothingThoughNoSetpointWaits) {
+  introduce_vehicle();
+  int ms = 0, blocked_at = -1;
+  for (; ms < 5000 && link_.fault(kStart + std::chrono::milliseconds(ms)) != LinkFault::kTransmitStalled; ms += 20) {
+    const Time now = kStart + std::chrono::milliseconds(ms);
+    say_and_poll(px4_heartbeat(false, 1), now);  // it speaks, and does not listen
+    for (int n = 0; n < 20; ++n) link_.send_statustext(6, "nobody reads this");
+    if (blocked_at < 0 && link_.transmit().waiting() > 0) blocked_at = ms;
+  }
+  ASSERT_GE(blocked_at, 0);
+  EXPECT_EQ(ms - blocked_at, 200) << "ms";
+  EXPECT_EQ(link_.transmit().missed_setpoints(), 0);
+  far_.await();  // the other end reads again
+  ASSERT_TRUE(link_.poll(kStart + std::chrono::milliseconds(ms)));
+  EXPECT_FALSE(link_.transmit_stalled(kStart + std::chrono::milliseconds(ms + 200)));
+}
+
 }  // namespace
 }  // namespace backwash::firmware_bridge::test
