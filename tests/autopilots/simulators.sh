@@ -54,8 +54,9 @@ sticks() {
   pids+=($!)
 }
 
-# start_px4 BUILD_DIR [NAME=VALUE …]: PX4 with its SIH quadrotor, or with $model_of_px4, another simulator's. In about one start of three its estimator never makes a first
-# step (`ekf2 status`: 0 updates), whatever else runs: then it is started again.
+# start_px4 BUILD_DIR [NAME=VALUE …]: PX4 with its SIH quadrotor, or with $model_of_px4, another simulator's. In about one
+# start of three its estimator never makes a first step (`ekf2 status`: 0 updates), whatever else runs: then it is started
+# again.
 start_px4() {
   local attempt
   for attempt in $(seq 10); do
