@@ -48,6 +48,14 @@ TEST(DaemonFile, ReadsTheShippedExample) {
   EXPECT_DOUBLE_EQ(d->control.battery_land, 0.15);
 }
 
+TEST(DaemonFile, AShareOfTheLineIsAboveNothingAndAtMostAllOfIt) {
+  EXPECT_FALSE(load_daemon("builtin:backwashd")->link.share);
+  for (const std::string good : {"0.05", "0.5", "1"})
+    EXPECT_EQ(error_after("system = 1 ", "share = " + good + "\nsystem = 1 "), "no error") << good;
+  for (const std::string bad : {"0", "0.04", "1.01", "nan"})
+    EXPECT_THAT(error_after("system = 1 ", "share = " + bad + "\nsystem = 1 "), HasSubstr("key 'link.share'")) << bad;
+}
+
 TEST(DaemonFile, ReadsTheFormsOfALinkDevice) {
   using Kind = LinkDevice::Kind;
   const auto read = [](const char* text) {
