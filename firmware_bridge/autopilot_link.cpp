@@ -45,16 +45,14 @@ AutopilotLink::AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Tim
 Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   std::swap(port_, port);
   opened_at_ = now;
-  lost_.reset();
+  heard_.reset();
+  lost_.reset(), blocked_.reset();
   parser_ = {};
   telemetry_ = {};
   queue_.clear();
-  blocked_.reset();
   budget_.forget();
-  heard_.reset();
   clock_ = {};
-  timesync_asked_ns_ = 0;
-  signed_rightly_ = false;
+  timesync_asked_ns_ = 0, signed_rightly_ = false;
   return port;
 }
 
