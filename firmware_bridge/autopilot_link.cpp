@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "firmware_bridge/autopilot_link.hpp"
 
-#include <cmath>
-#include <limits>
-
-#include "firmware_bridge/mavlink/frames.hpp"
-
 namespace backwash::firmware_bridge {
 namespace {
 
@@ -17,58 +12,11 @@ constexpr std::uint8_t kFlightController = 1;                    // MAV_COMP_ID_
 
 // Values of common.xml.
 constexpr std::uint8_t kTypeOnboardController = 18, kAutopilotInvalid = 8, kStateActive = 4, kMavlinkVersion = 3;
-constexpr std::uint8_t kFrameLocalNed = 1, kFrameBodyFrd = 12, kFrameLocalFrd = 20, kEstimatorVio = 3;
-constexpr std::uint16_t kIgnoreYawRate = 1 << 11;
 constexpr float kCustomModeEnabled = 1, kPx4MainModeOffboard = 6, kCopterModeGuided = 4;
 
 std::int64_t nanoseconds_of(Time t) noexcept { return duration_cast<nanoseconds>(t.time_since_epoch()).count(); }
 std::uint32_t milliseconds_of(Time t) noexcept {
   return static_cast<std::uint32_t>(duration_cast<milliseconds>(t.time_since_epoch()).count());
-}
-
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-using UpperTriangle = std::array<float, 21>;
-
-/// Upper triangle of the 6×6 diag(first, second); an absent first part marks all of it unknown, as MAVLink has it.
-UpperTriangle covariance(const std::optional<Vec3>& first, const std::optional<Vec3>& second) noexcept {
-  constexpr std::array<std::size_t, 6> kDiagonal{0, 6, 11, 15, 18, 20};
-  UpperTriangle c{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    c[kDiagonal[i]] = first ? static_cast<float>((*first)(static_cast<int>(i))) : kUnknown;
-    c[kDiagonal[i + 3]] = second ? static_cast<float>((*second)(static_cast<int>(i))) : kUnknown;
-  }
-  return c;
-}
-
-/// A permutation of axes permutes variances; no sign changes them.
-std::optional<Vec3> swap_variance_ned(const std::optional<Vec3>& v) noexcept {
-  if (!v) return std::nullopt;
-  return mavlink::swap_ned(*v).cwiseAbs();
-}
-
-/// What is given is a number; what is absent will be NaN on purpose.
-bool finite(const VioSample& s) noexcept {
-  const auto finite_or_absent = [](const std::optional<Vec3>& v) { return !v || v->cast<float>().allFinite(); };
-  return finite_or_absent(s.omega_B) && finite_or_absent(s.position_variance_O) &&
-         finite_or_absent(s.attitude_variance_O) && finite_or_absent(s.velocity_variance_B);
-}
-
-/// Every float of the message is a number, but for those of ODOMETRY that may be marked as unknown.
-template <class Message>
-bool finite(const Message& message) noexcept {
-  const auto number = [&]<class Member>(const mavlink::Field<Message, Member>& f) {
-    using Scalar = typename mavlink::Wire<Member>::Scalar;
-    if constexpr (!std::is_same_v<Scalar, float>) {
-      return true;
-    } else if constexpr (mavlink::Wire<Member>::kArray > 0) {
-      return f.name.ends_with("_covariance") ||
-             std::ranges::all_of(message.*f.member, [](float v) { return std::isfinite(v); });
-    } else {
-      const bool rate = std::is_same_v<Message, mavlink::Odometry> && f.name.ends_with("speed");
-      return rate || std::isfinite(message.*f.member);
-    }
-  };
-  return std::apply([&](const auto&... f) { return (number(f) && ...); }, Message::fields());
 }
 
 }  // namespace
@@ -97,14 +45,14 @@ AutopilotLink::AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Tim
 Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   std::swap(port_, port);
   opened_at_ = now;
-  lost_.reset();
+  heard_.reset();
+  lost_.reset(), blocked_.reset();
   parser_ = {};
   telemetry_ = {};
   queue_.clear();
-  heard_.reset();
+  budget_.forget();
   clock_ = {};
-  timesync_asked_ns_ = 0;
-  signed_rightly_ = false;
+  timesync_asked_ns_ = 0, signed_rightly_ = false;
   return port;
 }
 
@@ -115,6 +63,7 @@ void AutopilotLink::require_signatures(const mavlink::Signing& signing, Time now
 }
 
 tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {
+  now_ = now;
   if (signing_) {
     const auto run = duration_cast<microseconds>(now - signing_since_).count() / 10;
     signing_->advance_to(signing_start_ + static_cast<mavlink::SigningTime>(std::max<std::int64_t>(run, 0)));
@@ -135,14 +84,21 @@ tl::expected<void, PortError> AutopilotLink::poll(Time now) noexcept {
 
 void AutopilotLink::flush() noexcept {
   if (lost_) return;
+  bool took = false;
   const auto done = queue_.flush([&](std::span<const std::uint8_t> bytes) noexcept {
-    return std::visit([&](auto& port) { return port.write(bytes); }, port_);
+    const auto taken = std::visit([&](auto& port) { return port.write(bytes); }, port_);
+    took = took || (taken && *taken > 0);
+    return taken;
   });
   if (!done) lost_ = done.error();
+  if (took || queue_.waiting() == 0) blocked_.reset();
+  if (queue_.waiting() > 0 && !blocked_) blocked_ = now_;
 }
 
 void AutopilotLink::discard_unsent() noexcept {
   queue_.clear();
+  blocked_.reset();
+  budget_.forget();
   std::visit([](auto& port) { port.discard_output(); }, port_);
 }
 
@@ -188,16 +144,17 @@ void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
   });
 }
 
-/// When the controller took what it says, by its own stamp; now, where it has none, or one that cannot be.
+/// When the controller took what it says, by its own stamp, however long ago; now, where it has none, or one of the
+/// future. After a restart its stamps count as old until TIMESYNC has found its new clock.
 template <class Message>
 Time AutopilotLink::taken(const Message& m, Time now) const noexcept {
   if constexpr (requires { m.time_boot_ms; }) {
-    constexpr std::int64_t kLongestTrip_ns = 10'000'000, kOldest_ms = 200, kPerMillisecond = 1'000'000;
+    constexpr std::int64_t kLongestTrip_ns = 10'000'000, kPerMillisecond = 1'000'000;
     const auto clock = clock_.best();
     if (!clock || clock->round_trip_ns > kLongestTrip_ns) return now;
     const auto there_ms = static_cast<std::uint32_t>((nanoseconds_of(now) + clock->offset_ns) / kPerMillisecond);
     const auto age_ms = static_cast<std::int32_t>(there_ms - m.time_boot_ms);  // its 32 bits wrap after 49 days
-    return age_ms > 0 && age_ms <= kOldest_ms ? now - milliseconds(age_ms) : now;
+    return age_ms > 0 ? now - milliseconds(age_ms) : now;
   }
   return now;
 }
@@ -236,13 +193,17 @@ std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
     return signing_ && !signed_rightly_ ? LinkFault::kNoneSignedRightly : LinkFault::kHeartbeatLost;
   }
   if (age && *age >= kHeartbeatTimeout) return LinkFault::kHeartbeatLost;
-  if (queue_.missed_setpoints() >= kMaxMissedSetpoints) return LinkFault::kTransmitStalled;
+  if (transmit_stalled(now)) return LinkFault::kTransmitStalled;
   return std::nullopt;
+}
+
+bool AutopilotLink::transmit_stalled(Time now) const noexcept {
+  return queue_.missed_setpoints() >= kMaxMissedSetpoints || (blocked_ && now - *blocked_ >= kTransmitStall);
 }
 
 template <class Message>
 bool AutopilotLink::send(const Message& message, TransmitQueue::Kind kind) noexcept {
-  if (!heard_ || lost_ || !finite(message)) return false;
+  if (!heard_ || lost_ || !all_finite(message)) return false;
   return send_as(*heard_, message, kind);
 }
 
@@ -253,30 +214,14 @@ bool AutopilotLink::send_as(std::uint8_t system, const Message& message, Transmi
   mavlink::EncodedFrame frame = mavlink::encode_frame({system, kOnboardComputer, sequence_++}, message, flags);
   if (signing_ && !signing_->sign(frame)) return false;
   if (tap_) tap_(tap_context_, true, frame.view());
+  budget_.give(frame.length, kind == TransmitQueue::Kind::kOdometry, now_);
   queue_.push(frame, kind);
   flush();
   return !lost_;
 }
 
-bool AutopilotLink::send_setpoint(const Setpoint& s, Time now) noexcept {
-  const Eigen::Vector3f p = mavlink::swap_ned(s.p_W).cast<float>();
-  const Eigen::Vector3f v = mavlink::swap_ned(s.v_W).cast<float>();
-  const Eigen::Vector3f a = mavlink::swap_ned(s.a_W).cast<float>();
-  return send(mavlink::SetPositionTargetLocalNed{.time_boot_ms = milliseconds_of(now),
-                                                 .x = p.x(),
-                                                 .y = p.y(),
-                                                 .z = p.z(),
-                                                 .vx = v.x(),
-                                                 .vy = v.y(),
-                                                 .vz = v.z(),
-                                                 .afx = a.x(),
-                                                 .afy = a.y(),
-                                                 .afz = a.z(),
-                                                 .yaw = static_cast<float>(mavlink::swap_yaw(s.yaw)),
-                                                 .type_mask = kIgnoreYawRate,
-                                                 .target_system = heard_.value_or(0),
-                                                 .target_component = kFlightController,
-                                                 .coordinate_frame = kFrameLocalNed},
+bool AutopilotLink::send_setpoint(const Setpoint& setpoint_L, Time now) noexcept {
+  return send(setpoint_message(setpoint_L, milliseconds_of(now), {heard_.value_or(0), kFlightController}),
               TransmitQueue::Kind::kSetpoint);
 }
 
@@ -287,31 +232,13 @@ bool AutopilotLink::send_heartbeat() noexcept {
                                  .mavlink_version = kMavlinkVersion});
 }
 
-bool AutopilotLink::send_odometry(const VioSample& s) noexcept {
-  if (!finite(s)) return false;
-  const Eigen::Vector3f p = mavlink::swap_ned(s.p_O).cast<float>();
-  const Eigen::Quaternionf q = mavlink::swap_ned_frd(s.q_OB).cast<float>();
-  const Eigen::Vector3f v = mavlink::swap_frd(s.v_B).cast<float>();
-  const Eigen::Vector3f w =
-      s.omega_B ? Eigen::Vector3f(mavlink::swap_frd(*s.omega_B).cast<float>()) : Eigen::Vector3f::Constant(kUnknown);
-  return send(mavlink::Odometry{
-      .time_usec = s.time_us,
-      .x = p.x(),
-      .y = p.y(),
-      .z = p.z(),
-      .q = {q.w(), q.x(), q.y(), q.z()},
-      .vx = v.x(),
-      .vy = v.y(),
-      .vz = v.z(),
-      .rollspeed = w.x(),
-      .pitchspeed = w.y(),
-      .yawspeed = w.z(),
-      .pose_covariance = covariance(swap_variance_ned(s.position_variance_O), swap_variance_ned(s.attitude_variance_O)),
-      .velocity_covariance = covariance(s.velocity_variance_B, std::nullopt),
-      .frame_id = kFrameLocalFrd,
-      .child_frame_id = kFrameBodyFrd,
-      .reset_counter = s.reset_counter,
-      .estimator_type = kEstimatorVio});
+bool AutopilotLink::send_odometry(const VioSample& sample) noexcept {
+  if (!all_finite(sample)) return false;
+  if (!budget_.carries_odometry(now_)) {
+    ++thinned_;
+    return false;
+  }
+  return send(odometry_message(sample), TransmitQueue::Kind::kOdometry);
 }
 
 bool AutopilotLink::send_statustext(std::uint8_t severity, std::string_view text) noexcept {

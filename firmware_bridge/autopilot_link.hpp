@@ -8,7 +8,9 @@
 #include <variant>
 
 #include "firmware_bridge/clock_filter.hpp"
+#include "firmware_bridge/line_budget.hpp"
 #include "firmware_bridge/mavlink/signing.hpp"
+#include "firmware_bridge/outgoing.hpp"
 #include "firmware_bridge/plain_port.hpp"
 #include "firmware_bridge/serial_port.hpp"
 #include "firmware_bridge/tcp_port.hpp"
@@ -20,9 +22,10 @@ namespace backwash::firmware_bridge {
 
 using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort, PlainPort>;
 
-inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);  ///< docs/faults.md row 19
-inline constexpr int kMaxMissedSetpoints = 2;                        ///< docs/faults.md row 20
-inline constexpr std::uint8_t kOnboardComputer = 191;                ///< our component id
+inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);     ///< docs/faults.md row 19
+inline constexpr int kMaxMissedSetpoints = 2;                           ///< docs/faults.md row 20
+inline constexpr auto kTransmitStall = std::chrono::milliseconds(200);  ///< the same, where there are no set-points
+inline constexpr std::uint8_t kOnboardComputer = 191;                   ///< our component id
 
 /// Commands that the link sends (MAV_CMD), to ask telemetry().result_of() for their answers.
 inline constexpr std::uint16_t kCommandMessage = 512, kCommandLand = 21, kCommandTakeoff = 22, kCommandSetMode = 176,
@@ -35,22 +38,9 @@ enum class LinkFault : std::uint8_t {
   kNoValidFrame,       ///< row 19: bytes, but no frame within 2 s: wrong baud rate or no MAVLink
   kNoneSignedRightly,  ///< row 29: frames, but none within 2 s whose signature is good: another key, or signing is off
   kHeartbeatLost,      ///< row 21: none from the flight controller for 1.5 s
-  kTransmitStalled,    ///< row 20: two set-points in a row did not get out
+  kTransmitStalled,    ///< row 20: transmit_stalled()
 };
 std::string_view name(LinkFault fault) noexcept;
-
-/// A VIO sample to be forwarded. The VIO's frame O is z-up; sending it as one frame with the controller's local frame L
-/// means that a controller that follows it in position and yaw has L = O.
-struct VioSample {
-  std::uint64_t time_us = 0;                                     ///< monotonic
-  Vec3 p_O;                                                      ///< m
-  Eigen::Quaterniond q_OB;                                       ///< body FLU to O
-  Vec3 v_B;                                                      ///< velocity of the body, in body FLU, m/s
-  std::optional<Vec3> omega_B;                                   ///< rad/s, FLU; absent: not known
-  std::optional<Vec3> position_variance_O, attitude_variance_O;  ///< per axis of O, m², rad²
-  std::optional<Vec3> velocity_variance_B;                       ///< per axis of B, (m/s)²
-  std::uint8_t reset_counter = 0;                                ///< counts jumps of O, as loop closures make them
-};
 
 /// The MAVLink connection to one flight controller. Owned and called by the control thread alone: one thread sends both
 /// set-points and heartbeat, so that both stop when it does.
@@ -69,6 +59,9 @@ class AutopilotLink {
   /// As it stands; absent: frames are not signed, and signatures are not looked at.
   const std::optional<mavlink::Signing>& signing() const noexcept { return signing_; }
 
+  /// From now on ODOMETRY is thinned to what such a line carries; until then it carries everything.
+  void pace(const LineRate& line) noexcept { budget_ = LineBudget(line); }
+
   /// Takes a newly opened port after a loss and returns the lost one (closing it may wait for the line). All that was
   /// known of the vehicle is forgotten; nothing waits to be sent.
   Port reconnect(Port port, Time now) noexcept;
@@ -78,7 +71,7 @@ class AutopilotLink {
 
   const Telemetry& telemetry() const noexcept { return telemetry_; }
   /// The controller's clock, as send_timesync() has measured it since the port was opened. While it is good to 5 ms,
-  /// what telemetry() says has the time at which the controller took it, otherwise that of its arrival.
+  /// what telemetry() says has the time at which the controller took it, however old, otherwise that of its arrival.
   std::optional<ClockOffset> clock() const noexcept { return clock_.best(); }
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
@@ -90,8 +83,13 @@ class AutopilotLink {
   /// log. Must itself be real-time. Null: none.
   using Tap = void (*)(void* context, bool outgoing, std::span<const std::uint8_t> frame) noexcept;
   void tap(Tap each, void* context) noexcept { tap_ = each, tap_context_ = context; }
+  /// Two set-points in a row did not get out, or the port has taken nothing for 0.2 s of what waits: set-points are not
+  /// all that must get out (ArduPilot takes off without).
+  bool transmit_stalled(Time now) const noexcept;
   const mavlink::ParserCounters& received() const noexcept { return parser_.counters(); }
   const TransmitQueue& transmit() const noexcept { return queue_; }
+  /// ODOMETRY that the line had no room for.
+  std::uint64_t thinned() const noexcept { return thinned_; }
 
   /// Each of these encodes one frame and hands it to the port, or keeps it for poll(). False: refused, because no
   /// vehicle is known, the port is lost, or a value is not finite as the float that it would be on the wire. ODOMETRY
@@ -101,6 +99,7 @@ class AutopilotLink {
   /// acceleration and yaw; the yaw rate is left to the controller.
   bool send_setpoint(const Setpoint& setpoint_L, Time now) noexcept;
   bool send_heartbeat() noexcept;
+  /// As of the last poll(); false also for one that the line has no room for: see pace().
   bool send_odometry(const VioSample& sample) noexcept;
   /// At most 50 characters are sent. Severity as syslog.
   bool send_statustext(std::uint8_t severity, std::string_view text) noexcept;
@@ -147,6 +146,10 @@ class AutopilotLink {
   mavlink::Parser parser_;
   Telemetry telemetry_;
   TransmitQueue queue_;
+  LineBudget budget_;
+  Time now_{};  // of the last poll()
+  std::uint64_t thinned_ = 0;
+  std::optional<Time> blocked_;  // since when the port has taken nothing of what waits
   std::optional<std::uint8_t> heard_;
   ClockFilter clock_;
   std::int64_t timesync_asked_ns_ = 0;

@@ -24,10 +24,13 @@ std::optional<MessageRequests::Wish> MessageRequests::next(const Latest<CommandR
   if (!open()) {
     if (now - *round_ < kRound) return std::nullopt;
     at_ = 0;
-    round_ = now;
+    round_ = last_ = now;
     if (!open()) return std::nullopt;
+  } else if (last_ && now - *last_ < kApart) {
+    return std::nullopt;
   }
   if (!round_) round_ = now;
+  if (last_) last_ = now;
   asked_ = now;
   return kWishes[at_];
 }

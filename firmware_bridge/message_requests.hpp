@@ -26,6 +26,8 @@ class MessageRequests {
                                                 {mavlink::BatteryStatus::kId, 1}}};
   static constexpr auto kRound = std::chrono::seconds(2);          ///< from one round of questions to the next
   static constexpr auto kAnswer = std::chrono::milliseconds(300);  ///< that one is waited for
+  /// Between two questions of a later round: together they would hold up a slow line.
+  static constexpr auto kApart = std::chrono::milliseconds(300);
 
   /// What is to be asked for now, if anything. `answer`: the newest to SET_MESSAGE_INTERVAL.
   std::optional<Wish> next(const Latest<CommandResult>& answer, Time now) noexcept;
@@ -36,6 +38,7 @@ class MessageRequests {
   std::bitset<kWishes.size()> denied_;
   std::size_t at_ = 0;                 // the wish that was asked for last, or is next
   std::optional<Time> asked_, round_;  // waiting for its answer; begin of this round
+  std::optional<Time> last_;           // question of a later round
 };
 
 }  // namespace backwash::firmware_bridge

@@ -7,17 +7,15 @@ namespace backwash::firmware_bridge {
 
 void TransmitQueue::push(const mavlink::EncodedFrame& frame, Kind kind) noexcept {
   const std::size_t first_whole = head_written_ > 0 ? 1 : 0;
-  if (kind == Kind::kSetpoint) {
-    bool missed = false;
-    for (std::size_t i = count_; i-- > 0;) {
-      if (frames_[i].kind != Kind::kSetpoint) continue;
-      missed = true;
-      if (i < first_whole) continue;
-      remove(i);
-      ++dropped_;
-    }
-    if (missed) ++missed_setpoints_;
+  bool missed = false;
+  for (std::size_t i = count_; i-- > 0 && kind != Kind::kOther;) {
+    const bool older = frames_[i].kind == kind;
+    missed = missed || (older && kind == Kind::kSetpoint);
+    if (i < first_whole || (!older && frames_[i].kind != Kind::kOdometry)) continue;
+    remove(i);
+    ++dropped_;
   }
+  if (missed) ++missed_setpoints_;
   if (count_ == kCapacity) {
     if (frames_[first_whole].kind == Kind::kSetpoint) ++missed_setpoints_;
     remove(first_whole);

@@ -12,13 +12,14 @@
 namespace backwash::firmware_bridge {
 
 /// Frames that wait for the port, oldest first. Never blocks, never grows: a new set-point takes the place of one that
-/// still waits, and a frame for which there is no room takes the place of the oldest. A frame of which a part is
-/// already on the wire is finished, so that what follows it stays readable. Real-time: no allocation.
+/// still waits and of an ODOMETRY before it, a new ODOMETRY that of one that waits, and a frame for which there is no
+/// room that of the oldest. So a set-point waits for no ODOMETRY but one of which a part is on the wire: that is
+/// finished, as any such frame, so that what follows it stays readable. Real-time: no allocation.
 class TransmitQueue {
  public:
   static constexpr std::size_t kCapacity = 16;
 
-  enum class Kind { kSetpoint, kOther };
+  enum class Kind { kSetpoint, kOdometry, kOther };
 
   void push(const mavlink::EncodedFrame& frame, Kind kind) noexcept;
 

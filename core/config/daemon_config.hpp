@@ -43,7 +43,8 @@ struct Daemon {
     std::string device;   ///< as written: for messages
     LinkDevice endpoint;  ///< the same, read
     LinkProtocol protocol = LinkProtocol::mavlink;
-    int baud = 0;                          ///< of a serial port; a socket has none
+    int baud = 0;                          ///< of a serial port, or, with a share, of the line behind a socket
+    std::optional<double> share;           ///< of that rate which is ours; absent: nearly all of a serial port's
     int system = 1;                        ///< MAVLink system id of the vehicle
     std::optional<SecretKey> signing_key;  ///< of MAVLink's signatures, both ways; absent: none are made or asked for
   } link;

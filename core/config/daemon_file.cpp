@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::string_view kLive = "map.live";
 constexpr std::string_view kProtocol = "link.protocol";
+constexpr std::string_view kShare = "link.share";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
 constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", "odometry.child"};
 constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2];
@@ -179,10 +180,11 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (!file) return tl::unexpected(file.error());
 
   Daemon d;
-  double domain = 0, baud = 0, system = 0, priority = 0, cpu = 0;
+  double domain = 0, baud = 0, share = 0, system = 0, priority = 0, cpu = 0;
   const NumberKey numbers[] = {
       {"dds.domain", &domain, {0, 230}},
       {"link.baud", &baud, {9600, 4'000'000}},
+      {kShare, &share, {0.05, 1}, NumberKey::Presence::optional},
       {"link.system", &system, {1, 250}},
       {"control.priority", &priority, {0, 98}},
       {"map.closing_speed", &d.map.closing_speed, {0, 5}, NumberKey::Presence::optional},
@@ -220,6 +222,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (auto read = read_odometry(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
+  if (file->has(kShare)) d.link.share = share;
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
     return tl::unexpected(file->error("frames", "needs three different names"));
   if (auto read = read_live(*file, d); !read) return tl::unexpected(read.error());

@@ -39,6 +39,37 @@ struct HilSensor {
   }
 };
 
+/// HIL_GPS: Simulated satellite receiver: 1e-7 degrees, mm, cm, cm/s, cdeg.
+struct HilGps {
+  static constexpr std::uint32_t kId = 113;
+  static constexpr std::string_view kName = "HIL_GPS";
+  std::uint64_t time_usec = 0;
+  std::int32_t lat = 0, lon = 0, alt = 0;
+  std::uint16_t eph = 0, epv = 0, vel = 0;
+  std::int16_t vn = 0, ve = 0, vd = 0;
+  std::uint16_t cog = 0;
+  std::uint8_t fix_type = 0, satellites_visible = 0, id = 0;
+  std::uint16_t yaw = 0;
+  static constexpr auto fields() noexcept {
+    using M = HilGps;
+    return std::tuple{field("time_usec", &M::time_usec),
+                      field("lat", &M::lat),
+                      field("lon", &M::lon),
+                      field("alt", &M::alt),
+                      field("eph", &M::eph),
+                      field("epv", &M::epv),
+                      field("vel", &M::vel),
+                      field("vn", &M::vn),
+                      field("ve", &M::ve),
+                      field("vd", &M::vd),
+                      field("cog", &M::cog),
+                      field("fix_type", &M::fix_type),
+                      field("satellites_visible", &M::satellites_visible),
+                      extension("id", &M::id),
+                      extension("yaw", &M::yaw)};
+  }
+};
+
 /// HIL_ACTUATOR_CONTROLS: Actuator commands of a controller in the loop, −1…1.
 struct HilActuatorControls {
   static constexpr std::uint32_t kId = 93;

@@ -17,8 +17,8 @@ using KnownMessages =
     MessageList<Heartbeat, SysStatus, SystemTime, SetMode, ParamRequestRead, ParamValue, ParamSet, RawImu, Attitude,
                 AttitudeQuaternion, LocalPositionNed, CommandLong, CommandAck, SetPositionTargetLocalNed,
                 PositionTargetLocalNed, SetGpsGlobalOrigin, GpsGlobalOrigin, SimState, HilActuatorControls,
-                VisionPositionEstimate, HighresImu, HilSensor, Timesync, HilStateQuaternion, ScaledImu2, BatteryStatus,
-                EstimatorStatus, ExtendedSysState, Statustext, ObstacleDistance, Odometry>;
+                VisionPositionEstimate, HighresImu, HilSensor, HilGps, Timesync, HilStateQuaternion, ScaledImu2,
+                BatteryStatus, EstimatorStatus, ExtendedSysState, Statustext, ObstacleDistance, Odometry>;
 
 /// MessageInfo of an id, or null when the message is unknown. Real-time: wait-free, no allocation.
 const MessageInfo* find_message(std::uint32_t id) noexcept;

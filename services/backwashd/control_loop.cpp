@@ -83,7 +83,7 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   const auto& telemetry = link_.telemetry();
   track::AutopilotFacts facts;
   facts.port_open = port_open_;
-  facts.transmit_failed = link_.transmit().missed_setpoints() >= firmware_bridge::kMaxMissedSetpoints;
+  facts.transmit_failed = link_.transmit_stalled(time_of(now_ns));
   facts.armed = telemetry.status && telemetry.status->value.armed;
   facts.offboard = telemetry.status && telemetry.status->value.follows_setpoints;
   using firmware_bridge::LandedState;
@@ -119,6 +119,7 @@ track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
   const track::Order order = orders_.next();
   view_.stop_switch = SwitchReaction::read(channels_.stop_switch, now_ns);
   in.request = switch_.request(view_.stop_switch, flight_.mode(), order.request, now_ns);
+  in.request = pilot_.request(flight_.mode(), link_.telemetry().status, in.request);
   in.order = order.number;
   // Beside a switch that says STOP no segment is taken; the STOP ends the epoch of one that waits meanwhile.
   if (may_fly(view_.stop_switch)) in.segment = channels_.segments.take();
@@ -180,7 +181,6 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
     }
   }
   if (s.send_heartbeat && view_.ticks % kTicksPerSecond == 0 && link_.send_heartbeat()) row_.sent |= 2;
-  if (s.send_heartbeat && view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));
   if (out.forward_odometry) forward_odometry(out.odometry_resets);
   if (s.request_offboard) link_.send_follow_setpoints();
   if (s.request_land) link_.send_land();
@@ -198,6 +198,7 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
                       in.now_ns - channels_.enable_asked_ns.load(std::memory_order_relaxed) < kEnableWish_ns;
   parameters_.step(link_, passive || wished, passive, view_);
   if (!s.send_heartbeat && !wished) return;
+  if (view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));
   ask_for_messages(in.now_ns);
   if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);
 }

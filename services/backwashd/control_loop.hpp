@@ -8,6 +8,7 @@
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
 #include "services/backwashd/parameter_reader.hpp"
+#include "services/backwashd/pilot_reaction.hpp"
 #include "services/backwashd/sender_clock.hpp"
 #include "services/backwashd/switch_reaction.hpp"
 
@@ -57,6 +58,7 @@ class ControlLoop {
   std::int64_t takeoff_asked_ns_ = 0;  ///< of the autopilot, for the first time in this lift-off; 0: not yet
   track::Orders orders_;
   SwitchReaction switch_;
+  PilotReaction pilot_;
   double vio_sigma_ = 0;  ///< as the newest odometry that says it, m
   std::int64_t now_ns_ = 0;
   ControlView view_;

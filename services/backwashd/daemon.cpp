@@ -76,6 +76,7 @@ int reader_priority(const config::Daemon& daemon) {
 tl::expected<Settings, std::string> load_settings(const std::string& path) {
   auto daemon = config::load_daemon(path);
   if (!daemon) return tl::unexpected(daemon.error().message);
+  if (const auto line = configured_line(daemon->link); !line) return tl::unexpected(path + ": " + line.error());
   auto vehicle = config::load_vehicle(daemon->vehicle);
   if (!vehicle) return tl::unexpected(vehicle.error().message);
   // What a velocity from poses may be off is in the first set of every tube.
@@ -103,6 +104,7 @@ struct Flight {
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
         mission(s.vehicle),
         loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {
+    link.pace(configured_line(s.daemon.link).value());
     if (!s.daemon.gpio.chip.empty()) gpio.emplace(*channels, s.daemon.gpio);
   }
 

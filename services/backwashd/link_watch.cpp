@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashd/link_watch.hpp"
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <thread>
 #include <utility>
 
@@ -42,6 +44,20 @@ tl::expected<Port, PortError> open_port(const decltype(config::Daemon::link)& li
       return TcpPort::open(address, port, std::chrono::milliseconds(500)).map(as_port);
   }
   return tl::unexpected(PortError{PortError::Kind::kAddress});
+}
+
+tl::expected<LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link) {
+  constexpr double kRound = 100;
+  if (link.endpoint.kind != config::LinkDevice::Kind::serial && !link.share) return LineRate{};
+  const double share = link.share.value_or(kSerialShare);
+  const LineRate line = serial_line(link.baud, share, link.protocol == config::LinkProtocol::plain);
+  const double least = least_rate(line.frame, link.signing_key.has_value());
+  if (line.bytes_per_second >= least) return line;
+  return tl::unexpected(fmt::format(
+      "key 'link.baud' = {}: {:.0f} bytes/s at a share of {:g}, and set-points at 50 Hz with ODOMETRY every {} ms need "
+      "{:.0f}: a baud of {:.0f}, or a larger link.share",
+      link.baud, line.bytes_per_second, share, kLongestOdometryTicks * 20, least,
+      std::ceil(least / line.bytes_per_second * link.baud / kRound) * kRound));
 }
 
 void LinkWatch::step() {

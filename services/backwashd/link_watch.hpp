@@ -9,6 +9,10 @@ namespace backwash::daemon {
 /// Opens what [link] device names. Not real-time: a TCP connection is waited for half a second.
 tl::expected<firmware_bridge::Port, firmware_bridge::PortError> open_port(const decltype(config::Daemon::link)& link);
 
+/// What the line of [link] carries; that of a socket for which no share is given, everything. Error, by the key to
+/// change: less than a flight needs (firmware_bridge::least_rate).
+tl::expected<firmware_bridge::LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link);
+
 /// What the operator is told of the control thread, and the work on its port that must not be done in a tick.
 class LinkWatch {
  public:

@@ -44,12 +44,12 @@ class Autopilot {
   /// Frames from the companion computer, received at `t` (s, monotonic).
   void receive(std::span<const std::uint8_t> bytes, double t);
   /// One step of 1 ms that ends at `t`; the bytes to send are appended to `out`.
-  void step(double t, std::vector<std::uint8_t>& out);
+  virtual void step(double t, std::vector<std::uint8_t>& out);
 
-  const State& truth() const noexcept { return vehicle_.state(); }
-  Eigen::Quaterniond attitude() const { return vehicle_.attitude(); }
-  const Vec3& acceleration() const noexcept { return vehicle_.acceleration(); }
-  double thrust() const noexcept { return armed_ ? vehicle_.thrust() : 0; }
+  virtual const State& truth() const noexcept { return vehicle_.state(); }
+  virtual Eigen::Quaterniond attitude() const { return vehicle_.attitude(); }
+  virtual const Vec3& acceleration() const noexcept { return vehicle_.acceleration(); }
+  virtual double thrust() const noexcept { return armed_ ? vehicle_.thrust() : 0; }
   bool armed() const noexcept { return armed_; }
   bool landed() const noexcept { return landed_; }
   virtual const char* mode() const noexcept;

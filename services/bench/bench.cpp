@@ -9,16 +9,17 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <iomanip>
 #include <stdexcept>
 #include <thread>
 
 #include "core/map/distance_field.hpp"
 #include "core/sim/vio.hpp"
+#include "services/bench/controller_in_loop.hpp"
 #include "services/bench/firmware.hpp"
 #include "services/bench/messages.hpp"
 #include "services/bench/pty.hpp"
 #include "services/bench/scans.hpp"
+#include "services/bench/truth_log.hpp"
 #include "services/dds/topics.hpp"
 #include "services/parallel/real_time.hpp"
 
@@ -54,34 +55,10 @@ map::OccupancyGrid without(map::OccupancyGrid room, const std::array<Vec3, 2>& b
   return room;
 }
 
-/// The truth and the estimate, a row every 20 ms, with the flight log's column names.
-class TruthLog {
- public:
-  explicit TruthLog(const std::string& path) : file_(path) {
-    if (!path.empty() && !file_) throw std::runtime_error(path + ": cannot be created");
-    file_ << "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,qw,qx,qy,qz,thrust,vio_x_m,vio_y_m,vio_z_m,"
-             "armed,landed\n"
-          << std::setprecision(15);
-  }
-  void row(double t, const Autopilot& a, const State& vio) {
-    const auto vec = [&](const Vec3& v) { file_ << ',' << v.x() << ',' << v.y() << ',' << v.z(); };
-    const auto q = a.attitude();
-    file_ << t;
-    vec(a.truth().p_W);
-    vec(a.truth().v_W);
-    vec(a.acceleration());
-    file_ << ',' << q.w() << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << a.thrust();
-    vec(vio.p_W);
-    file_ << ',' << a.armed() << ',' << a.landed() << '\n';
-  }
-
- private:
-  std::ofstream file_;
-};
-
 std::unique_ptr<Autopilot> make_autopilot(const Options& o, const map::OccupancyGrid& grid, const Vehicle& vehicle) {
   constexpr double kUptime = 60;  // s: it was switched on before the bench
   const Vec3 ground = ground_below(grid, vehicle, o.start);
+  if (!o.in_loop.empty()) return std::make_unique<ControllerInLoop>(grid, vehicle, ground, o.seed, o.in_loop);
   const Site site{
       .grid = grid, .vehicle = vehicle, .ground_W = ground, .frame = o.frame, .seed = o.seed, .uptime = kUptime};
   std::unique_ptr<Autopilot> autopilot;
@@ -182,7 +159,7 @@ class Bench {
     if (!o_.wire.empty()) autopilot_->log_wire(o_.wire);
     if (o_.drift) closure_writer_.write(loop_closure(Vec3::Zero(), 0));
     send_map(MapMessage{known_}, o_.timeline.after_arming ? -1 : 0);
-    pty_.emplace(o_.link);
+    if (o_.in_loop.empty()) pty_.emplace(o_.link);
   }
 
   void run() {
@@ -194,7 +171,7 @@ class Bench {
       step(n, seconds(due));
     }
   }
-  const Autopilot& autopilot() const { return *autopilot_; }
+  Autopilot& autopilot() const { return *autopilot_; }
   /// Prints the expectations; true when each was kept.
   bool report() const { return faults_.report(); }
 
@@ -222,11 +199,12 @@ class Bench {
 
   /// Bytes of the link, both ways, through what the timeline does to them.
   void exchange(double t, double timeline_t) {
-    for (const Bytes& bytes : faults_.up.pass(some(pty_->read()), timeline_t))
+    for (const Bytes& bytes : faults_.up.pass(some(pty_ ? pty_->read() : Bytes{}), timeline_t))
       autopilot_->receive(bytes, seconds(Clock::now()));
     out_.clear();
     autopilot_->step(t, out_);
-    for (const Bytes& bytes : faults_.down.pass(some(out_), timeline_t)) pty_->write(bytes);
+    for (const Bytes& bytes : faults_.down.pass(some(out_), timeline_t))
+      if (pty_) pty_->write(bytes);
     if (!armed_at_ && autopilot_->armed()) armed_at_ = t;
   }
 
@@ -285,9 +263,11 @@ int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& v
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });
   Bench bench(options, grid, vehicle);
-  spdlog::info("bench runs: {} in {}, controller on {}", vehicle.name, options.map, options.link);
+  spdlog::info("bench runs: {} in {}, controller on {}", vehicle.name, options.map,
+               options.in_loop.empty() ? options.link : options.in_loop);
   bench.run();
-  const Autopilot& a = bench.autopilot();
+  Autopilot& a = bench.autopilot();
+  if (auto* const in_loop = dynamic_cast<ControllerInLoop*>(&a)) in_loop->tell_latency();
   spdlog::info("bench stopped: {}, {}, {} set-points received", a.mode(), a.landed() ? "on the ground" : "in the air",
                a.setpoints());
   return bench.report() ? 0 : 1;

@@ -31,7 +31,12 @@ void add_world(CLI::App& app, Given& given) {
       ->required()
       ->delimiter(',')
       ->expected(3);
-  app.add_option("--link", given.options.link, "symbolic link to make to the controller's serial port")->required();
+  auto* const link =
+      app.add_option("--link", given.options.link, "symbolic link to make to the controller's serial port");
+  app.add_option(
+         "--in-loop", given.options.in_loop,
+         "a real controller, simulated for: tcpin:ADDRESS:PORT (PX4's simulator_mavlink) or a serial port (HITL)")
+      ->excludes(link);
   app.add_option("--seed", given.options.seed, "of the airflow and of the VIO's drift")->capture_default_str();
   app.add_option("--local-yaw", given.options.frame.yaw, "yaw of the controller's own frame, rad")
       ->capture_default_str();
@@ -132,6 +137,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& wrong) {
     return failed(64, std::string(wrong.what()) + "; see backwash-bench --help");
   }
+  if (given.options.link.empty() && given.options.in_loop.empty())
+    return failed(64, "--link or --in-loop is needed; see backwash-bench --help");
   for (const std::string& text : given.parameters) {
     const auto named = parameter(text);
     if (!named) return failed(64, "--parameter " + text + ": expected NAME=NUMBER");

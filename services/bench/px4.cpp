@@ -47,6 +47,7 @@ constexpr double kSinkDecay = 0.8;           // s, of the speed across, ibid.:21
 constexpr double kSinkLanded = 1.05;         // s on the ground until "landed" there, ibid.:233,240
 constexpr double kBrakingJerk = 4.0, kBrakingGain = 8.0;  // m/s³ (MPC_JERK_AUTO, source), 1/s: nearly time-optimal, -loss0.3:221–228
 constexpr AxisLimits kAtOnce{12, 12, 3, 40, 13};  // a blind landing is not smoothed: px4-vio.csv:221–227
+constexpr double kStood = 1.0, kStale = 1.05;  // s: what it finds older than that after a standstill is lost: px4-sigstop.csv:276–296
 constexpr double kSetDown = 0.3;             // s on the ground until an offboard thrust is cut: px4-vio.csv:252–262
 // clang-format on
 
@@ -81,7 +82,7 @@ class Px4 : public Firmware {
   void change(CustomMode mode, bool failsafe) noexcept {
     mode_ = mode;
     failsafe_ = failsafe;
-    blind_ = lost_;
+    blind_ = lost();
     changed_at_ = now_;
     shaped_ = here();
     if (mode != offboard) loops_[0].reset(), loops_[1].reset();  // brakes and swings back: px4-loss0.3.csv:221–231
@@ -183,14 +184,18 @@ class Px4 : public Firmware {
     return shaped_;
   }
 
+  // Of seven standstills as many ended so as in a termination (docs/autopilots.md); one did nothing.
+  bool lost() const { return lost_ || now_ < stale_until_; }
+
   void watch(double t) override {
+    if (now_ > 0 && t - now_ > kStood) stale_until_ = t + kStale;
     now_ = t;
     const bool flying = armed_ && landed_state_ != on_ground;
-    if (flying && lost_ && !was_lost_) change(land, true);
-    was_lost_ = lost_;
+    if (flying && lost() && !was_lost_) change(land, true);
+    was_lost_ = lost();
     if (flying && mode_ == offboard && !streaming(t)) change(parameter("COM_OBL_RC_ACT") == 4 ? land : position, true);
     // What was lost is back: it goes back to offboard by itself, and may take off again: px4-vio.csv:244–276.
-    if (armed_ && failsafe_ && !lost_ && streaming(t)) change(offboard, false);
+    if (armed_ && failsafe_ && !lost() && streaming(t)) change(offboard, false);
     settle(t);
   }
   /// Landed, and after a while disarmed.
@@ -227,7 +232,7 @@ class Px4 : public Firmware {
   CustomMode mode_ = loiter;
   Phase phase_ = Phase::spooling;
   bool failsafe_ = false, blind_ = false, was_lost_ = false;
-  double ramp_at_ = 0, changed_at_ = 0, landed_at_ = -1, now_ = 0;
+  double ramp_at_ = 0, changed_at_ = 0, landed_at_ = -1, now_ = 0, stale_until_ = 0;
   std::array<AxisTarget, 3> shaped_;  // where the loops shall be now, in the map
 };
 

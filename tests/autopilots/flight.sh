@@ -2,6 +2,7 @@
 # Sourced by ardupilot.sh and px4.sh: one flight of the daemon with a given build of a real autopilot in its own
 # simulator, with our VIO fed by that simulator's truth: take off, fly through builtin:apartment's door, land.
 #   NAME.sh PATH_OF_BUILD [BUILD_DIR [OUT_DIR [GOAL]]]
+# LINE_BAUD: the daemon's line to the autopilot carries no more than this.
 # Exits 77 without a build to fly, otherwise with the judgement of `backwash report`, or 1 after a contact.
 
 fly_real() {
@@ -24,7 +25,7 @@ fly_real() {
   local settings=()
   [[ -z ${SETTINGS:-} ]] || read -ra settings <<<"$SETTINGS"
   "start_$name" "$path" "${settings[@]}"
-  [[ -z ${RELAY:-} ]] || relay
+  [[ -z ${RELAY:-}${LINE_BAUD:-} ]] || relay
   [[ -z ${STATION:-} ]] || helper ground_station.py $STATION
   vehicle=${VEHICLE:-$root/tests/autopilots/$name.vehicle.toml}
   mkfifo "$work/faults"
@@ -47,11 +48,12 @@ helper() {
 
 # The daemon's line goes through relay.py.
 relay() {
+  if [[ -n ${LINE_BAUD:-} ]]; then baud=$LINE_BAUD more_link='share = 0.95'; fi
   if [[ $name == px4 ]]; then
-    helper relay.py udp 14540 14541
+    helper relay.py udp 14540 14541 ${LINE_BAUD:-}
     device=udpin:127.0.0.1:14541
   else
-    helper relay.py tcp 5760 5770
+    helper relay.py tcp 5760 5770 ${LINE_BAUD:-}
     device=tcp:127.0.0.1:5770
   fi
 }

@@ -7,24 +7,19 @@ ground_station.py tcp|udp PORT [sticks]   where the autopilot listens on 127.0.0
 Lines of standard input: `quiet` ends heartbeats and sticks, `sticks` the sticks alone, `set NAME VALUE` sets a parameter (ArduPilot).
 """
 import os
+import pathlib
 import select
 import socket
 import struct
 import sys
 import time
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "system"))
+from mavlink_crc import crc  # noqa: E402
+
 SYSTEM, COMPONENT = 255, 190
 HEARTBEAT, PARAM_SET, MANUAL_CONTROL = (0, 50), (23, 168), (69, 243)  # id, CRC_EXTRA
 GCS, NO_AUTOPILOT, ACTIVE, REAL32 = 6, 8, 4, 9
-
-
-def crc(data):
-    value = 0xFFFF
-    for byte in data:
-        byte ^= value & 0xFF
-        byte = (byte ^ byte << 4) & 0xFF
-        value = (value >> 8) ^ (byte << 8) ^ (byte << 3) ^ (byte >> 4)
-    return value & 0xFFFF
 
 
 class Station:

@@ -54,8 +54,9 @@ sticks() {
   pids+=($!)
 }
 
-# start_px4 BUILD_DIR [NAME=VALUE …]: PX4 with its SIH quadrotor. In about one start of three its estimator never makes a first
-# step (`ekf2 status`: 0 updates), whatever else runs: then it is started again.
+# start_px4 BUILD_DIR [NAME=VALUE …]: PX4 with its SIH quadrotor, or with $model_of_px4, another simulator's. In about one
+# start of three its estimator never makes a first step (`ekf2 status`: 0 updates), whatever else runs: then it is started
+# again.
 start_px4() {
   local attempt
   for attempt in $(seq 10); do
@@ -79,7 +80,8 @@ begin_px4() {
   (
     cd "$work/px4"
     while read -r setting; do export "PX4_PARAM_${setting?}"; done < <(grep -v '^#' "$here/px4.params"; printf '%s\n' "$@")
-    export PATH=$build/bin:$PATH PX4_SIM_MODEL=sihsim_quadx PX4_SIMULATOR=sihsim
+    export PATH=$build/bin:$PATH PX4_SIM_MODEL=${model_of_px4:-sihsim_quadx}
+    [[ $PX4_SIM_MODEL != sihsim* ]] || export PX4_SIMULATOR=sihsim
     fifo "$build/bin/px4" -d "$build/etc"
   ) >"$work/autopilot.log" 2>&1 <&6 &
   autopilot_pid=$! device=udpin:127.0.0.1:14540 truth=/tmp/px4-sock-0

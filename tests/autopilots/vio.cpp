@@ -17,8 +17,8 @@
 #include "core/config/config.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/load_map.hpp"
-#include "core/map/octomap_message.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/bench/messages.hpp"
 #include "services/bench/scans.hpp"
 #include "services/dds/topics.hpp"
 #include "services/parallel/real_time.hpp"
@@ -86,18 +86,7 @@ class Vio {
     if (!grid) throw std::runtime_error(grid.error().message);
     return std::move(*grid);
   }
-  void publish_map() {
-    static const std::string frame = "map", id = "OcTree";
-    map_data_ = map::encode_octomap(grid_);
-    dds::Octomap m{};
-    m.header.frame_id = dds::c_string(frame);
-    m.binary = true;
-    m.id = dds::c_string(id);
-    m.resolution = grid_.resolution();
-    const auto size = static_cast<std::uint32_t>(map_data_.size());
-    m.data = {size, size, reinterpret_cast<decltype(m.data._buffer)>(map_data_.data()), false};
-    map_.write(m);
-  }
+  void publish_map() { map_.write(bench::octomap(grid_, map_data_)); }
 
   /// A simulator that has gone may come back with its autopilot, its vehicle where it first stood.
   std::optional<Truth> newest() {

@@ -67,7 +67,10 @@ TEST(MavlinkCrc, CrcExtraFollowsFromTheDefinitions) {
   EXPECT_EQ(info<Statustext>().crc_extra, 83);  // an array
   EXPECT_EQ(info<Odometry>().crc_extra, 91);    // arrays and extensions
   EXPECT_EQ(info<SimState>().crc_extra, 32);
+  EXPECT_EQ(info<HilGps>().crc_extra, 124);
   EXPECT_EQ(info<SimState>().base_length, 84U);
+  EXPECT_EQ(info<HilGps>().base_length, 36U);
+  EXPECT_EQ(info<HilGps>().full_length, 39U);
   EXPECT_EQ(info<SetGpsGlobalOrigin>().crc_extra, 41);
   EXPECT_EQ(info<SetGpsGlobalOrigin>().base_length, 13U);
   EXPECT_EQ(info<GpsGlobalOrigin>().crc_extra, 39);

@@ -99,6 +99,14 @@ TEST(DaemonFile, AProfileThatIsNoneAndKeysThatItDoesNotTakeAreNamed) {
   EXPECT_THAT(error_after("profile = \"ros\"", "sensor_x = 6.0"), HasSubstr("odometry.sensor_x"));
 }
 
+TEST(DaemonFile, AShareOfTheLineIsAboveNothingAndAtMostAllOfIt) {
+  EXPECT_FALSE(load_daemon("builtin:backwashd")->link.share);
+  for (const std::string good : {"0.05", "0.5", "1"})
+    EXPECT_EQ(error_after("system = 1 ", "share = " + good + "\nsystem = 1 "), "no error") << good;
+  for (const std::string bad : {"0", "0.04", "1.01", "nan"})
+    EXPECT_THAT(error_after("system = 1 ", "share = " + bad + "\nsystem = 1 "), HasSubstr("key 'link.share'")) << bad;
+}
+
 TEST(DaemonFile, ReadsTheFormsOfALinkDevice) {
   using Kind = LinkDevice::Kind;
   const auto read = [](const char* text) {

@@ -254,6 +254,28 @@ TEST(Row22, WhenTheControllerLeavesOffboardItStopsInTheSameTickAndNeverAsksAgain
   }
 }
 
+// He acts between our enable and the autopilot's first heartbeat that says that it follows: our request must not undo
+// it.
+TEST(Row22, APilotWhoChangesTheModeWhileWeEnableIsNotOverridden) {
+  constexpr std::uint32_t kManual = 1u << 16, kPosition = 3u << 16;
+  Lockstep rig;
+  rig.ticks(60);
+  rig.autopilot->mute = true;
+  rig.say(heartbeat(false, kPosition));  // his change of before is none of ours
+  rig.tick();
+  rig.channels->orders.push({track::Request::enable});
+  rig.tick();
+  ASSERT_EQ(rig.mode(), Mode::enabling) << to_string(rig.reason());
+  rig.ticks(3);
+  rig.say(heartbeat(false, kPosition));
+  rig.ticks(2);
+  ASSERT_EQ(rig.mode(), Mode::enabling) << "the same mode again is no change";
+  rig.say(heartbeat(true, kManual));
+  rig.tick();
+  EXPECT_EQ(rig.mode(), Mode::passive) << to_string(rig.reason());
+  for (int n = 0; n < 60; ++n) EXPECT_TRUE(rig.tick().silent()) << n;
+}
+
 TEST(Row25, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
   for (const Mode from : {Mode::tracking, Mode::hold, Mode::land}) {
     InFlight rig;

@@ -210,13 +210,32 @@ void Lockstep::drain_log() {
     log.push_back({r->header, {r->bytes.begin(), r->bytes.begin() + r->header.size}});
 }
 
+void Lockstep::slow_line(double baud, bool thinned) {
+  baud_ = baud;
+  if (thinned) link_->pace(firmware_bridge::serial_line(baud, firmware_bridge::kSerialShare, false));
+}
+
+// What was sent in this tick leaves with the next ones: a line that has nothing to carry gathers no credit.
+void Lockstep::carry(std::vector<std::uint8_t>& bytes) {
+  constexpr double kBitsPerByte = 10;
+  credit_ = under_way_.empty() ? 0 : credit_ + baud_ * kControlPeriod;
+  const auto carried = std::min(under_way_.size(), static_cast<std::size_t>(credit_ / kBitsPerByte));
+  credit_ -= kBitsPerByte * static_cast<double>(carried);
+  const auto end = under_way_.begin() + static_cast<std::ptrdiff_t>(carried);
+  std::vector<std::uint8_t> arrived(under_way_.begin(), end);
+  under_way_.erase(under_way_.begin(), end);
+  under_way_.insert(under_way_.end(), bytes.begin(), bytes.end());
+  bytes = std::move(arrived);
+}
+
 void Lockstep::read_wire(std::size_t expected) {
   wire_ = {};
   if (!line_ || unread) return;
-  const std::vector<std::uint8_t> bytes = line_->read(expected);
+  std::vector<std::uint8_t> bytes = line_->read(expected);
   if (recorded) {
     ASSERT_EQ(bytes.size(), expected) << "what is on the wire is not what was logged";
   }
+  if (baud_ > 0) carry(bytes);
   wire_.bytes = bytes.size();
   parser_.feed(bytes, [&](const mavlink::Frame& f) {
     mavlink::decode_and_visit(f.id, f.payload, [&](const auto& message) {

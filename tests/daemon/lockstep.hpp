@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -83,6 +84,10 @@ class Lockstep {
     inject_.insert(inject_.end(), frame.view().begin(), frame.view().end());
   }
 
+  /// From now on the flight controller gets what the daemon sends at this rate, 8N1, however much waits. `thinned`: the
+  /// daemon knows it.
+  void slow_line(double baud, bool thinned);
+
   bool vio_on = true;
   int vio_age_steps = 0;                       ///< ms between a sample's reception and the tick that sees it
   std::function<void(OdometrySample&)> spoil;  ///< changes each sample
@@ -120,6 +125,7 @@ class Lockstep {
   void hand_over(const std::vector<std::uint8_t>& bytes);
   void drain_log();
   void read_wire(std::size_t expected);
+  void carry(std::vector<std::uint8_t>& bytes);
 
   Vehicle vehicle_;
   sim::EmulatedVio vio_;
@@ -132,6 +138,8 @@ class Lockstep {
   std::uint64_t last_segment_ = 0;
   std::vector<Setpoint> route_;
   Wire wire_;
+  double baud_ = 0, credit_ = 0;  // of a slow line; bits that it may still carry
+  std::deque<std::uint8_t> under_way_;
   mavlink::Parser parser_;
 };
 

@@ -88,6 +88,24 @@ TEST_F(ParameterReading, InQuietItIsAskedOnlyForAnOperatorWhoAsksToEnable) {
 }
 
 // Who was killed in flight and started again says nothing to the vehicle, until an operator wants it in hand again.
+// The clock of one that restarted is another: without it every pose of its counts as old, and enabling is refused.
+TEST_F(ParameterReading, AfterARestartInTheAirTheClockIsAskedForTooByAnOperatorWhoAsksToEnable) {
+  rig_.ticks(150);
+  rig_.take_off();
+  rig_.restart();
+  rig_.ticks(55);
+  const auto questions = [&](int ticks) {
+    const std::size_t from = rig_.log.size();
+    rig_.ticks(ticks);
+    return std::count_if(rig_.log.begin() + static_cast<std::ptrdiff_t>(from), rig_.log.end(), [](const auto& r) {
+      return r.header.kind == log::RecordKind::frame_out && (r.bytes[7] | r.bytes[8] << 8) == mavlink::Timesync::kId;
+    });
+  };
+  EXPECT_EQ(questions(50), 0);
+  rig_.channels->enable_asked_ns = rig_.now_ns();
+  EXPECT_EQ(questions(50), 2);
+}
+
 TEST_F(ParameterReading, AfterARestartInTheAirItIsAskedForAnOperatorWhoAsksToEnable) {
   rig_.ticks(150);
   rig_.take_off();

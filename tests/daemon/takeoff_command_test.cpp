@@ -53,10 +53,12 @@ struct LiftsItself : Lockstep {
     ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
     offer(rise(), true, true);
     ASSERT_GT(ticks_until(track::Mode::lifting, 3), 0) << to_string(reason());
+    setpoints_before_lift = view().setpoints;
     armed = true;
     asked_within(60);  // until it says that it is armed
   }
   bool armed = false;
+  std::uint64_t setpoints_before_lift = 0;
 };
 
 TEST(TakeoffCommand, IsRepeatedUntilTheAutopilotTakesThisOneWhateverItSaidToAnother) {
@@ -95,6 +97,24 @@ TEST(TakeoffCommand, AStopOnTheGroundAsksToDisarmUnforced) {
       }
   }
   EXPECT_GT(asked, 0) << to_string(rig.mode());
+}
+
+// No set-point is sent while it lifts, so none is missed: what waits beside them shows that the line is full.
+TEST(TakeoffCommand, ALineThatTakesNothingWhileTheAutopilotLiftsIsQuiet) {
+  LiftsItself rig;
+  rig.ticks(60);
+  rig.lift();
+  ASSERT_EQ(rig.mode(), track::Mode::lifting);
+  rig.unread = true;
+  int blocked = 0;
+  for (int n = 0; n < 500 && rig.mode() == track::Mode::lifting; ++n) {
+    rig.tick();
+    blocked += rig.link().transmit().waiting() > 0;
+  }
+  EXPECT_EQ(rig.mode(), track::Mode::quiet);
+  EXPECT_EQ(rig.reason(), track::Reason::transmit_full);
+  EXPECT_EQ(rig.view().setpoints, rig.setpoints_before_lift) << "there were none";
+  EXPECT_LE(blocked, 11) << "200 ms";
 }
 
 }  // namespace

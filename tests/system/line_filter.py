@@ -10,17 +10,10 @@ import select
 import sys
 import tty
 
+from mavlink_crc import crc
+
 HEARTBEAT, ATTITUDE, ATTITUDE_QUATERNION, LOCAL_POSITION_NED = 0, 30, 31, 32
 HEARTBEAT_EXTRA = 50
-
-
-def crc(data):
-    value = 0xFFFF
-    for byte in data:
-        byte ^= value & 0xFF
-        byte = (byte ^ byte << 4) & 0xFF
-        value = (value >> 8) ^ (byte << 8) ^ (byte << 3) ^ (byte >> 4)
-    return value & 0xFFFF
 
 
 def frames(buffer):

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "firmware_bridge/line_budget.hpp"
+
+#include <algorithm>
+
+#include "core/types/geometry.hpp"
+#include "firmware_bridge/mavlink/frame.hpp"
+#include "firmware_bridge/mavlink/messages.hpp"
+#include "firmware_bridge/plain/plain.h"
+
+namespace backwash::firmware_bridge {
+namespace {
+
+constexpr double kBitsPerByte = 10;  // 8N1
+constexpr double kOtherFrames = 17;  // a second, TIMESYNC's most of them: 410 bytes to ArduPilot, 500 to PX4 measured
+
+}  // namespace
+
+LineRate serial_line(double baud, double share, bool plain) noexcept {
+  return {share * baud / kBitsPerByte, plain ? std::size_t{PLAIN_COMMAND_SIZE} : 0};
+}
+
+double least_rate(std::size_t frame, bool authenticated) noexcept {
+  const std::size_t around = mavlink::kHeaderV2 + mavlink::kChecksum + (authenticated ? mavlink::kSignature : 0);
+  const auto bytes = [&](std::size_t payload) { return static_cast<double>(frame > 0 ? frame : payload + around); };
+  return bytes(mavlink::info<mavlink::SetPositionTargetLocalNed>().full_length) / kControlPeriod +
+         bytes(mavlink::info<mavlink::Odometry>().full_length) / (kLongestOdometryTicks * kControlPeriod) +
+         bytes(mavlink::info<mavlink::Timesync>().full_length) * kOtherFrames;
+}
+
+void LineBudget::give(std::size_t bytes, bool odometry, Time now) noexcept {
+  const std::size_t wire = line_.frame > 0 ? line_.frame : bytes;
+  if (free_at_ <= now) odometry_ = false;
+  odometry_ = odometry_ || odometry;
+  const std::chrono::duration<double> takes(static_cast<double>(wire) / line_.bytes_per_second);
+  free_at_ = std::max(free_at_, now) + std::chrono::duration_cast<Time::duration>(takes);
+}
+
+}  // namespace backwash::firmware_bridge
