@@ -10,6 +10,7 @@
 #include "core/log/tick_log.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap_message.hpp"
+#include "services/backwashd/switch_reaction.hpp"
 
 namespace backwash::fuzz {
 namespace {
@@ -43,7 +44,10 @@ DaemonRig::DaemonRig(const std::vector<Event>& events, daemon::test::Medium medi
       lock_({0.7, Vec3(5, -3, 0.2)}, medium, world()),
       watch_(vehicle_5in().limits.v_max),
       log_(std::filesystem::temp_directory_path() / ("backwash_sequence." + std::to_string(getpid()))) {
-  for (const Event& e : events_) with_maps_ = with_maps_ || (e.kind >= Kind::map_same && e.kind <= Kind::scan_box);
+  for (const Event& e : events_) {
+    with_maps_ = with_maps_ || (e.kind >= Kind::map_same && e.kind <= Kind::scan_box);
+    with_switch_ = with_switch_ || e.kind == Kind::switch_pressed || e.kind == Kind::switch_broken;
+  }
   lock_.reader = [this](const auto& sample) { return read(sample); };
   lock_.noise = [this](auto& bytes) { spoil_bytes(bytes); };
   start();
@@ -90,6 +94,7 @@ void DaemonRig::advance() {
   while (next_ < events_.size() && events_[next_].tick <= tick_) apply(events_[next_++]);
   lock_.autopilot->mute = lasting(Kind::mute) != nullptr;
   delay_segments();
+  read_switch();
   const std::uint64_t segment = lock_.view().segment;
   const auto& wire = lock_.tick(missed_);
   const auto& view = lock_.view();
@@ -103,6 +108,7 @@ void DaemonRig::advance() {
     seen.disarms = seen.disarms || (arming && c.param1 == 0);
     seen.commands += !(arming && c.param1 == 0);
   }
+  seen.switched_off = !daemon::may_fly(view.stop_switch);
   seen.accepted = view.segment != segment && view.segment != 0;
   hear_autopilot();
   if (tick_ % kDrainEvery == 0) threads_->recorder.drain(*lock_.channels);
@@ -115,6 +121,18 @@ void DaemonRig::advance() {
   if (!lasting(Kind::slow_mission)) run_mission();  // what it acknowledges holds from the next tick on
   if (violation_) lock_.channels->stop = true;      // the planner returns
   ++tick_;
+}
+
+// As the GPIO thread leaves it for the control thread.
+void DaemonRig::read_switch() {
+  using firmware_bridge::SwitchState;
+  constexpr std::array kBroken{SwitchState::lost, SwitchState::untested, SwitchState::chattering};
+  if (!with_switch_) return;
+  SwitchState state = SwitchState::released;
+  if (const auto* e = lasting(Kind::switch_broken)) state = kBroken[static_cast<std::size_t>(e->b) % kBroken.size()];
+  if (lasting(Kind::switch_pressed)) state = SwitchState::pressed;
+  lock_.channels->stop_switch.state = state;
+  lock_.channels->stop_switch.at_ns = INT64_MAX;
 }
 
 // An estimator that follows the VIO leaps with it, as soon as it is told: the same place then has another number.

@@ -64,6 +64,7 @@ class DaemonRig {
   void delay_segments();
   void look();
   void hear_autopilot();
+  void read_switch();
   void offer_map(const map::OccupancyGrid& grid, std::vector<std::int8_t> data);
   void scan_box(const Vec3& at);
   std::optional<track::OdometrySample> read(const track::OdometrySample& sample);
@@ -87,7 +88,7 @@ class DaemonRig {
   daemon::CommandMessage last_command_;
   std::uint32_t sequence_ = 0;
   std::uint64_t session_ = 1;
-  bool restarts_ = false, with_maps_ = false;
+  bool restarts_ = false, with_maps_ = false, with_switch_ = false;
   std::unique_ptr<const track::AcceptedSegment> late_;
   std::array<long, track::kModes> spent_{};
 };

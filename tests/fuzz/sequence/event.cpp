@@ -20,22 +20,23 @@ struct Draw {
 };
 
 constexpr std::array kDraws{
-    Draw{Kind::command, 8, 12, 1},      Draw{Kind::foreign, 3, 12, 1},       Draw{Kind::repeated, 3, 1, 1},
-    Draw{Kind::old_number, 2, 12, 1},   Draw{Kind::new_session, 3, 12, 1},   Draw{Kind::departed, 2, 3, 0},
-    Draw{Kind::vio_off, 3, 40, 0},      Draw{Kind::vio_shift, 3, 100, 0.5},  Draw{Kind::vio_turn, 4, 400, 1.6},
-    Draw{Kind::vio_scale, 2, 400, 1},   Draw{Kind::vio_drift, 2, 200, 0.5},  Draw{Kind::vio_freeze, 3, 20, 0},
-    Draw{Kind::vio_late, 3, 100, 0.2},  Draw{Kind::vio_stamp, 2, 300, 100},  Draw{Kind::vio_repeat, 2, 6, 0},
-    Draw{Kind::vio_nan, 2, 10, 10},     Draw{Kind::vio_huge, 3, 3, 1e39},    Draw{Kind::closure, 5, 1, 0.3},
-    Draw{Kind::map_same, 1, 1, 0},      Draw{Kind::map_box, 2, 1, 1},        Draw{Kind::map_elsewhere, 1, 1, 1},
-    Draw{Kind::map_damaged, 2, 20, 1},  Draw{Kind::map_resolution, 1, 1, 1}, Draw{Kind::scan_box, 4, 1, 1},
-    Draw{Kind::noise, 3, 300, 0},       Draw{Kind::damage, 2, 40, 50},       Draw{Kind::swap, 2, 40, 0},
-    Draw{Kind::mute, 2, 120, 0},        Draw{Kind::deaf, 2, 200, 0},         Draw{Kind::heartbeat, 4, 4, 0},
-    Draw{Kind::take_over, 3, 1, 0},     Draw{Kind::disarm, 1, 1, 0},         Draw{Kind::ack, 2, 500, 6},
-    Draw{Kind::position, 3, 1, 1e39},   Draw{Kind::attitude, 2, 1, 1},       Draw{Kind::battery, 1, 1, 0.2},
-    Draw{Kind::timesync, 3, 1, 0},      Draw{Kind::reset, 4, 1, 1},          Draw{Kind::reset_counter, 3, 3, 0},
-    Draw{Kind::parameter, 2, 1, 1e39},  Draw{Kind::missed, 5, 30, 0},        Draw{Kind::slow_planner, 6, 60, 0},
-    Draw{Kind::late_segment, 8, 60, 0}, Draw{Kind::slow_mission, 3, 40, 0},  Draw{Kind::restart, 1, 1, 0},
-    Draw{Kind::hang_up, 1, 1, 0},       Draw{Kind::plug_in, 3, 1, 0},
+    Draw{Kind::command, 8, 12, 1},         Draw{Kind::foreign, 3, 12, 1},       Draw{Kind::repeated, 3, 1, 1},
+    Draw{Kind::old_number, 2, 12, 1},      Draw{Kind::new_session, 3, 12, 1},   Draw{Kind::departed, 2, 3, 0},
+    Draw{Kind::vio_off, 3, 40, 0},         Draw{Kind::vio_shift, 3, 100, 0.5},  Draw{Kind::vio_turn, 4, 400, 1.6},
+    Draw{Kind::vio_scale, 2, 400, 1},      Draw{Kind::vio_drift, 2, 200, 0.5},  Draw{Kind::vio_freeze, 3, 20, 0},
+    Draw{Kind::vio_late, 3, 100, 0.2},     Draw{Kind::vio_stamp, 2, 300, 100},  Draw{Kind::vio_repeat, 2, 6, 0},
+    Draw{Kind::vio_nan, 2, 10, 10},        Draw{Kind::vio_huge, 3, 3, 1e39},    Draw{Kind::closure, 5, 1, 0.3},
+    Draw{Kind::map_same, 1, 1, 0},         Draw{Kind::map_box, 2, 1, 1},        Draw{Kind::map_elsewhere, 1, 1, 1},
+    Draw{Kind::map_damaged, 2, 20, 1},     Draw{Kind::map_resolution, 1, 1, 1}, Draw{Kind::scan_box, 4, 1, 1},
+    Draw{Kind::noise, 3, 300, 0},          Draw{Kind::damage, 2, 40, 50},       Draw{Kind::swap, 2, 40, 0},
+    Draw{Kind::mute, 2, 120, 0},           Draw{Kind::deaf, 2, 200, 0},         Draw{Kind::heartbeat, 4, 4, 0},
+    Draw{Kind::take_over, 3, 1, 0},        Draw{Kind::disarm, 1, 1, 0},         Draw{Kind::ack, 2, 500, 6},
+    Draw{Kind::position, 3, 1, 1e39},      Draw{Kind::attitude, 2, 1, 1},       Draw{Kind::battery, 1, 1, 0.2},
+    Draw{Kind::timesync, 3, 1, 0},         Draw{Kind::reset, 4, 1, 1},          Draw{Kind::reset_counter, 3, 3, 0},
+    Draw{Kind::parameter, 2, 1, 1e39},     Draw{Kind::missed, 5, 30, 0},        Draw{Kind::slow_planner, 6, 60, 0},
+    Draw{Kind::late_segment, 8, 60, 0},    Draw{Kind::slow_mission, 3, 40, 0},  Draw{Kind::restart, 1, 1, 0},
+    Draw{Kind::hang_up, 1, 1, 0},          Draw{Kind::plug_in, 3, 1, 0},        Draw{Kind::switch_pressed, 4, 60, 0},
+    Draw{Kind::switch_broken, 2, 200, 10},
 };
 
 class Generator {
@@ -86,7 +87,7 @@ class Generator {
     e.c = in_room ? uniform() : number(draw->scale);
     e.d = number(0.1);
     if (draw->kind == Kind::vio_huge || draw->kind == Kind::vio_nan || draw->kind == Kind::position ||
-        draw->kind == Kind::ack)
+        draw->kind == Kind::ack || draw->kind == Kind::switch_broken)
       e.b = static_cast<double>(random_() % 10);
     return e;
   }
@@ -95,13 +96,14 @@ class Generator {
 };
 
 constexpr std::array kNames{
-    "operate",       "command",      "foreign",        "repeated",  "old_number",    "new_session", "departed",
-    "vio_off",       "vio_shift",    "vio_turn",       "vio_scale", "vio_drift",     "vio_freeze",  "vio_late",
-    "vio_stamp",     "vio_repeat",   "vio_nan",        "vio_huge",  "closure",       "map_same",    "map_box",
-    "map_elsewhere", "map_damaged",  "map_resolution", "scan_box",  "noise",         "damage",      "swap",
-    "mute",          "deaf",         "heartbeat",      "take_over", "disarm",        "ack",         "position",
-    "attitude",      "battery",      "timesync",       "reset",     "reset_counter", "parameter",   "missed",
-    "slow_planner",  "late_segment", "slow_mission",   "restart",   "hang_up",       "plug_in",
+    "operate",       "command",     "foreign",        "repeated",     "old_number",    "new_session", "departed",
+    "vio_off",       "vio_shift",   "vio_turn",       "vio_scale",    "vio_drift",     "vio_freeze",  "vio_late",
+    "vio_stamp",     "vio_repeat",  "vio_nan",        "vio_huge",     "closure",       "map_same",    "map_box",
+    "map_elsewhere", "map_damaged", "map_resolution", "scan_box",     "noise",         "damage",      "swap",
+    "mute",          "deaf",        "heartbeat",      "take_over",    "disarm",        "ack",         "position",
+    "attitude",      "battery",     "timesync",       "reset",        "reset_counter", "parameter",   "switch_pressed",
+    "switch_broken", "missed",      "slow_planner",   "late_segment", "slow_mission",  "restart",     "hang_up",
+    "plug_in",
 };
 static_assert(kNames.size() == static_cast<std::size_t>(Kind::kinds));
 

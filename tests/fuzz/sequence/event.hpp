@@ -55,6 +55,9 @@ struct Event {
     reset,          ///< the autopilot's frame moves by a, b, c m and d rad
     reset_counter,  ///< an ODOMETRY that counts n resets
     parameter,      ///< PARAM_VALUE of a
+    // The stop switch, for n ticks; a sequence without these has none.
+    switch_pressed,
+    switch_broken,  ///< b modulo 3: lost, untested, chattering
     // The daemon's own.
     missed,        ///< n periods
     slow_planner,  ///< n ticks until it looks again

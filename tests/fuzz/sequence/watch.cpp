@@ -85,6 +85,20 @@ void Watch::hear_pilot(const Seen& now) {
   may_arm_ = false;
 }
 
+// A switch that is pressed or broken is a STOP, of no latency, for as long as it is so.
+std::optional<std::string> Watch::hear_switch(const Seen& now) {
+  if (!now.switched_off) return std::nullopt;
+  if (last_.mode != Mode::passive && last_.mode != Mode::quiet && last_.mode != Mode::land) {
+    if (licence_ != Licence::none) licence_ = Licence::stopping;
+    if (stopped_ < 0) stopped_ = now.tick;
+    disarm_from_ = now.tick;
+  }
+  may_arm_ = false;
+  if (now.mode == Mode::enabling || now.mode == Mode::lifting || now.mode == Mode::tracking)
+    return line("%s beside a stop switch that does not let it", to_string(now.mode));
+  return std::nullopt;
+}
+
 std::optional<std::string> Watch::silence(const Seen& now) const {
   if (now.mode == Mode::quiet && last_.mode == Mode::quiet && now.bytes > 0)
     return line("QUIET sent %zu bytes", now.bytes);
@@ -132,7 +146,8 @@ std::optional<std::string> Watch::motion(const Seen& now) {
 std::optional<std::string> Watch::check(const Seen& now) {
   if (!started_) last_ = now, started_ = true;
   hear_pilot(now);
-  auto broken = silence(now);
+  auto broken = hear_switch(now);
+  if (!broken) broken = silence(now);
   if (!broken) broken = arming(now);
   if (!broken) broken = motion(now);
   last_ = now;

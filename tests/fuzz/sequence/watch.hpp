@@ -18,6 +18,7 @@ struct Seen {
   int setpoints = 0, commands = 0;       ///< sent; commands without those to disarm
   Vec3 setpoint = Vec3::Zero();          ///< the last one, in the autopilot's local frame, m
   bool arms = false, disarms = false;    ///< the vehicle was told to
+  bool switched_off = false;             ///< the stop switch does not let the vehicle be flown
   bool accepted = false;                 ///< a new segment was accepted
   bool inside = true;                    ///< the command lies in the newest map
 };
@@ -45,6 +46,7 @@ class Watch {
   std::optional<std::string> arming(const Seen& now);
   std::optional<std::string> motion(const Seen& now);
   void hear_pilot(const Seen& now);
+  std::optional<std::string> hear_switch(const Seen& now);
 
   double v_max_;
   Seen last_;

@@ -164,6 +164,27 @@ TEST_F(Flight, DisarmingIsForAStopOrADisable) {
   EXPECT_TRUE(tick());
 }
 
+TEST_F(Flight, AStopSwitchEndsTheWayInItsTickAndForGood) {
+  seen_.switched_off = true;
+  EXPECT_TRUE(tick(kStep)) << "tracking";
+  hold();
+  fly(10);
+  seen_.switched_off = false;
+  fly(60);
+  rest(60);
+  EXPECT_TRUE(tick(kStep)) << "released is no command";
+}
+
+TEST_F(Flight, AStopSwitchCancelsTheTakeoff) {
+  ask(backwash_msgs_msg_dds__COMMAND_TAKEOFF);
+  hold();
+  seen_.switched_off = true;
+  ASSERT_FALSE(tick());
+  seen_.switched_off = false;
+  seen_.arms = seen_.accepted = true;
+  EXPECT_TRUE(tick());
+}
+
 TEST_F(Flight, ASetpointOutsideTheMapIsFound) {
   seen_.inside = false;
   EXPECT_TRUE(tick(kStep));
