@@ -12,6 +12,9 @@ using Kind = SimulationTerm::Kind;
 
 constexpr double kThrustCoefficient = 0.025, kAir = 1.2;  // kg/m³
 
+/// How much faster each rotor of a craft turns than their mean: lines of rotors that turn exactly alike would be one.
+constexpr std::array<double, 4> kBuilt = {-0.004, 0.0015, 0.004, -0.0015};
+
 double typical_hover_rpm(const Vehicle& v) {
   const double r = v.body.rotor_radius, thrust = v.body.mass * kGravity / 4;
   const double omega = std::sqrt(thrust / (kThrustCoefficient * kAir * std::numbers::pi * r * r * r * r));
@@ -44,7 +47,7 @@ Sensors::Sensors(const Vehicle& vehicle, std::span<const SimulationTerm> terms, 
       if (term.kind == Kind::rotor_needs) needs_[i] += term.value[i];
       if (term.kind == Kind::rotor_reading) reads_[i] += term.value[i];
       if (term.kind == Kind::rotor_dropout) missing_[i] += term.value[i];
-      if (term.kind == Kind::sensor_lines) lines_[i] = std::hypot(lines_[i], term.value[i]);
+      if (term.kind == Kind::sensor_lines) lines_[i] = std::hypot(lines_[i], term.value[i]), built_[i] = kBuilt[i];
     }
     if (term.kind == Kind::sensor_lines) floor_ = std::max(floor_, term.value[4]);
   }
@@ -54,7 +57,7 @@ void Sensors::step(double thrust_acc, double dt) {
   thrust_acc_ = thrust_acc;
   const double hover = hover_rpm_ * std::sqrt(std::max(thrust_acc, 0.0) / kGravity) * std::numbers::pi / 30;
   for (std::size_t i = 0; i < 4; ++i)
-    phase_[i] = std::fmod(phase_[i] + hover * std::exp(0.5 * needs_[i]) * dt, 2 * std::numbers::pi);
+    phase_[i] = std::fmod(phase_[i] + hover * (1 + built_[i]) * std::exp(0.5 * needs_[i]) * dt, 2 * std::numbers::pi);
 }
 
 Vec3 Sensors::acceleration(const Vec3& acceleration_W, double yaw, double t, std::optional<double> temperature) {
@@ -75,7 +78,8 @@ RotorReadings Sensors::rotors() {
     const double need = std::exp(needs_[i]);
     told.motor[i] = std::clamp(command_of(vehicle_, share * need), 0.0, 1.0);
     const bool missing = missing_[i] > 0 && std::generate_canonical<double, 53>(rng_) < missing_[i];
-    told.rpm[i] = missing ? 0 : hover_rpm_ * std::sqrt(thrust_acc_ / kGravity * need) * std::exp(0.5 * reads_[i]);
+    const double turns = hover_rpm_ * (1 + built_[i]) * std::sqrt(thrust_acc_ / kGravity * need);
+    told.rpm[i] = missing ? 0 : turns * std::exp(0.5 * reads_[i]);
   }
   return told;
 }

@@ -39,6 +39,7 @@ class Sensors {
   std::vector<SimulationTerm> terms_;
   double hover_rpm_;
   std::array<double, 4> needs_{}, reads_{}, missing_{}, lines_{};  // ln, ln, share, m/s²
+  std::array<double, 4> built_{};                                  // relative rates, where they have lines
   double floor_ = 0;                                               // m/s²
   std::array<double, 4> phase_{0.3, 1.9, 4.0, 5.5};
   double thrust_acc_ = kGravity;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/study/findings/applied.hpp"
 #include "core/study/inference/dependence.hpp"
 #include "core/study/inference/search.hpp"
 
@@ -31,6 +32,7 @@ struct NamedCause {
   Accepted found;
   Gain gain;
   std::vector<Separation> separate_by;
+  Applied applied = {};  ///< what the extension by it is worth; refused: it does not join the model
 };
 
 struct StudyOptions {

@@ -92,6 +92,7 @@ struct WindowRow {
   std::array<double, 2> delay_gain{}, slope_gain{};
   std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                ///< (m/s²)²
+  std::array<Line, 4> lines{};           ///< of the rotors along z, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
 };
