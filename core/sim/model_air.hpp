@@ -9,7 +9,7 @@
 namespace backwash::sim {
 
 /// Air exactly as the model says: Gaussian gusts of covariance Σ and correlation e^{−|τ|/τ_w}, no mean (docs/model.md
-/// 5.3-1). It is the base simulation that a study judges; AirflowTruth is what a vehicle is flown against.
+/// 6-9). It is the base simulation that a study judges; AirflowTruth is what a vehicle is flown against.
 class ModelAir {
  public:
   /// The field must outlive it.

@@ -20,7 +20,7 @@ struct RotorReadings {
 };
 
 /// Rotors, and an accelerometer on the body that they shake, with what an extended model says of them (docs/model.md
-/// 6-17 to 6-19). Without terms the four are alike and the accelerometer tells the truth.
+/// 6-16, 6-17). Without terms the four are alike and the accelerometer tells the truth.
 class Sensors {
  public:
   /// `hover_rpm`: of the flight that is flown again; without it that of a rotor of thrust coefficient 0.025, T = C_T ρ

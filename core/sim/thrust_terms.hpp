@@ -9,7 +9,7 @@
 
 namespace backwash::sim {
 
-/// What the rotors give for a commanded thrust by an extended model (docs/model.md 6-13 to 6-16): its share, its slope
+/// What the rotors give for a commanded thrust by an extended model (docs/model.md 6-13 to 6-15): its share, its slope
 /// about hover, its sag with the battery's voltage, its lag. Without such terms: what was commanded.
 class ThrustTerms {
  public:

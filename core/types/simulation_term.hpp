@@ -6,7 +6,7 @@
 namespace backwash {
 
 /// What an accepted cause of the study adds to the simulation: an entry of [[extension.term]].simulation of a model
-/// file (docs/model.md 6-9 to 6-19). `value` holds the numbers in the order given here. Field, reach and plan read
+/// file (docs/model.md 6-10 to 6-17). `value` holds the numbers in the order given here. Field, reach and plan read
 /// ModelEffect instead: a plan does not know battery, time or sensor.
 struct SimulationTerm {
   enum class Kind {
