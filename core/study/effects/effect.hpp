@@ -78,6 +78,7 @@ struct Form {
   bool displaces_map = false;      ///< its scale is an offset, fitted along x and y
   bool motors_alone = false;       ///< seen in motor commands alone: which of such forms it is they do not tell
   bool constant = false;           ///< is itself what a free offset would be: tested without one
+  bool in_sensor = false;          ///< is told by a sensor and pushes nothing
   bool by_place = false;           ///< a push that differs by place: it moves the craft in itself
   double floor = 0;                ///< least root mean square over the flown windows that is called an effect
   double least = 0;                ///< least magnitude of the first parameter that is called an effect

@@ -26,6 +26,7 @@ SimulationTerm drift(Kind kind, const FittedForm& fitted) {
 Form with_time() {
   return {.formula = "accelerometer bias b t/100 s, fixed to the body",
           .parameters = {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
+          .in_sensor = true,
           .floor = 0.015,
           .needs = {Source::attitude},
           .columns = [](const Windows& ws, const Scale&) { return body_drift(ws, [](auto& w) { return w.t / 100; }); },
@@ -46,6 +47,7 @@ Form with_time() {
 Form with_temperature() {
   return {.formula = "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
           .parameters = {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
+          .in_sensor = true,
           .floor = 0.015,
           .needs = {Source::temperature, Source::attitude},
           .columns = [](const Windows& ws,

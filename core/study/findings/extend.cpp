@@ -96,7 +96,15 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
   const Accepted& f = cause.found;
   const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
   if (!f.form->extend) return {};
-  return f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+  auto effects = f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+  for (auto& e : effects) {
+    const bool variance = e.kind == ModelEffect::Kind::ln_variance ||
+                          e.kind == ModelEffect::Kind::ln_variance_under_surface ||
+                          e.kind == ModelEffect::Kind::ln_variance_with_speed;
+    if (variance || !cause.shift.refuted()) continue;
+    e.error += e.value.cwiseAbs(), e.value.setZero();  // the craft rests on its set-point: in the bound, not the centre
+  }
+  return effects;
 }
 
 std::vector<SimulationTerm> simulation_of(const NamedCause& cause, const Observations& seen) {

@@ -113,6 +113,10 @@ std::string figures(const NamedCause& cause) {
   const auto& a = cause.applied;
   text += row("As applied, without any free offset", number(a.nats) + " nats; samples in the central 90 % " +
                                                          number(a.coverage_before) + " → " + number(a.coverage_after));
+  if (cause.shift.tested)
+    text += row("Hovers off their set-points, of what this push predicts",
+                number(cause.shift.slope) + "  [" + number(cause.shift.low) + ", " + number(cause.shift.high) + "]" +
+                    (cause.shift.refuted() ? ": refuted, plans keep the centre. Has the loop an integrator?" : ""));
   if (!a.refused.empty()) text += row("Does not join the model", a.refused);
   for (const auto& s : cause.separate_by)
     text += row("Not told from " + spoken(s.rival),

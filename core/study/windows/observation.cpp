@@ -155,6 +155,7 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w
   row.p_W = mean_of(p), row.v_W = mean_of(v);
   const auto& kp = vehicle_.controller.kp;
   row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
+  row.off_W = as_told ? Vec3(mean_of(s.p) - row.p_W) : Vec3(Vec3::Zero());
   // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
   row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
   row.R_WB = Mat3::Zero();
