@@ -272,10 +272,6 @@ backwash::map::OccupancyGrid true_grid(const Room& room) {
   return grid;
 }
 
-}  // namespace
-
-namespace {
-
 /// The modelled gusts in a world's room. Worlds of one seed are pairs in one room: what was evaluated for the last one
 /// serves the next.
 Gusts& gusts_of(const World& world) {

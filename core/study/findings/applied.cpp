@@ -160,6 +160,7 @@ std::string why_refused(const Applied& a) {
 
 std::vector<Applied> judge(const Evidence& evidence, const std::vector<Accepted>& accepted) {
   std::vector<Applied> all(accepted.size());
+  for (std::size_t i = 0; i < accepted.size(); ++i) all[i].beside = judged(evidence, accepted, all, i).beside;
   for (;;) {
     std::size_t worst = accepted.size();
     for (std::size_t i = 0; i < accepted.size(); ++i) {

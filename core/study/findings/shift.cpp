@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/findings/shift.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/study/inference/intervals.hpp"
