@@ -45,6 +45,7 @@ const std::vector<TermKind>& kinds() {
       {"push_under_surface", Kind::push_under_surface, {kPush, kLength}},
       {"push_to_walls", Kind::push_to_walls, {kPush, kLength}},
       {"push_against_velocity", Kind::push_against_velocity, {kPush}},
+      {"push_against_climb", Kind::push_against_climb, {kPush}},
       {"push_with_speed", Kind::push_with_speed, {kPush}},
       {"ln_variance_under_surface", Kind::ln_variance_under_surface, {kLn, kLength}},
       {"ln_variance_with_speed", Kind::ln_variance_with_speed, {kLn, kLength}},

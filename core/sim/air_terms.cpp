@@ -36,6 +36,8 @@ Vec3 push_of(const SimulationTerm& term, const Flying& now, const field::Around&
     }
     case Kind::push_against_velocity:
       return {-x[0] * now.v_W.x(), -x[0] * now.v_W.y(), 0};
+    case Kind::push_against_climb:
+      return {0, 0, -x[0] * now.v_W.z()};
     case Kind::push_with_speed:
       return {0, 0, x[0] * now.v_W.squaredNorm()};
     default:

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/types/thrust.hpp"
+
 namespace backwash::sim {
 namespace {
 
@@ -19,12 +21,6 @@ double typical_hover_rpm(const Vehicle& v) {
   const double r = v.body.rotor_radius, thrust = v.body.mass * kGravity / 4;
   const double omega = std::sqrt(thrust / (kThrustCoefficient * kAir * std::numbers::pi * r * r * r * r));
   return omega * 30 / std::numbers::pi;
-}
-
-/// The command for a share of the greatest thrust: u of f u² + (1 − f) u.
-double command_of(const Vehicle& v, double share) {
-  const double f = v.propulsion.thr_mdl_fac;
-  return f > 0 ? (std::sqrt((1 - f) * (1 - f) + 4 * f * share) - (1 - f)) / (2 * f) : share;
 }
 
 /// Bias of the accelerometer along the heading's axes, m/s².
@@ -76,7 +72,7 @@ RotorReadings Sensors::rotors() {
   const double share = vehicle_.body.mass * thrust_acc_ / vehicle_.propulsion.max_thrust;
   for (std::size_t i = 0; i < 4; ++i) {
     const double need = std::exp(needs_[i]);
-    told.motor[i] = std::clamp(command_of(vehicle_, share * need), 0.0, 1.0);
+    told.motor[i] = std::clamp(thrust_command(vehicle_, share * need), 0.0, 1.0);
     const bool missing = missing_[i] > 0 && std::generate_canonical<double, 53>(rng_) < missing_[i];
     const double turns = hover_rpm_ * (1 + built_[i]) * std::sqrt(thrust_acc_ / kGravity * need);
     told.rpm[i] = missing ? 0 : turns * std::exp(0.5 * reads_[i]);

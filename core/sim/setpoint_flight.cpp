@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/types/thrust.hpp"
+
 namespace backwash::sim {
 namespace {
 
@@ -61,8 +63,8 @@ std::optional<double> hover_rpm(const log::FlightLog& log, const Vehicle& vehicl
     if (!log.has(name) || !log.has("thrust")) return std::nullopt;
     std::vector<double> rates;
     for (const auto row : flight.row) {
-      const double u = log.column("thrust")[row], f = vehicle.propulsion.thr_mdl_fac;
-      const double weights = (f * u * u + (1 - f) * u) * vehicle.propulsion.max_thrust / vehicle.body.mass / kGravity;
+      const double share = thrust_share(vehicle, log.column("thrust")[row]);
+      const double weights = share * vehicle.propulsion.max_thrust / vehicle.body.mass / kGravity;
       rates.push_back(log.column(name)[row] / std::sqrt(std::max(weights, 0.05)));
     }
     rotors.push_back(median(std::move(rates)));

@@ -17,6 +17,7 @@ struct SimulationTerm {
     push_under_surface,     ///< A m/s², L m: z push A e^{−(d − 0.3 m)/L}, d the gap to the surface above
     push_to_walls,          ///< A m/s², L m: A e^{−(d − 0.4 m)/L} towards each wall at distance d
     push_against_velocity,  ///< k 1/s: −k v, level
+    push_against_climb,     ///< k 1/s: z push −k v_z
     push_with_speed,        ///< C m/s²: z push C (|v|/1 m/s)²
     // Gusts.
     ln_variance_under_surface,  ///< B, L m: ln Σ + B e^{−(d − 0.3 m)/L}

@@ -41,6 +41,7 @@ TEST(AirTermsOfAModel, PushAsTheirFormulasSay) {
   EXPECT_TRUE(now({{Kind::push, {0.1, 0.2, 0.3}}}, low).push_W.isApprox(Vec3(0.1, 0.2, 0.3)));
   EXPECT_TRUE(now({{Kind::push_of_heading, {0.1, 0.2}}}, low).push_W.isApprox(Vec3(-0.2, 0.1, 0), 1e-9));
   EXPECT_TRUE(now({{Kind::push_against_velocity, {0.5}}}, low).push_W.isApprox(Vec3(-0.3, 0.4, 0)));
+  EXPECT_TRUE(now({{Kind::push_against_climb, {0.5}}}, {0, {2, 2, 1}, {1, 1, 0.4}}).push_W.isApprox(Vec3(0, 0, -0.2)));
   EXPECT_TRUE(now({{Kind::push_with_speed, {0.5}}}, low).push_W.isApprox(Vec3(0, 0, 0.5)));
 }
 

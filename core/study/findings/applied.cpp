@@ -6,10 +6,10 @@
 #include <cmath>
 #include <optional>
 
+#include "core/study/inference/rules.hpp"
+
 namespace backwash::study {
 namespace {
-
-constexpr double kCentral = 0.9, kWithin = 1.644854;  // share of a normal within so many standard deviations
 
 /// θ and the companions' coefficients behind it.
 struct Parts {
@@ -64,7 +64,8 @@ double at(const Moved& moved, std::size_t channel, std::size_t i) {
 
 /// P(|N(mean, variance)| ≤ 1.645 √model).
 double within(double mean, double variance, double model) {
-  const double limit = kWithin * std::sqrt(model), s = std::sqrt(2 * std::max(variance, 1e-12));
+  const double limit = kRules.normal_95 * std::sqrt(model);
+  const double s = std::sqrt(2 * std::max(variance, kRules.least_variance.value));
   return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
 }
 
@@ -151,7 +152,7 @@ Applied judged(const Evidence& evidence, const std::vector<Accepted>& all, const
 
 std::string why_refused(const Applied& a) {
   if (a.nats <= 0) return "flights that were not fitted are less likely with it";
-  if (a.coverage_after < a.coverage_before && a.coverage_after < kCentral)
+  if (a.coverage_after < a.coverage_before && a.coverage_after < kRules.coverage_level)
     return "of flights that were not fitted fewer samples lie in the central 90 % with it";
   return "";
 }

@@ -9,11 +9,11 @@
 
 #include "core/report/page.hpp"
 #include "core/study/findings/page_sections.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 namespace {
 
-constexpr double kNearestInTime = 0.15;  // s
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// The windows of one flight by the time of their middle.
@@ -28,7 +28,7 @@ std::vector<ByTime> by_time(const Observations& seen) {
 std::optional<std::size_t> nearest(const ByTime& flight, double t) {
   const auto after = flight.lower_bound(t);
   std::optional<std::size_t> best;
-  double distance = kNearestInTime;
+  double distance = kRules.window_match;
   const auto look = [&](auto at) {
     if (std::abs(at->first - t) <= distance) distance = std::abs(at->first - t), best = at->second;
   };

@@ -5,12 +5,13 @@
 #include <cmath>
 
 #include "core/study/inference/intervals.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
-namespace {
 
-constexpr double kHovering = 0.03;  // m/s, of the set-points' own motion
-constexpr double kLeast = 0.002;    // m
+bool ShiftCheck::refuted() const { return tested && high < kRules.refuted_shift; }
+
+namespace {
 
 /// Push of a form and its companions in each window, m/s².
 std::vector<Vec3> pushes(const Accepted& cause, const std::vector<double>& beside, const Observations& seen) {
@@ -41,7 +42,7 @@ ShiftCheck check_shift(const Accepted& cause, const std::vector<double>& beside,
   Sums all;
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     const auto& w = seen.windows[i];
-    if (w.give.isZero() || w.speed > kHovering) continue;
+    if (w.give.isZero() || w.speed > kRules.hovering) continue;
     const Vec3 shift = push[i].cwiseProduct(w.give);
     for (Sums* s : {&flights[w.flight], &all}) {
       s->product += shift.dot(w.off_W), s->predicted += shift.squaredNorm(), s->measured += w.off_W.squaredNorm();
@@ -55,7 +56,7 @@ ShiftCheck check_shift(const Accepted& cause, const std::vector<double>& beside,
   for (const Sums& s : flights)
     if (s.predicted > 0 && all.predicted - s.predicted > 0)
       left.push_back((all.product - s.product) / (all.predicted - s.predicted));
-  if (left.size() < 3 || check.predicted < kLeast) return check;
+  if (static_cast<double>(left.size()) < kRules.fewest_shifted || check.predicted < kRules.least_shift) return check;
   check.slope = all.product / all.predicted;
   const double n = static_cast<double>(left.size());
   double mean = 0, square = 0;
@@ -63,7 +64,7 @@ ShiftCheck check_shift(const Accepted& cause, const std::vector<double>& beside,
   for (const double x : left) square += (x - mean) * (x - mean);
   const double error = student_975(n - 1) * std::sqrt((n - 1) / n * square);
   check.low = check.slope - error, check.high = check.slope + error;
-  check.tested = 2 * error < 1;
+  check.tested = 2 * error < kRules.shift_interval;
   return check;
 }
 

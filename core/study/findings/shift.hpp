@@ -14,7 +14,7 @@ struct ShiftCheck {
   bool tested = false;                 ///< the interval is narrower than 1
   /// The log refutes the shift: less than half of it is there. The planner then takes the push for one of unknown sign
   /// in its bound, and leaves the centre where the set-point is.
-  bool refuted() const { return tested && high < 0.5; }
+  bool refuted() const;
 };
 
 /// Of a cause's pushes in the windows of hover, where set-points say where the craft should be. `beside`: coefficients
