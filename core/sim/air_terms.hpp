@@ -19,8 +19,8 @@ struct Flying {
   double yaw = 0;  ///< rad
 };
 
-/// What an extended model's terms make of the air (docs/model.md 6-10 to 6-12): a push, a factor of the gusts, and where
-/// their variance is looked up. Without such terms: no push, 1, and the vehicle's own place.
+/// What an extended model's terms make of the air (docs/model.md 6-10 to 6-12): a push, a factor of the gusts, and
+/// where their variance is looked up. Without such terms: no push, 1, and the vehicle's own place.
 class AirTerms {
  public:
   /// The grid must outlive it. `seed`: of the bursts.
