@@ -136,7 +136,7 @@ void AirflowTruth::advance(double dt) {
   burst_ = edge * burst_ + (1 - edge) * (bursting_ ? 1 : 0);
 }
 
-Vec3 AirflowTruth::step(const Vec3& p_W, double dt) {
+Vec3 AirflowTruth::step(const Vec3& p_W, double dt, double gust_factor) {
   advance(dt);
   if (!last_cast_ || (p_W - last_cast_->first).norm() > kRecast) last_cast_.emplace(p_W, flow(p_W));
   const Flow& f = last_cast_->second;
@@ -148,7 +148,7 @@ Vec3 AirflowTruth::step(const Vec3& p_W, double dt) {
   const Eigen::Vector2d xy = horizontal * limited(horizontal.norm());
   const Vec3 gust(l_xx * xy.x(), l_yx * xy.x() + l_yy * xy.y(),
                   std::sqrt(f.zz) * vertical * limited(std::abs(vertical)));
-  return std::sqrt(strength_) * (f.mean + gust);
+  return std::sqrt(strength_) * (f.mean + gust_factor * gust);
 }
 
 Vec3 AirflowTruth::variance(const Vec3& p_W) const {

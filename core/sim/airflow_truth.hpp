@@ -23,8 +23,8 @@ class AirflowTruth {
   /// further factor on all variances, for days that differ.
   AirflowTruth(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::uint64_t seed, double strength = 1);
   /// Disturbance acceleration over the next dt (s) at p, m/s² in W. Deterministic for a seed and a call sequence; its
-  /// statistics do not depend on dt.
-  Vec3 step(const Vec3& p_W, double dt);
+  /// statistics do not depend on dt. `gust`: factor on the gusts, not on the mean.
+  Vec3 step(const Vec3& p_W, double dt, double gust = 1);
   /// Long-time variance of step() per axis at p, (m/s²)²: for tests and docs, never read by the estimator.
   Vec3 variance(const Vec3& p_W) const;
   /// Long-time mean of step() at p, m/s²: for tests and docs, never read by the estimator.

@@ -134,7 +134,8 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   const auto rise = take_off(world, options);
   if (!rise) return tl::make_unexpected(rise.error());
   const double z_safe = rise->column.z_safe;
-  ClosedLoop loop(world.grid, vehicle, {rise->ground.p_W, Vec3::Zero()}, options.seed);
+  const Simulation simulation{.terms = options.terms};
+  ClosedLoop loop(world.grid, vehicle, {rise->ground.p_W, Vec3::Zero()}, options.seed, simulation);
   auto commands = rise->commands;
   auto tube = reach::tube_over_field(world.reach, loop.estimated(), rise->ground, commands, world.bounds);
   if (auto why = obstacle_to_take_off(tube, plan::takeoff_clearance(world, tube, z_safe)); !why.empty())

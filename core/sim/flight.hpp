@@ -2,14 +2,19 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
+#include <variant>
 #include <vector>
 
 #include "core/log/flight_log.hpp"
 #include "core/plan/planner.hpp"
+#include "core/sim/air_terms.hpp"
 #include "core/sim/airflow_truth.hpp"
+#include "core/sim/model_air.hpp"
 #include "core/sim/quadrotor.hpp"
+#include "core/sim/sensors.hpp"
 #include "core/sim/vio.hpp"
 #include "core/track/tracker.hpp"
 
@@ -25,25 +30,44 @@ struct FlightSample {
   Eigen::Quaterniond attitude;  ///< body to world
   double thrust;                ///< normalised collective command
   Setpoint command;
+  RotorReadings rotors{};
 };
 
-/// Vehicle, real airflow and emulated VIO in one closed loop: commands at 50 Hz, physics at 1 kHz.
+/// What a simulation is made of beside the vehicle file.
+struct Simulation {
+  double strength = 1;                     ///< factor on the variance of the airflow
+  std::vector<SimulationTerm> terms = {};  ///< of an extended model, in either air
+  ModelField* air = nullptr;               ///< gusts of this Σ instead of the airflow truth's; it must outlive them
+  std::optional<double> hover_rpm = {};    ///< of the rotors; without it a typical one
+};
+
+/// Vehicle, air and emulated VIO in one closed loop: commands at 50 Hz, physics at 1 kHz.
 class ClosedLoop {
  public:
-  /// `strength`: factor on the variance of the airflow.
   ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, const State& start, std::uint64_t seed,
-             double strength = 1);
+             const Simulation& simulation = {});
   const State& estimated() const noexcept { return estimated_; }
+  double time() const noexcept { return quadrotor_.time(); }  ///< s
   /// The vehicle now; `command` and `segment` are what the caller is about to fly.
-  FlightSample sample(const Setpoint& command, int segment) const;
+  FlightSample sample(const Setpoint& command, int segment);
   /// Issues a command and moves on by one control period (20 ms).
   void fly(const Setpoint& command);
 
+  /// What a flight that is flown again tells and no simulation knows, from now on: the heading (rad), the battery's
+  /// voltage (V), the sensor's temperature (°C).
+  void set_conditions(double yaw, std::optional<double> voltage, std::optional<double> temperature);
+  /// Issues a command and moves on by one Quadrotor::kStep.
+  void step(const Setpoint& command);
+
  private:
+  void step();
   Quadrotor quadrotor_;
-  AirflowTruth airflow_;
+  std::variant<AirflowTruth, ModelAir> air_;
+  AirTerms air_terms_;
+  Sensors sensors_;
   EmulatedVio vio_;
   State estimated_;
+  std::optional<double> temperature_;
 };
 
 /// Commands every 20 ms on the straight line between two points, rest to rest with a minimum-jerk profile within the
@@ -52,13 +76,15 @@ std::vector<Setpoint> straight_commands(const Vec3& from_W, const Vec3& to_W, do
 /// The same command `seconds` long.
 std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds);
 
-/// Columns of docs/interfaces.md, "Flight log, CSV"; position, velocity and attitude as estimated on board.
-log::FlightLog to_log(const std::vector<FlightSample>& samples);
+/// Columns of docs/interfaces.md, "Flight log, CSV"; position, velocity and attitude as estimated on board. `rotors`:
+/// with motor and rpm columns.
+log::FlightLog to_log(const std::vector<FlightSample>& samples, bool rotors = false);
 
 struct FlightOptions {
-  Vec3 start_W, goal_W;    ///< hover points, m
-  std::uint64_t seed = 1;  ///< of the airflow and the VIO error
-  double sigma_scale = 1;  ///< judge with sets of Σ·sigma_scale: below 1 a mutant that must be caught
+  Vec3 start_W, goal_W;                    ///< hover points, m
+  std::uint64_t seed = 1;                  ///< of the airflow and the VIO error
+  double sigma_scale = 1;                  ///< judge with sets of Σ·sigma_scale: below 1 a mutant that must be caught
+  std::vector<SimulationTerm> terms = {};  ///< of an extended model: what the vehicle and its air do beside their own
   plan::PlanOptions limits;
   double settle_s = 2;  ///< hover at the start, s
   double hold_s = 3;    ///< hover at the goal, s

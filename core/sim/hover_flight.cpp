@@ -28,12 +28,12 @@ std::vector<HoverFlight::Hover> hover_points(const HoverGrid& grid, std::uint64_
   return points;
 }
 
-std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehicle& vehicle,
-                                     const HoverFlight& flight) {
+std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehicle& vehicle, const HoverFlight& flight,
+                                     Simulation simulation) {
   std::mt19937_64 random(flight.seed ^ 0x5bd1e995u);
   std::normal_distribution<double> normal;
-  const double strength = std::exp(flight.strength_sd * normal(random));
-  ClosedLoop loop(grid, vehicle, {flight.start_W, Vec3::Zero()}, flight.seed, strength);
+  simulation.strength = std::exp(flight.strength_sd * normal(random));
+  ClosedLoop loop(grid, vehicle, {flight.start_W, Vec3::Zero()}, flight.seed, simulation);
   std::vector<FlightSample> samples;
   const auto follow = [&](const std::vector<Setpoint>& commands, int segment) {
     for (const auto& command : commands) {

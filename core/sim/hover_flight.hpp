@@ -31,6 +31,8 @@ std::vector<HoverFlight::Hover> hover_points(const HoverGrid& grid, std::uint64_
 
 /// Flies it (20 ms rows): rest to rest within the vehicle's limits; `segment` is the hover's number from 0, −1 on the
 /// way. Lines are not checked against obstacles. Deterministic for its seed. About 2 ms per second of flight.
-std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehicle& vehicle, const HoverFlight& flight);
+/// `simulation`: its strength is that of the flight.
+std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehicle& vehicle, const HoverFlight& flight,
+                                     Simulation simulation = {});
 
 }  // namespace backwash::sim

@@ -46,6 +46,17 @@ Vec3 Quadrotor::specific_force(const State& believed) const noexcept {
   return f;
 }
 
+double Quadrotor::commanded_thrust() const noexcept { return (produced_ + kGravityUp).norm(); }
+
+/// Acceleration by the rotors, gravity removed, when the simulation without terms produces `produced`.
+Vec3 Quadrotor::given(const Vec3& produced) {
+  if (thrust_terms_.none()) return produced;
+  const Vec3 force = produced + kGravityUp;
+  const double nominal = force.norm();
+  if (!(nominal > 1e-6)) return produced;
+  return force * (thrust_terms_.step(nominal, time(), voltage_, kStep) / nominal) - kGravityUp;
+}
+
 void Quadrotor::step(const Vec3& w_W, const State& estimated) {
   while (!in_transit_.empty() && in_transit_.front().first <= steps_) {
     active_ = in_transit_.front().second;
@@ -59,7 +70,7 @@ void Quadrotor::step(const Vec3& w_W, const State& estimated) {
   const Vec3 before = lag > 0 ? produced_ : wanted;
   produced_ = lag > 0 ? Vec3(wanted + std::exp(-kStep / lag) * (produced_ - wanted)) : wanted;
   const State start = state_;
-  acceleration_ = 0.5 * (before + produced_) + w_W;
+  acceleration_ = given(0.5 * (before + produced_)) + w_W;
   state_.v_W += kStep * acceleration_;
   state_.p_W += kStep * 0.5 * (start.v_W + state_.v_W);
 
@@ -85,7 +96,7 @@ Eigen::Quaterniond Quadrotor::attitude() const {
 }
 
 double Quadrotor::thrust() const noexcept {
-  const double share = vehicle_.body.mass * (produced_ + kGravityUp).norm() / vehicle_.propulsion.max_thrust;
+  const double share = vehicle_.body.mass * commanded_thrust() / vehicle_.propulsion.max_thrust;
   return std::clamp(thrust_command(vehicle_, share), 0.0, 1.0);
 }
 

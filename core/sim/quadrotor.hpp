@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/sim/thrust_terms.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -18,6 +19,8 @@ namespace backwash::sim {
 ///   u = a_cmd + k_p (p_cmd − p̂) + k_d (v_cmd − v̂)   set-points `latency` old, p̂ and v̂ `feedback_delay` old
 ///   f = saturated(u + g e_z)                         specific force the rotors shall produce
 ///   lag·ȧ = (f − g e_z) − a,   ṗ = v,   v̇ = a + w
+///
+/// With thrust terms the rotors give something else than f along its direction; what is commanded and logged stays.
 class Quadrotor {
  public:
   static constexpr double kStep = 1e-3;                       ///< s
@@ -32,6 +35,11 @@ class Quadrotor {
   void command(const Setpoint& setpoint);
   /// Motors off: no thrust at all (standing disarmed, or falling). On again: thrust builds up with the attitude lag.
   void set_motors(bool on) noexcept { motors_on_ = on; }
+  /// What the rotors give for what they are told; `voltage`: of the battery from now on, V.
+  void set_thrust_terms(ThrustTerms terms) { thrust_terms_ = std::move(terms); }
+  void set_voltage(std::optional<double> voltage) noexcept { voltage_ = voltage; }
+  /// Turns the body at once: a heading that was measured, for flights that are flown again, rad.
+  void set_heading(double yaw) noexcept { yaw_ = active_.yaw = yaw; }
   /// One kStep. `w_W`: disturbance acceleration, m/s². `estimated`: what the controller believes its state is.
   void step(const Vec3& w_W, const State& estimated);
 
@@ -41,11 +49,14 @@ class Quadrotor {
     return acceleration_;
   }  ///< m/s², W, gravity removed, disturbance included
   bool on_ground() const noexcept { return on_ground_; }
-  Eigen::Quaterniond attitude() const;  ///< body to world: z along the thrust, x towards the yaw
-  double thrust() const noexcept;       ///< normalised collective command u, 0..1, by the vehicle's thrust curve
+  double yaw() const noexcept { return yaw_; }  ///< rad
+  double commanded_thrust() const noexcept;     ///< per mass, m/s²
+  Eigen::Quaterniond attitude() const;          ///< body to world: z along the thrust, x towards the yaw
+  double thrust() const noexcept;  ///< normalised collective command u, 0..1, by the vehicle's thrust curve
 
  private:
   Vec3 specific_force(const State& believed) const noexcept;
+  Vec3 given(const Vec3& produced);
 
   Vehicle vehicle_;
   State state_;
@@ -58,6 +69,8 @@ class Quadrotor {
   double yaw_ = 0;
   std::deque<std::pair<long, Setpoint>> in_transit_;  // with the step of arrival
   std::vector<State> feedback_;                       // ring of the delayed estimates
+  ThrustTerms thrust_terms_{std::span<const SimulationTerm>()};
+  std::optional<double> voltage_;
 };
 
 }  // namespace backwash::sim

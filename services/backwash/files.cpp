@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "core/config/config.hpp"
+#include "core/config/simulation_terms.hpp"
 #include "core/map/load_map.hpp"
 #include "services/backwash/verb.hpp"
 
@@ -31,6 +32,9 @@ T read_configuration(tl::expected<T, config::ConfigError> value) {
 }  // namespace
 
 Model read_model(const std::string& path) { return read_configuration(config::load_model(path)); }
+std::vector<SimulationTerm> read_simulation(const std::string& path) {
+  return read_configuration(config::load_simulation(path));
+}
 Vehicle read_vehicle(const std::string& path) { return read_configuration(config::load_vehicle(path)); }
 
 log::FlightLog read_table(const std::string& path, const std::string& time_column) {

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/log/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/plan/world.hpp"
 #include "core/reach/reach_tube.hpp"
 #include "core/types/model.hpp"
+#include "core/types/simulation_term.hpp"
 #include "core/types/vehicle.hpp"
 
 namespace backwash::services {
@@ -16,6 +18,8 @@ namespace backwash::services {
 /// bad data, 78 for a configuration that is not valid.
 map::OccupancyGrid read_map(const std::string& path);
 Model read_model(const std::string& path);
+/// What an extended model adds to the simulation; nothing for others.
+std::vector<SimulationTerm> read_simulation(const std::string& path);
 Vehicle read_vehicle(const std::string& path);
 log::FlightLog read_table(const std::string& path, const std::string& time_column);
 

@@ -88,6 +88,7 @@ int run(const Options& options) {
                                     .goal_W = Vec3::Zero(),
                                     .seed = options.seed,
                                     .sigma_scale = options.sigma_scale,
+                                    .terms = read_simulation(options.model),
                                     .limits = {.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max}};
   const auto ends = choose_ends(options, *world, flight_options);
   flight_options.start_W = ends.start_W, flight_options.goal_W = ends.goal_W;

@@ -2,7 +2,7 @@
 #include <cstdio>
 
 #include "core/map/distance_field.hpp"
-#include "core/sim/flight.hpp"
+#include "core/sim/setpoint_flight.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/flight_spec.hpp"
 #include "services/backwash/json.hpp"
@@ -12,7 +12,7 @@ namespace backwash::services {
 namespace {
 
 struct Options {
-  std::string map, model, vehicle, flight, out;
+  std::string map, model, vehicle, flight, setpoints, out, air = "truth";
   std::optional<std::uint64_t> seed;
   bool json = false, force = false;
 };
@@ -31,12 +31,9 @@ void check_line(const Options& options, const map::OccupancyGrid& grid, const ma
   }
 }
 
-int run(const Options& options) {
-  refuse_to_overwrite(options.out, options.force);
-  const auto spec = read_flight_spec(options.flight, options.seed);
-  const auto vehicle = read_vehicle(options.vehicle);
-  if (!options.model.empty()) read_model(options.model);
-  const auto grid = read_map(options.map);
+/// What `--flight` asks for, rest to rest on straight lines.
+log::FlightLog fly_specified(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle,
+                             const sim::HoverFlight& spec, const sim::Simulation& simulation) {
   const map::DistanceField distance(grid);
   Vec3 at = spec.start_W;
   for (const auto& hover : spec.hovers) {
@@ -44,13 +41,50 @@ int run(const Options& options) {
     at = hover.p_W;
   }
   progress("flying");
-  const auto samples = sim::fly_hovers(grid, vehicle, spec);
-  const auto written = log::write_csv(options.out, sim::to_log(samples), options.force);
+  return sim::to_log(sim::fly_hovers(grid, vehicle, spec, simulation), !simulation.terms.empty() || simulation.air);
+}
+
+/// The set-points of `--setpoints` again.
+log::FlightLog fly_again(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle,
+                         std::uint64_t seed, const sim::Simulation& simulation) {
+  const auto from = read_table(options.setpoints, "t_s");
+  const auto flight = sim::logged_flight(from, vehicle, options.setpoints);
+  if (!flight) throw Failure(kBadData, flight.error().message);
+  progress("flying");
+  return sim::to_log(sim::fly_setpoints(grid, vehicle, *flight, seed, simulation), *flight, from);
+}
+
+void check(const Options& options) {
+  if (options.flight.empty() == options.setpoints.empty()) throw Failure(kUsage, "give either --flight or --setpoints");
+  if (options.air == "model" && options.model.empty()) throw Failure(kUsage, "--air model needs --model");
+  refuse_to_overwrite(options.out, options.force);
+}
+
+int run(const Options& options) {
+  check(options);
+  const auto vehicle = read_vehicle(options.vehicle);
+  Model model;
+  sim::Simulation simulation;
+  if (!options.model.empty()) {
+    model = read_model(options.model);
+    model.ground.r0 = vehicle.body.diagonal_radius;
+    simulation.terms = read_simulation(options.model);
+  }
+  std::optional<sim::HoverFlight> spec;
+  if (!options.flight.empty()) spec = read_flight_spec(options.flight, options.seed);
+  const auto grid = read_map(options.map);
+  std::optional<sim::ModelField> field;
+  if (options.air == "model") simulation.air = &field.emplace(grid, model);
+  const std::uint64_t seed = spec ? spec->seed : options.seed.value_or(1);
+  const auto log = spec ? fly_specified(options, grid, vehicle, *spec, simulation)
+                        : fly_again(options, grid, vehicle, seed, simulation);
+  const auto written = log::write_csv(options.out, log, options.force);
   if (!written) throw Failure(kCannotCreate, written.error().message);
+  const double time = log.t_s.back() - (spec ? 0 : log.t_s.front());
   if (options.json) {
-    print(Json{{"log", options.out}, {"rows", samples.size()}, {"time_s", samples.back().t}, {"seed", spec.seed}});
+    print(Json{{"log", options.out}, {"rows", log.t_s.size()}, {"time_s", time}, {"seed", seed}});
   } else {
-    std::printf("%zu rows, %.2f s, written to %s\n", samples.size(), samples.back().t, options.out.c_str());
+    std::printf("%zu rows, %.2f s, written to %s\n", log.t_s.size(), time, options.out.c_str());
   }
   return kOk;
 }
@@ -59,12 +93,17 @@ int run(const Options& options) {
 
 Verb simulate_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  auto* command =
-      app.add_subcommand("simulate", "Flight log of straight flights between hover points in simulated airflow");
+  auto* command = app.add_subcommand(
+      "simulate", "Flight log of a simulated flight: between hover points, or the set-points of a log again");
   command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  command->add_option("--model", options->model, "model file: checked, not used; the airflow has its own laws");
-  command->add_option("--flight", options->flight, "flight specification, TOML")->required();
+  command->add_option("--model", options->model,
+                      "model file: what its extension says of vehicle, air and sensors is flown");
+  command->add_option("--air", options->air, "gusts: the airflow truth's own laws, or those of --model")
+      ->check(CLI::IsMember({"truth", "model"}))
+      ->capture_default_str();
+  command->add_option("--flight", options->flight, "flight specification, TOML");
+  command->add_option("--setpoints", options->setpoints, "flight log, CSV, whose set-points are flown again");
   command->add_option("--out", options->out, "flight log to write, CSV")->required();
   command->add_option("--seed", options->seed, "in place of the specification's");
   command->add_flag("--json", options->json, "one JSON object on stdout");
@@ -72,7 +111,10 @@ Verb simulate_verb(CLI::App& app) {
   command->footer(
       "Example:\n  backwash simulate --map builtin:apartment --vehicle builtin:quad-5in --flight flight.toml --out "
       "log.csv\n"
-      "where flight.toml holds\n  start = [1.5, 1.5, 1.0]\n  [[hover]]\n  p = [2.0, 1.5, 0.6]\n  dwell = 10.0");
+      "where flight.toml holds\n  start = [1.5, 1.5, 1.0]\n  [[hover]]\n  p = [2.0, 1.5, 0.6]\n  dwell = 10.0\nWhat "
+      "the simulation says of a "
+      "flight that was measured:\n  backwash simulate --map room.bt --vehicle craft.toml --model extended.toml --air "
+      "model\n  --setpoints measured.csv --out simulated.csv");
   return {command, [options] { return run(*options); }};
 }
 

@@ -7,11 +7,13 @@
 
 #include "core/log/ulog.hpp"
 #include "core/study/findings/extend.hpp"
+#include "core/study/findings/residuals.hpp"
 #include "core/study/findings/study_page.hpp"
 #include "core/study/inference/rotor_reference.hpp"
 #include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/study_output.hpp"
+#include "services/backwash/study_simulation.hpp"
 #include "services/backwash/verb.hpp"
 #include "services/parallel/parallel.hpp"
 #include "version.hpp"
@@ -24,7 +26,7 @@ struct Options {
   std::vector<std::string> logs, reference;
   std::string group;
   unsigned seed = 1;
-  bool json = false, force = false, quick = false, rules = false;
+  bool json = false, force = false, quick = false, rules = false, residuals = false;
 };
 
 /// The study's own terms of a model file that it has extended before; none in others.
@@ -45,6 +47,9 @@ std::vector<study::Term> read_terms(const std::string& path) {
       term.scale.offset_W = {(*offset)[0].value_or(0.0), (*offset)[1].value_or(0.0), 0};
     if (const auto* theta = (*table)["theta"].as_array())
       for (const auto& value : *theta) term.theta.push_back(value.value_or(0.0));
+    for (const auto& [key, numbers] : {std::pair{"anchor", &term.scale.anchor}, {"beside", &term.beside}})
+      if (const auto* list_of = (*table)[key].as_array())
+        for (const auto& value : *list_of) numbers->push_back(value.value_or(0.0));
     terms.push_back(std::move(term));
   }
   return terms;
@@ -93,14 +98,19 @@ Flights read_flights(const Options& options) {
   return flights;
 }
 
-study::Observations observe(const Options& options, const Vehicle& vehicle, const Model& model,
-                            const map::OccupancyGrid* grid) {
-  const Flights flights = read_flights(options);
+/// The flights' numbers, those of one group behind each other.
+std::vector<std::size_t> order_of(const Flights& flights) {
   std::vector<std::size_t> order(flights.logs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (!flights.group.empty())
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return flights.group[a] < flights.group[b]; });
+  return order;
+}
+
+study::Observations observe(const Flights& flights, const Vehicle& vehicle, const Model& model,
+                            const map::OccupancyGrid* grid) {
+  const auto order = order_of(flights);
   study::Observer observer(vehicle, model, grid);
   for (const std::size_t k : order) observer.add(flights.logs[k]);
   auto seen = observer.finish();
@@ -112,6 +122,23 @@ study::Observations observe(const Options& options, const Vehicle& vehicle, cons
   }
   seen.first = std::move(first);
   return seen;
+}
+
+/// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
+std::string residuals(const Options& options, const Flights& flights, const Vehicle& vehicle, const Model& model,
+                      const map::OccupancyGrid& grid, const study::Observations& measured,
+                      const std::vector<SimulationTerm>& found) {
+  FlownAgain again{{}, {}, vehicle, model, grid, options.seed};
+  for (const std::size_t k : order_of(flights))
+    again.logs.push_back(&flights.logs[k]), again.paths.push_back(options.logs[k]);
+  auto terms = read_simulation(options.model);
+  progress("simulating the flights without the causes");
+  const auto before = simulated(again, terms, measured);
+  terms.insert(terms.end(), found.begin(), found.end());
+  progress("simulating the flights with the causes");
+  const auto section = study::residual_section(measured, before, simulated(again, terms, measured));
+  if (!section) throw Failure(kUnavailable, section.error().message);
+  return *section;
 }
 
 /// Motor shares of the flights against those of the reference flights.
@@ -143,6 +170,8 @@ int run(const Options& options) {
     return kOk;
   }
   if (options.vehicle.empty() || options.logs.empty()) throw Failure(kUsage, "study needs --vehicle and --log");
+  if (options.residuals && (options.map.empty() || options.report.empty()))
+    throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
@@ -150,7 +179,9 @@ int run(const Options& options) {
   model.ground.r0 = vehicle.body.diagonal_radius;
   std::optional<map::OccupancyGrid> grid;
   if (!options.map.empty()) grid = read_map(options.map);
-  auto seen = observe(options, vehicle, model, grid ? &*grid : nullptr);
+  const Flights flights = read_flights(options);
+  auto seen = observe(flights, vehicle, model, grid ? &*grid : nullptr);
+  const auto measured = seen;  // nothing that the model holds taken out
   const auto left = study::apply(read_terms(options.model), seen);
   study::StudyOptions study_options;
   study_options.search.seed = options.seed;
@@ -181,9 +212,12 @@ int run(const Options& options) {
     json["extended_model"] = options.out;
   }
   if (!options.report.empty()) {
+    std::string beside;
+    if (options.residuals)
+      beside = residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
     progress("drawing");
     const auto page = study::study_page(
-        result, seen, {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height});
+        result, seen, {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
     if (!page) throw Failure(kUnavailable, page.error().message);
     write_file(options.report, *page, options.force);
   }
@@ -211,6 +245,8 @@ Verb study_verb(CLI::App& app) {
   command->add_option("--group", options->group,
                       "column, such as day: flights with one value of it are left out, flipped and scattered together");
   command->add_option("--report", options->report, "HTML page to write");
+  command->add_flag("--residuals", options->residuals,
+                    "on the page, per channel: what the simulation of these flights says and what was measured");
   command->add_option("--out", options->out, "extended model file to write");
   command->add_option("--seed", options->seed, "of the null's sign draws")->capture_default_str();
   command->add_flag("--quick", options->quick, "without the smallest effects that could have been found");

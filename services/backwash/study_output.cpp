@@ -20,6 +20,7 @@ Json to_json(const study::NamedCause& cause) {
     separate.push_back(
         {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
   const auto& g = cause.gain;
+  const auto& a = cause.applied;
   return {{"name", found.form->cause()},
           {"set", set},
           {"p", found.p},
@@ -32,6 +33,19 @@ Json to_json(const study::NamedCause& cause) {
             {"rmse_after", g.rmse_after},
             {"variance_coverage_before", g.coverage_before},
             {"variance_coverage_after", g.coverage_after}}},
+          {"applied",
+           {{"held_out_nats", a.nats},
+            {"rmse_before", a.rmse_before},
+            {"rmse_after", a.rmse_after},
+            {"variance_coverage_before", a.coverage_before},
+            {"variance_coverage_after", a.coverage_after},
+            {"refused", a.refused}}},
+          {"hover_shift",
+           {{"predicted_m", cause.shift.predicted},
+            {"measured_m", cause.shift.measured},
+            {"slope", cause.shift.slope},
+            {"ci95", {cause.shift.low, cause.shift.high}},
+            {"refuted", cause.shift.refuted()}}},
           {"separate_by", separate}};
 }
 
@@ -133,6 +147,11 @@ void print_text(const study::StudyResult& result, const study::Observations& see
   for (const auto& cause : result.causes) {
     std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause().c_str(),
                 cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
+    if (!cause.applied.refused.empty()) std::printf("  does not join the model: %s\n", cause.applied.refused.c_str());
+    if (cause.shift.refuted())
+      std::printf(
+          "  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; has the loop an integrator?\n",
+          cause.shift.slope, cause.shift.low, cause.shift.high);
     for (const auto& e : cause.found.parameters)
       std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
     for (const auto& s : cause.separate_by) {

@@ -99,6 +99,9 @@ def check_keys(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, s
     kinds = set(re.findall(r'\{"(\w+)", ModelEffect::Kind', (root / "core/config/model_file.cpp").read_text()))
     table = [cells for cells in rows(sections_of["Model file"]) if len(cells) == 2]
     expect("kinds of effects", {k for cells in table for k in quoted(cells[0])}, kinds)
+    kinds = set(re.findall(r'\{"(\w+)",\s*Kind::', (root / "core/config/simulation_terms.cpp").read_text()))
+    table = [cells for cells in rows(sections_of["Model file"]) if len(cells) == 3]
+    expect("kinds of simulation terms", {k for cells in table for k in quoted(cells[0])}, kinds)
     spec = (root / "services/backwash/flight_spec.cpp").read_text()
     known = re.search(r'only\(path, file, \{([^}]*)\}', spec)[1]
     expect("Flight specification", {quoted(c[0])[0] for c in rows(sections_of["Flight specification"])[1:]},

@@ -59,12 +59,8 @@ class Flight {
       : world_(world),
         gusts_(gusts),
         rng_(world.request.seed * 1000003 + static_cast<std::uint64_t>(number) * 7717 + 5) {
-    const auto n = [&] { return normal_(rng_); };
     const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng_); };
-    ln_var_ = world.ln_var_vehicle + 0.36 * n();
-    accelerometer_bias_ = 0.02 * Vec3(n(), n(), n());
-    thrust_scale_ = 1 + 0.003 * n();
-    tilt_ = 0.002 * Vec3(n(), n(), 0);
+    scatter();
     charge_ = world.request.confound == "battery" ? 1.0 : u(0.55, 1.0);
     ambient_ = u(18, 28);
     accelerometer_noise_ = u(0.03, 0.08);
@@ -75,7 +71,8 @@ class Flight {
     }
   }
 
-  Table fly() {
+  /// `replica`: 0, or which of the flights with other gusts along the same plan.
+  Table fly(unsigned replica = 0) {
     const auto plan = draw_plan(world_, rng_);
     p_ = plan.front().p;
     thrust_ = produced_ = kG * Vec3::UnitZ();
@@ -87,8 +84,13 @@ class Flight {
                    "battery_v",  "rpm1",       "rpm2",        "rpm3",          "rpm4",        "motor1",
                    "motor2",     "motor3",     "motor4",      "temperature_c", "segment"};
     double next_row = 0;
-    const double frozen_from = std::uniform_real_distribution(0.0, 4.0)(rng_) * 60;  // often after the end
-    const double dropout_at = std::uniform_real_distribution(0.0, 3.0)(rng_) * 60;
+    double frozen_from = std::uniform_real_distribution(0.0, 4.0)(rng_) * 60;  // often after the end
+    double dropout_at = std::uniform_real_distribution(0.0, 3.0)(rng_) * 60;
+    if (replica > 0) {
+      frozen_from = dropout_at = 1e9;
+      rng_.seed(rng_() + replica), normal_.reset();
+      scatter();
+    }
     for (std::size_t k = 0; k < plan.size(); ++k) {
       const double t = static_cast<double>(k) * kStep;
       step(plan, k, t);
@@ -110,6 +112,14 @@ class Flight {
 
  private:
   double normal() { return normal_(rng_); }
+  /// What differs between flights for no reason that a log tells.
+  void scatter() {
+    const auto n = [&] { return normal_(rng_); };
+    ln_var_ = world_.ln_var_vehicle + 0.36 * n();
+    accelerometer_bias_ = 0.02 * Vec3(n(), n(), n());
+    thrust_scale_ = 1 + 0.003 * n();
+    tilt_ = 0.002 * Vec3(n(), n(), 0);
+  }
   Instant instant(double t) const {
     return {t, p_, v_, yaw_, produced_.norm(), (16.8 - voltage_) / 16.8, temperature_};
   }
@@ -262,19 +272,29 @@ backwash::map::OccupancyGrid true_grid(const Room& room) {
   return grid;
 }
 
+/// The modelled gusts in a world's room. Worlds of one seed are pairs in one room: what was evaluated for the last one
+/// serves the next.
+Gusts& gusts_of(const World& world) {
+  thread_local std::unique_ptr<Gusts> gusts;
+  thread_local std::pair<std::uint64_t, std::string> room;
+  if (const std::pair now(world.request.seed, world.request.confound); !gusts || room != now) {
+    auto model = *backwash::config::load_model("builtin:" + world.craft.model);
+    model.ground.r0 = world.craft.diagonal_radius;
+    gusts = std::make_unique<Gusts>(true_grid(world.room), model), room = now;
+  }
+  return *gusts;
+}
+
 }  // namespace
 
 std::vector<Table> fly_all(const World& world) {
-  auto model = *backwash::config::load_model("builtin:" + world.craft.model);
-  model.ground.r0 = world.craft.diagonal_radius;
-  // Worlds of one seed are pairs in one room: what was evaluated for the last one serves the next.
-  thread_local std::unique_ptr<Gusts> gusts;
-  thread_local std::pair<std::uint64_t, std::string> room;
-  if (const std::pair now(world.request.seed, world.request.confound); !gusts || room != now)
-    gusts = std::make_unique<Gusts>(true_grid(world.room), model), room = now;
   std::vector<Table> flights;
-  for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, *gusts, i).fly());
+  for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, gusts_of(world), i).fly());
   return flights;
+}
+
+Table fly_again(const World& world, int number, unsigned replica) {
+  return Flight(world, gusts_of(world), number).fly(replica);
 }
 
 }  // namespace study_worlds

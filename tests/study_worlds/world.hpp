@@ -76,6 +76,9 @@ struct Table {
   std::vector<Hidden> hidden;  ///< one per row
 };
 std::vector<Table> fly_all(const World& world);
+/// Flight `number` of the world along its plan again, nothing frozen or missing, with the gusts and the scatter between
+/// flights of a replica (from 1 on); battery and temperature begin as they did.
+Table fly_again(const World& world, int number, unsigned replica);
 
 /// Writes map.bt and vehicle.toml.
 void write_world_files(const World& world, const std::filesystem::path& folder);

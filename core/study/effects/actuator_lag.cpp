@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
 
@@ -17,7 +18,8 @@ Effect actuator_lag() {
                            return std::vector{
                                Column{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[0]; })},
                                        {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[0]; })}}}};
-                         }}},
+                         },
+                     .simulate = simulates(SimulationTerm::Kind::thrust_lag)}},
           .manoeuvres = {{"thrust pulses: climb and sink with 2 m/s² in turn", [](WindowRow& w, double) {
                             w.delay_gain = {-60, 0}, w.slope_gain = {0, 14};
                           }}}};

@@ -7,11 +7,26 @@
 namespace backwash::study {
 namespace {
 
-/// The thrust is as modelled at the highest voltage flown; relative to the mean one.
-std::vector<Column> sagging(const Windows& ws, const Scale&) {
+/// The highest and the mean voltage flown.
+std::vector<double> voltages(const Windows& ws) {
   double highest = 0, mean = 1e-6;
   for (const auto& w : ws) highest = std::max(highest, w.voltage), mean += w.voltage / ws.size();
-  return {missing_thrust(ws, [&](auto& w) { return (highest - w.voltage) / mean; })};
+  return {highest, mean};
+}
+
+/// Relative to the mean voltage; that the thrust is as modelled at the highest one is the companion's to correct.
+std::vector<Column> sagging(const Windows& ws, const Scale& scale) {
+  const auto anchor = scale.anchor.size() == 2 ? scale.anchor : voltages(ws);
+  return {missing_thrust(ws, [&](auto& w) { return (anchor[0] - w.voltage) / anchor[1]; })};
+}
+
+/// The voltage V* at which the thrust is as modelled takes the constant in: 1 − c − s (V0 − V)/Vm = 1 − s (V* − V)/Vm.
+std::vector<SimulationTerm> by_voltage(const FittedForm& fitted, const Observations& seen) {
+  const auto anchor = fitted.scale.anchor.size() == 2 ? fitted.scale.anchor : voltages(seen.windows);
+  const double s = fitted.theta[0], c = fitted.beside.empty() ? 0 : fitted.beside[0];
+  const Course course = mean_course(seen, &WindowRow::voltage);
+  return {{SimulationTerm::Kind::thrust_with_voltage,
+           {s, anchor[0] + (std::abs(s) > 1e-6 ? c * anchor[1] / s : 0), anchor[1], course.first, course.rate}}};
 }
 
 }  // namespace
@@ -26,7 +41,9 @@ Effect battery_sag() {
                      .columns = sagging,
                      .companions =
                          [](const Windows& ws) { return std::vector{missing_thrust(ws, [](auto&) { return 1.0; })}; },
-                     .extend = flown_range}},
+                     .anchor = voltages,
+                     .extend = flown_range,
+                     .simulate = by_voltage}},
           .axis = {"battery, V", false, [](auto& w) { return w.voltage; }},
           .manoeuvres = {{"hover on a fresh battery and on a used one, the same spot and time of flight",
                           [](WindowRow& w, double s) {

@@ -46,7 +46,8 @@ Form pull() {
                               });
                             })};
                           }}},
-          .extend = extends(ModelEffect::Kind::push_under_surface)};
+          .extend = extends(ModelEffect::Kind::push_under_surface),
+          .simulate = simulates(SimulationTerm::Kind::push_under_surface)};
 }
 
 Form gusts() {
@@ -61,7 +62,8 @@ Form gusts() {
               [](const Windows& ws, const Scale& length) {
                 return std::vector{in_variance(ws, [&](auto& w) { return by_gap(w, length, near_ceiling); })};
               },
-          .extend = extends(ModelEffect::Kind::ln_variance_under_surface)};
+          .extend = extends(ModelEffect::Kind::ln_variance_under_surface),
+          .simulate = simulates(SimulationTerm::Kind::ln_variance_under_surface)};
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
 
@@ -15,7 +16,8 @@ Effect command_latency() {
                      .columns =
                          [](const Windows& ws, const Scale&) {
                            return std::vector{in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; })};
-                         }}},
+                         },
+                     .simulate = simulates(SimulationTerm::Kind::setpoint_delay)}},
           .manoeuvres = {{"sideways steps of the set-point, hard", [](WindowRow& w, double) {
                             w.command_gain = {60, -10};
                           }}}};

@@ -10,6 +10,10 @@ std::vector<ModelEffect> as_told(const FittedForm& fitted, const Observations&) 
   return {{ModelEffect::Kind::push, Vec3(x.value, y.value, 0), Vec3(half_width(x), half_width(y), 0), 0}};
 }
 
+std::vector<SimulationTerm> in_the_plane(const FittedForm& fitted, const Observations&) {
+  return {{SimulationTerm::Kind::push, {fitted.theta[0], fitted.theta[1], 0}}};
+}
+
 }  // namespace
 
 /// A steady wind, or anything else that pushes to one side of the world.
@@ -24,7 +28,8 @@ Effect draft() {
                            return std::vector{level(ws, [](auto&) -> Vec3 { return Vec3::UnitX(); }),
                                               level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); })};
                          },
-                     .extend = as_told}},
+                     .extend = as_told,
+                     .simulate = in_the_plane}},
           .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }}};
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/study/windows/observation.hpp"
 #include "core/types/model.hpp"
+#include "core/types/simulation_term.hpp"
 
 namespace backwash::study {
 
@@ -41,6 +42,9 @@ struct Regressor {
 struct Scale {
   double value = 0;
   Vec3 offset_W = Vec3::Zero();  ///< m
+  /// What the columns take from the windows that they were fitted to (Form::anchor): other windows have others. Empty:
+  /// from the windows at hand.
+  std::vector<double> anchor = {};
 };
 /// Scales without an offset.
 std::vector<Scale> scales_of(std::initializer_list<double> values);
@@ -61,6 +65,7 @@ struct FittedForm {
   const std::vector<Column>& columns;
   std::span<const double> theta;            ///< one per column
   const std::vector<Estimate>& parameters;  ///< of all shapes, at the form's reference
+  std::span<const double> beside = {};      ///< of the form's companions, one each
 };
 
 /// One physical form of an effect, linear in its parameters at a given scale.
@@ -73,6 +78,7 @@ struct Form {
   bool displaces_map = false;      ///< its scale is an offset, fitted along x and y
   bool motors_alone = false;       ///< seen in motor commands alone: which of such forms it is they do not tell
   bool constant = false;           ///< is itself what a free offset would be: tested without one
+  bool in_sensor = false;          ///< is told by a sensor and pushes nothing
   bool by_place = false;           ///< a push that differs by place: it moves the craft in itself
   double floor = 0;                ///< least root mean square over the flown windows that is called an effect
   double least = 0;                ///< least magnitude of the first parameter that is called an effect
@@ -86,11 +92,15 @@ struct Form {
   /// What it leaves open and no other cause may claim: the voltage at which the thrust is as modelled, the bias at
   /// which a drift begins.
   std::function<std::vector<Column>(const Windows&)> companions = {};
+  /// What `columns` take from the windows themselves and a later study must be told (Scale::anchor).
+  std::function<std::vector<double>(const Windows&)> anchor = {};
   /// Other shapes, in the literature as good as this one: the same parameters at the same reference. They take no part
   /// in the search; estimates are averaged over them (estimate.hpp).
   std::vector<Form> shapes = {};
   /// What it adds to the model for field, reach and plan (core/study/README.md, "Extension"); without it nothing.
   std::function<std::vector<ModelEffect>(const FittedForm&, const Observations&)> extend = {};
+  /// What it adds to the simulation (core/sim); every form has one.
+  std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulate = {};
   const Effect* effect = nullptr;  ///< whose form it is; set by the table
 
   const std::string& cause() const;  ///< the effect's name

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
 
@@ -14,7 +15,8 @@ Effect heavy_tails() {
                .one_sided = true,
                .unknowable = [](const Observations&) { return kScatter2 / 2; },  // how much of the wander is within 1 s
                .columns = [](const Windows& ws,
-                             const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; }}}};
+                             const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; },
+               .simulate = simulates(SimulationTerm::Kind::kurtosis)}}};
 }
 
 }  // namespace backwash::study

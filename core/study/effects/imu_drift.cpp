@@ -13,9 +13,20 @@ std::vector<Column> first_bias(const Windows& ws) {
           level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
 }
 
+using Kind = SimulationTerm::Kind;
+
+/// The drift and the bias with which it begins.
+SimulationTerm drift(Kind kind, const FittedForm& fitted) {
+  SimulationTerm term{kind, {fitted.theta.begin(), fitted.theta.end()}};
+  term.value.resize(6, 0);
+  for (std::size_t i = 0; i < fitted.beside.size(); ++i) term.value[3 + i] = fitted.beside[i];
+  return term;
+}
+
 Form with_time() {
   return {.formula = "accelerometer bias b t/100 s, fixed to the body",
           .parameters = {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
+          .in_sensor = true,
           .floor = 0.015,
           .needs = {Source::attitude},
           .columns = [](const Windows& ws, const Scale&) { return body_drift(ws, [](auto& w) { return w.t / 100; }); },
@@ -28,18 +39,28 @@ Form with_time() {
                           [](const Windows& ws, const Scale& n) {
                             return body_drift(ws, [&](auto& w) { return std::pow(std::max(w.t, 0.0) / 100, n.value); });
                           }}},
-          .extend = unknown_push};
+          .extend = unknown_push,
+          .simulate = [](const FittedForm& fitted,
+                         const Observations&) { return std::vector{drift(Kind::sensor_drift_with_time, fitted)}; }};
 }
 
 Form with_temperature() {
   return {.formula = "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
           .parameters = {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
+          .in_sensor = true,
           .floor = 0.015,
           .needs = {Source::temperature, Source::attitude},
           .columns = [](const Windows& ws,
                         const Scale&) { return body_drift(ws, [](auto& w) { return (w.temperature - 25) / 10; }); },
           .companions = first_bias,
-          .extend = unknown_push};
+          .extend = unknown_push,
+          .simulate =
+              [](const FittedForm& fitted, const Observations& seen) {
+                auto term = drift(Kind::sensor_drift_with_temperature, fitted);
+                const Course course = mean_course(seen, &WindowRow::temperature);
+                term.value.insert(term.value.end(), {course.first, course.rate});
+                return std::vector{term};
+              }};
 }
 
 }  // namespace

@@ -40,7 +40,13 @@ Effect map_offset() {
                      .floor = 0.12,
                      .one_sided = true,
                      .needs = {Source::map},
-                     .columns = [](const Windows& ws, const Scale& scale) { return displaced(ws, scale.offset_W); }}}};
+                     .columns = [](const Windows& ws, const Scale& scale) { return displaced(ws, scale.offset_W); },
+                     .simulate =
+                         [](const FittedForm& fitted, const Observations&) {
+                           const Vec3& offset_W = fitted.scale.offset_W;
+                           return std::vector<SimulationTerm>{{SimulationTerm::Kind::variance_elsewhere,
+                                                               {fitted.theta[0], offset_W.x(), offset_W.y()}}};
+                         }}}};
 }
 
 }  // namespace backwash::study

@@ -45,12 +45,51 @@ std::vector<ModelEffect> unknown_push(const FittedForm& fitted, const Observatio
 }
 
 std::vector<ModelEffect> flown_range(const FittedForm& fitted, const Observations& seen) {
-  const auto z = added(fitted, seen, kMeanZ);
+  auto z = added(fitted, seen, kMeanZ);
+  if (fitted.form.companions && !fitted.beside.empty()) {
+    const auto open = fitted.form.companions(seen.windows);
+    for (std::size_t k = 0; k < std::min(open.size(), fitted.beside.size()); ++k)
+      for (const auto& part : open[k].parts)
+        for (std::size_t i = 0; i < z.size() && part.channel == kMeanZ; ++i) z[i] += fitted.beside[k] * part.x[i];
+  }
   const auto [low, high] = std::minmax_element(z.begin(), z.end());
   const Estimate& first = fitted.parameters.front();
   const double size = std::abs(first.value), most = std::max(std::abs(*low), std::abs(*high));
   return {{Kind::push, Vec3(0, 0, (*low + *high) / 2),
            Vec3(0, 0, (*high - *low) / 2 + (size > 0 ? most * half_width(first) / size : 0)), 0}};
+}
+
+std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulates(
+    SimulationTerm::Kind kind) {
+  return [kind](const FittedForm& fitted, const Observations&) {
+    SimulationTerm term{kind, {fitted.theta.begin(), fitted.theta.end()}};
+    if (!fitted.form.scale_name.empty()) term.value.push_back(fitted.scale.value);
+    return std::vector{term};
+  };
+}
+
+SimulationTerm rotor_lines(const Observations& seen) {
+  SimulationTerm term{SimulationTerm::Kind::sensor_lines, std::vector<double>(5, 0)};
+  double floor = 0, of_floor = 0;
+  for (std::size_t rotor = 0; rotor < 4; ++rotor) {
+    double power = 0, n = 0;
+    for (const auto& w : seen.windows) {
+      const auto& line = w.lines[rotor];
+      if (!std::isfinite(line.amplitude2)) continue;
+      power += line.amplitude2, floor += line.floor2, n += 1, of_floor += 1;
+    }
+    if (n > 0) term.value[rotor] = std::sqrt(std::max(0.0, power / n));
+  }
+  if (of_floor > 0) term.value[4] = std::sqrt(std::max(0.0, floor / of_floor));
+  return term;
+}
+
+Course mean_course(const Observations& seen, double WindowRow::*quantity) {
+  double n = 0, t = 0, x = 0, tt = 0, tx = 0;
+  for (const auto& w : seen.windows) n += 1, t += w.t, x += w.*quantity, tt += w.t * w.t, tx += w.t * (w.*quantity);
+  const double spread = n * tt - t * t;
+  const double rate = spread > 0 ? (n * tx - t * x) / spread : 0;
+  return {n > 0 ? (x - rate * t) / n : 0, rate};
 }
 
 }  // namespace backwash::study

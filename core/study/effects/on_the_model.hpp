@@ -21,7 +21,21 @@ std::function<std::vector<ModelEffect>(const FittedForm&, const Observations&)> 
 /// direction up to that.
 std::vector<ModelEffect> unknown_push(const FittedForm& fitted, const Observations& seen);
 
-/// Vertical push over the range that was flown: its middle, and half of it with the parameter's own error.
+/// Vertical push over the range that was flown, its companions' part in it: its middle, and half of it with the
+/// parameter's own error.
 std::vector<ModelEffect> flown_range(const FittedForm& fitted, const Observations& seen);
+
+/// A function for Form::simulate: one term of a kind, its numbers θ and, if the form has scales, the scale.
+std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulates(SimulationTerm::Kind kind);
+
+/// The rotors' lines as they were measured along z: root of their mean power, and of the noise beside them that the
+/// gusts leave.
+SimulationTerm rotor_lines(const Observations& seen);
+
+/// The mean course of a quantity over the flights: its value at their start, and per second.
+struct Course {
+  double first, rate;
+};
+Course mean_course(const Observations& seen, double WindowRow::*quantity);
 
 }  // namespace backwash::study

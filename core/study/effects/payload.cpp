@@ -6,8 +6,9 @@ namespace backwash::study {
 namespace {
 
 /// Which rotors face each other depends on the autopilot: 1-2 and 3-4, 1-3 and 2-4, or 1-4 and 2-3.
+constexpr std::size_t kFacing[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
+
 std::vector<Column> facing_rotors(const Windows& ws, const Scale& pairing) {
-  constexpr std::size_t kFacing[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
   const auto& pair = kFacing[static_cast<std::size_t>(pairing.value)];
   std::vector<Column> columns;
   for (const std::size_t k : {std::size_t{0}, std::size_t{2}}) {
@@ -15,6 +16,14 @@ std::vector<Column> facing_rotors(const Windows& ws, const Scale& pairing) {
     columns.push_back({{{first, std::vector<double>(ws.size(), 1.0)}, {second, std::vector<double>(ws.size(), -1.0)}}});
   }
   return columns;
+}
+
+std::vector<SimulationTerm> needed_of_rotors(const FittedForm& fitted, const Observations&) {
+  const auto& pair = kFacing[static_cast<std::size_t>(fitted.scale.value)];
+  SimulationTerm term{SimulationTerm::Kind::rotor_needs, std::vector<double>(4, 0)};
+  term.value[pair[0]] = fitted.theta[0], term.value[pair[1]] = -fitted.theta[0];
+  term.value[pair[2]] = fitted.theta[1], term.value[pair[3]] = -fitted.theta[1];
+  return {term};
 }
 
 }  // namespace
@@ -30,7 +39,8 @@ Effect payload() {
                  .needs = {Source::thrust},
                  .columns = [](const Windows& ws,
                                const Scale&) { return std::vector{missing_thrust(ws, [](auto&) { return 1.0; })}; },
-                 .extend = flown_range},
+                 .extend = flown_range,
+                 .simulate = simulates(SimulationTerm::Kind::thrust_share)},
                 {.formula = "an off-centre weight: rotors that face each other need (1 + m) and (1 - m) of the mean",
                  .parameters = {"m_first", "m_second"},
                  .scale_name = "pairing",
@@ -40,7 +50,8 @@ Effect payload() {
                  .constant = true,
                  .floor = 0.02,
                  .needs = {Source::motors},
-                 .columns = facing_rotors}}};
+                 .columns = facing_rotors,
+                 .simulate = needed_of_rotors}}};
 }
 
 }  // namespace backwash::study

@@ -1,7 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
+namespace {
+
+std::vector<SimulationTerm> needs_more(const FittedForm& fitted, const Observations&) {
+  SimulationTerm term{SimulationTerm::Kind::rotor_needs, std::vector<double>(4, 0)};
+  term.value[static_cast<std::size_t>(fitted.scale.value)] = fitted.theta[0];
+  return {term};
+}
+
+std::vector<SimulationTerm> needs_more_and_shakes(const FittedForm& fitted, const Observations& seen) {
+  auto terms = needs_more(fitted, seen);
+  auto lines = rotor_lines(seen);
+  for (std::size_t i = 0; i < 4; ++i)
+    if (i != static_cast<std::size_t>(fitted.scale.value)) lines.value[i] = 0;
+  terms.push_back(lines);
+  return terms;
+}
+
+}  // namespace
 
 /// One rotor gives less for the same command, and may shake.
 Effect propeller_damage() {
@@ -17,7 +36,8 @@ Effect propeller_damage() {
                      .one_sided = true,
                      .needs = {Source::motors},
                      .columns = [](const Windows& ws,
-                                   const Scale& rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; }},
+                                   const Scale& rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; },
+                     .simulate = needs_more},
                     {.formula = "one rotor needs (1 + d) of the others' thrust command and shakes at its rate",
                      .parameters = {"d", "P_ln"},
                      .scale_name = "rotor",
@@ -27,9 +47,11 @@ Effect propeller_damage() {
                      .least = 0.04,
                      .one_sided = true,
                      .needs = {Source::rpm, Source::motors},
-                     .columns = [](const Windows& ws, const Scale& rotor) {
-                       return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
-                     }}}};
+                     .columns =
+                         [](const Windows& ws, const Scale& rotor) {
+                           return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
+                         },
+                     .simulate = needs_more_and_shakes}}};
 }
 
 }  // namespace backwash::study

@@ -37,7 +37,8 @@ Effect recirculation() {
                          [](const Windows& ws, const Scale& tau) {
                            return std::vector{in_variance(ws, [&](auto& w) { return 1 - std::exp(-w.t / tau.value); })};
                          },
-                     .extend = largest}},
+                     .extend = largest,
+                     .simulate = simulates(SimulationTerm::Kind::ln_variance_with_time)}},
           .manoeuvres = {{"hover for five minutes in one spot, motors never stopped",
                           [](WindowRow& w, double s) { w.t = 300 * s; }}}};
 }

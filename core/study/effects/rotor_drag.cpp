@@ -13,7 +13,8 @@ Effect rotor_drag() {
                  .floor = 0.01,
                  .columns = [](const Windows& ws,
                                const Scale&) { return std::vector{level(ws, [](auto& w) -> Vec3 { return -w.v_W; })}; },
-                 .extend = extends(ModelEffect::Kind::push_against_velocity)}},
+                 .extend = extends(ModelEffect::Kind::push_against_velocity),
+                 .simulate = simulates(SimulationTerm::Kind::push_against_velocity)}},
       .axis = {"velocity along x, m/s", false, [](auto& w) { return w.v_W.x(); }}};
 }
 

@@ -2,6 +2,17 @@
 #include "core/study/effects/columns.hpp"
 
 namespace backwash::study {
+namespace {
+
+auto of_one_rotor(SimulationTerm::Kind kind) {
+  return [kind](const FittedForm& fitted, const Observations&) {
+    SimulationTerm term{kind, std::vector<double>(4, 0)};
+    term.value[static_cast<std::size_t>(fitted.scale.value)] = fitted.theta[0];
+    return std::vector{term};
+  };
+}
+
+}  // namespace
 
 /// One rotor's rpm reading is wrong, or fails now and then.
 Effect rotor_sensor_fault() {
@@ -15,7 +26,8 @@ Effect rotor_sensor_fault() {
                      .least = 0.06,
                      .needs = {Source::rpm},
                      .columns = [](const Windows& ws,
-                                   const Scale& rotor) { return std::vector{one_rotor(kRpm1, ws, rotor, true)}; }},
+                                   const Scale& rotor) { return std::vector{one_rotor(kRpm1, ws, rotor, true)}; },
+                     .simulate = of_one_rotor(SimulationTerm::Kind::rotor_reading)},
                     {.formula = "a share of one rotor's rpm readings is stuck or missing",
                      .parameters = {"share"},
                      .scale_name = "rotor",
@@ -25,9 +37,9 @@ Effect rotor_sensor_fault() {
                      .least = 0.01,
                      .one_sided = true,
                      .needs = {Source::rpm},
-                     .columns = [](const Windows& ws, const Scale& rotor) {
-                       return std::vector{one_rotor(kDropout1, ws, rotor, false)};
-                     }}}};
+                     .columns = [](const Windows& ws,
+                                   const Scale& rotor) { return std::vector{one_rotor(kDropout1, ws, rotor, false)}; },
+                     .simulate = of_one_rotor(SimulationTerm::Kind::rotor_dropout)}}};
 }
 
 }  // namespace backwash::study

@@ -17,7 +17,8 @@ Effect trim() {
                            return std::vector{level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
                                               level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); })};
                          },
-                     .extend = unknown_push}},
+                     .extend = unknown_push,
+                     .simulate = simulates(SimulationTerm::Kind::push_of_heading)}},
           .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }},
           .manoeuvres = {{"turn a full yaw turn on the spot, far from walls", [](WindowRow& w, double s) {
                             w.yaw = 2 * M_PI * s;

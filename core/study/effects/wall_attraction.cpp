@@ -64,7 +64,8 @@ Effect wall_attraction() {
                                  .scale_name = "n",
                                  .scales = exponents,
                                  .columns = pull(true, power)}},
-                     .extend = extends(ModelEffect::Kind::push_to_walls)}},
+                     .extend = extends(ModelEffect::Kind::push_to_walls),
+                     .simulate = simulates(SimulationTerm::Kind::push_to_walls)}},
           .axis = {"distance to the nearest wall, m", false, nearest},
           .towards_walls = true,
           .manoeuvres = {{"approach a wall to 0.35 m from both sides", [](WindowRow& w, double s) {

@@ -37,7 +37,7 @@ Added held_out(const StudyResult& result, const Observations& seen) {
     const auto& columns = cause.found.columns;
     const auto nuisance = cause.found.form->constant ? std::vector<Column>{} : offsets(columns, seen);
     const Normal normal = evidence.normal(columns, nuisance);
-    if (!normal.solvable) continue;
+    if (!normal.solvable || !cause.applied.refused.empty()) continue;
     for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
       const SmallVector theta = normal.fit_without(f);
       for (std::size_t k = 0; k < columns.size(); ++k)
@@ -48,6 +48,11 @@ Added held_out(const StudyResult& result, const Observations& seen) {
             to[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
         }
     }
+    const auto open = companions(*cause.found.form, seen);
+    for (std::size_t k = 0; k < std::min(open.size(), cause.applied.beside.size()); ++k)
+      for (const auto& part : open[k].parts)
+        for (std::size_t i = 0; i < part.x.size() && part.channel <= kMeanZ; ++i)
+          added.mean[part.channel][i] += cause.applied.beside[k] * part.x[i];
   }
   return added;
 }

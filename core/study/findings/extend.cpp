@@ -6,13 +6,14 @@
 #include <sstream>
 
 #include "core/config/model_table.hpp"
+#include "core/config/simulation_terms.hpp"
 #include "core/study/calibrate/model_text.hpp"
 
 namespace backwash::study {
 namespace {
 
 /// Numbers to eight significant digits.
-toml::array list(std::initializer_list<double> values) {
+toml::array list(const std::vector<double>& values) {
   toml::array all;
   for (const double v : values) all.push_back(config::rounded(v, 8));
   return all;
@@ -21,14 +22,18 @@ toml::array list(std::initializer_list<double> values) {
 /// A cause as an entry of [[extension.term]].
 toml::table table_of(const NamedCause& cause, const Observations& seen) {
   const auto& f = cause.found;
-  toml::array theta, effects;
+  toml::array theta, effects, simulation;
   for (const double v : f.theta) theta.push_back(config::rounded(v, 8));
+  for (const auto& term : simulation_of(cause, seen)) simulation.push_back(config::simulation_table(term));
   for (const auto& e : effects_of(cause, seen)) effects.push_back(config::effect_table(e));
   toml::table term{{"cause", f.form->cause()},
                    {"form", f.form->formula},
                    {"held_out_nats", config::rounded(cause.gain.held_out_nats, 8)},
                    {"theta", theta},
-                   {"effect", effects}};
+                   {"effect", effects},
+                   {"simulation", simulation}};
+  if (!f.scale.anchor.empty()) term.insert("anchor", list(f.scale.anchor));
+  if (!cause.applied.beside.empty()) term.insert("beside", list(cause.applied.beside));
   if (f.form->displaces_map)
     term.insert("offset_m", list({f.scale.offset_W.x(), f.scale.offset_W.y()}));
   else
@@ -47,7 +52,12 @@ std::vector<Term> terms_of(const StudyResult& result) {
   std::vector<Term> terms;
   for (const auto& cause : result.causes) {
     const auto& f = cause.found;
-    terms.push_back({f.form->cause(), f.form->formula, f.scale, {f.theta.data(), f.theta.data() + f.theta.size()}});
+    if (!cause.applied.refused.empty()) continue;
+    terms.push_back({f.form->cause(),
+                     f.form->formula,
+                     f.scale,
+                     {f.theta.data(), f.theta.data() + f.theta.size()},
+                     cause.applied.beside});
   }
   return terms;
 }
@@ -65,14 +75,19 @@ std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen) {
       continue;
     }
     const Form& form = **known;
-    const auto columns = form.columns(
-        moved_by_itself(
-            form, seen.windows, term.scale,
-            Eigen::Map<const Eigen::VectorXd>(term.theta.data(), static_cast<Eigen::Index>(term.theta.size()))),
-        term.scale);
+    auto columns = form.columns(moved_by_itself(form, seen.windows, term.scale,
+                                                Eigen::Map<const Eigen::VectorXd>(
+                                                    term.theta.data(), static_cast<Eigen::Index>(term.theta.size()))),
+                                term.scale);
+    auto coefficients = term.theta;
+    for (const auto& column : companions(form, seen)) {
+      if (coefficients.size() >= term.theta.size() + term.beside.size()) break;
+      coefficients.push_back(term.beside[coefficients.size() - term.theta.size()]);
+      columns.push_back(column);
+    }
     for (std::size_t k = 0; k < columns.size(); ++k)
       for (const auto& part : columns[k].parts)
-        for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] -= term.theta[k] * part.x[i];
+        for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] -= coefficients[k] * part.x[i];
   }
   return left;
 }
@@ -81,13 +96,36 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
   const Accepted& f = cause.found;
   const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
   if (!f.form->extend) return {};
-  return f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters}, seen);
+  auto effects = f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+  for (auto& e : effects) {
+    const bool variance = e.kind == ModelEffect::Kind::ln_variance ||
+                          e.kind == ModelEffect::Kind::ln_variance_under_surface ||
+                          e.kind == ModelEffect::Kind::ln_variance_with_speed;
+    if (variance || !cause.shift.refuted()) continue;
+    e.error += e.value.cwiseAbs(), e.value.setZero();  // the craft rests on its set-point: in the bound, not the centre
+  }
+  return effects;
+}
+
+std::vector<SimulationTerm> simulation_of(const NamedCause& cause, const Observations& seen) {
+  const Accepted& f = cause.found;
+  const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
+  return f.form->simulate({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+}
+
+std::vector<SimulationTerm> simulation_of(const StudyResult& result, const Observations& seen) {
+  std::vector<SimulationTerm> all;
+  for (const auto& cause : result.causes)
+    if (cause.applied.refused.empty())
+      for (auto& term : simulation_of(cause, seen)) all.push_back(std::move(term));
+  return all;
 }
 
 Model extended(const Model& model, const StudyResult& result, const Observations& seen) {
   Model m = model;
   for (const auto& cause : result.causes)
-    for (const auto& effect : effects_of(cause, seen)) m.extension.push_back(effect);
+    if (cause.applied.refused.empty())
+      for (const auto& effect : effects_of(cause, seen)) m.extension.push_back(effect);
   return m;
 }
 
@@ -102,7 +140,8 @@ std::string extended_model_text(const Model& model, const StudyResult& result, c
        << calibrate::model_tables(model) << config::text_of(toml::table{{"provenance", provenance}}, {"provenance"});
   if (!earlier.empty()) text << earlier << "\n\n";
   toml::array terms;
-  for (const auto& cause : result.causes) terms.push_back(table_of(cause, seen));
+  for (const auto& cause : result.causes)
+    if (cause.applied.refused.empty()) terms.push_back(table_of(cause, seen));
   if (!terms.empty()) text << config::text_of(toml::table{{"extension", toml::table{{"term", terms}}}}, {"extension"});
   return text.str();
 }

@@ -12,9 +12,11 @@ namespace backwash::study {
 struct Term {
   std::string cause, formula;  ///< name the catalogue's form
   Scale scale;
-  std::vector<double> theta;  ///< its parameters, in their order
+  std::vector<double> theta;        ///< its parameters, in their order
+  std::vector<double> beside = {};  ///< of its companions; empty in files of before they were stored
 };
 
+/// Of the causes that join the model.
 std::vector<Term> terms_of(const StudyResult& result);
 
 /// Takes the terms out of the observations: the simulation is then the extended model's. A term whose form or columns
@@ -25,11 +27,15 @@ std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen);
 /// Σ by place and velocity; what depends on things that a plan does not know (battery, time, heading) by its range over
 /// the flown windows. Empty for causes that move neither.
 std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen);
-/// The model with the effects of all causes behind its own.
+/// What a cause adds to the simulation (core/sim).
+std::vector<SimulationTerm> simulation_of(const NamedCause& cause, const Observations& seen);
+/// Of all causes that join the model.
+std::vector<SimulationTerm> simulation_of(const StudyResult& result, const Observations& seen);
+/// The model with the effects of all causes that join it behind its own.
 Model extended(const Model& model, const StudyResult& result, const Observations& seen);
 
-/// Model file: the model's own tables, then a [[extension.term]] per cause, with its effects. `earlier`: the text of
-/// the terms that the model has already.
+/// Model file: the model's own tables, then a [[extension.term]] per cause that joins it, with its effects. `earlier`:
+/// the text of the terms that the model has already.
 std::string extended_model_text(const Model& model, const StudyResult& result, const Observations& seen,
                                 const std::string& base_name, const std::string& version,
                                 const std::string& earlier = "");

@@ -135,8 +135,14 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   Evidence evidence = start;
   evidence.whiten(others_of(found.accepted, SIZE_MAX, seen));
   bool ambiguous = false;
+  const auto applied = judge(evidence, found.accepted);
   for (std::size_t i = 0; i < found.accepted.size(); ++i) {
-    NamedCause cause{found.accepted[i], gain_of(evidence, found.accepted, i), {}};
+    NamedCause cause{found.accepted[i],
+                     gain_of(evidence, found.accepted, i),
+                     {},
+                     applied[i],
+                     check_shift(found.accepted[i], applied[i].beside, seen)};
+    if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(seen.windows);
     for (const Rival& rival : cause.found.rivals)
       cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
     ambiguous = ambiguous || !cause.found.rivals.empty();

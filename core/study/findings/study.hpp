@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/study/findings/applied.hpp"
+#include "core/study/findings/shift.hpp"
 #include "core/study/inference/dependence.hpp"
 #include "core/study/inference/search.hpp"
 
@@ -31,6 +33,8 @@ struct NamedCause {
   Accepted found;
   Gain gain;
   std::vector<Separation> separate_by;
+  Applied applied = {};   ///< what the extension by it is worth; refused: it does not join the model
+  ShiftCheck shift = {};  ///< whether the craft hovers where its push would hold it
 };
 
 struct StudyOptions {

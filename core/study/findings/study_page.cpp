@@ -110,6 +110,14 @@ std::string figures(const NamedCause& cause) {
   text += row("Error of the windows, before and after", number(g.rmse_before) + " → " + number(g.rmse_after));
   text += row("Samples in the model's central 90 %, before and after",
               number(g.coverage_before) + " → " + number(g.coverage_after));
+  const auto& a = cause.applied;
+  text += row("As applied, without any free offset", number(a.nats) + " nats; samples in the central 90 % " +
+                                                         number(a.coverage_before) + " → " + number(a.coverage_after));
+  if (cause.shift.tested)
+    text += row("Hovers off their set-points, of what this push predicts",
+                number(cause.shift.slope) + "  [" + number(cause.shift.low) + ", " + number(cause.shift.high) + "]" +
+                    (cause.shift.refuted() ? ": refuted, plans keep the centre. Has the loop an integrator?" : ""));
+  if (!a.refused.empty()) text += row("Does not join the model", a.refused);
   for (const auto& s : cause.separate_by)
     text += row("Not told from " + spoken(s.rival),
                 "fly next: " + s.manoeuvre +
@@ -216,6 +224,7 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
   }
   if (context.consequence) page += consequence_section(*context.consequence);
   page += unknown_section(result.unknown);
+  page += context.residuals;
   page += remaining_section(result.remaining);
   page += limits_sections(result, seen);
   std::vector<std::string> told;

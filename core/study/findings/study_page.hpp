@@ -18,6 +18,7 @@ struct PageContext {
   std::optional<Consequence> consequence;  ///< of the accepted causes
   std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
   std::optional<calibrate::HeightEffects> height;
+  std::string residuals = {};  ///< residual_section(), or empty
 };
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,

@@ -82,6 +82,15 @@ struct Rules {
   Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust", "derived: the size of confusion.md"};
   Rule normal_80{"normal_80", 0.8416212, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
+  // The extension
+  Rule coverage_level{"coverage_level", 0.9, "of samples",
+                      "derived: the interval is the central 90 %; more may be lost without harm"};
+  Rule hovering{"hovering", 0.03, "m/s", "chosen: of the set-points' own motion; a lag of 0.1 s is 3 mm"};
+  Rule least_shift{"least_shift", 0.002, "m", "chosen: a tenth of a pose's error, which 100 windows average out"};
+  Rule refuted_shift{"refuted_shift", 0.5, "of the predicted shift", "chosen: below, no shift is nearer than this one"};
+  Rule shift_interval{"shift_interval", 1, "of the predicted shift", "derived: wider, it holds both answers"};
+  Rule fewest_shifted{"fewest_shifted", 3, "flights", "derived: one slope and a scatter"};
+  Rule window_match{"window_match", 0.15, "s", "chosen: a window of 2 s moved by less holds 90 % of the same gusts"};
   // What is told of it
   Rule fewest_flights{"fewest_flights", 10, "flights",
                       "chosen: the campaigns have 12; with fewer no name is warranted"};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 
 #include "core/study/windows/gates.hpp"
@@ -23,6 +24,13 @@ template <typename T, typename F>
 T mean(Stretch w, T sum, F value) {
   for (std::size_t i = w.begin; i < w.end; ++i) sum += value(i) / static_cast<double>(w.size());
   return sum;
+}
+
+/// Power of gusts of variance 1 and correlation e^{−|t|/0.15 s} at a share of the sampling rate, over that of white
+/// noise of variance 1.
+double gusts_at(double folded, double dt) {
+  const double a = std::exp(-dt / BoundModel().tau_w);
+  return (1 - a * a) / (1 + a * a - 2 * a * std::cos(2 * std::numbers::pi * folded));
 }
 
 /// The attitude without its tilt, which answers the gusts as the thrust does.
@@ -147,6 +155,7 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w
   row.p_W = mean_of(p), row.v_W = mean_of(v);
   const auto& kp = vehicle_.controller.kp;
   row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
+  row.off_W = as_told ? Vec3(mean_of(s.p) - row.p_W) : Vec3(Vec3::Zero());
   // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
   row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
   row.R_WB = Mat3::Zero();
@@ -210,8 +219,10 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
     residuals.push_back(put_means(row, s, w));
     if (!s.a_nominal.empty()) put_delays(row, s, w);
     for (const auto& [channel, value, weight] :
-         rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end))
+         rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end, row.lines))
       put(channel, value, weight);
+    const double dt = row.duration / static_cast<double>(w.size() - 1);
+    for (Line& line : row.lines) line.floor2 = std::max(0.0, line.floor2 - row.sigma.z() * gusts_at(line.folded, dt));
   }
   const double period = s.t.back() / static_cast<double>(s.size() - 1);
   seen_.row_period = std::max(seen_.row_period, period);

@@ -85,6 +85,7 @@ struct WindowRow {
   Place around;             ///< of p_W
   std::vector<Place> path;  ///< of points along the window; empty where it is one place
   Vec3 give;                ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  Vec3 off_W;               ///< measured place less p_W, m; 0 where p_W is measured
   Vec3 sigma;               ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
@@ -92,6 +93,7 @@ struct WindowRow {
   std::array<double, 2> delay_gain{}, slope_gain{};
   std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                ///< (m/s²)²
+  std::array<Line, 4> lines{};           ///< of the rotors along z, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
 };

@@ -40,7 +40,7 @@ RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
 
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end) {
+                                     std::size_t end, std::array<Line, 4>& lines) {
   std::vector<RotorValue> values;
   std::array<double, 4> share{}, ratio{};
   bool motors = true, rpms = true;
@@ -68,7 +68,8 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
       values.push_back({kDropout1 + rotor, bad / static_cast<double>(readings.size()), 1});
       ratio[rotor] = 2 * std::log(std::max(middle, 1.0));
       const std::span<const double> phase(phases[rotor].data() + begin, end - begin);
-      values.push_back({kLine1 + rotor, line_excess(residual, t, phase), 1});
+      lines[rotor] = rotor_line(residual, t, phase);
+      values.push_back({kLine1 + rotor, lines[rotor].excess, 1});
     }
   }
   const auto put_contrast = [&](std::size_t channel, const std::array<double, 4>& x) {

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/study/windows/series.hpp"
+#include "core/study/windows/signals.hpp"
 
 namespace backwash::study {
 
@@ -19,9 +20,9 @@ struct RotorValue {
   double value, weight;
 };
 /// Lines, motor shares, rpm against command and dropouts of the rows [begin, end). `residual`: detrended vertical
-/// residual of those rows, m/s².
+/// residual of those rows, m/s². `lines`: each rotor's, where the log tells its rate.
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end);
+                                     std::size_t end, std::array<Line, 4>& lines);
 
 }  // namespace backwash::study

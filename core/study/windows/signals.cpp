@@ -55,6 +55,10 @@ double ln_bias(double n) { return digamma(n / 2) - std::log(n / 2); }
 double ln_variance(double n) { return trigamma(n / 2); }
 
 double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
+  return rotor_line(x, t, phase).excess;
+}
+
+Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
   constexpr int kBeside = 4;  // on each side, 1 Hz apart from 1.5 Hz on
   using Complex = std::complex<double>;
   /// Power at the harmonic, and the sum at its neighbours.
@@ -75,6 +79,7 @@ double line_excess(std::span<const double> x, std::span<const double> t, std::sp
   };
   const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
   const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
+  Line found;
   double line = 0, beside = 0, count = 0;
   for (const double harmonic : {1.0, 2.0}) {
     // Folded next to 0 or to half the rate, the line and its neighbours lie on a curved spectrum.
@@ -83,10 +88,14 @@ double line_excess(std::span<const double> x, std::span<const double> t, std::sp
     count += 1;
     const auto [at, around] = powers(harmonic);
     line += at, beside += around;
+    if (harmonic > 1) continue;
+    found.folded = folded / rate;
+    const double gain = 2 * std::sin(std::numbers::pi * found.folded);  // of the difference
+    found.amplitude2 = 4 * (at - around) / std::pow((n - 1) * gain, 2), found.floor2 = around / ((n - 1) * gain * gain);
   }
   // Each power is exponential: a sum of m has E ln = ln mean + ψ(m) − ln m, ln_bias of 2m samples.
-  if (count == 0) return std::numeric_limits<double>::quiet_NaN();
-  return std::log(line / beside) - (ln_bias(2 * count) - ln_bias(16 * count));
+  if (count > 0) found.excess = std::log(line / beside) - (ln_bias(2 * count) - ln_bias(16 * count));
+  return found;
 }
 
 }  // namespace backwash::study

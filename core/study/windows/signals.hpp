@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -25,9 +26,19 @@ Spread spread(std::span<const double> detrended);
 double ln_bias(double n);
 double ln_variance(double n);
 
-/// ln of the power at a rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz, less
-/// its expectation for noise; twice the rotor's rate (two blades) is summed in; NaN where sampling folds both
-/// next to 0 or half the rate. `phase`: rad at each sample, `t`: s.
+/// A rotor's line in a stretch; all NaN where it cannot be told.
+struct Line {
+  /// ln of the power at the rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz,
+  /// less its expectation for noise; twice the rotor's rate (two blades) is summed in.
+  double excess = std::numeric_limits<double>::quiet_NaN();
+  /// At the rotor's rate alone: square of the amplitude beyond that noise (it may be negative by chance), and variance
+  /// of white noise of the same power as the detuned phases. Units of x².
+  double amplitude2 = std::numeric_limits<double>::quiet_NaN(), floor2 = std::numeric_limits<double>::quiet_NaN();
+  double folded = 0;  ///< where the rate lies after sampling, of the sampling rate, 0 … 1/2
+};
+/// NaN where sampling folds both harmonics next to 0 or half the rate. `phase`: rad at each sample, `t`: s.
+Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
+/// rotor_line().excess.
 double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
 
 }  // namespace backwash::study

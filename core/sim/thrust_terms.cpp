@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/sim/thrust_terms.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/types/geometry.hpp"
+
+namespace backwash::sim {
+namespace {
+
+using Kind = SimulationTerm::Kind;
+
+/// 1 − s (V* − V)/V_m.
+double sagging(const std::vector<double>& x, double t, std::optional<double> voltage) {
+  const double volts = voltage.value_or(x[3] + x[4] * t);
+  return std::clamp(1 - x[0] * (x[1] - volts) / x[2], 0.1, 2.0);
+}
+
+}  // namespace
+
+ThrustTerms::ThrustTerms(std::span<const SimulationTerm> terms) {
+  for (const auto& term : terms) {
+    if (term.kind == Kind::thrust_share || term.kind == Kind::thrust_slope || term.kind == Kind::thrust_with_voltage ||
+        term.kind == Kind::thrust_lag)
+      terms_.push_back(term);
+    if (term.kind == Kind::thrust_lag) lag_ += term.value[0];
+  }
+}
+
+double ThrustTerms::step(double nominal, double t, std::optional<double> voltage, double dt) {
+  double slope = 1, factor = 1;
+  for (const auto& term : terms_) {
+    if (term.kind == Kind::thrust_slope) slope += term.value[0];
+    if (term.kind == Kind::thrust_share) factor *= 1 - term.value[0];
+    if (term.kind == Kind::thrust_with_voltage) factor *= sagging(term.value, t, voltage);
+  }
+  const double wanted = std::max(0.0, factor * (kGravity + slope * (nominal - kGravity)));
+  if (!(lag_ > 0)) return wanted;
+  lagged_ = wanted + std::exp(-dt / lag_) * (lagged_.value_or(wanted) - wanted);
+  return *lagged_;
+}
+
+double setpoint_delay(std::span<const SimulationTerm> terms) {
+  double delay = 0;
+  for (const auto& term : terms)
+    if (term.kind == Kind::setpoint_delay) delay += term.value[0];
+  return delay;
+}
+
+}  // namespace backwash::sim

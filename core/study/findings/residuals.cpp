@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/residuals.hpp"
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include "core/report/page.hpp"
+#include "core/study/findings/page_sections.hpp"
+#include "core/study/inference/rules.hpp"
+
+namespace backwash::study {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// The windows of one flight by the time of their middle.
+using ByTime = std::map<double, std::size_t>;
+
+std::vector<ByTime> by_time(const Observations& seen) {
+  std::vector<ByTime> flights(seen.flights);
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) flights[seen.windows[i].flight][seen.windows[i].t] = i;
+  return flights;
+}
+
+std::optional<std::size_t> nearest(const ByTime& flight, double t) {
+  const auto after = flight.lower_bound(t);
+  std::optional<std::size_t> best;
+  double distance = kRules.window_match;
+  const auto look = [&](auto at) {
+    if (std::abs(at->first - t) <= distance) distance = std::abs(at->first - t), best = at->second;
+  };
+  if (after != flight.end()) look(after);
+  if (after != flight.begin()) look(std::prev(after));
+  return best;
+}
+
+bool both(const Observations& measured, const Told& told, Channel c, std::size_t i) {
+  return measured.weight[c][i] > 0 && std::isfinite(told[c][i]);
+}
+
+/// Measured as dots, simulated as lines.
+tl::expected<std::string, report::PlotError> picture(const Observations& measured, const Told& before,
+                                                     const Told& after, Channel c) {
+  std::ostringstream rows;
+  for (std::size_t i = 0; i < measured.windows.size(); ++i) {
+    if (!both(measured, before, c, i) || !both(measured, after, c, i)) continue;
+    rows << i << ' ' << measured.y[c][i] << ' ' << before[c][i] << ' ' << after[c][i] << '\n';
+  }
+  std::ostringstream script;
+  script << "$rows << EOD\n"
+         << rows.str() << "EOD\nset xlabel 'window, in the order of the flights'\nset ylabel '" << channel_name(c)
+         << (c <= kMeanZ ? ", m/s²" : "") << "'\nset key outside top center horizontal\nset grid\n"
+         << "plot $rows using 1:2 with points pt 7 ps 0.25 lc rgb '#888888' title 'measured', "
+         << "$rows using 1:3 with lines lw 1 lc rgb '#c0561d' title 'simulated before', "
+         << "$rows using 1:4 with lines lw 1 lc rgb '#1f6f9f' title 'simulated after'\n";
+  return report::draw(script.str(), report::Format::svg, 860, 260);
+}
+
+}  // namespace
+
+Told told_of(const Observations& measured, std::span<const Observations> simulated) {
+  Told told;
+  for (auto& channel : told) channel.assign(measured.windows.size(), 0);
+  std::array<std::vector<int>, kChannels> count;
+  for (auto& channel : count) channel.assign(measured.windows.size(), 0);
+  for (const Observations& replica : simulated) {
+    const auto flights = by_time(replica);
+    for (std::size_t i = 0; i < measured.windows.size(); ++i) {
+      const auto& w = measured.windows[i];
+      if (w.flight >= flights.size()) continue;
+      const auto at = nearest(flights[w.flight], w.t);
+      for (std::size_t c = 0; at && c < kChannels; ++c)
+        if (replica.weight[c][*at] > 0) told[c][i] += replica.y[c][*at], count[c][i] += 1;
+    }
+  }
+  for (std::size_t c = 0; c < kChannels; ++c)
+    for (std::size_t i = 0; i < told[c].size(); ++i) told[c][i] = count[c][i] > 0 ? told[c][i] / count[c][i] : kNone;
+  return told;
+}
+
+ChannelError channel_error(const Observations& measured, const Told& told, Channel c, bool about_mean) {
+  double weight = 0, mean = 0, square = 0;
+  ChannelError error;
+  for (std::size_t i = 0; i < measured.windows.size(); ++i) {
+    if (!both(measured, told, c, i)) continue;
+    const double w = measured.weight[c][i], r = measured.y[c][i] - told[c][i];
+    weight += w, mean += w * r, square += w * r * r, ++error.windows;
+  }
+  if (!(weight > 0)) return error;
+  mean /= weight;
+  error.value = std::sqrt(std::max(0.0, square / weight - (about_mean ? mean * mean : 0.0)));
+  return error;
+}
+
+tl::expected<std::string, report::PlotError> residual_section(const Observations& measured, const Told& before,
+                                                              const Told& after) {
+  std::string text =
+      "<section><h2>Simulated beside measured</h2>\n<p>The set-points of these flights, flown by the simulation in the "
+      "air of the model, before the extension and after it; the mean of several flights with other gusts. Errors are "
+      "root mean squares over windows of 2 s.</p>\n";
+  std::string table = "<table>\n", pictures;
+  for (std::size_t k = 0; k < kChannels; ++k) {
+    const auto c = static_cast<Channel>(k);
+    const auto b = channel_error(measured, before, c), a = channel_error(measured, after, c);
+    if (b.windows < 8) continue;
+    table += row(channel_name(c), number(b.value) + " → " + number(a.value));
+    const auto drawn = picture(measured, before, after, c);
+    if (!drawn) return drawn;
+    pictures += *drawn;
+  }
+  return text + table + "</table>\n" + pictures + "</section>\n";
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/config/simulation_terms.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/config/model_table.hpp"
+
+namespace backwash::config {
+namespace {
+
+tl::expected<std::vector<SimulationTerm>, ConfigError> read(const std::string& text) {
+  const auto path = testing::TempDir() + "backwash_simulation_" + std::to_string(getpid()) + ".toml";
+  std::ofstream(path) << text;
+  auto terms = load_simulation(path);
+  std::filesystem::remove(path);
+  return terms;
+}
+
+std::string with(const toml::table& entry) {
+  toml::table term, extension;
+  term.insert("simulation", toml::array(entry));
+  extension.insert("term", toml::array(term));
+  toml::table whole = model_table(Model{});
+  whole.insert("extension", extension);
+  return text_of(whole, {"base", "ground", "corner", "wall", "bound", "extension"});
+}
+
+TEST(SimulationTerms, EveryKindIsReadBackAsItWasWritten) {
+  for (int k = 0; k <= static_cast<int>(SimulationTerm::Kind::rotor_dropout); ++k) {
+    const auto kind = static_cast<SimulationTerm::Kind>(k);
+    const auto table = simulation_table({kind, std::vector<double>(8, 0.25)});
+    const auto found = read(with(table));
+    ASSERT_TRUE(found) << k << ": " << found.error().message;
+    ASSERT_EQ(found->size(), 1u) << k;
+    EXPECT_EQ(found->front().kind, kind);
+    EXPECT_EQ(simulation_table(found->front()), table) << k;
+  }
+}
+
+TEST(SimulationTerms, ThereAreNoneInAPlainModel) { EXPECT_TRUE(load_simulation("builtin:quad-5in")->empty()); }
+
+TEST(SimulationTerms, AWrongEntryIsRefusedByFileLineAndWhatWouldBeRight) {
+  for (const auto& [entry, said] :
+       {std::pair{toml::table{{"kind", "wind"}, {"value", toml::array{1.0}}}, "push_of_heading"},
+        {toml::table{{"kind", "push"}, {"value", toml::array{1.0}}}, "a list of 3"},
+        {toml::table{{"kind", "thrust_lag"}, {"value", toml::array{7.0}}}, "[0, 1]"},
+        {toml::table{{"kind", "thrust_lag"}, {"value", toml::array{0.1}}, {"scale", 1.0}}, "unknown key 'scale'"}}) {
+    const auto found = read(with(entry));
+    ASSERT_FALSE(found) << said;
+    EXPECT_NE(found.error().message.find(said), std::string::npos) << found.error().message;
+    EXPECT_NE(found.error().message.find(".toml:"), std::string::npos) << found.error().message;
+  }
+}
+
+}  // namespace
+}  // namespace backwash::config

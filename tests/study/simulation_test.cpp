@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a study's extension does to the simulation and to flights that it was not fitted to.
+#include "tests/study_worlds/simulation.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+
+#include "core/config/simulation_terms.hpp"
+#include "core/study/findings/extend.hpp"
+#include "core/study/findings/residuals.hpp"
+#include "tests/study_worlds/observe.hpp"
+
+namespace {
+
+using namespace backwash;
+using namespace backwash::study;
+
+const std::filesystem::path& folder() {
+  static const struct Folder {
+    std::filesystem::path path =
+        std::filesystem::temp_directory_path() / ("study-simulation-test-" + std::to_string(::getpid()));
+    ~Folder() { std::filesystem::remove_all(path); }
+  } made;
+  return made.path;
+}
+
+StudyOptions quick() {
+  StudyOptions options;
+  options.minimum_detectable = options.dependence = false;
+  return options;
+}
+
+/// 12 flights of a world to be studied, and 12 further ones.
+struct Halves {
+  Observations fitted, further;
+};
+Halves halves(const std::string& cause, double size, std::uint64_t seed = 4711) {
+  const auto world = study_worlds::draw_world({seed, {cause}, size, 24, ""});
+  const auto flights = study_worlds::fly_all(world);
+  return {study_worlds::observe(world, {flights.begin(), flights.begin() + 12}, folder()),
+          study_worlds::observe(world, {flights.begin() + 12, flights.end()}, folder())};
+}
+
+const NamedCause* named(const StudyResult& result, const std::string& cause) {
+  for (const auto& c : result.causes)
+    if (c.found.form->cause() == cause) return &c;
+  return nullptr;
+}
+
+double mean_square(const Observations& seen, Channel c) {
+  double sum = 0, n = 0;
+  for (std::size_t i = 0; i < seen.windows.size(); ++i)
+    if (seen.weight[c][i] > 0) sum += seen.y[c][i] * seen.y[c][i], n += 1;
+  return sum / n;
+}
+
+TEST(Simulation, EveryFormSaysWhatItAddsToIt) {
+  for (const Form* form : catalogue()) EXPECT_TRUE(form->simulate) << form->formula;
+}
+
+TEST(Simulation, ComesNearerToFurtherFlightsByWhatTheStudyFound) {
+  for (const char* cause : {"payload", "recirculation", "command_latency"}) {
+    const auto proof = study_worlds::prove({.cause = cause, .seed = 4711, .held_out = 3, .replicas = 2}, folder());
+    ASSERT_TRUE(proof.simulated) << cause << ": " << proof.told << proof.refused;
+    EXPECT_LT(proof.after, proof.before) << cause;
+    EXPECT_GT(proof.share, 0.6) << cause << ": " << proof.before << " to " << proof.after;
+  }
+}
+
+TEST(Extension, OfASaggingBatteryHoldsOnFlightsWithOtherVoltages) {
+  auto [fitted, further] = halves("battery_sag", 1.5);
+  const auto result = study::study(fitted, quick());
+  const auto* cause = named(result, "battery_sag");
+  ASSERT_NE(cause, nullptr) << study_worlds::told(result);
+  ASSERT_EQ(cause->found.scale.anchor.size(), 2u);
+  ASSERT_EQ(cause->applied.beside.size(), 1u);
+  EXPECT_EQ(cause->applied.refused, "");
+  EXPECT_GE(cause->applied.coverage_after, cause->applied.coverage_before);
+  // Half of the flights alone: their highest and mean voltage are others.
+  Observations emptier = further;
+  double highest = 0;
+  for (const auto& w : further.windows) highest = std::max(highest, w.voltage);
+  for (std::size_t i = 0; i < further.windows.size(); ++i)
+    if (further.windows[i].voltage > highest - 0.8)
+      for (auto& weight : emptier.weight) weight[i] = 0;
+  const double before = mean_square(emptier, kMeanZ);
+  ASSERT_TRUE(study::apply(terms_of(result), emptier).empty());
+  EXPECT_LT(mean_square(emptier, kMeanZ), 0.5 * before);
+}
+
+TEST(Extension, ThatMakesOtherFlightsLessLikelyIsRefused) {
+  auto seen = halves("payload", 1e-3).fitted;
+  const Form* form = nullptr;
+  for (const Form* f : catalogue())
+    if (f->cause() == "ground_thrust") form = f;
+  const auto columns = form->columns(seen.windows, {0.3});
+  // Every second flight is lifted and the others are pulled: no flight is told by the others.
+  for (std::size_t i = 0; i < seen.windows.size(); ++i)
+    seen.y[kMeanZ][i] += (seen.windows[i].flight % 2 ? 0.4 : -0.4) * columns[0].parts[0].x[i];
+  Evidence evidence(seen);
+  evidence.whiten(columns);
+  SmallVector theta(1);
+  theta << 0.05;
+  const auto applied = judge(evidence, {{form, {0.3}, columns, theta, 0.01, 5, {}, {}}});
+  EXPECT_LT(applied[0].nats, 0);
+  EXPECT_NE(applied[0].refused, "");
+  StudyResult result;
+  result.causes.push_back({{form, {0.3}, columns, theta, 0.01, 5, {{"A_mps2", 0.05, 0, 0.1}}, {}}, {}, {}, applied[0]});
+  EXPECT_TRUE(terms_of(result).empty());
+  EXPECT_TRUE(simulation_of(result, seen).empty());
+  EXPECT_TRUE(extended(Model{}, result, seen).extension.empty());
+}
+
+TEST(HoverShift, IsAsPredictedWithoutAnIntegratorAndRefutedWithOne) {
+  auto seen = halves("payload", 2).fitted;
+  auto result = study::study(seen, quick());
+  const auto* cause = named(result, "payload");
+  ASSERT_NE(cause, nullptr) << study_worlds::told(result);
+  EXPECT_TRUE(cause->shift.tested);
+  EXPECT_FALSE(cause->shift.refuted());
+  EXPECT_NEAR(cause->shift.slope, 1, 0.3);
+  const auto believed = effects_of(*cause, seen);
+  ASSERT_EQ(believed.size(), 1u);
+  EXPECT_GT(std::abs(believed[0].value.z()), 0.05);
+
+  for (auto& w : seen.windows) w.off_W *= 0.1;  // what an integrator leaves of it
+  NamedCause held = *cause;
+  held.shift = check_shift(cause->found, cause->applied.beside, seen);
+  EXPECT_TRUE(held.shift.refuted());
+  const auto doubted = effects_of(held, seen);
+  EXPECT_EQ(doubted[0].value.norm(), 0);
+  EXPECT_NEAR(doubted[0].error.z(), believed[0].error.z() + std::abs(believed[0].value.z()), 1e-12);
+}
+
+TEST(Residuals, AreOfTheSameWindowsAndLeaveOutWhatWasNotSimulated) {
+  Observations measured, replica;
+  measured.flights = replica.flights = 2;
+  const auto add = [](Observations& seen, std::size_t flight, double t, double y) {
+    WindowRow row{};
+    row.flight = flight, row.t = t;
+    seen.windows.push_back(row);
+    for (std::size_t c = 0; c < kChannels; ++c) seen.y[c].push_back(y), seen.weight[c].push_back(1);
+  };
+  add(measured, 0, 1, 5), add(measured, 0, 3, 6), add(measured, 1, 1, 7), add(measured, 1, 9, 8);
+  add(replica, 0, 1.1, 4), add(replica, 0, 2.95, 2), add(replica, 1, 1, 4), add(replica, 1, 8.7, 0);
+  Observations other = replica;
+  for (double& y : other.y[kMeanX]) y += 2;
+  const Told told = told_of(measured, std::vector{replica, other});
+  EXPECT_EQ(told[kMeanX][0], 5);
+  EXPECT_EQ(told[kMeanX][1], 3);
+  EXPECT_EQ(told[kMeanX][2], 5);
+  EXPECT_TRUE(std::isnan(told[kMeanX][3]));  // none within 0.15 s
+  const auto error = channel_error(measured, told, kMeanX);
+  EXPECT_EQ(error.windows, 3u);
+  EXPECT_NEAR(error.value, std::sqrt((0.0 + 9 + 4) / 3), 1e-12);
+  EXPECT_NEAR(channel_error(measured, told, kMeanX, true).value, std::sqrt(13.0 / 3 - 25.0 / 9), 1e-12);
+}
+
+}  // namespace
