@@ -10,6 +10,7 @@
 #include "services/backwashd/parameter_reader.hpp"
 #include "services/backwashd/pilot_reaction.hpp"
 #include "services/backwashd/sender_clock.hpp"
+#include "services/backwashd/service_manager.hpp"
 #include "services/backwashd/switch_reaction.hpp"
 
 namespace backwash::daemon {
@@ -74,8 +75,10 @@ struct Scheduling {
 
 /// Thread body: ticks every 20 ms on the monotonic clock, and listens every 2 ms between ticks. It does not wait for
 /// the port instead: poll() on a terminal waits for the same kernel worker as a read from an empty one
-/// (SerialPort::read). Periods that an overrun has passed are skipped whole and counted; the phase is kept.
-void run_control(Channels& channels, ControlLoop& loop);
+/// (SerialPort::read). Periods that an overrun has passed are skipped whole and counted; the phase is kept. Every
+/// kAliveTicks ticks it tells `manager` that it lives: no other thread does, so a control thread that hangs is noticed.
+void run_control(Channels& channels, ControlLoop& loop, const ServiceManager& manager = {});
+inline constexpr std::uint64_t kAliveTicks = 10;
 
 /// Locks the process's memory, what it has and what it will have. Where RLIMIT_MEMLOCK is finite (and CAP_IPC_LOCK is
 /// not there to lift it) only what it has: with a limit on what it will have, the next large map would be refused its

@@ -17,13 +17,20 @@
 #include "services/backwashd/map_worker.hpp"
 #include "services/backwashd/planner_worker.hpp"
 #include "services/backwashd/process.hpp"
+#include "services/backwashd/service_manager.hpp"
 #include "services/backwashd/signing_time.hpp"
 #include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
 namespace {
 
-constexpr double kToEnd = 10, kToFail = 2, kToRecord = 2, kToSay = 0.5;  // s that threads and lines are waited for
+using namespace std::chrono_literals;
+
+// Whatever is at work, the process is gone 2 s after it was asked to end: the threads have until kToEnd after that, the
+// raw log until kToRecord, the last lines kToSay more.
+constexpr auto kToEnd = 700ms, kToRecord = 1500ms;
+constexpr double kToSay = 0.3;  // s
+constexpr std::uint64_t kTicksToBeReady = kTicksPerSecond / 2;
 
 /// What keeps the daemon from starting, and is not its own fault.
 struct StartError {
@@ -91,8 +98,9 @@ namespace {
 
 /// Everything that runs. What others use comes first.
 struct Flight {
-  explicit Flight(const Settings& s)
+  Flight(const Settings& s, const ServiceManager& m)
       : settings(s),
+        manager(m),
         port(port_at_start(s.daemon.link)),  // first: a start that fails there leaves no log behind
         recorder(made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file); })),
         log(recorder->path()),
@@ -109,6 +117,7 @@ struct Flight {
   }
 
   const Settings& settings;
+  const ServiceManager& manager;
   std::unique_ptr<Channels> channels = std::make_unique<Channels>();
   firmware_bridge::Port port;
   std::unique_ptr<Recorder> recorder;
@@ -147,25 +156,30 @@ void start(Flight& f) {
   if (f.gpio) f.threads.start("gpio", [&] { run_gpio(channels, *f.gpio, reader_priority(daemon)); });
   f.threads.start("control", [&] {
     make_real_time({daemon.control.priority, daemon.control.cpu});
-    run_control(channels, f.loop);
+    run_control(channels, f.loop, f.manager);
     f.link.discard_unsent();
   });
   f.threads.start("reader", [&] { f.front->run_readers(); });
   f.threads.start("map reader", [&] { f.maps->run_readers(); });
-  f.threads.start("link watch", [&] { run_link_watch(channels, daemon.link); });
+  f.threads.start("link watch", [&] { run_link_watch(channels, daemon.link, f.manager); });
 }
 
-/// Waits for the threads and closes the log, with why the flight ended if nobody asked for it. False: a thread hangs.
+/// Waits for the threads and closes the log, with why the flight ended if nobody asked for it. False: a thread is still
+/// at work. It may be left: the control thread sends nothing more after its next tick, the log is closed by a thread of
+/// its own, and the rest (maps, plans, answers) is memory of this process alone.
 bool end(Flight& f) {
+  const auto asked = std::chrono::steady_clock::now();
   f.channels->stop = true;
-  const bool ended = f.threads.join(f.failure.happened() ? kToFail : kToEnd);
+  f.manager.stopping();
+  let_all_run();
+  const bool ended = f.threads.join(asked + kToEnd);
   if (!ended) f.link.discard_unsent();  // of a control thread that hangs
   try {
     if (f.failure.happened()) f.recorder->append(log::RecordKind::failure, f.failure.text());
   } catch (const std::bad_alloc&) {
   }
   f.recorded = true;
-  const bool closed = f.writer.join(kToRecord);
+  const bool closed = f.writer.join(asked + kToRecord);
   if (!closed) f.failure.note("recorder", "the disk does not answer", kInputOutput);
   if (const auto lost = f.recorder->lost() + f.channels->records_lost())
     spdlog::warn("{}: {} records were lost", f.log, lost);
@@ -180,17 +194,22 @@ bool end(Flight& f) {
 
 int run(const Settings& settings) {
   const sigset_t signals = shield_process();
-  const auto sink = LogSink::start(STDERR_FILENO);
+  const auto manager = ServiceManager::of_environment(STDERR_FILENO);
+  const auto sink =
+      LogSink::start(STDERR_FILENO, manager.has_journal() ? LogSink::Head::priority : LogSink::Head::time);
   spdlog::set_default_logger(std::make_shared<spdlog::logger>("backwashd", sink));
   int code = kSoftware;
   try {
-    auto flight = std::make_unique<Flight>(settings);
+    auto flight = std::make_unique<Flight>(settings, manager);
     try {
       start(*flight);
       spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}, raw log {}", settings.vehicle.name,
                    settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space,
                    flight->log);
-      wait_for_end(signals, flight->failure);
+      bool ready = false;  // the first ticks are on time only if the rest has started
+      wait_for_end(signals, flight->failure, [&] {
+        if (!ready && (ready = flight->channels->pulse.ticks >= kTicksToBeReady)) manager.ready();
+      });
     } catch (const std::system_error& e) {
       flight->failure.note("start", e.what(), kSystem);
     }

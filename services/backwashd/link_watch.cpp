@@ -13,10 +13,12 @@ namespace {
 
 using namespace firmware_bridge;
 
-void tell(const ControlEvent& event) {
+void tell(const ControlEvent& event, const ServiceManager& manager) {
   switch (event.kind) {
     case ControlEvent::Kind::transition:
-      return spdlog::info("{}: {}", to_string(event.mode), to_string(event.reason));
+      if (!manager.transition(to_string(event.mode), to_string(event.reason)))
+        spdlog::info("{}: {}", to_string(event.mode), to_string(event.reason));
+      return;
     case ControlEvent::Kind::missed_deadline:
       return spdlog::warn("control deadline missed: {} periods skipped", event.count);
     case ControlEvent::Kind::page_fault:
@@ -61,7 +63,7 @@ tl::expected<LineRate, std::string> configured_line(const decltype(config::Daemo
 }
 
 void LinkWatch::step() {
-  while (const auto event = channels_.events.pop()) tell(*event);
+  while (const auto event = channels_.events.pop()) tell(*event, manager_);
   constexpr std::uint8_t kPortLost = 1 + static_cast<std::uint8_t>(LinkFault::kPortLost);
   const std::uint32_t losses = channels_.port_losses.load(std::memory_order_relaxed);
   const std::uint8_t fault = channels_.link_fault.load(std::memory_order_relaxed);
@@ -82,8 +84,8 @@ void LinkWatch::step() {
   }
 }
 
-void run_link_watch(Channels& channels, const decltype(config::Daemon::link)& link) {
-  LinkWatch watch(channels, link);
+void run_link_watch(Channels& channels, const decltype(config::Daemon::link)& link, const ServiceManager& manager) {
+  LinkWatch watch(channels, link, manager);
   while (!channels.stop) {
     watch.step();
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

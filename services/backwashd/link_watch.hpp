@@ -3,6 +3,7 @@
 
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/backwashd/service_manager.hpp"
 
 namespace backwash::daemon {
 
@@ -16,7 +17,8 @@ tl::expected<firmware_bridge::LineRate, std::string> configured_line(const declt
 /// What the operator is told of the control thread, and the work on its port that must not be done in a tick.
 class LinkWatch {
  public:
-  LinkWatch(Channels& channels, const decltype(config::Daemon::link)& link) : channels_(channels), link_(link) {}
+  LinkWatch(Channels& channels, const decltype(config::Daemon::link)& link, const ServiceManager& manager)
+      : channels_(channels), link_(link), manager_(manager) {}
   /// Logs what the control thread reported, each loss of the port and a link fault that is new, and opens a lost port
   /// again (docs/faults.md rows 17 and 19), one that was lost again between two calls too. To be called a few times a
   /// second.
@@ -25,12 +27,13 @@ class LinkWatch {
  private:
   Channels& channels_;
   decltype(config::Daemon::link) link_;
+  const ServiceManager& manager_;  ///< told each transition
   std::uint8_t fault_ = 0;
   std::uint32_t losses_ = 0;  ///< that were told
   std::uint32_t mended_ = 0;  ///< for which a fresh port was offered: a loss of that one is the next
 };
 
 /// Thread body: step() every 50 ms.
-void run_link_watch(Channels& channels, const decltype(config::Daemon::link)& link);
+void run_link_watch(Channels& channels, const decltype(config::Daemon::link)& link, const ServiceManager& manager);
 
 }  // namespace backwash::daemon

@@ -24,6 +24,22 @@ constexpr auto kPoll = 10ms;
 
 bool printable(char c) { return c >= ' ' && c <= '~'; }
 
+/// As syslog(3) numbers levels.
+int priority_of(spdlog::level::level_enum level) {
+  switch (level) {
+    case spdlog::level::critical:
+      return 2;
+    case spdlog::level::err:
+      return 3;
+    case spdlog::level::warn:
+      return 4;
+    case spdlog::level::info:
+      return 6;
+    default:
+      return 7;
+  }
+}
+
 /// Level and text up to what differs between lines of one kind.
 std::size_t cause_of(spdlog::level::level_enum level, std::string_view text) {
   const auto differs =
@@ -54,10 +70,10 @@ int opened_again(int fd) {
 
 }  // namespace
 
-LogSink::LogSink(int fd) : own_(opened_again(fd)), fd_(own_.get() >= 0 ? own_.get() : fd) {}
+LogSink::LogSink(int fd, Head head) : own_(opened_again(fd)), fd_(own_.get() >= 0 ? own_.get() : fd), head_(head) {}
 
-std::shared_ptr<LogSink> LogSink::start(int fd) {
-  auto sink = std::make_shared<LogSink>(fd);
+std::shared_ptr<LogSink> LogSink::start(int fd, Head head) {
+  auto sink = std::make_shared<LogSink>(fd, head);
   // Owned by its thread too: one that hangs in a write outlives close().
   std::thread([sink] { sink->run(); }).detach();
   return sink;
@@ -94,15 +110,18 @@ void LogSink::log(const spdlog::details::log_msg& message) noexcept {
   ring_.push(line);
 }
 
-std::string LogSink::format(const Line& line) {
+std::string LogSink::format(const Line& line) const {
   const time_t seconds = line.time_ns / 1'000'000'000;
   tm local{};
   ::localtime_r(&seconds, &local);
   char date[32], head[64];
   std::strftime(date, sizeof date, "%Y-%m-%d %H:%M:%S", &local);
   const auto level = spdlog::level::to_string_view(line.level);
-  std::snprintf(head, sizeof head, "[%s.%03d] [%.*s] ", date, static_cast<int>(line.time_ns / 1'000'000 % 1000),
-                static_cast<int>(level.size()), level.data());
+  if (head_ == Head::priority)
+    std::snprintf(head, sizeof head, "<%d>", priority_of(line.level));
+  else
+    std::snprintf(head, sizeof head, "[%s.%03d] [%.*s] ", date, static_cast<int>(line.time_ns / 1'000'000 % 1000),
+                  static_cast<int>(level.size()), level.data());
   std::string text = head + std::string(line.text.data(), line.size);
   if (line.held_back > 0) text += " (and " + std::to_string(line.held_back) + " more of this kind)";
   return text + "\n";

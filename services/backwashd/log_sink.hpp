@@ -26,9 +26,13 @@ class LogSink : public spdlog::sinks::sink {
  public:
   static constexpr std::size_t kLongest = 400, kBurst = 20, kPerSecond = 5, kCapacity = 256;
 
+  /// Each line begins with date, time and level, or, for a journal that keeps them itself, with "<N>", N the level of
+  /// syslog.
+  enum class Head { time, priority };
+
   /// Starts the writing thread. `fd`: usually standard error; it is not changed and not closed.
-  static std::shared_ptr<LogSink> start(int fd);
-  explicit LogSink(int fd);
+  static std::shared_ptr<LogSink> start(int fd, Head head = Head::time);
+  LogSink(int fd, Head head);
 
   /// Of any thread. Lock-free, allocates nothing, calls nothing that waits.
   void log(const spdlog::details::log_msg& message) noexcept override;
@@ -58,12 +62,13 @@ class LogSink : public spdlog::sinks::sink {
   void run();
   bool write(std::string_view text);
   void say_lost(std::uint64_t& told);
-  static std::string format(const Line& line);
+  std::string format(const Line& line) const;
 
   sync::SharedRing<Line, kCapacity> ring_;
   std::array<Cause, 1024> causes_;       // by hash: so many that a flood hardly ever shares one with what matters
   firmware_bridge::FileDescriptor own_;  ///< the same pipe or terminal, opened again: non-blocking for us alone
   int fd_;
+  Head head_;
   std::atomic<std::uint64_t> unwritten_{0};
   std::atomic<bool> closing_{false}, closed_{false}, abandoned_{false};
 };

@@ -23,6 +23,7 @@ namespace {
 // hover map 16.
 constexpr std::size_t kBytesPerVoxel = 115;
 // Resolutions for which the field is known to hold (tests/field, test_resolution_and_yaw), m.
+constexpr int kBelowTheRest = 10;  // niceness
 constexpr double kFinest = 0.02, kCoarsest = 0.2;
 
 // 64-bit FNV-1a.
@@ -63,6 +64,19 @@ map::ScanChange difference(const map::OccupancyGrid& before, const map::Occupanc
   return change;
 }
 
+/// The daemon ends while a world is in the making.
+struct Ended {};
+
+/// run_parallel, given up with Ended as soon as the daemon ends: a world may take minutes.
+plan::Parallel until_the_end(const std::atomic<bool>& stop) {
+  return [&stop](std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
+    run_parallel(count, [&](std::size_t begin, std::size_t end) {
+      if (stop) throw Ended{};
+      work(begin, end);
+    });
+  };
+}
+
 /// As if a scan had found the newly occupied voxels of a whole map.
 NewVoxels as_new_voxels(const map::OccupancyGrid& before, const map::ScanChange& change, std::int64_t received_ns) {
   Scan scan;
@@ -72,6 +86,15 @@ NewVoxels as_new_voxels(const map::OccupancyGrid& before, const map::ScanChange&
 }
 
 }  // namespace
+
+MapWorker::MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
+                     const MapSettings& settings)
+    : channels_(channels),
+      recorder_(recorder),
+      model_(model),
+      vehicle_(vehicle),
+      settings_(settings),
+      parallel_(until_the_end(channels.stop)) {}
 
 MapWorker::~MapWorker() {
   while (const auto scan = channels_.scans.pop()) delete *scan;
@@ -124,10 +147,10 @@ void MapWorker::take_map(const MapMessage& message) {
     const auto change = difference(world_->grid, *grid);
     if (!change.occupied.empty()) channels_.map_voxels.push(as_new_voxels(world_->grid, change, message.received_ns));
     live_.emplace(*grid);
-    publish(plan::update_world(*world_, std::move(*grid), change.box, model_, run_parallel), message.received_ns);
+    publish(plan::update_world(*world_, std::move(*grid), change.box, model_, parallel_), message.received_ns);
   } else {
     live_.emplace(*grid);
-    publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, -1, run_parallel),
+    publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, -1, parallel_),
             message.received_ns);
   }
   ++channels_.maps_accepted;
@@ -158,7 +181,7 @@ bool MapWorker::take_scans() {
     channels_.map_ns.store(received_ns, std::memory_order_relaxed);  // the snapshot says what the scan says
     return true;
   }
-  publish(plan::update_world(*world_, live_->grid(), box, model_, run_parallel), received_ns);
+  publish(plan::update_world(*world_, live_->grid(), box, model_, parallel_), received_ns);
   const Index3 extent = box.high - box.low + Index3::Ones();
   spdlog::debug("map updated in {} x {} x {} voxels in {} ms", extent.x(), extent.y(), extent.z(),
                 (now_ns() - begun) / 1'000'000);
@@ -167,23 +190,29 @@ bool MapWorker::take_scans() {
 
 bool MapWorker::step() {
   const MapMessage* message = channels_.maps.take();
-  if (message) {
-    take_map(*message);
-    channels_.maps.give_back(message);
+  bool scanned = false;
+  try {
+    if (message) take_map(*message);
+    scanned = take_scans();
+  } catch (const Ended&) {  // the old world stays
   }
-  const bool scanned = take_scans();
+  if (message) channels_.maps.give_back(message);
   channels_.worlds.collect();
   return message || scanned;
 }
 
 void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
                     const MapSettings& settings) {
-  // Below everything else in the process, and below the kernel's workers that carry the serial line; inherited by the
-  // threads that build the world.
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
   MapWorker worker(channels, recorder, model, vehicle, settings);
-  while (!channels.stop)
+  bool below = false;
+  while (!channels.stop) {
     if (!worker.step()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    // From the first world on below everything else in the process, and below the kernel's workers that carry the
+    // serial line; inherited by the threads that build worlds. Before it nothing flies, and beside busy processors a
+    // thread so low waits for minutes.
+    if (!below && channels.maps_accepted > 0)
+      below = setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kBelowTheRest) == 0;
+  }
 }
 
 }  // namespace backwash::daemon

@@ -20,13 +20,12 @@ namespace backwash::daemon {
 class MapWorker {
  public:
   MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
-            const MapSettings& settings)
-      : channels_(channels), recorder_(recorder), model_(model), vehicle_(vehicle), settings_(settings) {}
+            const MapSettings& settings);
   ~MapWorker();
   MapWorker(const MapWorker&) = delete;
   MapWorker& operator=(const MapWorker&) = delete;
 
-  /// Takes what has arrived; false if nothing had.
+  /// Takes what has arrived; false if nothing had. A world in the making is given up when the daemon ends.
   bool step();
 
  private:
@@ -40,6 +39,7 @@ class MapWorker {
   Model model_;
   Vehicle vehicle_;
   MapSettings settings_;
+  plan::Parallel parallel_;
   std::optional<MapWriter> writer_;  // of the maps in use
   std::optional<map::LiveMap> live_;
   std::shared_ptr<const plan::World> world_;

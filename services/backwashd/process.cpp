@@ -4,12 +4,15 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 namespace backwash::daemon {
@@ -22,7 +25,7 @@ std::atomic<Failure*> failure_of_process{nullptr};
 
 // The thread cannot go on and cannot be left: its frames may hold what others use.
 [[noreturn]] void stay() noexcept {
-  constexpr unsigned kClosing = 5;  // s; SIGALRM ends the process if main cannot
+  constexpr unsigned kClosing = 2;  // s; SIGALRM ends the process if main cannot
   ::alarm(kClosing);
   for (;;) ::pause();
 }
@@ -77,10 +80,9 @@ void Threads::start(const char* name, std::function<void()> body) {
   }
 }
 
-bool Threads::join(double most_s) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(most_s);
+bool Threads::join(std::chrono::steady_clock::time_point latest) {
   while (running_ > 0) {
-    if (std::chrono::steady_clock::now() > end) return false;
+    if (std::chrono::steady_clock::now() > latest) return false;
     std::this_thread::sleep_for(1ms);
   }
   for (std::thread& thread : threads_)
@@ -102,6 +104,14 @@ sigset_t shield_process() {
   return set;
 }
 
+void let_all_run() {
+  std::error_code none;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", none)) {
+    const auto thread = static_cast<id_t>(std::strtoul(task.path().filename().c_str(), nullptr, 10));
+    if (::getpriority(PRIO_PROCESS, thread) > 0) ::setpriority(PRIO_PROCESS, thread, 0);
+  }
+}
+
 CatchTheRest::CatchTheRest(Failure& failure) {
   failure_of_process = &failure;
   std::set_terminate(on_terminate);
@@ -114,10 +124,11 @@ CatchTheRest::~CatchTheRest() {
   failure_of_process = nullptr;
 }
 
-void wait_for_end(const sigset_t& signals, const Failure& failure) {
-  const timespec look{0, 50'000'000};
+void wait_for_end(const sigset_t& signals, const Failure& failure, const std::function<void()>& look) {
+  const timespec between{0, 50'000'000};
   while (!failure.happened()) {
-    const int signal = sigtimedwait(&signals, nullptr, &look);
+    look();
+    const int signal = sigtimedwait(&signals, nullptr, &between);
     if (signal == SIGHUP)
       spdlog::warn("SIGHUP: ignored, a flight does not end with its terminal; SIGTERM or SIGINT ends the daemon");
     else if (signal > 0)

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <string>
 #include <thread>
@@ -46,8 +47,8 @@ class Threads {
 
   /// `name`: a literal. Throws std::system_error if the system has no thread left.
   void start(const char* name, std::function<void()> body);
-  /// Waits until all have ended, at most `most_s` seconds. False: one hangs.
-  bool join(double most_s);
+  /// Waits until all have ended, at most until `latest`. False: one is still at work.
+  bool join(std::chrono::steady_clock::time_point latest);
 
  private:
   Failure& failure_;
@@ -64,7 +65,7 @@ class Threads {
 sigset_t shield_process();
 
 /// While it lives std::terminate and abort (libraries without exceptions: no memory) end in `failure` too: the calling
-/// thread stays where it is, the others are ended in order, and the process after 5 s in any case. One at a time.
+/// thread stays where it is, the others are ended in order, and the process after 2 s in any case. One at a time.
 class CatchTheRest {
  public:
   explicit CatchTheRest(Failure& failure);
@@ -73,7 +74,13 @@ class CatchTheRest {
   CatchTheRest& operator=(const CatchTheRest&) = delete;
 };
 
+/// Gives every thread of ordinary scheduling niceness 0 where that is allowed: a thread ends, or is ended, only when it
+/// runs, and one of low priority runs seldom beside busy processors.
+void let_all_run();
+
 /// Returns on SIGINT, SIGTERM, SIGQUIT or a failure. SIGHUP is told and ignored: a flight does not end with a terminal.
-void wait_for_end(const sigset_t& signals, const Failure& failure);
+/// Calls `look` every 50 ms.
+void wait_for_end(
+    const sigset_t& signals, const Failure& failure, const std::function<void()>& look = [] {});
 
 }  // namespace backwash::daemon

@@ -47,9 +47,12 @@ void lock_memory() {
   ::getrlimit(RLIMIT_MEMLOCK, &limit);
   const bool finite = limit.rlim_cur != RLIM_INFINITY && !may_lock_beyond_limit();
   const bool locked = mlockall(finite ? MCL_CURRENT : MCL_CURRENT | MCL_FUTURE) == 0;
-  if (finite) {
-    spdlog::warn("RLIMIT_MEMLOCK is {} KiB: {}; page faults may delay ticks; set LimitMEMLOCK=infinity",
-                 limit.rlim_cur / 1024, locked ? "memory for later maps is not locked" : "memory is not locked");
+  if (finite && locked) {
+    spdlog::info("RLIMIT_MEMLOCK is {} KiB: memory for later maps is not locked; let the machine have no swap",
+                 limit.rlim_cur / 1024);
+  } else if (finite) {
+    spdlog::warn("RLIMIT_MEMLOCK is {} KiB: memory is not locked, page faults may delay ticks; raise LimitMEMLOCK",
+                 limit.rlim_cur / 1024);
   } else if (!locked) {
     spdlog::warn("memory is not locked ({}): page faults may delay ticks; grant CAP_IPC_LOCK or LimitMEMLOCK",
                  std::strerror(errno));
@@ -75,7 +78,7 @@ void make_real_time(const Scheduling& scheduling) {
   }
 }
 
-void run_control(Channels& channels, ControlLoop& loop) {
+void run_control(Channels& channels, ControlLoop& loop, const ServiceManager& manager) {
   std::int64_t due = now_ns() + kPeriod_ns;
   while (!channels.stop) {
     // What falls behind is left out: the tick reads the port itself.
@@ -89,6 +92,7 @@ void run_control(Channels& channels, ControlLoop& loop) {
     const std::int64_t missed = (woken - due) / kPeriod_ns;
     due += missed * kPeriod_ns;
     loop.tick(woken, static_cast<int>(missed), static_cast<double>(woken - due) * 1e-3);
+    if (loop.view().ticks % kAliveTicks == 0) manager.alive();
     loop.took(static_cast<double>(now_ns() - woken) * 1e-3);
     due += kPeriod_ns;
   }

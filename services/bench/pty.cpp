@@ -35,6 +35,9 @@ Pty::~Pty() {
 }
 
 std::vector<std::uint8_t> Pty::read() {
+  // A companion that is killed leaves its claim on the line behind: a real port drops it with the last descriptor, but
+  // here one stays open, and who is not root would find the line busy for ever.
+  ioctl(other_, TIOCNXCL);
   // A read from an empty terminal would wait for a kernel worker of ordinary priority (see SerialPort::read).
   int at_hand = 0;
   if (ioctl(fd_, FIONREAD, &at_hand) != 0 || at_hand <= 0) return {};

@@ -25,6 +25,7 @@ mavlink::Heartbeat heartbeat(bool armed, std::uint32_t custom_mode) {
           .mavlink_version = 3};
 }
 constexpr std::uint32_t kOffboard = 6u << 16, kReturn = 4u << 16 | 5u << 24;
+const ServiceManager kNobody;
 
 // But for odometry, which is a sensor and no command.
 int frames_out(const Lockstep& rig, std::size_t from) {
@@ -67,7 +68,7 @@ decltype(config::Daemon::link) serial(const std::string& path) {
 TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
-  LinkWatch watch(channels, serial(line.path()));
+  LinkWatch watch(channels, serial(line.path()), kNobody);
   watch.step();
   EXPECT_EQ(channels.ports.take(), nullptr);
   channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
@@ -88,7 +89,7 @@ TEST(Row17, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
   auto channels = std::make_unique<Channels>();
   firmware_bridge::AutopilotLink link(firmware_bridge::ClosedPort{}, std::uint8_t{1}, firmware_bridge::Time{});
   ControlLoop loop(*channels, link, vehicle_5in(), 0.15);
-  LinkWatch watch(*channels, serial(path));
+  LinkWatch watch(*channels, serial(path), kNobody);
   const auto together = [&](std::int64_t t_ns) {
     loop.tick(t_ns, 0, 0);
     watch.step();
@@ -118,7 +119,7 @@ TEST(Row17, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
 
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
-  LinkWatch watch(channels, serial(line.path()));
+  LinkWatch watch(channels, serial(line.path()), kNobody);
   for (std::uint32_t losses = 1; losses <= 3; ++losses) {
     channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
     channels.port_losses = losses;

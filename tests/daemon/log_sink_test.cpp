@@ -68,6 +68,22 @@ TEST(Row44LogSink, WritesTimeLevelAndTextInOrder) {
   EXPECT_THAT(said, HasSubstr("] [error] second\n"));
 }
 
+TEST(Row44LogSink, AJournalGetsTheLevelAsItsPriorityAndNoTime) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const auto sink = LogSink::start(ends[1], LogSink::Head::priority);
+  spdlog::logger logger("test", sink);
+  logger.critical("a");
+  logger.error("b");
+  logger.warn("c");
+  logger.info("d");
+  sink->close(2);
+  char bytes[64] = {};
+  EXPECT_EQ(::read(ends[0], bytes, sizeof bytes), 20);
+  EXPECT_STREQ(bytes, "<2>a\n<3>b\n<4>c\n<6>d\n");
+  for (const int end : ends) ::close(end);
+}
+
 TEST(Row44LogSink, AStalledTerminalDelaysNobodyAndTheLossIsSaidWhenItIsReadAgain) {
   Terminal t;
   t.stall();

@@ -51,6 +51,22 @@ class MapWorkerTest : public testing::Test {
   }
 };
 
+// Building one takes minutes where the map is large and the processor busy.
+TEST_F(MapWorkerTest, AWorldInTheMakingIsGivenUpWhenTheDaemonEnds) {
+  channels_->stop = true;
+  send(grid_);
+  EXPECT_EQ(world(), nullptr);
+  EXPECT_EQ(channels_->maps_accepted, 0u);
+  channels_->stop = false;
+  send(grid_);
+  const plan::World* whole = world();
+  ASSERT_NE(whole, nullptr);
+  channels_->stop = true;
+  grid_.set(grid_.index({0, 0, 1}), map::Cell::occupied);
+  send(grid_);
+  EXPECT_EQ(world(), whole) << "the old world stays";
+}
+
 TEST_F(MapWorkerTest, InOneTermMapsAreTakenOfTheFirstWriterWhoseMapWasGood) {
   const auto send_from = [&](std::uint32_t term, std::uint8_t writer, std::vector<std::int8_t> data) {
     auto message = MapMessage{std::move(data), grid_.resolution(), true, "OcTree", 1};

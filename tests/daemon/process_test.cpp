@@ -25,6 +25,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
+std::chrono::steady_clock::time_point after(std::chrono::nanoseconds time) {
+  return std::chrono::steady_clock::now() + time;
+}
+
 /// What `body` returns in a process of its own; 1000 + N: signal N killed it.
 template <typename Body>
 int in_a_process(Body&& body) {
@@ -46,7 +50,7 @@ TEST(Row50, AnExceptionInAThreadEndsTheOthersAndKeepsItsNameAndText) {
   EXPECT_EQ(failure.text(), "");
   EXPECT_EQ(failure.code(), 0);
   threads.start("planner", [] { throw std::runtime_error("no such primitive"); });
-  EXPECT_TRUE(threads.join(10));
+  EXPECT_TRUE(threads.join(after(10s)));
   EXPECT_TRUE(stop);
   EXPECT_EQ(failure.text(), "planner: no such primitive");
   EXPECT_EQ(failure.code(), 70);
@@ -63,9 +67,30 @@ TEST(Row50, AFailedAllocationAndAThrownNumberAreFailuresToo) {
       if (memory) static_cast<void>(std::vector<double>(std::size_t{1} << 58));
       throw 42;
     });
-    EXPECT_TRUE(threads.join(10));
+    EXPECT_TRUE(threads.join(after(10s)));
     EXPECT_EQ(failure.text(), memory ? "map worker: std::bad_alloc" : "map worker: an exception of unknown type");
   }
+}
+
+// Beside busy processors a thread of niceness 10 may not run for seconds, not even to be ended.
+TEST(Ending, EveryThreadIsGivenOrdinaryPriorityWhereAllowed) {
+  const int code = in_a_process([] {
+    std::atomic<pid_t> low{0};
+    std::thread([&] {
+      ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), 10);
+      low = ::gettid();
+      ::pause();
+    }).detach();
+    while (low == 0) std::this_thread::sleep_for(1ms);
+    rlimit limit{};
+    ::getrlimit(RLIMIT_NICE, &limit);
+    if (::geteuid() != 0 && limit.rlim_cur < 20) return 100;
+    const bool was_low = ::getpriority(PRIO_PROCESS, static_cast<id_t>(low)) == 10;
+    let_all_run();
+    return was_low && ::getpriority(PRIO_PROCESS, static_cast<id_t>(low)) == 0 ? 5 : 1;
+  });
+  if (code == 100) GTEST_SKIP() << "RLIMIT_NICE does not allow it";
+  EXPECT_EQ(code, 5);
 }
 
 TEST(Row50, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
@@ -74,7 +99,7 @@ TEST(Row50, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
     Failure failure(stop);
     Threads threads(failure);
     threads.start("status", [] { ::pause(); });
-    return threads.join(0.05) ? 1 : (::_exit(7), 0);
+    return threads.join(after(50ms)) ? 1 : (::_exit(7), 0);
   });
   EXPECT_EQ(code, 7);
 }
@@ -96,7 +121,7 @@ TEST(Row50, TerminateAndAbortInAThreadLeaveTheOthersToCloseDown) {
       const bool right = failure.text() ==
                          (aborts ? "abort: a library gave up"
                                  : "terminate: vector::_M_range_check: __n (which is 7) >= this->size() (which is 0)");
-      ::_exit(stop && right && !threads.join(0.05) ? failure.code() : 1);
+      ::_exit(stop && right && !threads.join(after(50ms)) ? failure.code() : 1);
       return 0;
     });
     EXPECT_EQ(code, 70) << (aborts ? "abort" : "terminate");
