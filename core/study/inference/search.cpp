@@ -221,7 +221,9 @@ std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Co
   if (!smooths) return all;
   for (const auto& along : regressors(seen)) {
     for (const auto& [name, channels] : channel_groups()) {
-      Candidate c{nullptr, along.name, {}, smooth_columns(along, seen.windows, channels), {}, 0, {}};
+      Candidate c;
+      c.name = along.name;
+      c.columns = smooth_columns(along, seen.windows, channels);
       auto nuisance = offsets(c.columns, seen);
       nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
       add(std::move(c), nuisance);
