@@ -29,6 +29,14 @@ std::optional<Vec3> variances(const double* covariance, std::size_t first) {
   return v;
 }
 
+/// Whose odometry has these frames; empty: nobody's that is known.
+std::string looks_like(const std::string& frame, const std::string& child) {
+  for (const auto& p : config::odometry_profiles())
+    if (p.frame == frame && p.child == child)
+      return " (this looks like " + std::string(p.told) + ": odometry.profile = \"" + std::string(p.name) + "\")";
+  return "";
+}
+
 }  // namespace
 
 tl::unexpected<std::string> wrong_frame(const std::string& what, const std::string& frame, const std::string& right) {
@@ -48,9 +56,11 @@ Localization::Localization(const config::Daemon& config, double max_sigma)
 
 tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odometry& m, std::int64_t received_ns) {
   const std::string frame = text(m.header.frame_id), child = text(m.child_frame_id);
-  if (child != told_.child) return wrong_frame("the twist of the odometry", child, "'" + told_.child + "'");
+  if (child != told_.child)
+    return wrong_frame("the twist of the odometry", child, "'" + told_.child + "'" + looks_like(frame, child));
   if (frame != frames_.map && frame != frames_.odometry)
-    return wrong_frame("the odometry", frame, "'" + frames_.map + "' or '" + frames_.odometry + "'");
+    return wrong_frame("the odometry", frame,
+                       "'" + frames_.map + "' or '" + frames_.odometry + "'" + looks_like(frame, child));
   if (frame == frames_.odometry && !map_from_odom_)
     return tl::unexpected<std::string>("odometry in frame '" + frame + "' before the first loop_closure from it to '" +
                                        frames_.map + "'");

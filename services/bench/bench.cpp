@@ -141,6 +141,13 @@ class Faults {
 std::optional<Bytes> some(Bytes bytes) { return bytes.empty() ? std::nullopt : std::optional(std::move(bytes)); }
 
 /// The emulated controller, VIO and mapper, a millisecond a step.
+/// Null: none is named.
+const config::OdometryProfile* profile(std::string_view name) {
+  const auto all = config::odometry_profiles();
+  const auto found = std::ranges::find(all, name, &config::OdometryProfile::name);
+  return found == all.end() ? nullptr : &*found;
+}
+
 class Bench {
  public:
   Bench(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle)
@@ -193,7 +200,7 @@ class Bench {
     std::optional<VioSample> sample;
     if (n % kOdometryEvery == 0 && !passed(o_.stop_odometry_s, t)) sample = {estimate, autopilot_->attitude(), t};
     for (const VioSample& s : faults_.odometry.pass(sample, timeline_t))
-      odometry_writer_.write(odometry(s, o_.drift.has_value()));
+      odometry_writer_.write(estimator_ ? odometry(s, *estimator_) : odometry(s, o_.drift.has_value()));
     if (n % 20 == 0) log_.row(t, *autopilot_, estimate);
   }
 
@@ -211,7 +218,7 @@ class Bench {
   void send_map(std::optional<MapMessage> in, double timeline_t) {
     for (const MapMessage& m : faults_.maps.pass(std::move(in), timeline_t)) {
       std::vector<std::int8_t> data;
-      const dds::Octomap message = octomap(m.grid, data);
+      const dds::Octomap message = octomap(m.grid, data, map_frame_);
       if (m.garbage) std::ranges::generate(data, [&] { return static_cast<std::int8_t>(noise_()); });
       map_writer_.write(message);
     }
@@ -236,6 +243,8 @@ class Bench {
   bool passed(const std::optional<double>& s, double t) const { return s && armed_at_ && t - *armed_at_ > *s; }
 
   const Options& o_;
+  const config::OdometryProfile* estimator_ = profile(o_.estimator);
+  const std::string map_frame_ = estimator_ ? std::string(estimator_->frame) : "map";
   const map::OccupancyGrid& grid_;
   const map::OccupancyGrid known_;
   std::unique_ptr<Autopilot> autopilot_;

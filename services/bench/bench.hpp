@@ -35,6 +35,9 @@ struct Options {
   /// The VIO has drifted by −drift before the flight: odometry comes in the frame odom, and a loop closure, map ← odom,
   /// brings it to light at the event, m.
   std::optional<Vec3> drift;
+  /// As which estimator of config::odometry_profiles() the odometry is filled, with the map in its frame; empty: in
+  /// `map`, as the message's definition says.
+  std::string estimator;
   Timeline timeline;
   double event_x = 0;  ///< the event: the armed vehicle has passed this x of the map, m
 };

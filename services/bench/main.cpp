@@ -60,6 +60,11 @@ void add_faults(CLI::App& app, Given& given) {
       ->capture_default_str();
   app.add_option("--faults", given.timeline,
                  "timeline of faults and of what the flight shall keep, TOML; services/bench/README.md");
+  std::vector<std::string> estimators;
+  for (const auto& profile : backwash::config::odometry_profiles())
+    if (!profile.child.empty()) estimators.emplace_back(profile.name);
+  app.add_option("--estimator", given.options.estimator, "the odometry as this one fills it, and the map in its frame")
+      ->check(CLI::IsMember(estimators));
   app.add_option("--parameter", given.parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
   app.add_option(
          "--hide", given.hidden,

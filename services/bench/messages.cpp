@@ -6,8 +6,8 @@
 
 namespace backwash::bench {
 
-dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& data) {
-  static const std::string frame = "map", id = "OcTree";
+dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& data, const std::string& frame) {
+  static const std::string id = "OcTree";
   data = map::encode_octomap(grid);
   dds::Octomap m{};
   m.header.frame_id = dds::c_string(frame);
@@ -41,6 +41,17 @@ dds::Odometry odometry(const VioSample& sample, bool drifting) {
   m.pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
   const Vec3 v_B = q.conjugate() * estimate.v_W;
   m.twist.twist.linear = {v_B.x(), v_B.y(), v_B.z()};
+  return m;
+}
+
+dds::Odometry odometry(const VioSample& sample, const config::OdometryProfile& profile) {
+  dds::Odometry m = odometry(sample, false);
+  const auto text = [](std::string_view view) { return const_cast<char*>(view.data()); };
+  m.header.frame_id = text(profile.frame);
+  m.child_frame_id = text(profile.child);
+  const Vec3& v_W = sample.estimate.v_W;
+  if (profile.twist == config::Twist::world) m.twist.twist.linear = {v_W.x(), v_W.y(), v_W.z()};
+  if (profile.twist == config::Twist::none) m.twist.twist.linear = {0, 0, 0};
   return m;
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "core/config/odometry_profile.hpp"
 #include "services/bench/faults.hpp"
 #include "services/dds/topics.hpp"
 
@@ -11,13 +13,15 @@ namespace backwash::bench {
 
 // What the bench publishes. Strings are literals, and live as long as the program.
 
-/// A whole OcTree in frame `map`. `data` holds its bytes; the message points into it.
-dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& data);
+/// A whole OcTree in a frame. `data` holds its bytes; the message points into it and into `frame`.
+dds::Octomap octomap(const map::OccupancyGrid& grid, std::vector<std::int8_t>& data, const std::string& frame);
 
 /// map <- odom, a translation (m) at `t` (s).
 dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t);
 
 /// Pose in `odom` if the VIO drifts, else in `map`; twist in the body.
 dds::Odometry odometry(const VioSample& sample, bool drifting);
+/// The same as an estimator fills it; the message points into `profile`, whose names end with a 0.
+dds::Odometry odometry(const VioSample& sample, const config::OdometryProfile& profile);
 
 }  // namespace backwash::bench

@@ -28,6 +28,7 @@ namespace backwash::autopilots {
 namespace {
 
 volatile std::sig_atomic_t stopped = 0;
+const std::string kMap = "map";
 
 struct Options {
   std::string truth, map, vehicle, log;
@@ -86,7 +87,7 @@ class Vio {
     if (!grid) throw std::runtime_error(grid.error().message);
     return std::move(*grid);
   }
-  void publish_map() { map_.write(bench::octomap(grid_, map_data_)); }
+  void publish_map() { map_.write(bench::octomap(grid_, map_data_, kMap)); }
 
   /// A simulator that has gone may come back with its autopilot, its vehicle where it first stood.
   std::optional<Truth> newest() {

@@ -58,7 +58,8 @@ TEST(Localization, RefusesFramesThatItDoesNotKnowAndNamesThem) {
   const auto other = l.odometry(odometry(kOther, kZero), 0);
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().find("'camera'"), std::string::npos);
-  const std::string hostile = "\x1b[2J\nbackwashd: all is well" + std::string(10'000, 'x');
+  std::string hostile = "\x1b[2J\nbackwashd: all is well";
+  hostile.resize(10'000, 'x');
   const auto cut = l.odometry(odometry(hostile, kZero), 0);
   ASSERT_FALSE(cut);
   EXPECT_LT(cut.error().size(), 400u);
@@ -123,6 +124,16 @@ config::Daemon told(config::Twist twist, const Vec3& sensor_B = kZero, const Vec
   d.odometry.sensor_B = sensor_B;
   d.odometry.sensor_turned = turned;
   return d;
+}
+
+TEST(Localization, WhoseFramesTheyAreIsSaid) {
+  auto l = localization();
+  const std::string child = "body";
+  auto m = odometry("camera_init", kZero);
+  m.child_frame_id = dds::c_string(child);
+  const auto refused = l.odometry(m, 0);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().find("FAST-LIO: odometry.profile = \"fast_lio\""), std::string::npos) << refused.error();
 }
 
 TEST(Localization, ATwistInTheFrameOfThePoseIsNotTurned) {

@@ -82,11 +82,11 @@ struct WindowRow {
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
   double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
   double temperature;
-  Place around;             ///< of p_W
-  std::vector<Place> path;  ///< of points along the window; empty where it is one place
-  Vec3 give;                ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
-  Vec3 off_W;               ///< measured place less p_W, m; 0 where p_W is measured
-  Vec3 sigma;               ///< modelled variance per axis, (m/s²)²
+  Place around;               ///< of p_W
+  std::vector<Place> path;    ///< of points along the window; empty where it is one place
+  Vec3 give = Vec3::Zero();   ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m; 0 where p_W is measured
+  Vec3 sigma;                 ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   /// Design of kThrustDelay and kThrustSlope: of (delay, slope).

@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Odometry as estimators really fill it (docs/faults.md row 53). A daemon that is told who it is flies: VINS-Fusion's twist is
+# in the frame of the pose, FAST-LIO's is zero. One that takes FAST-LIO for an estimator by the letter enables nothing.
+#   daemon_estimators.sh SOURCE_DIR BUILD_DIR
+set -euo pipefail
+source_dir=$1 build=$2
+source "$source_dir/services/bench/session.sh"
+status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json" 2>>"$log"; }
+
+# flies PROFILE FRAME: takes off and goes 3 m, every sample inside its set.
+flies() {
+  rm -f "$work/autopilot"
+  start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --estimator "$1"
+  more_tables=$(printf '[odometry]\nprofile = "%s"\n[frames]\nmap = "%s"' "$1" "$2")
+  start_daemon builtin:quad-5in "$work/$1.bwlog"
+  enable
+  ctl takeoff --height 1.2 --wait
+  ctl goto 1 0 1.2 --wait
+  status "$1"
+  ctl land --wait
+  stop
+  python3 - "$work/$1.json" "$1" <<'PYTHON'
+import json, sys
+s = json.load(open(sys.argv[1]))
+off = max(abs(a - b) for a, b in zip(s["position"], (1, 0, 1.2)))
+print(f"{sys.argv[2]}: {s['samples_inside']} samples inside, {s['samples_outside']} outside, {off:.3f} m off the goal")
+assert s["samples_inside"] > 100 and s["samples_outside"] == 0 and off < 0.15, s
+PYTHON
+}
+
+flies vins_fusion world
+flies fast_lio camera_init
+
+rm -f "$work/autopilot"
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --estimator fast_lio
+more_tables=$(printf '[odometry]\nprofile = "ros"\n[frames]\nmap = "camera_init"\nbody = "base_link"')
+write_configuration builtin:quad-5in "$work/wrong.bwlog"
+"$bin/backwashd" --config "$work/backwashd.toml" >>"$log" 2>&1 &
+daemon_pid=$!
+sleep 3
+status wrong
+python3 - "$work/wrong.json" <<'PYTHON'
+import json, sys
+s = json.load(open(sys.argv[1]))
+print("by the letter:", s["refused"])
+assert "'body'" in s["refused"] and "fast_lio" in s["refused"], s["refused"]
+PYTHON
