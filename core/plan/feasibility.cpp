@@ -12,10 +12,20 @@
 namespace backwash::plan {
 namespace {
 
+constexpr double kClearanceCap = 1.0;  // m, as hover_set's
+
 /// Clearance of the hover set at a voxel's centre, m.
 double clearance(const World& world, const Index3& v) {
   const Vec3 p_W = world.grid.center(v);
   return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin).clearance;
+}
+
+/// At least the clearance of the hover set at a voxel's centre, without looking for obstacles: the set holds a point no
+/// farther from the centre than a mean push shifts it, and with `distance` single precision.
+double clearance_at_most(const World& world, const Index3& v) {
+  const auto& vehicle = world.reach.vehicle;
+  if (!world.bounds.extension().none()) return kClearanceCap;
+  return std::min(kClearanceCap, world.distance.at(v) + 1e-5 - vehicle.body.radius - vehicle.estimation.position);
 }
 
 const std::array<Index3, 6> kNeighbours = {Index3{1, 0, 0},  Index3{-1, 0, 0}, Index3{0, 1, 0},
@@ -36,9 +46,11 @@ Region flood(const World& world, std::size_t seed, int number, std::vector<int>&
     const Vec3 p = grid.center(v);
     region.voxels += 1;
     region.low_W = region.low_W.cwiseMin(p - half), region.high_W = region.high_W.cwiseMax(p + half);
-    if (const double c = clearance(world, v); c > region.widest_clearance_m) {
-      region.widest_clearance_m = c;
-      region.widest_W = p;
+    if (clearance_at_most(world, v) > region.widest_clearance_m) {
+      if (const double c = clearance(world, v); c > region.widest_clearance_m) {
+        region.widest_clearance_m = c;
+        region.widest_W = p;
+      }
     }
     for (const auto& step : kNeighbours) {
       const Index3 next = v + step;
@@ -129,7 +141,6 @@ std::optional<Bottleneck> widest_way(const World& world, const Vec3& from_W, con
 SetCost cost_of_set(const World& world) {
   const auto& [grid, reach] = std::tie(world.grid, world.reach);
   const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
-  constexpr double kCap = 1.0;  // m, as hover_set's
   SetCost cost;
   std::vector<double> given_up;
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
@@ -137,12 +148,16 @@ SetCost cost_of_set(const World& world) {
     const Index3 v = grid.voxel(n);
     PerDirection h = world.bounds.at(v).w;
     for (std::size_t d = 0; d < kDirections; ++d) h[d] *= d == kZ ? reach.vertical.h_inf : reach.horizontal.h_inf;
-    const double at_centre = reach::prism_distance(grid, grid.center(v), h, kCap + taken) - taken;
+    // The prism holds its centre, so it is no farther from obstacles, and no nearer than its circumradius makes it.
+    const double free = world.distance.at(n), circumradius = Vec3(h[kX], h[kY], h[kZ]).norm();
+    const double limit = std::min(kClearanceCap + taken, free + 1e-5);
+    const bool far = free - 1e-5 - circumradius >= kClearanceCap + taken;
+    const double at_centre = far ? kClearanceCap : reach::prism_distance(grid, grid.center(v), h, limit) - taken;
     if (!(at_centre > 0)) continue;
     ++cost.safe_at_centre;
     if (!world.hover.safe(v)) {
       ++cost.lost;
-    } else if (at_centre < kCap) {
+    } else if (at_centre < kClearanceCap) {
       given_up.push_back(at_centre - clearance(world, v));
     }
   }
@@ -153,6 +168,17 @@ SetCost cost_of_set(const World& world) {
   return cost;
 }
 
+namespace {
+
+/// Whether the set's clearance is positive. A world by sets of method tight knows it; else it is looked for.
+bool safe_by_sets(const World& world, const reach::HoverSet& set, const Index3& v) {
+  if (world.constant_margin < 0 && world.reach.method == reach::Method::tight) return world.hover.safe(v);
+  return set.bounded &&
+         reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v)).safe();
+}
+
+}  // namespace
+
 std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m) {
   const auto& [grid, reach] = std::tie(world.grid, world.reach);
   const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
@@ -160,14 +186,16 @@ std::vector<AgainstMargin> set_against_margins(const World& world, const std::ve
   for (const double margin : margins_m) result.push_back({margin});
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     if (grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
-    const auto set = reach::hover_set(reach, grid, world.distance, world.bounds, grid.center(grid.voxel(n)));
+    const Index3 v = grid.voxel(n);
+    const auto set = reach::hover_extent(reach, grid, world.distance, world.bounds, grid.center(v));
+    const bool set_safe = safe_by_sets(world, set, v);
     const auto& h = set.half_widths;
     const double nearest = std::ranges::min(h), corner = Vec3(h[kX], h[kY], h[kZ]).norm();  // at least the farthest
     for (auto& against : result) {
       ++against.voxels;
       const bool ball_safe = world.distance.at(n) > taken + against.margin_m;
-      against.only_ball_safe += ball_safe && !set.safe();
-      against.only_set_safe += set.safe() && !ball_safe;
+      against.only_ball_safe += ball_safe && !set_safe;
+      against.only_set_safe += set_safe && !ball_safe;
       if (!set.bounded) {
         ++against.unbounded;
       } else {
@@ -190,7 +218,7 @@ std::optional<HoverPair> farthest_pair(const World& world, const Regions& region
       std::optional<Vec3> best;
       for (int k = 0; k < grid.size().z(); ++k) {
         const Index3 v(i, j, k);
-        if (regions.of_voxel[grid.linear(v)] != 0) continue;
+        if (regions.of_voxel[grid.linear(v)] != 0 || (best && clearance_at_most(world, v) <= widest)) continue;
         const double c = clearance(world, v);
         if (!best || c > widest) widest = c, best = grid.center(v);
       }

@@ -39,10 +39,11 @@ struct SearchResult {
 /// to the goal. The open set is taken by bands of f = G + H as wide as H(start), so the cost is below twice the best of
 /// the discretisation; inside a band greedily. A start faster than v_max may only slow down. Deterministic.
 ///
-/// Three attempts, each with more to spend: H = cost_to_go over the durations that the straight way needs at least;
-/// then over those that the way through passable voxels needs (SafeView::hops_to, least_stopping_time), which sees
-/// around walls; then stop_and_go(), which finds a way wherever passable voxels join start and goal. Both H are
-/// admissible; the third is not bounded in cost.
+/// Attempts, each where the one before has not found a way: H = cost_to_go over the durations that the straight way
+/// needs at least, for 1,000 states; then a way over blocks of voxels with stops, shortened by the quickest joins
+/// (shortened_way), which exists wherever passable voxels join start and goal; then, only for a
+/// start that cannot stop within passable voxels, H over the durations that the way through these needs
+/// (SafeView::hops_to, least_stopping_time). Both H are admissible; the shortened way has no bound of its cost.
 tl::expected<SearchResult, SearchFailure> search(const SafeView& space, const State& start, const Vec3& goal_W,
                                                  const SearchOptions& options);
 

@@ -3,10 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <span>
 #include <utility>
 
+#include "core/plan/ends.hpp"
 #include "core/plan/refinement.hpp"
 #include "core/reach/clearance.hpp"
 
@@ -18,18 +17,6 @@ constexpr double kSearchShare = 0.9;   ///< of the limits: re-timing has little 
 constexpr double kClearanceCap = 2.0;  ///< m
 
 double ms_since(Clock::time_point t) { return std::chrono::duration<double, std::milli>(Clock::now() - t).count(); }
-
-std::string text(const Vec3& p) {
-  char buffer[96];
-  std::snprintf(buffer, sizeof buffer, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
-  return buffer;
-}
-
-std::string metres(double d) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.3f m", d);
-  return buffer;
-}
 
 Plan refused(Plan plan, PlanStatus status, std::string message) {
   plan.status = status;
@@ -47,29 +34,6 @@ PlanStatus status_of(SearchFailure::Kind kind) {
     default:
       return PlanStatus::deadline;
   }
-}
-
-/// Why hovering at p is not safe; nothing where it is.
-std::optional<std::string> why_blocked(const World& world, const Vec3& p_W, double least_clearance) {
-  const Index3 v = world.grid.index(p_W);
-  if (!p_W.allFinite() || !world.grid.inside(v)) return text(p_W) + " is outside the map";
-  if (world.grid.occupied(v)) return text(p_W) + " is occupied";
-  if (!world.grid.free(v)) return text(p_W) + " is unknown space";
-  const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin);
-  if (!set.bounded) return text(p_W) + " is too near to obstacles: the hover set there has no bound in free space";
-  if (!(set.clearance > least_clearance))
-    return text(p_W) + " is not clear: the hover set's clearance is " + metres(set.clearance);
-  return std::nullopt;
-}
-
-/// Why the first set, of the vehicle where it is now, is not clear: whatever is commanded changes nothing there.
-std::optional<std::string> why_blocked_now(const World& world, const PlanStart& start, double least_clearance) {
-  auto tube =
-      reach::tube_over_field(world.reach, start.estimated, start.command, std::span(&start.command, 1), world.bounds);
-  tube.pop_back();
-  const double clearance = tube_clearance(world, tube);
-  if (clearance > least_clearance) return std::nullopt;
-  return text(start.estimated.p_W) + ", where the vehicle is now, is not clear: the clearance is " + metres(clearance);
 }
 
 PlanMetrics measured(PlanMetrics metrics, const BSpline& spline, double clearance) {

@@ -68,6 +68,8 @@ class SafeView {
   bool passable(const Index3& v) const noexcept;
   /// Whether every voxel that meets the closed box may be passed.
   bool clear(const Box& box) const noexcept;
+  /// Whether every voxel with low ≤ v ≤ high may be passed; true for none.
+  bool clear(const Index3& low, const Index3& high) const noexcept;
   /// Whether every voxel the motion meets may be passed: pieces with exact bounds, halved until their box is clear or
   /// smaller than a quarter of a voxel. Never true for a motion that touches a voxel that may not be passed.
   bool clear(const Motion& motion) const noexcept;
@@ -82,7 +84,6 @@ class SafeView {
   std::vector<Index3> chain(const Index3& from, const Index3& to) const;
 
  private:
-  bool clear(const Index3& low, const Index3& high) const noexcept;
   const SafeSpace* space_;
   std::vector<Index3> also_;  // not passable in the space itself, distinct
 };

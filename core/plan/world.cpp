@@ -12,23 +12,6 @@
 namespace backwash::plan {
 namespace {
 
-/// Free voxels that hold a point at which the vehicle's centre can be: farther from obstacles than its body's radius,
-/// less the half diagonal by which such a point may lie off the voxel's centre.
-std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                                           const Vehicle& vehicle) {
-  const double least = vehicle.body.radius - grid.resolution() * std::sqrt(3.0) / 2;
-  std::vector<std::size_t> voxels;
-  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    if (grid.at(n) == map::Cell::free && distance.at(n) >= least) voxels.push_back(n);
-  }
-  return voxels;
-}
-
-/// The paper's sets exist for its second-order loop only.
-reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
-  return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
-}
-
 map::VoxelBox grown(const map::VoxelBox& box, const Index3& by, const Index3& size) {
   return {(box.low - by).cwiseMax(0), (box.high + by).cwiseMin(size - Index3::Ones())};
 }
@@ -71,13 +54,27 @@ map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& boun
   return box;
 }
 
+}  // namespace
+
+std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const map::DistanceField& distance,
+                                           const Vehicle& vehicle) {
+  const double least = vehicle.body.radius - grid.resolution() * std::sqrt(3.0) / 2;
+  std::vector<std::size_t> voxels;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    if (grid.at(n) == map::Cell::free && distance.at(n) >= least) voxels.push_back(n);
+  }
+  return voxels;
+}
+
 Model with_vehicle(const Model& model, const Vehicle& vehicle) {
   Model result = model;
   result.ground.r0 = vehicle.body.diagonal_radius;
   return result;
 }
 
-}  // namespace
+reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
+  return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
+}
 
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) { work(0, count); }
 

@@ -21,6 +21,15 @@ namespace backwash::plan {
 using Parallel = std::function<void(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work)>;
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
 
+/// Free voxels that hold a point at which the vehicle's centre can be: farther from obstacles than its body's radius,
+/// less the half diagonal by which such a point may lie off the voxel's centre.
+std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const map::DistanceField& distance,
+                                           const Vehicle& vehicle);
+
+/// The model with the vehicle's r0, and the sets of its loop: the paper's exist for its second-order loop only.
+Model with_vehicle(const Model& model, const Vehicle& vehicle);
+reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method);
+
 /// Immutable picture of the surroundings for one vehicle: everything the planner and the checks read.
 struct World {
   map::OccupancyGrid grid;

@@ -165,11 +165,10 @@ class ClearTest {
 
 }  // namespace
 
-HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                   const BoundField& bounds, const Vec3& p_W, double constant_margin) {
+HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
+                      const BoundField& bounds, const Vec3& p_W, double constant_margin) {
   HoverSet set;
-  const double taken = body_and_estimation(reach.vehicle);
-  set.clearance = -taken;
+  set.clearance = -body_and_estimation(reach.vehicle);
   if (!grid.free(grid.index(p_W))) return set;
   const Vec3 push_W = bounds.push(p_W, Vec3::Zero());
   set.shift = static_shift(reach.vehicle, push_W);
@@ -178,7 +177,6 @@ HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, co
   if (!grid.free(v)) return set;
   if (constant_margin >= 0) {
     set.half_widths.fill(constant_margin);
-    set.clearance = std::min(kClearanceCap, distance.exact(grid, c_W) - constant_margin - taken);
     set.bounded = true;
     return set;
   }
@@ -192,7 +190,17 @@ HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, co
   if (!h) return set;
   set.bounded = true;
   set.half_widths = *h;
-  set.clearance = set_clearance(reach.vehicle, grid, distance, c_W, *h);
+  return set;
+}
+
+HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
+                   const BoundField& bounds, const Vec3& p_W, double constant_margin) {
+  HoverSet set = hover_extent(reach, grid, distance, bounds, p_W, constant_margin);
+  if (!set.bounded) return set;
+  const Vec3 c_W = set.shift + p_W;
+  const double taken = body_and_estimation(reach.vehicle);
+  set.clearance = constant_margin >= 0 ? std::min(kClearanceCap, distance.exact(grid, c_W) - constant_margin - taken)
+                                       : set_clearance(reach.vehicle, grid, distance, c_W, set.half_widths);
   return set;
 }
 

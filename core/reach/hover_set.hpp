@@ -29,6 +29,10 @@ struct HoverSet {
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
                    const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);
 
+/// The same set without its clearance, which is the dear part: `clearance` is that of touching.
+HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
+                      const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);
+
 /// Whether hovering at each voxel's centre is safe: hover_set(…).safe(), without the sets' clearances (hover_set gives
 /// them where they are asked for). For method paper the sets come from a table that is rounded up by up to 3e-5.
 class HoverMap {

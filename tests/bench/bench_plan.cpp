@@ -17,6 +17,8 @@
 // success/SCENE: pairs drawn anywhere; exists counts those that an exhaustive search over hover-safe voxels joins,
 // found the plans, wrong the pairs it cannot join whose status is anything but no_path.
 //
+// search_tail/V: the search alone at v_max V mm/s, 1,000 queries: quantiles and largest.
+//
 // set_extent: what the collision cost takes off the distance, ‖h‖₂ of a set (the scalar way) over what its own prism
 // takes (exact distance of the centre less that of the prism), over the steps of the forest's plans nearer than 0.5 m.
 #include <benchmark/benchmark.h>
@@ -192,6 +194,29 @@ void forest(benchmark::State& state, const plan::PlanOptions& options) {
 }
 BENCHMARK_CAPTURE(forest, first, kFirst)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
 BENCHMARK_CAPTURE(forest, polished, kPolished)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
+
+/// The search alone, 1,000 queries of 5.6 to 7 m, v_max of the argument, mm/s: quantiles and largest, ms. The speeds of
+/// the vehicle's own limit and below are where single queries once took half a second.
+void search_tail(benchmark::State& state) {
+  const auto& w = world(1);
+  const double v_max = 1e-3 * static_cast<double>(state.range(0)), a_max = v_max < 1 ? 1 : kAMax;
+  std::vector<double> ms, of_bound;
+  for (auto _ : state)
+    for (const Query& q : queries(w, 1000, 5.6, 7)) {
+      const plan::SearchOptions options{0.9 * v_max, 0.9 * a_max, kFirst.max_nodes,
+                                        plan::Clock::now() + std::chrono::seconds(60)};
+      const double begun = cpu_ms();
+      const plan::SafeView space(w.safe, {w.grid.index(q.start), w.grid.index(q.goal)});
+      const auto found = plan::search(space, {q.start, Vec3::Zero()}, q.goal, options);
+      ms.push_back(cpu_ms() - begun);
+      if (found) of_bound.push_back(found->cost / found->lower_bound);
+    }
+  state.counters["p50"] = quantile(ms, 0.5), state.counters["p95"] = quantile(ms, 0.95);
+  state.counters["p99"] = quantile(ms, 0.99), state.counters["max"] = quantile(ms, 1);
+  state.counters["found"] = static_cast<double>(of_bound.size());
+  state.counters["cost/bound_p50"] = quantile(of_bound, 0.5), state.counters["cost/bound_max"] = quantile(of_bound, 1);
+}
+BENCHMARK(search_tail)->Arg(1500)->Arg(500)->Arg(3000)->Unit(benchmark::kMillisecond)->Iterations(1);
 
 /// Regions of hover-safe voxels that share faces, flooded apart from the planner's own.
 std::vector<int> regions(const plan::World& world) {
