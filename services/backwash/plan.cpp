@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
 
-#include "core/plan/planner.hpp"
+#include "core/plan/ends.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -53,15 +53,19 @@ int run(const Options& options) {
   read_reachability(vehicle, method, reach::Loop::vehicle,
                     options.vehicle);  // names an unstable loop before the map is read
   auto grid = read_map(options.map);
-  progress("building the world");
-  const auto world =
-      plan::build_world(std::move(grid), model, vehicle, method, options.margin.value_or(-1), run_parallel);
-  progress("planning");
+  const double margin = options.margin.value_or(-1);
   const plan::PlanOptions limits{.v_max = options.v_max.value_or(vehicle.limits.v_max),
                                  .a_max = options.a_max.value_or(vehicle.limits.a_max)};
   Setpoint hover;
   hover.p_W = *options.start;
-  const auto plan = plan::plan(*world, {State{*options.start, Vec3::Zero()}, hover}, *options.goal, limits);
+  const plan::PlanStart start{State{*options.start, Vec3::Zero()}, hover};
+  progress("looking at both ends");
+  auto refused = plan::refused_at_once(grid, model, vehicle, method, margin, start, *options.goal, limits);
+  if (!refused) progress("building the world");
+  const auto world =
+      refused ? nullptr : plan::build_world(std::move(grid), model, vehicle, method, margin, run_parallel);
+  if (world) progress("planning");
+  const auto plan = world ? plan::plan(*world, start, *options.goal, limits) : *std::move(refused);
   options.json ? print_json(plan, method) : print_text(plan);
   if (plan.status == plan::PlanStatus::ok) return kOk;
   throw Failure(kUnavailable, options.map + ":1: " + plan::to_string(plan.status) + ": " + plan.message);
