@@ -205,8 +205,7 @@ int run(const Options& options) {
   const auto left = study::apply(read_terms(options.model), seen);
   const auto result = study::study(seen, study_options(options));
   Json json = to_json(result, seen);
-  if (!left.empty())
-    for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
@@ -234,10 +233,7 @@ int run(const Options& options) {
     write_page(options, result, seen,
                {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
   }
-  if (options.json)
-    print(json);
-  else
-    print_text(result, seen, rotors, height);
+  options.json ? print(json) : print_text(result, seen, rotors, height);
   return kOk;
 }
 
