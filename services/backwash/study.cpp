@@ -164,16 +164,36 @@ std::optional<study::calibrate::HeightEffects> height_effects(const Options& opt
   return read_height_effects(options.logs, model, options.seed);
 }
 
-int run(const Options& options) {
-  if (options.rules) {
-    print_rules(options.json);
-    return kOk;
-  }
+void check(const Options& options) {
   if (options.vehicle.empty() || options.logs.empty()) throw Failure(kUsage, "study needs --vehicle and --log");
   if (options.residuals && (options.map.empty() || options.report.empty()))
     throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
+}
+
+study::StudyOptions study_options(const Options& options) {
+  study::StudyOptions chosen;
+  chosen.search.seed = options.seed;
+  chosen.search.progress = [](const std::string& line) { progress(line); };
+  chosen.minimum_detectable = !options.quick;
+  return chosen;
+}
+
+void write_page(const Options& options, const study::StudyResult& result, const study::Observations& seen,
+                const study::PageContext& context) {
+  progress("drawing");
+  const auto page = study::study_page(result, seen, context);
+  if (!page) throw Failure(kUnavailable, page.error().message);
+  write_file(options.report, *page, options.force);
+}
+
+int run(const Options& options) {
+  if (options.rules) {
+    print_rules(options.json);
+    return kOk;
+  }
+  check(options);
   const auto vehicle = read_vehicle(options.vehicle);
   auto model = read_model(options.model);
   model.ground.r0 = vehicle.body.diagonal_radius;
@@ -183,14 +203,9 @@ int run(const Options& options) {
   auto seen = observe(flights, vehicle, model, grid ? &*grid : nullptr);
   const auto measured = seen;  // nothing that the model holds taken out
   const auto left = study::apply(read_terms(options.model), seen);
-  study::StudyOptions study_options;
-  study_options.search.seed = options.seed;
-  study_options.search.progress = [](const std::string& line) { progress(line); };
-  study_options.minimum_detectable = !options.quick;
-  const auto result = study::study(seen, study_options);
+  const auto result = study::study(seen, study_options(options));
   Json json = to_json(result, seen);
-  if (!left.empty())
-    for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
@@ -215,16 +230,10 @@ int run(const Options& options) {
     std::string beside;
     if (options.residuals)
       beside = residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
-    progress("drawing");
-    const auto page = study::study_page(
-        result, seen, {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
-    if (!page) throw Failure(kUnavailable, page.error().message);
-    write_file(options.report, *page, options.force);
+    write_page(options, result, seen,
+               {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
   }
-  if (options.json)
-    print(json);
-  else
-    print_text(result, seen, rotors, height);
+  options.json ? print(json) : print_text(result, seen, rotors, height);
   return kOk;
 }
 

@@ -136,7 +136,8 @@ std::string number(double x) {
 }  // namespace
 
 Proof prove(const ProofRequest& request, const std::filesystem::path& folder) {
-  Proof proof{.cause = request.cause, .seed = request.seed};
+  Proof proof;
+  proof.cause = request.cause, proof.seed = request.seed;
   const World world = draw_world({request.seed, {request.cause}, 1, 2 * request.flights, ""});
   const auto all = fly_all(world);
   const std::vector<Table> fitted(all.begin(), all.begin() + request.flights),
