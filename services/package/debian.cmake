@@ -18,25 +18,25 @@ set(CPACK_DEBIAN_BACKWASH_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_BACKWASH_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_BACKWASH_PACKAGE_RECOMMENDS "gnuplot-nox")
 set(CPACK_COMPONENT_BACKWASH_DESCRIPTION "quadrotor flight daemon that plans by reachable sets of its own wash
- Daemon, ground station and offline tools: estimates the disturbance that a
- quadrotor's rotor wash causes near floors, walls and corners from a voxel map,
- and plans and flies trajectories whose clearance is the reachable set of the
- control error. Odometry and maps over DDS, set-points over MAVLink.")
+Daemon, ground station and offline tools: estimates the disturbance that a
+quadrotor's rotor wash causes near floors, walls and corners from a voxel map,
+and plans and flies trajectories whose clearance is the reachable set of the
+control error. Odometry and maps over DDS, set-points over MAVLink.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME backwash-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), libnlopt-cxx-dev, libtomlplusplus-dev, libexpected-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "fields, reachable sets and plans of backwash as a library
- The core library as a CMake package, with its headers and an example that
- plans a flight.")
+The core library as a CMake package, with its headers and an example that
+plans a flight.")
 
 set(CPACK_DEBIAN_BENCH_PACKAGE_NAME backwash-bench)
 set(CPACK_DEBIAN_BENCH_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_BENCH_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_BENCH_PACKAGE_RECOMMENDS "backwash")
 set(CPACK_COMPONENT_BENCH_DESCRIPTION "emulated flight controller, odometry and mapper for backwash
- A bench for the flight daemon: an emulated flight controller on a
- pseudo-terminal, odometry and maps over DDS, faults on demand.")
+A bench for the flight daemon: an emulated flight controller on a
+pseudo-terminal, odometry and maps over DDS, faults on demand.")
 
 # Documents that Debian wants of each package, and what the daemon's package does at installation.
 execute_process(COMMAND git log -1 --format=%ct WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} OUTPUT_VARIABLE COMMIT_TIME

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A program's man page and bash completion, made of what its --help says and of nothing else.
 
-documents.py PAGE OUT_DIR PROGRAM     PAGE: NAME.SECTION; writes OUT_DIR/PAGE and OUT_DIR/NAME
+documents.py PAGE OUT_DIR PROGRAM     PAGE: NAME.SECTION; writes OUT_DIR/PAGE.gz and OUT_DIR/NAME
 """
+import gzip
 import pathlib
 import re
 import subprocess
@@ -71,7 +72,7 @@ def main() -> int:
     (name, section), out, program = sys.argv[1].rsplit(".", 1), pathlib.Path(sys.argv[2]), sys.argv[3]
     texts = {"": help_of(program, name)}
     texts |= {verb: help_of(program, name, verb) for verb in verbs_of(texts[""])}
-    (out / sys.argv[1]).write_text(page(name, section, texts))
+    (out / f"{sys.argv[1]}.gz").write_bytes(gzip.compress(page(name, section, texts).encode(), 9, mtime=0))
     (out / name).write_text(completion(name, texts))
     return 0
 
