@@ -57,6 +57,15 @@ int run_gnuplot(const std::string& script, const std::string& complaints) {
 
 }  // namespace
 
+std::string gnuplot_quoted(const std::string& text) {
+  std::string literal = "'";
+  for (const char c : text) {
+    const bool control = static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+    literal += c == '\'' ? "\u2019" : std::string(1, control ? '?' : c);
+  }
+  return literal + "'";
+}
+
 tl::expected<std::string, PlotError> draw(const std::string& script, Format format, int width, int height) {
   const TemporaryFolder folder;
   if (folder.path.empty())
@@ -68,7 +77,7 @@ tl::expected<std::string, PlotError> draw(const std::string& script, Format form
     std::ofstream file(script_path, std::ios::binary);
     file << "set encoding utf8\nset terminal " << (svg ? "svg dynamic" : "pngcairo") << " size " << width << ','
          << height << " enhanced font 'DejaVu Sans," << (svg ? 13 : 10) << "' background 'white'\n"
-         << "set output '" << picture.string() << "'\n"
+         << "set output " << gnuplot_quoted(picture.string()) << '\n'
          << script;
     if (!file.flush()) return fail("the plot script cannot be written; free some space in TMPDIR");
   }

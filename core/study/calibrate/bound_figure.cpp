@@ -64,8 +64,9 @@ tl::expected<std::string, report::PlotError> bound_figure(const Data& data, cons
     script << "$points" << i << " << EOD\n"
            << points(data, places[i].place, axis) << "EOD\n$surface" << i << " << EOD\n"
            << surface(e, *places[i].grid, model, axis) << "EOD\n";
-    plots << "set title '" << places[i].name << "' noenhanced\nsplot $surface" << i << " with pm3d notitle, $points"
-          << i << " with points pointtype 7 pointsize 0.2 linecolor '#c0392b' notitle\n";
+    plots << "set title " << report::gnuplot_quoted(places[i].name) << " noenhanced\nsplot $surface" << i
+          << " with pm3d notitle, $points" << i
+          << " with points pointtype 7 pointsize 0.2 linecolor '#c0392b' notitle\n";
   }
   script << "set pm3d depthorder border linecolor '#506070' linewidth 0.3\nset palette defined (0 '#d6e6f4', 0.4 "
             "'#8fc3dd', 0.7 '#f6c667', 1 '#e8703a')\nset style fill transparent solid 0.6\nunset colorbox\n"
