@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "core/config/config.hpp"
+#include "core/config/odometry_profile.hpp"
 #include "core/map/load_map.hpp"
 #include "services/bench/bench.hpp"
 #include "version.hpp"
