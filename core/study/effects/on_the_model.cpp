@@ -72,17 +72,13 @@ SimulationTerm rotor_lines(const Observations& seen) {
   SimulationTerm term{SimulationTerm::Kind::sensor_lines, std::vector<double>(5, 0)};
   double floor = 0, of_floor = 0;
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
-    double power = 0, ln = 0, ratio = 0, n = 0;
+    double power = 0, n = 0;
     for (const auto& w : seen.windows) {
       const auto& line = w.lines[rotor];
       if (!std::isfinite(line.amplitude2)) continue;
-      power += line.amplitude2, ln += line.excess, ratio += std::exp(line.excess), n += 1;
-      floor += line.floor2, of_floor += 1;
+      power += line.amplitude2, floor += line.floor2, n += 1, of_floor += 1;
     }
-    if (!(n > 0) || !(ratio > n)) continue;
-    // The rate is read with noise, so a measured line's power scatters; a simulated one's does not. Its ln is the mean.
-    const double steady = std::max(0.0, std::expm1(ln / n)) / (ratio / n - 1);
-    term.value[rotor] = std::sqrt(std::max(0.0, power / n) * std::min(1.0, steady));
+    if (n > 0) term.value[rotor] = std::sqrt(std::max(0.0, power / n));
   }
   if (of_floor > 0) term.value[4] = std::sqrt(std::max(0.0, floor / of_floor));
   return term;

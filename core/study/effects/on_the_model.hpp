@@ -28,8 +28,8 @@ std::vector<ModelEffect> flown_range(const FittedForm& fitted, const Observation
 /// A function for Form::simulate: one term of a kind, its numbers θ and, if the form has scales, the scale.
 std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulates(SimulationTerm::Kind kind);
 
-/// The rotors' lines as they were measured along z: steady ones of the same mean ln power, and the noise beside them
-/// that the gusts leave.
+/// The rotors' lines as they were measured along z: root of their mean power, and of the noise beside them that the
+/// gusts leave.
 SimulationTerm rotor_lines(const Observations& seen);
 
 /// The mean course of a quantity over the flights: its value at their start, and per second.
