@@ -77,14 +77,16 @@ const field::Around& AirTerms::around(const Vec3& p_W) {
   return last_look_->second;
 }
 
-/// The place moved by an offset; where that leads into a solid, as far as is free.
+/// The place moved by an offset; where that leads into what is not free, as far as is free.
 Vec3 AirTerms::moved(const Vec3& p_W, const Vec3& offset_W) const {
   constexpr int kParts = 10;
-  for (int k = kParts; k > 0; --k) {
+  Vec3 reached = p_W;
+  for (int k = 1; k <= kParts; ++k) {
     const Vec3 at = p_W + offset_W * (static_cast<double>(k) / kParts);
-    if (!grid_->occupied(grid_->index(at))) return at;
+    if (!grid_->free(grid_->index(at))) break;
+    reached = at;
   }
-  return p_W;
+  return reached;
 }
 
 AirTerms::Now AirTerms::step(const Flying& now, double dt) {

@@ -107,7 +107,8 @@ void compare(Proof& proof, const study::Accepted& found, const study::Observatio
   for (const auto c : channels_of(found)) {
     const double eb = channel_error(measured, before, c, about_mean).value,
                  ea = channel_error(measured, after, c, about_mean).value,
-                 eo = channel_error(measured, truth, c, about_mean).value;
+                 // The generator knows how this craft's rotors were built, which no simulation does and no cause is.
+        eo = std::hypot(channel_error(measured, truth, c, about_mean).value, study::built_scatter(c));
     if (!(eo > 0) || !(eb > 0)) continue;
     if (n == 0) {
       proof.channel = study::channel_name(c);
