@@ -34,7 +34,8 @@ if [[ ! -e $sysroot/.whole ]]; then
   rm -rf "$sysroot"
   wanted=$(sed 's/#.*//' packages.txt | grep -E -- '-dev *$' | xargs | tr ' ' ',')
   mkdir -p build
-  mmdebstrap --quiet --variant=extract --architectures=$debian --include="libc6-dev,libstdc++-12-dev,$wanted" bookworm "$sysroot" >build/sysroot-$arch.log 2>&1 ||
+  mmdebstrap --quiet --variant=extract --architectures=$debian --include="libc6-dev,libstdc++-12-dev,$wanted" \
+    bookworm "$sysroot" >build/sysroot-$arch.log 2>&1 ||
     { tail -n 20 build/sysroot-$arch.log >&2; echo "build: no sysroot: build/sysroot-$arch.log" >&2; exit 70; }
   # Nothing was configured in there: links into the root are made to stay, and the alternatives of BLAS and LAPACK chosen.
   find "$sysroot" -type l -lname '/*' -printf '%p\t%l\n' | while IFS=$'\t' read -r link to; do ln -sfn "$sysroot$to" "$link"; done

@@ -13,10 +13,10 @@ struct PlotError {
 
 enum class Format { svg, png };
 
-/// Text as gnuplot's literal string, quotes included, whatever it holds: within single quotes nothing is run or replaced.
-/// A control character, which would end the command there, becomes '?', an apostrophe ’ (doubled ones, the documented
-/// way, gnuplot 5.4 takes for the end where two of them meet). What others chose (a file's name) enters a script by this
-/// alone.
+/// Text as gnuplot's literal string, quotes included, whatever it holds: within single quotes nothing is run or
+/// replaced. A control character, which would end the command there, becomes '?', an apostrophe ’ (doubled ones, the
+/// documented way, gnuplot 5.4 takes for the end where two of them meet). What others chose (a file's name) enters a
+/// script by this alone.
 std::string gnuplot_quoted(const std::string& text);
 
 /// Runs gnuplot (Debian: gnuplot-nox) as a subprocess on a script that has neither terminal nor output, and returns the

@@ -33,7 +33,8 @@ said=$("$work/example/build/plan_a_flight")
 echo "example: $said"
 
 if command -v lintian >/dev/null; then
-  lintian --allow-root --fail-on error --tag-display-limit 0 "$work"/debs/*.deb >"$work/lintian" 2>&1 || { cat "$work/lintian" >&2; die "lintian has errors"; }
+  lintian --allow-root --fail-on error --tag-display-limit 0 "$work"/debs/*.deb >"$work/lintian" 2>&1 ||
+    { cat "$work/lintian" >&2; die "lintian has errors"; }
   echo "lintian: no error, $(grep -c '^W:' "$work/lintian" || true) warnings"
 else
   echo "skipped: lintian (package lintian)"
@@ -54,10 +55,13 @@ quiet() { "$@" >"$work/said" 2>&1 || { cat "$work/said" >&2; die "$* failed"; };
 
 quiet in_root dpkg -i /tmp/old.deb /tmp/bench.deb
 in_root backwashd --check-config --config /etc/backwash/backwashd.toml | grep -q good || die "the shipped configuration is not good"
-for program in backwash backwashctl backwashd backwash-bench; do in_root $program --version | grep -q "^$program " || die "$program does not run"; done
+for program in backwash backwashctl backwashd backwash-bench; do
+  in_root $program --version | grep -q "^$program " || die "$program does not run"
+done
 in_root backwash vehicle --help >/dev/null
 [[ $(in_root stat -c '%U %a' /var/lib/backwash) == 'backwash 750' ]] || die "/var/lib/backwash: $(in_root stat -c '%U %a' /var/lib/backwash)"
-in_root bash -c 'source /usr/share/bash-completion/completions/backwash && COMP_WORDS=(backwash pl) COMP_CWORD=1 && _backwash && [[ ${COMPREPLY[*]} == plan ]] &&
+in_root bash -c 'source /usr/share/bash-completion/completions/backwash &&
+  COMP_WORDS=(backwash pl) COMP_CWORD=1 && _backwash && [[ ${COMPREPLY[*]} == plan ]] &&
   COMP_WORDS=(backwash plan --vm) COMP_CWORD=2 && _backwash && [[ ${COMPREPLY[*]} == --vmax ]]' || die "the completion completes nothing"
 [[ ! -e $root/etc/systemd/system/multi-user.target.wants/backwashd.service ]] || die "installing enabled the daemon"
 

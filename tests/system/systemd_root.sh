@@ -47,7 +47,8 @@ sed -i 's|/dev/backwash-fc|/run/bench/autopilot|' "$root/etc/backwash/backwashd.
 # A network of its own; nothing but loopback. A container's limits are ceilings for its units, a machine's are not.
 echo '127.0.0.1 localhost' >"$root/etc/hosts"
 timeout --kill-after=10 280 systemd-nspawn --quiet --directory="$root" --boot --register=no --keep-unit --private-network \
-  --capability=CAP_IPC_LOCK --rlimit=RLIMIT_MEMLOCK=infinity --rlimit=RLIMIT_RTPRIO=99 --rlimit=RLIMIT_NICE=40 --link-journal=no </dev/null >"$work/console" 2>&1 || true
+  --capability=CAP_IPC_LOCK --rlimit=RLIMIT_MEMLOCK=infinity --rlimit=RLIMIT_RTPRIO=99 --rlimit=RLIMIT_NICE=40 \
+  --link-journal=no </dev/null >"$work/console" 2>&1 || true
 [[ -e $root/told ]] || { tail -n 30 "$work/console" >&2; skip "a systemd that boots here"; }
 grep '^systemd: ' "$root/told" || true
 grep -q '^systemd: all seen' "$root/told" || { tail -n 60 "$root/told" >&2; die "systemd_root: see above"; }
