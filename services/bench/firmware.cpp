@@ -79,8 +79,8 @@ void Firmware::on(const mavlink::ParamSet& m, double t) {
   on(mavlink::ParamRequestRead{-1, 0, 0, m.param_id}, t);
 }
 
-void Firmware::on(const mavlink::Timesync& m, double t) {
-  if (m.tc1 == 0) syncs_.push_back({static_cast<std::int64_t>(t * 1e9), m.ts1, 0, 0});
+void Firmware::on(const mavlink::Timesync& m, double) {
+  if (m.tc1 == 0) syncs_.push_back({since_boot_ns(), m.ts1, 0, 0});
 }
 
 void Firmware::say(std::uint8_t severity, std::string_view text) {
@@ -157,7 +157,7 @@ void Firmware::telemetry(double t, std::vector<std::uint8_t>& out) {
     if (id == mavlink::LocalPositionNed::kId && local_position_ && !silent_pose) send_position(out);
     if (id == mavlink::ExtendedSysState::kId) send(mavlink::ExtendedSysState{0, landed_state_}, out);
     if (id == mavlink::BatteryStatus::kId) send_battery(out);
-    if (id == mavlink::Timesync::kId) send(mavlink::Timesync{0, static_cast<std::int64_t>(t * 1e9), 0, 0}, out);
+    if (id == mavlink::Timesync::kId) send(mavlink::Timesync{0, since_boot_ns(), 0, 0}, out);
   }
 }
 

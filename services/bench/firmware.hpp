@@ -92,6 +92,8 @@ class Firmware : public Autopilot {
  private:
   void estimate(double t);
 
+  /// Its clock, which stamps its poses too.
+  std::int64_t since_boot_ns() const noexcept { return steps_ * 1'000'000; }
   Profile profile_;
   double drag_;
   struct Pending {
