@@ -41,6 +41,15 @@ Vec3 wall_pull(const Room& room, const Vec3& p, double length) {
           0};
 }
 
+/// Inflow through the disk that a climb adds to that of a hover, doubled: as large as the climb where that is slow.
+/// Momentum theory: (v_i + v_z) v_i = v_h².
+double more_inflow(const Craft& craft, double climb) {
+  constexpr double kAir = 1.2;  // kg/m³
+  const double disks = 4 * M_PI * craft.rotor_radius * craft.rotor_radius;
+  const double hover2 = craft.mass * 9.81 / (2 * kAir * disks);
+  return climb + 2 * (std::sqrt(climb * climb / 4 + hover2) - std::sqrt(hover2));
+}
+
 /// Causes that no name of the catalogue covers.
 Vec3 outside_the_catalogue(const Acting& a) {
   switch (static_cast<int>(a.shape)) {
@@ -102,6 +111,11 @@ std::map<std::string, Cause> pushes() {
           return -a.s * Vec3(a.now.v.x(), a.now.v.y(), 0) * (1 + 0.15 * a.now.v.template head<2>().norm());
         },
         .truth = {{"k_per_s", [](double s, double) { return s * (1 + 0.15); }}}}},
+      {"inflow",  // 1/s at rest
+       {.size = 0.2,
+        .one_signed = true,
+        .push = [](auto& a) { return up(-a.s * more_inflow(a.world.craft, a.now.v.z())); },
+        .truth = {{"k_per_s", same}}}},
       {"imu_drift",  // m/s² per 100 s; a push that the accelerometer alone feels
        {.size = 0.2,
         .truth = {{"x_mps2_per_100s", [=](double s, double d) { return after_100_s(std::cos(d))(s, d); }},
