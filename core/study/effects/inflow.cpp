@@ -15,7 +15,8 @@ Effect inflow() {
                          [](const Windows& ws, const Scale&) {
                            return std::vector{in(kMeanZ, ws, [](auto& w) { return -w.v_W.z(); })};
                          },
-                     .extend = unknown_push}},
+                     .extend = unknown_push,
+                     .simulate = simulates(SimulationTerm::Kind::push_against_climb)}},
           .axis = {"climb, m/s", false, [](auto& w) { return w.v_W.z(); }},
           .manoeuvres = {
               {"climb and sink at one speed through the same heights, away from walls", [](WindowRow& w, double s) {
