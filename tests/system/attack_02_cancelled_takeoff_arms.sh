@@ -11,8 +11,8 @@ start_daemon builtin:quad-5in "$work/flight.bwlog"
 enable
 ctl release
 steps=()
-# On the ground, disarmed, stop is disable.
-for pause in 0 10 25; do steps+=(takeoff=0,0,1.2 +$pause stop +400 enable +2000); done
+# On the ground, disarmed, stop is disable. A planner that was faster than the STOP has armed: then it lands for 3 s first.
+for pause in 0 10 25; do steps+=(takeoff=0,0,1.2 +$pause stop +4000 enable +2000); done
 "$build/tests/attacker" "$domain" send "${steps[@]}" >"$work/answers" || die "no answer"
 stop
 cat "$work/answers" >>"$log"
