@@ -17,6 +17,7 @@ struct Flying {
   Setpoint previous;  ///< command active before that
   plan::PlanMetrics metrics;
   std::optional<double> z_safe;  ///< of a take-off: below it only what is beside counts, m
+  bool held = false;             ///< told to hold: a loop closure moves the map alone, not the vehicle
 };
 
 /// Lets the last command be held at rest for as long as the last set takes to become the hover set's.

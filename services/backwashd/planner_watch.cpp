@@ -96,30 +96,43 @@ void PlannerWorker::verify_again() {
     block("the rest of it is not clear in the new map: " + metres(again.segment.clearance));
 }
 
-/// After a loop closure: the same flight, back to its place in the map from a little ahead of now.
+/// After a loop closure: the same flight, back to its place in the map from a little ahead of now. One that was told to
+/// hold stays where the vehicle is: nothing but a later command moves it.
 std::optional<std::string> PlannerWorker::rectify() {
   constexpr int kTries = 3;
   for (int attempt = 0; attempt < kTries; ++attempt) {
-    const auto& limits = world_->reach.vehicle.limits;
     const track::RigidShift D = view_.shift;
     const std::size_t branch = view_.index + kRectifyAfter;
-    auto commands = track::rectified(flying_->segment.commands, branch, D, limits.v_max, limits.a_max);
-    if (commands.size() > flying_->segment.commands.size()) append_hold(commands);
-    Flying next{{0, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
+    Flying next{{0, flying_->segment.id, branch, moved_by_closure(branch), {}, {}, view_.closures},
                 D.state(flying_->start),
                 D.setpoint(flying_->previous),
                 flying_->metrics,
-                flying_->z_safe};
+                flying_->z_safe,
+                flying_->held};
     verify(next, *world_, view_.index);
     if (!(next.segment.clearance > 0)) return "the way back is not clear: " + metres(next.segment.clearance);
     add_guards(next, *world_, view_.index);
-    spdlog::info("loop closure {}: {:.3f} m and {:.2f} degrees, rectified from command {} on", view_.closures,
-                 (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw * 180 / 3.14159265358979, branch);
+    spdlog::info("loop closure {}: {:.3f} m and {:.2f} degrees, {} from command {} on", view_.closures,
+                 (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw * 180 / 3.14159265358979,
+                 flying_->held ? "held where it is" : "rectified", branch);
     if (offer(std::move(next))) return std::nullopt;
     refresh();
     if (view_.closures == flying_->segment.closures || view_.braking) return std::nullopt;
   }
   return "the flight was past the branch each time";
+}
+
+/// What flies, in the map as the loop closure moved it.
+std::vector<Setpoint> PlannerWorker::moved_by_closure(std::size_t branch) const {
+  const auto& limits = world_->reach.vehicle.limits;
+  std::vector<Setpoint> commands = flying_->segment.commands;
+  if (flying_->held) {
+    for (Setpoint& command : commands) command = view_.shift.setpoint(command);
+    return commands;
+  }
+  commands = track::rectified(commands, branch, view_.shift, limits.v_max, limits.a_max);
+  if (commands.size() > flying_->segment.commands.size()) append_hold(commands);
+  return commands;
 }
 
 }  // namespace backwash::daemon

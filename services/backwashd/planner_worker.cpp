@@ -224,15 +224,22 @@ std::optional<std::string> PlannerWorker::explore(const PlanJob& job) {
   return "nothing more of the way became known" + (why.empty() ? "" : ": " + why);
 }
 
-/// The current segment, slowed to rest on its own path from a little ahead of now.
+/// The current segment, slowed to rest on its own path from a little ahead of now. What rests already stays.
 std::optional<std::string> PlannerWorker::brake() {
-  const bool rests = view_.finished || view_.braking;
-  if (rests || !flying_ || view_.segment != flying_->segment.id) return std::nullopt;  // or about to
+  if (!flying_ || view_.segment != flying_->segment.id) return std::nullopt;  // or about to
+  if (view_.finished || view_.braking) {
+    flying_->held = true;
+    return std::nullopt;
+  }
   if (view_.closures != flying_->segment.closures) return "a loop closure is being worked in: ask again";
   const std::size_t branch = view_.index + kBrakeAfter;
   auto commands = plan::stop_along(flying_->segment.commands, branch, world_->reach.vehicle.limits.a_max);
-  if (commands.empty()) return std::nullopt;  // it ends by itself before that
+  if (commands.empty()) {  // it ends by itself before that
+    flying_->held = true;
+    return std::nullopt;
+  }
   Flying next = continued(branch, std::move(commands));
+  next.held = true;
   verify(next, *world_, view_.index);
   if (!(next.segment.clearance > 0)) return not_clear("braking here", next.segment.clearance);
   return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");

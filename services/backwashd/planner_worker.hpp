@@ -63,6 +63,7 @@ class PlannerWorker {
   void block(const std::string& why);
   void verify_again();
   std::optional<std::string> rectify();
+  std::vector<Setpoint> moved_by_closure(std::size_t branch) const;
 
   void refresh();
   bool current();

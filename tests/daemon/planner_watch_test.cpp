@@ -100,6 +100,33 @@ TEST_F(PlannerWatch, AfterALoopClosureTheFlightGoesBackToItsPlaceInTheMapIfThatI
   }
 }
 
+TEST_F(PlannerWatch, AfterALoopClosureAFlightThatWasToldToHoldStaysWhereItIs) {
+  for (const bool at_rest : {false, true}) {
+    offers_.clear();
+    view_ = {};
+    channels_->blocked_segment = 0;
+    fly_past(1.8);
+    if (at_rest) {
+      view_.index = offers_.back().commands.size();
+      view_.finished = true;
+      show();
+    }
+    EXPECT_EQ(ask(PlanJob::Kind::brake, Vec3::Zero()), "");
+    const std::vector<Setpoint> flown = offers_.back().commands;
+    for (const std::uint32_t closures : {1u, 2u}) {
+      view_.closures = closures;
+      view_.shift.t = {0, 0.1, 0};
+      show();
+      planner_.step();
+      EXPECT_FALSE(blocked());
+      ASSERT_EQ(offers_.back().closures, closures);
+      ASSERT_EQ(offers_.back().commands.size(), flown.size());
+      for (std::size_t k = 0; k < flown.size(); k += 10)
+        EXPECT_LT((offers_.back().commands[k].p_W - flown[k].p_W - Vec3(0, 0.1 * closures, 0)).norm(), 1e-9) << k;
+    }
+  }
+}
+
 TEST_F(PlannerWatch, BrakingThatWouldTouchIsNotOffered) {
   fly_past(2.5);
   know(walled(view_.state.p_W.x() + 0.6, false));

@@ -59,5 +59,17 @@ TEST_F(Regression, AVioThatDriftsWhileEnablingIsNoResetOfTheAutopilot) {
   expect_kept({{500, Kind::take_over, 1}, {505, Kind::vio_shift, 65, 0, -0.48, 0.13}, {540, Kind::operate, 90}});
 }
 
+// A hold is a stop as well: it held its place in the map, and flew 0.24 m there by itself.
+TEST_F(Regression, AfterAHoldAtRestALoopClosureMovesNothing) {
+  DaemonRig rig({{413, Kind::closure, 1, -0.203, 0.134, 0.253, 0},
+                 {419, Kind::operate, 57, 0.363, 0.727, 0.02},
+                 {528, Kind::operate, 58, 0.752, 0.158, 0.73},
+                 {699, Kind::operate, 17, 0.858, 0.236, 0.383},
+                 {836, Kind::closure, 1, -0.019, -0.037, 0.006, 0.0986}},
+                daemon::test::Medium::udp);
+  const auto violation = rig.run(1000);
+  EXPECT_FALSE(violation) << "tick " << violation->tick << ": " << violation->what;
+}
+
 }  // namespace
 }  // namespace backwash::fuzz
