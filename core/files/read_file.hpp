@@ -25,4 +25,8 @@ struct FileError {
 tl::expected<std::string, FileError> read_file(const std::string& path, std::size_t most_bytes,
                                                const std::string& wanted);
 
+/// What gzip made this content of; content that gzip did not make, as it is. Error: damaged, cut short, or larger than
+/// `most_bytes` unpacked, of which no more than that is ever held.
+tl::expected<std::string, std::string> unzipped(std::string content, std::size_t most_bytes);
+
 }  // namespace backwash::files

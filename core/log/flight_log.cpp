@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/log/flight_log.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -40,6 +43,14 @@ std::optional<double> finite_number(std::string_view cell) {
   return value;
 }
 
+/// A cell of a recording whose sensors have rates of their own.
+std::optional<double> number_or_gap(std::string_view cell) {
+  const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; };
+  if (cell.empty() || std::ranges::equal(cell, std::string_view("nan"), same))
+    return std::numeric_limits<double>::quiet_NaN();
+  return finite_number(cell);
+}
+
 tl::unexpected<LogError> bad(const std::string& path, std::size_t line, const std::string& what) {
   return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":" + std::to_string(line) + ": " + what});
 }
@@ -54,35 +65,55 @@ void append(std::string& text, double value) {
 tl::expected<std::string, LogError> read_log_file(const std::string& path, std::size_t most_bytes,
                                                   const std::string& wanted) {
   auto content = files::read_file(path, most_bytes, wanted);
-  if (content) return std::move(*content);
+  if (content) {
+    auto plain = files::unzipped(std::move(*content), most_bytes);
+    if (plain) return std::move(*plain);
+    return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + plain.error()});
+  }
   const bool too_large = content.error().kind == files::FileError::Kind::too_large;
   return tl::make_unexpected(LogError{too_large ? LogError::Kind::bad_data : LogError::Kind::not_found,
                                       path + ":1: " + content.error().message});
 }
 
-tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column,
-                                           const std::set<std::string>& unread) {
-  auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
-  if (!content) return tl::make_unexpected(content.error());
-  std::istringstream file(std::move(*content));
+namespace {
+
+/// The first line's names.
+tl::expected<std::vector<std::string>, LogError> names_of(const std::string& path, std::istream& file) {
   std::string text;
   if (!std::getline(file, text)) return bad(path, 1, "the file is empty; the first line must name the columns");
-
   std::vector<std::string> names;
-  std::set<std::string_view> seen;
+  std::set<std::string> seen;
   for (const auto cell : cells_of(text)) {
     if (cell.empty())
       return bad(path, 1, "column " + std::to_string(names.size() + 1) + " has no name; name every column");
     names.emplace_back(cell);
+    if (!seen.insert(names.back()).second)
+      return bad(path, 1, "column '" + names.back() + "' is named twice; every name must be unique");
   }
-  for (const auto& name : names) {
-    if (!seen.insert(name).second)
-      return bad(path, 1, "column '" + name + "' is named twice; every name must be unique");
-  }
-  if (!time_column.empty() && !seen.contains(time_column)) {
-    return bad(path, 1, "no column '" + time_column + "'; the first line must name it");
-  }
+  return names;
+}
 
+}  // namespace
+
+tl::expected<std::vector<std::string>, LogError> csv_names(const std::string& path) {
+  auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
+  if (!content) return tl::make_unexpected(content.error());
+  std::istringstream file(std::move(*content));
+  return names_of(path, file);
+}
+
+tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column,
+                                           const std::set<std::string>& unread, bool gaps) {
+  auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
+  if (!content) return tl::make_unexpected(content.error());
+  std::istringstream file(std::move(*content));
+  const auto header = names_of(path, file);
+  if (!header) return tl::make_unexpected(header.error());
+  const auto& names = *header;
+  if (!time_column.empty() && !std::ranges::count(names, time_column))
+    return bad(path, 1, "no column '" + time_column + "'; the first line must name it");
+
+  std::string text;
   std::vector<std::vector<double>> values(names.size());
   for (std::size_t line = 2; std::getline(file, text); ++line) {
     if (trimmed(text).empty()) continue;
@@ -94,7 +125,7 @@ tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::s
     }
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (unread.contains(names[i])) continue;
-      const auto value = finite_number(cells[i]);
+      const auto value = gaps ? number_or_gap(cells[i]) : finite_number(cells[i]);
       if (!value)
         return bad(
             path, line,

@@ -26,9 +26,13 @@ struct LogError {
 
 /// Reads comma-separated numbers under a line of column names. Errors: missing file, no t_s column (unless
 /// `time_column` names another or is empty), a duplicated name, a row with too few or too many cells, a cell that is
-/// not a finite number. Columns named in `unread` are left out, whatever their cells hold.
+/// not a finite number. Columns named in `unread` are left out, whatever their cells hold. With `gaps`, a cell that is
+/// empty or nan is NaN. A file that gzip made is read as what is in it.
 tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column = "t_s",
-                                           const std::set<std::string>& unread = {});
+                                           const std::set<std::string>& unread = {}, bool gaps = false);
+
+/// The names in a CSV file's first line, in its order. Errors: missing file, a name that is empty.
+tl::expected<std::vector<std::string>, LogError> csv_names(const std::string& path);
 
 /// Writes t_s first, then the columns in name order, with enough digits to read back bit for bit.
 tl::expected<void, LogError> write_csv(const std::string& path, const FlightLog& log, bool overwrite);

@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/log/import_airgarage.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <set>
 
-#include "core/types/geometry.hpp"
+#include "core/log/local_cubic.hpp"
 
 namespace backwash::log {
 namespace {
 
-constexpr double kFrame = 0.01;      // s
-constexpr double kHalfWidth = 0.12;  // s, of the fitted cubic
-constexpr std::size_t kLeastFrames = 6;
+constexpr double kFrame = 0.01;          // s
 constexpr double kMarkerHeight = 0.027;  // m, marker above the feet
 
 /// What the notes that accompany the data say of a flight: hovers under a plate (1), nothing above (0), or a pass
@@ -53,22 +50,6 @@ std::vector<double> frame_times(const std::vector<double>& stamps) {
   return frames;
 }
 
-struct Fitted {
-  Vec3 p, v, a;
-};
-/// Cubic through the rows [first, last) around time t.
-Fitted cubic(const std::vector<double>& t, const std::vector<Vec3>& p, std::size_t first, std::size_t last, double at) {
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  Eigen::Matrix<double, 4, 3> right = Eigen::Matrix<double, 4, 3>::Zero();
-  for (std::size_t i = first; i < last; ++i) {
-    const double u = (t[i] - at) / kHalfWidth;
-    const Eigen::Vector4d basis(1, u, u * u, u * u * u);
-    normal += basis * basis.transpose(), right += basis * p[i].transpose();
-  }
-  const Eigen::Matrix<double, 4, 3> c = normal.ldlt().solve(right);
-  return {c.row(0), c.row(1) / kHalfWidth, 2 * c.row(2) / (kHalfWidth * kHalfWidth)};
-}
-
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -104,15 +85,11 @@ tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
       name.size() >= 8 && std::all_of(name.begin(), name.begin() + 8, ::isdigit) ? std::stod(name.substr(0, 8)) : 0;
 
   FlightLog log;
-  std::size_t first = 0, last = 0;
+  const auto motion = local_cubics(t, p);
   for (std::size_t i = 0; i < t.size(); ++i) {
-    while (t[first] < t[i] - kHalfWidth - 1e-9) ++first;
-    while (last < t.size() && t[last] <= t[i] + kHalfWidth + 1e-9) ++last;
-    const bool both_sides = t[i] - t[first] > 0.5 * kHalfWidth && t[last - 1] - t[i] > 0.5 * kHalfWidth;
-    if (last - first < kLeastFrames || !both_sides) continue;
-    const Fitted f = cubic(t, p, first, last, t[i]);
+    if (!motion[i]) continue;
     log.t_s.push_back(t[i]);
-    add(log, "", "_m", p[i]), add(log, "v", "_mps", f.v), add(log, "a", "_mps2", f.a);
+    add(log, "", "_m", p[i]), add(log, "v", "_mps", motion[i]->v), add(log, "a", "_mps2", motion[i]->a);
     for (const char* q : {"qw", "qx", "qy", "qz"}) log.columns[q].push_back(raw->column(q)[i]);
     log.columns["stood_z_m"].push_back(stood);
     log.columns["surface_z_m"].push_back(stood - kMarkerHeight);

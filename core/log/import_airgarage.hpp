@@ -12,10 +12,8 @@ namespace backwash::log {
 /// their arrival) as a flight log.
 ///
 /// Stamps: frames lie on a 10 ms grid; a frame that arrived late in a burst is put back before the next one. Velocity
-/// and acceleration: a cubic is fitted to the positions within ± 0.12 s of each row by least squares and differentiated
-/// in its middle; its second derivative passes half the amplitude at 4.0 Hz and less than a tenth above 6.5 Hz, so
-/// variances of these accelerations mean the band 0.2–4 Hz. Rows with fewer than six frames around them are left out:
-/// a gap.
+/// and acceleration are those of local_cubics, so variances of these accelerations mean the band 0.2–4 Hz. Rows without
+/// them are left out: a gap.
 ///
 /// Four columns are added: `stood_z_m` (the marker's height while it stood at first), `surface_z_m` (what it stood on
 /// then, the marker 27 mm above the feet), `ceiling` (1 hovering under a plate, 0 nothing above, −1 not said, by the

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <utility>
 
 #include "core/log/import_airgarage.hpp"
+#include "core/log/import_columns.hpp"
 #include "core/log/import_crazypad.hpp"
+#include "core/log/same_flight.hpp"
 #include "core/log/ulog.hpp"
+#include "services/backwash/column_map.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -12,12 +17,14 @@
 namespace backwash::services {
 namespace {
 
-using Importer = tl::expected<log::FlightLog, log::LogError> (*)(const std::string& path);
+/// Reads a recording; what was left out of it, a sentence each, goes to `notes`.
+using Importer = std::function<tl::expected<log::FlightLog, log::LogError>(const std::string& path,
+                                                                           std::vector<std::string>& notes)>;
 
 /// Kinds of recordings; add a line for a new one.
 constexpr struct {
   const char* kind;
-  Importer import;
+  tl::expected<log::FlightLog, log::LogError> (*import)(const std::string& path);
 } kImporters[] = {
     {"airgarage", log::import_airgarage},
     {"crazypad", log::import_crazypad},
@@ -25,49 +32,102 @@ constexpr struct {
 };
 
 struct Options {
-  std::string kind, folder;
-  std::vector<std::string> files;
-  bool json = false, force = false;
+  std::string kind, folder, map_columns;
+  std::vector<std::string> files;  ///< after `kind`, which is the first of them with a column map
+  bool propose = false, json = false, force = false;
 };
 
 Importer importer(const std::string& kind) {
   std::string known;
   for (const auto& entry : kImporters) {
-    if (kind == entry.kind) return entry.import;
+    if (kind == entry.kind) return [import = entry.import](const std::string& path, auto&) { return import(path); };
     known += (known.empty() ? "" : ", ") + std::string(entry.kind);
   }
   throw Failure(kUsage, "'" + kind + "' is no kind of recording; known are " + known);
 }
 
+/// The importer that the options name, and the recordings.
+std::pair<Importer, std::vector<std::string>> importer_of(const Options& options) {
+  if (options.map_columns.empty()) {
+    if (options.files.empty()) throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
+    return {importer(options.kind), options.files};
+  }
+  const auto map = read_column_map(options.map_columns);
+  if (!map)
+    throw Failure(map.error().kind == config::ConfigError::Kind::not_found ? kNoInput : kConfiguration,
+                  map.error().message);
+  std::vector<std::string> files{options.kind};
+  files.insert(files.end(), options.files.begin(), options.files.end());
+  return {[map = *map](const std::string& path, auto& notes) { return log::import_columns(path, map, &notes); }, files};
+}
+
+[[noreturn]] void fail(const log::LogError& error) {
+  throw Failure(error.kind == log::LogError::Kind::not_found ? kNoInput : kBadData, error.message);
+}
+
+int propose(const Options& options) {
+  if (!options.files.empty()) throw Failure(kUsage, "--propose looks at one table; give one");
+  const auto text = proposed_column_map(options.kind);
+  if (!text) fail(text.error());
+  std::fputs(text->c_str(), stdout);
+  return kOk;
+}
+
+/// Which flight this is already known as; empty: none.
+std::string known_as(const log::FlightMark& mark, const std::vector<std::pair<std::string, log::FlightMark>>& known) {
+  for (const auto& [name, other] : known)
+    if (const double shared = mark.shared(other); shared >= log::kSameFlight)
+      return std::to_string(static_cast<int>(100 * shared)) + " % of the positions are those of " + name +
+             ": the same flight under two names";
+  return {};
+}
+
+/// FOLDER/NAME.csv; of NAME.csv.gz as well.
+std::string target(const std::string& folder, const std::string& file) {
+  auto stem = std::filesystem::path(file).stem();
+  if (stem.extension() == ".csv") stem = stem.stem();
+  return (std::filesystem::path(folder) / stem).string() + ".csv";
+}
+
 int run(const Options& options) {
-  const Importer read = importer(options.kind);
+  if (options.propose) return propose(options);
+  const auto [read, files] = importer_of(options);
+  if (options.folder.empty()) throw Failure(kUsage, "--out is required: the folder for the flight logs");
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (!std::filesystem::is_directory(options.folder))
     throw Failure(kCannotCreate, options.folder + ":1: cannot be created; name a folder that can be written");
-  const auto target = [&](const std::string& file) {
-    return (std::filesystem::path(options.folder) / std::filesystem::path(file).stem()).string() + ".csv";
-  };
-  for (const auto& file : options.files) refuse_to_overwrite(target(file), options.force);
+  for (const auto& file : files) refuse_to_overwrite(target(options.folder, file), options.force);
   Json logs = Json::array(), refused = Json::array();
-  for (const auto& file : options.files) {
-    const auto log = read(file);
+  std::vector<std::pair<std::string, log::FlightMark>> known;
+  std::vector<std::string> notes;
+  for (const auto& file : files) {
+    const auto log = read(file, notes);
     if (!log) {
       // A recording without rows is not the end of a hundred others; alone it is an error.
-      if (options.files.size() == 1 || log.error().kind == log::LogError::Kind::not_found)
-        throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+      if (files.size() == 1 || log.error().kind == log::LogError::Kind::not_found) fail(log.error());
       refused.push_back(log.error().message);
       continue;
     }
-    const auto written = log::write_csv(target(file), *log, options.force);
+    log::FlightMark mark(*log);
+    if (const auto same = known_as(mark, known); !same.empty()) {
+      refused.push_back(file + ":1: " + same);
+      continue;
+    }
+    known.emplace_back(file, std::move(mark));
+    const auto written = log::write_csv(target(options.folder, file), *log, options.force);
     if (!written) throw Failure(kCannotCreate, written.error().message);
-    logs.push_back(Json{{"log", target(file)}, {"rows", log->t_s.size()}});
+    logs.push_back(Json{{"log", target(options.folder, file)}, {"rows", log->t_s.size()}});
   }
   if (logs.empty()) throw Failure(kBadData, refused.front().get<std::string>());
   if (options.json) {
-    print(Json{{"kind", options.kind}, {"logs", logs}, {"refused", refused}});
+    print(Json{{"kind", options.map_columns.empty() ? options.kind : "columns"},
+               {"logs", logs},
+               {"refused", refused},
+               {"notes", notes}});
   } else {
     std::printf("%zu flight logs written to %s\n", logs.size(), options.folder.c_str());
+    for (const auto& note : notes) std::printf("%s\n", note.c_str());
     for (const auto& why : refused) std::printf("left out: %s\n", why.get<std::string>().c_str());
   }
   return kOk;
@@ -78,12 +138,19 @@ int run(const Options& options) {
 Verb import_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   auto* command = app.add_subcommand("import", "Recordings of others as flight logs");
-  command->add_option("kind", options->kind, "airgarage, crazypad or ulog")->required();
-  command->add_option("files", options->files, "recordings")->required();
-  command->add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each")->required();
+  command->add_option("kind", options->kind, "airgarage, crazypad or ulog; left out with a column map")->required();
+  command->add_option("files", options->files, "recordings");
+  command->add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each");
+  command->add_option("--map-columns", options->map_columns,
+                      "column map (TOML): recordings are tables, CSV or .csv.gz");
+  command->add_flag("--propose", options->propose,
+                    "print a column map for one table, guessed and checked; writes nothing");
   command->add_flag("--json", options->json, "one JSON object on stdout");
   command->add_flag("--force", options->force, "overwrite logs that exist");
-  command->footer("Example:\n  backwash import airgarage 20240823_16_23_49.csv -o logs");
+  command->footer(
+      "Example:\n  backwash import airgarage 20240823_16_23_49.csv -o logs\n"
+      "  backwash import --propose flight.csv > map.toml\n  backwash import --map-columns map.toml flight*.csv -o "
+      "logs");
   return {command, [options] { return run(*options); }};
 }
 

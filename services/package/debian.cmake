@@ -25,7 +25,7 @@ control error. Odometry and maps over DDS, set-points over MAVLink.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME backwash-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), libnlopt-cxx-dev, libtomlplusplus-dev, libexpected-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), libnlopt-cxx-dev, libtomlplusplus-dev, libexpected-dev, zlib1g-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "fields, reachable sets and plans of backwash as a library
 The core library as a CMake package, with its headers and an example that
 plans a flight.")

@@ -37,6 +37,16 @@ printf 'start = [1, 0, 1]\n[[hover]]\np = [2, 0, 1]\ndwel = 3\n' >spec_key.toml
 printf 'start = [1, 1.5, 1]\n[[hover]]\np = [5, 1.5, 1]\ndwell = 3\n' >spec_wall.toml
 touch exists
 mkfifo fifo
+# Column maps, and tables of others.
+table() { printf 't,x,y,z\n'; for n in $(seq 0 200); do echo "$(($1 * n)),0,0,0.$n"; done; }
+table 10 >ms.csv
+printf '[columns]\nt_s = "t [ms]"\nx_m = "x"\ny_m = "y"\nz_m = "z"\n' >map.toml
+sed 's/ms/fortnight/' map.toml >unit.toml
+sed 's/^z_m/height/' map.toml >unknown_column.toml
+sed '/^z_m/d' map.toml >no_height.toml
+sed 's/\[ms\]/[us]/' map.toml >too_fast.toml
+printf '[frame]\nworld = "nwu"\n' | cat - map.toml >frame.toml
+printf 'vx_mps = "x"\n' | cat map.toml - >one_axis.toml
 # An OctoMap of two free cubes, from (-1.6, -1.6, -1.6) to the origin and from there to (1.6, 1.6, 1.6); the rest of its
 # extent is unknown. Two bytes a node, two bits a child: 00 unknown, 10 free, 11 inner.
 {
@@ -100,4 +110,18 @@ python3 -c 'import json, sys; assert json.load(open("stdout"))["status"] == "goa
 # a bare call is a usage error as well, without a verb to name
 "$backwash" >stdout 2>stderr
 [[ $? == 64 && $(wc -l <stderr) == 1 ]] || { echo "bare call: not 64 with one line"; failed=1; }
+refused 66 'absent.toml' import --map-columns absent.toml ms.csv -o logs
+refused 78 "unit.toml:2: key 'columns.t_s'" import --map-columns unit.toml ms.csv -o logs
+refused 78 "unknown_column.toml:5: key 'columns.height'" import --map-columns unknown_column.toml ms.csv -o logs
+refused 78 "key 'columns.z_m'" import --map-columns no_height.toml ms.csv -o logs
+refused 78 "is 'enu' or 'ned'" import --map-columns frame.toml ms.csv -o logs
+refused 78 'give all of vx_mps, vy_mps, vz_mps or none' import --map-columns one_axis.toml ms.csv -o logs
+refused 65 'is the unit of the time right?' import --map-columns too_fast.toml ms.csv -o logs
+refused 65 "no column 't', which the column map takes for t_s" import --map-columns map.toml no_z_points.csv -o logs
+refused 65 'called like a time' import --propose no_z_points.csv
+refused 64 'no kind of recording' import nanobench ms.csv -o logs
+refused 64 'no recording given' import ulog -o logs
+refused 64 '--out' import --map-columns map.toml ms.csv
+gzip -k ms.csv && head -c 100 ms.csv.gz >short.csv.gz
+refused 65 'cut short' import --map-columns map.toml short.csv.gz -o logs
 exit $failed

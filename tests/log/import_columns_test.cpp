@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Tables of others by a column map: units, frames, rates, and what physics says of them.
+#include "core/log/import_columns.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <numbers>
+
+#include "core/log/same_flight.hpp"
+#include "core/types/geometry.hpp"
+
+namespace backwash::log {
+namespace {
+
+/// A craft on a rounded path that tilts as it accelerates: what a table says of it, in our frames.
+struct Truth {
+  Vec3 p, v, a;
+  Eigen::Quaterniond q;  ///< body to world
+};
+Truth truth(double t) {
+  const Vec3 size(1.0, 0.7, 0.2), rate(1.9, 1.3, 2.3);
+  Truth s;
+  for (int i = 0; i < 3; ++i) {
+    s.p[i] = size[i] * std::sin(rate[i] * t);
+    s.v[i] = size[i] * rate[i] * std::cos(rate[i] * t);
+    s.a[i] = -size[i] * rate[i] * rate[i] * std::sin(rate[i] * t);
+  }
+  const Vec3 up = (s.a + Vec3(0, 0, kGravity)).normalized();
+  s.q = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), up) * Eigen::AngleAxisd(0.4, Vec3::UnitZ());
+  return s;
+}
+const Eigen::Quaterniond kEnuOfNed(0, std::sqrt(0.5), std::sqrt(0.5), 0), kFluOfFrd(0, 1, 0, 0);
+
+/// A row of a table.
+std::string line(std::initializer_list<double> cells) {
+  std::string text;
+  char number[32];
+  for (const double v : cells)
+    std::snprintf(number, sizeof number, text.empty() ? "%.16g" : ",%.12g", v), text += number;
+  return text;
+}
+
+class ImportColumns : public testing::Test {
+ protected:
+  std::string path_ =
+      std::filesystem::temp_directory_path() / ("backwash_columns." + std::to_string(getpid()) + ".csv");
+  ~ImportColumns() override { std::filesystem::remove(path_); }
+
+  /// A table of `rows` rows at 100 Hz whose cells `row` writes for a time.
+  void table(const std::string& header, const std::function<std::string(double)>& row, int rows = 800) {
+    std::ofstream file(path_);
+    file << header << "\n";
+    for (int k = 0; k < rows; ++k) file << row(0.01 * k) << "\n";
+  }
+  /// The path with velocity and acceleration as a wrong map would have them: each multiplied by a matrix.
+  void motion(const Mat3& of_v, const Mat3& of_a) {
+    table("t,x,y,z,vx,vy,vz,ax,ay,az", [&](double t) {
+      const Truth s = truth(t);
+      const Vec3 v = of_v * s.v, a = of_a * s.a;
+      return line({t, s.p.x(), s.p.y(), s.p.z(), v.x(), v.y(), v.z(), a.x(), a.y(), a.z()});
+    });
+  }
+  static ColumnMap motion_map() {
+    ColumnMap map;
+    for (const auto& [ours, theirs] : std::map<std::string, std::string>{{"t_s", "t"},
+                                                                         {"x_m", "x"},
+                                                                         {"y_m", "y"},
+                                                                         {"z_m", "z"},
+                                                                         {"vx_mps", "vx"},
+                                                                         {"vy_mps", "vy"},
+                                                                         {"vz_mps", "vz"},
+                                                                         {"ax_mps2", "ax"},
+                                                                         {"ay_mps2", "ay"},
+                                                                         {"az_mps2", "az"}})
+      map.columns[ours] = {theirs, ""};
+    return map;
+  }
+  std::string refusal(const ColumnMap& map) const {
+    const auto log = import_columns(path_, map);
+    return log ? "" : log.error().message;
+  }
+};
+
+TEST_F(ImportColumns, ATableInNedWithBodyForcesInGAndStampsInMicrosecondsIsTheFlightItWas) {
+  table("stamp,n,e,d,qa,qb,qc,qd,fx,fy,fz,bat", [](double t) {
+    const Truth s = truth(t);
+    const Vec3 p = kEnuOfNed * s.p * 1000;
+    const Eigen::Quaterniond q = kEnuOfNed * s.q * kFluOfFrd;
+    const Vec3 f = q.conjugate() * (kEnuOfNed * (s.a + Vec3(0, 0, kGravity))) / kGravity;
+    std::string cells =
+        line({1.7e15 + std::round(t * 1e6), p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), f.x(), f.y(), f.z()});
+    return cells += std::llround(t * 100) % 10 == 0 ? ",4012" : ",";  // ten times as rare
+  });
+  ColumnMap map;
+  map.ned = map.frd = true;
+  map.columns = {{"t_s", {"stamp", "us"}},
+                 {"x_m", {"n", "mm"}},
+                 {"y_m", {"e", "mm"}},
+                 {"z_m", {"d", "mm"}},
+                 {"qw", {"qa", ""}},
+                 {"qx", {"qb", ""}},
+                 {"qy", {"qc", ""}},
+                 {"qz", {"qd", ""}},
+                 {"specific_force_x", {"fx", "g"}},
+                 {"specific_force_y", {"fy", "g"}},
+                 {"specific_force_z", {"fz", "g"}},
+                 {"battery_v", {"bat", "mV"}}};
+  const auto log = import_columns(path_, map);
+  ASSERT_TRUE(log) << log.error().message;
+  ASSERT_GT(log->t_s.size(), 760u);
+  EXPECT_FALSE(log->has("specific_force_x"));
+  for (std::size_t k = 0; k < log->t_s.size(); k += 37) {
+    const Truth s = truth(log->t_s[k]);
+    EXPECT_NEAR(log->column("x_m")[k], s.p.x(), 1e-5);
+    EXPECT_NEAR(log->column("z_m")[k], s.p.z(), 1e-5);
+    EXPECT_NEAR(log->column("vy_mps")[k], s.v.y(), 0.02);
+    EXPECT_NEAR(log->column("ax_mps2")[k], s.a.x(), 1e-4);
+    EXPECT_NEAR(log->column("az_mps2")[k], s.a.z(), 1e-4);
+    const Eigen::Quaterniond q(log->column("qw")[k], log->column("qx")[k], log->column("qy")[k], log->column("qz")[k]);
+    EXPECT_NEAR(std::abs(q.dot(s.q)), 1, 1e-6);
+    EXPECT_NEAR(log->column("battery_v")[k], 4.012, 1e-12);
+  }
+}
+
+TEST_F(ImportColumns, AnglesAreRollPitchYaw) {
+  table("t,x,y,z,roll,pitch,yaw", [](double t) {
+    const Truth s = truth(t);
+    const Mat3 R = s.q.toRotationMatrix();
+    const double to_degree = 180 / std::numbers::pi;
+    return line({t, s.p.x(), s.p.y(), s.p.z(), to_degree * std::atan2(R(2, 1), R(2, 2)),
+                 -to_degree * std::asin(R(2, 0)), to_degree * std::atan2(R(1, 0), R(0, 0))});
+  });
+  ColumnMap map;
+  map.columns = {{"t_s", {"t", ""}},        {"x_m", {"x", ""}},          {"y_m", {"y", ""}},     {"z_m", {"z", ""}},
+                 {"roll", {"roll", "deg"}}, {"pitch", {"pitch", "deg"}}, {"yaw", {"yaw", "deg"}}};
+  const auto log = import_columns(path_, map);
+  ASSERT_TRUE(log) << log.error().message;
+  for (std::size_t k = 0; k < log->t_s.size(); k += 53) {
+    const Eigen::Quaterniond q(log->column("qw")[k], log->column("qx")[k], log->column("qy")[k], log->column("qz")[k]);
+    EXPECT_NEAR(std::abs(q.dot(truth(log->t_s[k]).q)), 1, 1e-6);
+  }
+  map.columns["roll"].unit = map.columns["pitch"].unit = "rad";
+  EXPECT_NE(refusal(map).find("tilt"), std::string::npos) << refusal(map);
+}
+
+TEST_F(ImportColumns, WhatPhysicsContradictsIsRefusedByTheAxisThatWouldFit) {
+  const Mat3 one = Mat3::Identity();
+  Mat3 flipped = one, swapped = Mat3::Zero();
+  flipped(2, 2) = -1;
+  swapped(0, 1) = swapped(1, 0) = swapped(2, 2) = 1;
+  motion(one, one);
+  EXPECT_EQ(refusal(motion_map()), "");
+  struct Wrong {
+    Mat3 of_v, of_a;
+    const char* words;
+  };
+  for (const auto& w :
+       {Wrong{1000 * one, one, "vx_mps is 1e+03 times the derivative of x_m"},
+        Wrong{flipped, one, "vz_mps is -1 times the derivative of z_m"},
+        Wrong{swapped, one, "times the derivative of y_m"}, Wrong{one, one / kGravity, "ax_mps2 is 0.10"},
+        Wrong{one, -one, "ax_mps2 is -"}, Wrong{one, flipped, "az_mps2 is -"}}) {
+    motion(w.of_v, w.of_a);
+    EXPECT_NE(refusal(motion_map()).find(w.words), std::string::npos) << w.words << ": " << refusal(motion_map());
+  }
+  // Two thirds of a moved craft's noise is no contradiction, and neither is one that stands still.
+  table("t,x,y,z,vx,vy,vz,ax,ay,az", [](double t) {
+    return line({t, 0.001, 0, 0, 0.03 * std::sin(40 * t), 0, 0, 0.1, 0, 0});
+  });
+  EXPECT_EQ(refusal(motion_map()), "");
+}
+
+TEST_F(ImportColumns, EveryRefusalSaysWhat) {
+  const auto with = [&](const std::string& ours, const ColumnMap::Source& theirs) {
+    ColumnMap map = motion_map();
+    map.columns[ours] = theirs;
+    return refusal(map);
+  };
+  motion(Mat3::Identity(), Mat3::Identity());
+  EXPECT_NE(with("vx_mps", {"speed", ""}).find("no column 'speed', which the column map takes for vx_mps"),
+            std::string::npos);
+  EXPECT_NE(with("t_s", {"t", "ms"}).find("is the unit of the time right?"), std::string::npos);
+  EXPECT_NE(with("thrust", {"x", "1"}).find("thrust goes from -1"), std::string::npos) << "negative";
+  table("t,x,y,z,vx,vy,vz,ax,ay,az", [](double t) { return line({t > 3 ? t - 1 : t, 0, 0, 0, 0, 0, 0, 0, 0, 0}); });
+  EXPECT_NE(refusal(motion_map()).find("'t' goes back"), std::string::npos);
+  table(
+      "t,x,y,z,vx,vy,vz,ax,ay,az",
+      [](double t) {
+        return line({t, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+      },
+      90);
+  EXPECT_NE(refusal(motion_map()).find("fewer than 100 rows"), std::string::npos);
+  table("t,x,y,z,vx,vy,vz,ax,ay,az", [](double t) { return line({t, 0, 0}) += ",zero,0,0,0,0,0,0"; });
+  EXPECT_NE(refusal(motion_map()).find(":2: column 'z' holds 'zero'"), std::string::npos);
+  ColumnMap force = motion_map();
+  for (const char* a : {"ax_mps2", "ay_mps2", "az_mps2"}) force.columns.erase(a);
+  force.columns["specific_force_x"].name = "ax";
+  force.columns["specific_force_y"].name = "ay";
+  force.columns["specific_force_z"].name = "az";
+  motion(Mat3::Identity(), Mat3::Identity());
+  EXPECT_NE(refusal(force).find("give an attitude as well"), std::string::npos);
+  ColumnMap quaternion = motion_map();
+  for (const char* q : {"qw", "qx", "qy", "qz"}) quaternion.columns[q].name = "x";
+  EXPECT_NE(refusal(quaternion).find("no unit quaternion"), std::string::npos);
+}
+
+TEST_F(ImportColumns, RowsWithoutAPositionOrWithTheLastStampAreLeftOut) {
+  table("t,x,y,z", [](double t) {
+    const Truth s = truth(t);
+    const long k = std::lround(t * 100);
+    if (k % 50 == 7) return line({t}) += ",nan,,0";
+    return line({k % 50 == 9 ? t - 0.01 : t, s.p.x(), s.p.y(), s.p.z()});
+  });
+  ColumnMap map;
+  map.columns = {{"t_s", {"t", "s"}}, {"x_m", {"x", "m"}}, {"y_m", {"y", "m"}}, {"z_m", {"z", "m"}}};
+  const auto log = import_columns(path_, map);
+  ASSERT_TRUE(log) << log.error().message;
+  for (std::size_t k = 1; k < log->t_s.size(); ++k) EXPECT_GT(log->t_s[k], log->t_s[k - 1]);
+  EXPECT_LT(log->t_s.size(), 800u - 2 * 16 - 10);
+  EXPECT_GT(log->t_s.size(), 800u - 2 * 16 - 20);
+}
+
+TEST_F(ImportColumns, WhatWasDrawnOnAfterTheLastSampleIsCutOffAndTold) {
+  table("t,x,y,z,vx,vy,vz,ax,ay,az", [](double t) {
+    const Truth s = truth(std::min(t, 6.0)), before = truth(5.99);
+    const Vec3 a = t > 6 ? Vec3(s.a + (t - 6) / 0.01 * (s.a - before.a)) : s.a;
+    const Vec3 p = truth(t).p, v = truth(t).v;
+    return line({t, p.x(), p.y(), p.z(), v.x(), v.y(), v.z(), a.x(), a.y(), a.z()});
+  });
+  std::vector<std::string> notes;
+  const auto log = import_columns(path_, motion_map(), &notes);
+  ASSERT_TRUE(log) << log.error().message;
+  EXPECT_NEAR(log->t_s.back(), 6.0, 0.03);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("straight line"), std::string::npos);
+}
+
+TEST_F(ImportColumns, AFlightIsFoundAgainUnderAnotherNameAndCutShort) {
+  const auto flight = [](double from, double to) {
+    FlightLog log;
+    for (double t = from; t < to; t += 0.01) {
+      log.t_s.push_back(t - from);
+      for (int i = 0; i < 3; ++i)
+        log.columns[std::array{"x_m", "y_m", "z_m"}[static_cast<std::size_t>(i)]].push_back(truth(t).p[i]);
+    }
+    return log;
+  };
+  const FlightMark whole(flight(0, 20)), part(flight(0, 12)), other(flight(20.003, 40));
+  EXPECT_GT(whole.shared(part), 0.99);
+  EXPECT_LT(whole.shared(other), 0.01);
+  FlightLog still = flight(0, 0.3);
+  for (int k = 0; k < 500; ++k)
+    for (auto& [name, column] : still.columns) column.push_back(column.back());
+  still.t_s.resize(still.columns["x_m"].size());
+  EXPECT_EQ(whole.shared(FlightMark(still)), 0) << "30 places say nothing";
+}
+
+}  // namespace
+}  // namespace backwash::log
