@@ -10,6 +10,9 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <array>
+#include <atomic>
+#include <cinttypes>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -23,11 +26,11 @@ namespace {
 using daemon::test::Medium;
 using Events = std::vector<Event>;
 
-constexpr int kTicks = 3000;         // of a sequence: a minute
-constexpr int kShards = 4;           // of the whole, so that ctest can run them side by side
-constexpr int kReplayEvery = 8;      // sequences
-constexpr int kMostRuns = 200;       // to cut a sequence down
-constexpr unsigned kPatience = 120;  // s for a sequence: else it hangs
+constexpr int kTicks = 3000;          // of a sequence: a minute
+constexpr int kShards = 4;            // of the whole, so that ctest can run them side by side
+constexpr int kReplayEvery = 8;       // sequences
+constexpr int kMostRuns = 200;        // to cut a sequence down
+constexpr unsigned kPatience = 1200;  // s for a sequence, beside whatever else runs: else it hangs
 
 double number(const char* name, double otherwise) {
   const char* text = std::getenv(name);
@@ -35,10 +38,11 @@ double number(const char* name, double otherwise) {
 }
 
 /// A crash or a hang names its sequence, with nothing but a system call.
-volatile std::sig_atomic_t running = 0;
+std::atomic<std::uint64_t> running{0};  // free of locks: a signal may come at any time
 char crash_line[64];
 void say_seed(int signal) {
-  const int size = std::snprintf(crash_line, sizeof crash_line, "signal %d in sequence %d\n", signal, int{running});
+  const int size =
+      std::snprintf(crash_line, sizeof crash_line, "signal %d in sequence %" PRIu64 "\n", signal, running.load());
   [[maybe_unused]] const auto n = ::write(STDERR_FILENO, crash_line, static_cast<std::size_t>(size));
   std::signal(signal, SIG_DFL);
   std::raise(signal);
@@ -118,7 +122,7 @@ class SequenceFuzz : public testing::TestWithParam<int> {
     long done = 0, sequences = 0, plans = 0, replays = 0;
     int violations = 0;
     for (std::uint64_t seed = first; static_cast<double>(done) < ticks; ++seed, ++sequences) {
-      running = static_cast<int>(seed);
+      running = seed;
       ::alarm(kPatience);
       DaemonRig rig(sequence(seed, kTicks), medium);
       const auto violation = rig.run(kTicks);
