@@ -33,12 +33,16 @@ struct ULog {
 /// cannot be, data without a subscription or of a wrong size.
 tl::expected<ULog, std::string> decode_ulog(std::span<const std::uint8_t> bytes);
 
-/// Reads a file as a flight log (docs/interfaces.md): vehicle_local_position, vehicle_attitude, sensor_combined or
-/// vehicle_acceleration for acceleration (else that of the local position), trajectory_setpoint, battery_status,
-/// actuator_outputs/actuator_motors, vehicle_thrust_setpoint or the thrust of vehicle_attitude_setpoint; NED/FRD turned
-/// into z-up and x forward, y left, z up. Rows are those of the local position; other topics are joined by their latest
-/// value before it, and left out where they are missing. Errors: not_found; bad_data with the offset, or the topic that
-/// is missing.
+/// A flight log (docs/interfaces.md) of a decoded ULog: vehicle_local_position, vehicle_attitude, trajectory_setpoint,
+/// battery_status, actuator_outputs/actuator_motors, vehicle_thrust_setpoint or the thrust of
+/// vehicle_attitude_setpoint; NED/FRD turned into z-up and x forward, y left, z up. Rows are those of the local
+/// position. If those are rarer than 20 Hz, rows are the accelerometer's (vehicle_acceleration or sensor_combined;
+/// means down to 100 Hz), positions a cubic between messages, and accelerations the specific force turned by the
+/// attitude; a gap of positions above 0.5 s, and a reset of the estimator, is one of the rows. Other topics are joined
+/// by their latest value before, and left out where they are missing. Error: the topic that is missing.
+tl::expected<FlightLog, std::string> flight_of(const ULog& ulog);
+
+/// Reads a file as a flight log. Errors: not_found; bad_data with the offset, or the topic that is missing.
 tl::expected<FlightLog, LogError> read_ulog(const std::string& path);
 
 }  // namespace backwash::log

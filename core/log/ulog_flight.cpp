@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "core/log/log_file.hpp"
 #include "core/log/ulog.hpp"
+#include "core/types/geometry.hpp"
 
 namespace backwash::log {
 namespace {
+
+constexpr double kLeastRate = 20, kMostRate = 100;  // Hz, of a flight's rows
+constexpr double kMostApart = 0.5;                  // s between messages; more is a gap
 
 /// Joins fields of other topics to the rows by the latest message before each.
 class Rows {
@@ -83,6 +91,85 @@ void join_attitude(const ULog& ulog, const ULog::Topic& position, FlightLog& log
   }
 }
 
+double rate(const ULog::Topic& topic) {
+  const double span = topic.t_s.size() < 2 ? 0 : topic.t_s.back() - topic.t_s.front();
+  return span > 0 ? static_cast<double>(topic.t_s.size() - 1) / span : 0;
+}
+
+/// The accelerometer's topic that was logged most often, and what its three columns are called without their index.
+std::pair<const ULog::Topic*, std::string> accelerometer(const ULog& ulog) {
+  std::pair<const ULog::Topic*, std::string> best{nullptr, {}};
+  for (const auto& [topic, field] :
+       {std::pair{"vehicle_acceleration", "xyz"}, {"sensor_combined", "accelerometer_m_s2"}}) {
+    const auto* found = ulog.find(topic);
+    if (!found || !found->columns.contains(std::string(field) + "[2]") || rate(*found) < kLeastRate) continue;
+    if (!best.first || rate(*found) > rate(*best.first)) best = {found, field};
+  }
+  return best;
+}
+
+/// Row k and the share of the way to the next one, of the messages around a time; nothing in a gap or outside.
+std::optional<std::pair<std::size_t, double>> between(const ULog::Topic& topic, double t, double most_apart) {
+  const auto after = std::ranges::upper_bound(topic.t_s, t);
+  if (after == topic.t_s.begin() || after == topic.t_s.end()) return std::nullopt;
+  const auto k = static_cast<std::size_t>(after - topic.t_s.begin()) - 1;
+  const double h = topic.t_s[k + 1] - topic.t_s[k];
+  if (h > most_apart) return std::nullopt;
+  return std::pair{k, (t - topic.t_s[k]) / h};
+}
+
+/// Whether the estimator set its position anew between message k and the next one.
+bool reset_after(const ULog::Topic& position, std::size_t k) {
+  return std::ranges::any_of(std::array{"xy_reset_counter", "z_reset_counter"}, [&](const char* counter) {
+    const auto found = position.columns.find(counter);
+    return found != position.columns.end() && found->second[k] != found->second[k + 1];
+  });
+}
+
+Eigen::Quaterniond attitude_at(const ULog::Topic& attitude, std::size_t k, double share) {
+  const auto q = [&](std::size_t row) {
+    const auto part = [&](int i) { return attitude.columns.at("q[" + std::to_string(i) + "]")[row]; };
+    return Eigen::Quaterniond(part(0), part(1), part(2), part(3)).normalized();
+  };
+  return q(k).slerp(share, q(k + 1));
+}
+
+/// Local positions (NED) as often as the accelerometer measures, at most kMostRate: PX4 logs positions at 5 to 10 Hz.
+/// Between two messages they follow the cubic that has both positions and velocities; the acceleration is the specific
+/// force's mean, turned by the attitude, without gravity. Nothing where the accelerometer or the attitude is missing.
+std::optional<ULog::Topic> densified(const ULog& ulog, const ULog::Topic& position) {
+  const auto [force, field] = accelerometer(ulog);
+  const auto* attitude = ulog.find("vehicle_attitude");
+  if (!force || !attitude || !attitude->columns.contains("q[3]") || !position.columns.contains("vz"))
+    return std::nullopt;
+  const auto each = static_cast<std::size_t>(std::max(1.0, std::round(rate(*force) / kMostRate)));
+  ULog::Topic dense{position.name, 0, {}, {}};
+  for (std::size_t first = 0; first + each <= force->t_s.size(); first += each) {
+    double t = 0;
+    Eigen::Vector3d f = Eigen::Vector3d::Zero();
+    for (std::size_t row = first; row < first + each; ++row) {
+      t += force->t_s[row] / static_cast<double>(each);
+      for (int i = 0; i < 3; ++i)
+        f[i] += force->columns.at(field + "[" + std::to_string(i) + "]")[row] / static_cast<double>(each);
+    }
+    const auto p = between(position, t, kMostApart), q = between(*attitude, t, kMostApart);
+    if (!p || !q || reset_after(position, p->first)) continue;
+    const Eigen::Vector3d a = attitude_at(*attitude, q->first, q->second) * f + Eigen::Vector3d(0, 0, kGravity);
+    const double s = p->second, h = position.t_s[p->first + 1] - position.t_s[p->first];
+    dense.t_s.push_back(t);
+    for (int i = 0; i < 3; ++i) {
+      const std::string axis(1, "xyz"[i]), speed = "v" + axis;
+      const double* at = &position.columns.at(axis)[p->first];
+      const double* v = &position.columns.at(speed)[p->first];
+      dense.columns[axis].push_back((1 + 2 * s) * (1 - s) * (1 - s) * at[0] + s * s * (3 - 2 * s) * at[1] +
+                                    h * s * (1 - s) * ((1 - s) * v[0] - s * v[1]));
+      dense.columns[speed].push_back((1 - s) * v[0] + s * v[1]);
+      dense.columns["a" + axis].push_back(a[i]);
+    }
+  }
+  return dense;
+}
+
 FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
   FlightLog log;
   for (const double t : position.t_s) log.t_s.push_back(t - position.t_s.front());
@@ -112,6 +199,16 @@ FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
 
 }  // namespace
 
+tl::expected<FlightLog, std::string> flight_of(const ULog& ulog) {
+  const auto* position = ulog.find("vehicle_local_position");
+  if (!position) return tl::make_unexpected("no topic vehicle_local_position; log it, a flight needs positions");
+  const auto dense = rate(*position) < kLeastRate ? densified(ulog, *position) : std::nullopt;
+  FlightLog log = flight_of(ulog, dense && dense->t_s.size() > position->t_s.size() ? *dense : *position);
+  for (const char* name : {"x_m", "y_m", "z_m"})
+    if (!log.has(name)) return tl::make_unexpected("vehicle_local_position has no finite x, y, z");
+  return log;
+}
+
 tl::expected<FlightLog, LogError> read_ulog(const std::string& path) {
   const auto content = read_log_file(path, files::kLargestTable, "a .ulg file");
   if (!content) return tl::make_unexpected(content.error());
@@ -121,12 +218,9 @@ tl::expected<FlightLog, LogError> read_ulog(const std::string& path) {
   };
   const auto ulog = decode_ulog(bytes);
   if (!ulog) return bad(ulog.error());
-  const auto* position = ulog->find("vehicle_local_position");
-  if (!position) return bad("no topic vehicle_local_position; log it, a flight needs positions");
-  FlightLog log = flight_of(*ulog, *position);
-  for (const char* name : {"x_m", "y_m", "z_m"})
-    if (!log.has(name)) return bad("vehicle_local_position has no finite x, y, z");
-  return log;
+  auto log = flight_of(*ulog);
+  if (!log) return bad(log.error());
+  return std::move(*log);
 }
 
 }  // namespace backwash::log
