@@ -137,8 +137,9 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
   // What was planned before an operator's order, or before the mode last ended it, is not flown (docs/faults.md row
-  // 39).
-  const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms);
+  // 39). Nor is anything while the cause of a hold lasts: braked on its own stops it would creep on in that hold.
+  const bool lasts = frames_apart(in) || Supervisor::silent(in.autopilot.pose_age(in.now_ns));
+  const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms && !lasts);
   out.accepted = following && closure_refused_ == closures_ && in.segment->epoch == epoch_ && gate_.last() &&
                  tracker_.accept(*in.segment, gate_.last()->state);
   out.refused = !out.accepted;
@@ -164,6 +165,8 @@ double FlightTick::apart(const TickInput& in) const noexcept {
   return std::clamp(FrameAlignment::kMaxPosition + 3 * sigma, kLeastApart, kMostApart);
 }
 
+bool FlightTick::frames_apart(const TickInput& in) const noexcept { return alignment_.position_residual() > apart(in); }
+
 SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
   SupervisorInput facts;
   facts.request = in.request;
@@ -178,7 +181,7 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) no
   facts.arming = arming_ > 0;
   facts.offboard = in.autopilot.offboard;
   facts.frames_aligned = alignment_.aligned();
-  facts.frames_apart = alignment_.position_residual() > apart(in);
+  facts.frames_apart = frames_apart(in);
   facts.frames_agree = alignment_.agree(2 * apart(in));
   facts.autopilot_reset = reset_;
   facts.closure_refused = closure_refused_now_;

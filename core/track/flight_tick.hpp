@@ -115,6 +115,7 @@ class FlightTick {
   void drop_segment(TickOutput& out) noexcept;
 
   double apart(const TickInput& in) const noexcept;
+  bool frames_apart(const TickInput& in) const noexcept;
 
   double battery_land_, sigma_;
   OdometryGate gate_;

@@ -224,7 +224,7 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::odometry_inconsistent:
       return in.odometry_inconsistent;  // row 41
     case Reason::pose_silent:
-      return in.pose_age > kPoseSilent - kControlPeriod / 2;  // row 42
+      return silent(in.pose_age);  // row 42
     case Reason::pose_lost:
       return in.pose_age > kPoseLost - kControlPeriod / 2;
     case Reason::closure_refused:

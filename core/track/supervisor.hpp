@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/track/frame_alignment.hpp"
+#include "core/types/geometry.hpp"
 
 namespace backwash::track {
 
@@ -173,6 +174,8 @@ class Supervisor {
   SupervisorOutput step(const SupervisorInput& in) noexcept;
   Mode mode() const noexcept { return mode_; }
   Reason reason() const noexcept { return reason_; }
+  /// Whether the autopilot's pose is too old to be flown by, at this age, s (row 42).
+  static constexpr bool silent(double pose_age) noexcept { return pose_age > kPoseSilent - kControlPeriod / 2; }
   /// False in a hold whose cause speaks against the pose.
   bool pose_trusted() const noexcept;
 

@@ -158,5 +158,18 @@ TEST(TickReactions, AnAttitudeThatStopsArrivingHoldsAlsoWhileThePositionComes) {
   EXPECT_EQ(ticks, 15);
 }
 
+TEST(TickReactions, WhileTheAutopilotsPoseIsSilentNothingIsFlownAndThenItLands) {
+  Flown f(Flown::Until::tracking);
+  f.attitude_on = false;
+  for (int n = 0; f.out.supervisor.mode == Mode::tracking && n < 30; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.reason, Reason::pose_silent);
+  const Vec3 held = f.out.command.p_W;
+  AcceptedSegment s = straight();
+  s.tube.front().center = Flown::map_of(f.truth_L);
+  EXPECT_TRUE(f.offer(s).refused) << "an operator's next command";
+  for (int n = 0; f.out.supervisor.mode == Mode::hold && n < 60; ++n) EXPECT_EQ(f.step().command.p_W, held) << n;
+  EXPECT_EQ(f.out.supervisor.reason, Reason::pose_lost);
+}
+
 }  // namespace
 }  // namespace backwash::track::test
