@@ -16,6 +16,7 @@ constexpr double kClosureFades = 10;  // s: closures add up for so long, or an a
 constexpr double kLeastBelow = 0.1;   // m: a lift-off is over from so far below its height on
 constexpr int kSettled = 50;  // ticks there: PX4 gives its loops their authority bit by bit, until 4 s after arming
 constexpr int kDisorder = 3;  // more in a row are as no odometry at all (docs/faults.md row 5)
+constexpr int kLeavesGround = 65;  // ticks: PX4 says 1.15 s before it leaves the ground that it is in the air
 
 double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
 std::int64_t nanoseconds(double s) noexcept { return static_cast<std::int64_t>(s * 1e9); }
@@ -90,8 +91,9 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
   }
   using Verdict = OdometryGate::Verdict;
   // A pose that repeats to the last bit is frozen in the air even if nothing is to move; standing, it may be still.
-  const bool flies = in.autopilot.armed && in.autopilot.landed == false;
-  const bool moving = (command_.v_W.norm() > 0.05 || flies) && mode() != Mode::lifting;
+  const bool flies = in.autopilot.armed && in.autopilot.landed == false, lifts = mode() == Mode::lifting;
+  off_ground_ = lifts && flies ? off_ground_ + 1 : 0;
+  const bool moving = lifts ? off_ground_ > kLeavesGround : command_.v_W.norm() > 0.05 || flies;
   out.verdict = gate_.take(*sample, moving);
   disorder_ = out.verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
   if (out.verdict == Verdict::good) {

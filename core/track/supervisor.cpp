@@ -44,6 +44,7 @@ constexpr Transition kTransitions[] = {
     {kLifting, Reason::pose_silent, Mode::land},
     {kLifting, Reason::odometry_jump, Mode::land},
     {kLifting, Reason::odometry_inconsistent, Mode::land},
+    {kLifting, Reason::odometry_frozen, Mode::land},
     {kLifting, Reason::odometry_disorder, Mode::land},
     {kLifting, Reason::odometry_lost, Mode::land},
     {kLifting, Reason::frames_disagree, Mode::land},
