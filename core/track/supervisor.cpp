@@ -291,6 +291,8 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
 SupervisorOutput Supervisor::step(const SupervisorInput& in) noexcept {
   count(in);
   const Mode before = mode_;
+  const bool again = in.request == Request::land || in.request == Request::stop;
+  if (mode_ == Mode::land && again && reason_ != Reason::pose_untrusted) ticks_in_mode_ = 0;
   if (!contains(kCommanding, mode_)) {
     if (in.request == Request::enable) {
       const auto* why = std::ranges::find_if(kRefusals, [&](Reason r) { return refused(r, in); });

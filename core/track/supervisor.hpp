@@ -168,7 +168,8 @@ class Supervisor {
   static constexpr double kLiftTimeout = 12.0;   ///< s from the take-off's acceptance until it must be in the air
   static constexpr std::int64_t kMissedWithin = 50;  ///< periods in which three missed ones lead to hold (row 32)
   static constexpr int kMissedQuiet = 25;            ///< missed periods in a row until QUIET (row 32)
-  static constexpr int kLandTicks = 10;              ///< LAND is asked for twice in these, one command may be lost
+  /// LAND is asked for twice in these, one command may be lost; and twice more each time that an operator asks again.
+  static constexpr int kLandTicks = 10;
 
   /// Real-time: wait-free, no allocation.
   SupervisorOutput step(const SupervisorInput& in) noexcept;
