@@ -72,9 +72,11 @@ TEST(TickReactions, TheOdometryIsComparedWithTheAutopilotAtOneMoment) {
 TEST(TickReactions, WhileNothingIsCommandedAVioMayStartAnewElsewhere) {
   Flown f(Flown::Until::aligned);
   ASSERT_TRUE(f.out.fresh);
+  const int before = f.out.odometry_resets;
   f.spoil = [](auto& s) { s.state.p_W.x() += 5; };
   EXPECT_FALSE(f.step().fresh);
   EXPECT_TRUE(f.step().fresh);
+  EXPECT_EQ(f.out.odometry_resets, before + 1) << "the autopilot's estimator has to know";
 }
 
 TEST(TickReactions, ASetpointThatIsNoNumberIsNotSent) {
