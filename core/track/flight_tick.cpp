@@ -16,6 +16,7 @@ constexpr double kClosureFades = 10;  // s: closures add up for so long, or an a
 constexpr double kLeastBelow = 0.1;   // m: a lift-off is over from so far below its height on
 constexpr int kSettled = 50;  // ticks there: PX4 gives its loops their authority bit by bit, until 4 s after arming
 constexpr int kDisorder = 3;  // more in a row are as no odometry at all (docs/faults.md row 5)
+constexpr int kLeavesGround = 65;  // ticks: PX4 says 1.15 s before it leaves the ground that it is in the air
 
 double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
 std::int64_t nanoseconds(double s) noexcept { return static_cast<std::int64_t>(s * 1e9); }
@@ -90,8 +91,9 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
   }
   using Verdict = OdometryGate::Verdict;
   // A pose that repeats to the last bit is frozen in the air even if nothing is to move; standing, it may be still.
-  const bool flies = in.autopilot.armed && in.autopilot.landed == false;
-  const bool moving = (command_.v_W.norm() > 0.05 || flies) && mode() != Mode::lifting;
+  const bool flies = in.autopilot.armed && in.autopilot.landed == false, lifts = mode() == Mode::lifting;
+  off_ground_ = lifts && flies ? off_ground_ + 1 : 0;
+  const bool moving = lifts ? off_ground_ > kLeavesGround : command_.v_W.norm() > 0.05 || flies;
   out.verdict = gate_.take(*sample, moving);
   disorder_ = out.verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
   if (out.verdict == Verdict::good) {
@@ -137,8 +139,9 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
   // What was planned before an operator's order, or before the mode last ended it, is not flown (docs/faults.md row
-  // 39).
-  const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms);
+  // 39). Nor is anything while the cause of a hold lasts: braked on its own stops it would creep on in that hold.
+  const bool lasts = frames_apart(in) || Supervisor::silent(in.autopilot.pose_age(in.now_ns));
+  const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms && !lasts);
   out.accepted = following && closure_refused_ == closures_ && in.segment->epoch == epoch_ && gate_.last() &&
                  tracker_.accept(*in.segment, gate_.last()->state);
   out.refused = !out.accepted;
@@ -164,6 +167,8 @@ double FlightTick::apart(const TickInput& in) const noexcept {
   return std::clamp(FrameAlignment::kMaxPosition + 3 * sigma, kLeastApart, kMostApart);
 }
 
+bool FlightTick::frames_apart(const TickInput& in) const noexcept { return alignment_.position_residual() > apart(in); }
+
 SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
   SupervisorInput facts;
   facts.request = in.request;
@@ -178,7 +183,7 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) no
   facts.arming = arming_ > 0;
   facts.offboard = in.autopilot.offboard;
   facts.frames_aligned = alignment_.aligned();
-  facts.frames_apart = alignment_.position_residual() > apart(in);
+  facts.frames_apart = frames_apart(in);
   facts.frames_agree = alignment_.agree(2 * apart(in));
   facts.autopilot_reset = reset_;
   facts.closure_refused = closure_refused_now_;

@@ -115,6 +115,7 @@ class FlightTick {
   void drop_segment(TickOutput& out) noexcept;
 
   double apart(const TickInput& in) const noexcept;
+  bool frames_apart(const TickInput& in) const noexcept;
 
   double battery_land_, sigma_;
   OdometryGate gate_;
@@ -136,6 +137,7 @@ class FlightTick {
   bool feed_distrusted_ = false;      ///< since then, until the vehicle is disarmed or follows us again
   std::uint8_t odometry_resets_ = 0;
   std::size_t lift_ticks_ = 0;      ///< since the take-off was accepted
+  int off_ground_ = 0;              ///< ticks of a lift-off that the autopilot does not call landed
   int settled_ = 0;                 ///< ticks in the air at its height
   int disorder_ = 0;                ///< samples in a row whose stamp did not rise
   std::int64_t last_good_ns_ = -1;  ///< reception, less what it was late

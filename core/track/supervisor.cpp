@@ -44,6 +44,7 @@ constexpr Transition kTransitions[] = {
     {kLifting, Reason::pose_silent, Mode::land},
     {kLifting, Reason::odometry_jump, Mode::land},
     {kLifting, Reason::odometry_inconsistent, Mode::land},
+    {kLifting, Reason::odometry_frozen, Mode::land},
     {kLifting, Reason::odometry_disorder, Mode::land},
     {kLifting, Reason::odometry_lost, Mode::land},
     {kLifting, Reason::frames_disagree, Mode::land},
@@ -224,7 +225,7 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
     case Reason::odometry_inconsistent:
       return in.odometry_inconsistent;  // row 41
     case Reason::pose_silent:
-      return in.pose_age > kPoseSilent - kControlPeriod / 2;  // row 42
+      return silent(in.pose_age);  // row 42
     case Reason::pose_lost:
       return in.pose_age > kPoseLost - kControlPeriod / 2;
     case Reason::closure_refused:
@@ -290,6 +291,8 @@ bool Supervisor::occurs(Reason reason, const SupervisorInput& in) const noexcept
 SupervisorOutput Supervisor::step(const SupervisorInput& in) noexcept {
   count(in);
   const Mode before = mode_;
+  const bool again = in.request == Request::land || in.request == Request::stop;
+  if (mode_ == Mode::land && again && reason_ != Reason::pose_untrusted) ticks_in_mode_ = 0;
   if (!contains(kCommanding, mode_)) {
     if (in.request == Request::enable) {
       const auto* why = std::ranges::find_if(kRefusals, [&](Reason r) { return refused(r, in); });

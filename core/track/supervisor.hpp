@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/track/frame_alignment.hpp"
+#include "core/types/geometry.hpp"
 
 namespace backwash::track {
 
@@ -167,12 +168,15 @@ class Supervisor {
   static constexpr double kLiftTimeout = 12.0;   ///< s from the take-off's acceptance until it must be in the air
   static constexpr std::int64_t kMissedWithin = 50;  ///< periods in which three missed ones lead to hold (row 32)
   static constexpr int kMissedQuiet = 25;            ///< missed periods in a row until QUIET (row 32)
-  static constexpr int kLandTicks = 10;              ///< LAND is asked for twice in these, one command may be lost
+  /// LAND is asked for twice in these, one command may be lost; and twice more each time that an operator asks again.
+  static constexpr int kLandTicks = 10;
 
   /// Real-time: wait-free, no allocation.
   SupervisorOutput step(const SupervisorInput& in) noexcept;
   Mode mode() const noexcept { return mode_; }
   Reason reason() const noexcept { return reason_; }
+  /// Whether the autopilot's pose is too old to be flown by, at this age, s (row 42).
+  static constexpr bool silent(double pose_age) noexcept { return pose_age > kPoseSilent - kControlPeriod / 2; }
   /// False in a hold whose cause speaks against the pose.
   bool pose_trusted() const noexcept;
 

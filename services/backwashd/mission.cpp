@@ -155,8 +155,7 @@ Decision Mission::decide(const CommandMessage& command) {
     case backwash_msgs_msg_dds__COMMAND_STOP:
       return stop(command);
     case backwash_msgs_msg_dds__COMMAND_LAND:
-      return flies(view_.mode) || view_.mode == Mode::lifting ? order(Request::land, "landing")
-                                                              : refused("not enabled");
+      return land();
     case backwash_msgs_msg_dds__COMMAND_RELEASE:
       return only(kAccepted, "session released");
     default:
@@ -235,6 +234,12 @@ Decision Mission::follow(const CommandMessage& command) {
   Decision decision = go_to(first);
   if (decision.job) route_ = std::move(route);
   return decision;
+}
+
+/// Also where it was asked for before: the line may have lost that.
+Decision Mission::land() {
+  const bool ours = flies(view_.mode) || view_.mode == Mode::lifting || view_.mode == Mode::land;
+  return ours ? order(Request::land, "landing") : refused("not enabled");
 }
 
 /// What was planned ends at once; a plan that slows the flight down on its path follows.

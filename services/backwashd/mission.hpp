@@ -79,6 +79,7 @@ class Mission {
   Decision go_to(const CommandMessage& command);
   Decision follow(const CommandMessage& command);
   Decision hold();
+  Decision land();
   Decision stop(const CommandMessage& command);
   Decision start(PlanJob::Kind kind, const Goal& goal = {});
   Decision order(track::Request request, std::string answer);

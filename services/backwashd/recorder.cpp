@@ -76,7 +76,11 @@ bool Recorder::create() {
   written_ = 0;
   told_lost_ = 0;
   const std::string_view magic(log::kRawLogMagic);
-  return fd >= 0 && write({magic.begin(), magic.end()});
+  if (fd < 0 || write({magic.begin(), magic.end()})) return fd >= 0;
+  const int why = errno;
+  ::unlink(path_.c_str());  // a full disk takes a name, and no byte behind it
+  errno = why;
+  return false;
 }
 
 bool Recorder::still_there() const {

@@ -110,6 +110,19 @@ TEST(Telemetry, DropsAndCountsWhatNoVehicleReaches) {
   EXPECT_TRUE(t.local_state);
 }
 
+// The frames may come apart by three times of it in flight.
+TEST(Telemetry, TheErrorOfThePositionIsThatOfItsWorstAxis) {
+  Telemetry t;
+  for (const std::size_t axis : {0U, 6U, 11U}) {
+    mavlink::Odometry m{};
+    m.pose_covariance[0] = m.pose_covariance[6] = m.pose_covariance[11] = 0.0001F;
+    m.pose_covariance[axis] = 0.04F;
+    t.take(m, Time{});
+    ASSERT_TRUE(t.position_sigma);
+    EXPECT_NEAR(t.position_sigma->value, 0.2, 1e-6) << axis;
+  }
+}
+
 TEST(Telemetry, DropsSwappedPacketsButFollowsARestartedClock) {
   Telemetry t;
   const auto position_at = [](std::uint32_t ms, float x) {

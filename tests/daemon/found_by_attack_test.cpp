@@ -32,6 +32,25 @@ TEST(Row6, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
   }
 }
 
+// The emulated autopilot's height is the VIO's: it climbed 526 m, and went on climbing after LAND.
+TEST(Row6, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
+  Lockstep rig;
+  rig.ticks(60);
+  rig.channels->orders.push({track::Request::enable});
+  ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
+  std::optional<OdometrySample> frozen;
+  rig.spoil = [&](OdometrySample& s) {
+    if (!frozen) frozen = s, frozen->state.v_W.setZero();
+    s.state = frozen->state, s.q = frozen->q;
+  };
+  rig.tick();
+  rig.offer(rig.rise(), true, true);
+  ASSERT_GT(rig.ticks_until(Mode::lifting, 3), 0) << to_string(rig.reason());
+  ASSERT_GT(rig.ticks_until(Mode::land, 200), 0) << to_string(rig.reason()) << ", " << rig.autopilot->truth().p_W.z();
+  EXPECT_EQ(rig.reason(), track::Reason::odometry_frozen);
+  EXPECT_EQ(rig.tick().odometry, 0) << "nor is the autopilot told any more that it has not left the ground";
+}
+
 // What one closure of 90° or 10 m may not do, ten of 9° and twelve of 0.9 m do within a quarter of a second.
 TEST(Row4, AnAbsurdLoopClosureInPiecesIsHeldToo) {
   for (const bool turns : {false, true}) {

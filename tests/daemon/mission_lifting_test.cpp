@@ -22,5 +22,19 @@ TEST_F(MissionTest, WhileItLiftsOffLandAndStopAreTakenAndEveryFlightIsRefused) {
   }
 }
 
+// The line may have lost both commands, and the autopilot hovers: nobody else asks again.
+TEST_F(MissionTest, WhileItLandsAnotherLandAndStopReachTheControlThread) {
+  view_.mode = Mode::land;
+  look();
+  const Decision land = give(gcs_.next(kLand));
+  ASSERT_TRUE(land.order) << land.answer->reason;
+  EXPECT_EQ(land.order->request, Request::land);
+  EXPECT_EQ(result(land), kAccepted);
+  look();
+  const Decision stop = give(other_.next(kStop));
+  ASSERT_TRUE(stop.order);
+  EXPECT_EQ(stop.order->request, Request::stop);
+}
+
 }  // namespace
 }  // namespace backwash::daemon::test

@@ -86,6 +86,10 @@ TEST(OdometryCheck, WhatIsNoNumberChangesNothing) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(check.look(1, {nan, 0, 0}, Eigen::Quaterniond::Identity(), Vec3::Zero()));
   EXPECT_EQ(walk(check, in_body, 1.57), "");
+  const auto mostly_zeros = [n = 0, nan](const Eigen::Quaterniond&, const Vec3&) mutable -> Vec3 {
+    return n++ % 10 == 9 ? Vec3(nan, 0, 0) : Vec3::Zero();
+  };
+  EXPECT_THAT(walk(check, mostly_zeros, 0.3), HasSubstr("all zero")) << "nor does it hide what is wrong beside it";
 }
 
 }  // namespace

@@ -103,6 +103,18 @@ TEST_F(Row35Recorder, AFileThatCannotBeMadeAtStartIsAConfigurationErrorThatNames
 }
 
 // A file system without room, not a limit of the process.
+// systemd starts it again every few seconds.
+TEST_F(Row35Recorder, AStartOnAFullDiskLeavesNoEmptyLogs) {
+  rlimit before{};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  ::signal(SIGXFSZ, SIG_IGN);
+  const rlimit full{0, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
+  for (int start = 0; start < 3; ++start) EXPECT_THROW(Recorder{path_}, std::runtime_error);
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
 TEST_F(Row35Recorder, ASmallDiskThatIsFullLosesRecordsUntilSomethingIsDeleted) {
   if (::unshare(CLONE_NEWNS) != 0 || ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
       ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=128k") != 0)

@@ -99,6 +99,23 @@ TEST(TakeoffCommand, AStopOnTheGroundAsksToDisarmUnforced) {
   EXPECT_GT(asked, 0) << to_string(rig.mode());
 }
 
+// A burst of 0.2 s on the line takes both LANDs: the autopilot goes on with its own take-off, and hovers there.
+TEST(TakeoffCommand, AStopWhoseLandIsLostOnTheLineCanBeGivenAgain) {
+  for (const track::Request again : {track::Request::stop, track::Request::land}) {
+    LiftsItself rig;
+    rig.ticks(60);
+    rig.lift();
+    rig.channels->orders.push({track::Request::stop});
+    rig.ticks(100);
+    ASSERT_EQ(rig.mode(), track::Mode::land) << to_string(rig.reason());
+    ASSERT_TRUE(rig.view().offboard) << "GUIDED as before";
+    rig.channels->orders.push({again, 2});
+    int asked = 0;
+    for (int n = 0; n < 20; ++n) asked += rig.tick().commanded(kCommandLand);
+    EXPECT_EQ(asked, 2);
+  }
+}
+
 // No set-point is sent while it lifts, so none is missed: what waits beside them shows that the line is full.
 TEST(TakeoffCommand, ALineThatTakesNothingWhileTheAutopilotLiftsIsQuiet) {
   LiftsItself rig;

@@ -149,6 +149,33 @@ TEST(LiftOff, LandsWhateverEndsItBecauseNoHoldIsVerifiedSoLow) {
   }
 }
 
+// Row 6: fresh stamps, the pose of the ground to the last bit. An autopilot whose height follows the VIO climbs until
+// somebody ends it: it believes that it has not left the ground.
+TEST(LiftOff, OnAPoseThatFrozeOnTheGroundLandsOnceTheVehicleMustHaveLeftIt) {
+  Lifting f;
+  std::optional<OdometrySample> frozen;
+  f.spoil = [&](OdometrySample& s) {
+    if (!frozen) frozen = s;
+    s.state = {frozen->state.p_W, Vec3::Zero()}, s.q = frozen->q;
+  };
+  const auto in_the_air = [&f](int ticks) {
+    for (int n = 0; n < ticks && f.out.supervisor.mode == Mode::lifting; ++n) {
+      f.out.command_local.p_W = f.ground_L + f.off_L, f.out.command_local.v_W = Vec3::Zero();  // as it believes
+      f.in.autopilot.landed = false;
+      f.in.autopilot.in_air = true;
+      f.step();
+    }
+  };
+  f.at(0, true);
+  in_the_air(60);
+  EXPECT_EQ(f.out.supervisor.mode, Mode::lifting) << "PX4 calls itself in the air before it leaves the ground";
+  in_the_air(10);
+  EXPECT_EQ(f.out.supervisor.mode, Mode::land);
+  EXPECT_EQ(f.out.supervisor.reason, Reason::odometry_frozen);
+  EXPECT_TRUE(f.out.supervisor.request_land);
+  EXPECT_FALSE(f.out.forward_odometry) << "it would go on climbing to where it is told that it is not";
+}
+
 TEST(LiftOff, ThatStraysFromItsColumnLandsAfterThreeTicks) {
   Lifting f;
   f.at(0.3, true);

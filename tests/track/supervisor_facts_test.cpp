@@ -145,6 +145,7 @@ TEST(SupervisorFacts, EachEndsALiftOffInItsOwnWay) {
       {Mode::land, Reason::pose_silent, [](auto& in) { in.pose_age = 0.31; }},
       {Mode::land, Reason::odometry_jump, [](auto& in) { in.odometry_jump = true; }},
       {Mode::land, Reason::odometry_inconsistent, [](auto& in) { in.odometry_inconsistent = true; }},
+      {Mode::land, Reason::odometry_frozen, [](auto& in) { in.odometry_frozen = true; }},
       {Mode::land, Reason::odometry_disorder, [](auto& in) { in.odometry_disorder = true; }},
       {Mode::land, Reason::odometry_lost, [](auto& in) { in.odometry_age = 0.081; }},
       {Mode::land, Reason::frames_disagree, [](auto& in) { in.frames_agree = false; }},

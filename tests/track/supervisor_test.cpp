@@ -166,6 +166,28 @@ TEST(Supervisor, NeverFightsAPilotWhoLeavesOffboard) {
   }
 }
 
+// Both of its commands were lost: an autopilot in GUIDED hovers, or goes on climbing in its own take-off.
+TEST(Supervisor, AsksForLandAgainWhenAnOperatorDoesOfAnAutopilotThatStillFollows) {
+  for (const Request again : {Request::land, Request::stop}) {
+    Supervisor s = flying();
+    SupervisorInput in = healthy();
+    in.request = Request::land;
+    s.step(in);
+    in.request = Request::none;
+    int asked = 0;
+    for (int tick = 0; tick < 100; ++tick) asked += s.step(in).request_land;
+    EXPECT_EQ(asked, 1) << "the second of the first two";
+    in.request = again;
+    asked = s.step(in).request_land;
+    in.request = Request::none;
+    for (int tick = 0; tick < 100; ++tick) asked += s.step(in).request_land;
+    EXPECT_EQ(asked, 2);
+    in.offboard = false;
+    in.request = again;
+    EXPECT_FALSE(s.step(in).request_land) << "it lands, or a pilot has it";
+  }
+}
+
 TEST(Supervisor, LandsOnRequestAndIsPassiveOnceDisarmed) {
   Supervisor s = flying();
   SupervisorInput in = healthy();

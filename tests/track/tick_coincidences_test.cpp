@@ -118,6 +118,67 @@ TEST(LoopClosures, AddUpInFlightToWhatIsNotFlown) {
   }
 }
 
+TEST(LoopClosures, OfAnEarlierFlightDoNotCountInTheNextOne) {
+  Flown f(Flown::Until::tracking);
+  f.closures = 1;
+  f.step();
+  const auto moved = [&f] {
+    f.frame_W.t.x() += 0.8;
+    ++f.closures;
+    f.step();
+    return f.out.supervisor.mode;
+  };
+  ASSERT_EQ(moved(), Mode::tracking);
+  f.in.autopilot.armed = f.in.autopilot.offboard = false;
+  f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::passive);
+  f.in.request = Request::enable;
+  f.step();
+  f.in.autopilot.armed = f.in.autopilot.offboard = true;
+  f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
+  EXPECT_EQ(moved(), Mode::tracking) << to_string(f.out.supervisor.reason);
+}
+
+// A segment that was taken although the pose is not trusted is not flown: neither whole nor to its first stop.
+TEST(UntrustedHold, FliesNothingThatIsOfferedInIt) {
+  Flown f;
+  f.vio_on = false;
+  for (int n = 0; f.out.supervisor.mode == Mode::tracking && n < 20; ++n) f.step();
+  ASSERT_TRUE(f.out.supervisor.freeze) << to_string(f.out.supervisor.reason);
+  const Vec3 held = f.out.command.p_W;
+  AcceptedSegment on = straight();
+  on.id = 2;
+  on.tube.front().center = f.tick.odometry()->state;
+  f.offer(on);
+  for (int n = 0; f.out.supervisor.mode == Mode::hold && n < 30; ++n) EXPECT_EQ(f.step().command.p_W, held) << n;
+  EXPECT_EQ(f.out.supervisor.mode, Mode::land);
+}
+
+// Row 40: of a vehicle that holds nobody asked for one, whatever the planner has offered.
+TEST(Hold, TakesNoTakeOff) {
+  Flown f = on_the_ground();
+  f.in.autopilot.armed = true;  // by a pilot
+  f.step();
+  f.in.request = Request::stop;
+  f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::hold) << to_string(f.out.supervisor.reason);
+  AcceptedSegment up = take_off();
+  EXPECT_TRUE(f.offer(up).refused);
+  EXPECT_EQ(f.out.supervisor.mode, Mode::hold);
+}
+
+// A sender whose clock is slewed: every sample would be late from then on.
+TEST(LateOdometry, WhileNothingIsCommandedIsMeasuredAnew) {
+  Flown f(Flown::Until::aligned);
+  std::int64_t slewed_ns = 0;
+  f.spoil = [&slewed_ns](auto& s) { s.stamp_ns -= slewed_ns += slewed_ns < 150'000'000 ? 2'000'000 : 0; };
+  for (int n = 0; n < 100; ++n) f.step();
+  EXPECT_LT(f.tick.odometry_age(), 0.08);
+  f.in.request = Request::enable;
+  EXPECT_EQ(f.step().supervisor.mode, Mode::enabling) << to_string(f.out.supervisor.reason);
+}
+
 // Row 6: at rest in the air a pose that repeats to the last bit is no sensor's; where nothing says that it flies it may
 // be.
 TEST(FrozenPose, IsFoundAtRestInTheAir) {

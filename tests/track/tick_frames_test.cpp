@@ -59,8 +59,10 @@ TEST(TickReactions, FramesThatCameApartAreFlownInAgainOnceTheyAreTogether) {
   ASSERT_EQ(f.out.supervisor.reason, Reason::frames_apart);
   AcceptedSegment s = straight();
   s.tube.front().center = Flown::map_of(f.truth_L);
-  f.offer(s);
-  EXPECT_EQ(f.out.supervisor.mode, Mode::hold) << "still apart";
+  const Vec3 held = f.out.command.p_W;
+  EXPECT_TRUE(f.offer(s).refused) << "still apart";
+  for (int n = 0; n < 60; ++n) EXPECT_EQ(f.step().command.p_W, held) << "a hold that creeps on, command by command";
+  EXPECT_EQ(f.out.supervisor.mode, Mode::hold);
   f.local_off.setZero();
   for (int n = 0; n < 30; ++n) f.step();
   AcceptedSegment next = straight();

@@ -72,9 +72,11 @@ TEST(TickReactions, TheOdometryIsComparedWithTheAutopilotAtOneMoment) {
 TEST(TickReactions, WhileNothingIsCommandedAVioMayStartAnewElsewhere) {
   Flown f(Flown::Until::aligned);
   ASSERT_TRUE(f.out.fresh);
+  const int before = f.out.odometry_resets;
   f.spoil = [](auto& s) { s.state.p_W.x() += 5; };
   EXPECT_FALSE(f.step().fresh);
   EXPECT_TRUE(f.step().fresh);
+  EXPECT_EQ(f.out.odometry_resets, before + 1) << "the autopilot's estimator has to know";
 }
 
 TEST(TickReactions, ASetpointThatIsNoNumberIsNotSent) {
@@ -156,6 +158,19 @@ TEST(TickReactions, AnAttitudeThatStopsArrivingHoldsAlsoWhileThePositionComes) {
   for (; f.out.supervisor.mode == Mode::tracking && ticks < 30; ++ticks) f.step();
   EXPECT_EQ(f.out.supervisor.reason, Reason::pose_silent);
   EXPECT_EQ(ticks, 15);
+}
+
+TEST(TickReactions, WhileTheAutopilotsPoseIsSilentNothingIsFlownAndThenItLands) {
+  Flown f(Flown::Until::tracking);
+  f.attitude_on = false;
+  for (int n = 0; f.out.supervisor.mode == Mode::tracking && n < 30; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.reason, Reason::pose_silent);
+  const Vec3 held = f.out.command.p_W;
+  AcceptedSegment s = straight();
+  s.tube.front().center = Flown::map_of(f.truth_L);
+  EXPECT_TRUE(f.offer(s).refused) << "an operator's next command";
+  for (int n = 0; f.out.supervisor.mode == Mode::hold && n < 60; ++n) EXPECT_EQ(f.step().command.p_W, held) << n;
+  EXPECT_EQ(f.out.supervisor.reason, Reason::pose_lost);
 }
 
 }  // namespace
