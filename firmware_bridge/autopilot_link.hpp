@@ -88,6 +88,8 @@ class AutopilotLink {
   bool transmit_stalled(Time now) const noexcept;
   const mavlink::ParserCounters& received() const noexcept { return parser_.counters(); }
   const TransmitQueue& transmit() const noexcept { return queue_; }
+  /// untold_delay() of the line that pace() has told, s.
+  double untold_delay() const noexcept { return firmware_bridge::untold_delay(budget_.line(), signing_.has_value()); }
   /// ODOMETRY that the line had no room for.
   std::uint64_t thinned() const noexcept { return thinned_; }
 

@@ -14,6 +14,12 @@ namespace {
 constexpr double kBitsPerByte = 10;  // 8N1
 constexpr double kOtherFrames = 17;  // a second, TIMESYNC's most of them: 410 bytes to ArduPilot, 500 to PX4 measured
 
+// On the line, of a message with such a payload.
+double bytes_of(std::size_t payload, std::size_t frame, bool authenticated) noexcept {
+  const std::size_t around = mavlink::kHeaderV2 + mavlink::kChecksum + (authenticated ? mavlink::kSignature : 0);
+  return static_cast<double>(frame > 0 ? frame : payload + around);
+}
+
 }  // namespace
 
 LineRate serial_line(double baud, double share, bool plain) noexcept {
@@ -21,11 +27,19 @@ LineRate serial_line(double baud, double share, bool plain) noexcept {
 }
 
 double least_rate(std::size_t frame, bool authenticated) noexcept {
-  const std::size_t around = mavlink::kHeaderV2 + mavlink::kChecksum + (authenticated ? mavlink::kSignature : 0);
-  const auto bytes = [&](std::size_t payload) { return static_cast<double>(frame > 0 ? frame : payload + around); };
+  const auto bytes = [&](std::size_t payload) { return bytes_of(payload, frame, authenticated); };
   return bytes(mavlink::info<mavlink::SetPositionTargetLocalNed>().full_length) / kControlPeriod +
          bytes(mavlink::info<mavlink::Odometry>().full_length) / (kLongestOdometryTicks * kControlPeriod) +
          bytes(mavlink::info<mavlink::Timesync>().full_length) * kOtherFrames;
+}
+
+double untold_delay(const LineRate& line, bool authenticated) noexcept {
+  const auto takes = [&](std::size_t payload) {
+    return bytes_of(payload, line.frame, authenticated) / line.bytes_per_second;
+  };
+  if (2 * takes(mavlink::info<mavlink::Timesync>().full_length) < kUsefulRoundTrip) return 0;
+  return takes(mavlink::info<mavlink::SetPositionTargetLocalNed>().full_length) +
+         takes(mavlink::info<mavlink::Odometry>().full_length);
 }
 
 void LineBudget::give(std::size_t bytes, bool odometry, Time now) noexcept {

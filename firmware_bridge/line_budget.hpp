@@ -29,6 +29,11 @@ inline constexpr int kLongestOdometryTicks = 8;
 /// what else there is. `frame`: as in LineRate. `authenticated`: MAVLink frames bear signatures.
 double least_rate(std::size_t frame, bool authenticated) noexcept;
 
+/// How much later than it believes an autopilot gets ODOMETRY, s: set-point and ODOMETRY on the line. 0 where a
+/// TIMESYNC question and its answer take less than kUsefulRoundTrip on it: then the autopilot finds out by itself.
+double untold_delay(const LineRate& line, bool authenticated) noexcept;
+inline constexpr double kUsefulRoundTrip = 0.010;  ///< s: PX4 takes no longer one (MAX_RTT_SAMPLE, Timesync.hpp)
+
 /// Thins ODOMETRY to what its line carries. A line is busy from when it is given a frame until all that it was given
 /// has left it. In one such time there is at most one ODOMETRY, so that no set-point waits behind two of them, and the
 /// next one comes as soon as the line has run dry. Nothing else is held back. Real-time.
@@ -42,6 +47,7 @@ class LineBudget {
   void give(std::size_t bytes, bool odometry, Time now) noexcept;
   /// What was given is no longer under way.
   void forget() noexcept { *this = LineBudget(line_); }
+  const LineRate& line() const noexcept { return line_; }
   /// When all of it has left the line.
   Time free_at() const noexcept { return free_at_; }
 

@@ -19,6 +19,7 @@ enum class Kind : std::uint8_t {
   k_p_vertical,
   v_max,
   a_max,
+  delay,  // of ODOMETRY, ms: what the line adds, and up to kLatestVio of the VIO's own; required where there is one
 };
 
 struct Rule {
@@ -47,10 +48,13 @@ constexpr Rule kPx4[] = {
     {"MPC_XY_VEL_MAX", true, Kind::v_max, 1, ""},
     {"MPC_Z_VEL_MAX_UP", true, Kind::v_max, 1, ""},
     {"MPC_Z_VEL_MAX_DN", true, Kind::v_max, 1, ""},
+    {"EKF2_EV_DELAY", true, Kind::delay, 1000, ""},
     {"COM_RC_OVERRIDE", false, Kind::bits, 2,
      "add 2 to COM_RC_OVERRIDE: without it the pilot's sticks do not take over in offboard"},
     {"NAV_DLL_ACT", false, Kind::one_of, any({0, 1, 3}),
      "set NAV_DLL_ACT to 0 (none), 1 (hold) or 3 (land): 2 climbs and returns, 5 and 6 drop the vehicle"},
+    {"NAV_RCL_ACT", false, Kind::one_of, any({0, 1, 3}),
+     "set NAV_RCL_ACT to 1 (hold) or 3 (land): 2 climbs and returns, 5 and 6 drop the vehicle"},
     {"COM_LOW_BAT_ACT", false, Kind::one_of, any({0, 2}), "set COM_LOW_BAT_ACT to 2 (land): 1 and 3 climb and return"},
     {"EKF2_EV_CTRL", false, Kind::bits, 1 + 2 + 8,
      "set EKF2_EV_CTRL to 15: the estimator must take position, height and heading from the VIO"},
@@ -70,6 +74,7 @@ constexpr Rule kArduPilot[] = {
     {"WPNAV_SPEED_DN", true, Kind::v_max, 100, ""},
     {"WPNAV_ACCEL", true, Kind::a_max, 100, ""},
     {"WPNAV_ACCEL_Z", true, Kind::a_max, 100, ""},
+    {"VISO_DELAY_MS", true, Kind::delay, 1000, ""},
     {"VISO_TYPE", false, Kind::one_of, any({1, 2, 3}),
      "set VISO_TYPE to 1 (MAVLink) and restart it: without it ODOMETRY is not read"},
     {"EK3_SRC1_POSXY", false, Kind::one_of, any({6}),
@@ -84,6 +89,10 @@ constexpr Rule kArduPilot[] = {
      "set FS_THR_ENABLE to 3 (land), or to 0 without a remote control: the others may climb and return"},
     {"FS_GCS_ENABLE", false, Kind::one_of, any({0, 5}),
      "set FS_GCS_ENABLE to 0 (none) or 5 (land): the others may climb and return"},
+    {"BATT_FS_LOW_ACT", false, Kind::one_of, any({0, 1, 7}),
+     "set BATT_FS_LOW_ACT to 0 (none) or 1 (land): 2 to 4 and 6 may climb and return, 5 drops the vehicle"},
+    {"BATT_FS_CRT_ACT", false, Kind::one_of, any({0, 1, 7}),
+     "set BATT_FS_CRT_ACT to 0 (none) or 1 (land): 2 to 4 and 6 may climb and return, 5 drops the vehicle"},
 };
 
 static_assert(std::size(kPx4) <= kMostParameters && std::size(kArduPilot) <= kMostParameters);
@@ -103,8 +112,15 @@ constexpr std::array<std::string_view, kCount> names_of(const Rule (&all)[kCount
 constexpr auto kPx4Names = names_of(kPx4);
 constexpr auto kArduPilotNames = names_of(kArduPilot);
 
-// The value that `kind` asks of the parameter, for the vehicle; for gains what the product with the velocity gain asks.
-double wanted(const Rule& rule, const Vehicle& vehicle) {
+// What parameters are judged against.
+struct Against {
+  const Vehicle& vehicle;
+  double untold_delay;  // s
+};
+
+// The value that `kind` asks of the parameter; for gains what the product with the velocity gain asks.
+double wanted(const Rule& rule, const Against& against) {
+  const Vehicle& vehicle = against.vehicle;
   const auto& [kp, kd] = std::pair(vehicle.controller.kp, vehicle.controller.kd);
   switch (rule.kind) {
     case Kind::k_d_horizontal:
@@ -119,6 +135,8 @@ double wanted(const Rule& rule, const Vehicle& vehicle) {
       return rule.bound * vehicle.limits.v_max;
     case Kind::a_max:
       return rule.bound * vehicle.limits.a_max;
+    case Kind::delay:
+      return rule.bound * against.untold_delay;
     default:
       return rule.bound;
   }
@@ -126,8 +144,8 @@ double wanted(const Rule& rule, const Vehicle& vehicle) {
 
 // k_p = P_position · P_velocity as both firmwares cascade them; `velocity`: its deviation from the vehicle file, as a
 // ratio.
-bool good(const Rule& rule, double value, double velocity, const Vehicle& vehicle) {
-  const double want = wanted(rule, vehicle);
+bool good(const Rule& rule, double value, double velocity, const Against& against) {
+  const double want = wanted(rule, against);
   // The link carries floats: 0.3 comes as 0.30000001, 1.3 as 1.29999995.
   const auto [told, limit] = std::pair(static_cast<float>(value), static_cast<float>(want));
   switch (rule.kind) {
@@ -148,6 +166,8 @@ bool good(const Rule& rule, double value, double velocity, const Vehicle& vehicl
     case Kind::v_max:
     case Kind::a_max:
       return told >= limit;
+    case Kind::delay:  // an ODOMETRY that waits for no set-point is a fifth faster
+      return value >= 0.8 * want && value <= want + rule.bound * kLatestVio;
   }
   return false;
 }
@@ -158,7 +178,7 @@ std::string text(const char* format, auto... values) {
   return line;
 }
 
-std::string advice(const Rule& rule, const Vehicle& vehicle) {
+std::string advice(const Rule& rule, const Against& against) {
   const std::string name(rule.name);
   switch (rule.kind) {
     case Kind::at_most:
@@ -167,11 +187,14 @@ std::string advice(const Rule& rule, const Vehicle& vehicle) {
       return rule.advice;
     case Kind::v_max:
     case Kind::a_max:
-      return text("set %s to %.3g or more: the vehicle file's %s is planned with", name.c_str(), wanted(rule, vehicle),
+      return text("set %s to %.3g or more: the vehicle file's %s is planned with", name.c_str(), wanted(rule, against),
                   rule.kind == Kind::v_max ? "v_max" : "a_max");
+    case Kind::delay:
+      return text("set %s to %.0f ms, and the VIO's own delay: so long are set-point and ODOMETRY on the line",
+                  name.c_str(), wanted(rule, against));
     default:
       return text("set %s to %.3g, or the vehicle file to the gains that fly: its sets are computed for them",
-                  name.c_str(), wanted(rule, vehicle));
+                  name.c_str(), wanted(rule, against));
   }
 }
 
@@ -184,27 +207,30 @@ std::span<const std::string_view> parameter_names(Autopilot autopilot) noexcept 
 }
 
 std::vector<ParameterFinding> judge_parameters(Autopilot autopilot, const ParameterValues& values,
-                                               const Vehicle& vehicle) {
+                                               const Vehicle& vehicle, double untold_delay) {
+  const Against against{vehicle, untold_delay};
   std::vector<ParameterFinding> findings;
   double velocity = 1;  // of the last velocity gain, which stands before its position gain
   for (const Rule& rule : rules(autopilot)) {
     const auto value = values[findings.size()];
-    ParameterFinding finding{rule.name, rule.required, false, value, {}};
-    finding.good = value && good(rule, *value, velocity, vehicle);
+    const bool required = rule.required && (rule.kind != Kind::delay || untold_delay > 0);
+    ParameterFinding finding{rule.name, required, false, value, {}};
+    finding.good = value && good(rule, *value, velocity, against);
     if (rule.kind == Kind::k_d_horizontal || rule.kind == Kind::k_d_vertical)
-      velocity = value.value_or(0) / wanted(rule, vehicle);
+      velocity = value.value_or(0) / wanted(rule, against);
     if (!value)
       finding.advice = "the autopilot has not answered: check the link, and that its firmware has this parameter";
     else if (!finding.good)
-      finding.advice = advice(rule, vehicle);
+      finding.advice = advice(rule, against);
     findings.push_back(std::move(finding));
   }
   return findings;
 }
 
-std::string forbidding_parameter(Autopilot autopilot, const ParameterValues& values, const Vehicle& vehicle) {
-  for (const ParameterFinding& finding : judge_parameters(autopilot, values, vehicle)) {
-    if (finding.good || !finding.required) continue;
+std::string forbidding_parameter(Autopilot autopilot, const ParameterValues& values, const Vehicle& vehicle,
+                                 double untold_delay, bool or_unknown) {
+  for (const ParameterFinding& finding : judge_parameters(autopilot, values, vehicle, untold_delay)) {
+    if (finding.good || !finding.required || !(finding.value || or_unknown)) continue;
     const std::string name(finding.name);
     if (!finding.value) return "no value of " + name + " from the autopilot yet";
     return text("%s is %g: %s", name.c_str(), *finding.value, finding.advice.c_str());

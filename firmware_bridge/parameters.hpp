@@ -32,11 +32,17 @@ struct ParameterFinding {
 };
 /// All of parameter_names(). Gains and limits are judged against the vehicle file: a set that was computed for other
 /// gains (more than kGainTolerance away in k_p or k_d), or for a motion that the controller cuts off, is no promise.
+/// `untold_delay`: of the line (untold_delay(), line_budget.hpp), s; where there is one, the controller must be told.
 std::vector<ParameterFinding> judge_parameters(Autopilot autopilot, const ParameterValues& values,
-                                               const Vehicle& vehicle);
+                                               const Vehicle& vehicle, double untold_delay = 0);
 inline constexpr double kGainTolerance = 0.10;
 
-/// "", or the first required parameter that is not good, its value and what to set.
-std::string forbidding_parameter(Autopilot autopilot, const ParameterValues& values, const Vehicle& vehicle);
+/// How old odometry may be at most when it reaches us, s (docs/faults.md row 1): more is no delay of a VIO's.
+inline constexpr double kLatestVio = 0.08;
+
+/// "", or the first required parameter that is not good, its value and what to set. `or_unknown`: one that the
+/// controller has not told counts too.
+std::string forbidding_parameter(Autopilot autopilot, const ParameterValues& values, const Vehicle& vehicle,
+                                 double untold_delay = 0, bool or_unknown = true);
 
 }  // namespace backwash::firmware_bridge

@@ -18,10 +18,13 @@ tl::unexpected<PortError> error(Kind kind, int number) { return tl::unexpected(P
 bool nothing_now(int number) noexcept { return number == EAGAIN || number == EWOULDBLOCK || number == EINTR; }
 
 // Set-points must leave at once; a few seconds of them at most may wait in the kernel; a peer that has vanished without
-// closing is given up after 5 s.
+// closing is given up after 5 s, also while we are quiet: then the kernel asks.
 bool configure(int fd) {
-  constexpr int kNoDelay = 1, kSendBuffer = 8192, kGiveUp_ms = 5000;
-  return ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &kNoDelay, sizeof kNoDelay) == 0 &&
+  constexpr int kNoDelay = 1, kSendBuffer = 8192, kGiveUp_ms = 5000, kAsk = 1, kQuiet_s = 2, kAgain_s = 1;
+  return ::setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &kAsk, sizeof kAsk) == 0 &&
+         ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &kQuiet_s, sizeof kQuiet_s) == 0 &&
+         ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &kAgain_s, sizeof kAgain_s) == 0 &&
+         ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &kNoDelay, sizeof kNoDelay) == 0 &&
          ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer) == 0 &&
          ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &kGiveUp_ms, sizeof kGiveUp_ms) == 0;
 }

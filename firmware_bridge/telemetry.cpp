@@ -55,20 +55,18 @@ std::optional<double> share(std::int8_t percent) noexcept {
 void Telemetry::take(const mavlink::Heartbeat& m, Time now) noexcept {
   const VehicleStatus s{autopilot_of(m.autopilot), (m.base_mode & kSafetyArmed) != 0, follows_setpoints(m),
                         m.custom_mode, m.system_status};
-  if (status && now - status->at >= kHeartbeatTimeout) {  // it may have restarted
-    forget_parameters();
-    has_origin = false;
-  }
+  if (status && now - status->at >= kHeartbeatTimeout) restarted();  // it may have
   status = {s, now};
 }
 
 bool Telemetry::in_order(std::optional<std::uint32_t>& last_ms, std::uint32_t now_ms) noexcept {
-  // A clock more than a second back is a restarted controller, not a late packet.
+  // A clock more than a second back is a restarted controller, not a late packet: faster than its silence shows.
   const auto ahead = last_ms ? static_cast<std::int32_t>(now_ms - *last_ms) : 0;
   if (ahead < 0 && ahead > -1000) {
     ++out_of_order;
     return false;
   }
+  if (ahead < 0) restarted();
   last_ms = now_ms;
   return true;
 }
@@ -185,12 +183,13 @@ void Telemetry::take(const mavlink::ParamValue& m, Time now) noexcept {
   double value = static_cast<double>(m.param_value);
   const bool px4 = status && status->value.autopilot == Autopilot::kPx4;
   if (px4 && m.param_type == kInt32) value = std::bit_cast<std::int32_t>(m.param_value);
-  if (!std::isfinite(value)) {
-    ++broken;
-    return;
+  const bool number = std::isfinite(value);
+  if (!number) ++broken;
+  for (std::size_t n = 0; n < expected_; ++n) {
+    if (parameters_[n].name != m.param_id) continue;
+    parameters_[n].value.reset();  // what it was before is not believed any more
+    if (number) parameters_[n].value = {value, now};
   }
-  for (std::size_t n = 0; n < expected_; ++n)
-    if (parameters_[n].name == m.param_id) parameters_[n].value = {value, now};
 }
 
 bool Telemetry::expect_parameter(std::string_view name) noexcept {
@@ -202,8 +201,9 @@ bool Telemetry::expect_parameter(std::string_view name) noexcept {
   return true;
 }
 
-void Telemetry::forget_parameters() noexcept {
+void Telemetry::restarted() noexcept {
   for (Parameter& p : parameters_) p.value.reset();
+  has_origin = false;
 }
 
 Latest<double> Telemetry::parameter(std::string_view name) const noexcept {

@@ -84,8 +84,8 @@ class Telemetry {
   Latest<Battery> battery;
   Latest<LandedState> landed_state;
   Latest<StatusLine> text;
-  /// Its local frame lies somewhere on the globe, as ArduPilot asks for before arming; not known after a silence of
-  /// kHeartbeatTimeout.
+  /// Its local frame lies somewhere on the globe, as ArduPilot asks for before arming; not known after a restart, as
+  /// with parameter().
   bool has_origin = false;
   std::uint64_t broken = 0;        ///< messages with values that cannot be
   std::uint64_t out_of_order = 0;  ///< messages older than their predecessor
@@ -94,7 +94,8 @@ class Telemetry {
   Latest<CommandResult> result_of(std::uint16_t command) const noexcept;
 
   /// The autopilot's value of a parameter that was asked for, if it came. Others, which stations ask for, are not kept;
-  /// after a silence of kHeartbeatTimeout it may have restarted with other values, and none is.
+  /// after a silence of kHeartbeatTimeout, or when its clock is more than a second back, it may have restarted with
+  /// other values, and none is; nor is one whose newest value is no number.
   Latest<double> parameter(std::string_view name) const noexcept;
   /// This name will be asked for. False: there is no room for another one.
   bool expect_parameter(std::string_view name) noexcept;
@@ -115,7 +116,7 @@ class Telemetry {
   void take(const mavlink::ParamValue& m, Time now) noexcept;
 
  private:
-  void forget_parameters() noexcept;
+  void restarted() noexcept;
   void take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
                      Time now) noexcept;
   void take_imu(const Vec3& force_F, const Vec3& omega_F, Time now) noexcept;

@@ -15,7 +15,7 @@ struct MessageList {};
 /// Every message that this codec knows, by id.
 using KnownMessages =
     MessageList<Heartbeat, SysStatus, SystemTime, SetMode, ParamRequestRead, ParamValue, ParamSet, RawImu, Attitude,
-                AttitudeQuaternion, LocalPositionNed, CommandLong, CommandAck, SetPositionTargetLocalNed,
+                AttitudeQuaternion, LocalPositionNed, ManualControl, CommandLong, CommandAck, SetPositionTargetLocalNed,
                 PositionTargetLocalNed, SetGpsGlobalOrigin, GpsGlobalOrigin, SimState, HilActuatorControls,
                 VisionPositionEstimate, HighresImu, HilSensor, HilGps, Timesync, HilStateQuaternion, ScaledImu2,
                 BatteryStatus, EstimatorStatus, ExtendedSysState, Statustext, ObstacleDistance, Odometry>;

@@ -39,6 +39,24 @@ struct SetPositionTargetLocalNed {
   }
 };
 
+/// MANUAL_CONTROL: a ground station's sticks, -1000 to 1000; z, the throttle, 0 to 1000.
+struct ManualControl {
+  static constexpr std::uint32_t kId = 69;
+  static constexpr std::string_view kName = "MANUAL_CONTROL";
+  std::int16_t x = 0, y = 0, z = 0, r = 0;
+  std::uint16_t buttons = 0;
+  std::uint8_t target = 0;
+  static constexpr auto fields() noexcept {
+    using M = ManualControl;
+    return std::tuple{field("x", &M::x),
+                      field("y", &M::y),
+                      field("z", &M::z),
+                      field("r", &M::r),
+                      field("buttons", &M::buttons),
+                      field("target", &M::target)};
+  }
+};
+
 /// COMMAND_LONG: One command (MAV_CMD) with seven parameters.
 struct CommandLong {
   static constexpr std::uint32_t kId = 76;

@@ -141,6 +141,7 @@ struct ControlView {
   firmware_bridge::SwitchState stop_switch = firmware_bridge::SwitchState::absent;
   firmware_bridge::Autopilot autopilot = firmware_bridge::Autopilot::kUnknown;
   firmware_bridge::ParameterValues parameters{};  ///< of parameter_names(autopilot)
+  double untold_delay = 0;                        ///< of the autopilot's line, s
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
   std::uint64_t log_lost = 0;  ///< records that the raw log had no room for

@@ -217,6 +217,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.odometry_age = flight_.odometry_age();
   view_.heartbeat_age = in.autopilot.heartbeat_age;
   view_.clock = link_.clock();
+  view_.untold_delay = link_.untold_delay();
   view_.pose_age = in.autopilot.pose_age(in.now_ns);
   if (flight_.odometry()) view_.state = flight_.odometry()->state;
   view_.command = out.command;

@@ -195,7 +195,8 @@ Decision Mission::enable() {
   if (view_.pose_age > track::Supervisor::kPoseSilent)
     return refused("no pose from the autopilot: its estimator does not follow the VIO yet, or its stream is off");
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
-  const std::string forbids = firmware_bridge::forbidding_parameter(view_.autopilot, view_.parameters, vehicle_);
+  const std::string forbids =
+      firmware_bridge::forbidding_parameter(view_.autopilot, view_.parameters, vehicle_, view_.untold_delay);
   if (!forbids.empty()) return refused(forbids);
   return order(Request::enable, "enabling");
 }
@@ -268,6 +269,10 @@ Decision Mission::start(PlanJob::Kind kind, const Goal& goal) {
   if (!world_) return refused("no map was received yet");
   if (kind != PlanJob::Kind::brake) {
     if (job_) return refused("still planning the last command");
+    // A station may have set it since: the autopilot tells each change, unasked.
+    const std::string changed =
+        firmware_bridge::forbidding_parameter(view_.autopilot, view_.parameters, vehicle_, view_.untold_delay, false);
+    if (!changed.empty()) return refused(changed);
     if (order_under_way()) return refused("the last order is still being carried out: ask again");
   }
   job_ = ++last_job_;

@@ -57,7 +57,7 @@ StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
                      {},
                      {},
                      {}};
-  text.findings = firmware_bridge::judge_parameters(view.autopilot, view.parameters, vehicle);
+  text.findings = firmware_bridge::judge_parameters(view.autopilot, view.parameters, vehicle, view.untold_delay);
   for (const auto& finding : text.findings) {
     char* const name = const_cast<char*>(finding.name.data());  // a literal, which ends
     if (finding.value) text.parameters.push_back({name, *finding.value});

@@ -19,10 +19,14 @@ const Profile kProfile{
         {"PSC_JERK_XY", 5}, {"PSC_JERK_Z", 5}, {"WPNAV_SPEED", 1000}, {"WPNAV_ACCEL", 250}, {"WPNAV_ACCEL_Z", 100},
         {"WPNAV_SPEED_UP", 250}, {"WPNAV_SPEED_DN", 150}, {"MOT_SPOOL_TIME", 0.5}, {"TKOFF_SLEW_TIME", 2},
         {"FS_GCS_ENABLE", 0}, {"FS_THR_ENABLE", 1}, {"FS_EKF_ACTION", 1}, {"FS_EKF_THRESH", 0.8}, {"FS_OPTIONS", 16},
-        {"DISARM_DELAY", 10}},
+        {"DISARM_DELAY", 10},
+        {"FS_GCS_TIMEOUT", 5}, {"BATT_LOW_VOLT", 10.5}, {"BATT_LOW_TIMER", 10}, {"BATT_FS_LOW_ACT", 0},
+        {"BATT_FS_CRT_ACT", 0}, {"VISO_DELAY_MS", 10},
+        {"SIM_RC_FAIL", 0}, {"SIM_BATT_VOLTAGE", 12.6}},  // the simulator's own: ardupilot-rc, -battery
     .integers = {{"VISO_TYPE", 2}, {"EK3_SRC1_POSXY", 2}, {"EK3_SRC1_VELXY", 2}, {"EK3_SRC1_POSZ", 2}, {"EK3_SRC1_VELZ", 2},
                  {"EK3_SRC1_YAW", 2}, {"FS_GCS_ENABLE", 2}, {"FS_THR_ENABLE", 2}, {"FS_EKF_ACTION", 2},
-                 {"FS_OPTIONS", 6}, {"DISARM_DELAY", 2}},
+                 {"FS_OPTIONS", 6}, {"DISARM_DELAY", 2}, {"BATT_LOW_TIMER", 2}, {"BATT_FS_LOW_ACT", 2}, {"BATT_FS_CRT_ACT", 2},
+                 {"VISO_DELAY_MS", 4}, {"SIM_RC_FAIL", 2}},
     .integers_by_value = true,               // ardupilot-flight.csv:35,101,104
     .parameter_period = 0.1,                 // ardupilot-flight.csv:30–88
     .intervals_ms = {},                      // HEARTBEAT alone until asked: ardupilot-flight.csv:1–33
@@ -41,6 +45,9 @@ constexpr double kLiftedAt = 0.5;            // of WPNAV_ACCEL_Z, source: then i
 constexpr double kReached = 0.9, kSlow = 0.1;  // source: the take-off is complete at 90 % of the height, below 10 % of the speed
 constexpr double kLandSpeed = 0.5;           // m/s: ardupilot-flight.csv:358–375
 constexpr double kLandPause = 4.2;           // s until a failsafe's landing descends: ardupilot-vio.csv:265,296
+constexpr double kRadioLost = 0.99;          // s: ardupilot-rc.csv:354,366
+constexpr double kBatteryNoticed = 0.17;     // s beyond BATT_LOW_TIMER: ardupilot-battery.csv:360,373
+constexpr double kStationNoticed = 0.30;     // s beyond FS_GCS_TIMEOUT, of its last heartbeat: ardupilot-gcs.csv:356,373
 constexpr double kReturnHeight = 2.0, kReturnPause = 0.5;  // m, s: RTL waits and climbs, ardupilot-modes.csv:363–387
 constexpr AxisLimits kReturn{1.5, 0.47, 0.5, 1.0};         // ibid.
 // clang-format on
@@ -48,7 +55,7 @@ constexpr AxisLimits kReturn{1.5, 0.47, 0.5, 1.0};         // ibid.
 enum CustomMode : std::uint32_t { stabilize = 0, alt_hold = 2, guided = 4, loiter = 5, rtl = 6, land = 9, brake = 17 };
 constexpr std::uint16_t kTakeOff = 22, kLand = 21, kSetMode = 176, kArm = 400, kMessageInterval = 511;
 constexpr std::uint8_t kAccepted = 0, kDenied = 2, kUnsupported = 3, kFailed = 4;
-constexpr std::uint8_t kCritical = 2, kInfo = 6;  // severities
+constexpr std::uint8_t kCritical = 2, kWarning = 4, kInfo = 6;  // severities
 
 class ArduCopter : public Firmware {
  public:
@@ -65,8 +72,9 @@ class ArduCopter : public Firmware {
 
  private:
   // Its HEARTBEAT follows a change of mode at once: ardupilot-flight.csv:128–130.
-  void change(CustomMode mode) noexcept {
+  void change(CustomMode mode, bool by_failsafe = false) noexcept {
     mode_ = mode;
+    paused_ = by_failsafe;
     shaped_ = here();
     take_off_ = climbing_ = false;
     blind_ = lost_;
@@ -156,7 +164,7 @@ class ArduCopter : public Firmware {
         z = shaped(z, {std::max(armed_z_ + (climbing_ ? height_ : kReturnHeight), climbing_ ? -1e9 : z.p), 0, 0}, along,
                    kStep);
       else
-        z = shaped_velocity(z, mode_ == land && t - changed_at_ > (blind_ ? kLandPause : 0) ? -kLandSpeed : 0, along,
+        z = shaped_velocity(z, mode_ == land && t - changed_at_ > (paused_ ? kLandPause : 0) ? -kLandSpeed : 0, along,
                             kStep);
     }
     if (climbing_ && z.p > armed_z_ + kReached * height_ && z.v < kSlow * along.speed_up) {
@@ -193,10 +201,12 @@ class ArduCopter : public Firmware {
   void watch(double t) override {
     now_ = t;
     if (lost_ != was_lost_ && armed_ && !land_complete_) {
-      if (lost_) say(kCritical, "EKF variance"), say(kCritical, "EKF Failsafe: changed to LAND Mode"), change(land);
+      if (lost_)
+        say(kCritical, "EKF variance"), say(kCritical, "EKF Failsafe: changed to LAND Mode"), change(land, true);
       if (!lost_) say(kCritical, "EKF Failsafe Cleared");
     }
     was_lost_ = lost_;
+    other_failsafes(t);
     if (!armed_) return;
     const double still = on_ground_for(t);
     if (!land_complete_ && mode_ == land && still > kProfile.landed_after) {
@@ -212,20 +222,42 @@ class ArduCopter : public Firmware {
     }
   }
 
+  /// Of remote control, ground station and battery those that land, as measured; each once.
+  void other_failsafes(double t) {
+    const bool low = parameter("SIM_BATT_VOLTAGE") < parameter("BATT_LOW_VOLT"), deaf = parameter("SIM_RC_FAIL") == 1;
+    if (!low) battery_good_at_ = t;
+    if (!deaf) radio_good_at_ = t;
+    const std::array<bool, 3> now{
+        parameter("FS_THR_ENABLE") == 3 && t - radio_good_at_ > kRadioLost,
+        parameter("FS_GCS_ENABLE") == 5 && station_silent(t, parameter("FS_GCS_TIMEOUT") + kStationNoticed),
+        parameter("BATT_FS_LOW_ACT") == 1 && t - battery_good_at_ > parameter("BATT_LOW_TIMER") + kBatteryNoticed};
+    constexpr std::array<std::string_view, 3> kSaid{"Radio Failsafe", "GCS Failsafe", "Battery Failsafe"};
+    for (std::size_t n = 0; n < now.size(); ++n) {
+      if (!now[n]) failed_[n] = false;
+      if (!now[n] || failed_[n] || !armed_ || land_complete_) continue;
+      failed_[n] = true;
+      change(land, true);
+      say(kWarning, kSaid[n]);
+    }
+  }
+
+  bool failed() const { return std::ranges::find(failed_, true) != failed_.end(); }
   mavlink::Heartbeat heartbeat() const override {  // ardupilot-modes.csv:129–540
     const bool by_position = mode_ == guided || mode_ == loiter || mode_ == rtl || mode_ == brake;
     return {.custom_mode = mode_,
             .type = 2,
             .autopilot = kProfile.autopilot,
             .base_mode = static_cast<std::uint8_t>(81 | (by_position ? 8 : 0) | (armed_ ? 128 : 0)),
-            .system_status = static_cast<std::uint8_t>(lost_ && armed_             ? 5
-                                                       : armed_ && !land_complete_ ? 4
-                                                                                   : 3),
+            .system_status = static_cast<std::uint8_t>((lost_ && armed_) || failed() ? 5
+                                                       : armed_ && !land_complete_   ? 4
+                                                                                     : 3),
             .mavlink_version = 3};
   }
 
   CustomMode mode_ = stabilize;
-  bool land_complete_ = true, take_off_ = false, climbing_ = false, blind_ = false, was_lost_ = false;
+  bool land_complete_ = true, take_off_ = false, climbing_ = false, blind_ = false, paused_ = false, was_lost_ = false;
+  std::array<bool, 3> failed_{};  // radio, ground station, battery
+  double radio_good_at_ = 0, battery_good_at_ = 0;
   double take_off_at_ = 0, height_ = 0, changed_at_ = 0, now_ = 0;
   std::array<AxisTarget, 3> shaped_;  // where the loops shall be now, in the map
 };

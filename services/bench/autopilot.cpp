@@ -156,7 +156,7 @@ void Autopilot::on(const mavlink::ParamRequestRead& m, double) {
   const std::string name(m.param_id.begin(), std::ranges::find(m.param_id, char{0}));
   const auto found = parameters.find(name);
   if (found == parameters.end()) return;
-  const bool real = name.ends_with("_T") || name.starts_with("MPC_");
+  const bool real = name.ends_with("_T") || name.ends_with("_DELAY") || name.starts_with("MPC_");
   mavlink::ParamValue answer{.param_count = 1, .param_id = m.param_id, .param_type = real ? kReal32 : kInt32};
   answer.param_value =
       real ? static_cast<float>(found->second) : std::bit_cast<float>(static_cast<std::int32_t>(found->second));

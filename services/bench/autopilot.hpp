@@ -62,11 +62,11 @@ class Autopilot {
   /// The estimator takes its heading from the odometry too; otherwise from its own sensors, which are right.
   bool follows_yaw = false;
   /// What PARAM_REQUEST_READ is answered from: safe indoors and the vehicle's gains until changed. Those whose name
-  /// ends in _T or begins with MPC_ are floats.
-  std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5}, {"COM_OBL_RC_ACT", 4},  {"COM_RC_OVERRIDE", 3},
-                                           {"NAV_DLL_ACT", 3},     {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},
-                                           {"EKF2_HGT_REF", 3},    {"MPC_XY_VEL_MAX", 12}, {"MPC_Z_VEL_MAX_UP", 3},
-                                           {"MPC_Z_VEL_MAX_DN", 3}};
+  /// ends in _T or _DELAY or begins with MPC_ are floats.
+  std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5}, {"COM_OBL_RC_ACT", 4},   {"COM_RC_OVERRIDE", 3},
+                                           {"NAV_DLL_ACT", 3},     {"NAV_RCL_ACT", 3},      {"EKF2_EV_DELAY", 0},
+                                           {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3},
+                                           {"MPC_XY_VEL_MAX", 12}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 3}};
   /// Remaining share, sent once a second as BATTERY_STATUS while set.
   std::optional<double> battery;
   /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
@@ -88,6 +88,8 @@ class Autopilot {
   virtual void on(const mavlink::ParamSet&, double) {}
   virtual void on(const mavlink::SetGpsGlobalOrigin&, double) {}
   virtual void on(const mavlink::Timesync&, double) {}
+  virtual void on(const mavlink::Heartbeat&, double) {}
+  virtual void on(const mavlink::ManualControl&, double) {}
   virtual void fly(double t);
   virtual void telemetry(double t, std::vector<std::uint8_t>& out);
 

@@ -8,9 +8,10 @@
 namespace backwash::bench {
 namespace {
 
-constexpr std::uint8_t kReal32 = 9;  // MAV_PARAM_TYPE
-constexpr double kFed = 0.05;        // s: without ODOMETRY for longer the inertial sensors alone carry the estimate on
-constexpr double kContinuous = 0.3;  // s: a gap in ODOMETRY from which it counts as come back
+constexpr std::uint8_t kReal32 = 9;   // MAV_PARAM_TYPE
+constexpr std::uint8_t kStation = 6;  // MAV_TYPE_GCS
+constexpr double kFed = 0.05;         // s: without ODOMETRY for longer the inertial sensors alone carry the estimate on
+constexpr double kContinuous = 0.3;   // s: a gap in ODOMETRY from which it counts as come back
 
 Eigen::Matrix3d yaw_matrix(double yaw) { return Eigen::AngleAxisd(yaw, Vec3::UnitZ()).toRotationMatrix(); }
 
@@ -81,6 +82,10 @@ void Firmware::on(const mavlink::ParamSet& m, double t) {
 
 void Firmware::on(const mavlink::Timesync& m, double) {
   if (m.tc1 == 0) syncs_.push_back({since_boot_ns(), m.ts1, 0, 0});
+}
+
+void Firmware::on(const mavlink::Heartbeat& m, double t) {
+  if (m.type == kStation) station_at_ = t;
 }
 
 void Firmware::say(std::uint8_t severity, std::string_view text) {

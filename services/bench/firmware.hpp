@@ -55,6 +55,8 @@ class Firmware : public Autopilot {
   void on(const mavlink::ParamRequestRead& m, double t) override;
   void on(const mavlink::ParamSet& m, double t) override;
   void on(const mavlink::Timesync& m, double t) override;
+  void on(const mavlink::Heartbeat& m, double t) override;
+  void on(const mavlink::ManualControl&, double t) override { sticks_at_ = t; }
   void fly(double t) final;
   void telemetry(double t, std::vector<std::uint8_t>& out) final;
 
@@ -79,6 +81,9 @@ class Firmware : public Autopilot {
   std::array<AxisTarget, 3> here() const;
   bool has_position() const { return local_position_ && !lost_; }
   bool grounded() const { return vehicle_.on_ground(); }
+  /// A ground station, or its sticks, that were heard and are not any more: for longer than `limit`, s.
+  bool station_silent(double t, double limit) const { return station_at_ >= 0 && t - station_at_ > limit; }
+  bool sticks_silent(double t, double limit) const { return sticks_at_ >= 0 && t - sticks_at_ > limit; }
   double on_ground_for(double t) const { return grounded() ? t - lifted_ : 0; }
 
   static constexpr double kStep = sim::Quadrotor::kStep;
@@ -103,6 +108,7 @@ class Firmware : public Autopilot {
   std::deque<Pending> asked_;  // parameters
   std::vector<mavlink::Statustext> texts_;
   std::vector<mavlink::Timesync> syncs_;
+  double station_at_ = -1, sticks_at_ = -1;  // s, when last heard
   double odometry_at_ = -1e9, odometry_since_ = -1e9, lifted_ = 0;
   State measured_;    // error of the newest ODOMETRY
   double drift_ = 0;  // m/s

@@ -21,10 +21,11 @@ const Profile kProfile{
         {"MPC_Z_VEL_P_ACC", 4}, {"MPC_Z_VEL_I_ACC", 2}, {"MPC_Z_VEL_D_ACC", 0}, {"MPC_TKO_RAMP_T", 3},
         {"MPC_TKO_SPEED", 1.5}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 1.5}, {"MPC_Z_V_AUTO_UP", 3},
         {"MPC_THR_HOVER", 0.5}, {"MPC_LAND_SPEED", 0.7}, {"MPC_ACC_HOR", 3}, {"MPC_XY_VEL_MAX", 12},
-        {"MPC_TILTMAX_LND", 12}},
+        {"MPC_TILTMAX_LND", 12}, {"COM_RC_LOSS_T", 0.5}, {"COM_DL_LOSS_T", 10}, {"CBRK_SUPPLY_CHK", 894281},
+        {"BAT_CRIT_THR", 0.07}, {"SIM_BAT_DRAIN", 60}, {"SIM_BAT_MIN_PCT", 50}},
     .integers = {{"COM_OBL_RC_ACT", 6}, {"COM_RC_IN_MODE", 6}, {"COM_RCL_EXCEPT", 6}, {"NAV_RCL_ACT", 6},
                  {"NAV_DLL_ACT", 6}, {"COM_RC_OVERRIDE", 6}, {"COM_LOW_BAT_ACT", 6}, {"EKF2_EV_CTRL", 6},
-                 {"EKF2_GPS_CTRL", 6}, {"EKF2_HGT_REF", 6}, {"EKF2_MAG_TYPE", 6}, {"EKF2_NOAID_TOUT", 6}},
+                 {"EKF2_GPS_CTRL", 6}, {"EKF2_HGT_REF", 6}, {"EKF2_MAG_TYPE", 6}, {"EKF2_NOAID_TOUT", 6}, {"CBRK_SUPPLY_CHK", 6}},
     .integers_by_value = false,              // px4-flight.csv:16–24
     .parameter_period = 0.001,               // px4-flight.csv:13–75
     .intervals_ms = {{mavlink::AttitudeQuaternion::kId, 20}, {mavlink::LocalPositionNed::kId, 33},
@@ -49,6 +50,9 @@ constexpr double kBrakingJerk = 4.0, kBrakingGain = 8.0;  // m/s³ (MPC_JERK_AUT
 constexpr AxisLimits kAtOnce{12, 12, 3, 40, 13};  // a blind landing is not smoothed: px4-vio.csv:221–227
 constexpr double kStood = 1.0, kStale = 1.05;  // s: what it finds older than that after a standstill is lost: px4-sigstop.csv:276–296
 constexpr double kSetDown = 0.3;             // s on the ground until an offboard thrust is cut: px4-vio.csv:252–262
+constexpr double kSticksLost = 0.10, kStationLost = 2.1;  // s beyond COM_RC_LOSS_T, COM_DL_LOSS_T: px4-rc.csv:304,311; -gcs:307,373
+constexpr double kBatteryNoticed = 2.2;      // s after the charge is below BAT_CRIT_THR: px4-battery.csv:303,336
+constexpr double kBatteryUnchecked = 894281;  // CBRK_SUPPLY_CHK, source: then it is not looked at
 // clang-format on
 
 enum CustomMode : std::uint32_t {
@@ -193,10 +197,24 @@ class Px4 : public Firmware {
     const bool flying = armed_ && landed_state_ != on_ground;
     if (flying && lost() && !was_lost_) change(land, true);
     was_lost_ = lost();
+    const bool bereft = failed(t);
+    if (flying && bereft && mode_ == offboard) change(land, true);
     if (flying && mode_ == offboard && !streaming(t)) change(parameter("COM_OBL_RC_ACT") == 4 ? land : position, true);
     // What was lost is back: it goes back to offboard by itself, and may take off again: px4-vio.csv:244–276.
-    if (armed_ && failsafe_ && !lost() && streaming(t)) change(offboard, false);
+    if (armed_ && failsafe_ && !lost() && !bereft && streaming(t)) change(offboard, false);
     settle(t);
+  }
+  /// Of remote control, ground station and battery those that land, as measured.
+  bool failed(double t) {
+    const double least = parameter("SIM_BAT_MIN_PCT") / 100;
+    charge_ = armed_ ? std::max(charge_ - kStep / parameter("SIM_BAT_DRAIN"), least) : 1;
+    if (charge_ > parameter("BAT_CRIT_THR")) charged_at_ = t;
+    const bool sticks = parameter("NAV_RCL_ACT") == 3 && parameter("COM_RC_IN_MODE") == 1 &&
+                        (static_cast<int>(parameter("COM_RCL_EXCEPT")) & 4) == 0;
+    return (sticks && sticks_silent(t, parameter("COM_RC_LOSS_T") + kSticksLost)) ||
+           (parameter("NAV_DLL_ACT") == 3 && station_silent(t, parameter("COM_DL_LOSS_T") + kStationLost)) ||
+           (parameter("COM_LOW_BAT_ACT") == 2 && parameter("CBRK_SUPPLY_CHK") != kBatteryUnchecked &&
+            t - charged_at_ > kBatteryNoticed);
   }
   /// Landed, and after a while disarmed.
   void settle(double t) {
@@ -216,7 +234,10 @@ class Px4 : public Firmware {
   }
 
   mavlink::Heartbeat heartbeat() const override {
-    const bool fresh = now_ - last_setpoint_ < kFresh, ready = mode_ == offboard && has_position() && fresh;
+    const bool fresh = now_ - last_setpoint_ < kFresh;
+    const bool watched =
+        parameter("NAV_DLL_ACT") == 0 || !station_silent(now_, parameter("COM_DL_LOSS_T") + kStationLost);
+    const bool ready = mode_ == offboard && has_position() && fresh && watched;
     // px4-flight.csv:5,119,407; -loss0.3pos:223; -refused
     const int base = mode_ == offboard ? (last_setpoint_ > 0 ? 17 : 1) : mode_ == position ? 81 : 29;
     return {.custom_mode = mode_,
@@ -232,6 +253,7 @@ class Px4 : public Firmware {
   CustomMode mode_ = loiter;
   Phase phase_ = Phase::spooling;
   bool failsafe_ = false, blind_ = false, was_lost_ = false;
+  double charge_ = 1, charged_at_ = 0;  // of the battery, its share; s
   double ramp_at_ = 0, changed_at_ = 0, landed_at_ = -1, now_ = 0, stale_until_ = 0;
   std::array<AxisTarget, 3> shaped_;  // where the loops shall be now, in the map
 };

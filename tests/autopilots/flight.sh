@@ -83,10 +83,11 @@ daemon() {
 ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1; }
 must() { ctl "$@" || die "backwashctl $* failed: $(tail -n 1 "$log")"; }
 
-# Both refuse for a while: ArduCopter arms when its gyros have settled.
+# Both refuse for a while: ArduCopter arms when its gyros have settled. A take-off that is refused leaves the daemon enabled.
 take_off() {
   for n in $(seq 30); do
-    ctl enable --wait && ctl takeoff --height 1.2 --wait && break
+    ctl enable --wait || true
+    ctl takeoff --height 1.2 --wait && break
     [[ $n != 30 ]] || die "no take-off: $(tail -n 1 "$log")"
     sleep 1
   done

@@ -11,7 +11,7 @@
 namespace backwash::autopilots {
 namespace {
 
-constexpr std::uint8_t kSystem = 1, kCompanion = 191, kFlightController = 1;
+constexpr std::uint8_t kSystem = 1, kCompanion = 191, kFlightController = 1, kStationSystem = 255, kStation = 190;
 constexpr std::uint8_t kLocalNed = 1, kLocalFrd = 20, kBodyFrd = 12, kVio = 3, kInt32 = 6, kReal32 = 9;
 
 template <std::size_t N>
@@ -22,7 +22,7 @@ std::string text_of(const std::array<char, N>& zero_filled) {
 }  // namespace
 
 Session::Session(Line line, const Options& options, std::ostream& trace)
-    : o_(options), peer_(std::move(line), kSystem, kCompanion), trace_(trace) {
+    : o_(options), peer_(line, kSystem, kCompanion), station_(line, kStationSystem, kStation), trace_(trace) {
   trace_ << "t_s,who,what,a,b,c,d,e,f,g\n" << std::fixed << std::setprecision(4);
   read(o_.script);
 }
@@ -36,6 +36,8 @@ bool Session::step(std::int64_t now_ns, const std::optional<Truth>& truth) {
   });
   if (truth) forward(*truth);
   if (ms_ % 1000 == 0) peer_.send(mavlink::Heartbeat{0, 18, 8, 0, 4, 3});
+  if (watched_ && ms_ % 1000 == 0) station_.send(mavlink::Heartbeat{0, 6, 8, 0, 4, 3});
+  if (sticks_ && ms_ % 50 == 0) station_.send(mavlink::ManualControl{.z = 500, .target = kSystem});
   if (ms_ % 20 == 0) stream();
   ++ms_;
   return advance();
@@ -215,12 +217,8 @@ void Session::begin(std::istringstream& in) {
     wait([this, end] { return t_ >= end; }, 1e9);
   } else if (verb == "await") {
     await(in);
-  } else if (verb == "odometry") {
-    in >> word;
-    odometry_ = word == "on";
-  } else if (verb == "stream") {
-    in >> word;
-    streaming_ = word == "on";
+  } else if (turn(verb, in)) {
+    return;
   } else if (verb == "here") {  // the set-point is where the vehicle is
     setpoint_ = target_ = now_.p_E;
     yaw_ = heading_ned();
@@ -259,6 +257,18 @@ void Session::begin(std::istringstream& in) {
   } else {
     throw std::runtime_error("no such verb: " + line_);
   }
+}
+
+/// What goes on until it is turned off: VERB on|off.
+bool Session::turn(const std::string& verb, std::istringstream& in) {
+  const std::map<std::string_view, bool*> all{
+      {"odometry", &odometry_}, {"stream", &streaming_}, {"station", &watched_}, {"sticks", &sticks_}};
+  const auto found = all.find(verb);
+  if (found == all.end()) return false;
+  std::string word;
+  in >> word;
+  *found->second = word == "on";
+  return true;
 }
 
 void Session::parameter(bool set, std::istringstream& in) {

@@ -62,11 +62,12 @@ class Session {
   bool advance();
   void wait(std::function<bool()> done, double at_most, bool must = true);
   void begin(std::istringstream& in);
+  bool turn(const std::string& verb, std::istringstream& in);
   void parameter(bool set, std::istringstream& in);
   void await(std::istringstream& in);
 
   Options o_;
-  Peer peer_;
+  Peer peer_, station_;  // the companion, and the ground station at the same line
   std::ostream& trace_;
   std::deque<std::string> script_;
   std::string line_;
@@ -75,7 +76,8 @@ class Session {
   double until_ = 0, t_ = 0;
   std::int64_t now_ns_ = 0, begun_ns_ = 0;
   long ms_ = 0;
-  bool odometry_ = false, streaming_ = false, have_truth_ = false, heard_ = false, armed_ = false;
+  bool odometry_ = false, streaming_ = false, watched_ = false, sticks_ = false, have_truth_ = false, heard_ = false,
+       armed_ = false;
   int landed_ = -1;
   std::uint32_t mode_ = 0;
   Truth now_;

@@ -170,6 +170,41 @@ void compare_landing(const Pair& pair, double down) {
   });
 }
 
+/// A failsafe that lands, from its cause on, while set-points go on. The cause of a silent station is its last
+/// heartbeat, which the session sends each whole second.
+void compare_failsafe(const Pair& pair, const std::string& note, double custom_mode, double stands) {
+  const auto cause = [&](const Trace& t) {
+    const double at = t.note(note).value();
+    return note == "station off" ? std::floor(at) : at;
+  };
+  const auto from = [&](const Figure& figure) -> Figure {
+    return [=, &note](const Trace& t) -> std::optional<double> {
+      const auto found = figure(t);
+      return found ? std::optional(*found + t.note(note).value() - cause(t)) : std::nullopt;
+    };
+  };
+  const auto landed_state = [&](double state) {
+    return from([=, &note](const Trace& t) {
+      const double at = t.note(note).value();
+      return since(t.at("in", "EXTENDED_SYS_STATE", {state}, at), at);
+    });
+  };
+  compare(pair, "the failsafe's mode in HEARTBEAT, s", 0.7, from(heartbeat_after(note, custom_mode)));
+  compare(pair, "landing said, s", 0.3, landed_state(4));
+  compare(pair, "gone until it stands, m", 0.2, [&](const Trace& t) -> std::optional<double> {
+    return (t.position(cause(t) + stands) - t.position(cause(t))).head<2>().norm();
+  });
+  compare(pair, "descends, s", 0.5, from(descends_after(note)));
+  compare(pair, "ground reached, s", 0.6, from([&](const Trace& t) {
+            const double at = t.note(note).value();
+            return since(t.crosses(2, 0.02, at, true), at);
+          }));
+  compare(pair, "on ground said, s", 0.7, landed_state(1));
+  EXPECT_EQ(heartbeats(pair.own, note), heartbeats(pair.real, note));
+  for (const char* text : {"STATUSTEXT Radio", "STATUSTEXT GCS", "STATUSTEXT Battery Failsafe"})
+    EXPECT_EQ(pair.own.said("in", text), pair.real.said("in", text));
+}
+
 TEST(ArduCopterProfile, TakesOffByItself) {
   const Pair p = ardupilot("flight");
   compare(p, "landed state 3 after arming, s", 0.3, after_arming("EXTENDED_SYS_STATE", 3));
@@ -258,6 +293,18 @@ TEST(ArduCopterProfile, ASetPointBeforeTheLiftOffCancelsTheTakeOff) {
           [&](const Trace& t) { return since(t.at("in", "EXTENDED_SYS_STATE", {2}), again(t)); });
 }
 
+TEST(ArduCopterProfile, LandsWithoutARemoteControl) {
+  compare_failsafe(ardupilot("rc", "rc", {{"FS_THR_ENABLE", 3}}), "set SIM_RC_FAIL 1", 9, 4);
+}
+TEST(ArduCopterProfile, LandsWithoutAGroundStation) {
+  compare_failsafe(ardupilot("gcs", "gcs", {{"FS_GCS_ENABLE", 5}, {"FS_GCS_TIMEOUT", 2}}), "station off", 9, 5);
+}
+TEST(ArduCopterProfile, LandsWithALowBattery) {
+  compare_failsafe(
+      ardupilot("battery", "battery", {{"BATT_LOW_VOLT", 11.5}, {"BATT_LOW_TIMER", 1}, {"BATT_FS_LOW_ACT", 1}}),
+      "set SIM_BATT_VOLTAGE 11", 9, 4);
+}
+
 TEST(ArduCopterProfile, ChasesStaleSetPointsAfterAPause) {
   const Pair p = ardupilot("sigstop");
   compare_share(p, "fastest after 3 s of standstill, m/s", 0.25, largest_speed("signal cont", 6));
@@ -293,6 +340,18 @@ TEST(Px4Profile, LandsBlindlyForASecondAfterAPauseAndGoesOn) {
     return since(t.crosses(2, t.truth(back, 2) - 0.45, back + 1), back);
   });
   compare_share(p, "gone in the 4 s after it, m", 0.25, moved("signal cont", 4));
+}
+
+TEST(Px4Profile, LandsWithoutSticks) {
+  compare_failsafe(px4("rc", "rc", {{"COM_RC_IN_MODE", 1}, {"COM_RCL_EXCEPT", 0}, {"NAV_RCL_ACT", 3}}), "sticks off",
+                   kLand, 4);
+}
+TEST(Px4Profile, LandsWithoutAGroundStation) {
+  compare_failsafe(px4("gcs", "gcs", {{"NAV_DLL_ACT", 3}, {"COM_DL_LOSS_T", 5}}), "station off", kLand, 11);
+}
+TEST(Px4Profile, LandsWithAnEmptyBattery) {
+  compare_failsafe(px4("battery", "battery", {{"COM_LOW_BAT_ACT", 2}, {"CBRK_SUPPLY_CHK", 0}}), "set SIM_BAT_DRAIN 1",
+                   kLand, 6);
 }
 
 TEST(Px4Profile, SaysInAirBeforeItLifts) {

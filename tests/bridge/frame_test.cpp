@@ -68,6 +68,8 @@ TEST(MavlinkCrc, CrcExtraFollowsFromTheDefinitions) {
   EXPECT_EQ(info<Odometry>().crc_extra, 91);    // arrays and extensions
   EXPECT_EQ(info<SimState>().crc_extra, 32);
   EXPECT_EQ(info<HilGps>().crc_extra, 124);
+  EXPECT_EQ(info<ManualControl>().crc_extra, 243);
+  EXPECT_EQ(info<ManualControl>().base_length, 11U);
   EXPECT_EQ(info<SimState>().base_length, 84U);
   EXPECT_EQ(info<HilGps>().base_length, 36U);
   EXPECT_EQ(info<HilGps>().full_length, 39U);

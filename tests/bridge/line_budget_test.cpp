@@ -195,5 +195,16 @@ TEST_F(LinkTest, TellsALineThatTakesNothingThoughNoSetpointWaits) {
   EXPECT_FALSE(link_.transmit_stalled(kStart + std::chrono::milliseconds(ms + 200)));
 }
 
+// A question and its answer: 60 bytes, signed 86. The plain link has one length.
+TEST(LineBudget, TheDelayThatAnAutopilotCannotFindOutIsThatOfSetPointAndOdometry) {
+  EXPECT_NEAR(untold_delay({5760, 0}, false), (kSetpoint + kOdometry) / 5760.0, 1e-12);
+  EXPECT_NEAR(untold_delay({5760, 0}, true), (kSetpoint + kOdometry + 2 * 13) / 5760.0, 1e-12);
+  EXPECT_EQ(untold_delay({6001, 0}, false), 0) << "9.998 ms";
+  EXPECT_GT(untold_delay({5999, 0}, false), 0);
+  EXPECT_GT(untold_delay({8599, 0}, true), 0);
+  EXPECT_EQ(untold_delay({8601, 0}, true), 0);
+  EXPECT_EQ(untold_delay({}, false), 0) << "a socket";
+}
+
 }  // namespace
 }  // namespace backwash::firmware_bridge::test

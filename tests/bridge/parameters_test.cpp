@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <map>
 
+#include "firmware_bridge/line_budget.hpp"
 #include "tests/bridge/emulated_controller.hpp"
 
 namespace backwash::firmware_bridge::test {
@@ -21,17 +23,17 @@ Vehicle vehicle() {
 }
 
 using Named = std::map<std::string, double, std::less<>>;
-const Named kPx4Good{{"COM_OF_LOSS_T", 0.3},  {"COM_OBL_RC_ACT", 4},   {"MPC_XY_VEL_P_ACC", 4},
-                     {"MPC_XY_P", 1.5},       {"MPC_Z_VEL_P_ACC", 8},  {"MPC_Z_P", 1.5},
-                     {"MPC_XY_VEL_MAX", 1.5}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 1.5},
-                     {"COM_RC_OVERRIDE", 3},  {"NAV_DLL_ACT", 0},      {"COM_LOW_BAT_ACT", 2},
-                     {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3}};
-const Named kArduPilotGood{{"GUID_TIMEOUT", 0.3},   {"PSC_VELXY_P", 4},      {"PSC_POSXY_P", 1.5},
-                           {"PSC_VELZ_P", 8},       {"PSC_POSZ_P", 1.5},     {"WPNAV_SPEED", 150},
-                           {"WPNAV_SPEED_UP", 250}, {"WPNAV_SPEED_DN", 150}, {"WPNAV_ACCEL", 200},
-                           {"WPNAV_ACCEL_Z", 250},  {"VISO_TYPE", 1},        {"EK3_SRC1_POSXY", 6},
-                           {"EK3_SRC1_POSZ", 6},    {"EK3_SRC1_YAW", 6},     {"FS_EKF_ACTION", 1},
-                           {"FS_THR_ENABLE", 3},    {"FS_GCS_ENABLE", 0}};
+const Named kPx4Good{
+    {"COM_OF_LOSS_T", 0.3},    {"COM_OBL_RC_ACT", 4},  {"MPC_XY_VEL_P_ACC", 4}, {"MPC_XY_P", 1.5},
+    {"MPC_Z_VEL_P_ACC", 8},    {"MPC_Z_P", 1.5},       {"MPC_XY_VEL_MAX", 1.5}, {"MPC_Z_VEL_MAX_UP", 3},
+    {"MPC_Z_VEL_MAX_DN", 1.5}, {"EKF2_EV_DELAY", 0},   {"NAV_RCL_ACT", 3},      {"COM_RC_OVERRIDE", 3},
+    {"NAV_DLL_ACT", 0},        {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3}};
+const Named kArduPilotGood{
+    {"GUID_TIMEOUT", 0.3}, {"PSC_VELXY_P", 4},     {"PSC_POSXY_P", 1.5},    {"PSC_VELZ_P", 8},
+    {"PSC_POSZ_P", 1.5},   {"WPNAV_SPEED", 150},   {"WPNAV_SPEED_UP", 250}, {"WPNAV_SPEED_DN", 150},
+    {"WPNAV_ACCEL", 200},  {"WPNAV_ACCEL_Z", 250}, {"VISO_TYPE", 1},        {"EK3_SRC1_POSXY", 6},
+    {"EK3_SRC1_POSZ", 6},  {"EK3_SRC1_YAW", 6},    {"FS_EKF_ACTION", 1},    {"FS_THR_ENABLE", 3},
+    {"FS_GCS_ENABLE", 0},  {"VISO_DELAY_MS", 10},  {"BATT_FS_LOW_ACT", 1},  {"BATT_FS_CRT_ACT", 0}};
 
 ParameterValues values(Autopilot autopilot, const Named& named) {
   ParameterValues all{};
@@ -121,7 +123,10 @@ TEST(Parameters, WhatIsOnlyUnwiseIsToldAndForbidsNothing) {
   for (const auto& [autopilot, name, value] :
        {std::tuple(Autopilot::kPx4, "COM_RC_OVERRIDE", 1.0), std::tuple(Autopilot::kPx4, "NAV_DLL_ACT", 2.0),
         std::tuple(Autopilot::kPx4, "COM_LOW_BAT_ACT", 3.0), std::tuple(Autopilot::kPx4, "EKF2_EV_CTRL", 7.0),
-        std::tuple(Autopilot::kPx4, "EKF2_HGT_REF", 0.0), std::tuple(Autopilot::kArduPilot, "VISO_TYPE", 0.0),
+        std::tuple(Autopilot::kPx4, "EKF2_HGT_REF", 0.0), std::tuple(Autopilot::kPx4, "NAV_RCL_ACT", 2.0),
+        std::tuple(Autopilot::kPx4, "EKF2_EV_DELAY", 81.0), std::tuple(Autopilot::kArduPilot, "BATT_FS_LOW_ACT", 2.0),
+        std::tuple(Autopilot::kArduPilot, "BATT_FS_CRT_ACT", 5.0),
+        std::tuple(Autopilot::kArduPilot, "VISO_DELAY_MS", 100.0), std::tuple(Autopilot::kArduPilot, "VISO_TYPE", 0.0),
         std::tuple(Autopilot::kArduPilot, "EK3_SRC1_POSXY", 3.0),
         std::tuple(Autopilot::kArduPilot, "EK3_SRC1_POSZ", 1.0), std::tuple(Autopilot::kArduPilot, "EK3_SRC1_YAW", 1.0),
         std::tuple(Autopilot::kArduPilot, "FS_EKF_ACTION", 2.0),
@@ -135,6 +140,29 @@ TEST(Parameters, WhatIsOnlyUnwiseIsToldAndForbidsNothing) {
       EXPECT_EQ(finding.good, finding.name != name) << finding.name;
       EXPECT_EQ(finding.name == name, finding.advice.find(name) != std::string::npos) << finding.advice;
     }
+  }
+}
+
+// docs/autopilots.md, "A line of 57,600 baud": with 57 ms both flew, with EKF2_EV_DELAY 0 PX4 left its sets.
+TEST(Parameters, ALineThatIsTooSlowForTimesyncForbidsUntilTheAutopilotIsToldItsDelay) {
+  const double line = untold_delay(serial_line(57'600, kSerialShare, false), false);
+  for (const auto& [autopilot, good, name] : {std::tuple(Autopilot::kPx4, kPx4Good, "EKF2_EV_DELAY"),
+                                              std::tuple(Autopilot::kArduPilot, kArduPilotGood, "VISO_DELAY_MS")}) {
+    const auto forbids = [&](double value, double delay) {
+      Named named = good;
+      named[name] = value;
+      return forbidding_parameter(autopilot, values(autopilot, named), vehicle(), delay);
+    };
+    for (const double value : {57.0, 46.0, 57.0 + 79}) EXPECT_EQ(forbids(value, line), "") << value;
+    for (const double value : {0.0, 10.0, 44.0, 57.0 + 81})
+      EXPECT_NE(forbids(value, line).find(std::string("set ") + name + " to 57 ms"), std::string::npos) << value;
+    for (const double value : {0.0, 10.0, 500.0}) EXPECT_EQ(forbids(value, 0), "") << value;
+    auto unknown = values(autopilot, good);
+    unknown[static_cast<std::size_t>(std::ranges::find(parameter_names(autopilot), name) -
+                                     parameter_names(autopilot).begin())]
+        .reset();
+    EXPECT_NE(forbidding_parameter(autopilot, unknown, vehicle(), line), "");
+    EXPECT_EQ(forbidding_parameter(autopilot, unknown, vehicle(), line, false), "");
   }
 }
 
@@ -161,6 +189,21 @@ TEST(Parameters, OnlyWhatWasAskedForIsKept) {
   t.take(answer("COM_OF_LOSS_T", 0.3F), kStart);
   ASSERT_TRUE(t.parameter("COM_OF_LOSS_T"));
   EXPECT_FLOAT_EQ(static_cast<float>(t.parameter("COM_OF_LOSS_T")->value), 0.3F);
+}
+
+// What it was before is not what it is.
+TEST(Parameters, OneWhoseNewestValueIsNoNumberIsNotKnown) {
+  for (const float none : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    Telemetry t;
+    t.take(mavlink::Heartbeat{0, 2, 3, 0, 3}, kStart);
+    ASSERT_TRUE(t.expect_parameter("GUID_TIMEOUT") && t.expect_parameter("PSC_POSXY_P"));
+    t.take(answer("GUID_TIMEOUT", 0.3F), kStart);
+    t.take(answer("PSC_POSXY_P", none), kStart);
+    EXPECT_TRUE(t.parameter("GUID_TIMEOUT")) << "another one";
+    t.take(answer("GUID_TIMEOUT", none), kStart);
+    EXPECT_FALSE(t.parameter("GUID_TIMEOUT"));
+    EXPECT_EQ(t.broken, 2U);
+  }
 }
 
 TEST(Parameters, AControllerThatWasSilentMayHaveRestartedWithOthersAndWithoutItsOrigin) {

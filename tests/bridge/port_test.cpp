@@ -2,6 +2,8 @@
 #include <arpa/inet.h>
 #include <asm/termbits.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -9,6 +11,7 @@
 
 #include <chrono>
 #include <numeric>
+#include <thread>
 
 #include "firmware_bridge/serial_port.hpp"
 #include "firmware_bridge/tcp_port.hpp"
@@ -296,6 +299,29 @@ TEST(TcpPort, TakesNoMoreThanTheKernelHasRoomForAndNeverBlocks) {
     refused += *n == 0;
   }
   EXPECT_EQ(refused, 1) << "nobody reads at the far end";
+}
+
+// A controller behind a network bridge that was switched off and on while we were quiet: nobody closes, and nothing
+// that we send would find out.
+TEST(TcpPort, LosesAPeerThatVanishedWhileNothingWasSent) {
+  const Listener listener;
+  auto port = TcpPort::open("127.0.0.1", listener.port(), std::chrono::milliseconds(500));
+  ASSERT_TRUE(port);
+  {
+    const FileDescriptor far = listener.accepted();
+    constexpr int kOn = 1;  // closed so, a connection is gone without a word
+    if (::setsockopt(far.get(), IPPROTO_TCP, TCP_REPAIR, &kOn, sizeof kOn) != 0)
+      GTEST_SKIP() << "a connection cannot be made to vanish without CAP_NET_ADMIN";
+  }
+  std::array<std::uint8_t, 16> bytes;
+  auto n = port->read(bytes);
+  EXPECT_TRUE(n) << "it has not been noticed yet";
+  for (int i = 0; i < 600 && n; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    n = port->read(bytes);
+  }
+  ASSERT_FALSE(n) << "after 6 s";
+  EXPECT_EQ(n.error().kind, Kind::kLost);
 }
 
 TEST(TcpPort, NamesWhyItCannotBeOpened) {

@@ -141,6 +141,31 @@ TEST(Telemetry, DropsSwappedPacketsButFollowsARestartedClock) {
   EXPECT_EQ(t.local_state->value.p_W.y(), 10) << "the sender's counter may wrap";
 }
 
+// A watchdog's restart may be over before the heartbeat is missed.
+TEST(Telemetry, ARestartThatTheClockTellsForgetsWhatMayBeOtherwiseNow) {
+  for (const bool by_attitude : {false, true}) {
+    Telemetry t;
+    const auto say = [&](std::uint32_t ms) {
+      if (by_attitude) t.take(mavlink::AttitudeQuaternion{.time_boot_ms = ms, .q1 = 1}, kNow);
+      if (!by_attitude) t.take(mavlink::LocalPositionNed{.time_boot_ms = ms}, kNow);
+    };
+    mavlink::ParamValue answer{.param_value = 0.3F, .param_type = 9};
+    std::ranges::copy(std::string_view("GUID_TIMEOUT"), answer.param_id.begin());
+    ASSERT_TRUE(t.expect_parameter("GUID_TIMEOUT"));
+    say(60'000);
+    t.take(answer, kNow);
+    t.take(mavlink::GpsGlobalOrigin{}, kNow);
+    say(59'500);
+    EXPECT_TRUE(t.parameter("GUID_TIMEOUT") && t.has_origin) << "a late packet";
+    say(900);
+    EXPECT_FALSE(t.parameter("GUID_TIMEOUT"));
+    EXPECT_FALSE(t.has_origin);
+    t.take(answer, kNow);
+    say(920);
+    EXPECT_TRUE(t.parameter("GUID_TIMEOUT"));
+  }
+}
+
 TEST(Telemetry, ScalesTheImuToSiAndFlu) {
   Telemetry t;
   t.take(mavlink::ScaledImu2{.xacc = 100, .yacc = 200, .zacc = -1000, .xgyro = 10, .ygyro = 20, .zgyro = 30}, kNow);

@@ -99,6 +99,27 @@ TEST_F(MissionRefusals, NothingIsEnabledWhileTheOdometryIsDoubted) {
   EXPECT_EQ(result(give(gcs_.next(kEnable))), kAccepted);
 }
 
+// A station changed it after `enable`, and the autopilot has told so. What stops or lands is never refused for it.
+TEST_F(MissionRefusals, NoFlightBeginsOnAParameterThatHasBecomeUnsafe) {
+  view_.autopilot = firmware_bridge::Autopilot::kArduPilot;
+  look();
+  EXPECT_EQ(result(give(gcs_.next(kGoto))), kAccepted) << "what is not known was judged by enable";
+  EXPECT_EQ(result(give(gcs_.next(kStop))), kAccepted);
+  view_.parameters[0] = 3;  // GUID_TIMEOUT
+  look();
+  expect_nothing(give(gcs_.next(kGoto)), kRefused, "GUID_TIMEOUT is 3");
+  expect_nothing(give(route(2)), kRefused, "GUID_TIMEOUT is 3");
+  EXPECT_TRUE(give(gcs_.next(kHold)).job);
+  EXPECT_EQ(result(give(gcs_.next(kStop))), kAccepted);
+  EXPECT_EQ(result(give(gcs_.next(kLand))), kAccepted);
+  view_.landed = true;
+  look();
+  expect_nothing(give(gcs_.next(kTakeoff)), kRefused, "GUID_TIMEOUT is 3");
+  view_.parameters[0] = 0.3;
+  look();
+  EXPECT_TRUE(give(gcs_.next(kTakeoff)).job);
+}
+
 TEST_F(MissionRefusals, ACommandWithoutANameOrWithANumberThatIsNoneIsInvalidAndTakesNoLease) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const std::function<void(CommandMessage&)> faults[] = {
