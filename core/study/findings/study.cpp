@@ -23,12 +23,12 @@ std::vector<Column> others_of(const std::vector<Accepted>& all, std::size_t but,
 /// What the cause adds to a channel in each window, its parameters fitted without the window's flight.
 std::vector<double> held_out(const Accepted& cause, const Normal& normal, const Observations& seen, Channel channel) {
   std::vector<double> sum(seen.windows.size(), 0);
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+  for (std::size_t f = 0; f < seen.units.size(); ++f) {
     const SmallVector theta = normal.fit_without(f);
     for (std::size_t k = 0; k < cause.columns.size(); ++k)
       for (const auto& part : cause.columns[k].parts)
         if (part.channel == channel)
-          for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+          for (std::size_t i = seen.units.first[f]; i < seen.units.first[f + 1]; ++i)
             sum[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
   }
   return sum;
@@ -123,7 +123,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   StudyResult result;
   result.not_tested = untested(seen);
   std::size_t flown = 0;
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) flown += seen.first[f + 1] > seen.first[f] ? 1u : 0u;
+  for (std::size_t f = 0; f < seen.units.size(); ++f) flown += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
   if (flown < options.fewest_flights) {
     result.verdict = Verdict::insufficient;
     return result;
@@ -167,7 +167,7 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
                                                                         const SearchOptions& options,
                                                                         double threshold) {
   constexpr int kFlips = static_cast<int>(kRules.power_flips);
-  const auto draws = sign_draws(evidence.seen().first.size() - 1, kFlips, options.seed + 1);
+  const auto draws = sign_draws(evidence.seen().units.size(), kFlips, options.seed + 1);
   std::map<std::string, std::map<std::string, double>> least;
   for (const auto& c : candidates(evidence, {}, false)) {
     if (least.contains(c.name) && !least[c.name].contains(c.form->parameters[0])) continue;

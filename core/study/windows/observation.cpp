@@ -217,7 +217,7 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
     WindowRow& row = seen_.windows.back();
     row.flight = seen_.flights - 1;
     residuals.push_back(put_means(row, s, w));
-    if (!s.a_nominal.empty()) put_delays(row, s, w);
+    if (!s.a_nominal.empty()) put_delays(s, w);
     for (const auto& [channel, value, weight] :
          rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end, row.lines))
       put(channel, value, weight);
@@ -230,7 +230,14 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
   smooth_voltage();
 }
 
+void Observations::group(const std::vector<double>& by_flight) {
+  units = {};
+  for (std::size_t f = 0; f < by_flight.size(); ++f)
+    if (f + 1 == by_flight.size() || by_flight[f + 1] != by_flight[f]) units.first.push_back(first[f + 1]);
+}
+
 Observations Observer::finish() {
+  seen_.units.first = seen_.first;
   follow_thrust();
   settle_commands();
   put_tails();
