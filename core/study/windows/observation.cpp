@@ -92,8 +92,11 @@ void Observer::add(const log::FlightLog& log) {
   if (s.size() >= kFewest) {
     const auto rotors = rotor_phases(log, s);
     std::vector<Stretch> good;
+    const WindowOptions options;
+    const LogGates gates(log, s.row, vehicle_, options);
     for (const Stretch w : cut(s)) {
-      auto why = gate(s, log, w);
+      auto why = gates(w);
+      if (!why) why = unfit(s, log, w, options);
       if (!why) why = misplaced(s, w);
       if (why)
         ++seen_.gated_out[*why];
