@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <iterator>
+#include <tuple>
 
 #include "core/config/daemon_config.hpp"
 #include "core/config/strict_table.hpp"
@@ -159,14 +160,44 @@ tl::expected<void, ConfigError> read_live(const StrictTable& file, Daemon& d) {
   return {};
 }
 
-struct WholeNumber {
-  std::string_view key;
-  double value;
-  int* target;
+/// Numbers of the file that a Daemon does not hold as they are.
+struct Converted {
+  double domain = 0, baud = 0, share = 0, system = 0, priority = 0, cpu = 0;
 };
 
-tl::expected<void, ConfigError> take_whole(const StrictTable& file, std::span<const WholeNumber> numbers) {
-  for (const auto& [key, value, target] : numbers) {
+/// Every number of the file; no keys but theirs and `others`.
+tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<const std::string_view> others,
+                                             Daemon& d, Converted& c) {
+  constexpr auto kOptional = NumberKey::Presence::optional;
+  const NumberKey numbers[] = {
+      {"dds.domain", &c.domain, {0, 230}},
+      {"link.baud", &c.baud, {9600, 4'000'000}},
+      {kShare, &c.share, {0.05, 1}, kOptional},
+      {"link.system", &c.system, {1, 250}},
+      {"control.priority", &c.priority, {0, 98}},
+      {"map.closing_speed", &d.map.closing_speed, {0, 5}, kOptional},
+      {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, kOptional},
+      {"map.max_mib", &d.map.max_mib, {1, 65536}, kOptional},
+      {"odometry.sensor_x", &d.odometry.sensor_B.x(), {-5, 5}, kOptional},
+      {"odometry.sensor_y", &d.odometry.sensor_B.y(), {-5, 5}, kOptional},
+      {"odometry.sensor_z", &d.odometry.sensor_B.z(), {-5, 5}, kOptional},
+      {"odometry.sensor_roll", &d.odometry.sensor_turned.x(), {-3.15, 3.15}, kOptional},
+      {"odometry.sensor_pitch", &d.odometry.sensor_turned.y(), {-3.15, 3.15}, kOptional},
+      {"odometry.sensor_yaw", &d.odometry.sensor_turned.z(), {-3.15, 3.15}, kOptional},
+      {"control.cpu", &c.cpu, {-1, 1023}},
+      {"control.battery_land", &d.control.battery_land, {0, 1}},
+  };
+  return file.read(numbers, others);
+}
+
+tl::expected<void, ConfigError> convert(const StrictTable& file, const Converted& c, Daemon& d) {
+  if (file.has(kShare)) d.link.share = c.share;
+  const std::tuple<std::string_view, double, int*> whole[] = {{"dds.domain", c.domain, &d.dds.domain},
+                                                              {"link.baud", c.baud, &d.link.baud},
+                                                              {"link.system", c.system, &d.link.system},
+                                                              {"control.priority", c.priority, &d.control.priority},
+                                                              {"control.cpu", c.cpu, &d.control.cpu}};
+  for (const auto& [key, value, target] : whole) {
     if (value != static_cast<int>(value)) return tl::unexpected(file.error(key, "needs a whole number"));
     *target = static_cast<int>(value);
   }
@@ -180,25 +211,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (!file) return tl::unexpected(file.error());
 
   Daemon d;
-  double domain = 0, baud = 0, share = 0, system = 0, priority = 0, cpu = 0;
-  const NumberKey numbers[] = {
-      {"dds.domain", &domain, {0, 230}},
-      {"link.baud", &baud, {9600, 4'000'000}},
-      {kShare, &share, {0.05, 1}, NumberKey::Presence::optional},
-      {"link.system", &system, {1, 250}},
-      {"control.priority", &priority, {0, 98}},
-      {"map.closing_speed", &d.map.closing_speed, {0, 5}, NumberKey::Presence::optional},
-      {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, NumberKey::Presence::optional},
-      {"map.max_mib", &d.map.max_mib, {1, 65536}, NumberKey::Presence::optional},
-      {"odometry.sensor_x", &d.odometry.sensor_B.x(), {-5, 5}, NumberKey::Presence::optional},
-      {"odometry.sensor_y", &d.odometry.sensor_B.y(), {-5, 5}, NumberKey::Presence::optional},
-      {"odometry.sensor_z", &d.odometry.sensor_B.z(), {-5, 5}, NumberKey::Presence::optional},
-      {"odometry.sensor_roll", &d.odometry.sensor_turned.x(), {-3.15, 3.15}, NumberKey::Presence::optional},
-      {"odometry.sensor_pitch", &d.odometry.sensor_turned.y(), {-3.15, 3.15}, NumberKey::Presence::optional},
-      {"odometry.sensor_yaw", &d.odometry.sensor_turned.z(), {-3.15, 3.15}, NumberKey::Presence::optional},
-      {"control.cpu", &cpu, {-1, 1023}},
-      {"control.battery_land", &d.control.battery_land, {0, 1}},
-  };
+  Converted converted;
   const TextKey texts[] = {
       {"vehicle", &d.vehicle},
       {"model", &d.model},
@@ -210,28 +223,22 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   };
   const TextKey frames[] = {
       {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
-  std::vector<std::string_view> text_keys{kLive, kProtocol, kSigningKeyFile};
-  text_keys.insert(text_keys.end(), std::begin(kOdometry), std::end(kOdometry));
-  text_keys.insert(text_keys.end(), std::begin(kGpio), std::end(kGpio));
-  for (const auto& [key, target] : texts) text_keys.push_back(key);
-  for (const auto& [key, target] : frames) text_keys.push_back(key);
-  if (auto read = file->read(numbers, text_keys); !read) return tl::unexpected(read.error());
+  std::vector<std::string_view> others{kLive, kProtocol, kSigningKeyFile};
+  others.insert(others.end(), std::begin(kOdometry), std::end(kOdometry));
+  others.insert(others.end(), std::begin(kGpio), std::end(kGpio));
+  for (const auto& [key, target] : texts) others.push_back(key);
+  for (const auto& [key, target] : frames) others.push_back(key);
+  if (auto read = read_numbers(*file, others, d, converted); !read) return tl::unexpected(read.error());
   if (auto read = read_texts(*file, texts, true); !read) return tl::unexpected(read.error());
   if (auto good = check_names(*file, d); !good) return tl::unexpected(good.error());
   if (auto read = read_texts(*file, frames, false); !read) return tl::unexpected(read.error());
   if (auto read = read_odometry(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
-  if (file->has(kShare)) d.link.share = share;
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
     return tl::unexpected(file->error("frames", "needs three different names"));
   if (auto read = read_live(*file, d); !read) return tl::unexpected(read.error());
-  const WholeNumber whole[] = {{"dds.domain", domain, &d.dds.domain},
-                               {"link.baud", baud, &d.link.baud},
-                               {"link.system", system, &d.link.system},
-                               {"control.priority", priority, &d.control.priority},
-                               {"control.cpu", cpu, &d.control.cpu}};
-  if (auto good = take_whole(*file, whole); !good) return tl::unexpected(good.error());
+  if (auto good = convert(*file, converted, d); !good) return tl::unexpected(good.error());
   return d;
 }
 

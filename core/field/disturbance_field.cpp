@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/map/lattice.hpp"
+
 namespace backwash::field {
 namespace {
 
@@ -115,11 +117,7 @@ void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
                static_cast<float>(s.yy), static_cast<float>(s.yz), static_cast<float>(s.zz)};
 }
 
-std::size_t DisturbanceField::linear(const Index3& v) const noexcept {
-  const auto nx = static_cast<std::size_t>(size_.x()), ny = static_cast<std::size_t>(size_.y());
-  return static_cast<std::size_t>(v.x()) +
-         nx * (static_cast<std::size_t>(v.y()) + ny * static_cast<std::size_t>(v.z()));
-}
+std::size_t DisturbanceField::linear(const Index3& v) const noexcept { return map::linear(size_, v); }
 
 void DisturbanceField::clear(const map::VoxelBox& box) noexcept {
   for (int k = box.low.z(); k <= box.high.z(); ++k)
@@ -128,8 +126,7 @@ void DisturbanceField::clear(const map::VoxelBox& box) noexcept {
 }
 
 bool DisturbanceField::has(const Index3& v) const noexcept {
-  const bool inside = (v.array() >= 0).all() && (v.array() < size_.array()).all();
-  return inside && sigma_[linear(v)][0] >= 0;
+  return map::inside(size_, v) && sigma_[linear(v)][0] >= 0;
 }
 
 Variance DisturbanceField::at(const Index3& v) const noexcept {
@@ -141,18 +138,13 @@ Variance DisturbanceField::interpolated(const Vec3& p_W, const Variance& fallbac
   const Vec3 x = (p_W - origin_W_) / resolution_ - Vec3::Constant(0.5);  // voxel centres at the integers
   // Beyond one voxel around the grid nothing is stored; also keeps the conversion to int within its range.
   if (!((x.array() > -1).all() && (x.array() < size_.array().cast<double>()).all())) return fallback;
-  const Vec3 low = x.array().floor(), t = x - low;
-  const Index3 corner = low.cast<int>();
   Variance sum;
   double total = 0;
-  for (int n = 0; n < 8; ++n) {
-    const Index3 d(n & 1, n >> 1 & 1, n >> 2);
-    const Index3 v = corner + d;
-    if (!has(v)) continue;
-    const double weight = (d.x() ? t.x() : 1 - t.x()) * (d.y() ? t.y() : 1 - t.y()) * (d.z() ? t.z() : 1 - t.z());
-    sum += weight * at(v);
-    total += weight;
-  }
+  map::for_corners(x, [&](const Index3& v, const Vec3& share) {
+    if (!has(v)) return;
+    sum += share.prod() * at(v);
+    total += share.prod();
+  });
   return total > 0 ? (1 / total) * sum : fallback;
 }
 

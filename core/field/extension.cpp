@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/map/lattice.hpp"
+
 namespace backwash::field {
 namespace {
 
@@ -97,11 +99,8 @@ void Extension::fill(const map::OccupancyGrid& grid, std::span<const std::size_t
 }
 
 Air Extension::at(const Index3& v) const noexcept {
-  if (!by_place() || (v.array() < 0).any() || (v.array() >= size_.array()).any()) return {};
-  const Stored& s = voxels_[static_cast<std::size_t>(v.x()) +
-                            static_cast<std::size_t>(size_.x()) *
-                                (static_cast<std::size_t>(v.y()) +
-                                 static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z()))];
+  if (!by_place() || !map::inside(size_, v)) return {};
+  const Stored& s = voxels_[map::linear(size_, v)];
   if (!s.set) return {};
   return {Vec3(s.push[0], s.push[1], s.push[2]), s.level, s.vertical, s.ln_variance};
 }
@@ -111,23 +110,17 @@ Vec3 Extension::push(const Vec3& p_W, const Vec3& v_W) const noexcept {
   Vec3 sum = Vec3::Zero();
   if (by_place()) {
     const Vec3 q = (p_W - origin_W_) / resolution_ - Vec3::Constant(0.5);
-    const Vec3 floor = q.array().floor(), t = q - floor;
     // Beyond one voxel around the grid nothing is stored; also keeps the conversion to int within its range.
     const bool near = (q.array() > -1).all() && (q.array() < size_.array().cast<double>()).all();
     double weight = 0;
-    for (int corner = 0; near && corner < 8; ++corner) {
-      const Index3 step(corner & 1, corner >> 1 & 1, corner >> 2);
-      const Index3 v = floor.cast<int>() + step;
-      if ((v.array() < 0).any() || (v.array() >= size_.array()).any()) continue;
-      const std::size_t n =
-          static_cast<std::size_t>(v.x()) +
-          static_cast<std::size_t>(size_.x()) *
-              (static_cast<std::size_t>(v.y()) + static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z()));
-      if (!voxels_[n].set) continue;
-      const Vec3 share = step.cast<double>().cwiseProduct(2 * t - Vec3::Ones()) + Vec3::Ones() - t;
+    const auto add = [&](const Index3& v, const Vec3& share) {
+      if (!map::inside(size_, v)) return;
+      const Stored& s = voxels_[map::linear(size_, v)];
+      if (!s.set) return;
       weight += share.prod();
-      sum += share.prod() * Vec3(voxels_[n].push[0], voxels_[n].push[1], voxels_[n].push[2]);
-    }
+      sum += share.prod() * Vec3(s.push[0], s.push[1], s.push[2]);
+    };
+    if (near) map::for_corners(q, add);
     if (weight > 0) sum /= weight;
   }
   return sum + moving(v_W).push_W;

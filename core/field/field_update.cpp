@@ -7,17 +7,6 @@
 
 namespace backwash::field {
 
-map::VoxelBox changed_box(const map::OccupancyGrid& before, const map::OccupancyGrid& after) {
-  const bool same_frame =
-      before.origin() == after.origin() && before.resolution() == after.resolution() && before.size() == after.size();
-  if (!same_frame) return {Index3::Zero(), after.size() - Index3::Ones()};
-  map::VoxelBox box;
-  const auto old = before.cells(), now = after.cells();
-  for (std::size_t n = 0; n < now.size(); ++n)
-    if (old[n] != now[n]) box.add(after.voxel(n));
-  return box;
-}
-
 map::VoxelBox affected_columns(const map::OccupancyGrid& grid, const Model& model, const map::VoxelBox& changed) {
   const auto& g = model.ground;
   const double a = grid.resolution(), cone = g.l_max * (g.theta_max < 1.5 ? std::sin(g.theta_max) : 1.0);

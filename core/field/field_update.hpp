@@ -9,10 +9,6 @@
 
 namespace backwash::field {
 
-/// The smallest box that holds every voxel in which two maps differ, empty if they are equal. Nothing that could be
-/// said of maps with another origin, edge or size: the box is then the whole of `after`. O(cells).
-map::VoxelBox changed_box(const map::OccupancyGrid& before, const map::OccupancyGrid& after);
-
 /// The columns of a map, from its floor to its top, in which Σ may change when voxels of `changed` do: within the
 /// model's ranges, and 3 voxels more for the normals and floors of the elements. Whole columns, so that WholeField
 /// gives the same bits for a part of the map as for all of it.

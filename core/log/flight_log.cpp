@@ -55,6 +55,49 @@ tl::unexpected<LogError> bad(const std::string& path, std::size_t line, const st
   return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":" + std::to_string(line) + ": " + what});
 }
 
+/// The columns that the first line names.
+tl::expected<std::vector<std::string>, LogError> read_names(std::istream& file, const std::string& path) {
+  std::string text;
+  if (!std::getline(file, text)) return bad(path, 1, "the file is empty; the first line must name the columns");
+  std::vector<std::string> names;
+  for (const auto cell : cells_of(text)) {
+    if (cell.empty())
+      return bad(path, 1, "column " + std::to_string(names.size() + 1) + " has no name; name every column");
+    names.emplace_back(cell);
+  }
+  std::set<std::string_view> seen;
+  for (const auto& name : names)
+    if (!seen.insert(name).second)
+      return bad(path, 1, "column '" + name + "' is named twice; every name must be unique");
+  return names;
+}
+
+/// The values below the first line by column, none of columns in `unread`.
+tl::expected<std::vector<std::vector<double>>, LogError> read_rows(std::istream& file, const std::string& path,
+                                                                   const std::vector<std::string>& names,
+                                                                   const std::set<std::string>& unread, bool gaps) {
+  std::vector<std::vector<double>> values(names.size());
+  std::string text;
+  for (std::size_t line = 2; std::getline(file, text); ++line) {
+    if (trimmed(text).empty()) continue;
+    const auto cells = cells_of(text);
+    if (cells.size() != names.size())
+      return bad(path, line,
+                 std::to_string(cells.size()) + " cells where the first line names " + std::to_string(names.size()) +
+                     " columns; give one number per column");
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (unread.contains(names[i])) continue;
+      const auto value = gaps ? number_or_gap(cells[i]) : finite_number(cells[i]);
+      if (!value)
+        return bad(
+            path, line,
+            "column '" + names[i] + "' holds '" + std::string(cells[i]) + "', which is not a finite number; give one");
+      values[i].push_back(*value);
+    }
+  }
+  return values;
+}
+
 void append(std::string& text, double value) {
   char digits[32];
   text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
@@ -75,31 +118,11 @@ tl::expected<std::string, LogError> read_log_file(const std::string& path, std::
                                       path + ":1: " + content.error().message});
 }
 
-namespace {
-
-/// The first line's names.
-tl::expected<std::vector<std::string>, LogError> names_of(const std::string& path, std::istream& file) {
-  std::string text;
-  if (!std::getline(file, text)) return bad(path, 1, "the file is empty; the first line must name the columns");
-  std::vector<std::string> names;
-  std::set<std::string> seen;
-  for (const auto cell : cells_of(text)) {
-    if (cell.empty())
-      return bad(path, 1, "column " + std::to_string(names.size() + 1) + " has no name; name every column");
-    names.emplace_back(cell);
-    if (!seen.insert(names.back()).second)
-      return bad(path, 1, "column '" + names.back() + "' is named twice; every name must be unique");
-  }
-  return names;
-}
-
-}  // namespace
-
 tl::expected<std::vector<std::string>, LogError> csv_names(const std::string& path) {
   auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
   if (!content) return tl::make_unexpected(content.error());
   std::istringstream file(std::move(*content));
-  return names_of(path, file);
+  return read_names(file, path);
 }
 
 tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column,
@@ -107,39 +130,19 @@ tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::s
   auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
   if (!content) return tl::make_unexpected(content.error());
   std::istringstream file(std::move(*content));
-  const auto header = names_of(path, file);
-  if (!header) return tl::make_unexpected(header.error());
-  const auto& names = *header;
-  if (!time_column.empty() && !std::ranges::count(names, time_column))
+  const auto names = read_names(file, path);
+  if (!names) return tl::make_unexpected(names.error());
+  if (!time_column.empty() && std::ranges::find(*names, time_column) == names->end())
     return bad(path, 1, "no column '" + time_column + "'; the first line must name it");
-
-  std::string text;
-  std::vector<std::vector<double>> values(names.size());
-  for (std::size_t line = 2; std::getline(file, text); ++line) {
-    if (trimmed(text).empty()) continue;
-    const auto cells = cells_of(text);
-    if (cells.size() != names.size()) {
-      return bad(path, line,
-                 std::to_string(cells.size()) + " cells where the first line names " + std::to_string(names.size()) +
-                     " columns; give one number per column");
-    }
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (unread.contains(names[i])) continue;
-      const auto value = gaps ? number_or_gap(cells[i]) : finite_number(cells[i]);
-      if (!value)
-        return bad(
-            path, line,
-            "column '" + names[i] + "' holds '" + std::string(cells[i]) + "', which is not a finite number; give one");
-      values[i].push_back(*value);
-    }
-  }
-
+  auto values = read_rows(file, path, *names, unread, gaps);
+  if (!values) return tl::make_unexpected(values.error());
   FlightLog log;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == time_column) {
-      log.t_s = std::move(values[i]);
-    } else if (!unread.contains(names[i])) {
-      log.columns.emplace(names[i], std::move(values[i]));
+  for (std::size_t i = 0; i < names->size(); ++i) {
+    const std::string& name = (*names)[i];
+    if (name == time_column) {
+      log.t_s = std::move((*values)[i]);
+    } else if (!unread.contains(name)) {
+      log.columns.emplace(name, std::move((*values)[i]));
     }
   }
   return log;

@@ -2,7 +2,7 @@
 #include "core/log/tick_log.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <optional>
 
 namespace backwash::log {
 namespace {
@@ -30,84 +30,108 @@ enum Flag : std::uint32_t {
 };
 
 void put(const Vec3& from, double* to) noexcept { std::copy_n(from.data(), 3, to); }
-Vec3 vec(const double* from) noexcept { return {from[0], from[1], from[2]}; }
 std::uint32_t bit(bool set, std::uint32_t flag) noexcept { return set ? flag : 0; }
+
+/// Members of a TickInput into its record.
+struct ToRecord {
+  TickInputRecord& record;
+
+  template <class From, class To>
+  void number(From from, To& to) const noexcept {
+    to = static_cast<To>(from);
+  }
+  template <class Numbers>
+  void numbers(const Numbers& from, double* to) const noexcept {
+    std::copy_n(from.data(), from.size(), to);
+  }
+  void flag(bool set, std::uint32_t flag) const noexcept { record.flags |= bit(set, flag); }
+  template <class T, class Members>
+  void optional(const std::optional<T>& from, std::uint32_t known, Members members) const noexcept {
+    flag(from.has_value(), known);
+    if (from) members(*from);
+  }
+};
+
+/// The same from the record: what is optional is there if its flag is set.
+struct FromRecord {
+  const TickInputRecord& record;
+
+  template <class To, class From>
+  void number(To& to, From from) const noexcept {
+    to = static_cast<To>(from);
+  }
+  template <class Numbers>
+  void numbers(Numbers& to, const double* from) const noexcept {
+    std::copy_n(from, to.size(), to.data());
+  }
+  void flag(bool& to, std::uint32_t flag) const noexcept { to = (record.flags & flag) != 0; }
+  template <class T, class Members>
+  void optional(std::optional<T>& to, std::uint32_t known, Members members) const noexcept {
+    bool there = false;
+    flag(there, known);
+    if (there) members(to.emplace());
+  }
+};
+
+/// Every member of a TickInput but its segment, and its place in the record: the one list that both directions follow.
+template <class Input, class Record, class Direction>
+void each_member(Input& in, Record& r, const Direction& direction) noexcept {
+  direction.number(in.now_ns, r.now_ns);
+  direction.number(in.missed_periods, r.missed_periods);
+  direction.number(in.request, r.request);
+  direction.number(in.order, r.order);
+  direction.number(in.position_sigma, r.position_sigma);
+  direction.optional(in.odometry, kOdometry, [&](auto& o) {
+    direction.number(o.received_ns, r.odometry_received_ns);
+    direction.number(o.stamp_ns, r.odometry_stamp_ns);
+    direction.numbers(o.state.p_W, r.p);
+    direction.numbers(o.state.v_W, r.v);
+    direction.numbers(o.q, r.q);
+    direction.number(o.closures, r.closures);
+    direction.number(o.map_from_odom.yaw, r.map_from_odom[0]);
+    direction.numbers(o.map_from_odom.t, r.map_from_odom + 1);
+  });
+  auto& a = in.autopilot;
+  direction.flag(a.port_open, kPortOpen);
+  direction.flag(a.transmit_failed, kTransmitFailed);
+  direction.flag(a.armed, kArmed);
+  direction.flag(a.offboard, kOffboard);
+  direction.flag(a.lifts_itself, kLiftsItself);
+  direction.flag(a.takeoff_taken, kTakeoffTaken);
+  direction.optional(a.landed, kLandedKnown, [&](auto& landed) { direction.flag(landed, kLanded); });
+  direction.optional(a.in_air, kInAirKnown, [&](auto& in_air) { direction.flag(in_air, kInAir); });
+  direction.number(a.heartbeat_age, r.heartbeat_age);
+  direction.optional(a.reset_counter, kResetCounter, [&](auto& n) { direction.number(n, r.reset_counter); });
+  direction.optional(a.battery, kBattery, [&](auto& share) { direction.number(share, r.battery); });
+  direction.optional(a.pose, kPose, [&](auto& pose) {
+    direction.number(pose.at_ns, r.pose_at_ns);
+    direction.number(pose.attitude_at_ns, r.attitude_at_ns);
+    direction.numbers(pose.state.p_W, r.pose_p);
+    direction.numbers(pose.state.v_W, r.pose_v);
+    direction.numbers(pose.q, r.pose_q);
+    direction.numbers(pose.omega_B, r.pose_omega);
+  });
+  auto& s = in.surroundings;
+  direction.flag(s.missing, kMapMissing);
+  direction.flag(s.outside, kOutside);
+  direction.flag(s.late, kMapLate);
+  direction.flag(s.tube_blocked, kTubeBlocked);
+  direction.flag(s.stop_blocked, kStopBlocked);
+}
 
 }  // namespace
 
 TickInputRecord encode(const track::TickInput& in) noexcept {
-  const auto& a = in.autopilot;
-  const auto& s = in.surroundings;
   TickInputRecord r{};
-  r.now_ns = in.now_ns;
   r.segment = in.segment ? in.segment->id : 0;
-  r.missed_periods = in.missed_periods;
-  r.request = static_cast<std::uint32_t>(in.request);
-  r.order = in.order;
-  r.heartbeat_age = a.heartbeat_age;
-  r.reset_counter = a.reset_counter.value_or(0);
-  r.battery = a.battery.value_or(0);
-  r.position_sigma = in.position_sigma;
-  r.flags = bit(in.odometry.has_value(), kOdometry) | bit(a.port_open, kPortOpen) |
-            bit(a.transmit_failed, kTransmitFailed) | bit(a.armed, kArmed) | bit(a.offboard, kOffboard) |
-            bit(a.pose.has_value(), kPose) | bit(a.reset_counter.has_value(), kResetCounter) |
-            bit(a.battery.has_value(), kBattery) | bit(s.missing, kMapMissing) | bit(s.outside, kOutside) |
-            bit(s.late, kMapLate) | bit(s.tube_blocked, kTubeBlocked) | bit(s.stop_blocked, kStopBlocked) |
-            bit(a.landed.has_value(), kLandedKnown) | bit(a.landed.value_or(false), kLanded) |
-            bit(a.in_air.has_value(), kInAirKnown) | bit(a.in_air.value_or(false), kInAir) |
-            bit(a.lifts_itself, kLiftsItself) | bit(a.takeoff_taken, kTakeoffTaken);
-  if (in.odometry) {
-    r.odometry_received_ns = in.odometry->received_ns;
-    r.odometry_stamp_ns = in.odometry->stamp_ns;
-    put(in.odometry->state.p_W, r.p);
-    put(in.odometry->state.v_W, r.v);
-    std::ranges::copy(in.odometry->q, r.q);
-    r.closures = in.odometry->closures;
-    r.map_from_odom[0] = in.odometry->map_from_odom.yaw;
-    put(in.odometry->map_from_odom.t, r.map_from_odom + 1);
-  }
-  if (a.pose) {
-    r.pose_at_ns = a.pose->at_ns;
-    r.attitude_at_ns = a.pose->attitude_at_ns;
-    put(a.pose->omega_B, r.pose_omega);
-    put(a.pose->state.p_W, r.pose_p);
-    put(a.pose->state.v_W, r.pose_v);
-    std::ranges::copy(a.pose->q, r.pose_q);
-  }
+  each_member(in, r, ToRecord{r});
   return r;
 }
 
 track::TickInput decode(const TickInputRecord& r, const track::AcceptedSegment* segment) noexcept {
-  const auto has = [&](std::uint32_t flag) { return (r.flags & flag) != 0; };
   track::TickInput in;
-  in.now_ns = r.now_ns;
-  in.missed_periods = r.missed_periods;
-  in.request = static_cast<track::Request>(r.request);
-  in.order = r.order;
   in.segment = segment;
-  in.position_sigma = r.position_sigma;
-  in.autopilot.port_open = has(kPortOpen);
-  in.autopilot.transmit_failed = has(kTransmitFailed);
-  in.autopilot.armed = has(kArmed);
-  in.autopilot.offboard = has(kOffboard);
-  if (has(kLandedKnown)) in.autopilot.landed = has(kLanded);
-  if (has(kInAirKnown)) in.autopilot.in_air = has(kInAir);
-  in.autopilot.lifts_itself = has(kLiftsItself);
-  in.autopilot.takeoff_taken = has(kTakeoffTaken);
-  in.autopilot.heartbeat_age = r.heartbeat_age;
-  if (has(kOdometry))
-    in.odometry = {
-        r.odometry_received_ns,           r.odometry_stamp_ns, {vec(r.p), vec(r.v)},
-        {r.q[0], r.q[1], r.q[2], r.q[3]}, r.closures,          {r.map_from_odom[0], vec(r.map_from_odom + 1)}};
-  if (has(kPose))
-    in.autopilot.pose = {r.pose_at_ns,
-                         {vec(r.pose_p), vec(r.pose_v)},
-                         {r.pose_q[0], r.pose_q[1], r.pose_q[2], r.pose_q[3]},
-                         r.attitude_at_ns,
-                         vec(r.pose_omega)};
-  if (has(kResetCounter)) in.autopilot.reset_counter = static_cast<std::uint8_t>(r.reset_counter);
-  if (has(kBattery)) in.autopilot.battery = r.battery;
-  in.surroundings = {has(kMapMissing), has(kOutside), has(kMapLate), has(kTubeBlocked), has(kStopBlocked)};
+  each_member(in, r, FromRecord{r});
   return in;
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/map/lattice.hpp"
+
 namespace backwash::map {
 namespace {
 
@@ -135,11 +137,7 @@ DistanceField::DistanceField(const OccupancyGrid& grid)
 }
 
 double DistanceField::at(const Index3& v) const noexcept {
-  if ((v.array() < 0).any() || (v.array() >= size_.array()).any()) return 0.0;
-  const auto nx = static_cast<std::size_t>(size_.x());
-  const auto ny = static_cast<std::size_t>(size_.y());
-  return static_cast<double>(distance_[static_cast<std::size_t>(v.x()) +
-                                       nx * (static_cast<std::size_t>(v.y()) + ny * static_cast<std::size_t>(v.z()))]);
+  return inside(size_, v) ? static_cast<double>(distance_[linear(size_, v)]) : 0.0;
 }
 
 bool DistanceField::covers(const Vec3& q) const noexcept {

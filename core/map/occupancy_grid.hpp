@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/map/lattice.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::map {
@@ -23,16 +24,9 @@ class OccupancyGrid {
   const Index3& size() const noexcept { return size_; }
   std::size_t cell_count() const noexcept { return cells_.size(); }
 
-  bool inside(const Index3& v) const noexcept {
-    return v.x() >= 0 && v.y() >= 0 && v.z() >= 0 && v.x() < size_.x() && v.y() < size_.y() && v.z() < size_.z();
-  }
+  bool inside(const Index3& v) const noexcept { return map::inside(size_, v); }
   /// Position of a voxel in the cell array: x runs fastest. Precondition: inside(v).
-  std::size_t linear(const Index3& v) const noexcept {
-    return static_cast<std::size_t>(v.x()) +
-           static_cast<std::size_t>(size_.x()) *
-               (static_cast<std::size_t>(v.y()) +
-                static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z()));
-  }
+  std::size_t linear(const Index3& v) const noexcept { return map::linear(size_, v); }
   Index3 voxel(std::size_t linear) const noexcept;
 
   /// The cell's content; unknown outside the grid.

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <span>
 #include <vector>
 
 #include "core/field/field_update.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -16,31 +16,19 @@ constexpr double kFirstReach = 0.3;  ///< m about an end: most hover sets are na
 constexpr double kMostReach = 3;     ///< m: beyond it the whole world costs little more
 constexpr double kAround = 1.5;      ///< m: obstacles count up to 1 m from the body and the errors of the estimate
 
-std::string text(const Vec3& p) {
-  char buffer[96];
-  std::snprintf(buffer, sizeof buffer, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
-  return buffer;
-}
-
-std::string metres(double d) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.3f m", d);
-  return buffer;
-}
-
 /// Why the place itself is none to hover in.
 std::optional<std::string> why_not_free(const map::OccupancyGrid& grid, const Vec3& p_W) {
   const Index3 v = grid.index(p_W);
-  if (!p_W.allFinite() || !grid.inside(v)) return text(p_W) + " is outside the map";
-  if (grid.occupied(v)) return text(p_W) + " is occupied";
-  if (!grid.free(v)) return text(p_W) + " is unknown space";
+  if (!p_W.allFinite() || !grid.inside(v)) return to_text(p_W) + " is outside the map";
+  if (grid.occupied(v)) return to_text(p_W) + " is occupied";
+  if (!grid.free(v)) return to_text(p_W) + " is unknown space";
   return std::nullopt;
 }
 
 std::optional<std::string> why_not_clear(const reach::HoverSet& set, const Vec3& p_W, double least_clearance) {
-  if (!set.bounded) return text(p_W) + " is too near to obstacles: the hover set there has no bound in free space";
+  if (!set.bounded) return to_text(p_W) + " is too near to obstacles: the hover set there has no bound in free space";
   if (!(set.clearance > least_clearance))
-    return text(p_W) + " is not clear: the hover set's clearance is " + metres(set.clearance);
+    return to_text(p_W) + " is not clear: the hover set's clearance is " + to_text(set.clearance, 3) + " m";
   return std::nullopt;
 }
 
@@ -105,7 +93,8 @@ std::optional<std::string> why_blocked_now(const World& world, const PlanStart& 
   tube.pop_back();
   const double clearance = tube_clearance(world, tube);
   if (clearance > least_clearance) return std::nullopt;
-  return text(start.estimated.p_W) + ", where the vehicle is now, is not clear: the clearance is " + metres(clearance);
+  return to_text(start.estimated.p_W) + ", where the vehicle is now, is not clear: the clearance is " +
+         to_text(clearance, 3) + " m";
 }
 
 std::optional<Plan> refused_at_once(const map::OccupancyGrid& grid, const Model& model, const Vehicle& vehicle,

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/map/lattice.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/occupancy_sums.hpp"
 #include "core/plan/motion_primitive.hpp"
@@ -25,11 +26,9 @@ class SafeSpace {
   Vec3 center(const Index3& v) const noexcept {
     return origin_W_ + resolution_ * (v.cast<double>() + Vec3::Constant(0.5));
   }
-  bool inside(const Index3& v) const noexcept { return (v.array() >= 0).all() && (v.array() < size_.array()).all(); }
+  bool inside(const Index3& v) const noexcept { return map::inside(size_, v); }
   /// Precondition: inside(v).
-  std::size_t linear(const Index3& v) const noexcept {
-    return static_cast<std::size_t>(v.x() + size_.x() * (v.y() + size_.y() * v.z()));
-  }
+  std::size_t linear(const Index3& v) const noexcept { return map::linear(size_, v); }
   bool passable(const Index3& v) const noexcept { return inside(v) && region_[linear(v)] != kNoRegion; }
   /// Whether all voxels with low ≤ v ≤ high may be passed; true for none. O(1).
   bool passable(const Index3& low, const Index3& high) const noexcept { return sums_.voxels_free(low, high); }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/map/lattice.hpp"
 #include "core/reach/clearance.hpp"
 
 namespace backwash::plan {
@@ -64,17 +65,13 @@ double combined(const PerDirection& k, const PerDirection& h) {
 
 LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField& bounds, const Vec3& p_W) noexcept {
   const Vec3 q = (p_W - grid.origin()) / grid.resolution() - Vec3::Constant(0.5);
-  const Vec3 floor = q.array().floor(), t = q - floor;
-  const Index3 base = floor.cast<int>();
   LocalBound sum;
   double weight = 0;
   Vec3 slope = Vec3::Zero();  // of the weight, per voxel
-  for (int corner = 0; corner < 8; ++corner) {
-    const Index3 step(corner & 1, corner >> 1 & 1, corner >> 2);
-    const DisturbanceBound b = bounds.at(base + step);
-    if (!(b.w[kZ] > 0)) continue;  // not stored
-    const Vec3 share = step.cast<double>().cwiseProduct(2 * t - Vec3::Ones()) + Vec3::Ones() - t;
-    const Vec3 sign = 2 * step.cast<double>() - Vec3::Ones();
+  map::for_corners(q, [&](const Index3& v, const Vec3& share) {
+    const DisturbanceBound b = bounds.at(v);
+    if (!(b.w[kZ] > 0)) return;  // not stored
+    const Vec3 sign = (q - v.cast<double>()).unaryExpr([](double x) { return x < 0 ? 1.0 : -1.0; });
     const double s = share.prod();
     const Vec3 ds(sign.x() * share.y() * share.z(), share.x() * sign.y() * share.z(), share.x() * share.y() * sign.z());
     weight += s;
@@ -83,7 +80,7 @@ LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField&
       sum.w[d] += s * b.w[d];
       sum.gradient.col(static_cast<Eigen::Index>(d)) += ds * b.w[d];
     }
-  }
+  });
   if (!(weight > 0)) return {};
   for (std::size_t d = 0; d < kDirections; ++d) {
     sum.w[d] /= weight;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/map/lattice.hpp"
+
 namespace backwash::reach {
 namespace {
 
@@ -88,14 +90,10 @@ void BoundField::pool(int level) noexcept {
   });
 }
 
-bool BoundField::inside(const Index3& v) const noexcept {
-  return (v.array() >= 0).all() && (v.array() < size_.array()).all();
-}
+bool BoundField::inside(const Index3& v) const noexcept { return map::inside(size_, v); }
 
 const BoundField::Entry& BoundField::entry(const Index3& v) const noexcept {
-  const auto row =
-      static_cast<std::size_t>(v.y()) + static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z());
-  return entries_[entry_of_[static_cast<std::size_t>(v.x()) + static_cast<std::size_t>(size_.x()) * row]];
+  return entries_[entry_of_[map::linear(size_, v)]];
 }
 
 // Closed voxels: one that only touches the box counts. Compared before the casts, so that any box is in range.

@@ -1,28 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/report/flight_report.hpp"
 
-#include <cstdio>
-
 #include "core/report/page.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::report {
 namespace {
 
 std::string number(double value, int decimals, const char* unit) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f%s%s", decimals, value, *unit ? "\u00a0" : "", unit);
-  return text;
+  return to_text(value, decimals) + (*unit ? "\u00a0" : "") + unit;
 }
 
 std::string row(const std::string& name, const std::string& value) {
   return "<tr><th>" + name + "</th><td>" + value + "</td></tr>\n";
 }
 
-std::string point(const Vec3& p) {
-  char text[96];
-  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)\u00a0m", p.x(), p.y(), p.z());
-  return text;
-}
+std::string point(const Vec3& p) { return to_text(p) + "\u00a0m"; }
 
 std::string verdict(const sim::FlightSummary& s) {
   const std::string samples = std::to_string(s.inside) + " of " + std::to_string(s.samples);

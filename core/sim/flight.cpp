@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <limits>
+
+#include "core/types/text.hpp"
 
 namespace backwash::sim {
 namespace {
@@ -13,29 +14,17 @@ using Clock = std::chrono::steady_clock;
 
 tl::unexpected<FlightRefused> refuse(const std::string& message) { return tl::make_unexpected(FlightRefused{message}); }
 
-std::string text(const Vec3& p) {
-  char line[80];
-  std::snprintf(line, sizeof line, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
-  return line;
-}
-
-std::string metres(double value) {
-  char line[40];
-  std::snprintf(line, sizeof line, "%.3f m", value);
-  return line;
-}
-
 /// What keeps a vehicle from hovering at a point; empty if nothing does.
 std::string obstacle_to_hover(const plan::World& world, const std::string& name, const Vec3& p_W) {
   const auto v = world.grid.index(p_W);
-  const std::string where = name + " " + text(p_W) + " ";
+  const std::string where = name + " " + to_text(p_W) + " ";
   if (!world.grid.inside(v)) return where + "lies outside the map; choose a point in it";
   if (world.grid.occupied(v)) return where + "lies in an occupied voxel; choose free space";
   if (!world.grid.free(v)) return where + "lies in unknown space; choose space that the map knows to be free";
   const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin);
   if (set.safe()) return {};
-  return where + "is not hover-safe: " + metres(world.distance.exact(world.grid, p_W)) +
-         " to the nearest obstacle, body and reachable set need more; choose a more open point";
+  return where + "is not hover-safe: " + to_text(world.distance.exact(world.grid, p_W), 3) +
+         " m to the nearest obstacle, body and reachable set need more; choose a more open point";
 }
 
 /// The tube a piece is judged with: w̄ of Σ scaled, propagated from the same state along the same commands.
@@ -62,8 +51,8 @@ void append(std::vector<Setpoint>& commands, const std::vector<Setpoint>& more) 
 /// Why a take-off tube with this clearance may not be flown; empty if it may.
 std::string obstacle_to_take_off(const reach::ReachTube& tube, double clearance) {
   if (clearance > 0) return {};
-  return "the take-off column under " + text(tube.back().center.p_W) + " is not clear (" + metres(clearance) +
-         "); choose a start with more room below and beside it";
+  return "the take-off column under " + to_text(tube.back().center.p_W) + " is not clear (" + to_text(clearance, 3) +
+         " m); choose a start with more room below and beside it";
 }
 
 }  // namespace
@@ -111,7 +100,8 @@ MethodTube method_tube(const plan::World& world, const reach::Reachability& reac
 tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const FlightOptions& options) {
   const auto column = plan::takeoff_column(world, options.start_W);
   if (!column) {
-    return refuse("start " + text(options.start_W) + " has no known floor to take off from; choose a start above one");
+    return refuse("start " + to_text(options.start_W) +
+                  " has no known floor to take off from; choose a start above one");
   }
   TakeOff rise{*column, {}, {}, 0, 0};
   rise.ground.p_W = options.start_W;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/map/lattice.hpp"
+
 namespace backwash::sim {
 namespace {
 
@@ -30,17 +32,14 @@ const Variance& ModelField::at(const Index3& lattice) {
 }
 
 Variance ModelField::sigma(const Vec3& p_W) {
-  const Vec3 q = (p_W / kLattice).cwiseMax(-1e6).cwiseMin(1e6), floor = q.array().floor(), t = q - floor;
+  const Vec3 q = (p_W / kLattice).cwiseMax(-1e6).cwiseMin(1e6);
   Variance sum;
   double weight = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Index3 step(corner & 1, corner >> 1 & 1, corner >> 2);
-    const Index3 v = floor.cast<int>() + step;
-    const double share =
-        (step.cast<double>().cwiseProduct(2 * t - Vec3::Ones()) + Vec3::Ones() - t).cwiseMax(0.0).prod();
-    if (!(share > 1e-9) || grid_->occupied(grid_->index(kLattice * v.cast<double>()))) continue;
+  map::for_corners(q, [&](const Index3& v, const Vec3& shares) {
+    const double share = shares.prod();
+    if (!(share > 1e-9) || grid_->occupied(grid_->index(kLattice * v.cast<double>()))) return;
     sum += share * at(v), weight += share;
-  }
+  });
   return weight > 0 ? 1 / weight * sum : field_.at(p_W).sigma();
 }
 

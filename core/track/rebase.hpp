@@ -18,7 +18,6 @@ struct RigidShift {
   State state(const State& s) const noexcept { return {point(s.p_W), rotate(s.v_W)}; }
   Setpoint setpoint(const Setpoint& s) const noexcept;
   RigidShift inverse() const noexcept;
-  bool identity() const noexcept { return yaw == 0 && t.isZero(0); }
 };
 /// First b, then a.
 RigidShift operator*(const RigidShift& a, const RigidShift& b) noexcept;

@@ -54,6 +54,26 @@ bool checksum_right(std::span<const std::uint8_t> b, const Header& h, std::uint8
   return crc.value() == (b[at] | b[at + 1] << 8);
 }
 
+/// What bytes are that may begin a frame; part: what they are depends on bytes to come.
+enum class Found { part, noise, bad_checksum, unknown, frame };
+
+/// h: their header. `continuing`: they follow a frame of its sender, whose count goes on.
+Found look(std::span<const std::uint8_t> b, const Header& h, bool continuing) noexcept {
+  if (!is_magic(b[0])) return Found::noise;
+  if (h.length == 0) return Found::part;
+  const MessageInfo* known = find_message(h.id);
+  if (known == nullptr) {
+    if (!continuing) return Found::noise;
+    if (b.size() <= h.total) return Found::part;
+    return is_magic(b[h.total]) ? Found::unknown : Found::noise;
+  }
+  // MAVLink 1 neither truncates nor extends, and its short header makes noise look like a frame too often otherwise.
+  if (b[0] == kMagicV1 && h.payload != known->base_length) return Found::noise;
+  if (b.size() < h.length + h.payload + kChecksum) return Found::part;
+  if (!checksum_right(b, h, known->crc_extra)) return Found::bad_checksum;
+  return b.size() < h.total ? Found::part : Found::frame;
+}
+
 }  // namespace
 
 std::size_t Parser::take(std::span<const std::uint8_t> input) noexcept {
@@ -70,49 +90,24 @@ std::size_t Parser::take(std::span<const std::uint8_t> input) noexcept {
 }
 
 std::optional<Frame> Parser::next() noexcept {
-  const auto skip_byte = [&] {
-    ++begin_;
-    ++counters_.skipped_bytes;
-    in_step_ = false;
-  };
-  const auto pass_whole = [&](const Header& h) {
-    begin_ += h.total;
-    in_step_ = true;
-    last_sender_ = h.sender;
-  };
   while (begin_ < end_) {
     const std::span<const std::uint8_t> b{buffer_.data() + begin_, end_ - begin_};
-    if (!is_magic(b[0])) {
-      skip_byte();
-      continue;
-    }
     const Header h = read_header(b);
-    if (h.length == 0) return std::nullopt;
-    const MessageInfo* known = find_message(h.id);
-    if (known == nullptr) {
-      const bool plausible = in_step_ && continues(last_sender_, h.sender);
-      if (plausible && b.size() <= h.total) return std::nullopt;
-      if (plausible && is_magic(b[h.total])) {
-        ++counters_.unknown_id;
-        pass_whole(h);
-      } else {
-        skip_byte();
-      }
+    const Found found = look(b, h, in_step_ && continues(last_sender_, h.sender));
+    if (found == Found::part) return std::nullopt;
+    in_step_ = found == Found::frame || found == Found::unknown;
+    if (!in_step_) {
+      ++begin_;
+      ++counters_.skipped_bytes;
+      counters_.bad_crc += found == Found::bad_checksum ? 1u : 0u;
       continue;
     }
-    // MAVLink 1 neither truncates nor extends, and its short header makes noise look like a frame too often otherwise.
-    if (b[0] == kMagicV1 && h.payload != known->base_length) {
-      skip_byte();
+    begin_ += h.total;
+    last_sender_ = h.sender;
+    if (found == Found::unknown) {
+      ++counters_.unknown_id;
       continue;
     }
-    if (b.size() < h.length + h.payload + kChecksum) return std::nullopt;
-    if (!checksum_right(b, h, known->crc_extra)) {
-      ++counters_.bad_crc;
-      skip_byte();
-      continue;
-    }
-    if (b.size() < h.total) return std::nullopt;
-    pass_whole(h);
     if ((h.incompat & ~kIncompatSigned) != 0) {
       ++counters_.unknown_incompat;
       continue;

@@ -115,12 +115,9 @@ study::Observations observe(const Flights& flights, const Vehicle& vehicle, cons
   for (const std::size_t k : order) observer.add(flights.logs[k]);
   auto seen = observer.finish();
   if (flights.group.empty()) return seen;
-  std::vector<std::size_t> first{0};
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const bool last = k + 1 == order.size() || flights.group[order[k + 1]] != flights.group[order[k]];
-    if (last) first.push_back(seen.first[k + 1]);
-  }
-  seen.first = std::move(first);
+  std::vector<double> by_flight;
+  for (const std::size_t k : order) by_flight.push_back(flights.group[k]);
+  seen.group(by_flight);
   return seen;
 }
 
@@ -206,7 +203,7 @@ int run(const Options& options) {
   const auto result = study::study(seen, study_options(options));
   Json json = to_json(result, seen);
   for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
-  if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.first.size() - 1}};
+  if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
   std::optional<study::RotorVerdict> rotors;

@@ -26,16 +26,4 @@ void progress(const std::string& line) {
   if (::isatty(STDERR_FILENO)) std::fprintf(stderr, "%s\n", line.c_str());
 }
 
-std::string to_text(double value, int decimals) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  return text;
-}
-
-std::string to_text(const Vec3& p) {
-  char text[96];
-  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", p.x(), p.y(), p.z());
-  return text;
-}
-
 }  // namespace backwash::services

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/types/geometry.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::services {
 
@@ -58,10 +59,5 @@ CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional
 
 /// A line on stderr if that is a terminal, nothing otherwise.
 void progress(const std::string& line);
-
-/// "(1.00, 2.00, 0.80)".
-std::string to_text(const Vec3& p);
-/// A number with a fixed count of decimals.
-std::string to_text(double value, int decimals);
 
 }  // namespace backwash::services

@@ -15,6 +15,7 @@
 #include "core/map/load_map.hpp"
 #include "services/parallel/parallel.hpp"
 #include "tests/bench/furnished_room.hpp"
+#include "tests/support/changed_box.hpp"
 
 namespace {
 
@@ -251,7 +252,7 @@ void region_update(benchmark::State& state) {
   const auto rebuild_clocks = static_cast<double>(std::clock() - rebuild);
   const auto begun = std::clock();
   for (auto _ : state) {
-    const auto columns = field::affected_columns(after, {}, field::changed_box(before, after));
+    const auto columns = field::affected_columns(after, {}, test::changed_box(before, after));
     stored.clear(columns);
     fill(stored, after, field::voxels_within(after, bench::free_voxels(after), columns));
   }

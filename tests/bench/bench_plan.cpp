@@ -33,6 +33,7 @@
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
 #include "core/reach/clearance.hpp"
+#include "tests/support/regions.hpp"
 
 namespace {
 
@@ -218,29 +219,6 @@ void search_tail(benchmark::State& state) {
 }
 BENCHMARK(search_tail)->Arg(1500)->Arg(500)->Arg(3000)->Unit(benchmark::kMillisecond)->Iterations(1);
 
-/// Regions of hover-safe voxels that share faces, flooded apart from the planner's own.
-std::vector<int> regions(const plan::World& world) {
-  std::vector<int> region(world.grid.cell_count(), 0);
-  int count = 0;
-  for (std::size_t seed = 0; seed < region.size(); ++seed) {
-    if (region[seed] != 0 || !world.hover.safe(world.grid.voxel(seed))) continue;
-    std::vector<Index3> open{world.grid.voxel(seed)};
-    region[seed] = ++count;
-    while (!open.empty()) {
-      const Index3 v = open.back();
-      open.pop_back();
-      for (int axis = 0; axis < 3; ++axis)
-        for (const int step : {-1, 1}) {
-          const Index3 u = v + step * Index3::Unit(axis);
-          if (!world.hover.safe(u) || region[world.grid.linear(u)] != 0) continue;
-          region[world.grid.linear(u)] = count;
-          open.push_back(u);
-        }
-    }
-  }
-  return region;
-}
-
 void success(benchmark::State& state, const std::string& scene) {
   const auto vehicle = config::load_vehicle("builtin:quad-5in").value();
   const auto w =
@@ -248,7 +226,7 @@ void success(benchmark::State& state, const std::string& scene) {
   const plan::PlanOptions options{.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max};
   double exists = 0, found = 0, wrong = 0;
   for (auto _ : state) {
-    const auto region = regions(*w);
+    const auto region = test::regions(w->grid, [&](const Index3& v) { return w->hover.safe(v); });
     for (const Query& q : queries(*w, static_cast<std::size_t>(state.range(0)), 0, INFINITY)) {
       const auto p = plan::plan(*w, at_rest(q.start), q.goal, options);
       const auto at = [&](const Vec3& x) { return region[w->grid.linear(w->grid.index(x))]; };

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "core/config/daemon_config.hpp"
 
@@ -24,16 +25,21 @@ std::filesystem::path temporary(const std::string& name) {
   return std::filesystem::temp_directory_path() / ("backwash." + std::to_string(::getpid()) + "." + name);
 }
 
-// What the shipped file says of itself once `from` is replaced by `to`.
+tl::expected<Daemon, ConfigError> loaded(const std::string& text) {
+  const auto path = temporary("daemon_file_test.toml");
+  std::ofstream(path) << text;
+  auto read = load_daemon(path);
+  std::filesystem::remove(path);
+  return read;
+}
+
+/// What the shipped file says of itself once `from` is replaced by `to`.
 std::string error_after(const std::string& from, const std::string& to) {
   std::string text = shipped();
   const auto at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   text.replace(at, from.size(), to);
-  const auto path = temporary("daemon_file_test.toml");
-  std::ofstream(path) << text;
-  const auto read = load_daemon(path);
-  std::filesystem::remove(path);
+  const auto read = loaded(text);
   return read ? std::string("no error") : read.error().message;
 }
 
@@ -49,44 +55,44 @@ TEST(DaemonFile, ReadsTheShippedExample) {
 }
 
 /// The shipped file with these lines instead of its [odometry] and [frames].
-std::optional<Daemon> with_odometry(const std::string& lines, const std::string& map = "map") {
+Daemon with_odometry(const std::string& lines, const std::string& map = "map") {
   std::string text = shipped();
   const auto frames = text.find("\n[frames]"), odometry = text.find("\n[odometry]"), next = text.find("\n[map]");
   EXPECT_TRUE(frames < odometry && odometry < next && next != std::string::npos);
   text.replace(frames, next - frames, "\n[frames]\nmap = \"" + map + "\"\n[odometry]\n" + lines + "\n");
-  const auto path = temporary("odometry_test.toml");
-  std::ofstream(path) << text;
-  const auto read = load_daemon(path);
-  std::filesystem::remove(path);
-  if (!read) ADD_FAILURE() << read.error().message;
-  return read ? std::optional(*read) : std::nullopt;
+  const auto read = loaded(text);
+  EXPECT_TRUE(read) << lines << ": " << (read ? "" : read.error().message);
+  return read.value_or(Daemon{});
 }
 
 TEST(DaemonFile, AnEstimatorsProfileSetsItsFramesAndItsTwist) {
-  const auto vins = with_odometry("profile = \"vins_fusion\"");
-  ASSERT_TRUE(vins);
-  EXPECT_EQ(vins->odometry.twist, Twist::world);
-  EXPECT_EQ(vins->frames.odometry, "world");
-  EXPECT_EQ(vins->odometry.child, "world");
-  const auto fast_lio = with_odometry("profile = \"fast_lio\"\nsensor_roll = 3.14159\nsensor_x = 0.1");
-  ASSERT_TRUE(fast_lio);
-  EXPECT_EQ(fast_lio->odometry.twist, Twist::none);
-  EXPECT_EQ(fast_lio->frames.odometry, "camera_init");
-  EXPECT_EQ(fast_lio->odometry.child, "body");
-  EXPECT_DOUBLE_EQ(fast_lio->odometry.sensor_B.x(), 0.1);
-  EXPECT_DOUBLE_EQ(fast_lio->odometry.sensor_turned.x(), 3.14159);
-  const auto same = with_odometry("profile = \"openvins\"", "global");
-  ASSERT_TRUE(same) << "a map in the estimator's own frame";
-  EXPECT_EQ(same->frames.map, "global");
-  EXPECT_EQ(same->odometry.child, "imu");
-  const auto custom = with_odometry("profile = \"custom\"\ntwist = \"world\"\nchild = \"lidar\"");
-  ASSERT_TRUE(custom);
-  EXPECT_EQ(custom->odometry.twist, Twist::world);
-  EXPECT_EQ(custom->odometry.child, "lidar");
-  const auto none = with_odometry("");
-  ASSERT_TRUE(none);
-  EXPECT_EQ(none->odometry.twist, Twist::body);
-  EXPECT_EQ(none->frames.odometry, "odom");
+  struct Case {
+    std::string lines;
+    Twist twist;
+    std::string frame, child;
+  };
+  for (const auto& [lines, twist, frame, child] :
+       std::vector<Case>{{"profile = \"vins_fusion\"", Twist::world, "world", "world"},
+                         {"profile = \"fast_lio\"", Twist::none, "camera_init", "body"},
+                         {"profile = \"custom\"\ntwist = \"world\"\nchild = \"lidar\"", Twist::world, "odom", "lidar"},
+                         {"", Twist::body, "odom", ""}}) {
+    const auto d = with_odometry(lines);
+    EXPECT_EQ(d.odometry.twist, twist) << lines;
+    EXPECT_EQ(d.frames.odometry, frame) << lines;
+    EXPECT_EQ(d.odometry.child, child) << lines;
+  }
+}
+
+TEST(DaemonFile, ASensorsPlaceAndTurnStandBesideItsProfile) {
+  const auto d = with_odometry("profile = \"fast_lio\"\nsensor_roll = 3.14159\nsensor_x = 0.1");
+  EXPECT_DOUBLE_EQ(d.odometry.sensor_B.x(), 0.1);
+  EXPECT_DOUBLE_EQ(d.odometry.sensor_turned.x(), 3.14159);
+}
+
+TEST(DaemonFile, AMapInTheEstimatorsOwnFrameKeepsItsName) {
+  const auto d = with_odometry("profile = \"openvins\"", "global");
+  EXPECT_EQ(d.frames.map, "global");
+  EXPECT_EQ(d.odometry.child, "imu");
 }
 
 TEST(DaemonFile, AProfileThatIsNoneAndKeysThatItDoesNotTakeAreNamed) {
@@ -126,10 +132,7 @@ TEST(DaemonFile, ReadsTheFormsOfALinkDevice) {
 TEST(DaemonFile, FramesAndMapMayBeLeftOut) {
   std::string text = shipped();
   text.resize(text.find("\n[frames]"));
-  const auto path = temporary("daemon_file_short_test.toml");
-  std::ofstream(path) << text;
-  const auto d = load_daemon(path);
-  std::filesystem::remove(path);
+  const auto d = loaded(text);
   ASSERT_TRUE(d) << d.error().message;
   EXPECT_EQ(d->frames.map, "map");
   EXPECT_FALSE(d->map.live);

@@ -10,6 +10,7 @@
 #include "core/map/load_map.hpp"
 #include "tests/field/brute_force.hpp"
 #include "tests/field/scenes.hpp"
+#include "tests/support/changed_box.hpp"
 
 namespace backwash::field {
 namespace {
@@ -163,7 +164,7 @@ void expect_update_equals_rebuild(const OccupancyGrid& before, const OccupancyGr
   DisturbanceField updated(before), rebuilt(after);
   store(updated, before, free_voxels(before)), store(rebuilt, after, free_voxels(after));
   const DisturbanceField old = updated;
-  const auto changed = changed_box(before, after);
+  const auto changed = test::changed_box(before, after);
   ASSERT_FALSE(changed.empty());
   const map::VoxelBox columns = affected_columns(after, Model{}, changed);
   updated.clear(columns);
@@ -193,21 +194,6 @@ TEST(StoredField, FollowsAChangeOfOneCubicMetreBitForBit) {
       after.set(v, after.at(n) == Cell::free ? Cell::occupied : v.x() % 2 ? Cell::free : Cell::unknown);
     }
     expect_update_equals_rebuild(before, after);
-  }
-}
-
-TEST(StoredField, FindsNoChangeBetweenEqualMapsAndAllOfItBetweenMapsOfOtherFrames) {
-  const OccupancyGrid room = scene::small_room();
-  EXPECT_TRUE(changed_box(room, room).empty());
-  const Vec3 origin = room.origin();
-  const Index3 size = room.size();
-  OccupancyGrid moved(origin + Vec3(0.1, 0, 0), 0.1, size, Cell::free), finer(origin, 0.05, size, Cell::free);
-  for (std::size_t n = 0; n < room.cell_count(); ++n)
-    for (auto* same : {&moved, &finer}) same->set(room.voxel(n), room.at(n));
-  for (const OccupancyGrid& other : {moved, finer}) {
-    const auto all = changed_box(room, other);
-    EXPECT_EQ(all.low, Index3::Zero()) << "though each voxel holds the same";
-    EXPECT_EQ(all.high, Index3(size - Index3::Ones()));
   }
 }
 

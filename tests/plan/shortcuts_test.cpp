@@ -12,6 +12,7 @@
 #include "core/plan/kinodynamic_astar.hpp"
 #include "core/plan/way.hpp"
 #include "core/plan/world.hpp"
+#include "tests/support/regions.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -87,25 +88,6 @@ TEST(Quickest, IsNothingThatTakesLonger) {
   EXPECT_FALSE(quickest({{0, 0, 0}, {1.4, 0, 0}}, to, kLimits, INFINITY));
 }
 
-/// Free voxels that faces join to one.
-std::vector<char> joined_to(const OccupancyGrid& grid, const Index3& from) {
-  std::vector<char> seen(grid.cell_count(), 0);
-  std::vector<Index3> open{from};
-  seen[grid.linear(from)] = 1;
-  while (!open.empty()) {
-    const Index3 v = open.back();
-    open.pop_back();
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int step : {-1, 1}) {
-        const Index3 u = v + step * Index3::Unit(axis);
-        if (!grid.free(u) || seen[grid.linear(u)]) continue;
-        seen[grid.linear(u)] = 1;
-        open.push_back(u);
-      }
-  }
-  return seen;
-}
-
 TEST(Way, OfSingleVoxelsExistsExactlyWhereFacesJoin) {
   std::mt19937 random(3);
   int joined = 0, apart = 0;
@@ -115,15 +97,16 @@ TEST(Way, OfSingleVoxelsExistsExactlyWhereFacesJoin) {
       if (random() % 100 < 62) grid.set(grid.voxel(i), Cell::occupied);
     const Index3 from(1, 1, 1), to(12, 11, 7);
     grid.set(from, Cell::free), grid.set(to, Cell::free);
-    const auto seen = joined_to(grid, from);
+    const auto region = test::regions(grid, [&](const Index3& v) { return grid.free(v); });
     const SafeSpace space(grid);
     for (std::size_t i = 0; i < grid.cell_count(); i += 7) {
       if (!grid.free(grid.voxel(i))) continue;
       const Vec3 goal = grid.center(grid.voxel(i)) + Vec3(0.01, 0.02, -0.03);
       const auto way = way_over_blocks(space, grid.center(from), goal, 1, SIZE_MAX, Clock::time_point::max());
-      ASSERT_EQ(way.status, seen[i] ? Way::Status::found : Way::Status::none);
-      (seen[i] ? joined : apart) += 1;
-      if (!seen[i]) continue;
+      const bool one = region[i] == region[grid.linear(from)];
+      ASSERT_EQ(way.status, one ? Way::Status::found : Way::Status::none);
+      (one ? joined : apart) += 1;
+      if (!one) continue;
       EXPECT_EQ(way.points.front(), grid.center(from));
       EXPECT_EQ(way.points.back(), goal);
       const auto motions = along(space, {grid.center(from), Vec3::Zero()}, way.points, kLimits);

@@ -5,9 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <random>
-#include <stdexcept>
 
 #include "tests/reach/axis_rollouts.hpp"
 
@@ -278,66 +276,6 @@ TEST(SupportRecursion, IntervalIsTheLargestSupportWithinHalfAPerCent) {
       ASSERT_LE(tube.until_next[k][kX], largest * 1.005) << name(c) << " step " << k;
     }
   }
-}
-
-TEST(SupportRecursion, BeyondTheTableTheTailKeepsTheSumCovered) {
-  Case c{{}, Loop::vehicle, {}};
-  c.vehicle.controller.attitude_lag = 0.05;  // a loop that the FIR serves
-  c.vehicle.controller.kp = {20, 20};
-  c.vehicle.controller.kd = {4, 4};
-  c.response = axis_response(c.axis(), c.loop);
-  SupportRecursion support(c.response, c.response, c.vehicle);
-  DisturbanceBound b;
-  b.w.fill(2);
-  const std::size_t N = c.response.G.size();
-  for (std::size_t k = 0; k < 3 * N + 5; ++k) {
-    support.step(b);
-    const double least = 2 * c.response.P[std::min(k + 1, N) * AxisResponse::kPhases];
-    ASSERT_GE(support.half_widths()[kX], least - 1e-14);
-    ASSERT_LE(support.half_widths()[kX], least + 2 * c.response.tail + 1e-14);
-    ASSERT_EQ(support.half_widths()[kX], support.half_widths()[kXyMinus]);
-  }
-  // A storm in the past: what is left of it is never forgotten altogether.
-  for (std::size_t k = 0; k < N + 3; ++k) support.step(DisturbanceBound{});
-  EXPECT_GT(support.half_widths()[kZ], 0);
-  EXPECT_LE(support.half_widths()[kZ], 2 * c.response.tail);
-}
-
-TEST(SupportRecursion, BeyondTheTableTheFirstErrorsAreStillCovered) {
-  Case c{{}, Loop::vehicle, {}};
-  c.vehicle.controller.attitude_lag = 0.05;
-  c.vehicle.controller.feedback_delay = 0;
-  c.vehicle.controller.kp = {20, 20};
-  c.vehicle.controller.kd = {4, 4};
-  c.response = axis_response(c.axis(), c.loop);
-  for (const auto& [position, velocity] : {std::pair(1.0, 0.0), std::pair(0.0, 1.0)}) {
-    c.vehicle.initial_error = {position, velocity};
-    SupportRecursion support(c.response, c.response, c.vehicle);
-    AxisRollouts e(c.axis(), false, kH, Batch{{position}}, Batch{{velocity}});
-    for (std::size_t k = 0; k < c.response.G.size() + 40; ++k) {
-      support.step(DisturbanceBound{});
-      for (int i = 0; i < kPerStep; ++i) e.step(Batch{{0.0}});
-      ASSERT_GE(support.half_widths()[kX], (1 - 1e-3) * std::abs(e.p()[0])) << "step " << k;
-    }
-  }
-}
-
-TEST(SupportRecursion, AxesAndDirectionsAreTheirOwn) {
-  Case c{{}, Loop::continuous, {}};
-  c.vehicle.controller.kp = {6, 16};
-  c.vehicle.controller.kd = {4, 8};
-  const AxisResponse horizontal = axis_response(axis_loop(c.vehicle, false, c.loop), c.loop);
-  const AxisResponse vertical = axis_response(axis_loop(c.vehicle, true, c.loop), c.loop);
-  SupportRecursion support(horizontal, vertical, c.vehicle);
-  const DisturbanceBound b{{0.5, 1, 2, 3, 4}};
-  for (int k = 0; k < 400; ++k) support.step(b);
-  const PerDirection h = support.half_widths();
-  const double closed_form = 0.170633990;  // (6, 4), see AxisResponse.HoverHalfWidthIsTheClosedForm
-  EXPECT_NEAR(h[kX], 0.5 * closed_form, 1e-6);
-  EXPECT_NEAR(h[kY], closed_form, 1e-6);
-  EXPECT_NEAR(h[kXyPlus], 3 * closed_form, 1e-6);
-  EXPECT_NEAR(h[kXyMinus], 4 * closed_form, 1e-6);
-  EXPECT_NEAR(h[kZ], 2.0 / 16, 1e-6);
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ Observations flights() {
     if (i % kOfFlight == 0) seen.first.push_back(i);
   }
   seen.first.push_back(seen.windows.size());
+  seen.units.first = seen.first;
   for (auto& y : seen.y) y.assign(seen.windows.size(), 0);
   for (auto& weight : seen.weight) weight.assign(seen.windows.size(), 0);
   seen.missing[Source::attitude] = "not flown";

@@ -123,7 +123,6 @@ Days days(std::mt19937& rng) {
   std::normal_distribution<double> normal;
   Days made;
   made.seen.flights = 120;
-  made.seen.first = {0};
   for (int day = 0; day < 30; ++day) {
     const double of_day = 0.6 * normal(rng);
     for (int flight = 0; flight < 4; ++flight) {
@@ -141,7 +140,7 @@ Days days(std::mt19937& rng) {
         made.day.push_back(day), made.x.push_back(x + 0.3 * normal(rng));
       }
     }
-    made.seen.first.push_back(made.seen.windows.size());
+    made.seen.units.first.push_back(made.seen.windows.size());
   }
   for (const Source source : {Source::attitude, Source::map}) made.seen.missing[source] = "none";
   return made;

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/study/inference/evidence.hpp"
+#include "core/study/windows/gates.hpp"
 #include "core/study/windows/instrument.hpp"
 #include "core/study/windows/signals.hpp"
 #include "core/study/windows/texture.hpp"
@@ -137,6 +138,15 @@ TEST(Study, TellsASaggingBatteryFromEqualStartsWithoutAFalseNameBesideIt) {
   std::filesystem::remove_all(folder);
   EXPECT_TRUE(o.in_sets()) << study_worlds::told(o.sets, o.unknown);
   EXPECT_FALSE(o.wrong_name()) << study_worlds::told(o.sets, o.unknown);
+}
+
+TEST(Gaps, AGapIsLongerThanFivePeriodsAndFiftyMilliseconds) {
+  std::vector<double> t;
+  for (int k = 0; k < 100; ++k) t.push_back(0.01 * k + (k >= 40 ? 0.03 : 0) + (k >= 70 ? 0.06 : 0));  // 0.04 s, 0.07 s
+  const auto stretches = unbroken(t, {});
+  ASSERT_EQ(stretches.size(), 2u);
+  EXPECT_EQ(stretches[0].end, 70u);
+  EXPECT_EQ(stretches[1].end, 100u);
 }
 
 }  // namespace

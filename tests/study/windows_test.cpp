@@ -10,6 +10,7 @@
 #include "core/config/config.hpp"
 #include "core/sim/quadrotor.hpp"
 #include "core/sim/vio.hpp"
+#include "core/study/windows/observation.hpp"
 
 namespace backwash::study {
 namespace {
@@ -230,6 +231,35 @@ TEST_F(Gates, CountGapsAndTransit) {
   EXPECT_EQ(count(flight, Gate::gap), 2u);                     // 3 s
   EXPECT_EQ(count(flight, Gate::transit), 1u + 1u + 2u + 1u);  // settling three times, 4 s on the way
   for (const auto& w : flight.windows) EXPECT_TRUE(w.t_s + 2 <= 20.0 || w.t_s >= 22.99);
+}
+
+/// Windows that calibration leaves out of a log for one reason, and that a study does; none: it keeps some window.
+void expect_left_out(const log::FlightLog& log, Gate gate) {
+  const auto flight = flight_windows(log, five_inch(), {}, "log.csv");
+  ASSERT_TRUE(flight) << flight.error().message;
+  EXPECT_EQ(flight->gated[static_cast<std::size_t>(gate)], 20u) << to_string(gate);
+  EXPECT_TRUE(flight->windows.empty()) << to_string(gate);
+  Observer observer(five_inch(), config::load_model("builtin:quad-5in").value(), nullptr);
+  observer.add(log);
+  const Observations seen = observer.finish();
+  EXPECT_EQ(seen.gated_out.at(gate), 20u) << to_string(gate);
+  EXPECT_TRUE(seen.windows.empty()) << to_string(gate);
+}
+
+TEST_F(Gates, AreTheSameForCalibrationAndStudy) {
+  auto frozen = log_, resting = log_, standing = log_, stopped = log_;
+  for (const char* axis : {"x_m", "y_m", "z_m"})  // the tracker has stopped, the accelerometer has not
+    for (double& p : frozen.columns[axis]) p = 1;
+  expect_left_out(frozen, Gate::frozen);
+  for (const char* motor : {"motor1", "motor2", "motor3", "motor4"})
+    resting.columns[motor] = std::vector<double>(log_.t_s.size(), 0.03);
+  expect_left_out(resting, Gate::perched);
+  standing.columns["stood_z_m"] = standing.columns["z_m"];
+  expect_left_out(standing, Gate::perched);
+  for (std::size_t k = 0; k < log_.t_s.size(); ++k)  // one rotor at its lower end, the others at work
+    for (const char* motor : {"motor1", "motor2", "motor3", "motor4"})
+      stopped.columns[motor].push_back(motor[5] == '2' ? 0.0 : 0.5);
+  expect_left_out(stopped, Gate::saturated);
 }
 
 TEST(Windows, FindHoverPositionsWithoutASegmentColumn) {

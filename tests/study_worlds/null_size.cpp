@@ -57,7 +57,7 @@ double p_value(const study::Normal& normal, const std::vector<std::vector<int>>&
 NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path& folder) {
   const auto seen = observe(draw_world({seed, {}, 1, flights, ""}), folder);
   const study::Evidence evidence(seen);
-  const auto draws = study::sign_draws(seen.first.size() - 1, kFlips, static_cast<unsigned>(seed));
+  const auto draws = study::sign_draws(seen.units.size(), kFlips, static_cast<unsigned>(seed));
   std::mt19937_64 rng(seed + 4242);
   NullSize sizes;
   const auto test = [&](const std::string& name, const char* kind, const std::vector<study::Channel>& channels,

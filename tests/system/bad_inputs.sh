@@ -1,11 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Every bad input gives the documented exit code and exactly one line on stderr that names the verb and what is wrong.
-set -uo pipefail
-backwash=${1:?usage: bad_inputs.sh BACKWASH}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
+set +e
 failed=0
 
 # refused CODE WORDS ARGUMENTS…: runs backwash and checks code, one line, its beginning, and the words in it.

@@ -1,12 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # From simulated hover flights to a model file that other verbs read, and the refusal of what the flights cannot tell.
-set -euo pipefail
-backwash=${1:?usage: calibrate.sh BACKWASH}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-die() { echo "$*"; exit 1; }
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 quad=builtin:quad-5in
 
 grid() { printf 'start = [0, 0, 1.0]\nstrength_sd = 0.35\n[grid]\nlow = %s\nhigh = %s\ncount = %s\njitter = 0.03\ndwell = 5.0\n' "$1" "$2" "$3"; }

@@ -2,12 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A small comparison, end to end: the JSON, the CSV and the page agree with each other, a seed repeats itself, and wrong
 # arguments are refused.
-set -euo pipefail
-backwash=${1:?usage: compare.sh BACKWASH}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-die() { echo "$*"; exit 1; }
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 
 small=(compare --scenes builtin:narrow-gap --flights 8)
 "$backwash" "${small[@]}" --seed 1 --json --out a.csv --report page.html >a.json 2>stderr || die "failed: $(cat stderr)"

@@ -1,12 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Conventions of every verb: --help with an example, --version with a commit, --json that is one JSON object.
-set -euo pipefail
-backwash=${1:?usage: conventions.sh BACKWASH}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-die() { echo "$*"; exit 1; }
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 
 for verb in fly plan reach field simulate feasibility compare calibrate import; do
   "$backwash" "$verb" --help >help || die "$verb --help fails"

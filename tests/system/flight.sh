@@ -2,12 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # One flight through the apartment, end to end: passes as it is, and is caught when judged with sets of a variance 25
 # times too small.
-set -euo pipefail
-backwash=${1:?usage: flight.sh BACKWASH}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-die() { echo "$*"; exit 1; }
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 
 "$backwash" fly --map builtin:apartment --seed 1 --json --report flight.html --log flight.csv >flight.json 2>stderr ||
   die "the flight failed: $(cat stderr)"

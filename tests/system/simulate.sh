@@ -1,15 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # An extended model changes what is simulated, in either air; the set-points of a log are flown again at its stamps.
-set -euo pipefail
-backwash=${1:?usage: simulate.sh BACKWASH}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-die() { echo "$*"; exit 1; }
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 
 quad=builtin:quad-5in
-here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 cp "$here/../../core/config/files/quad-5in.model.toml" plain.toml
 extended() { # FILE KIND VALUES
   { cat plain.toml; printf '\n[[extension.term]]\ncause = "x"\nsimulation = [{ kind = "%s", value = [%s] }]\n' "$2" "$3"; } >"$1"

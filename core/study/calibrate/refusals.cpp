@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 
 #include "core/study/calibrate/calibrate.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::study::calibrate {
 namespace {
@@ -24,11 +24,7 @@ struct Range {
   double spread() const { return hovers > 0 ? high - low : 0; }
 };
 
-std::string metres(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f m", x);
-  return text;
-}
+std::string metres(double x) { return to_text(x, 2) + " m"; }
 
 std::vector<Refusal> too_few_flights(const Data& data) {
   std::map<std::size_t, std::size_t> flights;

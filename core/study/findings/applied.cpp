@@ -140,10 +140,10 @@ Applied judged(const Evidence& evidence, const std::vector<Accepted>& all, const
     applied.refused = "one flight alone tells it: it cannot be judged on others";
     return applied;
   }
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+  for (std::size_t f = 0; f < seen.units.size(); ++f) {
     const SmallVector by = with_companions(joint, theta.fit_without(f), f);
     applied.nats += by.dot(joint.b[f]) - 0.5 * by.dot(joint.A[f] * by);
-    add(own, parts.columns, by, seen.first[f], seen.first[f + 1], n);
+    add(own, parts.columns, by, seen.units.first[f], seen.units.first[f + 1], n);
   }
   measure_error(applied, seen, own, others);
   measure_coverage(applied, seen, own, others);

@@ -38,13 +38,13 @@ Added held_out(const StudyResult& result, const Observations& seen) {
     const auto nuisance = cause.found.form->constant ? std::vector<Column>{} : offsets(columns, seen);
     const Normal normal = evidence.normal(columns, nuisance);
     if (!normal.solvable || !cause.applied.refused.empty()) continue;
-    for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+    for (std::size_t f = 0; f < seen.units.size(); ++f) {
       const SmallVector theta = normal.fit_without(f);
       for (std::size_t k = 0; k < columns.size(); ++k)
         for (const auto& part : columns[k].parts) {
           if (part.channel > kVarZ) continue;
           auto& to = part.channel <= kMeanZ ? added.mean[part.channel] : added.ln_variance[part.channel - kVarX];
-          for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+          for (std::size_t i = seen.units.first[f]; i < seen.units.first[f + 1]; ++i)
             to[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
         }
     }

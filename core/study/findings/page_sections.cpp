@@ -48,9 +48,9 @@ std::string row(const std::string& name, const std::string& value) {
 
 std::string too_few(const Observations& seen) {
   std::size_t good = 0;
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) good += seen.first[f + 1] > seen.first[f] ? 1u : 0u;
+  for (std::size_t f = 0; f < seen.units.size(); ++f) good += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
   const std::size_t needed = StudyOptions{}.fewest_flights;
-  const bool grouped = seen.first.size() - 1 != seen.flights;
+  const bool grouped = seen.units.size() != seen.flights;
   std::string text = std::to_string(good) + (grouped ? " group" : " flight") + (good == 1 ? "" : "s") +
                      " with good windows, " + std::to_string(needed) + " are needed to warrant a name: fly " +
                      std::to_string(needed - good) + " more";

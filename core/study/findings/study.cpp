@@ -23,12 +23,12 @@ std::vector<Column> others_of(const std::vector<Accepted>& all, std::size_t but,
 /// What the cause adds to a channel in each window, its parameters fitted without the window's flight.
 std::vector<double> held_out(const Accepted& cause, const Normal& normal, const Observations& seen, Channel channel) {
   std::vector<double> sum(seen.windows.size(), 0);
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+  for (std::size_t f = 0; f < seen.units.size(); ++f) {
     const SmallVector theta = normal.fit_without(f);
     for (std::size_t k = 0; k < cause.columns.size(); ++k)
       for (const auto& part : cause.columns[k].parts)
         if (part.channel == channel)
-          for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+          for (std::size_t i = seen.units.first[f]; i < seen.units.first[f + 1]; ++i)
             sum[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
   }
   return sum;
@@ -39,6 +39,24 @@ double within_interval(double mean, double variance, double model) {
   const double limit = kRules.normal_95 * std::sqrt(model);
   const double s = std::sqrt(2 * std::max(variance, kRules.least_variance.value));
   return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
+}
+
+/// Share of the windows' samples within the central 90 %, without and with what the cause moves by channel.
+void add_coverage(Gain& gain, const Observations& seen, const std::array<std::vector<double>, kChannels>& moved) {
+  double covered_before = 0, covered_after = 0, samples = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t mean = kMeanX + static_cast<std::size_t>(axis), variance = kVarX + static_cast<std::size_t>(axis);
+    for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+      const auto& w = seen.windows[i];
+      if (!(seen.weight[variance][i] > 0)) continue;
+      const double m = seen.y[mean][i], x_m = moved[mean].empty() ? 0 : moved[mean][i];
+      const double factor = moved[variance].empty() ? 1 : std::exp(moved[variance][i]);
+      covered_before += within_interval(m, w.measured_variance[axis], w.sigma[axis]);
+      covered_after += within_interval(m - x_m, w.measured_variance[axis], w.sigma[axis] * factor);
+      samples += 1;
+    }
+  }
+  if (samples > 0) gain.coverage_before = covered_before / samples, gain.coverage_after = covered_after / samples;
 }
 
 /// `total`: of all accepted causes; `own`: of this one. Residuals y − (total − own) before, y − total after.
@@ -79,20 +97,7 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
     moved[c] = x;
   }
   if (count > 0) gain.rmse_before = std::sqrt(before / count), gain.rmse_after = std::sqrt(after / count);
-  double covered_before = 0, covered_after = 0, samples = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t mean = kMeanX + static_cast<std::size_t>(axis), variance = kVarX + static_cast<std::size_t>(axis);
-    for (std::size_t i = 0; i < seen.windows.size(); ++i) {
-      const auto& w = seen.windows[i];
-      if (!(seen.weight[variance][i] > 0)) continue;
-      const double m = seen.y[mean][i], x_m = moved[mean].empty() ? 0 : moved[mean][i];
-      const double factor = moved[variance].empty() ? 1 : std::exp(moved[variance][i]);
-      covered_before += within_interval(m, w.measured_variance[axis], w.sigma[axis]);
-      covered_after += within_interval(m - x_m, w.measured_variance[axis], w.sigma[axis] * factor);
-      samples += 1;
-    }
-  }
-  if (samples > 0) gain.coverage_before = covered_before / samples, gain.coverage_after = covered_after / samples;
+  add_coverage(gain, seen, moved);
   return gain;
 }
 
@@ -123,7 +128,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   StudyResult result;
   result.not_tested = untested(seen);
   std::size_t flown = 0;
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) flown += seen.first[f + 1] > seen.first[f] ? 1u : 0u;
+  for (std::size_t f = 0; f < seen.units.size(); ++f) flown += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
   if (flown < options.fewest_flights) {
     result.verdict = Verdict::insufficient;
     return result;
@@ -167,7 +172,7 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
                                                                         const SearchOptions& options,
                                                                         double threshold) {
   constexpr int kFlips = static_cast<int>(kRules.power_flips);
-  const auto draws = sign_draws(evidence.seen().first.size() - 1, kFlips, options.seed + 1);
+  const auto draws = sign_draws(evidence.seen().units.size(), kFlips, options.seed + 1);
   std::map<std::string, std::map<std::string, double>> least;
   for (const auto& c : candidates(evidence, {}, false)) {
     if (least.contains(c.name) && !least[c.name].contains(c.form->parameters[0])) continue;

@@ -32,8 +32,8 @@ std::optional<double> between_by_moments(const std::vector<Member>& members, dou
 void Evidence::anova(Channel c, const std::vector<double>& r) {
   double sse = 0, n = 0;
   std::vector<Member> flights;
-  for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
-    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1];) {
+  for (std::size_t f = 0; f < seen_->units.size(); ++f) {
+    for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1];) {
       double weight = 0, sum = 0, square = 0, count = 0;
       for (const std::size_t end = flight_end_[i]; i < end; ++i) {
         const double w = weight_[c][i];

@@ -42,7 +42,7 @@ Column decorrelated(const Column& column);
 /// Observations with the scatter of each channel (after `decorrelated`): within flights (σ_w²) and between them (σ_b²,
 /// a random intercept), by analysis of variance of what the accepted columns leave. V = diag(σ_w²/weight) + σ_b² 11ᵀ
 /// per flight and channel, and in the level means + σ_t² ZZᵀ, Z the body's two level axes: craft are trimmed anew
-/// before each flight. Where several flights make one unit (`Observations::first` of days), flights of a unit have
+/// before each flight. Where several flights make one unit (days), flights of a unit have
 /// σ_b², and units σ_u² beside it. A window's mean weighs more where its own variance, shrunk towards its flight's, is
 /// small.
 class Evidence {

@@ -45,9 +45,9 @@ Column decorrelated(const Column& column) {
 
 Evidence::Evidence(const Observations& seen)
     : seen_(&seen), weight_(seen.weight), flight_end_(seen.windows.size(), seen.windows.size()) {
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f)
-    for (std::size_t i = seen.first[f + 1]; i-- > seen.first[f];) {
-      const bool last = i + 1 == seen.first[f + 1] || seen.windows[i + 1].flight != seen.windows[i].flight;
+  for (std::size_t f = 0; f < seen.units.size(); ++f)
+    for (std::size_t i = seen.units.first[f + 1]; i-- > seen.units.first[f];) {
+      const bool last = i + 1 == seen.units.first[f + 1] || seen.windows[i + 1].flight != seen.windows[i].flight;
       flight_end_[i] = last ? i + 1 : flight_end_[i + 1];
     }
   Column all;
@@ -93,7 +93,7 @@ void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const
   for (std::size_t f = 0; f < grams.size(); ++f) {
     unit_sum.setZero();
     double unit_weight = 0;
-    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1];) {
+    for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1];) {
       outer.setZero(), sum.setZero();
       double weight = 0;
       for (const std::size_t end = flight_end_[i]; i < end; ++i) {
@@ -125,7 +125,7 @@ std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const Column*>& c
   if (trimmed) all.insert(all.begin(), tilts_.begin(), tilts_.end());
   all.push_back(y_);
   const Eigen::Index z = trimmed ? 2 : 0;
-  std::vector<Eigen::MatrixXd> grams(seen_->first.size() - 1, Eigen::MatrixXd::Zero(z + p + 1, z + p + 1));
+  std::vector<Eigen::MatrixXd> grams(seen_->units.size(), Eigen::MatrixXd::Zero(z + p + 1, z + p + 1));
   for (std::size_t c = 0; c < kChannels; ++c) add_channel(grams, static_cast<Channel>(c), all);
   if (!trimmed) return grams;
   for (auto& g : grams) {  // Woodbury: V⁻¹ less what the flight's own trim may explain
@@ -141,7 +141,7 @@ std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const Column*>& c
 double Evidence::trim_scatter(const Column& residual) const {
   std::vector<Column> all = tilts_;
   all.push_back(residual);
-  std::vector<Eigen::MatrixXd> grams(seen_->first.size() - 1, Eigen::MatrixXd::Zero(3, 3));
+  std::vector<Eigen::MatrixXd> grams(seen_->units.size(), Eigen::MatrixXd::Zero(3, 3));
   for (const Channel c : {kMeanX, kMeanY}) add_channel(grams, c, all);
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero(), square = sum;
   Eigen::Vector2d moved = Eigen::Vector2d::Zero();
@@ -174,12 +174,12 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
       static_cast<double>(count) / std::accumulate(weight_[kVarX].begin(), weight_[kVarX].end(), 0.0);
   const double most = kRules.ln_variance_limit;
   const double share = std::clamp(1 - error / count / (within_[kVarX] * typical), 0.0, 1.0);
-  for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
+  for (std::size_t f = 0; f < seen_->units.size(); ++f) {
     double mean = 0, weight = 0;
-    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i)
+    for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i)
       mean += weight_[kVarX][i] * ln_variance[i], weight += weight_[kVarX][i];
     if (weight > 0) mean /= weight;
-    for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
+    for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) {
       const double own = weight_[kVarX][i] > 0 ? share * (ln_variance[i] - mean) : 0;
       const double ln = std::clamp((mean + own) / std::sqrt(3.0), -most, most);
       for (std::size_t k = 0; k < 3; ++k) {
@@ -224,7 +224,7 @@ void Evidence::whiten(const std::vector<Column>& accepted) {
 /// Takes each flight's mean out of every channel, and with the level means' its own trim, ridge 1/σ_t².
 void Evidence::take_flights_out(Column& residual) const {
   const bool trimmed = tilt_ > 0;
-  for (std::size_t f = 0; f + 1 < seen_->first.size(); ++f) {
+  for (std::size_t f = 0; f < seen_->units.size(); ++f) {
     Eigen::Matrix4d normal = Eigen::Vector4d(0, 0, trimmed ? 1 / tilt_ : 1, trimmed ? 1 / tilt_ : 1).asDiagonal();
     Eigen::Vector4d moved = Eigen::Vector4d::Zero();
     const auto design = [&](Channel c, std::size_t i) {
@@ -235,7 +235,7 @@ void Evidence::take_flights_out(Column& residual) const {
     };
     for (auto& [c, x] : residual.parts) {
       double mean = 0, weight = 0;
-      for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) {
+      for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) {
         const double w = weight_[c][i] / within_[c];
         mean += w * x[i], weight += w;
         if (c > kMeanY || !(w > 0)) continue;
@@ -243,11 +243,12 @@ void Evidence::take_flights_out(Column& residual) const {
         normal += w * d * d.transpose(), moved += w * x[i] * d;
       }
       if (c <= kMeanY || !(weight > 0)) continue;
-      for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1]; ++i) x[i] -= mean / weight;
+      for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) x[i] -= mean / weight;
     }
     const Eigen::Vector4d own = normal.completeOrthogonalDecomposition().solve(moved);
     for (auto& [c, x] : residual.parts)
-      for (std::size_t i = seen_->first[f]; i < seen_->first[f + 1] && c <= kMeanY; ++i) x[i] -= own.dot(design(c, i));
+      for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1] && c <= kMeanY; ++i)
+        x[i] -= own.dot(design(c, i));
   }
 }
 

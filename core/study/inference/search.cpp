@@ -235,7 +235,7 @@ std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Co
 SearchResult search(const Evidence& start, const SearchOptions& options) {
   SearchResult result;
   Evidence evidence = start;
-  const auto draws = sign_draws(evidence.seen().first.size() - 1, options.flips, options.seed);
+  const auto draws = sign_draws(evidence.seen().units.size(), options.flips, options.seed);
   while (result.accepted.size() < options.most_causes) {
     const auto accepted = columns_of(result.accepted, evidence.seen());
     evidence.whiten(accepted);

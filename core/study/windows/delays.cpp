@@ -20,7 +20,7 @@ double earlier(const Series& s, std::size_t i, double shift, int axis) {
 }  // namespace
 
 /// How late and how steeply thrust and commands act.
-void Observer::put_delays(WindowRow& row, const Series& s, Stretch w) {
+void Observer::put_delays(const Series& s, Stretch w) {
   const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
   if (s.simulated_by_thrust) {
     // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
@@ -31,15 +31,19 @@ void Observer::put_delays(WindowRow& row, const Series& s, Stretch w) {
     const auto flown = detrended_values(w, [&](std::size_t i) { return s.thrust_acc[i]; });
     const auto flown_rate = rates(s, w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); });
     const Moment delay(rate), slope(level);
+    ThrustMoments moments{seen_.windows.size() - 1};
     if (delay.excited(0.05)) {
-      row.delay_gain = {delay.with(level), delay.with(rate)};
+      moments.delay = {delay.with(level), delay.with(rate)};
       put(kThrustDelay, delay.with(r), 1);
     }
     if (slope.excited(0.05)) {
-      row.slope_gain = {slope.with(level), slope.with(rate)};
+      moments.slope = {slope.with(level), slope.with(rate)};
       put(kThrustSlope, slope.with(r), 1);
     }
-    if (delay.excited(0.05) || slope.excited(0.05)) thrust_stage_.add({level, rate}, {flown, flown_rate});
+    if (delay.excited(0.05) || slope.excited(0.05)) {
+      thrust_stage_.add({level, rate}, {flown, flown_rate});
+      thrust_moments_.push_back(moments);
+    }
   }
   put_command_delay(s, w, 0, 2);
   put_command_delay(s, w, 2, 3);
@@ -73,14 +77,15 @@ void Observer::settle_commands() {
     for (const auto& [window, design] : command_stage_[k].designs()) seen_.windows[window].command_gain[k] = design;
 }
 
-/// The designs, so far Σ z (level, rate)/√Σz², become those of (delay, slope): of −ȧ and T/m − g as they follow z.
+/// Designs of (delay, slope): the moments with −ȧ and T/m − g as they follow z.
 void Observer::follow_thrust() {
   const Eigen::Matrix2d follows = thrust_stage_.coefficients();
-  for (auto& w : seen_.windows)
-    for (auto* gain : {&w.delay_gain, &w.slope_gain}) {
-      const Eigen::RowVector2d flown = Eigen::RowVector2d((*gain)[0], (*gain)[1]) * follows;
-      *gain = {-flown[1], flown[0]};
-    }
+  const auto design = [&](const std::array<double, 2>& moment) {
+    const Eigen::RowVector2d flown = Eigen::RowVector2d(moment[0], moment[1]) * follows;
+    return std::array<double, 2>{-flown[1], flown[0]};
+  };
+  for (const auto& [window, delay, slope] : thrust_moments_)
+    seen_.windows[window].delay_gain = design(delay), seen_.windows[window].slope_gain = design(slope);
 }
 
 }  // namespace backwash::study

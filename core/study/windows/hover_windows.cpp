@@ -3,46 +3,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tuple>
 
 #include "core/study/windows/log_stretch.hpp"
 
 namespace backwash::study {
 namespace {
 
-Vec3 mean_of(const std::vector<Vec3>& x, Span s) {
+Vec3 mean_of(const std::vector<Vec3>& x, Stretch s) {
   Vec3 sum = Vec3::Zero();
   for (std::size_t k = s.begin; k < s.end; ++k) sum += x[k];
   return sum / static_cast<double>(s.size());
 }
 
-bool perched(const Even& e, Span s, const std::optional<Vehicle>& vehicle, const WindowOptions& options) {
-  Vec3 square = Vec3::Zero();
-  const Vec3 mean = mean_of(e.p, s);
-  for (std::size_t k = s.begin; k < s.end; ++k) square += (e.p[k] - mean).cwiseAbs2();
-  if (std::sqrt(square.maxCoeff() / static_cast<double>(s.size())) < options.perched_m) return true;
-  if (e.thrust.empty() || !vehicle) return false;
-  double thrust = 0;
-  for (std::size_t k = s.begin; k < s.end; ++k) {
-    const double f = vehicle->propulsion.thr_mdl_fac, u = e.thrust[k];
-    thrust += vehicle->propulsion.max_thrust * (f * u * u + (1 - f) * u) / static_cast<double>(s.size());
-  }
-  return thrust < options.perched_thrust * vehicle->body.mass * kGravity;
-}
-
-std::optional<Gate> gate(const Even& e, Span s, const std::optional<Vehicle>& vehicle, const WindowOptions& options) {
-  std::size_t frozen = 0, saturated = 0;
-  for (std::size_t k = s.begin; k < s.end; ++k) {
-    frozen += e.frozen[k] ? 1 : 0;
-    if (!e.fullest.empty() && (e.fullest[k] >= 0.99 || e.emptiest[k] <= 0.01)) saturated += 1;
-  }
-  if (frozen > 0) return Gate::frozen;
-  if (perched(e, s, vehicle, options)) return Gate::perched;
-  if (static_cast<double>(saturated) > options.saturated_share * static_cast<double>(s.size())) return Gate::saturated;
-  return std::nullopt;
+/// The rows of a stretch at times from … to.
+Stretch rows_between(const std::vector<double>& t, Stretch raw, double from, double to) {
+  const auto at = [&](double time) {
+    return static_cast<std::size_t>(std::lower_bound(t.begin() + static_cast<std::ptrdiff_t>(raw.begin),
+                                                     t.begin() + static_cast<std::ptrdiff_t>(raw.end), time) -
+                                    t.begin());
+  };
+  return {at(from), at(to)};
 }
 
 /// The windows of one unbroken stretch of good ones.
-void add_windows(const Even& e, Span stretch, std::size_t length, FlightWindows& flight) {
+void add_windows(const Even& e, Stretch stretch, std::size_t length, FlightWindows& flight) {
   std::array<std::vector<double>, 3> filtered;
   std::array<Correlation, 3> rho;
   for (int axis = 0; axis < 3; ++axis) {
@@ -53,7 +39,7 @@ void add_windows(const Even& e, Span stretch, std::size_t length, FlightWindows&
     rho[i] = correlation(filtered[i], e.rate);
   }
   for (std::size_t begin = stretch.begin; begin < stretch.end; begin += length) {
-    const Span s{begin, begin + length};
+    const Stretch s{begin, begin + length};
     Window window{e.t0 + static_cast<double>(begin) / e.rate,
                   e.segment[begin],
                   mean_of(e.p, s),
@@ -85,9 +71,15 @@ void add_windows(const Even& e, Span stretch, std::size_t length, FlightWindows&
   }
 }
 
-void cut(const Even& e, const std::optional<Vehicle>& vehicle, const WindowOptions& options, FlightWindows& flight) {
+/// Windows of a stretch `raw` of the log, e at even times.
+void cut(const Even& e, const log::FlightLog& log, Stretch raw, const LogGates& gates, const WindowOptions& options,
+         FlightWindows& flight) {
   const auto length = static_cast<std::size_t>(std::lround(options.length_s * e.rate));
   const auto in_windows = [length](std::size_t rows) { return (rows + length / 2) / length; };
+  const auto why_left_out = [&](std::size_t at) {
+    const double from = e.t0 + (static_cast<double>(at) - 0.5) / e.rate;
+    return gates(rows_between(log.t_s, raw, from, from + options.length_s));
+  };
   auto& transit = flight.gated[static_cast<std::size_t>(Gate::transit)];
   for (std::size_t begin = 0; begin < e.size();) {
     std::size_t end = begin;
@@ -96,9 +88,9 @@ void cut(const Even& e, const std::optional<Vehicle>& vehicle, const WindowOptio
     const auto settling = static_cast<std::size_t>(std::lround(options.settle_s * e.rate));
     const std::size_t first = hover ? std::min(end, begin + settling) : end;
     transit += in_windows(first - begin);
-    Span good{first, first};
+    Stretch good{first, first};
     for (std::size_t at = first; at + length <= end; at += length) {
-      if (const auto why = gate(e, {at, at + length}, vehicle, options)) {
+      if (const auto why = why_left_out(at)) {
         flight.gated[static_cast<std::size_t>(*why)] += 1;
         if (good.size() > 0) add_windows(e, good, length, flight);
         good = {at + length, at + length};
@@ -109,6 +101,46 @@ void cut(const Even& e, const std::optional<Vehicle>& vehicle, const WindowOptio
     if (good.size() > 0) add_windows(e, good, length, flight);
     begin = end;
   }
+}
+
+/// What makes a log one that cannot be cut; nothing if it can.
+std::optional<std::string> refusal(const log::FlightLog& log, double length_s) {
+  for (const char* name : {"x_m", "y_m", "z_m", "ax_mps2", "ay_mps2", "az_mps2"})
+    if (!log.has(name)) return ":1: no column '" + std::string(name) + "'; windows need position and acceleration";
+  const auto& t = log.t_s;
+  for (std::size_t i = 1; i < t.size(); ++i)
+    if (!(t[i] > t[i - 1]))
+      return std::string(":").append(std::to_string(i + 2)).append(": t_s does not rise; sort the rows by time");
+  if (t.size() < 2 || t.back() - t.front() < length_s) return ":1: shorter than one window; give a longer flight";
+  return std::nullopt;
+}
+
+/// What stands for the disturbance, and what of it the closed loop swallows.
+void choose_signal(FlightWindows& flight, bool commanded, const std::optional<Vehicle>& vehicle, double tau_w) {
+  flight.attenuation = Vec3::Ones();
+  flight.signal = !vehicle ? Signal::raw : commanded ? Signal::commanded : Signal::divided;
+  if (flight.signal != Signal::divided) return;
+  const auto& c = vehicle->controller;
+  const auto of = [&](double kp, double kd) {
+    return loop_attenuation(kp, kd, c.feedback_delay, c.attitude_lag, tau_w, flight.band);
+  };
+  const double horizontal = of(c.kp.horizontal, c.kd.horizontal);
+  flight.attenuation = {horizontal, horizontal, of(c.kp.vertical, c.kd.vertical)};
+}
+
+/// Windows that gaps between stretches swallowed; mean rate within them, Hz.
+std::pair<std::size_t, double> gaps_and_rate(const std::vector<double>& t, const std::vector<Stretch>& stretches,
+                                             double length_s) {
+  std::size_t lost = 0, intervals = 0;
+  double seconds = 0;
+  for (std::size_t k = 0; k < stretches.size(); ++k) {
+    const auto [begin, end] = stretches[k];
+    for (std::size_t i = begin + 1; i < end; ++i) seconds += t[i] - t[i - 1];
+    intervals += end - begin - 1;
+    if (k > 0)
+      lost += std::max<std::size_t>(1, static_cast<std::size_t>(std::lround((t[begin] - t[begin - 1]) / length_s)));
+  }
+  return {lost, static_cast<double>(intervals) / seconds};
 }
 
 }  // namespace
@@ -127,61 +159,25 @@ const char* to_string(Signal signal) noexcept {
 tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& log,
                                                           const std::optional<Vehicle>& vehicle,
                                                           const WindowOptions& options, const std::string& path) {
-  const auto bad = [&](const std::string& what) {
-    return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, std::string(path).append(what)});
-  };
-  for (const char* name : {"x_m", "y_m", "z_m", "ax_mps2", "ay_mps2", "az_mps2"}) {
-    if (!log.has(name)) return bad(":1: no column '" + std::string(name) + "'; windows need position and acceleration");
-  }
-  const auto& t = log.t_s;
-  for (std::size_t i = 1; i < t.size(); ++i) {
-    if (!(t[i] > t[i - 1]))
-      return bad(std::string(":").append(std::to_string(i + 2)).append(": t_s does not rise; sort the rows by time"));
-  }
-  if (t.size() < 2 || t.back() - t.front() < options.length_s)
-    return bad(":1: shorter than one window; give a longer flight");
-
+  if (const auto why = refusal(log, options.length_s))
+    return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, path + *why});
+  std::vector<std::size_t> rows(log.t_s.size());
+  std::iota(rows.begin(), rows.end(), std::size_t{0});
+  const LogGates gates(log, std::move(rows), vehicle, options);
+  const auto stretches = unbroken(log.t_s, options);
   FlightWindows flight;
-  Rows spacing;
-  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
-  std::nth_element(spacing.begin(), spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2), spacing.end());
-  const double longest = std::max(0.05, 5 * spacing[spacing.size() / 2]);
-  std::vector<Span> stretches{{0, 1}};
-  double seconds = 0;
-  std::size_t intervals = 0;
-  for (std::size_t i = 1; i < t.size(); ++i) {
-    const double dt = t[i] - t[i - 1];
-    if (dt > longest) {
-      const auto lost = static_cast<std::size_t>(std::lround(dt / options.length_s));
-      flight.gated[static_cast<std::size_t>(Gate::gap)] += std::max<std::size_t>(1, lost);
-      stretches.push_back({i, i});
-    } else {
-      seconds += dt, intervals += 1;
-    }
-    stretches.back().end = i + 1;
-  }
-  flight.rate_hz = static_cast<double>(intervals) / seconds;
+  std::tie(flight.gated[static_cast<std::size_t>(Gate::gap)], flight.rate_hz) =
+      gaps_and_rate(log.t_s, stretches, options.length_s);
   flight.band = options.band.within(flight.rate_hz);
-  flight.attenuation = Vec3::Ones();
-  const bool commanded = has_xyz(log, "cmd_", "_m");
-  flight.signal = !vehicle ? Signal::raw : commanded ? Signal::commanded : Signal::divided;
-  if (flight.signal == Signal::divided) {
-    const auto& c = vehicle->controller;
-    const auto of = [&](double kp, double kd) {
-      return loop_attenuation(kp, kd, c.feedback_delay, c.attitude_lag, options.tau_w, flight.band);
-    };
-    const double horizontal = of(c.kp.horizontal, c.kd.horizontal);
-    flight.attenuation = {horizontal, horizontal, of(c.kp.vertical, c.kd.vertical)};
-  }
+  choose_signal(flight, has_xyz(log, "cmd_", "_m"), vehicle, options.tau_w);
   flight.segments_from_log = log.has("segment");
   if (!log.has("thrust") && !log.has("motor1"))
     flight.not_tested.emplace_back("saturated: no column 'thrust' or 'motor1' … 'motor4'");
-
   int next_segment = 0;
-  for (const auto& rows : stretches) {
-    if (t[rows.end - 1] - t[rows.begin] < options.length_s) continue;
-    cut(even_stretch(log, rows, flight.rate_hz, flight.signal, vehicle, options, next_segment), vehicle, options,
-        flight);
+  for (const Stretch raw : stretches) {
+    if (log.t_s[raw.end - 1] - log.t_s[raw.begin] < options.length_s) continue;
+    const Even e = even_stretch(log, raw, flight.rate_hz, flight.signal, vehicle, options, next_segment);
+    cut(e, log, raw, gates, options, flight);
   }
   return flight;
 }

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "core/log/flight_log.hpp"
-#include "core/study/windows/band.hpp"
-#include "core/study/windows/gate.hpp"
+#include "core/study/windows/gates.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -49,27 +48,16 @@ struct FlightWindows {
   std::vector<Window> windows;
 };
 
-struct WindowOptions {
-  double length_s = 2;            ///< of a window
-  Band band;                      ///< of the variance
-  double tau_w = 0.15;            ///< s, assumed when an attenuation is divided out (Model::bound.tau_w)
-  double settle_s = 1;            ///< at the start of each hover, counted as transit
-  double still_mps = 0.12;        ///< hovers found by themselves are slower than this, averaged over half a second
-  double perched_m = 0.0003;      ///< largest standard deviation of the position of a vehicle that stands
-  double perched_thrust = 0.7;    ///< of the weight
-  double saturated_share = 0.02;  ///< of a window's rows
-};
-
 /// Cuts a flight into gated windows (docs/model.md section 3). Needs x_m y_m z_m and ax_mps2 ay_mps2 az_mps2.
 ///
 ///   w = a − r,  lag·ṙ = u − r,  u = a_cmd(t − latency) + k_p (p_cmd(t − latency) − p(t − delay)) + k_d (v_cmd … − v …)
 ///
 /// with lag, latency and feedback delay of the vehicle file; all zero, this is w = a + k_p e + k_d ė − a_cmd. Rows are
-/// brought to even spacing by linear interpolation between gaps (more than 5 mean periods and 50 ms). Segments come
-/// from the column `segment`, else from the speed of the command (with set-points) or of the vehicle. Windows touch
-/// neither each other nor a gated row; filters run over unbroken stretches of good windows alone. A gated window counts
-/// once, for the first of frozen, perched, saturated that holds. `path` names the log in errors: bad_data, with the
-/// column that is missing, time that does not rise, or a log shorter than a window. O(rows).
+/// brought to even spacing by linear interpolation between gaps. Segments come from the column `segment`, else from the
+/// speed of the command (with set-points) or of the vehicle. Windows touch neither each other nor a gated row; filters
+/// run over unbroken stretches of good windows alone. A gated window counts once, by the first of LogGates that holds.
+/// `path` names the log in errors: bad_data, with the column that is missing, time that does not rise, or a log shorter
+/// than a window. O(rows).
 tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& log,
                                                           const std::optional<Vehicle>& vehicle,
                                                           const WindowOptions& options, const std::string& path);

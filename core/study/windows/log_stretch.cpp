@@ -14,7 +14,7 @@ namespace {
 /// The rows of a log at even times.
 class Resampler {
  public:
-  Resampler(const log::FlightLog& log, Span rows, double rate) : log_(log) {
+  Resampler(const log::FlightLog& log, Stretch rows, double rate) : log_(log) {
     const auto& t = log.t_s;
     const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + 1e-6) + 1;
     std::size_t row = rows.begin;
@@ -91,24 +91,10 @@ std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log
   return w;
 }
 
-/// Rows whose position is exactly that of the row before, at least four and 0.1 s in a row.
-std::vector<char> frozen_rows(const log::FlightLog& log, Span rows) {
-  const Rows &x = log.column("x_m"), &y = log.column("y_m"), &z = log.column("z_m");
-  std::vector<char> frozen(rows.size());
-  for (std::size_t i = rows.begin + 1; i < rows.end;) {
-    std::size_t end = i;
-    while (end < rows.end && x[end] == x[end - 1] && y[end] == y[end - 1] && z[end] == z[end - 1]) ++end;
-    if (end - i >= 3 && log.t_s[end - 1] - log.t_s[i - 1] >= 0.1)
-      std::fill(frozen.begin() + static_cast<std::ptrdiff_t>(i - 1 - rows.begin),
-                frozen.begin() + static_cast<std::ptrdiff_t>(end - rows.begin), char{1});
-    i = std::max(end, i + 1);
-  }
-  return frozen;
-}
-
-/// Hover positions found by the speed, averaged over half a second.
-std::vector<int> found_segments(const std::vector<Vec3>& path, double rate, double still_mps, int& next) {
-  const auto half = static_cast<std::size_t>(std::max(1.0, std::round(0.25 * rate)));
+/// Hover positions found by the speed, averaged over `still_s`.
+std::vector<int> found_segments(const std::vector<Vec3>& path, double rate, double still_mps, double still_s,
+                                int& next) {
+  const auto half = static_cast<std::size_t>(std::max(1.0, std::round(still_s / 2 * rate)));
   std::vector<int> segment(path.size(), -1);
   for (std::size_t k = 0; k < path.size(); ++k) {
     const std::size_t low = k > half ? k - half : 0, high = std::min(k + half, path.size() - 1);
@@ -121,10 +107,10 @@ std::vector<int> found_segments(const std::vector<Vec3>& path, double rate, doub
 
 }  // namespace
 
-Even even_stretch(const log::FlightLog& log, Span raw, double rate, Signal signal,
+Even even_stretch(const log::FlightLog& log, Stretch raw, double rate, Signal signal,
                   const std::optional<Vehicle>& vehicle, const WindowOptions& options, int& next_segment) {
   const Resampler rows(log, raw, rate);
-  Even e{log.t_s[raw.begin], rate, rows.xyz("", "_m"), {}, rows.xyz("a", "_mps2"), {}, {}, {}, {}, {}, {}, {}};
+  Even e{log.t_s[raw.begin], rate, rows.xyz("", "_m"), {}, rows.xyz("a", "_mps2"), {}, {}, {}};
   e.v = has_xyz(log, "v", "_mps") ? rows.xyz("v", "_mps") : differentiated(e.p, rate);
   if (log.has("qw") && log.has("qx") && log.has("qy") && log.has("qz")) {
     for (std::size_t k = 0; k < e.size(); ++k) {
@@ -132,25 +118,13 @@ Even even_stretch(const log::FlightLog& log, Span raw, double rate, Signal signa
       e.q.emplace_back(log.column("qw")[i], log.column("qx")[i], log.column("qy")[i], log.column("qz")[i]);
     }
   }
-  if (log.has("thrust")) e.thrust = rows.column("thrust");
-  for (const char* name : {"thrust", "motor1", "motor2", "motor3", "motor4"}) {
-    if (!log.has(name)) continue;
-    const Rows command = rows.column(name);
-    if (e.fullest.empty()) e.fullest = e.emptiest = command;
-    for (std::size_t k = 0; k < e.size(); ++k) {
-      e.fullest[k] = std::max(e.fullest[k], command[k]);
-      e.emptiest[k] = std::min(e.emptiest[k], command[k]);
-    }
-  }
-  const auto frozen = frozen_rows(log, raw);
-  for (std::size_t k = 0; k < e.size(); ++k) e.frozen.push_back(frozen[rows.nearest(k) - raw.begin]);
   if (log.has("segment")) {
     for (std::size_t k = 0; k < e.size(); ++k)
       e.segment.push_back(static_cast<int>(std::lround(log.column("segment")[rows.nearest(k)])));
   } else {
     const bool commanded = has_xyz(log, "cmd_", "_m");
     e.segment = found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate, commanded ? 0.01 : options.still_mps,
-                               next_segment);
+                               options.still_s, next_segment);
   }
   e.w = signal == Signal::commanded ? beyond_command(e, rows, log, *vehicle) : e.a;
   return e;

@@ -17,23 +17,15 @@ struct Even {
   double t0, rate;
   std::vector<Vec3> p, v, a, w;  ///< w: the disturbance
   std::vector<Eigen::Quaterniond> q;
-  Rows fullest, emptiest, thrust;  ///< largest and smallest rotor command, collective
-  std::vector<int> segment;        ///< −1: transit
-  std::vector<char> frozen;
+  std::vector<int> segment;  ///< −1: transit
   std::size_t size() const { return p.size(); }
-};
-
-/// Half-open range of rows.
-struct Span {
-  std::size_t begin, end;
-  std::size_t size() const { return end - begin; }
 };
 
 bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit);
 
 /// Rows `raw` of a log (no gap inside) at even spacing 1/rate, with the disturbance as `signal` defines it
 /// (flight_windows() has the equation). New hover positions are numbered from `next_segment` on.
-Even even_stretch(const log::FlightLog& log, Span raw, double rate, Signal signal,
+Even even_stretch(const log::FlightLog& log, Stretch raw, double rate, Signal signal,
                   const std::optional<Vehicle>& vehicle, const WindowOptions& options, int& next_segment);
 
 }  // namespace backwash::study

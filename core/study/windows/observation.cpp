@@ -92,8 +92,11 @@ void Observer::add(const log::FlightLog& log) {
   if (s.size() >= kFewest) {
     const auto rotors = rotor_phases(log, s);
     std::vector<Stretch> good;
+    const WindowOptions options;
+    const LogGates gates(log, s.row, vehicle_, options);
     for (const Stretch w : cut(s)) {
-      auto why = gate(s, log, w);
+      auto why = gates(w);
+      if (!why) why = unfit(s, log, w, options);
       if (!why) why = misplaced(s, w);
       if (why)
         ++seen_.gated_out[*why];
@@ -217,7 +220,7 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
     WindowRow& row = seen_.windows.back();
     row.flight = seen_.flights - 1;
     residuals.push_back(put_means(row, s, w));
-    if (!s.a_nominal.empty()) put_delays(row, s, w);
+    if (!s.a_nominal.empty()) put_delays(s, w);
     for (const auto& [channel, value, weight] :
          rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end, row.lines))
       put(channel, value, weight);
@@ -230,7 +233,14 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
   smooth_voltage();
 }
 
+void Observations::group(const std::vector<double>& by_flight) {
+  units = {};
+  for (std::size_t f = 0; f < by_flight.size(); ++f)
+    if (f + 1 == by_flight.size() || by_flight[f + 1] != by_flight[f]) units.first.push_back(first[f + 1]);
+}
+
 Observations Observer::finish() {
+  seen_.units.first = seen_.first;
   follow_thrust();
   settle_commands();
   put_tails();

@@ -89,7 +89,7 @@ struct WindowRow {
   Vec3 sigma;                 ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
-  /// Design of kThrustDelay and kThrustSlope: of (delay, slope).
+  /// Design of kThrustDelay and kThrustSlope, of (delay, slope); 0 where nothing was excited.
   std::array<double, 2> delay_gain{}, slope_gain{};
   std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                ///< (m/s²)²
@@ -98,17 +98,27 @@ struct WindowRow {
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
 };
 
+/// What is left out, flipped and scattered together: one flight, or the flights of one day. first[k]: the window at
+/// which unit k begins; one more at the end.
+struct Units {
+  std::vector<std::size_t> first{0};
+  std::size_t size() const { return first.size() - 1; }
+};
+
 /// All flights of a study as rows of windows, in flight order.
 struct Observations {
   std::size_t flights = 0;
   std::vector<WindowRow> windows;
   std::vector<std::size_t> first;                        ///< window at which each flight begins; one more at the end
+  Units units;                                           ///< flights, or what groups them
   double row_period = 0;                                 ///< s, longest of the flights' mean
   std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
   std::map<Gate, std::size_t, ByName> gated_out;         ///< windows by reason
   std::map<Source, std::string> missing;                 ///< what no flight had, and why: "no battery_v column"
   bool has(Source what) const { return !missing.contains(what); }
   bool measured(Channel c) const;
+  /// Units of neighbouring flights with the same value, one a flight.
+  void group(const std::vector<double>& by_flight);
 };
 
 /// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
@@ -130,7 +140,7 @@ class Observer {
   WindowRow placed(const log::FlightLog& log, const Series& s, Stretch w);
   void look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
   Residual put_means(const WindowRow& row, const Series& s, Stretch w);
-  void put_delays(WindowRow& row, const Series& s, Stretch w);
+  void put_delays(const Series& s, Stretch w);
   void put_command_delay(const Series& s, Stretch w, int from, int to);
   void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
   void put(std::size_t channel, double y, double weight);
@@ -142,6 +152,12 @@ class Observer {
   const Vehicle vehicle_;
   Observations seen_;
   FirstStage thrust_stage_;
+  /// Σ z (level, rate)/√Σz² of a window, z the instrument of the delay and that of the slope.
+  struct ThrustMoments {
+    std::size_t window;
+    std::array<double, 2> delay{}, slope{};
+  };
+  std::vector<ThrustMoments> thrust_moments_;
   std::array<DelayStage, 2> command_stage_;  // level, vertical
   std::vector<Fourth> tails_;                // of every window
   std::set<std::string> ever_;               // columns that some flight had

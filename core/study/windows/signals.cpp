@@ -54,10 +54,6 @@ Spread spread(std::span<const double> x) {
 double ln_bias(double n) { return digamma(n / 2) - std::log(n / 2); }
 double ln_variance(double n) { return trigamma(n / 2); }
 
-double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
-  return rotor_line(x, t, phase).excess;
-}
-
 Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
   constexpr int kBeside = 4;  // on each side, 1 Hz apart from 1.5 Hz on
   using Complex = std::complex<double>;

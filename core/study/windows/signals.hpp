@@ -38,7 +38,5 @@ struct Line {
 };
 /// NaN where sampling folds both harmonics next to 0 or half the rate. `phase`: rad at each sample, `t`: s.
 Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
-/// rotor_line().excess.
-double line_excess(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
 
 }  // namespace backwash::study

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/map/lattice.hpp"
+
 namespace backwash::study {
 
 Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
@@ -43,7 +45,7 @@ bool Surroundings::whole(const Vec3& p_W, const field::Around& around, const std
 }
 
 const Vec3& Surroundings::lattice_ln_sigma(const Index3& at) {
-  auto& stored = lattice_[static_cast<std::size_t>(at.x() + size_.x() * (at.y() + size_.y() * at.z()))];
+  auto& stored = lattice_[map::linear(size_, at)];
   if (!stored) {
     const Variance s = field_->at(low_ + kLattice * at.cast<double>()).sigma();
     stored = Vec3(s.xx, s.yy, s.zz).array().max(1e-9).log().matrix();
@@ -59,14 +61,10 @@ Vec3 Surroundings::sigma(const Vec3& p_W) {
     const Variance s = field_->at(p_W).sigma();
     return {s.xx, s.yy, s.zz};
   }
-  const Vec3 f = q - corner.cast<double>();
   Vec3 ln = Vec3::Zero();
-  for (int n = 0; n < 8; ++n) {
-    const Index3 bit(n & 1, (n >> 1) & 1, n >> 2);
-    double weight = 1;
-    for (int i = 0; i < 3; ++i) weight *= bit[i] ? f[i] : 1 - f[i];
-    if (weight > 1e-9) ln += weight * lattice_ln_sigma(corner + bit);
-  }
+  map::for_corners(q, [&](const Index3& v, const Vec3& share) {
+    if (share.prod() > 1e-9) ln += share.prod() * lattice_ln_sigma(v);
+  });
   return ln.array().exp();
 }
 
