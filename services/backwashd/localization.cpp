@@ -54,29 +54,45 @@ Localization::Localization(const config::Daemon& config, double max_sigma)
   if (told_.child.empty()) told_.child = frames_.body;
 }
 
-tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odometry& m, std::int64_t received_ns) {
+/// Why a message in these frames cannot be placed, or holds its own position for too uncertain; empty: neither.
+std::string Localization::unusable(const dds::Odometry& m) const {
   const std::string frame = text(m.header.frame_id), child = text(m.child_frame_id);
   if (child != told_.child)
-    return wrong_frame("the twist of the odometry", child, "'" + told_.child + "'" + looks_like(frame, child));
+    return wrong_frame("the twist of the odometry", child, "'" + told_.child + "'" + looks_like(frame, child)).value();
   if (frame != frames_.map && frame != frames_.odometry)
     return wrong_frame("the odometry", frame,
-                       "'" + frames_.map + "' or '" + frames_.odometry + "'" + looks_like(frame, child));
+                       "'" + frames_.map + "' or '" + frames_.odometry + "'" + looks_like(frame, child))
+        .value();
   if (frame == frames_.odometry && !map_from_odom_)
-    return tl::unexpected<std::string>("odometry in frame '" + frame + "' before the first loop_closure from it to '" +
-                                       frames_.map + "'");
+    return "odometry in frame '" + frame + "' before the first loop_closure from it to '" + frames_.map + "'";
   const double* covariance = m.pose.covariance;
   const bool unknown = covariance[0] == -1 || (covariance[0] == 0 && covariance[7] == 0 && covariance[14] == 0);
-  if (!unknown) {
-    const double worst = std::max({covariance[0], covariance[7], covariance[14]});
-    if (!(covariance[0] >= 0 && covariance[7] >= 0 && covariance[14] >= 0 && worst <= max_sigma_ * max_sigma_))
-      return tl::unexpected<std::string>(
-          "the odometry's own position error is above the vehicle's estimation.position of " +
-          std::to_string(max_sigma_) + " m");
-  }
-  const auto& p = m.pose.pose.position;
-  const auto& q = m.pose.pose.orientation;
+  const double worst = std::max({covariance[0], covariance[7], covariance[14]});
+  if (!unknown &&
+      !(covariance[0] >= 0 && covariance[7] >= 0 && covariance[14] >= 0 && worst <= max_sigma_ * max_sigma_))
+    return "the odometry's own position error is above the vehicle's estimation.position of " +
+           std::to_string(max_sigma_) + " m";
+  return {};
+}
+
+/// The body's velocity in the frame of the pose. `attitude`: the sensor's; `lever`: from the body to the sensor.
+/// Nothing: it comes from poses, of which too few are known yet.
+std::optional<Vec3> Localization::velocity(const dds::Odometry& m, std::int64_t stamp_ns, const Vec3& p_W,
+                                           const Eigen::Quaterniond& attitude, const Vec3& lever) {
+  if (told_.twist == config::Twist::none) return within(p_W, kFarthest) ? velocity_.add(stamp_ns, p_W) : Vec3::Zero();
   const auto& v = m.twist.twist.linear;
   const auto& w = m.twist.twist.angular;
+  const bool in_body = told_.twist == config::Twist::body;
+  const Vec3 linear(v.x, v.y, v.z), angular(w.x, w.y, w.z);
+  Vec3 v_W = in_body ? attitude * linear : linear;
+  if (!lever.isZero(0)) v_W -= (in_body ? attitude * angular : angular).cross(lever);
+  return v_W;
+}
+
+tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odometry& m, std::int64_t received_ns) {
+  if (std::string why = unusable(m); !why.empty()) return tl::unexpected<std::string>(std::move(why));
+  const auto& p = m.pose.pose.position;
+  const auto& q = m.pose.pose.orientation;
   OdometrySample s;
   s.received_ns = received_ns;
   s.stamp_ns = dds::nanoseconds(m.header.stamp);
@@ -90,18 +106,11 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
   Eigen::Quaterniond attitude = sensor * body_from_sensor_.conjugate();
   const Vec3 lever = attitude * told_.sensor_B;
   s.state.p_W = Vec3(p.x, p.y, p.z) - lever;
-  if (told_.twist == config::Twist::none) {
-    const auto velocity = within(s.state.p_W, kFarthest) ? velocity_.add(s.stamp_ns, s.state.p_W) : Vec3::Zero();
-    if (!velocity)
-      return tl::unexpected<std::string>("the velocity is not known yet: it comes from the poses of the last 0.2 s");
-    s.state.v_W = *velocity;
-  } else {
-    const bool in_body = told_.twist == config::Twist::body;
-    const Vec3 linear(v.x, v.y, v.z), angular(w.x, w.y, w.z);
-    s.state.v_W = in_body ? sensor * linear : linear;
-    if (!lever.isZero(0)) s.state.v_W -= (in_body ? sensor * angular : angular).cross(lever);
-  }
-  if (frame == frames_.odometry) {
+  const auto v_W = velocity(m, s.stamp_ns, s.state.p_W, sensor, lever);
+  if (!v_W)
+    return tl::unexpected<std::string>("the velocity is not known yet: it comes from the poses of the last 0.2 s");
+  s.state.v_W = *v_W;
+  if (text(m.header.frame_id) == frames_.odometry) {
     s.map_from_odom = *map_from_odom_;
     s.closures = closures_;
     s.state = map_from_odom_->state(s.state);

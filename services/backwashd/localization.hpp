@@ -35,6 +35,10 @@ class Localization {
   const std::optional<track::RigidShift>& map_from_odom() const noexcept { return map_from_odom_; }
 
  private:
+  std::string unusable(const dds::Odometry& message) const;
+  std::optional<Vec3> velocity(const dds::Odometry& message, std::int64_t stamp_ns, const Vec3& p_W,
+                               const Eigen::Quaterniond& attitude, const Vec3& lever);
+
   decltype(config::Daemon::frames) frames_;
   config::Daemon::Odometry told_;
   Eigen::Quaterniond body_from_sensor_;

@@ -263,6 +263,8 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
     add_guards(next, *world_);
     if (offer(std::move(next))) return std::nullopt;
   }
+  if (view_.mode == track::Mode::hold)
+    return "nothing flies out of the hold for its cause: " + std::string(to_string(view_.reason));
   return "the vehicle is not still enough to start: its state left the first set each time";
 }
 

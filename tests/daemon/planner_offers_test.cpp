@@ -135,6 +135,19 @@ TEST_F(PlannerOffers, NoFlightWhoseTubeFromTheNewestStateIsNotClear) {
 }
 
 // The control thread refuses the first offer: the next one is made only if nothing has ended the plan meanwhile.
+TEST_F(PlannerOffers, WhereTheCauseOfAHoldLastsThatIsWhyNothingFlies) {
+  for (const bool held : {false, true}) {
+    stand({1.05, 2.05, 1.05});
+    know(room());
+    view_.mode = held ? track::Mode::hold : track::Mode::tracking;
+    view_.reason = held ? track::Reason::frames_apart : track::Reason::autopilot_follows;
+    show();
+    answer_ = [&](const auto& s) { view_.refused_segment = s.id; };
+    const std::string why = ask(PlanJob::Kind::go_to, {2.05, 2.05, 1.05});
+    EXPECT_NE(why.find(held ? to_string(track::Reason::frames_apart) : "not still enough"), std::string::npos) << why;
+  }
+}
+
 TEST_F(PlannerOffers, NothingMoreOnceALaterOrderOrALoopClosureCameBetweenTwoOffers) {
   for (const bool closure : {false, true}) {
     offers_.clear();
