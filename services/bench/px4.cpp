@@ -199,7 +199,9 @@ class Px4 : public Firmware {
     was_lost_ = lost();
     const bool bereft = failed(t);
     if (flying && bereft && mode_ == offboard) change(land, true);
-    if (flying && mode_ == offboard && !streaming(t)) change(parameter("COM_OBL_RC_ACT") == 4 ? land : position, true);
+    // 5, hold, lands too: without a global position there is no AUTO.LOITER, px4-loss0.3hold.csv.
+    const double without = parameter("COM_OBL_RC_ACT");
+    if (flying && mode_ == offboard && !streaming(t)) change(without == 4 || without == 5 ? land : position, true);
     // What was lost is back: it goes back to offboard by itself, and may take off again: px4-vio.csv:244–276.
     if (armed_ && failsafe_ && !lost() && !bereft && streaming(t)) change(offboard, false);
     settle(t);

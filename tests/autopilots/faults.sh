@@ -29,7 +29,8 @@ fi
 source "$root/tests/autopilots/flight.sh"
 
 # What the autopilot is set to for a fault. The pilot's switch brings a mode that holds the position: ArduCopter's sixth (LOITER),
-# PX4's POSCTL, which needs sticks (its AUTO.LOITER is refused without a global position).
+# PX4's POSCTL, which needs sticks (its AUTO.LOITER is refused without a global position). Others: SETTINGS=FLTMODE6=17,
+# PILOT_MODE=auto:land.
 case $kind/$fault in
   ardupilot/pilot) SETTINGS=${SETTINGS:-FLTMODE6=5} ;;
   ardupilot/battery) SETTINGS=${SETTINGS:-BATT_LOW_VOLT=10.5 BATT_LOW_TIMER=1 BATT_FS_LOW_ACT=1} ;;
@@ -118,7 +119,7 @@ inject() {
       ;;
     pilot)
       if [[ $kind == px4 ]]; then
-        "$path/bin/px4-commander" mode posctl >>"$log" 2>&1
+        "$path/bin/px4-commander" mode "${PILOT_MODE:-posctl}" >>"$log" 2>&1
       else
         echo 1900 >"$work/switch"
       fi

@@ -111,6 +111,13 @@ TEST(Px4Profile, AnswersParametersByTheirBytesAndUnknownOnesNot) {
 
 TEST(Px4Profile, RunsOutWithItsTimeoutOf1s) { compare_run_out(px4("loss", "loss1")); }
 TEST(Px4Profile, RunsOutWithATimeoutOf03s) { compare_run_out(px4("loss", "loss0.3", {{"COM_OF_LOSS_T", 0.3}})); }
+// It is allowed by enable as a hold, and lands: there is no global position.
+TEST(Px4Profile, RunsOutAndLandsWhereItShallHold) {
+  const Pair p = px4("loss", "loss0.3hold", {{"COM_OF_LOSS_T", 0.3}, {"COM_OBL_RC_ACT", 5}});
+  compare_run_out(p);
+  compare(p, "AUTO.LAND in HEARTBEAT, s", 1.0, heartbeat_after("stream off", kLand));
+  compare(p, "descends, s", 0.5, descends_after("stream off"));
+}
 TEST(Px4Profile, RunsOutAndSinksInPositionMode) {
   compare_run_out(px4("loss", "loss0.3pos", {{"COM_OF_LOSS_T", 0.3}, {"COM_OBL_RC_ACT", 0}}));
 }
