@@ -2,7 +2,9 @@
 #include "core/field/kernels.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <numbers>
 
 // Loaders that call a resolver before a sanitizer has started would crash.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -66,10 +68,34 @@ BACKWASH_CLONES
 void see_stack(const Stack& stack, int first, int last, double* wall, double* seen) noexcept {
   const int end = stack.wall_range + 1, from = stack.from, to = stack.to, range = stack.range;
   const double* decay = stack.decay;
+  if (from == to) {  // most segments of crooked walls
+    for (int z = first; z <= last; ++z)
+      wall[z] = z >= from && z < from + end ? decay[z - from + 1] - decay[z - from] : 0;
+    for (int z = first; z <= last; ++z) seen[z] = z >= from - range && z <= from + range ? 1 : 0;
+    return;
+  }
   for (int z = first; z <= last; ++z) {
     const int farthest = std::min(std::max(z - from + 1, 0), end), nearest = std::min(std::max(z - to, 0), end);
     wall[z] = decay[farthest] - decay[nearest];
     seen[z] = std::max(0, std::min(to, z + range) - std::max(from, z - range) + 1);
+  }
+}
+
+BACKWASH_CLONES
+void scale_by_corner(const CornerLine& line, int first, int count, double* factors) noexcept {
+  // atan x over −1 ≤ x ≤ 1 to 2e-8: Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.49.
+  constexpr float k2 = -0.3333314528F, k4 = 0.1999355085F, k6 = -0.1420889944F, k8 = 0.1065626393F,
+                  k10 = -0.0752896400F, k12 = 0.0429096138F, k14 = -0.0161657367F, k16 = 0.0028662257F;
+  constexpr float kPi = std::numbers::pi_v<float>;
+  const auto a = static_cast<float>(line.voxel_edge), d2 = static_cast<float>(line.d2), d = std::sqrt(d2);
+  const auto phi_max = static_cast<float>(line.phi_max);
+  const float least = a * a * a * a * a * a / 64;
+  for (int n = 0; n < count; ++n) {
+    const float h = a * (static_cast<float>(first + n) - 0.5F), height = std::abs(h), h2 = h * h;
+    const float x = (d - height) / (d + height), x2 = x * x;
+    const float series = k2 + x2 * (k4 + x2 * (k6 + x2 * (k8 + x2 * (k10 + x2 * (k12 + x2 * (k14 + x2 * k16))))));
+    const float acute = kPi / 4 + x + x * x2 * series, phi = h > 0 ? acute : kPi - acute;
+    factors[n] *= static_cast<double>(std::max(phi_max - phi, 0.0F) / std::max(d2 + h2 * h2 * h2, least));
   }
 }
 

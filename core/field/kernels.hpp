@@ -26,6 +26,13 @@ struct Stack {
 /// Real-time: wait-free, no allocation.
 void see_stack(const Stack& stack, int first, int last, double* wall, double* seen) noexcept;
 
+/// factors[n] times (φ̄_c − φ)/(d_c² + h_c⁶) at the heights h_c = a (up − 1/2), up = first … first + count − 1: what
+/// ProximityModel::corner_factor() gives within its gates, to 1e-6 or better. Real-time: wait-free, no allocation.
+struct CornerLine {
+  double voxel_edge, d2, phi_max;
+};
+void scale_by_corner(const CornerLine& line, int first, int count, double* factors) noexcept;
+
 /// sums[z] += wall_term · wall[z] + corner_term · corner[z] per component for first ≤ z ≤ last.
 /// Real-time: wait-free, no allocation.
 struct Factors {
