@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -37,12 +38,12 @@ LateralColumns::LateralColumns(const map::OccupancyGrid& grid, const Model& mode
 
 void LateralColumns::add_segments() {
   struct Piece {
-    int y, x;
+    int y, x, sector;
     Direction direction;
     int z, floor;
     Vec3 normal;
     double area;
-    auto key() const { return std::tie(y, x, direction, z); }
+    auto key() const { return std::tie(y, x, sector, direction, z); }
   };
   const double a = grid_->resolution();
   std::vector<Piece> pieces;
@@ -51,7 +52,8 @@ void LateralColumns::add_segments() {
     const Index3 v = grid_->index(e.c_W - 0.5 * a * e.normal);
     const int floor =
         e.corner_W ? static_cast<int>(std::lround((e.corner_W->z() - grid_->origin().z()) / a)) - 1 : kNoFloor;
-    pieces.push_back({v.y(), v.x(), {e.normal.x(), e.normal.y()}, v.z(), floor, e.normal, e.area});
+    const int sector = sector_of(e.normal.x(), e.normal.y(), kSectors);
+    pieces.push_back({v.y(), v.x(), sector, {e.normal.x(), e.normal.y()}, v.z(), floor, e.normal, e.area});
   }
   std::ranges::sort(pieces, [](const Piece& p, const Piece& q) { return p.key() < q.key(); });
   const auto nx = static_cast<std::size_t>(grid_->size().x()), ny = static_cast<std::size_t>(grid_->size().y());
@@ -72,29 +74,29 @@ void LateralColumns::add_segments() {
                     static_cast<float>(t.zz)};
     };
     const auto z = static_cast<std::int16_t>(p.z), floor = static_cast<std::int16_t>(p.floor);
-    segments_.push_back(
-        {p.normal.x(), p.normal.y(), about(model_.wall.k1), about(model_.corner.lambda), p.x, p.y, z, z, floor, 0});
+    segments_.push_back({p.normal.x(), p.normal.y(), about(model_.wall.k1), about(model_.corner.lambda), p.x, p.y, z, z,
+                         floor, static_cast<std::int16_t>(p.sector)});
     ++column_first_[static_cast<std::size_t>(p.y) * nx + static_cast<std::size_t>(p.x) + 1];
   }
   for (std::size_t n = 1; n < column_first_.size(); ++n) column_first_[n] += column_first_[n - 1];
 }
 
-/// The normals of each sector of the circle; numbers the segments' bundles.
+/// The normals of each sector of the circle that has any; segments, numbered by sectors, get the numbers of bundles.
 std::vector<SightLines::Bundle> LateralColumns::bundle_normals() {
-  std::vector<SightLines::Bundle> bundles;
-  std::array<std::int16_t, kSectors> number;
-  number.fill(-1);
-  for (Segment& s : segments_) {
-    auto& here = number[static_cast<std::size_t>(sector_of(s.m_x, s.m_y, kSectors))];
-    if (here < 0) {
-      here = static_cast<std::int16_t>(bundles.size());
-      bundles.push_back({{s.m_x, s.m_y}, {s.m_x, s.m_y}});
-    }
-    s.bundle = here;
-    auto& [low, high] = bundles[static_cast<std::size_t>(here)];
+  std::map<std::int16_t, SightLines::Bundle> of_sector;
+  for (const Segment& s : segments_) {
+    auto& [low, high] =
+        of_sector.try_emplace(s.bundle, SightLines::Bundle{{s.m_x, s.m_y}, {s.m_x, s.m_y}}).first->second;
     low = {std::min(low[0], s.m_x), std::min(low[1], s.m_y)};
     high = {std::max(high[0], s.m_x), std::max(high[1], s.m_y)};
   }
+  std::vector<SightLines::Bundle> bundles;
+  std::array<std::int16_t, kSectors> number{};
+  for (const auto& [sector, bundle] : of_sector) {
+    number[static_cast<std::size_t>(sector)] = static_cast<std::int16_t>(bundles.size());
+    bundles.push_back(bundle);
+  }
+  for (Segment& s : segments_) s.bundle = number[static_cast<std::size_t>(s.bundle)];
   return bundles;
 }
 
@@ -102,11 +104,14 @@ void LateralColumns::add_tables() {
   constexpr double kSteps = 0x1p40;
   const double a = grid_->resolution(), a2 = a * a;
   decay_.push_back(0);
+  step_.assign(kLayers, 0);
   for (int n = 0; n <= radius_ + 1; ++n) {
-    decay_.push_back(decay_.back() + std::round(kSteps * std::exp(-model_.wall.k2 * a2 * n * n)) / kSteps);
+    step_.push_back(std::round(kSteps * std::exp(-model_.wall.k2 * a2 * n * n)) / kSteps);
+    decay_.push_back(decay_.back() + step_.back());
     const auto gate = terms_.wall_gate(-a * n);
     wall_low_.push_back(gate.low - a2 * n * n), wall_high_.push_back(gate.high - a2 * n * n);
   }
+  step_.resize(step_.size() + kLayers, 0);
   const double phi_max = model_.corner.phi_max;
   cot_phi_max_ = phi_max < std::numbers::pi / 2 ? 1 / std::tan(phi_max) : 0;
   const auto count = static_cast<std::size_t>(range2_) + 2;

@@ -47,8 +47,8 @@ class LateralColumns {
     std::int16_t bundle;     ///< of its normal, in lines_
   };
   static constexpr int kNoFloor = -1;
-  static constexpr int kSectors = 16;  ///< of the circle: the normals of each are a bundle
-  static constexpr int kWindow = 64;   ///< most columns along x in a block
+  static constexpr int kSectors = 8;  ///< of the circle: the normals of each are a bundle
+  static constexpr int kWindow = 64;  ///< most columns along x in a block
 
   void add_segments();
   std::vector<SightLines::Bundle> bundle_normals();
@@ -61,10 +61,11 @@ class LateralColumns {
   double range2_;                            ///< (l̄_w/a)² and a little, voxel edges²
   int radius_;                               ///< of the columns' surroundings, voxels
   int pitch_;                                ///< columns in a row of a block's window
-  std::vector<Segment> segments_;            ///< row by row, then by x, then by normal, then by height
+  std::vector<Segment> segments_;            ///< row by row, then by x, sector, normal and height
   std::vector<std::uint32_t> column_first_;  ///< of the segments, per column
   SightLines lines_;
   std::vector<double> decay_;  ///< [n]: Σ exp(−k_w2 a² i²) over i < n, in multiples of 2⁻⁴⁰: sums are exact
+  std::vector<double> step_;   ///< [kLayers + n]: exp(−k_w2 a² n²), the same; 0 for n < 0 or beyond the range
   std::vector<double> wall_low_, wall_high_;  ///< limits of d_c² for the wall term n voxels below, m²
   struct Reach {
     int range;       ///< |z_e − z_q| at most, voxels: the gate |r| ≤ l̄_w

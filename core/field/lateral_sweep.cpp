@@ -13,6 +13,7 @@ namespace backwash::field {
 namespace {
 
 constexpr double kInPlane = 1e-9;  // m: a point in an element's own plane does not see it, whatever the rounding
+constexpr int kFar = 1000;         // layers: farther than anything in a window
 
 /// A word moved up by n bits, down if n < 0; |n| ≥ 64 leaves nothing.
 std::uint64_t moved(std::uint64_t word, int n) noexcept {
@@ -44,6 +45,7 @@ void LateralSweep::add(int x, int y, std::uint64_t targets, LateralColumns::Sums
   if (!targets) return;
   x_ = x, y_ = y;
   home_ = window_.data() + static_cast<std::ptrdiff_t>(y - first_y_) * columns_.pitch_ + (x - first_x_);
+  line_ = nullptr;
   const int radius = columns_.radius_;
   const Index3& size = columns_.grid_->size();
   const int low = first_z_ + std::countr_zero(targets) - radius,
@@ -83,6 +85,7 @@ bool LateralSweep::meet(const Segment& segment, std::uint64_t targets, View& vie
   if (view.wall_range < 0) low = std::max(low, floor + view.first_up), high = std::min(high, floor + view.last_up);
   if (view.wall_range < 0 && !corners) return false;
   view.targets = targets & bits(low, high);
+  view.with_corner = corners ? bits(floor + view.first_up, floor + view.last_up) : 0;
   if (!view.targets) return false;
   view.low = std::countr_zero(view.targets), view.high = 63 - std::countl_zero(view.targets);
   view.from = std::max(z_low, view.low - down), view.to = std::min(z_high, view.high + up);
@@ -106,87 +109,99 @@ void LateralSweep::add_corner(View& view) const noexcept {
   while (view.first_up <= view.last_up && !inside(view.last_up)) --view.last_up;
 }
 
+/// Takes the columns in hand that the lines to a segment cross; those of the last segment often do.
+void LateralSweep::look_along(const SightLines::Line& line) {
+  if (line_ == &line) return;
+  line_ = &line;
+  const auto crossings = columns_.lines_.crossings(line);
+  if (crossed_.size() < crossings.size()) crossed_.resize(crossings.size()), hiding_.resize(crossings.size());
+  all_ = 0;
+  for (std::size_t n = 0; n < crossings.size(); ++n)
+    all_ |= crossed_[n] = home_[static_cast<std::ptrdiff_t>(crossings[n].y) * columns_.pitch_ + crossings[n].x];
+}
+
 /// The free heights that all crossed columns have in common; false if every element is hidden from every target.
-bool LateralSweep::common_stretch(const View& view, Stretch& stretch) const noexcept {
+bool LateralSweep::common_stretch(const View& view, Stretch& stretch) {
   const int low = std::min(view.low, view.from) + kBelow, high = std::max(view.high, view.to) + kBelow;
-  stretch = {-1000, 1000};
-  if (low < 0 || high > 127) {  // beyond the window: all of it uncertain
-    stretch = {0, 0};
-    return true;
-  }
-  const Layers band = ~Layers{0} >> (127 - high + low) << low;
-  const auto crossings = columns_.lines_.crossings(*view.line);
-  Layers all = 0;
-  std::size_t n = 0;
-  for (; n < view.line->must; ++n) {
-    const Layers column = occupied(crossings[n]);
-    if ((column & band) == band) return false;
-    all |= column;
-  }
-  for (; n < crossings.size(); ++n) all |= occupied(crossings[n]);
-  all &= band;
+  const bool inside = low >= 0 && high <= 127;  // else all of it is uncertain
+  stretch = inside ? Stretch{-kFar, kFar} : Stretch{0, 0};
+  const Layers band = inside ? ~Layers{0} >> (127 - high + low) << low : ~Layers{0}, all = all_ & band;
+  hiding_count_ = 0;
   if (all == 0) return true;
+  for (std::size_t n = 0; inside && n < line_->must; ++n)
+    if ((crossed_[n] & band) == band) return false;
+  const auto crossings = columns_.lines_.crossings(*line_);
+  for (std::size_t n = 0; n < crossings.size(); ++n) {
+    hiding_[hiding_count_] = {crossings[n], crossed_[n]};
+    hiding_count_ += (crossed_[n] & band) != 0 ? 1 : 0;
+  }
+  if (!inside) return true;
   const int middle = std::clamp((view.low + view.high) / 2, view.from, view.to) + kBelow;
   const auto highest_below = [](std::uint64_t upper, std::uint64_t lower) {
-    return upper ? 127 - std::countl_zero(upper) : lower ? 63 - std::countl_zero(lower) : -1000;
+    return upper ? 127 - std::countl_zero(upper) : lower ? 63 - std::countl_zero(lower) : -kFar;
   };
   const Layers under = all & ((Layers{1} << middle) - 1), over = all >> middle << middle;
   const auto low_part = static_cast<std::uint64_t>(over), high_part = static_cast<std::uint64_t>(over >> 64);
   stretch.below = highest_below(static_cast<std::uint64_t>(under >> 64), static_cast<std::uint64_t>(under)) - kBelow;
-  stretch.above = (low_part    ? std::countr_zero(low_part)
-                   : high_part ? 64 + std::countr_zero(high_part)
-                               : 1000) -
-                  kBelow;
+  const int above = low_part ? std::countr_zero(low_part) : high_part ? 64 + std::countr_zero(high_part) : kFar;
+  stretch.above = above - kBelow;
   return true;
 }
 
 void LateralSweep::add(const Segment& segment, std::uint64_t targets, LateralColumns::Sums& sums) {
   View view;
   if (!meet(segment, targets, view)) return;
-  view.line = &columns_.lines_.at(segment.bundle, segment.x - x_, segment.y - y_);
+  look_along(columns_.lines_.at(segment.bundle, segment.x - x_, segment.y - y_));
   Stretch stretch;
   if (!common_stretch(view, stretch)) return;
+  const double decay = std::exp(-columns_.model_.wall.k2 * view.d2);
+  const auto &w = segment.wall, &c = segment.corner;
+  const LateralTerms terms{{decay * w.xx, decay * w.xy, decay * w.yy, decay * w.zz},
+                           {c.xx, c.xy, c.yy, c.zz},
+                           columns_.grid_->resolution(),
+                           view.d2,
+                           columns_.model_.corner.phi_max,
+                           segment.floor - first_z_};
+  const LateralSums out{sums.xx.data(), sums.xy.data(), sums.yy.data(), sums.zz.data()};
+  const std::uint64_t certain = bits(stretch.below + 1, stretch.above - 1);
+  if (segment.low == segment.high) {  // most segments of crooked walls
+    const int z = view.from;
+    const bool inside = z > stretch.below && z < stretch.above;
+    std::uint64_t seen = in_range(view, z);
+    if (const std::uint64_t open = inside ? seen & ~certain : seen) seen = (seen & ~open) | seen_from(view, z, open);
+    if (seen)
+      add_element(terms, columns_.step_.data() + columns_.kLayers - z, seen & bits(z, z + view.wall_range),
+                  seen & view.with_corner, out);
+    return;
+  }
   const int begin = view.low, end = view.high;
+  std::fill(wall_.begin() + begin, wall_.begin() + end + 1, 0);
+  std::fill(seen_.begin() + begin, seen_.begin() + end + 1, 0);
   const int from = std::max(view.from, stretch.below + 1), to = std::min(view.to, stretch.above - 1);
   const int first = std::max(begin, stretch.below + 1), last = std::min(end, stretch.above - 1);
-  const bool certain = from <= to && first == begin && last == end;
-  if (!certain) {
-    std::fill(wall_.begin() + begin, wall_.begin() + end + 1, 0);
-    std::fill(seen_.begin() + begin, seen_.begin() + end + 1, 0);
-  }
   if (from <= to)
     see_stack({from, to, view.wall_range, view.range, columns_.decay_.data()}, first, last, wall_.data(), seen_.data());
-  if (!certain || from > view.from || to < view.to) add_uncertain(view, stretch);
+  if (from > view.from || to < view.to || first > begin || last < end) add_uncertain(view, stretch);
+  add_stack(terms, begin, end, view.with_corner, wall_.data(), seen_.data(), out);
+}
 
-  const auto &w = segment.wall, &c = segment.corner;
-  const int floor = segment.floor - first_z_;
-  const int corner_begin = std::clamp(floor + view.first_up, begin, end + 1);
-  const int corner_end = std::clamp(floor + view.last_up + 1, corner_begin, end + 1);
-  std::fill(seen_.begin() + begin, seen_.begin() + corner_begin, 0);
-  std::fill(seen_.begin() + corner_end, seen_.begin() + end + 1, 0);
-  if (corner_begin < corner_end)
-    scale_by_corner({columns_.grid_->resolution(), view.d2, columns_.model_.corner.phi_max}, corner_begin - floor,
-                    corner_end - corner_begin, seen_.data() + corner_begin);
-  const double decay = std::exp(-columns_.model_.wall.k2 * view.d2);
-  add_terms({decay * w.xx, decay * w.xy, decay * w.yy, decay * w.zz}, {c.xx, c.xy, c.yy, c.zz}, wall_.data(),
-            seen_.data(), begin, end, sums.xx.data(), sums.xy.data(), sums.yy.data(), sums.zz.data());
+/// Targets at which the gates leave a term of the element at height z.
+std::uint64_t LateralSweep::in_range(const View& view, int z) noexcept {
+  return view.targets & (bits(z, z + view.wall_range) | (view.with_corner & bits(z - view.range, z + view.range)));
 }
 
 /// Adds to wall_ and seen_ what does not lie in the common stretch of free heights at both ends.
 void LateralSweep::add_uncertain(const View& view, const Stretch& stretch) noexcept {
   const std::uint64_t certain = bits(stretch.below + 1, stretch.above - 1);
-  const int floor = view.segment->floor - first_z_;
-  const std::uint64_t with_corner =
-      view.first_up <= view.last_up ? bits(floor + view.first_up, floor + view.last_up) : 0;
   for (int z = view.from; z <= view.to; ++z) {
-    std::uint64_t lanes =
-        view.targets & (bits(z, z + view.wall_range) | (with_corner & bits(z - view.range, z + view.range)));
+    std::uint64_t lanes = in_range(view, z);
     if (z > stretch.below && z < stretch.above) lanes &= ~certain;
     if (!lanes) continue;
     for (lanes = seen_from(view, z, lanes); lanes; lanes &= lanes - 1) {
       const int n = std::countr_zero(lanes);
-      const auto at = static_cast<std::size_t>(n), above = static_cast<std::size_t>(n - z);
-      if (n >= z && n - z <= view.wall_range) wall_[at] += columns_.decay_[above + 1] - columns_.decay_[above];
+      const auto at = static_cast<std::size_t>(n);
+      if (n >= z && n - z <= view.wall_range)
+        wall_[at] += columns_.step_[static_cast<std::size_t>(n - z + columns_.kLayers)];
       seen_[at] += 1;
     }
   }
@@ -198,13 +213,12 @@ std::uint64_t LateralSweep::seen_from(const View& view, int z, std::uint64_t tar
   constexpr int kCentre = LineFromAbove::kCentre;
   const int up = kCentre - z, down = z - kCentre + kBelow;
   std::uint64_t open = moved(targets, up);
-  if (moved(open, -up) != targets || down < -kBelow || down > 96) return looked_at(view, z, targets);
+  if (moved(open, -up) != targets) return looked_at(view, z, targets);
   const int low = std::min(std::countr_zero(open), kCentre), high = std::max(63 - std::countl_zero(open), kCentre);
   const std::uint64_t band = bits(low, high);
   const Segment& s = *view.segment;
   LineFromAbove line(s.x - x_ + 0.5 * s.m_x, s.y - y_ + 0.5 * s.m_y, view.range);
-  for (const ColumnOffset& crossing : columns_.lines_.crossings(*view.line)) {
-    const Layers column = occupied(crossing);
+  for (const auto& [crossing, column] : std::span(hiding_).first(hiding_count_)) {
     std::uint64_t inside = static_cast<std::uint64_t>(down >= 0 ? column >> down : column << -down) & band;
     if (!inside || !line.cross(crossing)) continue;
     while (inside) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/field/lateral_columns.hpp"
@@ -32,31 +33,34 @@ class LateralSweep {
   /// A segment as seen from the column in hand; heights count from first_z.
   struct View : LateralColumns::Reach {
     const Segment* segment;
-    const SightLines::Line* line;
-    double d2;              ///< d_c², m²
-    int first_up, last_up;  ///< heights above the floor's voxel that may have a corner term
-    int from, to;           ///< elements
-    std::uint64_t targets;
-    int low, high;  ///< first and last target
+    double d2;                           ///< d_c², m²
+    int first_up, last_up;               ///< heights above the floor's voxel that may have a corner term
+    int from, to;                        ///< elements
+    std::uint64_t targets, with_corner;  ///< with_corner: heights that may have a corner term
+    int low, high;                       ///< first and last target
   };
 
-  Layers occupied(const ColumnOffset& column) const noexcept {
-    return home_[static_cast<std::ptrdiff_t>(column.y) * columns_.pitch_ + column.x];
-  }
   void add(const Segment& segment, std::uint64_t targets, LateralColumns::Sums& sums);
   bool meet(const Segment& segment, std::uint64_t targets, View& view) const noexcept;
   void add_corner(View& view) const noexcept;
-  bool common_stretch(const View& view, Stretch& stretch) const noexcept;
+  void look_along(const SightLines::Line& line);
+  bool common_stretch(const View& view, Stretch& stretch);
+  static std::uint64_t in_range(const View& view, int z) noexcept;
   void add_uncertain(const View& view, const Stretch& stretch) noexcept;
   std::uint64_t seen_from(const View& view, int z, std::uint64_t targets) const noexcept;
   std::uint64_t looked_at(const View& view, int z, std::uint64_t targets) const noexcept;
 
   const LateralColumns& columns_;
-  int first_x_ = 0, first_y_ = 0, first_z_ = 0;  ///< of the window and the layers
-  int x_ = 0, y_ = 0;                            ///< the column in hand
-  const Layers* home_ = nullptr;                 ///< the same, in the window
-  std::vector<Layers> window_;                   ///< occupied voxels
-  std::vector<const Segment*> near_;
+  int first_x_ = 0, first_y_ = 0, first_z_ = 0;          ///< of the window and the layers
+  int x_ = 0, y_ = 0;                                    ///< the column in hand
+  const Layers* home_ = nullptr;                         ///< the same, in the window
+  std::vector<Layers> window_;                           ///< occupied voxels
+  std::vector<const Segment*> near_;                     ///< segments of one row that may have a term
+  const SightLines::Line* line_ = nullptr;               ///< to the segment in hand
+  std::vector<Layers> crossed_;                          ///< the columns that it crosses
+  Layers all_ = 0;                                       ///< what is occupied in any of them
+  std::vector<std::pair<ColumnOffset, Layers>> hiding_;  ///< those that are not empty at the heights in question
+  std::size_t hiding_count_ = 0;
   std::array<double, LateralColumns::kLayers> wall_{}, seen_{};  ///< per layer: Σ exp(−k_w2 a² n²), number of elements
 };
 

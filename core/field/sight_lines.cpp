@@ -43,10 +43,6 @@ void SightLines::make(const Bundle& bundle, int dx, int dy, Line& line) {
   const std::size_t lead = std::abs(dx) >= std::abs(dy) ? 0 : 1;
   made_.clear();
   for (int s = std::max(std::abs(dx), std::abs(dy)); s >= 0; --s) add_slab(c[lead], c[1 - lead], s);
-  // A column is crossed by every line if what is left behind it is longer than 2 even in the shortest one.
-  const double shortest2 = c[0][0] * c[0][0] + c[1][0] * c[1][0];
-  if (shortest2 <= (2 + kTouch) * (2 + kTouch))
-    for (Crossing& crossing : made_) crossing.must = false;
   std::ranges::stable_partition(made_, &Crossing::must);
   line.first = static_cast<std::uint32_t>(crossings_.size());
   line.count = static_cast<std::uint16_t>(made_.size());
@@ -63,7 +59,7 @@ void SightLines::add_slab(const Limits& lead, const Limits& side, int s) {
   const double in_must = std::max(0.0, (s - kHalf) / lead[0]), out_must = (s + kHalf) / lead[1];
   if (in_may > out_may) return;
   const int first = std::max(0, ceil_to_int(in_may * side[0] - kHalf)), last = floor_to_int(out_may * side[1] + kHalf);
-  const double level_end = 1 - 2 / std::sqrt(lead[0] * lead[0] + side[0] * side[0]);  // of the shortest line
+  const double level_end = 1 - (2 + kTouch) / std::sqrt(lead[0] * lead[0] + side[0] * side[0]);  // the shortest line's
   for (int w = first; w <= last; ++w) {
     const double enter = w > 0 ? (w - kHalf) / side[1] : 0, late = w > 0 ? (w - kHalf) / side[0] : 0;
     if (std::max(in_may, enter) > std::min(out_may, (w + kHalf) / side[0])) continue;
@@ -91,8 +87,7 @@ bool LineFromAbove::cross(const ColumnOffset& column) noexcept {
 }
 
 std::uint64_t LineFromAbove::hidden(int low, int high) const noexcept {
-  // Where the last 2 voxel edges begin as seen from height y: y/(what is left), at most h + kHalf up to kEnds[h] ·
-  // flat_.
+  // From y ≤ kEnds[h] · flat_ the last 2 voxel edges begin below the top of the voxel h.
   constexpr auto reach = [](double top) { return top / std::sqrt(4 - top * top); };
   static const std::array<double, 2> kEnds{reach(kHalf), reach(1 + kHalf)};
   const double bottom = low - kHalf, top = high + kHalf;
