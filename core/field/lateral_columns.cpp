@@ -32,7 +32,7 @@ LateralColumns::LateralColumns(const map::OccupancyGrid& grid, const Model& mode
       range2_(std::pow(model.wall.l_max / grid.resolution() + 1e-6, 2)),
       radius_(static_cast<int>(model.wall.l_max / grid.resolution() + 0.5 + 1e-6) + 1),
       pitch_(kWindow + 2 * radius_),
-      lines_((add_segments(), bundle_normals()), radius_, range2_) {
+      lines_((add_segments(), bundle_normals()), radius_, range2_) {  // of the segments' normals
   add_tables();
 }
 
@@ -117,23 +117,9 @@ void LateralColumns::add_tables() {
   const auto count = static_cast<std::size_t>(range2_) + 2;
   least_reach_.assign(count, {-1, -1});
   std::vector<Reach> at(count + 1);
-  for (std::size_t n = 0; n <= count; ++n) at[n] = reach_of(a2 * static_cast<double>(n));
+  for (std::size_t n = 0; n <= count; ++n) at[n] = reach_of(static_cast<double>(n));
   for (std::size_t n = 0; n < count; ++n)
     least_reach_[n] = {std::min(at[n].range, at[n + 1].range), std::min(at[n].wall_range, at[n + 1].wall_range)};
-}
-
-/// The largest heights that the gates allow at the horizontal distance d_c² = d2, m².
-LateralColumns::Reach LateralColumns::reach_of(double d2) const noexcept {
-  const double a2 = grid_->resolution() * grid_->resolution();
-  const auto n = static_cast<std::size_t>(d2 / a2);
-  Reach reach = n < least_reach_.size() ? least_reach_[n] : Reach{-1, -1};
-  while (terms_.in_wall_range(d2 + a2 * (reach.range + 1) * (reach.range + 1))) ++reach.range;
-  const auto in_gate = [&](int up) {
-    const auto at = static_cast<std::size_t>(up);
-    return at < wall_low_.size() && d2 >= wall_low_[at] && d2 <= wall_high_[at];
-  };
-  while (in_gate(reach.wall_range + 1)) ++reach.wall_range;
-  return reach;
 }
 
 }  // namespace backwash::field

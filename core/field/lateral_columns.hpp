@@ -71,7 +71,19 @@ class LateralColumns {
     int range;       ///< |z_e − z_q| at most, voxels: the gate |r| ≤ l̄_w
     int wall_range;  ///< z_q − z_e at most for the wall term; −1: none
   };
-  Reach reach_of(double d2) const noexcept;
+  /// The largest heights that the gates allow at the horizontal distance (d_c/a)² = flat2.
+  Reach reach_of(double flat2) const noexcept {
+    const double a2 = grid_->resolution() * grid_->resolution(), d2 = a2 * flat2;
+    const auto n = static_cast<std::size_t>(flat2);
+    Reach reach = n < least_reach_.size() ? least_reach_[n] : Reach{-1, -1};
+    while (terms_.in_wall_range(d2 + a2 * (reach.range + 1) * (reach.range + 1))) ++reach.range;
+    const auto in_gate = [&](int up) {
+      const auto at = static_cast<std::size_t>(up);
+      return at < wall_low_.size() && d2 >= wall_low_[at] && d2 <= wall_high_[at];
+    };
+    while (in_gate(reach.wall_range + 1)) ++reach.wall_range;
+    return reach;
+  }
   std::vector<Reach> least_reach_;  ///< [n]: what reach_of() is at least, n ≤ (d_c/a)² < n + 1
   double cot_phi_max_;              ///< 0 if φ̄_c is not less than π/2
 };

@@ -75,7 +75,7 @@ bool LateralSweep::meet(const Segment& segment, std::uint64_t targets, View& vie
   view.segment = &segment;
   view.d2 = a2 * flat2;
   if (-a * (along + 0.5) <= kInPlane || !columns_.terms_.in_wall_range(view.d2)) return false;
-  static_cast<LateralColumns::Reach&>(view) = columns_.reach_of(view.d2);
+  static_cast<LateralColumns::Reach&>(view) = columns_.reach_of(flat2);
   view.first_up = 0, view.last_up = -1;
   if (segment.floor != LateralColumns::kNoFloor) add_corner(view);
   const bool corners = view.first_up <= view.last_up;

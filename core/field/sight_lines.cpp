@@ -16,14 +16,17 @@ constexpr double kHalf = 0.5 + kTouch;  // of a closed box with its tolerance, v
 SightLines::SightLines(std::span<const Bundle> bundles, int radius, double range2)
     : radius_(radius),
       width_(2 * radius + 1),
+      bundles_(static_cast<int>(bundles.size())),
       end_(1 - 2 / std::max(2.0, std::sqrt(range2))),
       lines_(bundles.size() * static_cast<std::size_t>(width_ * width_)) {
+  const auto beyond = [](int d) { return std::max(0, std::abs(d) - 1); };
   std::size_t n = 0;
-  for (const Bundle& bundle : bundles)
-    for (int dy = -radius; dy <= radius; ++dy)
-      for (int dx = -radius; dx <= radius; ++dx, ++n)
-        if ((std::abs(dx) - 1) * (std::abs(dx) - 1) + (std::abs(dy) - 1) * (std::abs(dy) - 1) <= range2)
-          make(bundle, dx, dy, lines_[n]);
+  for (int dy = -radius; dy <= radius; ++dy)
+    for (int dx = -radius; dx <= radius; ++dx)
+      for (const Bundle& bundle : bundles) {
+        if (beyond(dx) * beyond(dx) + beyond(dy) * beyond(dy) <= range2) make(bundle, dx, dy, lines_[n]);
+        ++n;
+      }
 }
 
 /// `line` stays empty where no normal of the bundle looks at the column.

@@ -34,7 +34,7 @@ class SightLines {
   SightLines(std::span<const Bundle> bundles, int radius, double range2);
 
   const Line& at(int bundle, int dx, int dy) const noexcept {
-    return lines_[static_cast<std::size_t>((bundle * width_ + dy + radius_) * width_ + dx + radius_)];
+    return lines_[static_cast<std::size_t>(((dy + radius_) * width_ + dx + radius_) * bundles_ + bundle)];
   }
   /// The columns crossed; of those that must be and of the others, the ones near the element first.
   std::span<const ColumnOffset> crossings(const Line& line) const noexcept {
@@ -47,9 +47,9 @@ class SightLines {
   void make(const Bundle& bundle, int dx, int dy, Line& line);
   void add_slab(const Limits& lead, const Limits& side, int s);
 
-  int radius_, width_;
+  int radius_, width_, bundles_;
   double end_;               ///< part of the way that is not the last 2 voxel edges, of the longest line
-  std::vector<Line> lines_;  ///< per bundle, dy and dx
+  std::vector<Line> lines_;  ///< per dy, dx and bundle: in the order of the segments of a row
   std::vector<ColumnOffset> crossings_;
   struct Crossing {
     int lead, side;
