@@ -105,14 +105,15 @@ template <typename Store>
 void BlockSweep::each(const Store& store) {
   const auto& base = whole_.model_.base;
   LateralColumns::Sums sums;
-  for (std::size_t y = 0; y < kRows; ++y)
-    for (std::size_t x = 0; x < static_cast<std::size_t>(block_.width); ++x)
-      for (std::size_t z0 = 0; z0 < layers_; z0 += 64) {
+  for (std::size_t z0 = 0; z0 < layers_; z0 += LateralColumns::kLayers) {
+    lateral_.open(block_.x, block_.y, kRows, static_cast<int>(z0));
+    for (std::size_t y = 0; y < kRows; ++y)
+      for (std::size_t x = 0; x < static_cast<std::size_t>(block_.width); ++x) {
         std::uint64_t targets = column_targets(x, y, z0);
         if (!targets) continue;
         const int at_x = block_.x + static_cast<int>(x), at_y = block_.y + static_cast<int>(y);
         sums = {};
-        lateral_.add(at_x, at_y, static_cast<int>(z0), targets, sums);
+        lateral_.add(at_x, at_y, targets, sums);
         for (; targets; targets &= targets - 1) {
           const auto n = static_cast<std::size_t>(std::countr_zero(targets));
           const std::size_t ground = sum_row(z0 + n, y) + x;
@@ -122,6 +123,7 @@ void BlockSweep::each(const Store& store) {
                          base.vertical + static_cast<double>(v_[ground]) + sums.zz[n]});
         }
       }
+  }
 }
 
 void WholeField::evaluate(std::size_t begin, std::size_t end,

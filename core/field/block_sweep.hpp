@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/field/lateral_columns.hpp"
+#include "core/field/lateral_sweep.hpp"
 #include "core/field/whole_field.hpp"
 
 namespace backwash::field {

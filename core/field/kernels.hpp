@@ -26,12 +26,25 @@ struct Stack {
 /// Real-time: wait-free, no allocation.
 void see_stack(const Stack& stack, int first, int last, double* wall, double* seen) noexcept;
 
-/// sums[z] += wall_term · wall[z] + corner_term · corner[z] per component for first ≤ z ≤ last.
-/// Real-time: wait-free, no allocation.
 struct Factors {
   double xx, xy, yy, zz;
 };
-void add_terms(const Factors& wall_term, const Factors& corner_term, const double* wall, const double* corner,
-               int first, int last, double* xx, double* xy, double* yy, double* zz) noexcept;
+/// Lateral elements of one normal and one floor as seen from a column; heights count from that of entry 0.
+struct LateralTerms {
+  Factors wall, corner;  ///< per unit of the wall's and the corner's factors
+  double voxel_edge, d2, phi_max;
+  int floor;  ///< height of the voxel under the corners
+};
+struct LateralSums {
+  double *xx, *xy, *yy, *zz;
+};
+/// Adds the terms of a stack: sums[z] += wall · wall[z] + corner · seen[z] (φ̄_c − φ)/(d_c² + h_c⁶) per component for
+/// first ≤ z ≤ last; no corner term where `with_corner` has no bit. The fraction is ProximityModel::corner_factor()
+/// within its gates, to 1e-6. Real-time: wait-free, no allocation.
+void add_stack(const LateralTerms& terms, int first, int last, std::uint64_t with_corner, const double* wall,
+               const double* seen, const LateralSums& sums) noexcept;
+/// The same for a single element: wall[z] = step[z] at the bits of `with_wall`, seen[z] = 1.
+void add_element(const LateralTerms& terms, const double* step, std::uint64_t with_wall, std::uint64_t with_corner,
+                 const LateralSums& sums) noexcept;
 
 }  // namespace backwash::field

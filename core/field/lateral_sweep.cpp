@@ -1,269 +1,247 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "core/field/lateral_sweep.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <numbers>
 
 #include "core/field/kernels.hpp"
-#include "core/field/lateral_columns.hpp"
 #include "core/field/sight.hpp"
 
 namespace backwash::field {
 namespace {
 
 constexpr double kInPlane = 1e-9;  // m: a point in an element's own plane does not see it, whatever the rounding
+constexpr int kFar = 1000;         // layers: farther than anything in a window
 
-/// Bits low … high of a word; none if low > high or all are outside it.
-std::uint64_t bits(int low, int high) noexcept {
-  low = std::max(low, 0), high = std::min(high, 63);
-  return low > high ? 0 : ~std::uint64_t{0} >> (63 - high + low) << low;
+/// A word moved up by n bits, down if n < 0; |n| ≥ 64 leaves nothing.
+std::uint64_t moved(std::uint64_t word, int n) noexcept {
+  if (n <= -64 || n >= 64) return 0;
+  return n < 0 ? word >> -n : word << n;
 }
-
-int ceil_to_int(double x) noexcept { return -floor_to_int(-x); }
 
 }  // namespace
 
-LateralSweep::LateralSweep(const LateralColumns& columns)
-    : columns_(columns),
-      width_(2 * columns.radius_ + 1),
-      lines_(static_cast<std::size_t>(LateralColumns::kFrequent * width_ * width_)) {}
+LateralSweep::LateralSweep(const LateralColumns& columns) : columns_(columns) {}
 
-void LateralSweep::add(int x, int y, int first_z, std::uint64_t targets, LateralColumns::Sums& sums) {
-  if (!targets) return;
-  const View view{
-      x, y, first_z, targets, first_z + std::countr_zero(targets), first_z + 63 - std::countl_zero(targets)};
-  const int radius = columns_.radius_, rows = columns_.grid_->size().y();
-  for (int row = std::max(0, y - radius); row <= std::min(rows - 1, y + radius); ++row) {
-    const auto first = columns_.segments_.begin() + columns_.row_first_[static_cast<std::size_t>(row)];
-    const auto last = columns_.segments_.begin() + columns_.row_first_[static_cast<std::size_t>(row) + 1];
-    for (auto s = std::lower_bound(first, last, x - radius, [](const Segment&t, int v) { return t.x < v; });
-         s != last && s->x <= x + radius; ++s) {
-      if (s->low > view.high + radius || s->high < view.low - radius) continue;
-      add(view, *s, row - y, sums);
-    }
-  }
-}
-
-LateralSweep::Line& LateralSweep::line(const Segment& segment, int dx, int dy) {
-  if (segment.normal < 0) {
-    make(other_, segment, dx, dy);
-    return other_;
-  }
-  const int place = (segment.normal * width_ + dy + columns_.radius_) * width_ + dx + columns_.radius_;
-  Line& kept = lines_[static_cast<std::size_t>(place)];
-  if (!kept.made) make(kept, segment, dx, dy);
-  return kept;
-}
-
-void LateralSweep::make(Line& line, const Segment& segment, int dx, int dy) const {
-  const double a = columns_.grid_->resolution(), a2 = a * a;
-  const double along = dx * segment.m_x + dy * segment.m_y;
-  line.made = true;
-  line.flat2 = dx * dx + dy * dy + 0.25 + along;
-  line.d2 = a2 * line.flat2;
-  line.in_range = -a * (along + 0.5) > kInPlane && columns_.terms_.in_wall_range(line.d2);
-  if (!line.in_range) return;
-  line.range = 0;
-  while (columns_.terms_.in_wall_range(line.d2 + a2 * (line.range + 1) * (line.range + 1))) ++line.range;
-  line.wall_range = -1;
-  for (std::size_t n = 0; n < columns_.wall_low_.size(); ++n) {
-    if (line.d2 < columns_.wall_low_[n] || line.d2 > columns_.wall_high_[n]) break;
-    line.wall_range = static_cast<int>(n);
-  }
-  line.decay = std::exp(-columns_.model_.wall.k2 * line.d2);
-  line.corner.clear();
-  if (segment.normal >= 0 || segment.floor != LateralColumns::kNoFloor) add_corner(line);
-  line.crossed = false;
-}
-
-/// The factors of ProximityModel::corner_factor(d_c², h_c) at the heights where they are not zero.
-void LateralSweep::add_corner(Line& line) const {
-  const auto& k = columns_.model_.corner;
-  const double a = columns_.grid_->resolution(), d = std::sqrt(line.d2);
-  const double h2 = (k.l_max + 1e-6) * (k.l_max + 1e-6) - line.d2;
-  if (h2 < 0) return;
-  const double highest = std::sqrt(h2), pi = std::numbers::pi;
-  const double least = k.phi_max < pi / 2 ? d / std::tan(k.phi_max) : -highest;
-  line.corner_low = ceil_to_int(least / a + 0.5 - 1e-6);
-  const int last = floor_to_int(highest / a + 0.5);
-  const auto sixth = [](double x) { return x * x * x * x * x * x; };
-  for (int up = line.corner_low; up <= last; ++up) {
-    const double h = a * (up - 0.5), height = std::abs(h);
-    const double at = (d - height) / (d + height) * 2048 + 2048;
-    const auto n = static_cast<std::size_t>(at);
-    const double acute = columns_.arc_[n] + (at - static_cast<double>(n)) * (columns_.arc_[n + 1] - columns_.arc_[n]);
-    const double phi = h > 0 ? acute : pi - acute;
-    const bool inside = columns_.terms_.in_corner_range(line.d2 + h * h) && phi < k.phi_max;
-    line.corner.push_back(inside ? (k.phi_max - phi) / std::max(line.d2 + sixth(h), sixth(0.5 * a)) : 0);
-  }
-}
-
-/// Columns of closed boxes that the line to c meets before its last 2 voxel edges, for the farthest element.
-void LateralSweep::add_crossings(Line& line, double c_x, double c_y, int dx, int dy) const {
-  line.crossings.clear();
-  const double longest = std::sqrt(line.flat2 + line.range * line.range);
-  if (longest <= 2 + kTouch) return;
-  const double end = 1 - 2 / longest;
-  const bool x_leads = std::abs(dx) >= std::abs(dy);
-  const double lead = x_leads ? c_x : c_y, side = x_leads ? c_y : c_x;
-  const int slabs = std::abs(x_leads ? dx : dy), along = lead < 0 ? -1 : 1;
-  const double per_size = 1 / std::abs(lead), per_side = side != 0 ? 1 / side : 0, half = 0.5 + kTouch;
-  for (int s = 0; s <= slabs; ++s) {
-    const double t0 = std::max(0.0, (s - half) * per_size), t1 = std::min(end, (s + half) * per_size);
-    if (t0 > t1) break;
-    const int low = ceil_to_int(std::min(t0 * side, t1 * side) - half);
-    const int high = floor_to_int(std::max(t0 * side, t1 * side) + half);
-    for (int w = low; w <= high; ++w) {
-      double in = t0, out = t1;
-      if (side != 0) {
-        const double first = (w - half) * per_side, second = (w + half) * per_side;
-        in = std::max(in, std::min(first, second)), out = std::min(out, std::max(first, second));
-      }
-      if (in > out) continue;
-      const int x = x_leads ? along * s : w, y = x_leads ? w : along * s;
-      line.crossings.push_back({x, y, static_cast<std::ptrdiff_t>(y) * columns_.grid_->size().x() + x, in, out});
-    }
-  }
-}
-
-/// Whether the box about all lines of sight from the view to the segment is empty.
-bool LateralSweep::surely_clear(const View& view, const Segment& segment, const Line& line, int dx,
-                                int dy) const noexcept {
-  const int corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(line.corner.size());
-  const int down = corners ? line.range : line.wall_range, up = corners ? line.range : 0;
-  const double share = std::max(0.0, 1 - 2 / std::sqrt(line.flat2 + line.range * line.range));
-  const double x = view.x + 0.5, y = view.y + 0.5;
-  const double to_x = x + share * (dx + 0.5 * segment.m_x), to_y = y + share * (dy + 0.5 * segment.m_y);
-  const int low = std::min(view.low, std::max(segment.low, view.low - down));
-  const int high = std::max(view.high, std::min(segment.high, view.high + up));
-  return columns_.sight_.empty(Vec3(std::min(x, to_x), std::min(y, to_y), low + 0.5),
-                               Vec3(std::max(x, to_x), std::max(y, to_y), high + 0.5));
-}
-
-LateralColumns::Stretch LateralSweep::common_stretch(const View& view, const Line& line, int z) const noexcept {
+void LateralSweep::open(int x, int y, int height, int first_z) {
+  const int r = columns_.radius_, rows = height + 2 * r, pitch = columns_.pitch_;
   const Index3& size = columns_.grid_->size();
-  const auto home = static_cast<std::ptrdiff_t>(columns_.column(view.x, view.y));
-  const auto* layer = columns_.stretches_.data() + columns_.grid_->linear(Index3(0, 0, z));
-  LateralColumns::Stretch common{INT16_MIN, INT16_MAX};
-  for (const Crossing& c : line.crossings) {
-    if (static_cast<unsigned>(view.x + c.dx) >= static_cast<unsigned>(size.x()) ||
-        static_cast<unsigned>(view.y + c.dy) >= static_cast<unsigned>(size.y()))
-      continue;
-    const auto& here = layer[home + c.column];
-    common.below = std::max(common.below, here.below), common.above = std::min(common.above, here.above);
-  }
-  return common;
+  first_x_ = x - r, first_y_ = y - r, first_z_ = first_z;
+  window_.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(pitch), 0);
+  for (int z = std::max(0, first_z - kBelow); z < std::min(size.z(), first_z + 128 - kBelow); ++z)
+    for (int j = std::max(0, -first_y_); j < std::min(rows, size.y() - first_y_); ++j) {
+      Layers* row = window_.data() + static_cast<std::ptrdiff_t>(j) * pitch;
+      const int begin = std::max(0, -first_x_), end = std::min(pitch, size.x() - first_x_);
+      const std::size_t cells = columns_.grid_->linear(Index3(0, first_y_ + j, z));
+      for (int i = begin; i < end; ++i)
+        if (columns_.grid_->at(cells + static_cast<std::size_t>(first_x_ + i)) == map::Cell::occupied)
+          row[i] |= Layers{1} << (z - first_z + kBelow);
+    }
 }
 
-void LateralSweep::add(const View& view, const Segment& segment, int dy, LateralColumns::Sums& sums) {
-  const int dx = segment.x - view.x;
-  const double along = dx * segment.m_x + dy * segment.m_y;
-  if (along >= -0.5 || dx * dx + dy * dy + 0.25 + along > columns_.range2_) return;  // behind it, or too far away
-  Line& l = line(segment, dx, dy);
-  if (!l.in_range) return;
-  const int corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(l.corner.size());
-  const int corner_low = segment.floor + l.corner_low, corner_high = corner_low + corners - 1;
-  // Layers whose voxels may have a term.
-  int low = std::max(view.low, segment.low - (corners ? l.range : 0));
-  int high = std::min(view.high, segment.high + std::max(l.wall_range, corners ? l.range : 0));
-  if (l.wall_range < 0) low = std::max(low, corner_low), high = std::min(high, corner_high);
-  if (low > high || (l.wall_range < 0 && !corners)) return;
-  View part = view;
-  part.targets &= bits(low - view.first_z, high - view.first_z);
-  if (!part.targets) return;
-  part.low = view.first_z + std::countr_zero(part.targets),
-  part.high = view.first_z + 63 - std::countl_zero(part.targets);
-
-  const bool clear = surely_clear(part, segment, l, dx, dy);
-  if (!clear && !l.crossed) {
-    add_crossings(l, dx + 0.5 * segment.m_x, dy + 0.5 * segment.m_y, dx, dy);
-    l.crossed = true;
+void LateralSweep::add(int x, int y, std::uint64_t targets, LateralColumns::Sums& sums) {
+  if (!targets) return;
+  x_ = x, y_ = y;
+  home_ = window_.data() + static_cast<std::ptrdiff_t>(y - first_y_) * columns_.pitch_ + (x - first_x_);
+  line_ = nullptr;
+  const int radius = columns_.radius_;
+  const Index3& size = columns_.grid_->size();
+  const int low = first_z_ + std::countr_zero(targets) - radius,
+            high = first_z_ + 63 - std::countl_zero(targets) + radius;
+  for (int row = std::max(0, y - radius); row <= std::min(size.y() - 1, y + radius); ++row) {
+    const auto* column = columns_.column_first_.data() + static_cast<std::ptrdiff_t>(row) * size.x();
+    const std::uint32_t first = column[std::max(0, x - radius)], end = column[std::min(size.x(), x + radius + 1)];
+    if (near_.size() < end - first) near_.resize(end - first);
+    std::size_t count = 0;
+    const int dy = row - y;
+    for (const Segment* s = columns_.segments_.data() + first; s != columns_.segments_.data() + end; ++s) {
+      const int dx = s->x - x;
+      const double along = dx * s->m_x + dy * s->m_y;
+      near_[count] = s;
+      count += static_cast<std::size_t>((along < -0.5) & (dx * dx + dy * dy + 0.25 + along <= columns_.range2_) &
+                                        (s->low <= high) & (s->high >= low));
+    }
+    for (std::size_t n = 0; n < count; ++n) add(*near_[n], targets, sums);
   }
-  const int middle = std::clamp((part.low + part.high) / 2, segment.low, segment.high);
-  const auto stretch = clear ? LateralColumns::Stretch{INT16_MIN, INT16_MAX} : common_stretch(part, l, middle);
-  const int from = std::max<int>(segment.low, stretch.below + 1), to = std::min<int>(segment.high, stretch.above - 1);
-  const int first = std::max<int>(part.low, stretch.below + 1), last = std::min<int>(part.high, stretch.above - 1);
-  const int z0 = view.first_z;
-  const int begin = part.low - z0, end = part.high - z0;
-  std::fill(wall_.begin() + begin, wall_.begin() + end + 1, 0),
-      std::fill(seen_.begin() + begin, seen_.begin() + end + 1, 0);
-  if (from <= to)
-    see_stack({from - z0, to - z0, l.wall_range, l.range, columns_.decay_.data()}, first - z0, last - z0, wall_.data(),
-              seen_.data());
-  const int down = corners ? l.range : l.wall_range, up = corners ? l.range : 0;  // to the elements
-  const int lowest = std::min(part.low, std::max(segment.low, part.low - down));
-  const int highest = std::max(part.high, std::min(segment.high, part.high + up));
-  if (stretch.below >= lowest || stretch.above <= highest) add_uncertain(part, segment, l, stretch);
+}
 
+/// The gates; false if no element has a term at a target.
+bool LateralSweep::meet(const Segment& segment, std::uint64_t targets, View& view) const noexcept {
+  const int dx = segment.x - x_, dy = segment.y - y_;
+  const double a = columns_.grid_->resolution(), a2 = a * a, along = dx * segment.m_x + dy * segment.m_y;
+  const double flat2 = dx * dx + dy * dy + 0.25 + along;
+  view.segment = &segment;
+  view.d2 = a2 * flat2;
+  if (-a * (along + 0.5) <= kInPlane || !columns_.terms_.in_wall_range(view.d2)) return false;
+  static_cast<LateralColumns::Reach&>(view) = columns_.reach_of(flat2);
+  view.first_up = 0, view.last_up = -1;
+  if (segment.floor != LateralColumns::kNoFloor) add_corner(view);
+  const bool corners = view.first_up <= view.last_up;
+  const int z_low = segment.low - first_z_, z_high = segment.high - first_z_, floor = segment.floor - first_z_;
+  const int up = corners ? view.range : 0, down = std::max(view.wall_range, up);
+  int low = z_low - up, high = z_high + down;
+  if (view.wall_range < 0) low = std::max(low, floor + view.first_up), high = std::min(high, floor + view.last_up);
+  if (view.wall_range < 0 && !corners) return false;
+  view.targets = targets & bits(low, high);
+  view.with_corner = corners ? bits(floor + view.first_up, floor + view.last_up) : 0;
+  if (!view.targets) return false;
+  view.low = std::countr_zero(view.targets), view.high = 63 - std::countl_zero(view.targets);
+  view.from = std::max(z_low, view.low - down), view.to = std::min(z_high, view.high + up);
+  return view.from <= view.to;
+}
+
+/// The heights at which ProximityModel::corner_factor(d_c², h_c) may not be zero.
+void LateralSweep::add_corner(View& view) const noexcept {
+  const auto& k = columns_.model_.corner;
+  const double a = columns_.grid_->resolution(), d = std::sqrt(view.d2);
+  const double h2 = (k.l_max + 1e-6) * (k.l_max + 1e-6) - view.d2;
+  if (h2 < 0) return;
+  const double highest = std::sqrt(h2);
+  const double least = k.phi_max < std::numbers::pi / 2 ? d * columns_.cot_phi_max_ : -highest;
+  view.first_up = ceil_to_int(least / a + 0.5 - 1e-6), view.last_up = floor_to_int(highest / a + 0.5);
+  const auto inside = [&](int up) {
+    const double h = a * (up - 0.5);
+    return columns_.terms_.in_corner_range(view.d2 + h * h);
+  };
+  while (view.first_up <= view.last_up && !inside(view.first_up)) ++view.first_up;
+  while (view.first_up <= view.last_up && !inside(view.last_up)) --view.last_up;
+}
+
+/// Takes the columns in hand that the lines to a segment cross; those of the last segment often do.
+void LateralSweep::look_along(const SightLines::Line& line) {
+  if (line_ == &line) return;
+  line_ = &line;
+  const auto crossings = columns_.lines_.crossings(line);
+  if (crossed_.size() < crossings.size()) crossed_.resize(crossings.size()), hiding_.resize(crossings.size());
+  all_ = 0;
+  for (std::size_t n = 0; n < crossings.size(); ++n)
+    all_ |= crossed_[n] = home_[static_cast<std::ptrdiff_t>(crossings[n].y) * columns_.pitch_ + crossings[n].x];
+}
+
+/// The free heights that all crossed columns have in common; false if every element is hidden from every target.
+bool LateralSweep::common_stretch(const View& view, Stretch& stretch) {
+  const int low = std::min(view.low, view.from) + kBelow, high = std::max(view.high, view.to) + kBelow;
+  const bool inside = low >= 0 && high <= 127;  // else all of it is uncertain
+  stretch = inside ? Stretch{-kFar, kFar} : Stretch{0, 0};
+  const Layers band = inside ? ~Layers{0} >> (127 - high + low) << low : ~Layers{0}, all = all_ & band;
+  hiding_count_ = 0;
+  if (all == 0) return true;
+  for (std::size_t n = 0; inside && n < line_->must; ++n)
+    if ((crossed_[n] & band) == band) return false;
+  const auto crossings = columns_.lines_.crossings(*line_);
+  for (std::size_t n = 0; n < crossings.size(); ++n) {
+    hiding_[hiding_count_] = {crossings[n], crossed_[n]};
+    hiding_count_ += (crossed_[n] & band) != 0 ? 1 : 0;
+  }
+  if (!inside) return true;
+  const int middle = std::clamp((view.low + view.high) / 2, view.from, view.to) + kBelow;
+  const auto highest_below = [](std::uint64_t upper, std::uint64_t lower) {
+    return upper ? 127 - std::countl_zero(upper) : lower ? 63 - std::countl_zero(lower) : -kFar;
+  };
+  const Layers under = all & ((Layers{1} << middle) - 1), over = all >> middle << middle;
+  const auto low_part = static_cast<std::uint64_t>(over), high_part = static_cast<std::uint64_t>(over >> 64);
+  stretch.below = highest_below(static_cast<std::uint64_t>(under >> 64), static_cast<std::uint64_t>(under)) - kBelow;
+  const int above = low_part ? std::countr_zero(low_part) : high_part ? 64 + std::countr_zero(high_part) : kFar;
+  stretch.above = above - kBelow;
+  return true;
+}
+
+void LateralSweep::add(const Segment& segment, std::uint64_t targets, LateralColumns::Sums& sums) {
+  View view;
+  if (!meet(segment, targets, view)) return;
+  look_along(columns_.lines_.at(segment.bundle, segment.x - x_, segment.y - y_));
+  Stretch stretch;
+  if (!common_stretch(view, stretch)) return;
+  const double decay = std::exp(-columns_.model_.wall.k2 * view.d2);
   const auto &w = segment.wall, &c = segment.corner;
-  const int corner_begin = std::clamp(corner_low - z0, begin, end + 1);
-  const int corner_end = std::clamp(corner_high - z0 + 1, corner_begin, end + 1);
-  std::fill(seen_.begin() + begin, seen_.begin() + corner_begin, 0);
-  std::fill(seen_.begin() + corner_end, seen_.begin() + end + 1, 0);
-  for (int n = corner_begin; n < corner_end; ++n)
-    seen_[static_cast<std::size_t>(n)] *= l.corner[static_cast<std::size_t>(n - (corner_low - z0))];
-  add_terms({l.decay * w.xx, l.decay * w.xy, l.decay * w.yy, l.decay * w.zz}, {c.xx, c.xy, c.yy, c.zz}, wall_.data(),
-            seen_.data(), begin, end, sums.xx.data(), sums.xy.data(), sums.yy.data(), sums.zz.data());
+  const LateralTerms terms{{decay * w.xx, decay * w.xy, decay * w.yy, decay * w.zz},
+                           {c.xx, c.xy, c.yy, c.zz},
+                           columns_.grid_->resolution(),
+                           view.d2,
+                           columns_.model_.corner.phi_max,
+                           segment.floor - first_z_};
+  const LateralSums out{sums.xx.data(), sums.xy.data(), sums.yy.data(), sums.zz.data()};
+  const std::uint64_t certain = bits(stretch.below + 1, stretch.above - 1);
+  if (segment.low == segment.high) {  // most segments of crooked walls
+    const int z = view.from;
+    const bool inside = z > stretch.below && z < stretch.above;
+    std::uint64_t seen = in_range(view, z);
+    if (const std::uint64_t open = inside ? seen & ~certain : seen) seen = (seen & ~open) | seen_from(view, z, open);
+    if (seen)
+      add_element(terms, columns_.step_.data() + columns_.kLayers - z, seen & bits(z, z + view.wall_range),
+                  seen & view.with_corner, out);
+    return;
+  }
+  const int begin = view.low, end = view.high;
+  std::fill(wall_.begin() + begin, wall_.begin() + end + 1, 0);
+  std::fill(seen_.begin() + begin, seen_.begin() + end + 1, 0);
+  const int from = std::max(view.from, stretch.below + 1), to = std::min(view.to, stretch.above - 1);
+  const int first = std::max(begin, stretch.below + 1), last = std::min(end, stretch.above - 1);
+  if (from <= to)
+    see_stack({from, to, view.wall_range, view.range, columns_.decay_.data()}, first, last, wall_.data(), seen_.data());
+  if (from > view.from || to < view.to || first > begin || last < end) add_uncertain(view, stretch);
+  add_stack(terms, begin, end, view.with_corner, wall_.data(), seen_.data(), out);
+}
+
+/// Targets at which the gates leave a term of the element at height z.
+std::uint64_t LateralSweep::in_range(const View& view, int z) noexcept {
+  return view.targets & (bits(z, z + view.wall_range) | (view.with_corner & bits(z - view.range, z + view.range)));
 }
 
 /// Adds to wall_ and seen_ what does not lie in the common stretch of free heights at both ends.
-void LateralSweep::add_uncertain(const View& view, const Segment& segment, const Line& line,
-                                 const LateralColumns::Stretch& stretch) {
-  const Index3& size = columns_.grid_->size();
-  const auto home = static_cast<std::ptrdiff_t>(columns_.column(view.x, view.y));
-  const int corners = segment.floor == LateralColumns::kNoFloor ? 0 : static_cast<int>(line.corner.size());
-  const int down = corners ? line.range : line.wall_range, up = corners ? line.range : 0;  // to the elements
-  const int low = std::min(view.low, std::max(segment.low, view.low - down));
-  const int high = std::max(view.high, std::min(segment.high, view.high + up));
-  const auto* layer = columns_.stretches_.data() + columns_.grid_->linear(Index3(0, 0, low));
-  active_.clear();
-  for (const Crossing& c : line.crossings) {
-    if (static_cast<unsigned>(view.x + c.dx) >= static_cast<unsigned>(size.x()) ||
-        static_cast<unsigned>(view.y + c.dy) >= static_cast<unsigned>(size.y()))
-      continue;
-    if (layer[home + c.column].above <= high) active_.push_back(c);
-  }
-  const int z0 = view.first_z;
-  const int corner_low = segment.floor + line.corner_low - z0;
-  const std::uint64_t with_corner = corners ? bits(corner_low, corner_low + corners - 1) : 0;
-  const auto free = [&](int dz) { return bits(stretch.below + 1 - dz - z0, stretch.above - 1 - dz - z0); };
-  const int dz_end = std::min(up, segment.high - view.low);
-  for (int dz = std::max(-down, segment.low - view.high); dz <= dz_end; ++dz) {
-    std::uint64_t lanes = view.targets & bits(segment.low - dz - z0, segment.high - dz - z0) & ~(free(0) & free(dz));
-    const bool has_wall = dz <= 0 && -dz <= line.wall_range;
-    if (!has_wall) lanes &= with_corner;
+void LateralSweep::add_uncertain(const View& view, const Stretch& stretch) noexcept {
+  const std::uint64_t certain = bits(stretch.below + 1, stretch.above - 1);
+  for (int z = view.from; z <= view.to; ++z) {
+    std::uint64_t lanes = in_range(view, z);
+    if (z > stretch.below && z < stretch.above) lanes &= ~certain;
     if (!lanes) continue;
-    lanes &= ~blocked(view, line, dz, lanes);
-    const double decay =
-        has_wall ? columns_.decay_[static_cast<std::size_t>(1 - dz)] - columns_.decay_[static_cast<std::size_t>(-dz)]
-                 : 0;
-    for (; lanes; lanes &= lanes - 1) {
-      const auto n = static_cast<std::size_t>(std::countr_zero(lanes));
-      wall_[n] += decay, seen_[n] += 1;
+    for (lanes = seen_from(view, z, lanes); lanes; lanes &= lanes - 1) {
+      const int n = std::countr_zero(lanes);
+      const auto at = static_cast<std::size_t>(n);
+      if (n >= z && n - z <= view.wall_range)
+        wall_[at] += columns_.step_[static_cast<std::size_t>(n - z + columns_.kLayers)];
+      seen_[at] += 1;
     }
   }
 }
 
-/// Lanes whose line to the element dz voxels higher meets an occupied voxel of the active columns; some of them only,
-/// when all of `lanes` are among them.
-std::uint64_t LateralSweep::blocked(const View& view, const Line& line, int dz, std::uint64_t lanes) const noexcept {
-  const double length = std::sqrt(line.flat2 + dz * dz), end = 1 - 2 / length, half = 0.5 + kTouch;
-  if (length <= 2 + kTouch) return 0;
-  const auto home = static_cast<std::ptrdiff_t>(columns_.column(view.x, view.y));
-  const int lowest = -64, highest = columns_.grid_->size().z();
-  std::uint64_t met = 0;
-  for (std::size_t n = active_.size(); n-- > 0;) {  // what hides an element is most often near it
-    const Crossing& c = active_[n];
-    if (c.t_in > end) continue;
-    const double in = dz * c.t_in, out = dz * std::min(c.t_out, end);
-    const int first = ceil_to_int(std::min(in, out) - half), last = floor_to_int(std::max(in, out) + half);
-    for (int s = first; s <= last; ++s) {
-      const int z = view.first_z + s;
-      if (z >= lowest && z <= highest) met |= columns_.occupied(static_cast<std::size_t>(home + c.column), z);
+/// Those of `targets` that see the element at height z.
+std::uint64_t LateralSweep::seen_from(const View& view, int z, std::uint64_t targets) const noexcept {
+  // Words about the element: bit kCentre is its own layer.
+  constexpr int kCentre = LineFromAbove::kCentre;
+  const int up = kCentre - z, down = z - kCentre + kBelow;
+  std::uint64_t open = moved(targets, up);
+  if (moved(open, -up) != targets) return looked_at(view, z, targets);
+  const int low = std::min(std::countr_zero(open), kCentre), high = std::max(63 - std::countl_zero(open), kCentre);
+  const std::uint64_t band = bits(low, high);
+  const Segment& s = *view.segment;
+  LineFromAbove line(s.x - x_ + 0.5 * s.m_x, s.y - y_ + 0.5 * s.m_y, view.range);
+  for (const auto& [crossing, column] : std::span(hiding_).first(hiding_count_)) {
+    std::uint64_t inside = static_cast<std::uint64_t>(down >= 0 ? column >> down : column << -down) & band;
+    if (!inside || !line.cross(crossing)) continue;
+    while (inside) {
+      const int first = std::countr_zero(inside), last = first + std::countr_one(inside >> first) - 1;
+      inside &= ~bits(first, last);
+      open &= ~line.hidden(first - kCentre, last - kCentre);
     }
-    if ((lanes & ~met) == 0) break;
+    if (!open) return 0;
   }
-  return met;
+  return moved(open, -up);
+}
+
+/// As seen_from(), line by line.
+std::uint64_t LateralSweep::looked_at(const View& view, int z, std::uint64_t targets) const noexcept {
+  const Segment& s = *view.segment;
+  const auto& grid = *columns_.grid_;
+  const Vec3 c_W = grid.center(Index3(s.x, s.y, first_z_ + z)) + 0.5 * grid.resolution() * Vec3(s.m_x, s.m_y, 0);
+  std::uint64_t seen = targets;
+  for (; targets; targets &= targets - 1) {
+    const Vec3 p_W = grid.center(Index3(x_, y_, first_z_ + std::countr_zero(targets)));
+    if (!columns_.sight_.line_of_sight(columns_.sight_.viewpoint(p_W), c_W)) seen &= ~(targets & -targets);
+  }
+  return seen;
 }
 
 }  // namespace backwash::field

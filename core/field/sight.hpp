@@ -25,6 +25,8 @@ inline int floor_to_int(double x) noexcept {
   const int i = static_cast<int>(x);
   return i - (x < i ? 1 : 0);
 }
+/// Smallest integer ≥ x.
+inline int ceil_to_int(double x) noexcept { return -floor_to_int(-x); }
 
 /// The segment from p to c without its last 2a (docs/model.md section 1, "Visible"), in voxel units; nothing when |c −
 /// p| ≤ 2a.

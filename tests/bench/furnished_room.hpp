@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
@@ -41,14 +43,41 @@ inline map::OccupancyGrid plain_room(double a) {
   return grid;
 }
 
-/// Closed room with 25 random boxes standing on the floor, their faces on a lattice of 0.1 m.
-inline map::OccupancyGrid furnished_room(double a) {
-  map::OccupancyGrid grid = empty_room(a, true);
+/// Opposite corners of 25 random boxes standing on the floor, on a lattice of 0.1 m.
+inline std::vector<std::pair<Vec3, Vec3>> furniture() {
+  std::vector<std::pair<Vec3, Vec3>> boxes;
   std::mt19937 random(1);
   const auto draw = [&](int low, int high) { return 0.1 * std::uniform_int_distribution(low, high)(random); };
   for (int n = 0; n < 25; ++n) {
     const double x = draw(0, 95), y = draw(0, 95), dx = draw(3, 12), dy = draw(3, 12), dz = draw(4, 20);
-    add_box(grid, Vec3(x, y, 0), Vec3(x + dx, y + dy, dz));
+    boxes.emplace_back(Vec3(x, y, 0), Vec3(x + dx, y + dy, dz));
+  }
+  return boxes;
+}
+
+/// Closed room with the furniture.
+inline map::OccupancyGrid furnished_room(double a) {
+  map::OccupancyGrid grid = empty_room(a, true);
+  for (const auto& [from, to] : furniture()) add_box(grid, from, to);
+  return grid;
+}
+
+/// The same turned by an angle, rad; walls 1.5 voxels thick, so that they stay closed; unknown outside.
+inline map::OccupancyGrid turned_room(double a, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle), across = kRoom.x() * (std::abs(c) + std::abs(s));
+  const int n = static_cast<int>(std::ceil(across / a)) + 2, layers = static_cast<int>(std::lround(kRoom.z() / a));
+  map::OccupancyGrid grid(Vec3::Zero(), a, Index3(n, n, layers), map::Cell::unknown);
+  const auto boxes = furniture();
+  const auto within = [](const Vec3& q, const Vec3& from, const Vec3& to) {
+    return ((q - from).array() > 0).all() && ((to - q).array() > 0).all();
+  };
+  for (std::size_t k = 0; k < grid.cell_count(); ++k) {
+    const Vec3 p = grid.center(grid.voxel(k)), d = p - Vec3(0.5 * n * a, 0.5 * n * a, 0);
+    const Vec3 q(c * d.x() + s * d.y() + 5, c * d.y() - s * d.x() + 5, d.z()), thick(1.5 * a, 1.5 * a, a);
+    if (!within(q, Vec3::Zero(), kRoom)) continue;
+    bool occupied = !within(q, thick, kRoom - thick);
+    for (const auto& [from, to] : boxes) occupied = occupied || within(q, from, to);
+    grid.set(grid.voxel(k), occupied ? map::Cell::occupied : map::Cell::free);
   }
   return grid;
 }

@@ -65,4 +65,29 @@ inline OccupancyGrid small_room(double a = 0.1) {
   return grid;
 }
 
+/// A room of 3 × 2.4 m turned by an angle, rad, with a thin wall, a pillar and a table; unknown outside.
+inline OccupancyGrid turned_room(double angle, double a, double height = 1.5) {
+  const int across = static_cast<int>(4.2 / a);
+  OccupancyGrid grid(Vec3(1, -2, 0.3), a, Index3(across, across, static_cast<int>(std::lround(height / a))),
+                     Cell::unknown);
+  const Vec3 middle = grid.origin() + 0.5 * a * Vec3(across, across, 0);
+  const double c = std::cos(angle), s = std::sin(angle), thick = 1.5 * a;
+  const auto in_room = [&](const Vec3& x) -> Vec3 {
+    const Vec3 d = x - middle;
+    return {c * d.x() + s * d.y() + 1.5, c * d.y() - s * d.x() + 1.2, d.z()};
+  };
+  const auto within = [](const Vec3& q, const Vec3& from, const Vec3& to) {
+    return ((q - from).array() >= 0).all() && ((to - q).array() >= 0).all();
+  };
+  paint(grid, Cell::free, [&](const Vec3& x) { return within(in_room(x), Vec3::Zero(), Vec3(3, 2.4, height)); });
+  paint(grid, Cell::occupied, [&](const Vec3& x) {
+    const Vec3 q = in_room(x);
+    if (!within(q, Vec3::Zero(), Vec3(3, 2.4, height))) return false;
+    const bool shell = !within(q, Vec3(thick, thick, a), Vec3(3 - thick, 2.4 - thick, height - a));
+    return shell || within(q, Vec3(1, 0, 0), Vec3(1 + a, 1.3, 0.8 * height)) ||
+           within(q, Vec3(2, 1.5, 0), Vec3(2.2, 1.7, height)) || within(q, Vec3(1.6, 0.4, 0.5), Vec3(2.4, 0.9, 0.6));
+  });
+  return grid;
+}
+
 }  // namespace backwash::scene

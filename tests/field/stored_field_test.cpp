@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <numbers>
 #include <random>
 
 #include "core/field/disturbance_field.hpp"
@@ -106,6 +107,19 @@ TEST(StoredField, EqualsTheExactFieldInEveryBuiltInScene) {
     SCOPED_TRACE(name);
     expect_exact_at_samples(*map::builtin_scene(name, 0.1), 500);
   }
+}
+
+TEST(StoredField, EqualsTheExactFieldInRoomsTurnedByAnyAngle) {
+  for (const double degrees : {0.0, 7.0, 23.0, 45.0, 68.0}) {
+    SCOPED_TRACE(degrees);
+    expect_exact_at_samples(scene::turned_room(degrees * std::numbers::pi / 180, 0.08), 2000);
+  }
+}
+
+// More layers than a word of heights has, and an edge so small that elements stand beyond one.
+TEST(StoredField, EqualsTheExactFieldInATallRoomAndAtASmallEdge) {
+  expect_exact_at_samples(scene::turned_room(0.4, 0.1, 17), 1000);
+  expect_exact_at_samples(scene::turned_room(0.4, 0.035, 2.5), 200);
 }
 
 TEST(StoredField, HasTheSameBitsWithThePathsMadeAnewForEachBlock) {
