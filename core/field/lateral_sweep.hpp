@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/field/lateral_columns.hpp"
+#include "core/field/layers.hpp"
 #include "core/field/sight_lines.hpp"
 
 namespace backwash::field {
@@ -24,8 +25,7 @@ class LateralSweep {
 
  private:
   using Segment = LateralColumns::Segment;
-  __extension__ using Layers = unsigned __int128;  ///< bit n of a column of the window: layer first_z − kBelow + n
-  static constexpr int kBelow = 32;
+  static constexpr int kBelow = 32;  ///< bit n of a column of the window is layer first_z − kBelow + n
   /// Free heights, below < z < above.
   struct Stretch {
     int below, above;
