@@ -26,7 +26,7 @@ build() {
 rtsan() {
   install_packages tests/nightly/packages.txt
   build build/rtsan test_daemon -- -DCMAKE_C_COMPILER=clang-22 -DCMAKE_CXX_COMPILER=clang++-22 \
-    -DCMAKE_C_FLAGS='-fsanitize=realtime -w' -DCMAKE_CXX_FLAGS='-fsanitize=realtime -w'
+    -DCMAKE_C_FLAGS='-fsanitize=realtime -w' -DCMAKE_CXX_FLAGS='-fsanitize=realtime -fno-optimize-sibling-calls -w'
   RTSAN_SYMBOLIZER_PATH=/usr/lib/llvm-22/bin/llvm-symbolizer \
     RTSAN_OPTIONS="suppressions=$PWD/tests/nightly/rtsan.supp:halt_on_error=true" build/rtsan/tests/test_daemon
 }
