@@ -91,6 +91,7 @@ FlightLog in_our_units(const FlightLog& raw, const ColumnMap& map) {
   const double to_s = *unit_factor("t_s", source("t_s").unit);
   std::map<std::string, double> latest;
   const auto first = std::ranges::find_if(raw.t_s, [](double t) { return !std::isnan(t); });
+  if (first == raw.t_s.end()) return log;
   for (std::size_t row = 0; row < raw.t_s.size(); ++row) {
     bool placed = !std::isnan(raw.t_s[row]);
     for (const auto& [ours, theirs] : map.columns) {
@@ -116,6 +117,8 @@ void turn(FlightLog& log, const ColumnMap& map) {
     if (map.ned)
       for (const Names& names : kWorld)
         if (has_all(log, names)) set(log, names, row, enu_of_ned * at(log, names, row));
+    for (const char* height : {"surface_z_m", "stood_z_m"})
+      if (map.ned && log.has(height)) log.columns[height][row] *= -1;
     if (has_all(log, kQuaternion)) {
       Eigen::Quaterniond q = attitude(log, row);
       if (map.ned) q = enu_of_ned * q;
@@ -271,6 +274,8 @@ tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, cons
   for (const auto& [ours, theirs] : map.columns) {
     if (!std::ranges::count(*header, theirs.name))
       return bad("no column '" + theirs.name + "', which the column map takes for " + ours);
+    if (ours != "t_s" && theirs.name == map.columns.at("t_s").name)
+      return bad("column '" + theirs.name + "' is the time, and " + ours + " as well");
     unread.erase(theirs.name);
   }
   const auto raw = read_csv(path, map.columns.at("t_s").name, unread, true);
@@ -293,7 +298,11 @@ tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, cons
     if (!has_all(log, kQuaternion)) return bad("specific force is in the body: give an attitude as well");
     acceleration_of_force(log);
   }
-  return with_motion(log);
+  log = with_motion(log);
+  if (log.t_s.size() < 100)
+    return bad(
+        "too few rows around each position for its velocity: give 30 rows a second, or velocity and acceleration");
+  return log;
 }
 
 }  // namespace backwash::log

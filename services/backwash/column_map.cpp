@@ -174,6 +174,9 @@ tl::expected<ColumnMap, config::ConfigError> read_column_map(const std::string& 
       if (!map.columns.contains(name) &&
           std::ranges::any_of(family, [&](const auto& n) { return map.columns.contains(n); }))
         return tl::make_unexpected(table->error("columns." + name, "give all of " + list(family) + " or none"));
+  for (const auto& [one, other] : {std::pair{"qw", "roll"}, {"ax_mps2", "specific_force_x"}})
+    if (map.columns.contains(one) && map.columns.contains(other))
+      return tl::make_unexpected(table->error("columns." + std::string(other), "give this or " + std::string(one)));
   return map;
 }
 

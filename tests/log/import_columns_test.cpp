@@ -209,6 +209,33 @@ TEST_F(ImportColumns, EveryRefusalSaysWhat) {
   EXPECT_NE(refusal(quaternion).find("no unit quaternion"), std::string::npos);
 }
 
+TEST_F(ImportColumns, TablesThatAreNoFlightAreRefusedAndCrashNothing) {
+  ColumnMap map;
+  map.columns = {{"t_s", {"t", ""}}, {"x_m", {"x", ""}}, {"y_m", {"y", ""}}, {"z_m", {"z", ""}}};
+  table("t,x,y,z", [](double) { return std::string("nan,0,0,0"); });
+  EXPECT_NE(refusal(map).find("fewer than 100 rows"), std::string::npos) << refusal(map);
+  table("t,x,y,z", [](double) { return std::string(); });
+  EXPECT_NE(refusal(map).find("fewer than 100 rows"), std::string::npos) << refusal(map);
+  table("t,x,y,z", [](double t) { return line({5 * t, std::sin(t), 0, 1}); });  // 20 Hz
+  EXPECT_NE(refusal(map).find("too few rows around each position"), std::string::npos) << refusal(map);
+  map.columns["y_m"].name = "t";
+  EXPECT_NE(refusal(map).find("is the time, and y_m as well"), std::string::npos) << refusal(map);
+}
+
+TEST_F(ImportColumns, HeightsOfANedTableAreTurnedToo) {
+  table("t,x,y,z,floor", [](double t) {
+    const Vec3 p = kEnuOfNed * truth(t).p;
+    return line({t, p.x(), p.y(), p.z(), 1.5});
+  });
+  ColumnMap map;
+  map.ned = true;
+  map.columns = {
+      {"t_s", {"t", ""}}, {"x_m", {"x", ""}}, {"y_m", {"y", ""}}, {"z_m", {"z", ""}}, {"surface_z_m", {"floor", ""}}};
+  const auto log = import_columns(path_, map);
+  ASSERT_TRUE(log) << log.error().message;
+  EXPECT_EQ(log->column("surface_z_m").front(), -1.5);
+}
+
 TEST_F(ImportColumns, RowsWithoutAPositionOrWithTheLastStampAreLeftOut) {
   table("t,x,y,z", [](double t) {
     const Truth s = truth(t);

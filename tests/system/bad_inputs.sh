@@ -44,6 +44,7 @@ sed '/^z_m/d' map.toml >no_height.toml
 sed 's/\[ms\]/[us]/' map.toml >too_fast.toml
 printf '[frame]\nworld = "nwu"\n' | cat - map.toml >frame.toml
 printf 'vx_mps = "x"\n' | cat map.toml - >one_axis.toml
+{ cat map.toml; for key in qw qx qy qz roll pitch yaw; do echo "$key = \"x\""; done; } >two_attitudes.toml
 # An OctoMap of two free cubes, from (-1.6, -1.6, -1.6) to the origin and from there to (1.6, 1.6, 1.6); the rest of its
 # extent is unknown. Two bytes a node, two bits a child: 00 unknown, 10 free, 11 inner.
 {
@@ -113,6 +114,7 @@ refused 78 "unknown_column.toml:5: key 'columns.height'" import --map-columns un
 refused 78 "key 'columns.z_m'" import --map-columns no_height.toml ms.csv -o logs
 refused 78 "is 'enu' or 'ned'" import --map-columns frame.toml ms.csv -o logs
 refused 78 'give all of vx_mps, vy_mps, vz_mps or none' import --map-columns one_axis.toml ms.csv -o logs
+refused 78 'give this or qw' import --map-columns two_attitudes.toml ms.csv -o logs
 refused 65 'is the unit of the time right?' import --map-columns too_fast.toml ms.csv -o logs
 refused 65 "no column 't', which the column map takes for t_s" import --map-columns map.toml no_z_points.csv -o logs
 refused 65 'called like a time' import --propose no_z_points.csv
