@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/log/local_cubic.hpp"
+#include "core/log/median.hpp"
 
 namespace backwash::log {
 namespace {
@@ -48,12 +49,6 @@ std::vector<double> frame_times(const std::vector<double>& stamps) {
   const double first = frames.front();
   for (double& frame : frames) frame = (frame - first) * kFrame;
   return frames;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 void add(FlightLog& log, const std::string& prefix, const std::string& unit, const Vec3& value) {

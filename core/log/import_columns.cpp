@@ -9,6 +9,7 @@
 #include <span>
 
 #include "core/log/local_cubic.hpp"
+#include "core/log/median.hpp"
 
 namespace backwash::log {
 namespace {
@@ -213,8 +214,7 @@ std::string wrong_stamps(const FlightLog& log, const std::string& name) {
       return "column '" + name + "' goes back at " + std::to_string(log.t_s[row]) + " s; one file is one flight";
   std::vector<double> steps;
   for (std::size_t row = 1; row < log.t_s.size(); ++row) steps.push_back(log.t_s[row] - log.t_s[row - 1]);
-  std::ranges::nth_element(steps, steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2));
-  const double step = steps[steps.size() / 2];
+  const double step = median(std::move(steps));
   if (step > 1 / 20.0 * 1.01 || step < 1 / 5000.0)
     return "column '" + name + "' steps by " + std::to_string(step) +
            " s: a flight has 20 to 5000 rows a second; is the unit of the time right?";

@@ -8,6 +8,7 @@
 
 #include "core/log/import_columns.hpp"
 #include "core/log/local_cubic.hpp"
+#include "core/log/median.hpp"
 
 namespace backwash::log {
 namespace {
@@ -47,12 +48,6 @@ Rows averaged(const std::vector<double>& t, const Rows& rows) {
     means.push_back(sum / static_cast<double>(last - first));
   }
   return means;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 struct Pairing {

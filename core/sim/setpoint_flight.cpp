@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/log/median.hpp"
 #include "core/types/thrust.hpp"
 
 namespace backwash::sim {
@@ -49,12 +50,6 @@ std::vector<double> slow_course(const log::FlightLog& log, const std::string& na
   return {course.data(), course.data() + n};
 }
 
-double median(std::vector<double> x) {
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
-
 /// Rate at which the four hover, 1/min: of each its median over rows, of these the mean of the two in the middle, so
 /// that one rotor that reads wrong does not move it.
 std::optional<double> hover_rpm(const log::FlightLog& log, const Vehicle& vehicle, const LoggedFlight& flight) {
@@ -67,7 +62,7 @@ std::optional<double> hover_rpm(const log::FlightLog& log, const Vehicle& vehicl
       const double weights = share * vehicle.propulsion.max_thrust / vehicle.body.mass / kGravity;
       rates.push_back(log.column(name)[row] / std::sqrt(std::max(weights, 0.05)));
     }
-    rotors.push_back(median(std::move(rates)));
+    rotors.push_back(log::median(std::move(rates)));
   }
   std::sort(rotors.begin(), rotors.end());
   const double middle = 0.5 * (rotors[1] + rotors[2]);

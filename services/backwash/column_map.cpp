@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/config/strict_table.hpp"
+#include "core/log/median.hpp"
 
 namespace backwash::services {
 namespace {
@@ -102,8 +103,7 @@ std::string unit_of(const std::string& ours, const log::FlightLog& table, const 
     std::vector<double> steps;
     for (std::size_t i = 1; i < table.t_s.size(); ++i) steps.push_back(table.t_s[i] - table.t_s[i - 1]);
     if (steps.empty()) return "s";
-    std::ranges::nth_element(steps, steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2));
-    const double step = steps[steps.size() / 2];
+    const double step = log::median(std::move(steps));
     return step < 0.1 ? "s" : step < 100 ? "ms" : step < 1e5 ? "us" : "ns";
   }
   double most = 0;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/log/median.hpp"
 #include "core/study/windows/observation.hpp"
 #include "core/study/windows/signals.hpp"
 
@@ -13,12 +14,6 @@ namespace backwash::study {
 namespace {
 
 std::string name_of(const char* kind, std::size_t rotor) { return kind + std::to_string(rotor + 1); }
-
-double median(std::vector<double> x) {
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -59,7 +54,7 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
       const auto& rpm = log.column(name_of("rpm", rotor));
       std::vector<double> readings;
       for (std::size_t i = begin; i < end; ++i) readings.push_back(rpm[s.row[i]]);
-      const double middle = median(readings);
+      const double middle = log::median(readings);
       double bad = 0;
       for (std::size_t i = 0; i < readings.size(); ++i) {
         const bool stuck = i > 1 && readings[i] == readings[i - 1] && readings[i] == readings[i - 2];
