@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
+
+#include "core/types/geometry.hpp"
 
 namespace backwash::firmware_bridge {
 namespace {
@@ -19,6 +22,8 @@ enum class Kind : std::uint8_t {
   k_p_vertical,
   v_max,
   a_max,
+  lean,  // that of a_max along both horizontal axes; both firmwares bound g·tan(lean), whatever is asked upwards
+  lean_or_zero,  // the same; 0: another parameter's
   delay,  // of ODOMETRY, ms: what the line adds, and up to kLatestVio of the VIO's own; required where there is one
 };
 
@@ -48,6 +53,7 @@ constexpr Rule kPx4[] = {
     {"MPC_XY_VEL_MAX", true, Kind::v_max, 1, ""},
     {"MPC_Z_VEL_MAX_UP", true, Kind::v_max, 1, ""},
     {"MPC_Z_VEL_MAX_DN", true, Kind::v_max, 1, ""},
+    {"MPC_TILTMAX_AIR", true, Kind::lean, 1, ""},
     {"EKF2_EV_DELAY", true, Kind::delay, 1000, ""},
     {"COM_RC_OVERRIDE", false, Kind::bits, 2,
      "add 2 to COM_RC_OVERRIDE: without it the pilot's sticks do not take over in offboard"},
@@ -74,6 +80,8 @@ constexpr Rule kArduPilot[] = {
     {"WPNAV_SPEED_DN", true, Kind::v_max, 100, ""},
     {"WPNAV_ACCEL", true, Kind::a_max, 100, ""},
     {"WPNAV_ACCEL_Z", true, Kind::a_max, 100, ""},
+    {"ANGLE_MAX", true, Kind::lean, 100, ""},
+    {"PSC_ANGLE_MAX", true, Kind::lean_or_zero, 1, ""},
     {"VISO_DELAY_MS", true, Kind::delay, 1000, ""},
     {"VISO_TYPE", false, Kind::one_of, any({1, 2, 3}),
      "set VISO_TYPE to 1 (MAVLink) and restart it: without it ODOMETRY is not read"},
@@ -89,6 +97,9 @@ constexpr Rule kArduPilot[] = {
      "set FS_THR_ENABLE to 3 (land), or to 0 without a remote control: the others may climb and return"},
     {"FS_GCS_ENABLE", false, Kind::one_of, any({0, 5}),
      "set FS_GCS_ENABLE to 0 (none) or 5 (land): the others may climb and return"},
+    {"RTL_ALT", false, Kind::one_of, any({0}),
+     "set RTL_ALT to 0 (the height at the time, but 2 m): otherwise the pilot's RTL first climbs to it, ceiling or "
+     "not"},
     {"BATT_FS_LOW_ACT", false, Kind::one_of, any({0, 1, 7}),
      "set BATT_FS_LOW_ACT to 0 (none) or 1 (land): 2 to 4 and 6 may climb and return, 5 drops the vehicle"},
     {"BATT_FS_CRT_ACT", false, Kind::one_of, any({0, 1, 7}),
@@ -135,6 +146,9 @@ double wanted(const Rule& rule, const Against& against) {
       return rule.bound * vehicle.limits.v_max;
     case Kind::a_max:
       return rule.bound * vehicle.limits.a_max;
+    case Kind::lean:
+    case Kind::lean_or_zero:
+      return rule.bound * std::atan(std::numbers::sqrt2 * vehicle.limits.a_max / kGravity) * 180 / std::numbers::pi;
     case Kind::delay:
       return rule.bound * against.untold_delay;
     default:
@@ -165,7 +179,10 @@ bool good(const Rule& rule, double value, double velocity, const Against& agains
       return std::abs(value / want * velocity - 1) <= kGainTolerance;
     case Kind::v_max:
     case Kind::a_max:
+    case Kind::lean:
       return told >= limit;
+    case Kind::lean_or_zero:
+      return told == 0 || told >= limit;
     case Kind::delay:  // an ODOMETRY that waits for no set-point is a fifth faster
       return value >= 0.8 * want && value <= want + rule.bound * kLatestVio;
   }
@@ -189,6 +206,10 @@ std::string advice(const Rule& rule, const Against& against) {
     case Kind::a_max:
       return text("set %s to %.3g or more: the vehicle file's %s is planned with", name.c_str(), wanted(rule, against),
                   rule.kind == Kind::v_max ? "v_max" : "a_max");
+    case Kind::lean:
+    case Kind::lean_or_zero:
+      return text("set %s to %.0f or more%s: the vehicle file's a_max along both axes leans so far", name.c_str(),
+                  std::ceil(wanted(rule, against)), rule.kind == Kind::lean ? "" : ", or to 0");
     case Kind::delay:
       return text("set %s to %.0f ms, and the VIO's own delay: so long are set-point and ODOMETRY on the line",
                   name.c_str(), wanted(rule, against));

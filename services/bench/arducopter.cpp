@@ -12,12 +12,13 @@ namespace {
 // clang-format off
 const Profile kProfile{
     .autopilot = 3,                          // MAV_AUTOPILOT_ARDUPILOTMEGA
-    .parameters = {                          // ardupilot-flight.csv:30–112
+    .parameters = {                          // ardupilot-flight.csv:30–112; angles and RTL_ALT: source
         {"GUID_TIMEOUT", 3}, {"VISO_TYPE", 1}, {"EK3_SRC1_POSXY", 6}, {"EK3_SRC1_VELXY", 6}, {"EK3_SRC1_POSZ", 6},
         {"EK3_SRC1_VELZ", 6}, {"EK3_SRC1_YAW", 6}, {"PSC_POSXY_P", 1}, {"PSC_VELXY_P", 2}, {"PSC_VELXY_I", 1},
         {"PSC_VELXY_D", 0.5}, {"PSC_POSZ_P", 1}, {"PSC_VELZ_P", 5}, {"PSC_ACCZ_P", 0.5}, {"PSC_ACCZ_I", 1},
         {"PSC_JERK_XY", 5}, {"PSC_JERK_Z", 5}, {"WPNAV_SPEED", 1000}, {"WPNAV_ACCEL", 250}, {"WPNAV_ACCEL_Z", 100},
-        {"WPNAV_SPEED_UP", 250}, {"WPNAV_SPEED_DN", 150}, {"MOT_SPOOL_TIME", 0.5}, {"TKOFF_SLEW_TIME", 2},
+        {"WPNAV_SPEED_UP", 250}, {"WPNAV_SPEED_DN", 150}, {"ANGLE_MAX", 3000}, {"PSC_ANGLE_MAX", 0}, {"RTL_ALT", 1500},
+        {"MOT_SPOOL_TIME", 0.5}, {"TKOFF_SLEW_TIME", 2},
         {"FS_GCS_ENABLE", 0}, {"FS_THR_ENABLE", 1}, {"FS_EKF_ACTION", 1}, {"FS_EKF_THRESH", 0.8}, {"FS_OPTIONS", 16},
         {"DISARM_DELAY", 10},
         {"FS_GCS_TIMEOUT", 5}, {"BATT_LOW_VOLT", 10.5}, {"BATT_LOW_TIMER", 10}, {"BATT_FS_LOW_ACT", 0},
@@ -25,8 +26,8 @@ const Profile kProfile{
         {"SIM_RC_FAIL", 0}, {"SIM_BATT_VOLTAGE", 12.6}},  // the simulator's own: ardupilot-rc, -battery
     .integers = {{"VISO_TYPE", 2}, {"EK3_SRC1_POSXY", 2}, {"EK3_SRC1_VELXY", 2}, {"EK3_SRC1_POSZ", 2}, {"EK3_SRC1_VELZ", 2},
                  {"EK3_SRC1_YAW", 2}, {"FS_GCS_ENABLE", 2}, {"FS_THR_ENABLE", 2}, {"FS_EKF_ACTION", 2},
-                 {"FS_OPTIONS", 6}, {"DISARM_DELAY", 2}, {"BATT_LOW_TIMER", 2}, {"BATT_FS_LOW_ACT", 2}, {"BATT_FS_CRT_ACT", 2},
-                 {"VISO_DELAY_MS", 4}, {"SIM_RC_FAIL", 2}},
+                 {"FS_OPTIONS", 6}, {"DISARM_DELAY", 2}, {"ANGLE_MAX", 4}, {"RTL_ALT", 6},
+                 {"BATT_LOW_TIMER", 2}, {"BATT_FS_LOW_ACT", 2}, {"BATT_FS_CRT_ACT", 2}, {"VISO_DELAY_MS", 4}, {"SIM_RC_FAIL", 2}},
     .integers_by_value = true,               // ardupilot-flight.csv:35,101,104
     .parameter_period = 0.1,                 // ardupilot-flight.csv:30–88
     .intervals_ms = {},                      // HEARTBEAT alone until asked: ardupilot-flight.csv:1–33

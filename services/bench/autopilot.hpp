@@ -66,7 +66,8 @@ class Autopilot {
   std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5}, {"COM_OBL_RC_ACT", 4},   {"COM_RC_OVERRIDE", 3},
                                            {"NAV_DLL_ACT", 3},     {"NAV_RCL_ACT", 3},      {"EKF2_EV_DELAY", 0},
                                            {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3},
-                                           {"MPC_XY_VEL_MAX", 12}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 3}};
+                                           {"MPC_XY_VEL_MAX", 12}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 3},
+                                           {"MPC_TILTMAX_AIR", 45}};
   /// Remaining share, sent once a second as BATTERY_STATUS while set.
   std::optional<double> battery;
   /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.

@@ -12,7 +12,7 @@ namespace {
 // clang-format off
 const Profile kProfile{
     .autopilot = 12,                         // MAV_AUTOPILOT_PX4
-    .parameters = {                          // px4-flight.csv:13–77; default COM_OBL_RC_ACT is 0
+    .parameters = {                          // px4-flight.csv:13–77; default COM_OBL_RC_ACT is 0; MPC_TILTMAX_AIR: source
         {"COM_OF_LOSS_T", 1}, {"COM_OBL_RC_ACT", 0}, {"COM_RC_IN_MODE", 4}, {"COM_RCL_EXCEPT", 4}, {"NAV_RCL_ACT", 0},
         {"NAV_DLL_ACT", 0}, {"COM_SPOOLUP_TIME", 1}, {"COM_DISARM_PRFLT", 10}, {"COM_DISARM_LAND", 2},
         {"COM_RC_OVERRIDE", 1}, {"COM_LOW_BAT_ACT", 0}, {"EKF2_EV_CTRL", 15}, {"EKF2_EV_DELAY", 0},
@@ -21,7 +21,7 @@ const Profile kProfile{
         {"MPC_Z_VEL_P_ACC", 4}, {"MPC_Z_VEL_I_ACC", 2}, {"MPC_Z_VEL_D_ACC", 0}, {"MPC_TKO_RAMP_T", 3},
         {"MPC_TKO_SPEED", 1.5}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 1.5}, {"MPC_Z_V_AUTO_UP", 3},
         {"MPC_THR_HOVER", 0.5}, {"MPC_LAND_SPEED", 0.7}, {"MPC_ACC_HOR", 3}, {"MPC_XY_VEL_MAX", 12},
-        {"MPC_TILTMAX_LND", 12}, {"COM_RC_LOSS_T", 0.5}, {"COM_DL_LOSS_T", 10}, {"CBRK_SUPPLY_CHK", 894281},
+        {"MPC_TILTMAX_LND", 12}, {"MPC_TILTMAX_AIR", 45}, {"COM_RC_LOSS_T", 0.5}, {"COM_DL_LOSS_T", 10}, {"CBRK_SUPPLY_CHK", 894281},
         {"BAT_CRIT_THR", 0.07}, {"SIM_BAT_DRAIN", 60}, {"SIM_BAT_MIN_PCT", 50}},
     .integers = {{"COM_OBL_RC_ACT", 6}, {"COM_RC_IN_MODE", 6}, {"COM_RCL_EXCEPT", 6}, {"NAV_RCL_ACT", 6},
                  {"NAV_DLL_ACT", 6}, {"COM_RC_OVERRIDE", 6}, {"COM_LOW_BAT_ACT", 6}, {"EKF2_EV_CTRL", 6},

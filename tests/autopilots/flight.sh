@@ -84,11 +84,13 @@ ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1; }
 must() { ctl "$@" || die "backwashctl $* failed: $(tail -n 1 "$log")"; }
 
 # Both refuse for a while: ArduCopter arms when its gyros have settled. A take-off that is refused leaves the daemon enabled.
+# An estimate that was reset on the ground is held there until `land`.
 take_off() {
   for n in $(seq 30); do
     ctl enable --wait || true
     ctl takeoff --height 1.2 --wait && break
     [[ $n != 30 ]] || die "no take-off: $(tail -n 1 "$log")"
+    ! tail -n 8 "$log" | grep -q 'land ends it' || ctl land --wait || true
     sleep 1
   done
 }

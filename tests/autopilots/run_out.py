@@ -15,8 +15,8 @@ AT_REST = 0.1  # m/s, for a second
 WITHIN = 12.0  # s
 # What the daemon says of each, in this order; all but the first may come or not.
 SAYS = {"hold": "", "stop": "hold: operator asks to stop", "land": "land: operator asks to land", "vio_stop": "hold: odometry lost",
-        "vio_freeze": "hold: odometry frozen|hold: map and autopilot", "vio_jump": "hold: odometry jumped", "vio_turn": "hold: odometry jumped",
-        "sigstop": "quiet: no heartbeat|hold: autopilot's pose|quiet: port|hold: map and autopilot", "kill": "passive: started",
+        "vio_freeze": "hold: odometry frozen|hold: odometry contradicts|hold: map and autopilot", "vio_jump": "hold: odometry jumped", "vio_turn": "hold: odometry jumped",
+        "sigstop": "quiet: no heartbeat|hold: autopilot's pose|quiet: port|hold: map and autopilot|hold: odometry lost", "kill": "passive: started",
         "restart": "land: operator asks to land", "pilot": "passive: autopilot left offboard",
         "battery": "land: battery low|passive: autopilot left offboard", "rc": "passive: autopilot left offboard",
         "gcs": "passive: autopilot left offboard", "link": "quiet: no heartbeat", "reboot": "tracking: lifted off"}

@@ -23,17 +23,19 @@ Vehicle vehicle() {
 }
 
 using Named = std::map<std::string, double, std::less<>>;
-const Named kPx4Good{
-    {"COM_OF_LOSS_T", 0.3},    {"COM_OBL_RC_ACT", 4},  {"MPC_XY_VEL_P_ACC", 4}, {"MPC_XY_P", 1.5},
-    {"MPC_Z_VEL_P_ACC", 8},    {"MPC_Z_P", 1.5},       {"MPC_XY_VEL_MAX", 1.5}, {"MPC_Z_VEL_MAX_UP", 3},
-    {"MPC_Z_VEL_MAX_DN", 1.5}, {"EKF2_EV_DELAY", 0},   {"NAV_RCL_ACT", 3},      {"COM_RC_OVERRIDE", 3},
-    {"NAV_DLL_ACT", 0},        {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3}};
+const Named kPx4Good{{"COM_OF_LOSS_T", 0.3},  {"COM_OBL_RC_ACT", 4},   {"MPC_XY_VEL_P_ACC", 4},
+                     {"MPC_XY_P", 1.5},       {"MPC_Z_VEL_P_ACC", 8},  {"MPC_Z_P", 1.5},
+                     {"MPC_XY_VEL_MAX", 1.5}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 1.5},
+                     {"MPC_TILTMAX_AIR", 45}, {"EKF2_EV_DELAY", 0},    {"NAV_RCL_ACT", 3},
+                     {"COM_RC_OVERRIDE", 3},  {"NAV_DLL_ACT", 0},      {"COM_LOW_BAT_ACT", 2},
+                     {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3}};
 const Named kArduPilotGood{
     {"GUID_TIMEOUT", 0.3}, {"PSC_VELXY_P", 4},     {"PSC_POSXY_P", 1.5},    {"PSC_VELZ_P", 8},
     {"PSC_POSZ_P", 1.5},   {"WPNAV_SPEED", 150},   {"WPNAV_SPEED_UP", 250}, {"WPNAV_SPEED_DN", 150},
     {"WPNAV_ACCEL", 200},  {"WPNAV_ACCEL_Z", 250}, {"VISO_TYPE", 1},        {"EK3_SRC1_POSXY", 6},
     {"EK3_SRC1_POSZ", 6},  {"EK3_SRC1_YAW", 6},    {"FS_EKF_ACTION", 1},    {"FS_THR_ENABLE", 3},
-    {"FS_GCS_ENABLE", 0},  {"VISO_DELAY_MS", 10},  {"BATT_FS_LOW_ACT", 1},  {"BATT_FS_CRT_ACT", 0}};
+    {"FS_GCS_ENABLE", 0},  {"VISO_DELAY_MS", 10},  {"BATT_FS_LOW_ACT", 1},  {"BATT_FS_CRT_ACT", 0},
+    {"ANGLE_MAX", 3000},   {"PSC_ANGLE_MAX", 0},   {"RTL_ALT", 0}};
 
 ParameterValues values(Autopilot autopilot, const Named& named) {
   ParameterValues all{};
@@ -77,6 +79,9 @@ TEST(Parameters, EachThatAPromiseRestsOnForbidsBeyondItsLimit) {
       {Autopilot::kArduPilot, "WPNAV_SPEED_DN", {149}, {150}},
       {Autopilot::kArduPilot, "WPNAV_ACCEL", {199}, {200}},
       {Autopilot::kArduPilot, "WPNAV_ACCEL_Z", {100, 199}, {200}},
+      // g tan 16.09° = √2 · 2 m/s²
+      {Autopilot::kArduPilot, "ANGLE_MAX", {1000, 1608, 0}, {1610, 3000}},
+      {Autopilot::kArduPilot, "PSC_ANGLE_MAX", {10, 16.0, -1}, {0, 16.2, 45}},
       {Autopilot::kPx4, "COM_OF_LOSS_T", {1, 0.51, 0}, {0.5, 0.2}},
       {Autopilot::kPx4, "COM_OBL_RC_ACT", {0, 1, 2, 3, 6, 7, -1, 4.5, 40}, {4, 5}},
       {Autopilot::kPx4, "MPC_XY_VEL_P_ACC", {1.8, 3.59}, {3.61}},
@@ -86,6 +91,7 @@ TEST(Parameters, EachThatAPromiseRestsOnForbidsBeyondItsLimit) {
       {Autopilot::kPx4, "MPC_XY_VEL_MAX", {1.49}, {1.5, 12}},
       {Autopilot::kPx4, "MPC_Z_VEL_MAX_UP", {1}, {1.5}},
       {Autopilot::kPx4, "MPC_Z_VEL_MAX_DN", {1}, {1.5}},
+      {Autopilot::kPx4, "MPC_TILTMAX_AIR", {0, 12, 16.0}, {16.2, 45}},
   };
   for (const Case& c : cases) {
     const Named& rest = c.autopilot == Autopilot::kPx4 ? kPx4Good : kArduPilotGood;
@@ -131,7 +137,8 @@ TEST(Parameters, WhatIsOnlyUnwiseIsToldAndForbidsNothing) {
         std::tuple(Autopilot::kArduPilot, "EK3_SRC1_POSZ", 1.0), std::tuple(Autopilot::kArduPilot, "EK3_SRC1_YAW", 1.0),
         std::tuple(Autopilot::kArduPilot, "FS_EKF_ACTION", 2.0),
         std::tuple(Autopilot::kArduPilot, "FS_THR_ENABLE", 1.0),
-        std::tuple(Autopilot::kArduPilot, "FS_GCS_ENABLE", 1.0)}) {
+        std::tuple(Autopilot::kArduPilot, "FS_GCS_ENABLE", 1.0),
+        std::tuple(Autopilot::kArduPilot, "RTL_ALT", 1500.0)}) {
     Named named = autopilot == Autopilot::kPx4 ? kPx4Good : kArduPilotGood;
     named[name] = value;
     const auto all = values(autopilot, named);

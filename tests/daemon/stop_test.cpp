@@ -18,10 +18,11 @@ namespace {
 using track::Mode;
 using track::Reason;
 
-constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED;
+constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED, kRefused = backwash_msgs_msg_dds__ACK_REFUSED;
 constexpr std::uint8_t kEnable = backwash_msgs_msg_dds__COMMAND_ENABLE,
                        kTakeoff = backwash_msgs_msg_dds__COMMAND_TAKEOFF, kGoto = backwash_msgs_msg_dds__COMMAND_GOTO,
-                       kHold = backwash_msgs_msg_dds__COMMAND_HOLD, kStop = backwash_msgs_msg_dds__COMMAND_STOP;
+                       kHold = backwash_msgs_msg_dds__COMMAND_HOLD, kLand = backwash_msgs_msg_dds__COMMAND_LAND,
+                       kStop = backwash_msgs_msg_dds__COMMAND_STOP;
 
 struct Flight {
   std::string log_ = std::filesystem::temp_directory_path() / ("backwash_stop." + std::to_string(getpid()));
@@ -32,6 +33,7 @@ struct Flight {
   PlannerWorker planner_{*rig_.channels, recorder_, [](const auto&) {}, [this] { pause(); }};
   std::uint32_t sequence_ = 0;
   int armed_commands_ = 0;
+  std::string said_;  // the last answer
 
   ~Flight() { std::filesystem::remove(log_); }
 
@@ -76,6 +78,7 @@ struct Flight {
     c.position = position;
     const Decision d = mission_.handle(c, static_cast<double>(rig_.now_ns()) * 1e-9);
     carry_out(d);
+    said_ = d.answer->reason;
     return d.answer->result;
   }
   void rises() {
@@ -154,6 +157,27 @@ TEST(StopWhilePlanning, AHoldEndsTheFlightThatWasPlannedBeforeItAndALaterGotoFli
   f.planner_.step();
   f.ticks(50);
   EXPECT_NE(f.rig_.view().command.p_W, here);
+  EXPECT_EQ(f.rig_.mode(), Mode::tracking);
+}
+
+// As a real autopilot did it after a restart: its estimate was reset once more just after it had been taken in hand.
+TEST(OnTheGround, AHoldThereSaysThatLandEndsItAndSoItDoes) {
+  Flight f;
+  f.ticks(60);
+  ASSERT_EQ(f.give(kEnable), kAccepted);
+  for (int n = 0; n < 250 && f.rig_.mode() != Mode::tracking; ++n) f.tick();
+  f.rig_.local_frame.origin += Vec3(0.4, 0, 0);
+  f.rig_.autopilot->reset_estimator(f.rig_.local_frame);
+  f.ticks(50);
+  ASSERT_EQ(f.rig_.mode(), Mode::hold);
+  ASSERT_EQ(f.rig_.reason(), Reason::autopilot_reset);
+  EXPECT_EQ(f.give(kEnable), kRefused);
+  EXPECT_EQ(f.said_, "already hold (autopilot's position estimate was reset): land ends it, then enable");
+  EXPECT_EQ(f.give(kLand), kAccepted);
+  for (int n = 0; n < 250 && f.rig_.mode() != Mode::passive; ++n) f.tick();
+  EXPECT_EQ(f.rig_.mode(), Mode::passive);
+  ASSERT_EQ(f.give(kEnable), kAccepted) << f.said_;
+  for (int n = 0; n < 250 && f.rig_.mode() != Mode::tracking; ++n) f.tick();
   EXPECT_EQ(f.rig_.mode(), Mode::tracking);
 }
 
