@@ -113,7 +113,7 @@ inject() {
     restart) # at once, and taken in hand again; the row begins there, that of `kill` tells what is before
       kill -KILL "$daemon_pid"
       daemon "$vehicle" "$out/again.bwlog"
-      for _ in $(seq 5); do ctl enable --wait && break; sleep 0.5; done
+      for _ in $(seq 20); do ctl enable --wait && break; sleep 0.5; done
       at=$(now)
       must land --wait
       ;;
