@@ -5,13 +5,14 @@
 #include <optional>
 #include <sstream>
 
-#include "core/log/ulog.hpp"
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
 #include "core/study/findings/study_page.hpp"
 #include "core/study/inference/rotor_reference.hpp"
 #include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
+#include "services/backwash/study_anytime.hpp"
+#include "services/backwash/study_flights.hpp"
 #include "services/backwash/study_output.hpp"
 #include "services/backwash/study_simulation.hpp"
 #include "services/backwash/verb.hpp"
@@ -26,7 +27,8 @@ struct Options {
   std::vector<std::string> logs, reference;
   std::string group;
   unsigned seed = 1;
-  bool json = false, force = false, quick = false, rules = false, residuals = false;
+  std::vector<std::string> fleet;
+  bool json = false, force = false, quick = false, rules = false, residuals = false, anytime = false;
 };
 
 /// The study's own terms of a model file that it has extended before; none in others.
@@ -66,59 +68,19 @@ std::string earlier_terms(const std::string& path) {
   return text.str();
 }
 
-/// A flight log: ULog by its name, else CSV.
-log::FlightLog read_flight(const std::string& path) {
-  if (!path.ends_with(".ulg")) return read_table(path, "t_s");
-  auto log = log::read_ulog(path);
-  if (log) return std::move(*log);
-  throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
-}
-
-/// Flights, and the value of the column that they are grouped by in each one's first row; empty: none.
-struct Flights {
-  std::vector<log::FlightLog> logs;
-  std::vector<double> group;
-};
-
-Flights read_flights(const Options& options) {
-  Flights flights;
-  const auto read = [&](const std::string& path) {
-    progress("reading " + path);
-    flights.logs.push_back(read_flight(path));
-    const auto& log = flights.logs.back();
-    for (const char* name : {"x_m", "y_m", "z_m"})
-      if (!log.has(name))
-        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
-    if (options.group.empty()) return;
-    if (!log.has(options.group) || log.column(options.group).empty())
-      throw Failure(kBadData, path + ":1: no column '" + options.group + "' to group flights by; name one that it has");
-    flights.group.push_back(log.column(options.group).front());
-  };
-  for (const auto& path : options.logs) read(path);
-  return flights;
-}
-
-/// The flights' numbers, those of one group behind each other.
-std::vector<std::size_t> order_of(const Flights& flights) {
-  std::vector<std::size_t> order(flights.logs.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  if (!flights.group.empty())
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return flights.group[a] < flights.group[b]; });
-  return order;
-}
-
-study::Observations observe(const Flights& flights, const Vehicle& vehicle, const Model& model,
-                            const map::OccupancyGrid* grid) {
-  const auto order = order_of(flights);
+/// The evidence after every flight, in the order of the logs, what the model holds taken out.
+AnytimeReport look_every_time(const Options& options, const Flights& flights, const Vehicle& vehicle,
+                              const Model& model, const map::OccupancyGrid* grid) {
+  const auto terms = read_terms(options.model);
   study::Observer observer(vehicle, model, grid);
-  for (const std::size_t k : order) observer.add(flights.logs[k]);
-  auto seen = observer.finish();
-  if (flights.group.empty()) return seen;
-  std::vector<double> by_flight;
-  for (const std::size_t k : order) by_flight.push_back(flights.group[k]);
-  seen.group(by_flight);
-  return seen;
+  study::Anytime anytime;
+  for (const auto& log : flights.logs) {
+    observer.add(log);
+    auto seen = observer.so_far();
+    study::apply(terms, seen);
+    anytime.look(seen);
+  }
+  return anytime_report(flights.paths, anytime, options.fleet);
 }
 
 /// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
@@ -126,8 +88,8 @@ std::string residuals(const Options& options, const Flights& flights, const Vehi
                       const map::OccupancyGrid& grid, const study::Observations& measured,
                       const std::vector<SimulationTerm>& found) {
   FlownAgain again{{}, {}, vehicle, model, grid, options.seed};
-  for (const std::size_t k : order_of(flights))
-    again.logs.push_back(&flights.logs[k]), again.paths.push_back(options.logs[k]);
+  for (const std::size_t k : flights.order())
+    again.logs.push_back(&flights.logs[k]), again.paths.push_back(flights.paths[k]);
   auto terms = read_simulation(options.model);
   progress("simulating the flights without the causes");
   const auto before = simulated(again, terms, measured);
@@ -165,6 +127,9 @@ void check(const Options& options) {
   if (options.vehicle.empty() || options.logs.empty()) throw Failure(kUsage, "study needs --vehicle and --log");
   if (options.residuals && (options.map.empty() || options.report.empty()))
     throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
+  if (options.anytime && !options.group.empty())
+    throw Failure(kUsage, "--anytime takes flights one by one, in the order of --log: give it without --group");
+  if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
 }
@@ -196,13 +161,19 @@ int run(const Options& options) {
   model.ground.r0 = vehicle.body.diagonal_radius;
   std::optional<map::OccupancyGrid> grid;
   if (!options.map.empty()) grid = read_map(options.map);
-  const Flights flights = read_flights(options);
+  Flights flights = read_flights(options.logs, options.group);
   auto seen = observe(flights, vehicle, model, grid ? &*grid : nullptr);
   const auto measured = seen;  // nothing that the model holds taken out
   const auto left = study::apply(read_terms(options.model), seen);
   const auto result = study::study(seen, study_options(options));
   Json json = to_json(result, seen);
   for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
+  std::optional<AnytimeReport> anytime;
+  if (options.anytime) {
+    anytime = look_every_time(options, flights, vehicle, model, grid ? &*grid : nullptr);
+    json["anytime"] = to_json(*anytime);
+  }
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
@@ -224,13 +195,20 @@ int run(const Options& options) {
     json["extended_model"] = options.out;
   }
   if (!options.report.empty()) {
-    std::string beside;
+    std::string beside = anytime ? html(*anytime) : "";
     if (options.residuals)
-      beside = residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
+      beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
     write_page(options, result, seen,
                {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
   }
-  options.json ? print(json) : print_text(result, seen, rotors, height);
+  if (options.json) {
+    print(json);
+    return kOk;
+  }
+  print_text(result, seen, rotors, height);
+  for (const auto& [log, known] : flights.twice)
+    std::printf("counted once: %s is %s again\n", log.c_str(), known.c_str());
+  if (anytime) print_text(*anytime);
   return kOk;
 }
 
@@ -250,6 +228,10 @@ Verb study_verb(CLI::App& app) {
       "theirs, as one condition");
   command->add_option("--group", options->group,
                       "column, such as day: flights with one value of it are left out, flipped and scattered together");
+  command->add_flag("--anytime", options->anytime,
+                    "evidence that may be looked at after every flight, in the order of --log");
+  command->add_option("--fleet", options->fleet,
+                      "what --anytime --json printed for other vehicles: the evidence of all together");
   command->add_option("--report", options->report, "HTML page to write");
   command->add_flag("--residuals", options->residuals,
                     "on the page, per channel: what the simulation of these flights says and what was measured");

@@ -26,12 +26,12 @@ struct MapSeen {
 
 }  // namespace
 
-study::Observations observe(const World& world, const std::filesystem::path& folder) {
-  return observe(world, fly_all(world), folder);
-}
+namespace {
 
-study::Observations observe(const World& world, const std::vector<Table>& flights,
-                            const std::filesystem::path& folder) {
+/// Gives `add` an observer of the world, and each flight as a log.
+template <typename Add>
+study::Observations look_at(const World& world, const std::vector<Table>& flights, const std::filesystem::path& folder,
+                            Add add) {
   write_world_files(world, folder);
   const auto vehicle = backwash::config::load_vehicle((folder / "vehicle.toml").string()).value();
   auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
@@ -48,9 +48,28 @@ study::Observations observe(const World& world, const std::vector<Table>& flight
       for (const auto& row : table.rows) column.push_back(row[c]);
       (table.names[c] == "t_s" ? log.t_s : log.columns[table.names[c]]) = std::move(column);
     }
-    observer.add(log);
+    add(observer, log);
   }
   return observer.finish();
+}
+
+}  // namespace
+
+study::Observations observe(const World& world, const std::filesystem::path& folder) {
+  return observe(world, fly_all(world), folder);
+}
+
+study::Observations observe(const World& world, const std::vector<Table>& flights,
+                            const std::filesystem::path& folder) {
+  return look_at(world, flights, folder, [](study::Observer& observer, const auto& log) { observer.add(log); });
+}
+
+void observe_each(const World& world, const std::filesystem::path& folder,
+                  const std::function<void(const study::Observations&)>& look) {
+  look_at(world, fly_all(world), folder, [&](study::Observer& observer, const auto& log) {
+    observer.add(log);
+    look(observer.so_far());
+  });
 }
 
 std::vector<std::vector<std::string>> sets_of(const study::StudyResult& result) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 
 #include "core/study/findings/study.hpp"
 #include "tests/study_worlds/world.hpp"
@@ -13,6 +14,10 @@ backwash::study::Observations observe(const World& world, const std::filesystem:
 
 backwash::study::Observations observe(const World& world, const std::vector<Table>& flights,
                                       const std::filesystem::path& folder);
+
+/// The same after every flight.
+void observe_each(const World& world, const std::filesystem::path& folder,
+                  const std::function<void(const backwash::study::Observations&)>& look);
 
 /// Per told cause its name, then its rivals.
 std::vector<std::vector<std::string>> sets_of(const backwash::study::StudyResult& result);

@@ -64,10 +64,11 @@ Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Co
     normal.b.push_back(reduced.topRightCorner(p, 1));
     normal.total += normal.A.back();
   }
-  normal.solvable = true;
+  normal.excited = true;
   for (Eigen::Index k = 0; k < p; ++k)  // all but a trace of the column explained by the nuisance: nothing to learn
     if (!(normal.total(k, k) > kRules.spanned * sum(q + k, q + k)) || !(normal.total(k, k) > kRules.least_square))
-      normal.solvable = false;
+      normal.excited = false;
+  normal.solvable = normal.excited;
   for (const auto& a : normal.A) {
     SmallMatrix rest = normal.total - a;
     rest.diagonal() *= 1 + kRules.ridge;

@@ -21,7 +21,8 @@ struct Normal {
   std::vector<SmallVector> b;
   std::vector<SmallMatrix> left_out;  ///< (ΣA − A_f)⁻¹
   SmallMatrix total;                  ///< ΣA
-  bool solvable = false;              ///< every flight may be left out
+  bool excited = false;               ///< no column is one that the nuisance explains
+  bool solvable = false;              ///< excited, and every flight may be left out
 
   /// θ = (ΣA)⁻¹ Σ s_f b_f.
   SmallVector fit(const std::vector<int>& signs = {}) const;
@@ -52,6 +53,9 @@ class Evidence {
 
   /// Takes the accepted columns (with the offsets of their channels) out and estimates the scatter of what is left.
   void whiten(const std::vector<Column>& accepted);
+
+  /// A flight that came after these, by itself, weighed with the scatter of these. Keeps a pointer to `flight`.
+  Evidence next(const Observations& flight) const;
 
   /// Normal equations of `columns`, `nuisance` projected out (columns of it that others span are ignored).
   Normal normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const;

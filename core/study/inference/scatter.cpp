@@ -70,6 +70,14 @@ Evidence::Evidence(const Observations& seen)
   whiten({});
 }
 
+Evidence Evidence::next(const Observations& flight) const {
+  Evidence one(flight);
+  one.within_ = within_, one.between_ = between_, one.unit_ = unit_, one.tilt_ = tilt_;
+  for (const auto& part : one.y_.parts)
+    if (part.channel == kVarX) one.weigh_means(part.x);
+  return one;
+}
+
 /// Adds one channel's part of every flight's XᵀV⁻¹X, the random trim left aside.
 void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const {
   std::vector<std::pair<Eigen::Index, const std::vector<double>*>> active;

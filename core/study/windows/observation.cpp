@@ -239,6 +239,13 @@ void Observations::group(const std::vector<double>& by_flight) {
     if (f + 1 == by_flight.size() || by_flight[f + 1] != by_flight[f]) units.first.push_back(first[f + 1]);
 }
 
+Observations Observer::so_far() const {
+  Observer copy(vehicle_, surroundings_);
+  copy.seen_ = seen_, copy.thrust_stage_ = thrust_stage_, copy.thrust_moments_ = thrust_moments_;
+  copy.command_stage_ = command_stage_, copy.tails_ = tails_, copy.ever_ = ever_;
+  return copy.finish();
+}
+
 Observations Observer::finish() {
   seen_.units.first = seen_.first;
   follow_thrust();

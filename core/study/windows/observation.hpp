@@ -131,6 +131,8 @@ class Observer {
   Observer(const Observer&) = delete;
   void add(const log::FlightLog& log);
   Observations finish();
+  /// As finish() would tell it now; more flights may be added.
+  Observations so_far() const;
 
  private:
   void add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,

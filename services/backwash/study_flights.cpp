@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/study_flights.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
+#include "core/log/same_flight.hpp"
+#include "core/log/ulog.hpp"
+#include "core/study/windows/same_gusts.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+/// Leaves out the later of two flights with the same gusts; whether there was one.
+bool leave_out_twins(Flights& flights, const study::Observations& seen) {
+  const auto order = flights.order();
+  const auto same = study::same_gusts(seen);
+  std::vector<std::size_t> twins;
+  for (std::size_t f = 0; f < same.size(); ++f) {
+    if (same[f] == f) continue;
+    twins.push_back(order[f]);
+    flights.twice.emplace_back(flights.paths[order[f]], flights.paths[order[same[f]]]);
+  }
+  std::ranges::sort(twins, std::greater());
+  for (const std::size_t k : twins) {
+    const auto at = static_cast<std::ptrdiff_t>(k);
+    flights.paths.erase(flights.paths.begin() + at), flights.logs.erase(flights.logs.begin() + at);
+    if (!flights.group.empty()) flights.group.erase(flights.group.begin() + at);
+  }
+  return !twins.empty();
+}
+
+study::Observations look_at(const Flights& flights, const Vehicle& vehicle, const Model& model,
+                            const map::OccupancyGrid* grid) {
+  const auto order = flights.order();
+  study::Observer observer(vehicle, model, grid);
+  for (const std::size_t k : order) observer.add(flights.logs[k]);
+  auto seen = observer.finish();
+  if (flights.group.empty()) return seen;
+  std::vector<double> by_flight;
+  for (const std::size_t k : order) by_flight.push_back(flights.group[k]);
+  seen.group(by_flight);
+  return seen;
+}
+
+}  // namespace
+
+log::FlightLog read_flight(const std::string& path) {
+  if (!path.ends_with(".ulg")) return read_table(path, "t_s");
+  auto log = log::read_ulog(path);
+  if (log) return std::move(*log);
+  throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+}
+
+Flights read_flights(const std::vector<std::string>& paths, const std::string& group) {
+  Flights flights;
+  std::vector<log::FlightMark> marks;
+  const auto read = [&](const std::string& path) {
+    progress("reading " + path);
+    auto log = read_flight(path);
+    for (const char* name : {"x_m", "y_m", "z_m"})
+      if (!log.has(name))
+        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
+    if (!group.empty() && (!log.has(group) || log.column(group).empty()))
+      throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
+    const log::FlightMark mark(log);
+    const auto known = std::ranges::find_if(marks, [&](auto& m) { return m.shared(mark) >= log::kSameFlight; });
+    if (known != marks.end()) {
+      flights.twice.emplace_back(path, flights.paths[static_cast<std::size_t>(known - marks.begin())]);
+      return;
+    }
+    marks.push_back(mark);
+    if (!group.empty()) flights.group.push_back(log.column(group).front());
+    flights.paths.push_back(path);
+    flights.logs.push_back(std::move(log));
+  };
+  for (const auto& path : paths) read(path);
+  return flights;
+}
+
+std::vector<std::size_t> Flights::order() const {
+  std::vector<std::size_t> order(logs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (!group.empty())
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return group[a] < group[b]; });
+  return order;
+}
+
+study::Observations observe(Flights& flights, const Vehicle& vehicle, const Model& model,
+                            const map::OccupancyGrid* grid) {
+  auto seen = look_at(flights, vehicle, model, grid);
+  return leave_out_twins(flights, seen) ? look_at(flights, vehicle, model, grid) : seen;
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/log/flight_log.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/study/windows/observation.hpp"
+#include "core/types/model.hpp"
+#include "core/types/vehicle.hpp"
+
+namespace backwash::services {
+
+/// A flight log: ULog by its name, else CSV. Throws Failure.
+log::FlightLog read_flight(const std::string& path);
+
+/// The flights of a study, each once.
+struct Flights {
+  std::vector<std::string> paths;
+  std::vector<log::FlightLog> logs;
+  std::vector<double> group;  ///< value of the column that they are grouped by in each one's first row; empty: none
+  std::vector<std::pair<std::string, std::string>> twice;  ///< left out, and which flight it is again
+  /// Numbers of the flights, those of one group behind each other.
+  std::vector<std::size_t> order() const;
+};
+
+/// Reads them and leaves out those that hold another one's positions. `group`: a column, or empty. Throws Failure.
+Flights read_flights(const std::vector<std::string>& paths, const std::string& group);
+/// Leaves out those with another one's gusts, too, and makes windows of the others. `grid` may be null.
+study::Observations observe(Flights& flights, const Vehicle& vehicle, const Model& model,
+                            const map::OccupancyGrid* grid);
+
+}  // namespace backwash::services
