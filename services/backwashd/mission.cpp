@@ -182,8 +182,7 @@ Decision Mission::order(Request request, std::string answer) {
 // What has to be right before the daemon takes control; the frames are judged by the supervisor while it is enabling.
 Decision Mission::enable() {
   if (order_under_way()) return refused("the last order is still being carried out: ask again");
-  if (view_.mode != Mode::passive && view_.mode != Mode::quiet)
-    return refused(std::string("already ") + to_string(view_.mode));
+  if (track::commanding(view_.mode)) return refused(std::string("already ") + to_string(view_.mode));
   if (!may_fly(view_.stop_switch)) return refused(refusal(view_.stop_switch));
   if (!other_daemon_.empty()) return refused(other_daemon_);
   if (!odometry_doubt_.empty()) return refused(odometry_doubt_);
