@@ -46,7 +46,7 @@ void SightLines::make(const Bundle& bundle, int dx, int dy, Line& line) {
   const std::size_t lead = std::abs(dx) >= std::abs(dy) ? 0 : 1;
   made_.clear();
   for (int s = std::max(std::abs(dx), std::abs(dy)); s >= 0; --s) add_slab(c[lead], c[1 - lead], s);
-  std::ranges::stable_partition(made_, &Crossing::must);
+  std::stable_partition(made_.begin(), made_.end(), [](const Crossing& made) { return made.must; });
   line.first = static_cast<std::uint32_t>(crossings_.size());
   line.count = static_cast<std::uint16_t>(made_.size());
   line.must = static_cast<std::uint16_t>(std::ranges::count_if(made_, &Crossing::must));

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/log/tick_decisions.hpp"
+
 namespace backwash::log {
 namespace {
 
@@ -29,9 +31,6 @@ enum Flag : std::uint32_t {
   kTakeoffTaken = 1u << 19,
 };
 
-void put(const Vec3& from, double* to) noexcept { std::copy_n(from.data(), 3, to); }
-std::uint32_t bit(bool set, std::uint32_t flag) noexcept { return set ? flag : 0; }
-
 /// Members of a TickInput into its record.
 struct ToRecord {
   TickInputRecord& record;
@@ -44,7 +43,7 @@ struct ToRecord {
   void numbers(const Numbers& from, double* to) const noexcept {
     std::copy_n(from.data(), from.size(), to);
   }
-  void flag(bool set, std::uint32_t flag) const noexcept { record.flags |= bit(set, flag); }
+  void flag(bool set, std::uint32_t flag) const noexcept { record.flags |= set ? flag : 0; }
   template <class T, class Members>
   void optional(const std::optional<T>& from, std::uint32_t known, Members members) const noexcept {
     flag(from.has_value(), known);
@@ -136,33 +135,7 @@ track::TickInput decode(const TickInputRecord& r, const track::AcceptedSegment* 
 }
 
 void decided(const track::FlightTick& flight, const track::TickOutput& out, TickRecord& r) noexcept {
-  r.segment = out.judged_segment;
-  r.index = out.judged_index;
-  r.mode = static_cast<std::uint32_t>(out.supervisor.mode);
-  r.reason = static_cast<std::uint32_t>(out.supervisor.reason);
-  r.judged = out.inside.judged;
-  r.inside = out.inside.inside;
-  r.frame_residual_m = static_cast<float>(flight.alignment().position_residual());
-  r.frame_residual_rad = static_cast<float>(flight.alignment().yaw_residual());
-  if (flight.odometry()) {
-    put(flight.odometry()->state.p_W, r.p);
-    put(flight.odometry()->state.v_W, r.v);
-  }
-  put(out.command.p_W, r.cmd_p);
-  put(out.command.v_W, r.cmd_v);
-  put(out.command.a_W, r.cmd_a);
-  r.cmd_yaw = out.command.yaw;
-  put(out.inside.center, r.center);
-  std::ranges::copy(out.inside.half_widths, r.half_widths);
-  put(out.command_local.p_W, r.local_p);
-  put(out.command_local.v_W, r.local_v);
-  put(out.command_local.a_W, r.local_a);
-  r.local_yaw = out.command_local.yaw;
-  const auto& s = out.supervisor;
-  r.asked = bit(s.send_setpoint, kAskedSetpoint) | bit(s.send_heartbeat, kAskedHeartbeat) |
-            bit(out.forward_odometry, kAskedOdometry) | bit(s.request_offboard, kAskedOffboard) |
-            bit(s.request_land, kAskedLand) | bit(out.arm, kAskedArm) | bit(out.disarm, kAskedDisarm) |
-            bit(out.takeoff.has_value(), kAskedTakeoff);
+  each_decision([&](const auto& decision) { decision.write({flight, out}, r); });
 }
 
 ConstantsRecord constants(const Vehicle& vehicle, double battery_land) noexcept {

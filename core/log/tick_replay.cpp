@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include "core/log/tick_log.hpp"
+#include "core/log/tick_decisions.hpp"
 
 namespace backwash::log {
 namespace {
@@ -93,39 +93,22 @@ class Cursor {
   std::span<const std::uint8_t> left_;
 };
 
-/// Calls each(name, logged, replayed) for every decided member of the two.
-template <typename Each>
-void members(const TickRecord& a, const TickRecord& b, Each each) {
-  each("segment", a.segment, b.segment);
-  each("index", a.index, b.index);
-  each("mode", a.mode, b.mode);
-  each("reason", a.reason, b.reason);
-  each("judged", a.judged, b.judged);
-  each("inside", a.inside, b.inside);
-  each("frame_residual_m", a.frame_residual_m, b.frame_residual_m);
-  each("frame_residual_rad", a.frame_residual_rad, b.frame_residual_rad);
-  each("cmd_yaw", a.cmd_yaw, b.cmd_yaw);
-  each("local_yaw", a.local_yaw, b.local_yaw);
-  each("asked", a.asked, b.asked);
-  const auto array = [&](const char* name, const auto& x, const auto& y) {
-    for (std::size_t i = 0; i < std::size(x); ++i) each(name, x[i], y[i]);
-  };
-  array("p", a.p, b.p), array("v", a.v, b.v);
-  array("cmd_p", a.cmd_p, b.cmd_p), array("cmd_v", a.cmd_v, b.cmd_v), array("cmd_a", a.cmd_a, b.cmd_a);
-  array("local_p", a.local_p, b.local_p), array("local_v", a.local_v, b.local_v);
-  array("local_a", a.local_a, b.local_a);
-  array("center", a.center, b.center), array("half_widths", a.half_widths, b.half_widths);
-}
-
 /// Compares a tick, and mixes what was replayed into the hash.
 std::optional<Difference> compare(const TickRecord& logged, const TickRecord& replayed, std::uint64_t& hash) {
   std::optional<Difference> first;
-  members(logged, replayed, [&](const char* name, auto a, auto b) {
+  const auto number = [&](const char* name, auto a, auto b) {
     std::uint8_t bytes[sizeof b];
     std::memcpy(bytes, &b, sizeof b);
     for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
     if (std::memcmp(&a, &b, sizeof a) != 0 && !first)
       first = Difference{logged.tick, 0, name, static_cast<double>(a), static_cast<double>(b)};
+  };
+  each_decision([&](const auto& decision) {
+    const auto &a = logged.*decision.member, &b = replayed.*decision.member;
+    if constexpr (std::is_array_v<std::remove_cvref_t<decltype(a)>>)
+      for (std::size_t i = 0; i < std::size(a); ++i) number(decision.name, a[i], b[i]);
+    else
+      number(decision.name, a, b);
   });
   return first;
 }

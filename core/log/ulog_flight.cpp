@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/log/log_file.hpp"
+#include "core/log/turned_attitude.hpp"
 #include "core/log/ulog.hpp"
 #include "core/types/geometry.hpp"
 
@@ -83,11 +84,10 @@ void join_attitude(const ULog& ulog, const ULog::Topic& position, FlightLog& log
   }
   if (q.columns.size() != 4) return;
   for (std::size_t row = 0; row < position.t_s.size(); ++row) {
-    const double w = q.column("q[0]")[row], x = q.column("q[1]")[row], y = q.column("q[2]")[row],
-                 z = q.column("q[3]")[row], s = std::sqrt(0.5);
-    // (0, s, s, 0) ⊗ q ⊗ (0, 1, 0, 0)
-    log.columns["qw"].push_back(-s * (w + z)), log.columns["qx"].push_back(-s * (x + y));
-    log.columns["qy"].push_back(s * (y - x)), log.columns["qz"].push_back(s * (z - w));
+    const auto part = [&](const char* name) { return q.column(name)[row]; };
+    const Eigen::Quaterniond ours = flu_of_frd(enu_of_ned({part("q[0]"), part("q[1]"), part("q[2]"), part("q[3]")}));
+    log.columns["qw"].push_back(ours.w()), log.columns["qx"].push_back(ours.x());
+    log.columns["qy"].push_back(ours.y()), log.columns["qz"].push_back(ours.z());
   }
 }
 

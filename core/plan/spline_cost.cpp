@@ -61,6 +61,40 @@ double combined(const PerDirection& k, const PerDirection& h) {
   return sum;
 }
 
+using Points = SplineCost::Points;
+
+/// What each sample's predicted position moves by when the free control points move.
+Points displaced(const MotionBasis& basis, const Points& moved) {
+  Points p(basis.P_horizontal.rows(), 3);
+  p.leftCols<2>().noalias() = basis.P_horizontal * moved.leftCols<2>();
+  p.col(2).noalias() = basis.P_vertical * moved.col(2);
+  return p;
+}
+
+/// And what the velocity of the sample in this row changes by.
+Vec3 faster(const MotionBasis& basis, const Points& moved, Eigen::Index row) {
+  Vec3 v;
+  v.head<2>() = (basis.V_horizontal.row(row) * moved.leftCols<2>()).transpose();
+  v.z() = basis.V_vertical.row(row).dot(moved.col(2));
+  return v;
+}
+
+/// The chain rule: slopes by the samples' positions and velocities become slopes by the free control points.
+void add_by_points(const MotionBasis& basis, const Points& by_p, const Points& by_v, Points& gradient) {
+  gradient.leftCols<2>() += basis.P_horizontal.transpose() * by_p.leftCols<2>();
+  gradient.leftCols<2>() += basis.V_horizontal.transpose() * by_v.leftCols<2>();
+  gradient.col(2) += basis.P_vertical.transpose() * by_p.col(2);
+  gradient.col(2) += basis.V_vertical.transpose() * by_v.col(2);
+}
+
+/// Slopes of k·Δe of sample m in direction d, by the positions of the samples before it.
+void add_growth_slope(double k, std::size_t d, const std::vector<double>& G, const std::vector<LocalBound>& local,
+                      std::size_t m, Points& by_p) {
+  for (std::size_t age = 0; age < std::min(G.size(), m); ++age)
+    by_p.row(static_cast<Eigen::Index>(m - 1 - age)) +=
+        k * G[age] * local[m - 1 - age].gradient.col(static_cast<Eigen::Index>(d)).transpose();
+}
+
 }  // namespace
 
 LocalBound interpolated(const map::OccupancyGrid& grid, const reach::BoundField& bounds, const Vec3& p_W) noexcept {
@@ -215,9 +249,7 @@ void SplineCost::grow(const std::vector<Vec3>& p, const std::vector<std::size_t>
 
 double SplineCost::collision(const Points& moved, Points& gradient) const {
   const std::size_t count = samples_.size();
-  Points p(static_cast<Eigen::Index>(count), 3);
-  p.leftCols<2>().noalias() = basis_.P_horizontal * moved.leftCols<2>();
-  p.col(2).noalias() = basis_.P_vertical * moved.col(2);
+  Points p = displaced(basis_, moved);
   std::vector<Vec3> at(count);
   std::vector<std::size_t> near;
   std::vector<double> lack;
@@ -243,27 +275,17 @@ double SplineCost::collision(const Points& moved, Points& gradient) const {
     if (lack[n] <= 0) continue;
     const std::size_t m = near[n];
     const auto row = static_cast<Eigen::Index>(m);
-    Vec3 velocity = samples_[m].v;
-    velocity.head<2>() += (basis_.V_horizontal.row(row) * moved.leftCols<2>()).transpose();
-    velocity.z() += basis_.V_vertical.row(row).dot(moved.col(2));
+    const Vec3 velocity = samples_[m].v + faster(basis_, moved, row);
     const double speed = velocity.norm(), by_lack = 2 * scale * lack[n] * speed;
     f += scale * lack[n] * lack[n] * speed;
     if (speed > 0) v.row(row) = scale * lack[n] * lack[n] / speed * velocity.transpose();
     p.row(row) -= by_lack * world_.distance.gradient(at[m]).transpose();
-    for (std::size_t d = 0; d < kDirections && !local.empty(); ++d) {
-      const double k = by_lack * samples_[m].k[d];
-      const auto& G = d == kZ ? G_vertical_ : G_horizontal_;
-      if (k == 0) continue;
-      for (std::size_t age = 0; age < std::min(G.size(), m); ++age)
-        p.row(row - 1 - static_cast<Eigen::Index>(age)) +=
-            k * G[age] * local[m - 1 - age].gradient.col(static_cast<Eigen::Index>(d)).transpose();
-    }
+    for (std::size_t d = 0; d < kDirections && !local.empty(); ++d)
+      if (const double k = by_lack * samples_[m].k[d]; k != 0)
+        add_growth_slope(k, d, d == kZ ? G_vertical_ : G_horizontal_, local, m, p);
   }
   if (f == 0) return 0;
-  gradient.leftCols<2>() += basis_.P_horizontal.transpose() * p.leftCols<2>();
-  gradient.leftCols<2>() += basis_.V_horizontal.transpose() * v.leftCols<2>();
-  gradient.col(2) += basis_.P_vertical.transpose() * p.col(2);
-  gradient.col(2) += basis_.V_vertical.transpose() * v.col(2);
+  add_by_points(basis_, p, v, gradient);
   return f;
 }
 

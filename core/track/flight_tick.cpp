@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
+
+#include "core/types/time.hpp"
 
 namespace backwash::track {
 namespace {
@@ -12,29 +13,8 @@ namespace {
 constexpr int kArmingTicks = 150;  // 3 s: heartbeats come once a second
 constexpr int kDisarmEvery = 25;   // ticks: one command may be lost
 constexpr std::size_t kTakeoffEvery = 25;
-constexpr double kClosureFades = 10;  // s: closures add up for so long, or an absurd one would come in pieces
-constexpr double kLeastBelow = 0.1;   // m: a lift-off is over from so far below its height on
+constexpr double kLeastBelow = 0.1;  // m: a lift-off is over from so far below its height on
 constexpr int kSettled = 50;  // ticks there: PX4 gives its loops their authority bit by bit, until 4 s after arming
-constexpr int kDisorder = 3;  // more in a row are as no odometry at all (docs/faults.md row 5)
-constexpr int kLeavesGround = 65;  // ticks: PX4 says 1.15 s before it leaves the ground that it is in the air
-
-double seconds(std::int64_t ns) noexcept { return static_cast<double>(ns) * 1e-9; }
-std::int64_t nanoseconds(double s) noexcept { return static_cast<std::int64_t>(s * 1e9); }
-
-FramePose pose_of(const State& state, const std::array<double, 4>& q) noexcept {
-  return {state.p_W, heading(q), state.v_W, up_in_body(q)};
-}
-
-// With the heading's rate: the body's about the vertical, over the share of it that turns the heading.
-FramePose pose_of(const AutopilotFacts::Pose& pose) noexcept {
-  FramePose result = pose_of(pose.state, pose.q);
-  const Vec3& up = result.up_B;
-  result.yaw_rate =
-      (pose.omega_B.y() * up.y() + pose.omega_B.z() * up.z()) / std::max(1e-3, up.tail<2>().squaredNorm());
-  return result;
-}
-
-bool commanding(Mode mode) noexcept { return mode != Mode::passive && mode != Mode::quiet; }
 
 // As the floats that go on the wire.
 bool finite(const Setpoint& s) noexcept {
@@ -46,95 +26,6 @@ bool finite(const Setpoint& s) noexcept {
 
 FlightTick::FlightTick(const Vehicle& vehicle, double battery_land)
     : battery_land_(battery_land), sigma_(vehicle.estimation.position), gate_(vehicle), tracker_(Setpoint{}, vehicle) {}
-
-// A loop closure (docs/faults.md row 4) moves the map frame under the vehicle. Everything that is in it moves along
-// within this tick, so that in the controller's frame, and physically, nothing has moved; the planner then brings the
-// flight back to its place in the map (rectified()). One that is absurd is not flown: the samples are brought back into
-// the frame that is flown in, until the vehicle is in other hands.
-void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
-  closure_refused_now_ = false;
-  const double faded = was_commanding_ ? 1 - kControlPeriod / kClosureFades : 0;
-  closed_m_ *= faded, closed_rad_ *= faded;
-  if (!sample || sample->closures == closures_) return;
-  const RigidShift D = sample->map_from_odom * map_from_odom_.inverse();
-  const bool first = closures_ == 0;
-  const OdometrySample before = moved(D.inverse(), *sample);
-  // Written so that what is no number is refused.
-  const double by = (sample->state.p_W - before.state.p_W).norm(), turn = std::abs(D.yaw);
-  const bool small = closed_m_ + by <= kMaxClosure && closed_rad_ + turn <= kMaxClosureTurn;
-  if (was_commanding_ && small) closed_m_ += by, closed_rad_ += turn;
-  if (was_commanding_ && !small) {
-    closure_refused_now_ = closure_refused_ != sample->closures;
-    closure_refused_ = sample->closures;
-    sample = before;
-    sample->closures = closures_;
-    sample->map_from_odom = map_from_odom_;
-    return;
-  }
-  closure_refused_ = closures_ = sample->closures;
-  map_from_odom_ = sample->map_from_odom;
-  if (first) return tracker_.rebase({}, closures_);  // until now nothing was in the map by way of it
-  gate_.rebase(D);
-  alignment_.rebase(D);
-  tracker_.rebase(D, closures_);
-  command_ = D.setpoint(command_);
-}
-
-void FlightTick::take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample,
-                               TickOutput& out) noexcept {
-  if (!sample) return;
-  // After a jump or a gap a sample that looks good again may still be in another place: it is not believed, and not
-  // forwarded, until the vehicle is in other hands.
-  if (odometry_distrusted_) {
-    out.verdict = OdometryGate::Verdict::rejected;
-    return;
-  }
-  using Verdict = OdometryGate::Verdict;
-  // A pose that repeats to the last bit is frozen in the air even if nothing is to move; standing, it may be still.
-  const bool flies = in.autopilot.armed && in.autopilot.landed == false, lifts = mode() == Mode::lifting;
-  off_ground_ = lifts && flies ? off_ground_ + 1 : 0;
-  const bool moving = lifts ? off_ground_ > kLeavesGround : command_.v_W.norm() > 0.05 || flies;
-  out.verdict = gate_.take(*sample, moving);
-  disorder_ = out.verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
-  if (out.verdict == Verdict::good) {
-    last_good_ns_ = std::min(sample->received_ns, in.now_ns) - nanoseconds(gate_.late());
-    out.fresh = true;
-  }
-  const bool elsewhere = out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent ||
-                         disorder_ > kDisorder ||
-                         (out.fresh && seconds(in.now_ns - last_good_ns_) > Supervisor::kHoldAfter);
-  if (!elsewhere || was_commanding_) return;
-  gate_.forget();
-  if (out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent) ++odometry_resets_;
-}
-
-// Learns local ← map while nothing is commanded, watches it otherwise. Takes it anew when the controller's estimator
-// was reset: by its counter, or by its own samples, which jumped while the odometry passed its gate. The odometry is
-// brought to the moments of the controller's position and attitude. What is told again, its stamp by now a little
-// earlier in our clock, is no new pair: as a step of no time it would end what the gyros have added up.
-void FlightTick::align(const TickInput& in, bool fresh) noexcept {
-  reset_ = false;
-  const auto& pose = in.autopilot.pose;
-  if (!pose || !gate_.last() || !fresh || pose->at_ns <= last_pose_ns_ || pose->attitude_at_ns <= last_attitude_ns_)
-    return;
-  const double dt = seconds(pose->at_ns - last_pose_ns_);
-  last_pose_ns_ = pose->at_ns;
-  last_attitude_ns_ = pose->attitude_at_ns;
-  const FramePose in_local = pose_of(*pose);
-  FramePose in_map = pose_of(gate_.last()->state, gate_.last()->q);
-  in_map.p += seconds(pose->at_ns - last_good_ns_) * in_map.v;
-  in_map.yaw += seconds(pose->attitude_at_ns - last_good_ns_) * in_local.yaw_rate;
-  const bool counted = reset_counter_ && in.autopilot.reset_counter && *reset_counter_ != *in.autopilot.reset_counter;
-  if (in.autopilot.reset_counter) reset_counter_ = in.autopilot.reset_counter;
-  const bool may_move = mode() != Mode::land && !(mode() == Mode::hold && !supervisor_.pose_trusted());
-  const bool jumped =
-      alignment_.reset_between(in_map, in_local) && (!was_commanding_ || alignment_.local_jumped(in_local, dt));
-  if (may_move && (counted || jumped)) {
-    alignment_.rebase(in_map, in_local);
-    reset_ = was_commanding_;
-  }
-  alignment_.update(in_map, in_local, dt, !was_commanding_);
-}
 
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
@@ -156,18 +47,6 @@ void FlightTick::judge(TickOutput& out) noexcept {
   out.judged_index = tracker_.index();
   if (out.fresh) out.inside = tracker_.judge(gate_.last()->state.p_W);
 }
-
-double AutopilotFacts::pose_age(std::int64_t now_ns) const noexcept {
-  return pose ? seconds(now_ns - std::min(pose->at_ns, pose->attitude_at_ns)) : std::numeric_limits<double>::infinity();
-}
-
-// What enabling allows, and three standard deviations of the two estimates against each other.
-double FlightTick::apart(const TickInput& in) const noexcept {
-  const double sigma = in.position_sigma > 0 ? static_cast<double>(in.position_sigma) : std::numbers::sqrt2 * sigma_;
-  return std::clamp(FrameAlignment::kMaxPosition + 3 * sigma, kLeastApart, kMostApart);
-}
-
-bool FlightTick::frames_apart(const TickInput& in) const noexcept { return alignment_.position_residual() > apart(in); }
 
 SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
   SupervisorInput facts;
@@ -246,17 +125,6 @@ bool FlightTick::lifted(const TickInput& in) noexcept {
                      gate_.last()->state.p_W.z() > tracker_.at(SIZE_MAX).p_W.z() - below;
   settled_ = there ? settled_ + 1 : 0;
   return settled_ > kSettled;
-}
-
-// Odometry is a sensor of the autopilot's, not a command: it gets every good sample in every mode, so that its
-// estimator stays right under a pilot's hands and after us. What we have stopped to believe in flight is not forwarded
-// until the vehicle stands or follows us again.
-void FlightTick::feed(const TickInput& in, TickOutput& out) noexcept {
-  const bool again = !in.autopilot.armed || out.supervisor.mode == Mode::tracking;
-  const bool distrusted = odometry_distrusted_ || (was_commanding_ && !supervisor_.pose_trusted());
-  feed_distrusted_ = distrusted || (feed_distrusted_ && !again);
-  out.forward_odometry = out.fresh && !feed_distrusted_;
-  out.odometry_resets = odometry_resets_;
 }
 
 // The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on

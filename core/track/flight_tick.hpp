@@ -74,6 +74,9 @@ struct TickOutput {
   std::array<const AcceptedSegment*, 2> released{};
 };
 
+/// A state and an attitude (body to its frame: w, x, y, z) as a pose in that frame; the heading's rate is not known.
+FramePose pose_of(const State& state, const std::array<double, 4>& q) noexcept;
+
 /// The decisions of the 50 Hz tick: odometry gate, frames, tracker, supervisor and set-point, without any input or
 /// output of its own. The daemon's control thread and `backwash replay` run the same object.
 class FlightTick {
@@ -82,6 +85,8 @@ class FlightTick {
   /// decimetres and degrees, and the tubes of a room are narrower than this.
   static constexpr double kMaxClosure = 1.0;                              ///< m
   static constexpr double kMaxClosureTurn = 10 * 3.14159265358979 / 180;  ///< rad
+  /// More samples in a row whose stamp does not rise are as no odometry at all (docs/faults.md row 5).
+  static constexpr int kDisorder = 3;
   /// What the frames may come apart in flight, whatever the two estimates claim, m: one that boasts is not believed to
   /// the millimetre, and one that knows nothing excuses nothing.
   static constexpr double kLeastApart = 0.10, kMostApart = 0.25;

@@ -72,8 +72,8 @@ OdometryGate::Verdict OdometryGate::take(const OdometrySample& sample, bool movi
     last_ = sample;
     return Verdict::good;
   }
-  const double by_stamp = static_cast<double>(sample.stamp_ns - last_->stamp_ns) * 1e-9;
-  const double by_reception = std::max(0.0, static_cast<double>(sample.received_ns - last_->received_ns) * 1e-9);
+  const double by_stamp = seconds(sample.stamp_ns - last_->stamp_ns);
+  const double by_reception = std::max(0.0, seconds(sample.received_ns - last_->received_ns));
   const bool clock_was_set = std::abs(by_stamp - by_reception) > kClockStep;
   if (!clock_was_set && by_stamp <= 0) return Verdict::disorder;
   const double dt = clock_was_set ? by_reception : std::min(by_stamp, by_reception + late());

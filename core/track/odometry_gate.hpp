@@ -7,6 +7,7 @@
 
 #include "core/track/rebase.hpp"
 #include "core/types/state.hpp"
+#include "core/types/time.hpp"
 #include "core/types/vehicle.hpp"
 
 namespace backwash::track {
@@ -63,7 +64,7 @@ class OdometryGate {
   const std::optional<OdometrySample>& last() const noexcept { return last_; }
   /// How much longer the newest sample took from its stamp to its reception than the fastest one so far, s, ≥ 0 (row
   /// 49). Clocks that differ by up to 100 ppm add nothing.
-  double late() const noexcept { return static_cast<double>(late_ns_) * 1e-9; }
+  double late() const noexcept { return seconds(late_ns_); }
   /// The map moved under the vehicle (loop closure): the last sample is what it would have said. map_new ← map_old.
   void rebase(const RigidShift& D) noexcept;
   /// After a jump: the next sample is believed whatever it says. Only while nothing is commanded.

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/types/time.hpp"
+
 namespace backwash::track {
 namespace {
 
@@ -18,7 +20,7 @@ double weight(const Mat3& inverse_moments, double t) { return inverse_moments.ro
 std::optional<Vec3> PoseVelocity::add(std::int64_t stamp_ns, const Vec3& p_W) noexcept {
   const auto back = [&](std::size_t n) -> Sample& { return samples_[(next_ + kMost - 1 - n) % kMost]; };
   if (count_ > 0) {
-    const double dt = static_cast<double>(stamp_ns - back(0).stamp_ns) * 1e-9;
+    const double dt = seconds(stamp_ns - back(0).stamp_ns);
     if (dt <= 0 && dt > -kGap) return std::nullopt;
     if (dt > kGap || dt < 0) count_ = 0;
   }
@@ -29,7 +31,7 @@ std::optional<Vec3> PoseVelocity::add(std::int64_t stamp_ns, const Vec3& p_W) no
   double oldest = 0;
   std::size_t used = 0;
   for (; used < count_; ++used) {
-    const double t = static_cast<double>(back(used).stamp_ns - stamp_ns) * 1e-9;
+    const double t = seconds(back(used).stamp_ns - stamp_ns);
     if (t < -kWindow && used >= kLeast) break;
     const Vec3 powers(1, t, t * t);
     moments += powers * powers.transpose();

@@ -139,6 +139,10 @@ constexpr ModeSet set_of(std::initializer_list<Mode> modes) noexcept {
   return static_cast<ModeSet>(set);
 }
 constexpr bool contains(ModeSet set, Mode m) noexcept { return set >> static_cast<unsigned>(m) & 1; }
+/// Modes in which the daemon acts on the vehicle, and of these the ones whose set-points the autopilot follows.
+inline constexpr ModeSet kCommanding = set_of({Mode::enabling, Mode::lifting, Mode::tracking, Mode::hold, Mode::land});
+inline constexpr ModeSet kFollowed = set_of({Mode::tracking, Mode::hold});
+constexpr bool commanding(Mode m) noexcept { return contains(kCommanding, m); }
 
 /// In one of the modes `from`, when the fact that `when` names occurs: to mode `to`. The first row that applies is
 /// taken, one a tick.
@@ -152,6 +156,16 @@ std::span<const Transition> transitions() noexcept;
 /// Why a request to enable (in passive or quiet) is refused, in the order in which they are tried: the mode stays and
 /// the reason says so. If none occurs: → enabling.
 std::span<const Reason> refusals() noexcept;
+
+/// Which reasons there are in one tick to change the mode, or to refuse to enable.
+class Occurring {
+ public:
+  bool& operator[](Reason reason) noexcept { return is_[static_cast<std::size_t>(reason)]; }
+  bool operator[](Reason reason) const noexcept { return is_[static_cast<std::size_t>(reason)]; }
+
+ private:
+  std::array<bool, kReasons> is_{};
+};
 
 /// The daemon's explicit states and reactions: a pure function of the facts of each tick (docs/faults.md).
 class Supervisor {
@@ -183,8 +197,10 @@ class Supervisor {
  private:
   void enter(Mode mode, Reason reason) noexcept;
   void count(const SupervisorInput& in) noexcept;
-  bool occurs(Reason reason, const SupervisorInput& in) const noexcept;
-  bool refused(Reason reason, const SupervisorInput& in) const noexcept;
+  Occurring occurring(const SupervisorInput& in) const noexcept;
+  void note_link_and_operator(const SupervisorInput& in, Occurring& now) const noexcept;
+  void note_poses(const SupervisorInput& in, Occurring& now) const noexcept;
+  void note_flight(const SupervisorInput& in, Occurring& now) const noexcept;
   double seconds_in_mode() const noexcept;
   SupervisorOutput output(const SupervisorInput& in) noexcept;
 

@@ -44,7 +44,8 @@ std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after
       "the control thread takes a quarter of its period and more: look for what else runs");
   add("map overlap", after.place.empty(), after.place.empty() ? "the vehicle stands in known free space" : after.place,
       "send the map of this place, or align the VIO with it, and put the vehicle where there is room to rise");
-  add("map age", n.map_age >= 0, n.map_age < 0 ? "no map" : number("%.1f s", n.map_age), "send a map");
+  const auto map_age = measured(n.map_age);
+  add("map age", map_age.has_value(), map_age ? number("%.1f s", *map_age) : "no map", "send a map");
   for (const auto& [name, value] : after.parameters) {
     const auto advice = std::ranges::find(after.advice, name, &std::pair<std::string, std::string>::first);
     add(name, advice == after.advice.end(), number("%g", value), advice == after.advice.end() ? "" : advice->second);

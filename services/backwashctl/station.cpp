@@ -79,28 +79,17 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
     waitset_.wait(0.05);
     acks_.take([](const dds::Ack&) {});
     statuses_.take([&](const dds::Status& s) {
-      newest = StatusCopy{s,
-                          text(s.vehicle),
-                          text(s.state),
-                          text(s.reason),
-                          text(s.task),
-                          text(s.mismatch),
-                          text(s.place),
-                          text(s.stop_switch),
-                          text(s.refused),
-                          text(s.autopilot),
-                          text(s.autopilot_says),
-                          {},
-                          {}};
+      newest.emplace().numbers = s;
+      for (const StatusText& t : kStatusTexts) {
+        (*newest).*t.own = text(s.*t.sent);
+        newest->numbers.*t.sent = nullptr;
+      }
       for (std::uint32_t n = 0; n < s.parameters._length; ++n)
         newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
       for (std::uint32_t n = 0; n < s.advice._length; ++n)
         newest->advice.emplace_back(text(s.advice._buffer[n].name), text(s.advice._buffer[n].text));
-      auto& own = newest->numbers;
-      own.vehicle = own.state = own.reason = own.task = own.mismatch = own.place = own.stop_switch = own.refused =
-          own.autopilot = own.autopilot_says = nullptr;
-      own.parameters = {};
-      own.advice = {};
+      newest->numbers.parameters = {};
+      newest->numbers.advice = {};
     });
   }
   return newest;

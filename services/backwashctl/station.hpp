@@ -33,6 +33,29 @@ struct StatusCopy {
   std::vector<std::pair<std::string, std::string>> advice;  ///< on those that are not good
 };
 
+/// A text of the status: the key that JSON gives it, and where it is in the message and in a copy.
+struct StatusText {
+  const char* key;
+  char* dds::Status::*sent;
+  std::string StatusCopy::*own;
+};
+/// All of them.
+inline constexpr StatusText kStatusTexts[] = {
+    {"vehicle", &dds::Status::vehicle, &StatusCopy::vehicle},
+    {"state", &dds::Status::state, &StatusCopy::state},
+    {"reason", &dds::Status::reason, &StatusCopy::reason},
+    {"task", &dds::Status::task, &StatusCopy::task},
+    {"frame_mismatch", &dds::Status::mismatch, &StatusCopy::mismatch},
+    {"place", &dds::Status::place, &StatusCopy::place},
+    {"stop_switch", &dds::Status::stop_switch, &StatusCopy::stop_switch},
+    {"refused", &dds::Status::refused, &StatusCopy::refused},
+    {"autopilot", &dds::Status::autopilot, &StatusCopy::autopilot},
+    {"autopilot_says", &dds::Status::autopilot_says, &StatusCopy::autopilot_says},
+};
+
+/// An age or a delay of the status, s; −1 on the wire: nothing was measured for it yet.
+inline std::optional<double> measured(double told) noexcept { return told < 0 ? std::nullopt : std::optional(told); }
+
 /// One ground station: sends commands, waits for their acknowledgement and watches the status.
 class Station {
  public:

@@ -6,61 +6,72 @@
 namespace backwash::ctl {
 namespace {
 
+/// A member of the status and the key that JSON gives it: with the unit where the IDL says it in a comment.
+template <typename T>
+struct Member {
+  const char* key;
+  T dds::Status::*member;
+};
+
+constexpr Member<bool> kFlags[] = {
+    {"armed", &dds::Status::armed},
+    {"offboard", &dds::Status::offboard},
+    {"landed", &dds::Status::landed},
+    {"moving", &dds::Status::moving},
+    {"frames_aligned", &dds::Status::frames_aligned},
+};
+
+constexpr Member<std::uint64_t> kCounts[] = {
+    {"ticks", &dds::Status::ticks},
+    {"ticks_missed", &dds::Status::ticks_missed},
+    {"setpoints_sent", &dds::Status::setpoints_sent},
+    {"samples_inside", &dds::Status::samples_inside},
+    {"samples_outside", &dds::Status::samples_outside},
+    {"odometry_received", &dds::Status::odometry_received},
+    {"odometry_rejected", &dds::Status::odometry_rejected},
+    {"odometry_refused", &dds::Status::odometry_refused},
+    {"maps_accepted", &dds::Status::maps_accepted},
+    {"maps_rejected", &dds::Status::maps_rejected},
+    {"scans_accepted", &dds::Status::scans_accepted},
+    {"scans_rejected", &dds::Status::scans_rejected},
+    {"loop_closures", &dds::Status::loop_closures},
+    {"closures_refused", &dds::Status::closures_refused},
+    {"foreign_writers", &dds::Status::foreign_writers},
+    {"commands_refused", &dds::Status::commands_refused},
+    {"frames_bad", &dds::Status::frames_bad},
+    {"frames_refused", &dds::Status::frames_refused},
+    {"records_lost", &dds::Status::records_lost},
+    {"page_faults", &dds::Status::page_faults},
+    {"parts_filtered", &dds::Status::parts_filtered},
+};
+
+constexpr Member<double> kMeasures[] = {
+    {"odometry_age_s", &dds::Status::odometry_age},
+    {"map_age_s", &dds::Status::map_age},
+    {"heartbeat_age_s", &dds::Status::heartbeat_age},
+    {"frame_residual_m", &dds::Status::frame_residual_m},
+    {"frame_residual_rad", &dds::Status::frame_residual_rad},
+    {"clock_offset_s", &dds::Status::clock_offset},
+    {"clock_delay_s", &dds::Status::clock_delay},
+};
+
 nlohmann::json timing(const dds::Timing& t) { return {{"p50", t.p50}, {"p99", t.p99}, {"max", t.max}}; }
 
 }  // namespace
 
 nlohmann::json json_of(const StatusCopy& s) {
   const auto& n = s.numbers;
-  return {{"vehicle", s.vehicle},
-          {"state", s.state},
-          {"reason", s.reason},
-          {"task", s.task},
-          {"armed", static_cast<bool>(n.armed)},
-          {"offboard", static_cast<bool>(n.offboard)},
-          {"landed", static_cast<bool>(n.landed)},
-          {"moving", static_cast<bool>(n.moving)},
-          {"frames_aligned", static_cast<bool>(n.frames_aligned)},
-          {"position", {n.position.x, n.position.y, n.position.z}},
-          {"setpoint", {n.setpoint.x, n.setpoint.y, n.setpoint.z}},
-          {"ticks", n.ticks},
-          {"ticks_missed", n.ticks_missed},
-          {"setpoints_sent", n.setpoints_sent},
-          {"samples_inside", n.samples_inside},
-          {"samples_outside", n.samples_outside},
-          {"odometry_received", n.odometry_received},
-          {"odometry_rejected", n.odometry_rejected},
-          {"odometry_age_s", n.odometry_age},
-          {"maps_accepted", n.maps_accepted},
-          {"maps_rejected", n.maps_rejected},
-          {"scans_accepted", n.scans_accepted},
-          {"scans_rejected", n.scans_rejected},
-          {"odometry_refused", n.odometry_refused},
-          {"loop_closures", n.loop_closures},
-          {"closures_refused", n.closures_refused},
-          {"foreign_writers", n.foreign_writers},
-          {"map_age_s", n.map_age},
-          {"commands_refused", n.commands_refused},
-          {"frames_bad", n.frames_bad},
-          {"frames_refused", n.frames_refused},
-          {"stop_switch", s.stop_switch},
-          {"records_lost", n.records_lost},
-          {"page_faults", n.page_faults},
-          {"frame_residual_m", n.frame_residual_m},
-          {"frame_residual_rad", n.frame_residual_rad},
-          {"frame_mismatch", s.mismatch},
-          {"heartbeat_age_s", n.heartbeat_age},
-          {"clock_offset_s", n.clock_offset},
-          {"clock_delay_s", n.clock_delay},
-          {"place", s.place},
-          {"parts_filtered", n.parts_filtered},
-          {"refused", s.refused},
-          {"autopilot", s.autopilot},
-          {"autopilot_says", s.autopilot_says},
-          {"parameters", s.parameters},
-          {"tick_us", timing(n.tick)},
-          {"lateness_us", timing(n.lateness)},
-          {"odometry_to_wire_us", timing(n.odometry_to_wire)}};
+  nlohmann::json all{{"position", {n.position.x, n.position.y, n.position.z}},
+                     {"setpoint", {n.setpoint.x, n.setpoint.y, n.setpoint.z}},
+                     {"parameters", s.parameters},
+                     {"tick_us", timing(n.tick)},
+                     {"lateness_us", timing(n.lateness)},
+                     {"odometry_to_wire_us", timing(n.odometry_to_wire)}};
+  for (const auto& [key, member] : kFlags) all[key] = n.*member;
+  for (const auto& [key, member] : kCounts) all[key] = n.*member;
+  for (const auto& [key, member] : kMeasures) all[key] = n.*member;
+  for (const StatusText& t : kStatusTexts) all[t.key] = s.*t.own;
+  return all;
 }
 
 void print(const StatusCopy& s) {

@@ -17,6 +17,7 @@
 #include "core/sync/latest_value.hpp"
 #include "core/sync/record_ring.hpp"
 #include "core/track/flight_tick.hpp"
+#include "core/types/time.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
 #include "firmware_bridge/gpio/stop_switch.hpp"
 #include "firmware_bridge/parameters.hpp"
@@ -241,6 +242,11 @@ struct Channels {
   Pulse pulse;                // control → gpio
   std::atomic<bool> stop{false};
 
+  /// s since the newest data in the map was received; nothing: there is no map. Real-time: wait-free.
+  std::optional<double> map_age(std::int64_t now_ns) const noexcept {
+    const std::int64_t received_ns = map_ns.load(std::memory_order_relaxed);
+    return received_ns < 0 ? std::nullopt : std::optional(seconds(now_ns - received_ns));
+  }
   /// Records of real-time threads that the raw log had no room for.
   std::uint64_t records_lost() const noexcept { return control_log.lost() + command_log.lost(); }
 };

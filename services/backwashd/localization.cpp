@@ -29,6 +29,17 @@ std::optional<Vec3> variances(const double* covariance, std::size_t first) {
   return v;
 }
 
+/// When it is of and how well it is known; no pose yet.
+OdometrySample told_with(const dds::Odometry& m, std::int64_t received_ns) {
+  OdometrySample s;
+  s.received_ns = received_ns;
+  s.stamp_ns = dds::nanoseconds(m.header.stamp);
+  s.position_variance = variances(m.pose.covariance, 0);
+  s.attitude_variance = variances(m.pose.covariance, 3);
+  s.velocity_variance = variances(m.twist.covariance, 0);
+  return s;
+}
+
 /// Whose odometry has these frames; empty: nobody's that is known.
 std::string looks_like(const std::string& frame, const std::string& child) {
   for (const auto& p : config::odometry_profiles())
@@ -93,12 +104,7 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
   if (std::string why = unusable(m); !why.empty()) return tl::unexpected<std::string>(std::move(why));
   const auto& p = m.pose.pose.position;
   const auto& q = m.pose.pose.orientation;
-  OdometrySample s;
-  s.received_ns = received_ns;
-  s.stamp_ns = dds::nanoseconds(m.header.stamp);
-  s.position_variance = variances(m.pose.covariance, 0);
-  s.attitude_variance = variances(m.pose.covariance, 3);
-  s.velocity_variance = variances(m.twist.covariance, 0);
+  OdometrySample s = told_with(m, received_ns);
   const Eigen::Quaterniond sensor(q.w, q.x, q.y, q.z);
   // The gate would reject what is refused here too, but here it takes no good sample's place, and places no scan.
   if (!(std::abs(sensor.norm() - 1) < kUnit))

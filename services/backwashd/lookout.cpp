@@ -57,9 +57,8 @@ class Runs {
 // Its age shrinks what a live map is trusted for: something may have come nearer meanwhile.
 bool Lookout::late(const track::Tracker& tracker, std::int64_t now_ns) const noexcept {
   if (!map_.live || tracker.finished()) return false;
-  const std::int64_t seen = channels_.map_ns.load(std::memory_order_relaxed);
-  const double age = static_cast<double>(now_ns - seen) * 1e-9;
-  return seen < 0 || age > kLate || map_.closing_speed * age > tracker.clearance();
+  const std::optional<double> age = channels_.map_age(now_ns);
+  return !age || *age > kLate || map_.closing_speed * *age > tracker.clearance();
 }
 
 void Lookout::hold_against(const NewVoxels& voxels, const track::Tracker& tracker,

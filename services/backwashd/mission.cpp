@@ -185,8 +185,7 @@ Decision Mission::enable() {
   if (view_.mode == Mode::hold)
     return refused(std::string("already hold (") + to_string(view_.reason) + ")" +
                    (view_.landed ? ": land ends it, then enable" : ""));
-  if (view_.mode != Mode::passive && view_.mode != Mode::quiet)
-    return refused(std::string("already ") + to_string(view_.mode));
+  if (track::commanding(view_.mode)) return refused(std::string("already ") + to_string(view_.mode));
   if (!may_fly(view_.stop_switch)) return refused(refusal(view_.stop_switch));
   if (!other_daemon_.empty()) return refused(other_daemon_);
   if (!odometry_doubt_.empty()) return refused(odometry_doubt_);

@@ -44,6 +44,7 @@ class PlannerWorker {
     std::size_t lead = kLeastLead;  ///< commands between now and the branch of what continues the flight
   };
   static constexpr std::size_t kLeastLead = 20, kMostLead = 100;
+  static constexpr const char* kEnded = "a later command, or what happened meanwhile, ended it";
 
   std::optional<std::string> perform(const PlanJob& job);
   std::optional<std::string> take_off(const PlanJob& job);

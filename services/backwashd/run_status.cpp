@@ -11,6 +11,8 @@
 namespace backwash::daemon {
 namespace {
 
+constexpr double kNotKnown = -1;  // s: an age or a delay that nothing was measured for yet
+
 geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
 dds::Timing timing(const TimingHistogram& h) {
@@ -92,8 +94,8 @@ void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
   s.frame_residual_rad = view.residual_rad;
   s.odometry_age = view.odometry_age;
   s.heartbeat_age = view.heartbeat_age;
-  s.clock_offset = view.clock ? 1e-9 * static_cast<double>(view.clock->offset_ns) : 0;
-  s.clock_delay = view.clock ? 0.5e-9 * static_cast<double>(view.clock->round_trip_ns) : -1;
+  s.clock_offset = view.clock ? seconds(view.clock->offset_ns) : 0;
+  s.clock_delay = view.clock ? 0.5 * seconds(view.clock->round_trip_ns) : kNotKnown;
   s.mismatch = dds::c_string(text.mismatch);
   s.stop_switch = dds::c_string(text.stop_switch);
   s.tick = timing(view.tick);
@@ -114,8 +116,7 @@ void set_counts(dds::Status& s, const Channels& channels) {
   s.loop_closures = channels.loop_closures;
   s.closures_refused = channels.closures_refused;
   s.foreign_writers = channels.foreign_writers;
-  const std::int64_t map_ns = channels.map_ns;
-  s.map_age = map_ns < 0 ? -1 : static_cast<double>(now_ns() - map_ns) * 1e-9;
+  s.map_age = channels.map_age(now_ns()).value_or(kNotKnown);
   s.commands_refused = channels.commands_refused;
   s.parts_filtered = dds::filtered_parts();
 }
@@ -136,7 +137,7 @@ void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
     if (const auto newest = channels_.place.read_new()) place = *newest;
     for (auto* line : {&channels_.refused, &channels_.refused_map})
       if (const auto newest = line->read_new()) refused = *newest;
-    commanding_ = view.mode != track::Mode::passive && view.mode != track::Mode::quiet;
+    commanding_ = track::commanding(view.mode);
     StatusStrings text = strings_of(view, vehicle);
     dds::Status s{};
     s.stamp = dds::wall_clock();

@@ -3,52 +3,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
-#include <fstream>
-#include <sstream>
+#include "tests/config/file_texts.hpp"
 
 namespace backwash::config {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-std::string shipped(const std::string& name) {
-  std::ifstream in(std::string(BACKWASH_SOURCE_DIR "/core/config/files/") + name);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-std::string temporary_path() {
-  return testing::TempDir() + "backwash_config_test_" + std::to_string(getpid()) + ".toml";
-}
-
-/// Writes text to a file of its own and removes it afterwards.
-struct TemporaryFile {
-  explicit TemporaryFile(const std::string& text) : path(temporary_path()) { std::ofstream(path) << text; }
-  ~TemporaryFile() { std::filesystem::remove(path); }
-  std::string path;
-};
-
-/// Message of the error that a file with this text gives, "" if it loads.
-std::string message(bool vehicle, const std::string& text) {
-  const TemporaryFile file(text);
-  if (vehicle) {
-    const auto v = load_vehicle(file.path);
-    return v ? "" : v.error().message;
-  }
-  const auto m = load_model(file.path);
-  return m ? "" : m.error().message;
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
 
 /// One number in a TOML text of the shipped files' style: `key = 1` or `a = { b = 1, c = 2 }` below `[section]`.
 struct Place {
@@ -258,65 +220,6 @@ TEST(LoadModel, TakesWholeNumbersToo) {
 TEST(LoadModel, RefusesAQuotedKeyThatLooksLikeAPath) {
   EXPECT_THAT(message(false, std::string("\"wall.k2\" = 1.0\n") + shipped("quad-5in.model.toml")),
               HasSubstr("unknown"));
-}
-
-constexpr const char* kKp = "kp = { horizontal = 10.0, vertical = 12.0 }   # 1/s²\n";
-constexpr const char* kKd = "kd = { horizontal = 5.5, vertical = 6.0 }     # 1/s\n";
-
-TEST(LoadVehicle, MultipliesPx4CascadedGains) {
-  // docs/model.md section 4: k_p = P_pos·P_vel, k_d = P_vel; PX4's defaults 0.95, 1.8, 1.0, 4.0 where a key is absent.
-  std::string text = replaced(shipped("quad-5in.vehicle.toml"), kKp, "px4 = { MPC_XY_P = 1.5, MPC_Z_VEL_P_ACC = 5 }\n");
-  const TemporaryFile file(replaced(text, kKd, ""));
-  const auto v = load_vehicle(file.path);
-  ASSERT_TRUE(v) << v.error().message;
-  EXPECT_DOUBLE_EQ(v->controller.kp.horizontal, 1.5 * 1.8);
-  EXPECT_DOUBLE_EQ(v->controller.kd.horizontal, 1.8);
-  EXPECT_DOUBLE_EQ(v->controller.kp.vertical, 1.0 * 5);
-  EXPECT_DOUBLE_EQ(v->controller.kd.vertical, 5);
-}
-
-TEST(LoadVehicle, WantsEitherGainsOrPx4) {
-  const std::string text = shipped("quad-5in.vehicle.toml");
-  const std::string right = "needs either both kp and kd, or px4 and neither of them";
-  EXPECT_THAT(message(true, replaced(text, kKp, "px4 = {}\n")), HasSubstr(right));
-  EXPECT_THAT(message(true, replaced(text, kKd, "")), HasSubstr("key 'controller.kd' = (missing): " + right));
-  EXPECT_THAT(message(true, replaced(replaced(text, kKd, ""), kKp, "")), HasSubstr(right));
-  EXPECT_THAT(message(true, replaced(text, kKp, std::string(kKp) + "px4 = {}\n")), HasSubstr(right));
-}
-
-TEST(LoadVehicle, RefusesAnUnstableLoop) {
-  // Without delay s²(lag s + 1) + kd s + kp is stable iff kd > kp·lag (Routh): for kp 12, kd 6 the limit is lag 0.5 s,
-  // for the horizontal 10, 5.5 it is 0.55 s.
-  const std::string text = shipped("quad-5in.vehicle.toml"), lag = "attitude_lag = 0.05";
-  EXPECT_EQ(message(true, replaced(text, lag, "attitude_lag = 0.499")), "");
-  EXPECT_THAT(message(true, replaced(text, lag, "attitude_lag = 0.501")), HasSubstr("unstable"));
-  // Double integrator with delay d: |L| = 1 at ω² = (kd² + √(kd⁴ + 4kp²))/2, limit d = atan(kd ω/kp)/ω = 0.2007 s for
-  // (12, 6) and 0.2194 s for (10, 5.5).
-  const std::string no_lag = replaced(text, lag, "attitude_lag = 0.0"), delay = "feedback_delay = 0.0 ";
-  EXPECT_EQ(message(true, replaced(no_lag, delay, "feedback_delay = 0.200 ")), "");
-  EXPECT_THAT(message(true, replaced(no_lag, delay, "feedback_delay = 0.201 ")), HasSubstr("unstable"));
-}
-
-TEST(LoadVehicle, RefusesThrustBelowWeight) {
-  EXPECT_THAT(message(true, replaced(shipped("quad-5in.vehicle.toml"), "max_thrust = 18.0", "max_thrust = 8.8")),
-              HasSubstr("key 'propulsion.max_thrust' = 8.8: needs more than the vehicle's weight"));
-}
-
-TEST(LoadVehicle, RefusesAMissingOrEmptyName) {
-  const std::string text = shipped("quad-5in.vehicle.toml");
-  EXPECT_THAT(message(true, replaced(text, "name = \"quad-5in\"", "")), HasSubstr("key 'name' = (missing)"));
-  EXPECT_THAT(message(true, replaced(text, "\"quad-5in\"", "\"\"")), HasSubstr("key 'name' = "));
-  EXPECT_THAT(message(true, replaced(text, "\"quad-5in\"", "5")), HasSubstr("key 'name' = 5: needs a string"));
-}
-
-TEST(LoadVehicle, TellsWhatCannotBeFound) {
-  for (const char* path : {"builtin:quad-6in", "/nonexistent/v.toml", "/tmp"}) {
-    const auto v = load_vehicle(path);
-    ASSERT_FALSE(v);
-    EXPECT_EQ(v.error().kind, ConfigError::Kind::not_found);
-    EXPECT_THAT(v.error().message, StartsWith(std::string(path) + ": "));
-  }
-  EXPECT_THAT(load_vehicle("builtin:quad-6in").error().message, HasSubstr("builtin:quad-5in builtin:quad-7in"));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -14,7 +15,8 @@ namespace {
 
 using log::RecordKind;
 
-/// A raw log of a flight in lockstep with a hold and a landing, in a file of its own.
+/// A raw log of a flight in lockstep with a hold and a landing, in a file of its own. tests/golden keeps it: the
+/// environment variable BACKWASH_KEEP_RAW_LOG names where.
 class Replay : public testing::Test {
  protected:
   void SetUp() override {
@@ -29,7 +31,11 @@ class Replay : public testing::Test {
     path_ = testing::TempDir() + "replay_" + std::to_string(::getpid()) + ".bwlog";
     rig.save(path_);
   }
-  void TearDown() override { std::filesystem::remove(path_); }
+  void TearDown() override {
+    if (const char* kept = std::getenv("BACKWASH_KEEP_RAW_LOG"))
+      std::filesystem::copy_file(path_, kept, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::remove(path_);
+  }
 
   log::RawLog read() const { return log::read_raw_log(path_).value(); }
   /// Changes one byte of the file.

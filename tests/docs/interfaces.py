@@ -158,6 +158,14 @@ def names_of_json(text: str) -> set[str]:
     return set(re.findall(r'\{"([A-Za-z]\w*)",(?! *&)', text)) | set(re.findall(r'(?<=[\w\]])\["([A-Za-z]\w*)"\]', text))
 
 
+def names_of_status(root: pathlib.Path) -> set[str]:
+    """Keys of the status: in json_of itself, and in the lists of members that it goes through."""
+    folder = root / "services/backwashctl"
+    code = (folder / "status_output.cpp").read_text()
+    lists = code + (folder / "station.hpp").read_text()
+    return names_of_json(code.split("json_of(")[1]) | set(re.findall(r'\{"(\w+)",\s*&dds::Status::', lists))
+
+
 def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> None:
     # Every name that the programs write is somewhere in the page; every name in a JSON table is written somewhere.
     named = {part for q in quoted(text) for part in re.findall(r"[A-Za-z_]\w*", q)}
@@ -171,6 +179,7 @@ def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> No
             input_names = set(re.findall(r'\(\*table\)\["(\w+)"\]', code))  # of TOML that is read
             wrong.extend(f"JSON of {file.name}: not documented: {x}"
                          for x in sorted(names_of_json(code) - input_names - named))
+    written |= names_of_status(root)
     for measures in (root / "core/sim").glob("compare*.cpp"):  # names of Measure
         written |= set(re.findall(r'"([a-z]\w*)"', measures.read_text()))
     for heading, section in sections_of.items():
@@ -219,8 +228,7 @@ def check_dds(root: pathlib.Path, sections_of: dict[str, str]) -> None:
         expect(f"{prefix}…", {w for c in cells for w in re.findall(rf"{prefix}\w+", c)},
                set(re.findall(rf"const octet ({prefix}\w+)", idl)))
     status = {q for c in rows(sections_of["JSON of status"])[1:] for q in quoted(c[0])}
-    code = (root / "services/backwashctl/status_output.cpp").read_text()
-    expect("JSON of status", status, names_of_json(code.split("json_of(")[1]))
+    expect("JSON of status", status, names_of_status(root))
 
 
 def check_mavlink(root: pathlib.Path, sections_of: dict[str, str]) -> None:

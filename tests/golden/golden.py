@@ -8,9 +8,11 @@ golden.py compare BUILD FOLDER                            runs every case again;
     --within SHARE  numbers may differ by this share of themselves; the largest difference is said (a numerical method changed)
 
 Inputs: worlds of tests/study_worlds, simulated flights, maps (builtin and geb079 of liboctomap-dev), recordings of
-../shared/data where they are, and a raw log of the daemon where one is given. They are made once and stay in FOLDER, so a
-changed generator is no difference. Times that a clock measured and the version are taken out. What remains depends on the
-machine's libm and compiler, so that it is kept in FOLDER and not in the tree. Of a TOML file the values count, not the layout.
+../shared/data where they are, and a raw log of the daemon: the one given, or of a flight in lockstep (test_daemon). They
+are made once and stay in FOLDER, so a changed generator is no difference. The flight in lockstep is flown again by every
+build, and its raw log compared record by record. Times that a clock measured and the version are taken out. What remains
+depends on the machine's libm and compiler, so that it is kept in FOLDER and not in the tree. Of a TOML file the values
+count, not the layout.
 """
 import argparse
 import concurrent.futures
@@ -21,6 +23,7 @@ import os
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
 import sys
 import tomllib
@@ -31,7 +34,7 @@ GEB079 = [pathlib.Path("/usr/share/doc/liboctomap-dev/examples/data/geb079.bt"),
 QUAD = "builtin:quad-5in"
 MODEL = "builtin:quad-5in"
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?")
-CLOCK = re.compile(r'"(?:\w+_ms|planning_ms|version)": ?(?:\{[^}]*\}|"[^"]*"|[\d.eE+-]+|null),?')
+CLOCK = re.compile(r'\(\d+ ms(?: total)?\)|"(?:\w+_ms|planning_ms|version)": ?(?:\{[^}]*\}|"[^"]*"|[\d.eE+-]+|null),?')
 # Hidden causes of the worlds; several causes with a plus; what comes after / is the size.
 WORLDS = ["none", "unknown", "ground_thrust", "ceiling", "wall_attraction", "recirculation", "forward_speed", "battery_sag",
           "thrust_slope", "payload", "trim", "draft", "rotor_drag", "actuator_lag", "command_latency", "imu_drift", "vibration",
@@ -41,14 +44,23 @@ WORLDS = ["none", "unknown", "ground_thrust", "ceiling", "wall_attraction", "rec
 PAGES = {"wall_attraction", "propeller_damage", "unknown"}  # worlds of which page, model and the smallest effects are kept
 
 
+RAW_LOG, TICK, CONSTANTS = b"backwash raw log", 8, 10
+LOCKSTEP = "Replay.OfAFlightIsBitForBitEqualEachTime"  # leaves its raw log where the variable below says
+
+
 def run(command: list, cwd: pathlib.Path) -> subprocess.CompletedProcess:
-    return subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, timeout=600, check=False)
+    environment = os.environ | {"BACKWASH_KEEP_RAW_LOG": "flight.bwlog"}
+    return subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, timeout=600, check=False, env=environment)
 
 
 def made(command: list, cwd: pathlib.Path) -> None:
     done = run(command, cwd)
     if done.returncode:
         sys.exit(f"{' '.join(map(str, command))}: {done.stderr.decode()}")
+
+
+def lockstep(build: pathlib.Path) -> list:
+    return [build / "tests/test_daemon", f"--gtest_filter={LOCKSTEP}"]
 
 
 def grid(low: str, high: str) -> str:
@@ -83,7 +95,9 @@ def make_inputs(build: pathlib.Path, folder: pathlib.Path, raw: str, truth: str)
     for kind in ("airgarage", "crazypad"):
         if files := sorted((DATA / kind).glob("*.csv"))[:24]:
             made([backwash, "import", kind, *files, "-o", kind], inputs)
-    for name, path in (("raw.log", raw), ("truth.csv", truth)):
+    if not raw:
+        made(lockstep(build), inputs)
+    for name, path in (("flight.bwlog", raw), ("truth.csv", truth)):
         if path:
             shutil.copy(path, inputs / name)
     if map_file := next((m for m in GEB079 if m.is_file()), None):
@@ -138,15 +152,32 @@ def cases_of(folder: pathlib.Path) -> dict:
                                             "--method", method, "--json", *(["--map", "builtin:apartment"] if track == "places"
                                                                             else []),
                                             *(["--probability", "1e-3"] if method == "chance" else [])]
-    if (inputs / "raw.log").is_file():
-        cases["replay"] = ["replay", "--log", inputs / "raw.log", "--json"]
-        cases["report"] = ["report", "--log", inputs / "raw.log", "--truth", inputs / "truth.csv", "--json", "--out", "page.html"]
+    raw, truth = inputs / "flight.bwlog", inputs / "truth.csv"
+    cases["replay"] = ["replay", "--log", raw, "--json"]
+    if truth.is_file():
+        cases["report"] = ["report", "--log", raw, "--truth", truth, "--json", "--out", "page.html"]
     return cases | study_cases(inputs)
+
+
+def records(log: bytes):
+    """A raw log's records as lines, without what the machine measured: the microseconds and page faults of a tick, and the
+    time at which the loop was made (core/log/raw_log.hpp)."""
+    at = len(RAW_LOG) + log[len(RAW_LOG):].index(b"\n") + 1
+    while at < len(log):
+        t_ns, kind, size = struct.unpack_from("<qII", log, at)
+        body = bytearray(log[at + 16:at + 16 + size])
+        if kind == TICK:
+            for measured in (48, 52, 56, 68):
+                body[measured:measured + 4] = bytes(4)
+        yield f"{kind} {0 if kind == CONSTANTS else t_ns} {body.hex()}"
+        at += 16 + size
 
 
 def normal(text: bytes, folder: pathlib.Path, version: str) -> bytes:
     if text.startswith(b"\x89PNG"):
         return text
+    if text.startswith(RAW_LOG):
+        return "\n".join(records(text)).encode()
     said = text.decode(errors="surrogateescape").replace(version, "VERSION").replace(str(folder), "FOLDER")
     return CLOCK.sub("", said).encode(errors="surrogateescape")
 
@@ -167,14 +198,15 @@ def say(build: pathlib.Path, folder: pathlib.Path, out: pathlib.Path, only: str)
         name, arguments = item
         place = out / name
         place.mkdir(parents=True)
-        done = run([backwash, *arguments], place)
+        done = run(arguments if name == "lockstep" else [backwash, *arguments], place)
         (place / "stdout").write_bytes(done.stdout)
         (place / "stderr").write_bytes(done.stderr + b"exit %d\n" % done.returncode)
         for file in place.iterdir():
             file.write_bytes(normal(file.read_bytes(), folder, version))
 
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(one, [case for case in cases_of(folder).items() if case[0].startswith(only)]))
+        cases = cases_of(folder) | {"lockstep": lockstep(build)}
+        list(pool.map(one, [case for case in cases.items() if case[0].startswith(only)]))
     return kept(out, only)
 
 

@@ -22,6 +22,7 @@ TEST(Rules, EachHasANameOfItsOwnAUnitAndAReasonOfAKnownKind) {
     EXPECT_GT(r.reason.size(), kind.size() + 10) << r.name << " says no reason";
   }
   EXPECT_TRUE(names.contains("flips") && names.contains("manoeuvre_nats")) << "first and last of the struct";
+  EXPECT_TRUE(names.contains("window_length") && names.contains("inconsistent")) << "and of the windows";
 }
 
 /// Numbers of formulas: halves of ½ xᵀAx, roots of the turned axes, the contrasts of four rotors.

@@ -179,21 +179,26 @@ void analyse(const Data& data, std::span<const double> weights, const Sums& r, G
   }
 }
 
+/// Calls each(flight, axis, ln variance of a window less that of the fitted Σ) for the flights of any weight.
+template <typename Each>
+void for_each_residual(const Data& data, std::span<const double> weights, const Parameters& parameters,
+                       const Each& each) {
+  for (const auto& h : data.hovers) {
+    if (weights[h.flight] == 0) continue;
+    const Vec3 at = bound_variance(h.features, parameters).array().log();
+    for (const auto& v : h.ln_variance)
+      for (int axis = 0; axis < 3; ++axis) each(h.flight, axis, v[axis] - at[axis]);
+  }
+}
+
 Scatter scatter(const Data& data, std::span<const double> weights, const Parameters& parameters) {
   const std::size_t flights = weights.size();
   Scatter s{Levels(flights), Levels(flights), {}, {}};
   std::array<Sums, kGroups> sums{Sums(flights), Sums(flights)};
-  for (const auto& h : data.hovers) {
-    if (weights[h.flight] == 0) continue;
-    const Vec3 at = bound_variance(h.features, parameters).array().log();
-    for (const auto& v : h.ln_variance) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const double r = v[axis] - at[axis];
-        auto& g = sums[group(axis)];
-        g.first[h.flight] += r, g.second[h.flight] += r * r, g.count[h.flight] += 1;
-      }
-    }
-  }
+  for_each_residual(data, weights, parameters, [&](std::size_t flight, int axis, double r) {
+    auto& g = sums[group(axis)];
+    g.first[flight] += r, g.second[flight] += r * r, g.count[flight] += 1;
+  });
   for (const Group g : {kHorizontal, kVertical}) analyse(data, weights, sums[g], g, s);
   return s;
 }
@@ -203,17 +208,11 @@ double level_shift(const Data& data, std::span<const double> weights, const Para
                    Group g, double q) {
   std::vector<std::pair<double, double>> within;  // residual about its flight's level, weight
   double total = 0;
-  for (const auto& h : data.hovers) {
-    if (weights[h.flight] == 0) continue;
-    const Vec3 at = bound_variance(h.features, parameters).array().log();
-    for (const auto& v : h.ln_variance) {
-      for (int axis = 0; axis < 3; ++axis) {
-        if (group(axis) != g) continue;
-        within.emplace_back(v[axis] - at[axis] - s.means[h.flight][g], weights[h.flight]);
-        total += weights[h.flight];
-      }
-    }
-  }
+  for_each_residual(data, weights, parameters, [&](std::size_t flight, int axis, double r) {
+    if (group(axis) != g) return;
+    within.emplace_back(r - s.means[flight][g], weights[flight]);
+    total += weights[flight];
+  });
   const double sd = std::max(s.between[g], 1e-3);
   const auto covered = [&](double shift) {
     double sum = 0;
