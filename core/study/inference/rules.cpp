@@ -18,7 +18,7 @@ constexpr std::array<Rule, sizeof(WindowOptions) / sizeof(double)> window_rules(
        "chosen: a hover of 5 s holds two, and the band's slowest gusts half a cycle"},
       {"band_low", kDefaults.band.low_hz, "Hz", "chosen: slower, it is in the windows' means, which are fitted apart"},
       {"band_high", kDefaults.band.high_hz, "Hz",
-       "derived: 0.4 of 50 Hz, the rate of the control loop and of its logs"},
+       "derived: two fifths of 50 Hz, the rate of the control loop and of its logs"},
       {"tau_w", kDefaults.tau_w, "s", "measured: as bound.tau_w of the shipped model (docs/model.md section 3)"},
       {"settle", kDefaults.settle_s, "s", "chosen: at the start of each hover, counted as transit (calibration)"},
       {"gap", kDefaults.gap_s, "s", "derived: the period of 20 Hz, the least rate of a log: farther apart is a gap"},
