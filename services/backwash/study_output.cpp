@@ -88,10 +88,11 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen) 
   for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
   for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause));
   for (const auto& u : result.unknown)
-    json["unknown"].push_back({{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}});
+    json["unknown"].push_back(
+        {{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}, {"shape", u.shape}, {"hz", u.hz}});
   for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
   for (const auto& d : result.remaining)
-    if (d.found())
+    if (d.found)
       json["remaining_dependence"].push_back(
           {{"regressor", d.regressor}, {"group", d.group}, {"hsic", d.hsic}, {"p", d.p}, {"p_holm", d.p_holm}});
   for (const auto& [cause, sizes] : result.minimum_detectable)
@@ -160,9 +161,10 @@ void print_text(const study::StudyResult& result, const study::Observations& see
     }
   }
   for (const auto& u : result.unknown)
-    std::printf("unknown structure in %s along %s, p %.4f\n", u.group.c_str(), u.along.c_str(), u.p);
+    std::printf("unknown structure in %s along %s (%s), p %.4f\n", u.group.c_str(), u.along.c_str(), u.shape.c_str(),
+                u.p);
   for (const auto& d : result.remaining)
-    if (d.found())
+    if (d.found)
       std::printf("what remains in %s depends on %s, p %.4f (Holm)\n", d.group.c_str(), d.regressor.c_str(), d.p_holm);
   for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
   if (height) print_text("hovers and passes", height->all);

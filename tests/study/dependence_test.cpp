@@ -117,7 +117,15 @@ TEST(Dependence, AutocorrelationAloneIsNotDependence) {
 
 std::vector<Dependence> remaining(const std::vector<std::string>& causes, double size) {
   const auto folder = std::filesystem::temp_directory_path() / ("study-dependence-" + std::to_string(::getpid()));
-  const auto seen = study_worlds::observe(study_worlds::draw_world({4711, causes, size, 12, ""}), folder);
+  auto world = study_worlds::draw_world({4711, causes, size, 12, ""});
+  using study_worlds::Structure;  // two waves of the vertical push along each turn of the heading
+  world.effects.structure = {Structure::Kind::heading,
+                             Structure::Where::up,
+                             {Structure::Quantity::yaw, Structure::Quantity::t},
+                             {2, 0},
+                             {0.4, 0},
+                             0};
+  const auto seen = study_worlds::observe(world, folder);
   std::filesystem::remove_all(folder);
   return remaining_dependence(Evidence(seen), {}, 1);
 }
@@ -125,13 +133,13 @@ std::vector<Dependence> remaining(const std::vector<std::string>& causes, double
 TEST(Dependence, AWorldWithAStructureOutsideTheCatalogueShowsIt) {
   const auto all = remaining({"unknown"}, 1.5);
   ASSERT_FALSE(all.empty());
-  EXPECT_TRUE(all.front().found()) << all.front().regressor << " " << all.front().p_holm;
+  EXPECT_TRUE(all.front().found) << all.front().regressor << " " << all.front().p_holm;
 }
 
 TEST(Dependence, AWorldWithoutAnEffectShowsNone) {
   const auto all = remaining({}, 1);
   ASSERT_GE(all.size(), 20u);
-  EXPECT_FALSE(all.front().found()) << all.front().regressor << " " << all.front().p_holm;
+  EXPECT_FALSE(all.front().found) << all.front().regressor << " " << all.front().p_holm;
 }
 
 }  // namespace

@@ -92,6 +92,33 @@ TEST(Study, TellsAWeakCauseBesideAStrongOneOfOtherChannels) {
   }
 }
 
+TEST(Study, NamesAVibrationWhoseLinesFoldBelowSixHertz) {
+  int named = 0;
+  std::string all;
+  for (std::uint64_t k = 0; k < 4; ++k) {
+    const study_worlds::Request request{seed() + k, {"vibration"}, 4.2, 12, "fold"};  // 1.05 m/s²
+    const auto told = study_worlds::told(studied(study_worlds::observe(study_worlds::draw_world(request), folder())));
+    named += told.find("vibration") != std::string::npos ? 1 : 0;
+    all += told + "; ";
+  }
+  EXPECT_GE(named, 3) << "seed " << seed() << ": " << all;
+}
+
+TEST(Study, SaysWhyAVibrationIsNotTestedWhereItsLinesCannotBeTold) {
+  auto seen = world_with({}, 1);
+  const auto why = [](const StudyResult& result) {
+    for (const auto& [name, reason] : result.not_tested)
+      if (name == "vibration") return reason;
+    return std::string("tested");
+  };
+  EXPECT_EQ(why(studied(seen)), "tested");
+  for (std::size_t rotor = 0; rotor < 4; ++rotor)
+    std::fill_n(seen.weight[kLine1 + rotor].begin(), seen.windows.size(), 0.0);
+  EXPECT_NE(why(studied(seen)).find("fold below 0.75 Hz"), std::string::npos) << why(studied(seen));
+  seen.missing.emplace(Source::rpm, "no rpm1 column");
+  EXPECT_EQ(why(studied(seen)), "no rpm1 column");
+}
+
 TEST(Study, NamesACeilingOfWhichTwoHeightsCannotTellTheLength) {
   int in_set = 0;
   std::string all;

@@ -85,7 +85,11 @@ World draw_world(const Request& request) {
     const double sign = !cause.one_signed && between(rng, 0, 1) < 0.5 ? -1 : 1;
     world.effects.size[name] = sign * request.size * cause.size;
     world.effects.shape[name] = cause.shape ? cause.shape(rng) : between(rng, -M_PI, M_PI);
+    if (name == "unknown") world.effects.structure = draw_structure(rng);
   }
+  world.rotor_rpm = world.craft.model == "quad-7in" ? 7200 : 11000;
+  if (request.confound == "fold")
+    world.rotor_rpm = 60 * (world.rate_hz * std::round(world.rotor_rpm / 60 / world.rate_hz) + between(rng, -6, 6));
   return world;
 }
 
@@ -169,7 +173,9 @@ std::string truth_line(const World& world) {
   bool first = true;
   for (const auto& [name, size] : world.effects.size) {
     text << (first ? "" : ", ") << "{\"name\": \"" << name << "\", \"size\": " << size
-         << ", \"shape\": " << world.effects.shape_of(name) << "}";
+         << ", \"shape\": " << world.effects.shape_of(name);
+    if (name == "unknown") text << ", \"structure\": \"" << text_of(world.effects.structure) << '"';
+    text << '}';
     first = false;
   }
   return text.str() + "]}";

@@ -50,18 +50,17 @@ double more_inflow(const Craft& craft, double climb) {
   return climb + 2 * (std::sqrt(climb * climb / 4 + hover2) - std::sqrt(hover2));
 }
 
-/// Causes that no name of the catalogue covers.
-Vec3 outside_the_catalogue(const Acting& a) {
-  switch (static_cast<int>(a.shape)) {
-    case 0:  // a standing wave of pressure along the room
-      return up(a.s * std::sqrt(2.0) * std::sin(2 * M_PI * a.now.p.y() / 1.9));
-    case 1:  // the vehicle's heading disturbs its height
-      return up(a.s * std::sqrt(2.0) * std::cos(2 * a.now.yaw));
-    case 2:  // a jet at one height
-      return Vec3(a.s, a.s, 0) * 1.5 * std::exp(-std::pow((a.now.p.z() - 1.1) / 0.18, 2));
-    default:  // warmth in the middle of the range
-      return up(2 * a.s * std::exp(-std::pow((a.now.temperature - 31) / 2.0, 2)));
-  }
+/// Outside the catalogue: a push along a direction.
+Vec3 unnamed_push(const Acting& a) {
+  const Structure& what = a.world.effects.structure;
+  if (what.where == Structure::Where::variance) return Vec3::Zero();
+  return a.s * value_at(what, a.now) * (what.where == Structure::Where::up ? Vec3::UnitZ() : level(what.direction));
+}
+
+/// The same in ln variance, where 0.15 m/s² is 0.6.
+double unnamed_ln_variance(const Acting& a) {
+  const Structure& what = a.world.effects.structure;
+  return what.where == Structure::Where::variance ? 4 * a.s * value_at(what, a.now) : 0;
 }
 
 Vec3 ceiling_push(const Acting& a) {
@@ -121,7 +120,8 @@ std::map<std::string, Cause> pushes() {
         .truth = {{"x_mps2_per_100s", [=](double s, double d) { return after_100_s(std::cos(d))(s, d); }},
                   {"y_mps2_per_100s", [=](double s, double d) { return after_100_s(std::sin(d))(s, d); }},
                   {"z_mps2_per_100s", after_100_s(0.3)}}}},
-      {"unknown", {.size = 0.15, .shape = one_of_four, .push = outside_the_catalogue}}};  // m/s²; which
+      {"unknown",  // m/s², or a quarter of ln variance, root mean square
+       {.size = 0.15, .push = unnamed_push, .ln_variance = unnamed_ln_variance}}};
 }
 
 /// All others.

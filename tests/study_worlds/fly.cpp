@@ -194,7 +194,7 @@ class Flight {
     for (int i = 0; i < 4; ++i) {
       const bool hurt = damage != 0 && i == damaged;
       const double need = produced_.norm() / kG / (hurt ? 1 - damage : 1.0);
-      spin_[i] = (world_.craft.model == "quad-7in" ? 7200 : 11000) * std::sqrt(need) * (1 + 0.004 * offset_[i]);
+      spin_[i] = world_.rotor_rpm * std::sqrt(need) * (1 + 0.004 * offset_[i]);
       motor_[i] = command_of(world_.craft, world_.craft.mass * kG * need) * (1 + 0.006 * offset_[i + 4]);
       phase_[i] += 2 * M_PI * spin_[i] / 60 * kStep;
     }

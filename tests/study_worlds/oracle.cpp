@@ -94,6 +94,21 @@ std::vector<study::Column> seen_by(const study::Column& oracle, std::vector<stud
 
 }  // namespace
 
+double explained(const study::Observations& seen, const std::vector<Table>& flights) {
+  double most = 0;
+  for (const auto& [channel, x] : oracle_column(seen, flights, 0).parts) {
+    double n = 0, sx = 0, sy = 0, xx = 0, xy = 0, yy = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (!(seen.weight[channel][i] > 0)) continue;
+      const double y = seen.y[channel][i];
+      n += 1, sx += x[i], sy += y, xx += x[i] * x[i], xy += x[i] * y, yy += y * y;
+    }
+    const double vx = xx - sx * sx / n, vy = yy - sy * sy / n, both = xy - sx * sy / n;
+    if (n > 2 && vx > 0 && vy > 0) most = std::max(most, both * both / (vx * vy));
+  }
+  return most;
+}
+
 void compare_with_oracle(Outcome& outcome, const study::Accepted& found, const study::Observations& seen,
                          const std::vector<Table>& flights) {
   const double beyond = found.form->cause() == "battery_sag" ? kBeyondOfBattery : 0;

@@ -10,6 +10,10 @@ namespace study_worlds {
 /// them); empty for a cause without one.
 std::vector<Compared> compare(const World& world, const std::vector<Table>& flights,
                               const backwash::study::Accepted& found);
+/// Share of a channel's variance between windows that the hidden effect's window means explain, largest of all
+/// channels.
+double explained(const backwash::study::Observations& seen, const std::vector<Table>& flights);
+
 /// |value − truth|/|truth| over all of them as one vector.
 std::optional<double> parameter_error(const std::vector<Compared>& compared);
 

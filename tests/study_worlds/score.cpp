@@ -39,6 +39,7 @@ const std::vector<Cell>& cells() {
     list.insert(list.end(), {{"unknown", {"unknown"}},
                              {"none", {}},
                              {"two causes", {}, "", true},
+                             {"vibration, folded below 6 Hz", {"vibration"}, "fold"},
                              {"trim, no yaw turn", {"trim"}, "yaw"},
                              {"draft, no yaw turn", {"draft"}, "yaw"},
                              {"battery_sag, equal batteries", {"battery_sag"}, "battery"},
@@ -79,11 +80,13 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   const auto seen = observe(world, tables, folder);
   const double observed = cpu();
   backwash::study::StudyOptions options;
-  options.minimum_detectable = options.dependence = false;
+  options.minimum_detectable = false;
   const auto result = backwash::study::study(seen, options);
   out.world_s = observed - start, out.study_s = cpu() - observed;
   out.sets = sets_of(result);
   for (const auto& u : result.unknown) out.unknown.push_back(u.along);
+  if (holds(out.truth, "unknown"))
+    out.structure = text_of(world.effects.structure), out.explained = explained(seen, tables);
   if (out.truth.size() != 1) return out;
   for (const auto& cause : result.causes) {
     if (cause.found.form->cause() != out.truth.front()) continue;
@@ -104,6 +107,7 @@ nlohmann::json to_json(const Outcome& o) {
     if (c.best) one["best_of_form"] = *c.best;
     json["compared"].push_back(one);
   }
+  if (!o.structure.empty()) json["structure"] = o.structure, json["explained"] = o.explained;
   if (o.error) json["parameter_error"] = *o.error;
   if (o.gain_share) json["gain_share"] = *o.gain_share;
   return json;
@@ -120,6 +124,7 @@ Outcome from_json(const nlohmann::json& json) {
     o.compared.push_back({c.at("name"), c.at("value"), c.at("ci95").at(0), c.at("ci95").at(1), c.at("truth"), {}});
     if (c.contains("best_of_form")) o.compared.back().best = c.at("best_of_form").get<double>();
   }
+  o.structure = json.value("structure", ""), o.explained = json.value("explained", 1.0);
   if (json.contains("parameter_error")) o.error = json.at("parameter_error").get<double>();
   if (json.contains("gain_share")) o.gain_share = json.at("gain_share").get<double>();
   return o;

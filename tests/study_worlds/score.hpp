@@ -39,7 +39,9 @@ struct Outcome {
   std::vector<Compared> compared;              ///< of the hidden cause, if its name comes first in a set
   std::optional<double> error;                 ///< |parameters − truth| over |truth|
   std::optional<double> gain_share;            ///< held-out gain over that of the true effect's own column
-  double study_s = 0, world_s = 0;             ///< CPU: of the search, and of flying and observing
+  std::string structure;                       ///< of a hidden "unknown"
+  double explained = 1;             ///< share of the variance between windows that it explains, of the channel of most
+  double study_s = 0, world_s = 0;  ///< CPU: of the search, and of flying and observing
 
   bool right() const;       ///< exactly the hidden causes, each alone in its set; "unknown": structure and no name
   bool in_sets() const;     ///< every hidden cause is in some set (unknown: told)

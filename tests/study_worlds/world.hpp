@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/study_worlds/structure.hpp"
+
 /// Worlds with a hidden effect for the study. Nothing of the study's code is used here: own integrator, own forms of
 /// every effect, own queries of the room. Only the null model's Σ (what the simulation claims) comes from core/field.
 namespace study_worlds {
@@ -22,7 +24,8 @@ struct Request {
   double size = 1;                  ///< in units of the effect-size table (core/study/confusion.md)
   int flights = 12;
   /// "yaw": never turns; "battery": all flights start full and equal; "height": an empty room, hovers at two heights
-  /// only, low and under the ceiling; empty: none.
+  /// only, low and under the ceiling; "fold": the rotors' rate lies within 6 Hz of a multiple of the logging rate;
+  /// empty: none.
   std::string confound;
 };
 
@@ -49,6 +52,7 @@ struct Craft {
 struct Effects {
   std::map<std::string, double> size;
   std::map<std::string, double> shape;  ///< a second, drawn number: length, time or direction
+  Structure structure{};                ///< of "unknown"
   double of(const std::string& name) const { return size.contains(name) ? size.at(name) : 0.0; }
   double shape_of(const std::string& name) const { return shape.contains(name) ? shape.at(name) : 0.0; }
 };
@@ -59,6 +63,7 @@ struct World {
   Craft craft;
   Effects effects;
   double rate_hz, jitter, ln_var_vehicle;
+  double rotor_rpm;  ///< at hover
 };
 
 World draw_world(const Request& request);

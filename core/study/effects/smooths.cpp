@@ -52,26 +52,6 @@ const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups(
   return all;
 }
 
-std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group) {
-  const std::vector<double> u = ranks(along, windows);
-  std::vector<Column> columns;
-  for (int k = 1; k <= 4; ++k) {
-    std::vector<double> x;
-    for (const double q : u) {
-      const int turns = (k + 1) / 2;
-      x.push_back(!along.circular ? std::cos(M_PI * k * q) : k % 2 ? std::cos(turns * q) : std::sin(turns * q));
-    }
-    // A push may point anywhere in the plane: x and y have coefficients of their own. ln variance moves as one.
-    if (group.front() == kVarX) {
-      columns.emplace_back();
-      for (const Channel c : group) columns.back().parts.push_back({c, x});
-    } else {
-      for (const Channel c : group) columns.push_back({{{c, x}}});
-    }
-  }
-  return columns;
-}
-
 std::vector<Column> companions(const Form& form, const Observations& seen) {
   return form.companions ? form.companions(seen.windows) : std::vector<Column>{};
 }

@@ -3,18 +3,15 @@
 
 #include "core/study/effects/table.hpp"
 
-/// What competes with the effects, and what stands beside them: smooths of a regressor, free offsets, companions.
+/// What competes with the effects, and what stands beside them: regressors, free offsets, companions.
 namespace backwash::study {
 
-/// Regressors of which any smooth function competes with the catalogue.
+/// Regressors of which any structure competes with the catalogue (structures.hpp).
 std::vector<Regressor> regressors(const Observations& seen);
 /// Each window's rank q in [0, 1] along a regressor (ties share theirs); circular: the angle itself, rad.
 std::vector<double> ranks(const Regressor& along, const Windows& windows);
-/// The channels that a smooth moves together, with their name.
+/// The channels that a structure moves together, with their name.
 const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups();
-/// cos(π k q), k = 1 … 4, of the regressor's rank q in [0, 1] (circular: sin and cos of one and two turns), in the
-/// channels of one group: level means each for themselves, ln variance along all axes as one.
-std::vector<Column> smooth_columns(const Regressor& along, const Windows& windows, const std::vector<Channel>& group);
 
 /// What an accepted form leaves open (Form::companions).
 std::vector<Column> companions(const Form& form, const Observations& seen);

@@ -116,6 +116,18 @@ std::vector<std::pair<std::string, std::string>> untested(const Observations& se
   return all;
 }
 
+/// Where nothing else was found, a dependence is a structure without a name, at its share of the verdict's level.
+/// Beside an accepted cause it is a hint: with enough flights the error of the cause's form is found as well.
+void look_at_what_remains(StudyResult& result, const Evidence& evidence, const std::vector<Column>& accepted,
+                          const SearchOptions& options) {
+  const bool silent = result.causes.empty() && result.unknown.empty();
+  const double level = silent ? kRules.dependence_share * options.accept_p : kRules.dependence_level.value;
+  result.remaining = remaining_dependence(evidence, accepted, options.seed, level);
+  if (!silent || result.remaining.empty() || !result.remaining.front().found) return;
+  const Dependence& first = result.remaining.front();
+  result.unknown.push_back({first.regressor, first.group, first.p_holm / kRules.dependence_share, 0, "any"});
+}
+
 }  // namespace
 
 const char* to_string(Verdict verdict) {
@@ -153,13 +165,13 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
     ambiguous = ambiguous || !cause.found.rivals.empty();
     result.causes.push_back(std::move(cause));
   }
+  if (options.dependence) {
+    options.search.progress("whether what remains depends on something");
+    look_at_what_remains(result, evidence, others_of(found.accepted, SIZE_MAX, seen), options.search);
+  }
   result.verdict = !result.causes.empty()    ? (ambiguous ? Verdict::cannot_distinguish : Verdict::cause_found)
                    : !result.unknown.empty() ? Verdict::unknown_structure
                                              : Verdict::nothing_found;
-  if (options.dependence) {
-    options.search.progress("whether what remains depends on something");
-    result.remaining = remaining_dependence(evidence, others_of(found.accepted, SIZE_MAX, seen), options.search.seed);
-  }
   if (options.minimum_detectable) {
     options.search.progress("smallest effects that these flights would show");
     result.minimum_detectable =
@@ -174,7 +186,7 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
   constexpr int kFlips = static_cast<int>(kRules.power_flips);
   const auto draws = sign_draws(evidence.seen().units.size(), kFlips, options.seed + 1);
   std::map<std::string, std::map<std::string, double>> least;
-  for (const auto& c : candidates(evidence, {}, false)) {
+  for (const auto& c : named_candidates(evidence, {})) {
     if (least.contains(c.name) && !least[c.name].contains(c.form->parameters[0])) continue;
     const auto power = [&](double size) {
       int found = 0;

@@ -40,7 +40,7 @@ struct NamedCause {
 struct StudyOptions {
   SearchOptions search;
   bool minimum_detectable = true;
-  bool dependence = true;  ///< whether what remains depends on something: no part of the verdict
+  bool dependence = true;  ///< whether what remains depends on something: where nothing is accepted, of the verdict too
   std::size_t fewest_flights =
       static_cast<std::size_t>(kRules.fewest_flights);  ///< fewer do not warrant a name (core/study/README.md)
 };
@@ -53,7 +53,8 @@ struct StudyResult {
   /// Per cause and parameter: least size found with 80 % power.
   std::map<std::string, std::map<std::string, double>> minimum_detectable;
   double threshold = 0;  ///< nats
-  /// Every pair tested, ascending in p_holm; says nothing about the verdict. Empty with too few flights.
+  /// Every pair tested, found ones first. Where nothing was accepted, those found make the verdict
+  /// unknown_structure; else they are hints. Empty with too few flights.
   std::vector<Dependence> remaining;
 };
 

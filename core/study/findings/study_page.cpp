@@ -158,15 +158,16 @@ std::string consequence_section(const Consequence& c) {
 }
 
 /// Whether what the accepted causes leave depends on something.
-std::string remaining_section(const std::vector<Dependence>& all) {
+std::string remaining_section(const std::vector<Dependence>& all, bool counted) {
   if (all.empty()) return "";
   std::string text = "<section><h2>What remains</h2>\n";
-  if (!all.front().found())
+  if (!all.front().found)
     return text + "<p>No dependence left was found (smallest corrected p " + number(all.front().p_holm) + " of " +
            std::to_string(all.size()) + " tested).</p>\n</section>\n";
-  text += "<p>What remains depends on the following; the verdict does not count it.</p>\n<table>\n";
+  text += std::string("<p>What remains depends on the following") +
+          (counted ? "." : "; beside a cause the verdict does not count it.") + "</p>\n<table>\n";
   for (const auto& d : all)
-    if (d.found()) text += row(d.group + " on " + d.regressor, "p " + number(d.p_holm) + ", corrected (Holm)");
+    if (d.found) text += row(d.group + " on " + d.regressor, "p " + number(d.p_holm) + ", corrected (Holm)");
   return text + "</table>\n</section>\n";
 }
 
@@ -174,7 +175,8 @@ std::string unknown_section(const std::vector<UnknownStructure>& unknown) {
   if (unknown.empty()) return "";
   std::string text = "<section><h2>Without a name</h2>\n<table>\n";
   for (const auto& u : unknown)
-    text += row(u.group + " along " + u.along, "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
+    text += row(u.group + " along " + u.along + " (" + u.shape + ")",
+                "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
   return text + "</table>\n</section>\n";
 }
 
@@ -225,7 +227,7 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
   if (context.consequence) page += consequence_section(*context.consequence);
   page += unknown_section(result.unknown);
   page += context.residuals;
-  page += remaining_section(result.remaining);
+  page += remaining_section(result.remaining, result.causes.empty());
   page += limits_sections(result, seen);
   std::vector<std::string> told;
   for (const auto& cause : result.causes) {

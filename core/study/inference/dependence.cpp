@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <tuple>
 
 namespace backwash::study {
 namespace {
@@ -67,9 +68,9 @@ MatrixXd turned_products(const MatrixXd& phi, const MatrixXd& psi) {
   return products;
 }
 
-/// `phi` centred within flights.
+/// `phi` centred within flights. Ends when `enough` draws are as large as the data.
 Independence turn_test(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first, int shifts,
-                       unsigned seed) {
+                       int enough, unsigned seed) {
   std::vector<MatrixXd> products;
   for (std::size_t f = 0; f + 1 < first.size(); ++f) {
     const auto begin = static_cast<Index>(first[f]), count = static_cast<Index>(first[f + 1] - first[f]);
@@ -80,14 +81,14 @@ Independence turn_test(const MatrixXd& phi, const MatrixXd& psi, const std::vect
   for (const auto& p : products) sum += p.col(0);
   const double hsic = sum.squaredNorm() / n2;
   std::mt19937_64 rng(seed);
-  int above = 1;
-  for (int draw = 0; draw < shifts; ++draw) {
+  int above = 1, draw = 0;
+  for (; draw < shifts && above <= enough; ++draw) {
     sum.setZero();
     for (const auto& p : products)
       sum += p.col(static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(p.cols())));
     above += sum.squaredNorm() / n2 >= hsic * (1 - kRules.same) ? 1 : 0;
   }
-  return {hsic, above / (1.0 + shifts)};
+  return {hsic, above / (1.0 + draw)};
 }
 
 /// Rows of the windows that measure every channel of a group, and where each flight begins among them.
@@ -106,6 +107,29 @@ Rows rows_of(const Evidence& evidence, const std::vector<Channel>& group) {
   }
   rows.first.push_back(rows.window.size());
   return rows;
+}
+
+/// Every other flight's rows, from flight `from` on, and where each of them begins.
+std::pair<std::vector<Index>, std::vector<std::size_t>> every_other(const std::vector<std::size_t>& first,
+                                                                    std::size_t from) {
+  std::pair<std::vector<Index>, std::vector<std::size_t>> half{{}, {0}};
+  for (std::size_t f = from; f + 1 < first.size(); f += 2) {
+    for (std::size_t i = first[f]; i < first[f + 1]; ++i) half.first.push_back(static_cast<Index>(i));
+    half.second.push_back(half.first.size());
+  }
+  return half;
+}
+
+/// Whether both halves of the flights show it by themselves: the drift of one flight is no dependence.
+bool in_both_halves(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first, unsigned seed) {
+  for (const std::size_t from : {0u, 1u}) {
+    const auto [rows, begins] = every_other(first, from);
+    if (rows.empty()) return false;
+    const auto test = turn_test(phi(rows, Eigen::all), psi(rows, Eigen::all), begins,
+                                static_cast<int>(kRules.shift_draws), static_cast<int>(kRules.enough_turns), seed);
+    if (test.p > kRules.dependence_level) return false;
+  }
+  return true;
 }
 
 MatrixXd points_of(const Regressor& along, const Windows& windows, const Rows& rows) {
@@ -136,7 +160,7 @@ MatrixXd remainder(const Column& whitened, const std::vector<Channel>& group, co
 
 Independence independence(const MatrixXd& x, const MatrixXd& y, const std::vector<std::size_t>& first, int shifts,
                           unsigned seed) {
-  return turn_test(centred(features(x), first), features(y), first, shifts, seed);
+  return turn_test(centred(features(x), first), features(y), first, shifts, shifts, seed);
 }
 
 std::vector<double> holm(const std::vector<double>& p) {
@@ -153,7 +177,7 @@ std::vector<double> holm(const std::vector<double>& p) {
 }
 
 std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std::vector<Column>& accepted,
-                                             unsigned seed) {
+                                             unsigned seed, double level) {
   const Observations& seen = evidence.seen();
   Column everything;
   for (const auto& [name, channels] : channel_groups())
@@ -161,23 +185,30 @@ std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std
   std::vector<Column> explained = offsets({everything}, seen);
   explained.insert(explained.end(), accepted.begin(), accepted.end());
   const Column whitened = evidence.whitened(explained);
+  const auto along_all = regressors(seen);
+  const double pairs = static_cast<double>(channel_groups().size() * along_all.size());
+  const int draws = static_cast<int>(std::max(kRules.shift_draws.value, std::ceil(2 * pairs / level)));
   std::vector<Dependence> all;
   std::vector<double> p;
+  std::vector<char> twice;  // in both halves; asked where p alone would do
   for (const auto& [name, channels] : channel_groups()) {
     const Rows rows = rows_of(evidence, channels);
     if (rows.window.empty()) continue;
     const MatrixXd psi = features(remainder(whitened, channels, rows));
-    for (const auto& along : regressors(seen)) {
+    for (const auto& along : along_all) {
       const MatrixXd phi = centred(features(points_of(along, seen.windows, rows)), rows.first);
       if (!(phi.squaredNorm() > kRules.constant_regressor)) continue;  // constant within every flight
-      const auto test = turn_test(phi, psi, rows.first, static_cast<int>(kRules.shift_draws), seed);
-      all.push_back({along.name, name, test.hsic, test.p, 1}), p.push_back(test.p);
+      const auto test = turn_test(phi, psi, rows.first, draws, static_cast<int>(kRules.enough_turns), seed);
+      all.push_back({along.name, name, test.hsic, test.p, 1, false}), p.push_back(test.p);
+      twice.push_back(test.p <= level && in_both_halves(phi, psi, rows.first, seed));
     }
   }
   const auto corrected = holm(p);
-  for (std::size_t k = 0; k < all.size(); ++k) all[k].p_holm = corrected[k];
-  std::stable_sort(all.begin(), all.end(),
-                   [](auto& a, auto& b) { return std::pair(a.p_holm, a.p) < std::pair(b.p_holm, b.p); });
+  for (std::size_t k = 0; k < all.size(); ++k)
+    all[k].p_holm = corrected[k], all[k].found = corrected[k] <= level && twice[k];
+  std::stable_sort(all.begin(), all.end(), [](auto& a, auto& b) {
+    return std::tuple(!a.found, a.p_holm, a.p) < std::tuple(!b.found, b.p_holm, b.p);
+  });
   return all;
 }
 

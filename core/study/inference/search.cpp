@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <random>
 
 #include "core/study/inference/estimate.hpp"
 
@@ -22,13 +21,6 @@ std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Obse
     all.insert(all.end(), open.begin(), open.end());
   }
   return all;
-}
-
-std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& columns,
-                                const std::vector<Column>& accepted, const Observations& seen) {
-  std::vector<Column> nuisance = form.constant ? std::vector<Column>{} : offsets(columns, seen);
-  nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
-  return nuisance;
 }
 
 /// What a cause may disturb besides the channels that its columns move: the error of its form is left over there too.
@@ -73,32 +65,13 @@ bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b)
   });
 }
 
-/// Gain that a smooth needs beside the accepted causes.
-double needed_structure(const Candidate& smooth, const std::vector<Accepted>& accepted) {
+/// Gain that a structure needs beside the accepted causes.
+double needed_structure(const Candidate& structure, const std::vector<Accepted>& accepted) {
   double needed = 0;
   for (const auto& a : accepted)
-    if (share_a_channel(smooth.columns, a.columns))
+    if (share_a_channel(structure.columns, a.columns))
       needed = std::max(needed, (a.form->constant ? kRules.left_of_constant : kRules.left_share) * a.gain);
   return needed;
-}
-
-std::vector<double> null_maxima(const std::vector<Candidate>& all, const std::vector<std::vector<int>>& draws) {
-  std::vector<double> maxima;
-  for (const auto& signs : draws) {
-    double most = 0;
-    for (const auto& candidate : all) {
-      const double gain = candidate.normal.gain(signs);
-      if (gain > most && candidate.effect(candidate.normal.fit(signs))) most = gain;
-    }
-    maxima.push_back(most);
-  }
-  std::sort(maxima.begin(), maxima.end());
-  return maxima;
-}
-
-double p_value(const std::vector<double>& sorted_null, double gain) {
-  const auto above = sorted_null.end() - std::lower_bound(sorted_null.begin(), sorted_null.end(), gain);
-  return (1.0 + static_cast<double>(above)) / (1.0 + static_cast<double>(sorted_null.size()));
 }
 
 /// Σ and standard error of the sum of per-flight differences.
@@ -178,59 +151,56 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
     refine(evidence, accepted[i], columns_of(accepted, evidence.seen(), i));
 }
 
+/// What one step tries: the catalogue and the structures, each with the null of its own maxima and its share of the
+/// level.
+struct Step {
+  std::vector<Candidate> named, structures;
+  std::vector<double> null_named, null_structures;
+  double threshold, structure_threshold;  // nats
+
+  Step(const Evidence& evidence, const std::vector<Column>& accepted, const std::vector<std::vector<int>>& draws,
+       double level)
+      : named(named_candidates(evidence, accepted)),
+        structures(structure_candidates(evidence, accepted)),
+        null_named(null_maxima(named, draws)),
+        null_structures(null_maxima(structures, draws)),
+        threshold(least_gain(null_named, named_share() * level)),
+        structure_threshold(least_gain(null_structures, kRules.structure_share * level)) {}
+
+  static double named_share() { return 1 - kRules.structure_share - kRules.dependence_share; }
+  /// Gain above which p_value is at most `level`: so many of the null may be larger.
+  static double least_gain(const std::vector<double>& null, double level) {
+    const auto larger = static_cast<std::size_t>(level * (1 + static_cast<double>(null.size())) + kRules.bound_error);
+    return std::max(kRules.least_threshold.value, null[null.size() - std::clamp<std::size_t>(larger, 1, null.size())]);
+  }
+};
+
+const Candidate* best_of(const std::vector<Candidate>& all, const std::vector<Accepted>& accepted, double threshold) {
+  const Candidate* best = nullptr;
+  for (const auto& c : all) {
+    const bool known = std::any_of(accepted.begin(), accepted.end(),
+                                   [&](auto& a) { return c.form && a.form->effect == c.form->effect; });
+    if (known || (best && c.gain <= best->gain)) continue;
+    if (c.gain <= needed_gain(c, accepted, threshold) || !c.effect(c.normal.fit())) continue;
+    if (!c.form || excludes_zero(c.normal, c.columns)) best = &c;
+  }
+  return best;
+}
+
+UnknownStructure told(const Candidate& structure, double p) {
+  const auto group = std::find_if(channel_groups().begin(), channel_groups().end(), [&](auto& g) {
+    return g.second.front() == structure.columns.front().parts.front().channel;
+  });
+  return {structure.name, group->first, p, structure.gain, structure.structure.shape, structure.structure.hz};
+}
+
+/// Whether a structure says more than any cause does, and more than the error of an accepted one could.
+bool leads(const Candidate& structure, const Candidate* cause, const std::vector<Accepted>& accepted) {
+  if (structure.gain < needed_structure(structure, accepted)) return false;
+  return !cause || structure.gain - cause->gain > std::max(kRules.smooth_lead.value, kRules.smooth_share * cause->gain);
+}
+
 }  // namespace
-
-bool Candidate::effect(const SmallVector& theta) const {
-  const auto floor_of_smooth = [&] {
-    return columns.front().parts.front().channel == kVarX ? kRules.smooth_floor_ln : kRules.smooth_floor_mean;
-  };
-  if (!form) return theta.dot(size * theta) >= std::pow(floor_of_smooth().value, 2);
-  if (std::abs(theta[0]) < form->least || (form->one_sided && theta[0] < 0)) return false;
-  const double square =
-      form->integer_scale && form->one_sided ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
-  return square >= form->floor * form->floor;
-}
-
-std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigned seed) {
-  std::mt19937_64 rng(seed);
-  std::vector<std::vector<int>> draws(static_cast<std::size_t>(flips), std::vector<int>(flights));
-  for (auto& signs : draws)
-    for (int& s : signs) s = (rng() >> 33) & 1 ? 1 : -1;
-  return draws;
-}
-
-std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Column>& accepted, bool smooths) {
-  std::vector<Candidate> all;
-  const Observations& seen = evidence.seen();
-  const auto add = [&](Candidate c, const std::vector<Column>& nuisance) {
-    c.normal = evidence.normal(c.columns, nuisance);
-    if (!c.normal.solvable) return;
-    c.gain = c.normal.gain();
-    c.size = evidence.size(c.columns);
-    all.push_back(std::move(c));
-  };
-  for (const Form* each : catalogue()) {
-    const Form& form = *each;
-    if (why_not_tested(form, seen)) continue;
-    for (const Scale& scale : form.scales) {
-      Candidate c{&form, form.cause(), scale, form.columns(seen.windows, scale), {}, 0, {}};
-      const auto nuisance = nuisance_of(form, c.columns, accepted, seen);
-      add(std::move(c), nuisance);
-    }
-  }
-  if (!smooths) return all;
-  for (const auto& along : regressors(seen)) {
-    for (const auto& [name, channels] : channel_groups()) {
-      Candidate c;
-      c.name = along.name;
-      c.columns = smooth_columns(along, seen.windows, channels);
-      auto nuisance = offsets(c.columns, seen);
-      nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
-      add(std::move(c), nuisance);
-    }
-  }
-  return all;
-}
 
 SearchResult search(const Evidence& start, const SearchOptions& options) {
   SearchResult result;
@@ -240,38 +210,25 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     const auto accepted = columns_of(result.accepted, evidence.seen());
     evidence.whiten(accepted);
     options.progress("looking at every cause, step " + std::to_string(result.accepted.size() + 1));
-    auto all = candidates(evidence, accepted, true);
-    if (all.empty()) break;
-    result.null_gain = null_maxima(all, draws);
-    const double level = options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value);
-    const auto index = static_cast<std::size_t>((1 - level) * static_cast<double>(draws.size()));
-    result.threshold = std::max(kRules.least_threshold.value, result.null_gain[std::min(index, draws.size() - 1)]);
-
-    const Candidate *cause = nullptr, *smooth = nullptr;
-    for (const auto& c : all) {
-      const bool known = std::any_of(result.accepted.begin(), result.accepted.end(),
-                                     [&](auto& a) { return c.form && a.form->effect == c.form->effect; });
-      if (known) continue;
-      if (c.gain < needed_gain(c, result.accepted, result.threshold) || !c.effect(c.normal.fit())) continue;
-      if (c.form && !excludes_zero(c.normal, c.columns)) continue;
-      if (!c.form && (!smooth || c.gain > smooth->gain)) smooth = &c;
-      if (c.form && (!cause || c.gain > cause->gain)) cause = &c;
-    }
-    if (smooth && smooth->gain >= needed_structure(*smooth, result.accepted) &&
-        (!cause ||
-         smooth->gain - cause->gain > std::max(kRules.smooth_lead.value, kRules.smooth_share * cause->gain))) {
-      const auto group = std::find_if(channel_groups().begin(), channel_groups().end(), [&](auto& g) {
-        return g.second.front() == smooth->columns.front().parts.front().channel;
-      });
+    const Step step(evidence, accepted, draws,
+                    options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value));
+    if (step.named.empty() && step.structures.empty()) break;
+    result.null_gain = step.null_named;
+    result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
+    const Candidate* cause = best_of(step.named, result.accepted, step.threshold);
+    const Candidate* structure = best_of(step.structures, result.accepted, step.structure_threshold);
+    if (structure && leads(*structure, cause, result.accepted)) {
       // A constant of which more than half as much again varies along a regressor is the structure's mean.
-      std::erase_if(result.accepted,
-                    [&](const Accepted& a) { return a.form->constant && share_a_channel(smooth->columns, a.columns); });
-      result.unknown.push_back({smooth->name, group->first, p_value(result.null_gain, smooth->gain), smooth->gain});
+      std::erase_if(result.accepted, [&](const Accepted& a) {
+        return a.form->constant && share_a_channel(structure->columns, a.columns);
+      });
+      const double p = p_value(step.null_structures, structure->gain) / kRules.structure_share;
+      result.unknown.push_back(told(with_harmonics(*structure, evidence, accepted), p));
       break;
     }
     if (!cause) break;
-    Accepted a{cause->form, cause->scale, cause->columns, {}, p_value(result.null_gain, cause->gain), cause->gain, {},
-               {}};
+    const double p = p_value(step.null_named, cause->gain) / Step::named_share();
+    Accepted a{cause->form, cause->scale, cause->columns, {}, p, cause->gain, {}, {}};
     refine(evidence, a, accepted);
     result.accepted.push_back(std::move(a));
   }

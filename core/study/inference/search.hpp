@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/study/inference/evidence.hpp"
+#include "core/study/inference/candidates.hpp"
 #include "core/study/inference/intervals.hpp"
 #include "core/study/inference/rules.hpp"
 
@@ -17,20 +17,6 @@ struct SearchOptions {
   unsigned seed = 1;
   std::size_t most_causes = static_cast<std::size_t>(kRules.most_causes);
   std::function<void(const std::string&)> progress = [](const std::string&) {};
-};
-
-/// A form at a scale, or a smooth along a regressor: something that may explain what the simulation gets wrong.
-struct Candidate {
-  const Form* form = nullptr;  ///< null for a smooth
-  std::string name;            ///< of the cause or of the regressor
-  Scale scale;
-  std::vector<Column> columns;
-  Normal normal;
-  double gain = 0;   ///< held out, nats
-  SmallMatrix size;  ///< θᵀ size θ: mean square of what the columns add
-
-  /// Whether parameters are an effect at all: at least the stated floor, and of a possible sign.
-  bool effect(const SmallVector& theta) const;
 };
 
 struct Rival {
@@ -52,24 +38,22 @@ struct Accepted {
 };
 
 struct UnknownStructure {
-  std::string along;  ///< regressor
-  std::string group;  ///< channels: "mean x", "mean y", "mean z", "ln variance"
-  double p, gain;
+  std::string along;  ///< regressor; two, "x_m, y_m", if their products are meant
+  std::string group;  ///< channels: "mean x, y", "mean z", "ln variance"
+  double p, gain;     ///< family-wise; held out, nats, 0 where only the dependence was found
+  std::string shape;  ///< Structure::shape; "any" where only the dependence was found
+  double hz = 0;      ///< of a tone
 };
 
 struct SearchResult {
   std::vector<Accepted> accepted;  ///< in the order found
   std::vector<UnknownStructure> unknown;
-  double threshold = 0;           ///< nats that the null exceeds with probability accept_p, last step
-  std::vector<double> null_gain;  ///< sorted maxima of the last step
+  double threshold = 0;            ///< nats that the null of the catalogue exceeds at its level, last step
+  double structure_threshold = 0;  ///< the same of the structures
+  std::vector<double> null_gain;   ///< sorted maxima of the catalogue's null, last step
 };
 
 /// Greedy search under the null of whole flights' signs flipped (core/study/README.md says the rules).
 SearchResult search(const Evidence& evidence, const SearchOptions& options);
-
-/// All that can be tested, with the accepted columns as nuisance; catalogue first, then the smooths.
-std::vector<Candidate> candidates(const Evidence& evidence, const std::vector<Column>& accepted, bool smooths);
-/// `flips` rows of ±1 per flight.
-std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigned seed);
 
 }  // namespace backwash::study

@@ -54,43 +54,78 @@ Spread spread(std::span<const double> x) {
 double ln_bias(double n) { return digamma(n / 2) - std::log(n / 2); }
 double ln_variance(double n) { return trigamma(n / 2); }
 
-Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
-  constexpr int kBeside = 4;  // on each side, 1 Hz apart from 1.5 Hz on
+namespace {
+
+constexpr int kBeside = 4;             // on each side, 1 Hz apart from 1.5 Hz on
+constexpr double kBlock = 1;           // s: over more the phase that rpm readings give drifts
+constexpr double kLeastFolded = 0.75;  // Hz: below, a block holds no whole turn and the line is as slow as a gust
+constexpr double kFromHalfRate = 1;    // Hz
+
+/// x without what it shares with its last sample as a first-order process: the ratio of its second autocorrelation to
+/// its first, which white noise on top does not change. Gusts come out flat down to 0 Hz.
+struct Flattened {
+  std::vector<double> x;  ///< one fewer
+  double decay;
+  /// Square of what the filter leaves of a line at a share of the rate.
+  double gain2(double folded) const { return 1 + decay * decay - 2 * decay * std::cos(2 * std::numbers::pi * folded); }
+};
+
+Flattened flattened(std::span<const double> x) {
+  double first = 0, second = 0;
+  for (std::size_t i = 2; i < x.size(); ++i) first += x[i] * x[i - 1], second += x[i] * x[i - 2];
+  Flattened flat{{}, first > 0 ? std::clamp(second / first, 0.0, 1.0) : 0.0};
+  for (std::size_t i = 1; i < x.size(); ++i) flat.x.push_back(x[i] - flat.decay * x[i - 1]);
+  return flat;
+}
+
+/// Power at a phase, and mean power at its neighbours, each summed over blocks.
+std::pair<double, double> powers(const std::vector<double>& x, std::span<const double> t, std::span<const double> phase,
+                                 double harmonic, std::size_t blocks) {
   using Complex = std::complex<double>;
-  /// Power at the harmonic, and the sum at its neighbours.
-  const auto powers = [&](double harmonic) {
-    Complex at = 0;
-    std::array<Complex, 2 * kBeside> beside{};
-    for (std::size_t i = 1; i < x.size(); ++i) {
-      const double d = x[i] - x[i - 1];  // the difference flattens the slow part of the spectrum
-      const Complex line = std::polar(d, harmonic * phase[i]), hz = std::polar(1.0, 2 * std::numbers::pi * t[i]);
-      at += line;
-      Complex detuned = std::polar(1.0, 3 * std::numbers::pi * t[i]);
+  double at = 0, beside = 0;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    Complex own = 0;
+    std::array<Complex, 2 * kBeside> detunings{};
+    for (std::size_t i = b * x.size() / blocks; i < (b + 1) * x.size() / blocks; ++i) {
+      const Complex line = std::polar(x[i], harmonic * phase[i + 1]),
+                    hz = std::polar(1.0, 2 * std::numbers::pi * t[i + 1]);
+      own += line;
+      Complex detuned = std::polar(1.0, 3 * std::numbers::pi * t[i + 1]);
       for (std::size_t k = 0; k < kBeside; ++k, detuned *= hz)
-        beside[2 * k] += line * detuned, beside[2 * k + 1] += line * std::conj(detuned);
+        detunings[2 * k] += line * detuned, detunings[2 * k + 1] += line * std::conj(detuned);
     }
-    double sum = 0;
-    for (const Complex& z : beside) sum += std::norm(z);
-    return std::pair(std::norm(at), sum / (2 * kBeside));
-  };
+    at += std::norm(own);
+    for (const Complex& z : detunings) beside += std::norm(z) / (2 * kBeside);
+  }
+  return {at, beside};
+}
+
+}  // namespace
+
+Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
   const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
   const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
+  const auto blocks = static_cast<std::size_t>(std::max(1L, std::lround(seconds / kBlock)));
+  const Flattened flat = flattened(x);
   Line found;
   double line = 0, beside = 0, count = 0;
   for (const double harmonic : {1.0, 2.0}) {
-    // Folded next to 0 or to half the rate, the line and its neighbours lie on a curved spectrum.
     const double folded = std::abs(std::remainder(harmonic * hz_of_rotor, rate));
-    if (folded < 6 || folded > rate / 2 - 1) continue;
-    count += 1;
-    const auto [at, around] = powers(harmonic);
-    line += at, beside += around;
-    if (harmonic > 1) continue;
+    // A window that cannot show the rotor's own rate is none, whatever twice the rate shows.
+    if (folded < kLeastFolded || folded > rate / 2 - kFromHalfRate) {
+      if (harmonic > 1) break;
+      return found;
+    }
+    const auto [at, around] = powers(flat.x, t, phase, harmonic, blocks);
+    count += static_cast<double>(blocks), line += at, beside += around;
+    if (harmonic > 1) break;
     found.folded = folded / rate;
-    const double gain = 2 * std::sin(std::numbers::pi * found.folded);  // of the difference
-    found.amplitude2 = 4 * (at - around) / std::pow((n - 1) * gain, 2), found.floor2 = around / ((n - 1) * gain * gain);
+    const double gain2 = flat.gain2(found.folded);
+    found.amplitude2 = 4 * static_cast<double>(blocks) * (at - around) / (std::pow(n - 1, 2) * gain2);
+    found.floor2 = around / ((n - 1) * gain2);
   }
   // Each power is exponential: a sum of m has E ln = ln mean + ψ(m) − ln m, ln_bias of 2m samples.
-  if (count > 0) found.excess = std::log(line / beside) - (ln_bias(2 * count) - ln_bias(16 * count));
+  found.excess = std::log(line / beside) - (ln_bias(2 * count) - ln_bias(2 * 2 * kBeside * count));
   return found;
 }
 

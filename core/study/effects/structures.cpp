@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/effects/structures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <numbers>
+
+#include "core/study/effects/columns.hpp"
+
+namespace backwash::study {
+namespace {
+
+using std::numbers::pi;
+
+constexpr int kFew = 4, kMany = 8;  // cosines of a rank
+constexpr int kTurns = 6;           // of an angle
+constexpr double kHighest = 0.25;   // Hz: half of one over a window
+constexpr double kLowest = 1.5;     // periods of a tone in the longest flight: slower ones are cosines of the time
+constexpr double kStep = 0.5;       // of one over the longest flight
+constexpr int kMostTones = 400;     // of a long flight the lowest
+
+std::vector<double> cosine(double k, const std::vector<double>& u) {
+  std::vector<double> x;
+  x.reserve(u.size());
+  for (const double q : u) x.push_back(std::cos(k * q));
+  return x;
+}
+
+std::vector<double> sine(double k, const std::vector<double>& u) {
+  std::vector<double> x;
+  x.reserve(u.size());
+  for (const double q : u) x.push_back(std::sin(k * q));
+  return x;
+}
+
+std::vector<double> product(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> x;
+  x.reserve(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) x.push_back(a[i] * b[i]);
+  return x;
+}
+
+Functions turn(int k, const std::vector<double>& angle) { return {cosine(k, angle), sine(k, angle)}; }
+
+void add_rank(std::vector<Structure>& all, const Regressor& along, const std::vector<double>& q) {
+  Structure few{along.name, std::to_string(kFew) + " cosines", 0, {}};
+  for (int k = 1; k <= kFew; ++k) few.functions.push_back(cosine(pi * k, q));
+  Structure many = few;
+  many.shape = std::to_string(kMany) + " cosines";
+  for (int k = kFew + 1; k <= kMany; ++k) many.functions.push_back(cosine(pi * k, q));
+  all.push_back(std::move(few)), all.push_back(std::move(many));
+}
+
+void add_turns(std::vector<Structure>& all, const Regressor& along, const std::vector<double>& angle) {
+  Structure both{along.name, "turns 1 and 2", 0, turn(1, angle)};
+  for (auto& x : turn(2, angle)) both.functions.push_back(std::move(x));
+  all.push_back(std::move(both));
+  for (int k = 1; k <= kTurns; ++k) {
+    Structure one{along.name, "turn " + std::to_string(k), 0, turn(k, angle)};
+    // The others in the order of their number.
+    one.further = [k, angle](int n) {
+      const int other = n < k ? n : n + 1;
+      return other <= kTurns ? turn(other, angle) : Functions{};
+    };
+    all.push_back(std::move(one));
+  }
+}
+
+void add_products(std::vector<Structure>& all, const std::vector<std::string>& names,
+                  const std::vector<Functions>& bases) {
+  for (std::size_t a = 0; a < bases.size(); ++a)
+    for (std::size_t b = a + 1; b < bases.size(); ++b) {
+      Structure pair{names[a] + ", " + names[b], "products", 0, bases[a]};
+      for (const auto& y : bases[b]) pair.functions.push_back(y);
+      for (const auto& x : bases[a])
+        for (const auto& y : bases[b]) pair.functions.push_back(product(x, y));
+      all.push_back(std::move(pair));
+    }
+}
+
+/// When each window was flown and how long it is, s.
+using Moments = std::vector<std::pair<double, double>>;
+
+Functions tone(double hz, const Moments& windows) {
+  Functions both(2);
+  for (const auto& [t, duration] : windows) {
+    // Its mean over the window is weaker than its value in the middle.
+    const double half = pi * hz * duration, kept = half > 0 ? std::sin(half) / half : 1;
+    both[0].push_back(kept * std::cos(2 * pi * hz * t)), both[1].push_back(kept * std::sin(2 * pi * hz * t));
+  }
+  return both;
+}
+
+void add_tones(std::vector<Structure>& all, const Windows& windows) {
+  const auto moments = std::make_shared<Moments>();
+  double longest = 0;
+  for (const auto& w : windows) {
+    moments->emplace_back(w.t, w.duration);
+    longest = std::max(longest, w.t + w.duration / 2);
+  }
+  for (int k = 0; k < kMostTones && longest > 0; ++k) {
+    const double hz = (kLowest + kStep * k) / longest;
+    if (hz > kHighest) break;
+    char shape[32];
+    std::snprintf(shape, sizeof shape, "%.4f Hz", hz);
+    all.push_back({"t_s", shape, hz, tone(hz, *moments), [moments, hz](int n) {
+                     return (n + 1) * hz <= kHighest ? tone((n + 1) * hz, *moments) : Functions{};
+                   }});
+  }
+}
+
+}  // namespace
+
+std::vector<Structure> structures(const Observations& seen) {
+  std::vector<Structure> all;
+  std::vector<std::string> names;
+  std::vector<Functions> bases;
+  for (const auto& along : regressors(seen)) {
+    const auto u = ranks(along, seen.windows);
+    if (along.circular)
+      add_turns(all, along, u);
+    else
+      add_rank(all, along, u);
+    names.push_back(along.name);
+    bases.push_back(along.circular ? turn(1, u) : Functions{cosine(pi, u), cosine(2 * pi, u)});
+  }
+  add_products(all, names, bases);
+  add_tones(all, seen.windows);
+  return all;
+}
+
+std::vector<Column> columns_in(const std::vector<Channel>& group, const Functions& functions) {
+  std::vector<Column> columns;
+  for (const auto& x : functions) {
+    if (group.front() == kVarX) {
+      columns.emplace_back();
+      for (const Channel c : group) columns.back().parts.push_back({c, x});
+    } else {
+      for (const Channel c : group) columns.push_back({{{c, x}}});
+    }
+  }
+  return columns;
+}
+
+}  // namespace backwash::study

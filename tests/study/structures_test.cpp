@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Structures without a name: what the study says of shapes that no form of the catalogue has.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "core/study/findings/study.hpp"
+#include "tests/study_worlds/observe.hpp"
+#include "tests/study_worlds/oracle.hpp"
+
+namespace {
+
+using namespace backwash;
+using namespace backwash::study;
+using study_worlds::Structure;
+using Kind = Structure::Kind;
+using Quantity = Structure::Quantity;
+using Where = Structure::Where;
+
+std::filesystem::path folder() {
+  return std::filesystem::temp_directory_path() / ("study-structures-" + std::to_string(::getpid()));
+}
+
+struct Seen {
+  Observations observations;
+  double explained;
+};
+
+Seen world_with(const Structure& structure, double size, std::uint64_t seed = 4711) {
+  auto world = study_worlds::draw_world({seed, {"unknown"}, size, 12, ""});
+  world.effects.structure = structure;
+  const auto flights = study_worlds::fly_all(world);
+  Seen seen{study_worlds::observe(world, flights, folder()), 0};
+  seen.explained = study_worlds::explained(seen.observations, flights);
+  std::filesystem::remove_all(folder());
+  return seen;
+}
+
+Observations quiet(std::uint64_t seed = 4711) {
+  auto seen = study_worlds::observe(study_worlds::draw_world({seed, {}, 1, 12, ""}), folder());
+  std::filesystem::remove_all(folder());
+  return seen;
+}
+
+StudyResult studied(const Observations& seen) {
+  StudyOptions options;
+  options.minimum_detectable = false;
+  return study::study(seen, options);
+}
+
+TEST(Structures, AGustOfOneFrequencyCommonToAllFlightsIsToldWithItsFrequency) {
+  const auto seen =
+      world_with({Kind::tone, Where::up, {Quantity::t, Quantity::t}, {2 * M_PI * 0.07, 0}, {0.8, 0}, 0}, 1);
+  EXPECT_GT(seen.explained, 0.15);
+  const auto result = studied(seen.observations);
+  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  EXPECT_EQ(result.unknown.front().along, "t_s");
+  EXPECT_NEAR(result.unknown.front().hz, 0.07, 0.006);
+  EXPECT_LE(result.unknown.front().p, SearchOptions{}.accept_p);
+}
+
+TEST(Structures, AThirdHarmonicOfTheHeadingIsTold) {
+  const auto seen = world_with({Kind::heading, Where::up, {Quantity::yaw, Quantity::t}, {3, 0}, {0.4, 0}, 0}, 1);
+  EXPECT_GT(seen.explained, 0.15);
+  const auto result = studied(seen.observations);
+  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  EXPECT_EQ(result.unknown.front().along, "yaw_rad");
+  EXPECT_EQ(result.unknown.front().shape, "turn 3");
+}
+
+TEST(Structures, AProductOfTwoPlacesIsToldWithBoth) {
+  const auto seen = world_with(
+      {Kind::product, Where::level, {Quantity::x, Quantity::y}, {2 * M_PI / 3, 2 * M_PI / 3}, {0.3, 0.9}, 0.5}, 1);
+  EXPECT_GT(seen.explained, 0.15);
+  const auto result = studied(seen.observations);
+  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  EXPECT_EQ(result.unknown.front().along, "x_m, y_m");
+}
+
+TEST(Structures, HarmonicsAreAddedUntilTheGainEnds) {
+  auto seen = quiet();
+  for (std::size_t i = 0; i < seen.windows.size(); ++i)
+    seen.y[kMeanZ][i] += 0.3 * std::cos(3 * seen.windows[i].yaw) + 0.25 * std::cos(5 * seen.windows[i].yaw);
+  const auto result = studied(seen);
+  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  EXPECT_EQ(result.unknown.front().shape, "turn 3 and 1 more");
+}
+
+TEST(Structures, ADependenceWithoutAMeanIsNeverNothingFound) {
+  // Gusts change the vertical mean four times as much in the upper half of the flown heights, to both sides alike.
+  auto seen = quiet();
+  std::mt19937_64 rng(5);
+  std::normal_distribution draw(0.0, 0.3);
+  std::vector<double> heights;
+  for (const auto& w : seen.windows) heights.push_back(w.around.height);
+  std::nth_element(heights.begin(), heights.begin() + static_cast<long>(heights.size() / 2), heights.end());
+  const double middle = heights[heights.size() / 2];
+  for (std::size_t i = 0; i < seen.windows.size(); ++i)
+    if (seen.windows[i].around.height > middle) seen.y[kMeanZ][i] += draw(rng);
+  const auto result = studied(seen);
+  ASSERT_FALSE(result.remaining.empty());
+  EXPECT_TRUE(result.remaining.front().found);
+  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  EXPECT_EQ(result.unknown.front().shape, "any");
+  EXPECT_LE(result.unknown.front().p, SearchOptions{}.accept_p);
+}
+
+TEST(Structures, ADependenceThatHalfOfTheFlightsDoNotShowIsNotFound) {
+  auto seen = quiet();
+  for (std::size_t f = 0; f < seen.flights; f += 2)
+    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+      seen.y[kMeanZ][i] += 0.4 * std::cos(3 * seen.windows[i].around.height);
+  const auto remaining = remaining_dependence(Evidence(seen), {}, 1);
+  EXPECT_TRUE(std::any_of(remaining.begin(), remaining.end(), [](auto& d) { return d.p_holm <= 0.05; }))
+      << "all flights together show it";
+  for (const auto& d : remaining) EXPECT_FALSE(d.found) << d.group << " on " << d.regressor << " " << d.p_holm;
+}
+
+TEST(Structures, NothingFoundListsNoDependence) {
+  for (std::uint64_t seed = 4711; seed < 4714; ++seed) {
+    const auto result = studied(quiet(seed));
+    if (result.verdict != Verdict::nothing_found) continue;
+    for (const auto& d : result.remaining) EXPECT_FALSE(d.found) << d.group << " on " << d.regressor;
+  }
+}
+
+TEST(Structures, TheNullsMaximaAreThoseOfEveryCandidateInEveryDraw) {
+  const auto seen = quiet();
+  const Evidence evidence(seen);
+  const auto draws = sign_draws(seen.units.size(), 40, 3);
+  for (const auto& all : {named_candidates(evidence, {}), structure_candidates(evidence, {})}) {
+    ASSERT_GT(all.size(), 50u);
+    std::vector<double> expected;
+    for (const auto& signs : draws) {
+      double most = 0;
+      for (const auto& c : all)
+        if (const double gain = c.normal.gain(signs); gain > most && c.effect(c.normal.fit(signs))) most = gain;
+      expected.push_back(most);
+    }
+    std::sort(expected.begin(), expected.end());
+    EXPECT_EQ(null_maxima(all, draws), expected);
+  }
+}
+
+TEST(StudyWorlds, UnknownsAreAFamilyAndNotAFewShapes) {
+  std::set<std::string> drawn;
+  std::set<int> kinds, wheres;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    const auto s = study_worlds::draw_world({seed, {"unknown"}, 1, 12, ""}).effects.structure;
+    drawn.insert(study_worlds::text_of(s));
+    kinds.insert(static_cast<int>(s.kind)), wheres.insert(static_cast<int>(s.where));
+  }
+  EXPECT_GT(drawn.size(), 45u);
+  EXPECT_EQ(kinds.size(), 5u);
+  EXPECT_EQ(wheres.size(), 3u);
+}
+
+}  // namespace
