@@ -58,7 +58,7 @@ struct StudyResult {
   std::vector<Dependence> remaining;
 };
 
-/// The whole procedure on observed flights. About 0.3 s for 12 flights of 100 s, more with the minimum detectable
+/// The whole procedure on observed flights. About 1 s for 12 flights of 100 s, more with the minimum detectable
 /// effects.
 StudyResult study(const Observations& seen, const StudyOptions& options);
 
