@@ -100,9 +100,10 @@ std::string residuals(const Options& options, const Flights& flights, const Vehi
   return *section;
 }
 
-/// Motor shares of the flights against those of the reference flights.
+/// Motor shares of the flights against those of the reference flights; nothing without such.
 std::optional<study::RotorVerdict> against_reference(const Options& options, const Vehicle& vehicle, const Model& model,
                                                      const study::Observations& seen) {
+  if (options.reference.empty()) return std::nullopt;
   study::Observer observer(vehicle, model, nullptr);
   for (const auto& path : options.reference) observer.add(read_flight(path));
   const auto sound = study::rotor_contrasts(observer.finish());
@@ -150,6 +151,19 @@ void write_page(const Options& options, const study::StudyResult& result, const 
   write_file(options.report, *page, options.force);
 }
 
+void write_model(const Options& options, const Model& model, const study::StudyResult& result,
+                 const study::Observations& seen) {
+  const auto text =
+      study::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model));
+  write_file(options.out, text, options.force);
+}
+
+void print_text(const Flights& flights, const std::optional<AnytimeReport>& anytime) {
+  for (const auto& [log, known] : flights.twice)
+    std::printf("counted once: %s is %s again\n", log.c_str(), known.c_str());
+  if (anytime) print_text(*anytime);
+}
+
 int run(const Options& options) {
   if (options.rules) {
     print_rules(options.json);
@@ -159,10 +173,10 @@ int run(const Options& options) {
   const auto vehicle = read_vehicle(options.vehicle);
   auto model = read_model(options.model);
   model.ground.r0 = vehicle.body.diagonal_radius;
-  std::optional<map::OccupancyGrid> grid;
-  if (!options.map.empty()) grid = read_map(options.map);
+  const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
+  const map::OccupancyGrid* grid = room ? &*room : nullptr;
   Flights flights = read_flights(options.logs, options.group);
-  auto seen = observe(flights, vehicle, model, grid ? &*grid : nullptr);
+  auto seen = observe(flights, vehicle, model, grid);
   const auto measured = seen;  // nothing that the model holds taken out
   const auto left = study::apply(read_terms(options.model), seen);
   const auto result = study::study(seen, study_options(options));
@@ -171,27 +185,22 @@ int run(const Options& options) {
   for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
   std::optional<AnytimeReport> anytime;
   if (options.anytime) {
-    anytime = look_every_time(options, flights, vehicle, model, grid ? &*grid : nullptr);
+    anytime = look_every_time(options, flights, vehicle, model, grid);
     json["anytime"] = to_json(*anytime);
   }
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
-  std::optional<study::RotorVerdict> rotors;
-  if (!options.reference.empty()) {
-    rotors = against_reference(options, vehicle, model, seen);
-    json["rotors_against_reference"] = to_json(*rotors);
-  }
+  const auto rotors = against_reference(options, vehicle, model, seen);
+  if (rotors) json["rotors_against_reference"] = to_json(*rotors);
   std::optional<study::Consequence> consequence;
   if (!result.causes.empty()) {
     progress("hover sets and a plan, before and after");
-    consequence = study::consequence(result, seen, model, vehicle, grid ? &*grid : nullptr, run_parallel);
+    consequence = study::consequence(result, seen, model, vehicle, grid, run_parallel);
     json["consequence"] = to_json(*consequence);
   }
   if (!options.out.empty()) {
-    write_file(options.out,
-               study::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model)),
-               options.force);
+    write_model(options, model, result, seen);
     json["extended_model"] = options.out;
   }
   if (!options.report.empty()) {
@@ -201,14 +210,8 @@ int run(const Options& options) {
     write_page(options, result, seen,
                {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
   }
-  if (options.json) {
-    print(json);
-    return kOk;
-  }
-  print_text(result, seen, rotors, height);
-  for (const auto& [log, known] : flights.twice)
-    std::printf("counted once: %s is %s again\n", log.c_str(), known.c_str());
-  if (anytime) print_text(*anytime);
+  options.json ? print(json) : print_text(result, seen, rotors, height);
+  if (!options.json) print_text(flights, anytime);
   return kOk;
 }
 

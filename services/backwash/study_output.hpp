@@ -11,7 +11,7 @@
 
 namespace backwash::services {
 
-/// JSON of `backwash study` (core/study/README.md, "JSON").
+/// JSON of `backwash study` (docs/interfaces.md, "backwash study").
 Json to_json(const study::StudyResult& result, const study::Observations& seen);
 Json to_json(const study::Consequence& consequence);
 Json to_json(const study::RotorVerdict& verdict);

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every citation of docs/ in code and documents leads somewhere: sections and equations of model.md, headings of
-interfaces.md, rows of faults.md; so do relative links, and paths of documents that text names.
+"""Every citation of docs/ in code, scripts and documents leads somewhere: sections and equations of model.md, headings of
+interfaces.md, rows of faults.md, in either order ("row 3 of docs/faults.md"); bare rows in comments and documents, bare
+sections and equations in docs/; so do relative links, headings quoted after them, and paths of files that text names.
 
 citations.py SOURCE_DIR [--mend]    --mend: first makes docs/… of citations without a folder; format the code after it
 """
@@ -10,10 +11,14 @@ import pathlib
 import re
 import sys
 
-SUFFIXES = {".cpp", ".hpp", ".c", ".h", ".md", ".sh", ".py", ".txt", ".idl", ".toml", ".in", ".cmake", ".inc", ""}
+SUFFIXES = {".cpp", ".hpp", ".c", ".h", ".md", ".sh", ".py", ".txt", ".idl", ".toml", ".in", ".cmake", ".inc",
+            ".yml", ".yaml", ".cff", ".service", ".json", ".svg", ".html", ""}
 LEFT_OUT = {".git", "build", "flight", "__pycache__"}
 NUMBER = r"\d\w?(?:\.\d)?"
-LIST = rf"{NUMBER}(?:(?:, | and | to | or |–){NUMBER})*"
+LIST = rf"{NUMBER}(?:(?:, and |, | and | to | or |–){NUMBER})*"
+EQUATION = r"(?<![\w.^_-])\d[a-d]?(?:\.\d)?-\d+(?![\w-])"
+NAMED = re.compile(r"(?<![\w./$}*<-])(?:core|docs|firmware_bridge|services|tests|idl|systemd|toolchains)/[\w./-]+\."
+                   r"(?:md|cpp|hpp|c|h|py|sh|toml|idl|cmake|cff|svg|png)\b(?!\.\w|\*)")
 
 
 def texts(root: pathlib.Path):
@@ -68,10 +73,22 @@ def main() -> int:
     interfaces = set(headings((root / "docs/interfaces.md").read_text()))
     wrong, seen = [], 0
 
+    def rows_in(path, text):
+        # Row 0 is the first of a table or a matrix, not a fault.
+        for list_ in re.findall(rf"\brows? ({LIST})\b(?! of (?!docs/faults))", text):
+            wrong.extend(f"{path}: faults.md has no row {n}" for n in numbers(list_) if n not in rows | {"0"})
+
+    def sections_in(path, text):
+        for list_ in re.findall(rf"\b[Ss]ections? ({LIST})\b", text):
+            wrong.extend(f"{path}: model.md has no section {n}" for n in numbers(list_) if n not in sections)
+
+    def equations_in(path, text):
+        wrong.extend(f"{path}: model.md has no equation {n}" for n in re.findall(EQUATION, text) if n not in equations)
+
     for path, text in texts(root):
         # A citation may be broken by a comment's end of line.
         joined = re.sub(r"[ \t]*\n[ \t]*(?:///?|#|\*)?[ \t]*", " ", text)
-        for match in re.finditer(r"([\w./-]*)\b(model|interfaces|faults)\.md(?=(.{0,90}))", joined):
+        for match in re.finditer(r"([\w./-]*)\b(model|interfaces|faults)\.md(?=(.{0,200}))", joined):
             prefix, page, after = match.groups()
             if not prefix and path.parent == pathlib.Path("docs"):
                 pass
@@ -79,7 +96,15 @@ def main() -> int:
                 wrong.append(f"{path}: cites {prefix}{page}.md, which is docs/{page}.md")
                 continue
             seen += 1
-            after = after.lstrip(")`")
+            after = re.sub(r"^\]\([^)]*\)", "", after).lstrip(")`")
+            after = re.sub(r"^[,:]? ?\(?(?=rows? |sections? |equations? )|^#(row|section)-", lambda m: ", " + (f"{m[1]} " if m[1] else ""), after)
+            before = joined[max(0, match.start() - 60):match.start()]
+            if page == "model" and (cited := re.search(rf"\b[Ss]ections? ({LIST}) (?:of|in) [(`[]*$", before)):
+                sections_in(path, f"section {cited[1]}")
+            if page == "model" and (cited := re.match(rf"(?:, )?(?:sections? {LIST})?[ ,(]*(?:equations? )?({EQUATION}(?:(?:, | and | to ){EQUATION})*)", after)):
+                equations_in(path, cited[1])
+            if page == "interfaces" and re.match(r",? sections? \d", after):
+                wrong.append(f"{path}: interfaces.md has headings, no numbered sections")
             if page == "model" and (cited := re.match(rf",? (?:sections? )?({NUMBER}-\d+)", after)):
                 if cited[1] not in equations:
                     wrong.append(f"{path}: model.md has no equation {cited[1]}")
@@ -87,17 +112,36 @@ def main() -> int:
                 wrong += [f"{path}: model.md has no section {n}" for n in numbers(cited[1]) if n not in sections]
             elif page == "faults" and (cited := re.match(rf",? rows? ({LIST})\b", after)):
                 wrong += [f"{path}: faults.md has no row {n}" for n in numbers(cited[1]) if n not in rows]
-            elif page == "interfaces" and (cited := re.match(r', "([^"]+)"', after)):
+            elif page == "interfaces" and (cited := re.match(r',? \(?"([^"]+)"', after)):
                 if cited[1] not in interfaces:
                     wrong.append(f"{path}: interfaces.md has no heading '{cited[1]}'")
-        for name in re.findall(r"(?<![\w./-])(?:core|docs|firmware_bridge|services|tests)/[\w./-]+\.md\b", joined):
-            if not (root / name).is_file():
+        if path.suffix in {".cpp", ".hpp", ".c", ".h", ".idl"}:
+            rows_in(path, re.sub(r"\n[ \t]*///?<?", " ", "".join(re.findall(r"//[^\n]*\n(?=[ \t]*//)|//[^\n]*", text))))
+            if found := re.findall(rf"//[^\n]*\b(?:equations?|Eqs?\.) ({EQUATION})", text):
+                equations_in(path, " ".join(found))
+        elif path.suffix == ".md":
+            rows_in(path, joined)
+        if path.parent == pathlib.Path("docs") and path.suffix == ".md":
+            sections_in(path, joined)
+        if path == pathlib.Path("docs/model.md"):
+            equations_in(path, re.sub(r"`[^`]*`", "", text))
+        if path == pathlib.Path("docs/faults.md"):
+            wrong += [f"{path}: there is no row {n}" for n in re.findall(r"\bas (\d+)\b", text) if n not in rows]
+        for name in NAMED.findall(joined):
+            if "NAME" not in name and not (root / name).is_file():
                 wrong.append(f"{path}: there is no {name}")
+        for page, heading in re.findall(r'(?<![\w./-])((?:core|docs|firmware_bridge|services|tests)/[\w./-]+\.md)`?,? "([^"]+)"', joined):
+            if (root / page).is_file() and heading not in headings((root / page).read_text()):
+                wrong.append(f"{path}: {page} has no heading '{heading}'")
         if found := re.search(r"shared/\w+\.md", joined):
             wrong.append(f"{path}: cites {found[0]}, which a clone does not have")
         if path.suffix != ".md":
             continue
-        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        for target, heading in re.findall(r'\]\(([^)#]+\.md)\),? "([^"]+)"', joined):
+            if (root / path.parent / target).is_file() and heading not in headings((root / path.parent / target).read_text()):
+                wrong.append(f"{path}: {target} has no heading '{heading}'")
+        linked_to = re.findall(r"\]\(([^)\s<]+)(?: \"[^\"]*\")?\)|\]\(<([^>]+)>\)|^\[[^\]^]+\]: (\S+)|(?:src|href)=\"([^\"]+)\"", text, re.M)
+        for target in ("".join(found) for found in linked_to):
             if re.match(r"\w+:", target):
                 continue
             file, _, fragment = target.partition("#")

@@ -5,7 +5,7 @@
 interfaces.py SOURCE_DIR BUILD_DIR
 
 Keys of the files, as the programs tell them, with range and presence by the strict tables of core/config; verbs and options by --help, names of JSON, exit codes, kinds of
-effects, topics with type and delivery, verbs and results of commands, MAVLink messages.
+effects, columns of the flight log, topics with type and delivery, verbs and results of commands, MAVLink messages.
 """
 import pathlib
 import re
@@ -207,6 +207,24 @@ def check_exit_codes(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     expect("exit codes", documented, actual)
 
 
+# --- tables ----------------------------------------------------------------------------------------------------------
+
+def check_columns(root: pathlib.Path, sections_of: dict[str, str]) -> None:
+    """Columns of the flight log. Of a series the first one is documented: x for x, y and z, 1 for 1 to 4."""
+    code = (root / "core/log/column_units.cpp").read_text().split("kinds() {")[1].split("return all;")[0]
+    actual = set(re.findall(r'"(\w+)"', code))
+    shown = {q for c in rows(sections_of["Flight log, CSV"])[1:] for q in quoted(c[0])}
+    in_words = set(re.findall(r"\w+", " ".join(quoted(sections_of["Column map"]))))  # what only a foreign table has
+
+    def first(column: str) -> str:
+        return re.sub(r"^(rpm|motor)[2-4]$", r"\g<1>1", re.sub(r"^((?:cmd_)?[va]?|specific_force_)[yz](?=_m|$)", r"\1x", column))
+
+    wrong.extend(f"Flight log, CSV: not documented: {c}" for c in sorted(actual) if not {c, first(c)} & (shown | in_words))
+    wrong.extend(f"Flight log, CSV: does not exist: {c}" for c in sorted(shown - actual))
+    if len(actual) < 30:
+        wrong.append(f"Flight log, CSV: only {len(actual)} columns were found in core/log/column_units.cpp")
+
+
 # --- DDS and MAVLink -------------------------------------------------------------------------------------------------
 
 DELIVERY = {"latest": "best effort, keep last 1", "scans": "best effort, keep last 8",
@@ -249,6 +267,7 @@ def main() -> int:
     check_programs(root, build, sections_of)
     check_json(root, text, sections_of)
     check_exit_codes(root, sections_of)
+    check_columns(root, sections_of)
     check_dds(root, sections_of)
     check_mavlink(root, sections_of)
     for line in wrong:

@@ -19,6 +19,10 @@ def names(code: str, symbol: str) -> bool:
     return "::" in symbol and all(re.search(rf"\b{re.escape(part)}\b", code) for part in symbol.split("::"))
 
 
+def ranked(number: str) -> list[str]:
+    return [part.rjust(4) for part in re.split(r"[.-]", number)]
+
+
 def main() -> int:
     source = pathlib.Path(sys.argv[1])
     wrong, seen, open_equations = [], {}, []
@@ -55,6 +59,12 @@ def main() -> int:
                 wrong.append(f"{n}: there is no {path}")
             elif not names(file.read_text(), symbol):
                 wrong.append(f"{n}: {path} has no {symbol}")
+    # The table at the top names each section's first and last equation.
+    for first, last in re.findall(r"^\| \[[^|]*\|[^|]*\| (\S+-\d+) … (\S+-\d+) \|", (source / "docs/model.md").read_text(), re.M):
+        group = [number for number in seen if number.split("-")[0].split(".")[0] == first.split("-")[0].split(".")[0]]
+        ends = [min(group, key=ranked), max(group, key=ranked)] if group else []
+        if ends != [first, last]:
+            wrong.append(f"1: the table says {first} … {last}, there are {' … '.join(ends)}")
     if len(seen) < 50:
         wrong.append(f"1: only {len(seen)} equations were found")
     for line in wrong:

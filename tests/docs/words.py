@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Documents are in plain words: in every tracked .md file no sentence, and no clause of a table's cell, has more than 35
-words. Code and equations in `…` count as one word; indented and fenced blocks are left out.
+"""Documents are in plain words: in every tracked .md file no sentence, no heading, and no clause of a table's cell, has
+more than 35 words. Code and equations in `…` count as one word, words on both sides of a dash as two. A colon before
+a capital, a number or code ends a sentence, and so does an arrow. Fenced blocks are
+left out, and indented ones: indented by four columns, after a blank line, and not under an entry of a list.
 
 words.py SOURCE_DIR
 """
@@ -11,16 +13,24 @@ import subprocess
 import sys
 
 MOST = 35
+ABBREVIATION = re.compile(r"\b(e\.g|i\.e|cf|vs|etc|approx|Fig|Figs|Eq|Eqs|No|Sec|Ch|Dr|Prof|St)\.(?=\s)")
 
 
 def blocks(text: str):
-    """(line, text) of each paragraph, list entry and table cell; code is left out."""
-    paragraph, start, fenced = [], 0, False
+    """(line, text) of each paragraph, heading, list entry and table cell; code is left out."""
+    paragraph, start, fenced, indented, listed = [], 0, "", False, False
     for n, line in enumerate(text.splitlines() + [""], 1):
-        if line.startswith("```"):
-            fenced = not fenced
-        code = fenced or line.startswith("```") or line.startswith("    ") or line.startswith("→")
-        table, heading, entry = line.startswith("|"), line.startswith("#"), re.match(r"(- |\d+\. )", line)
+        fence = re.match(r"\s*(```|~~~)(?!.*`)", line)
+        if fence and fenced in ("", fence[1]):
+            fenced = "" if fenced else fence[1]
+        entry = re.match(r"\s*([-*+] |\d+[.)] )", line)
+        # Four columns are code at the start of a block only; below an entry they carry it on.
+        indented = line.startswith(("    ", "\t")) and (indented or not paragraph) and not listed
+        listed = bool(entry and not indented) or listed and (not line.strip() or line.startswith((" ", "\t")) or bool(paragraph))
+        code = bool(fenced or fence or indented) or line.startswith("→ `")
+        table, heading = line.startswith("|"), line.startswith("#") and not code
+        if heading:
+            yield n, line.lstrip("# ")
         if not line.strip() or code or table or heading or entry:
             if paragraph:
                 yield start, " ".join(paragraph)
@@ -43,8 +53,9 @@ def main() -> int:
     for page in pages:
         for n, block in blocks((source / page).read_text()):
             # An abbreviation or a number is no end: a sentence ends before a capital or at the block's end.
-            for sentence in re.split(r"[.:?!]\*{0,2}\s+(?=[A-ZΣΔ`*0-9(\[|])|\s→\s", re.sub(r"`[^`]*`", "X", block)):
-                words = [w for w in sentence.split() if re.search(r"\w", w)]
+            plain = ABBREVIATION.sub(r"\1", re.sub(r"`[^`]*`", "X", block))
+            for sentence in re.split(r"[.:?!]\*{0,2}\s+(?=[A-ZΣΔ`*0-9(\[|])|\s→\s", plain):
+                words = [w for w in re.split(r"\s|—|–(?!\d)", sentence) if re.search(r"\w", w)]
                 if len(words) > MOST:
                     wrong += 1
                     print(f"{page}:{n}: {len(words)} words: {sentence[:90]} …")
