@@ -158,7 +158,7 @@ void write_model(const Options& options, const Model& model, const study::StudyR
   write_file(options.out, text, options.force);
 }
 
-void print_text(const Flights& flights, const std::optional<AnytimeReport>& anytime) {
+void print_beside(const Flights& flights, const std::optional<AnytimeReport>& anytime) {
   for (const auto& [log, known] : flights.twice)
     std::printf("counted once: %s is %s again\n", log.c_str(), known.c_str());
   if (anytime) print_text(*anytime);
@@ -211,7 +211,7 @@ int run(const Options& options) {
                {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
   }
   options.json ? print(json) : print_text(result, seen, rotors, height);
-  if (!options.json) print_text(flights, anytime);
+  if (!options.json) print_beside(flights, anytime);
   return kOk;
 }
 
