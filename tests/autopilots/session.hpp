@@ -15,6 +15,9 @@
 
 namespace backwash::autopilots {
 
+inline constexpr std::uint8_t kSystem = 1, kFlightController = 1;  ///< the autopilot's addresses
+inline constexpr std::uint8_t kInt32 = 6, kReal32 = 9;             ///< MAV_PARAM_TYPE
+
 /// Plays a script against an autopilot, real or emulated, without the daemon: its own companion computer with odometry
 /// made of the truth. Writes what passed on the line, and the truth, as a trace. README.md has verbs and columns.
 class Session {

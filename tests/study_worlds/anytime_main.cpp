@@ -2,19 +2,17 @@
 // study_anytime: worlds looked at after every flight. How often does the e-value ever pass 1/level, and, beside it, how
 // often does the study itself ever name something (--studies: it is run after every flight, too)? Every world is one
 // line of JSON in --out as soon as it is done; --from makes the table of such files.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "core/study/inference/anytime.hpp"
+#include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/observe.hpp"
+#include "tests/study_worlds/summary.hpp"
 
 namespace {
 
@@ -45,7 +43,7 @@ Watched watch(const Options& options, std::uint64_t seed, const std::filesystem:
   observe_each(draw_world(request), folder, [&](const study::Observations& seen) {
     anytime.look(seen);
     study::StudyOptions chosen;
-    chosen.minimum_detectable = chosen.dependence = false;
+    chosen.minimum_detectable = false;
     if (options.studies) watched.named.push_back(told(study::study(seen, chosen)));
   });
   watched.log_e = anytime.log_e();
@@ -57,68 +55,54 @@ nlohmann::json to_json(const Watched& w, std::uint64_t seed, const std::string& 
   return {{"seed", seed}, {"cause", cause}, {"log_e", w.log_e}, {"leading", w.leading}, {"named", w.named}};
 }
 
-Watched from_json(const nlohmann::json& json) { return {json["log_e"], json["leading"], json["named"]}; }
+Watched watched_from(const nlohmann::json& json) { return {json["log_e"], json["leading"], json["named"]}; }
 
 std::vector<Watched> run(const Options& options) {
   std::vector<Watched> all;
   std::mutex writing;
-  std::atomic<int> next = 0;
   std::ofstream out(options.out, std::ios::app);
-  std::vector<std::jthread> threads;
-  for (int j = 0; j < options.jobs; ++j)
-    threads.emplace_back([&, j] {
-      const auto folder = std::filesystem::temp_directory_path() /
-                          ("study-anytime-" + std::to_string(::getpid()) + "-" + std::to_string(j));
-      for (int k = next++; k < options.worlds; k = next++) {
-        const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(k);
-        auto watched = watch(options, seed, folder);
-        const std::lock_guard lock(writing);
-        if (out) out << to_json(watched, seed, options.cause).dump() << std::endl;
-        all.push_back(std::move(watched));
-      }
-      std::filesystem::remove_all(folder);
-    });
-  threads.clear();
+  in_parallel(options.jobs, static_cast<std::size_t>(options.worlds), [&](std::size_t k, auto& folder) {
+    auto watched = watch(options, options.seed + k, folder);
+    const std::lock_guard lock(writing);
+    if (out) out << to_json(watched, options.seed + k, options.cause).dump() << std::endl;
+    all.push_back(std::move(watched));
+  });
   return all;
 }
 
-/// "5 of 249 (0.01 to 0.05)": Wilson's interval.
-std::string share(std::size_t hits, std::size_t of) {
-  const double n = static_cast<double>(of), p = static_cast<double>(hits) / n, z2 = 3.8415;
-  const double middle = (p + z2 / (2 * n)) / (1 + z2 / n);
-  const double half = std::sqrt(z2 * (p * (1 - p) / n + z2 / (4 * n * n))) / (1 + z2 / n);
+/// "5 of 249 (0.01 to 0.05)".
+std::string text(const Rate& rate) {
   char line[64];
-  std::snprintf(line, sizeof line, "%zu of %zu (%.3f to %.3f)", hits, of, middle - half, middle + half);
+  std::snprintf(line, sizeof line, "%d of %d (%.3f to %.3f)", rate.hits, rate.n, rate.low(), rate.high());
   return line;
 }
 
 void report(const std::vector<Watched>& all) {
-  if (all.empty()) return;
   for (const double level : {0.05, 0.015, 0.01}) {
-    std::vector<std::size_t> after;
+    Rate alarms;
+    std::vector<std::ptrdiff_t> after;
     for (const auto& w : all) {
       const auto at = std::ranges::find_if(w.log_e, [&](double e) { return e >= -std::log(level); });
-      if (at != w.log_e.end()) after.push_back(static_cast<std::size_t>(at - w.log_e.begin()) + 1);
+      alarms.count(at != w.log_e.end());
+      if (at != w.log_e.end()) after.push_back(at - w.log_e.begin() + 1);
     }
     std::ranges::sort(after);
-    std::printf("e-value ever above %.0f: %s worlds", 1 / level, share(after.size(), all.size()).c_str());
-    if (!after.empty()) std::printf(", the middle one after %zu flights", after[after.size() / 2]);
+    std::printf("e-value ever above %.0f: %s worlds", 1 / level, text(alarms).c_str());
+    if (!after.empty()) std::printf(", the middle one after %td flights", after[after.size() / 2]);
     std::printf("\n");
   }
   std::map<std::string, std::size_t> leading;
-  for (const auto& w : all)
-    if (w.log_e.back() >= std::log(20.0)) ++leading[w.leading];
-  for (const auto& [name, count] : leading) std::printf("  leading: %s in %zu\n", name.c_str(), count);
-  std::size_t asked = 0, ever = 0, at_last = 0;
+  Rate ever, at_last;
   for (const auto& w : all) {
+    if (w.log_e.back() >= std::log(20.0)) ++leading[w.leading];
     if (w.named.empty()) continue;
-    ++asked;
-    ever += std::ranges::any_of(w.named, [](auto& n) { return n != "nothing"; }) ? 1 : 0;
-    at_last += w.named.back() != "nothing" ? 1 : 0;
+    ever.count(std::ranges::any_of(w.named, [](auto& n) { return n != "nothing"; }));
+    at_last.count(w.named.back() != "nothing");
   }
-  if (asked > 0)
+  for (const auto& [name, count] : leading) std::printf("  leading: %s in %zu\n", name.c_str(), count);
+  if (ever.n > 0)
     std::printf("the study after every flight: ever a name in %s worlds; after the last flight alone %s\n",
-                share(ever, asked).c_str(), share(at_last, asked).c_str());
+                text(ever).c_str(), text(at_last).c_str());
 }
 
 }  // namespace
@@ -143,7 +127,7 @@ int main(int argc, char** argv) {
   std::vector<Watched> all;
   for (const auto& file : options.from) {
     std::ifstream in(file);
-    for (std::string line; std::getline(in, line);) all.push_back(from_json(nlohmann::json::parse(line)));
+    for (std::string line; std::getline(in, line);) all.push_back(watched_from(nlohmann::json::parse(line)));
   }
   report(all);
   return 0;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // study_matrix: how often the study names what was hidden. Every world is one line of JSON in --out as soon as it is
 // done, so that a cut run counts; --from makes the tables of such files. --gate: exit 1 when a gate is missed.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
@@ -10,8 +8,8 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <thread>
 
+#include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/null_size.hpp"
 #include "tests/study_worlds/summary.hpp"
 
@@ -45,20 +43,6 @@ std::vector<Cell> chosen_cells(const Options& options) {
     chosen.push_back(*at);
   }
   return chosen;
-}
-
-/// Runs `task(k, folder)` for k below `count` on `jobs` threads, each with a folder of its own.
-template <typename Task>
-void in_parallel(int jobs, std::size_t count, Task task) {
-  std::atomic<std::size_t> next = 0;
-  std::vector<std::jthread> threads;
-  for (int j = 0; j < jobs; ++j)
-    threads.emplace_back([&, j] {
-      const auto folder = std::filesystem::temp_directory_path() /
-                          ("study-matrix-" + std::to_string(::getpid()) + "-" + std::to_string(j));
-      for (std::size_t k = next++; k < count; k = next++) task(k, folder);
-      std::filesystem::remove_all(folder);
-    });
 }
 
 /// Worlds outside, cells inside: a cut run has as many worlds of each cell.

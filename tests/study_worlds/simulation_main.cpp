@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // study_simulation: whether a simulation that a study extended comes as near to further flights as the truth's own.
 // Every world is one line of JSON in --out as soon as it is done; --from makes the table of such files.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <cstdio>
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
+#include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/simulation.hpp"
 
 namespace {
@@ -30,24 +27,15 @@ std::vector<Proof> run(const Options& options) {
   const std::size_t count = causes.size() * static_cast<std::size_t>(options.worlds);
   std::vector<Proof> proofs;
   std::mutex writing;
-  std::atomic<std::size_t> next = 0;
   std::ofstream out(options.out, std::ios::app);
-  std::vector<std::jthread> threads;
-  for (int j = 0; j < options.jobs; ++j)
-    threads.emplace_back([&, j] {
-      const auto folder = std::filesystem::temp_directory_path() /
-                          ("study-simulation-" + std::to_string(::getpid()) + "-" + std::to_string(j));
-      for (std::size_t k = next++; k < count; k = next++) {
-        ProofRequest request = options.request;
-        request.cause = causes[k % causes.size()], request.seed += k / causes.size();
-        auto proof = prove(request, folder);
-        const std::lock_guard lock(writing);
-        if (out) out << to_json(proof).dump() << std::endl;
-        proofs.push_back(std::move(proof));
-      }
-      std::filesystem::remove_all(folder);
-    });
-  threads.clear();
+  in_parallel(options.jobs, count, [&](std::size_t k, auto& folder) {
+    ProofRequest request = options.request;
+    request.cause = causes[k % causes.size()], request.seed += k / causes.size();
+    auto proof = prove(request, folder);
+    const std::lock_guard lock(writing);
+    if (out) out << to_json(proof).dump() << std::endl;
+    proofs.push_back(std::move(proof));
+  });
   return proofs;
 }
 

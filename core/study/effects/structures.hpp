@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/study/effects/smooths.hpp"
+#include "core/study/effects/regressors.hpp"
 
 /// Structures without a name: what is tried where no form of the catalogue may fit.
 namespace backwash::study {

@@ -3,6 +3,8 @@
 
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/study/windows/signals.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::study {
 namespace {
@@ -17,7 +19,8 @@ std::optional<std::string> folded_away(const Observations& seen) {
   const double all = 4 * static_cast<double>(seen.windows.size());
   if (lines >= kEnough * all) return std::nullopt;
   return "sampled once in " + std::to_string(std::lround(1000 * seen.row_period)) +
-         " ms the rotors' lines fold below 0.75 Hz, where gusts and loop are, or next to half the rate, in " +
+         " ms the rotors' lines fold below " + to_text(kLeastFolded, 2) +
+         " Hz, where gusts and loop are, or next to half the rate, in " +
          std::to_string(std::lround(100 * (1 - lines / all))) + " % of the windows";
 }
 

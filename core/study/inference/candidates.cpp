@@ -52,7 +52,7 @@ class Bound {
 
 bool Candidate::effect(const SmallVector& theta) const {
   const auto floor_of_structure = [&] {
-    return columns.front().parts.front().channel == kVarX ? kRules.smooth_floor_ln : kRules.smooth_floor_mean;
+    return columns.front().parts.front().channel == kVarX ? kRules.structure_floor_ln : kRules.structure_floor_mean;
   };
   if (!form) return theta.dot(size * theta) >= std::pow(floor_of_structure().value, 2);
   if (std::abs(theta[0]) < form->least || (form->one_sided && theta[0] < 0)) return false;

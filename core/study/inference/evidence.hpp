@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/study/effects/smooths.hpp"
+#include "core/study/effects/regressors.hpp"
 
 namespace backwash::study {
 

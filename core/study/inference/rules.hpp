@@ -30,9 +30,9 @@ struct Rules {
   Rule least_threshold{"least_threshold", 0.5, "nats", "derived: what one parameter without effect gains on average"};
   Rule harmonic_nats{"harmonic_nats", 1, "nats", "derived: what two parameters without effect gain on average"};
   Rule bound_error{"bound_error", 1e-6, "1", "derived: more than rounding in a bound that spares draws"};
-  Rule smooth_lead{"smooth_lead", 3, "nats", "derived: a likelihood ratio of 20"};
-  Rule smooth_share{"smooth_share", 0.6, "of the cause's gain",
-                    "chosen: a structure has 4 columns and more and bends to where a form is wrong"};
+  Rule structure_lead{"structure_lead", 3, "nats", "derived: a likelihood ratio of 20"};
+  Rule structure_margin{"structure_margin", 0.6, "of the cause's gain",
+                        "chosen: a structure has 4 columns and more and bends to where a form is wrong"};
   Rule least_share{"least_share", 0.08, "of an accepted gain",
                    "chosen: the error of an accepted form gains less (confusion.md, two causes, has the price)"};
   Rule repair_share{"repair_share", 0.25, "of an accepted gain",
@@ -41,8 +41,9 @@ struct Rules {
                   "derived: the error of a form is smaller than what it explains"};
   Rule left_of_constant{"left_of_constant", 0.5, "of an accepted gain",
                         "chosen: a constant beside a structure half as strong is the structure's mean"};
-  Rule smooth_floor_mean{"smooth_floor_mean", 0.03, "m/s²", "chosen: 1.5 floors of the pushes of the catalogue"};
-  Rule smooth_floor_ln{"smooth_floor_ln", 0.2, "ln variance", "chosen: 1.7 floors of the variances of the catalogue"};
+  Rule structure_floor_mean{"structure_floor_mean", 0.03, "m/s²", "chosen: 1.5 floors of the pushes of the catalogue"};
+  Rule structure_floor_ln{"structure_floor_ln", 0.2, "ln variance",
+                          "chosen: 1.7 floors of the variances of the catalogue"};
   // Rivals
   Rule rival_nats{"rival_nats", 3, "nats", "derived: a likelihood ratio of 20"};
   Rule rival_errors{"rival_errors", 2, "standard errors", "derived: 95 % of the flights' difference"};

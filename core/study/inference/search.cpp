@@ -197,7 +197,8 @@ UnknownStructure told(const Candidate& structure, double p) {
 /// Whether a structure says more than any cause does, and more than the error of an accepted one could.
 bool leads(const Candidate& structure, const Candidate* cause, const std::vector<Accepted>& accepted) {
   if (structure.gain < needed_structure(structure, accepted)) return false;
-  return !cause || structure.gain - cause->gain > std::max(kRules.smooth_lead.value, kRules.smooth_share * cause->gain);
+  return !cause ||
+         structure.gain - cause->gain > std::max(kRules.structure_lead.value, kRules.structure_margin * cause->gain);
 }
 
 }  // namespace

@@ -56,10 +56,8 @@ double ln_variance(double n) { return trigamma(n / 2); }
 
 namespace {
 
-constexpr int kBeside = 4;             // on each side, 1 Hz apart from 1.5 Hz on
-constexpr double kBlock = 1;           // s: over more the phase that rpm readings give drifts
-constexpr double kLeastFolded = 0.75;  // Hz: below, a block holds no whole turn and the line is as slow as a gust
-constexpr double kFromHalfRate = 1;    // Hz
+constexpr int kBeside = 4;    // on each side, 1 Hz apart from 1.5 Hz on
+constexpr double kBlock = 1;  // s: over more the phase that rpm readings give drifts
 
 /// x without what it shares with its last sample as a first-order process: the ratio of its second autocorrelation to
 /// its first, which white noise on top does not change. Gusts come out flat down to 0 Hz.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/effects/smooths.hpp"
+#include "core/study/effects/regressors.hpp"
 
 #include <algorithm>
 #include <cmath>
