@@ -121,14 +121,17 @@ struct Seen {
   std::string leading;
 };
 
-Seen look(const std::string& cause, int flights) {
+/// After every flight, or after the last alone.
+Seen look(const std::string& cause, int flights, bool last_alone = false) {
   const auto folder = std::filesystem::temp_directory_path() / ("anytime-test-" + std::to_string(getpid()));
   study_worlds::Request request;
   request.seed = 100, request.flights = flights;
   if (!cause.empty()) request.causes = {cause};
   Anytime anytime;
   study_worlds::observe_each(study_worlds::draw_world(request), folder,
-                             [&](const Observations& seen) { anytime.look(seen); });
+                             [&, n = 0](const Observations& seen) mutable {
+                               if (++n == flights || !last_alone) anytime.look(seen);
+                             });
   std::filesystem::remove_all(folder);
   return {anytime.log_e(), std::ranges::max_element(anytime.causes(), {}, [](auto& c) { return c.second; })->first};
 }
@@ -141,6 +144,14 @@ TEST(Anytime, ARealEffectPassesAndAWorldWithoutNeverDoes) {
   EXPECT_GT(drag.log_e.back(), std::log(1000.0));
   for (std::size_t n = 1; n < drag.log_e.size(); ++n) EXPECT_GE(drag.log_e[n], drag.log_e[n - 1] - 1e-12) << n;
   for (std::size_t n = 0; n < 4; ++n) EXPECT_NEAR(drag.log_e[n], std::log(0.5), 1e-12) << "bet before the first look";
+}
+
+// What a flight is weighed by comes from those before it: later ones change no bet.
+TEST(Anytime, LookingLessOftenChangesNoBet) {
+  const Seen each = look("rotor_drag", 9), once = look("rotor_drag", 9, true);
+  ASSERT_EQ(once.log_e.size(), 1u);
+  EXPECT_GT(once.log_e.back(), std::log(20.0));
+  EXPECT_NEAR(once.log_e.back(), each.log_e.back(), 1e-6);
 }
 
 // Alike flown, in the same room: only the copy has the same gusts.
