@@ -62,7 +62,7 @@ class Decoder {
  public:
   explicit Decoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
-  tl::expected<ULog, std::string> run() {
+  tl::expected<TopicLog, std::string> run() {
     if (bytes_.size() < kHeader || std::memcmp(bytes_.data(), kMagic, sizeof kMagic) != 0)
       return fail(0, "no ULog magic; give a .ulg file");
     for (std::size_t at = kHeader; at + 3 <= bytes_.size();) {
@@ -182,7 +182,7 @@ class Decoder {
       return fail(at, "data of " + std::to_string(body.size() - 2) + " bytes where its format has " +
                           std::to_string(s.size))
           .value();
-    ULog::Topic& topic = log_.topics[s.topic];
+    TopicLog::Topic& topic = log_.topics[s.topic];
     const std::uint8_t* p = body.data() + 2;
     for (const auto& f : s.fields) {
       if (f.kind == '_') {
@@ -202,17 +202,15 @@ class Decoder {
   std::span<const std::uint8_t> bytes_;
   std::map<std::string, std::string> formats_;
   std::map<std::uint16_t, Subscription> subscriptions_;
-  ULog log_;
+  TopicLog log_;
 };
 
 }  // namespace
 
-const ULog::Topic* ULog::find(const std::string& name, unsigned instance) const {
-  for (const auto& topic : topics)
-    if (topic.name == name && topic.instance == instance && !topic.t_s.empty()) return &topic;
-  return nullptr;
-}
+tl::expected<TopicLog, std::string> decode_ulog(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
 
-tl::expected<ULog, std::string> decode_ulog(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
+tl::expected<FlightLog, LogError> read_ulog(const std::string& path) {
+  return read_topics(path, "a .ulg file", decode_ulog);
+}
 
 }  // namespace backwash::log

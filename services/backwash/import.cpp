@@ -4,6 +4,7 @@
 #include <functional>
 #include <utility>
 
+#include "core/log/dataflash.hpp"
 #include "core/log/import_airgarage.hpp"
 #include "core/log/import_columns.hpp"
 #include "core/log/import_crazypad.hpp"
@@ -27,6 +28,7 @@ constexpr struct {
   tl::expected<log::FlightLog, log::LogError> (*import)(const std::string& path);
 } kImporters[] = {
     {"airgarage", log::import_airgarage},
+    {"ardupilot", log::read_dataflash},
     {"crazypad", log::import_crazypad},
     {"ulog", log::read_ulog},
 };
@@ -138,7 +140,9 @@ int run(const Options& options) {
 Verb import_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   auto* command = app.add_subcommand("import", "Recordings of others as flight logs");
-  command->add_option("kind", options->kind, "airgarage, crazypad or ulog; left out with a column map")->required();
+  command
+      ->add_option("kind", options->kind, "airgarage, ardupilot (.bin), crazypad or ulog; left out with a column map")
+      ->required();
   command->add_option("files", options->files, "recordings");
   command->add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each");
   command->add_option("--map-columns", options->map_columns,

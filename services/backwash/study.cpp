@@ -224,7 +224,7 @@ Verb study_verb(CLI::App& app) {
                       "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
   command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
-  command->add_option("--log", options->logs, "flight logs, one flight each: CSV or ULog (.ulg)");
+  command->add_option("--log", options->logs, "flight logs, one flight each: CSV, PX4 (.ulg) or ArduPilot (.bin)");
   command->add_option(
       "--reference", options->reference,
       "flights of the same vehicle known to be sound, 4 or more: the --log flights' motor shares are judged against "

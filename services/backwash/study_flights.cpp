@@ -5,6 +5,7 @@
 #include <functional>
 #include <numeric>
 
+#include "core/log/dataflash.hpp"
 #include "core/log/same_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "core/study/windows/same_gusts.hpp"
@@ -49,8 +50,9 @@ study::Observations look_at(const Flights& flights, const Vehicle& vehicle, cons
 }  // namespace
 
 log::FlightLog read_flight(const std::string& path) {
-  if (!path.ends_with(".ulg")) return read_table(path, "t_s");
-  auto log = log::read_ulog(path);
+  const bool ulog = path.ends_with(".ulg");
+  if (!ulog && !path.ends_with(".bin") && !path.ends_with(".BIN")) return read_table(path, "t_s");
+  auto log = ulog ? log::read_ulog(path) : log::read_dataflash(path);
   if (log) return std::move(*log);
   throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
 }

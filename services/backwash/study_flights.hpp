@@ -13,7 +13,7 @@
 
 namespace backwash::services {
 
-/// A flight log: ULog by its name, else CSV. Throws Failure.
+/// A flight log: ULog (.ulg) or DataFlash (.bin) by its name, else CSV. Throws Failure.
 log::FlightLog read_flight(const std::string& path);
 
 /// The flights of a study, each once.

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/log/dataflash.hpp"
 #include "core/log/tick_log.hpp"
 #include "core/log/ulog.hpp"
 #include "core/report/recorded_flight.hpp"
@@ -176,6 +177,28 @@ TEST(Fuzz, ADamagedULogIsReadOrRefusedByItsByte) {
     }
   }
   EXPECT_GT(outcome.refused, 0u);
+}
+
+TEST(Fuzz, ADamagedDataflashLogIsReadAsFiniteNumbersOrRefused) {
+  Mutator mutator("DataFlash", 0.5);
+  const Bytes whole = read(BACKWASH_SOURCE_DIR "/tests/data/ardupilot/door.bin");
+  Outcome outcome;
+  for (bool more = true; more;) {
+    const Bytes bytes = mutator.damaged(whole);
+    more = mutator.spend(bytes.size());
+    const auto log = log::decode_dataflash(bytes);
+    const auto flight = log ? log::flight_of(log::px4_names(*log)) : tl::make_unexpected(log.error());
+    ++(flight ? outcome.taken : outcome.refused);
+    if (!flight) {
+      ASSERT_FALSE(flight.error().empty());
+      continue;
+    }
+    for (const auto& [name, column] : flight->columns) {
+      ASSERT_EQ(column.size(), flight->t_s.size()) << name;
+      ASSERT_TRUE(std::ranges::all_of(column, [](double v) { return std::isfinite(v); })) << name;
+    }
+  }
+  EXPECT_GT(outcome.taken, 0u);
 }
 
 TEST(Fuzz, ADamagedFlightLogHoldsFiniteNumbersOrIsRefusedByItsLine) {

@@ -79,10 +79,10 @@ TEST(ULogReader, RefusesWhatIsNoULog) {
 }
 
 /// A craft that swings along north and tilts for it: positions at 5 Hz, accelerometer at 250 Hz, attitude at 100 Hz.
-ULog swinging() {
+TopicLog swinging() {
   const double size = 0.4, w = 3.0;
-  ULog log;
-  ULog::Topic position{"vehicle_local_position", 0, {}, {}}, force{"sensor_combined", 0, {}, {}},
+  TopicLog log;
+  TopicLog::Topic position{"vehicle_local_position", 0, {}, {}}, force{"sensor_combined", 0, {}, {}},
       attitude{"vehicle_attitude", 0, {}, {}};
   for (int k = 0; k < 100; ++k) {
     const double t = 10 + 0.2 * k;
@@ -128,7 +128,7 @@ TEST(ULogReader, RowsAreTheAccelerometersWherePositionsAreRare) {
     ASSERT_NEAR(log->column("x_m")[row], 2, 1e-12);
   }
   EXPECT_NEAR(longest, 1.2, 0.05) << "the gap stays one";
-  ULog jumps = swinging();
+  TopicLog jumps = swinging();
   jumps.topics[0].columns["xy_reset_counter"].assign(95, 0);
   for (std::size_t k = 20; k < 95; ++k) {
     jumps.topics[0].columns["xy_reset_counter"][k] = 1;
@@ -137,7 +137,7 @@ TEST(ULogReader, RowsAreTheAccelerometersWherePositionsAreRare) {
   const auto jumped = flight_of(jumps);
   ASSERT_TRUE(jumped);
   for (const double y : jumped->column("y_m")) ASSERT_TRUE(y < 0.41 || y > 4.59) << "between the two";
-  ULog without = swinging();
+  TopicLog without = swinging();
   without.topics.pop_back();
   const auto rare = flight_of(without);
   ASSERT_TRUE(rare);

@@ -128,10 +128,9 @@ Seen look(const std::string& cause, int flights, bool last_alone = false) {
   request.seed = 100, request.flights = flights;
   if (!cause.empty()) request.causes = {cause};
   Anytime anytime;
-  study_worlds::observe_each(study_worlds::draw_world(request), folder,
-                             [&, n = 0](const Observations& seen) mutable {
-                               if (++n == flights || !last_alone) anytime.look(seen);
-                             });
+  study_worlds::observe_each(study_worlds::draw_world(request), folder, [&, n = 0](const Observations& seen) mutable {
+    if (++n == flights || !last_alone) anytime.look(seen);
+  });
   std::filesystem::remove_all(folder);
   return {anytime.log_e(), std::ranges::max_element(anytime.causes(), {}, [](auto& c) { return c.second; })->first};
 }

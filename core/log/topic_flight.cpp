@@ -6,9 +6,8 @@
 #include <optional>
 #include <span>
 
-#include "core/log/log_file.hpp"
+#include "core/log/topic_log.hpp"
 #include "core/log/turned_attitude.hpp"
-#include "core/log/ulog.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::log {
@@ -20,11 +19,11 @@ constexpr double kMostApart = 0.5;                  // s between messages; more 
 /// Joins fields of other topics to the rows by the latest message before each.
 class Rows {
  public:
-  Rows(const ULog::Topic& base, FlightLog& log) : base_(base), log_(log) {}
+  Rows(const TopicLog::Topic& base, FlightLog& log) : base_(base), log_(log) {}
 
   /// Column `to` = factor × field; left out unless the topic has the field and every row a finite value (rows before
   /// the first message take it).
-  void join(const ULog::Topic* topic, const std::string& field, const std::string& to, double factor) {
+  void join(const TopicLog::Topic* topic, const std::string& field, const std::string& to, double factor) {
     if (!topic || !topic->columns.contains(field) || log_.has(to)) return;
     const auto& values = topic->columns.at(field);
     std::vector<double> column;
@@ -44,7 +43,7 @@ class Rows {
   }
 
  private:
-  const ULog::Topic& base_;
+  const TopicLog::Topic& base_;
   FlightLog& log_;
 };
 
@@ -56,11 +55,11 @@ void keep_whole(FlightLog& log, std::initializer_list<const char*> names) {
     }
 }
 
-void join_motors(const ULog& ulog, Rows& rows, FlightLog& log) {
-  const auto* motors = ulog.find("actuator_motors");
-  const ULog::Topic* outputs = nullptr;
+void join_motors(const TopicLog& topics, Rows& rows, FlightLog& log) {
+  const auto* motors = topics.find("actuator_motors");
+  const TopicLog::Topic* outputs = nullptr;
   for (unsigned instance = 0; instance < 4 && !outputs; ++instance)  // of the output board that is there
-    outputs = ulog.find("actuator_outputs", instance);
+    outputs = topics.find("actuator_outputs", instance);
   for (int i = 0; i < 4; ++i) {
     const std::string to = std::string("motor").append(std::to_string(i + 1));
     const std::string index = std::string("[").append(std::to_string(i)).append("]");
@@ -72,36 +71,17 @@ void join_motors(const ULog& ulog, Rows& rows, FlightLog& log) {
   }
 }
 
-/// Body FRD → NED into body FLU → ENU.
-void join_attitude(const ULog& ulog, const ULog::Topic& position, FlightLog& log) {
-  const auto* attitude = ulog.find("vehicle_attitude");
-  if (!attitude) return;
-  FlightLog q;
-  Rows turned(position, q);
-  for (int i = 0; i < 4; ++i) {
-    const std::string name = std::string("q[").append(std::to_string(i)).append("]");
-    turned.join(attitude, name, name, 1);
-  }
-  if (q.columns.size() != 4) return;
-  for (std::size_t row = 0; row < position.t_s.size(); ++row) {
-    const auto part = [&](const char* name) { return q.column(name)[row]; };
-    const Eigen::Quaterniond ours = flu_of_frd(enu_of_ned({part("q[0]"), part("q[1]"), part("q[2]"), part("q[3]")}));
-    log.columns["qw"].push_back(ours.w()), log.columns["qx"].push_back(ours.x());
-    log.columns["qy"].push_back(ours.y()), log.columns["qz"].push_back(ours.z());
-  }
-}
-
-double rate(const ULog::Topic& topic) {
+double rate(const TopicLog::Topic& topic) {
   const double span = topic.t_s.size() < 2 ? 0 : topic.t_s.back() - topic.t_s.front();
   return span > 0 ? static_cast<double>(topic.t_s.size() - 1) / span : 0;
 }
 
 /// The accelerometer's topic that was logged most often, and what its three columns are called without their index.
-std::pair<const ULog::Topic*, std::string> accelerometer(const ULog& ulog) {
-  std::pair<const ULog::Topic*, std::string> best{nullptr, {}};
+std::pair<const TopicLog::Topic*, std::string> accelerometer(const TopicLog& topics) {
+  std::pair<const TopicLog::Topic*, std::string> best{nullptr, {}};
   for (const auto& [topic, field] :
        {std::pair{"vehicle_acceleration", "xyz"}, {"sensor_combined", "accelerometer_m_s2"}}) {
-    const auto* found = ulog.find(topic);
+    const auto* found = topics.find(topic);
     if (!found || !found->columns.contains(std::string(field) + "[2]") || rate(*found) < kLeastRate) continue;
     if (!best.first || rate(*found) > rate(*best.first)) best = {found, field};
   }
@@ -109,7 +89,7 @@ std::pair<const ULog::Topic*, std::string> accelerometer(const ULog& ulog) {
 }
 
 /// Row k and the share of the way to the next one, of the messages around a time; nothing in a gap or outside.
-std::optional<std::pair<std::size_t, double>> between(const ULog::Topic& topic, double t, double most_apart) {
+std::optional<std::pair<std::size_t, double>> between(const TopicLog::Topic& topic, double t, double most_apart) {
   const auto after = std::ranges::upper_bound(topic.t_s, t);
   if (after == topic.t_s.begin() || after == topic.t_s.end()) return std::nullopt;
   const auto k = static_cast<std::size_t>(after - topic.t_s.begin()) - 1;
@@ -119,31 +99,49 @@ std::optional<std::pair<std::size_t, double>> between(const ULog::Topic& topic, 
 }
 
 /// Whether the estimator set its position anew between message k and the next one.
-bool reset_after(const ULog::Topic& position, std::size_t k) {
+bool reset_after(const TopicLog::Topic& position, std::size_t k) {
   return std::ranges::any_of(std::array{"xy_reset_counter", "z_reset_counter"}, [&](const char* counter) {
     const auto found = position.columns.find(counter);
     return found != position.columns.end() && found->second[k] != found->second[k + 1];
   });
 }
 
-Eigen::Quaterniond attitude_at(const ULog::Topic& attitude, std::size_t k, double share) {
-  const auto q = [&](std::size_t row) {
-    const auto part = [&](int i) { return attitude.columns.at("q[" + std::to_string(i) + "]")[row]; };
-    return Eigen::Quaterniond(part(0), part(1), part(2), part(3)).normalized();
-  };
-  return q(k).slerp(share, q(k + 1));
+Eigen::Quaterniond attitude_at(const TopicLog::Topic& attitude, std::size_t row) {
+  const auto part = [&](int i) { return attitude.columns.at("q[" + std::to_string(i) + "]")[row]; };
+  return Eigen::Quaterniond(part(0), part(1), part(2), part(3)).normalized();
+}
+/// A share of the way from message k to the next.
+Eigen::Quaterniond attitude_at(const TopicLog::Topic& attitude, std::size_t k, double share) {
+  return attitude_at(attitude, k).slerp(share, attitude_at(attitude, k + 1));
+}
+
+/// Body FRD → NED into body FLU → ENU: between two messages turned from one to the other, else the latest before.
+void join_attitude(const TopicLog& topics, const TopicLog::Topic& position, FlightLog& log) {
+  const auto* attitude = topics.find("vehicle_attitude");
+  if (!attitude) return;
+  for (int i = 0; i < 4; ++i)
+    if (!attitude->columns.contains("q[" + std::to_string(i) + "]")) return;
+  for (const double t : position.t_s) {
+    const auto at = between(*attitude, t, kMostApart);
+    const auto before = std::ranges::upper_bound(attitude->t_s, t) - attitude->t_s.begin();
+    const Eigen::Quaterniond q = flu_of_frd(
+        enu_of_ned(at ? attitude_at(*attitude, at->first, at->second)
+                      : attitude_at(*attitude, static_cast<std::size_t>(std::max<std::ptrdiff_t>(before - 1, 0)))));
+    log.columns["qw"].push_back(q.w()), log.columns["qx"].push_back(q.x());
+    log.columns["qy"].push_back(q.y()), log.columns["qz"].push_back(q.z());
+  }
 }
 
 /// Local positions (NED) as often as the accelerometer measures, at most kMostRate: PX4 logs positions at 5 to 10 Hz.
 /// Between two messages they follow the cubic that has both positions and velocities; the acceleration is the specific
 /// force's mean, turned by the attitude, without gravity. Nothing where the accelerometer or the attitude is missing.
-std::optional<ULog::Topic> densified(const ULog& ulog, const ULog::Topic& position) {
-  const auto [force, field] = accelerometer(ulog);
-  const auto* attitude = ulog.find("vehicle_attitude");
+std::optional<TopicLog::Topic> densified(const TopicLog& topics, const TopicLog::Topic& position) {
+  const auto [force, field] = accelerometer(topics);
+  const auto* attitude = topics.find("vehicle_attitude");
   if (!force || !attitude || !attitude->columns.contains("q[3]") || !position.columns.contains("vz"))
     return std::nullopt;
   const auto each = static_cast<std::size_t>(std::max(1.0, std::round(rate(*force) / kMostRate)));
-  ULog::Topic dense{position.name, 0, {}, {}};
+  TopicLog::Topic dense{position.name, 0, {}, {}};
   for (std::size_t first = 0; first + each <= force->t_s.size(); first += each) {
     double t = 0;
     Eigen::Vector3d f = Eigen::Vector3d::Zero();
@@ -170,7 +168,7 @@ std::optional<ULog::Topic> densified(const ULog& ulog, const ULog::Topic& positi
   return dense;
 }
 
-FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
+FlightLog flight_of(const TopicLog& topics, const TopicLog::Topic& position) {
   FlightLog log;
   for (const double t : position.t_s) log.t_s.push_back(t - position.t_s.front());
   Rows rows(position, log);
@@ -182,45 +180,31 @@ FlightLog flight_of(const ULog& ulog, const ULog::Topic& position) {
   rows.join(&position, "az", "az_mps2", -1);
   // A trajectory_setpoint that another mode left empty says nothing; what the controller followed stands in the other.
   for (const char* topic : {"trajectory_setpoint", "vehicle_local_position_setpoint"}) {
-    const auto* setpoint = ulog.find(topic);
+    const auto* setpoint = topics.find(topic);
     for (const auto& [x, y, z] : {std::tuple{"position[0]", "position[1]", "position[2]"}, std::tuple{"x", "y", "z"}})
       rows.join(setpoint, y, "cmd_x_m", 1), rows.join(setpoint, x, "cmd_y_m", 1), rows.join(setpoint, z, "cmd_z_m", -1);
     keep_whole(log, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
   }
-  const auto* battery = ulog.find("battery_status");
+  const auto* battery = topics.find("battery_status");
   rows.join(battery, "voltage_v", "battery_v", 1);
   rows.join(battery, "temperature", "temperature_c", 1);
-  join_motors(ulog, rows, log);
-  rows.join(ulog.find("vehicle_thrust_setpoint"), "xyz[2]", "thrust", -1);
-  rows.join(ulog.find("vehicle_attitude_setpoint"), "thrust_body[2]", "thrust", -1);  // before PX4 1.14
-  join_attitude(ulog, position, log);
+  join_motors(topics, rows, log);
+  rows.join(topics.find("vehicle_thrust_setpoint"), "xyz[2]", "thrust", -1);
+  rows.join(topics.find("vehicle_attitude_setpoint"), "thrust_body[2]", "thrust", -1);  // before PX4 1.14
+  join_attitude(topics, position, log);
   return log;
 }
 
 }  // namespace
 
-tl::expected<FlightLog, std::string> flight_of(const ULog& ulog) {
-  const auto* position = ulog.find("vehicle_local_position");
+tl::expected<FlightLog, std::string> flight_of(const TopicLog& topics) {
+  const auto* position = topics.find("vehicle_local_position");
   if (!position) return tl::make_unexpected("no topic vehicle_local_position; log it, a flight needs positions");
-  const auto dense = rate(*position) < kLeastRate ? densified(ulog, *position) : std::nullopt;
-  FlightLog log = flight_of(ulog, dense && dense->t_s.size() > position->t_s.size() ? *dense : *position);
+  const auto dense = rate(*position) < kLeastRate ? densified(topics, *position) : std::nullopt;
+  FlightLog log = flight_of(topics, dense && dense->t_s.size() > position->t_s.size() ? *dense : *position);
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!log.has(name)) return tl::make_unexpected("vehicle_local_position has no finite x, y, z");
   return log;
-}
-
-tl::expected<FlightLog, LogError> read_ulog(const std::string& path) {
-  const auto content = read_log_file(path, files::kLargestTable, "a .ulg file");
-  if (!content) return tl::make_unexpected(content.error());
-  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
-  const auto bad = [&](const std::string& what) {
-    return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + what});
-  };
-  const auto ulog = decode_ulog(bytes);
-  if (!ulog) return bad(ulog.error());
-  auto log = flight_of(*ulog);
-  if (!log) return bad(log.error());
-  return std::move(*log);
 }
 
 }  // namespace backwash::log
