@@ -16,7 +16,7 @@ class Resampler {
  public:
   Resampler(const log::FlightLog& log, Stretch rows, double rate) : log_(log) {
     const auto& t = log.t_s;
-    const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + 1e-6) + 1;
+    const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + kWindowRules.row_error) + 1;
     std::size_t row = rows.begin;
     for (std::size_t k = 0; k < count; ++k) {
       const double time = t[rows.begin] + static_cast<double>(k) / rate;
@@ -123,8 +123,9 @@ Even even_stretch(const log::FlightLog& log, Stretch raw, double rate, Signal si
       e.segment.push_back(static_cast<int>(std::lround(log.column("segment")[rows.nearest(k)])));
   } else {
     const bool commanded = has_xyz(log, "cmd_", "_m");
-    e.segment = found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate, commanded ? 0.01 : options.still_mps,
-                               options.still_s, next_segment);
+    e.segment =
+        found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate,
+                       commanded ? kWindowRules.still_command.value : options.still_mps, options.still_s, next_segment);
   }
   e.w = signal == Signal::commanded ? beyond_command(e, rows, log, *vehicle) : e.a;
   return e;

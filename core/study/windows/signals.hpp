@@ -37,10 +37,7 @@ struct Line {
   double amplitude2 = std::numeric_limits<double>::quiet_NaN(), floor2 = std::numeric_limits<double>::quiet_NaN();
   double folded = 0;  ///< where the rate lies after sampling, of the sampling rate, 0 … 1/2
 };
-/// Below, Hz, a block holds no whole turn of a folded line and it is as slow as a gust; and so near to half the rate
-/// its neighbours are missing.
-inline constexpr double kLeastFolded = 0.75, kFromHalfRate = 1;
-/// NaN where sampling folds the rotor's rate below kLeastFolded or within kFromHalfRate of half the rate. `phase`: rad
+/// NaN where sampling folds the rotor's rate below least_folded or within from_half_rate of half the rate. `phase`: rad
 /// at each sample, `t`: s.
 Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
 
