@@ -14,6 +14,7 @@
 #include "core/study/findings/consequence.hpp"
 #include "core/study/findings/extend.hpp"
 #include "tests/study_worlds/observe.hpp"
+#include "tests/support/terms_of.hpp"
 
 namespace {
 

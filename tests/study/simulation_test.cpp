@@ -11,6 +11,7 @@
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
 #include "tests/study_worlds/observe.hpp"
+#include "tests/support/terms_of.hpp"
 
 namespace {
 

@@ -14,6 +14,7 @@
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
 #include "tests/study_worlds/observe.hpp"
+#include "tests/support/terms_of.hpp"
 
 namespace study_worlds {
 
