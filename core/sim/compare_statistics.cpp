@@ -176,7 +176,7 @@ std::vector<Demand> demands(const Table& table, const std::vector<CompareMethod>
       {text("no sample outside its set: %zu of %zu were", first.outside, first.samples), first.outside == 0}};
   for (std::size_t m = 0; m < methods.size(); ++m) {
     const MethodRow& row = table.rows[m];
-    if (methods[m].margin < 0) continue;
+    if (!methods[m].margin) continue;
     if (row.contacts > first.contacts) {
       list.push_back({text("%s has more contacts: %zu flights", row.method.c_str(), row.contacts), true});
       continue;

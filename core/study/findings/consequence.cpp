@@ -162,8 +162,8 @@ Consequence consequence(const StudyResult& result, const Observations& seen, con
     c.before.safe = c.after.safe = 0;
     return c;
   }
-  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, -1, parallel);
-  const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, -1, parallel);
+  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, parallel);
+  const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, std::nullopt, parallel);
   const auto sets = sets_at(*world, places);
   describe(c.before, sets);
   describe(c.after, sets_at(*extended_world, places));
