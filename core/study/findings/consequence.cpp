@@ -129,7 +129,7 @@ void try_plan(Outcome& outcome, const plan::World& world, const Vec3& start_W, c
   const auto& limits = world.reach.vehicle.limits;
   const plan::PlanOptions options{.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = 3};
   const auto plan = plan::plan(world, {{start_W, Vec3::Zero()}, hover}, goal_W, options);
-  outcome.plan = plan::to_string(plan.status);
+  outcome.plan = plan.status;
   if (plan.status != plan::PlanStatus::ok) return;
   outcome.length_m = plan.metrics.length_m, outcome.time_s = plan.metrics.time_s;
   outcome.clearance_m = plan.metrics.min_clearance_m;

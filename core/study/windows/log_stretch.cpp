@@ -92,15 +92,15 @@ std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log
 }
 
 /// Hover positions found by the speed, averaged over `still_s`.
-std::vector<int> found_segments(const std::vector<Vec3>& path, double rate, double still_mps, double still_s,
-                                int& next) {
+std::vector<std::optional<int>> found_segments(const std::vector<Vec3>& path, double rate, double still_mps,
+                                               double still_s, int& next) {
   const auto half = static_cast<std::size_t>(std::max(1.0, std::round(still_s / 2 * rate)));
-  std::vector<int> segment(path.size(), -1);
+  std::vector<std::optional<int>> segment(path.size());
   for (std::size_t k = 0; k < path.size(); ++k) {
     const std::size_t low = k > half ? k - half : 0, high = std::min(k + half, path.size() - 1);
     const double seconds = static_cast<double>(high - low) / rate;
     const bool still = seconds > 0 && (path[high] - path[low]).norm() < still_mps * seconds;
-    if (still) segment[k] = k > 0 && segment[k - 1] >= 0 ? segment[k - 1] : next++;
+    if (still) segment[k] = k > 0 && segment[k - 1] ? *segment[k - 1] : next++;
   }
   return segment;
 }
@@ -119,8 +119,7 @@ Even even_stretch(const log::FlightLog& log, Stretch raw, double rate, Signal si
     }
   }
   if (log.has("segment")) {
-    for (std::size_t k = 0; k < e.size(); ++k)
-      e.segment.push_back(static_cast<int>(std::lround(log.column("segment")[rows.nearest(k)])));
+    for (std::size_t k = 0; k < e.size(); ++k) e.segment.push_back(segment_of(log.column("segment")[rows.nearest(k)]));
   } else {
     const bool commanded = has_xyz(log, "cmd_", "_m");
     e.segment =

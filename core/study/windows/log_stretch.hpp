@@ -17,7 +17,7 @@ struct Even {
   double t0, rate;
   std::vector<Vec3> p, v, a, w;  ///< w: the disturbance
   std::vector<Eigen::Quaterniond> q;
-  std::vector<int> segment;  ///< −1: transit
+  std::vector<std::optional<int>> segment;  ///< hover position; none in transit
   std::size_t size() const { return p.size(); }
 };
 

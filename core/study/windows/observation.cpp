@@ -225,7 +225,8 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
          rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end, row.lines))
       put(channel, value, weight);
     const double dt = row.duration / static_cast<double>(w.size() - 1);
-    for (Line& line : row.lines) line.floor2 = std::max(0.0, line.floor2 - row.sigma.z() * gusts_at(line.folded, dt));
+    for (auto& line : row.lines)
+      if (line) line->floor2 = std::max(0.0, line->floor2 - row.sigma.z() * gusts_at(line->folded, dt));
   }
   const double period = s.t.back() / static_cast<double>(s.size() - 1);
   seen_.row_period = std::max(seen_.row_period, period);

@@ -69,11 +69,11 @@ inline constexpr auto kPoints = static_cast<std::size_t>(kWindowRules.points);
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {
   std::size_t flight;
-  int segment;      ///< −1 in transit or unknown
-  double t;         ///< s since the flight's first row, middle of the window
-  double duration;  ///< s
-  Vec3 p_W, v_W;    ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
-  double speed;     ///< m/s, mean of the norm
+  std::optional<int> segment;  ///< none in transit or unknown
+  double t;                    ///< s since the flight's first row, middle of the window
+  double duration;             ///< s
+  Vec3 p_W, v_W;  ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
+  double speed;   ///< m/s, mean of the norm
   std::array<double, kPoints> speeds{}, shares{};  ///< m/s, along the window; of the modelled variance, sum 1
   Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
   double yaw;         ///< rad
@@ -91,7 +91,8 @@ struct WindowRow {
   std::array<double, 2> delay_gain{}, slope_gain{};
   std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                ///< (m/s²)²
-  std::array<Line, 4> lines{};           ///< of the rotors along z, the gusts' share taken out of floor2, (m/s²)²
+  std::array<std::optional<Line>, 4>
+      lines{};  ///< of the rotors along z, none that cannot be told, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
 };

@@ -36,7 +36,7 @@ RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
 
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::array<Line, 4>& lines) {
+                                     std::size_t end, std::array<std::optional<Line>, 4>& lines) {
   std::vector<RotorValue> values;
   std::array<double, 4> share{}, ratio{};
   bool motors = true, rpms = true;
@@ -65,7 +65,7 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
       ratio[rotor] = 2 * std::log(std::max(middle, kWindowRules.least_rpm.value));
       const std::span<const double> phase(phases[rotor].data() + begin, end - begin);
       lines[rotor] = rotor_line(residual, t, phase);
-      values.push_back({kLine1 + rotor, lines[rotor].excess, 1});
+      if (lines[rotor]) values.push_back({kLine1 + rotor, lines[rotor]->excess, 1});
     }
   }
   const auto put_contrast = [&](std::size_t channel, const std::array<double, 4>& x) {

@@ -123,6 +123,11 @@ void read_attitude(Series& s, const log::FlightLog& log, const Rows& rows) {
 
 }  // namespace
 
+std::optional<int> segment_of(double logged) {
+  const auto number = static_cast<int>(std::lround(std::clamp(logged, -1.0, kWindowRules.segments.value)));
+  return number >= 0 ? std::optional(number) : std::nullopt;
+}
+
 Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
   Series s;
   const Rows rows = rising_rows(log.t_s);
@@ -136,10 +141,9 @@ Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
     for (const auto i : rows)
       s.thrust_acc.push_back(vehicle.propulsion.max_thrust / vehicle.body.mass * thrust_share(vehicle, u[i]));
   }
-  s.segment.assign(s.size(), -1);
+  s.segment.resize(s.size());
   if (log.has("segment"))
-    for (std::size_t k = 0; k < rows.size(); ++k)
-      s.segment[k] = static_cast<int>(std::clamp(log.column("segment")[rows[k]], -1.0, kWindowRules.segments.value));
+    for (std::size_t k = 0; k < rows.size(); ++k) s.segment[k] = segment_of(log.column("segment")[rows[k]]);
   s.simulated_by_thrust = !s.thrust_acc.empty() && !s.R_WB.empty();
   const bool commanded = has3(log, "cmd_x_m", "cmd_y_m", "cmd_z_m");
   if (s.simulated_by_thrust) {

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <numbers>
 
 #include "core/study/windows/distributions.hpp"
@@ -101,7 +100,7 @@ std::pair<double, double> powers(const std::vector<double>& x, std::span<const d
 
 }  // namespace
 
-Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
+std::optional<Line> rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
   const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
   const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
   const auto blocks = static_cast<std::size_t>(std::max(1L, std::lround(seconds / kWindowRules.line_block)));
@@ -113,7 +112,7 @@ Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<
     // A window that cannot show the rotor's own rate is none, whatever twice the rate shows.
     if (folded < kWindowRules.least_folded || folded > rate / 2 - kWindowRules.from_half_rate) {
       if (harmonic > 1) break;
-      return found;
+      return std::nullopt;
     }
     const auto [at, around] = powers(flat.x, t, phase, harmonic, blocks);
     count += static_cast<double>(blocks), line += at, beside += around;
