@@ -9,6 +9,7 @@
 
 #include "core/plan/planner.hpp"
 #include "core/study/findings/extend.hpp"
+#include "core/study/inference/coverage.hpp"
 
 namespace backwash::study {
 namespace {
@@ -55,12 +56,6 @@ Added held_out(const StudyResult& result, const Observations& seen) {
           added.mean[part.channel][i] += cause.applied.beside[k] * part.x[i];
   }
   return added;
-}
-
-/// Share of a Gaussian's samples within ± limit.
-double share_within(double mean, double variance, double limit) {
-  const double s = std::sqrt(2 * std::max(variance, 1e-12));
-  return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
 }
 
 /// Share of the samples within push ± w̄, w̄ = mean + κ√Σ; `added`: what a model says beside Σ and mean, or null.
