@@ -5,10 +5,6 @@
 #include <cmath>
 
 namespace backwash::study {
-bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit) {
-  return log.has(prefix + "x" + unit) && log.has(prefix + "y" + unit) && log.has(prefix + "z" + unit);
-}
-
 namespace {
 
 /// The rows of a log at even times.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/log/log_columns.hpp"
 #include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
@@ -11,15 +12,12 @@ namespace {
 
 using Rows = std::vector<std::size_t>;
 
-bool has3(const log::FlightLog& log, const char* x, const char* y, const char* z) {
-  return log.has(x) && log.has(y) && log.has(z);
-}
-
-std::vector<Vec3> vectors(const log::FlightLog& log, const Rows& rows, const char* x, const char* y, const char* z) {
-  const auto &cx = log.column(x), &cy = log.column(y), &cz = log.column(z);
+std::vector<Vec3> vectors(const log::FlightLog& log, const Rows& rows, const char* prefix, const char* unit) {
   std::vector<Vec3> out;
   out.reserve(rows.size());
-  for (const auto i : rows) out.emplace_back(cx[i], cy[i], cz[i]);
+  const std::string name(prefix);
+  const auto &x = log.column(name + "x" + unit), &y = log.column(name + "y" + unit), &z = log.column(name + "z" + unit);
+  for (const auto i : rows) out.emplace_back(x[i], y[i], z[i]);
   return out;
 }
 
@@ -39,15 +37,10 @@ struct Commands {
 };
 
 Commands commands_of(const log::FlightLog& log, const Rows& rows) {
-  Commands c;
-  c.p = vectors(log, rows, "cmd_x_m", "cmd_y_m", "cmd_z_m");
-  c.v = has3(log, "cmd_vx_mps", "cmd_vy_mps", "cmd_vz_mps")
-            ? vectors(log, rows, "cmd_vx_mps", "cmd_vy_mps", "cmd_vz_mps")
-            : std::vector<Vec3>(rows.size(), Vec3::Zero());
-  c.a = has3(log, "cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2")
-            ? vectors(log, rows, "cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2")
-            : std::vector<Vec3>(rows.size(), Vec3::Zero());
-  return c;
+  const auto or_rest = [&](const char* prefix, const char* unit) {
+    return has_xyz(log, prefix, unit) ? vectors(log, rows, prefix, unit) : std::vector<Vec3>(rows.size(), Vec3::Zero());
+  };
+  return {vectors(log, rows, "cmd_", "_m"), or_rest("cmd_v", "_mps"), or_rest("cmd_a", "_mps2")};
 }
 
 struct Loop {
@@ -100,17 +93,15 @@ Rows rising_rows(const std::vector<double>& t) {
 }
 
 void read_motion(Series& s, const log::FlightLog& log, const Rows& rows) {
-  s.p = vectors(log, rows, "x_m", "y_m", "z_m");
-  s.has_velocity = has3(log, "vx_mps", "vy_mps", "vz_mps");
-  s.has_acceleration = has3(log, "ax_mps2", "ay_mps2", "az_mps2");
+  s.p = vectors(log, rows, "", "_m");
+  s.has_velocity = has_xyz(log, "v", "_mps");
+  s.has_acceleration = has_xyz(log, "a", "_mps2");
   const double rate = s.size() > 1 ? static_cast<double>(s.size() - 1) / (s.t.back() - s.t.front()) : 1;
   const auto reach = [&](double seconds) {
     return static_cast<std::size_t>(std::lround(std::clamp(seconds * rate / 2, 1.0, kWindowRules.slope_rows.value)));
   };
-  s.v = s.has_velocity ? vectors(log, rows, "vx_mps", "vy_mps", "vz_mps")
-                       : derivative(s.t, s.p, reach(kWindowRules.slope_time));
-  s.a = s.has_acceleration ? vectors(log, rows, "ax_mps2", "ay_mps2", "az_mps2")
-                           : derivative(s.t, s.v, reach(kWindowRules.slope_time));
+  s.v = s.has_velocity ? vectors(log, rows, "v", "_mps") : derivative(s.t, s.p, reach(kWindowRules.slope_time));
+  s.a = s.has_acceleration ? vectors(log, rows, "a", "_mps2") : derivative(s.t, s.v, reach(kWindowRules.slope_time));
 }
 
 void read_attitude(Series& s, const log::FlightLog& log, const Rows& rows) {
@@ -145,7 +136,7 @@ Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
   if (log.has("segment"))
     for (std::size_t k = 0; k < rows.size(); ++k) s.segment[k] = segment_of(log.column("segment")[rows[k]]);
   s.simulated_by_thrust = !s.thrust_acc.empty() && !s.R_WB.empty();
-  const bool commanded = has3(log, "cmd_x_m", "cmd_y_m", "cmd_z_m");
+  const bool commanded = has_xyz(log, "cmd_", "_m");
   if (s.simulated_by_thrust) {
     for (std::size_t i = 0; i < s.size(); ++i)
       s.a_sim.push_back(s.R_WB[i].col(2) * s.thrust_acc[i] - kGravity * Vec3::UnitZ());
