@@ -108,8 +108,10 @@ Json to_json(const study::Consequence& c) {
 }
 
 Json to_json(const study::RotorVerdict& v) {
+  Json set = Json::array();
+  for (const auto state : v.set) set.push_back(study::to_string(state));
   return {{"verdict", study::to_string(v.kind)},
-          {"set", v.set},
+          {"set", std::move(set)},
           {"rotor", v.rotor},
           {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}},
           {"minimum_detectable", {{"d", v.minimum}}},
