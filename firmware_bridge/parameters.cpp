@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
+#include "core/types/formatted.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::firmware_bridge {
@@ -189,12 +189,6 @@ bool good(const Rule& rule, double value, double velocity, const Against& agains
   return false;
 }
 
-std::string text(const char* format, auto... values) {
-  char line[192];
-  std::snprintf(line, sizeof line, format, values...);
-  return line;
-}
-
 std::string advice(const Rule& rule, const Against& against) {
   const std::string name(rule.name);
   switch (rule.kind) {
@@ -204,18 +198,18 @@ std::string advice(const Rule& rule, const Against& against) {
       return rule.advice;
     case Kind::v_max:
     case Kind::a_max:
-      return text("set %s to %.3g or more: the vehicle file's %s is planned with", name.c_str(), wanted(rule, against),
-                  rule.kind == Kind::v_max ? "v_max" : "a_max");
+      return formatted("set %s to %.3g or more: the vehicle file's %s is planned with", name.c_str(),
+                       wanted(rule, against), rule.kind == Kind::v_max ? "v_max" : "a_max");
     case Kind::lean:
     case Kind::lean_or_zero:
-      return text("set %s to %.0f or more%s: the vehicle file's a_max along both axes leans so far", name.c_str(),
-                  std::ceil(wanted(rule, against)), rule.kind == Kind::lean ? "" : ", or to 0");
+      return formatted("set %s to %.0f or more%s: the vehicle file's a_max along both axes leans so far", name.c_str(),
+                       std::ceil(wanted(rule, against)), rule.kind == Kind::lean ? "" : ", or to 0");
     case Kind::delay:
-      return text("set %s to %.0f ms, and the VIO's own delay: so long are set-point and ODOMETRY on the line",
-                  name.c_str(), wanted(rule, against));
+      return formatted("set %s to %.0f ms, and the VIO's own delay: so long are set-point and ODOMETRY on the line",
+                       name.c_str(), wanted(rule, against));
     default:
-      return text("set %s to %.3g, or the vehicle file to the gains that fly: its sets are computed for them",
-                  name.c_str(), wanted(rule, against));
+      return formatted("set %s to %.3g, or the vehicle file to the gains that fly: its sets are computed for them",
+                       name.c_str(), wanted(rule, against));
   }
 }
 
@@ -254,7 +248,7 @@ std::string forbidding_parameter(Autopilot autopilot, const ParameterValues& val
     if (finding.good || !finding.required || !(finding.value || or_unknown)) continue;
     const std::string name(finding.name);
     if (!finding.value) return "no value of " + name + " from the autopilot yet";
-    return text("%s is %g: %s", name.c_str(), *finding.value, finding.advice.c_str());
+    return formatted("%s is %g: %s", name.c_str(), *finding.value, finding.advice.c_str());
   }
   return "";
 }

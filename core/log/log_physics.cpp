@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "core/log/import_columns.hpp"
 #include "core/log/local_cubic.hpp"
 #include "core/log/median.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::log {
 namespace {
@@ -92,12 +92,6 @@ double rms(const Rows& rows, int axis) {
   return std::sqrt(sum / static_cast<double>(rows.size()));
 }
 
-std::string text(const char* format, double value) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, format, value);
-  return buffer;
-}
-
 void pair_up(const Pairing& p, const Rows& said, const Rows& shown, std::vector<std::string>& wrong) {
   for (int axis = 0; axis < p.axes; ++axis) {
     if (rms(shown, axis) < p.least && rms(said, axis) < p.least) continue;
@@ -106,11 +100,11 @@ void pair_up(const Pairing& p, const Rows& said, const Rows& shown, std::vector<
     const double r = std::abs(match.correlation);
     if (r >= kFollows) {
       if (match.axis == axis && match.slope >= p.right[0] && match.slope <= p.right[1]) continue;
-      wrong.push_back(std::string(p.said[i]) + " is " + text("%.3g", match.slope) + " times " + p.of_what + " of " +
-                      p.wanted[j] + ": a wrong unit, sign, axis or frame");
+      wrong.push_back(std::string(p.said[i]) + " is " + formatted("%.3g", match.slope) + " times " + p.of_what +
+                      " of " + p.wanted[j] + ": a wrong unit, sign, axis or frame");
     } else if (r < kStranger && rms(shown, axis) > 2 * p.least && rms(said, axis) > 2 * p.least) {
       wrong.push_back(std::string(p.said[i]) + " has nothing to do with " + p.of_what + " of " + p.wanted[i] +
-                      " (correlation " + text("%.2f", match.correlation) + "): are the " + p.what +
+                      " (correlation " + formatted("%.2f", match.correlation) + "): are the " + p.what +
                       "'s columns named rightly?");
     }
   }
@@ -152,7 +146,7 @@ std::vector<std::string> contradictions(const FlightLog& log) {
     std::vector<double> up;
     for (const Vec3& a : measured) up.push_back(a.z());
     if (const double left = median(up); std::abs(left) > kGravityLeft)
-      wrong.push_back("az_mps2 has a median of " + text("%.2f", left) +
+      wrong.push_back("az_mps2 has a median of " + formatted("%.2f", left) +
                       " m/s²: gravity is in it, or its unit, sign or frame is wrong");
     const auto a = known(measured, true);
     pair_up({"acceleration", "the second derivative", kA, kP, kLeastAcceleration, kAccelerationRight}, a.said,
@@ -170,7 +164,7 @@ std::vector<std::string> contradictions(const FlightLog& log) {
   if (log.has("thrust")) {
     const auto [least, most] = std::ranges::minmax(log.column("thrust"));
     if (least < kLeastThrust || most > kMostThrust)
-      wrong.push_back("thrust goes from " + text("%.3g", least) + " to " + text("%.3g", most) +
+      wrong.push_back("thrust goes from " + formatted("%.3g", least) + " to " + formatted("%.3g", most) +
                       ": it is a share, 0 … 1; give its unit");
   }
   return wrong;

@@ -11,7 +11,7 @@ namespace backwash::map {
 
 /// Why a map could not be had. `message` is one line that names the file and what would be right.
 struct MapError {
-  enum class Kind { not_found, corrupt, unknown_name, too_large, cannot_write, bad_resolution } kind;
+  enum class Kind { not_found, corrupt, unknown_name, too_large, bad_resolution } kind;
   std::string message;
 };
 
@@ -20,10 +20,6 @@ struct MapError {
 /// the tree does not know is unknown. Errors: not_found, corrupt (wrong magic, truncated, empty tree …), too_large
 /// (file or decoded size above `max_bytes`, checked before anything of that size is allocated).
 tl::expected<OccupancyGrid, MapError> load_octomap(const std::string& path, std::size_t max_bytes = 512u << 20);
-
-/// Writes a binary OctoMap (`.bt`) that load_octomap and liboctomap read back; replaces an existing file. Error:
-/// cannot_write (the file, or a grid whose corner is no multiple of its resolution: see encode_octomap).
-tl::expected<void, MapError> write_octomap(const OccupancyGrid& grid, const std::string& path);
 
 /// One of the built-in worlds: parallel-walls-4m, -2m, -1m, narrow-gap, corridors, apartment, thin-wall,
 /// forest-SEED, at `resolution` (m). Every cell is known; what each looks like, with routes to fly: README.md here.

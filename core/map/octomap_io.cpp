@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <charconv>
-#include <fstream>
 #include <optional>
-#include <stdexcept>
 #include <string_view>
 
 #include "core/files/read_file.hpp"
@@ -87,21 +85,6 @@ tl::expected<OccupancyGrid, MapError> load_octomap(const std::string& path, std:
         "the header says size " + std::to_string(*header.nodes) + ", the tree has " + std::to_string(nodes) + " nodes");
   }
   return grid;
-}
-
-tl::expected<void, MapError> write_octomap(const OccupancyGrid& grid, const std::string& path) try {
-  const auto data = encode_octomap(grid);
-  const auto nodes = octomap_tree::walk(data, true, [](const Index3&, int, Cell) {}).nodes;
-  std::ofstream file(path, std::ios::binary);
-  file.precision(17);
-  file << kBinaryMagic << "\n# (feel free to add / change comments, but leave the first line as it is!)\n"
-       << "id OcTree\nsize " << nodes << "\nres " << grid.resolution() << "\ndata\n";
-  file.write(reinterpret_cast<const char*>(data.data()), static_cast<std::streamsize>(data.size()));
-  file.close();
-  if (!file) return error(MapError::Kind::cannot_write, path, "cannot be written");
-  return {};
-} catch (const std::invalid_argument& unsuitable) {
-  return error(MapError::Kind::cannot_write, path, unsuitable.what());
 }
 
 }  // namespace backwash::map

@@ -67,10 +67,10 @@ reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& mod
 /// why_blocked() without a world. A set from too little of the field is too small: what it says is blocked is. Where
 /// it leaves what was computed, more is, up to kMostReach.
 std::optional<std::string> why_blocked(const map::OccupancyGrid& grid, const Model& model,
-                                       const reach::Reachability& reach, double constant_margin, const Vec3& p_W,
-                                       double least_clearance) {
+                                       const reach::Reachability& reach, std::optional<double> constant_margin,
+                                       const Vec3& p_W, double least_clearance) {
   if (const auto why = why_not_free(grid, p_W)) return why;
-  if (constant_margin >= 0 || !model.extension.empty()) return std::nullopt;
+  if (constant_margin || !model.extension.empty()) return std::nullopt;
   for (double within = kFirstReach; within < kMostReach; within *= 2) {
     const auto set = set_from_around(grid, model, reach, p_W, within);
     const double widest = *std::ranges::max_element(set.half_widths);
@@ -98,7 +98,7 @@ std::optional<std::string> why_blocked_now(const World& world, const PlanStart& 
 }
 
 std::optional<Plan> refused_at_once(const map::OccupancyGrid& grid, const Model& model, const Vehicle& vehicle,
-                                    reach::Method method, double constant_margin, const PlanStart& start,
+                                    reach::Method method, std::optional<double> constant_margin, const PlanStart& start,
                                     const Vec3& goal_W, const PlanOptions& options) {
   const Model vehicle_model = with_vehicle(model, vehicle);
   const reach::Reachability reach = sets_of(vehicle, method);

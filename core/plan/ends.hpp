@@ -19,7 +19,7 @@ std::optional<std::string> why_blocked_now(const World& world, const PlanStart& 
 /// before a world is built: Σ is computed about both ends alone, from the part of the map that it can depend on.
 /// Nothing where the ends are clear, and where only a world can say (a model with an extension).
 std::optional<Plan> refused_at_once(const map::OccupancyGrid& grid, const Model& model, const Vehicle& vehicle,
-                                    reach::Method method, double constant_margin, const PlanStart& start,
+                                    reach::Method method, std::optional<double> constant_margin, const PlanStart& start,
                                     const Vec3& goal_W, const PlanOptions& options);
 
 }  // namespace backwash::plan

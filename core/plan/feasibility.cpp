@@ -37,7 +37,7 @@ Region flood(const World& world, std::size_t seed, int number, std::vector<int>&
   Region region;
   region.first_voxel = seed;
   region.low_W = region.high_W = region.widest_W = grid.center(grid.voxel(seed));
-  region.widest_clearance_m = -1;
+  region.widest_clearance_m = clearance(world, grid.voxel(seed));
   std::vector<std::size_t> open = {seed};
   of_voxel[seed] = number;
   while (!open.empty()) {
@@ -172,7 +172,7 @@ namespace {
 
 /// Whether the set's clearance is positive. A world by sets of method tight knows it; else it is looked for.
 bool safe_by_sets(const World& world, const reach::HoverSet& set, const Index3& v) {
-  if (world.constant_margin < 0 && world.reach.method == reach::Method::tight) return world.hover.safe(v);
+  if (!world.constant_margin && world.reach.method == reach::Method::tight) return world.hover.safe(v);
   return set.bounded &&
          reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v)).safe();
 }

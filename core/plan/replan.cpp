@@ -63,7 +63,7 @@ std::vector<Index3> optimistic_way(const World& world, const Vec3& from_W, const
   const map::OccupancyGrid grid = hopeful(world.grid);
   const map::DistanceField known(grid);  // to occupied voxels and the grid's sides
   const auto& vehicle = world.reach.vehicle;
-  const double taken = vehicle.body.radius + vehicle.estimation.position + std::max(world.constant_margin, 0.0);
+  const double taken = vehicle.body.radius + vehicle.estimation.position + world.constant_margin.value_or(0.0);
   map::OccupancyGrid passable = world.hover.safe_voxels();
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const Index3 v = grid.voxel(n);

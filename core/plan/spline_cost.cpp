@@ -139,17 +139,17 @@ SplineCost::SplineCost(const World& world, const BSpline& spline, const reach::R
   const std::size_t last = std::min(commands + kSettling, tube.size() - 1);
   basis_ = world.response.basis(spline.control_points.size(), spline.knot_span, last / stride_, stride_);
   for (std::size_t k = stride_; k <= last; k += stride_) samples_.push_back(sample(tube, k, margin));
-  if (world.constant_margin >= 0) return;
+  if (world.constant_margin) return;
   G_horizontal_ = coarse(world.reach.horizontal, stride_);
   G_vertical_ = coarse(world.reach.vertical, stride_);
 }
 
 SplineCost::Sample SplineCost::sample(const reach::ReachTube& tube, std::size_t k, double margin) const {
   const auto& vehicle = world_.reach.vehicle;
-  const double constant = world_.constant_margin;
-  const double taken = vehicle.body.radius + vehicle.estimation.position + std::max(constant, 0.0);
+  const std::optional<double> ball = world_.constant_margin;
+  const double taken = vehicle.body.radius + vehicle.estimation.position + ball.value_or(0.0);
   const reach::TubeStep& step = tube[k];
-  const PerDirection h = constant >= 0 ? PerDirection{} : step.half_widths_interval;
+  const PerDirection h = ball ? PerDirection{} : step.half_widths_interval;
   Sample s{step.center.p_W, step.center.v_W, 0, world_.distance.interpolated(step.center.p_W), {}, {}};
   const Vec3 gradient = world_.distance.gradient(s.p), box(h[kX], h[kY], h[kZ]);
   s.k = norm_ ? norm_weights(box) : support_weights(gradient.norm() > 0 ? gradient.normalized() : box.normalized());
@@ -161,7 +161,7 @@ SplineCost::Sample SplineCost::sample(const reach::ReachTube& tube, std::size_t 
     if (distance > 0) s.clearance = distance - taken;
   }
   s.clearance -= margin;
-  if (constant < 0) s.w = interpolated(world_.grid, world_.bounds, s.p).w;
+  if (!ball) s.w = interpolated(world_.grid, world_.bounds, s.p).w;
   return s;
 }
 

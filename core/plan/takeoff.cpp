@@ -52,7 +52,7 @@ double lateral_clearance(const World& world, const reach::ReachTube& tube) {
     const Vec3& to = tube[std::min(n + 1, tube.size() - 1)].center.p_W;
     const Vec3 middle = (from + to) / 2;
     PerDirection h = tube[n].half_widths_interval;
-    if (world.constant_margin >= 0) h.fill(world.constant_margin);
+    if (world.constant_margin) h.fill(*world.constant_margin);
     for (std::size_t d = 0; d < kDirections; ++d) h[d] += std::abs(unit(static_cast<Direction>(d)).dot(to - from)) / 2;
 
     // Layers beside the body and the set: from the first free one under the centre, so that the floor does not count.

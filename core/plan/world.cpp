@@ -40,8 +40,8 @@ map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& boun
   const Vec3 far = grid.origin() + grid.resolution() * grid.size().cast<double>();
   const auto after = bounds.max_over(grid.origin(), far), before = world.bounds.max_over(grid.origin(), far);
   const double w = std::max(std::ranges::max(after.w), std::ranges::max(before.w));
-  const double h =
-      std::max(w * std::max(world.reach.horizontal.h_inf, world.reach.vertical.h_inf), world.constant_margin);
+  const double h = std::max(w * std::max(world.reach.horizontal.h_inf, world.reach.vertical.h_inf),
+                            world.constant_margin.value_or(0.0));
   const auto& vehicle = world.reach.vehicle;
   const auto voxels = [&](double metres) {
     return Index3::Constant(static_cast<int>(std::ceil(metres / grid.resolution())) + 2).eval();
@@ -79,7 +79,8 @@ reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
 void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) { work(0, count); }
 
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
-                                         reach::Method method, double constant_margin, const Parallel& parallel) {
+                                         reach::Method method, std::optional<double> constant_margin,
+                                         const Parallel& parallel) {
   const Model vehicle_model = with_vehicle(model, vehicle);
   reach::Reachability reach = sets_of(vehicle, method);
   map::DistanceField distance(grid);
@@ -103,7 +104,8 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
                                              std::move(response), constant_margin});
 }
 
-World with_clearance_by(World world, reach::Method method, double constant_margin, const Parallel& parallel) {
+World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
+                        const Parallel& parallel) {
   const Vehicle vehicle = world.reach.vehicle;
   world.reach = sets_of(vehicle, method);
   world.response = CentreResponse(vehicle, world.reach.loop);

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "core/field/disturbance_field.hpp"
 #include "core/map/distance_field.hpp"
@@ -40,19 +41,20 @@ struct World {
   reach::HoverMap hover;
   SafeSpace safe;  ///< where hover.safe()
   reach::Reachability reach;
-  CentreResponse response;  ///< of the predicted motion, for the optimiser
-  double constant_margin;   ///< < 0: reachable sets; ≥ 0: constant margin, m
+  CentreResponse response;                ///< of the predicted motion, for the optimiser
+  std::optional<double> constant_margin;  ///< m: a ball in place of the reachable sets
 };
 
 /// Builds all of it. Σ is stored at every free voxel where the vehicle's centre can be (distance ≥ body radius less one
 /// voxel diagonal). The model's r0 is taken from the vehicle.
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
-                                         reach::Method method = reach::Method::tight, double constant_margin = -1,
+                                         reach::Method method = reach::Method::tight,
+                                         std::optional<double> constant_margin = std::nullopt,
                                          const Parallel& parallel = run_serial);
 
 /// The same surroundings kept clear of in another way: Σ and its bounds, the expensive part, are taken over; loop and
 /// hover map are made anew. Equal to building with that method and margin.
-World with_clearance_by(World world, reach::Method method, double constant_margin,
+World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
                         const Parallel& parallel = run_serial);
 
 /// The same as build_world(grid, …), from a world of which only the voxels in `changed` differ: Σ and the hover map are

@@ -166,7 +166,7 @@ class ClearTest {
 }  // namespace
 
 HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                      const BoundField& bounds, const Vec3& p_W, double constant_margin) {
+                      const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin) {
   HoverSet set;
   set.clearance = -body_and_estimation(reach.vehicle);
   if (!grid.free(grid.index(p_W))) return set;
@@ -175,8 +175,8 @@ HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid,
   const Vec3 c_W = p_W + set.shift;
   const Index3 v = grid.index(c_W);
   if (!grid.free(v)) return set;
-  if (constant_margin >= 0) {
-    set.half_widths.fill(constant_margin);
+  if (constant_margin) {
+    set.half_widths.fill(*constant_margin);
     set.bounded = true;
     return set;
   }
@@ -194,13 +194,13 @@ HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid,
 }
 
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                   const BoundField& bounds, const Vec3& p_W, double constant_margin) {
+                   const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin) {
   HoverSet set = hover_extent(reach, grid, distance, bounds, p_W, constant_margin);
   if (!set.bounded) return set;
   const Vec3 c_W = set.shift + p_W;
   const double taken = body_and_estimation(reach.vehicle);
-  set.clearance = constant_margin >= 0 ? std::min(kClearanceCap, distance.exact(grid, c_W) - constant_margin - taken)
-                                       : set_clearance(reach.vehicle, grid, distance, c_W, set.half_widths);
+  set.clearance = constant_margin ? std::min(kClearanceCap, distance.exact(grid, c_W) - *constant_margin - taken)
+                                  : set_clearance(reach.vehicle, grid, distance, c_W, set.half_widths);
   return set;
 }
 
@@ -209,7 +209,7 @@ HoverMap::HoverMap(const map::OccupancyGrid& grid)
 
 void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
                     const map::OccupancySums& sums, const BoundField& bounds, std::span<const std::size_t> voxels,
-                    double constant_margin) {
+                    std::optional<double> constant_margin) {
   const double taken = body_and_estimation(reach.vehicle);
   const bool extended = !bounds.extension().none();
   struct Centre {  // of a set
@@ -230,11 +230,11 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
       if (safe(c)) safe_.set(v, map::Cell::free);
     }
   };
-  if (constant_margin >= 0) {
+  if (constant_margin) {
     // Stored distances are exact at centres, in single precision.
     return fill_where([&](const Centre& c) {
       const double free_distance = extended ? distance.exact(grid, c.p_W) : distance.at(c.v);
-      return free_distance - 1e-6 > constant_margin + taken;
+      return free_distance - 1e-6 > *constant_margin + taken;
     });
   }
   const ClearTest test(reach.vehicle, grid, sums);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include "core/map/distance_field.hpp"
@@ -23,15 +24,14 @@ struct HoverSet {
 /// Smallest fixed point of h = h_∞ × max w̄(c ± h), then its clearance; c = p + d(p)/k_p with d the mean push at p, and
 /// by how much the push differs over the set is in w̄. For method paper h is the support of the
 /// infinite-time ellipsoid instead. Unbounded, with the clearance of touching, when h exceeds the free distance and
-/// where p or c is not in a free voxel. `constant_margin` >= 0 replaces the set by a ball of that radius (the baseline
-/// of
-/// `--margin`). Cost: some look-ups of max_over and one prism_distance, which the distance field limits.
+/// where p or c is not in a free voxel. A `constant_margin`, m, replaces the set by a ball of that radius (the baseline
+/// of `--margin`). Cost: some look-ups of max_over and one prism_distance, which the distance field limits.
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                   const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);
+                   const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin = std::nullopt);
 
 /// The same set without its clearance, which is the dear part: `clearance` is that of touching.
 HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                      const BoundField& bounds, const Vec3& p_W, double constant_margin = -1);
+                      const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin = std::nullopt);
 
 /// Whether hovering at each voxel's centre is safe: hover_set(…).safe(), without the sets' clearances (hover_set gives
 /// them where they are asked for). For method paper the sets come from a table that is rounded up by up to 3e-5.
@@ -43,7 +43,7 @@ class HoverMap {
   /// `distance` and `sums` are those of `grid`.
   void fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
             const map::OccupancySums& sums, const BoundField& bounds, std::span<const std::size_t> voxels,
-            double constant_margin = -1);
+            std::optional<double> constant_margin = std::nullopt);
   /// As if the voxels of a box inside the grid had never been computed.
   void clear(const map::VoxelBox& box) noexcept;
   /// False outside the grid and where nothing was computed.

@@ -106,15 +106,4 @@ PerDirection SupportRecursion::half_widths_until_next(const DisturbanceBound& ne
   return together(horizontal_.half_widths_until_next(horizontal(next)), vertical_.half_widths_until_next({next.w[kZ]}));
 }
 
-std::vector<double> support_gradient(const AxisResponse& response, std::span<const double> weights) {
-  SupportFilter<1> filter(response);
-  std::vector<double> gradient(weights.size());
-  double later = 0;
-  for (std::size_t k = weights.size(); k-- > 0;) {
-    gradient[k] = later + weights[k] * response.G[0];
-    later = filter.push({weights[k]})[0];
-  }
-  return gradient;
-}
-
 }  // namespace backwash::reach

@@ -62,8 +62,4 @@ class SupportRecursion {
   SupportGroup<1> vertical_;
 };
 
-/// Adjoint of the supports: ∂J/∂w̄_k = Σ_{n>k} λ_n G_{n−1−k}, k = 0 … K − 1, for J of the half widths h_1 … h_K with
-/// λ_n = ∂J/∂h_n = weights[n − 1]: the filter itself, run backwards. Signs of λ are free; tails are left out.
-std::vector<double> support_gradient(const AxisResponse& response, std::span<const double> weights);
-
 }  // namespace backwash::reach

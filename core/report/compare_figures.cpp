@@ -22,7 +22,7 @@ std::string ratio_block(const Comparison& c, sim::Measure measure) {
   for (std::size_t m = 1; m < c.methods.size(); ++m) {
     const auto& r = c.table.rows[m].on_common.total[measure];
     block << m << ' ' << r.value << ' ' << r.low << ' ' << r.high << " \""
-          << (c.methods[m].margin < 0 ? c.methods[m].name : short_metres(c.methods[m].margin)) << "\"\n";
+          << (c.methods[m].margin ? short_metres(*c.methods[m].margin) : c.methods[m].name) << "\"\n";
   }
   block << "EOD\n";
   return block.str();
@@ -32,8 +32,9 @@ std::string ratio_block(const Comparison& c, sim::Measure measure) {
 
 std::optional<double> paper_jerk2_ratio(const sim::CompareMethod& method) {
   // Table I of the paper: 5770.6 for the proposed method, 8021.3 and 22848 for margins of 0.3 and 0.4 m.
-  if (std::abs(method.margin - 0.3) < 1e-9) return 5770.6 / 8021.3;
-  if (std::abs(method.margin - 0.4) < 1e-9) return 5770.6 / 22848;
+  if (!method.margin) return std::nullopt;
+  if (std::abs(*method.margin - 0.3) < 1e-9) return 5770.6 / 8021.3;
+  if (std::abs(*method.margin - 0.4) < 1e-9) return 5770.6 / 22848;
   return std::nullopt;
 }
 

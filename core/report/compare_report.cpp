@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/report/compare_report.hpp"
 
-#include <cstdio>
 #include <sstream>
 
 #include "core/report/page.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::report {
 namespace {
-
-std::string text(const char* format, auto... values) {
-  char line[320];
-  std::snprintf(line, sizeof line, format, values...);
-  return line;
-}
 
 std::string table_row(const char* cell, const std::vector<std::string>& cells) {
   std::string row = "<tr>";
@@ -40,16 +34,17 @@ std::string no_path(const sim::MethodRow& row) {
   return std::to_string(row.pairs - row.solved) + (reasons.empty() ? "" : " (" + reasons + ")");
 }
 
-std::string with_interval(const sim::Interval& r) { return text("%.2f (%.2f to %.2f)", r.value, r.low, r.high); }
+std::string with_interval(const sim::Interval& r) { return formatted("%.2f (%.2f to %.2f)", r.value, r.low, r.high); }
 
 std::string table_one(const Comparison& c) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& row : c.table.rows) {
-    rows.push_back({row.method, text("%.1f", row.common[sim::kLength]), text("%.1f", row.common[sim::kTime]),
-                    text("%.1f", row.common[sim::kJerk2]), text("%.2f", row.common[sim::kEnergy] / 1000),
-                    text("%zu", row.contacts), no_path(row), text("%zu of %zu", row.solved_of_eligible, row.eligible),
-                    text("%zu of %zu", row.outside, row.samples), text("%.0f", row.flown_m),
-                    text("%.0f / %.0f", row.planning_ms_median, row.planning_ms_p95)});
+    rows.push_back({row.method, formatted("%.1f", row.common[sim::kLength]), formatted("%.1f", row.common[sim::kTime]),
+                    formatted("%.1f", row.common[sim::kJerk2]), formatted("%.2f", row.common[sim::kEnergy] / 1000),
+                    formatted("%zu", row.contacts), no_path(row),
+                    formatted("%zu of %zu", row.solved_of_eligible, row.eligible),
+                    formatted("%zu of %zu", row.outside, row.samples), formatted("%.0f", row.flown_m),
+                    formatted("%.0f / %.0f", row.planning_ms_median, row.planning_ms_p95)});
   }
   const auto head = {std::string("method"),
                      std::string("length, m"),
@@ -62,11 +57,12 @@ std::string table_one(const Comparison& c) {
                      std::string("samples outside"),
                      std::string("flown, m"),
                      std::string("planning, ms, median / 95 %")};
-  return section("Table I",
-                 text("Length, time, jerk² and energy are totals over the %zu start–goal pairs that all methods solve; "
-                      "everything else counts all %zu pairs.",
-                      c.table.common_pairs, c.table.rows.front().pairs),
-                 table(head, rows));
+  return section(
+      "Table I",
+      formatted("Length, time, jerk² and energy are totals over the %zu start–goal pairs that all methods solve; "
+                "everything else counts all %zu pairs.",
+                c.table.common_pairs, c.table.rows.front().pairs),
+      table(head, rows));
 }
 
 std::string ratios(const Comparison& c) {
@@ -76,10 +72,11 @@ std::string ratios(const Comparison& c) {
     const auto paper = paper_jerk2_ratio(c.methods[m]);
     for (const auto& [name, ratio] : {std::pair{"all solve", &row.on_common}, {"both solve", &row.pairwise}}) {
       if (ratio->pairs == 0) continue;
-      rows.push_back({row.method, text("%zu that %s", ratio->pairs, name), with_interval(ratio->total[sim::kJerk2]),
-                      paper ? text("%.2f", *paper) : "", with_interval(ratio->mean[sim::kJerk2]),
-                      with_interval(ratio->mean[sim::kShape]), with_interval(ratio->total[sim::kLength]),
-                      with_interval(ratio->total[sim::kTime]), with_interval(ratio->total[sim::kEnergy])});
+      rows.push_back({row.method, formatted("%zu that %s", ratio->pairs, name),
+                      with_interval(ratio->total[sim::kJerk2]), paper ? formatted("%.2f", *paper) : "",
+                      with_interval(ratio->mean[sim::kJerk2]), with_interval(ratio->mean[sim::kShape]),
+                      with_interval(ratio->total[sim::kLength]), with_interval(ratio->total[sim::kTime]),
+                      with_interval(ratio->total[sim::kEnergy])});
     }
   }
   return table({"over", "pairs", "jerk², totals", "the paper’s", "jerk², geometric mean",
@@ -95,7 +92,7 @@ std::string by_scene(const Comparison& c) {
     const auto part = sim::tabulate(std::span(&scene, 1), c.methods, c.seed);
     std::vector<std::string> row = {escaped(scene.scene), escaped(scene.vehicle), std::to_string(scene.pairs.size())};
     for (const auto& r : part.rows)
-      row.push_back(std::to_string(r.solved) + (r.contacts > 0 ? text(" (%zu with contact)", r.contacts) : ""));
+      row.push_back(std::to_string(r.solved) + (r.contacts > 0 ? formatted(" (%zu with contact)", r.contacts) : ""));
     rows.push_back(std::move(row));
   }
   return section("Pairs solved, by scene", "A pair that a method does not solve counts as no path.", table(head, rows));
@@ -116,8 +113,8 @@ std::string demanded(const Comparison& c) {
 
 tl::expected<std::string, PlotError> comparison_report(const Comparison& c) {
   std::string body = "<h1>The same routes with other clearances</h1>\n<p class=\"context\">" +
-                     text("%zu start–goal pairs a scene and vehicle, seed %llu; backwash ", c.flights,
-                          static_cast<unsigned long long>(c.seed)) +
+                     formatted("%zu start–goal pairs a scene and vehicle, seed %llu; backwash ", c.flights,
+                               static_cast<unsigned long long>(c.seed)) +
                      escaped(c.version) + "</p>\n" + demanded(c) + table_one(c);
   if (c.table.common_pairs > 0) {
     const auto figure = ratio_figure(c);
@@ -131,13 +128,13 @@ tl::expected<std::string, PlotError> comparison_report(const Comparison& c) {
   for (const auto& gap : c.gaps) {
     const auto figure = gap_figure(gap);
     if (!figure) return tl::make_unexpected(figure.error());
-    body +=
-        section("Through the narrow gap: " + escaped(gap.vehicle),
-                text("Measured position minus the predicted centre, first of %zu flights. Largest error over bound of "
-                     "all of them: x %.2f, y %.2f, z %.2f; %zu of %zu samples outside; %zu flights with contact.",
-                     gap.flights, gap.largest_ratio.x(), gap.largest_ratio.y(), gap.largest_ratio.z(), gap.outside,
-                     gap.samples, gap.contacts),
-                *figure);
+    body += section(
+        "Through the narrow gap: " + escaped(gap.vehicle),
+        formatted("Measured position minus the predicted centre, first of %zu flights. Largest error over bound of "
+                  "all of them: x %.2f, y %.2f, z %.2f; %zu of %zu samples outside; %zu flights with contact.",
+                  gap.flights, gap.largest_ratio.x(), gap.largest_ratio.y(), gap.largest_ratio.z(), gap.outside,
+                  gap.samples, gap.contacts),
+        *figure);
   }
   return html_page("backwash compare", body + by_scene(c));
 }

@@ -72,15 +72,15 @@ double induced_power(const Vehicle& vehicle, double thrust_N) {
 
 bool outside_set(const plan::World& world, const FlightPiece& piece, std::size_t k) {
   const auto& judged = piece.judged[k];
-  if (world.constant_margin < 0) return !judged.judged || !judged.inside;
-  return (piece.samples[k].estimated.p_W - judged.center).norm() > world.constant_margin;
+  if (!world.constant_margin) return !judged.judged || !judged.inside;
+  return (piece.samples[k].estimated.p_W - judged.center).norm() > *world.constant_margin;
 }
 
 }  // namespace
 
 std::vector<CompareMethod> compare_methods() {
   return {{"tight"},
-          {"tight-norm", reach::Method::tight, -1, true},
+          {"tight-norm", reach::Method::tight, std::nullopt, true},
           {"paper", reach::Method::paper},
           {"margin-0.1", reach::Method::tight, 0.1},
           {"margin-0.2", reach::Method::tight, 0.2},
@@ -142,7 +142,7 @@ RouteOutcome measure(const Route& route, const plan::World& world, const Vehicle
     outcome.clearance_m = std::min(outcome.clearance_m, clearance);
     outcome.contacts += clearance < 0 ? 1 : 0;
     outcome.outside += outside_set(world, piece, k) ? 1 : 0;
-    for (int axis = 0; axis < 3 && world.constant_margin < 0; ++axis) {
+    for (int axis = 0; axis < 3 && !world.constant_margin; ++axis) {
       const auto d = static_cast<std::size_t>(axis);
       const double ratio = std::abs(piece.judged[k].error[d]) / piece.judged[k].half_widths[d];
       outcome.largest_ratio[axis] = std::max(outcome.largest_ratio[axis], ratio);

@@ -15,8 +15,8 @@ namespace backwash::sim {
 struct CompareMethod {
   std::string name;
   reach::Method sets = reach::Method::tight;
-  double margin = -1;      ///< m; < 0: the sets
-  bool norm_cost = false;  ///< plan::PlanOptions::norm_cost
+  std::optional<double> margin = {};  ///< m: a ball in place of the sets
+  bool norm_cost = false;             ///< plan::PlanOptions::norm_cost
 };
 /// The proposed method ("tight"), the same with ‖h‖₂ in the cost ("tight-norm"), with the paper's ellipsoids ("paper"),
 /// and margins of 0.1, 0.2, 0.3 and 0.4 m.

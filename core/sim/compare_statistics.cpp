@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdio>
 #include <random>
+
+#include "core/types/formatted.hpp"
 
 namespace backwash::sim {
 namespace {
@@ -90,12 +91,6 @@ void count_flights(MethodRow& row, const std::vector<const RouteOutcome*>& outco
   row.planning_ms_p95 = quantile(planning, 0.95);
 }
 
-std::string text(const char* format, auto... values) {
-  char line[200];
-  std::snprintf(line, sizeof line, format, values...);
-  return line;
-}
-
 }  // namespace
 
 Interval ratio_of_totals(std::span<const double> a, std::span<const double> b, std::uint64_t seed) {
@@ -172,24 +167,24 @@ Table tabulate(std::span<const SceneComparison> scenes, const std::vector<Compar
 std::vector<Demand> demands(const Table& table, const std::vector<CompareMethod>& methods) {
   const MethodRow& first = table.rows.front();
   std::vector<Demand> list = {
-      {text("no flight touches anything: %zu of %zu did", first.contacts, first.solved), first.contacts == 0},
-      {text("no sample outside its set: %zu of %zu were", first.outside, first.samples), first.outside == 0}};
+      {formatted("no flight touches anything: %zu of %zu did", first.contacts, first.solved), first.contacts == 0},
+      {formatted("no sample outside its set: %zu of %zu were", first.outside, first.samples), first.outside == 0}};
   for (std::size_t m = 0; m < methods.size(); ++m) {
     const MethodRow& row = table.rows[m];
-    if (methods[m].margin < 0) continue;
+    if (!methods[m].margin) continue;
     if (row.contacts > first.contacts) {
-      list.push_back({text("%s has more contacts: %zu flights", row.method.c_str(), row.contacts), true});
+      list.push_back({formatted("%s has more contacts: %zu flights", row.method.c_str(), row.contacts), true});
       continue;
     }
     const Interval& jerk2 = row.on_common.total[kJerk2];
     list.push_back({row.on_common.pairs == 0
-                        ? text("jerk2 below %s: no pair that all solve", row.method.c_str())
-                        : text("jerk2 below %s on %zu pairs that all solve: ratio %.2f (%.2f to %.2f)",
-                               row.method.c_str(), row.on_common.pairs, jerk2.value, jerk2.low, jerk2.high),
+                        ? formatted("jerk2 below %s: no pair that all solve", row.method.c_str())
+                        : formatted("jerk2 below %s on %zu pairs that all solve: ratio %.2f (%.2f to %.2f)",
+                                    row.method.c_str(), row.on_common.pairs, jerk2.value, jerk2.low, jerk2.high),
                     row.on_common.pairs > 0 && jerk2.high < 1});
     const std::size_t without = first.pairs - first.solved, other = row.pairs - row.solved;
-    list.push_back({text("no path no more often than %s: %zu against %zu of %zu pairs", row.method.c_str(), without,
-                         other, row.pairs),
+    list.push_back({formatted("no path no more often than %s: %zu against %zu of %zu pairs", row.method.c_str(),
+                              without, other, row.pairs),
                     without <= other});
   }
   return list;

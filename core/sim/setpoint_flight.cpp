@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/log/log_columns.hpp"
 #include "core/log/median.hpp"
 #include "core/types/thrust.hpp"
 
@@ -13,14 +14,9 @@ namespace {
 
 using Rows = std::vector<std::size_t>;
 
-bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit) {
-  return log.has(prefix + "x" + unit) && log.has(prefix + "y" + unit) && log.has(prefix + "z" + unit);
-}
-
-Vec3 xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit, std::size_t row) {
-  if (!has_xyz(log, prefix, unit)) return Vec3::Zero();
-  return {log.column(prefix + "x" + unit)[row], log.column(prefix + "y" + unit)[row],
-          log.column(prefix + "z" + unit)[row]};
+/// Zero where the log does not say.
+Vec3 said(const log::FlightLog& log, const std::string& prefix, const std::string& unit, std::size_t row) {
+  return has_xyz(log, prefix, unit) ? xyz(log, prefix, unit, row) : Vec3(Vec3::Zero());
 }
 
 /// The heading at a row, rad; 0 without attitude.
@@ -97,12 +93,12 @@ tl::expected<LoggedFlight, log::LogError> logged_flight(const log::FlightLog& lo
     flight.row.push_back(i);
     flight.t_s.push_back(log.t_s[i] - log.t_s[flight.row.front()]);
     flight.commands.push_back(
-        {xyz(log, "cmd_", "_m", i), xyz(log, "cmd_v", "_mps", i), xyz(log, "cmd_a", "_mps2", i), heading(log, i)});
+        {said(log, "cmd_", "_m", i), said(log, "cmd_v", "_mps", i), said(log, "cmd_a", "_mps2", i), heading(log, i)});
     flight.segment.push_back(log.has("segment") ? static_cast<int>(std::clamp(log.column("segment")[i], -1.0, 1e9))
                                                 : -1);
   }
   if (flight.row.size() < 2) return wrong("fewer than 2 rows with rising stamps");
-  flight.start = {xyz(log, "", "_m", flight.row.front()), xyz(log, "v", "_mps", flight.row.front())};
+  flight.start = {said(log, "", "_m", flight.row.front()), said(log, "v", "_mps", flight.row.front())};
   flight.voltage = slow_course(log, "battery_v", flight);
   flight.temperature = slow_course(log, "temperature_c", flight);
   flight.hover_rpm = hover_rpm(log, vehicle, flight);

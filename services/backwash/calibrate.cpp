@@ -172,7 +172,7 @@ int run(const Options& options) {
   if (options.judge) return judge(campaign, gates, options, std::move(json));
   const auto refused = refusals(campaign.data, gates);
   json["refused"] = to_json(refused);
-  const bool nothing = !refused.empty() && refused.front().what == "all";
+  const bool nothing = !refused.empty() && refused.front().of_everything();
   if (nothing || (!refused.empty() && !options.keep_base)) {
     if (options.json) print(json);
     throw Failure(kBadData, refusal_line(refused) +

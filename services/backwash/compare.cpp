@@ -67,8 +67,8 @@ report::Comparison compare(const Options& options, const std::vector<std::string
     for (std::size_t n = 0; n < options.vehicles.size(); ++n) {
       const auto vehicle = read_vehicle(options.vehicles[n]);
       progress(scene + ", " + vehicle.name + ": building the world");
-      const auto world =
-          plan::build_world(read_map(map), read_model(models[n]), vehicle, reach::Method::tight, -1, run_parallel);
+      const auto world = plan::build_world(read_map(map), read_model(models[n]), vehicle, reach::Method::tight,
+                                           std::nullopt, run_parallel);
       const auto pairs = sim::draw_pairs(world->grid, world->distance, vehicle, options.flights,
                                          seed_for(options.seed, scene, vehicle.name));
       if (!pairs)

@@ -29,9 +29,9 @@ Json to_json(const sim::MethodRow& row, const sim::CompareMethod& method) {
   Json common;
   for (std::size_t i = 0; i < sim::kMeasures; ++i) common[sim::name(static_cast<sim::Measure>(i))] = row.common[i];
   const auto paper = report::paper_jerk2_ratio(method);
-  const bool flew = row.solved > 0, sets = method.margin < 0;
+  const bool flew = row.solved > 0, sets = !method.margin;
   return {{"method", row.method},
-          {"margin_m", sets ? Json() : Json(method.margin)},
+          {"margin_m", sets ? Json() : Json(*method.margin)},
           {"pairs", row.pairs},
           {"solved", row.solved},
           {"no_path", row.pairs - row.solved},

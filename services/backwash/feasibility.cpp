@@ -12,7 +12,8 @@ namespace backwash::services {
 namespace {
 
 struct Options {
-  std::string map, model, vehicle, method = "tight";
+  std::string map, model, vehicle;
+  reach::Method method = reach::Method::tight;
   std::optional<Vec3> start, goal;
   std::optional<double> margin;
   bool json = false;
@@ -26,13 +27,16 @@ struct Sets {
 
 /// The question about one way: its ends' regions and its tightest place.
 struct Way {
-  int start_region, goal_region;
+  std::optional<int> start_region, goal_region;  ///< none where an end is not hover-safe
+  bool connected() const { return start_region && start_region == goal_region; }
   std::optional<plan::Bottleneck> bottleneck;
 };
 
-int region_of(const plan::World& world, const plan::Regions& regions, const Vec3& p) {
+std::optional<int> region_of(const plan::World& world, const plan::Regions& regions, const Vec3& p) {
   const auto v = world.grid.index(p);
-  return world.grid.inside(v) ? regions.of_voxel[world.grid.linear(v)] : -1;
+  if (!world.grid.inside(v)) return std::nullopt;
+  const int region = regions.of_voxel[world.grid.linear(v)];
+  return region >= 0 ? std::optional(region) : std::nullopt;
 }
 
 Json to_json(const plan::Region& r, const plan::World&) {
@@ -53,9 +57,9 @@ void print_json(const plan::World& world, const plan::Regions& regions, const st
   }
   Json json = {{"resolution_m", world.grid.resolution()}, {"hover_safe_voxels", voxels}, {"regions", std::move(list)}};
   if (way) {
-    Json entry = {{"start_region", way->start_region < 0 ? Json() : Json(way->start_region)},
-                  {"goal_region", way->goal_region < 0 ? Json() : Json(way->goal_region)},
-                  {"connected", way->start_region >= 0 && way->start_region == way->goal_region}};
+    Json entry = {{"start_region", way->start_region ? Json(*way->start_region) : Json()},
+                  {"goal_region", way->goal_region ? Json(*way->goal_region) : Json()},
+                  {"connected", way->connected()}};
     entry["bottleneck"] = nullptr;
     if (way->bottleneck) {
       const auto& b = *way->bottleneck;
@@ -108,11 +112,11 @@ void print_text(const plan::World& world, const plan::Regions& regions, const st
           a.margin_m, a.voxels, a.only_ball_safe, a.only_set_safe);
   }
   if (!way) return;
-  const auto name = [](int region) {
-    return region < 0 ? std::string("no region") : "region " + std::to_string(region);
+  const auto name = [](std::optional<int> region) {
+    return region ? "region " + std::to_string(*region) : std::string("no region");
   };
   std::printf("start in %s, goal in %s: %s\n", name(way->start_region).c_str(), name(way->goal_region).c_str(),
-              way->start_region >= 0 && way->start_region == way->goal_region ? "connected" : "not connected");
+              way->connected() ? "connected" : "not connected");
   if (!way->bottleneck) {
     std::printf("no way through free voxels\n");
     return;
@@ -130,8 +134,7 @@ int run(const Options& options) {
   const auto model = read_model(options.model);
   auto grid = read_map(options.map);
   progress("building the world");
-  const auto world = plan::build_world(std::move(grid), model, vehicle, read_method(options.method),
-                                       options.margin.value_or(-1), run_parallel);
+  const auto world = plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_parallel);
   const auto regions = plan::hover_regions(*world);
   std::optional<Way> way;
   if (options.start) {
@@ -139,7 +142,7 @@ int run(const Options& options) {
               plan::widest_way(*world, *options.start, *options.goal)};
   }
   std::optional<Sets> sets;
-  if (options.method == "tight" && !options.margin)
+  if (options.method == reach::Method::tight && !options.margin)
     sets = Sets{plan::cost_of_set(*world), plan::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4})};
   options.json ? print_json(*world, regions, way, sets) : print_text(*world, regions, way, sets);
   return kOk;
@@ -153,8 +156,7 @@ Verb feasibility_verb(CLI::App& app) {
   command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
   command->add_option("--model", options->model, "model file or builtin:NAME")->required();
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  command->add_option("--method", options->method, "tight: exact supports; paper: ellipsoids")
-      ->check(CLI::IsMember({"tight", "paper"}));
+  add_method(*command, options->method);
   command->add_option("--margin", options->margin, "constant margin in place of the sets, m")
       ->check(CLI::NonNegativeNumber);
   add_point(*command, "--start", options->start, "one end of a way, m");

@@ -43,8 +43,10 @@ log::FlightLog read_table(const std::string& path, const std::string& time_colum
   throw Failure(table.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, table.error().message);
 }
 
-reach::Method read_method(const std::string& name) {
-  return name == "paper" ? reach::Method::paper : reach::Method::tight;
+CLI::Option* add_method(CLI::App& command, reach::Method& target) {
+  const std::vector<std::pair<std::string, reach::Method>> methods = {{"tight", reach::Method::tight},
+                                                                      {"paper", reach::Method::paper}};
+  return add_choice(command, "--method", target, methods, "tight: exact supports; paper: ellipsoids");
 }
 
 void refuse_to_overwrite(const std::string& path, bool force) {

@@ -12,6 +12,11 @@
 #include "core/types/simulation_term.hpp"
 #include "core/types/vehicle.hpp"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace backwash::services {
 
 /// Readers of a verb's inputs. Each throws Failure with the documented exit code: 66 for what does not exist, 65 for
@@ -23,8 +28,8 @@ std::vector<SimulationTerm> read_simulation(const std::string& path);
 Vehicle read_vehicle(const std::string& path);
 log::FlightLog read_table(const std::string& path, const std::string& time_column);
 
-/// `tight` or `paper`.
-reach::Method read_method(const std::string& name);
+/// Adds `--method`: tight or paper.
+CLI::Option* add_method(CLI::App& command, reach::Method& target);
 
 /// Throws Failure 73 if the file exists and `force` is not given: asked before work is spent on it.
 void refuse_to_overwrite(const std::string& path, bool force);

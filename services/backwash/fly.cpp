@@ -83,7 +83,8 @@ int run(const Options& options) {
   auto grid = read_map(options.map);
   if (const auto known = known_ends(options); options.ends && known) return print_ends(*known);
   progress("building the world");
-  const auto world = plan::build_world(std::move(grid), model, vehicle, reach::Method::tight, -1, run_parallel);
+  const auto world =
+      plan::build_world(std::move(grid), model, vehicle, reach::Method::tight, std::nullopt, run_parallel);
   sim::FlightOptions flight_options{.start_W = Vec3::Zero(),
                                     .goal_W = Vec3::Zero(),
                                     .seed = options.seed,

@@ -11,7 +11,8 @@ namespace backwash::services {
 namespace {
 
 struct Options {
-  std::string map, model, vehicle, method = "tight";
+  std::string map, model, vehicle;
+  reach::Method method = reach::Method::tight;
   std::optional<Vec3> start, goal;
   std::optional<double> margin, v_max, a_max;
   bool json = false;
@@ -49,24 +50,24 @@ void print_text(const plan::Plan& plan) {
 int run(const Options& options) {
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
-  const auto method = read_method(options.method);
-  read_reachability(vehicle, method, reach::Loop::vehicle,
+  read_reachability(vehicle, options.method, reach::Loop::vehicle,
                     options.vehicle);  // names an unstable loop before the map is read
   auto grid = read_map(options.map);
-  const double margin = options.margin.value_or(-1);
   const plan::PlanOptions limits{.v_max = options.v_max.value_or(vehicle.limits.v_max),
                                  .a_max = options.a_max.value_or(vehicle.limits.a_max)};
   Setpoint hover;
   hover.p_W = *options.start;
   const plan::PlanStart start{State{*options.start, Vec3::Zero()}, hover};
   progress("looking at both ends");
-  auto refused = plan::refused_at_once(grid, model, vehicle, method, margin, start, *options.goal, limits);
+  auto refused =
+      plan::refused_at_once(grid, model, vehicle, options.method, options.margin, start, *options.goal, limits);
   if (!refused) progress("building the world");
   const auto world =
-      refused ? nullptr : plan::build_world(std::move(grid), model, vehicle, method, margin, run_parallel);
+      refused ? nullptr
+              : plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_parallel);
   if (world) progress("planning");
   const auto plan = world ? plan::plan(*world, start, *options.goal, limits) : *std::move(refused);
-  options.json ? print_json(plan, method) : print_text(plan);
+  options.json ? print_json(plan, options.method) : print_text(plan);
   if (plan.status == plan::PlanStatus::ok) return kOk;
   throw Failure(kUnavailable, options.map + ":1: " + plan::to_string(plan.status) + ": " + plan.message);
 }
@@ -87,8 +88,7 @@ Verb plan_verb(CLI::App& app) {
       ->check(CLI::PositiveNumber);
   command->add_option("--amax", options->a_max, "m/s2 per axis; the vehicle's limit by default")
       ->check(CLI::PositiveNumber);
-  command->add_option("--method", options->method, "tight: exact supports; paper: ellipsoids")
-      ->check(CLI::IsMember({"tight", "paper"}));
+  add_method(*command, options->method);
   command->add_flag("--json", options->json, "one JSON object on stdout");
   command->footer(
       "Exit code 0 when a trajectory was found and verified, 69 otherwise.\nExample:\n"

@@ -14,11 +14,21 @@
 namespace backwash::services {
 namespace {
 
+enum class Kind { tight, paper, chance };
+const std::vector<std::pair<std::string, Kind>> kKinds = {
+    {"tight", Kind::tight}, {"paper", Kind::paper}, {"chance", Kind::chance}};
+const std::vector<std::pair<std::string, reach::Loop>> kLoops = {
+    {"vehicle", reach::Loop::vehicle}, {"continuous", reach::Loop::continuous}, {"sampled", reach::Loop::sampled}};
+
 struct Options {
-  std::string vehicle, track, map, model, method = "tight", loop;
+  std::string vehicle, track, map, model;
+  Kind kind = Kind::tight;
+  std::optional<reach::Loop> loop;
   std::optional<double> probability;
   std::optional<Vec3> direction;
   bool json = false;
+  /// Of the sets that are bounded or left; the chance is that of the exact supports.
+  reach::Method method() const { return kind == Kind::paper ? reach::Method::paper : reach::Method::tight; }
 };
 
 const char* const kSigmaColumns[] = {"sigma_xx", "sigma_xy", "sigma_xz", "sigma_yy", "sigma_yz", "sigma_zz"};
@@ -87,23 +97,26 @@ std::vector<Variance> read_variances(const std::string& path, const log::FlightL
   return variances;
 }
 
+const std::string& name_of(Kind kind) {
+  return std::ranges::find(kKinds, kind, &std::pair<std::string, Kind>::second)->first;
+}
+
 reach::Loop read_loop(const Options& options) {
-  if (options.method == "paper") {
-    if (options.loop == "vehicle" || options.loop == "sampled") {
+  if (options.kind == Kind::paper) {
+    if (options.loop && options.loop != reach::Loop::continuous) {
       throw Failure(kUsage, "--method paper knows only --loop continuous; the second-order loop of the paper");
     }
     return reach::Loop::continuous;
   }
-  if (options.method == "chance" && options.loop == "sampled") {
+  if (options.kind == Kind::chance && options.loop == reach::Loop::sampled) {
     throw Failure(kUsage,
                   "--method chance knows --loop vehicle and continuous; sampled feedback has no covariance yet");
   }
-  if (options.loop == "continuous") return reach::Loop::continuous;
-  return options.loop == "sampled" ? reach::Loop::sampled : reach::Loop::vehicle;
+  return options.loop.value_or(reach::Loop::vehicle);
 }
 
 void check_probability(const Options& options) {
-  if (options.method != "chance") {
+  if (options.kind != Kind::chance) {
     if (options.probability)
       throw Failure(kUsage, "--probability belongs to --method chance; the others bound the worst case");
     return;
@@ -121,7 +134,7 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
   check_times(options.track, track);
   const auto commands = read_commands(options.track, track);
   const State start{commands[0].p_W, commands[0].v_W};
-  const bool chance = options.method == "chance";
+  const bool chance = options.kind == Kind::chance;
   if (has_variances(options.track, track)) {
     if (!options.map.empty()) throw Failure(kUsage, "the track has sigma columns; give either those or --map");
     const BoundModel model = options.model.empty() ? BoundModel{} : read_model(options.model).bound;
@@ -139,7 +152,8 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
   if (chance && model.bound.kappa == 0)
     throw Failure(kConfiguration, options.model + ":1: --method chance over a map needs bound.kappa above 0");
   progress("building the world");
-  const auto world = plan::build_world(read_map(options.map), model, reach.vehicle, reach.method, -1, run_parallel);
+  const auto world =
+      plan::build_world(read_map(options.map), model, reach.vehicle, reach.method, std::nullopt, run_parallel);
   if (chance) {
     return chance_tube_over_field(reach, start, commands[0], commands, world->bounds, model.bound,
                                   *options.probability);
@@ -148,7 +162,6 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
 }
 
 void print_table(const reach::ReachTube& tube, const Options& options) {
-  const auto method = read_method(options.method);
   if (options.probability) {
     std::printf("left with at most %g per second of flight, for Gaussian disturbances: no worst case\n",
                 *options.probability);
@@ -160,7 +173,7 @@ void print_table(const reach::ReachTube& tube, const Options& options) {
     const auto& h = step.half_widths;
     std::printf("%8.3f %9.4f %9.4f %9.4f   %8.5f %8.5f %8.5f %8.5f %8.5f %8.5f", step.t, p.x(), p.y(), p.z(), h[kX],
                 h[kY], h[kZ], h[kXyPlus], h[kXyMinus], step.r_max);
-    if (options.direction) std::printf("   support %8.5f", support(step, method, *options.direction));
+    if (options.direction) std::printf("   support %8.5f", support(step, options.method(), *options.direction));
     std::printf("\n");
   }
 }
@@ -171,20 +184,20 @@ int run(Options options) {
     options.direction->normalize();
   }
   check_probability(options);
-  const auto method = read_method(options.method);
-  const auto reach = read_reachability(read_vehicle(options.vehicle), method, read_loop(options), options.vehicle);
+  const auto reach =
+      read_reachability(read_vehicle(options.vehicle), options.method(), read_loop(options), options.vehicle);
   const auto [steps, levels] = tube(options, reach);
   if (!options.json) {
     print_table(steps, options);
     return kOk;
   }
-  Json json = {{"method", options.method}};
+  Json json = {{"method", name_of(options.kind)}};
   if (options.probability) {
     json["probability"] = *options.probability;
     json["levels"] = Json::array();
     for (const PerDirection& level : levels) json["levels"].push_back(to_json(level));
   }
-  json["steps"] = to_json(steps, method, options.direction);
+  json["steps"] = to_json(steps, options.method(), options.direction);
   print(json);
   return kOk;
 }
@@ -197,13 +210,10 @@ Verb reach_verb(CLI::App& app) {
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
   command->add_option("--track", options->track, "CSV: t_s, cmd_x_m … cmd_az_mps2, and sigma_xx … sigma_zz or --map")
       ->required();
-  command
-      ->add_option("--method", options->method,
-                   "tight: exact supports; paper: ellipsoids; chance: left with --probability, no worst case")
-      ->check(CLI::IsMember({"tight", "paper", "chance"}));
+  add_choice(*command, "--method", options->kind, kKinds,
+             "tight: exact supports; paper: ellipsoids; chance: left with --probability, no worst case");
   command->add_option("--probability", options->probability, "chance only: of leaving the sets, per second of flight");
-  command->add_option("--loop", options->loop, "vehicle (default), continuous (always with paper) or sampled")
-      ->check(CLI::IsMember({"vehicle", "continuous", "sampled"}));
+  add_choice(*command, "--loop", options->loop, kLoops, "vehicle (default), continuous (always with paper) or sampled");
   command->add_option("--map", options->map, "OctoMap file or builtin:NAME, for tracks without sigma columns");
   command->add_option("--model", options->model, "model file or builtin:NAME: its bound, and its field with --map");
   add_point(*command, "--direction", options->direction, "also the support along this direction");

@@ -28,8 +28,8 @@ int run(const Options& options) {
   const auto log = take(log::read_raw_log(options.log)).records;
   const auto truth = take(log::read_csv(options.truth));
   progress("building the world");
-  const auto world =
-      plan::build_world(take(report::recorded_map(log)), model, vehicle, reach::Method::tight, -1, run_parallel);
+  const auto world = plan::build_world(take(report::recorded_map(log)), model, vehicle, reach::Method::tight,
+                                       std::nullopt, run_parallel);
   const auto flight = take(report::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
   const report::ReportContext context{options.log, options.model, options.vehicle, kVersion, start, goal, {}, 1};

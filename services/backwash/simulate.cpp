@@ -11,8 +11,12 @@
 namespace backwash::services {
 namespace {
 
+/// Whose laws the gusts follow.
+enum class Air { truth, model };
+
 struct Options {
-  std::string map, model, vehicle, flight, setpoints, out, air = "truth";
+  std::string map, model, vehicle, flight, setpoints, out;
+  Air air = Air::truth;
   std::optional<std::uint64_t> seed;
   bool json = false, force = false;
 };
@@ -56,7 +60,7 @@ log::FlightLog fly_again(const Options& options, const map::OccupancyGrid& grid,
 
 void check(const Options& options) {
   if (options.flight.empty() == options.setpoints.empty()) throw Failure(kUsage, "give either --flight or --setpoints");
-  if (options.air == "model" && options.model.empty()) throw Failure(kUsage, "--air model needs --model");
+  if (options.air == Air::model && options.model.empty()) throw Failure(kUsage, "--air model needs --model");
   refuse_to_overwrite(options.out, options.force);
 }
 
@@ -74,7 +78,7 @@ int run(const Options& options) {
   if (!options.flight.empty()) spec = read_flight_spec(options.flight, options.seed);
   const auto grid = read_map(options.map);
   std::optional<sim::ModelField> field;
-  if (options.air == "model") simulation.air = &field.emplace(grid, model);
+  if (options.air == Air::model) simulation.air = &field.emplace(grid, model);
   const std::uint64_t seed = spec ? spec->seed : options.seed.value_or(1);
   const auto log = spec ? fly_specified(options, grid, vehicle, *spec, simulation)
                         : fly_again(options, grid, vehicle, seed, simulation);
@@ -99,9 +103,9 @@ Verb simulate_verb(CLI::App& app) {
   command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
   command->add_option("--model", options->model,
                       "model file: what its extension says of vehicle, air and sensors is flown");
-  command->add_option("--air", options->air, "gusts: the airflow truth's own laws, or those of --model")
-      ->check(CLI::IsMember({"truth", "model"}))
-      ->capture_default_str();
+  const std::vector<std::pair<std::string, Air>> airs = {{"truth", Air::truth}, {"model", Air::model}};
+  add_choice(*command, "--air", options->air, airs, "gusts: the airflow truth's own laws, or those of --model")
+      ->default_str("truth");
   command->add_option("--flight", options->flight, "flight specification, TOML");
   command->add_option("--setpoints", options->setpoints, "flight log, CSV, whose set-points are flown again");
   command->add_option("--out", options->out, "flight log to write, CSV")->required();

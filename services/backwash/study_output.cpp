@@ -64,10 +64,10 @@ Json to_json(const study::Outcome& o) {
   Json json = {{"samples_inside_bound", o.inside},
                {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
                {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
-  if (!o.plan.empty()) {
+  if (o.plan) {
     json["hover_safe_share"] = o.safe;
-    json["plan"] = {{"status", o.plan}};
-    if (o.plan == "ok")
+    json["plan"] = {{"status", plan::to_string(*o.plan)}};
+    if (o.plan == plan::PlanStatus::ok)
       json["plan"].update({{"length_m", o.length_m}, {"time_s", o.time_s}, {"min_clearance_m", o.clearance_m}});
   }
   return json;
@@ -103,13 +103,15 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen) 
 
 Json to_json(const study::Consequence& c) {
   Json json = {{"places", c.places}, {"before", to_json(c.before)}, {"after", to_json(c.after)}};
-  if (!c.before.plan.empty()) json.update({{"start", to_json(c.start_W)}, {"goal", to_json(c.goal_W)}});
+  if (c.before.plan) json.update({{"start", to_json(c.start_W)}, {"goal", to_json(c.goal_W)}});
   return json;
 }
 
 Json to_json(const study::RotorVerdict& v) {
+  Json set = Json::array();
+  for (const auto state : v.set) set.push_back(study::to_string(state));
   return {{"verdict", study::to_string(v.kind)},
-          {"set", v.set},
+          {"set", std::move(set)},
           {"rotor", v.rotor},
           {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}},
           {"minimum_detectable", {{"d", v.minimum}}},

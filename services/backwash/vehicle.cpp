@@ -152,7 +152,8 @@ int run(const Options& options) {
   if (!options.log.empty()) evidence = evidence_of(options.log);
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
   progress("building the world");
-  const auto world = plan::build_world(read_map(options.map), model, vehicle, reach::Method::tight, -1, run_parallel);
+  const auto world =
+      plan::build_world(read_map(options.map), model, vehicle, reach::Method::tight, std::nullopt, run_parallel);
   // Half an octave apart, from half of what flies to four times as much.
   const std::vector<double> factors{0.5, 0.71, 1, 1.41, 2, 2.83, 4};
   const auto sweep = plan::sweep_gains(*world, *options.start, *options.goal, factors, run_parallel);

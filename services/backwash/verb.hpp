@@ -7,6 +7,8 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/types/geometry.hpp"
 #include "core/types/text.hpp"
@@ -56,6 +58,19 @@ Verb vehicle_verb(CLI::App& app);
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.
 CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional<Vec3>& target,
                        const std::string& help);
+
+/// Adds an option that takes one of some names, each of which stands for a value; anything else is a usage error.
+template <typename Target, typename Value>
+CLI::Option* add_choice(CLI::App& command, const std::string& name, Target& target,
+                        const std::vector<std::pair<std::string, Value>>& choices, const std::string& help) {
+  std::vector<std::string> names;
+  for (const auto& choice : choices) names.push_back(choice.first);
+  const auto take = [&target, choices](const std::string& said) {
+    for (const auto& [known, value] : choices)
+      if (known == said) target = value;
+  };
+  return command.add_option_function<std::string>(name, take, help)->check(CLI::IsMember(names));
+}
 
 /// A line on stderr if that is a terminal, nothing otherwise.
 void progress(const std::string& line);

@@ -150,7 +150,7 @@ void MapWorker::take_map(const MapMessage& message) {
     publish(plan::update_world(*world_, std::move(*grid), change.box, model_, parallel_), message.received_ns);
   } else {
     live_.emplace(*grid);
-    publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, -1, parallel_),
+    publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_),
             message.received_ns);
   }
   ++channels_.maps_accepted;

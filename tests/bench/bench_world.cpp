@@ -62,12 +62,13 @@ void rebuild(benchmark::State& state) {
   const Change change = with_crate(furnished_room(), {45, 45, 1});
   for (auto _ : state)
     benchmark::DoNotOptimize(
-        plan::build_world(change.grid, kModel, kVehicle, reach::Method::tight, -1, threads(state)));
+        plan::build_world(change.grid, kModel, kVehicle, reach::Method::tight, std::nullopt, threads(state)));
 }
 BENCHMARK(rebuild)->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void by_region(benchmark::State& state) {
-  const auto old = plan::build_world(furnished_room(), kModel, kVehicle, reach::Method::tight, -1, run_parallel);
+  const auto old =
+      plan::build_world(furnished_room(), kModel, kVehicle, reach::Method::tight, std::nullopt, run_parallel);
   const Change change = with_crate(old->grid, {45, 45, 1});
   for (auto _ : state)
     benchmark::DoNotOptimize(plan::update_world(*old, change.grid, change.box, kModel, threads(state)));

@@ -8,6 +8,7 @@
 #include "core/map/octomap_message.hpp"
 #include "services/backwashd/cloud.hpp"
 #include "tests/fuzz/mutator.hpp"
+#include "tests/support/write_octomap.hpp"
 
 namespace backwash::fuzz {
 namespace {

@@ -28,7 +28,7 @@ void fill(OccupancyGrid& grid, const Index3& low, const Index3& high, Cell cell 
     for (int j = low.y(); j <= high.y(); ++j)
       for (int i = low.x(); i <= high.x(); ++i) grid.set({i, j, k}, cell);
 }
-std::shared_ptr<const World> world_of(OccupancyGrid grid, double margin = -1) {
+std::shared_ptr<const World> world_of(OccupancyGrid grid, std::optional<double> margin = std::nullopt) {
   return build_world(std::move(grid), Model{}, vehicle(), reach::Method::tight, margin);
 }
 
@@ -46,7 +46,7 @@ reach::ReachTube tube_along(const std::vector<Vec3>& centers, double half_width 
 }
 
 /// Random flights through random clutter; the clearance of each step taken by itself, without a limit.
-void expect_equal_to_each_step_by_itself(double margin) {
+void expect_equal_to_each_step_by_itself(std::optional<double> margin) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> u(0, 1);
   OccupancyGrid grid = room();
@@ -64,10 +64,10 @@ void expect_equal_to_each_step_by_itself(double margin) {
     for (auto& s : tube) s.half_widths_interval[kZ] *= 0.3 + u(random);
     double expected = 2.0;
     for (std::size_t k = 0; k < tube.size(); ++k) {
-      const PerDirection h = margin >= 0 ? PerDirection{} : tube[k].half_widths_interval;
+      const PerDirection h = margin ? PerDirection{} : tube[k].half_widths_interval;
       const Vec3& to = tube[std::min(k + 1, tube.size() - 1)].center.p_W;
       expected = std::min(
-          expected, reach::swept_prism_distance(grid, tube[k].center.p_W, to, h, 9.0) - body() - std::max(margin, 0.0));
+          expected, reach::swept_prism_distance(grid, tube[k].center.p_W, to, h, 9.0) - body() - margin.value_or(0.0));
     }
     EXPECT_NEAR(tube_clearance(*world, tube), expected, 1e-9) << flight;
     positive += expected > 0;
@@ -76,7 +76,7 @@ void expect_equal_to_each_step_by_itself(double margin) {
   EXPECT_LT(positive, 55);
 }
 
-TEST(TubeClearance, IsTheLeastOfItsStepsEachTakenByItself) { expect_equal_to_each_step_by_itself(-1); }
+TEST(TubeClearance, IsTheLeastOfItsStepsEachTakenByItself) { expect_equal_to_each_step_by_itself({}); }
 TEST(TubeClearance, WithAConstantMarginIsTheLeastOfItsStepsToo) { expect_equal_to_each_step_by_itself(0.1); }
 
 /// A pillar whose near face is at x = 2.5, in the given layers.

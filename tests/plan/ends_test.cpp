@@ -31,7 +31,7 @@ TEST(RefusedAtOnce, SaysOfAnyGoalWhatTheWorldSays) {
       const double x = u(random), y = u(random), z = u(random);
       Vec3 goal = grid.origin() + extent.cwiseProduct(Vec3(x, y, z));
       if (n % 5 == 0) goal.z() = 0.02;  // on the floor
-      const auto said = refused_at_once(grid, kModel, vehicle, method, -1, at_rest(start), goal, kOptions);
+      const auto said = refused_at_once(grid, kModel, vehicle, method, std::nullopt, at_rest(start), goal, kOptions);
       const auto why = why_blocked(*world, goal, 0);
       ASSERT_EQ(said.has_value(), why.has_value()) << goal.transpose() << ": " << (why ? *why : said->message);
       if (!why) {
@@ -53,8 +53,8 @@ TEST(RefusedAtOnce, SaysOfAnyGoalWhatTheWorldSays) {
 
 TEST(RefusedAtOnce, NamesTheStartFirst) {
   const auto grid = map::builtin_scene("apartment").value();
-  const auto said =
-      refused_at_once(grid, kModel, kVehicle, reach::Method::tight, -1, at_rest({-5, 4, 1.2}), {-6, 4, 1.2}, kOptions);
+  const auto said = refused_at_once(grid, kModel, kVehicle, reach::Method::tight, std::nullopt, at_rest({-5, 4, 1.2}),
+                                    {-6, 4, 1.2}, kOptions);
   ASSERT_TRUE(said);
   EXPECT_EQ(said->status, PlanStatus::start_blocked);
   EXPECT_EQ(said->message, "start (-5.00, 4.00, 1.20) is outside the map");
@@ -63,15 +63,15 @@ TEST(RefusedAtOnce, NamesTheStartFirst) {
 TEST(RefusedAtOnce, LeavesToTheWorldWhatOnlyItCanSay) {
   const auto grid = map::builtin_scene("apartment").value();
   const Vec3 free(3, 4, 1.2), near_a_wall(3, 0.1, 2.2);
-  const auto refuses = [&](const Model& model, double margin) {
+  const auto refuses = [&](const Model& model, std::optional<double> margin) {
     return refused_at_once(grid, model, kVehicle, reach::Method::tight, margin, at_rest(free), near_a_wall, kOptions)
         .has_value();
   };
-  EXPECT_TRUE(refuses(kModel, -1));
+  EXPECT_TRUE(refuses(kModel, std::nullopt));
   EXPECT_FALSE(refuses(kModel, 0.1));
   Model extended = kModel;
   extended.extension.push_back({});
-  EXPECT_FALSE(refuses(extended, -1));
+  EXPECT_FALSE(refuses(extended, std::nullopt));
 }
 
 }  // namespace

@@ -63,8 +63,8 @@ TEST(CentreResponse, BasisEqualsThePredictionOfAMovedControlPoint) {
 }
 
 /// Room with a block beside a wavy spline that comes too near to it and breaks both limits somewhere.
-const World& block_world(double constant_margin) {
-  const auto build = [](double margin) {
+const World& block_world(bool ball) {
+  const auto build = [](std::optional<double> margin) {
     OccupancyGrid grid({0, 0, 0}, 0.1, {60, 30, 20}, Cell::free);
     for (int i = 25; i < 32; ++i)
       for (int j = 0; j < 13; ++j)
@@ -74,15 +74,15 @@ const World& block_world(double constant_margin) {
     model.wall.k1 = {1.0, 0.4, 0.4};
     return build_world(grid, model, test_vehicle(0.02, 0.05), reach::Method::tight, margin);
   };
-  static const auto sets = build(-1), constant = build(0.15);
-  return constant_margin < 0 ? *sets : *constant;
+  static const auto sets = build(std::nullopt), constant = build(0.15);
+  return ball ? *constant : *sets;
 }
 
 struct Scene {
   const World& world;
   PlanStart start{{Vec3(1.02, 1.51, 1.03), Vec3(0.1, 0, 0)}, {Vec3(1, 1.5, 1), Vec3(0.2, 0, 0), Vec3::Zero(), 0}};
 
-  explicit Scene(double constant_margin = -1) : world(block_world(constant_margin)) {}
+  explicit Scene(bool ball = false) : world(block_world(ball)) {}
   BSpline spline(unsigned seed, double y = 1.68) const {
     std::mt19937 random(seed);
     std::vector<Vec3> samples;
@@ -127,8 +127,8 @@ TEST(SplineCost, GradientOfTheSmoothnessEqualsFiniteDifferences) {
   expect_exact_gradient(scene.cost(scene.spline(1), 0.02, {1, 0, 0}), 11);
 }
 TEST(SplineCost, GradientOfTheCollisionCostEqualsFiniteDifferences) {
-  for (const double constant_margin : {-1.0, 0.15}) {
-    const Scene scene(constant_margin);
+  for (const bool ball : {false, true}) {
+    const Scene scene(ball);
     for (const unsigned seed : {2u, 3u, 4u})
       expect_exact_gradient(scene.cost(scene.spline(seed), 0.2, {0, 1, 0}), seed);
   }

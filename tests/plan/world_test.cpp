@@ -57,7 +57,8 @@ TEST(World, DoesNotDependOnHowTheWorkIsDivided) {
       end = begin;
     }
   };
-  const auto parts = build_world(corridor(), Model{}, vehicle_5in(), reach::Method::tight, -1, backwards_in_parts);
+  const auto parts =
+      build_world(corridor(), Model{}, vehicle_5in(), reach::Method::tight, std::nullopt, backwards_in_parts);
   std::size_t safe = 0;
   for (std::size_t n = 0; n < whole->grid.cell_count(); ++n) {
     const Index3 v = whole->grid.voxel(n);
@@ -93,8 +94,8 @@ TEST(World, WithAnotherClearanceIsTheWorldBuiltForIt) {
   const auto tight = build_world(corridor(), Model{}, vehicle_5in());
   const struct {
     reach::Method method;
-    double margin;
-  } others[] = {{reach::Method::paper, -1}, {reach::Method::tight, 0.3}};
+    std::optional<double> margin;
+  } others[] = {{reach::Method::paper, std::nullopt}, {reach::Method::tight, 0.3}};
   for (const auto& [method, margin] : others) {
     const auto built = build_world(corridor(), Model{}, vehicle_5in(), method, margin);
     const World changed = with_clearance_by(*tight, method, margin);

@@ -123,37 +123,5 @@ TEST(DelayRecursion, GivesTheSetsOfTheFir) {
   }
 }
 
-// ∂J/∂w̄ against differences of the sets themselves; h is linear in w̄, so that a difference of any size is exact.
-TEST(SupportGradient, IsTheDerivativeOfTheHalfWidthsUnderEveryLoop) {
-  constexpr std::size_t kSteps = 90;
-  std::mt19937 random(2);
-  std::uniform_real_distribution<double> weight(-1, 1);
-  for (const AxisLoop& axis : {AxisLoop{6, 4, 0, 0}, AxisLoop{20, 4, 0, 0}, AxisLoop{6, 8, 0, 0},
-                               AxisLoop{10, 5.5, 0, 0.05}, AxisLoop{6, 4, 0.03, 0.05}}) {
-    for (const Loop loop : {Loop::vehicle, Loop::sampled}) {
-      const AxisResponse response = axis_response(axis, loop);
-      std::vector<double> lambda(kSteps);
-      for (double& x : lambda) x = weight(random);
-      const auto J = [&](const std::vector<double>& w) {
-        SupportRecursion sets(response, response, {});
-        double sum = 0;
-        for (std::size_t k = 0; k < kSteps; ++k) {
-          sets.step(DisturbanceBound{{w[k], 0, 0, 0, 0}});
-          sum += lambda[k] * sets.half_widths()[kX];
-        }
-        return sum;
-      };
-      const std::vector<double> gradient = support_gradient(response, lambda), w = random_bounds(kSteps, 3);
-      ASSERT_EQ(gradient.size(), kSteps);
-      for (std::size_t k = 0; k < kSteps; ++k) {
-        std::vector<double> more = w;
-        more[k] += 1;
-        const double slack = static_cast<double>(kSteps) * (response.delay ? 8 * response.delay->tail : 0.0);
-        EXPECT_NEAR(gradient[k], J(more) - J(w), 1e-12 + slack) << axis.kp << " " << axis.kd << " " << k;
-      }
-    }
-  }
-}
-
 }  // namespace
 }  // namespace backwash::reach

@@ -201,7 +201,7 @@ TEST(HoverSet, IsNeverSafeOutsideFreeSpace) {
   const Scene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   for (const Vec3& p : {Vec3(-1, 1, 1), Vec3(1, 1, 1.7), Vec3(1, 1, 0.05), Vec3(1, 0.05, 1)}) {
-    for (const double margin : {-1.0, 0.0}) {
+    for (const auto margin : {std::optional<double>(), std::optional(0.0)}) {
       const HoverSet set = hover_set(reach, scene.grid, scene.distance, scene.bounds, p, margin);
       EXPECT_FALSE(set.safe());
       EXPECT_LT(set.clearance, 0);

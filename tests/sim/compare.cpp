@@ -210,11 +210,11 @@ TEST(CompareMethods, AreTheSetsTwoVariantsOfThemAndFourMargins) {
   const auto methods = compare_methods();
   ASSERT_EQ(methods.size(), 7u);
   for (std::size_t m = 0; m < 3; ++m) {
-    EXPECT_LT(methods[m].margin, 0);
+    EXPECT_FALSE(methods[m].margin);
     EXPECT_EQ(methods[m].norm_cost, m == 1);
     EXPECT_EQ(methods[m].sets, m == 2 ? reach::Method::paper : reach::Method::tight);
   }
-  for (std::size_t m = 3; m < 7; ++m) EXPECT_NEAR(methods[m].margin, 0.1 * static_cast<double>(m - 2), 1e-12);
+  for (std::size_t m = 3; m < 7; ++m) EXPECT_NEAR(methods[m].margin.value(), 0.1 * static_cast<double>(m - 2), 1e-12);
 }
 
 }  // namespace

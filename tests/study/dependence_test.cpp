@@ -33,6 +33,12 @@ VectorXd autoregressive(double phi, std::mt19937_64& rng) {
   return x;
 }
 
+/// Every draw is made.
+Independence independence(const MatrixXd& x, const MatrixXd& y, const std::vector<std::size_t>& first, int shifts,
+                          unsigned seed) {
+  return turn_test(centred(kernel_features(x), first), kernel_features(y), first, shifts, shifts, seed);
+}
+
 double kernel(const MatrixXd& points, Eigen::Index i, Eigen::Index j) {
   std::vector<double> distances;
   for (Eigen::Index a = 0; a < points.rows(); ++a)

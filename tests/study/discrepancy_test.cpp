@@ -14,6 +14,7 @@
 #include "core/study/findings/consequence.hpp"
 #include "core/study/findings/extend.hpp"
 #include "tests/study_worlds/observe.hpp"
+#include "tests/support/terms_of.hpp"
 
 namespace {
 
@@ -187,7 +188,7 @@ TEST(Study, AnExtendedModelMovesHoverSetsUnderTheCeilingAndKeepsMoreSamplesInsid
   EXPECT_LT(c.after.shift_median, 0.3 * c.after.shift_95);  // by place: most were flown far below the ceiling
   EXPECT_GT(c.after.inside, c.before.inside);
   EXPECT_GE(c.after.extent_95, c.before.extent_95);
-  EXPECT_EQ(c.before.plan, "ok");
+  EXPECT_EQ(c.before.plan, plan::PlanStatus::ok);
 }
 
 /// What would separate two causes of the catalogue, by the first form of each that is, or is not, about rotors.

@@ -105,8 +105,8 @@ double height_answers_gusts(const study::Observations& seen) {
   std::map<std::pair<std::size_t, int>, std::array<double, 3>> dwells;  // count, height, residual
   const auto each = [&](auto use) {
     for (std::size_t i = 0; i < seen.windows.size(); ++i)
-      if (const auto& w = seen.windows[i]; w.segment >= 0 && seen.weight[study::kMeanZ][i] > 0)
-        use(dwells[{w.flight, w.segment}], w.p_W.z(), seen.y[study::kMeanZ][i]);
+      if (const auto& w = seen.windows[i]; w.segment && seen.weight[study::kMeanZ][i] > 0)
+        use(dwells[{w.flight, *w.segment}], w.p_W.z(), seen.y[study::kMeanZ][i]);
   };
   each([](auto& d, double h, double y) { d[0] += 1, d[1] += h, d[2] += y; });
   each([&](auto& d, double h, double y) {

@@ -154,8 +154,8 @@ TEST(DaysOfFlights, HaveAScatterOfTheirOwnBesideThatOfFlightsAndWindows) {
   for (int k = 0; k < kDraws; ++k) {
     const auto made = days(rng);
     const Evidence evidence(made.seen);
-    within += evidence.within(kVarX) / 3 / kDraws, between += evidence.between(kVarX) / 3 / kDraws;
-    units += evidence.between_units(kVarX) / 3 / kDraws;
+    const Scatter scatter = evidence.scatter(kVarX);
+    within += scatter.within / 3 / kDraws, between += scatter.between / 3 / kDraws, units += scatter.units / 3 / kDraws;
   }
   EXPECT_NEAR(within, 0.25, 0.01);
   EXPECT_NEAR(between, 0.16, 0.02);
@@ -170,15 +170,16 @@ TEST(DaysOfFlights, NormalEquationsAreThoseOfTheWholeCovariance) {
   for (const Channel c : {kVarX, kVarY, kVarZ}) column.parts.push_back({c, made.x});
   const Normal normal = evidence.normal({column}, {});
   const auto n = static_cast<Eigen::Index>(made.x.size());
-  Eigen::MatrixXd V = evidence.within(kVarX) * Eigen::MatrixXd::Identity(n, n);
+  const Scatter scatter = evidence.scatter(kVarX);
+  Eigen::MatrixXd V = scatter.within * Eigen::MatrixXd::Identity(n, n);
   Eigen::VectorXd x(n), y(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto a = static_cast<std::size_t>(i);
     x[i] = std::sqrt(3.0) * made.x[a], y[i] = std::sqrt(3.0) * made.seen.y[kVarX][a];
     for (Eigen::Index j = 0; j < n; ++j) {
       const auto b = static_cast<std::size_t>(j);
-      if (made.seen.windows[a].flight == made.seen.windows[b].flight) V(i, j) += evidence.between(kVarX);
-      if (made.day[a] == made.day[b]) V(i, j) += evidence.between_units(kVarX);
+      if (made.seen.windows[a].flight == made.seen.windows[b].flight) V(i, j) += scatter.between;
+      if (made.day[a] == made.day[b]) V(i, j) += scatter.units;
     }
   }
   const Eigen::VectorXd solved = V.ldlt().solve(x);

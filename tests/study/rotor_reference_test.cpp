@@ -35,8 +35,8 @@ std::vector<RotorContrasts> flights(int count, std::array<double, 4> extra, std:
   return all;
 }
 
-bool holds(const RotorVerdict& v, const std::string& name) {
-  return std::find(v.set.begin(), v.set.end(), name) != v.set.end();
+bool holds(const RotorVerdict& v, RotorState state) {
+  return std::find(v.set.begin(), v.set.end(), state) != v.set.end();
 }
 
 TEST(RotorsAgainstReference, NameADamagedPropellerButNoWeightAndNoSoundVehicle) {
@@ -55,9 +55,9 @@ TEST(RotorsAgainstReference, NameADamagedPropellerButNoWeightAndNoSoundVehicle) 
     std::array<double, 4> weight{};
     weight[rotor] = m, weight[(rotor + 2) % 4] = -m;
     const auto beside = judge_rotors(reference, flights(3, weight, rng));
-    ++weighted[beside->kind], named_weight += holds(*beside, "payload");
+    ++weighted[beside->kind], named_weight += holds(*beside, RotorState::payload);
     const auto same = judge_rotors(reference, flights(3, {}, rng));
-    ++sound[same->kind], sound_in_set += holds(*same, "sound");
+    ++sound[same->kind], sound_in_set += holds(*same, RotorState::sound);
     ++quiet[judge_rotors(flights(8, {}, rng, 0.003), flights(3, {}, rng, 0.003))->kind];
   }
   EXPECT_GE(damaged[Kind::propeller_damage], 0.9 * kTrials);
@@ -113,7 +113,7 @@ TEST(RotorsAgainstReference, CallASoundVehicleDamagedMoreOftenWhereTheReferenceI
     for (const int count : {3, 2, 2})
       for (const auto& f : session(count)) reference.push_back(f);
     const auto v = judge_rotors(reference, session(3));
-    damaged += v->kind == Kind::propeller_damage, other += !holds(*v, "sound");
+    damaged += v->kind == Kind::propeller_damage, other += !holds(*v, RotorState::sound);
   }
   std::printf("seven flights of three sessions: called damaged %.3f, not as sound %.3f\n", damaged / double{kTrials},
               other / double{kTrials});
@@ -167,10 +167,11 @@ TEST(CrazyPad, CutsOfARotorAreNamedWhereTheyPassSoundFlightsAndNoWeightIsCalledD
     if (large) {
       EXPECT_EQ(v->rotor, 3u) << name;
     } else {
-      EXPECT_TRUE(holds(*v, "propeller_damage") || holds(*v, "payload")) << name << ": what is not told is said";
+      EXPECT_TRUE(holds(*v, RotorState::propeller_damage) || holds(*v, RotorState::payload))
+          << name << ": what is not told is said";
     }
     if (name.starts_with("weight")) {
-      EXPECT_TRUE(holds(*v, "payload")) << name;
+      EXPECT_TRUE(holds(*v, RotorState::payload)) << name;
     }
   }
 }

@@ -22,17 +22,21 @@ TEST(Rules, EachHasANameOfItsOwnAUnitAndAReasonOfAKnownKind) {
     EXPECT_GT(r.reason.size(), kind.size() + 10) << r.name << " says no reason";
   }
   EXPECT_TRUE(names.contains("flips") && names.contains("manoeuvre_nats")) << "first and last of the struct";
-  EXPECT_TRUE(names.contains("window_length") && names.contains("inconsistent")) << "and of the windows";
+  EXPECT_TRUE(names.contains("window_length") && names.contains("same_time")) << "and of the windows";
 }
 
 /// Numbers of formulas: halves of ½ xᵀAx, roots of the turned axes, the contrasts of four rotors.
 const std::set<std::string> kOfFormulas = {"0.0", "0.25", "0.5", "1.0", "2.0", "3.0", "6.0"};
 
-TEST(Rules, NoConstantOfTheInferenceStandsElsewhere) {
+class NoConstant : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(OfARoom, NoConstant, testing::Values("inference", "windows"));
+
+TEST_P(NoConstant, StandsOutsideTheRoomsRules) {
   const std::regex number("(^|[^A-Za-z_0-9.])([0-9]+\\.[0-9]+(e-?[0-9]+)?|[0-9]+e-?[0-9]+)");
   const std::regex constant("constexpr (double|int) k\\w+ = [-0-9]");
   std::size_t files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(BACKWASH_SOURCE_DIR "/core/study/inference")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(BACKWASH_SOURCE_DIR "/core/study/" + std::string(GetParam()))) {
     if (entry.path().extension() != ".cpp") continue;
     ++files;
     std::ifstream file(entry.path());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 #include <sstream>
 
 #include "core/study/effects/table.hpp"
@@ -13,12 +14,11 @@ namespace {
 using namespace backwash::study;
 
 TEST(SelfTest, HasEveryCauseOfTheCatalogueAndWhatIsNone) {
-  std::vector<std::string> names;
-  for (const auto& effect : effects()) names.push_back(effect.name);
-  names.insert(names.end(), {"unknown", "none"});
-  EXPECT_EQ(self_test().rows.size(), names.size());
-  for (const auto& name : names) {
-    const auto* r = self_test().of(name);
+  std::map<std::string, const SelfTestRow*> rows = {{"unknown", self_test().of(Hidden::structure)},
+                                                    {"none", self_test().of(Hidden::nothing)}};
+  for (const auto& effect : effects()) rows[effect.name] = self_test().of(effect.name);
+  EXPECT_EQ(self_test().rows.size(), rows.size());
+  for (const auto& [name, r] : rows) {
     ASSERT_TRUE(r) << name;
     EXPECT_GE(r->worlds, 100) << name;
     EXPECT_LE(r->alone, r->in_set) << name;
@@ -26,6 +26,7 @@ TEST(SelfTest, HasEveryCauseOfTheCatalogueAndWhatIsNone) {
     EXPECT_LE(r->wrong, r->worlds - r->alone) << name;
   }
   EXPECT_EQ(self_test().of("gremlins"), nullptr);
+  EXPECT_EQ(self_test().of("none"), nullptr) << "a cause of that name";
 }
 
 TEST(SelfTest, AgreesWithTheConfusionTable) {
@@ -36,8 +37,11 @@ TEST(SelfTest, AgreesWithTheConfusionTable) {
   EXPECT_NE(table.find("--seed " + std::to_string(self_test().seed)), std::string::npos);
   for (const auto& r : self_test().rows) {
     const auto of = [&](int count) { return std::to_string(count) + "/" + std::to_string(r.worlds); };
-    const auto begin = table.find("\n| " + std::string(r.hidden) + " | " + of(r.alone) + " (");
-    ASSERT_NE(begin, std::string::npos) << r.hidden;
+    const std::string hidden = r.hidden == Hidden::nothing     ? "none"
+                               : r.hidden == Hidden::structure ? "unknown"
+                                                               : r.cause;
+    const auto begin = table.find("\n| " + hidden + " | " + of(r.alone) + " (");
+    ASSERT_NE(begin, std::string::npos) << hidden;
     const std::string line = table.substr(begin + 1, table.find('\n', begin + 1) - begin);
     EXPECT_NE(line.find("| " + of(r.in_set) + " ("), std::string::npos) << line;
     EXPECT_NE(line.find("| " + of(r.wrong) + " ("), std::string::npos) << line;

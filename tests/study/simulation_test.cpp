@@ -11,6 +11,7 @@
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
 #include "tests/study_worlds/observe.hpp"
+#include "tests/support/terms_of.hpp"
 
 namespace {
 
@@ -162,11 +163,13 @@ TEST(Residuals, AreOfTheSameWindowsAndLeaveOutWhatWasNotSimulated) {
   EXPECT_EQ(told[kMeanX][0], 5);
   EXPECT_EQ(told[kMeanX][1], 3);
   EXPECT_EQ(told[kMeanX][2], 5);
-  EXPECT_TRUE(std::isnan(told[kMeanX][3]));  // none within 0.15 s
+  EXPECT_FALSE(told[kMeanX][3]);  // none within 0.15 s
   const auto error = channel_error(measured, told, kMeanX);
-  EXPECT_EQ(error.windows, 3u);
-  EXPECT_NEAR(error.value, std::sqrt((0.0 + 9 + 4) / 3), 1e-12);
-  EXPECT_NEAR(channel_error(measured, told, kMeanX, true).value, std::sqrt(13.0 / 3 - 25.0 / 9), 1e-12);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->windows, 3u);
+  EXPECT_NEAR(error->value, std::sqrt((0.0 + 9 + 4) / 3), 1e-12);
+  EXPECT_NEAR(channel_error(measured, told, kMeanX, true)->value, std::sqrt(13.0 / 3 - 25.0 / 9), 1e-12);
+  EXPECT_FALSE(channel_error(measured, told_of(measured, {}), kMeanX)) << "nothing was simulated";
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 constexpr int kDraws = 4, kFlips = 400;
 
 std::vector<double> per_dwell(const study::Windows& windows, std::mt19937_64& rng) {
-  std::map<std::pair<std::size_t, int>, double> drawn;
+  std::map<std::pair<std::size_t, std::optional<int>>, double> drawn;
   std::vector<double> x;
   for (const auto& w : windows) {
     const auto [at, fresh] = drawn.try_emplace({w.flight, w.segment}, 0);

@@ -14,6 +14,7 @@
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
 #include "tests/study_worlds/observe.hpp"
+#include "tests/support/terms_of.hpp"
 
 namespace study_worlds {
 
@@ -105,10 +106,12 @@ void compare(Proof& proof, const study::Accepted& found, const study::Observatio
   double b = 0, a = 0, n = 0;
   const bool about_mean = !found.form->constant;
   for (const auto c : channels_of(found)) {
-    const double eb = channel_error(measured, before, c, about_mean).value,
-                 ea = channel_error(measured, after, c, about_mean).value,
-                 // The generator knows how this craft's rotors were built, which no simulation does and no cause is.
-        eo = std::hypot(channel_error(measured, truth, c, about_mean).value, study::built_scatter(c));
+    const auto of_before = channel_error(measured, before, c, about_mean),
+               of_after = channel_error(measured, after, c, about_mean),
+               of_truth = channel_error(measured, truth, c, about_mean);
+    if (!of_before || !of_after || !of_truth) continue;
+    // The generator knows how this craft's rotors were built, which no simulation does and no cause is.
+    const double eb = of_before->value, ea = of_after->value, eo = std::hypot(of_truth->value, study::built_scatter(c));
     if (!(eo > 0) || !(eb > 0)) continue;
     if (n == 0) {
       proof.channel = study::channel_name(c);

@@ -14,6 +14,7 @@ struct Refusal {
   std::string what;  ///< table of the model file, as in "wall", or "all"
   std::vector<Parameter> parameters;
   std::string why, flight;
+  bool of_everything() const { return parameters.size() == kParameters; }
 };
 
 /// What the geometry of the flights leaves undetermined, before anything is fitted: gates as in the base model. Empty

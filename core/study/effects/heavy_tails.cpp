@@ -7,16 +7,18 @@ namespace backwash::study {
 /// Bursts: the gusts are larger now and then than a Gaussian's.
 Effect heavy_tails() {
   return {.name = "heavy_tails",
-          .forms = {
-              {.formula = "ln kurtosis + K",
-               .parameters = {"K_ln"},
-               .constant = true,
-               .floor = 0.15,
-               .one_sided = true,
-               .unknowable = [](const Observations&) { return kScatter2 / 2; },  // how much of the wander is within 1 s
-               .columns = [](const Windows& ws,
-                             const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; },
-               .simulate = simulates(SimulationTerm::Kind::kurtosis)}}};
+          .forms = {{.formula = "ln kurtosis + K",
+                     .parameters = {"K_ln"},
+                     .constant = true,
+                     .floor = 0.15,
+                     .one_sided = true,
+                     .unknowable =
+                         [](const Observations&) {
+                           return kWindowRules.scatter2 / 2;
+                         },  // how much of the wander is within 1 s
+                     .columns = [](const Windows& ws,
+                                   const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; },
+                     .simulate = simulates(SimulationTerm::Kind::kurtosis)}}};
 }
 
 }  // namespace backwash::study

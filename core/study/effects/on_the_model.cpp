@@ -75,8 +75,7 @@ SimulationTerm rotor_lines(const Observations& seen) {
     double power = 0, n = 0;
     for (const auto& w : seen.windows) {
       const auto& line = w.lines[rotor];
-      if (!std::isfinite(line.amplitude2)) continue;
-      power += line.amplitude2, floor += line.floor2, n += 1, of_floor += 1;
+      if (line) power += line->amplitude2, floor += line->floor2, n += 1, of_floor += 1;
     }
     if (n > 0) term.value[rotor] = std::sqrt(std::max(0.0, power / n));
   }

@@ -19,7 +19,7 @@ std::optional<std::string> folded_away(const Observations& seen) {
   const double all = 4 * static_cast<double>(seen.windows.size());
   if (lines >= kEnough * all) return std::nullopt;
   return "sampled once in " + std::to_string(std::lround(1000 * seen.row_period)) +
-         " ms the rotors' lines fold below " + to_text(kLeastFolded, 2) +
+         " ms the rotors' lines fold below " + to_text(kWindowRules.least_folded, 2) +
          " Hz, where gusts and loop are, or next to half the rate, in " +
          std::to_string(std::lround(100 * (1 - lines / all))) + " % of the windows";
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/study/inference/coverage.hpp"
 #include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
@@ -62,13 +63,6 @@ double at(const Moved& moved, std::size_t channel, std::size_t i) {
   return moved[channel].empty() ? 0 : moved[channel][i];
 }
 
-/// P(|N(mean, variance)| ≤ 1.645 √model).
-double within(double mean, double variance, double model) {
-  const double limit = kRules.normal_95 * std::sqrt(model);
-  const double s = std::sqrt(2 * std::max(variance, kRules.least_variance.value));
-  return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
-}
-
 /// Errors of the window values: those of ln variance about their mean.
 void measure_error(Applied& applied, const Observations& seen, const Moved& own, const Moved& others) {
   double before = 0, after = 0, count = 0;
@@ -98,8 +92,9 @@ void measure_coverage(Applied& applied, const Observations& seen, const Moved& o
       if (!(seen.weight[variance][i] > 0)) continue;
       const auto& w = seen.windows[i];
       const double m = seen.y[mean][i] - at(others, mean, i), sigma = w.sigma[axis] * std::exp(at(others, variance, i));
-      before += within(m, w.measured_variance[axis], sigma);
-      after += within(m - at(own, mean, i), w.measured_variance[axis], sigma * std::exp(at(own, variance, i)));
+      before += share_of_interval(m, w.measured_variance[axis], sigma);
+      after +=
+          share_of_interval(m - at(own, mean, i), w.measured_variance[axis], sigma * std::exp(at(own, variance, i)));
       samples += 1;
     }
   }

@@ -9,6 +9,7 @@
 
 #include "core/plan/planner.hpp"
 #include "core/study/findings/extend.hpp"
+#include "core/study/inference/coverage.hpp"
 
 namespace backwash::study {
 namespace {
@@ -55,12 +56,6 @@ Added held_out(const StudyResult& result, const Observations& seen) {
           added.mean[part.channel][i] += cause.applied.beside[k] * part.x[i];
   }
   return added;
-}
-
-/// Share of a Gaussian's samples within ± limit.
-double share_within(double mean, double variance, double limit) {
-  const double s = std::sqrt(2 * std::max(variance, 1e-12));
-  return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
 }
 
 /// Share of the samples within push ± w̄, w̄ = mean + κ√Σ; `added`: what a model says beside Σ and mean, or null.
@@ -129,7 +124,7 @@ void try_plan(Outcome& outcome, const plan::World& world, const Vec3& start_W, c
   const auto& limits = world.reach.vehicle.limits;
   const plan::PlanOptions options{.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = 3};
   const auto plan = plan::plan(world, {{start_W, Vec3::Zero()}, hover}, goal_W, options);
-  outcome.plan = plan::to_string(plan.status);
+  outcome.plan = plan.status;
   if (plan.status != plan::PlanStatus::ok) return;
   outcome.length_m = plan.metrics.length_m, outcome.time_s = plan.metrics.time_s;
   outcome.clearance_m = plan.metrics.min_clearance_m;
@@ -162,8 +157,8 @@ Consequence consequence(const StudyResult& result, const Observations& seen, con
     c.before.safe = c.after.safe = 0;
     return c;
   }
-  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, -1, parallel);
-  const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, -1, parallel);
+  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, parallel);
+  const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, std::nullopt, parallel);
   const auto sets = sets_at(*world, places);
   describe(c.before, sets);
   describe(c.after, sets_at(*extended_world, places));

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/plan/planner.hpp"
 #include "core/plan/world.hpp"
 #include "core/study/findings/study.hpp"
 
@@ -15,7 +16,7 @@ struct Outcome {
   double extent_median = 0, extent_95 = 0;  ///< largest half width of the hover sets at flown places, m
   double shift_median = 0, shift_95 = 0;    ///< of those sets' centres, m
   double safe = 0;                          ///< share of the places where hovering is safe; 0 without a map
-  std::string plan;                         ///< status of the plan; empty: none was tried
+  std::optional<plan::PlanStatus> plan;     ///< none was tried without two places and a map
   double length_m = 0, time_s = 0, clearance_m = 0;  ///< of the plan, if ok
 };
 

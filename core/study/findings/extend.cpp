@@ -48,20 +48,6 @@ toml::table table_of(const NamedCause& cause, const Observations& seen) {
 
 }  // namespace
 
-std::vector<Term> terms_of(const StudyResult& result) {
-  std::vector<Term> terms;
-  for (const auto& cause : result.causes) {
-    const auto& f = cause.found;
-    if (!cause.applied.refused.empty()) continue;
-    terms.push_back({f.form->cause(),
-                     f.form->formula,
-                     f.scale,
-                     {f.theta.data(), f.theta.data() + f.theta.size()},
-                     cause.applied.beside});
-  }
-  return terms;
-}
-
 std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen) {
   std::vector<Term> left;
   for (const Term& term : terms) {

@@ -16,9 +16,6 @@ struct Term {
   std::vector<double> beside = {};  ///< of its companions; empty in files of before they were stored
 };
 
-/// Of the causes that join the model.
-std::vector<Term> terms_of(const StudyResult& result);
-
 /// Takes the terms out of the observations: the simulation is then the extended model's. A term whose form or columns
 /// are unknown here is returned.
 std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen);

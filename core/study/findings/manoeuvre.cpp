@@ -44,7 +44,8 @@ double nats_apart(const Evidence& evidence, const Accepted& cause, const Rival& 
   const auto weighted = [&](const Column& column) {
     Eigen::VectorXd all = Eigen::VectorXd::Zero(rows);
     for (const auto& part : decorrelated(column).parts) {
-      const double weight = 1 / std::sqrt(evidence.within(part.channel) + kWindows * evidence.between(part.channel));
+      const Scatter scatter = evidence.scatter(part.channel);
+      const double weight = 1 / std::sqrt(scatter.within + kWindows * scatter.between);
       for (std::size_t i = 0; i < kWindows; ++i)
         all[static_cast<Eigen::Index>(part.channel * kWindows + i)] += weight * part.x[i];
     }

@@ -72,7 +72,7 @@ std::string rotor_sentence(const RotorVerdict& v) {
     case Kind::payload:
       return "An off-centre weight, no damaged propeller.";
     case Kind::cannot_distinguish:
-      if (v.set.front() != "sound")
+      if (v.set.front() != RotorState::sound)
         return "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
       return "Not told from the sound flights, nor from a small damage or weight: " + rotor + " differs most, by " +
              interval(v) + " of its command, and only a propeller that needs " + percent(v.minimum) +

@@ -2,7 +2,6 @@
 #include "core/study/findings/residuals.hpp"
 
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -13,8 +12,6 @@
 
 namespace backwash::study {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// The windows of one flight by the time of their middle.
 using ByTime = std::map<double, std::size_t>;
@@ -38,7 +35,7 @@ std::optional<std::size_t> nearest(const ByTime& flight, double t) {
 }
 
 bool both(const Observations& measured, const Told& told, Channel c, std::size_t i) {
-  return measured.weight[c][i] > 0 && std::isfinite(told[c][i]);
+  return measured.weight[c][i] > 0 && told[c][i].has_value();
 }
 
 /// Measured as dots, simulated as lines.
@@ -47,7 +44,7 @@ tl::expected<std::string, report::PlotError> picture(const Observations& measure
   std::ostringstream rows;
   for (std::size_t i = 0; i < measured.windows.size(); ++i) {
     if (!both(measured, before, c, i) || !both(measured, after, c, i)) continue;
-    rows << i << ' ' << measured.y[c][i] << ' ' << before[c][i] << ' ' << after[c][i] << '\n';
+    rows << i << ' ' << measured.y[c][i] << ' ' << *before[c][i] << ' ' << *after[c][i] << '\n';
   }
   std::ostringstream script;
   script << "$rows << EOD\n"
@@ -62,8 +59,8 @@ tl::expected<std::string, report::PlotError> picture(const Observations& measure
 }  // namespace
 
 Told told_of(const Observations& measured, std::span<const Observations> simulated) {
-  Told told;
-  for (auto& channel : told) channel.assign(measured.windows.size(), 0);
+  std::array<std::vector<double>, kChannels> sum;
+  for (auto& channel : sum) channel.assign(measured.windows.size(), 0);
   std::array<std::vector<int>, kChannels> count;
   for (auto& channel : count) channel.assign(measured.windows.size(), 0);
   for (const Observations& replica : simulated) {
@@ -73,26 +70,29 @@ Told told_of(const Observations& measured, std::span<const Observations> simulat
       if (w.flight >= flights.size()) continue;
       const auto at = nearest(flights[w.flight], w.t);
       for (std::size_t c = 0; at && c < kChannels; ++c)
-        if (replica.weight[c][*at] > 0) told[c][i] += replica.y[c][*at], count[c][i] += 1;
+        if (replica.weight[c][*at] > 0) sum[c][i] += replica.y[c][*at], count[c][i] += 1;
     }
   }
-  for (std::size_t c = 0; c < kChannels; ++c)
-    for (std::size_t i = 0; i < told[c].size(); ++i) told[c][i] = count[c][i] > 0 ? told[c][i] / count[c][i] : kNone;
+  Told told;
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    told[c].resize(measured.windows.size());
+    for (std::size_t i = 0; i < told[c].size(); ++i)
+      if (count[c][i] > 0) told[c][i] = sum[c][i] / count[c][i];
+  }
   return told;
 }
 
-ChannelError channel_error(const Observations& measured, const Told& told, Channel c, bool about_mean) {
+std::optional<ChannelError> channel_error(const Observations& measured, const Told& told, Channel c, bool about_mean) {
   double weight = 0, mean = 0, square = 0;
-  ChannelError error;
+  std::size_t windows = 0;
   for (std::size_t i = 0; i < measured.windows.size(); ++i) {
     if (!both(measured, told, c, i)) continue;
-    const double w = measured.weight[c][i], r = measured.y[c][i] - told[c][i];
-    weight += w, mean += w * r, square += w * r * r, ++error.windows;
+    const double w = measured.weight[c][i], r = measured.y[c][i] - *told[c][i];
+    weight += w, mean += w * r, square += w * r * r, ++windows;
   }
-  if (!(weight > 0)) return error;
+  if (!(weight > 0)) return std::nullopt;
   mean /= weight;
-  error.value = std::sqrt(std::max(0.0, square / weight - (about_mean ? mean * mean : 0.0)));
-  return error;
+  return ChannelError{std::sqrt(std::max(0.0, square / weight - (about_mean ? mean * mean : 0.0))), windows};
 }
 
 tl::expected<std::string, report::PlotError> residual_section(const Observations& measured, const Told& before,
@@ -105,8 +105,8 @@ tl::expected<std::string, report::PlotError> residual_section(const Observations
   for (std::size_t k = 0; k < kChannels; ++k) {
     const auto c = static_cast<Channel>(k);
     const auto b = channel_error(measured, before, c), a = channel_error(measured, after, c);
-    if (b.windows < 8) continue;
-    table += row(channel_name(c), number(b.value) + " → " + number(a.value));
+    if (!b || !a || b->windows < 8) continue;
+    table += row(channel_name(c), number(b->value) + " → " + number(a->value));
     const auto drawn = picture(measured, before, after, c);
     if (!drawn) return drawn;
     pictures += *drawn;

@@ -14,27 +14,42 @@ std::string of_worlds(int count, const SelfTestRow& r) {
 }
 
 std::string sentence(const SelfTestRow& r) {
-  const std::string hidden = r.hidden;
-  if (hidden == "none") return "something was named, or called unknown, in " + of_worlds(r.worlds - r.alone, r);
-  std::string text = (hidden == "unknown" ? "called unknown in " : "named alone in ") + of_worlds(r.alone, r) +
-                     ", in what was told in " + of_worlds(r.in_set, r) + ", a wrong name in " + of_worlds(r.wrong, r);
+  if (r.hidden == Hidden::nothing)
+    return "something was named, or called unknown, in " + of_worlds(r.worlds - r.alone, r);
+  std::string text = (r.hidden == Hidden::structure ? "called unknown in " : "named alone in ") +
+                     of_worlds(r.alone, r) + ", in what was told in " + of_worlds(r.in_set, r) + ", a wrong name in " +
+                     of_worlds(r.wrong, r);
   if (*r.other) text += "; otherwise mostly: " + std::string(r.other);
   return text;
 }
 
-std::string shown(const SelfTestRow& r) {
-  const std::string hidden = r.hidden;
-  return row(hidden == "none"      ? "Nothing hidden"
-             : hidden == "unknown" ? "Something outside the catalogue hidden"
-                                   : spoken(hidden) + " hidden",
-             sentence(r));
+std::string title(const SelfTestRow& r) {
+  switch (r.hidden) {
+    case Hidden::nothing:
+      return "Nothing hidden";
+    case Hidden::structure:
+      return "Something outside the catalogue hidden";
+    default:
+      return spoken(r.cause) + " hidden";
+  }
+}
+
+std::string shown(const SelfTestRow& r) { return row(title(r), sentence(r)); }
+
+template <typename Matches>
+const SelfTestRow* first(std::span<const SelfTestRow> rows, Matches matches) {
+  const auto at = std::ranges::find_if(rows, matches);
+  return at == rows.end() ? nullptr : &*at;
 }
 
 }  // namespace
 
-const SelfTestRow* SelfTest::of(const std::string& hidden) const {
-  const auto at = std::find_if(rows.begin(), rows.end(), [&](const SelfTestRow& r) { return r.hidden == hidden; });
-  return at == rows.end() ? nullptr : &*at;
+const SelfTestRow* SelfTest::of(const std::string& cause) const {
+  return first(rows, [&](const SelfTestRow& r) { return r.hidden == Hidden::cause && r.cause == cause; });
+}
+
+const SelfTestRow* SelfTest::of(Hidden hidden) const {
+  return first(rows, [&](const SelfTestRow& r) { return r.hidden == hidden; });
 }
 
 const SelfTest& self_test() {
@@ -49,10 +64,10 @@ std::string self_test_section(const std::vector<std::string>& names) {
                      " made flights each, by a generator with other formulas, effects of the size of the table in "
                      "core/study/confusion.md, seed " +
                      std::to_string(test.seed) + ".</p>\n<table>\n";
-  std::vector<std::string> told = names;
-  told.insert(told.end(), {"none", "unknown"});
-  for (const auto& name : told)
+  for (const auto& name : names)
     if (const auto* r = test.of(name)) text += shown(*r);
+  for (const Hidden hidden : {Hidden::nothing, Hidden::structure})
+    if (const auto* r = test.of(hidden)) text += shown(*r);
   text += "</table>\n<details><summary>Every cause</summary>\n<table>\n";
   for (const auto& r : test.rows) text += shown(r);
   return text + "</table>\n</details>\n</section>\n";

@@ -8,9 +8,17 @@
 
 namespace backwash::study {
 
-/// How worlds with one hidden cause, at the size of confusion.md, were told: a row of its table.
+/// What a world hides.
+enum class Hidden {
+  cause,      ///< of the catalogue
+  structure,  ///< something outside the catalogue: `unknown` in confusion.md
+  nothing,    ///< `none`
+};
+
+/// How worlds that hide one thing, at the size of confusion.md, were told: a row of its table.
 struct SelfTestRow {
-  const char* hidden;  ///< cause, "unknown" (outside the catalogue) or "none"
+  Hidden hidden;
+  const char* cause;  ///< its name; empty where none of the catalogue is hidden
   int worlds;
   int alone;          ///< exactly what was hidden was told
   int in_set;         ///< what was hidden was in what was told
@@ -23,7 +31,8 @@ struct SelfTest {
   std::uint64_t seed;
   int flights;
   std::span<const SelfTestRow> rows;
-  const SelfTestRow* of(const std::string& hidden) const;  ///< null: not tested
+  const SelfTestRow* of(const std::string& cause) const;  ///< null: not tested
+  const SelfTestRow* of(Hidden hidden) const;             ///< where no cause is hidden
 };
 const SelfTest& self_test();
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/inference/coverage.hpp"
 #include "core/study/inference/estimate.hpp"
 
 namespace backwash::study {
@@ -34,13 +35,6 @@ std::vector<double> held_out(const Accepted& cause, const Normal& normal, const 
   return sum;
 }
 
-/// P(|N(mean, variance)| ≤ 1.645 √model).
-double within_interval(double mean, double variance, double model) {
-  const double limit = kRules.normal_95 * std::sqrt(model);
-  const double s = std::sqrt(2 * std::max(variance, kRules.least_variance.value));
-  return 0.5 * (std::erf((limit - mean) / s) + std::erf((limit + mean) / s));
-}
-
 /// Share of the windows' samples within the central 90 %, without and with what the cause moves by channel.
 void add_coverage(Gain& gain, const Observations& seen, const std::array<std::vector<double>, kChannels>& moved) {
   double covered_before = 0, covered_after = 0, samples = 0;
@@ -51,8 +45,8 @@ void add_coverage(Gain& gain, const Observations& seen, const std::array<std::ve
       if (!(seen.weight[variance][i] > 0)) continue;
       const double m = seen.y[mean][i], x_m = moved[mean].empty() ? 0 : moved[mean][i];
       const double factor = moved[variance].empty() ? 1 : std::exp(moved[variance][i]);
-      covered_before += within_interval(m, w.measured_variance[axis], w.sigma[axis]);
-      covered_after += within_interval(m - x_m, w.measured_variance[axis], w.sigma[axis] * factor);
+      covered_before += share_of_interval(m, w.measured_variance[axis], w.sigma[axis]);
+      covered_after += share_of_interval(m - x_m, w.measured_variance[axis], w.sigma[axis] * factor);
       samples += 1;
     }
   }

@@ -128,7 +128,7 @@ std::string figures(const NamedCause& cause) {
 std::string share(double value) { return number(100 * value) + " %"; }
 
 std::string plan_text(const Outcome& o) {
-  if (o.plan != "ok") return o.plan;
+  if (o.plan != plan::PlanStatus::ok) return o.plan ? plan::to_string(*o.plan) : "";
   return number(o.length_m) + " m in " + number(o.time_s) + " s, " + number(100 * o.clearance_m) + " cm clear";
 }
 
@@ -150,7 +150,7 @@ std::string consequence_section(const Consequence& c) {
        number(100 * b.extent_median) + " (" + number(100 * b.extent_95) + ") cm",
        number(100 * a.extent_median) + " (" + number(100 * a.extent_95) + ") cm");
   if (b.safe + a.safe > 0) line("Flown places where hovering is safe", share(b.safe), share(a.safe));
-  if (!b.plan.empty()) {
+  if (b.plan) {
     const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
     line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
   }

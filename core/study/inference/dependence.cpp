@@ -29,32 +29,6 @@ double median_distance(const MatrixXd& points) {
   return *middle;
 }
 
-/// Φ, n × r: ΦΦᵀ is the Gaussian kernel of the points but for kRules.kernel_error.
-MatrixXd features(const MatrixXd& points) {
-  const Index n = points.rows(), most = std::min(n, kMostFeatures);
-  const double scale = -0.5 / std::pow(median_distance(points), 2);
-  MatrixXd phi = MatrixXd::Zero(n, most);
-  Eigen::VectorXd left = Eigen::VectorXd::Ones(n);
-  for (Index k = 0; k < most; ++k) {
-    Index pivot = 0;
-    const double largest = left.maxCoeff(&pivot);
-    if (largest < kRules.kernel_error) return phi.leftCols(k);
-    const Eigen::VectorXd kernel =
-        (scale * (points.rowwise() - points.row(pivot)).rowwise().squaredNorm()).array().exp();
-    phi.col(k) = (kernel - phi.leftCols(k) * phi.row(pivot).head(k).transpose()) / std::sqrt(largest);
-    left -= phi.col(k).cwiseAbs2();
-  }
-  return phi;
-}
-
-MatrixXd centred(MatrixXd phi, const std::vector<std::size_t>& first) {
-  for (std::size_t f = 0; f + 1 < first.size(); ++f) {
-    auto own = phi.middleRows(static_cast<Index>(first[f]), static_cast<Index>(first[f + 1] - first[f]));
-    if (own.rows() > 0) own.rowwise() -= own.colwise().mean().eval();
-  }
-  return phi;
-}
-
 /// ΦᵀΨ of one flight with Ψ turned round, a column for each turn; the first is as flown.
 MatrixXd turned_products(const MatrixXd& phi, const MatrixXd& psi) {
   const Index n = phi.rows(), turns = std::min(n, kMostTurns);
@@ -66,29 +40,6 @@ MatrixXd turned_products(const MatrixXd& phi, const MatrixXd& psi) {
     products.col(j) = product.reshaped();
   }
   return products;
-}
-
-/// `phi` centred within flights. Ends when `enough` draws are as large as the data.
-Independence turn_test(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first, int shifts,
-                       int enough, unsigned seed) {
-  std::vector<MatrixXd> products;
-  for (std::size_t f = 0; f + 1 < first.size(); ++f) {
-    const auto begin = static_cast<Index>(first[f]), count = static_cast<Index>(first[f + 1] - first[f]);
-    if (count > 0) products.push_back(turned_products(phi.middleRows(begin, count), psi.middleRows(begin, count)));
-  }
-  const double n2 = std::pow(static_cast<double>(phi.rows()), 2);
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(phi.cols() * psi.cols());
-  for (const auto& p : products) sum += p.col(0);
-  const double hsic = sum.squaredNorm() / n2;
-  std::mt19937_64 rng(seed);
-  int above = 1, draw = 0;
-  for (; draw < shifts && above <= enough; ++draw) {
-    sum.setZero();
-    for (const auto& p : products)
-      sum += p.col(static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(p.cols())));
-    above += sum.squaredNorm() / n2 >= hsic * (1 - kRules.same) ? 1 : 0;
-  }
-  return {hsic, above / (1.0 + draw)};
 }
 
 /// Rows of the windows that measure every channel of a group, and where each flight begins among them.
@@ -158,9 +109,51 @@ MatrixXd remainder(const Column& whitened, const std::vector<Channel>& group, co
 
 }  // namespace
 
-Independence independence(const MatrixXd& x, const MatrixXd& y, const std::vector<std::size_t>& first, int shifts,
-                          unsigned seed) {
-  return turn_test(centred(features(x), first), features(y), first, shifts, shifts, seed);
+MatrixXd kernel_features(const MatrixXd& points) {
+  const Index n = points.rows(), most = std::min(n, kMostFeatures);
+  const double scale = -0.5 / std::pow(median_distance(points), 2);
+  MatrixXd phi = MatrixXd::Zero(n, most);
+  Eigen::VectorXd left = Eigen::VectorXd::Ones(n);
+  for (Index k = 0; k < most; ++k) {
+    Index pivot = 0;
+    const double largest = left.maxCoeff(&pivot);
+    if (largest < kRules.kernel_error) return phi.leftCols(k);
+    const Eigen::VectorXd kernel =
+        (scale * (points.rowwise() - points.row(pivot)).rowwise().squaredNorm()).array().exp();
+    phi.col(k) = (kernel - phi.leftCols(k) * phi.row(pivot).head(k).transpose()) / std::sqrt(largest);
+    left -= phi.col(k).cwiseAbs2();
+  }
+  return phi;
+}
+
+MatrixXd centred(MatrixXd phi, const std::vector<std::size_t>& first) {
+  for (std::size_t f = 0; f + 1 < first.size(); ++f) {
+    auto own = phi.middleRows(static_cast<Index>(first[f]), static_cast<Index>(first[f + 1] - first[f]));
+    if (own.rows() > 0) own.rowwise() -= own.colwise().mean().eval();
+  }
+  return phi;
+}
+
+Independence turn_test(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first, int shifts,
+                       int enough, unsigned seed) {
+  std::vector<MatrixXd> products;
+  for (std::size_t f = 0; f + 1 < first.size(); ++f) {
+    const auto begin = static_cast<Index>(first[f]), count = static_cast<Index>(first[f + 1] - first[f]);
+    if (count > 0) products.push_back(turned_products(phi.middleRows(begin, count), psi.middleRows(begin, count)));
+  }
+  const double n2 = std::pow(static_cast<double>(phi.rows()), 2);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(phi.cols() * psi.cols());
+  for (const auto& p : products) sum += p.col(0);
+  const double hsic = sum.squaredNorm() / n2;
+  std::mt19937_64 rng(seed);
+  int above = 1, draw = 0;
+  for (; draw < shifts && above <= enough; ++draw) {
+    sum.setZero();
+    for (const auto& p : products)
+      sum += p.col(static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(p.cols())));
+    above += sum.squaredNorm() / n2 >= hsic * (1 - kRules.same) ? 1 : 0;
+  }
+  return {hsic, above / (1.0 + draw)};
 }
 
 std::vector<double> holm(const std::vector<double>& p) {
@@ -194,9 +187,9 @@ std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std
   for (const auto& [name, channels] : channel_groups()) {
     const Rows rows = rows_of(evidence, channels);
     if (rows.window.empty()) continue;
-    const MatrixXd psi = features(remainder(whitened, channels, rows));
+    const MatrixXd psi = kernel_features(remainder(whitened, channels, rows));
     for (const auto& along : along_all) {
-      const MatrixXd phi = centred(features(points_of(along, seen.windows, rows)), rows.first);
+      const MatrixXd phi = centred(kernel_features(points_of(along, seen.windows, rows)), rows.first);
       if (!(phi.squaredNorm() > kRules.constant_regressor)) continue;  // constant within every flight
       const auto test = turn_test(phi, psi, rows.first, draws, static_cast<int>(kRules.enough_turns), seed);
       all.push_back({along.name, name, test.hsic, test.p, 1, false}), p.push_back(test.p);

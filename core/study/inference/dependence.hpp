@@ -10,18 +10,24 @@
 
 namespace backwash::study {
 
+/// Φ, n × r: ΦΦᵀ is the Gaussian kernel exp(−|·|²/2σ²) of the rows of `points` (n × d), σ the median of their distances
+/// that are not 0. Low rank (pivoted Cholesky), each entry to kRules.kernel_error. Precondition: n > 0.
+Eigen::MatrixXd kernel_features(const Eigen::MatrixXd& points);
+
+/// Features less their mean over each flight, whose rows are first[f] … first[f + 1] − 1.
+Eigen::MatrixXd centred(Eigen::MatrixXd phi, const std::vector<std::size_t>& first);
+
 struct Independence {
   double hsic, p;
 };
 
-/// Hilbert–Schmidt independence criterion given the flight, tr(K H L H)/n²: K and L Gaussian kernels of the rows of x
-/// (n × d) and y (n × e), exp(−|·|²/2σ²), σ the median of the distances that are not 0; H centres within each flight,
-/// whose rows first[f] … first[f + 1] − 1 are in the order of time. One flight: the usual (biased) HSIC.
-/// p: share of `shifts` draws, the data counted, that are at least as large when each flight's y is turned round by an
-/// amount of its own, which keeps the autocorrelation of both. Exact up to the seam where a flight's end meets its
-/// beginning. Kernels are low rank (pivoted Cholesky, each entry to 1e-5). Precondition: n > 0. Offline.
-Independence independence(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const std::vector<std::size_t>& first,
-                          int shifts, unsigned seed);
+/// Hilbert–Schmidt independence criterion given the flight, tr(K H L H)/n² = |ΦᵀΨ|²/n² with K = ΦΦᵀ, L = ΨΨᵀ, H that
+/// centres within each flight (`phi` is centred). Rows are in the order of time. One flight: the usual (biased) HSIC.
+/// p: share of `shifts` draws, the data counted, that are at least as large when each flight's psi is turned round by
+/// an amount of its own, which keeps the autocorrelation of both. Exact up to the seam where a flight's end meets its
+/// beginning. Ends when more than `enough` draws are as large as the data. Offline.
+Independence turn_test(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& psi, const std::vector<std::size_t>& first,
+                       int shifts, int enough, unsigned seed);
 
 /// p values multiplied by the number of those not smaller, made monotone, at most 1 (Holm); in the order given.
 std::vector<double> holm(const std::vector<double>& p);

@@ -33,6 +33,12 @@ struct Normal {
   std::vector<double> gain_per_flight() const;
 };
 
+/// Variances of a channel, of windows within a flight, of flights, and of units of several flights (none of their own
+/// where a unit is a flight).
+struct Scatter {
+  double within, between, units;
+};
+
 /// Scatter between the rotors and sensors of a craft that is no effect and that no number of flights averages out.
 double built_scatter(Channel c);
 
@@ -68,9 +74,7 @@ class Evidence {
   Column whitened(const std::vector<Column>& columns) const;
   /// Whether a window measures a channel (decorrelated).
   bool measured(Channel c, std::size_t window) const { return weight_[c][window] > 0; }
-  double within(Channel c) const { return within_[c]; }
-  double between(Channel c) const { return between_[c]; }
-  double between_units(Channel c) const { return unit_[c]; }  ///< of several flights each; 0 where a unit is a flight
+  Scatter scatter(Channel c) const { return {within_[c], between_[c], unit_[c]}; }
 
  private:
   /// XᵀV⁻¹X of each flight, X the columns and last y.

@@ -36,6 +36,11 @@ Contrast damaged(std::size_t rotor) {
 
 }  // namespace
 
+const char* to_string(RotorState state) {
+  constexpr const char* kNames[] = {"sound", "propeller_damage", "payload"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
 const char* to_string(RotorVerdict::Kind kind) {
   static const char* const kNames[] = {"as_sound", "propeller_damage", "payload", "cannot_distinguish", "neither"};
   return kNames[static_cast<std::size_t>(kind)];
@@ -68,7 +73,8 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
   const double degrees = n - 1, t975 = student_975(degrees),
                needed = student_quantile(1 - kRules.rotor_level / 4, degrees);
   using Kind = RotorVerdict::Kind;
-  RotorVerdict v{Kind::as_sound, {"sound"}, 0, 0, 0, 0, {}, t[0], t[1], t[2], 0, needed, 0};
+  using State = RotorState;
+  RotorVerdict v{Kind::as_sound, {State::sound}, 0, 0, 0, 0, {}, t[0], t[1], t[2], 0, needed, 0};
   double left = 0;
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
     const Contrast unit = damaged(rotor) / error;
@@ -83,17 +89,17 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
   }
   const double f = f_quantile(1 - kRules.rotor_level, 2, degrees);
   const bool twisted = std::abs(t[0]) > t975, apart = t[1] * t[1] + t[2] * t[2] > 2 * f;
-  const auto told = [&v](Kind kind, std::vector<std::string> set) { v.kind = kind, v.set = std::move(set); };
+  const auto told = [&v](Kind kind, std::vector<RotorState> set) { v.kind = kind, v.set = std::move(set); };
   if (v.t_d > needed && !twisted)
-    told(Kind::cannot_distinguish, {"propeller_damage", "payload"});
+    told(Kind::cannot_distinguish, {State::propeller_damage, State::payload});
   else if (v.t_d > needed && left <= 2 * f)
-    told(Kind::propeller_damage, {"propeller_damage"});
+    told(Kind::propeller_damage, {State::propeller_damage});
   else if (v.t_d > needed || (apart && twisted))
     told(Kind::neither, {});
   else if (apart)
-    told(Kind::payload, {"payload"});
+    told(Kind::payload, {State::payload});
   else if (v.minimum > kRules.rotor_of_interest)
-    told(Kind::cannot_distinguish, {"sound", "propeller_damage", "payload"});
+    told(Kind::cannot_distinguish, {State::sound, State::propeller_damage, State::payload});
   return v;
 }
 

@@ -26,6 +26,10 @@ struct RotorNeed {
   double d = 0, low = 0, high = 0;
 };
 
+/// What may be the matter with rotors, told by their commands alone.
+enum class RotorState { sound, propeller_damage, payload };
+const char* to_string(RotorState state);
+
 /// What a group of flights says of its rotors against flights of the same vehicle known to be sound.
 struct RotorVerdict {
   enum class Kind {
@@ -35,7 +39,7 @@ struct RotorVerdict {
     cannot_distinguish,  ///< what `set` holds
     neither,             ///< differs, and fits neither
   } kind;
-  std::vector<std::string> set;        ///< all that the flights do not tell apart: sound, propeller_damage, payload
+  std::vector<RotorState> set;         ///< all that the flights do not tell apart
   std::size_t rotor = 0;               ///< 1 … 4, the damage that fits best
   double d = 0, low = 0, high = 0;     ///< share of thrust command that `rotor` needs more, 95 %
   std::array<RotorNeed, 4> each;       ///< of every rotor, if it is that one alone

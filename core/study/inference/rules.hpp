@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string_view>
 #include <vector>
 
-namespace backwash::study {
+#include "core/study/windows/rule.hpp"
 
-/// A constant of the inference with its unit and why it is that: derived, measured (where) or chosen.
-struct Rule {
-  std::string_view name;
-  double value;
-  std::string_view unit, reason;
-  constexpr operator double() const { return value; }
-};
+namespace backwash::study {
 
 /// Every constant that decides what a study says (`backwash study --rules`). Members are rules and nothing else: the
 /// printed list is the struct itself. Floors of single effects are in their files.
@@ -119,7 +112,7 @@ struct Rules {
 };
 inline constexpr Rules kRules;
 
-/// All of them, in the order of the struct.
+/// All of them and those of the windows (WindowRules), in the order of the structs.
 std::vector<Rule> rules();
 
 }  // namespace backwash::study

@@ -176,7 +176,7 @@ double Evidence::trim_scatter(const Column& residual) const {
 void Evidence::weigh_means(const std::vector<double>& ln_variance) {
   double error = 0, count = 0;
   for (const double w : weight_[kVarX])
-    if (w > 0) error += 1 / w - kScatter2, count += 1;
+    if (w > 0) error += 1 / w - kWindowRules.scatter2, count += 1;
   if (count == 0) return;
   const double typical =
       static_cast<double>(count) / std::accumulate(weight_[kVarX].begin(), weight_[kVarX].end(), 0.0);
@@ -192,8 +192,8 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
       const double ln = std::clamp((mean + own) / std::sqrt(3.0), -most, most);
       for (std::size_t k = 0; k < 3; ++k) {
         const double modelled = seen_->windows[i].sigma[static_cast<Eigen::Index>(k)];
-        weight_[kMeanX + k][i] =
-            seen_->weight[kMeanX + k][i] * (modelled + kMeanNoise) / (modelled * std::exp(ln) + kMeanNoise);
+        weight_[kMeanX + k][i] = seen_->weight[kMeanX + k][i] * (modelled + kWindowRules.mean_noise) /
+                                 (modelled * std::exp(ln) + kWindowRules.mean_noise);
       }
     }
   }

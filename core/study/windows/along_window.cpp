@@ -5,11 +5,6 @@
 #include "core/study/windows/observation.hpp"
 
 namespace backwash::study {
-namespace {
-
-constexpr double kStill = 0.05;  // m: a window whose ways are shorter is one place
-
-}  // namespace
 
 Vec3 WindowRow::ln_sigma_at(const Vec3& offset_W) const {
   constexpr double kHalf = (kOffsetsAside - 1) / 2.0;
@@ -34,11 +29,11 @@ Vec3 WindowRow::ln_sigma_at(const Vec3& offset_W) const {
 void Observer::look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v) {
   const auto sample = [&](std::size_t k) { return w.begin + (2 * k + 1) * w.size() / (2 * kPoints); };
   const auto at = [&](std::size_t k) -> const Vec3& { return p[sample(k)]; };
-  const bool still = (at(0) - at(kPoints - 1)).norm() + (at(0) - at(kPoints / 2)).norm() < kStill;
+  const bool still = (at(0) - at(kPoints - 1)).norm() + (at(0) - at(kPoints / 2)).norm() < kWindowRules.one_place;
   // An offset that puts the craft into a solid says nothing of the air there: as far along it as is free.
   const auto sigma = [&](const Vec3& from_W, const Vec3& offset_W) {
     double share = 1;
-    while (share > 0 && surroundings_.inside_solid(from_W + share * offset_W)) share -= 0.25;
+    while (share > 0 && surroundings_.inside_solid(from_W + share * offset_W)) share -= kWindowRules.offset_retreat;
     return surroundings_.sigma(from_W + share * offset_W);
   };
   const auto along = [&](const Vec3& offset_W) {
@@ -58,7 +53,10 @@ void Observer::look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p,
     constexpr double kMiddle = (kOffsetsAside - 1) / 2;
     const Vec3 offset_W = kOffsetStep * Vec3(static_cast<double>(n / kOffsetsAside) - kMiddle,
                                              static_cast<double>(n % kOffsetsAside) - kMiddle, 0);
-    row.ln_sigma_moved[n] = (along(offset_W).array() / row.sigma.array()).log().max(-2.0).min(2.0);
+    row.ln_sigma_moved[n] = (along(offset_W).array() / row.sigma.array())
+                                .log()
+                                .max(-kWindowRules.offset_limit)
+                                .min(kWindowRules.offset_limit);
   }
 }
 

@@ -51,7 +51,9 @@ void both_ways(const Biquad& f, std::vector<double>& x) {
 
 }  // namespace
 
-Band Band::within(double rate_hz) const noexcept { return {low_hz, std::min(high_hz, 0.4 * rate_hz)}; }
+Band Band::within(double rate_hz) const noexcept {
+  return {low_hz, std::min(high_hz, kWindowRules.rate_share * rate_hz)};
+}
 
 std::vector<double> band_passed(std::span<const double> signal, double rate_hz, const Band& band) {
   const std::size_t n = signal.size();
@@ -90,8 +92,9 @@ double loop_attenuation(double k_p, double k_d, double delay_s, double lag_s, do
                         const std::optional<Band>& band) {
   using Complex = std::complex<double>;
   // Even steps in ln f: the integrand is smooth in it from far below to far above every corner.
-  const double low = std::log(band ? band->low_hz : 1e-4), high = std::log(band ? band->high_hz : 1e5 / tau_w);
-  const int steps = static_cast<int>(std::ceil((high - low) / 0.01));
+  const double low = std::log(band ? band->low_hz : kWindowRules.integral_low),
+               high = std::log(band ? band->high_hz : kWindowRules.integral_high / tau_w);
+  const int steps = static_cast<int>(std::ceil((high - low) / kWindowRules.integral_step));
   double passed = 0, whole = 0;
   for (int i = 0; i < steps; ++i) {
     const double f = std::exp(low + (high - low) * (i + 0.5) / steps), omega = 2 * std::numbers::pi * f;

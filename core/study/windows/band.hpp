@@ -5,14 +5,16 @@
 #include <span>
 #include <vector>
 
+#include "core/study/windows/window_rules.hpp"
 #include "core/types/vehicle.hpp"
 
 namespace backwash::study {
 
 /// Frequencies that a variance counts, Hz (docs/model.md section 3).
 struct Band {
-  double low_hz = 0.2, high_hz = 20;
-  /// The band that a signal of this rate can carry: the top is lowered to 0.4·rate, below the Nyquist frequency.
+  double low_hz = kWindowRules.band_low, high_hz = kWindowRules.band_high;
+  /// The band that a signal of this rate can carry: the top is lowered to rate_share of the rate, below the Nyquist
+  /// frequency.
   Band within(double rate_hz) const noexcept;
 };
 
@@ -30,7 +32,7 @@ struct Correlation {
 };
 /// Autocorrelation of a signal about its mean, lags up to `longest_s`. Both times are at least half a sample (white
 /// noise). O(n·lags). A constant signal counts as white.
-Correlation correlation(std::span<const double> signal, double rate_hz, double longest_s = 2.0);
+Correlation correlation(std::span<const double> signal, double rate_hz, double longest_s = kWindowRules.window_length);
 
 /// var(a)/var(w) of a closed position loop held at rest, for a disturbance w of correlation time tau_w (s; spectrum
 /// 1/(1 + (2πfτ)²)): ∫|H|²S / ∫S with H(s) = 1/(1 + (k_p + k_d s) e^(−s·delay)/(s² (1 + lag s))) (docs/model.md section

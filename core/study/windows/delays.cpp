@@ -32,15 +32,16 @@ void Observer::put_delays(const Series& s, Stretch w) {
     const auto flown_rate = rates(s, w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); });
     const Moment delay(rate), slope(level);
     ThrustMoments moments{seen_.windows.size() - 1};
-    if (delay.excited(0.05)) {
+    const bool late = delay.excited(kWindowRules.excited_rate), steep = slope.excited(kWindowRules.excited_level);
+    if (late) {
       moments.delay = {delay.with(level), delay.with(rate)};
       put(kThrustDelay, delay.with(r), 1);
     }
-    if (slope.excited(0.05)) {
+    if (steep) {
       moments.slope = {slope.with(level), slope.with(rate)};
       put(kThrustSlope, slope.with(r), 1);
     }
-    if (delay.excited(0.05) || slope.excited(0.05)) {
+    if (late || steep) {
       thrust_stage_.add({level, rate}, {flown, flown_rate});
       thrust_moments_.push_back(moments);
     }
@@ -56,7 +57,7 @@ void Observer::put_command_delay(const Series& s, Stretch w, int from, int to) {
   for (int axis = from; axis < to; ++axis) {
     const auto nominal = [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; };
     const Moment m(rates(s, w, nominal));
-    if (!m.excited(0.05)) continue;
+    if (!m.excited(kWindowRules.excited_rate)) continue;
     const double norm = std::sqrt(m.square);
     y -= norm * m.with(detrended_values(w, [&](std::size_t i) { return s.a[i][axis] - nominal(i); }));
     square += m.square;

@@ -8,7 +8,7 @@
 namespace backwash::study {
 namespace {
 
-/// Rows whose position is exactly that of the row before, at least four and so many seconds in a row.
+/// Rows whose position is exactly that of the row before, at least frozen_rows and so many seconds in a row.
 std::vector<char> frozen_rows(const log::FlightLog& log, const std::vector<std::size_t>& rows, double seconds) {
   const auto &x = log.column("x_m"), &y = log.column("y_m"), &z = log.column("z_m");
   const auto repeats = [&](std::size_t k) {
@@ -19,7 +19,8 @@ std::vector<char> frozen_rows(const log::FlightLog& log, const std::vector<std::
   for (std::size_t k = 1; k < rows.size();) {
     std::size_t end = k;
     while (end < rows.size() && repeats(end)) ++end;
-    if (end - k >= 3 && log.t_s[rows[end - 1]] - log.t_s[rows[k - 1]] >= seconds)
+    if (static_cast<double>(end - k + 1) >= kWindowRules.frozen_rows &&
+        log.t_s[rows[end - 1]] - log.t_s[rows[k - 1]] >= seconds)
       std::fill(frozen.begin() + static_cast<std::ptrdiff_t>(k - 1), frozen.begin() + static_cast<std::ptrdiff_t>(end),
                 char{1});
     k = std::max(end, k + 1);
@@ -117,7 +118,8 @@ bool under_way(const Series& s, Stretch w, const WindowOptions& options) {
   for (std::size_t a = w.begin, b = w.begin; b < w.end; ++b) {
     while (s.t[b] - s.t[a] > options.still_s) ++a;
     const double time = s.t[b] - s.t[a];
-    if (time > 0.8 * options.still_s && (s.p[b] - s.p[a]).norm() > options.still_mps * time) return true;
+    if (time > kWindowRules.still_enough * options.still_s && (s.p[b] - s.p[a]).norm() > options.still_mps * time)
+      return true;
   }
   return false;
 }

@@ -41,7 +41,7 @@ void add_windows(const Even& e, Stretch stretch, std::size_t length, FlightWindo
   for (std::size_t begin = stretch.begin; begin < stretch.end; begin += length) {
     const Stretch s{begin, begin + length};
     Window window{e.t0 + static_cast<double>(begin) / e.rate,
-                  e.segment[begin],
+                  *e.segment[begin],
                   mean_of(e.p, s),
                   {},
                   0,
@@ -84,7 +84,7 @@ void cut(const Even& e, const log::FlightLog& log, Stretch raw, const LogGates& 
   for (std::size_t begin = 0; begin < e.size();) {
     std::size_t end = begin;
     while (end < e.size() && e.segment[end] == e.segment[begin]) ++end;
-    const bool hover = e.segment[begin] >= 0;
+    const bool hover = e.segment[begin].has_value();
     const auto settling = static_cast<std::size_t>(std::lround(options.settle_s * e.rate));
     const std::size_t first = hover ? std::min(end, begin + settling) : end;
     transit += in_windows(first - begin);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/study/windows/window_rules.hpp"
+
 namespace backwash::study {
 
 void FirstStage::add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust) {
@@ -18,7 +20,8 @@ void FirstStage::add(const std::array<std::vector<double>, 2>& z, const std::arr
 }
 
 Eigen::Matrix2d FirstStage::coefficients() const {
-  if (!(instruments.determinant() > 1e-6 * instruments(0, 0) * instruments(1, 1))) return Eigen::Matrix2d::Identity();
+  if (!(instruments.determinant() > kWindowRules.no_turn * instruments(0, 0) * instruments(1, 1)))
+    return Eigen::Matrix2d::Identity();
   return instruments.ldlt().solve(followed);
 }
 
@@ -34,9 +37,8 @@ double between(const DelayStage::PerSecond& design, double shift) {
 }  // namespace
 
 std::vector<std::pair<std::size_t, double>> DelayStage::designs() const {
-  constexpr int kSteps = 20;
   double shift = 0;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int turn = 0; turn < kWindowRules.delay_turns; ++turn) {
     double product = 0, square = 0;
     for (const auto& w : seen_) {
       const double g = between(w.design, shift);

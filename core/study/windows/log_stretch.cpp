@@ -5,10 +5,6 @@
 #include <cmath>
 
 namespace backwash::study {
-bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit) {
-  return log.has(prefix + "x" + unit) && log.has(prefix + "y" + unit) && log.has(prefix + "z" + unit);
-}
-
 namespace {
 
 /// The rows of a log at even times.
@@ -16,7 +12,7 @@ class Resampler {
  public:
   Resampler(const log::FlightLog& log, Stretch rows, double rate) : log_(log) {
     const auto& t = log.t_s;
-    const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + 1e-6) + 1;
+    const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + kWindowRules.row_error) + 1;
     std::size_t row = rows.begin;
     for (std::size_t k = 0; k < count; ++k) {
       const double time = t[rows.begin] + static_cast<double>(k) / rate;
@@ -92,15 +88,15 @@ std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log
 }
 
 /// Hover positions found by the speed, averaged over `still_s`.
-std::vector<int> found_segments(const std::vector<Vec3>& path, double rate, double still_mps, double still_s,
-                                int& next) {
+std::vector<std::optional<int>> found_segments(const std::vector<Vec3>& path, double rate, double still_mps,
+                                               double still_s, int& next) {
   const auto half = static_cast<std::size_t>(std::max(1.0, std::round(still_s / 2 * rate)));
-  std::vector<int> segment(path.size(), -1);
+  std::vector<std::optional<int>> segment(path.size());
   for (std::size_t k = 0; k < path.size(); ++k) {
     const std::size_t low = k > half ? k - half : 0, high = std::min(k + half, path.size() - 1);
     const double seconds = static_cast<double>(high - low) / rate;
     const bool still = seconds > 0 && (path[high] - path[low]).norm() < still_mps * seconds;
-    if (still) segment[k] = k > 0 && segment[k - 1] >= 0 ? segment[k - 1] : next++;
+    if (still) segment[k] = k > 0 && segment[k - 1] ? *segment[k - 1] : next++;
   }
   return segment;
 }
@@ -119,12 +115,12 @@ Even even_stretch(const log::FlightLog& log, Stretch raw, double rate, Signal si
     }
   }
   if (log.has("segment")) {
-    for (std::size_t k = 0; k < e.size(); ++k)
-      e.segment.push_back(static_cast<int>(std::lround(log.column("segment")[rows.nearest(k)])));
+    for (std::size_t k = 0; k < e.size(); ++k) e.segment.push_back(segment_of(log.column("segment")[rows.nearest(k)]));
   } else {
     const bool commanded = has_xyz(log, "cmd_", "_m");
-    e.segment = found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate, commanded ? 0.01 : options.still_mps,
-                               options.still_s, next_segment);
+    e.segment =
+        found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate,
+                       commanded ? kWindowRules.still_command.value : options.still_mps, options.still_s, next_segment);
   }
   e.w = signal == Signal::commanded ? beyond_command(e, rows, log, *vehicle) : e.a;
   return e;

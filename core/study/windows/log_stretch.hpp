@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/log/log_columns.hpp"
 #include "core/study/windows/hover_windows.hpp"
 
 namespace backwash::study {
@@ -17,11 +18,9 @@ struct Even {
   double t0, rate;
   std::vector<Vec3> p, v, a, w;  ///< w: the disturbance
   std::vector<Eigen::Quaterniond> q;
-  std::vector<int> segment;  ///< −1: transit
+  std::vector<std::optional<int>> segment;  ///< hover position; none in transit
   std::size_t size() const { return p.size(); }
 };
-
-bool has_xyz(const log::FlightLog& log, const std::string& prefix, const std::string& unit);
 
 /// Rows `raw` of a log (no gap inside) at even spacing 1/rate, with the disturbance as `signal` defines it
 /// (flight_windows() has the equation). New hover positions are numbered from `next_segment` on.

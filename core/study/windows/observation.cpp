@@ -17,19 +17,16 @@
 namespace backwash::study {
 namespace {
 
-constexpr double kLeastGusts = 0.2;  // share of a window's variance that is left when noise is taken out
-constexpr double kStray = 0.3;       // m: a craft farther from where its set-points lead does not follow them
-
 template <typename T, typename F>
 T mean(Stretch w, T sum, F value) {
   for (std::size_t i = w.begin; i < w.end; ++i) sum += value(i) / static_cast<double>(w.size());
   return sum;
 }
 
-/// Power of gusts of variance 1 and correlation e^{−|t|/0.15 s} at a share of the sampling rate, over that of white
+/// Power of gusts of variance 1 and correlation e^{−|t|/τ_w} at a share of the sampling rate, over that of white
 /// noise of variance 1.
 double gusts_at(double folded, double dt) {
-  const double a = std::exp(-dt / BoundModel().tau_w);
+  const double a = std::exp(-dt / kWindowRules.tau_w);
   return (1 - a * a) / (1 + a * a - 2 * a * std::cos(2 * std::numbers::pi * folded));
 }
 
@@ -89,7 +86,7 @@ void Observer::add(const log::FlightLog& log) {
   const Series s = series_of(log, vehicle_);
   for (const auto& [name, column] : log.columns) ever_.insert(name);
   ++seen_.flights;
-  if (s.size() >= kFewest) {
+  if (static_cast<double>(s.size()) >= kWindowRules.fewest_rows) {
     const auto rotors = rotor_phases(log, s);
     std::vector<Stretch> good;
     const WindowOptions options;
@@ -153,7 +150,7 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w
   row.duration = s.t[w.end - 1] - s.t[w.begin];
   // A gust that pushes the craft up is in its mean residual and in its measured height: a place that answers the gusts
   // would explain them. Where the set-points lead is known without them, unless the craft flies elsewhere.
-  const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kStray;
+  const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kWindowRules.stray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
   row.p_W = mean_of(p), row.v_W = mean_of(v);
   const auto& kp = vehicle_.controller.kp;
@@ -169,7 +166,8 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w
   row.around = surroundings_.around(row.p_W);
   if (!surroundings_.has_map()) {  // imported recordings say what stood below and above (backwash import)
     if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
-    if (log.has("ceiling") && column_mean("ceiling") > 0.5) row.around.ceiling_gap = 0.3;
+    if (log.has("ceiling") && column_mean("ceiling") > kWindowRules.yes)
+      row.around.ceiling_gap = kWindowRules.said_ceiling;
   }
   look_along(row, w, p, v);
   if (!as_told) row.speeds.fill(row.speed);
@@ -185,7 +183,9 @@ Residual Observer::put_means(const WindowRow& row, const Series& s, Stretch w) {
     // Unsimulated, a mean would be the velocity's change and no push. It scatters with the modelled variance; the
     // constant stands for the accelerometer's noise.
     if (simulated(s))
-      put(kMeanX + a, mean(w, 0.0, residual), row.duration / kWindow * 0.01 / (row.sigma[axis] + kMeanNoise));
+      put(kMeanX + a, mean(w, 0.0, residual),
+          row.duration / kWindowRules.window_length * kWindowRules.mean_unit /
+              (row.sigma[axis] + kWindowRules.mean_noise));
     rest.x[a] = detrended_values(w, residual);
   }
   return rest;
@@ -202,10 +202,10 @@ void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_h
       const auto [variance, samples] = spread(residuals[i].x[a]);
       row.measured_variance[axis] = variance;
       if (!residuals[i].comparable || !(variance > 0) || !(samples > 2)) continue;
-      const double gusts = std::max(variance - texture.white[axis], kLeastGusts * variance);
+      const double gusts = std::max(variance - texture.white[axis], kWindowRules.least_gusts * variance);
       const double own = ln_variance(samples) * std::pow(variance / gusts, 2);
       seen_.y[kVarX + a][first + i] = std::log(gusts / row.sigma[axis]) - ln_bias(samples);
-      seen_.weight[kVarX + a][first + i] = 1 / (own + kScatter2);
+      seen_.weight[kVarX + a][first + i] = 1 / (own + kWindowRules.scatter2);
     }
     tails_.push_back(residuals[i].comparable ? fourth_moments(residuals[i], texture) : Fourth{});
   }
@@ -225,7 +225,8 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
          rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end, row.lines))
       put(channel, value, weight);
     const double dt = row.duration / static_cast<double>(w.size() - 1);
-    for (Line& line : row.lines) line.floor2 = std::max(0.0, line.floor2 - row.sigma.z() * gusts_at(line.folded, dt));
+    for (auto& line : row.lines)
+      if (line) line->floor2 = std::max(0.0, line->floor2 - row.sigma.z() * gusts_at(line->folded, dt));
   }
   const double period = s.t.back() / static_cast<double>(s.size() - 1);
   seen_.row_period = std::max(seen_.row_period, period);

@@ -17,13 +17,11 @@
 #include "core/study/windows/stretch.hpp"
 #include "core/study/windows/surroundings.hpp"
 #include "core/study/windows/texture.hpp"
+#include "core/study/windows/window_rules.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 
 namespace backwash::study {
-
-/// Variance of ln variance between windows beside its estimate's own; and, (m/s²)², what a mean scatters by beside Σ.
-inline constexpr double kScatter2 = 0.16, kMeanNoise = 0.002;
 
 /// What is measured on every 2 s window: each channel has one number per window and a weight (0: not measured).
 enum Channel : std::size_t {
@@ -50,7 +48,7 @@ enum Channel : std::size_t {
   kRpm2,
   kRpm3,
   kRpm4,
-  kDropout1,  ///< share of samples whose rpm reading is stuck or below 0.3 of its median
+  kDropout1,  ///< share of samples whose rpm reading is stuck or below `dropout` of its median
   kDropout2,
   kDropout3,
   kDropout4,
@@ -61,21 +59,21 @@ const char* channel_name(Channel c);
 /// What flights must hold for an effect to be tested: a map, or something above said by map or log; columns of the log.
 enum class Source : std::size_t { map, ceiling, battery, temperature, attitude, thrust, setpoints, rpm, motors };
 
-/// Level offsets of the map at which Σ is looked up: a square of so many points, and their spacing.
-inline constexpr std::size_t kOffsetsAside = 9;
-inline constexpr double kOffsetStep = 0.1;  ///< m
+/// Level offsets of the map at which Σ is looked up: a square of so many points.
+inline constexpr auto kOffsetsAside = static_cast<std::size_t>(kWindowRules.offsets_aside);
+inline constexpr double kOffsetStep = kWindowRules.offset_step;  ///< m between them
 
 /// Places along a window: a moving vehicle crosses different air at different speeds.
-inline constexpr std::size_t kPoints = 7;
+inline constexpr auto kPoints = static_cast<std::size_t>(kWindowRules.points);
 
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {
   std::size_t flight;
-  int segment;      ///< −1 in transit or unknown
-  double t;         ///< s since the flight's first row, middle of the window
-  double duration;  ///< s
-  Vec3 p_W, v_W;    ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
-  double speed;     ///< m/s, mean of the norm
+  std::optional<int> segment;  ///< none in transit or unknown
+  double t;                    ///< s since the flight's first row, middle of the window
+  double duration;             ///< s
+  Vec3 p_W, v_W;  ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
+  double speed;   ///< m/s, mean of the norm
   std::array<double, kPoints> speeds{}, shares{};  ///< m/s, along the window; of the modelled variance, sum 1
   Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
   double yaw;         ///< rad
@@ -87,13 +85,14 @@ struct WindowRow {
   Vec3 give = Vec3::Zero();   ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
   Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m; 0 where p_W is measured
   Vec3 sigma;                 ///< modelled variance per axis, (m/s²)²
-  /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±2.
+  /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±offset_limit.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   /// Design of kThrustDelay and kThrustSlope, of (delay, slope); 0 where nothing was excited.
   std::array<double, 2> delay_gain{}, slope_gain{};
   std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
   Vec3 measured_variance;                ///< (m/s²)²
-  std::array<Line, 4> lines{};           ///< of the rotors along z, the gusts' share taken out of floor2, (m/s²)²
+  std::array<std::optional<Line>, 4>
+      lines{};  ///< of the rotors along z, none that cannot be told, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
 };

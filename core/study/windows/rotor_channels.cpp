@@ -9,6 +9,7 @@
 #include "core/log/median.hpp"
 #include "core/study/windows/observation.hpp"
 #include "core/study/windows/signals.hpp"
+#include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
 namespace {
@@ -35,7 +36,7 @@ RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
 
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::array<Line, 4>& lines) {
+                                     std::size_t end, std::array<std::optional<Line>, 4>& lines) {
   std::vector<RotorValue> values;
   std::array<double, 4> share{}, ratio{};
   bool motors = true, rpms = true;
@@ -48,7 +49,7 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
       double sum = 0;
       for (std::size_t i = begin; i < end; ++i)
         sum += thrust_share(vehicle, motor[s.row[i]]) / static_cast<double>(end - begin);
-      share[rotor] = std::log(std::max(sum, 1e-6));
+      share[rotor] = std::log(std::max(sum, kWindowRules.least_share.value));
     }
     if (has_rpm) {
       const auto& rpm = log.column(name_of("rpm", rotor));
@@ -58,13 +59,13 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
       double bad = 0;
       for (std::size_t i = 0; i < readings.size(); ++i) {
         const bool stuck = i > 1 && readings[i] == readings[i - 1] && readings[i] == readings[i - 2];
-        bad += readings[i] < 0.3 * middle || stuck ? 1.0 : 0.0;
+        bad += readings[i] < kWindowRules.dropout * middle || stuck ? 1.0 : 0.0;
       }
       values.push_back({kDropout1 + rotor, bad / static_cast<double>(readings.size()), 1});
-      ratio[rotor] = 2 * std::log(std::max(middle, 1.0));
+      ratio[rotor] = 2 * std::log(std::max(middle, kWindowRules.least_rpm.value));
       const std::span<const double> phase(phases[rotor].data() + begin, end - begin);
       lines[rotor] = rotor_line(residual, t, phase);
-      values.push_back({kLine1 + rotor, lines[rotor].excess, 1});
+      if (lines[rotor]) values.push_back({kLine1 + rotor, lines[rotor]->excess, 1});
     }
   }
   const auto put_contrast = [&](std::size_t channel, const std::array<double, 4>& x) {

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "core/study/windows/window_rules.hpp"
+
 namespace backwash::study {
 namespace {
 
@@ -15,7 +17,7 @@ double likeness(const Observations& seen, std::size_t a, std::size_t b) {
     double mean_x = 0, mean_y = 0;
     std::size_t j = seen.first[b];
     for (std::size_t i = seen.first[a]; i < seen.first[a + 1]; ++i) {
-      const double near = seen.windows[i].duration / 4;
+      const double near = kWindowRules.same_time * seen.windows[i].duration;
       while (j < seen.first[b + 1] && seen.windows[j].t < seen.windows[i].t - near) ++j;
       if (j == seen.first[b + 1]) break;
       if (seen.windows[j].t > seen.windows[i].t + near) continue;
@@ -30,7 +32,7 @@ double likeness(const Observations& seen, std::size_t a, std::size_t b) {
     }
     count += pairs.size();
   }
-  return count >= kFewestCompared && xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0;
+  return static_cast<double>(count) >= kWindowRules.same_windows && xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0;
 }
 
 }  // namespace
@@ -40,7 +42,7 @@ std::vector<std::size_t> same_gusts(const Observations& seen) {
   for (std::size_t f = 0; f < seen.flights; ++f) {
     same[f] = f;
     for (std::size_t g = 0; g < f && same[f] == f; ++g)
-      if (same[g] == g && likeness(seen, f, g) >= kSameGusts) same[f] = g;
+      if (same[g] == g && likeness(seen, f, g) >= kWindowRules.same_gusts) same[f] = g;
   }
   return same;
 }

@@ -4,20 +4,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/log/log_columns.hpp"
+#include "core/study/windows/window_rules.hpp"
+
 namespace backwash::study {
 namespace {
 
 using Rows = std::vector<std::size_t>;
 
-bool has3(const log::FlightLog& log, const char* x, const char* y, const char* z) {
-  return log.has(x) && log.has(y) && log.has(z);
-}
-
-std::vector<Vec3> vectors(const log::FlightLog& log, const Rows& rows, const char* x, const char* y, const char* z) {
-  const auto &cx = log.column(x), &cy = log.column(y), &cz = log.column(z);
+std::vector<Vec3> vectors(const log::FlightLog& log, const Rows& rows, const char* prefix, const char* unit) {
   std::vector<Vec3> out;
   out.reserve(rows.size());
-  for (const auto i : rows) out.emplace_back(cx[i], cy[i], cz[i]);
+  const std::string name(prefix);
+  const auto &x = log.column(name + "x" + unit), &y = log.column(name + "y" + unit), &z = log.column(name + "z" + unit);
+  for (const auto i : rows) out.emplace_back(x[i], y[i], z[i]);
   return out;
 }
 
@@ -37,15 +37,10 @@ struct Commands {
 };
 
 Commands commands_of(const log::FlightLog& log, const Rows& rows) {
-  Commands c;
-  c.p = vectors(log, rows, "cmd_x_m", "cmd_y_m", "cmd_z_m");
-  c.v = has3(log, "cmd_vx_mps", "cmd_vy_mps", "cmd_vz_mps")
-            ? vectors(log, rows, "cmd_vx_mps", "cmd_vy_mps", "cmd_vz_mps")
-            : std::vector<Vec3>(rows.size(), Vec3::Zero());
-  c.a = has3(log, "cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2")
-            ? vectors(log, rows, "cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2")
-            : std::vector<Vec3>(rows.size(), Vec3::Zero());
-  return c;
+  const auto or_rest = [&](const char* prefix, const char* unit) {
+    return has_xyz(log, prefix, unit) ? vectors(log, rows, prefix, unit) : std::vector<Vec3>(rows.size(), Vec3::Zero());
+  };
+  return {vectors(log, rows, "cmd_", "_m"), or_rest("cmd_v", "_mps"), or_rest("cmd_a", "_mps2")};
 }
 
 struct Loop {
@@ -60,20 +55,22 @@ Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool 
   Vec3 p = cmd.p.front(), v = Vec3::Zero(), produced = Vec3::Zero();
   std::size_t heard = 0, felt = 0;
   // A command acts from some time in the period before its row on (held) or all along it (streamed): a quarter between.
-  const double period = s.t.back() / static_cast<double>(s.size() - 1), age = c.latency + period / 4;
+  const double period = s.t.back() / static_cast<double>(s.size() - 1),
+               age = c.latency + kWindowRules.command_age * period;
   const auto at_time = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
-    if (heard + 1 >= s.size() || s.t[heard + 1] - s.t[heard] > 0.1) return x[heard];
+    if (heard + 1 >= s.size() || s.t[heard + 1] - s.t[heard] > kWindowRules.held) return x[heard];
     const double share = std::clamp((t - s.t[heard]) / (s.t[heard + 1] - s.t[heard]), 0.0, 1.0);
     return x[heard] + share * (x[heard + 1] - x[heard]);
   };
   for (std::size_t i = 0; i < s.size(); ++i) {
     const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
-    if (dt > 0.2) p = s.p[i], v = s.v[i];  // a gap: start again where the vehicle is
-    const int steps = dt > 0.2 ? 1 : std::max(1, static_cast<int>(std::ceil(dt / 0.005)));
+    const bool gap = dt > kWindowRules.restart;
+    if (gap) p = s.p[i], v = s.v[i];  // start again where the vehicle is
+    const int steps = gap ? 1 : std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
     for (int k = 0; k < steps; ++k) {
-      const double h = dt > 0.2 ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
-      while (heard + 1 < s.size() && s.t[heard + 1] <= now - age + 1e-9) ++heard;
-      while (felt + 1 < s.size() && s.t[felt + 1] <= now - c.feedback_delay + 1e-9) ++felt;
+      const double h = gap ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
+      while (heard + 1 < s.size() && s.t[heard + 1] <= now - age + kWindowRules.stamp_error) ++heard;
+      while (felt + 1 < s.size() && s.t[felt + 1] <= now - c.feedback_delay + kWindowRules.stamp_error) ++felt;
       const Vec3 at = closed ? p : s.p[felt], moving = closed ? v : s.v[felt];
       const double sent = now - age;
       const Vec3 wanted = at_time(cmd.a, sent) + kp.cwiseProduct(at_time(cmd.p, sent) - at) +
@@ -96,26 +93,31 @@ Rows rising_rows(const std::vector<double>& t) {
 }
 
 void read_motion(Series& s, const log::FlightLog& log, const Rows& rows) {
-  s.p = vectors(log, rows, "x_m", "y_m", "z_m");
-  s.has_velocity = has3(log, "vx_mps", "vy_mps", "vz_mps");
-  s.has_acceleration = has3(log, "ax_mps2", "ay_mps2", "az_mps2");
+  s.p = vectors(log, rows, "", "_m");
+  s.has_velocity = has_xyz(log, "v", "_mps");
+  s.has_acceleration = has_xyz(log, "a", "_mps2");
   const double rate = s.size() > 1 ? static_cast<double>(s.size() - 1) / (s.t.back() - s.t.front()) : 1;
   const auto reach = [&](double seconds) {
-    return static_cast<std::size_t>(std::lround(std::clamp(seconds * rate / 2, 1.0, 1000.0)));
+    return static_cast<std::size_t>(std::lround(std::clamp(seconds * rate / 2, 1.0, kWindowRules.slope_rows.value)));
   };
-  s.v = s.has_velocity ? vectors(log, rows, "vx_mps", "vy_mps", "vz_mps") : derivative(s.t, s.p, reach(0.06));
-  s.a = s.has_acceleration ? vectors(log, rows, "ax_mps2", "ay_mps2", "az_mps2") : derivative(s.t, s.v, reach(0.06));
+  s.v = s.has_velocity ? vectors(log, rows, "v", "_mps") : derivative(s.t, s.p, reach(kWindowRules.slope_time));
+  s.a = s.has_acceleration ? vectors(log, rows, "a", "_mps2") : derivative(s.t, s.v, reach(kWindowRules.slope_time));
 }
 
 void read_attitude(Series& s, const log::FlightLog& log, const Rows& rows) {
   const auto &w = log.column("qw"), &x = log.column("qx"), &y = log.column("qy"), &z = log.column("qz");
   for (const auto i : rows) {
     Eigen::Quaterniond q(w[i], x[i], y[i], z[i]);
-    s.R_WB.push_back(q.norm() > 1e-6 ? q.normalized().toRotationMatrix() : Mat3(Mat3::Identity()));
+    s.R_WB.push_back(q.norm() > kWindowRules.no_attitude ? q.normalized().toRotationMatrix() : Mat3(Mat3::Identity()));
   }
 }
 
 }  // namespace
+
+std::optional<int> segment_of(double logged) {
+  const auto number = static_cast<int>(std::lround(std::clamp(logged, -1.0, kWindowRules.segments.value)));
+  return number >= 0 ? std::optional(number) : std::nullopt;
+}
 
 Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
   Series s;
@@ -130,12 +132,11 @@ Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
     for (const auto i : rows)
       s.thrust_acc.push_back(vehicle.propulsion.max_thrust / vehicle.body.mass * thrust_share(vehicle, u[i]));
   }
-  s.segment.assign(s.size(), -1);
+  s.segment.resize(s.size());
   if (log.has("segment"))
-    for (std::size_t k = 0; k < rows.size(); ++k)
-      s.segment[k] = static_cast<int>(std::clamp(log.column("segment")[rows[k]], -1.0, 1e9));
+    for (std::size_t k = 0; k < rows.size(); ++k) s.segment[k] = segment_of(log.column("segment")[rows[k]]);
   s.simulated_by_thrust = !s.thrust_acc.empty() && !s.R_WB.empty();
-  const bool commanded = has3(log, "cmd_x_m", "cmd_y_m", "cmd_z_m");
+  const bool commanded = has_xyz(log, "cmd_", "_m");
   if (s.simulated_by_thrust) {
     for (std::size_t i = 0; i < s.size(); ++i)
       s.a_sim.push_back(s.R_WB[i].col(2) * s.thrust_acc[i] - kGravity * Vec3::UnitZ());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 #include "core/log/flight_log.hpp"
@@ -20,10 +21,13 @@ struct Series {
   std::vector<double> thrust_acc;  ///< T/m, m/s²; empty without thrust
   /// Closed loop fed with the set-points alone; empty without set-points.
   std::vector<Vec3> p_nominal, v_nominal, a_nominal;
-  std::vector<int> segment;  ///< −1 without the column
+  std::vector<std::optional<int>> segment;  ///< hover position; none in transit or without the column
   bool simulated_by_thrust = false, has_velocity = false, has_acceleration = false;
   std::size_t size() const { return t.size(); }
 };
+
+/// Hover position of a value of the column `segment`; negative ones are transit.
+std::optional<int> segment_of(double logged);
 
 /// Reads a log. Rows must have growing stamps; those that do not are dropped. Positions must be there.
 Series series_of(const log::FlightLog& log, const Vehicle& vehicle);

@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <numbers>
 
 #include "core/study/windows/distributions.hpp"
+#include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
 std::vector<double> detrended(std::span<const double> x) {
@@ -29,8 +29,9 @@ std::vector<double> slow_course(std::span<const double> t, std::span<const doubl
   const auto n = static_cast<Eigen::Index>(x.size());
   if (n == 0) return {};
   const auto at = Eigen::Map<const Eigen::ArrayXd>(t.data(), n);
-  const double low = at.minCoeff(), length = std::max(at.maxCoeff() - low, 1e-9);
-  Eigen::MatrixXd powers(n, n < 4 ? 1 : n < 8 ? 2 : 3);
+  const double low = at.minCoeff(), length = std::max(at.maxCoeff() - low, kWindowRules.stamp_error.value);
+  const double windows = static_cast<double>(n);
+  Eigen::MatrixXd powers(n, windows < kWindowRules.voltage_line ? 1 : windows < kWindowRules.voltage_parabola ? 2 : 3);
   powers.col(0).setOnes();
   for (Eigen::Index k = 1; k < powers.cols(); ++k) powers.col(k) = powers.col(k - 1).array() * (at - low) / length;
   const auto values = Eigen::Map<const Eigen::VectorXd>(x.data(), n);
@@ -46,7 +47,7 @@ Spread spread(std::span<const double> x) {
   }
   const double n = static_cast<double>(x.size());
   if (!(square > 0) || n < 4) return {0, 0};
-  const double rho = std::clamp(product / square, 0.0, 0.98);
+  const double rho = std::clamp(product / square, 0.0, kWindowRules.correlated.value);
   const double samples = std::max(2.0, (n - 2) * (1 - rho * rho) / (1 + rho * rho));
   return {square / (n - 2), samples};
 }
@@ -56,8 +57,7 @@ double ln_variance(double n) { return trigamma(n / 2); }
 
 namespace {
 
-constexpr int kBeside = 4;    // on each side, 1 Hz apart from 1.5 Hz on
-constexpr double kBlock = 1;  // s: over more the phase that rpm readings give drifts
+constexpr int kBeside = static_cast<int>(kWindowRules.beside);  // on each side, 1 Hz apart from 1.5 Hz on
 
 /// x without what it shares with its last sample as a first-order process: the ratio of its second autocorrelation to
 /// its first, which white noise on top does not change. Gusts come out flat down to 0 Hz.
@@ -100,19 +100,19 @@ std::pair<double, double> powers(const std::vector<double>& x, std::span<const d
 
 }  // namespace
 
-Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
+std::optional<Line> rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
   const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
   const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
-  const auto blocks = static_cast<std::size_t>(std::max(1L, std::lround(seconds / kBlock)));
+  const auto blocks = static_cast<std::size_t>(std::max(1L, std::lround(seconds / kWindowRules.line_block)));
   const Flattened flat = flattened(x);
   Line found;
   double line = 0, beside = 0, count = 0;
   for (const double harmonic : {1.0, 2.0}) {
     const double folded = std::abs(std::remainder(harmonic * hz_of_rotor, rate));
     // A window that cannot show the rotor's own rate is none, whatever twice the rate shows.
-    if (folded < kLeastFolded || folded > rate / 2 - kFromHalfRate) {
+    if (folded < kWindowRules.least_folded || folded > rate / 2 - kWindowRules.from_half_rate) {
       if (harmonic > 1) break;
-      return found;
+      return std::nullopt;
     }
     const auto [at, around] = powers(flat.x, t, phase, harmonic, blocks);
     count += static_cast<double>(blocks), line += at, beside += around;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,22 +26,19 @@ Spread spread(std::span<const double> detrended);
 double ln_bias(double n);
 double ln_variance(double n);
 
-/// A rotor's line in a stretch; all NaN where it cannot be told.
+/// A rotor's line in a stretch.
 struct Line {
   /// ln of the power at the rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz,
   /// less its expectation for noise; twice the rotor's rate (two blades) is summed in, and blocks of 1 s, over which
   /// the phase from rpm readings does not drift. x is flattened first by a filter of first order.
-  double excess = std::numeric_limits<double>::quiet_NaN();
+  double excess = 0;
   /// At the rotor's rate alone: square of the amplitude beyond that noise (it may be negative by chance), and variance
   /// of white noise of the same power as the detuned phases. Units of x².
-  double amplitude2 = std::numeric_limits<double>::quiet_NaN(), floor2 = std::numeric_limits<double>::quiet_NaN();
+  double amplitude2 = 0, floor2 = 0;
   double folded = 0;  ///< where the rate lies after sampling, of the sampling rate, 0 … 1/2
 };
-/// Below, Hz, a block holds no whole turn of a folded line and it is as slow as a gust; and so near to half the rate
-/// its neighbours are missing.
-inline constexpr double kLeastFolded = 0.75, kFromHalfRate = 1;
-/// NaN where sampling folds the rotor's rate below kLeastFolded or within kFromHalfRate of half the rate. `phase`: rad
-/// at each sample, `t`: s.
-Line rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
+/// Nothing where sampling folds the rotor's rate below least_folded or within from_half_rate of half the rate. `phase`:
+/// rad at each sample, `t`: s.
+std::optional<Line> rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
 
 }  // namespace backwash::study

@@ -4,11 +4,9 @@
 #include <vector>
 
 #include "core/study/windows/series.hpp"
+#include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
-
-inline constexpr double kWindow = 2.0;      ///< s
-inline constexpr std::size_t kFewest = 20;  ///< samples of a window
 
 /// Samples begin … end − 1.
 struct Stretch {
@@ -16,7 +14,8 @@ struct Stretch {
   std::size_t size() const { return end - begin; }
 };
 
-/// Windows of 2 s (to the nearest whole number in each run of rows without a gap and of one segment).
+/// Windows of kWindowRules.window_length (to the nearest whole number in each run of rows without a gap and of one
+/// segment).
 std::vector<Stretch> cut(const Series& s);
 
 }  // namespace backwash::study

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/map/lattice.hpp"
+#include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
 
@@ -15,26 +16,27 @@ Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
   field_.emplace(*grid_, model);
   low_ = grid_->origin();
   const Vec3 extent = grid_->resolution() * grid_->size().cast<double>();
-  size_ = (extent / kLattice).array().ceil().cast<int>() + 2;
+  size_ = (extent / kWindowRules.sigma_lattice).array().ceil().cast<int>() + 2;
   lattice_.resize(static_cast<std::size_t>(size_.prod()));
 }
 
 bool Surroundings::near(const Vec3& p_W) const {
-  if (!grid_) return (p_W.array().abs() < 1e5).all();
+  if (!grid_) return (p_W.array().abs() < kWindowRules.room).all();
   const Vec3 high = low_ + grid_->resolution() * grid_->size().cast<double>();
-  return (p_W.array() > low_.array() - kSight).all() && (p_W.array() < high.array() + kSight).all();
+  return (p_W.array() > low_.array() - kWindowRules.sight).all() &&
+         (p_W.array() < high.array() + kWindowRules.sight).all();
 }
 
 Place Surroundings::around(const Vec3& p_W) const {
   if (!grid_) return {{p_W.z(), kNoSurface, {}}, {}};
-  Place place{field::around(*grid_, p_W, {20, 20, kSight}), {}};
+  Place place{field::around(*grid_, p_W, {kWindowRules.sight_up, kWindowRules.sight_up, kWindowRules.sight}), {}};
   for (const auto& wall : place.walls)
     if (whole(p_W, place, wall)) place.whole_walls.push_back(wall);
   return place;
 }
 
 bool Surroundings::whole(const Vec3& p_W, const field::Around& around, const std::pair<double, Vec3>& wall) const {
-  constexpr double kOpen = 1;  // m: how far it must reach where nothing is below or above
+  constexpr double kOpen = kWindowRules.whole_wall;
   const double a = grid_->resolution();
   const double down = std::isfinite(around.height) ? around.height : kOpen;
   const double up = std::isfinite(around.ceiling_gap) ? around.ceiling_gap : kOpen;
@@ -47,15 +49,15 @@ bool Surroundings::whole(const Vec3& p_W, const field::Around& around, const std
 const Vec3& Surroundings::lattice_ln_sigma(const Index3& at) {
   auto& stored = lattice_[map::linear(size_, at)];
   if (!stored) {
-    const Variance s = field_->at(low_ + kLattice * at.cast<double>()).sigma();
-    stored = Vec3(s.xx, s.yy, s.zz).array().max(1e-9).log().matrix();
+    const Variance s = field_->at(low_ + kWindowRules.sigma_lattice * at.cast<double>()).sigma();
+    stored = Vec3(s.xx, s.yy, s.zz).array().max(kWindowRules.sigma_least).log().matrix();
   }
   return *stored;
 }
 
 Vec3 Surroundings::sigma(const Vec3& p_W) {
   if (!field_) return base_;
-  const Vec3 q = (p_W - low_) / kLattice;
+  const Vec3 q = (p_W - low_) / kWindowRules.sigma_lattice;
   const Index3 corner = q.array().floor().cast<int>();
   if ((corner.array() < 0).any() || ((corner + Index3::Ones()).array() >= size_.array()).any()) {
     const Variance s = field_->at(p_W).sigma();
@@ -63,7 +65,7 @@ Vec3 Surroundings::sigma(const Vec3& p_W) {
   }
   Vec3 ln = Vec3::Zero();
   map::for_corners(q, [&](const Index3& v, const Vec3& share) {
-    if (share.prod() > 1e-9) ln += share.prod() * lattice_ln_sigma(v);
+    if (share.prod() > kWindowRules.corner_least) ln += share.prod() * lattice_ln_sigma(v);
   });
   return ln.array().exp();
 }

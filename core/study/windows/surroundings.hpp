@@ -20,19 +20,18 @@ struct Place : field::Around {
 /// Surfaces and modelled Σ about a point. Without a map: a floor at z = 0, nothing else, and Σ = Σ_0.
 class Surroundings {
  public:
-  static constexpr double kSight = 3;  ///< m: walls farther than this are none
   Surroundings(const map::OccupancyGrid* grid, const Model& model);
   Place around(const Vec3& p_W) const;
-  /// Diagonal of Σ at p, (m/s²)²: trilinear between points on a lattice of kLattice, evaluated exactly once each.
+  /// Diagonal of Σ at p, (m/s²)²: trilinear between points on a lattice of kWindowRules.sigma_lattice, evaluated
+  /// exactly once each.
   Vec3 sigma(const Vec3& p_W);
-  /// Whether a flight may be there: within sight of the map's box; without a map, of anything (100 km). False for what
-  /// is not finite. Precondition of all the others.
+  /// Whether a flight may be there: within sight of the map's box; without a map, of anything (kWindowRules.room).
+  /// False for what is not finite. Precondition of all the others.
   bool near(const Vec3& p_W) const;
   bool inside_solid(const Vec3& p_W) const { return grid_ && grid_->occupied(grid_->index(p_W)); }
   bool has_map() const noexcept { return grid_ != nullptr; }
 
  private:
-  static constexpr double kLattice = 0.15;  ///< m
   bool whole(const Vec3& p_W, const field::Around& around, const std::pair<double, Vec3>& wall) const;
   const Vec3& lattice_ln_sigma(const Index3& at);
 

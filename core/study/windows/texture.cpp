@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/windows/window_rules.hpp"
+
 namespace backwash::study {
 namespace {
-
-constexpr double kNearest = 0.3, kFarthest = 1.0, kBetween = 0.05;  // s
 
 /// Mean of x_i x_{i+lag}.
 double shared(const std::vector<double>& x, std::size_t lag) {
@@ -28,9 +28,12 @@ Texture texture_of(const std::vector<Residual>& windows, double rate_hz) {
   std::size_t shortest = SIZE_MAX;
   for (const auto& w : windows)
     if (w.comparable) shortest = std::min(shortest, w.x[0].size());
-  for (double seconds = kNearest; seconds <= kFarthest; seconds += kBetween) {
+  for (double seconds = kWindowRules.noise_near; seconds <= kWindowRules.noise_far;
+       seconds += kWindowRules.noise_between) {
     const auto lag = static_cast<std::size_t>(std::lround(seconds * rate_hz));
-    if (lag > 2 && lag + 5 < shortest && (t.lags.empty() || lag > t.lags.back())) t.lags.push_back(lag);
+    if (lag > 2 && lag + static_cast<std::size_t>(kWindowRules.noise_overlap) < shortest &&
+        (t.lags.empty() || lag > t.lags.back()))
+      t.lags.push_back(lag);
   }
   t.correlation.assign(t.lags.size(), 0);
   double total = 0, count = 0;
