@@ -55,10 +55,11 @@ def generate(out, worlds, flights=12, seconds=80.0):
             plan = flight(rng, size, seconds)
             plans.append(np.column_stack([plan["p"], plan["v"], plan["a"], plan["yaw"]]))
             segments.append(plan["segment"])
-        rooms.append((stored_field(size, cache), flights))
+        rooms.append(size)
         generators.append(rng)
+    kinds = [(stored_field(size, cache), np.repeat([r == size for r in rooms], flights).nonzero()[0]) for size in sorted(set(rooms))]
     each = {k: np.repeat([c[k] for c in constants], flights).astype(float) for k in constants[0]}
-    record = fly(each, {k: np.concatenate([o[k] for o in own]) for k in own[0]}, np.array(plans), rooms, generators)
+    record = fly(each, {k: np.concatenate([o[k] for o in own]) for k in own[0]}, np.array(plans), kinds, generators)
     for f, plan in enumerate(plans):
         w = f // flights
         part = {k: v[:, f] for k, v in record.items()}
