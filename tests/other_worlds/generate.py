@@ -40,7 +40,7 @@ def write_files(folder, c, size, name, seed):
 
 
 def generate(out, worlds, flights=12, seconds=80.0):
-    """Folders of the worlds [(name, seed), ...], all simulated at once."""
+    """Yields the folder of each world of [(name, seed), ...] when its logs are written. All are simulated at once."""
     cache = os.path.join(out, "fields")
     os.makedirs(cache, exist_ok=True)
     constants, own, plans, rooms, generators, segments, folders = [], [], [], [], [], [], []
@@ -60,11 +60,12 @@ def generate(out, worlds, flights=12, seconds=80.0):
     kinds = [(stored_field(size, cache), np.repeat([r == size for r in rooms], flights).nonzero()[0]) for size in sorted(set(rooms))]
     each = {k: np.repeat([c[k] for c in constants], flights).astype(float) for k in constants[0]}
     record = fly(each, {k: np.concatenate([o[k] for o in own]) for k in own[0]}, np.array(plans), kinds, generators)
-    for f, plan in enumerate(plans):
-        w = f // flights
-        part = {k: v[:, f] for k, v in record.items()}
-        write_log(os.path.join(folders[w], f"flight{f % flights:02d}.csv"), generators[w], constants[w], part, plan, segments[f], own[w]["phase"][f % flights])
-    return folders
+    for w, folder in enumerate(folders):
+        for f in range(flights):
+            i = w * flights + f
+            part = {k: v[:, i] for k, v in record.items()}
+            write_log(os.path.join(folder, f"flight{f:02d}.csv"), generators[w], constants[w], part, plans[i], segments[i], own[w]["phase"][f])
+        yield folder
 
 
 def main():

@@ -14,7 +14,7 @@ import sys
 from effects import EFFECTS
 from generate import generate
 
-BATCH = 32  # worlds simulated at once
+BATCH = 16  # worlds simulated at once
 COLUMNS = ("alone", "beside", "set", "unknown", "nothing", "wrong")
 
 
