@@ -56,13 +56,15 @@ EFFECTS = {
     "ground": (lambda rng: dict(ground_radius=rng.uniform(0.28, 0.36)), "ground_thrust", (), "3 to 6 % of thrust at 0.4 m"),
     "ceiling": (lambda rng: dict(ceiling=rng.uniform(1.2, 2.0)), "ceiling", (), "0.32 to 0.53 m/s^2 at 0.3 m"),
     "wall": (lambda rng: dict(wall=rng.uniform(0.2, 0.4)), "wall_attraction", (), "0.2 to 0.4 m/s^2 at 0.4 m"),
-    "flapping": (lambda rng: dict(flapping=rng.uniform(0.12, 0.25), induced=rng.uniform(0.05, 0.15)), "rotor_drag", (), "0.17 to 0.4 m/s^2 at 1 m/s"),
+    "flapping": (lambda rng: dict(flapping=rng.uniform(0.12, 0.25), induced=rng.uniform(0.05, 0.15)), "rotor_drag", (),
+                 "0.17 to 0.4 m/s^2 at 1 m/s"),
     "slung": (lambda rng: dict(slung=rng.uniform(0.05, 0.12)), "payload", (), "a load of 5 to 12 % on a cord of 0.22 m"),
     "payload": (lambda rng: dict(mass=rng.uniform(0.05, 0.12)), "payload", (), "5 to 12 % of mass"),
     "drift": (drift, "imu_drift", (), "0.25 to 0.4 m/s^2 per 10 K, half play 1 K"),
     "shots": (lambda rng: dict(shots=rng.uniform(0.5, 1.0)), "heavy_tails", (), "shots at 0.5 to 1 per s and axis group"),
     "battery": (lambda rng: dict(sag=rng.uniform(1.0, 1.8)), "battery_sag", (), "7 to 15 % of thrust over a flight"),
-    "propeller": (lambda rng: dict(damage=rng.uniform(0.08, 0.15), damaged=rng.integers(4)), "propeller_damage", ("payload",), "one rotor 8 to 15 % weaker"),
+    "propeller": (lambda rng: dict(damage=rng.uniform(0.08, 0.15), damaged=rng.integers(4)), "propeller_damage", ("payload",),
+                  "one rotor 8 to 15 % weaker"),
     "latency": (lambda rng: dict(late=rng.uniform(0.05, 0.09), jitter=0.015), "command_latency", (), "50 to 90 ms with a jitter of 15 ms"),
     "actuator": (lambda rng: dict(rotor_frequency=rng.uniform(11.0, 14.0)), "actuator_lag", (), "second order at 11 to 14 Hz, 18 to 23 ms"),
     "draft": (lambda rng: pair(("push_x", "push_y"), level(rng, rng.uniform(0.2, 0.35))), "draft", (), "0.2 to 0.35 m/s^2"),
@@ -73,11 +75,13 @@ EFFECTS = {
     "speed": (lambda rng: dict(speed_variance=rng.uniform(2.5, 5.0)), "forward_speed", (), "variance times 3.5 to 6 at 1 m/s"),
     "vibration": (lambda rng: dict(imbalance=rng.uniform(0.3, 0.6)), "vibration", (), "0.3 to 0.6 m/s^2 a rotor, once per turn"),
     "map": (lambda rng: pair(("offset_x", "offset_y"), level(rng, rng.uniform(0.2, 0.3))), "map_offset", (), "0.2 to 0.3 m"),
-    "stuck": (lambda rng: dict(stuck=rng.uniform(0.04, 0.08), stuck_rotor=rng.integers(4)), "rotor_sensor_fault", (), "4 to 8 % of one rotor's readings are 0, in bursts"),
+    "stuck": (lambda rng: dict(stuck=rng.uniform(0.04, 0.08), stuck_rotor=rng.integers(4)), "rotor_sensor_fault", (),
+              "4 to 8 % of one rotor's readings are 0, in bursts"),
     # No effect but the vehicle file's own idealisation: attitude of second order, its 63 % time in the file. Right is nothing.
     "sluggish": (lambda rng: dict(tilt=10.0, tilt_rate=25.0), None, (), "attitude loop of half the bandwidth, lag 0.11 s"),
     # Outside the catalogue: right is `unknown_structure`, no name.
-    "plume": (lambda rng: dict(plume=rng.uniform(0.6, 1.0), plume_heading=rng.uniform(-np.pi, np.pi)), "unknown_structure", (), "a level jet of 0.6 to 1 m/s^2, 0.5 m wide"),
+    "plume": (lambda rng: dict(plume=rng.uniform(0.6, 1.0), plume_heading=rng.uniform(-np.pi, np.pi)), "unknown_structure", (),
+              "a level jet of 0.6 to 1 m/s^2, 0.5 m wide"),
     "tether": (lambda rng: dict(tether=rng.uniform(0.04, 0.07)), "unknown_structure", (), "4 to 7 % of weight per metre of height"),
 }
 

@@ -26,8 +26,8 @@ def craft(rng, c, count):
     torque = np.ones(4)
     rotors[int(c["damaged"])] *= 1 - c["damage"]
     torque[int(c["damaged"])] *= 1 + 0.8 * c["damage"]
-    return dict(thrust=rotors * (1 + 0.003 * rng.standard_normal((count, 1))), torque=np.tile(torque, (count, 1)), strength=np.exp(0.2 * rng.standard_normal(count)),
-                charge=rng.uniform(0.86, 1.0, count), phase=rng.uniform(0, 2 * np.pi, (count, 4)))
+    return dict(thrust=rotors * (1 + 0.003 * rng.standard_normal((count, 1))), torque=np.tile(torque, (count, 1)),
+                strength=np.exp(0.2 * rng.standard_normal(count)), charge=rng.uniform(0.86, 1.0, count), phase=rng.uniform(0, 2 * np.pi, (count, 4)))
 
 
 def write_files(folder, c, size, name, seed):
@@ -64,7 +64,8 @@ def generate(out, worlds, flights=12, seconds=80.0):
         for f in range(flights):
             i = w * flights + f
             part = {k: v[:, i] for k, v in record.items()}
-            write_log(os.path.join(folder, f"flight{f:02d}.csv"), generators[w], constants[w], part, plans[i], segments[i], own[w]["phase"][f])
+            path = os.path.join(folder, f"flight{f:02d}.csv")
+            write_log(path, generators[w], constants[w], part, plans[i], segments[i], own[w]["phase"][f])
         yield folder
 
 

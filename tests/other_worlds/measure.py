@@ -21,7 +21,8 @@ COLUMNS = ("alone", "beside", "set", "unknown", "nothing", "wrong")
 def study(program, folder):
     """The study's JSON of one world."""
     files = {k: os.path.join(folder, f) for k, f in (("--map", "room.bt"), ("--model", "model.toml"), ("--vehicle", "vehicle.toml"))}
-    command = [program, "study", "--quick", "--json"] + [x for pair in files.items() for x in pair] + ["--log"] + sorted(glob.glob(os.path.join(folder, "flight*.csv")))
+    logs = sorted(glob.glob(os.path.join(folder, "flight*.csv")))
+    command = [program, "study", "--quick", "--json"] + [x for pair in files.items() for x in pair] + ["--log"] + logs
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
@@ -46,7 +47,7 @@ def run(program, out, worlds):
             batch = worlds[first:first + BATCH]
             for (name, seed), folder in zip(batch, generate(out, batch)):
                 told = study(program, folder)
-                causes = [dict(name=c["name"], set=c["set"], p=c["p"], nats=c["gain"]["held_out_nats"], parameters=c["parameters"]) for c in told["causes"]]
+                causes = [dict({k: c[k] for k in ("name", "set", "p", "parameters")}, nats=c["gain"]["held_out_nats"]) for c in told["causes"]]
                 row = dict(name=name, seed=seed, answer=answer(name, told), verdict=told["verdict"], causes=causes, unknown=told["unknown"],
                            not_tested=told["not_tested"], dependence=told["remaining_dependence"], windows=told["windows"])
                 results.write(json.dumps(row) + "\n")

@@ -40,7 +40,8 @@ def accelerometer(rng, c, rec, warmth, phase):
     w, v = rec["q"][:, :1], rec["q"][:, 1:]
     q = np.concatenate([w - v @ error[1:, None], v + w * error[1:] + np.cross(v, error[1:])], 1)
     q /= np.linalg.norm(q, axis=1, keepdims=True)
-    bias = 0.01 * rng.standard_normal(3) + (play(warmth, c["hysteresis"])[:, None] - 25) / 10 * np.array([c["drift_x"], c["drift_y"], c["drift_z"]])
+    warm = (play(warmth, c["hysteresis"])[:, None] - 25) / 10
+    bias = 0.01 * rng.standard_normal(3) + warm * np.array([c["drift_x"], c["drift_y"], c["drift_z"]])
     specific = rec["specific"] + bias + 0.03 * rng.standard_normal(rec["specific"].shape) + lines(c, rec["spin"], phase)
     return np.einsum("nij,nj->ni", rotation(q), specific) - [0, 0, G], q
 
@@ -59,7 +60,8 @@ def write_log(path, rng, c, rec, plan, segment, phase):
     warmth = temperature(rng, rec["v"])
     a, q = accelerometer(rng, c, rec, warmth, phase)
     volts = rec["volts"] + 0.01 * rng.standard_normal(rows)
-    table = np.column_stack([np.arange(rows) * 0.02, rec["p"], rec["v"], a, q, plan[:, :9], rec["thrust"], volts, warmth + 0.05 * rng.standard_normal(rows),
+    shown = warmth + 0.05 * rng.standard_normal(rows)
+    table = np.column_stack([np.arange(rows) * 0.02, rec["p"], rec["v"], a, q, plan[:, :9], rec["thrust"], volts, shown,
                              tachometers(rng, c, rec["spin"]), rec["motors"], segment, np.zeros(rows)])
     with open(path, "w", encoding="ascii") as file:
         file.write(NAMES + "\n" + "".join(FORMAT % tuple(row) for row in table.tolist()))

@@ -126,7 +126,9 @@ class Flights:
         volts = (self.volts / 15.6) ** self.c["sag"]
         target = share_of(self.motors, self.c["curve"][:, None]) * volts[:, None]
         s, g = self.step_of, self.gain_of
-        self.spin, self.spun = s[..., 0] * self.spin + s[..., 1] * self.spun + g[..., 0] * target, s[..., 2] * self.spin + s[..., 3] * self.spun + g[..., 1] * target
+        spin = s[..., 0] * self.spin + s[..., 1] * self.spun + g[..., 0] * target
+        self.spun = s[..., 2] * self.spin + s[..., 3] * self.spun + g[..., 1] * target
+        self.spin = spin
         self.volts = self.battery.step((np.maximum(self.spin, 0) ** 1.5).mean(1) / HOVER**1.5, DT)
         return self.spin * self.own["thrust"]
 
@@ -211,7 +213,8 @@ def fly(c, own, plans, rooms, generators):
     rows = plans.shape[1]
     steps = SETTLE + (rows - 1) * LOG + 1
     count = len(plans) // len(generators)
-    index = np.concatenate([arrivals(g, {k: c[k][i * count:(i + 1) * count] for k in ("late", "jitter")}, rows, steps) for i, g in enumerate(generators)])
+    late = [{k: c[k][i * count:(i + 1) * count] for k in ("late", "jitter")} for i in range(len(generators))]
+    index = np.concatenate([arrivals(g, own_late, rows, steps) for g, own_late in zip(generators, late)])
     flights = Flights(c, own, plans[:, 0, :3], plans[:, 0, 9], rooms)
     draws, every, record = Draws(generators, count), np.arange(len(plans)), []
     for k in range(steps):
