@@ -100,6 +100,15 @@ std::string residuals(const Options& options, const Flights& flights, const Vehi
   return *section;
 }
 
+/// An autopilot's own log numbers rotors 1 and 2 as facing ones; the verdict is about 1 and 3. Throws Failure.
+void refuse_other_numbers(const std::vector<std::string>& logs) {
+  const auto found = std::ranges::find_if(logs, is_autopilots_log);
+  if (found != logs.end())
+    throw Failure(kUsage, *found +
+                              ":1: --reference takes rotors 1 and 3 as facing each other; in this log 1 faces 2: "
+                              "import it and swap motor2 and motor3");
+}
+
 /// Motor shares of the flights against those of the reference flights; nothing without such.
 std::optional<study::RotorVerdict> against_reference(const Options& options, const Vehicle& vehicle, const Model& model,
                                                      const study::Observations& seen) {
@@ -175,6 +184,7 @@ int run(const Options& options) {
   model.ground.r0 = vehicle.body.diagonal_radius;
   const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
   const map::OccupancyGrid* grid = room ? &*room : nullptr;
+  if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
   Flights flights = read_flights(options.logs, options.group);
   auto seen = observe(flights, vehicle, model, grid);
   const auto measured = seen;  // nothing that the model holds taken out

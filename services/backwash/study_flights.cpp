@@ -49,10 +49,13 @@ study::Observations look_at(const Flights& flights, const Vehicle& vehicle, cons
 
 }  // namespace
 
+bool is_autopilots_log(const std::string& path) {
+  return path.ends_with(".ulg") || path.ends_with(".bin") || path.ends_with(".BIN");
+}
+
 log::FlightLog read_flight(const std::string& path) {
-  const bool ulog = path.ends_with(".ulg");
-  if (!ulog && !path.ends_with(".bin") && !path.ends_with(".BIN")) return read_table(path, "t_s");
-  auto log = ulog ? log::read_ulog(path) : log::read_dataflash(path);
+  if (!is_autopilots_log(path)) return read_table(path, "t_s");
+  auto log = path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path);
   if (log) return std::move(*log);
   throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
 }

@@ -13,6 +13,9 @@
 
 namespace backwash::services {
 
+/// PX4's or ArduPilot's own log, by its name.
+bool is_autopilots_log(const std::string& path);
+
 /// A flight log: ULog (.ulg) or DataFlash (.bin) by its name, else CSV. Throws Failure.
 log::FlightLog read_flight(const std::string& path);
 

@@ -120,6 +120,8 @@ refused 65 "no column 't', which the column map takes for t_s" import --map-colu
 refused 65 'called like a time' import --propose no_z_points.csv
 refused 64 'no kind of recording' import nanobench ms.csv -o logs
 refused 64 'no recording given' import ulog -o logs
+refused 65 'no format message (FMT)' import ardupilot corrupt.bt -o logs
+refused 64 'in this log 1 faces 2' study --vehicle $quad --log flight.bin --reference sound.csv
 refused 64 '--out' import --map-columns map.toml ms.csv
 gzip -k ms.csv && head -c 100 ms.csv.gz >short.csv.gz
 refused 65 'cut short' import --map-columns map.toml short.csv.gz -o logs
