@@ -144,6 +144,7 @@ std::map<std::string, Cause> others() {
             .one_signed = true,
             .truth = {{"tau_s", [](double s, double) { return kStep / std::expm1(kStep / s); }}}}},
           {"command_latency", {.size = 0.06, .one_signed = true, .truth = {{"latency_s", same}}}},  // s
+          {"attitude_lag", {.size = 0.03, .truth = {{"lag_s", same}}}},  // s beyond that of the vehicle file
           {"vibration", {.size = 0.25, .one_signed = true}},  // m/s², amplitude of the rotors' line
           {"map_offset",                                      // m
            {.size = 0.25,

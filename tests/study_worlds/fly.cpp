@@ -133,7 +133,7 @@ class Flight {
     const Vec3 believed_p = p_ + vio_, believed_v = v_;
     const Vec3 wanted =
         cmd.a + kp.cwiseProduct(cmd.p - believed_p) + kd.cwiseProduct(cmd.v - believed_v) + kG * Vec3::UnitZ();
-    thrust_ += (wanted - thrust_) * (1 - std::exp(-kStep / c.attitude_lag));  // attitude and thrust follow
+    thrust_ += (wanted - thrust_) * (1 - std::exp(-kStep / (c.attitude_lag + world_.effects.of("attitude_lag"))));  // attitude and thrust follow
     yaw_ = plan[k].yaw;
     u_ = command_of(c, c.mass * thrust_.norm());
     const double believed = thrust_of(c, u_, 0) / c.mass;
