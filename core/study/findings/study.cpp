@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/findings/words.hpp"
 #include "core/study/inference/estimate.hpp"
 
 namespace backwash::study {
@@ -148,7 +149,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   const Evidence start(seen);
   const SearchResult found = search(start, options.search);
   result.threshold = found.threshold;
-  result.unknown = found.unknown;
+  result.unknown = found.unknown, result.refused = found.refused;
   Evidence evidence = start;
   evidence.whiten(others_of(found.accepted, SIZE_MAX, seen));
   bool ambiguous = false;
@@ -158,6 +159,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
                      gain_of(evidence, found.accepted, i),
                      {},
                      applied[i],
+                     extrapolated(found.accepted[i], seen),
+                     largest_flown(found.accepted[i], seen),
                      check_shift(found.accepted[i], applied[i].beside, seen)};
     if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(seen.windows);
     for (const Rival& rival : cause.found.rivals)
