@@ -83,17 +83,20 @@ TEST(Rivals, NeitherIsToldBesideTheOther) {
 }
 
 TEST(Rivals, AWrongAttitudeLagIsToldFromLateCommandsByTheLoggedTilt) {
-  for (const char* cause : {"attitude_lag", "command_latency"}) {
-    const auto result = studied(world_with(cause, 1.3, "", 1795800002));
-    ASSERT_EQ(result.verdict, Verdict::cause_found) << cause << ": " << study_worlds::told(result);
-    EXPECT_EQ(result.causes.front().found.form->cause(), cause);
-  }
+  const auto lagging = studied(world_with("actuator_lag", 0.8, "attitude", 1795800002));
+  ASSERT_EQ(lagging.verdict, Verdict::cause_found) << study_worlds::told(lagging);
+  const Accepted& lag = lagging.causes.front().found;
+  EXPECT_EQ(lag.form->parameters.front(), "lag_s") << study_worlds::told(lagging);
+  EXPECT_NEAR(lag.parameters.front().value, 0.04, 0.008);
+  const auto late = studied(world_with("command_latency", 1.3, "", 1795800002));
+  ASSERT_EQ(late.verdict, Verdict::cause_found) << study_worlds::told(late);
+  EXPECT_EQ(late.causes.front().found.form->cause(), "command_latency");
 }
 
 TEST(Rivals, WithoutTheTiltTheyAreOneSet) {
   const auto result = studied(world_with("command_latency", 1.5, "", 1795800002, "q"));
   ASSERT_EQ(result.verdict, Verdict::cannot_distinguish) << study_worlds::told(result);
-  EXPECT_TRUE(in_every_set("attitude_lag", result) && in_every_set("command_latency", result))
+  EXPECT_TRUE(in_every_set("actuator_lag", result) && in_every_set("command_latency", result))
       << study_worlds::told(result);
 }
 
@@ -149,15 +152,15 @@ Vehicle vehicle() {
   return v;
 }
 
-Remedy remedy_for(const std::string& cause, double theta, double scale = 0) {
+Remedy remedy_for(const std::string& cause, double theta, double scale = 0, std::size_t form = 0) {
   NamedCause named;
-  named.found.form = &form_of(cause), named.found.scale.value = scale;
+  named.found.form = &form_of(cause).effect->forms[form], named.found.scale.value = scale;
   named.found.theta = SmallVector::Constant(1, theta);
   return remedy_of(named, vehicle());
 }
 
 TEST(Words, ADelayIsAKeyOfTheVehicleFileWithItsValue) {
-  const auto late = remedy_for("command_latency", 0.06), lagging = remedy_for("attitude_lag", -0.02);
+  const auto late = remedy_for("command_latency", 0.06), lagging = remedy_for("actuator_lag", -0.02, 0, 1);
   ASSERT_EQ(late.set.size(), 1u);
   EXPECT_EQ(late.set[0].key, "controller.latency");
   EXPECT_NEAR(late.set[0].to, 0.08, 1e-12);

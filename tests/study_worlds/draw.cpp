@@ -75,7 +75,8 @@ World draw_world(const Request& request) {
   Rng rng(request.seed * 7919 + 17);  // independent of the cause: worlds with the same seed are pairs
   World world;
   world.request = request;
-  world.room = draw_room(rng, request.confound == "height" || request.confound == "bob", request.confound == "fast" ? 2 : 1);
+  world.room =
+      draw_room(rng, request.confound == "height" || request.confound == "bob", request.confound == "fast" ? 2 : 1);
   world.craft = draw_craft(rng);
   world.rate_hz = between(rng, 0, 1) < 0.7 ? 50 : between(rng, 0, 1) < 0.5 ? 100 : 40;
   world.jitter = between(rng, 0, 0.3);

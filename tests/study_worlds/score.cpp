@@ -41,6 +41,7 @@ const std::vector<Cell>& cells() {
                              {"two causes", {}, "", true},
                              {"thrust_slope, up and down", {"thrust_slope"}, "bob"},
                              {"ground_thrust, up and down", {"ground_thrust"}, "bob"},
+                             {"actuator_lag, of the attitude", {"actuator_lag"}, "attitude"},
                              {"none, up and down", {}, "bob"},
                              {"rotor_drag, above 2 m/s", {"rotor_drag"}, "fast"},
                              {"none, above 2 m/s", {}, "fast"},

@@ -7,15 +7,15 @@ namespace backwash::study {
 
 // The table: an effect's file, and its line here in both lists.
 Effect ground_thrust(), ceiling(), wall_attraction(), recirculation(), forward_speed(), battery_sag(), thrust_slope(),
-    payload(), trim(), draft(), rotor_drag(), inflow(), actuator_lag(), attitude_lag(), command_latency(), imu_drift(),
-    vibration(), map_offset(), heavy_tails(), propeller_damage(), rotor_sensor_fault();
+    payload(), trim(), draft(), rotor_drag(), inflow(), actuator_lag(), command_latency(), imu_drift(), vibration(),
+    map_offset(), heavy_tails(), propeller_damage(), rotor_sensor_fault();
 
 namespace {
 
 constexpr Effect (*kEffects[])() = {
-    ground_thrust,   ceiling,   wall_attraction, recirculation, forward_speed, battery_sag,      thrust_slope,
-    payload,         trim,      draft,           rotor_drag,    inflow,        actuator_lag,     attitude_lag,
-    command_latency, imu_drift, vibration,       map_offset,    heavy_tails,   propeller_damage, rotor_sensor_fault};
+    ground_thrust, ceiling,   wall_attraction, recirculation, forward_speed,    battery_sag,       thrust_slope,
+    payload,       trim,      draft,           rotor_drag,    inflow,           actuator_lag,      command_latency,
+    imu_drift,     vibration, map_offset,      heavy_tails,   propeller_damage, rotor_sensor_fault};
 
 }  // namespace
 

@@ -83,9 +83,9 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
   for (std::size_t c = 0; c < kChannels; ++c) {
     const auto x = held_out(cause, normal, seen, static_cast<Channel>(c));
     if (std::none_of(x.begin(), x.end(), [](double v) { return v != 0; })) continue;
-    // Offsets that the cause does not claim are taken out of both.
+    // Offsets that stand beside the cause (offsets()) and that it does not claim are taken out of both.
     double offset_before = 0, offset_after = 0, weight = 0;
-    for (std::size_t i = 0; i < x.size() && !cause.form->constant; ++i) {
+    for (std::size_t i = 0; i < x.size() && !cause.form->constant && c <= kVarZ; ++i) {
       const double w = seen.weight[c][i];
       offset_before += w * seen.y[c][i], offset_after += w * (seen.y[c][i] - x[i]), weight += w;
     }
