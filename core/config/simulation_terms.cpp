@@ -57,6 +57,7 @@ const std::vector<TermKind>& kinds() {
       {"thrust_with_voltage", Kind::thrust_with_voltage, {kSag, kVolts, kVolts, kVolts, kCourse}},
       {"thrust_lag", Kind::thrust_lag, {kLag}},
       {"setpoint_delay", Kind::setpoint_delay, {kDelay}},
+      {"attitude_lag", Kind::attitude_lag, {kDelay}},
       {"sensor_drift_with_time", Kind::sensor_drift_with_time, {kPush, kPush, kPush, kPush, kPush, kPush}},
       {"sensor_drift_with_temperature",
        Kind::sensor_drift_with_temperature,

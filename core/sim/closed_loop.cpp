@@ -10,6 +10,7 @@ namespace {
 
 Vehicle later(Vehicle vehicle, std::span<const SimulationTerm> terms) {
   vehicle.controller.latency = std::max(0.0, vehicle.controller.latency + setpoint_delay(terms));
+  vehicle.controller.attitude_lag = std::max(0.0, vehicle.controller.attitude_lag + more_attitude_lag(terms));
   return vehicle;
 }
 

@@ -17,6 +17,14 @@ double sagging(const std::vector<double>& x, double t, std::optional<double> vol
   return std::clamp(1 - x[0] * (x[1] - volts) / x[2], 0.1, 2.0);
 }
 
+/// Of the first number of all terms of a kind.
+double sum_of(std::span<const SimulationTerm> terms, Kind kind) {
+  double sum = 0;
+  for (const auto& term : terms)
+    if (term.kind == kind) sum += term.value[0];
+  return sum;
+}
+
 }  // namespace
 
 ThrustTerms::ThrustTerms(std::span<const SimulationTerm> terms) {
@@ -41,11 +49,7 @@ double ThrustTerms::step(double nominal, double t, std::optional<double> voltage
   return *lagged_;
 }
 
-double setpoint_delay(std::span<const SimulationTerm> terms) {
-  double delay = 0;
-  for (const auto& term : terms)
-    if (term.kind == Kind::setpoint_delay) delay += term.value[0];
-  return delay;
-}
+double setpoint_delay(std::span<const SimulationTerm> terms) { return sum_of(terms, Kind::setpoint_delay); }
+double more_attitude_lag(std::span<const SimulationTerm> terms) { return sum_of(terms, Kind::attitude_lag); }
 
 }  // namespace backwash::sim

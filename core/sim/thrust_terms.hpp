@@ -27,5 +27,7 @@ class ThrustTerms {
 
 /// By how much set-points act later than the vehicle file says, s.
 double setpoint_delay(std::span<const SimulationTerm> terms);
+/// By how much the attitude lags longer than the vehicle file says, s.
+double more_attitude_lag(std::span<const SimulationTerm> terms);
 
 }  // namespace backwash::sim

@@ -31,6 +31,7 @@ struct SimulationTerm {
     thrust_with_voltage,  ///< s, V* V, V_m V, V_0 V, r V/s: thrust (1 − s (V* − V)/V_m); V_0 + r t where no log tells V
     thrust_lag,           ///< τ s: thrust follows its command with a first-order lag
     setpoint_delay,       ///< τ s: set-points act later by this
+    attitude_lag,         ///< τ s: the attitude follows its command with a lag that is longer by this
     // Sensors and rotors.
     sensor_drift_with_time,  ///< x, y, z m/s² per 100 s, and at t = 0: bias of the accelerometer along the heading's
                              ///< axes

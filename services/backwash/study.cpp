@@ -190,7 +190,7 @@ int run(const Options& options) {
   const auto measured = seen;  // nothing that the model holds taken out
   const auto left = study::apply(read_terms(options.model), seen);
   const auto result = study::study(seen, study_options(options));
-  Json json = to_json(result, seen);
+  Json json = to_json(result, seen, vehicle);
   for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
   for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
   std::optional<AnytimeReport> anytime;
@@ -218,9 +218,9 @@ int run(const Options& options) {
     if (options.residuals)
       beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
     write_page(options, result, seen,
-               {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside});
+               {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle});
   }
-  options.json ? print(json) : print_text(result, seen, rotors, height);
+  options.json ? print(json) : print_text(result, seen, vehicle, consequence, rotors, height);
   if (!options.json) print_beside(flights, anytime);
   return kOk;
 }

@@ -4,12 +4,19 @@
 #include <cstdio>
 
 #include "core/study/findings/page_sections.hpp"
+#include "core/study/findings/words.hpp"
 
 namespace backwash::services {
 
 namespace {
 
-Json to_json(const study::NamedCause& cause) {
+Json to_json(const study::Remedy& remedy) {
+  Json set = Json::array();
+  for (const auto& [key, from, to] : remedy.set) set.push_back({{"key", key}, {"from", from}, {"to", to}});
+  return {{"file", remedy.file}, {"set", set}, {"words", remedy.words}};
+}
+
+Json to_json(const study::NamedCause& cause, const Vehicle& vehicle) {
   const auto& found = cause.found;
   Json parameters = Json::object();
   for (const auto& e : found.parameters) parameters[e.name] = {{"value", e.value}, {"ci95", {e.low, e.high}}};
@@ -46,6 +53,10 @@ Json to_json(const study::NamedCause& cause) {
             {"slope", cause.shift.slope},
             {"ci95", {cause.shift.low, cause.shift.high}},
             {"refuted", cause.shift.refuted()}}},
+          {"extrapolated", cause.extrapolated},
+          {"largest_flown", cause.largest_flown},
+          {"odds", study::odds(g.held_out_nats)},
+          {"change", to_json(study::remedy_of(cause, vehicle))},
           {"separate_by", separate}};
 }
 
@@ -75,7 +86,7 @@ Json to_json(const study::Outcome& o) {
 
 }  // namespace
 
-Json to_json(const study::StudyResult& result, const study::Observations& seen) {
+Json to_json(const study::StudyResult& result, const study::Observations& seen, const Vehicle& vehicle) {
   Json json = {{"verdict", study::to_string(result.verdict)},
                {"flights", seen.flights},
                {"windows", seen.windows.size()},
@@ -86,7 +97,15 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen) 
                {"remaining_dependence", Json::array()},
                {"minimum_detectable", Json::object()}};
   for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
-  for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause));
+  for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause, vehicle));
+  json["refused"] = Json::array();
+  for (const auto& r : result.refused)
+    json["refused"].push_back({{"name", r.name},
+                               {"form", r.form},
+                               {"parameter", r.parameter},
+                               {"value", r.value},
+                               {"possible", {r.possible.least, r.possible.most}},
+                               {"why", r.possible.reason}});
   for (const auto& u : result.unknown)
     json["unknown"].push_back(
         {{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}, {"shape", u.shape}, {"hz", u.hz}});
@@ -103,6 +122,7 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen) 
 
 Json to_json(const study::Consequence& c) {
   Json json = {{"places", c.places}, {"before", to_json(c.before)}, {"after", to_json(c.after)}};
+  if (const auto cost = study::clearance_cost(c)) json["clearance_cost_m"] = *cost;
   if (c.before.plan) json.update({{"start", to_json(c.start_W)}, {"goal", to_json(c.goal_W)}});
   return json;
 }
@@ -142,26 +162,36 @@ Json to_json(const study::calibrate::HeightEffects& effects) {
   return json;
 }
 
-void print_text(const study::StudyResult& result, const study::Observations& seen,
-                const std::optional<study::RotorVerdict>& rotors,
+namespace {
+
+void print_text(const study::NamedCause& cause, const Vehicle& vehicle) {
+  std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats: odds of %s\n", cause.found.form->cause().c_str(),
+              cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats,
+              study::odds(cause.gain.held_out_nats).c_str());
+  if (!cause.applied.refused.empty()) std::printf("  does not join the model: %s\n", cause.applied.refused.c_str());
+  if (cause.shift.refuted())
+    std::printf("  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; has the loop an integrator?\n",
+                cause.shift.slope, cause.shift.low, cause.shift.high);
+  for (const auto& e : cause.found.parameters)
+    std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
+  if (!cause.extrapolated.empty()) std::printf("  extrapolated: %s\n", cause.extrapolated.c_str());
+  std::printf("  what to change: %s\n", study::remedy_of(cause, vehicle).words.c_str());
+  for (const auto& s : cause.separate_by) {
+    std::printf("  not told from %s; fly: %s", s.rival.c_str(), s.manoeuvre.c_str());
+    std::printf(s.expected_nats ? " (%.1f nats expected)\n" : "\n", s.expected_nats.value_or(0));
+  }
+}
+
+}  // namespace
+
+void print_text(const study::StudyResult& result, const study::Observations& seen, const Vehicle& vehicle,
+                const std::optional<study::Consequence>& consequence, const std::optional<study::RotorVerdict>& rotors,
                 const std::optional<study::calibrate::HeightEffects>& height) {
   std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
   if (result.verdict == study::Verdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
-  for (const auto& cause : result.causes) {
-    std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats\n", cause.found.form->cause().c_str(),
-                cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats);
-    if (!cause.applied.refused.empty()) std::printf("  does not join the model: %s\n", cause.applied.refused.c_str());
-    if (cause.shift.refuted())
-      std::printf(
-          "  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; has the loop an integrator?\n",
-          cause.shift.slope, cause.shift.low, cause.shift.high);
-    for (const auto& e : cause.found.parameters)
-      std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
-    for (const auto& s : cause.separate_by) {
-      std::printf("  not told from %s; fly: %s", s.rival.c_str(), s.manoeuvre.c_str());
-      std::printf(s.expected_nats ? " (%.1f nats expected)\n" : "\n", s.expected_nats.value_or(0));
-    }
-  }
+  for (const auto& cause : result.causes) print_text(cause, vehicle);
+  if (consequence) std::printf("%s\n", study::cost_sentence(*consequence).c_str());
+  for (const auto& r : result.refused) std::printf("refused: %s\n", study::refusal(r).c_str());
   for (const auto& u : result.unknown)
     std::printf("unknown structure in %s along %s (%s), p %.4f\n", u.group.c_str(), u.along.c_str(), u.shape.c_str(),
                 u.p);
@@ -182,9 +212,18 @@ void print_rules(bool json) {
     Json all;
     for (const auto& r : study::rules())
       all["rules"].push_back({{"name", r.name}, {"value", r.value}, {"unit", r.unit}, {"reason", r.reason}});
-    for (const study::Form* f : study::catalogue())
-      all["forms"].push_back(
-          {{"effect", f->cause()}, {"form", f->formula}, {"least_rms", f->floor}, {"least_parameter", f->least}});
+    for (const study::Form* f : study::catalogue()) {
+      Json possible = Json::object();
+      for (std::size_t k = 0; k < f->possible.size(); ++k) {
+        const auto& p = f->possible[k];
+        possible[f->parameters[k]] = {{"range", {p.least, p.most}}, {"why", p.reason}};
+      }
+      all["forms"].push_back({{"effect", f->cause()},
+                              {"form", f->formula},
+                              {"least_rms", f->floor},
+                              {"least_parameter", f->least},
+                              {"possible", possible}});
+    }
     return print(all);
   }
   for (const auto& [name, value, unit, reason] : study::rules())
@@ -193,6 +232,11 @@ void print_rules(bool json) {
   std::printf("\nleast root mean square over the flown windows, least first parameter, of each form:\n");
   for (const study::Form* f : study::catalogue())
     std::printf("%-20s %7.3g %7.3g  %s\n", f->cause().c_str(), f->floor, f->least, f->formula.c_str());
+  std::printf("\nsizes beyond which a cause is refused by name:\n");
+  for (const study::Form* f : study::catalogue())
+    for (std::size_t k = 0; k < f->possible.size(); ++k)
+      std::printf("%-20s %-16s %6.3g to %.3g: %s\n", f->cause().c_str(), f->parameters[k].c_str(), f->possible[k].least,
+                  f->possible[k].most, f->possible[k].reason.c_str());
 }
 
 }  // namespace backwash::services

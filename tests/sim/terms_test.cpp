@@ -158,6 +158,23 @@ TEST(ThrustTermsOfAModel, SetpointsActLater) {
   EXPECT_EQ(rises({{Kind::setpoint_delay, {0.04}}}) - rises({}), 40);
 }
 
+TEST(ThrustTermsOfAModel, TheAttitudeLagsLonger) {
+  const auto grid = room();
+  const auto way_after_50_ms = [&](const Terms& terms) {
+    ClosedLoop loop(grid, five_inch(), {Vec3(2, 2, 1.5), Vec3::Zero()}, 1, {.terms = terms});
+    ClosedLoop still(grid, five_inch(), {Vec3(2, 2, 1.5), Vec3::Zero()}, 1, {.terms = terms});
+    Setpoint aside, stay;
+    aside.p_W = {2.1, 2, 1.5}, stay.p_W = {2, 2, 1.5};
+    for (int i = 0; i < 120; ++i) loop.step(aside), still.step(stay);
+    return (loop.estimated().p_W - still.estimated().p_W).norm();
+  };
+  // Of a first-order lag the way in the beginning goes with its inverse.
+  const double as_filed = way_after_50_ms({}), slower = way_after_50_ms({{Kind::attitude_lag, {0.05}}});
+  EXPECT_GT(as_filed, 0);
+  EXPECT_LT(slower, 0.8 * as_filed);
+  EXPECT_GT(slower, 0.3 * as_filed);
+}
+
 TEST(SensorsOfAModel, DriftWithTimeAndTemperatureAlongTheHeading) {
   Sensors by_time(five_inch(), Terms{{Kind::sensor_drift_with_time, {0.1, 0.2, 0.3, 0.01, 0.02, 0.03}}}, {}, 1);
   EXPECT_TRUE(by_time.acceleration(Vec3::Zero(), M_PI / 2, 200, {}).isApprox(Vec3(-0.42, 0.21, 0.63), 1e-9));

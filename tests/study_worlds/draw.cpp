@@ -17,9 +17,9 @@ double between(Rng& rng, double low, double high) { return std::uniform_real_dis
 
 double to_decimetre(double x) { return std::round(10 * x) / 10; }
 
-Room draw_room(Rng& rng, bool empty) {
+Room draw_room(Rng& rng, bool empty, double larger) {
   Room room;
-  const double x = to_decimetre(between(rng, 3.2, 5.5)), y = to_decimetre(between(rng, 3.0, 4.5));
+  const double x = larger * to_decimetre(between(rng, 3.2, 5.5)), y = larger * to_decimetre(between(rng, 3.0, 4.5));
   const double z = to_decimetre(between(rng, 2.3, 2.8));
   room.inside = {Vec3::Zero(), {x, y, z}};
   if (empty) return room;
@@ -75,7 +75,8 @@ World draw_world(const Request& request) {
   Rng rng(request.seed * 7919 + 17);  // independent of the cause: worlds with the same seed are pairs
   World world;
   world.request = request;
-  world.room = draw_room(rng, request.confound == "height");
+  world.room =
+      draw_room(rng, request.confound == "height" || request.confound == "bob", request.confound == "fast" ? 2 : 1);
   world.craft = draw_craft(rng);
   world.rate_hz = between(rng, 0, 1) < 0.7 ? 50 : between(rng, 0, 1) < 0.5 ? 100 : 40;
   world.jitter = between(rng, 0, 0.3);

@@ -142,7 +142,7 @@ std::map<std::string, Cause> others() {
           {"actuator_lag",
            {.size = 0.05,
             .one_signed = true,
-            .truth = {{"tau_s", [](double s, double) { return kStep / std::expm1(kStep / s); }}}}},
+            .truth = {{"tau_s", [](double s, double) { return kStep / std::expm1(kStep / s); }}, {"lag_s", same}}}},
           {"command_latency", {.size = 0.06, .one_signed = true, .truth = {{"latency_s", same}}}},  // s
           {"vibration", {.size = 0.25, .one_signed = true}},  // m/s², amplitude of the rotors' line
           {"map_offset",                                      // m

@@ -130,15 +130,15 @@ class Flight {
     const std::size_t back = static_cast<std::size_t>(late / kStep + 0.5);
     const Command& cmd = plan[k > back ? k - back : 0];
     const Vec3 kp(c.kp_h, c.kp_h, c.kp_z), kd(c.kd_h, c.kd_h, c.kd_z);
+    const double slow = world_.effects.of("actuator_lag"), tau = world_.request.confound == "attitude" ? 0 : slow;
     const Vec3 believed_p = p_ + vio_, believed_v = v_;
     const Vec3 wanted =
         cmd.a + kp.cwiseProduct(cmd.p - believed_p) + kd.cwiseProduct(cmd.v - believed_v) + kG * Vec3::UnitZ();
-    thrust_ += (wanted - thrust_) * (1 - std::exp(-kStep / c.attitude_lag));  // attitude and thrust follow
-    yaw_ = plan[k].yaw;
-    u_ = command_of(c, c.mass * thrust_.norm());
+    thrust_ += (wanted - thrust_) * (1 - std::exp(-kStep / (c.attitude_lag + slow - tau)));  // attitude, thrust follow
+    yaw_ = plan[k].yaw, u_ = command_of(c, c.mass * thrust_.norm());
     const double believed = thrust_of(c, u_, 0) / c.mass;
     double real = thrust_of(c, u_, world_.effects.of("thrust_slope")) / c.mass;
-    if (const double tau = world_.effects.of("actuator_lag"); tau > 0) {
+    if (tau > 0) {
       lagged_ += (real - lagged_) * (1 - std::exp(-kStep / tau));
       real = lagged_;
     } else {

@@ -13,7 +13,7 @@ namespace study = backwash::study;
 
 namespace {
 
-using MapKey = std::tuple<std::uint64_t, bool, double>;  // seed, empty room, offset
+using MapKey = std::tuple<std::uint64_t, std::string, double>;  // seed, circumstances (of the room), offset
 
 struct MapSeen {
   MapKey key;
@@ -38,7 +38,7 @@ study::Observations look_at(const World& world, const std::vector<Table>& flight
   model.ground.r0 = vehicle.body.diagonal_radius;
   // Worlds of one seed and map are pairs: what was looked up for the last one serves the next.
   thread_local std::optional<MapSeen> last;
-  const MapKey key{world.request.seed, world.request.confound == "height", world.effects.of("map_offset")};
+  const MapKey key{world.request.seed, world.request.confound, world.effects.of("map_offset")};
   if (!last || last->key != key) last.emplace(key, folder / "map.bt", model);
   study::Observer observer(vehicle, last->surroundings);
   for (const Table& table : flights) {

@@ -9,9 +9,9 @@ namespace {
 
 /// Minimum-jerk line, sampled at kStep.
 void append_line(std::vector<Command>& plan, const Vec3& from, const Vec3& to, double yaw_from, double yaw_to,
-                 double a_max) {
+                 double a_max, double v_max = 1.3) {
   const double length = (to - from).norm();
-  const double time = std::max({std::sqrt(5.78 * length / a_max), 1.875 * length / 1.3, 1.0});
+  const double time = std::max({std::sqrt(5.78 * length / a_max), 1.875 * length / v_max, 1.0});
   const int n = static_cast<int>(time / kStep);
   const double turn = std::remainder(yaw_to - yaw_from, 2 * M_PI);
   for (int i = 0; i < n; ++i) {
@@ -42,11 +42,51 @@ Vec3 draw_spot(const Room& room, Rng& rng, int kind, bool two_heights) {
   }
 }
 
+/// Up and down on a sine at one spot: where the craft is low it accelerates upwards.
+void append_bob(std::vector<Command>& plan, const Vec3& bottom, double amplitude, double period, int cycles, double yaw,
+                int segment) {
+  const double omega = 2 * M_PI / period;
+  const int n = static_cast<int>(cycles * period / kStep);
+  for (int i = 0; i < n; ++i) {
+    const double phase = omega * (i + 0.5) * kStep;
+    plan.push_back({bottom + Vec3(0, 0, amplitude * (1 - std::cos(phase))),
+                    {0, 0, amplitude * omega * std::sin(phase)},
+                    {0, 0, amplitude * omega * omega * std::cos(phase)},
+                    yaw,
+                    segment});
+  }
+}
+
+/// Flights that go up and down at six to eight spots, all about the same height.
+std::vector<Command> bobbing_plan(const World& world, Rng& rng) {
+  const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
+  const Vec3& far = world.room.inside.high;
+  const auto spot = [&] {
+    const double x = u(0.7, far.x() - 0.7), y = u(0.7, far.y() - 0.7);  // in an order that no compiler may change
+    return Vec3(x, y, u(0.35, 0.5));
+  };
+  std::vector<Command> plan;
+  Vec3 at = spot();
+  double yaw = u(-M_PI, M_PI);
+  const int dwells = static_cast<int>(u(6, 9));
+  for (int i = 0; i < dwells; ++i) {
+    const double amplitude = u(0.25, 0.4);
+    append_bob(plan, at, amplitude, u(3, 5), 2, yaw, i);
+    const Vec3 next = spot();
+    const double turned = u(-M_PI, M_PI);
+    append_line(plan, at, next, yaw, turned, 1.0);
+    at = next, yaw = turned;
+  }
+  return plan;
+}
+
 }  // namespace
 
 std::vector<Command> draw_plan(const World& world, Rng& rng) {
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
+  if (world.request.confound == "bob") return bobbing_plan(world, rng);
   const bool turns = world.request.confound != "yaw", two_heights = world.request.confound == "height";
+  const bool fast = world.request.confound == "fast";
   const int dwells = static_cast<int>(u(9, 13));
   std::vector<int> kinds;
   for (int i = 0; i < dwells; ++i) kinds.push_back(i % 5);
@@ -59,12 +99,12 @@ std::vector<Command> draw_plan(const World& world, Rng& rng) {
     for (int k = 0; k < n; ++k) plan.push_back({at, Vec3::Zero(), Vec3::Zero(), yaw, i});
     const Vec3 next = draw_spot(world.room, rng, kinds[static_cast<std::size_t>(i)], two_heights);
     const double turned = turns ? u(-M_PI, M_PI) : 0;
-    const double a_max = u(0.8, 2.0), z = 1.2;
+    const double a_max = fast ? u(3, 5) : u(0.8, 2.0), v_max = fast ? u(2, 4) : 1.3, z = 1.2;
     if (two_heights) {
       append_line(plan, at, next, yaw, turned, a_max);
     } else {
       append_line(plan, at, {at.x(), at.y(), z}, yaw, yaw, a_max);
-      append_line(plan, {at.x(), at.y(), z}, {next.x(), next.y(), z}, yaw, turned, a_max);
+      append_line(plan, {at.x(), at.y(), z}, {next.x(), next.y(), z}, yaw, turned, a_max, v_max);
       append_line(plan, {next.x(), next.y(), z}, next, turned, turned, a_max);
     }
     at = next, yaw = turned;

@@ -24,8 +24,10 @@ struct Request {
   double size = 1;                  ///< in units of the effect-size table (core/study/confusion.md)
   int flights = 12;
   /// "yaw": never turns; "battery": all flights start full and equal; "height": an empty room, hovers at two heights
-  /// only, low and under the ceiling; "fold": the rotors' rate lies within 6 Hz of a multiple of the logging rate;
-  /// empty: none.
+  /// only, low and under the ceiling; "bob": an empty room, up and down on sines
+  /// at one height; "fast": a room of twice the size, level ways at 2 to 4 m/s; "attitude": actuator_lag acts on the
+  /// attitude, the thrust has none; "fold": the rotors' rate lies within 6 Hz of a multiple of the logging rate; empty:
+  /// none.
   std::string confound;
 };
 

@@ -21,38 +21,43 @@ double by_gap(const WindowRow& w, const Scale& scale, F amount) {
   return along(w, [&](auto& at) { return amount(at.ceiling_gap, scale.value); });
 }
 
+const Reference under = {kCeilingReference, "m under the surface", [](auto& w) { return w.around.ceiling_gap; }};
+
 Form pull() {
-  return {.formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
-          .parameters = {"A_mps2"},
-          .scale_name = "L_m",
-          .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
-          .by_place = true,
-          .floor = 0.02,
-          .needs = {Source::ceiling},
-          .not_flown = not_under_one,
-          .columns =
-              [](const Windows& ws, const Scale& length) {
-                return std::vector{in(kMeanZ, ws, [&](auto& w) { return by_gap(w, length, near_ceiling); })};
-              },
-          .shapes = {{.formula = "z push A (0.3 m/d)^n",
-                      .parameters = {},
-                      .scale_name = "n",
-                      .scales = scales_of({1.0, 3.0}),
-                      .columns =
-                          [](const Windows& ws, const Scale& exponent) {
-                            return std::vector{in(kMeanZ, ws, [&](auto& w) {
-                              return by_gap(w, exponent, [](double d, double n) {
-                                return power_of_distance(d, kCeilingReference, n);
-                              });
-                            })};
-                          }}},
-          .extend = extends(ModelEffect::Kind::push_under_surface),
-          .simulate = simulates(SimulationTerm::Kind::push_under_surface)};
+  return {
+      .formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
+      .parameters = {"A_mps2"},
+      .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, more than any rotor gains 0.3 m under a ceiling"}},
+      .reference = under,
+      .scale_name = "L_m",
+      .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
+      .by_place = true,
+      .floor = 0.02,
+      .needs = {Source::ceiling},
+      .not_flown = not_under_one,
+      .columns =
+          [](const Windows& ws, const Scale& length) {
+            return std::vector{lifting(ws, [&](auto& at) { return near_ceiling(at.ceiling_gap, length.value); })};
+          },
+      .shapes = {{.formula = "z push A (0.3 m/d)^n",
+                  .parameters = {},
+                  .scale_name = "n",
+                  .scales = scales_of({1.0, 3.0}),
+                  .columns =
+                      [](const Windows& ws, const Scale& n) {
+                        return std::vector{lifting(ws, [&](auto& at) {
+                          return power_of_distance(at.ceiling_gap, kCeilingReference, n.value);
+                        })};
+                      }}},
+      .extend = extends(ModelEffect::Kind::push_under_surface),
+      .simulate = simulates(SimulationTerm::Kind::push_under_surface)};
 }
 
 Form gusts() {
   return {.formula = "ln variance + B exp(-(d - 0.3 m)/L), d the gap to the surface above",
           .parameters = {"B_ln"},
+          .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
+          .reference = under,
           .scale_name = "L_m",
           .scales = scales_of({0.15, 0.3, 0.6}),
           .floor = 0.12,

@@ -49,6 +49,29 @@ auto along(const WindowRow& w, F value) {
   return sum;
 }
 
+/// A vertical push that varies along the window, value(w, k) at its point k with mean mean(w): where the craft also
+/// accelerates by its set-points, what varies looks like a steeper or a later thrust, and is told as its part of those.
+template <typename F, typename M>
+Column lifting(const Windows& windows, F value, M mean) {
+  const auto moment = [&](const std::array<double, kPoints>& weight, const WindowRow& w) {
+    double sum = 0;
+    for (std::size_t k = 0; k < kPoints; ++k)
+      if (weight[k] != 0) sum += weight[k] * value(w, k);
+    return sum;
+  };
+  return {{{kMeanZ, values(windows, mean)},
+           {kThrustDelay, values(windows, [&](auto& w) { return moment(w.delay_at, w); })},
+           {kThrustSlope, values(windows, [&](auto& w) { return moment(w.slope_at, w); })}}};
+}
+
+/// The same of amount(place).
+template <typename F>
+Column lifting(const Windows& windows, F amount) {
+  return lifting(
+      windows, [&](auto& w, std::size_t k) { return w.path.empty() ? 0.0 : amount(w.path[k]); },
+      [&](auto& w) { return along(w, amount); });
+}
+
 /// Σ amount(d) over walls, towards each.
 template <typename F>
 Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {

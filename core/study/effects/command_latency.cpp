@@ -9,6 +9,7 @@ Effect command_latency() {
   return {.name = "command_latency",
           .forms = {{.formula = "set-points act later by this, level axes",
                      .parameters = {"latency_s"},
+                     .possible = {{-0.5, 1, "no controller acts a second late, none acts before it is told"}},
                      .constant = true,
                      .least = 0.015,
                      .needs = {Source::setpoints},
@@ -18,8 +19,13 @@ Effect command_latency() {
                            return std::vector{in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; })};
                          },
                      .simulate = simulates(SimulationTerm::Kind::setpoint_delay)}},
+          .remedy =
+              [](auto& fitted, auto& v) {
+                const double now = v.controller.latency;
+                return in_vehicle({{"controller.latency", now, now + fitted.theta[0]}});
+              },
           .manoeuvres = {{"sideways steps of the set-point, hard", [](WindowRow& w, double) {
-                            w.command_gain = {60, -10};
+                            w.command_gain = w.lag_gain = {60, -10};
                           }}}};
 }
 

@@ -21,6 +21,7 @@ Effect draft() {
   return {.name = "draft",
           .forms = {{.formula = "constant level push fixed to the world",
                      .parameters = {"x_mps2", "y_mps2"},
+                     .possible = {{-3, 3, "3 m/s² are a wind in which nobody flies indoors"}, {-3, 3, "as along x"}},
                      .constant = true,
                      .floor = 0.02,
                      .columns =
@@ -30,7 +31,10 @@ Effect draft() {
                          },
                      .extend = as_told,
                      .simulate = in_the_plane}},
-          .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }}};
+          .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }},
+          .remedy = [](auto&, auto&) {
+            return Remedy{"place", {}, "Find what moves the air: a fan, a vent, a window or a door."};
+          }};
 }
 
 }  // namespace backwash::study

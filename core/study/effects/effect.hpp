@@ -7,9 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "core/study/effects/remedy.hpp"
 #include "core/study/windows/observation.hpp"
 #include "core/types/model.hpp"
 #include "core/types/simulation_term.hpp"
+#include "core/types/vehicle.hpp"
 
 namespace backwash::study {
 
@@ -58,6 +60,20 @@ struct Manoeuvre {
 struct Effect;
 struct Form;
 
+/// The least and the most that a parameter can be, and why. A cause that would have to be beyond it is refused by name.
+struct Possible {
+  double least, most;
+  std::string reason;
+  bool holds(double value) const { return least <= value && value <= most; }
+};
+
+/// Where the size is stated, and what of it a window flew: outside of that range the size is an extrapolation.
+struct Reference {
+  double value;
+  std::string unit;
+  std::function<double(const WindowRow&)> flown;
+};
+
 /// An accepted form as it was fitted.
 struct FittedForm {
   const Form& form;
@@ -70,9 +86,11 @@ struct FittedForm {
 
 /// One physical form of an effect, linear in its parameters at a given scale.
 struct Form {
-  std::string formula;                  ///< what is added to which channel
-  std::vector<std::string> parameters;  ///< one per column, unit in the name
-  std::string scale_name = {};          ///< "L_m" …; empty without a scale
+  std::string formula;                      ///< what is added to which channel
+  std::vector<std::string> parameters;      ///< one per column, unit in the name
+  std::vector<Possible> possible = {};      ///< one for each parameter
+  std::optional<Reference> reference = {};  ///< without one the size is that of what was flown
+  std::string scale_name = {};              ///< "L_m" …; empty without a scale
   std::vector<Scale> scales = {Scale()};
   bool integer_scale = false;      ///< a rotor's number: not polished
   bool displaces_map = false;      ///< its scale is an offset, fitted along x and y
@@ -80,6 +98,7 @@ struct Form {
   bool constant = false;           ///< is itself what a free offset would be: tested without one
   bool in_sensor = false;          ///< is told by a sensor and pushes nothing
   bool by_place = false;           ///< a push that differs by place: it moves the craft in itself
+  bool by_speed = false;           ///< a push that slows the craft, and by its size (Scale::anchor) changes its columns
   double floor = 0;                ///< least root mean square over the flown windows that is called an effect
   double least = 0;                ///< least magnitude of the first parameter that is called an effect
   bool one_sided = false;          ///< the first parameter cannot be negative
@@ -114,7 +133,11 @@ struct Effect {
   Regressor axis = {"time since the flight began, s", false,
                     [](const WindowRow& w) { return w.t; }};  ///< of its picture
   bool towards_walls = false;                                 ///< its picture shows the part towards the nearest wall
-  std::vector<Manoeuvre> manoeuvres = {};                     ///< that set it apart from others
+  /// What to change where it is found.
+  std::function<Remedy(const FittedForm&, const Vehicle&)> remedy = [](const FittedForm& fitted, const Vehicle&) {
+    return by_extension(fitted);
+  };
+  std::vector<Manoeuvre> manoeuvres = {};  ///< that set it apart from others
 };
 
 }  // namespace backwash::study

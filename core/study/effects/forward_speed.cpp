@@ -19,6 +19,8 @@ double gusts_speed_power(const WindowRow& w, double power) {
   return sum;
 }
 
+const Reference pace = {1, "m/s", [](auto& w) { return w.speed; }};
+
 }  // namespace
 
 /// Thrust and gusts change with the speed.
@@ -26,6 +28,8 @@ Effect forward_speed() {
   return {.name = "forward_speed",
           .forms = {{.formula = "z push C (v/1 m/s)^2",
                      .parameters = {"C_mps2"},
+                     .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, at a walking pace"}},
+                     .reference = pace,
                      .floor = 0.02,
                      .columns =
                          [](const Windows& ws, const Scale&) {
@@ -35,6 +39,8 @@ Effect forward_speed() {
                      .simulate = simulates(SimulationTerm::Kind::push_with_speed)},
                     {.formula = "ln variance + B (v/1 m/s)^n",
                      .parameters = {"B_ln"},
+                     .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
+                     .reference = pace,
                      .scale_name = "n",
                      .scales = scales_of({1, 2}),
                      .floor = 0.12,

@@ -11,14 +11,17 @@ using field::kSurfaceReference, field::near_surface;
 Effect ground_thrust() {
   const auto lift = [](auto amount) {
     return [amount](const Windows& ws, const Scale& scale) {
-      return std::vector{
-          in(kMeanZ, ws, [&](auto& w) { return along(w, [&](auto& at) { return amount(at.height, scale.value); }); })};
+      return std::vector{lifting(ws, [&](auto& at) { return amount(at.height, scale.value); })};
     };
   };
   return {
       .name = "ground_thrust",
       .forms = {{.formula = "z push A exp(-(h - 0.4 m)/L), h the height over the surface below",
                  .parameters = {"A_mps2"},
+                 .possible = {{-3, 3,
+                               "a push of 3 m/s² is 30 % of the weight, more than any rotor gains 0.4 m over a floor"}},
+                 .reference =
+                     Reference{kSurfaceReference, "m over the surface", [](auto& w) { return w.around.height; }},
                  .scale_name = "L_m",
                  .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
                  .by_place = true,

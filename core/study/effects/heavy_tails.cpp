@@ -6,19 +6,22 @@ namespace backwash::study {
 
 /// Bursts: the gusts are larger now and then than a Gaussian's.
 Effect heavy_tails() {
-  return {.name = "heavy_tails",
-          .forms = {{.formula = "ln kurtosis + K",
-                     .parameters = {"K_ln"},
-                     .constant = true,
-                     .floor = 0.15,
-                     .one_sided = true,
-                     .unknowable =
-                         [](const Observations&) {
-                           return kWindowRules.scatter2 / 2;
-                         },  // how much of the wander is within 1 s
-                     .columns = [](const Windows& ws,
-                                   const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; },
-                     .simulate = simulates(SimulationTerm::Kind::kurtosis)}}};
+  return {
+      .name = "heavy_tails",
+      .forms = {{.formula = "ln kurtosis + K",
+                 .parameters = {"K_ln"},
+                 .possible = {{0, 4, "55 times a Gaussian's kurtosis: not gusts, but a log with errors"}},
+                 .constant = true,
+                 .floor = 0.15,
+                 .one_sided = true,
+                 .unknowable =
+                     [](const Observations&) { return kWindowRules.scatter2 / 2; },  // what of the wander is within 1 s
+                 .columns = [](const Windows& ws,
+                               const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; },
+                 .simulate = simulates(SimulationTerm::Kind::kurtosis)}},
+      .remedy = [](auto&, auto&) {
+        return Remedy{"model", {}, "Raise bound.kappa of the model file: gusts come in bursts."};
+      }};
 }
 
 }  // namespace backwash::study

@@ -9,11 +9,14 @@ Effect inflow() {
   return {.name = "inflow",
           .forms = {{.formula = "z push -k v_z",
                      .parameters = {"k_per_s"},
+                     .possible = {{0, 5, "a climb takes thrust; 5 1/s would be half the weight at 1 m/s"}},
                      .floor = 0.01,
                      .one_sided = true,
                      .columns =
                          [](const Windows& ws, const Scale&) {
-                           return std::vector{in(kMeanZ, ws, [](auto& w) { return -w.v_W.z(); })};
+                           return std::vector{lifting(
+                               ws, [](auto& w, std::size_t k) { return -w.climbs[k]; },
+                               [](auto& w) { return -w.v_W.z(); })};
                          },
                      .extend = unknown_push,
                      .simulate = simulates(SimulationTerm::Kind::push_against_climb)}},

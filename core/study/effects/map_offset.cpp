@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+
 #include "core/study/effects/columns.hpp"
 
 namespace backwash::study {
@@ -33,6 +35,7 @@ Effect map_offset() {
   return {.name = "map_offset",
           .forms = {{.formula = "ln variance as modelled at the position plus a level offset",
                      .parameters = {"share"},
+                     .possible = {{0, 3, "a share of what the map says there: three times of it is no offset"}},
                      .scale_name = "offset",
                      .scales = tried_offsets(),
                      .integer_scale = true,
@@ -46,7 +49,13 @@ Effect map_offset() {
                            const Vec3& offset_W = fitted.scale.offset_W;
                            return std::vector<SimulationTerm>{{SimulationTerm::Kind::variance_elsewhere,
                                                                {fitted.theta[0], offset_W.x(), offset_W.y()}}};
-                         }}}};
+                         }}},
+          .remedy = [](auto& fitted, auto&) {
+            char text[96];
+            const Vec3& by = fitted.scale.offset_W;
+            std::snprintf(text, sizeof text, "Move the map by %.2f m along x and %.2f m along y.", -by.x(), -by.y());
+            return Remedy{"map", {}, text};
+          }};
 }
 
 }  // namespace backwash::study

@@ -34,6 +34,7 @@ Effect payload() {
       .name = "payload",
       .forms = {{.formula = "thrust per mass (1 - m), m the relative excess of mass",
                  .parameters = {"m"},
+                 .possible = {{-0.5, 0.5, "a craft of half or of twice its mass is another vehicle"}},
                  .constant = true,
                  .floor = 0.01,
                  .needs = {Source::thrust},
@@ -43,6 +44,8 @@ Effect payload() {
                  .simulate = simulates(SimulationTerm::Kind::thrust_share)},
                 {.formula = "an off-centre weight: rotors that face each other need (1 + m) and (1 - m) of the mean",
                  .parameters = {"m_first", "m_second"},
+                 .possible = {{-1, 1, "a rotor that needs none, or twice the mean, flies alone"},
+                              {-1, 1, "as m_first"}},
                  .scale_name = "pairing",
                  .scales = scales_of({0, 1, 2}),
                  .integer_scale = true,
@@ -51,7 +54,12 @@ Effect payload() {
                  .floor = 0.02,
                  .needs = {Source::motors},
                  .columns = facing_rotors,
-                 .simulate = needed_of_rotors}}};
+                 .simulate = needed_of_rotors}},
+      .remedy = [](auto& fitted, auto& v) {
+        if (fitted.form.motors_alone)
+          return with_craft("Move the weight, or the battery, towards the middle of the craft.");
+        return in_vehicle({{"body.mass", v.body.mass, v.body.mass / (1 - fitted.theta[0])}});
+      }};
 }
 
 }  // namespace backwash::study

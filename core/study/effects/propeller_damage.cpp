@@ -27,6 +27,7 @@ Effect propeller_damage() {
   return {.name = "propeller_damage",
           .forms = {{.formula = "one rotor needs (1 + d) of the others' thrust command",
                      .parameters = {"d"},
+                     .possible = {{0, 1, "a rotor that needs twice the command has none to spare"}},
                      .scale_name = "rotor",
                      .scales = rotors(),
                      .integer_scale = true,
@@ -40,6 +41,8 @@ Effect propeller_damage() {
                      .simulate = needs_more},
                     {.formula = "one rotor needs (1 + d) of the others' thrust command and shakes at its rate",
                      .parameters = {"d", "P_ln"},
+                     .possible = {{0, 1, "a rotor that needs twice the command has none to spare"},
+                                  {-2, 20, "ln of a line's power over the noise"}},
                      .scale_name = "rotor",
                      .scales = rotors(),
                      .integer_scale = true,
@@ -51,7 +54,10 @@ Effect propeller_damage() {
                          [](const Windows& ws, const Scale& rotor) {
                            return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
                          },
-                     .simulate = needs_more_and_shakes}}};
+                     .simulate = needs_more_and_shakes}},
+          .remedy = [](auto& fitted, auto&) {
+            return with_craft("Replace or re-glue the propeller of " + rotor_of(fitted) + ".");
+          }};
 }
 
 }  // namespace backwash::study

@@ -19,6 +19,7 @@ Effect rotor_sensor_fault() {
   return {.name = "rotor_sensor_fault",
           .forms = {{.formula = "one rotor's rpm^2 reads (1 + e) of what its command gives",
                      .parameters = {"e"},
+                     .possible = {{-3, 3, "ln of rpm² as read: beyond, it is another unit"}},
                      .scale_name = "rotor",
                      .scales = rotors(),
                      .integer_scale = true,
@@ -30,6 +31,7 @@ Effect rotor_sensor_fault() {
                      .simulate = of_one_rotor(SimulationTerm::Kind::rotor_reading)},
                     {.formula = "a share of one rotor's rpm readings is stuck or missing",
                      .parameters = {"share"},
+                     .possible = {{0, 1, "a share of the readings"}},
                      .scale_name = "rotor",
                      .scales = rotors(),
                      .integer_scale = true,
@@ -39,7 +41,11 @@ Effect rotor_sensor_fault() {
                      .needs = {Source::rpm},
                      .columns = [](const Windows& ws,
                                    const Scale& rotor) { return std::vector{one_rotor(kDropout1, ws, rotor, false)}; },
-                     .simulate = of_one_rotor(SimulationTerm::Kind::rotor_dropout)}}};
+                     .simulate = of_one_rotor(SimulationTerm::Kind::rotor_dropout)}},
+          .remedy = [](auto& fitted, auto&) {
+            return with_craft("Look at the rpm sensor of " + rotor_of(fitted) +
+                              ": its gap, its wire, its number of poles.");
+          }};
 }
 
 }  // namespace backwash::study

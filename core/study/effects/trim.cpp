@@ -9,6 +9,7 @@ Effect trim() {
   return {.name = "trim",
           .forms = {{.formula = "constant push fixed to the body",
                      .parameters = {"body_x_mps2", "body_y_mps2"},
+                     .possible = {{-3, 3, "3 m/s² are a tilt of 17 degrees that nobody saw"}, {-3, 3, "as along x"}},
                      .constant = true,
                      .floor = 0.02,
                      .needs = {Source::attitude},
@@ -20,6 +21,11 @@ Effect trim() {
                      .extend = unknown_push,
                      .simulate = simulates(SimulationTerm::Kind::push_of_heading)}},
           .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }},
+          .remedy =
+              [](auto&, auto&) {
+                return with_craft(
+                    "Level the craft anew: calibrate the autopilot's level horizon, and look for a bent arm or motor.");
+              },
           .manoeuvres = {{"turn a full yaw turn on the spot, far from walls", [](WindowRow& w, double s) {
                             w.yaw = 2 * M_PI * s;
                             w.R_WB = Eigen::AngleAxisd(w.yaw, Vec3::UnitZ()).toRotationMatrix();

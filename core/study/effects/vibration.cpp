@@ -30,22 +30,26 @@ std::optional<std::string> folded_away(const Observations& seen) {
 Effect vibration() {
   return {
       .name = "vibration",
-      .forms = {
-          {.formula = "ln power at all rotors' rates + P",
-           .parameters = {"P_ln"},
-           .constant = true,
-           .floor = 0.25,
-           .one_sided = true,
-           .needs = {Source::rpm},
-           .not_flown = folded_away,
-           .columns =
-               [](const Windows& ws, const Scale&) {
-                 Column c;
-                 for (std::size_t rotor = 0; rotor < 4; ++rotor)
-                   c.parts.push_back({static_cast<Channel>(kLine1 + rotor), std::vector<double>(ws.size(), 1.0)});
-                 return std::vector{c};
-               },
-           .simulate = [](const FittedForm&, const Observations& seen) { return std::vector{rotor_lines(seen)}; }}}};
+      .forms = {{.formula = "ln power at all rotors' rates + P",
+                 .parameters = {"P_ln"},
+                 .possible = {{0, 20, "ln of a line's power over the noise: beyond, no accelerometer reads on"}},
+                 .constant = true,
+                 .floor = 0.25,
+                 .one_sided = true,
+                 .needs = {Source::rpm},
+                 .not_flown = folded_away,
+                 .columns =
+                     [](const Windows& ws, const Scale&) {
+                       Column c;
+                       for (std::size_t rotor = 0; rotor < 4; ++rotor)
+                         c.parts.push_back({static_cast<Channel>(kLine1 + rotor), std::vector<double>(ws.size(), 1.0)});
+                       return std::vector{c};
+                     },
+                 .simulate = [](const FittedForm&,
+                                const Observations& seen) { return std::vector{rotor_lines(seen)}; }}},
+      .remedy = [](auto&, auto&) {
+        return with_craft("Balance the propellers, and look for loose motors and a worn damping of the autopilot.");
+      }};
 }
 
 }  // namespace backwash::study

@@ -42,6 +42,8 @@ Effect wall_attraction() {
   return {.name = "wall_attraction",
           .forms = {{.formula = formula,
                      .parameters = {"A_mps2"},
+                     .possible = {{-3, 3, "a push of 3 m/s² tilts the craft by 17 degrees beside a wall"}},
+                     .reference = Reference{kSurfaceReference, "m from the wall", nearest},
                      .scale_name = "L_m",
                      .scales = lengths,
                      .by_place = true,

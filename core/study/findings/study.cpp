@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/findings/words.hpp"
 #include "core/study/inference/coverage.hpp"
 #include "core/study/inference/estimate.hpp"
 
@@ -76,9 +77,9 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
   for (std::size_t c = 0; c < kChannels; ++c) {
     const auto x = held_out(cause, normal, seen, static_cast<Channel>(c));
     if (std::none_of(x.begin(), x.end(), [](double v) { return v != 0; })) continue;
-    // Offsets that the cause does not claim are taken out of both.
+    // Offsets that stand beside the cause (offsets()) and that it does not claim are taken out of both.
     double offset_before = 0, offset_after = 0, weight = 0;
-    for (std::size_t i = 0; i < x.size() && !cause.form->constant; ++i) {
+    for (std::size_t i = 0; i < x.size() && !cause.form->constant && c <= kVarZ; ++i) {
       const double w = seen.weight[c][i];
       offset_before += w * seen.y[c][i], offset_after += w * (seen.y[c][i] - x[i]), weight += w;
     }
@@ -142,7 +143,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   const Evidence start(seen);
   const SearchResult found = search(start, options.search);
   result.threshold = found.threshold;
-  result.unknown = found.unknown;
+  result.unknown = found.unknown, result.refused = found.refused;
   Evidence evidence = start;
   evidence.whiten(others_of(found.accepted, SIZE_MAX, seen));
   bool ambiguous = false;
@@ -152,6 +153,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
                      gain_of(evidence, found.accepted, i),
                      {},
                      applied[i],
+                     extrapolated(found.accepted[i], seen),
+                     largest_flown(found.accepted[i], seen),
                      check_shift(found.accepted[i], applied[i].beside, seen)};
     if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(seen.windows);
     for (const Rival& rival : cause.found.rivals)

@@ -33,8 +33,10 @@ struct NamedCause {
   Accepted found;
   Gain gain;
   std::vector<Separation> separate_by;
-  Applied applied = {};   ///< what the extension by it is worth; refused: it does not join the model
-  ShiftCheck shift = {};  ///< whether the craft hovers where its push would hold it
+  Applied applied = {};           ///< what the extension by it is worth; refused: it does not join the model
+  std::string extrapolated = {};  ///< why the size is none that was flown (words.hpp)
+  double largest_flown = 0;       ///< m/s² or ln: what the cause added at most, of its first channel
+  ShiftCheck shift = {};          ///< whether the craft hovers where its push would hold it
 };
 
 struct StudyOptions {
@@ -49,6 +51,7 @@ struct StudyResult {
   Verdict verdict = Verdict::nothing_found;
   std::vector<NamedCause> causes;
   std::vector<UnknownStructure> unknown;
+  std::vector<Refused> refused;  ///< causes that would have led, but for a size that no vehicle can have
   std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
   /// Per cause and parameter: least size found with 80 % power.
   std::map<std::string, std::map<std::string, double>> minimum_detectable;

@@ -10,6 +10,7 @@
 #include "core/report/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/self_test.hpp"
+#include "core/study/findings/words.hpp"
 
 namespace backwash::study {
 namespace {
@@ -39,7 +40,8 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
   switch (result.verdict) {
     case Verdict::cause_found:
       return "The simulation misses " + names + of + "; with it, flights that were not fitted are likelier by " +
-             number(result.causes.front().gain.held_out_nats) + " nats.";
+             number(result.causes.front().gain.held_out_nats) +
+             " nats. A nat is a factor e in odds: 3 nats are 20 to 1, 7 are 1,000 to 1.";
     case Verdict::cannot_distinguish:
       return "The simulation misses something that these flights cannot tell apart: " + names + of + ".";
     case Verdict::unknown_structure:
@@ -99,14 +101,16 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
   return report::draw(script.str(), report::Format::svg, 860, 380);
 }
 
-std::string figures(const NamedCause& cause) {
+std::string figures(const NamedCause& cause, const std::optional<Vehicle>& vehicle) {
   const auto& g = cause.gain;
   std::string text = "<table>\n";
+  if (vehicle) text += row("What to change", remedy_of(cause, *vehicle).words);
   for (const auto& e : cause.found.parameters)
     text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
+  if (!cause.extrapolated.empty()) text += row("The size is extrapolated", cause.extrapolated);
   text += row("Probability of as much by chance, over everything tried", number(cause.found.p));
-  text += row("Gain on flights not fitted",
-              number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " + number(g.high_nats) + "]");
+  text += row("Gain on flights not fitted", number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " +
+                                                number(g.high_nats) + "]: odds of " + odds(g.held_out_nats));
   text += row("Error of the windows, before and after", number(g.rmse_before) + " → " + number(g.rmse_after));
   text += row("Samples in the model's central 90 %, before and after",
               number(g.coverage_before) + " → " + number(g.coverage_after));
@@ -154,7 +158,7 @@ std::string consequence_section(const Consequence& c) {
     const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
     line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
   }
-  return text + "</table>\n</section>\n";
+  return text + "</table>\n<p>" + report::escaped(cost_sentence(c)) + "</p>\n</section>\n";
 }
 
 /// Whether what the accepted causes leave depends on something.
@@ -184,6 +188,7 @@ std::string unknown_section(const std::vector<UnknownStructure>& unknown) {
 std::string limits_sections(const StudyResult& result, const Observations& seen) {
   std::string page = "<section><h2>What was not tested, and why</h2>\n<table>\n";
   for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
+  for (const auto& r : result.refused) page += row("Refused: " + spoken(r.name), refusal(r));
   if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
   page +=
       "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
@@ -216,7 +221,8 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());
     page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause())) + "</h2>\n<p>" +
-            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause) + "</section>\n";
+            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause, context.read_vehicle) +
+            "</section>\n";
   }
   if (context.height) page += height_section(*context.height);
   if (context.rotors) {

@@ -19,6 +19,8 @@ struct PageContext {
   std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
   std::optional<calibrate::HeightEffects> height;
   std::string residuals = {};  ///< residual_section(), or empty
+  /// The file as read: what to change is told with its values. Without it nothing is.
+  std::optional<Vehicle> read_vehicle = {};
 };
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,

@@ -50,7 +50,7 @@ class Bound {
 
 }  // namespace
 
-bool Candidate::effect(const SmallVector& theta) const {
+bool Candidate::large_enough(const SmallVector& theta) const {
   const auto floor_of_structure = [&] {
     return columns.front().parts.front().channel == kVarX ? kRules.structure_floor_ln : kRules.structure_floor_mean;
   };
@@ -59,6 +59,13 @@ bool Candidate::effect(const SmallVector& theta) const {
   const double square =
       form->integer_scale && form->one_sided ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
   return square >= form->floor * form->floor;
+}
+
+std::optional<std::size_t> Candidate::beyond_possible(const SmallVector& theta) const {
+  if (!form) return std::nullopt;
+  for (std::size_t k = 0; k < form->possible.size() && k < static_cast<std::size_t>(theta.size()); ++k)
+    if (!form->possible[k].holds(theta[static_cast<Eigen::Index>(k)])) return k;
+  return std::nullopt;
 }
 
 std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& columns,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,8 +22,11 @@ struct Candidate {
   SmallMatrix size;       ///< θᵀ size θ: mean square of what the columns add
   Structure structure{};  ///< of a structure, its functions left out: they are the columns
 
-  /// Whether parameters are an effect at all: at least the stated floor, and of a possible sign.
-  bool effect(const SmallVector& theta) const;
+  /// Whether parameters are an effect at all: at least the stated floor, of the right sign, and possible.
+  bool effect(const SmallVector& theta) const { return large_enough(theta) && !beyond_possible(theta); }
+  bool large_enough(const SmallVector& theta) const;
+  /// The first parameter that no vehicle can have, by its number; nothing of a structure.
+  std::optional<std::size_t> beyond_possible(const SmallVector& theta) const;
 };
 
 /// Columns that stand beside a form's: free offsets, unless it is one itself, and what was accepted.

@@ -178,6 +178,16 @@ struct Family {
     }
   }
 
+  /// The columns at the speed that the push itself leaves.
+  void follow_speed() {
+    for (int k = 0; k < kRules.turns; ++k) {
+      const Normal n = normal_at(shapes[0], scale);
+      if (!n.solvable) return;
+      scale.anchor = {n.fit()[0]};
+    }
+    fit();
+  }
+
   /// How many members are of the form itself.
   std::size_t own() const {
     return static_cast<std::size_t>(
@@ -238,6 +248,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
   family.shapes.insert(family.shapes.begin(), form);
   family.fit();
   if (form.by_place) family.follow_push();
+  if (form.by_speed) family.follow_speed();
   if (family.own() == 0) return;
   const Member best = family.best_own();
   cause.scale = best.scale, cause.theta = best.theta, cause.gain = best.normal.gain();

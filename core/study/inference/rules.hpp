@@ -42,6 +42,12 @@ struct Rules {
   Rule rival_errors{"rival_errors", 2, "standard errors", "derived: 95 % of the flights' difference"};
   Rule rival_most_nats{"rival_most_nats", 12, "nats", "chosen: four times rival_nats, however much flights differ"};
   Rule rival_rest{"rival_rest", 0.5, "of a gain", "chosen: what keeps more than half of its gain is a second cause"};
+  Rule rival_share{"rival_share", 0.3, "of a gain",
+                   "measured: of two columns that go together at 0.94 the wrong one has 0.70 to 0.77 of the gain"};
+  Rule form_error{"form_error", 0.25, "of an accepted gain",
+                  "chosen: what lost more than half of its gain to a cause is the error of that one's form below this"};
+  Rule beyond_flown{"beyond_flown", 1.25, "1",
+                    "chosen: a reference farther than a quarter outside of what was flown is an extrapolation"};
   // Scatter
   Rule motor_scatter{"motor_scatter", 0.01, "1", "chosen: rotors of one craft differ by 1 % (README.md, Scatter)"};
   Rule dropout_scatter{"dropout_scatter", 0.003, "1", "chosen: of readings, lost by a sound sensor"};

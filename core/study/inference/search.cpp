@@ -4,24 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "core/study/inference/estimate.hpp"
+#include "core/study/inference/rivals.hpp"
 
 namespace backwash::study {
 namespace {
-
-/// Everything accepted but one, with what it leaves open, as columns.
-std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen,
-                               std::size_t but = SIZE_MAX) {
-  std::vector<Column> all;
-  for (std::size_t i = 0; i < accepted.size(); ++i) {
-    if (i == but) continue;
-    all.insert(all.end(), accepted[i].columns.begin(), accepted[i].columns.end());
-    const auto open = companions(*accepted[i].form, seen);
-    all.insert(all.end(), open.begin(), open.end());
-  }
-  return all;
-}
 
 /// What a cause may disturb besides the channels that its columns move: the error of its form is left over there too.
 /// Bits: level means; vertical mean; variance, tail and lines; delays and slope; single rotors.
@@ -33,11 +22,16 @@ unsigned disturbs(const std::vector<Column>& columns) {
       if (c == kMeanX || c == kMeanY) kinds |= 1;
       if (c == kMeanZ) kinds |= 16;
       if ((c >= kVarX && c <= kTail) || (c >= kLine1 && c <= kLine4)) kinds |= 2;
-      if (c >= kThrustDelay && c <= kCommandDelayZ) kinds |= 4;
+      if (c >= kThrustDelay && c <= kTiltDelay) kinds |= 4;
       if (c >= kLine1) kinds |= 8;
     }
   }
   return kinds;
+}
+
+bool dynamic(const std::vector<Column>& columns) {
+  const Channel c = columns.front().parts.front().channel;
+  return c >= kThrustDelay && c <= kTiltDelay;
 }
 
 /// Gain that a further cause needs: a share of that of each accepted one whose form's error it might be, a larger one
@@ -46,23 +40,10 @@ double needed_gain(const Candidate& candidate, const std::vector<Accepted>& acce
   double needed = threshold;
   for (const auto& a : accepted) {
     if (!(disturbs(a.columns) & disturbs(candidate.columns))) continue;
-    const auto dynamic = [](const std::vector<Column>& columns) {
-      const Channel c = columns.front().parts.front().channel;
-      return c >= kThrustDelay && c <= kCommandDelayZ;
-    };
     const double share = dynamic(a.columns) && dynamic(candidate.columns) ? kRules.repair_share : kRules.least_share;
     needed = std::max(needed, share * a.gain);
   }
   return needed;
-}
-
-bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b) {
-  std::array<bool, kChannels> moved{};
-  for (const auto& column : a)
-    for (const auto& part : column.parts) moved[part.channel] = true;
-  return std::any_of(b.begin(), b.end(), [&](const Column& column) {
-    return std::any_of(column.parts.begin(), column.parts.end(), [&](auto& part) { return moved[part.channel]; });
-  });
 }
 
 /// Gain that a structure needs beside the accepted causes.
@@ -72,61 +53,6 @@ double needed_structure(const Candidate& structure, const std::vector<Accepted>&
     if (share_a_channel(structure.columns, a.columns))
       needed = std::max(needed, (a.form->constant ? kRules.left_of_constant : kRules.left_share) * a.gain);
   return needed;
-}
-
-/// Σ and standard error of the sum of per-flight differences.
-std::pair<double, double> difference(const Normal& a, const Normal& b) {
-  const auto ga = a.gain_per_flight(), gb = b.gain_per_flight();
-  double sum = 0, square = 0;
-  const double n = static_cast<double>(ga.size());
-  for (std::size_t f = 0; f < ga.size(); ++f) sum += ga[f] - gb[f], square += (ga[f] - gb[f]) * (ga[f] - gb[f]);
-  return {sum, std::sqrt(std::max(0.0, (square - sum * sum / n) * n / (n - 1)))};
-}
-
-void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std::size_t which, double threshold) {
-  Accepted& own = accepted[which];
-  const auto others = columns_of(accepted, evidence.seen(), which);
-  std::vector<Rival> found;
-  for (const Form* each : catalogue()) {
-    const Form& form = *each;
-    if (form.effect == own.form->effect || why_not_tested(form, evidence.seen())) continue;
-    if (std::any_of(accepted.begin(), accepted.end(), [&](auto& a) { return a.form->effect == form.effect; })) continue;
-    for (const Scale& scale : form.scales) {
-      const auto columns = form.columns(evidence.seen().windows, scale);
-      // Both with the same free offsets, unless one of them is an offset itself.
-      std::vector<Column> both = own.columns;
-      both.insert(both.end(), columns.begin(), columns.end());
-      std::vector<Column> nuisance = others;
-      if (!form.constant && !own.form->constant) {
-        const auto free = offsets(both, evidence.seen());
-        nuisance.insert(nuisance.end(), free.begin(), free.end());
-      }
-      const Normal theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);
-      if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, kRules.rival_rest * ours.gain()))
-        continue;
-      const Candidate rival{&form, form.cause(), scale, {}, {}, 0, evidence.size(columns)};
-      if (!rival.effect(theirs.fit())) continue;
-      // Two causes that explain different data are two causes, not rivals: a rival gains less once ours is known.
-      std::vector<Column> with_ours = nuisance;
-      with_ours.insert(with_ours.end(), own.columns.begin(), own.columns.end());
-      const Normal rest = evidence.normal(columns, with_ours);
-      if (rest.solvable && rest.gain() > kRules.rival_rest * theirs.gain()) continue;
-      const auto [lead, error] = difference(ours, theirs);
-      // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
-      // its rate does.
-      if (own.form->motors_alone && form.motors_alone) {
-        found.push_back({form.cause(), &form, scale, lead});
-        continue;
-      }
-      if (lead > kRules.rival_nats && lead > kRules.rival_errors * error) continue;
-      if (lead > kRules.rival_most_nats) continue;
-      found.push_back({form.cause(), &form, scale, lead});
-    }
-  }
-  std::sort(found.begin(), found.end(), [](auto& a, auto& b) { return a.behind_nats < b.behind_nats; });
-  for (const auto& rival : found)
-    if (std::none_of(own.rivals.begin(), own.rivals.end(), [&](auto& r) { return r.name == rival.name; }))
-      own.rivals.push_back(rival);
 }
 
 /// Drops causes that the others make unnecessary, and estimates the rest given each other.
@@ -139,7 +65,8 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
       const auto& a = accepted[i];
       const Normal n = evidence.normal(
           a.columns, nuisance_of(*a.form, a.columns, columns_of(accepted, evidence.seen(), i), evidence.seen()));
-      const double gain = n.solvable ? n.gain() : 0;
+      double gain = n.solvable ? n.gain() : 0;
+      if (error_of_form(*a.form, a.columns, gain, accepted, evidence, i)) gain = std::min(gain, 0.0);
       if (gain < least) least = gain, weakest = i;
     }
     if (weakest != SIZE_MAX) {
@@ -175,13 +102,34 @@ struct Step {
   }
 };
 
-const Candidate* best_of(const std::vector<Candidate>& all, const std::vector<Accepted>& accepted, double threshold) {
+bool is_known(const Candidate& c, const std::vector<Accepted>& accepted) {
+  return std::any_of(accepted.begin(), accepted.end(),
+                     [&](auto& a) { return c.form && a.form->effect == c.form->effect; });
+}
+
+/// The cause that gains most beside what is accepted, more than `led` nats, but is none that a vehicle can have.
+std::optional<Refused> impossible(const std::vector<Candidate>& all, const std::vector<Accepted>& accepted,
+                                  double threshold, double led) {
+  std::optional<Refused> found;
+  for (const auto& c : all) {
+    if (!c.form || is_known(c, accepted) || c.gain <= std::max(led, needed_gain(c, accepted, threshold))) continue;
+    const auto theta = c.normal.fit();
+    const auto k = c.beyond_possible(theta);
+    if (!k || !c.large_enough(theta) || !excludes_zero(c.normal, c.columns)) continue;
+    led = c.gain;
+    found = {c.name, c.form->formula, c.form->parameters[*k], theta[static_cast<Eigen::Index>(*k)],
+             c.form->possible[*k]};
+  }
+  return found;
+}
+
+const Candidate* best_of(const std::vector<Candidate>& all, const std::vector<Accepted>& accepted, double threshold,
+                         const Evidence& evidence) {
   const Candidate* best = nullptr;
   for (const auto& c : all) {
-    const bool known = std::any_of(accepted.begin(), accepted.end(),
-                                   [&](auto& a) { return c.form && a.form->effect == c.form->effect; });
-    if (known || (best && c.gain <= best->gain)) continue;
+    if (is_known(c, accepted) || (best && c.gain <= best->gain)) continue;
     if (c.gain <= needed_gain(c, accepted, threshold) || !c.effect(c.normal.fit())) continue;
+    if (c.form && error_of_form(*c.form, c.columns, c.gain, accepted, evidence)) continue;
     if (!c.form || excludes_zero(c.normal, c.columns)) best = &c;
   }
   return best;
@@ -201,6 +149,29 @@ bool leads(const Candidate& structure, const Candidate* cause, const std::vector
          structure.gain - cause->gain > std::max(kRules.structure_lead.value, kRules.structure_margin * cause->gain);
 }
 
+/// What came out beyond what a vehicle can have, once averaged over the shapes, is refused; no interval holds it.
+void refuse_impossible(SearchResult& result) {
+  std::erase_if(result.accepted, [&](Accepted& a) {
+    const auto& possible = a.form->possible;
+    for (std::size_t k = 0; k < possible.size() && !a.form->displaces_map && k < a.parameters.size(); ++k) {
+      Estimate& e = a.parameters[k];
+      if (!possible[k].holds(e.value)) {
+        result.refused.push_back({a.form->cause(), a.form->formula, e.name, e.value, possible[k]});
+        return true;
+      }
+      e.low = std::max(e.low, possible[k].least), e.high = std::min(e.high, possible[k].most);
+    }
+    return false;
+  });
+  std::vector<Refused> once;  // what was accepted in another form or scale is no refusal
+  for (const Refused& r : result.refused)
+    if (std::none_of(once.begin(), once.end(), [&](auto& o) { return o.name == r.name; }) &&
+        std::none_of(result.accepted.begin(), result.accepted.end(),
+                     [&](auto& a) { return a.form->cause() == r.name; }))
+      once.push_back(r);
+  result.refused = std::move(once);
+}
+
 }  // namespace
 
 SearchResult search(const Evidence& start, const SearchOptions& options) {
@@ -216,8 +187,10 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     if (step.named.empty() && step.structures.empty()) break;
     result.null_gain = step.null_named;
     result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
-    const Candidate* cause = best_of(step.named, result.accepted, step.threshold);
-    const Candidate* structure = best_of(step.structures, result.accepted, step.structure_threshold);
+    const Candidate* cause = best_of(step.named, result.accepted, step.threshold, evidence);
+    const Candidate* structure = best_of(step.structures, result.accepted, step.structure_threshold, evidence);
+    if (const auto no = impossible(step.named, result.accepted, step.threshold, cause ? cause->gain : 0))
+      result.refused.push_back(*no);
     if (structure && leads(*structure, cause, result.accepted)) {
       // A constant of which more than half as much again varies along a regressor is the structure's mean.
       std::erase_if(result.accepted, [&](const Accepted& a) {
@@ -235,6 +208,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
   }
   evidence.whiten(columns_of(result.accepted, evidence.seen()));
   settle(evidence, result.accepted, result.threshold);
+  refuse_impossible(result);
   for (std::size_t i = 0; i < result.accepted.size(); ++i) find_rivals(evidence, result.accepted, i, result.threshold);
   return result;
 }

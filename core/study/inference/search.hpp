@@ -45,8 +45,16 @@ struct UnknownStructure {
   double hz = 0;      ///< of a tone
 };
 
+/// A cause that would have led, but for a size that no vehicle can have.
+struct Refused {
+  std::string name, form, parameter;
+  double value;
+  Possible possible;
+};
+
 struct SearchResult {
   std::vector<Accepted> accepted;  ///< in the order found
+  std::vector<Refused> refused;
   std::vector<UnknownStructure> unknown;
   double threshold = 0;            ///< nats that the null of the catalogue exceeds at its level, last step
   double structure_threshold = 0;  ///< the same of the structures

@@ -32,13 +32,18 @@ void Observer::put_delays(const Series& s, Stretch w) {
     const auto flown_rate = rates(s, w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); });
     const Moment delay(rate), slope(level);
     ThrustMoments moments{seen_.windows.size() - 1};
+    for (std::size_t i = w.begin; i < w.end; ++i) moments.mean[0] += s.a_nominal[i].z() / static_cast<double>(w.size());
+    moments.mean[1] = (s.a_nominal[w.end - 1].z() - s.a_nominal[w.begin].z()) / (s.t[w.end - 1] - s.t[w.begin]);
+    WindowRow& row = seen_.windows.back();
     const bool late = delay.excited(kWindowRules.excited_rate), steep = slope.excited(kWindowRules.excited_level);
     if (late) {
       moments.delay = {delay.with(level), delay.with(rate)};
+      row.delay_at = delay.at_points<kPoints>();
       put(kThrustDelay, delay.with(r), 1);
     }
     if (steep) {
       moments.slope = {slope.with(level), slope.with(rate)};
+      row.slope_at = slope.at_points<kPoints>();
       put(kThrustSlope, slope.with(r), 1);
     }
     if (late || steep) {
@@ -48,11 +53,40 @@ void Observer::put_delays(const Series& s, Stretch w) {
   }
   put_command_delay(s, w, 0, 2);
   put_command_delay(s, w, 2, 3);
+  if (s.simulated_by_thrust) put_tilt_delay(s, w);
+}
+
+/// How late the attitude follows what the loop asks of it, in hover: there the loop answers gusts alone, by the
+/// measured state, and set-points that act late change nothing.
+void Observer::put_tilt_delay(const Series& s, Stretch w) {
+  double y = 0, square = 0;
+  DelayStage::PerSecond design{};
+  constexpr std::size_t kOwn = 2;  // of kShifts
+  for (int axis = 0; axis < 2; ++axis) {
+    const auto nominal = [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; };
+    if (Moment(rates(s, w, nominal)).excited(kWindowRules.excited_rate)) return;
+    const auto answer = [&s, axis](std::size_t i) { return s.answer[kOwn][i][axis]; };
+    const Moment m(rates(s, w, answer));
+    if (!m.excited(kWindowRules.excited_rate)) continue;
+    const double norm = std::sqrt(m.square);
+    y -= norm * m.with(detrended_values(w, [&](std::size_t i) { return s.a_sim[i][axis] - answer(i); }));
+    square += m.square;
+    for (std::size_t k = 0; k < kShifts.size(); ++k) {
+      if (k == kOwn) continue;
+      const auto later = [&](std::size_t i) { return s.answer[k][i][axis] - answer(i); };
+      design[k] += -norm * m.with(detrended_values(w, later)) / kShifts[k];
+    }
+  }
+  if (!(square > 0)) return;
+  design[kOwn] = 0.5 * (design[kOwn - 1] + design[kOwn + 1]);
+  for (double& g : design) g /= std::sqrt(square);
+  put(kTiltDelay, y / std::sqrt(square), 1);
+  tilt_stage_.add(seen_.windows.size() - 1, y / std::sqrt(square), design);
 }
 
 /// Of axes `from` … `to` − 1, along the nominal rate of each.
 void Observer::put_command_delay(const Series& s, Stretch w, int from, int to) {
-  double y = 0, square = 0;
+  double y = 0, square = 0, lagging = 0;
   DelayStage::PerSecond design{};
   for (int axis = from; axis < to; ++axis) {
     const auto nominal = [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; };
@@ -61,6 +95,7 @@ void Observer::put_command_delay(const Series& s, Stretch w, int from, int to) {
     const double norm = std::sqrt(m.square);
     y -= norm * m.with(detrended_values(w, [&](std::size_t i) { return s.a[i][axis] - nominal(i); }));
     square += m.square;
+    lagging -= norm * m.with(detrended_values(w, [&](std::size_t i) { return s.a_lagging[i][axis] - nominal(i); }));
     for (std::size_t k = 0; k < kShifts.size(); ++k) {
       const auto later = [&](std::size_t i) { return earlier(s, i, kShifts[k], axis) - nominal(i); };
       design[k] += kShifts[k] != 0 ? -norm * m.with(detrended_values(w, later)) / kShifts[k] : m.square;
@@ -70,12 +105,14 @@ void Observer::put_command_delay(const Series& s, Stretch w, int from, int to) {
   for (double& d : design) d /= std::sqrt(square);
   const std::size_t channel = from == 0 ? kCommandDelayH : kCommandDelayZ;
   put(channel, y / std::sqrt(square), 1);
+  seen_.windows.back().lag_gain[channel - kCommandDelayH] = lagging / kWindowRules.more_lag / std::sqrt(square);
   command_stage_[channel - kCommandDelayH].add(seen_.windows.size() - 1, y / std::sqrt(square), design);
 }
 
 void Observer::settle_commands() {
   for (std::size_t k = 0; k < command_stage_.size(); ++k)
     for (const auto& [window, design] : command_stage_[k].designs()) seen_.windows[window].command_gain[k] = design;
+  for (const auto& [window, design] : tilt_stage_.designs()) seen_.windows[window].tilt_gain = design;
 }
 
 /// Designs of (delay, slope): the moments with −ȧ and T/m − g as they follow z.
@@ -85,8 +122,10 @@ void Observer::follow_thrust() {
     const Eigen::RowVector2d flown = Eigen::RowVector2d(moment[0], moment[1]) * follows;
     return std::array<double, 2>{-flown[1], flown[0]};
   };
-  for (const auto& [window, delay, slope] : thrust_moments_)
-    seen_.windows[window].delay_gain = design(delay), seen_.windows[window].slope_gain = design(slope);
+  for (const auto& [window, delay, slope, mean] : thrust_moments_) {
+    WindowRow& row = seen_.windows[window];
+    row.delay_gain = design(delay), row.slope_gain = design(slope), row.mean_gain = design(mean);
+  }
 }
 
 }  // namespace backwash::study

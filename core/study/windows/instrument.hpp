@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "core/study/windows/series.hpp"
 #include "core/study/windows/signals.hpp"
 #include "core/study/windows/stretch.hpp"
 
@@ -41,6 +43,19 @@ struct Moment {
     for (std::size_t i = 0; i < z.size(); ++i) sum += z[i] * x[i];
     return sum / std::sqrt(square);
   }
+  /// The same of a course given at n points in the middles of n equal parts, joined by lines: weight of each point.
+  template <std::size_t n>
+  std::array<double, n> at_points() const {
+    std::array<double, n> weight{};
+    for (std::size_t i = 0; i < z.size(); ++i) {
+      const double q = (static_cast<double>(i) + 0.5) / static_cast<double>(z.size()) * n - 0.5;
+      const double at = std::clamp(q, 0.0, n - 1.0);
+      const std::size_t k = std::min(static_cast<std::size_t>(at), n - 2);
+      const double share = at - static_cast<double>(k);
+      weight[k] += (1 - share) * z[i] / std::sqrt(square), weight[k + 1] += share * z[i] / std::sqrt(square);
+    }
+    return weight;
+  }
   bool excited(double least_rms) const { return square > least_rms * least_rms * static_cast<double>(z.size()); }
 };
 
@@ -58,8 +73,6 @@ struct FirstStage {
 /// A delay of set-points by τ makes a difference a(t − τ) − a(t) that is proportional to τ only while it is short
 /// against what the set-points do (at 0.06 s, 13 % less). So the design is the difference per second at the delay that
 /// the windows together show: its fixed point τ = Σ g(τ) y/Σ g(τ)².
-/// The design is linear between these: dense about 0, where delays are, and out to the longest that a loop survives.
-inline constexpr std::array<double, 8> kShifts = {-0.06, -0.03, 0, 0.03, 0.06, 0.1, 0.15, 0.2};  // s
 class DelayStage {
  public:
   using PerSecond = std::array<double, kShifts.size()>;  ///< design at each shift; at 0 its limit

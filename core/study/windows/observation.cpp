@@ -49,6 +49,7 @@ const char* channel_name(Channel c) {
                                        "thrust slope",
                                        "command delay, level",
                                        "command delay, z",
+                                       "tilt delay",
                                        "line 1",
                                        "line 2",
                                        "line 3",
@@ -155,6 +156,10 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w
   row.p_W = mean_of(p), row.v_W = mean_of(v);
   const auto& kp = vehicle_.controller.kp;
   row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
+  if (as_told) row.slowed = (row.v_W - mean_of(s.v_dragged)) / kWindowRules.loop_drag;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double x : detrended_values(w, [&](std::size_t i) { return v[i][axis]; }))
+      row.varied2[axis] += x * x / static_cast<double>(w.size());
   row.off_W = as_told ? Vec3(mean_of(s.p) - row.p_W) : Vec3(Vec3::Zero());
   // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
   row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
@@ -243,7 +248,7 @@ void Observations::group(const std::vector<double>& by_flight) {
 Observations Observer::so_far() const {
   Observer copy(vehicle_, surroundings_);
   copy.seen_ = seen_, copy.thrust_stage_ = thrust_stage_, copy.thrust_moments_ = thrust_moments_;
-  copy.command_stage_ = command_stage_, copy.tails_ = tails_, copy.ever_ = ever_;
+  copy.command_stage_ = command_stage_, copy.tilt_stage_ = tilt_stage_, copy.tails_ = tails_, copy.ever_ = ever_;
   return copy.finish();
 }
 

@@ -36,7 +36,8 @@ enum Channel : std::size_t {
   kThrustSlope,    ///< the same with the set-points' own vertical acceleration: how steep the thrust curve is
   kCommandDelayH,  ///< Σ x (a − a_nominal)/√Σx², x = −ȧ_nominal of the closed loop that hears set-points alone
   kCommandDelayZ,
-  kLine1,  ///< ln power of the rotors' line over that of its neighbours, expectation without a line removed
+  kTiltDelay,  ///< Σ x (a_tilt − r)/√Σx², level, in hover: r the loop's answer to the logged state, x = −ṙ
+  kLine1,      ///< ln power of the rotors' line over that of its neighbours, expectation without a line removed
   kLine2,
   kLine3,
   kLine4,
@@ -80,16 +81,24 @@ struct WindowRow {
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
   double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
   double temperature;
-  Place around;               ///< of p_W
-  std::vector<Place> path;    ///< of points along the window; empty where it is one place
-  Vec3 give = Vec3::Zero();   ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
-  Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m; 0 where p_W is measured
-  Vec3 sigma;                 ///< modelled variance per axis, (m/s²)²
+  Place around;                 ///< of p_W
+  std::vector<Place> path;      ///< of points along the window; empty where it is one place
+  Vec3 give = Vec3::Zero();     ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  Vec3 slowed = Vec3::Zero();   ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer; 0 where measured
+  Vec3 varied2 = Vec3::Zero();  ///< (m/s)², variance of the velocity along the window, its trend taken out
+  Vec3 off_W = Vec3::Zero();    ///< measured place less p_W, m; 0 where p_W is measured
+  Vec3 sigma;                   ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±offset_limit.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   /// Design of kThrustDelay and kThrustSlope, of (delay, slope); 0 where nothing was excited.
   std::array<double, 2> delay_gain{}, slope_gain{};
+  std::array<double, 2> mean_gain{};  ///< of (delay, slope) in kMeanZ: what was asked for on the mean of the window
+  /// What values at the points along the window, joined by lines, add to kThrustDelay and kThrustSlope.
+  std::array<double, kPoints> delay_at{}, slope_at{};
+  std::array<double, kPoints> climbs{};  ///< m/s, v_z along the window
   std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
+  std::array<double, 2> lag_gain{};      ///< the same of a longer lag of the attitude
+  double tilt_gain = 0;                  ///< design of kTiltDelay
   Vec3 measured_variance;                ///< (m/s²)²
   std::array<std::optional<Line>, 4>
       lines{};  ///< of the rotors along z, none that cannot be told, the gusts' share taken out of floor2, (m/s²)²
@@ -143,6 +152,7 @@ class Observer {
   Residual put_means(const WindowRow& row, const Series& s, Stretch w);
   void put_delays(const Series& s, Stretch w);
   void put_command_delay(const Series& s, Stretch w, int from, int to);
+  void put_tilt_delay(const Series& s, Stretch w);
   void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
   void put(std::size_t channel, double y, double weight);
   void smooth_voltage();
@@ -153,15 +163,16 @@ class Observer {
   const Vehicle vehicle_;
   Observations seen_;
   FirstStage thrust_stage_;
-  /// Σ z (level, rate)/√Σz² of a window, z the instrument of the delay and that of the slope.
+  /// Σ z (level, rate)/√Σz² of a window, z the instrument of the delay and that of the slope; their means.
   struct ThrustMoments {
     std::size_t window;
-    std::array<double, 2> delay{}, slope{};
+    std::array<double, 2> delay{}, slope{}, mean{};  // mean: not an instrument's, of the window
   };
   std::vector<ThrustMoments> thrust_moments_;
   std::array<DelayStage, 2> command_stage_;  // level, vertical
-  std::vector<Fourth> tails_;                // of every window
-  std::set<std::string> ever_;               // columns that some flight had
+  DelayStage tilt_stage_;
+  std::vector<Fourth> tails_;   // of every window
+  std::set<std::string> ever_;  // columns that some flight had
   std::optional<Surroundings> own_;
   Surroundings& surroundings_;
 };

@@ -48,7 +48,7 @@ struct Loop {
 };
 
 /// The controller's loop at each row: fed with the logged state, or (`closed`) with its own.
-Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed) {
+Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed, double drag = 0) {
   const auto& c = vehicle.controller;
   const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
   Loop out;
@@ -77,10 +77,39 @@ Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool 
                           kd.cwiseProduct(at_time(cmd.v, sent) - moving);
       const double rate = c.attitude_lag > 0 ? 1 - std::exp(-h / c.attitude_lag) : 1;
       produced += rate * (wanted - produced);
-      v += h * produced;
+      v += h * (produced - drag * Vec3(v.x(), v.y(), 0));
       p += h * v;
     }
     out.p.push_back(p), out.v.push_back(v), out.a.push_back(produced);
+  }
+  return out;
+}
+
+/// The loop's answer to the logged state, joined between rows as the controller saw it, at each lag of kShifts.
+std::array<std::vector<Vec3>, kShifts.size()> answers(const Series& s, const Commands& cmd, const Vehicle& vehicle) {
+  const auto& c = vehicle.controller;
+  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
+  std::array<std::vector<Vec3>, kShifts.size()> out;
+  std::array<Vec3, kShifts.size()> r;
+  r.fill(Vec3::Zero());
+  std::size_t at = 0;
+  const auto between = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
+    while (at > 0 && s.t[at] > t) --at;
+    while (at + 2 < s.size() && s.t[at + 1] <= t) ++at;
+    const double share = std::clamp((t - s.t[at]) / (s.t[at + 1] - s.t[at]), 0.0, 1.0);
+    return x[at] + share * (x[at + 1] - x[at]);
+  };
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
+    const int steps = dt > 0.2 ? 1 : std::max(1, static_cast<int>(std::ceil(dt / 0.005)));
+    for (int k = 0; k < steps; ++k) {
+      const double now = s.t[i] - dt + (k + 0.5) * dt / steps, sent = now - c.latency, felt = now - c.feedback_delay;
+      const Vec3 wanted = between(cmd.a, sent) + kp.cwiseProduct(between(cmd.p, sent) - between(s.p, felt)) +
+                          kd.cwiseProduct(between(cmd.v, sent) - between(s.v, felt));
+      for (std::size_t n = 0; n < kShifts.size(); ++n)
+        r[n] += (1 - std::exp(-dt / steps / std::max(0.001, c.attitude_lag + kShifts[n]))) * (wanted - r[n]);
+    }
+    for (std::size_t n = 0; n < kShifts.size(); ++n) out[n].push_back(r[n]);
   }
   return out;
 }
@@ -145,6 +174,11 @@ Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
     const Commands cmd = commands_of(log, rows);
     if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
     Loop nominal = loop_of(s, cmd, vehicle, true);
+    Vehicle lagging = vehicle;
+    lagging.controller.attitude_lag += kWindowRules.more_lag;
+    s.a_lagging = loop_of(s, cmd, lagging, true).a;
+    s.v_dragged = loop_of(s, cmd, vehicle, true, kWindowRules.loop_drag).v;
+    if (s.simulated_by_thrust) s.answer = answers(s, cmd, vehicle);
     s.p_nominal = std::move(nominal.p), s.v_nominal = std::move(nominal.v), s.a_nominal = std::move(nominal.a);
   }
   if (s.a_sim.empty()) s.a_sim.assign(s.size(), Vec3::Zero());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -10,6 +11,9 @@
 #include "core/types/thrust.hpp"
 
 namespace backwash::study {
+
+/// By how much a delay or a lag may differ from the vehicle file's, s: where its design is computed.
+inline constexpr std::array<double, 8> kShifts = {-0.06, -0.03, 0, 0.03, 0.06, 0.1, 0.15, 0.2};
 
 /// A flight by sample, with what the simulation says of it (docs/interfaces.md, "Flight log, CSV").
 struct Series {
@@ -21,6 +25,12 @@ struct Series {
   std::vector<double> thrust_acc;  ///< T/m, m/s²; empty without thrust
   /// Closed loop fed with the set-points alone; empty without set-points.
   std::vector<Vec3> p_nominal, v_nominal, a_nominal;
+  std::vector<Vec3> v_dragged;  ///< of the same loop against a level drag of kWindowRules.loop_drag
+  /// The same loop with an attitude that lags kWindowRules.more_lag longer.
+  std::vector<Vec3> a_lagging;
+  /// What the loop answers to the logged state and set-points, by an attitude lag that is kShifts longer; empty without
+  /// set-points or attitude.
+  std::array<std::vector<Vec3>, kShifts.size()> answer;
   std::vector<std::optional<int>> segment;  ///< hover position; none in transit or without the column
   bool simulated_by_thrust = false, has_velocity = false, has_acceleration = false;
   std::size_t size() const { return t.size(); }

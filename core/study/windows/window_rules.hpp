@@ -59,6 +59,8 @@ struct WindowRules {
   Rule held{"held", 0.1, "s", "chosen: between rows farther apart a set-point is held and not interpolated"};
   Rule restart{"restart", 0.2, "s", "chosen: after a gap so long the closed loop starts where the vehicle is"};
   Rule loop_step{"loop_step", 0.005, "s", "derived: a tenth of the shortest lag (0.05 s) that vehicles ship with"};
+  Rule more_lag{"more_lag", 0.03, "s", "chosen: the design of a longer lag is the loop's with so much more of it"};
+  Rule loop_drag{"loop_drag", 0.2, "1/s", "derived: small enough that twice as much slows twice as much"};
   Rule command_age{"command_age", 0.25, "periods",
                    "derived: a held command is half a period old on the mean, a streamed one not: the middle"};
   Rule slope_time{"slope_time", 0.06, "s", "chosen: a slope over so long loses 2 % of what moves at 2 Hz"};

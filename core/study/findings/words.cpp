@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/findings/words.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/study/findings/page_sections.hpp"
+
+namespace backwash::study {
+
+Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
+  const Accepted& f = cause.found;
+  const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
+  return f.form->effect->remedy({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, vehicle);
+}
+
+std::string odds(double nats) {
+  return nats < 0 ? "1 to " + number(std::exp(-nats)) : number(std::exp(nats)) + " to 1";
+}
+
+double largest_flown(const Accepted& cause, const Observations& seen) {
+  const Channel channel = cause.columns.front().parts.front().channel;
+  std::vector<double> sum(seen.windows.size(), 0);
+  for (std::size_t k = 0; k < cause.columns.size(); ++k)
+    for (const auto& part : cause.columns[k].parts)
+      for (std::size_t i = 0; part.channel == channel && i < part.x.size(); ++i)
+        sum[i] += cause.theta[static_cast<Eigen::Index>(k)] * part.x[i];
+  double largest = 0;
+  for (const double x : sum) largest = std::max(largest, std::abs(x));
+  return largest;
+}
+
+std::string extrapolated(const Accepted& cause, const Observations& seen) {
+  const auto& reference = cause.form->reference;
+  if (!reference) return "";
+  double least = HUGE_VAL, most = -HUGE_VAL;
+  for (const auto& w : seen.windows) {
+    const double flown = reference->flown(w);
+    if (std::isfinite(flown)) least = std::min(least, flown), most = std::max(most, flown);
+  }
+  const double at = reference->value;
+  if (at * kRules.beyond_flown >= least && at <= most * kRules.beyond_flown) return "";
+  return "stated at " + number(at) + " " + reference->unit + ", flown " + number(least) + " to " + number(most) +
+         "; the most that was flown is " + number(largest_flown(cause, seen));
+}
+
+std::string refusal(const Refused& r) {
+  return spoken(r.name) + " would have to be " + number(r.value) + " (" + r.parameter + "), possible are " +
+         number(r.possible.least) + " to " + number(r.possible.most) + ": " + r.possible.reason;
+}
+
+std::optional<double> clearance_cost(const Consequence& c) {
+  if (c.before.plan != "ok" || c.after.plan != "ok") return std::nullopt;
+  return c.before.clearance_m - c.after.clearance_m;
+}
+
+std::string cost_sentence(const Consequence& c) {
+  const double wider = c.after.extent_95 - c.before.extent_95 + c.after.shift_95 - c.before.shift_95;
+  std::string text = "Hover sets reach " + number(100 * wider) + " cm farther (95 % of the flown places)";
+  if (const auto cost = clearance_cost(c))
+    return text + "; the plan between two of them has " + number(100 * *cost) + " cm less clearance.";
+  if (c.before.plan == "ok") return text + "; the plan between two of them is none any more: " + c.after.plan + ".";
+  return text + ".";
+}
+
+}  // namespace backwash::study

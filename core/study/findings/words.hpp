@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/study/findings/consequence.hpp"
+#include "core/study/findings/study.hpp"
+
+/// What a study says, in an engineer's words.
+namespace backwash::study {
+
+/// What to change for a cause that was found: file, key, value, or what to do with the craft.
+Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle);
+
+/// Nats as odds: "20 to 1", "5e+09 to 1".
+std::string odds(double nats);
+
+/// Why the size of a cause is an extrapolation, and the most of it that was flown: its reference lies outside of what
+/// the flights flew. Empty where it was flown, or where the size has no reference.
+std::string extrapolated(const Accepted& cause, const Observations& seen);
+
+/// Largest |Σ θ x| over the flown windows of the cause's first channel, in that channel's unit (m/s² or ln).
+double largest_flown(const Accepted& cause, const Observations& seen);
+
+/// "ground_thrust would have to be 172 A_mps2 (possible: -3 to 3): …".
+std::string refusal(const Refused& refused);
+
+/// Clearance that the causes take from the same plan, m: before less after. Nothing unless both plans are ok.
+std::optional<double> clearance_cost(const Consequence& consequence);
+/// In a sentence, hover sets too; empty without a consequence of either kind.
+std::string cost_sentence(const Consequence& consequence);
+
+}  // namespace backwash::study

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/inference/rivals.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace backwash::study {
+
+std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen, std::size_t but) {
+  std::vector<Column> all;
+  for (std::size_t i = 0; i < accepted.size(); ++i) {
+    if (i == but) continue;
+    all.insert(all.end(), accepted[i].columns.begin(), accepted[i].columns.end());
+    const auto open = companions(*accepted[i].form, seen);
+    all.insert(all.end(), open.begin(), open.end());
+  }
+  return all;
+}
+
+bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b) {
+  std::array<bool, kChannels> moved{};
+  for (const auto& column : a)
+    for (const auto& part : column.parts) moved[part.channel] = true;
+  return std::any_of(b.begin(), b.end(), [&](const Column& column) {
+    return std::any_of(column.parts.begin(), column.parts.end(), [&](auto& part) { return moved[part.channel]; });
+  });
+}
+
+bool error_of_form(const Form& form, const std::vector<Column>& columns, double gain,
+                   const std::vector<Accepted>& accepted, const Evidence& evidence, std::size_t itself) {
+  for (std::size_t i = 0; i < accepted.size(); ++i) {
+    if (i == itself || gain > kRules.form_error * accepted[i].gain) continue;
+    if (!share_a_channel(columns, accepted[i].columns)) continue;
+    std::vector<Accepted> others;
+    for (std::size_t k = 0; k < accepted.size(); ++k)
+      if (k != i && k != itself) others.push_back(accepted[k]);
+    const auto beside = nuisance_of(form, columns, columns_of(others, evidence.seen()), evidence.seen());
+    const Normal alone = evidence.normal(columns, beside);
+    if (alone.solvable && gain < kRules.rival_rest * alone.gain()) return true;
+  }
+  return false;
+}
+
+namespace {
+
+/// Σ and standard error of the sum of per-flight differences.
+std::pair<double, double> difference(const Normal& a, const Normal& b) {
+  const auto ga = a.gain_per_flight(), gb = b.gain_per_flight();
+  double sum = 0, square = 0;
+  const double n = static_cast<double>(ga.size());
+  for (std::size_t f = 0; f < ga.size(); ++f) sum += ga[f] - gb[f], square += (ga[f] - gb[f]) * (ga[f] - gb[f]);
+  return {sum, std::sqrt(std::max(0.0, (square - sum * sum / n) * n / (n - 1)))};
+}
+
+/// Whether these flights do not tell a rival that is `lead` nats behind, by a difference with this standard error, from
+/// a cause of this gain: a lead that is a small share of the gain is one that the error of a form makes.
+bool as_good(double lead, double error, double gain) {
+  const double share = kRules.rival_share * gain;
+  if (lead > std::max(kRules.rival_nats.value, share) && lead > kRules.rival_errors * error) return false;
+  return lead <= std::max(kRules.rival_most_nats.value, share);
+}
+
+}  // namespace
+
+void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std::size_t which, double threshold) {
+  Accepted& own = accepted[which];
+  const auto others = columns_of(accepted, evidence.seen(), which);
+  std::vector<Rival> found;
+  for (const Form* each : catalogue()) {
+    const Form& form = *each;
+    if (form.effect == own.form->effect || why_not_tested(form, evidence.seen())) continue;
+    if (std::any_of(accepted.begin(), accepted.end(), [&](auto& a) { return a.form->effect == form.effect; })) continue;
+    for (const Scale& scale : form.scales) {
+      const auto columns = form.columns(evidence.seen().windows, scale);
+      // Both with the same free offsets, unless one of them is an offset itself.
+      std::vector<Column> both = own.columns;
+      both.insert(both.end(), columns.begin(), columns.end());
+      std::vector<Column> nuisance = others;
+      if (!form.constant && !own.form->constant) {
+        const auto free = offsets(both, evidence.seen());
+        nuisance.insert(nuisance.end(), free.begin(), free.end());
+      }
+      const Normal theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);
+      if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, kRules.rival_rest * ours.gain()))
+        continue;
+      const Candidate rival{&form, form.cause(), scale, {}, {}, 0, evidence.size(columns)};
+      if (!rival.effect(theirs.fit())) continue;
+      // Two causes that explain different data are two causes, not rivals: a rival gains less once ours is known.
+      std::vector<Column> with_ours = nuisance;
+      with_ours.insert(with_ours.end(), own.columns.begin(), own.columns.end());
+      const Normal rest = evidence.normal(columns, with_ours);
+      if (rest.solvable && rest.gain() > kRules.rival_rest * theirs.gain()) continue;
+      const auto [lead, error] = difference(ours, theirs);
+      // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
+      // its rate does.
+      if (own.form->motors_alone && form.motors_alone) {
+        found.push_back({form.cause(), &form, scale, lead});
+        continue;
+      }
+      if (!as_good(lead, error, ours.gain())) continue;
+      found.push_back({form.cause(), &form, scale, lead});
+    }
+  }
+  std::sort(found.begin(), found.end(), [](auto& a, auto& b) { return a.behind_nats < b.behind_nats; });
+  for (const auto& rival : found)
+    if (std::none_of(own.rivals.begin(), own.rivals.end(), [&](auto& r) { return r.name == rival.name; }))
+      own.rivals.push_back(rival);
+}
+
+}  // namespace backwash::study
