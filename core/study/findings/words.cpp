@@ -50,7 +50,7 @@ std::string refusal(const Refused& r) {
 }
 
 std::optional<double> clearance_cost(const Consequence& c) {
-  if (c.before.plan != "ok" || c.after.plan != "ok") return std::nullopt;
+  if (c.before.plan != plan::PlanStatus::ok || c.after.plan != plan::PlanStatus::ok) return std::nullopt;
   return c.before.clearance_m - c.after.clearance_m;
 }
 
@@ -59,7 +59,8 @@ std::string cost_sentence(const Consequence& c) {
   std::string text = "Hover sets reach " + number(100 * wider) + " cm farther (95 % of the flown places)";
   if (const auto cost = clearance_cost(c))
     return text + "; the plan between two of them has " + number(100 * *cost) + " cm less clearance.";
-  if (c.before.plan == "ok") return text + "; the plan between two of them is none any more: " + c.after.plan + ".";
+  if (c.before.plan == plan::PlanStatus::ok && c.after.plan)
+    return text + "; the plan between two of them is none any more: " + plan::to_string(*c.after.plan) + ".";
   return text + ".";
 }
 
