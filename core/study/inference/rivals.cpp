@@ -18,6 +18,11 @@ std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Obse
   return all;
 }
 
+bool dynamic(const std::vector<Column>& columns) {
+  const Channel c = columns.front().parts.front().channel;
+  return c >= kThrustDelay && c <= kTiltDelay;
+}
+
 bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b) {
   std::array<bool, kChannels> moved{};
   for (const auto& column : a)
@@ -98,7 +103,7 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
         found.push_back({form.cause(), &form, scale, lead});
         continue;
       }
-      if (!as_good(lead, error, ours.gain())) continue;
+      if (!as_good(lead, error, dynamic(own.columns) || dynamic(columns) ? ours.gain() : 0.0)) continue;
       found.push_back({form.cause(), &form, scale, lead});
     }
   }

@@ -11,6 +11,9 @@ namespace backwash::study {
 std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen,
                                std::size_t but = SIZE_MAX);
 
+/// Whether a cause is a delay or a slope, told by the moments of what is commanded.
+bool dynamic(const std::vector<Column>& columns);
+
 bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b);
 
 /// Whether a cause of this gain beside the accepted ones is what the error of the form of one of them looks like: it

@@ -29,11 +29,6 @@ unsigned disturbs(const std::vector<Column>& columns) {
   return kinds;
 }
 
-bool dynamic(const std::vector<Column>& columns) {
-  const Channel c = columns.front().parts.front().channel;
-  return c >= kThrustDelay && c <= kTiltDelay;
-}
-
 /// Gain that a further cause needs: a share of that of each accepted one whose form's error it might be, a larger one
 /// where it repairs it in the same moments of the thrust's or the commands' delay.
 double needed_gain(const Candidate& candidate, const std::vector<Accepted>& accepted, double threshold) {
