@@ -62,10 +62,10 @@ std::unique_ptr<Autopilot> make_autopilot(const Options& o, const map::Occupancy
   const Site site{
       .grid = grid, .vehicle = vehicle, .ground_W = ground, .frame = o.frame, .seed = o.seed, .uptime = kUptime};
   std::unique_ptr<Autopilot> autopilot;
-  if (o.autopilot == "ardupilot") autopilot = make_arducopter(site);
-  if (o.autopilot == "px4") autopilot = make_px4(site);
+  if (o.autopilot == Options::Profile::ardupilot) autopilot = make_arducopter(site);
+  if (o.autopilot == Options::Profile::px4) autopilot = make_px4(site);
   if (!autopilot) autopilot = std::make_unique<Autopilot>(grid, vehicle, ground, o.frame, o.seed, std::uint8_t{1});
-  const bool px4 = o.autopilot != "ardupilot";
+  const bool px4 = o.autopilot != Options::Profile::ardupilot;
   for (const auto& [name, value] :
        gain_parameters(px4 ? firmware_bridge::Autopilot::kPx4 : firmware_bridge::Autopilot::kArduPilot, vehicle))
     autopilot->parameters[name] = value;

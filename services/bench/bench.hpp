@@ -15,8 +15,8 @@ namespace backwash::bench {
 
 struct Options {
   std::string map, vehicle, link, log, wire;
-  /// simple, ardupilot or px4. The last two fly with the vehicle file's gains as their parameters.
-  std::string autopilot = "simple";
+  enum class Profile { simple, ardupilot, px4 };
+  Profile autopilot = Profile::simple;  ///< the last two fly with the vehicle file's gains as their parameters
   std::string in_loop;  ///< line to a real controller that is simulated for, in place of an emulated one; empty: none
   Vec3 start = Vec3::Zero();  ///< above the place where the vehicle stands, m
   LocalFrame frame;

@@ -56,9 +56,15 @@ void add_faults(CLI::App& app, Given& given) {
   app.add_option("--stop-odometry", given.options.stop_odometry_s, "fault: VIO stops this long after arming, s");
   app.add_option("--stop-heartbeat", given.options.stop_heartbeat_s,
                  "fault: the controller goes silent this long after arming, s");
-  app.add_option("--autopilot", given.options.autopilot, "simple, or as measured of a real one: ardupilot, px4")
+  app.add_option_function<std::string>(
+         "--autopilot",
+         [&given](const std::string& name) {
+           using enum backwash::bench::Options::Profile;
+           given.options.autopilot = name == "px4" ? px4 : name == "ardupilot" ? ardupilot : simple;
+         },
+         "simple, or as measured of a real one: ardupilot, px4")
       ->check(CLI::IsMember({"simple", "ardupilot", "px4"}))
-      ->capture_default_str();
+      ->default_str("simple");
   app.add_option("--faults", given.timeline,
                  "timeline of faults and of what the flight shall keep, TOML; services/bench/README.md");
   std::vector<std::string> estimators;

@@ -20,6 +20,11 @@ std::vector<SimulationTerm> needs_more_and_shakes(const FittedForm& fitted, cons
   return terms;
 }
 
+/// A weak rotor takes up to d/4 of the collective thrust with it: no payload.
+std::vector<Column> lost_thrust(const Windows& ws) {
+  return {missing_thrust(ws, [](auto&) { return 1.0; })};
+}
+
 }  // namespace
 
 /// One rotor gives less for the same command, and may shake.
@@ -38,6 +43,7 @@ Effect propeller_damage() {
                      .needs = {Source::motors},
                      .columns = [](const Windows& ws,
                                    const Scale& rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; },
+                     .companions = lost_thrust,
                      .simulate = needs_more},
                     {.formula = "one rotor needs (1 + d) of the others' thrust command and shakes at its rate",
                      .parameters = {"d", "P_ln"},
@@ -54,6 +60,7 @@ Effect propeller_damage() {
                          [](const Windows& ws, const Scale& rotor) {
                            return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
                          },
+                     .companions = lost_thrust,
                      .simulate = needs_more_and_shakes}},
           .remedy = [](auto& fitted, auto&) {
             return with_craft("Replace or re-glue the propeller of " + rotor_of(fitted) + ".");

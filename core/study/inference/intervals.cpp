@@ -15,12 +15,13 @@ Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
   double total = 0, value = 0, low = guesses.front().value, high = low;
   for (const auto& g : guesses) {
     total += g.weight, value += g.weight * g.value;
-    low = std::min(low, g.value - 6 * g.error), high = std::max(high, g.value + 6 * g.error);
+    low = std::min(low, g.value - kRules.mixture_reach * g.error),
+    high = std::max(high, g.value + kRules.mixture_reach * g.error);
   }
   value /= total;
   const auto quantile = [&](double p) {
     double a = low, b = high;
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < kRules.mixture_turns; ++i) {
       const double q = (a + b) / 2;
       double below = 0;
       for (const auto& g : guesses)

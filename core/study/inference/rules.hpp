@@ -12,8 +12,9 @@ namespace backwash::study {
 struct Rules {
   // Search
   Rule flips{"flips", 1200, "draws", "derived: resolves a sixth of a third of accept_p, a further structure's level"};
-  Rule accept_p{"accept_p", 0.015, "1",
-                "measured: at 0.03 worlds without an effect raised alarms twice as often (confusion.md)"};
+  Rule accept_p{
+      "accept_p", 0.015, "1",
+      "measured: at 0.03 worlds without an effect raised alarms about three times as often (core/study/confusion.md)"};
   Rule structure_share{"structure_share", 1.0 / 6, "of accept_p",
                        "chosen: structures gain much or little, and the catalogue's names shall lose little"};
   Rule dependence_share{"dependence_share", 1.0 / 6, "of accept_p", "chosen: as structure_share"};
@@ -26,8 +27,9 @@ struct Rules {
   Rule structure_lead{"structure_lead", 3, "nats", "derived: a likelihood ratio of 20"};
   Rule structure_margin{"structure_margin", 0.6, "of the cause's gain",
                         "chosen: a structure has 4 columns and more and bends to where a form is wrong"};
-  Rule least_share{"least_share", 0.08, "of an accepted gain",
-                   "chosen: the error of an accepted form gains less (confusion.md, two causes, has the price)"};
+  Rule least_share{
+      "least_share", 0.08, "of an accepted gain",
+      "chosen: the error of an accepted form gains less (core/study/confusion.md, two causes, has the price)"};
   Rule repair_share{"repair_share", 0.25, "of an accepted gain",
                     "chosen: delays and slopes share one moment, so a form's error is larger there"};
   Rule left_share{"left_share", 1, "of an accepted gain",
@@ -49,7 +51,8 @@ struct Rules {
   Rule beyond_flown{"beyond_flown", 1.25, "1",
                     "chosen: a reference farther than a quarter outside of what was flown is an extrapolation"};
   // Scatter
-  Rule motor_scatter{"motor_scatter", 0.01, "1", "chosen: rotors of one craft differ by 1 % (README.md, Scatter)"};
+  Rule motor_scatter{"motor_scatter", 0.01, "1",
+                     "chosen: rotors of one craft differ by 1 % (core/study/inference/README.md)"};
   Rule dropout_scatter{"dropout_scatter", 0.003, "1", "chosen: of readings, lost by a sound sensor"};
   Rule least_scatter{"least_scatter", 1e-8, "channel²", "derived: so that an exact channel can be divided by"};
   Rule least_rotor_scatter{"least_rotor_scatter", 1e-6, "1", "derived: the same for counted dropouts"};
@@ -76,6 +79,8 @@ struct Rules {
   // At any time
   Rule first_look{"first_look", 5, "flights", "chosen: the scatter of the first flights is that of so many"};
   Rule prior_flights{"prior_flights", 0.1, "flights", "chosen: best for effects of 3 standard errors a flight"};
+  Rule mixture_reach{"mixture_reach", 6, "standard errors", "derived: 1e-9 of a shape's estimate lies beyond"};
+  Rule mixture_turns{"mixture_turns", 60, "halvings", "derived: more than a double's digits"};
   Rule null_range{"null_range", 40, "ln of a multiplier", "derived: both ends are beyond what doubles tell apart"};
   Rule null_turns{"null_turns", 60, "halvings", "derived: of that range, to a part in 1e16"};
   // What remains
@@ -90,7 +95,8 @@ struct Rules {
   Rule dependence_level{"dependence_level", 0.05, "1", "chosen: family-wise, by Holm, beside an accepted cause"};
   // Rotors against sound flights
   Rule rotor_level{"rotor_level", 0.05, "1", "chosen: over the four rotors"};
-  Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust", "derived: the size of confusion.md"};
+  Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust",
+                         "derived: the size of core/study/confusion.md"};
   Rule normal_80{"normal_80", 0.8416212, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
   // The extension

@@ -13,7 +13,7 @@ namespace backwash::study {
 
 struct SearchOptions {
   int flips = static_cast<int>(kRules.flips);  ///< sign draws of the null
-  double accept_p = kRules.accept_p;           ///< family-wise, nominal; confusion.md says what it comes to
+  double accept_p = kRules.accept_p;           ///< family-wise, nominal; core/study/confusion.md says what it comes to
   unsigned seed = 1;
   std::size_t most_causes = static_cast<std::size_t>(kRules.most_causes);
   std::function<void(const std::string&)> progress = [](const std::string&) {};

@@ -101,13 +101,15 @@ std::array<std::vector<Vec3>, kShifts.size()> answers(const Series& s, const Com
   };
   for (std::size_t i = 0; i < s.size(); ++i) {
     const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
-    const int steps = dt > 0.2 ? 1 : std::max(1, static_cast<int>(std::ceil(dt / 0.005)));
+    const int steps =
+        dt > kWindowRules.restart ? 1 : std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
     for (int k = 0; k < steps; ++k) {
       const double now = s.t[i] - dt + (k + 0.5) * dt / steps, sent = now - c.latency, felt = now - c.feedback_delay;
       const Vec3 wanted = between(cmd.a, sent) + kp.cwiseProduct(between(cmd.p, sent) - between(s.p, felt)) +
                           kd.cwiseProduct(between(cmd.v, sent) - between(s.v, felt));
       for (std::size_t n = 0; n < kShifts.size(); ++n)
-        r[n] += (1 - std::exp(-dt / steps / std::max(0.001, c.attitude_lag + kShifts[n]))) * (wanted - r[n]);
+        r[n] += (1 - std::exp(-dt / steps / std::max<double>(kWindowRules.least_lag, c.attitude_lag + kShifts[n]))) *
+                (wanted - r[n]);
     }
     for (std::size_t n = 0; n < kShifts.size(); ++n) out[n].push_back(r[n]);
   }

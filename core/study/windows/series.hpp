@@ -7,13 +7,17 @@
 #include <vector>
 
 #include "core/log/flight_log.hpp"
+#include "core/study/windows/window_rules.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/thrust.hpp"
 
 namespace backwash::study {
 
 /// By how much a delay or a lag may differ from the vehicle file's, s: where its design is computed.
-inline constexpr std::array<double, 8> kShifts = {-0.06, -0.03, 0, 0.03, 0.06, 0.1, 0.15, 0.2};
+inline constexpr std::array<double, 8> kShifts = {
+    -2 * kWindowRules.shift_step, -1 * kWindowRules.shift_step, 0,
+    kWindowRules.shift_step,      2 * kWindowRules.shift_step,  2 * kWindowRules.shift_far,
+    3 * kWindowRules.shift_far,   4 * kWindowRules.shift_far};
 
 /// A flight by sample, with what the simulation says of it (docs/interfaces.md, "Flight log, CSV").
 struct Series {

@@ -88,7 +88,7 @@ std::pair<double, double> powers(const std::vector<double>& x, std::span<const d
       const Complex line = std::polar(x[i], harmonic * phase[i + 1]),
                     hz = std::polar(1.0, 2 * std::numbers::pi * t[i + 1]);
       own += line;
-      Complex detuned = std::polar(1.0, 3 * std::numbers::pi * t[i + 1]);
+      Complex detuned = std::polar(1.0, 2 * std::numbers::pi * kWindowRules.line_nearest * t[i + 1]);
       for (std::size_t k = 0; k < kBeside; ++k, detuned *= hz)
         detunings[2 * k] += line * detuned, detunings[2 * k + 1] += line * std::conj(detuned);
     }

@@ -21,33 +21,37 @@ struct WindowRules {
   Rule gap_periods{"gap_periods", 5, "median periods",
                    "chosen: more than four rows lost in a row; jitter and a late packet lose fewer"};
   Rule frozen{"frozen", 0.1, "s",
-              "measured: halved and doubled no window of the recordings changes (README.md); five control periods"};
+              "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md); five "
+              "control periods"};
   Rule frozen_rows{"frozen_rows", 4, "rows",
                    "chosen: and in so many; a tracker of half the log's rate repeats each position once"};
-  Rule perched_spread{
-      "perched_spread", 0.0003, "m",
-      "measured: halved and doubled no window of the recordings changes (README.md); hovers move by 10 mm"};
+  Rule perched_spread{"perched_spread", 0.0003, "m",
+                      "measured: halved and doubled no window of the recordings changes "
+                      "(core/study/windows/README.md); hovers move by 10 mm"};
   Rule perched_thrust{"perched_thrust", 0.6, "of the weight",
                       "derived: below every hover, of a thrust curve that may be 30 % off"};
   Rule idle{"idle", 0.05, "of the full command",
-            "measured: halved and doubled no window of the recordings changes (README.md)"};
+            "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md)"};
   Rule clear{"clear", 0.005, "m",
-             "measured: halved and doubled, 4 of 33 windows change and no name (README.md): nearer, feet may touch"};
-  Rule rotor_limit{
-      "rotor_limit", 0.01, "of the full command",
-      "measured: halved and doubled, 1 of 69 windows changes (README.md); no rotor hovers near either end"};
-  Rule saturated_share{
-      "saturated_share", 0.02, "of a window's rows",
-      "measured: halved and doubled, 4 of 69 windows change and no name (README.md); two rows at 50 Hz"};
-  Rule still_speed{
-      "still_speed", 0.12, "m/s",
-      "measured: halved, half of the hovers are lost; doubled, transits among them are named as causes (README.md)"};
-  Rule still_time{"still_time", 0.5, "s",
-                  "measured: halved and doubled, up to 5 of 33 windows change and no name (README.md)"};
+             "measured: halved and doubled, 4 of 33 windows change and no name (core/study/windows/README.md): nearer, "
+             "feet may touch"};
+  Rule rotor_limit{"rotor_limit", 0.01, "of the full command",
+                   "measured: halved and doubled, 1 of 69 windows changes (core/study/windows/README.md); no rotor "
+                   "hovers near either end"};
+  Rule saturated_share{"saturated_share", 0.02, "of a window's rows",
+                       "measured: halved and doubled, 4 of 69 windows change and no name "
+                       "(core/study/windows/README.md); two rows at 50 Hz"};
+  Rule still_speed{"still_speed", 0.12, "m/s",
+                   "measured: halved, half of the hovers are lost; doubled, transits among them are named as causes "
+                   "(core/study/windows/README.md)"};
+  Rule still_time{
+      "still_time", 0.5, "s",
+      "measured: halved and doubled, up to 5 of 33 windows change and no name (core/study/windows/README.md)"};
   Rule still_enough{"still_enough", 0.8, "of still_time",
                     "derived: rows at 10 Hz are 0.4 s apart at most within still_time"};
-  Rule inconsistent{"inconsistent", 0.15, "m/s",
-                    "measured: halved, 2 windows of the recordings are lost; doubled, none changes (README.md)"};
+  Rule inconsistent{
+      "inconsistent", 0.15, "m/s",
+      "measured: halved, 2 windows of the recordings are lost; doubled, none changes (core/study/windows/README.md)"};
   Rule still_command{"still_command", 0.01, "m/s",
                      "derived: a set-point that rests moves by rounding alone, 5 mm over still_time"};
   Rule rate_share{"rate_share", 0.4, "of the rate", "derived: as band_high at 50 Hz; half the rate would fold back"};
@@ -59,6 +63,9 @@ struct WindowRules {
   Rule held{"held", 0.1, "s", "chosen: between rows farther apart a set-point is held and not interpolated"};
   Rule restart{"restart", 0.2, "s", "chosen: after a gap so long the closed loop starts where the vehicle is"};
   Rule loop_step{"loop_step", 0.005, "s", "derived: a tenth of the shortest lag (0.05 s) that vehicles ship with"};
+  Rule shift_step{"shift_step", 0.03, "s", "chosen: delays are about 0; designs are linear between 0, 1 and 2 steps"};
+  Rule shift_far{"shift_far", 0.05, "s", "chosen: and on to 2, 3 and 4 of these, the longest that a loop survives"};
+  Rule least_lag{"least_lag", 0.001, "s", "derived: a fifth of loop_step, below which a lag is none"};
   Rule more_lag{"more_lag", 0.03, "s", "chosen: the design of a longer lag is the loop's with so much more of it"};
   Rule loop_drag{"loop_drag", 0.2, "1/s", "derived: small enough that twice as much slows twice as much"};
   Rule command_age{"command_age", 0.25, "periods",
@@ -97,9 +104,9 @@ struct WindowRules {
   Rule least_gusts{"least_gusts", 0.2, "of a window's variance",
                    "chosen: is left when noise is taken out: ln of less would be noise alone"};
   Rule correlated{"correlated", 0.98, "1", "derived: at it a window of 100 rows is worth 2 samples, the least"};
-  Rule noise_near{
-      "noise_near", 0.3, "s",
-      "measured: halved and doubled, a kurtosis of 1.09 becomes 1.07 and 1.32 (README.md); two times tau_w"};
+  Rule noise_near{"noise_near", 0.3, "s",
+                  "measured: halved and doubled, a kurtosis of 1.09 becomes 1.07 and 1.32 "
+                  "(core/study/windows/README.md); two times tau_w"};
   Rule noise_far{"noise_far", 1, "s", "derived: half a window"};
   Rule noise_between{"noise_between", 0.05, "s", "derived: a third of a gust's correlation time"};
   Rule noise_overlap{"noise_overlap", 5, "rows", "chosen: a lag that leaves fewer products is none"};
@@ -114,6 +121,7 @@ struct WindowRules {
   Rule delay_turns{"delay_turns", 20, "turns", "chosen: more than the fixed point of a delay below 0.2 s needs"};
   // Rotors
   Rule beside{"line_beside", 4, "1", "chosen: neighbours on each side, 1 Hz apart: their mean is known to a third"};
+  Rule line_nearest{"line_nearest", 1.5, "Hz", "derived: what a line spreads over in line_block ends at 1 Hz"};
   Rule line_block{"line_block", 1, "s", "chosen: over more the phase that rpm readings give drifts"};
   Rule least_folded{"least_folded", 0.75, "Hz",
                     "derived: below, a block of 1 s holds no whole turn, and the line is as slow as a gust"};
