@@ -75,7 +75,7 @@ def main() -> int:
 
     def rows_in(path, text):
         # Row 0 is the first of a table or a matrix, not a fault.
-        for list_ in re.findall(rf"\brows? ({LIST})\b(?! of (?!docs/faults))", text):
+        for list_ in re.findall(rf"\b[Rr]ows? ({LIST})\b(?! of (?!docs/faults))", text):
             wrong.extend(f"{path}: faults.md has no row {n}" for n in numbers(list_) if n not in rows | {"0"})
 
     def sections_in(path, text):
@@ -121,6 +121,8 @@ def main() -> int:
                 equations_in(path, " ".join(found))
         elif path.suffix == ".md":
             rows_in(path, joined)
+        elif path.suffix in {".sh", ".toml"}:
+            rows_in(path, " ".join(re.findall(r"#[^\n]*", text)))
         if path.parent == pathlib.Path("docs") and path.suffix == ".md":
             sections_in(path, joined)
         if path == pathlib.Path("docs/model.md"):
@@ -146,7 +148,9 @@ def main() -> int:
                 continue
             file, _, fragment = target.partition("#")
             linked = root / path.parent / file if file else root / path
-            if not linked.exists():
+            if not linked.resolve().is_relative_to(root):
+                wrong.append(f"{path}: the link {target} leaves the clone")
+            elif not linked.exists():
                 wrong.append(f"{path}: the link {target} leads nowhere")
             elif fragment and fragment not in map(anchor, headings(linked.read_text())):
                 wrong.append(f"{path}: the link {target} leads to no heading")

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/faults.md: every row from 1 to the last is there once, and every test that a row names exists.
+"""docs/faults.md: every row from 1 to the last is there once, and every test that a row names exists. So do those that
+SECURITY.md names.
 
 faults.py SOURCE_DIR BUILD_DIR    (the build tells its tests by ctest -N)
 """
@@ -47,13 +48,14 @@ def main() -> int:
             wrong.append(f"row {number}, {fault}: names no test")
         wrong += [f"row {number}: no test is called {n}" for n in names if not fnmatch.filter(tests, n)]
         wrong += [f"row {number}: tests/nightly/realtime.sh has no part {p}" for p in nightly if p not in parts]
-    for token in re.findall(r"`(\*?[A-Za-z0-9]+\.[A-Z*][A-Za-z0-9*]*|daemon_\w+|attack_\w+)`", text):
+    both = text + (source / "SECURITY.md").read_text()
+    for token in re.findall(r"`(\*?[A-Za-z0-9]+\.[A-Z*][A-Za-z0-9*]*|(?:daemon|attack|systemd)_\w+)`", both):
         if not fnmatch.filter(tests, token):
             wrong.append(f"no test is called {token}")
     wrong += [f"row {n} is there {numbers.count(n)} times" for n in range(1, ROWS + 1) if numbers.count(n) != 1]
     wrong += [f"row {n} is not among 1 … {ROWS}" for n in numbers if not 1 <= n <= ROWS]
     for line in dict.fromkeys(wrong):
-        print(f"docs/faults.md: {line}")
+        print(f"docs/faults.md or SECURITY.md: {line}")
     return 1 if wrong else 0
 
 

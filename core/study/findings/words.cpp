@@ -15,7 +15,11 @@ Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
 }
 
 std::string odds(double nats) {
-  return nats < 0 ? "1 to " + number(std::exp(-nats)) : number(std::exp(nats)) + " to 1";
+  constexpr double kMost = 1e6;  // beyond, nobody weighs them
+  const double ratio = std::exp(std::abs(nats));
+  const std::string told = ratio > kMost ? "a million" : number(ratio);
+  const std::string text = nats < 0 ? "1 to " + told : told + " to 1";
+  return ratio > kMost ? "beyond " + text : text;
 }
 
 double largest_flown(const Accepted& cause, const Observations& seen) {
@@ -58,7 +62,8 @@ std::string cost_sentence(const Consequence& c) {
   const double wider = c.after.extent_95 - c.before.extent_95 + c.after.shift_95 - c.before.shift_95;
   std::string text = "Hover sets reach " + number(100 * wider) + " cm farther (95 % of the flown places)";
   if (const auto cost = clearance_cost(c))
-    return text + "; the plan between two of them has " + number(100 * *cost) + " cm less clearance.";
+    return text + "; the plan between two of them has " + number(100 * std::abs(*cost)) +
+           (*cost < 0 ? " cm more clearance." : " cm less clearance.");
   if (c.before.plan == plan::PlanStatus::ok && c.after.plan)
     return text + "; the plan between two of them is none any more: " + plan::to_string(*c.after.plan) + ".";
   return text + ".";
