@@ -140,6 +140,7 @@ void check(const Options& options) {
   if (options.anytime && !options.group.empty())
     throw Failure(kUsage, "--anytime takes flights one by one, in the order of --log: give it without --group");
   if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
+  if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
 }
@@ -184,7 +185,6 @@ int run(const Options& options) {
   model.ground.r0 = vehicle.body.diagonal_radius;
   const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
   const map::OccupancyGrid* grid = room ? &*room : nullptr;
-  if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
   Flights flights = read_flights(options.logs, options.group);
   auto seen = observe(flights, vehicle, model, grid);
   const auto measured = seen;  // nothing that the model holds taken out

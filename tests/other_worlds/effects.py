@@ -77,7 +77,7 @@ EFFECTS = {
     "map": (lambda rng: pair(("offset_x", "offset_y"), level(rng, rng.uniform(0.2, 0.3))), "map_offset", (), "0.2 to 0.3 m"),
     "stuck": (lambda rng: dict(stuck=rng.uniform(0.04, 0.08), stuck_rotor=rng.integers(4)), "rotor_sensor_fault", (),
               "4 to 8 % of one rotor's readings are 0, in bursts"),
-    # No effect but the vehicle file's own idealisation: attitude of second order, its 63 % time in the file. Right is nothing.
+    # No effect but the vehicle file's own idealisation: attitude of second order, its mean lateness in the file. Right is nothing.
     "sluggish": (lambda rng: dict(tilt=10.0, tilt_rate=25.0), None, (), "attitude loop of half the bandwidth, lag 0.11 s"),
     # Outside the catalogue: right is `unknown_structure`, no name.
     "plume": (lambda rng: dict(plume=rng.uniform(0.6, 1.0), plume_heading=rng.uniform(-np.pi, np.pi)), "unknown_structure", (),

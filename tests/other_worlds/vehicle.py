@@ -48,19 +48,20 @@ def gains(tilt, rate):
 
 
 def attitude_lag(frequency, tilt, damping):
-    """63 % time of the tilt after a step of its set-point, s, with this actuator and these gains: what the vehicle file asks for."""
-    dt, angle, rate, trim, value, speed = 0.0005, 0.0, 0.0, 0.0, 0.0, 0.0
+    """Mean lateness of the tilt after a step of its set-point, s, with this actuator and these gains: what the vehicle file asks for."""
+    dt, angle, rate, trim, value, speed, late = 0.0005, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     step, gain = actuator_step(frequency, dt)
-    for k in range(4000):
+    for _ in range(10000):
         error = tilt * (1 - angle) - rate
         trim += TRIM * error * dt
         wanted = damping * error + trim
         value, speed = step[0] * value + step[1] * speed + gain[0] * wanted, step[2] * value + step[3] * speed + gain[1] * wanted
         rate += value * dt
         angle += rate * dt
-        if angle >= 1 - np.exp(-1):
-            return k * dt
-    raise ValueError("the attitude loop does not answer")
+        late += (1 - angle) * dt
+    if abs(1 - angle) > 0.01:
+        raise ValueError("the attitude loop does not answer")
+    return late
 
 
 def vehicle_toml(c):

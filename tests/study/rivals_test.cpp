@@ -168,8 +168,8 @@ TEST(Plausible, ASizeAtAReferenceThatWasNotFlownIsToldAsExtrapolated) {
 
 TEST(Words, OddsAreThoseOfTheNats) {
   EXPECT_EQ(odds(3), "20.1 to 1");
-  EXPECT_EQ(odds(521), "beyond a million to 1");
-  EXPECT_EQ(odds(-1000), "beyond 1 to a million");
+  EXPECT_EQ(odds(521), "more than a million to 1");
+  EXPECT_EQ(odds(-1000), "1 to more than a million");
   EXPECT_EQ(odds(-std::log(5.0)), "1 to 5");
 }
 

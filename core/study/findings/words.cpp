@@ -17,9 +17,8 @@ Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
 std::string odds(double nats) {
   constexpr double kMost = 1e6;  // beyond, nobody weighs them
   const double ratio = std::exp(std::abs(nats));
-  const std::string told = ratio > kMost ? "a million" : number(ratio);
-  const std::string text = nats < 0 ? "1 to " + told : told + " to 1";
-  return ratio > kMost ? "beyond " + text : text;
+  const std::string told = ratio > kMost ? "more than a million" : number(ratio);
+  return nats < 0 ? "1 to " + told : told + " to 1";
 }
 
 double largest_flown(const Accepted& cause, const Observations& seen) {

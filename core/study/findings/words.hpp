@@ -13,7 +13,7 @@ namespace backwash::study {
 /// What to change for a cause that was found: file, key, value, or what to do with the craft.
 Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle);
 
-/// Nats as odds: "20 to 1", "5e+09 to 1".
+/// Nats as odds: "20 to 1", "1 to 5", "more than a million to 1".
 std::string odds(double nats);
 
 /// Why the size of a cause is an extrapolation, and the most of it that was flown: its reference lies outside of what
