@@ -2,7 +2,9 @@
 """Demands of `backwash` what is sure in worlds of other hands: check.py BACKWASH. Exit 1 and one line for each demand that is not met.
 
 The field of a box room agrees with this folder's own sum of equations 2-1 to 2-5 within 5 %. A world without an effect is told nothing.
-A load of 5 % and more, rotor drag and an uncompensated battery are each named alone, and the load's size is right within a tenth.
+Nor is one whose attitude loop is of another order than the vehicle file's idealisation, with the mean lateness that the file tells.
+A load of 5 % and more, rotor drag, an uncompensated battery and a wrong attitude_lag are each named alone. The load's size is right within a
+tenth, the lag's within 15 ms.
 """
 import json
 import os
@@ -44,6 +46,10 @@ def study_demands(name, told):
         value, true = told["causes"][0]["parameters"]["m"]["value"], parameters(name, SEED)["mass"]
         if abs(value / (true / (1 + true)) - 1) > 0.1:
             return [f"payload: {value:.4f} of the thrust per mass is lost, told; true is {true / (1 + true):.4f}"]
+    if name == "lag":
+        value, true = told["causes"][0]["parameters"].get("lag_s", {}).get("value", 0), -parameters(name, SEED)["file_lag"]
+        if abs(value - true) > 0.015:
+            return [f"lag: the attitude lags {value:.3f} s more than the file says, told; true is {true:.3f} s"]
     return []
 
 
@@ -51,7 +57,7 @@ def main():
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     with tempfile.TemporaryDirectory() as out:
-        worlds = [(name, SEED) for name in ("none", "payload", "flapping", "battery")]
+        worlds = [(name, SEED) for name in ("none", "sluggish", "payload", "flapping", "battery", "lag")]
         folders = list(generate(out, worlds))
         failures = field_demands(sys.argv[1], folders[0])
         for (name, _), folder in zip(worlds, folders):

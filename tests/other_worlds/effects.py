@@ -17,6 +17,7 @@ NEUTRAL = dict(
     curve=-1.0,  # true f of the thrust curve; -1: the file's
     rotor_frequency=60.0,  # Hz, of the second-order actuator
     tilt=20.0, tilt_rate=50.0,  # 1/s, of the attitude loop
+    file_lag=0.0,  # s, by which the vehicle file's attitude_lag is too long
     damage=0.0, damaged=0.0,  # loss of one rotor's thrust coefficient; which
     late=0.0, jitter=0.0,  # s, of the set-points beyond the file's latency
     drift_x=0.0, drift_y=0.0, drift_z=0.0,  # m/s^2 per 10 K, accelerometer, body
@@ -79,6 +80,8 @@ EFFECTS = {
               "4 to 8 % of one rotor's readings are 0, in bursts"),
     # No effect but the vehicle file's own idealisation: attitude of second order, its mean lateness in the file. Right is nothing.
     "sluggish": (lambda rng: dict(tilt=10.0, tilt_rate=25.0), None, (), "attitude loop of half the bandwidth, lag 0.11 s"),
+    "lag": (lambda rng: dict(tilt=10.0, tilt_rate=25.0, file_lag=sign(rng) * rng.uniform(0.03, 0.05)), "actuator_lag", (),
+            "the same vehicle, attitude_lag in the file wrong by 30 to 50 ms"),
     # Outside the catalogue: right is `unknown_structure`, no name.
     "plume": (lambda rng: dict(plume=rng.uniform(0.6, 1.0), plume_heading=rng.uniform(-np.pi, np.pi)), "unknown_structure", (),
               "a level jet of 0.6 to 1 m/s^2, 0.5 m wide"),

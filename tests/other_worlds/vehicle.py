@@ -77,7 +77,7 @@ kp = {{ horizontal = {KP[0]}, vertical = {KP[2]} }}
 kd = {{ horizontal = {KD[0]}, vertical = {KD[2]} }}
 latency = {LATENCY}
 feedback_delay = {FEEDBACK_DELAY}
-attitude_lag = {attitude_lag(c["rotor_frequency"], c["tilt"], c["tilt_rate"]):.4f}
+attitude_lag = {attitude_lag(c["rotor_frequency"], c["tilt"], c["tilt_rate"]) + c["file_lag"]:.4f}
 [estimation]
 position = 0.03
 [propulsion]

@@ -154,6 +154,32 @@ TEST(Plausible, ASizeThatNoVehicleCanHaveIsRefusedByName) {
   EXPECT_NE(refusal(result.refused.front()).find("battery sag would have to be"), std::string::npos);
 }
 
+/// kMeanZ moved by `push` of each window's height over the surface below.
+template <typename F>
+Observations pushed_by_height(F push) {
+  auto seen = quiet();
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) seen.y[kMeanZ][i] += push(seen.windows[i].around.height);
+  return seen;
+}
+
+TEST(Plausible, APushThatReachesFartherThanAWashHasNoName) {
+  const auto result = studied(pushed_by_height([](double h) { return -0.5 * (h - 1); }));
+  ASSERT_FALSE(result.unknown.empty()) << study_worlds::told(result);
+  EXPECT_EQ(result.unknown.front().along, "z_m");
+  for (const auto& cause : result.causes) {
+    EXPECT_NE(cause.found.form->cause(), "ground_thrust") << study_worlds::told(result);
+    EXPECT_NE(cause.found.form->cause(), "ceiling") << study_worlds::told(result);
+  }
+  const auto wash = studied(pushed_by_height([](double h) { return 0.5 * std::exp(-(h - 0.4) / 0.2); }));
+  ASSERT_EQ(wash.causes.size(), 1u) << study_worlds::told(wash);
+  EXPECT_EQ(wash.causes.front().found.form->cause(), "ground_thrust");
+}
+
+TEST(Plausible, ACeilingDoesNotPushDown) {
+  EXPECT_FALSE(form_of("ceiling").possible.front().holds(-0.1));
+  EXPECT_TRUE(form_of("ceiling").possible.front().holds(0.5));
+}
+
 TEST(Plausible, ASizeAtAReferenceThatWasNotFlownIsToldAsExtrapolated) {
   auto seen = quiet();
   const Form& form = form_of("ground_thrust");

@@ -27,10 +27,13 @@ Form pull() {
   return {
       .formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
       .parameters = {"A_mps2"},
-      .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, more than any rotor gains 0.3 m under a ceiling"}},
+      .possible =
+          {{0, 3, "a surface above pulls upward; 3 m/s² are 30 % of the weight, more than any rotor gains under one"}},
       .reference = under,
       .scale_name = "L_m",
       .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
+      .reach = Reach{0.85, "ceiling_gap_m",
+                     "a wash is felt within two or three diameters of a rotor; farther it is a slope by height"},
       .by_place = true,
       .floor = 0.02,
       .needs = {Source::ceiling},

@@ -67,6 +67,13 @@ struct Possible {
   bool holds(double value) const { return least <= value && value <= most; }
 };
 
+/// How far a push by distance can reach. One that the flights would draw out farther is none of this effect: what
+/// they show along `regressor` has no name.
+struct Reach {
+  double most;  ///< of the fitted scale, m
+  std::string regressor, reason;
+};
+
 /// Where the size is stated, and what of it a window flew: outside of that range the size is an extrapolation.
 struct Reference {
   double value;
@@ -92,6 +99,7 @@ struct Form {
   std::optional<Reference> reference = {};  ///< without one the size is that of what was flown
   std::string scale_name = {};              ///< "L_m" …; empty without a scale
   std::vector<Scale> scales = {Scale()};
+  std::optional<Reach> reach = {};
   bool integer_scale = false;      ///< a rotor's number: not polished
   bool displaces_map = false;      ///< its scale is an offset, fitted along x and y
   bool motors_alone = false;       ///< seen in motor commands alone: which of such forms it is they do not tell

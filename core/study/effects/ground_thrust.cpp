@@ -24,6 +24,9 @@ Effect ground_thrust() {
                      Reference{kSurfaceReference, "m over the surface", [](auto& w) { return w.around.height; }},
                  .scale_name = "L_m",
                  .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
+                 .reach =
+                     Reach{0.85, "z_m",
+                           "a wash is felt within two or three diameters of a rotor; farther it is a slope by height"},
                  .by_place = true,
                  .floor = 0.02,
                  .columns = lift([](double h, double length) { return near_surface(h, kSurfaceReference, length); }),

@@ -144,6 +144,27 @@ bool leads(const Candidate& structure, const Candidate* cause, const std::vector
          structure.gain - cause->gain > std::max(kRules.structure_lead.value, kRules.structure_margin * cause->gain);
 }
 
+/// A constant of which more than half as much again varies along a regressor is the structure's mean.
+void drop_means_of(const std::vector<Column>& structure, double gain, std::vector<Accepted>& accepted) {
+  std::erase_if(accepted, [&](const Accepted& a) {
+    return a.form->constant && gain > kRules.left_of_constant * a.gain && share_a_channel(structure, a.columns);
+  });
+}
+
+/// What reaches farther than its cause can is told as a structure in its place. False: it is the cause.
+bool reaches_too_far(const Accepted& a, SearchResult& result) {
+  if (!a.form->reach || a.scale.value <= a.form->reach->most) return false;
+  const Reach& reach = *a.form->reach;
+  result.refused.push_back(
+      {a.form->cause(), a.form->formula, a.form->scale_name, a.scale.value, {0, reach.most, reach.reason}});
+  Candidate as_structure;
+  as_structure.name = reach.regressor, as_structure.columns = a.columns, as_structure.gain = a.gain;
+  as_structure.structure.shape = a.form->formula;
+  result.unknown.push_back(told(as_structure, a.p));
+  drop_means_of(a.columns, a.gain, result.accepted);
+  return true;
+}
+
 /// What came out beyond what a vehicle can have, once averaged over the shapes, is refused; no interval holds it.
 void refuse_impossible(SearchResult& result) {
   std::erase_if(result.accepted, [&](Accepted& a) {
@@ -187,10 +208,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     if (const auto no = impossible(step.named, result.accepted, step.threshold, cause ? cause->gain : 0))
       result.refused.push_back(*no);
     if (structure && leads(*structure, cause, result.accepted)) {
-      // A constant of which more than half as much again varies along a regressor is the structure's mean.
-      std::erase_if(result.accepted, [&](const Accepted& a) {
-        return a.form->constant && share_a_channel(structure->columns, a.columns);
-      });
+      drop_means_of(structure->columns, structure->gain, result.accepted);
       const double p = p_value(step.null_structures, structure->gain) / kRules.structure_share;
       result.unknown.push_back(told(with_harmonics(*structure, evidence, accepted), p));
       break;
@@ -199,6 +217,7 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     const double p = p_value(step.null_named, cause->gain) / Step::named_share();
     Accepted a{cause->form, cause->scale, cause->columns, {}, p, cause->gain, {}, {}};
     refine(evidence, a, accepted);
+    if (reaches_too_far(a, result)) break;
     result.accepted.push_back(std::move(a));
   }
   evidence.whiten(columns_of(result.accepted, evidence.seen()));

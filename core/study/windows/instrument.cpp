@@ -8,6 +8,19 @@
 
 namespace backwash::study {
 
+std::vector<double> slow(const Series& s, Stretch w, const std::vector<double>& z, double width) {
+  std::vector<double> out(z.size());
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    double sum = 0, weights = 0;
+    for (std::size_t k = 0; k < z.size(); ++k) {
+      const double away = (s.t[w.begin + k] - s.t[w.begin + i]) / width, weight = std::exp(-0.5 * away * away);
+      sum += weight * z[k], weights += weight;
+    }
+    out[i] = sum / weights;
+  }
+  return detrended(out);
+}
+
 void FirstStage::add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust) {
   const auto product = [](const std::vector<double>& a, const std::vector<double>& b) {
     return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);

@@ -31,6 +31,9 @@ std::vector<double> rates(const Series& s, Stretch w, F value) {
   return detrended(x);
 }
 
+/// z weighted by a bell of standard deviation `width` in s over the window's own rows, detrended: what is slow in it.
+std::vector<double> slow(const Series& s, Stretch w, const std::vector<double>& z, double width);
+
 /// Σ z·y and Σ z·x of detrended z over √Σz²: one row of an instrumental regression; nothing without excitation.
 struct Moment {
   double y = 0, square = 0;

@@ -117,6 +117,8 @@ struct WindowRules {
                      "chosen: root mean square of the set-points' acceleration; below, a slope of 10 % is 5 mm/s²"};
   Rule excited_rate{"excited_rate", 0.05, "m/s³",
                     "chosen: root mean square of its rate; below, a delay of 0.05 s is 2.5 mm/s²"};
+  Rule slow_tilt{"slow_tilt", 0.45, "s",
+                 "measured: below 0.3 s the order of the attitude loop is told as a lag (other_worlds, sluggish)"};
   Rule no_turn{"no_first_stage", 1e-6, "1", "derived: a determinant that rounding made"};
   Rule delay_turns{"delay_turns", 20, "turns", "chosen: more than the fixed point of a delay below 0.2 s needs"};
   // Rotors
