@@ -80,7 +80,11 @@ std::map<std::string, Cause> pushes() {
         .push = [](auto& a) { return up(a.s * image_doublet(a.shape, a.world.room.height_above_solid(a.now.p), 0.4)); },
         .truth = {{"A_mps2", same}}}},
       {"ceiling",  // m/s² 0.3 m below the ceiling; effective radius, m
-       {.size = 0.12, .one_signed = true, .shape = between(0.3, 0.7), .push = ceiling_push, .truth = {{"A_mps2", same}}}},
+       {.size = 0.12,
+        .one_signed = true,
+        .shape = between(0.3, 0.7),
+        .push = ceiling_push,
+        .truth = {{"A_mps2", same}}}},
       {"wall_attraction",  // m/s² 0.4 m from the wall; length of the potential, m
        {.size = 0.12,
         .shape = between(0.15, 0.4),
