@@ -28,7 +28,7 @@ class LinkWatch {
   Channels& channels_;
   decltype(config::Daemon::link) link_;
   const ServiceManager& manager_;  ///< told each transition
-  std::uint8_t fault_ = 0;
+  std::optional<firmware_bridge::LinkFault> fault_;
   std::uint32_t losses_ = 0;  ///< that were told
   std::uint32_t mended_ = 0;  ///< for which a fresh port was offered: a loss of that one is the next
 };

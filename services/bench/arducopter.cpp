@@ -181,7 +181,7 @@ class ArduCopter : public Firmware {
   }
   /// Until GUID_TIMEOUT the target goes on by its last velocity and acceleration, then it stands (source).
   void move_target(double t) {
-    if (t - last_setpoint_ > std::max(parameter("GUID_TIMEOUT"), 0.1)) target_.v_W = target_.a_W = Vec3::Zero();
+    if (since(last_setpoint_, t) > std::max(parameter("GUID_TIMEOUT"), 0.1)) target_.v_W = target_.a_W = Vec3::Zero();
     target_.p_W += kStep * target_.v_W;
     target_.v_W += kStep * target_.a_W;
   }

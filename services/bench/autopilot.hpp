@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <optional>
 #include <random>
@@ -104,6 +105,10 @@ class Autopilot {
   Setpoint target_of(const mavlink::SetPositionTargetLocalNed& m) const;
   State believed() const;
   State felt() const;
+  /// s from `then` to t; infinite when it has not been yet.
+  static double since(const std::optional<double>& then, double t) {
+    return then ? t - *then : std::numeric_limits<double>::infinity();
+  }
   void send_attitude(std::vector<std::uint8_t>& out);
   void send_position(std::vector<std::uint8_t>& out);
   void send_battery(std::vector<std::uint8_t>& out);
@@ -117,7 +122,8 @@ class Autopilot {
   sim::AirflowTruth air_;
   LocalFrame frame_;
   bool armed_ = false, landed_ = true, local_position_ = false, heartbeat_due_ = false;
-  double last_setpoint_ = -1e9, landed_since_ = 0;
+  std::optional<double> last_setpoint_;  // s, when it came
+  double landed_since_ = 0;
   long steps_ = 0;
   std::uint64_t setpoints_ = 0;
   Setpoint target_;  // in the map as the estimator believes it to lie

@@ -80,9 +80,10 @@ const Fault* FaultyChannel<Item>::active(double t) const {
 // A link keeps what it cannot send yet; of samples only those are sent for which there is time.
 template <class Item>
 void FaultyChannel<Item>::slow(Item in, const Fault& fault, double t) {
-  if (!queues(in) && t < free_at_) return;
-  free_at_ = std::max(t, free_at_) + cost(in) / fault.rate;
-  held_.emplace_back(queues(in) ? free_at_ : t, std::move(in));
+  const double free_at = std::max(t, free_at_.value_or(t));
+  if (!queues(in) && t < free_at) return;
+  free_at_ = free_at + cost(in) / fault.rate;
+  held_.emplace_back(queues(in) ? *free_at_ : t, std::move(in));
 }
 
 template <class Item>
@@ -161,11 +162,11 @@ std::vector<Judge::Verdict> Judge::verdicts() const {
         break;
       case speed:
         all.push_back(
-            {"speed", "at most " + number(e.limit, "m/s"), number(speed_, "m/s"), last_ >= 0 && speed_ <= e.limit});
+            {"speed", "at most " + number(e.limit, "m/s"), number(speed_, "m/s"), last_ && speed_ <= e.limit});
         break;
       case clearance:
-        all.push_back({"clearance", "at least " + number(e.limit, "m"), number(clearance_, "m"),
-                       last_ >= 0 && clearance_ >= e.limit});
+        all.push_back(
+            {"clearance", "at least " + number(e.limit, "m"), number(clearance_, "m"), last_ && clearance_ >= e.limit});
     }
   }
   return all;

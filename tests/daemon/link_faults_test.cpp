@@ -36,14 +36,14 @@ TEST(Row17, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
   rig.tick();
   EXPECT_EQ(rig.mode(), Mode::quiet);
   EXPECT_EQ(rig.reason(), Reason::port_lost);
-  EXPECT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  EXPECT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::kPortLost);
   const std::size_t from = rig.log.size();
   rig.ticks(10);
   EXPECT_EQ(frames_out(rig, from), 0);
   rig.plug_in();
   for (int n = 0; n < 150; ++n) EXPECT_TRUE(rig.tick().silent());
   EXPECT_EQ(rig.mode(), Mode::quiet);
-  EXPECT_EQ(rig.channels->link_fault, 0);
+  EXPECT_EQ(rig.channels->link_fault.load(), std::nullopt);
   // The line works again: an operator can take control anew.
   rig.channels->orders.push({track::Request::enable});
   EXPECT_EQ(rig.ticks_until(Mode::enabling, 3), 1) << to_string(rig.reason());
@@ -63,7 +63,7 @@ TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
   LinkWatch watch(channels, serial(line.path()), kNobody);
   watch.step();
   EXPECT_EQ(channels.ports.take(), nullptr);
-  channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
+  channels.link_fault = firmware_bridge::LinkFault::kPortLost;
   channels.port_losses = 1;
   watch.step();
   const auto* port = channels.ports.take();
@@ -87,11 +87,11 @@ TEST(Row17, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
     watch.step();
   };
   for (std::int64_t n = 0; n < 5; ++n) together(n * 20'000'000);
-  EXPECT_EQ(channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  EXPECT_EQ(channels->link_fault.load(), firmware_bridge::LinkFault::kPortLost);
   std::filesystem::create_symlink(line.path(), path);
   for (std::int64_t n = 5; n < 10; ++n) together(n * 20'000'000);
   std::filesystem::remove(path);
-  EXPECT_EQ(channels->link_fault, 0);
+  EXPECT_EQ(channels->link_fault.load(), std::nullopt);
   EXPECT_EQ(channels->port_losses, 1u);
   EXPECT_EQ(loop.view().mode, Mode::passive);
   channels->ports.collect();
@@ -106,14 +106,14 @@ TEST(Row17, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
   rig.plug_in();
   rig.hang_up();
   rig.ticks(3);
-  EXPECT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost));
+  EXPECT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::kPortLost);
   EXPECT_EQ(rig.channels->port_losses, 2u);
 
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
   LinkWatch watch(channels, serial(line.path()), kNobody);
   for (std::uint32_t losses = 1; losses <= 3; ++losses) {
-    channels.link_fault = 1 + static_cast<int>(firmware_bridge::LinkFault::kPortLost);
+    channels.link_fault = firmware_bridge::LinkFault::kPortLost;
     channels.port_losses = losses;
     watch.step();
     const auto* port = channels.ports.take();
@@ -181,9 +181,9 @@ TEST(Row19, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
     for (auto& byte : out) byte = static_cast<std::uint8_t>(rng());
   };
   rig.ticks(99);
-  EXPECT_EQ(rig.channels->link_fault, 0);
+  EXPECT_EQ(rig.channels->link_fault.load(), std::nullopt);
   rig.ticks(2);
-  ASSERT_EQ(rig.channels->link_fault, 1 + static_cast<int>(firmware_bridge::LinkFault::kNoValidFrame));
+  ASSERT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::kNoValidFrame);
   EXPECT_EQ(name(firmware_bridge::LinkFault::kNoValidFrame), "no valid frame (wrong baud rate?)");
   rig.channels->orders.push({track::Request::enable});
   rig.tick();

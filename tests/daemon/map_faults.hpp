@@ -57,7 +57,7 @@ class MapFaults : public testing::Test {
   const track::TickOutput& tick(track::Request request = track::Request::none,
                                 const track::AcceptedSegment* segment = nullptr) {
     now_ns_ += kTick_ns;
-    if (map_moves_on_) channels_->map_ns = now_ns_;
+    if (map_moves_on_) channels_->map_ns.store(now_ns_);
     track::TickInput in;
     in.now_ns = now_ns_;
     in.request = request;
