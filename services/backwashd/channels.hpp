@@ -120,8 +120,8 @@ inline constexpr std::uint64_t kTicksPerSecond = 50;
 /// What the control thread shows to the others, once a tick.
 struct ControlView {
   std::int64_t t_ns = 0;
-  track::Mode mode = track::Mode::passive;
-  track::Reason reason = track::Reason::started;
+  Mode mode = Mode::passive;
+  Reason reason = Reason::started;
   bool armed = false, offboard = false, landed = true, aligned = false;
   std::optional<firmware_bridge::ClockOffset> clock;                         ///< the autopilot's
   static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< an age before the first, s
@@ -141,7 +141,7 @@ struct ControlView {
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
   std::uint64_t frames_refused = 0;  ///< of the link, for their signature
   double residual_m = 0, residual_rad = 0;
-  track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
+  Mismatch mismatch = Mismatch::none;  ///< of the frames: then enabling is refused
   firmware_bridge::SwitchState stop_switch = firmware_bridge::SwitchState::absent;
   firmware_bridge::Autopilot autopilot = firmware_bridge::Autopilot::kUnknown;
   firmware_bridge::ParameterValues parameters{};  ///< of parameter_names(autopilot)
@@ -162,8 +162,8 @@ struct ControlRecord {
 struct ControlEvent {
   enum class Kind : std::uint8_t { transition, missed_deadline, page_fault } kind = Kind::transition;
   std::int64_t t_ns = 0;
-  track::Mode mode = track::Mode::passive;
-  track::Reason reason = track::Reason::started;
+  Mode mode = Mode::passive;
+  Reason reason = Reason::started;
   std::uint64_t count = 0;  ///< periods missed, pages faulted
 };
 

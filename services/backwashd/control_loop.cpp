@@ -29,10 +29,10 @@ std::uint64_t page_faults() noexcept {
   return static_cast<std::uint64_t>(usage.ru_minflt + usage.ru_majflt);
 }
 
-firmware_bridge::Signal signal_of(track::Mode mode) noexcept {
+firmware_bridge::Signal signal_of(Mode mode) noexcept {
   using firmware_bridge::Signal;
-  if (mode == track::Mode::quiet) return Signal::fault;
-  return mode == track::Mode::passive ? Signal::idle : Signal::commanding;
+  if (mode == Mode::quiet) return Signal::fault;
+  return mode == Mode::passive ? Signal::idle : Signal::commanding;
 }
 
 }  // namespace
@@ -168,7 +168,7 @@ void ControlLoop::give_origin(const track::AutopilotFacts& autopilot) noexcept {
 
 void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out) noexcept {
   const auto& s = out.supervisor;
-  if (s.changed && s.mode == track::Mode::quiet) link_.discard_unsent();
+  if (s.changed && s.mode == Mode::quiet) link_.discard_unsent();
   if (s.send_setpoint && link_.send_setpoint(out.command_local, time_of(in.now_ns))) {
     row_.sent |= 1;
     ++view_.setpoints;
@@ -184,17 +184,16 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.request_land) link_.send_land();
   if (out.arm) link_.send_arm(true);
   if (out.disarm) link_.send_arm(false);
-  if (s.mode != track::Mode::lifting) takeoff_asked_ns_.reset();
+  if (s.mode != Mode::lifting) takeoff_asked_ns_.reset();
   if (out.takeoff && link_.send_takeoff(*out.takeoff) && !takeoff_asked_ns_) takeoff_asked_ns_ = in.now_ns;
-  if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
-    link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
-                          to_string(s.reason));
+  if (s.changed && s.send_heartbeat && s.reason != Reason::started)
+    link_.send_statustext(s.mode == Mode::hold || s.mode == Mode::land ? kWarning : kNotice, to_string(s.reason));
   // Only while nothing depends on the line's time. Quiet, and silence to an armed vehicle, end by an operator's wish
   // alone: the autopilot, or we, may have restarted since.
-  const bool passive = s.mode == track::Mode::passive && s.send_heartbeat;
+  const bool passive = s.mode == Mode::passive && s.send_heartbeat;
   const std::optional<std::int64_t> asked_ns = channels_.enable_asked_ns.load();
-  const bool wished = (s.mode == track::Mode::quiet || s.mode == track::Mode::passive) && asked_ns &&
-                      in.now_ns - *asked_ns < kEnableWish_ns;
+  const bool wished =
+      (s.mode == Mode::quiet || s.mode == Mode::passive) && asked_ns && in.now_ns - *asked_ns < kEnableWish_ns;
   parameters_.step(link_, passive || wished, passive, view_);
   if (!s.send_heartbeat && !wished) return;
   if (view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));

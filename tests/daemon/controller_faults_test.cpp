@@ -8,9 +8,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 TEST(Row21, WithoutAHeartbeatOfTheControllerItIsQuietAfterOneAndAHalfSeconds) {
   InFlight rig;
   rig.autopilot->mute = true;

@@ -10,8 +10,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-
 constexpr double kDegree = std::numbers::pi / 180;
 
 // Fresh stamps, the same pose to the last bit: the autopilot believes it and drifts, 0.6 m in 5 s and 25 m in a minute.
@@ -47,7 +45,7 @@ TEST(Row6, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
   rig.offer(rig.rise(), true, true);
   ASSERT_GT(rig.ticks_until(Mode::lifting, 3), 0) << to_string(rig.reason());
   ASSERT_GT(rig.ticks_until(Mode::land, 200), 0) << to_string(rig.reason()) << ", " << rig.autopilot->truth().p_W.z();
-  EXPECT_EQ(rig.reason(), track::Reason::odometry_frozen);
+  EXPECT_EQ(rig.reason(), Reason::odometry_frozen);
   EXPECT_EQ(rig.tick().odometry, 0) << "nor is the autopilot told any more that it has not left the ground";
 }
 
@@ -75,7 +73,7 @@ TEST(Row4, AnAbsurdLoopClosureInPiecesIsHeldToo) {
       rig.tick();
     }
     EXPECT_EQ(rig.mode(), Mode::hold) << (turns ? "turned by 108° in the map" : "moved by 10.8 m in the map");
-    EXPECT_EQ(rig.reason(), track::Reason::closure_refused);
+    EXPECT_EQ(rig.reason(), Reason::closure_refused);
   }
 }
 

@@ -14,9 +14,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 /// A vehicle that is carried about before it is enabled. The VIO sees the truth changed by `wrong`.
 Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond&)>& wrong, bool& commanded) {
   Lockstep rig;

@@ -14,9 +14,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 const ServiceManager kNobody;
 
 // But for odometry, which is a sensor and no command.

@@ -53,7 +53,7 @@ class Lockstep {
   const Wire& tick(int missed = 0);
   void ticks(int count);
   /// Ticks until the daemon is in this mode; how many it took, or −1 after `most`.
-  int ticks_until(track::Mode mode, int most);
+  int ticks_until(Mode mode, int most);
 
   /// Enable, follow, arm, take off to 1.2 m. Ends in tracking, the take-off's commands all sent.
   void take_off();
@@ -68,8 +68,8 @@ class Lockstep {
   const std::vector<Setpoint>& route() const { return route_; }
 
   const ControlView& view() const { return loop_->view(); }
-  track::Mode mode() const { return loop_->view().mode; }
-  track::Reason reason() const { return loop_->view().reason; }
+  Mode mode() const { return loop_->view().mode; }
+  Reason reason() const { return loop_->view().reason; }
   const Wire& wire() const { return wire_; }
   const plan::World& world() const { return *world_; }
   const firmware_bridge::AutopilotLink& link() const { return *link_; }

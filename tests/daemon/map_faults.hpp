@@ -88,7 +88,7 @@ class MapFaults : public testing::Test {
     for (int n = 0; n < 40; ++n) tick();
     tick(track::Request::enable);
     for (int n = 0; n < 3; ++n) tick();
-    ASSERT_EQ(out_.supervisor.mode, track::Mode::tracking);
+    ASSERT_EQ(out_.supervisor.mode, Mode::tracking);
   }
   /// 4 m along x, in 8 s, with stops every 0.2 s.
   void fly(bool with_stops = true, double clearance = 1) {
@@ -124,7 +124,7 @@ class MapFaults : public testing::Test {
     voxels.centers[0] = {p.x(), p.y(), p.z()};
     channels_->scan_voxels.push(voxels);
   }
-  int ticks_until(track::Mode mode, int most) {
+  int ticks_until(Mode mode, int most) {
     for (int n = 1; n <= most; ++n)
       if (tick().supervisor.mode == mode) return n;
     return most + 1;

@@ -5,9 +5,6 @@
 namespace backwash::daemon {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 TEST_F(MapFaults, Row14AnObstacleOnThePathIsDecidedOnInOneTickAndTheVehicleRestsBeforeIt) {
   enable();
   fly();

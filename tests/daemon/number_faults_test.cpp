@@ -13,8 +13,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
 constexpr double kBad[] = {kNan, kInf, -kInf, 1e39, -1e39, 1e300};
 

@@ -13,9 +13,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 /// From the middle of a route at 1 m/s: HOLD within 100 ms of the last good sample (frozen: one position, no velocity),
 /// LAND within 400 ms, then QUIET and not a byte more.
 void expect_hold_land_quiet(Lockstep& rig, std::int64_t last_good_ns) {

@@ -8,9 +8,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 std::vector<ControlEvent> events(Lockstep& rig) {
   std::vector<ControlEvent> all;
   while (const auto event = rig.channels->events.pop()) all.push_back(*event);

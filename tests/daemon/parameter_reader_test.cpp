@@ -75,12 +75,12 @@ TEST_F(ParameterReading, InQuietItIsAskedOnlyForAnOperatorWhoAsksToEnable) {
   rig_.ticks(150);
   rig_.take_off();
   rig_.autopilot->mute = true;
-  ASSERT_GE(rig_.ticks_until(track::Mode::quiet, 200), 0);
+  ASSERT_GE(rig_.ticks_until(Mode::quiet, 200), 0);
   rig_.ticks(50);
   rig_.autopilot->mute = false;
   rig_.autopilot->disarm();
   EXPECT_EQ(commands_in(200), 0);
-  ASSERT_EQ(rig_.mode(), track::Mode::quiet);
+  ASSERT_EQ(rig_.mode(), Mode::quiet);
   EXPECT_TRUE(forbids(rig_).starts_with("no value of")) << forbids(rig_);
   rig_.channels->enable_asked_ns.store(rig_.now_ns());
   EXPECT_GT(commands_in(120), 0) << "messages and origin are asked for too: without a pose nobody enables";
@@ -129,7 +129,7 @@ TEST_F(ParameterReading, AnArmedVehicleIsAskedForNothing) {
       rig.restart();
     } else {
       rig.autopilot->mute = true;
-      ASSERT_GE(rig.ticks_until(track::Mode::quiet, 200), 0);
+      ASSERT_GE(rig.ticks_until(Mode::quiet, 200), 0);
       rig.autopilot->mute = false;
     }
     rig.ticks(40);

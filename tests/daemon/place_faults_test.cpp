@@ -17,9 +17,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 /// In the air, at rest.
 struct Hovering : Lockstep {
   Hovering() : Lockstep({0.7, Vec3(5, -3, 0.2)}, Medium::udp) { take_off(); }

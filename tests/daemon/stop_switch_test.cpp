@@ -8,7 +8,6 @@ namespace backwash::daemon::test {
 namespace {
 
 using firmware_bridge::SwitchState;
-using track::Reason;
 
 constexpr SwitchState kBroken[] = {SwitchState::lost, SwitchState::untested, SwitchState::chattering};
 
