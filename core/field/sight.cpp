@@ -29,11 +29,6 @@ bool meets(const Segment& segment, const Index3& voxel) noexcept {
   return enter <= leave;
 }
 
-bool line_of_sight(const map::OccupancyGrid& grid, const Vec3& p_W, const Vec3& c_W) noexcept {
-  const auto segment = open_part(grid.origin(), grid.resolution(), p_W, c_W);
-  return !segment || clear(*segment, [&](const Index3& v) { return grid.occupied(v) ? 0 : 1; });
-}
-
 SightMap::Viewpoint SightMap::viewpoint(const Vec3& p_W) const noexcept {
   const Vec3 x =
       ((p_W - origin_W_) / resolution_).cwiseMax(-1.0).cwiseMin(Vec3(nx_, ny_, nz_));  // within the int range

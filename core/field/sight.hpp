@@ -85,14 +85,8 @@ bool clear(const Segment& segment, const EmptyRadius& empty_radius, int empty_st
                                   : clear_along<2>(segment, empty_radius, empty_start);
 }
 
-/// Whether the segment from p to c, its last 2a left out, meets no occupied voxel (docs/model.md section 1, "Visible").
-/// Voxels are closed boxes: a segment through exactly an edge or a corner is blocked if any voxel that touches that
-/// point is occupied. Unknown voxels do not block. Does not test the normal. O(|c − p|/a).
-bool line_of_sight(const map::OccupancyGrid& grid, const Vec3& p_W, const Vec3& c_W) noexcept;
-
 /// A copy of a grid's occupied voxels made for fast lines of sight: the Chebyshev distance from each voxel to the
-/// nearest occupied one, one byte each, and summed-area counts, four bytes each. Gives exactly the answers of
-/// line_of_sight(). Thread-safe.
+/// nearest occupied one, one byte each, and summed-area counts, four bytes each. Thread-safe.
 class SightMap {
  public:
   /// O(cells).
@@ -104,7 +98,10 @@ class SightMap {
     int empty_radius;
   };
   Viewpoint viewpoint(const Vec3& p_W) const noexcept;
-  /// As field::line_of_sight(grid, p, c). Three or four jumps for a line across a room.
+  /// Whether the segment from p to c, its last 2a left out, meets no occupied voxel (docs/model.md section 1,
+  /// "Visible"). Voxels are closed boxes: a segment through exactly an edge or a corner is blocked if any voxel that
+  /// touches that point is occupied. Unknown voxels do not block. Does not test the normal. Three or four jumps for a
+  /// line across a room.
   bool line_of_sight(const Viewpoint& from, const Vec3& c_W) const noexcept;
 
   /// The line from a viewpoint to c without its end, in voxel units; nothing when it is all end.

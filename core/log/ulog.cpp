@@ -102,7 +102,7 @@ class Decoder {
         return data(at, body);
       case 'O':
         if (body.size() < 2) return bad("a dropout without its length");
-        log_.dropouts += 1, log_.dropped_s += 1e-3 * little<std::uint16_t>(body.data());
+        log_.dropouts += 1;
         return std::nullopt;
       default:
         // Later versions may add messages, but all types are capital letters: anything else is damage.

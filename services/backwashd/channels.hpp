@@ -148,7 +148,6 @@ struct ControlView {
   double untold_delay = 0;                        ///< of the autopilot's line, s
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
-  std::uint64_t log_lost = 0;  ///< records that the raw log had no room for
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 

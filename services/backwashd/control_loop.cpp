@@ -238,7 +238,6 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   if (telemetry.text && telemetry.text->value.severity <= kWorstNotice) view_.warning = telemetry.text;
   view_.residual_m = flight_.alignment().position_residual();
   view_.residual_rad = flight_.alignment().yaw_residual();
-  view_.log_lost = channels_.control_log.lost();
 }
 
 // Transitions, missed deadlines and page faults, each to the operator; the tick itself to the raw log.

@@ -62,6 +62,17 @@ tl::expected<LineRate, std::string> configured_line(const decltype(config::Daemo
       std::ceil(least / line.bytes_per_second * link.baud / kRound) * kRound));
 }
 
+std::string traffic(const AutopilotLink& link) {
+  const auto& in = link.received();
+  const auto& heard = link.telemetry();
+  const auto& out = link.transmit();
+  return fmt::format(
+      "{} frames received; {} damaged, {} of other messages, {} with unknown flags, {} bytes between frames; {} "
+      "messages late, {} broken; {} frames sent, {} gave way, {} ODOMETRY left out",
+      in.frames, in.bad_crc, in.unknown_id, in.unknown_incompat, in.skipped_bytes, heard.out_of_order, heard.broken,
+      out.sent(), out.dropped(), link.thinned());
+}
+
 void LinkWatch::step() {
   while (const auto event = channels_.events.pop()) tell(*event, manager_);
   const std::uint32_t losses = channels_.port_losses.load(std::memory_order_relaxed);

@@ -56,10 +56,7 @@ map::ScanChange difference(const map::OccupancyGrid& before, const map::Occupanc
   for (std::size_t n = 0; n < after.cell_count(); ++n) {
     if (before.at(n) == after.at(n)) continue;
     change.box.add(after.voxel(n));
-    if (after.at(n) == map::Cell::occupied)
-      change.occupied.push_back(after.voxel(n));
-    else
-      change.freed += after.at(n) == map::Cell::free;
+    if (after.at(n) == map::Cell::occupied) change.occupied.push_back(after.voxel(n));
   }
   return change;
 }

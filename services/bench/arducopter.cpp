@@ -62,8 +62,10 @@ class ArduCopter : public Firmware {
  public:
   explicit ArduCopter(const Site& site) : Firmware(kProfile, site) {}
   const char* mode() const noexcept override { return mode_ == guided ? "guided" : mode_ == land ? "land" : "pilot"; }
-  void take_over() noexcept override { change(stabilize); }
-  void disarm() noexcept override {
+
+ private:
+  /// The motors stop, wherever the vehicle is.
+  void disarm() noexcept {
     armed_ = take_off_ = climbing_ = false;
     land_complete_ = true;
     landed_state_ = on_ground;
@@ -71,7 +73,6 @@ class ArduCopter : public Firmware {
     heartbeat_due_ = true;
   }
 
- private:
   // Its HEARTBEAT follows a change of mode at once: ardupilot-flight.csv:128–130.
   void change(CustomMode mode, bool by_failsafe = false) noexcept {
     mode_ = mode;

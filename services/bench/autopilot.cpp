@@ -56,17 +56,6 @@ const char* Autopilot::mode() const noexcept {
   return mode_ == Mode::offboard ? "offboard" : mode_ == Mode::land ? "land" : "manual";
 }
 
-void Autopilot::take_over() noexcept {
-  mode_ = Mode::manual;
-  heartbeat_due_ = true;
-}
-
-void Autopilot::disarm() noexcept {
-  armed_ = false;
-  vehicle_.set_motors(false);
-  heartbeat_due_ = true;
-}
-
 Setpoint Autopilot::target_of(const mavlink::SetPositionTargetLocalNed& m) const {
   const Eigen::Matrix3d R = yaw_matrix(-frame_.yaw);
   return {R * (mavlink::swap_ned({m.x, m.y, m.z}) - frame_.origin), R * mavlink::swap_ned({m.vx, m.vy, m.vz}),

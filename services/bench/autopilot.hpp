@@ -71,12 +71,6 @@ class Autopilot {
                                            {"MPC_TILTMAX_AIR", 45}};
   /// Remaining share, sent once a second as BATTERY_STATUS while set.
   std::optional<double> battery;
-  /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
-  virtual void take_over() noexcept;
-  /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
-  virtual void disarm() noexcept;
-  /// The estimator is reset: from now on its local frame lies elsewhere.
-  void reset_estimator(const LocalFrame& frame) noexcept { frame_ = frame; }
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position; of a command
   /// its number and parameters 1, 2 and 7.
   void log_wire(const std::string& path);
@@ -133,8 +127,10 @@ class Autopilot {
   std::vector<mavlink::CommandAck> acks_;
   std::vector<mavlink::ParamValue> values_;  // asked for and not yet sent
 
- private:
   enum class Mode { manual, offboard, land };
+  Mode mode_ = Mode::manual;
+
+ private:
   template <typename Other>
   void on(const Other&, double) {}
   void steer();
@@ -142,7 +138,6 @@ class Autopilot {
 
   std::uint8_t system_, sequence_ = 0;
   mavlink::Parser parser_;
-  Mode mode_ = Mode::manual;
   struct Truth {
     double t;
     State state;

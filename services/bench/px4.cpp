@@ -71,15 +71,16 @@ class Px4 : public Firmware {
   const char* mode() const noexcept override {
     return mode_ == offboard ? "offboard" : mode_ == land ? "land" : "pilot";
   }
-  void take_over() noexcept override { change(position, false); }
-  void disarm() noexcept override {
+
+ private:
+  /// The motors stop, wherever the vehicle is.
+  void disarm() noexcept {
     armed_ = false;
     landed_state_ = on_ground;
     phase_ = Phase::spooling;
     vehicle_.set_motors(false);
   }
 
- private:
   /// Of a take-off (source: TakeoffState).
   enum class Phase { spooling, ready, ramp, flight };
 

@@ -214,6 +214,8 @@ TEST(Row20, ALineThatTakesNothingIsQuietAtTheSecondMissedSetpointAndTheTickNever
   EXPECT_EQ(rig.reason(), Reason::transmit_full);
   EXPECT_EQ(missed_since, 2) << "ticks between the first missed set-point and QUIET";
   EXPECT_GT(rig.link().transmit().dropped(), 0u);
+  const std::string told = std::to_string(rig.link().transmit().dropped()) + " gave way";
+  EXPECT_NE(traffic(rig.link()).find(told), std::string::npos) << traffic(rig.link());
   EXPECT_EQ(rig.link().transmit().waiting(), 0u) << "an old set-point could still follow";
   const std::size_t from = rig.log.size();
   rig.ticks(50);

@@ -74,7 +74,7 @@ Lockstep::Lockstep(const bench::LocalFrame& local, Medium medium, std::shared_pt
       vio_(0.75 * vehicle_.estimation.position, 2),
       medium_(medium) {
   const Vec3 ground(kStart.x(), kStart.y(), vehicle_.body.radius);
-  autopilot = std::make_unique<bench::Autopilot>(world_->grid, vehicle_, ground, local_frame, 1, 1);
+  autopilot = std::make_unique<HandledAutopilot>(world_->grid, vehicle_, ground, local_frame, 1, 1);
   restart();
 }
 

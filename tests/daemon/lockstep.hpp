@@ -34,6 +34,25 @@ struct Wire {
   bool silent() const { return setpoints.empty() && commands.empty() && texts.empty() && heartbeats == 0; }
 };
 
+/// The emulated flight controller in a test's hands.
+class HandledAutopilot : public bench::Autopilot {
+ public:
+  using bench::Autopilot::Autopilot;
+  /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
+  void take_over() noexcept {
+    mode_ = Mode::manual;
+    heartbeat_due_ = true;
+  }
+  /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
+  void disarm() noexcept {
+    armed_ = false;
+    vehicle_.set_motors(false);
+    heartbeat_due_ = true;
+  }
+  /// The estimator is reset: from now on its local frame lies elsewhere.
+  void reset_estimator(const bench::LocalFrame& frame) noexcept { frame_ = frame; }
+};
+
 inline constexpr std::uint16_t kCommandLand = 21, kCommandMode = 176, kCommandArm = 400;
 
 /// What the daemon's link runs over: a pseudo-terminal, or two UDP sockets on the loopback, where a byte that was
@@ -103,7 +122,7 @@ class Lockstep {
   std::vector<std::uint8_t> inject_;
   bench::LocalFrame local_frame;  ///< the controller's true one
   std::shared_ptr<const plan::World> world_;
-  std::unique_ptr<bench::Autopilot> autopilot;
+  std::unique_ptr<HandledAutopilot> autopilot;
   /// In shared memory, so that forget_pages() loses nothing.
   struct Unmap {
     void operator()(Channels* c) const;
