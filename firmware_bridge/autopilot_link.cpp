@@ -106,8 +106,8 @@ void AutopilotLink::discard_unsent() noexcept {
 /// before it counts as heard, it is asked for the time, once a second: that frame carries ours.
 bool AutopilotLink::signature_good(const mavlink::Frame& frame, Time now) noexcept {
   const auto verdict = signing_->judge(frame);
-  if (verdict == mavlink::Verdict::kGood) return signed_rightly_ = true;
-  const bool late = verdict == mavlink::Verdict::kOld || verdict == mavlink::Verdict::kReplayed;
+  if (verdict == mavlink::SignatureVerdict::kGood) return signed_rightly_ = true;
+  const bool late = verdict == mavlink::SignatureVerdict::kOld || verdict == mavlink::SignatureVerdict::kReplayed;
   const bool from_vehicle = frame.sender.component == kFlightController &&
                             frame.sender.system == configured_vehicle_.value_or(frame.sender.system);
   const auto age = heartbeat_age(now);

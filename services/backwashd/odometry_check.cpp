@@ -74,8 +74,9 @@ std::string OdometryCheck::twist_doubt() const {
         "odometry.profile = \"fast_lio\", or \"custom\" with twist = \"none\"",
         kZeroWay);
   if (count_ < kStretches) return "";
-  Stretch sum{};
-  for (const Stretch& s : stretches_) sum = {sum.way + s.way, sum.in_body + s.in_body, sum.in_world + s.in_world};
+  ComparedStretch sum{};
+  for (const ComparedStretch& s : stretches_)
+    sum = {sum.way + s.way, sum.in_body + s.in_body, sum.in_world + s.in_world};
   const double claimed = twist_ == Twist::body ? sum.in_body : sum.in_world;
   const double other = twist_ == Twist::body ? sum.in_world : sum.in_body;
   if (claimed < kOff * sum.way) return "";

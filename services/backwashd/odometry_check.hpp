@@ -32,7 +32,7 @@ class OdometryCheck {
   std::optional<std::string> look(std::int64_t stamp_ns, const Vec3& p, const Eigen::Quaterniond& q, const Vec3& v);
 
  private:
-  struct Stretch {
+  struct ComparedStretch {
     double way, in_body, in_world;  ///< m: of the pose; by what the twist, taken so, misses it
   };
   void compare(double dt, const Vec3& p, const Eigen::Quaterniond& q, const Vec3& v);
@@ -47,7 +47,7 @@ class OdometryCheck {
   double zero_way_ = 0;
   Vec3 from_ = Vec3::Zero(), by_body_ = Vec3::Zero(), by_world_ = Vec3::Zero();
   double lasted_ = 0;
-  std::array<Stretch, kStretches> stretches_{};
+  std::array<ComparedStretch, kStretches> stretches_{};
   std::size_t count_ = 0;
   std::string told_;
 };

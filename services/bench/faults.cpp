@@ -138,14 +138,14 @@ void Judge::take(const Sample& s, double t) {
   moved_ = std::max(moved_, (s.truth.p_W - *place_).head<2>().norm());
 }
 
-std::vector<Judge::Verdict> Judge::verdicts() const {
+std::vector<Judge::Judgement> Judge::judgements() const {
   const auto landed_at = [&](double t) {
     bool landed = true;
     for (const auto& [since, is] : changes_)
       if (since <= t) landed = is;
     return landed;
   };
-  std::vector<Verdict> all;
+  std::vector<Judgement> all;
   for (const Expectation& e : expectations_) {
     using enum Expectation::What;
     const bool seen = e.at <= last_;

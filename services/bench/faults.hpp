@@ -98,11 +98,11 @@ class Judge {
     double clearance;  ///< m, of the vehicle's ball
   };
   void take(const Sample& s, double t);
-  struct Verdict {
+  struct Judgement {
     std::string what, limit, measured;
     bool passed;
   };
-  std::vector<Verdict> verdicts() const;
+  std::vector<Judgement> judgements() const;
 
  private:
   std::vector<Expectation> expectations_;
