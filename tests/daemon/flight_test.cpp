@@ -92,7 +92,7 @@ TEST(Tick, GivesEverySegmentBackToBeFreed) {
   EXPECT_LT(late, early + 5 * segment) << segment << " bytes a segment";
 }
 
-TEST(Row15, WithoutANewTrajectoryTheVerifiedTailIsFlownAndItsEndIsHeld) {
+TEST(LatePlanFault, WithoutANewTrajectoryTheVerifiedTailIsFlownAndItsEndIsHeld) {
   Lockstep rig;
   rig.take_off();
   rig.start_route(1);

@@ -14,7 +14,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 // Fresh stamps, the same pose to the last bit: the autopilot believes it and drifts, 0.6 m in 5 s and 25 m in a minute.
 // Nothing compares identical poses unless a velocity is commanded.
-TEST(Row6, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
+TEST(VioFreezeFault, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
   for (const bool follows_yaw : {false, true}) {
     Lockstep rig;
     rig.autopilot->follows_yaw = follows_yaw;
@@ -31,7 +31,7 @@ TEST(Row6, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
 }
 
 // The emulated autopilot's height is the VIO's: it climbed 526 m, and went on climbing after LAND.
-TEST(Row6, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
+TEST(VioFreezeFault, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
   Lockstep rig;
   rig.ticks(60);
   rig.channels->orders.push({track::Request::enable});
@@ -50,7 +50,7 @@ TEST(Row6, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
 }
 
 // What one closure of 90° or 10 m may not do, ten of 9° and twelve of 0.9 m do within a quarter of a second.
-TEST(Row4, AnAbsurdLoopClosureInPiecesIsHeldToo) {
+TEST(AbsurdClosureFault, AnAbsurdLoopClosureInPiecesIsHeldToo) {
   for (const bool turns : {false, true}) {
     Lockstep rig;
     rig.take_off();

@@ -27,7 +27,7 @@ int frames_out(const Lockstep& rig, std::size_t from) {
   return count;
 }
 
-TEST(Row17, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
+TEST(PortLossFault, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
   InFlight rig;
   rig.hang_up();
   rig.tick();
@@ -54,7 +54,7 @@ decltype(config::Daemon::link) serial(const std::string& path) {
   return link;
 }
 
-TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
+TEST(PortLossFault, TheLinkWatchOpensTheLostPortAgain) {
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
   LinkWatch watch(channels, serial(line.path()), kNobody);
@@ -72,7 +72,7 @@ TEST(Row17, TheLinkWatchOpensTheLostPortAgain) {
 }
 
 // Lost from the start: a controller that boots after its companion.
-TEST(Row17, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
+TEST(PortLossFault, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
   firmware_bridge::test::PseudoTerminal line;
   const auto path = std::filesystem::temp_directory_path() / ("backwash_late_port_" + std::to_string(::getpid()));
   auto channels = std::make_unique<Channels>();
@@ -95,7 +95,7 @@ TEST(Row17, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
 }
 
 // Lost, opened again and lost again between two looks of the watch: the fault that it sees has not changed.
-TEST(Row17, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
+TEST(PortLossFault, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
   InFlight rig;
   rig.hang_up();
   rig.ticks(3);
@@ -120,7 +120,7 @@ TEST(Row17, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
   }
 }
 
-TEST(Row18, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
+TEST(LineNoiseFault, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
   InFlight rig(0.5);
   std::mt19937 rng(3);
   std::size_t good = 0;
@@ -155,7 +155,7 @@ TEST(Row18, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
   EXPECT_GT(rig.view().frames_bad, 0u);
 }
 
-TEST(Row18, AFrameWithABitFlippedIsNeverActedOn) {
+TEST(LineNoiseFault, AFrameWithABitFlippedIsNeverActedOn) {
   InFlight rig(0.5);
   std::mt19937 rng(4);
   rig.noise = [&](std::vector<std::uint8_t>& out) {
@@ -171,7 +171,7 @@ TEST(Row18, AFrameWithABitFlippedIsNeverActedOn) {
   EXPECT_GE(rig.view().frames_bad, 150u);
 }
 
-TEST(Row19, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
+TEST(BaudRateFault, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
   Lockstep rig;
   std::mt19937 rng(5);
   rig.noise = [&](std::vector<std::uint8_t>& out) {
@@ -188,7 +188,7 @@ TEST(Row19, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
   EXPECT_EQ(rig.reason(), Reason::autopilot_silent);
 }
 
-TEST(Row20, ALineThatTakesNothingIsQuietAtTheSecondMissedSetpointAndTheTickNeverWaits) {
+TEST(FullLineFault, ALineThatTakesNothingIsQuietAtTheSecondMissedSetpointAndTheTickNeverWaits) {
   InFlight rig;
   // Its own failsafe would answer first: of it only its pose is heard.
   int missed_since = 0, ticks = 0;

@@ -130,5 +130,8 @@ class MapFaults : public testing::Test {
     return most + 1;
   }
 };
+using LateMapFault = MapFaults;
+using LoopClosureFault = MapFaults;
+using ObstacleFault = MapFaults;
 
 }  // namespace backwash::daemon
