@@ -52,7 +52,7 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   queue_.clear();
   budget_.forget();
   clock_ = {};
-  timesync_asked_ns_ = 0, signed_rightly_ = false;
+  timesync_asked_ns_.reset(), signed_rightly_ = false;
   return port;
 }
 
@@ -106,8 +106,8 @@ void AutopilotLink::discard_unsent() noexcept {
 /// before it counts as heard, it is asked for the time, once a second: that frame carries ours.
 bool AutopilotLink::signature_good(const mavlink::Frame& frame, Time now) noexcept {
   const auto verdict = signing_->judge(frame);
-  if (verdict == mavlink::Verdict::kGood) return signed_rightly_ = true;
-  const bool late = verdict == mavlink::Verdict::kOld || verdict == mavlink::Verdict::kReplayed;
+  if (verdict == mavlink::SignatureVerdict::kGood) return signed_rightly_ = true;
+  const bool late = verdict == mavlink::SignatureVerdict::kOld || verdict == mavlink::SignatureVerdict::kReplayed;
   const bool from_vehicle = frame.sender.component == kFlightController &&
                             frame.sender.system == configured_vehicle_.value_or(frame.sender.system);
   const auto age = heartbeat_age(now);
@@ -169,10 +169,10 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
   const std::int64_t now_ns = nanoseconds_of(now);
   if (m.tc1 == 0) {
     send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
-  } else if (m.ts1 == timesync_asked_ns_ && timesync_asked_ns_ != 0) {
+  } else if (timesync_asked_ns_ == m.ts1) {
     constexpr std::int64_t kSane_ns = std::int64_t{1} << 62;  // 146 years: differences do not overflow
     if (m.tc1 < 0 || m.tc1 > kSane_ns) return;
-    timesync_asked_ns_ = 0;
+    timesync_asked_ns_.reset();
     const std::int64_t round_trip = now_ns - m.ts1;
     if (round_trip < 0) return;
     clock_.add({m.tc1 - (m.ts1 + round_trip / 2), round_trip});
@@ -256,7 +256,7 @@ bool AutopilotLink::send_parameter_request(std::string_view name) noexcept {
 
 bool AutopilotLink::send_timesync(Time now) noexcept {
   timesync_asked_ns_ = nanoseconds_of(now);
-  return send(mavlink::Timesync{0, timesync_asked_ns_, heard_.value_or(0), kFlightController});
+  return send(mavlink::Timesync{0, *timesync_asked_ns_, heard_.value_or(0), kFlightController});
 }
 
 bool AutopilotLink::send_command(std::uint16_t command, const std::array<float, 7>& p) noexcept {

@@ -154,7 +154,7 @@ class AutopilotLink {
   std::optional<Time> blocked_;  // since when the port has taken nothing of what waits
   std::optional<std::uint8_t> heard_;
   ClockFilter clock_;
-  std::int64_t timesync_asked_ns_ = 0;
+  std::optional<std::int64_t> timesync_asked_ns_;
   std::uint8_t sequence_ = 0;
   std::optional<mavlink::Signing> signing_;
   mavlink::SigningTime signing_start_ = 0;  // at signing_since_

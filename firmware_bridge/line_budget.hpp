@@ -48,8 +48,6 @@ class LineBudget {
   /// What was given is no longer under way.
   void forget() noexcept { *this = LineBudget(line_); }
   const LineRate& line() const noexcept { return line_; }
-  /// When all of it has left the line.
-  Time free_at() const noexcept { return free_at_; }
 
  private:
   LineRate line_;

@@ -109,23 +109,6 @@ void Telemetry::take(const mavlink::Odometry& m, Time now) noexcept {
     position_sigma = {std::sqrt(variance), now};
 }
 
-void Telemetry::take_imu(const Vec3& force_F, const Vec3& omega_F, Time now) noexcept {
-  if (!force_F.allFinite() || !omega_F.allFinite()) {
-    ++broken;
-    return;
-  }
-  imu = {Imu{mavlink::swap_frd(force_F), mavlink::swap_frd(omega_F)}, now};
-}
-
-void Telemetry::take(const mavlink::HighresImu& m, Time now) noexcept {
-  take_imu({m.xacc, m.yacc, m.zacc}, {m.xgyro, m.ygyro, m.zgyro}, now);
-}
-
-void Telemetry::take(const mavlink::ScaledImu2& m, Time now) noexcept {
-  const Vec3 force_mG(m.xacc, m.yacc, m.zacc), omega_mrad(m.xgyro, m.ygyro, m.zgyro);
-  take_imu(force_mG * (kGravity / 1000), omega_mrad / 1000, now);
-}
-
 void Telemetry::take(const mavlink::BatteryStatus& m, Time now) noexcept {
   if (m.id != 0) return;
   battery_status_seen_ = true;

@@ -43,12 +43,6 @@ struct VehicleAttitude {
   Vec3 omega_B;             ///< rad/s, FLU
 };
 
-/// From HIGHRES_IMU or SCALED_IMU2.
-struct Imu {
-  Vec3 specific_force_B;  ///< acceleration without gravity's pull (+g e_z at rest), m/s², FLU
-  Vec3 omega_B;           ///< rad/s, FLU
-};
-
 /// From BATTERY_STATUS of battery 0; from SYS_STATUS where the controller sends none.
 struct Battery {
   std::optional<double> voltage;    ///< V
@@ -80,7 +74,6 @@ class Telemetry {
   Latest<VehicleAttitude> attitude;
   Latest<std::uint8_t> reset_counter;  ///< of the controller's estimator, from ODOMETRY; a change: L has moved
   Latest<double> position_sigma;       ///< of local_state as the controller says, from ODOMETRY, m
-  Latest<Imu> imu;
   Latest<Battery> battery;
   Latest<LandedState> landed_state;
   Latest<StatusLine> text;
@@ -105,8 +98,6 @@ class Telemetry {
   void take(const mavlink::AttitudeQuaternion& m, Time now) noexcept;
   void take(const mavlink::Attitude& m, Time now) noexcept;
   void take(const mavlink::Odometry& m, Time now) noexcept;
-  void take(const mavlink::HighresImu& m, Time now) noexcept;
-  void take(const mavlink::ScaledImu2& m, Time now) noexcept;
   void take(const mavlink::BatteryStatus& m, Time now) noexcept;
   void take(const mavlink::SysStatus& m, Time now) noexcept;
   void take(const mavlink::ExtendedSysState& m, Time now) noexcept;
@@ -119,7 +110,6 @@ class Telemetry {
   void restarted() noexcept;
   void take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
                      Time now) noexcept;
-  void take_imu(const Vec3& force_F, const Vec3& omega_F, Time now) noexcept;
   bool in_order(std::optional<std::uint32_t>& last_ms, std::uint32_t now_ms) noexcept;
 
   std::optional<std::uint32_t> position_ms_, attitude_ms_;  // sender's clock

@@ -50,7 +50,7 @@ struct Daemon {
   } link;
   struct {
     int priority = 0;         ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
-    int cpu = -1;             ///< processor that the control thread is bound to; −1: any
+    std::optional<int> cpu;   ///< processor that the control thread is bound to; none: any
     double battery_land = 0;  ///< remaining share below which LAND is asked for, once; 0: never
   } control;
   struct Gpio {

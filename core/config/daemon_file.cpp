@@ -192,15 +192,18 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
 
 tl::expected<void, ConfigError> convert(const StrictTable& file, const Converted& c, Daemon& d) {
   if (file.has(kShare)) d.link.share = c.share;
+  constexpr int kAny = -1;  // of the file: no processor in particular
+  int cpu = kAny;
   const std::tuple<std::string_view, double, int*> whole[] = {{"dds.domain", c.domain, &d.dds.domain},
                                                               {"link.baud", c.baud, &d.link.baud},
                                                               {"link.system", c.system, &d.link.system},
                                                               {"control.priority", c.priority, &d.control.priority},
-                                                              {"control.cpu", c.cpu, &d.control.cpu}};
+                                                              {"control.cpu", c.cpu, &cpu}};
   for (const auto& [key, value, target] : whole) {
     if (value != static_cast<int>(value)) return tl::unexpected(file.error(key, "needs a whole number"));
     *target = static_cast<int>(value);
   }
+  if (cpu != kAny) d.control.cpu = cpu;
   return {};
 }
 

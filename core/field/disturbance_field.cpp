@@ -19,25 +19,25 @@ bool nonzero(const Variance& v) noexcept { return v.xx != 0 || v.yy != 0 || v.zz
 
 /// Elements with a term, until their lines of sight are looked at together: where the box about all of them is empty,
 /// which one look shows, all are seen.
-class Candidates {
+class PendingTerms {
  public:
-  Candidates(const SightMap& sight, const Vec3& p_W) : sight_(sight), view_(sight.viewpoint(p_W)) {}
+  PendingTerms(const SightMap& sight, const Vec3& p_W) : sight_(sight), view_(sight.viewpoint(p_W)) {}
 
   /// Takes an element's term in; calls add(first, second) for those of the seen ones at some time, in their order.
   template <typename Add>
   void take(const Vec3& c_W, const Variance& first, const Variance& second, const Add& add) {
-    Candidate& candidate = candidates_[count_++];
-    candidate = {sight_.open_part(view_, c_W), first, second};
-    if (candidate.line) {
-      const Vec3 &from = candidate.line->from, to = from + candidate.line->delta;
+    PendingTerm& term = pending_[count_++];
+    term = {sight_.open_part(view_, c_W), first, second};
+    if (term.line) {
+      const Vec3 &from = term.line->from, to = from + term.line->delta;
       low_ = low_.cwiseMin(from.cwiseMin(to)), high_ = high_.cwiseMax(from.cwiseMax(to));
     }
-    if (count_ == candidates_.size()) settle(add);
+    if (count_ == pending_.size()) settle(add);
   }
   template <typename Add>
   void settle(const Add& add) {
     const bool all = low_.x() > high_.x() || sight_.empty(low_, high_);
-    for (const Candidate& c : std::span(candidates_).first(count_))
+    for (const PendingTerm& c : std::span(pending_).first(count_))
       if (all || !c.line || sight_.clear(view_, *c.line)) add(c.first, c.second);
     count_ = 0;
     low_.setConstant(kFar), high_.setConstant(-kFar);
@@ -45,13 +45,13 @@ class Candidates {
 
  private:
   static constexpr double kFar = 1e300;
-  struct Candidate {
-    std::optional<Segment> line;
+  struct PendingTerm {
+    std::optional<LineSegment> line;
     Variance first, second;
   };
   const SightMap& sight_;
   SightMap::Viewpoint view_;
-  std::array<Candidate, 8> candidates_;
+  std::array<PendingTerm, 8> pending_;
   std::size_t count_ = 0;
   Vec3 low_ = Vec3::Constant(kFar), high_ = Vec3::Constant(-kFar);
 };
@@ -70,21 +70,21 @@ Breakdown ProximityField::at(const Vec3& p_W) const {
   Breakdown b;
   b.base = Variance::horizontal_vertical(model_.base.horizontal, model_.base.vertical);
   // The terms first: most elements in the boxes are outside every gate, and the line of sight is the dear part.
-  Candidates candidates(sight_, p_W);
+  PendingTerms pending(sight_, p_W);
   const auto add_ground = [&](const Variance& ground, const Variance&) { b.ground += ground; };
   const auto& g = model_.ground;
   const double slope = g.theta_max < 1.5 ? std::tan(g.theta_max + 1e-6) : Reach::kNoCone;
   up_.for_each_near(p_W, {g.l_max, g.r0, g.l_footprint_max, slope}, [&](const Element& e) {
     const Variance ground = terms_.ground(e, p_W);
-    if (nonzero(ground)) candidates.take(e.c_W, ground, {}, add_ground);
+    if (nonzero(ground)) pending.take(e.c_W, ground, {}, add_ground);
   });
-  candidates.settle(add_ground);
+  pending.settle(add_ground);
   const auto add_lateral = [&](const Variance& corner, const Variance& wall) { b.corner += corner, b.wall += wall; };
   lateral_.for_each_near(p_W, {.ball = model_.wall.l_max}, [&](const Element& e) {
     const Variance corner = terms_.corner(e, p_W), wall = terms_.wall(e, p_W);
-    if (nonzero(corner) || nonzero(wall)) candidates.take(e.c_W, corner, wall, add_lateral);
+    if (nonzero(corner) || nonzero(wall)) pending.take(e.c_W, corner, wall, add_lateral);
   });
-  candidates.settle(add_lateral);
+  pending.settle(add_lateral);
   return b;
 }
 

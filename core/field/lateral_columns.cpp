@@ -84,7 +84,7 @@ void LateralColumns::add_segments() {
 /// The normals of each sector of the circle that has any; segments, numbered by sectors, get the numbers of bundles.
 std::vector<SightLines::Bundle> LateralColumns::bundle_normals() {
   std::map<std::int16_t, SightLines::Bundle> of_sector;
-  for (const Segment& s : segments_) {
+  for (const ElementSegment& s : segments_) {
     auto& [low, high] =
         of_sector.try_emplace(s.bundle, SightLines::Bundle{{s.m_x, s.m_y}, {s.m_x, s.m_y}}).first->second;
     low = {std::min(low[0], s.m_x), std::min(low[1], s.m_y)};
@@ -96,7 +96,7 @@ std::vector<SightLines::Bundle> LateralColumns::bundle_normals() {
     number[static_cast<std::size_t>(sector)] = static_cast<std::int16_t>(bundles.size());
     bundles.push_back(bundle);
   }
-  for (Segment& s : segments_) s.bundle = number[static_cast<std::size_t>(s.bundle)];
+  for (ElementSegment& s : segments_) s.bundle = number[static_cast<std::size_t>(s.bundle)];
   return bundles;
 }
 

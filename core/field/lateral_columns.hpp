@@ -38,7 +38,7 @@ class LateralColumns {
   struct Tensor {
     float xx, xy, yy, zz;
   };
-  struct Segment {
+  struct ElementSegment {
     double m_x, m_y;      ///< unit normal
     Tensor wall, corner;  ///< per unit of the factors of ProximityModel
     int x, y;
@@ -61,7 +61,7 @@ class LateralColumns {
   double range2_;                            ///< (l̄_w/a)² and a little, voxel edges²
   int radius_;                               ///< of the columns' surroundings, voxels
   int pitch_;                                ///< columns in a row of a block's window
-  std::vector<Segment> segments_;            ///< row by row, then by x, sector, normal and height
+  std::vector<ElementSegment> segments_;     ///< row by row, then by x, sector, normal and height
   std::vector<std::uint32_t> column_first_;  ///< of the segments, per column
   SightLines lines_;
   std::vector<double> decay_;  ///< [n]: Σ exp(−k_w2 a² i²) over i < n, in multiples of 2⁻⁴⁰: sums are exact

@@ -56,7 +56,7 @@ void LateralSweep::add(int x, int y, std::uint64_t targets, LateralColumns::Sums
     if (near_.size() < end - first) near_.resize(end - first);
     std::size_t count = 0;
     const int dy = row - y;
-    for (const Segment* s = columns_.segments_.data() + first; s != columns_.segments_.data() + end; ++s) {
+    for (const ElementSegment* s = columns_.segments_.data() + first; s != columns_.segments_.data() + end; ++s) {
       const int dx = s->x - x;
       const double along = dx * s->m_x + dy * s->m_y;
       near_[count] = s;
@@ -68,7 +68,7 @@ void LateralSweep::add(int x, int y, std::uint64_t targets, LateralColumns::Sums
 }
 
 /// The gates; false if no element has a term at a target.
-bool LateralSweep::meet(const Segment& segment, std::uint64_t targets, View& view) const noexcept {
+bool LateralSweep::meet(const ElementSegment& segment, std::uint64_t targets, View& view) const noexcept {
   const int dx = segment.x - x_, dy = segment.y - y_;
   const double a = columns_.grid_->resolution(), a2 = a * a, along = dx * segment.m_x + dy * segment.m_y;
   const double flat2 = dx * dx + dy * dy + 0.25 + along;
@@ -121,10 +121,10 @@ void LateralSweep::look_along(const SightLines::Line& line) {
 }
 
 /// The free heights that all crossed columns have in common; false if every element is hidden from every target.
-bool LateralSweep::common_stretch(const View& view, Stretch& stretch) {
+bool LateralSweep::common_stretch(const View& view, FreeStretch& stretch) {
   const int low = std::min(view.low, view.from) + kBelow, high = std::max(view.high, view.to) + kBelow;
   const bool inside = low >= 0 && high <= 127;  // else all of it is uncertain
-  stretch = inside ? Stretch{-kFar, kFar} : Stretch{0, 0};
+  stretch = inside ? FreeStretch{-kFar, kFar} : FreeStretch{0, 0};
   const Layers band = inside ? ~Layers{0} >> (127 - high + low) << low : ~Layers{0}, all = all_ & band;
   hiding_count_ = 0;
   if (all == 0) return true;
@@ -148,11 +148,11 @@ bool LateralSweep::common_stretch(const View& view, Stretch& stretch) {
   return true;
 }
 
-void LateralSweep::add(const Segment& segment, std::uint64_t targets, LateralColumns::Sums& sums) {
+void LateralSweep::add(const ElementSegment& segment, std::uint64_t targets, LateralColumns::Sums& sums) {
   View view;
   if (!meet(segment, targets, view)) return;
   look_along(columns_.lines_.at(segment.bundle, segment.x - x_, segment.y - y_));
-  Stretch stretch;
+  FreeStretch stretch;
   if (!common_stretch(view, stretch)) return;
   const double decay = std::exp(-columns_.model_.wall.k2 * view.d2);
   const auto &w = segment.wall, &c = segment.corner;
@@ -191,7 +191,7 @@ std::uint64_t LateralSweep::in_range(const View& view, int z) noexcept {
 }
 
 /// Adds to wall_ and seen_ what does not lie in the common stretch of free heights at both ends.
-void LateralSweep::add_uncertain(const View& view, const Stretch& stretch) noexcept {
+void LateralSweep::add_uncertain(const View& view, const FreeStretch& stretch) noexcept {
   const std::uint64_t certain = bits(stretch.below + 1, stretch.above - 1);
   for (int z = view.from; z <= view.to; ++z) {
     std::uint64_t lanes = in_range(view, z);
@@ -216,7 +216,7 @@ std::uint64_t LateralSweep::seen_from(const View& view, int z, std::uint64_t tar
   if (moved(open, -up) != targets) return looked_at(view, z, targets);
   const int low = std::min(std::countr_zero(open), kCentre), high = std::max(63 - std::countl_zero(open), kCentre);
   const std::uint64_t band = bits(low, high);
-  const Segment& s = *view.segment;
+  const ElementSegment& s = *view.segment;
   LineFromAbove line(s.x - x_ + 0.5 * s.m_x, s.y - y_ + 0.5 * s.m_y, view.range);
   for (const auto& [crossing, column] : std::span(hiding_).first(hiding_count_)) {
     std::uint64_t inside = static_cast<std::uint64_t>(down >= 0 ? column >> down : column << -down) & band;
@@ -233,7 +233,7 @@ std::uint64_t LateralSweep::seen_from(const View& view, int z, std::uint64_t tar
 
 /// As seen_from(), line by line.
 std::uint64_t LateralSweep::looked_at(const View& view, int z, std::uint64_t targets) const noexcept {
-  const Segment& s = *view.segment;
+  const ElementSegment& s = *view.segment;
   const auto& grid = *columns_.grid_;
   const Vec3 c_W = grid.center(Index3(s.x, s.y, first_z_ + z)) + 0.5 * grid.resolution() * Vec3(s.m_x, s.m_y, 0);
   std::uint64_t seen = targets;

@@ -24,15 +24,15 @@ class LateralSweep {
   void add(int x, int y, std::uint64_t targets, LateralColumns::Sums& sums);
 
  private:
-  using Segment = LateralColumns::Segment;
+  using ElementSegment = LateralColumns::ElementSegment;
   static constexpr int kBelow = 32;  ///< bit n of a column of the window is layer first_z − kBelow + n
   /// Free heights, below < z < above.
-  struct Stretch {
+  struct FreeStretch {
     int below, above;
   };
   /// A segment as seen from the column in hand; heights count from first_z.
   struct View : LateralColumns::Reach {
-    const Segment* segment;
+    const ElementSegment* segment;
     double d2;                           ///< d_c², m²
     int first_up, last_up;               ///< heights above the floor's voxel that may have a corner term
     int from, to;                        ///< elements
@@ -40,13 +40,13 @@ class LateralSweep {
     int low, high;                       ///< first and last target
   };
 
-  void add(const Segment& segment, std::uint64_t targets, LateralColumns::Sums& sums);
-  bool meet(const Segment& segment, std::uint64_t targets, View& view) const noexcept;
+  void add(const ElementSegment& segment, std::uint64_t targets, LateralColumns::Sums& sums);
+  bool meet(const ElementSegment& segment, std::uint64_t targets, View& view) const noexcept;
   void add_corner(View& view) const noexcept;
   void look_along(const SightLines::Line& line);
-  bool common_stretch(const View& view, Stretch& stretch);
+  bool common_stretch(const View& view, FreeStretch& stretch);
   static std::uint64_t in_range(const View& view, int z) noexcept;
-  void add_uncertain(const View& view, const Stretch& stretch) noexcept;
+  void add_uncertain(const View& view, const FreeStretch& stretch) noexcept;
   std::uint64_t seen_from(const View& view, int z, std::uint64_t targets) const noexcept;
   std::uint64_t looked_at(const View& view, int z, std::uint64_t targets) const noexcept;
 
@@ -55,7 +55,7 @@ class LateralSweep {
   int x_ = 0, y_ = 0;                                    ///< the column in hand
   const Layers* home_ = nullptr;                         ///< the same, in the window
   std::vector<Layers> window_;                           ///< occupied voxels
-  std::vector<const Segment*> near_;                     ///< segments of one row that may have a term
+  std::vector<const ElementSegment*> near_;              ///< segments of one row that may have a term
   const SightLines::Line* line_ = nullptr;               ///< to the segment in hand
   std::vector<Layers> crossed_;                          ///< the columns that it crosses
   Layers all_ = 0;                                       ///< what is occupied in any of them

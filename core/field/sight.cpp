@@ -5,19 +5,20 @@
 
 namespace backwash::field {
 
-std::optional<Segment> open_part(const Vec3& origin_W, double voxel_edge, const Vec3& p_W, const Vec3& c_W) noexcept {
+std::optional<LineSegment> open_part(const Vec3& origin_W, double voxel_edge, const Vec3& p_W,
+                                     const Vec3& c_W) noexcept {
   const double inverse_edge = 1 / voxel_edge;
   const Vec3 delta = (c_W - p_W) * inverse_edge;
   const double length = delta.norm();
   if (length <= 2 + kTouch) return std::nullopt;
-  return Segment{(p_W - origin_W) * inverse_edge, delta * (1 - 2 / length)};
+  return LineSegment{(p_W - origin_W) * inverse_edge, delta * (1 - 2 / length)};
 }
 
-bool meets(const Segment& segment, const Index3& voxel) noexcept {
+bool meets(const LineSegment& line, const Index3& voxel) noexcept {
   double enter = 0, leave = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = voxel[axis] - kTouch - segment.from[axis], high = voxel[axis] + 1 + kTouch - segment.from[axis];
-    const double d = segment.delta[axis];
+    const double low = voxel[axis] - kTouch - line.from[axis], high = voxel[axis] + 1 + kTouch - line.from[axis];
+    const double d = line.delta[axis];
     if (d == 0) {
       if (low > 0 || high < 0) return false;
       continue;
@@ -27,11 +28,6 @@ bool meets(const Segment& segment, const Index3& voxel) noexcept {
     leave = std::min(leave, std::max(t0, t1));
   }
   return enter <= leave;
-}
-
-bool line_of_sight(const map::OccupancyGrid& grid, const Vec3& p_W, const Vec3& c_W) noexcept {
-  const auto segment = open_part(grid.origin(), grid.resolution(), p_W, c_W);
-  return !segment || clear(*segment, [&](const Index3& v) { return grid.occupied(v) ? 0 : 1; });
 }
 
 SightMap::Viewpoint SightMap::viewpoint(const Vec3& p_W) const noexcept {
@@ -45,7 +41,7 @@ bool SightMap::line_of_sight(const Viewpoint& from, const Vec3& c_W) const noexc
   return !line || clear(from, *line);
 }
 
-bool SightMap::clear(const Viewpoint& from, const Segment& line) const noexcept {
+bool SightMap::clear(const Viewpoint& from, const LineSegment& line) const noexcept {
   const Vec3 to = line.from + line.delta;
   return empty(line.from.cwiseMin(to), line.from.cwiseMax(to)) ||
          field::clear(

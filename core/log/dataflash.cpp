@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <optional>
 #include <sstream>
 #include <tuple>
+
+#include "core/log/little_endian.hpp"
 
 namespace backwash::log {
 namespace {
@@ -14,13 +15,6 @@ namespace {
 constexpr std::uint8_t kHead[] = {0xA3, 0x95}, kFormat = 0x80;
 constexpr std::size_t kHeader = 3, kFormatSize = 89;
 constexpr std::size_t kNameAt = 5, kTypesAt = 9, kLabelsAt = 25;  // in a format message: 4, 16 and 64 characters
-
-template <typename T>
-double little(const std::uint8_t* p, double unit = 1) {
-  T value;
-  std::memcpy(&value, p, sizeof value);
-  return unit * static_cast<double>(value);
-}
 
 /// Bytes of a field; 0: no such type.
 std::size_t size_of(char type) {
@@ -60,39 +54,20 @@ std::size_t size_of(char type) {
 /// Nothing: a text, an array or a half float.
 std::optional<double> value_of(char type, const std::uint8_t* p) {
   switch (type) {
-    case 'b':
-      return little<std::int8_t>(p);
-    case 'B':
     case 'M':
       return little<std::uint8_t>(p);
-    case 'h':
-      return little<std::int16_t>(p);
-    case 'H':
-      return little<std::uint16_t>(p);
     case 'c':
-      return little<std::int16_t>(p, 0.01);
+      return 0.01 * little<std::int16_t>(p);
     case 'C':
-      return little<std::uint16_t>(p, 0.01);
-    case 'i':
-      return little<std::int32_t>(p);
-    case 'I':
-      return little<std::uint32_t>(p);
+      return 0.01 * little<std::uint16_t>(p);
     case 'e':
-      return little<std::int32_t>(p, 0.01);
+      return 0.01 * little<std::int32_t>(p);
     case 'E':
-      return little<std::uint32_t>(p, 0.01);
+      return 0.01 * little<std::uint32_t>(p);
     case 'L':
-      return little<std::int32_t>(p, 1e-7);
-    case 'f':
-      return little<float>(p);
-    case 'd':
-      return little<double>(p);
-    case 'q':
-      return little<std::int64_t>(p);
-    case 'Q':
-      return little<std::uint64_t>(p);
+      return 1e-7 * little<std::int32_t>(p);
     default:
-      return std::nullopt;
+      return number_at(p, type);
   }
 }
 

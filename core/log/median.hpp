@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
+#include <utility>
 #include <vector>
+
+#include "core/types/quantile.hpp"
 
 namespace backwash::log {
 
 /// The middle value, of an even count the upper one of the two. Needs one at least.
-inline double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+inline double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
 
 }  // namespace backwash::log

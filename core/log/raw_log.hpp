@@ -72,7 +72,7 @@ struct SegmentRecord {
 struct TickRecord {
   std::uint64_t tick;
   std::uint64_t segment, index;  ///< accepted segment and the command of it that this tick sent; 0 before the first
-  std::uint32_t mode, reason;    ///< track::Mode, track::Reason
+  std::uint32_t mode, reason;    ///< Mode, Reason
   std::uint32_t sent;            ///< bit 0: set-point, bit 1: heartbeat, bit 2: odometry forwarded
   std::uint32_t judged, inside;  ///< whether the error was judged this tick, and the verdict
   std::uint32_t missed_periods;

@@ -39,6 +39,7 @@ struct ToRecord {
   void number(From from, To& to) const noexcept {
     to = static_cast<To>(from);
   }
+  void above_zero(std::optional<float> from, float& to) const noexcept { to = from.value_or(0); }
   template <class Numbers>
   void numbers(const Numbers& from, double* to) const noexcept {
     std::copy_n(from.data(), from.size(), to);
@@ -58,6 +59,9 @@ struct FromRecord {
   template <class To, class From>
   void number(To& to, From from) const noexcept {
     to = static_cast<To>(from);
+  }
+  void above_zero(std::optional<float>& to, float from) const noexcept {
+    if (from > 0) to = from;
   }
   template <class Numbers>
   void numbers(Numbers& to, const double* from) const noexcept {
@@ -79,7 +83,7 @@ void each_member(Input& in, Record& r, const Direction& direction) noexcept {
   direction.number(in.missed_periods, r.missed_periods);
   direction.number(in.request, r.request);
   direction.number(in.order, r.order);
-  direction.number(in.position_sigma, r.position_sigma);
+  direction.above_zero(in.position_sigma, r.position_sigma);
   direction.optional(in.odometry, kOdometry, [&](auto& o) {
     direction.number(o.received_ns, r.odometry_received_ns);
     direction.number(o.stamp_ns, r.odometry_stamp_ns);

@@ -23,7 +23,6 @@ struct TopicLog {
   };
   std::vector<Topic> topics;
   std::size_t dropouts = 0;
-  double dropped_s = 0;
   const Topic* find(const std::string& name, unsigned instance = 0) const;
 };
 

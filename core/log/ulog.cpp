@@ -2,8 +2,9 @@
 #include "core/log/ulog.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <optional>
+
+#include "core/log/little_endian.hpp"
 
 namespace backwash::log {
 namespace {
@@ -13,16 +14,9 @@ constexpr std::size_t kHeader = 16, kMostFields = 4096;
 
 struct Field {
   std::string name;
-  char kind;  ///< type code of read(); '_' padding
+  char kind;  ///< of number_at(); '_' padding
   std::size_t size;
 };
-
-template <typename T>
-T little(const std::uint8_t* p) {
-  T value;
-  std::memcpy(&value, p, sizeof value);
-  return value;
-}
 
 struct Basic {
   const char* name;
@@ -32,31 +26,6 @@ struct Basic {
 constexpr Basic kBasics[] = {{"int8_t", 'b', 1},  {"uint8_t", 'B', 1},  {"int16_t", 'h', 2}, {"uint16_t", 'H', 2},
                              {"int32_t", 'i', 4}, {"uint32_t", 'I', 4}, {"int64_t", 'q', 8}, {"uint64_t", 'Q', 8},
                              {"float", 'f', 4},   {"double", 'd', 8},   {"bool", 'B', 1},    {"char", 'B', 1}};
-
-double value_of(char kind, const std::uint8_t* p) {
-  switch (kind) {
-    case 'b':
-      return little<std::int8_t>(p);
-    case 'B':
-      return *p;
-    case 'h':
-      return little<std::int16_t>(p);
-    case 'H':
-      return little<std::uint16_t>(p);
-    case 'i':
-      return little<std::int32_t>(p);
-    case 'I':
-      return little<std::uint32_t>(p);
-    case 'q':
-      return static_cast<double>(little<std::int64_t>(p));
-    case 'Q':
-      return static_cast<double>(little<std::uint64_t>(p));
-    case 'f':
-      return little<float>(p);
-    default:
-      return little<double>(p);
-  }
-}
 
 class Decoder {
  public:
@@ -102,7 +71,7 @@ class Decoder {
         return data(at, body);
       case 'O':
         if (body.size() < 2) return bad("a dropout without its length");
-        log_.dropouts += 1, log_.dropped_s += 1e-3 * little<std::uint16_t>(body.data());
+        log_.dropouts += 1;
         return std::nullopt;
       default:
         // Later versions may add messages, but all types are capital letters: anything else is damage.
@@ -189,7 +158,7 @@ class Decoder {
         p += f.size;
         continue;
       }
-      const double value = value_of(f.kind, p);
+      const double value = *number_at(p, f.kind);
       p += f.size;
       if (&f == &s.fields.front())
         topic.t_s.push_back(1e-6 * value);

@@ -46,10 +46,7 @@ ScanChange LiveMap::insert(std::span<const Vec3> points_W, const Vec3& sensor_W,
   const Vec3 sensor = (sensor_W - grid_.origin()) / a;
   for (const Vec3& p : points_W) {
     const double range = (p - sensor_W).norm();
-    if (!std::isfinite(range)) {
-      ++change.points_left_out;
-      continue;
-    }
+    if (!std::isfinite(range)) continue;
     const bool hit = range <= max_range;
     const Vec3 end = hit ? p : Vec3(sensor_W + max_range / range * (p - sensor_W));
     pass(sensor, (end - grid_.origin()) / a);
@@ -70,10 +67,7 @@ ScanChange LiveMap::insert(std::span<const Vec3> points_W, const Vec3& sensor_W,
     const Index3 v = grid_.voxel(n);
     grid_.set(v, now);
     change.box.add(v);
-    if (now == Cell::occupied)
-      change.occupied.push_back(v);
-    else
-      ++change.freed;
+    if (now == Cell::occupied) change.occupied.push_back(v);
   }
   touched_.clear();
   return change;

@@ -12,10 +12,8 @@ namespace backwash::map {
 
 /// What a scan changed in the grid.
 struct ScanChange {
-  VoxelBox box;                     ///< around all voxels whose content changed; empty: none did
-  std::vector<Index3> occupied;     ///< voxels that were not occupied before
-  std::size_t freed = 0;            ///< voxels that were not free before
-  std::size_t points_left_out = 0;  ///< not finite
+  VoxelBox box;                  ///< around all voxels whose content changed; empty: none did
+  std::vector<Index3> occupied;  ///< voxels that were not occupied before
 };
 
 /// A grid that takes in range scans while flying. Within one scan occupied wins over free. A voxel that a point lies in

@@ -35,7 +35,6 @@ Region flood(const World& world, std::size_t seed, int number, std::vector<int>&
   const auto& grid = world.grid;
   const Vec3 half = Vec3::Constant(grid.resolution() / 2);
   Region region;
-  region.first_voxel = seed;
   region.low_W = region.high_W = region.widest_W = grid.center(grid.voxel(seed));
   region.widest_clearance_m = clearance(world, grid.voxel(seed));
   std::vector<std::size_t> open = {seed};

@@ -13,10 +13,9 @@ namespace backwash::plan {
 struct Region {
   std::size_t voxels = 0;
   double volume_m3 = 0;
-  Vec3 low_W, high_W;           ///< extent, outer faces of its voxels, m
-  Vec3 widest_W;                ///< centre of its voxel with the largest clearance
-  double widest_clearance_m;    ///< clearance of the hover set there
-  std::size_t first_voxel = 0;  ///< its lowest linear index
+  Vec3 low_W, high_W;         ///< extent, outer faces of its voxels, m
+  Vec3 widest_W;              ///< centre of its voxel with the largest clearance
+  double widest_clearance_m;  ///< clearance of the hover set there
 };
 
 struct Regions {

@@ -71,11 +71,11 @@ double tube_clearance(const World& world, const reach::ReachTube& tube);
 
 /// Lowest clear hover height z_safe (m, W) of the column through p, and the floor below it; nothing if there is none.
 /// Take-off and landing move vertically in this column (docs/model.md section 4).
-struct Column {
+struct TakeoffColumn {
   double z_floor;  ///< top of the first obstacle below, m
   double z_safe;   ///< m
 };
-std::optional<Column> takeoff_column(const World& world, const Vec3& p_W);
+std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W);
 
 /// Vertical commands from `from` to `to` (same column), rest to rest, minimum-jerk profile within the limits.
 std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);

@@ -10,7 +10,7 @@ namespace {
 constexpr double kLateralCap = 1.0;  ///< m
 }
 
-std::optional<Column> takeoff_column(const World& world, const Vec3& p_W) {
+std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W) {
   const auto& grid = world.grid;
   Index3 v = grid.index(p_W);
   if (!p_W.allFinite() || !grid.free(v)) return std::nullopt;
@@ -20,7 +20,7 @@ std::optional<Column> takeoff_column(const World& world, const Vec3& p_W) {
   for (; grid.free(v); ++v.z()) {
     const Vec3 hover_W(p_W.x(), p_W.y(), grid.center(v).z());
     if (reach::hover_set(world.reach, grid, world.distance, world.bounds, hover_W, world.constant_margin).safe())
-      return Column{z_floor, hover_W.z()};
+      return TakeoffColumn{z_floor, hover_W.z()};
   }
   return std::nullopt;
 }

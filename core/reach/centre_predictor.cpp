@@ -51,7 +51,7 @@ CentrePredictor::CentrePredictor(const Vehicle& vehicle, Loop loop, const State&
   x_.row(2) = a_W;
   held_.fill(feedback(x_));
   sample_delay_ = 0;
-  add_segments(horizontal, vertical, latency.rest);
+  add_subintervals(horizontal, vertical, latency.rest);
 }
 
 namespace {
@@ -77,7 +77,7 @@ std::vector<double> pieces_of_period(double switch_time, double measured_at, dou
 
 // Cuts the period at the switch of the command and, as the kind of feedback needs it, at the instant of measurement or
 // into short pieces.
-void CentrePredictor::add_segments(const AxisLoop& horizontal, const AxisLoop& vertical, double switch_time) {
+void CentrePredictor::add_subintervals(const AxisLoop& horizontal, const AxisLoop& vertical, double switch_time) {
   const double delay = horizontal.feedback_delay;
   double measured_at = 0;
   if (kind_ == Feedback::held) {
@@ -90,19 +90,19 @@ void CentrePredictor::add_segments(const AxisLoop& horizontal, const AxisLoop& v
   for (std::size_t i = 0; i + 1 < starts.size(); ++i) {
     const double length = starts[i + 1] - starts[i];
     const bool closed = kind_ == Feedback::immediate;
-    segments_.push_back({axis_step(horizontal, closed, length),
-                         axis_step(vertical, closed, length),
-                         length,
-                         starts[i] > switch_time - kSameInstant,
-                         kind_ == Feedback::held && std::abs(starts[i] - measured_at) < kSameInstant,
-                         {},
-                         {}});
+    subintervals_.push_back({axis_step(horizontal, closed, length),
+                             axis_step(vertical, closed, length),
+                             length,
+                             starts[i] > switch_time - kSameInstant,
+                             kind_ == Feedback::held && std::abs(starts[i] - measured_at) < kSameInstant,
+                             {},
+                             {}});
   }
   if (kind_ != Feedback::delayed) return;
 
-  const int count = static_cast<int>(segments_.size());
+  const int count = static_cast<int>(subintervals_.size());
   int longest_back = 0;
-  // The segment, `back` before segment i, that holds t (relative to this period's start) once `slack` is added.
+  // The subinterval, `back` before subinterval i, that holds t (relative to this period's start) once `slack` is added.
   const auto locate = [&](int i, double t, double slack) {
     int back = 0;
     const auto start_of = [&](int b) {
@@ -115,8 +115,8 @@ void CentrePredictor::add_segments(const AxisLoop& horizontal, const AxisLoop& v
   };
   for (int i = 0; i < count; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    segments_[k].start = locate(i, starts[k] - delay, kSameInstant);
-    segments_[k].end = locate(i, starts[k + 1] - delay, -kSameInstant);
+    subintervals_[k].start = locate(i, starts[k] - delay, kSameInstant);
+    subintervals_[k].end = locate(i, starts[k + 1] - delay, -kSameInstant);
   }
   const Vec3 u = feedback(x_);
   past_.assign(static_cast<std::size_t>(longest_back) + 1, {kControlPeriod, u, Vec3::Zero(), u, Vec3::Zero()});
@@ -130,9 +130,9 @@ Vec3 CentrePredictor::feedback_rate(const Axes& x) const noexcept {
   return -kp_.cwiseProduct(x.row(1).transpose()) - kd_.cwiseProduct(x.row(2).transpose());
 }
 
-// Feedback and its rate where it was taken from: cubic Hermite over that past segment.
+// Feedback and its rate where it was taken from: cubic Hermite over that past subinterval.
 std::pair<Vec3, Vec3> CentrePredictor::past_feedback(const Lookup& at) const noexcept {
-  // Segment 1 before the current one is the newest of the ring.
+  // Subinterval 1 before the current one is the newest of the ring.
   const std::size_t back = static_cast<std::size_t>(at.back) - 1;
   const FeedbackPiece& piece = past_[(newest_ + past_.size() - back) % past_.size()];
   const double h = piece.length, x = at.s / h, y = 1 - x;
@@ -142,28 +142,28 @@ std::pair<Vec3, Vec3> CentrePredictor::past_feedback(const Lookup& at) const noe
   return {value, rate};
 }
 
-CentrePredictor::Input CentrePredictor::delayed_input(const Segment& segment) const noexcept {
-  const auto [u0, du0] = past_feedback(segment.start);
-  const auto [u1, du1] = past_feedback(segment.end);
+CentrePredictor::Input CentrePredictor::delayed_input(const Subinterval& subinterval) const noexcept {
+  const auto [u0, du0] = past_feedback(subinterval.start);
+  const auto [u1, du1] = past_feedback(subinterval.end);
   Input u;
   for (int axis = 0; axis < 3; ++axis)
-    u.col(axis) = cubic_through(u0[axis], du0[axis], u1[axis], du1[axis], segment.length);
+    u.col(axis) = cubic_through(u0[axis], du0[axis], u1[axis], du1[axis], subinterval.length);
   return u;
 }
 
-void CentrePredictor::run(const Segment& segment, const Vec3& r) noexcept {
+void CentrePredictor::run(const Subinterval& subinterval, const Vec3& r) noexcept {
   Input u = Input::Zero();
   if (kind_ == Feedback::held) u.row(0) = held_[static_cast<std::size_t>(sample_delay_)];
-  if (kind_ == Feedback::delayed) u = delayed_input(segment);
+  if (kind_ == Feedback::delayed) u = delayed_input(subinterval);
   u.row(0) += r.transpose();
 
   Axes before = x_;
   if (!lag_) before.row(2) = u.row(0);
-  x_.leftCols<2>() = segment.horizontal.E * before.leftCols<2>() + segment.horizontal.F * u.leftCols<2>();
-  x_.col(2) = segment.vertical.E * before.col(2) + segment.vertical.F * u.col(2);
+  x_.leftCols<2>() = subinterval.horizontal.E * before.leftCols<2>() + subinterval.horizontal.F * u.leftCols<2>();
+  x_.col(2) = subinterval.vertical.E * before.col(2) + subinterval.vertical.F * u.col(2);
   if (kind_ == Feedback::delayed) {
     newest_ = (newest_ + 1) % past_.size();
-    past_[newest_] = {segment.length, feedback(before), feedback_rate(before), feedback(x_), feedback_rate(x_)};
+    past_[newest_] = {subinterval.length, feedback(before), feedback_rate(before), feedback(x_), feedback_rate(x_)};
   }
 }
 
@@ -175,9 +175,9 @@ State CentrePredictor::step(const Setpoint& command, const Vec3& push_W) noexcep
   r_[0] = kp_.cwiseProduct(command.p_W) + kd_.cwiseProduct(command.v_W) + command.a_W;
   const auto newer = static_cast<std::size_t>(command_delay_);
   if (kind_ == Feedback::held) std::copy_backward(held_.begin(), held_.end() - 1, held_.end());
-  for (const Segment& segment : segments_) {
-    if (segment.measure) held_[0] = feedback(x_);
-    run(segment, (segment.new_command ? r_[newer] : r_[newer + 1]) + push_W);
+  for (const Subinterval& subinterval : subintervals_) {
+    if (subinterval.measure) held_[0] = feedback(x_);
+    run(subinterval, (subinterval.new_command ? r_[newer] : r_[newer + 1]) + push_W);
   }
   state_ = {x_.row(0).transpose(), x_.row(1).transpose()};
   a_W_ = x_.row(2).transpose();

@@ -92,38 +92,38 @@ class CentrePredictor {
  private:
   enum class Feedback { immediate, held, delayed };
   using Axes = Eigen::Matrix3d;               // rows p, v, a; one column per world axis
-  using Input = Eigen::Matrix<double, 4, 3>;  // u and its first three derivatives at a segment's start
+  using Input = Eigen::Matrix<double, 4, 3>;  // u and its first three derivatives at a subinterval's start
   struct Lookup {                             // where the delayed feedback lies
-    int back;                                 // segments before the current one
-    double s;                                 // time after that segment's start, s
+    int back;                                 // subintervals before the current one
+    double s;                                 // time after that subinterval's start, s
   };
-  struct Segment {  // part of a period with one command and no kink
+  struct Subinterval {  // part of a period with one command and no kink
     AxisStep horizontal, vertical;
     double length;      // s
     bool new_command;   // whether the newer command acts already
-    bool measure;       // held: feedback is measured at the segment's start
+    bool measure;       // held: feedback is measured at the subinterval's start
     Lookup start, end;  // delayed only
   };
-  struct FeedbackPiece {  // −k_p p − k_d v and its derivative over a past segment
+  struct FeedbackPiece {  // −k_p p − k_d v and its derivative over a past subinterval
     double length;
     Vec3 u0, du0, u1, du1;
   };
   Vec3 feedback(const Axes& x) const noexcept;
   Vec3 feedback_rate(const Axes& x) const noexcept;
-  Input delayed_input(const Segment& segment) const noexcept;
+  Input delayed_input(const Subinterval& subinterval) const noexcept;
   std::pair<Vec3, Vec3> past_feedback(const Lookup& at) const noexcept;
-  void run(const Segment& segment, const Vec3& r) noexcept;
-  void add_segments(const AxisLoop& horizontal, const AxisLoop& vertical, double switch_time);
+  void run(const Subinterval& subinterval, const Vec3& r) noexcept;
+  void add_subintervals(const AxisLoop& horizontal, const AxisLoop& vertical, double switch_time);
 
   Feedback kind_;
   bool lag_;
   Vec3 kp_, kd_;
   int command_delay_;  // whole periods of latency
   int sample_delay_;   // held: periods from a measurement to its use
-  std::vector<Segment> segments_;
+  std::vector<Subinterval> subintervals_;
   std::array<Vec3, kMaxDelaySteps + 2> r_;     // commands r, newest first
   std::array<Vec3, kMaxDelaySteps + 2> held_;  // held: measured feedback, newest first
-  std::vector<FeedbackPiece> past_;            // delayed: ring of past segments
+  std::vector<FeedbackPiece> past_;            // delayed: ring of past subintervals
   std::size_t newest_ = 0;
   Axes x_;  // row a: v̇, the push included
   Vec3 push_W_ = Vec3::Zero();

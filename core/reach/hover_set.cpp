@@ -59,9 +59,9 @@ double set_clearance(const Vehicle& vehicle, const map::OccupancyGrid& grid, con
 }
 
 /// Boxes of voxels around a point of voxel v.
-class Surroundings {
+class NearbyVoxels {
  public:
-  Surroundings(const map::OccupancyGrid& grid, const Index3& v, const Vec3& p_W)
+  NearbyVoxels(const map::OccupancyGrid& grid, const Index3& v, const Vec3& p_W)
       : v_(v),
         resolution_(grid.resolution()),
         per_voxel_(1 / grid.resolution()),
@@ -94,7 +94,7 @@ class Surroundings {
 /// centre's voxel, free; `free_distance`: there; `push_W`: that put the centre there.
 template <typename HalfWidths>
 std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, double free_distance, const BoundField& bounds,
-                                        const Surroundings& around, const Index3& v, const Vec3& push_W) {
+                                        const NearbyVoxels& around, const Index3& v, const Vec3& push_W) {
   const bool extended = !bounds.extension().none();
   auto over = around.meeting(Vec3::Zero());
   DisturbanceBound w_bar{};
@@ -120,7 +120,7 @@ class ClearTest {
       : grid_(grid), sums_(sums), taken_(body_and_estimation(vehicle)) {}
 
   /// True only where a set that holds this one is not clear. `free_distance`: of the set's centre.
-  bool blocked(const Surroundings& around, double free_distance, const PerDirection& half_widths) const noexcept {
+  bool blocked(const NearbyVoxels& around, double free_distance, const PerDirection& half_widths) const noexcept {
     if (far(free_distance, half_widths)) return false;
     const Octagon o(half_widths);
     const double t = taken_ * (1 - 1e-9);
@@ -128,7 +128,7 @@ class ClearTest {
            !box_free(around, o.along_y + Vec3(0, t, 0));
   }
   /// Exact. `p_W`: the set's centre.
-  bool clear(const Surroundings& around, const Vec3& p_W, double free_distance, const PerDirection& half_widths) const {
+  bool clear(const NearbyVoxels& around, const Vec3& p_W, double free_distance, const PerDirection& half_widths) const {
     if (far(free_distance, half_widths) || box_free(around, box(half_widths) + Vec3::Constant(taken_))) return true;
     if (blocked(around, free_distance, half_widths)) return false;
     const Octagon o(half_widths);
@@ -154,7 +154,7 @@ class ClearTest {
   bool far(double free_distance, const PerDirection& half_widths) const noexcept {
     return free_distance - box(half_widths).norm() - 1e-6 > taken_;  // the field is stored in single precision
   }
-  bool box_free(const Surroundings& around, const Vec3& half) const noexcept {
+  bool box_free(const NearbyVoxels& around, const Vec3& half) const noexcept {
     const auto voxels = around.meeting(half);
     return sums_.voxels_free(voxels.low, voxels.high);
   }
@@ -183,7 +183,7 @@ HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid,
   const auto paper = [&](const DisturbanceBound& w_bar) {
     return supports(hover_ellipsoid(reach.vehicle, channels(w_bar)).diagonal().cwiseSqrt());
   };
-  const Surroundings around(grid, v, c_W);
+  const NearbyVoxels around(grid, v, c_W);
   const auto h = reach.method == Method::tight
                      ? fixed_point(ExactHalfWidths(reach), distance.at(v), bounds, around, v, push_W)
                      : fixed_point(paper, distance.at(v), bounds, around, v, push_W);
@@ -240,7 +240,7 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
   const ClearTest test(reach.vehicle, grid, sums);
   const auto safe_with = [&](const auto& half_widths) {
     return [&](const Centre& c) {
-      const Surroundings around(grid, c.v, c.p_W);
+      const NearbyVoxels around(grid, c.v, c.p_W);
       // A centre off its voxel's is nearer to obstacles by that much at most.
       const double free_distance = distance.at(c.v), off = extended ? (c.p_W - grid.center(c.v)).norm() : 0;
       // A part of the set, and cheap.

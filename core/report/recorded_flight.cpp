@@ -15,14 +15,14 @@ tl::unexpected<log::LogError> bad(const std::string& what) {
   return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, "raw log: " + what});
 }
 
-struct Segment {
+struct RecordedSegment {
   log::SegmentRecord head;
   Setpoint previous;
   std::vector<Setpoint> commands;
 };
 
-Segment segment_of(const log::RawRecord& record) {
-  Segment s;
+RecordedSegment segment_of(const log::RawRecord& record) {
+  RecordedSegment s;
   std::memcpy(&s.head, record.bytes.data(), sizeof s.head);
   const std::size_t rows = (record.bytes.size() - sizeof s.head) / (10 * sizeof(double));
   for (std::size_t r = 0; r < rows; ++r) {
@@ -72,9 +72,9 @@ class Truth {
   const log::FlightLog& log_;
 };
 
-tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawRecord> log, const Segment& segment,
-                                                       const Truth& truth, const plan::World& world, double t_zero,
-                                                       double z_safe) {
+tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawRecord> log,
+                                                       const RecordedSegment& segment, const Truth& truth,
+                                                       const plan::World& world, double t_zero, double z_safe) {
   sim::FlightPiece piece;
   piece.accepted.id = segment.head.id;
   piece.accepted.commands = segment.commands;
@@ -140,16 +140,16 @@ tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::Ra
   for (const char* name : {"x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "ax_mps2", "ay_mps2", "az_mps2"})
     if (!truth.has(name)) return bad(std::string("the truth has no column ") + name);
   if (truth.t_s.size() < 2) return bad("the truth has fewer than two rows");
-  std::vector<Segment> segments;
+  std::vector<RecordedSegment> segments;
   for (const log::RawRecord& record : log)
     if (record.header.kind == log::RecordKind::segment && record.bytes.size() >= sizeof(log::SegmentRecord))
       segments.push_back(segment_of(record));
   if (segments.size() != 2) return bad("needs one take-off and one route, has " + std::to_string(segments.size()));
-  for (const Segment& s : segments)
+  for (const RecordedSegment& s : segments)
     if (s.commands.empty() || s.commands.size() != s.head.commands)
       return bad("segment " + std::to_string(s.head.id) + " holds " + std::to_string(s.commands.size()) +
                  " commands, its head says " + std::to_string(s.head.commands));
-  const Segment &up = segments[0], &route = segments[1];
+  const RecordedSegment &up = segments[0], &route = segments[1];
 
   const auto column = plan::takeoff_column(world, up.commands.back().p_W);
   if (!column) return bad("the map has no floor below the take-off");

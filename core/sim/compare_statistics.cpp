@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/types/formatted.hpp"
+#include "core/types/quantile.hpp"
 
 namespace backwash::sim {
 namespace {
@@ -27,12 +28,6 @@ Interval bootstrap(std::size_t n, std::uint64_t seed, const Statistic& statistic
   }
   std::ranges::sort(drawn);
   return {value, drawn[kResamples / 40], drawn[kResamples - 1 - kResamples / 40]};
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
 bool solved(const RouteOutcome& outcome) { return outcome.status == plan::PlanStatus::ok; }
@@ -87,6 +82,7 @@ void count_flights(MethodRow& row, const std::vector<const RouteOutcome*>& outco
     row.smallest_clearance_m = std::min(row.smallest_clearance_m, o->clearance_m);
     row.largest_ratio = std::max(row.largest_ratio, o->largest_ratio.maxCoeff());
   }
+  if (planning.empty()) return;
   row.planning_ms_median = quantile(planning, 0.5);
   row.planning_ms_p95 = quantile(planning, 0.95);
 }

@@ -114,7 +114,7 @@ struct MethodTube {
 
 /// A whole flight: vertical take-off with a settling hover, then the planned route with a hold at the goal.
 struct Flight {
-  plan::Column column;
+  plan::TakeoffColumn column;
   plan::Plan plan;
   FlightPiece take_off, route;
   MethodTube tight;  ///< flown: what the route was planned and accepted with
@@ -134,7 +134,7 @@ struct FlightRefused {
 
 /// Vertical commands from the floor under the start up to it, and a settling hover there.
 struct TakeOff {
-  plan::Column column;
+  plan::TakeoffColumn column;
   Setpoint ground;  ///< at rest on the floor
   std::vector<Setpoint> commands;
   std::size_t risen;   ///< commands before the hover

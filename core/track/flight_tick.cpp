@@ -160,7 +160,7 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   align(in, out.fresh);
   take_segment(in, out);
   judge(out);
-  odometry_age_ = last_good_ns_ < 0 ? std::numeric_limits<double>::infinity() : seconds(in.now_ns - last_good_ns_);
+  odometry_age_ = last_good_ns_ ? seconds(in.now_ns - *last_good_ns_) : std::numeric_limits<double>::infinity();
   const Mode before = mode();
   out.supervisor = supervisor_.step(facts(in, out));
   const auto& s = out.supervisor;

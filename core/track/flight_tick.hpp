@@ -50,8 +50,8 @@ struct TickInput {
   const AcceptedSegment* segment = nullptr;  ///< offered since the last tick
   AutopilotFacts autopilot;
   Surroundings surroundings;
-  /// Of odometry and autopilot's estimate against each other, as both say themselves, m; 0: one does not say.
-  float position_sigma = 0;
+  /// Of odometry and autopilot's estimate against each other, as both say themselves, m; none: one does not say.
+  std::optional<float> position_sigma;
 };
 
 /// What a tick decided.
@@ -141,12 +141,12 @@ class FlightTick {
   bool odometry_distrusted_ = false;  ///< since a fault of the odometry, until nothing is commanded any more
   bool feed_distrusted_ = false;      ///< since then, until the vehicle is disarmed or follows us again
   std::uint8_t odometry_resets_ = 0;
-  std::size_t lift_ticks_ = 0;      ///< since the take-off was accepted
-  int off_ground_ = 0;              ///< ticks of a lift-off that the autopilot does not call landed
-  int settled_ = 0;                 ///< ticks in the air at its height
-  int disorder_ = 0;                ///< samples in a row whose stamp did not rise
-  std::int64_t last_good_ns_ = -1;  ///< reception, less what it was late
-  std::int64_t last_pose_ns_ = -1, last_attitude_ns_ = -1;
+  std::size_t lift_ticks_ = 0;                ///< since the take-off was accepted
+  int off_ground_ = 0;                        ///< ticks of a lift-off that the autopilot does not call landed
+  int settled_ = 0;                           ///< ticks in the air at its height
+  int disorder_ = 0;                          ///< samples in a row whose stamp did not rise
+  std::optional<std::int64_t> last_good_ns_;  ///< reception, less what it was late
+  std::optional<std::int64_t> last_pose_ns_, last_attitude_ns_;
   std::optional<std::uint8_t> reset_counter_;
   double odometry_age_ = std::numeric_limits<double>::infinity();
 };

@@ -89,7 +89,7 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
   }
   const bool elsewhere = out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent ||
                          disorder_ > kDisorder ||
-                         (out.fresh && seconds(in.now_ns - last_good_ns_) > Supervisor::kHoldAfter);
+                         (out.fresh && seconds(in.now_ns - *last_good_ns_) > Supervisor::kHoldAfter);
   if (!elsewhere || was_commanding_) return;
   gate_.forget();
   if (out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent) ++odometry_resets_;
@@ -104,13 +104,13 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   const auto& pose = in.autopilot.pose;
   if (!pose || !gate_.last() || !fresh || pose->at_ns <= last_pose_ns_ || pose->attitude_at_ns <= last_attitude_ns_)
     return;
-  const double dt = seconds(pose->at_ns - last_pose_ns_);
+  const double dt = last_pose_ns_ ? seconds(pose->at_ns - *last_pose_ns_) : 0;  // the first pair ends no step
   last_pose_ns_ = pose->at_ns;
   last_attitude_ns_ = pose->attitude_at_ns;
   const FramePose in_local = local_pose(*pose);
   FramePose in_map = pose_of(gate_.last()->state, gate_.last()->q);
-  in_map.p += seconds(pose->at_ns - last_good_ns_) * in_map.v;
-  in_map.yaw += seconds(pose->attitude_at_ns - last_good_ns_) * in_local.yaw_rate;
+  in_map.p += seconds(pose->at_ns - *last_good_ns_) * in_map.v;
+  in_map.yaw += seconds(pose->attitude_at_ns - *last_good_ns_) * in_local.yaw_rate;
   const bool counted = reset_counter_ && in.autopilot.reset_counter && *reset_counter_ != *in.autopilot.reset_counter;
   if (in.autopilot.reset_counter) reset_counter_ = in.autopilot.reset_counter;
   const bool may_move = mode() != Mode::land && !(mode() == Mode::hold && !supervisor_.pose_trusted());
@@ -125,7 +125,7 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
 
 // What enabling allows, and three standard deviations of the two estimates against each other.
 double FlightTick::apart(const TickInput& in) const noexcept {
-  const double sigma = in.position_sigma > 0 ? static_cast<double>(in.position_sigma) : std::numbers::sqrt2 * sigma_;
+  const double sigma = in.position_sigma ? static_cast<double>(*in.position_sigma) : std::numbers::sqrt2 * sigma_;
   return std::clamp(FrameAlignment::kMaxPosition + 3 * sigma, kLeastApart, kMostApart);
 }
 

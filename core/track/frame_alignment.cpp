@@ -23,26 +23,6 @@ Vec3 turned(double yaw, const Vec3& v) noexcept {
 
 }  // namespace
 
-const char* to_string(Mismatch mismatch) noexcept {
-  switch (mismatch) {
-    case Mismatch::none:
-      return "none";
-    case Mismatch::x:
-      return "x";
-    case Mismatch::y:
-      return "y";
-    case Mismatch::z:
-      return "z";
-    case Mismatch::yaw:
-      return "yaw";
-    case Mismatch::roll:
-      return "roll";
-    case Mismatch::pitch:
-      return "pitch";
-  }
-  return "?";
-}
-
 double wrap_angle(double angle) noexcept {
   angle = std::remainder(angle, 2 * std::numbers::pi);
   return angle <= -std::numbers::pi ? std::numbers::pi : angle;

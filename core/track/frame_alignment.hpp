@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/track/rebase.hpp"
+#include "core/types/mode.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::track {
@@ -17,10 +18,6 @@ struct FramePose {
   Vec3 up_B = Vec3::UnitZ();  ///< the frame's z axis in the body's, x forward, y left
   double yaw_rate = 0;        ///< as the autopilot's gyros measure it, rad/s; in_local only
 };
-
-/// In what two descriptions of the same motion contradict each other: an axis of the map, or an angle.
-enum class Mismatch : std::uint8_t { none, x, y, z, yaw, roll, pitch };
-const char* to_string(Mismatch mismatch) noexcept;
 
 /// Estimates local ← map, p_local = R_z(yaw) p_map + t, from the vehicle's pose in both frames at the same moments
 /// (docs/interfaces.md, "Frames between map, odometry and controller"). While learning it follows the newest samples;

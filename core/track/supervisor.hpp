@@ -8,73 +8,9 @@
 
 #include "core/track/frame_alignment.hpp"
 #include "core/types/geometry.hpp"
+#include "core/types/mode.hpp"
 
 namespace backwash::track {
-
-/// What the daemon does with the vehicle. core/track/README.md has the transition table.
-enum class Mode : std::uint8_t {
-  passive,   ///< nothing is commanded; an operator has to enable
-  enabling,  ///< set-points of the present place are streamed until the autopilot follows them
-  tracking,  ///< set-points come from the tracker: accepted segments, then their end
-  hold,      ///< a verified stop to rest, or the last good set-point frozen with zero velocity and acceleration
-  land,      ///< the autopilot's own land mode was asked for; no set-points
-  quiet,     ///< neither set-points nor heartbeat: the autopilot's failsafe acts
-  lifting,   ///< a take-off was accepted: motors start, and the vehicle leaves the ground by the autopilot's own means
-};
-inline constexpr int kModes = 7;
-const char* to_string(Mode mode) noexcept;
-
-/// Why the mode is what it is; docs/faults.md has the rows.
-enum class Reason : std::uint8_t {
-  started,
-  enabled,
-  operator_request,
-  autopilot_follows,
-  segment_accepted,
-  enable_timeout,
-  odometry_lost,
-  odometry_jump,
-  frames_disagree,
-  outside_set,
-  deadline_missed,
-  port_lost,
-  transmit_full,
-  autopilot_silent,
-  offboard_left,
-  disarmed,
-  landed,
-  land_sent,
-  land_requested,
-  odometry_disorder,
-  odometry_frozen,
-  pose_untrusted,
-  autopilot_reset,
-  obstacle_ahead,
-  outside_map,
-  map_late,
-  map_missing,
-  battery_low,
-  clock_stopped,
-  frame_mismatch_x,
-  frame_mismatch_y,
-  frame_mismatch_z,
-  frame_mismatch_yaw,
-  frame_mismatch_roll,
-  frame_mismatch_pitch,
-  stop_requested,
-  odometry_inconsistent,
-  pose_silent,
-  pose_lost,
-  closure_refused,
-  takeoff_accepted,
-  lifted_off,
-  lift_timeout,
-  outside_column,
-  not_armed,
-  frames_apart,
-};
-inline constexpr int kReasons = 46;
-const char* to_string(Reason reason) noexcept;
 
 /// What an operator asked for since the last tick. `hold` ends what was planned before it and changes no mode: a plan
 /// that slows the flight down follows.

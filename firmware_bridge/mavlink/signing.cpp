@@ -46,27 +46,27 @@ bool Signing::sign(EncodedFrame& frame) noexcept {
   return true;
 }
 
-Verdict Signing::judge_stream(const Stream& now) noexcept {
+SignatureVerdict Signing::judge_stream(const Stream& now) noexcept {
   const auto same = [&](const std::optional<Stream>& s) {
     return s && s->system == now.system && s->component == now.component && s->link_id == now.link_id;
   };
   auto at = std::ranges::find_if(streams_, same);
   if (at != streams_.end()) {
-    if (now.time <= (*at)->time) return Verdict::kReplayed;
+    if (now.time <= (*at)->time) return SignatureVerdict::kReplayed;
   } else {
-    if (now.time + kOldestNewStream < time_) return Verdict::kOld;
+    if (now.time + kOldestNewStream < time_) return SignatureVerdict::kOld;
     at = std::ranges::find_if(streams_, [](const auto& s) { return !s; });
-    if (at == streams_.end()) return Verdict::kNoRoom;
+    if (at == streams_.end()) return SignatureVerdict::kNoRoom;
   }
   *at = now;
   advance_to(now.time);
-  return Verdict::kGood;
+  return SignatureVerdict::kGood;
 }
 
-Verdict Signing::judge(const Frame& frame) noexcept {
+SignatureVerdict Signing::judge(const Frame& frame) noexcept {
   if (frame.signature.size() != kSignature) {
     ++counters_.unsigned_frames;
-    return Verdict::kUnsigned;
+    return SignatureVerdict::kUnsigned;
   }
   // Every byte is compared, so that the time taken tells nothing of how many were right.
   const Hash right = hash(frame.bytes, frame.signature.first(kLinkAndTime));
@@ -75,18 +75,18 @@ Verdict Signing::judge(const Frame& frame) noexcept {
     difference = static_cast<std::uint8_t>(difference | (right[i] ^ frame.signature[kLinkAndTime + i]));
   if (difference != 0) {
     ++counters_.wrong_signature;
-    return Verdict::kWrongSignature;
+    return SignatureVerdict::kWrongSignature;
   }
-  const Verdict verdict =
+  const SignatureVerdict verdict =
       judge_stream({frame.sender.system, frame.sender.component, frame.signature[0], time_of(frame.signature)});
   switch (verdict) {
-    case Verdict::kReplayed:
+    case SignatureVerdict::kReplayed:
       ++counters_.replayed;
       break;
-    case Verdict::kOld:
+    case SignatureVerdict::kOld:
       ++counters_.old;
       break;
-    case Verdict::kNoRoom:
+    case SignatureVerdict::kNoRoom:
       ++counters_.no_room;
       break;
     default:

@@ -18,7 +18,7 @@ inline constexpr SigningTime kSigningSecond = 100'000;
 inline constexpr SigningTime kOldestNewStream = 60 * kSigningSecond;  ///< behind our own time
 
 /// What a frame's signature is worth.
-enum class Verdict : std::uint8_t {
+enum class SignatureVerdict : std::uint8_t {
   kGood,
   kUnsigned,        ///< no signature; MAVLink 1 has none
   kWrongSignature,  ///< made with another key, or the frame was changed
@@ -54,7 +54,7 @@ class Signing {
   bool sign(EncodedFrame& frame) noexcept;
 
   /// Judges a received frame and counts it. Only a good one changes what is known of its stream and our own time.
-  Verdict judge(const Frame& frame) noexcept;
+  SignatureVerdict judge(const Frame& frame) noexcept;
   const SigningCounters& counters() const noexcept { return counters_; }
 
  private:
@@ -64,7 +64,7 @@ class Signing {
   };
   using Hash = std::array<std::uint8_t, 6>;
   Hash hash(std::span<const std::uint8_t> frame, std::span<const std::uint8_t> link_and_time) const noexcept;
-  Verdict judge_stream(const Stream& now) noexcept;
+  SignatureVerdict judge_stream(const Stream& now) noexcept;
 
   SigningKey key_;
   std::uint8_t link_id_;

@@ -35,7 +35,7 @@ std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after
       "check link.device, link.baud and link.system, and that the autopilot is on");
   add("frames, position", n.frames_aligned != 0, number("residual %.3f m", n.frame_residual_m),
       "the autopilot must follow the VIO (EKF2_EV_CTRL): the residual has to fall below 0.05 m and 3 degrees");
-  add("frames, motion", after.mismatch == "none", after.mismatch,
+  add("frames, motion", mismatch_named(after.mismatch) == Mismatch::none, after.mismatch,
       "move the vehicle by hand along x, y and z: the axis named is mirrored, turned or dead in VIO or autopilot");
   const double missed = rate(before.numbers.ticks_missed, n.ticks_missed);
   add("control clock", missed == 0, number("%.1f periods missed a second", missed),

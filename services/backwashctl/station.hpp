@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/types/geometry.hpp"
+#include "core/types/mode.hpp"
 #include "services/dds/topics.hpp"
 
 namespace backwash::ctl {
@@ -31,6 +32,10 @@ struct StatusCopy {
   std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says;
   std::vector<std::pair<std::string, double>> parameters;   ///< that the autopilot has told
   std::vector<std::pair<std::string, std::string>> advice;  ///< on those that are not good
+
+  /// Whether state and reason are these. What a daemon of another version may say besides is none of them.
+  bool in(Mode mode) const noexcept { return mode_named(state) == mode; }
+  bool because(Reason why) const noexcept { return reason_named(reason) == why; }
 };
 
 /// A text of the status: the key that JSON gives it, and where it is in the message and in a copy.

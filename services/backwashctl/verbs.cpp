@@ -26,7 +26,7 @@ std::string default_station() {
   return std::string(user ? user : "operator") + "@" + host;
 }
 
-bool tracking(const StatusCopy& s) { return s.state == "tracking"; }
+bool tracking(const StatusCopy& s) { return s.in(Mode::tracking); }
 bool rests(const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }
 std::function<bool(const StatusCopy&)> rests_at(const Vec3& goal) {
   return [goal](const StatusCopy& s) {
@@ -116,14 +116,14 @@ void Verbs::add_ends(CLI::App& app) {
                "stop --wait",
                [this] {
                  return command("stop", backwash_msgs_msg_dds__COMMAND_STOP, Vec3::Zero(), [](const StatusCopy& s) {
-                   return s.state == "passive" || (s.state == "hold" && !s.numbers.moving);
+                   return s.in(Mode::passive) || (s.in(Mode::hold) && !s.numbers.moving);
                  });
                }),
           20);
   waiting(verb(app, "land", "land below, with the autopilot's own landing", "land --wait",
                [this] {
                  return command("land", backwash_msgs_msg_dds__COMMAND_LAND, Vec3::Zero(),
-                                [](const StatusCopy& s) { return s.state == "passive" && !s.numbers.armed; });
+                                [](const StatusCopy& s) { return s.in(Mode::passive) && !s.numbers.armed; });
                }),
           60);
 }
@@ -163,12 +163,15 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task) +
            (s.autopilot_says.empty() ? "" : "; the autopilot says: " + s.autopilot_says);
     superseded = station.superseded(s);
-    if (superseded || s.task.starts_with("refused")) return true;
+    if (superseded || s.task.starts_with(kRefusedTask)) return true;
     // On its way to a goal it goes on by itself after an obstacle.
-    const bool goes_on = (name == "goto" || name == "follow") && s.reason == "obstacle in the way";
-    const bool held = s.state == "hold" && !goes_on;
-    const bool lost = s.state == "quiet" || held || (s.state == "passive" && name != "land");
-    return lost && name != "hold" && name != "stop";
+    const bool on_its_way = verb == backwash_msgs_msg_dds__COMMAND_GOTO ||
+                            verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING ||
+                            verb == backwash_msgs_msg_dds__COMMAND_FOLLOW;
+    const bool held = s.in(Mode::hold) && !(on_its_way && s.because(Reason::obstacle_ahead));
+    const bool lands = verb == backwash_msgs_msg_dds__COMMAND_LAND;
+    const bool lost = s.in(Mode::quiet) || held || (s.in(Mode::passive) && !lands);
+    return lost && verb != backwash_msgs_msg_dds__COMMAND_HOLD && verb != backwash_msgs_msg_dds__COMMAND_STOP;
   });
   if (interrupted()) return fail("interrupted; the session is over, the daemon is " + last);
   if (superseded) return fail("a later command took its place; the daemon is " + last);

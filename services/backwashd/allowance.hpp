@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 
 namespace backwash::daemon {
 
@@ -14,14 +15,14 @@ class Allowance {
 
   /// Whether a sample that came now (monotonic, ns) is within it; then it is counted.
   bool take(std::int64_t now_ns) noexcept {
-    const std::int64_t next = std::max(paid_ns_, now_ns) + kPrice_ns;
+    const std::int64_t next = std::max(paid_ns_.value_or(now_ns), now_ns) + kPrice_ns;
     if (next - now_ns > kBurst * kPrice_ns) return false;
     paid_ns_ = next;
     return true;
   }
 
  private:
-  std::int64_t paid_ns_ = INT64_MIN / 2;
+  std::optional<std::int64_t> paid_ns_;
 };
 
 }  // namespace backwash::daemon

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "core/log/raw_log.hpp"
 #include "core/plan/world.hpp"
+#include "core/sync/atomic_optional.hpp"
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
 #include "core/sync/record_ring.hpp"
@@ -118,19 +120,20 @@ inline constexpr std::uint64_t kTicksPerSecond = 50;
 /// What the control thread shows to the others, once a tick.
 struct ControlView {
   std::int64_t t_ns = 0;
-  track::Mode mode = track::Mode::passive;
-  track::Reason reason = track::Reason::started;
+  Mode mode = Mode::passive;
+  Reason reason = Reason::started;
   bool armed = false, offboard = false, landed = true, aligned = false;
-  std::optional<firmware_bridge::ClockOffset> clock;               ///< the autopilot's
-  double odometry_age = 1e9, heartbeat_age = 1e9, pose_age = 1e9;  ///< s; pose: the autopilot's
-  State state;                                                     ///< newest good odometry
-  Setpoint command;                                                ///< sent or held this tick, map frame
-  track::Epoch epoch;                                              ///< what is planned under another one is refused
-  std::uint64_t segment = 0;                                       ///< accepted segment, 0 before the first
-  std::uint64_t index = 0;                                         ///< of its next command
-  bool finished = true;                                            ///< the segment's commands are all sent
-  bool braking = false;                                            ///< on a verified stop of the segment
-  std::uint64_t stop_branch = 0;                                   ///< of that stop
+  std::optional<firmware_bridge::ClockOffset> clock;                         ///< the autopilot's
+  static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< an age before the first, s
+  double odometry_age = kNever, heartbeat_age = kNever, pose_age = kNever;   ///< s; pose: the autopilot's
+  State state;                                                               ///< newest good odometry
+  Setpoint command;                                                          ///< sent or held this tick, map frame
+  track::Epoch epoch;                 ///< what is planned under another one is refused
+  std::uint64_t segment = 0;          ///< accepted segment, 0 before the first
+  std::uint64_t index = 0;            ///< of its next command
+  bool finished = true;               ///< the segment's commands are all sent
+  bool braking = false;               ///< on a verified stop of the segment
+  std::uint64_t stop_branch = 0;      ///< of that stop
   std::uint32_t closures = 0;         ///< loop closures seen: the map frame of state and command
   track::RigidShift shift;            ///< from the segment's frame into that one
   std::uint64_t refused_segment = 0;  ///< the last one refused
@@ -138,14 +141,13 @@ struct ControlView {
   std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
   std::uint64_t frames_refused = 0;  ///< of the link, for their signature
   double residual_m = 0, residual_rad = 0;
-  track::Mismatch mismatch = track::Mismatch::none;  ///< of the frames: then enabling is refused
+  Mismatch mismatch = Mismatch::none;  ///< of the frames: then enabling is refused
   firmware_bridge::SwitchState stop_switch = firmware_bridge::SwitchState::absent;
   firmware_bridge::Autopilot autopilot = firmware_bridge::Autopilot::kUnknown;
   firmware_bridge::ParameterValues parameters{};  ///< of parameter_names(autopilot)
   double untold_delay = 0;                        ///< of the autopilot's line, s
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
-  std::uint64_t log_lost = 0;  ///< records that the raw log had no room for
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 
@@ -159,8 +161,8 @@ struct ControlRecord {
 struct ControlEvent {
   enum class Kind : std::uint8_t { transition, missed_deadline, page_fault } kind = Kind::transition;
   std::int64_t t_ns = 0;
-  track::Mode mode = track::Mode::passive;
-  track::Reason reason = track::Reason::started;
+  Mode mode = Mode::passive;
+  Reason reason = Reason::started;
   std::uint64_t count = 0;  ///< periods missed, pages faulted
 };
 
@@ -203,6 +205,9 @@ struct Pulse {
   std::atomic<firmware_bridge::Signal> signal{firmware_bridge::Signal::idle};
 };
 
+/// When something was done, CLOCK_MONOTONIC, ns; none: not yet.
+using AtomicTime = sync::AtomicOptional<std::int64_t, INT64_MIN>;
+
 struct Channels {
   sync::LatestValue<OdometrySample> odometry;              // DDS reader → control
   sync::RecordRing<OdometrySample, 512> poses;             // DDS reader → map reader
@@ -214,7 +219,7 @@ struct Channels {
   sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
   Worlds worlds;                                           // map worker → each
   sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control
-  std::atomic<std::int64_t> map_ns{-1};                    // map worker: reception of the newest data in the snapshot
+  AtomicTime map_ns;                                       // map worker: reception of the newest data in the snapshot
   std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
   sync::RecordRing<track::Order, 64> orders;               // mission → control
   sync::Handover<PlanJob> jobs;                            // mission → planner
@@ -225,16 +230,16 @@ struct Channels {
   sync::RecordRing<ControlRecord, 256> command_log;                        // DDS reader → recorder
   sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
   sync::Handover<FreshPort> ports;                                         // link watch → control
-  std::atomic<std::uint8_t> link_fault{0};            // control → link watch: 1 + LinkFault, 0: none
-  std::atomic<std::uint32_t> port_losses{0};          // control → link watch: times that a good port was lost
-  std::atomic<mavlink::SigningTime> signing_time{0};  // control → signing time: of the newest signature; 0: none
-  sync::LatestValue<Line> odometry_doubt;             // DDS reader → mission: "", or why it is not what we were told
-  sync::LatestValue<Line> other_daemon;               // DDS reader → mission: "", or who else obeys our commands
-  sync::LatestValue<std::array<char, 192>> place;     // mission → status: what keeps it from flying from here
-  std::atomic<std::int64_t> enable_asked_ns =
-      INT64_MIN / 2;                              // mission → control: when an operator last asked to enable
-  sync::LatestValue<CommandId> accepted;          // mission → status: the newest command that was
-  sync::LatestValue<std::array<char, 192>> task;  // mission → status: of the last command
+  std::atomic<std::optional<firmware_bridge::LinkFault>> link_fault;       // control → link watch
+  static_assert(decltype(link_fault)::is_always_lock_free);
+  std::atomic<std::uint32_t> port_losses{0};  // control → link watch: times that a good port was lost
+  sync::AtomicOptional<mavlink::SigningTime, 0> signing_time;  // control → signing time: of the newest signature
+  sync::LatestValue<Line> odometry_doubt;          // DDS reader → mission: "", or why it is not what we were told
+  sync::LatestValue<Line> other_daemon;            // DDS reader → mission: "", or who else obeys our commands
+  sync::LatestValue<std::array<char, 192>> place;  // mission → status: what keeps it from flying from here
+  AtomicTime enable_asked_ns;                      // mission → control: when an operator last asked to enable
+  sync::LatestValue<CommandId> accepted;           // mission → status: the newest command that was
+  sync::LatestValue<std::array<char, 192>> task;   // mission → status: of the last command
   std::atomic<std::uint64_t> maps_accepted{0}, maps_rejected{0}, commands_refused{0};
   std::atomic<std::uint64_t> scans_accepted{0}, scans_rejected{0}, odometry_refused{0}, loop_closures{0},
       closures_refused{0}, foreign_writers{0};
@@ -244,8 +249,8 @@ struct Channels {
 
   /// s since the newest data in the map was received; nothing: there is no map. Real-time: wait-free.
   std::optional<double> map_age(std::int64_t now_ns) const noexcept {
-    const std::int64_t received_ns = map_ns.load(std::memory_order_relaxed);
-    return received_ns < 0 ? std::nullopt : std::optional(seconds(now_ns - received_ns));
+    const std::optional<std::int64_t> received_ns = map_ns.load();
+    return received_ns ? std::optional(seconds(now_ns - *received_ns)) : std::nullopt;
   }
   /// Records of real-time threads that the raw log had no room for.
   std::uint64_t records_lost() const noexcept { return control_log.lost() + command_log.lost(); }

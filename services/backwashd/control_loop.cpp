@@ -29,10 +29,10 @@ std::uint64_t page_faults() noexcept {
   return static_cast<std::uint64_t>(usage.ru_minflt + usage.ru_majflt);
 }
 
-firmware_bridge::Signal signal_of(track::Mode mode) noexcept {
+firmware_bridge::Signal signal_of(Mode mode) noexcept {
   using firmware_bridge::Signal;
-  if (mode == track::Mode::quiet) return Signal::fault;
-  return mode == track::Mode::passive ? Signal::idle : Signal::commanding;
+  if (mode == Mode::quiet) return Signal::fault;
+  return mode == Mode::passive ? Signal::idle : Signal::commanding;
 }
 
 }  // namespace
@@ -74,9 +74,7 @@ void ControlLoop::poll(std::int64_t now_ns) noexcept {
   }
   const bool open = link_.poll(time_of(now_ns)).has_value();
   if (std::exchange(port_open_, open) && !open) channels_.port_losses.fetch_add(1, std::memory_order_relaxed);
-  const auto fault = link_.fault(time_of(now_ns));
-  channels_.link_fault.store(fault ? static_cast<std::uint8_t>(1 + static_cast<int>(*fault)) : 0,
-                             std::memory_order_relaxed);
+  channels_.link_fault.store(link_.fault(time_of(now_ns)), std::memory_order_relaxed);
 }
 
 track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept {
@@ -94,7 +92,7 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   facts.lifts_itself = telemetry.status && telemetry.status->value.autopilot == firmware_bridge::Autopilot::kArduPilot;
   const auto taken = telemetry.result_of(firmware_bridge::kCommandTakeoff);
   facts.takeoff_taken =
-      takeoff_asked_ns_ != 0 && taken && taken->value.result == 0 && ns_of(taken->at) >= takeoff_asked_ns_;
+      takeoff_asked_ns_ && taken && taken->value.result == 0 && ns_of(taken->at) >= *takeoff_asked_ns_;
   if (const auto age = link_.heartbeat_age(time_of(now_ns)))
     facts.heartbeat_age = std::chrono::duration<double>(*age).count();
   if (telemetry.local_state && telemetry.attitude) {
@@ -127,7 +125,7 @@ track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
   in.surroundings = lookout_.look(flight_, now_ns);
   const auto& said = link_.telemetry().position_sigma;
   if (in.odometry && in.odometry->position_variance) vio_sigma_ = std::sqrt(in.odometry->position_variance->maxCoeff());
-  if (said && vio_sigma_ > 0) in.position_sigma = static_cast<float>(std::hypot(said->value, vio_sigma_));
+  if (said && vio_sigma_) in.position_sigma = static_cast<float>(std::hypot(said->value, *vio_sigma_));
   return in;
 }
 
@@ -170,7 +168,7 @@ void ControlLoop::give_origin(const track::AutopilotFacts& autopilot) noexcept {
 
 void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out) noexcept {
   const auto& s = out.supervisor;
-  if (s.changed && s.mode == track::Mode::quiet) link_.discard_unsent();
+  if (s.changed && s.mode == Mode::quiet) link_.discard_unsent();
   if (s.send_setpoint && link_.send_setpoint(out.command_local, time_of(in.now_ns))) {
     row_.sent |= 1;
     ++view_.setpoints;
@@ -186,16 +184,16 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.request_land) link_.send_land();
   if (out.arm) link_.send_arm(true);
   if (out.disarm) link_.send_arm(false);
-  if (s.mode != track::Mode::lifting) takeoff_asked_ns_ = 0;
-  if (out.takeoff && link_.send_takeoff(*out.takeoff) && takeoff_asked_ns_ == 0) takeoff_asked_ns_ = in.now_ns;
-  if (s.changed && s.send_heartbeat && s.reason != track::Reason::started)
-    link_.send_statustext(s.mode == track::Mode::hold || s.mode == track::Mode::land ? kWarning : kNotice,
-                          to_string(s.reason));
+  if (s.mode != Mode::lifting) takeoff_asked_ns_.reset();
+  if (out.takeoff && link_.send_takeoff(*out.takeoff) && !takeoff_asked_ns_) takeoff_asked_ns_ = in.now_ns;
+  if (s.changed && s.send_heartbeat && s.reason != Reason::started)
+    link_.send_statustext(s.mode == Mode::hold || s.mode == Mode::land ? kWarning : kNotice, to_string(s.reason));
   // Only while nothing depends on the line's time. Quiet, and silence to an armed vehicle, end by an operator's wish
   // alone: the autopilot, or we, may have restarted since.
-  const bool passive = s.mode == track::Mode::passive && s.send_heartbeat;
-  const bool wished = (s.mode == track::Mode::quiet || s.mode == track::Mode::passive) &&
-                      in.now_ns - channels_.enable_asked_ns.load(std::memory_order_relaxed) < kEnableWish_ns;
+  const bool passive = s.mode == Mode::passive && s.send_heartbeat;
+  const std::optional<std::int64_t> asked_ns = channels_.enable_asked_ns.load();
+  const bool wished =
+      (s.mode == Mode::quiet || s.mode == Mode::passive) && asked_ns && in.now_ns - *asked_ns < kEnableWish_ns;
   parameters_.step(link_, passive || wished, passive, view_);
   if (!s.send_heartbeat && !wished) return;
   if (view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));
@@ -240,7 +238,6 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   if (telemetry.text && telemetry.text->value.severity <= kWorstNotice) view_.warning = telemetry.text;
   view_.residual_m = flight_.alignment().position_residual();
   view_.residual_rad = flight_.alignment().yaw_residual();
-  view_.log_lost = channels_.control_log.lost();
 }
 
 // Transitions, missed deadlines and page faults, each to the operator; the tick itself to the raw log.
@@ -291,7 +288,7 @@ void ControlLoop::tick(std::int64_t now_ns, int missed, double lateness_us) noex
   publish(in, out);
   report(in, out);
   for (const auto* segment : out.released) channels_.segments.give_back(segment);
-  if (link_.signing()) channels_.signing_time.store(link_.signing()->time(), std::memory_order_relaxed);
+  if (link_.signing()) channels_.signing_time.store(link_.signing()->time());
   ++view_.ticks;
   channels_.pulse.signal.store(signal_of(view_.mode), std::memory_order_relaxed);
   channels_.pulse.ticks.store(view_.ticks, std::memory_order_relaxed);

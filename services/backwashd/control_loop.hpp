@@ -56,11 +56,11 @@ class ControlLoop {
   bool port_open_ = true;
   firmware_bridge::MessageRequests requests_;
   int origin_asked_ = 0;
-  std::int64_t takeoff_asked_ns_ = 0;  ///< of the autopilot, for the first time in this lift-off; 0: not yet
+  std::optional<std::int64_t> takeoff_asked_ns_;  ///< of the autopilot, for the first time in this lift-off
   track::Orders orders_;
   SwitchReaction switch_;
   PilotReaction pilot_;
-  double vio_sigma_ = 0;  ///< as the newest odometry that says it, m
+  std::optional<double> vio_sigma_;  ///< as the newest odometry that says it, m
   std::int64_t now_ns_ = 0;
   ControlView view_;
   log::TickRecord row_{};
@@ -69,8 +69,8 @@ class ControlLoop {
 
 /// Where and how the control thread runs.
 struct Scheduling {
-  int priority = 0;  ///< SCHED_FIFO; 0: ordinary
-  int cpu = -1;      ///< processor that it is bound to; −1: any
+  int priority = 0;        ///< SCHED_FIFO; 0: ordinary
+  std::optional<int> cpu;  ///< processor that it is bound to; none: any
 };
 
 /// Thread body: ticks every 20 ms on the monotonic clock, and listens every 2 ms between ticks. It does not wait for

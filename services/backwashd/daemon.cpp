@@ -183,6 +183,7 @@ bool end(Flight& f) {
   if (!closed) f.failure.note("recorder", "the disk does not answer", kInputOutput);
   if (const auto lost = f.recorder->lost() + f.channels->records_lost())
     spdlog::warn("{}: {} records were lost", f.log, lost);
+  if (ended) spdlog::info("{}: {}", f.settings.daemon.link.device, traffic(f.link));
   if (f.failure.happened())
     spdlog::critical("backwashd: {}; nothing more is sent", f.failure.text());
   else

@@ -62,18 +62,28 @@ tl::expected<LineRate, std::string> configured_line(const decltype(config::Daemo
       std::ceil(least / line.bytes_per_second * link.baud / kRound) * kRound));
 }
 
+std::string traffic(const AutopilotLink& link) {
+  const auto& in = link.received();
+  const auto& heard = link.telemetry();
+  const auto& out = link.transmit();
+  return fmt::format(
+      "{} frames received; {} damaged, {} of other messages, {} with unknown flags, {} bytes between frames; {} "
+      "messages late, {} broken; {} frames sent, {} gave way, {} ODOMETRY left out",
+      in.frames, in.bad_crc, in.unknown_id, in.unknown_incompat, in.skipped_bytes, heard.out_of_order, heard.broken,
+      out.sent(), out.dropped(), link.thinned());
+}
+
 void LinkWatch::step() {
   while (const auto event = channels_.events.pop()) tell(*event, manager_);
-  constexpr std::uint8_t kPortLost = 1 + static_cast<std::uint8_t>(LinkFault::kPortLost);
   const std::uint32_t losses = channels_.port_losses.load(std::memory_order_relaxed);
-  const std::uint8_t fault = channels_.link_fault.load(std::memory_order_relaxed);
+  const std::optional<LinkFault> fault = channels_.link_fault.load(std::memory_order_relaxed);
   if (std::exchange(losses_, losses) != losses)
     spdlog::error("{}: {}, loss {}", link_.device, name(LinkFault::kPortLost), losses);
   if (fault != fault_) {
-    if (fault == 0)
+    if (!fault)
       spdlog::info("{}: link good", link_.device);
-    else if (fault != kPortLost)
-      spdlog::error("{}: {}", link_.device, name(static_cast<LinkFault>(fault - 1)));
+    else if (*fault != LinkFault::kPortLost)
+      spdlog::error("{}: {}", link_.device, name(*fault));
     fault_ = fault;
   }
   channels_.ports.collect();

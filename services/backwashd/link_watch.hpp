@@ -14,6 +14,9 @@ tl::expected<firmware_bridge::Port, firmware_bridge::PortError> open_port(const 
 /// change: less than a flight needs (firmware_bridge::least_rate).
 tl::expected<firmware_bridge::LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link);
 
+/// What went over the line since its port was opened last, and what did not, in one line for the operator.
+std::string traffic(const firmware_bridge::AutopilotLink& link);
+
 /// What the operator is told of the control thread, and the work on its port that must not be done in a tick.
 class LinkWatch {
  public:
@@ -28,7 +31,7 @@ class LinkWatch {
   Channels& channels_;
   decltype(config::Daemon::link) link_;
   const ServiceManager& manager_;  ///< told each transition
-  std::uint8_t fault_ = 0;
+  std::optional<firmware_bridge::LinkFault> fault_;
   std::uint32_t losses_ = 0;  ///< that were told
   std::uint32_t mended_ = 0;  ///< for which a fresh port was offered: a loss of that one is the next
 };

@@ -56,10 +56,7 @@ map::ScanChange difference(const map::OccupancyGrid& before, const map::Occupanc
   for (std::size_t n = 0; n < after.cell_count(); ++n) {
     if (before.at(n) == after.at(n)) continue;
     change.box.add(after.voxel(n));
-    if (after.at(n) == map::Cell::occupied)
-      change.occupied.push_back(after.voxel(n));
-    else
-      change.freed += after.at(n) == map::Cell::free;
+    if (after.at(n) == map::Cell::occupied) change.occupied.push_back(after.voxel(n));
   }
   return change;
 }
@@ -107,7 +104,7 @@ void MapWorker::reject(const std::string& why) {
 
 void MapWorker::publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns) {
   world_ = std::move(world);
-  channels_.map_ns.store(received_ns, std::memory_order_relaxed);
+  channels_.map_ns.store(received_ns);
   channels_.worlds.offer({world_, received_ns});
   const double age = static_cast<double>(now_ns() - received_ns) * 1e-6;
   recorder_.append(log::RecordKind::world, "snapshot " + std::to_string(age) + " ms after its newest data");
@@ -161,7 +158,7 @@ void MapWorker::take_map(const MapMessage& message) {
 bool MapWorker::take_scans() {
   const auto begun = now_ns();
   map::VoxelBox box;
-  std::int64_t received_ns = -1;
+  std::optional<std::int64_t> received_ns;
   while (const auto next = channels_.scans.pop()) {
     const std::unique_ptr<Scan> scan(*next);
     if (!live_ || !live_->grid().inside(live_->grid().index(scan->sensor_W))) {
@@ -176,12 +173,12 @@ bool MapWorker::take_scans() {
     received_ns = scan->received_ns;
     ++channels_.scans_accepted;
   }
-  if (received_ns < 0) return false;
+  if (!received_ns) return false;
   if (box.empty()) {
-    channels_.map_ns.store(received_ns, std::memory_order_relaxed);  // the snapshot says what the scan says
+    channels_.map_ns.store(*received_ns);  // the snapshot says what the scan says
     return true;
   }
-  publish(plan::update_world(*world_, live_->grid(), box, model_, parallel_), received_ns);
+  publish(plan::update_world(*world_, live_->grid(), box, model_, parallel_), *received_ns);
   const Index3 extent = box.high - box.low + Index3::Ones();
   spdlog::debug("map updated in {} x {} x {} voxels in {} ms", extent.x(), extent.y(), extent.z(),
                 (now_ns() - begun) / 1'000'000);

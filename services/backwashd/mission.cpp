@@ -11,7 +11,6 @@
 namespace backwash::daemon {
 namespace {
 
-using track::Mode;
 using track::Request;
 
 constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED;
@@ -38,9 +37,9 @@ Decision Mission::observe(const MissionInput& in) {
   for (const PlanOutcome& outcome : in.outcomes) {
     if (job_ != outcome.job) continue;  // a newer command took its place
     job_.reset();
-    task_ = outcome.ok ? "" : std::string("refused: ") + outcome.reason.data();
+    task_ = outcome.ok ? "" : std::string(kRefusedTask) + outcome.reason.data();
     retry_at_s_ = in.now_s + kRetry;
-    if (!outcome.ok && view_.reason != track::Reason::obstacle_ahead) route_.clear();
+    if (!outcome.ok && view_.reason != Reason::obstacle_ahead) route_.clear();
   }
   if (in.now_s >= judge_at_s_) {
     judge_at_s_ = in.now_s + kJudgeEvery;
@@ -65,7 +64,7 @@ std::string Mission::judge_place() const {
 std::optional<PlanJob> Mission::continue_route(double now_s) {
   constexpr double kAtGoal = 0.01, kRest = 0.1;  // m, m/s
   const bool tracking = view_.mode == Mode::tracking;
-  const bool obstacle = view_.mode == Mode::hold && view_.reason == track::Reason::obstacle_ahead;
+  const bool obstacle = view_.mode == Mode::hold && view_.reason == Reason::obstacle_ahead;
   // Any other mode, and any other hold, is an operator's to end.
   if (!tracking && !obstacle) route_.clear();
   if (route_.empty() || job_ || order_under_way() || !view_.finished) return std::nullopt;
@@ -190,7 +189,7 @@ Decision Mission::enable() {
   if (!other_daemon_.empty()) return refused(other_daemon_);
   if (!odometry_doubt_.empty()) return refused(odometry_doubt_);
   if (!world_) return refused("no map was received yet");
-  if (view_.mismatch != track::Mismatch::none)
+  if (view_.mismatch != Mismatch::none)
     return refused(std::string("map and autopilot disagree: ") + to_string(view_.mismatch));
   if (view_.odometry_age > track::Supervisor::kHoldAfter) return refused("no odometry");
   if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");

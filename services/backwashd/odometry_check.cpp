@@ -30,10 +30,11 @@ std::optional<std::string> OdometryCheck::look(std::int64_t stamp_ns, const Vec3
   if (stamp_ns_ && dt == 0) return std::nullopt;
   stamp_ns_ = stamp_ns;
   if (goes_on) {
-    interval_ = intervals_ == 0 ? dt : (1 - kSmooth) * interval_ + kSmooth * dt;
+    interval_ = interval_ ? (1 - kSmooth) * *interval_ + kSmooth * dt : dt;
     intervals_ = std::min(intervals_ + 1, kIntervals);
     compare(dt, p, q, v);
   } else {
+    interval_.reset();
     intervals_ = 0;
     zero_from_.reset();
     zero_way_ = 0, count_ = 0;
@@ -60,7 +61,7 @@ void OdometryCheck::compare(double dt, const Vec3& p, const Eigen::Quaterniond& 
 }
 
 std::string OdometryCheck::doubt() const {
-  if (intervals_ == kIntervals && 1 / interval_ < kLeastRate)
+  if (intervals_ == kIntervals && 1 / *interval_ < kLeastRate)
     return line("odometry comes at less than %.0f Hz: each gap would be a HOLD; raise the rate of the estimator",
                 kLeastRate);
   return twist_ == Twist::none ? "" : twist_doubt();
@@ -73,8 +74,9 @@ std::string OdometryCheck::twist_doubt() const {
         "odometry.profile = \"fast_lio\", or \"custom\" with twist = \"none\"",
         kZeroWay);
   if (count_ < kStretches) return "";
-  Stretch sum{};
-  for (const Stretch& s : stretches_) sum = {sum.way + s.way, sum.in_body + s.in_body, sum.in_world + s.in_world};
+  ComparedStretch sum{};
+  for (const ComparedStretch& s : stretches_)
+    sum = {sum.way + s.way, sum.in_body + s.in_body, sum.in_world + s.in_world};
   const double claimed = twist_ == Twist::body ? sum.in_body : sum.in_world;
   const double other = twist_ == Twist::body ? sum.in_world : sum.in_body;
   if (claimed < kOff * sum.way) return "";

@@ -32,7 +32,7 @@ class OdometryCheck {
   std::optional<std::string> look(std::int64_t stamp_ns, const Vec3& p, const Eigen::Quaterniond& q, const Vec3& v);
 
  private:
-  struct Stretch {
+  struct ComparedStretch {
     double way, in_body, in_world;  ///< m: of the pose; by what the twist, taken so, misses it
   };
   void compare(double dt, const Vec3& p, const Eigen::Quaterniond& q, const Vec3& v);
@@ -41,13 +41,13 @@ class OdometryCheck {
 
   config::Twist twist_;
   std::optional<std::int64_t> stamp_ns_;
-  double interval_ = 0;  ///< s between two messages, smoothed; 0: not known
-  int intervals_ = 0;
-  std::optional<Vec3> zero_from_;  ///< where the twist began to be zero
+  std::optional<double> interval_;  ///< s between two messages, smoothed
+  int intervals_ = 0;               ///< that it is of, up to as many as make it known
+  std::optional<Vec3> zero_from_;   ///< where the twist began to be zero
   double zero_way_ = 0;
   Vec3 from_ = Vec3::Zero(), by_body_ = Vec3::Zero(), by_world_ = Vec3::Zero();
   double lasted_ = 0;
-  std::array<Stretch, kStretches> stretches_{};
+  std::array<ComparedStretch, kStretches> stretches_{};
   std::size_t count_ = 0;
   std::string told_;
 };

@@ -14,10 +14,10 @@ namespace backwash::daemon {
 class PilotReaction {
  public:
   /// What is asked of the supervisor in this tick: `request`, or to end the enabling. Real-time.
-  track::Request request(track::Mode mode, const firmware_bridge::Latest<firmware_bridge::VehicleStatus>& status,
+  track::Request request(Mode mode, const firmware_bridge::Latest<firmware_bridge::VehicleStatus>& status,
                          track::Request request) noexcept {
     const auto now = status ? std::optional(status->value.custom_mode) : std::nullopt;
-    if (mode != track::Mode::enabling || !found_ || (status && status->value.follows_setpoints)) found_ = now;
+    if (mode != Mode::enabling || !found_ || (status && status->value.follows_setpoints)) found_ = now;
     return now && now != found_ ? track::Request::disable : request;
   }
 

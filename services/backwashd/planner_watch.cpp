@@ -39,9 +39,8 @@ void PlannerWorker::watch() {
 /// Whether the flight to a goal is to be looked at now. It ends with any hold but the one for an obstacle.
 bool PlannerWorker::pursues() {
   if (!pursuit_) return false;
-  const bool braking_for_obstacle =
-      view_.mode == track::Mode::hold && view_.reason == track::Reason::obstacle_ahead && view_.braking;
-  if (view_.mode != track::Mode::tracking && !braking_for_obstacle) {
+  const bool braking_for_obstacle = view_.mode == Mode::hold && view_.reason == Reason::obstacle_ahead && view_.braking;
+  if (view_.mode != Mode::tracking && !braking_for_obstacle) {
     pursuit_.reset();
     return false;
   }

@@ -108,7 +108,7 @@ std::vector<Setpoint> PlannerWorker::rise(const Vec3& from, const Vec3& to) cons
 std::optional<std::string> PlannerWorker::lift_off(std::uint64_t lift) {
   while (!channels_.stop) {
     if (!current()) return "the take-off ended: " + std::string(to_string(view_.reason));
-    if (view_.segment != lift && view_.mode == track::Mode::tracking) return std::nullopt;
+    if (view_.segment != lift && view_.mode == Mode::tracking) return std::nullopt;
     if (std::exchange(new_world_, false)) verify_again();
     pause_();
   }
@@ -144,7 +144,7 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
   append_hold(commands);
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (!current()) return kEnded;
-    if (view_.mode != track::Mode::tracking && view_.mode != track::Mode::hold) return "control was lost meanwhile";
+    if (view_.mode != Mode::tracking && view_.mode != Mode::hold) return "control was lost meanwhile";
     if (view_.closures != closures) return "a loop closure moved the map meanwhile";
     Flying next{{0, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
     next.segment.arms = lifts;
@@ -154,7 +154,7 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
     add_guards(next, *world_);
     if (offer(std::move(next))) return std::nullopt;
   }
-  if (view_.mode == track::Mode::hold)
+  if (view_.mode == Mode::hold)
     return "nothing flies out of the hold for its cause: " + std::string(to_string(view_.reason));
   return "the vehicle is not still enough to start: its state left the first set each time";
 }

@@ -62,13 +62,13 @@ void lock_memory() {
 void make_real_time(const Scheduling& scheduling) {
   lock_memory();
   prefault_stack();
-  if (scheduling.cpu >= 0) {
+  if (scheduling.cpu) {
     cpu_set_t set;
     CPU_ZERO(&set);
-    CPU_SET(static_cast<std::size_t>(scheduling.cpu), &set);
+    CPU_SET(static_cast<std::size_t>(*scheduling.cpu), &set);
     if (sched_setaffinity(0, sizeof set, &set) != 0)
       spdlog::warn("the control thread is not bound to processor {} ({}): set control.cpu to one that exists",
-                   scheduling.cpu, std::strerror(errno));
+                   *scheduling.cpu, std::strerror(errno));
   }
   if (scheduling.priority == 0) {
     spdlog::warn("control.priority is 0: the control thread has ordinary scheduling, ticks may be late");

@@ -55,7 +55,7 @@ void run_mission(Channels& channels, Mission& mission, const SendAnswer& answer)
   while (!channels.stop) {
     carry_out(channels, observe(channels, mission));
     while (const auto command = channels.commands.pop()) {
-      if (command->verb == backwash_msgs_msg_dds__COMMAND_ENABLE) channels.enable_asked_ns = now_ns();
+      if (command->verb == backwash_msgs_msg_dds__COMMAND_ENABLE) channels.enable_asked_ns.store(now_ns());
       const Decision decision = mission.handle(*command, seconds_now());
       const bool done = carry_out(channels, decision);
       if (!decision.answer) continue;

@@ -71,14 +71,14 @@ std::string signing_time_path(const std::string& log) {
 void run_signing_time(SigningTimeFile& file, Channels& channels, const std::atomic<bool>& end) {
   bool failing = false;
   while (!end) {
-    const bool kept = file.keep(channels.signing_time);
+    const std::optional<SigningTime> last = channels.signing_time.load();
+    const bool kept = !last || file.keep(*last);
     if (std::exchange(failing, !kept) == kept && !kept)
       spdlog::warn("the time of signatures cannot be kept: {}; after a restart they may be refused",
                    std::strerror(errno));
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
-  const SigningTime last = channels.signing_time;
-  if (last > 0) file.close(last);
+  if (const auto last = channels.signing_time.load()) file.close(*last);
 }
 
 }  // namespace backwash::daemon

@@ -4,7 +4,6 @@
 namespace backwash::daemon {
 
 using firmware_bridge::SwitchState;
-using track::Mode;
 using track::Request;
 
 std::string refusal(SwitchState state) {

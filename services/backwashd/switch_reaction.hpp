@@ -26,7 +26,7 @@ class SwitchReaction {
   /// Reading as of now. Real-time: wait-free.
   static firmware_bridge::SwitchState read(const SwitchReading& reading, std::int64_t now_ns) noexcept;
   /// Real-time: wait-free, no allocation.
-  track::Request request(firmware_bridge::SwitchState state, track::Mode mode, track::Request asked,
+  track::Request request(firmware_bridge::SwitchState state, Mode mode, track::Request asked,
                          std::int64_t now_ns) noexcept;
 
  private:

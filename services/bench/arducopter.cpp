@@ -62,8 +62,10 @@ class ArduCopter : public Firmware {
  public:
   explicit ArduCopter(const Site& site) : Firmware(kProfile, site) {}
   const char* mode() const noexcept override { return mode_ == guided ? "guided" : mode_ == land ? "land" : "pilot"; }
-  void take_over() noexcept override { change(stabilize); }
-  void disarm() noexcept override {
+
+ private:
+  /// The motors stop, wherever the vehicle is.
+  void disarm() noexcept {
     armed_ = take_off_ = climbing_ = false;
     land_complete_ = true;
     landed_state_ = on_ground;
@@ -71,7 +73,6 @@ class ArduCopter : public Firmware {
     heartbeat_due_ = true;
   }
 
- private:
   // Its HEARTBEAT follows a change of mode at once: ardupilot-flight.csv:128–130.
   void change(CustomMode mode, bool by_failsafe = false) noexcept {
     mode_ = mode;
@@ -181,7 +182,7 @@ class ArduCopter : public Firmware {
   }
   /// Until GUID_TIMEOUT the target goes on by its last velocity and acceleration, then it stands (source).
   void move_target(double t) {
-    if (t - last_setpoint_ > std::max(parameter("GUID_TIMEOUT"), 0.1)) target_.v_W = target_.a_W = Vec3::Zero();
+    if (since(last_setpoint_, t) > std::max(parameter("GUID_TIMEOUT"), 0.1)) target_.v_W = target_.a_W = Vec3::Zero();
     target_.p_W += kStep * target_.v_W;
     target_.v_W += kStep * target_.a_W;
   }

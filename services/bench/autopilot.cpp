@@ -56,17 +56,6 @@ const char* Autopilot::mode() const noexcept {
   return mode_ == Mode::offboard ? "offboard" : mode_ == Mode::land ? "land" : "manual";
 }
 
-void Autopilot::take_over() noexcept {
-  mode_ = Mode::manual;
-  heartbeat_due_ = true;
-}
-
-void Autopilot::disarm() noexcept {
-  armed_ = false;
-  vehicle_.set_motors(false);
-  heartbeat_due_ = true;
-}
-
 Setpoint Autopilot::target_of(const mavlink::SetPositionTargetLocalNed& m) const {
   const Eigen::Matrix3d R = yaw_matrix(-frame_.yaw);
   return {R * (mavlink::swap_ned({m.x, m.y, m.z}) - frame_.origin), R * mavlink::swap_ned({m.vx, m.vy, m.vz}),
@@ -132,7 +121,7 @@ void Autopilot::on(const mavlink::CommandLong& m, double t) {
   std::uint8_t result = kUnsupported;
   if (m.command == kSetMode) {
     // Offboard needs set-points that already stream.
-    const bool streaming = t - last_setpoint_ < kOffboardTimeout;
+    const bool streaming = since(last_setpoint_, t) < kOffboardTimeout;
     result = m.param2 == 6 && streaming ? kAccepted : kTemporarilyRejected;
     if (result == kAccepted) mode_ = Mode::offboard;
   } else if (m.command == kArm) {
@@ -183,7 +172,7 @@ void Autopilot::receive(std::span<const std::uint8_t> bytes, double t) {
 
 void Autopilot::fly(double t) {
   // The controller's own failsafe: offboard without a stream becomes a landing (PX4's COM_OF_LOSS_T).
-  if (mode_ == Mode::offboard && armed_ && t - last_setpoint_ > kOffboardTimeout) {
+  if (mode_ == Mode::offboard && armed_ && since(last_setpoint_, t) > kOffboardTimeout) {
     mode_ = Mode::land;
     target_ = {believed().p_W, Vec3::Zero(), Vec3::Zero(), target_.yaw};
   }

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <optional>
 #include <random>
@@ -70,12 +71,6 @@ class Autopilot {
                                            {"MPC_TILTMAX_AIR", 45}};
   /// Remaining share, sent once a second as BATTERY_STATUS while set.
   std::optional<double> battery;
-  /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
-  virtual void take_over() noexcept;
-  /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
-  virtual void disarm() noexcept;
-  /// The estimator is reset: from now on its local frame lies elsewhere.
-  void reset_estimator(const LocalFrame& frame) noexcept { frame_ = frame; }
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position; of a command
   /// its number and parameters 1, 2 and 7.
   void log_wire(const std::string& path);
@@ -104,6 +99,10 @@ class Autopilot {
   Setpoint target_of(const mavlink::SetPositionTargetLocalNed& m) const;
   State believed() const;
   State felt() const;
+  /// s from `then` to t; infinite when it has not been yet.
+  static double since(const std::optional<double>& then, double t) {
+    return then ? t - *then : std::numeric_limits<double>::infinity();
+  }
   void send_attitude(std::vector<std::uint8_t>& out);
   void send_position(std::vector<std::uint8_t>& out);
   void send_battery(std::vector<std::uint8_t>& out);
@@ -117,7 +116,8 @@ class Autopilot {
   sim::AirflowTruth air_;
   LocalFrame frame_;
   bool armed_ = false, landed_ = true, local_position_ = false, heartbeat_due_ = false;
-  double last_setpoint_ = -1e9, landed_since_ = 0;
+  std::optional<double> last_setpoint_;  // s, when it came
+  double landed_since_ = 0;
   long steps_ = 0;
   std::uint64_t setpoints_ = 0;
   Setpoint target_;  // in the map as the estimator believes it to lie
@@ -127,8 +127,10 @@ class Autopilot {
   std::vector<mavlink::CommandAck> acks_;
   std::vector<mavlink::ParamValue> values_;  // asked for and not yet sent
 
- private:
   enum class Mode { manual, offboard, land };
+  Mode mode_ = Mode::manual;
+
+ private:
   template <typename Other>
   void on(const Other&, double) {}
   void steer();
@@ -136,7 +138,6 @@ class Autopilot {
 
   std::uint8_t system_, sequence_ = 0;
   mavlink::Parser parser_;
-  Mode mode_ = Mode::manual;
   struct Truth {
     double t;
     State state;

@@ -109,7 +109,7 @@ class Faults {
   bool report() const {
     bool kept = true;
     if (!timeline_.expectations.empty()) std::printf("%-10s %-18s %-14s\n", "expected", "limit", "measured");
-    for (const auto& v : judge_.verdicts()) {
+    for (const auto& v : judge_.judgements()) {
       std::printf("%-10s %-18s %-14s %s\n", v.what.c_str(), v.limit.c_str(), v.measured.c_str(),
                   v.passed ? "pass" : "FAIL");
       kept = kept && v.passed;

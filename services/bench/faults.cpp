@@ -80,9 +80,10 @@ const Fault* FaultyChannel<Item>::active(double t) const {
 // A link keeps what it cannot send yet; of samples only those are sent for which there is time.
 template <class Item>
 void FaultyChannel<Item>::slow(Item in, const Fault& fault, double t) {
-  if (!queues(in) && t < free_at_) return;
-  free_at_ = std::max(t, free_at_) + cost(in) / fault.rate;
-  held_.emplace_back(queues(in) ? free_at_ : t, std::move(in));
+  const double free_at = std::max(t, free_at_.value_or(t));
+  if (!queues(in) && t < free_at) return;
+  free_at_ = free_at + cost(in) / fault.rate;
+  held_.emplace_back(queues(in) ? *free_at_ : t, std::move(in));
 }
 
 template <class Item>
@@ -137,14 +138,14 @@ void Judge::take(const Sample& s, double t) {
   moved_ = std::max(moved_, (s.truth.p_W - *place_).head<2>().norm());
 }
 
-std::vector<Judge::Verdict> Judge::verdicts() const {
+std::vector<Judge::Judgement> Judge::judgements() const {
   const auto landed_at = [&](double t) {
     bool landed = true;
     for (const auto& [since, is] : changes_)
       if (since <= t) landed = is;
     return landed;
   };
-  std::vector<Verdict> all;
+  std::vector<Judgement> all;
   for (const Expectation& e : expectations_) {
     using enum Expectation::What;
     const bool seen = e.at <= last_;
@@ -161,11 +162,11 @@ std::vector<Judge::Verdict> Judge::verdicts() const {
         break;
       case speed:
         all.push_back(
-            {"speed", "at most " + number(e.limit, "m/s"), number(speed_, "m/s"), last_ >= 0 && speed_ <= e.limit});
+            {"speed", "at most " + number(e.limit, "m/s"), number(speed_, "m/s"), last_ && speed_ <= e.limit});
         break;
       case clearance:
-        all.push_back({"clearance", "at least " + number(e.limit, "m"), number(clearance_, "m"),
-                       last_ >= 0 && clearance_ >= e.limit});
+        all.push_back(
+            {"clearance", "at least " + number(e.limit, "m"), number(clearance_, "m"), last_ && clearance_ >= e.limit});
     }
   }
   return all;

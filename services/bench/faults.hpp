@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <random>
 #include <string>
@@ -82,7 +83,7 @@ class FaultyChannel {
   std::mt19937_64 random_;
   std::optional<Item> last_;  // that came through unharmed
   std::deque<std::pair<double, Item>> held_;
-  double free_at_ = -1e9;  // slow: when the next may leave
+  std::optional<double> free_at_;  // slow: when the next may leave
   long spoilt_ = 0;
 };
 
@@ -97,18 +98,19 @@ class Judge {
     double clearance;  ///< m, of the vehicle's ball
   };
   void take(const Sample& s, double t);
-  struct Verdict {
+  struct Judgement {
     std::string what, limit, measured;
     bool passed;
   };
-  std::vector<Verdict> verdicts() const;
+  std::vector<Judgement> judgements() const;
 
  private:
   std::vector<Expectation> expectations_;
   double first_fault_;
   std::optional<Vec3> place_;
-  double moved_ = 0, speed_ = 0, clearance_ = 1e9, last_ = -1;
-  std::vector<std::pair<double, bool>> changes_;  // of landed
+  double moved_ = 0, speed_ = 0, clearance_ = std::numeric_limits<double>::infinity();  // of what was seen
+  std::optional<double> last_;                                                          // s, when something was
+  std::vector<std::pair<double, bool>> changes_;                                        // of landed
 };
 
 }  // namespace backwash::bench

@@ -37,7 +37,7 @@ Firmware::Firmware(const Profile& profile, const Site& site)
 void Firmware::on(const mavlink::Odometry& m, double t) {
   const auto wrong = error_of(m);
   if (!wrong) return;
-  if (t - odometry_at_ > kContinuous) odometry_since_ = t;
+  if (since(odometry_at_, t) > kContinuous) odometry_since_ = t;
   if (!local_position_) error_ = wrong->error;
   odometry_at_ = t;
   measured_ = wrong->error;
@@ -46,7 +46,7 @@ void Firmware::on(const mavlink::Odometry& m, double t) {
 }
 
 void Firmware::estimate(double t) {
-  const double unfed = t - odometry_at_;
+  const double unfed = since(odometry_at_, t);
   if (unfed < kFed) {
     const double share = 1 - std::exp(-kStep / profile_.fusion);
     error_.p_W += share * (measured_.p_W - error_.p_W);
@@ -58,7 +58,7 @@ void Firmware::estimate(double t) {
     error_.v_W += more * (yaw_matrix(-frame_.yaw) * profile_.drift_way);
     error_.p_W += kStep * error_.v_W;
   }
-  lost_ = lost_ ? unfed > kContinuous || t - odometry_since_ < profile_.estimator_found
+  lost_ = lost_ ? unfed > kContinuous || since(odometry_since_, t) < profile_.estimator_found
                 : local_position_ && unfed > profile_.estimator_lost;
 }
 

@@ -82,8 +82,8 @@ class Firmware : public Autopilot {
   bool has_position() const { return local_position_ && !lost_; }
   bool grounded() const { return vehicle_.on_ground(); }
   /// A ground station, or its sticks, that were heard and are not any more: for longer than `limit`, s.
-  bool station_silent(double t, double limit) const { return station_at_ >= 0 && t - station_at_ > limit; }
-  bool sticks_silent(double t, double limit) const { return sticks_at_ >= 0 && t - sticks_at_ > limit; }
+  bool station_silent(double t, double limit) const { return station_at_ && t - *station_at_ > limit; }
+  bool sticks_silent(double t, double limit) const { return sticks_at_ && t - *sticks_at_ > limit; }
   double on_ground_for(double t) const { return grounded() ? t - lifted_ : 0; }
 
   static constexpr double kStep = sim::Quadrotor::kStep;
@@ -108,8 +108,9 @@ class Firmware : public Autopilot {
   std::deque<Pending> asked_;  // parameters
   std::vector<mavlink::Statustext> texts_;
   std::vector<mavlink::Timesync> syncs_;
-  double station_at_ = -1, sticks_at_ = -1;  // s, when last heard
-  double odometry_at_ = -1e9, odometry_since_ = -1e9, lifted_ = 0;
+  std::optional<double> station_at_, sticks_at_, odometry_at_;  // s, when last heard
+  std::optional<double> odometry_since_;                        // s, without a gap
+  double lifted_ = 0;
   State measured_;    // error of the newest ODOMETRY
   double drift_ = 0;  // m/s
 };

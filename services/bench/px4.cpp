@@ -71,15 +71,16 @@ class Px4 : public Firmware {
   const char* mode() const noexcept override {
     return mode_ == offboard ? "offboard" : mode_ == land ? "land" : "pilot";
   }
-  void take_over() noexcept override { change(position, false); }
-  void disarm() noexcept override {
+
+ private:
+  /// The motors stop, wherever the vehicle is.
+  void disarm() noexcept {
     armed_ = false;
     landed_state_ = on_ground;
     phase_ = Phase::spooling;
     vehicle_.set_motors(false);
   }
 
- private:
   /// Of a take-off (source: TakeoffState).
   enum class Phase { spooling, ready, ramp, flight };
 
@@ -92,7 +93,7 @@ class Px4 : public Firmware {
     if (mode != offboard) loops_[0].reset(), loops_[1].reset();  // brakes and swings back: px4-loss0.3.csv:221–231
     if (phase_ == Phase::flight) landed_state_ = mode == land && !blind_ ? landing : in_air;
   }
-  bool streaming(double t) const { return t - last_setpoint_ < parameter("COM_OF_LOSS_T") + kLossNoticed; }
+  bool streaming(double t) const { return since(last_setpoint_, t) < parameter("COM_OF_LOSS_T") + kLossNoticed; }
 
   using Firmware::on;
   void on(const mavlink::CommandLong& m, double t) override {
@@ -164,7 +165,7 @@ class Px4 : public Firmware {
   /// A take-off begins by any wish upwards; the estimate's noise decides about a set-point at the present height
   /// (source).
   bool wants_up(double t) const {
-    return t - last_setpoint_ < kFresh &&
+    return since(last_setpoint_, t) < kFresh &&
            (target_.p_W.z() > believed().p_W.z() || target_.v_W.z() > 0 || target_.a_W.z() > 0);
   }
   std::array<AxisTarget, 3> targets() {
@@ -189,7 +190,7 @@ class Px4 : public Firmware {
   }
 
   // Of seven standstills as many ended so as in a termination (docs/autopilots.md); one did nothing.
-  bool lost() const { return lost_ || now_ < stale_until_; }
+  bool lost() const { return lost_ || (stale_until_ && now_ < *stale_until_); }
 
   void watch(double t) override {
     if (now_ > 0 && t - now_ > kStood) stale_until_ = t + kStale;
@@ -227,8 +228,8 @@ class Px4 : public Firmware {
       landed_at_ = t;
     }
     const bool landed_long =
-        phase_ == Phase::ready && landed_at_ > armed_at_ && t - landed_at_ > kProfile.disarms_after;
-    const bool idle = phase_ == Phase::ready && landed_at_ < armed_at_ &&
+        phase_ == Phase::ready && landed_at_ > armed_at_ && since(landed_at_, t) > kProfile.disarms_after;
+    const bool idle = phase_ == Phase::ready && (!landed_at_ || *landed_at_ < armed_at_) &&
                       t - armed_at_ > parameter("COM_DISARM_PRFLT") + parameter("COM_SPOOLUP_TIME");  // -refused
     if (!landed_long && !idle) return;
     disarm();
@@ -236,12 +237,12 @@ class Px4 : public Firmware {
   }
 
   mavlink::Heartbeat heartbeat() const override {
-    const bool fresh = now_ - last_setpoint_ < kFresh;
+    const bool fresh = since(last_setpoint_, now_) < kFresh;
     const bool watched =
         parameter("NAV_DLL_ACT") == 0 || !station_silent(now_, parameter("COM_DL_LOSS_T") + kStationLost);
     const bool ready = mode_ == offboard && has_position() && fresh && watched;
     // px4-flight.csv:5,119,407; -loss0.3pos:223; -refused
-    const int base = mode_ == offboard ? (last_setpoint_ > 0 ? 17 : 1) : mode_ == position ? 81 : 29;
+    const int base = mode_ == offboard ? (last_setpoint_ ? 17 : 1) : mode_ == position ? 81 : 29;
     return {.custom_mode = mode_,
             .type = 2,
             .autopilot = kProfile.autopilot,
@@ -256,7 +257,8 @@ class Px4 : public Firmware {
   Phase phase_ = Phase::spooling;
   bool failsafe_ = false, blind_ = false, was_lost_ = false;
   double charge_ = 1, charged_at_ = 0;  // of the battery, its share; s
-  double ramp_at_ = 0, changed_at_ = 0, landed_at_ = -1, now_ = 0, stale_until_ = 0;
+  double ramp_at_ = 0, changed_at_ = 0, now_ = 0;
+  std::optional<double> landed_at_, stale_until_;
   std::array<AxisTarget, 3> shaped_;  // where the loops shall be now, in the map
 };
 

@@ -17,6 +17,7 @@
 #include "services/parallel/parallel.hpp"
 #include "tests/bench/furnished_room.hpp"
 #include "tests/support/changed_box.hpp"
+#include "tests/support/line_of_sight.hpp"
 
 namespace {
 

@@ -33,6 +33,7 @@
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
 #include "core/reach/clearance.hpp"
+#include "core/types/quantile.hpp"
 #include "tests/support/regions.hpp"
 
 namespace {
@@ -114,11 +115,6 @@ bool breaks_limits(const plan::BSpline& spline) {
         spline.derivative(t, 2).cwiseAbs().maxCoeff() > kAMax * (1 + 1e-6))
       return true;
   return false;
-}
-
-double quantile(std::vector<double> values, double q) {
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
 struct Tally {

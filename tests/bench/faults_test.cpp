@@ -162,12 +162,12 @@ TEST(Judge, PassesWhatWasKeptAndFailsTheRest) {
               2.0);
   for (double t = 0; t < 10; t += 0.1) judge.take({{Vec3(t < 2 ? 5 : 0.03 * t, 0, 1), Vec3(0.5, 0, 0)}, t > 8, 0.2}, t);
   std::vector<bool> passed;
-  for (const auto& v : judge.verdicts()) passed.push_back(v.passed);
+  for (const auto& v : judge.judgements()) passed.push_back(v.passed);
   EXPECT_THAT(passed, ElementsAre(true, false, true, false, true, true, false, false));
 }
 TEST(Judge, PassesNothingThatItDidNotSee) {
   using What = Expectation::What;
-  for (const auto& v : Judge({{What::moved, 0, 9}, {What::speed, 0, 9}, {What::landed, 0, 0}}, 1).verdicts())
+  for (const auto& v : Judge({{What::moved, 0, 9}, {What::speed, 0, 9}, {What::landed, 0, 0}}, 1).judgements())
     EXPECT_FALSE(v.passed) << v.what;
 }
 

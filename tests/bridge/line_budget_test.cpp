@@ -109,7 +109,9 @@ TEST(LineBudget, SignaturesAndThePlainLinkCountWithTheirOwnBytes) {
   EXPECT_NEAR(least_rate(58, false), 58 * (50 + 1 / 0.16 + 17), 1e-6);
   LineBudget plain(serial_line(57'600, 1, true));
   plain.give(kOdometry, true, kStart);
-  EXPECT_NEAR(std::chrono::duration<double>(plain.free_at() - kStart).count(), 58 / 5760.0, 1e-8);
+  constexpr auto kTakes = std::chrono::nanoseconds(1'000'000'000LL * 58 / 5760);
+  EXPECT_FALSE(plain.carries_odometry(kStart + kTakes - std::chrono::microseconds(1)));
+  EXPECT_TRUE(plain.carries_odometry(kStart + kTakes + std::chrono::microseconds(1)));
 }
 
 TEST(LineBudget, WhatIsForgottenNoLongerOccupiesTheLine) {

@@ -19,7 +19,7 @@ mavlink::Heartbeat heartbeat(std::uint8_t autopilot, std::uint8_t base_mode, std
 
 TEST(Telemetry, HoldsNothingThatNeverCame) {
   const Telemetry t;
-  EXPECT_FALSE(t.status || t.local_state || t.attitude || t.reset_counter || t.imu || t.battery || t.landed_state);
+  EXPECT_FALSE(t.status || t.local_state || t.attitude || t.reset_counter || t.battery || t.landed_state);
   EXPECT_FALSE(t.result_of(400));
 }
 
@@ -88,10 +88,9 @@ TEST(Telemetry, DropsAndCountsWhatCannotBe) {
   t.take(mavlink::AttitudeQuaternion{1, 0, 0, 0, 0, 0, 0, 0}, kNow);
   t.take(mavlink::AttitudeQuaternion{1, nan, 0, 0, 0, 0, 0, 0}, kNow);
   t.take(mavlink::Attitude{1, nan, 0, 0, 0, 0, 0}, kNow);
-  t.take(mavlink::HighresImu{.xacc = nan}, kNow);
   t.take(mavlink::ExtendedSysState{0, 9}, kNow);
-  EXPECT_EQ(t.broken, 7U);
-  EXPECT_FALSE(t.local_state || t.attitude || t.imu || t.landed_state);
+  EXPECT_EQ(t.broken, 6U);
+  EXPECT_FALSE(t.local_state || t.attitude || t.landed_state);
 }
 
 // Finite numbers that no vehicle indoors has: float's largest, and just beyond the bounds.
@@ -164,13 +163,6 @@ TEST(Telemetry, ARestartThatTheClockTellsForgetsWhatMayBeOtherwiseNow) {
     say(920);
     EXPECT_TRUE(t.parameter("GUID_TIMEOUT"));
   }
-}
-
-TEST(Telemetry, ScalesTheImuToSiAndFlu) {
-  Telemetry t;
-  t.take(mavlink::ScaledImu2{.xacc = 100, .yacc = 200, .zacc = -1000, .xgyro = 10, .ygyro = 20, .zgyro = 30}, kNow);
-  EXPECT_TRUE(t.imu->value.specific_force_B.isApprox(Vec3(0.980665, -1.96133, 9.80665), 1e-9));
-  EXPECT_TRUE(t.imu->value.omega_B.isApprox(Vec3(0.01, -0.02, -0.03), 1e-9));
 }
 
 TEST(Telemetry, AddsUpCellsAndLeavesAbsentValuesAbsent) {

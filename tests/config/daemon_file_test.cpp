@@ -50,7 +50,7 @@ TEST(DaemonFile, ReadsTheShippedExample) {
   EXPECT_EQ(d->dds.name_space, "backwash");
   EXPECT_EQ(d->link.baud, 921600);
   EXPECT_EQ(d->control.priority, 80);
-  EXPECT_EQ(d->control.cpu, -1);
+  EXPECT_EQ(d->control.cpu, std::nullopt);
   EXPECT_DOUBLE_EQ(d->control.battery_land, 0.15);
 }
 

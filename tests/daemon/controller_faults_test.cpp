@@ -8,10 +8,7 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
-TEST(Row21, WithoutAHeartbeatOfTheControllerItIsQuietAfterOneAndAHalfSeconds) {
+TEST(ControllerSilenceFault, WithoutAHeartbeatOfTheControllerItIsQuietAfterOneAndAHalfSeconds) {
   InFlight rig;
   rig.autopilot->mute = true;
   rig.say(heartbeat(true, kOffboard));
@@ -21,7 +18,7 @@ TEST(Row21, WithoutAHeartbeatOfTheControllerItIsQuietAfterOneAndAHalfSeconds) {
   for (int n = 0; n < 100; ++n) EXPECT_TRUE(rig.tick().silent());
 }
 
-TEST(Row22, WhenTheControllerLeavesOffboardItStopsInTheSameTickAndNeverAsksAgain) {
+TEST(OffboardLeftFault, WhenTheControllerLeavesOffboardItStopsInTheSameTickAndNeverAsksAgain) {
   InFlight rig;
   rig.autopilot->take_over();
   EXPECT_TRUE(rig.tick().silent());
@@ -37,7 +34,7 @@ TEST(Row22, WhenTheControllerLeavesOffboardItStopsInTheSameTickAndNeverAsksAgain
 
 // He acts between our enable and the autopilot's first heartbeat that says that it follows: our request must not undo
 // it.
-TEST(Row22, APilotWhoChangesTheModeWhileWeEnableIsNotOverridden) {
+TEST(OffboardLeftFault, APilotWhoChangesTheModeWhileWeEnableIsNotOverridden) {
   constexpr std::uint32_t kManual = 1u << 16, kPosition = 3u << 16;
   Lockstep rig;
   rig.ticks(60);
@@ -57,7 +54,7 @@ TEST(Row22, APilotWhoChangesTheModeWhileWeEnableIsNotOverridden) {
   for (int n = 0; n < 60; ++n) EXPECT_TRUE(rig.tick().silent()) << n;
 }
 
-TEST(Row25, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
+TEST(OtherHandsFault, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
   for (const Mode from : {Mode::tracking, Mode::hold, Mode::land}) {
     InFlight rig;
     if (from == Mode::hold) {
@@ -77,7 +74,7 @@ TEST(Row25, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
   }
 }
 
-TEST(Row23, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
+TEST(DisarmingFault, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
   InFlight rig;
   rig.autopilot->disarm();
   rig.tick();
@@ -92,7 +89,7 @@ TEST(Row23, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
   for (int n = 0; n < 50; ++n) EXPECT_LT((rig.in_map(rig.tick().setpoints.at(0)).p_W - here).norm(), 0.1);
 }
 
-TEST(Row24, ALowBatteryAsksToLandOnce) {
+TEST(LowBatteryFault, ALowBatteryAsksToLandOnce) {
   InFlight rig;
   rig.autopilot->battery = 0.5;
   rig.ticks(60);

@@ -17,7 +17,6 @@
 namespace backwash::daemon::test::epoch {
 
 using track::AcceptedSegment;
-using track::Mode;
 
 inline constexpr std::uint8_t kGoto = backwash_msgs_msg_dds__COMMAND_GOTO, kStop = backwash_msgs_msg_dds__COMMAND_STOP,
                               kLand = backwash_msgs_msg_dds__COMMAND_LAND, kHold = backwash_msgs_msg_dds__COMMAND_HOLD,

@@ -42,8 +42,8 @@ TEST(Tick, NeitherAllocatesNorLocksNorReadsTheWallClockNorFaultsAPageInAWholeFli
   rig.take_off();
   rig.start_route(7);
   rig.channels->orders.push({track::Request::land});
-  ASSERT_GT(rig.ticks_until(track::Mode::passive, 600), 0);
-  EXPECT_EQ(rig.reason(), track::Reason::landed);
+  ASSERT_GT(rig.ticks_until(Mode::passive, 600), 0);
+  EXPECT_EQ(rig.reason(), Reason::landed);
   EXPECT_GT(rig.view().inside, 340u);  // the lift-off is not judged
   EXPECT_EQ(rig.view().outside, 0u);
   EXPECT_EQ(rig.channels->control_log.lost(), 0u);
@@ -92,7 +92,7 @@ TEST(Tick, GivesEverySegmentBackToBeFreed) {
   EXPECT_LT(late, early + 5 * segment) << segment << " bytes a segment";
 }
 
-TEST(Row15, WithoutANewTrajectoryTheVerifiedTailIsFlownAndItsEndIsHeld) {
+TEST(LatePlanFault, WithoutANewTrajectoryTheVerifiedTailIsFlownAndItsEndIsHeld) {
   Lockstep rig;
   rig.take_off();
   rig.start_route(1);

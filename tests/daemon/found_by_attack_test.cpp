@@ -10,13 +10,11 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-
 constexpr double kDegree = std::numbers::pi / 180;
 
 // Fresh stamps, the same pose to the last bit: the autopilot believes it and drifts, 0.6 m in 5 s and 25 m in a minute.
 // Nothing compares identical poses unless a velocity is commanded.
-TEST(Row6, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
+TEST(VioFreezeFault, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
   for (const bool follows_yaw : {false, true}) {
     Lockstep rig;
     rig.autopilot->follows_yaw = follows_yaw;
@@ -33,7 +31,7 @@ TEST(Row6, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {
 }
 
 // The emulated autopilot's height is the VIO's: it climbed 526 m, and went on climbing after LAND.
-TEST(Row6, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
+TEST(VioFreezeFault, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
   Lockstep rig;
   rig.ticks(60);
   rig.channels->orders.push({track::Request::enable});
@@ -47,12 +45,12 @@ TEST(Row6, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
   rig.offer(rig.rise(), true, true);
   ASSERT_GT(rig.ticks_until(Mode::lifting, 3), 0) << to_string(rig.reason());
   ASSERT_GT(rig.ticks_until(Mode::land, 200), 0) << to_string(rig.reason()) << ", " << rig.autopilot->truth().p_W.z();
-  EXPECT_EQ(rig.reason(), track::Reason::odometry_frozen);
+  EXPECT_EQ(rig.reason(), Reason::odometry_frozen);
   EXPECT_EQ(rig.tick().odometry, 0) << "nor is the autopilot told any more that it has not left the ground";
 }
 
 // What one closure of 90° or 10 m may not do, ten of 9° and twelve of 0.9 m do within a quarter of a second.
-TEST(Row4, AnAbsurdLoopClosureInPiecesIsHeldToo) {
+TEST(AbsurdClosureFault, AnAbsurdLoopClosureInPiecesIsHeldToo) {
   for (const bool turns : {false, true}) {
     Lockstep rig;
     rig.take_off();
@@ -75,7 +73,7 @@ TEST(Row4, AnAbsurdLoopClosureInPiecesIsHeldToo) {
       rig.tick();
     }
     EXPECT_EQ(rig.mode(), Mode::hold) << (turns ? "turned by 108° in the map" : "moved by 10.8 m in the map");
-    EXPECT_EQ(rig.reason(), track::Reason::closure_refused);
+    EXPECT_EQ(rig.reason(), Reason::closure_refused);
   }
 }
 

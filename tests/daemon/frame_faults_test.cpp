@@ -14,9 +14,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 /// A vehicle that is carried about before it is enabled. The VIO sees the truth changed by `wrong`.
 Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond&)>& wrong, bool& commanded) {
   Lockstep rig;
@@ -62,7 +59,7 @@ Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond
   return Reason::started;
 }
 
-TEST(Row7, AFrameOrYawThatDoesNotMatchIsRefusedBeforeEnablingNamingTheAxis) {
+TEST(FrameMismatchFault, AFrameOrYawThatDoesNotMatchIsRefusedBeforeEnablingNamingTheAxis) {
   const auto mirrored = [](int axis) {
     return [axis](State& s, Eigen::Quaterniond&) { s.p_W[axis] *= -1, s.v_W[axis] *= -1; };
   };
@@ -92,7 +89,7 @@ TEST(Row7, AFrameOrYawThatDoesNotMatchIsRefusedBeforeEnablingNamingTheAxis) {
 }
 
 // The controller's frame moves by 2 m and 23°, as its estimator's reset does, in flight and at rest.
-TEST(Row8, WhenTheControllersEstimatorResetsTheVehicleHoldsInTheNewFrameWithinTwoTicks) {
+TEST(EstimatorResetFault, WhenTheControllersEstimatorResetsTheVehicleHoldsInTheNewFrameWithinTwoTicks) {
   for (const double fly : {2.0, 6.5}) {
     for (const double moved : {2.0, 0.2}) {
       Lockstep rig;
@@ -120,7 +117,7 @@ TEST(Row8, WhenTheControllersEstimatorResetsTheVehicleHoldsInTheNewFrameWithinTw
   }
 }
 
-TEST(Row8, TheControllersOwnResetCounterIsEnough) {
+TEST(EstimatorResetFault, TheControllersOwnResetCounterIsEnough) {
   Lockstep rig;
   rig.take_off();
   rig.say(mavlink::Odometry{.q = {1, 0, 0, 0}, .reset_counter = 7});

@@ -74,7 +74,7 @@ Lockstep::Lockstep(const bench::LocalFrame& local, Medium medium, std::shared_pt
       vio_(0.75 * vehicle_.estimation.position, 2),
       medium_(medium) {
   const Vec3 ground(kStart.x(), kStart.y(), vehicle_.body.radius);
-  autopilot = std::make_unique<bench::Autopilot>(world_->grid, vehicle_, ground, local_frame, 1, 1);
+  autopilot = std::make_unique<HandledAutopilot>(world_->grid, vehicle_, ground, local_frame, 1, 1);
   restart();
 }
 
@@ -212,7 +212,7 @@ void Lockstep::ticks(int count) {
   for (int n = 0; n < count; ++n) tick();
 }
 
-int Lockstep::ticks_until(track::Mode wanted, int most) {
+int Lockstep::ticks_until(Mode wanted, int most) {
   for (int n = 1; n <= most; ++n) {
     tick();
     if (mode() == wanted) return n;
@@ -242,15 +242,15 @@ std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops, b
 void Lockstep::take_off() {
   ticks(60);
   channels->orders.push({track::Request::enable});
-  ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
+  ASSERT_GT(ticks_until(Mode::tracking, 250), 0) << to_string(reason());
   offer(rise(), true, true);
-  ASSERT_EQ(ticks_until(track::Mode::lifting, 3) > 0, true) << to_string(reason());
-  ASSERT_GT(ticks_until(track::Mode::tracking, 500), 0) << to_string(reason());
+  ASSERT_EQ(ticks_until(Mode::lifting, 3) > 0, true) << to_string(reason());
+  ASSERT_GT(ticks_until(Mode::tracking, 500), 0) << to_string(reason());
   auto commands = rise();
   const auto count = static_cast<int>(commands.size());
   offer(std::move(commands));
   ticks(count + 5);
-  ASSERT_EQ(mode(), track::Mode::tracking) << to_string(reason());
+  ASSERT_EQ(mode(), Mode::tracking) << to_string(reason());
   ASSERT_TRUE(view().finished);
   ASSERT_LT((autopilot->truth().p_W - kStart).norm(), 0.2);
 }
@@ -275,7 +275,7 @@ void Lockstep::start_route(double seconds) {
   const auto id = offer(route_);
   ticks(static_cast<int>(seconds / kControlPeriod));
   ASSERT_EQ(view().segment, id);
-  ASSERT_EQ(mode(), track::Mode::tracking) << to_string(reason());
+  ASSERT_EQ(mode(), Mode::tracking) << to_string(reason());
 }
 
 Setpoint Lockstep::in_map(const SetPositionTargetLocalNed& m) const {

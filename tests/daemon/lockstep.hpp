@@ -34,6 +34,25 @@ struct Wire {
   bool silent() const { return setpoints.empty() && commands.empty() && texts.empty() && heartbeats == 0; }
 };
 
+/// The emulated flight controller in a test's hands.
+class HandledAutopilot : public bench::Autopilot {
+ public:
+  using bench::Autopilot::Autopilot;
+  /// A pilot switches to manual: set-points are not followed any more. Said in a heartbeat at once.
+  void take_over() noexcept {
+    mode_ = Mode::manual;
+    heartbeat_due_ = true;
+  }
+  /// The motors stop, wherever the vehicle is. Said in a heartbeat at once.
+  void disarm() noexcept {
+    armed_ = false;
+    vehicle_.set_motors(false);
+    heartbeat_due_ = true;
+  }
+  /// The estimator is reset: from now on its local frame lies elsewhere.
+  void reset_estimator(const bench::LocalFrame& frame) noexcept { frame_ = frame; }
+};
+
 inline constexpr std::uint16_t kCommandLand = 21, kCommandMode = 176, kCommandArm = 400;
 
 /// What the daemon's link runs over: a pseudo-terminal, or two UDP sockets on the loopback, where a byte that was
@@ -53,7 +72,7 @@ class Lockstep {
   const Wire& tick(int missed = 0);
   void ticks(int count);
   /// Ticks until the daemon is in this mode; how many it took, or −1 after `most`.
-  int ticks_until(track::Mode mode, int most);
+  int ticks_until(Mode mode, int most);
 
   /// Enable, follow, arm, take off to 1.2 m. Ends in tracking, the take-off's commands all sent.
   void take_off();
@@ -68,8 +87,8 @@ class Lockstep {
   const std::vector<Setpoint>& route() const { return route_; }
 
   const ControlView& view() const { return loop_->view(); }
-  track::Mode mode() const { return loop_->view().mode; }
-  track::Reason reason() const { return loop_->view().reason; }
+  Mode mode() const { return loop_->view().mode; }
+  Reason reason() const { return loop_->view().reason; }
   const Wire& wire() const { return wire_; }
   const plan::World& world() const { return *world_; }
   const firmware_bridge::AutopilotLink& link() const { return *link_; }
@@ -103,7 +122,7 @@ class Lockstep {
   std::vector<std::uint8_t> inject_;
   bench::LocalFrame local_frame;  ///< the controller's true one
   std::shared_ptr<const plan::World> world_;
-  std::unique_ptr<bench::Autopilot> autopilot;
+  std::unique_ptr<HandledAutopilot> autopilot;
   /// In shared memory, so that forget_pages() loses nothing.
   struct Unmap {
     void operator()(Channels* c) const;

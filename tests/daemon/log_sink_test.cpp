@@ -59,7 +59,7 @@ struct Terminal {
   std::unique_ptr<spdlog::logger> logger;
 };
 
-TEST(Row44LogSink, WritesTimeLevelAndTextInOrder) {
+TEST(LogSink, WritesTimeLevelAndTextInOrder) {
   Terminal t;
   t.logger->info("first {}", 1);
   t.logger->error("second");
@@ -68,7 +68,7 @@ TEST(Row44LogSink, WritesTimeLevelAndTextInOrder) {
   EXPECT_THAT(said, HasSubstr("] [error] second\n"));
 }
 
-TEST(Row44LogSink, AJournalGetsTheLevelAsItsPriorityAndNoTime) {
+TEST(LogSink, AJournalGetsTheLevelAsItsPriorityAndNoTime) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   const auto sink = LogSink::start(ends[1], LogSink::Head::priority);
@@ -84,7 +84,7 @@ TEST(Row44LogSink, AJournalGetsTheLevelAsItsPriorityAndNoTime) {
   for (const int end : ends) ::close(end);
 }
 
-TEST(Row44LogSink, AStalledTerminalDelaysNobodyAndTheLossIsSaidWhenItIsReadAgain) {
+TEST(LogSink, AStalledTerminalDelaysNobodyAndTheLossIsSaidWhenItIsReadAgain) {
   Terminal t;
   t.stall();
   std::thread speaker([&] {
@@ -101,7 +101,7 @@ TEST(Row44LogSink, AStalledTerminalDelaysNobodyAndTheLossIsSaidWhenItIsReadAgain
   EXPECT_THAT(t.read_until("and on"), HasSubstr("[info] and on"));
 }
 
-TEST(Row44LogSink, AStalledTerminalDoesNotKeepTheProcessFromEnding) {
+TEST(LogSink, AStalledTerminalDoesNotKeepTheProcessFromEnding) {
   Terminal t;
   t.stall();
   t.logger->info("never read");
@@ -110,7 +110,7 @@ TEST(Row44LogSink, AStalledTerminalDoesNotKeepTheProcessFromEnding) {
   EXPECT_LT(std::chrono::steady_clock::now() - before, 5s);
 }
 
-TEST(Row44LogSink, APipeThatNobodyReadsAnyMoreCostsItsLines) {
+TEST(LogSink, APipeThatNobodyReadsAnyMoreCostsItsLines) {
   const auto before = ::signal(SIGPIPE, SIG_IGN);  // as the daemon does
   {
     Terminal t;
@@ -122,7 +122,7 @@ TEST(Row44LogSink, APipeThatNobodyReadsAnyMoreCostsItsLines) {
   ::signal(SIGPIPE, before);
 }
 
-TEST(Row44LogSink, OneCauseCannotCrowdOutTheOthersAndWhatWasHeldBackIsTold) {
+TEST(LogSink, OneCauseCannotCrowdOutTheOthersAndWhatWasHeldBackIsTold) {
   Terminal t;
   for (int n = 0; n < 1000; ++n) t.logger->warn("refused: cloud of {} points from '{}'", n, std::string(5, 'x'));
   t.logger->info("quiet: the pilot took over");
@@ -139,7 +139,7 @@ TEST(Row44LogSink, OneCauseCannotCrowdOutTheOthersAndWhatWasHeldBackIsTold) {
               testing::ContainsRegex("refused: cloud of 7 points \\(and 9[0-9][0-9] more of this kind\\)"));
 }
 
-TEST(Row44LogSink, ForeignTextNeitherForgesLinesNorSteersTheTerminalNorGoesOnForEver) {
+TEST(LogSink, ForeignTextNeitherForgesLinesNorSteersTheTerminalNorGoesOnForEver) {
   Terminal t;
   t.logger->info("station '{}'",
                  "x\n[2026-01-01] [info] forged\x1b[2J\x7f\xc2\x9b"
@@ -151,7 +151,7 @@ TEST(Row44LogSink, ForeignTextNeitherForgesLinesNorSteersTheTerminalNorGoesOnFor
   EXPECT_LT(said.size(), 2 * (LogSink::kLongest + 64));
 }
 
-TEST(Row44LogSink, TheFlagsOfTheTerminalThatOthersShareStayAsTheyWere) {
+TEST(LogSink, TheFlagsOfTheTerminalThatOthersShareStayAsTheyWere) {
   Terminal t;
   t.logger->info("x");
   t.read_until("x\n");

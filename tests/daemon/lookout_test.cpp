@@ -180,7 +180,7 @@ TEST(Lookout, ALiveMapThatNeverCameIsLateFromTheClocksFirstSecondOn) {
   MapSettings live;
   live.live = true;
   Lookout lookout(*f.channels, vehicle(), live);
-  ASSERT_EQ(f.channels->map_ns, -1);
+  ASSERT_EQ(f.channels->map_ns.load(), std::nullopt);
   for (const std::int64_t now : {std::int64_t{20'000'000}, f.in.now_ns}) EXPECT_TRUE(lookout.look(f.flight, now).late);
 }
 

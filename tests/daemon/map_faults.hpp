@@ -57,7 +57,7 @@ class MapFaults : public testing::Test {
   const track::TickOutput& tick(track::Request request = track::Request::none,
                                 const track::AcceptedSegment* segment = nullptr) {
     now_ns_ += kTick_ns;
-    if (map_moves_on_) channels_->map_ns = now_ns_;
+    if (map_moves_on_) channels_->map_ns.store(now_ns_);
     track::TickInput in;
     in.now_ns = now_ns_;
     in.request = request;
@@ -88,7 +88,7 @@ class MapFaults : public testing::Test {
     for (int n = 0; n < 40; ++n) tick();
     tick(track::Request::enable);
     for (int n = 0; n < 3; ++n) tick();
-    ASSERT_EQ(out_.supervisor.mode, track::Mode::tracking);
+    ASSERT_EQ(out_.supervisor.mode, Mode::tracking);
   }
   /// 4 m along x, in 8 s, with stops every 0.2 s.
   void fly(bool with_stops = true, double clearance = 1) {
@@ -124,11 +124,14 @@ class MapFaults : public testing::Test {
     voxels.centers[0] = {p.x(), p.y(), p.z()};
     channels_->scan_voxels.push(voxels);
   }
-  int ticks_until(track::Mode mode, int most) {
+  int ticks_until(Mode mode, int most) {
     for (int n = 1; n <= most; ++n)
       if (tick().supervisor.mode == mode) return n;
     return most + 1;
   }
 };
+using LateMapFault = MapFaults;
+using LoopClosureFault = MapFaults;
+using ObstacleFault = MapFaults;
 
 }  // namespace backwash::daemon

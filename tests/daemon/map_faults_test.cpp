@@ -5,10 +5,7 @@
 namespace backwash::daemon {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
-TEST_F(MapFaults, Row9APoseOutsideTheMapIsHeld) {
+TEST_F(MapFaults, APoseOutsideTheMapIsHeld) {
   enable();
   tick();
   EXPECT_EQ(out_.supervisor.mode, Mode::tracking);
@@ -19,7 +16,7 @@ TEST_F(MapFaults, Row9APoseOutsideTheMapIsHeld) {
   EXPECT_EQ(out_.supervisor.reason, Reason::outside_map);
 }
 
-TEST_F(MapFaults, Row10WithoutAMapEnablingIsRefused) {
+TEST_F(MapFaults, WithoutAMapEnablingIsRefused) {
   channels_ = std::make_unique<Channels>();
   lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
   for (int n = 0; n < 40; ++n) tick();
@@ -28,7 +25,7 @@ TEST_F(MapFaults, Row10WithoutAMapEnablingIsRefused) {
   EXPECT_EQ(out_.supervisor.reason, Reason::map_missing);
 }
 
-TEST_F(MapFaults, Row13ALateLiveMapIsHeldAfterASecondInMotionAndAStaticOneIsExempt) {
+TEST_F(LateMapFault, ALateLiveMapIsHeldAfterASecondInMotionAndAStaticOneIsExempt) {
   for (const bool live : {false, true}) {
     settings_.live = live;
     settings_.closing_speed = 0.2;
@@ -52,7 +49,7 @@ TEST_F(MapFaults, Row13ALateLiveMapIsHeldAfterASecondInMotionAndAStaticOneIsExem
   }
 }
 
-TEST_F(MapFaults, Row13TheAgeShrinksTheTrustedClearance) {
+TEST_F(LateMapFault, TheAgeShrinksTheTrustedClearance) {
   settings_.live = true;
   settings_.closing_speed = 0.2;
   lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
@@ -64,7 +61,7 @@ TEST_F(MapFaults, Row13TheAgeShrinksTheTrustedClearance) {
 }
 
 // Past a narrow place what is ahead counts: 0.1 m for the first two seconds, 0.5 m from there on.
-TEST_F(MapFaults, Row13TheClearanceOfWhatIsBehindDoesNotCount) {
+TEST_F(LateMapFault, TheClearanceOfWhatIsBehindDoesNotCount) {
   settings_.live = true;
   settings_.closing_speed = 0.2;
   lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
@@ -76,7 +73,7 @@ TEST_F(MapFaults, Row13TheClearanceOfWhatIsBehindDoesNotCount) {
   EXPECT_EQ(ticks_until(Mode::hold, 60), 51);  // 1 s: 0.5 m would last longer
 }
 
-TEST_F(MapFaults, Row13AtRestAnOldMapIsNoFault) {
+TEST_F(LateMapFault, AtRestAnOldMapIsNoFault) {
   settings_.live = true;
   lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
   enable();
@@ -84,7 +81,7 @@ TEST_F(MapFaults, Row13AtRestAnOldMapIsNoFault) {
   EXPECT_EQ(ticks_until(Mode::hold, 100), 101);
 }
 
-TEST_F(MapFaults, Row4ALoopClosureMovesMapTrajectoryAndSetpointInOneTickAndTheVehicleNotAtAll) {
+TEST_F(LoopClosureFault, ALoopClosureMovesMapTrajectoryAndSetpointInOneTickAndTheVehicleNotAtAll) {
   closures_ = 1;  // where odom lies in the map before the flight
   map_from_odom_ = {0.1, {0.5, -0.3, 0}};
   enable();
@@ -114,7 +111,7 @@ TEST_F(MapFaults, Row4ALoopClosureMovesMapTrajectoryAndSetpointInOneTickAndTheVe
   }
 }
 
-TEST_F(MapFaults, Row4ASegmentOfTheOldMapFrameIsRefused) {
+TEST_F(LoopClosureFault, ASegmentOfTheOldMapFrameIsRefused) {
   closures_ = 1;
   map_from_odom_ = {0, {0.5, 0, 0}};
   enable();
@@ -133,7 +130,7 @@ TEST_F(MapFaults, Row4ASegmentOfTheOldMapFrameIsRefused) {
   EXPECT_TRUE(out_.accepted);
 }
 
-TEST_F(MapFaults, Row4AfterAClosureNewVoxelsMeetTheTrajectoryWhereItNowIs) {
+TEST_F(LoopClosureFault, AfterAClosureNewVoxelsMeetTheTrajectoryWhereItNowIs) {
   closures_ = 1;
   map_from_odom_ = {0, {0, 0, 0}};
   enable();
@@ -148,7 +145,7 @@ TEST_F(MapFaults, Row4AfterAClosureNewVoxelsMeetTheTrajectoryWhereItNowIs) {
   EXPECT_EQ(ticks_until(Mode::hold, 3), 1);
 }
 
-TEST_F(MapFaults, Row4AnAbsurdLoopClosureIsNotFlown) {
+TEST_F(LoopClosureFault, AnAbsurdLoopClosureIsNotFlown) {
   const track::RigidShift absurd[] = {{0, {10, 0, 0}}, {1.57, {0, 0, 0}}, {0, {0, 1.05, 0}}, {0.18, {0, 0, 0}}};
   for (const track::RigidShift& shift : absurd) {
     closures_ = 1;

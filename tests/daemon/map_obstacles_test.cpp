@@ -5,10 +5,7 @@
 namespace backwash::daemon {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
-TEST_F(MapFaults, Row14AnObstacleOnThePathIsDecidedOnInOneTickAndTheVehicleRestsBeforeIt) {
+TEST_F(ObstacleFault, AnObstacleOnThePathIsDecidedOnInOneTickAndTheVehicleRestsBeforeIt) {
   enable();
   fly();
   for (int n = 0; n < 150; ++n) tick();
@@ -31,7 +28,7 @@ TEST_F(MapFaults, Row14AnObstacleOnThePathIsDecidedOnInOneTickAndTheVehicleRests
   EXPECT_GT(gap, 0);
 }
 
-TEST_F(MapFaults, Row14WhatDoesNotReachIntoTheSetsIsFlownPast) {
+TEST_F(ObstacleFault, WhatDoesNotReachIntoTheSetsIsFlownPast) {
   enable();
   fly();
   for (int n = 0; n < 100; ++n) tick();
@@ -42,7 +39,7 @@ TEST_F(MapFaults, Row14WhatDoesNotReachIntoTheSetsIsFlownPast) {
   EXPECT_EQ(ticks_until(Mode::hold, 5), 1);
 }
 
-TEST_F(MapFaults, Row14BehindTheVehicleNothingMatters) {
+TEST_F(ObstacleFault, BehindTheVehicleNothingMatters) {
   enable();
   fly();
   for (int n = 0; n < 200; ++n) tick();
@@ -50,7 +47,7 @@ TEST_F(MapFaults, Row14BehindTheVehicleNothingMatters) {
   EXPECT_EQ(ticks_until(Mode::hold, 5), 6);
 }
 
-TEST_F(MapFaults, Row14WithoutAStopBeforeItTheVehicleHoldsAtOnce) {
+TEST_F(ObstacleFault, WithoutAStopBeforeItTheVehicleHoldsAtOnce) {
   enable();
   fly(false);
   for (int n = 0; n < 150; ++n) tick();
@@ -62,7 +59,7 @@ TEST_F(MapFaults, Row14WithoutAStopBeforeItTheVehicleHoldsAtOnce) {
   EXPECT_EQ(out_.command.v_W, Vec3::Zero());
 }
 
-TEST_F(MapFaults, Row14VoxelsThatCameBeforeTheSegmentAreHeldAgainstIt) {
+TEST_F(ObstacleFault, VoxelsThatCameBeforeTheSegmentAreHeldAgainstIt) {
   enable();
   voxel_at({in_map().x() + 2, 0, 1});
   for (int n = 0; n < 3; ++n) tick();
@@ -70,7 +67,7 @@ TEST_F(MapFaults, Row14VoxelsThatCameBeforeTheSegmentAreHeldAgainstIt) {
   EXPECT_EQ(ticks_until(Mode::hold, 2), 1);
 }
 
-TEST_F(MapFaults, Row14EverythingSeenWhileThePlanWasMadeIsHeldAgainstItAndNothingThatThePlanKnew) {
+TEST_F(ObstacleFault, EverythingSeenWhileThePlanWasMadeIsHeldAgainstItAndNothingThatThePlanKnew) {
   for (const bool known : {false, true}) {
     SetUp();
     enable();
@@ -89,7 +86,7 @@ TEST_F(MapFaults, Row14EverythingSeenWhileThePlanWasMadeIsHeldAgainstItAndNothin
   }
 }
 
-TEST_F(MapFaults, Row14WhereMoreWasSeenThanIsKeptTheFlightCountsAsBlocked) {
+TEST_F(ObstacleFault, WhereMoreWasSeenThanIsKeptTheFlightCountsAsBlocked) {
   enable();
   for (int n = 0; n < 40; ++n) {
     voxel_at({in_map().x() + 2, 1.5, 1});
@@ -99,7 +96,7 @@ TEST_F(MapFaults, Row14WhereMoreWasSeenThanIsKeptTheFlightCountsAsBlocked) {
   EXPECT_EQ(ticks_until(Mode::hold, 2), 1);
 }
 
-TEST_F(MapFaults, Row14AFlightThatIsNotClearInTheNewestWorldIsBraked) {
+TEST_F(ObstacleFault, AFlightThatIsNotClearInTheNewestWorldIsBraked) {
   enable();
   fly();
   for (int n = 0; n < 100; ++n) tick();

@@ -94,7 +94,7 @@ TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {
   ASSERT_TRUE(world());
   EXPECT_EQ(world()->grid.size(), grid_.size());
   EXPECT_EQ(channels_->maps_accepted, 1u);
-  EXPECT_EQ(channels_->map_ns, 1);
+  EXPECT_EQ(channels_->map_ns.load(), 1);
   for (auto* to : {&channels_->worlds.mission, &channels_->worlds.planner, &channels_->worlds.reader}) {
     const auto* taken = to->take();
     ASSERT_TRUE(taken);
@@ -138,7 +138,7 @@ TEST_F(MapWorkerTest, ACorruptEmptyOrForeignMapIsRejectedWholeAndTheOldWorldStay
   send(map::OccupancyGrid({0, 0, 0}, 0.2, {8, 8, 8}, map::Cell::occupied));
   EXPECT_EQ(channels_->maps_rejected, 5u);
   EXPECT_EQ(world(), before);
-  EXPECT_EQ(channels_->map_ns, 1);
+  EXPECT_EQ(channels_->map_ns.load(), 1);
 }
 
 TEST_F(MapWorkerTest, AFirstMapOfAResolutionThatNoFieldIsKnownForIsRejected) {
@@ -169,7 +169,7 @@ TEST_F(MapWorkerTest, AScanIsAddedToTheNewestMap) {
 TEST_F(MapWorkerTest, AnEmptyMapIsNoMap) {
   send(std::vector<std::int8_t>{}, 0.2);
   EXPECT_EQ(world(), nullptr);
-  EXPECT_EQ(channels_->map_ns, -1);
+  EXPECT_EQ(channels_->map_ns.load(), std::nullopt);
 }
 
 long resident_kib() {
@@ -223,11 +223,11 @@ TEST_F(MapWorkerTest, AScanChangesTheWorldWhereItSaysSomethingNew) {
   scan({point}, sensor, 9);
   EXPECT_TRUE(world()->grid.occupied(world()->grid.index(point)));
   EXPECT_FALSE(world()->hover.safe(world()->grid.index({1.0, 0.1, 1.1})));
-  EXPECT_EQ(channels_->map_ns, 9);
+  EXPECT_EQ(channels_->map_ns.load(), 9);
   const auto* before = world();
   scan({point}, sensor, 12);
   EXPECT_EQ(world(), before) << "nothing new";
-  EXPECT_EQ(channels_->map_ns, 12) << "but the map is as old as that";
+  EXPECT_EQ(channels_->map_ns.load(), 12) << "but the map is as old as that";
   scan({point}, {90, 0, 1}, 13);
   EXPECT_EQ(channels_->scans_rejected, 2u) << "the sensor is outside the map";
 }

@@ -32,7 +32,7 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
   const struct {
     std::function<void()> fault;
     const char* why;
-  } faults[] = {{[&] { view_.mismatch = track::Mismatch::yaw; }, "map and autopilot disagree"},
+  } faults[] = {{[&] { view_.mismatch = Mismatch::yaw; }, "map and autopilot disagree"},
                 {[&] { view_.odometry_age = 0.2; }, "no odometry"},
                 {[&] { view_.heartbeat_age = 2; }, "no heartbeat"},
                 {[&] { view_.pose_age = 0.32; }, "no pose from the autopilot"},
@@ -186,7 +186,7 @@ TEST_F(MissionRefusals, AWayThatWasBlockedIsTriedAgainFromRestOnly) {
   now_s_ += 5;
   view_.finished = true;
   view_.mode = Mode::hold;
-  view_.reason = track::Reason::obstacle_ahead;
+  view_.reason = Reason::obstacle_ahead;
   view_.state.v_W = {0.5, 0, 0};
   EXPECT_FALSE(look().job);
   view_.state.v_W.setZero();

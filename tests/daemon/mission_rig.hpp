@@ -8,7 +8,6 @@
 #include "tests/daemon/lockstep.hpp"
 
 namespace backwash::daemon::test {
-using track::Mode;
 using track::Request;
 
 inline constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED,

@@ -132,11 +132,11 @@ TEST_F(MissionTest, ARouteGoesOnAtItsNextGoalAndAfterAnObstacleAndAfterNoOtherHo
   const Decision on = look();
   ASSERT_TRUE(on.job);
   EXPECT_EQ(on.job->position, Vec3(-1, 0, 1.2));
-  for (int r = 0; r < track::kReasons; ++r) {
+  for (int r = 0; r < kReasons; ++r) {
     begun();
     view_.mode = Mode::hold;
-    view_.reason = static_cast<track::Reason>(r);
-    EXPECT_EQ(look().job.has_value(), view_.reason == track::Reason::obstacle_ahead) << to_string(view_.reason);
+    view_.reason = static_cast<Reason>(r);
+    EXPECT_EQ(look().job.has_value(), view_.reason == Reason::obstacle_ahead) << to_string(view_.reason);
   }
 }
 

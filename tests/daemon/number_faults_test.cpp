@@ -13,8 +13,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
 constexpr double kBad[] = {kNan, kInf, -kInf, 1e39, -1e39, 1e300};
 
@@ -56,7 +54,7 @@ class NumberFaults : public testing::Test {
   }
 };
 
-TEST_F(NumberFaults, Row2EveryNumberOfTheOdometryIsHeldWithin100msLandedWithin400AndNeverSent) {
+TEST_F(NumberFaults, EveryNumberOfTheOdometryIsHeldWithin100msLandedWithin400AndNeverSent) {
   for (int n = 0; n < 10; ++n) {
     Rig rig;
     rig.take_off();
@@ -71,7 +69,7 @@ TEST_F(NumberFaults, Row2EveryNumberOfTheOdometryIsHeldWithin100msLandedWithin40
   }
 }
 
-TEST_F(NumberFaults, Row2ASingleBadNumberOfTheOdometryIsFlownPast) {
+TEST_F(NumberFaults, ASingleBadNumberOfTheOdometryIsFlownPast) {
   Rig rig;
   rig.take_off();
   rig.start_route(0.5);
@@ -90,7 +88,7 @@ TEST_F(NumberFaults, Row2ASingleBadNumberOfTheOdometryIsFlownPast) {
 }
 
 // The autopilot's own messages: floats, so what is beyond a float cannot come, but the largest float can.
-TEST_F(NumberFaults, Row2EveryNumberOfTheAutopilotIsDroppedOrHeldAndNeverSent) {
+TEST_F(NumberFaults, EveryNumberOfTheAutopilotIsDroppedOrHeldAndNeverSent) {
   constexpr float kBadFloats[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
                                   -std::numeric_limits<float>::infinity(), std::numeric_limits<float>::max(), 1e30F};
   const auto at = [](auto& values, int n) -> float& { return values[static_cast<std::size_t>(n)]; };
@@ -123,7 +121,7 @@ TEST_F(NumberFaults, Row2EveryNumberOfTheAutopilotIsDroppedOrHeldAndNeverSent) {
   }
 }
 
-TEST_F(NumberFaults, Row2EveryNumberOfALoopClosureIsRefusedWholeOrWithinAFloat) {
+TEST_F(NumberFaults, EveryNumberOfALoopClosureIsRefusedWholeOrWithinAFloat) {
   static const std::string map = "map", odom = "odom";
   Rig rig;
   dds::TransformStamped identity{};

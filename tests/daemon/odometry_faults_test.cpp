@@ -13,9 +13,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 /// From the middle of a route at 1 m/s: HOLD within 100 ms of the last good sample (frozen: one position, no velocity),
 /// LAND within 400 ms, then QUIET and not a byte more.
 void expect_hold_land_quiet(Lockstep& rig, std::int64_t last_good_ns) {
@@ -47,7 +44,7 @@ void expect_hold_land_quiet(Lockstep& rig, std::int64_t last_good_ns) {
   for (int n = 0; n < 100; ++n) EXPECT_EQ(rig.tick().bytes, 0u);
 }
 
-TEST(Row1, VioStops) {
+TEST(VioSilenceFault, HoldsWithin100msLandsWithin400AndSendsNothingAfterwards) {
   // The last sample comes just before a tick, and just after one.
   for (const int age : {0, 19}) {
     Lockstep rig;
@@ -61,7 +58,7 @@ TEST(Row1, VioStops) {
   }
 }
 
-TEST(Row2, VioSaysWhatIsNoNumberOrNoRotation) {
+TEST(VioNonsenseFault, WhatIsNoNumberOrNoRotationIsAsASilence) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   const std::function<void(OdometrySample&)> spoils[] = {
       [=](auto& s) { s.state.p_W.y() = nan; }, [=](auto& s) { s.state.v_W.x() = inf; }, [=](auto& s) { s.q[3] = nan; },
@@ -78,7 +75,7 @@ TEST(Row2, VioSaysWhatIsNoNumberOrNoRotation) {
   }
 }
 
-TEST(Row43, NumbersThatAreFiniteAndAbsurdReachNoFieldOfAnyFrame) {
+TEST(BeyondFloatFault, NumbersThatAreFiniteAndAbsurdReachNoFieldOfAnyFrame) {
   const std::function<void(OdometrySample&)> spoils[] = {
       [](auto& s) { s.state.p_W.x() = 1e39; }, [](auto& s) { s.state.p_W.z() = -1e308; },
       [](auto& s) { s.state.v_W.y() = 1e39; }, [](auto& s) { s.state.v_W.z() = -1e308; },
@@ -118,7 +115,7 @@ class Late {
   std::vector<OdometrySample> past_;
 };
 
-TEST(Row49, AVioThatFallsBehindByItsOwnStampsIsAsOneThatStops) {
+TEST(VioLatenessFault, AVioThatFallsBehindByItsOwnStampsIsAsOneThatStops) {
   for (const double profile : {0.0, 0.03}) {
     Lockstep rig;
     Late late;
@@ -139,7 +136,7 @@ TEST(Row49, AVioThatFallsBehindByItsOwnStampsIsAsOneThatStops) {
 }
 
 // A stamp that is ahead would let the gate through whatever can be reached by then.
-TEST(Row49, StampsAheadOfTheirReceptionWidenNoGate) {
+TEST(VioLatenessFault, StampsAheadOfTheirReceptionWidenNoGate) {
   for (const double jump : {0.13, 0.5}) {
     Lockstep rig;
     rig.take_off();
@@ -154,7 +151,7 @@ TEST(Row49, StampsAheadOfTheirReceptionWidenNoGate) {
   }
 }
 
-TEST(Row3, VioJumpsAndIsHeldInTheSameTick) {
+TEST(VioJumpFault, AJumpIsHeldInTheSameTick) {
   for (const double jump : {0.2, -3.0}) {
     Lockstep rig;
     rig.take_off();
@@ -170,7 +167,7 @@ TEST(Row3, VioJumpsAndIsHeldInTheSameTick) {
   }
 }
 
-TEST(Row5, DuplicatesAndStampsThatGoBackAreDroppedAndMoreThanThreeInARowHold) {
+TEST(VioStampFault, DuplicatesAndStampsThatGoBackAreDroppedAndMoreThanThreeInARowHold) {
   for (const std::int64_t back_ns : {0, 100'000'000}) {
     Lockstep rig;
     rig.take_off();
@@ -198,7 +195,7 @@ TEST(Row5, DuplicatesAndStampsThatGoBackAreDroppedAndMoreThanThreeInARowHold) {
   }
 }
 
-TEST(Row6, FiveIdenticalPosesUnderCommandedMotionHold) {
+TEST(VioFreezeFault, FiveIdenticalPosesUnderCommandedMotionHold) {
   Lockstep rig;
   rig.take_off();
   rig.start_route(2);
@@ -215,7 +212,7 @@ TEST(Row6, FiveIdenticalPosesUnderCommandedMotionHold) {
   EXPECT_EQ(rig.reason(), Reason::odometry_frozen);
 }
 
-TEST(Row6, IdenticalPosesOnTheGroundAreNoFault) {
+TEST(VioFreezeFault, IdenticalPosesOnTheGroundAreNoFault) {
   Lockstep rig;
   rig.ticks(50);
   std::optional<OdometrySample> frozen;
@@ -231,7 +228,7 @@ TEST(Row6, IdenticalPosesOnTheGroundAreNoFault) {
 }
 
 // The measured position leaves the tube with 5 m/s², as in a gust, and its velocity says so: nothing for the gate.
-TEST(Row16, AnErrorOutsideItsSetIsAnEventAtOnceAndHoldsAfterThreeTicks) {
+TEST(OutsideTheSetFault, AnErrorOutsideItsSetIsAnEventAtOnceAndHoldsAfterThreeTicks) {
   Lockstep rig;
   rig.take_off();
   rig.start_route(2);
@@ -252,7 +249,7 @@ TEST(Row16, AnErrorOutsideItsSetIsAnEventAtOnceAndHoldsAfterThreeTicks) {
   EXPECT_EQ(rig.reason(), Reason::outside_set);
 }
 
-TEST(Row30, TheWallClockOfTheVioStepsByAnHourAndNothingHappens) {
+TEST(WallClockFault, AStepOfTheViosByAnHourChangesNothing) {
   for (const std::int64_t hours : {1, -1}) {
     Lockstep rig;
     rig.take_off();

@@ -8,16 +8,13 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 std::vector<ControlEvent> events(Lockstep& rig) {
   std::vector<ControlEvent> all;
   while (const auto event = rig.channels->events.pop()) all.push_back(*event);
   return all;
 }
 
-TEST(Row32, OneMissedDeadlineIsLoggedThreeInASecondHoldTwentyFiveInARowAreQuiet) {
+TEST(MissedDeadlineFault, OneMissedDeadlineIsLoggedThreeInASecondHoldTwentyFiveInARowAreQuiet) {
   const auto missed_events = [](Lockstep& rig) {
     std::uint64_t periods = 0;
     for (const auto& e : events(rig)) periods += e.kind == ControlEvent::Kind::missed_deadline ? e.count : 0;
@@ -81,7 +78,7 @@ TEST(Hold, WithATrustedPoseRestsOnTheVerifiedStopWithinTheLimits) {
   EXPECT_LT((rig.autopilot->truth().p_W - last.p_W).norm(), 0.15);
 }
 
-TEST(Row33, APageFaultInATickIsAnEvent) {
+TEST(PageFault, APageFaultInATickIsAnEvent) {
   Lockstep rig;
   rig.ticks(20);
   events(rig);
@@ -97,7 +94,7 @@ TEST(Row33, APageFaultInATickIsAnEvent) {
   EXPECT_GT(seen[0].count, 0u);
 }
 
-TEST(Row35, WhenNobodyTakesTheRecordsTheFlightIsUnaffectedAndTheLossIsCounted) {
+TEST(UntakenRecordsFault, WhenNobodyTakesTheRecordsTheFlightIsUnaffectedAndTheLossIsCounted) {
   InFlight rig(0.2);
   rig.recorded = false;
   for (int n = 0; n < 300; ++n) EXPECT_EQ(rig.tick().setpoints.size(), 1u);
@@ -105,7 +102,7 @@ TEST(Row35, WhenNobodyTakesTheRecordsTheFlightIsUnaffectedAndTheLossIsCounted) {
   EXPECT_GT(rig.channels->control_log.lost(), 100u);
 }
 
-TEST(Row36, ADaemonThatRestartsInFlightSendsNothingToTheArmedVehicleAndStaysPassive) {
+TEST(RestartFault, ADaemonThatRestartsInFlightSendsNothingToTheArmedVehicleAndStaysPassive) {
   InFlight rig;
   rig.restart();
   int armed = 0, forwarded = 0;

@@ -75,14 +75,14 @@ TEST_F(ParameterReading, InQuietItIsAskedOnlyForAnOperatorWhoAsksToEnable) {
   rig_.ticks(150);
   rig_.take_off();
   rig_.autopilot->mute = true;
-  ASSERT_GE(rig_.ticks_until(track::Mode::quiet, 200), 0);
+  ASSERT_GE(rig_.ticks_until(Mode::quiet, 200), 0);
   rig_.ticks(50);
   rig_.autopilot->mute = false;
   rig_.autopilot->disarm();
   EXPECT_EQ(commands_in(200), 0);
-  ASSERT_EQ(rig_.mode(), track::Mode::quiet);
+  ASSERT_EQ(rig_.mode(), Mode::quiet);
   EXPECT_TRUE(forbids(rig_).starts_with("no value of")) << forbids(rig_);
-  rig_.channels->enable_asked_ns = rig_.now_ns();
+  rig_.channels->enable_asked_ns.store(rig_.now_ns());
   EXPECT_GT(commands_in(120), 0) << "messages and origin are asked for too: without a pose nobody enables";
   EXPECT_EQ(forbids(rig_), "");
 }
@@ -102,7 +102,7 @@ TEST_F(ParameterReading, AfterARestartInTheAirTheClockIsAskedForTooByAnOperatorW
     });
   };
   EXPECT_EQ(questions(50), 0);
-  rig_.channels->enable_asked_ns = rig_.now_ns();
+  rig_.channels->enable_asked_ns.store(rig_.now_ns());
   EXPECT_EQ(questions(50), 2);
 }
 
@@ -113,7 +113,7 @@ TEST_F(ParameterReading, AfterARestartInTheAirItIsAskedForAnOperatorWhoAsksToEna
   rig_.ticks(55);  // the first heartbeat is among them
   ASSERT_TRUE(rig_.autopilot->armed());
   EXPECT_EQ(known(), 0U);
-  rig_.channels->enable_asked_ns = rig_.now_ns();
+  rig_.channels->enable_asked_ns.store(rig_.now_ns());
   for (int n = 0; n < 75 && !forbids(rig_).empty(); ++n) rig_.tick();
   EXPECT_EQ(forbids(rig_), "");
   EXPECT_TRUE(rig_.autopilot->armed()) << "it was not in the air any more";
@@ -129,7 +129,7 @@ TEST_F(ParameterReading, AnArmedVehicleIsAskedForNothing) {
       rig.restart();
     } else {
       rig.autopilot->mute = true;
-      ASSERT_GE(rig.ticks_until(track::Mode::quiet, 200), 0);
+      ASSERT_GE(rig.ticks_until(Mode::quiet, 200), 0);
       rig.autopilot->mute = false;
     }
     rig.ticks(40);

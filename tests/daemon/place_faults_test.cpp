@@ -17,16 +17,13 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 /// In the air, at rest.
 struct Hovering : Lockstep {
   Hovering() : Lockstep({0.7, Vec3(5, -3, 0.2)}, Medium::udp) { take_off(); }
 };
 
 // Each part of the frame alone, in motion: what goes out is the same place of the room, in the new frame.
-TEST(Row8, AResetOfYawHeightOrOneAxisAloneIsHeldInTheNewFrameWithinTwoTicks) {
+TEST(EstimatorResetFault, AResetOfYawHeightOrOneAxisAloneIsHeldInTheNewFrameWithinTwoTicks) {
   struct Move {
     double yaw;
     Vec3 by;
@@ -55,7 +52,7 @@ TEST(Row8, AResetOfYawHeightOrOneAxisAloneIsHeldInTheNewFrameWithinTwoTicks) {
 }
 
 // Too small to be told from noise by one sample: its counter says so, and the frame is taken anew.
-TEST(Row8, ASmallResetThatIsCountedIsTakenIn) {
+TEST(EstimatorResetFault, ASmallResetThatIsCountedIsTakenIn) {
   InFlight rig(2);
   rig.say(mavlink::Odometry{.q = {1, 0, 0, 0}, .reset_counter = 3});
   rig.tick();
@@ -80,7 +77,7 @@ std::shared_ptr<const plan::World> box_around(const Vec3& p, int side, double be
   return plan::build_world(std::move(grid), Model{}, vehicle_5in());
 }
 
-TEST(Row9, BeyondEachOfTheMapsSixSidesTheSetpointRests) {
+TEST(OutsideTheMapFault, BeyondEachOfTheMapsSixSidesTheSetpointRests) {
   constexpr const char* kSides[] = {"-x", "+x", "-y", "+y", "-z", "+z"};
   for (int side = 0; side < 6; ++side) {
     Hovering rig;
@@ -102,7 +99,7 @@ TEST(Row9, BeyondEachOfTheMapsSixSidesTheSetpointRests) {
   }
 }
 
-TEST(Row9, BeyondEachOfTheMapsSixSidesEnablingIsRefused) {
+TEST(OutsideTheMapFault, BeyondEachOfTheMapsSixSidesEnablingIsRefused) {
   for (int side = 0; side < 6; ++side) {
     for (const double beyond : {-0.15, 0.15}) {
       Lockstep rig({0.7, Vec3(5, -3, 0.2)}, Medium::udp);
@@ -144,8 +141,9 @@ class Maps : public testing::Test {
     worker_->step();
   }
 };
+using HugeMapFault = Maps;
 
-TEST_F(Maps, Row10WithoutAMapOrWithAnEmptyOneNothingIsEverCommanded) {
+TEST_F(Maps, WithoutAMapOrWithAnEmptyOneNothingIsEverCommanded) {
   const map::OccupancyGrid solid({-3, -3, 0}, 0.2, {30, 30, 20}, map::Cell::occupied);
   const map::OccupancyGrid unknown({-3, -3, 0}, 0.2, {30, 30, 20}, map::Cell::unknown);
   const std::vector<std::int8_t> nothing[] = {{}, map::encode_octomap(solid), map::encode_octomap(unknown)};
@@ -197,7 +195,7 @@ std::vector<std::int8_t> two_paths(int a, int b) {
   return data;
 }
 
-TEST_F(Maps, Row11AFewBytesThatMeanAHugeMapAreRefusedBeforeTheyCostMemoryOrTime) {
+TEST_F(HugeMapFault, AFewBytesThatMeanAHugeMapAreRefusedBeforeTheyCostMemoryOrTime) {
   use(*channels_);
   std::vector<std::vector<std::int8_t>> bombs;
   for (int a = 0; a < 8; ++a)
@@ -222,7 +220,7 @@ TEST_F(Maps, Row11AFewBytesThatMeanAHugeMapAreRefusedBeforeTheyCostMemoryOrTime)
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(20 * sent));
 }
 
-TEST_F(Maps, Row11TheCapIsWhatItSays) {
+TEST_F(HugeMapFault, TheCapIsWhatItSays) {
   // 115 bytes a voxel (map_worker.cpp): 1 MiB are 9,118 voxels, 20 × 20 × 22 = 8,800 fit and 21 × 21 × 22 = 9,702 do
   // not.
   settings_.max_mib = 1;
@@ -234,7 +232,7 @@ TEST_F(Maps, Row11TheCapIsWhatItSays) {
 }
 
 // Whatever a few bytes mean: never more than the cap.
-TEST_F(Maps, Row11RandomTreesOfAFewBytesStayBelowTheCap) {
+TEST_F(HugeMapFault, RandomTreesOfAFewBytesStayBelowTheCap) {
   settings_.max_mib = 1;
   use(*channels_);
   std::mt19937 random(5);

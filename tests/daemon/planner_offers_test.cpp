@@ -115,7 +115,7 @@ TEST_F(PlannerOffers, NothingThatIsEndedAlreadyOrWithoutControl) {
   stand({1.05, 2.05, 1.05});
   EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}, {6, 2}), "") << "an earlier order's";
   EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}, {7, 1}), "") << "before the mode ended it";
-  view_.mode = track::Mode::passive;
+  view_.mode = Mode::passive;
   show();
   EXPECT_NE(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}), "");
   EXPECT_TRUE(offers_.empty());
@@ -139,12 +139,12 @@ TEST_F(PlannerOffers, WhereTheCauseOfAHoldLastsThatIsWhyNothingFlies) {
   for (const bool held : {false, true}) {
     stand({1.05, 2.05, 1.05});
     know(room());
-    view_.mode = held ? track::Mode::hold : track::Mode::tracking;
-    view_.reason = held ? track::Reason::frames_apart : track::Reason::autopilot_follows;
+    view_.mode = held ? Mode::hold : Mode::tracking;
+    view_.reason = held ? Reason::frames_apart : Reason::autopilot_follows;
     show();
     answer_ = [&](const auto& s) { view_.refused_segment = s.id; };
     const std::string why = ask(PlanJob::Kind::go_to, {2.05, 2.05, 1.05});
-    EXPECT_NE(why.find(held ? to_string(track::Reason::frames_apart) : "not still enough"), std::string::npos) << why;
+    EXPECT_NE(why.find(held ? to_string(Reason::frames_apart) : "not still enough"), std::string::npos) << why;
   }
 }
 

@@ -54,7 +54,7 @@ class PlannerOffers : public testing::Test {
     std::filesystem::remove(log_);
   }
   void stand(const Vec3& p_W) {
-    view_.mode = track::Mode::tracking;
+    view_.mode = Mode::tracking;
     view_.state = {p_W, Vec3::Zero()};
     view_.command = {p_W, Vec3::Zero(), Vec3::Zero(), 0.3};
     view_.epoch = {7, 2};
@@ -73,14 +73,14 @@ class PlannerOffers : public testing::Test {
       answer_(*s);
     }
     // The autopilot lifts in no time.
-    if (view_.mode == track::Mode::lifting) {
-      view_.mode = track::Mode::tracking;
-      view_.reason = track::Reason::lifted_off;
+    if (view_.mode == Mode::lifting) {
+      view_.mode = Mode::tracking;
+      view_.reason = Reason::lifted_off;
       view_.state = {offers_.back().commands.back().p_W, Vec3::Zero()};
       view_.command = offers_.back().commands.back();
       view_.segment = 0;
     } else if (!offers_.empty() && view_.segment == offers_.back().id && offers_.back().arms) {
-      view_.mode = track::Mode::lifting;
+      view_.mode = Mode::lifting;
     }
     view_.t_ns += pause_ns_;
     meanwhile_();

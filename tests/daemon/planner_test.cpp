@@ -60,7 +60,7 @@ class PlannerFlight : public testing::Test {
     ++ticks_;
     ASSERT_EQ(wire.setpoints.size(), 1u);
     const Setpoint now = rig_.in_map(wire.setpoints[0]);
-    const bool tracking = rig_.mode() == track::Mode::tracking;
+    const bool tracking = rig_.mode() == Mode::tracking;
     if (last_) {
       EXPECT_LT((now.p_W - last_->p_W - kControlPeriod / 2 * (last_->v_W + now.v_W)).norm(), 3e-3) << ticks_;
       EXPECT_LT((now.v_W - last_->v_W).norm(), 3.5 * kControlPeriod) << ticks_;  // a_max is 2 m/s² per axis
@@ -70,7 +70,7 @@ class PlannerFlight : public testing::Test {
       last_rate_ = rate;
     }
     last_ = now;
-    held_ += rig_.mode() == track::Mode::hold;
+    held_ += rig_.mode() == Mode::hold;
     nearest_ = std::min(nearest_, distance_.exact(truth_, rig_.autopilot->truth().p_W));
     if (scan_every_ > 0 && ticks_ % scan_every_ == 0) scan();
     if (ticks_ % kWorldEvery == 0) map_.step();
@@ -217,11 +217,11 @@ TEST_F(CrateAppears, AnOperatorsStopEndsTheFlightAlsoWhileItBrakesForTheCrate) {
   bool stopped = false;
   fly(3000, [&] {
     appear();
-    if (!stopped && rig_.mode() == track::Mode::hold) stopped = rig_.channels->orders.push({track::Request::stop});
+    if (!stopped && rig_.mode() == Mode::hold) stopped = rig_.channels->orders.push({track::Request::stop});
   });
   ASSERT_TRUE(stopped);
-  EXPECT_EQ(rig_.mode(), track::Mode::hold);
-  EXPECT_EQ(rig_.reason(), track::Reason::stop_requested);
+  EXPECT_EQ(rig_.mode(), Mode::hold);
+  EXPECT_EQ(rig_.reason(), Reason::stop_requested);
   EXPECT_EQ(segments_, 1u);
   EXPECT_GT(nearest_, vehicle_5in().body.radius);
 }
@@ -264,7 +264,7 @@ TEST_F(UnknownRoom, AGoalThatNothingLeadsToIsRefusedFromRest) {
   ASSERT_EQ(go({1.8, -0.6, 1.2}), "");
   fly(4000);
   EXPECT_LT(rig_.autopilot->truth().p_W.x(), 0.2);
-  EXPECT_EQ(rig_.mode(), track::Mode::tracking);
+  EXPECT_EQ(rig_.mode(), Mode::tracking);
   EXPECT_NE(go({1.8, -0.6, 1.2}).find("goal_blocked"), std::string::npos);
   EXPECT_GT(nearest_, vehicle_5in().body.radius);
 }

@@ -72,8 +72,8 @@ TEST_F(PlannerWatch, AFlightWithoutAClearWayOnIsBlocked) {
 
 TEST_F(PlannerWatch, AFlightThatWasStoppedIsNotExtended) {
   fly_past(1.4);
-  view_.mode = track::Mode::hold;
-  view_.reason = track::Reason::operator_request;
+  view_.mode = Mode::hold;
+  view_.reason = Reason::operator_request;
   view_.braking = true;
   show();
   know(walled(3.8, true));

@@ -15,9 +15,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// What a wrong frame makes of a sample, about the place where the vehicle was when it went wrong.
@@ -119,12 +116,12 @@ void expect_safe(const std::string& what, const Wrong& wrong, int ticks, double 
   }
 }
 
-TEST(Row41, AFrameThatTurnsIsHeldAtOnceAndNotFlown) {
+TEST(VioFrameFault, AFrameThatTurnsIsHeldAtOnceAndNotFlown) {
   for (const double angle : {10., 20., 45., 90., 135., 180., -10., -90.})
     expect_safe(with("turned by %.0f°", angle), turned(angle * kDegree, Vec3::UnitZ(), true), 2, 0.2);
 }
 
-TEST(Row41, AFrameThatTiltsIsHeld) {
+TEST(VioFrameFault, AFrameThatTiltsIsHeld) {
   for (const double angle : {10., 20., 45., 90., 180.}) {
     const int ticks = angle < 20 ? 8 : 3;
     expect_safe(with("tilted by %.0f° about x", angle), turned(angle * kDegree, Vec3::UnitX(), true), ticks, 0.2);
@@ -132,7 +129,7 @@ TEST(Row41, AFrameThatTiltsIsHeld) {
   }
 }
 
-TEST(Row41, PositionsThatGoAnotherWayThanTheVelocitiesAreHeld) {
+TEST(VioFrameFault, PositionsThatGoAnotherWayThanTheVelocitiesAreHeld) {
   for (const double angle : {10., 20., 45., 90., 180.})
     expect_safe(with("positions turned by %.0f°", angle), turned(angle * kDegree, Vec3::UnitZ(), false), 30, 0.3);
   for (const double scale : {0.5, 0.8, 0.9, 1.1, 1.25, 2.0})
@@ -141,14 +138,14 @@ TEST(Row41, PositionsThatGoAnotherWayThanTheVelocitiesAreHeld) {
   expect_safe("positions mirrored along x", scaled({-1, 1, 1}, false), 5, 0.3);
 }
 
-TEST(Row41, PositionsAndVelocitiesThatAreRescaledTogetherAreHeldAtTheStepOfTheVelocity) {
+TEST(VioFrameFault, PositionsAndVelocitiesThatAreRescaledTogetherAreHeldAtTheStepOfTheVelocity) {
   for (const double scale : {0.5, 0.65, 1.35, 2.0})
     expect_safe(with("all scaled by %.2f", scale), scaled(Vec3::Constant(scale), true), 2, 0.3);
   expect_safe("all frozen along x", scaled({0, 1, 1}, true), 2, 0.3);
   expect_safe("all mirrored along x", scaled({-1, 1, 1}, true), 2, 0.3);
 }
 
-TEST(Row41, AFrameThatTurnsByAndByDisagreesBeforeAWallIsReached) {
+TEST(VioFrameFault, AFrameThatTurnsByAndByDisagreesBeforeAWallIsReached) {
   for (const double rate : {2., 5., 10., 30., 90., -10.}) {
     const Wrong wrong{"",
                       [=](double t) { return Eigen::AngleAxisd(rate * t * kDegree, Vec3::UnitZ()).toRotationMatrix(); },
@@ -157,7 +154,7 @@ TEST(Row41, AFrameThatTurnsByAndByDisagreesBeforeAWallIsReached) {
   }
 }
 
-TEST(Row41, PositionsThatRescaleByAndByAreHeld) {
+TEST(VioFrameFault, PositionsThatRescaleByAndByAreHeld) {
   for (const double rate : {-0.1, 0.1, -0.5, 0.5}) {
     const Wrong wrong{"", [=](double t) -> Mat3 { return std::max(0.2, 1 + rate * t) * Mat3::Identity(); }, false,
                       false};
@@ -165,7 +162,7 @@ TEST(Row41, PositionsThatRescaleByAndByAreHeld) {
   }
 }
 
-TEST(Row42, WithoutTheAutopilotsPositionOrAttitudeItHoldsAfter300MillisecondsAndLandsAfterOneSecond) {
+TEST(AutopilotPoseFault, WithoutTheAutopilotsPositionOrAttitudeItHoldsAfter300MillisecondsAndLandsAfterOneSecond) {
   for (const bool attitude : {false, true}) {
     InFlight rig;
     (attitude ? rig.autopilot->silent_attitude : rig.autopilot->silent_pose) = true;
@@ -180,7 +177,7 @@ TEST(Row42, WithoutTheAutopilotsPositionOrAttitudeItHoldsAfter300MillisecondsAnd
   }
 }
 
-TEST(Row42, AShortSilenceIsBridgedAndAHoldAfterALongerOneTakesANewFlight) {
+TEST(AutopilotPoseFault, AShortSilenceIsBridgedAndAHoldAfterALongerOneTakesANewFlight) {
   InFlight rig(1);
   rig.autopilot->silent_pose = true;
   rig.ticks(14);
@@ -198,7 +195,7 @@ TEST(Row42, AShortSilenceIsBridgedAndAHoldAfterALongerOneTakesANewFlight) {
   EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
 }
 
-TEST(Row42, EnableIsRefusedOnAnOldPose) {
+TEST(AutopilotPoseFault, EnableIsRefusedOnAnOldPose) {
   for (const bool attitude : {false, true}) {
     Lockstep rig;
     rig.ticks(60);
@@ -215,7 +212,7 @@ TEST(Row42, EnableIsRefusedOnAnOldPose) {
 }
 
 // Row 43, from the other side: numbers of the autopilot that no vehicle has are as silence.
-TEST(Row42, APoseOfTheAutopilotThatCannotBeIsAsNone) {
+TEST(AutopilotPoseFault, APoseOfTheAutopilotThatCannotBeIsAsNone) {
   for (const float far : {3e38F, -3e38F, 2e4F}) {
     InFlight rig;
     rig.autopilot->silent_pose = true;

@@ -39,7 +39,7 @@ int in_a_process(Body&& body) {
   return WIFSIGNALED(status) ? 1000 + WTERMSIG(status) : WEXITSTATUS(status);
 }
 
-TEST(Row50, AnExceptionInAThreadEndsTheOthersAndKeepsItsNameAndText) {
+TEST(ThreadFault, AnExceptionInAThreadEndsTheOthersAndKeepsItsNameAndText) {
   std::atomic<bool> stop{false};
   Failure failure(stop);
   Threads threads(failure);
@@ -58,7 +58,7 @@ TEST(Row50, AnExceptionInAThreadEndsTheOthersAndKeepsItsNameAndText) {
   EXPECT_EQ(failure.text(), "planner: no such primitive");
 }
 
-TEST(Row50, AFailedAllocationAndAThrownNumberAreFailuresToo) {
+TEST(ThreadFault, AFailedAllocationAndAThrownNumberAreFailuresToo) {
   for (const bool memory : {true, false}) {
     std::atomic<bool> stop{false};
     Failure failure(stop);
@@ -93,7 +93,7 @@ TEST(Ending, EveryThreadIsGivenOrdinaryPriorityWhereAllowed) {
   EXPECT_EQ(code, 5);
 }
 
-TEST(Row50, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
+TEST(ThreadFault, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
   const int code = in_a_process([] {
     std::atomic<bool> stop{false};
     Failure failure(stop);
@@ -105,7 +105,7 @@ TEST(Row50, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
 }
 
 // What no catch sees: a throwing function that promised not to, and a C library without memory.
-TEST(Row50, TerminateAndAbortInAThreadLeaveTheOthersToCloseDown) {
+TEST(ThreadFault, TerminateAndAbortInAThreadLeaveTheOthersToCloseDown) {
   for (const bool aborts : {true, false}) {
     const int code = in_a_process([aborts] {
       std::atomic<bool> stop{false};
@@ -128,7 +128,7 @@ TEST(Row50, TerminateAndAbortInAThreadLeaveTheOthersToCloseDown) {
   }
 }
 
-TEST(Row44, PipesTerminalsAndLimitsKillAndStopNoProcessAndHangUpsAreIgnored) {
+TEST(StandardOutputFault, PipesTerminalsAndLimitsKillAndStopNoProcessAndHangUpsAreIgnored) {
   const int code = in_a_process([] {
     const sigset_t signals = shield_process();
     std::atomic<bool> stop{false};
@@ -148,7 +148,7 @@ TEST(Row44, PipesTerminalsAndLimitsKillAndStopNoProcessAndHangUpsAreIgnored) {
 }
 
 // Ctrl-\\: as it is, the log would end without what the last ticks decided.
-TEST(Row44, AQuitOfTheTerminalIsAnEndInOrder) {
+TEST(StandardOutputFault, AQuitOfTheTerminalIsAnEndInOrder) {
   const int code = in_a_process([] {
     const sigset_t signals = shield_process();
     std::atomic<bool> stop{false};
@@ -160,7 +160,7 @@ TEST(Row44, AQuitOfTheTerminalIsAnEndInOrder) {
   EXPECT_EQ(code, 5);
 }
 
-TEST(Row44, AClosedStandardDescriptorIsNeverGivenToAPortOrLog) {
+TEST(StandardOutputFault, AClosedStandardDescriptorIsNeverGivenToAPortOrLog) {
   const int code = in_a_process([] {
     ::close(STDIN_FILENO);
     ::close(STDERR_FILENO);

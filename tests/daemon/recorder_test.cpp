@@ -23,7 +23,7 @@
 namespace backwash::daemon {
 namespace {
 
-class Row35Recorder : public testing::Test {
+class RecorderFault : public testing::Test {
  protected:
   void SetUp() override {
     folder_ = testing::TempDir() + "recorder_" + std::to_string(::getpid());
@@ -51,7 +51,7 @@ class Row35Recorder : public testing::Test {
   std::unique_ptr<Channels> channels_;
 };
 
-TEST_F(Row35Recorder, AFullDiskLosesWholeBatchesAndTheLogSaysHowManyOnceItCanBeWrittenAgain) {
+TEST_F(RecorderFault, AFullDiskLosesWholeBatchesAndTheLogSaysHowManyOnceItCanBeWrittenAgain) {
   Recorder recorder(path_);
   put(50);
   recorder.drain(*channels_);
@@ -74,7 +74,7 @@ TEST_F(Row35Recorder, AFullDiskLosesWholeBatchesAndTheLogSaysHowManyOnceItCanBeW
   EXPECT_EQ(read(), std::pair(std::size_t{50 + 1 + 7 + 3}, std::uint64_t{50}));
 }
 
-TEST_F(Row35Recorder, ADirectoryThatIsGoneLosesRecordsUntilItIsBack) {
+TEST_F(RecorderFault, ADirectoryThatIsGoneLosesRecordsUntilItIsBack) {
   Recorder recorder(path_);
   put(5);
   recorder.drain(*channels_);
@@ -93,7 +93,7 @@ TEST_F(Row35Recorder, ADirectoryThatIsGoneLosesRecordsUntilItIsBack) {
   EXPECT_EQ(read(), std::pair(std::size_t{1 + 4}, std::uint64_t{30}));
 }
 
-TEST_F(Row35Recorder, AFileThatCannotBeMadeAtStartIsAConfigurationErrorThatNamesIt) {
+TEST_F(RecorderFault, AFileThatCannotBeMadeAtStartIsAConfigurationErrorThatNamesIt) {
   try {
     Recorder recorder(folder_ + "/nowhere/flight.bwlog");
     FAIL() << "started without a log";
@@ -104,7 +104,7 @@ TEST_F(Row35Recorder, AFileThatCannotBeMadeAtStartIsAConfigurationErrorThatNames
 
 // A file system without room, not a limit of the process.
 // systemd starts it again every few seconds.
-TEST_F(Row35Recorder, AStartOnAFullDiskLeavesNoEmptyLogs) {
+TEST_F(RecorderFault, AStartOnAFullDiskLeavesNoEmptyLogs) {
   rlimit before{};
   ::getrlimit(RLIMIT_FSIZE, &before);
   ::signal(SIGXFSZ, SIG_IGN);
@@ -115,7 +115,7 @@ TEST_F(Row35Recorder, AStartOnAFullDiskLeavesNoEmptyLogs) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }
 
-TEST_F(Row35Recorder, ASmallDiskThatIsFullLosesRecordsUntilSomethingIsDeleted) {
+TEST_F(RecorderFault, ASmallDiskThatIsFullLosesRecordsUntilSomethingIsDeleted) {
   if (::unshare(CLONE_NEWNS) != 0 || ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
       ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=128k") != 0)
     GTEST_SKIP() << "a file system cannot be mounted here: " << std::strerror(errno);
@@ -138,7 +138,7 @@ TEST_F(Row35Recorder, ASmallDiskThatIsFullLosesRecordsUntilSomethingIsDeleted) {
   ::umount(folder_.c_str());
 }
 
-TEST_F(Row35Recorder, ADiskThatHangsDelaysNobodyAndHoldsNoMoreThanItsShareOfMemory) {
+TEST_F(RecorderFault, ADiskThatHangsDelaysNobodyAndHoldsNoMoreThanItsShareOfMemory) {
   if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns write()";
   constexpr std::size_t kMiB = 1u << 20;
   Recorder recorder(path_);
@@ -162,7 +162,7 @@ TEST_F(Row35Recorder, ADiskThatHangsDelaysNobodyAndHoldsNoMoreThanItsShareOfMemo
   EXPECT_EQ(records + lost, 10u + 100 + 3000 + 1);  // one says what was lost
 }
 
-TEST_F(Row35Recorder, EachChangeOfTheModeIsPutOnTheDiskByTheRecordersThread) {
+TEST_F(RecorderFault, EachChangeOfTheModeIsPutOnTheDiskByTheRecordersThread) {
   if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns fdatasync()";
   Recorder recorder(path_);
   const auto tick = [&](std::uint32_t mode) {
@@ -187,7 +187,7 @@ std::string content(const std::string& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-TEST_F(Row35Recorder, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) {
+TEST_F(RecorderFault, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) {
   for (const char* file : {"flight-7.bwlog", "flight-x.bwlog", "flight-07x.bwlog", "flighty-9.bwlog"})
     std::ofstream(folder_ + "/" + file) << file;
   EXPECT_EQ(Recorder(path_).path(), path_);
@@ -206,7 +206,7 @@ TEST_F(Row35Recorder, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) 
   EXPECT_EQ(status.st_mode & 0777, 0640u);
 }
 
-TEST_F(Row35Recorder, AStartThatFailsBeforeAnythingIsRecordedLeavesNoLogAndTouchesNoOther) {
+TEST_F(RecorderFault, AStartThatFailsBeforeAnythingIsRecordedLeavesNoLogAndTouchesNoOther) {
   std::ofstream(path_) << "an earlier flight";
   { const Recorder failed(path_); }
   EXPECT_FALSE(std::filesystem::exists(folder_ + "/flight-2.bwlog"));
@@ -231,7 +231,7 @@ static_assert(!std::is_constructible_v<DdsFront, const config::Daemon&, int, con
 static_assert(!std::is_constructible_v<ControlLoop, Channels&, firmware_bridge::AutopilotLink&, const Vehicle&, double,
                                        const MapSettings&, Recorder&>);
 
-TEST_F(Row35Recorder, CommandsComeThroughARingAndWhatItHadNoRoomForIsCounted) {
+TEST_F(RecorderFault, CommandsComeThroughARingAndWhatItHadNoRoomForIsCounted) {
   Recorder recorder(path_);
   ControlRecord r;
   r.header = {now_ns(), log::RecordKind::command, 10};
@@ -242,7 +242,7 @@ TEST_F(Row35Recorder, CommandsComeThroughARingAndWhatItHadNoRoomForIsCounted) {
   EXPECT_EQ(read(), std::pair(sent + 1, std::uint64_t{1}));
 }
 
-TEST_F(Row35Recorder, ALinkInThePlaceOfTheLogIsNotFollowed) {
+TEST_F(RecorderFault, ALinkInThePlaceOfTheLogIsNotFollowed) {
   std::ofstream(folder_ + "/other") << "of somebody else";
   std::filesystem::create_symlink(folder_ + "/other", path_);
   std::filesystem::create_symlink(folder_ + "/nowhere", folder_ + "/flight-2.bwlog");
@@ -251,7 +251,7 @@ TEST_F(Row35Recorder, ALinkInThePlaceOfTheLogIsNotFollowed) {
   EXPECT_FALSE(std::filesystem::exists(folder_ + "/nowhere"));
 }
 
-TEST_F(Row35Recorder, AFileThatWasReplacedInFlightIsLeftAndTheNextOneMade) {
+TEST_F(RecorderFault, AFileThatWasReplacedInFlightIsLeftAndTheNextOneMade) {
   Recorder recorder(path_);
   put(5);
   recorder.drain(*channels_);

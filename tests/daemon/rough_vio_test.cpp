@@ -13,9 +13,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// A VIO as bad as the vehicle file allows (estimation.position, and its velocity by σ / 0.5 s), delivered with up to

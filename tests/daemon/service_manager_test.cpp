@@ -85,7 +85,7 @@ TEST(ServiceManagerTest, TheJournalIsSpokenToOnlyIfTheLogLeadsThere) {
 }
 
 // The watchdog is fed by the loop that flies, and by its ticks alone: where it hangs nothing is said.
-TEST(Row36, TheWatchdogIsFedByTheControlThreadsTicksAndByNothingElse) {
+TEST(Watchdog, IsFedByTheControlThreadsTicksAndByNothingElse) {
   const Listener listener;
   const auto manager = ServiceManager::of_environment(STDERR_FILENO);
   auto channels = std::make_unique<Channels>();

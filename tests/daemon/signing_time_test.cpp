@@ -101,10 +101,10 @@ TEST_F(SigningTimeTest, IsKeptAheadWhileTheLinkSignsAndNotPutBackByAnEndBeforeTh
   end = false;
   std::thread keeper([&] { run_signing_time(file, *channels, end); });
   const SigningTime later = kThen + 1000 * kSigningSecond;
-  channels->signing_time = later;
+  channels->signing_time.store(later);
   for (int i = 0; i < 1000 && stored() <= later; ++i) std::this_thread::sleep_for(10ms);
   EXPECT_GT(stored(), later) << "while it runs";
-  channels->signing_time = later + 3;
+  channels->signing_time.store(later + 3);
   end = true;
   keeper.join();
   EXPECT_EQ(stored(), later + 3) << "an end in order gives the rest back";

@@ -8,7 +8,6 @@ namespace backwash::daemon::test {
 namespace {
 
 using firmware_bridge::SwitchState;
-using track::Reason;
 
 constexpr SwitchState kBroken[] = {SwitchState::lost, SwitchState::untested, SwitchState::chattering};
 
@@ -42,7 +41,7 @@ struct Switched : Lockstep {
   }
 };
 
-TEST(Row37StopSwitch, PressedInFlightItIsAStopInItsTickForAsLongAsItIsPressed) {
+TEST(StopSwitchFault, PressedInFlightItIsAStopInItsTickForAsLongAsItIsPressed) {
   Switched rig;
   rig.fly();
   rig.set(SwitchState::pressed);
@@ -62,7 +61,7 @@ TEST(Row37StopSwitch, PressedInFlightItIsAStopInItsTickForAsLongAsItIsPressed) {
   EXPECT_EQ(rig.mode(), Mode::hold) << "released is no order to go on";
 }
 
-TEST(Row37StopSwitch, WhatIsOfferedInTheTickOfThePressIsNotFlown) {
+TEST(StopSwitchFault, WhatIsOfferedInTheTickOfThePressIsNotFlown) {
   Switched rig;
   rig.channels->stop_switch.at_ns = INT64_MAX;
   rig.take_off();
@@ -77,7 +76,7 @@ TEST(Row37StopSwitch, WhatIsOfferedInTheTickOfThePressIsNotFlown) {
   EXPECT_EQ(rig.view().command.p_W, held) << "nor after the release";
 }
 
-TEST(Row37StopSwitch, ABrokenOneStopsTheFlightAndLandsItThreeSecondsLater) {
+TEST(StopSwitchFault, ABrokenOneStopsTheFlightAndLandsItThreeSecondsLater) {
   for (const SwitchState broken : kBroken) {
     Switched rig;
     rig.fly();
@@ -90,7 +89,7 @@ TEST(Row37StopSwitch, ABrokenOneStopsTheFlightAndLandsItThreeSecondsLater) {
   }
 }
 
-TEST(Row37StopSwitch, OneThatIsWholeAgainInTimeDoesNotLandTheFlight) {
+TEST(StopSwitchFault, OneThatIsWholeAgainInTimeDoesNotLandTheFlight) {
   Switched rig;
   rig.fly();
   rig.set(SwitchState::chattering);
@@ -100,7 +99,7 @@ TEST(Row37StopSwitch, OneThatIsWholeAgainInTimeDoesNotLandTheFlight) {
   EXPECT_EQ(rig.mode(), Mode::hold);
 }
 
-TEST(Row37StopSwitch, AThreadThatReadsNothingMoreIsALostLine) {
+TEST(StopSwitchFault, AThreadThatReadsNothingMoreIsALostLine) {
   Switched rig;
   rig.fly();
   rig.look_and_tick();
@@ -111,7 +110,7 @@ TEST(Row37StopSwitch, AThreadThatReadsNothingMoreIsALostLine) {
   EXPECT_EQ(rig.view().stop_switch, SwitchState::lost);
 }
 
-TEST(Row37StopSwitch, OperatorsMayLandBesideAPressedSwitch) {
+TEST(StopSwitchFault, OperatorsMayLandBesideAPressedSwitch) {
   Switched rig;
   rig.fly();
   rig.set(SwitchState::pressed);
@@ -121,7 +120,7 @@ TEST(Row37StopSwitch, OperatorsMayLandBesideAPressedSwitch) {
   EXPECT_EQ(rig.mode(), Mode::land);
 }
 
-TEST(Row37StopSwitch, WhileEnablingItEndsThat) {
+TEST(StopSwitchFault, WhileEnablingItEndsThat) {
   for (const SwitchState state : {SwitchState::pressed, SwitchState::lost}) {
     Switched rig;
     for (int n = 0; n < 200; ++n) rig.look_and_tick();
@@ -134,7 +133,7 @@ TEST(Row37StopSwitch, WhileEnablingItEndsThat) {
   }
 }
 
-TEST(Row37StopSwitch, NeitherAPilotNorAnAutopilotThatLandsIsFought) {
+TEST(StopSwitchFault, NeitherAPilotNorAnAutopilotThatLandsIsFought) {
   for (const Mode mode : {Mode::passive, Mode::quiet, Mode::land})
     for (const SwitchState state : {SwitchState::pressed, SwitchState::lost, SwitchState::untested}) {
       SwitchReaction reaction;
@@ -146,7 +145,7 @@ TEST(Row37StopSwitch, NeitherAPilotNorAnAutopilotThatLandsIsFought) {
 }
 
 // The control thread ticks before the thread that reads the lines has opened them.
-TEST(Row37StopSwitch, ANamedSwitchIsLostAndNotAbsentBeforeItIsRead) {
+TEST(StopSwitchFault, ANamedSwitchIsLostAndNotAbsentBeforeItIsRead) {
   Channels channels;
   config::Daemon::Gpio names;
   names.chip = "/dev/gpiochip0";

@@ -15,9 +15,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-using track::Mode;
-using track::Reason;
-
 constexpr std::uint8_t kAccepted = backwash_msgs_msg_dds__ACK_ACCEPTED, kRefused = backwash_msgs_msg_dds__ACK_REFUSED;
 constexpr std::uint8_t kEnable = backwash_msgs_msg_dds__COMMAND_ENABLE,
                        kTakeoff = backwash_msgs_msg_dds__COMMAND_TAKEOFF, kGoto = backwash_msgs_msg_dds__COMMAND_GOTO,

@@ -50,9 +50,9 @@ struct LiftsItself : Lockstep {
   /// Enabled, asked to take off and armed, on the ground.
   void lift() {
     channels->orders.push({track::Request::enable});
-    ASSERT_GT(ticks_until(track::Mode::tracking, 250), 0) << to_string(reason());
+    ASSERT_GT(ticks_until(Mode::tracking, 250), 0) << to_string(reason());
     offer(rise(), true, true);
-    ASSERT_GT(ticks_until(track::Mode::lifting, 3), 0) << to_string(reason());
+    ASSERT_GT(ticks_until(Mode::lifting, 3), 0) << to_string(reason());
     setpoints_before_lift = view().setpoints;
     armed = true;
     asked_within(60);  // until it says that it is armed
@@ -75,7 +75,7 @@ TEST(TakeoffCommand, IsRepeatedUntilTheAutopilotTakesThisOneWhateverItSaidToAnot
   rig.answer(kAccepted);
   rig.tick();
   EXPECT_EQ(rig.asked_within(100), 0);
-  ASSERT_EQ(rig.mode(), track::Mode::lifting) << to_string(rig.reason());
+  ASSERT_EQ(rig.mode(), Mode::lifting) << to_string(rig.reason());
 }
 
 // The order of a STOP reaches the wire: what the tick decides alone stops no motor.
@@ -83,7 +83,7 @@ TEST(TakeoffCommand, AStopOnTheGroundAsksToDisarmUnforced) {
   LiftsItself rig;
   rig.ticks(60);
   rig.lift();
-  ASSERT_EQ(rig.mode(), track::Mode::lifting) << to_string(rig.reason());
+  ASSERT_EQ(rig.mode(), Mode::lifting) << to_string(rig.reason());
   ASSERT_TRUE(rig.view().armed);
   rig.channels->orders.push({track::Request::stop});
   int asked = 0;
@@ -107,7 +107,7 @@ TEST(TakeoffCommand, AStopWhoseLandIsLostOnTheLineCanBeGivenAgain) {
     rig.lift();
     rig.channels->orders.push({track::Request::stop});
     rig.ticks(100);
-    ASSERT_EQ(rig.mode(), track::Mode::land) << to_string(rig.reason());
+    ASSERT_EQ(rig.mode(), Mode::land) << to_string(rig.reason());
     ASSERT_TRUE(rig.view().offboard) << "GUIDED as before";
     rig.channels->orders.push({again, 2});
     int asked = 0;
@@ -121,15 +121,15 @@ TEST(TakeoffCommand, ALineThatTakesNothingWhileTheAutopilotLiftsIsQuiet) {
   LiftsItself rig;
   rig.ticks(60);
   rig.lift();
-  ASSERT_EQ(rig.mode(), track::Mode::lifting);
+  ASSERT_EQ(rig.mode(), Mode::lifting);
   rig.unread = true;
   int blocked = 0;
-  for (int n = 0; n < 500 && rig.mode() == track::Mode::lifting; ++n) {
+  for (int n = 0; n < 500 && rig.mode() == Mode::lifting; ++n) {
     rig.tick();
     blocked += rig.link().transmit().waiting() > 0;
   }
-  EXPECT_EQ(rig.mode(), track::Mode::quiet);
-  EXPECT_EQ(rig.reason(), track::Reason::transmit_full);
+  EXPECT_EQ(rig.mode(), Mode::quiet);
+  EXPECT_EQ(rig.reason(), Reason::transmit_full);
   EXPECT_EQ(rig.view().setpoints, rig.setpoints_before_lift) << "there were none";
   EXPECT_LE(blocked, 11) << "200 ms";
 }

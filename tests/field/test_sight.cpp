@@ -6,6 +6,7 @@
 #include "core/field/sight.hpp"
 #include "tests/field/brute_force.hpp"
 #include "tests/field/scenes.hpp"
+#include "tests/support/line_of_sight.hpp"
 
 namespace backwash::field {
 namespace {

@@ -49,7 +49,7 @@ Bytes raw_log() {
   Lockstep rig;
   rig.ticks(60);
   rig.channels->orders.push({track::Request::enable});
-  EXPECT_GT(rig.ticks_until(track::Mode::tracking, 250), 0);
+  EXPECT_GT(rig.ticks_until(Mode::tracking, 250), 0);
   rig.offer(std::vector<Setpoint>(10, Setpoint{rig.view().state.p_W, Vec3::Zero(), Vec3::Zero(), 0}));
   rig.ticks(12);
   Bytes log;

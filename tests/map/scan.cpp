@@ -98,7 +98,6 @@ TEST(LiveMap, PointsThatAreNotFiniteOrOutsideTheGridDoNoHarm) {
   const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
   const std::vector<Vec3> points{{nan, 0, 0}, {0.5, inf, 0}, {0.55, -3, 0.15}, {1e300, 0, 0}, {0.15, 0.15, 0.15}};
   const auto change = map.insert(points, {0.15, 0.15, 0.15}, 20);
-  EXPECT_GE(change.points_left_out, 2u);
   for (const Index3& v : change.occupied) EXPECT_EQ(v, Index3(1, 1, 1));
 }
 
@@ -111,17 +110,15 @@ TEST(LiveMap, TheChangeNamesEveryVoxelThatDiffers) {
     for (int n = 0; n < 30; ++n) points.push_back(inside(before, random));
     const auto change = map.insert(points, inside(before, random), 1.2);
     VoxelBox box;
-    std::size_t freed = 0;
     std::set<std::size_t> occupied;
     for (std::size_t n = 0; n < before.cell_count(); ++n) {
       if (map.grid().at(n) == before.at(n)) continue;
       box.add(before.voxel(n));
-      map.grid().at(n) == Cell::occupied ? void(occupied.insert(n)) : void(++freed);
+      if (map.grid().at(n) == Cell::occupied) occupied.insert(n);
     }
     std::set<std::size_t> named;
     for (const Index3& v : change.occupied) named.insert(before.linear(v));
     EXPECT_EQ(named, occupied);
-    EXPECT_EQ(change.freed, freed);
     EXPECT_EQ(change.box.low, box.low);
     EXPECT_EQ(change.box.high, box.high);
   }

@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <utility>
 
+#include "core/sync/atomic_optional.hpp"
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
 #include "core/sync/record_ring.hpp"
@@ -76,6 +78,15 @@ TEST(LatestValue, NeverTearsNeverGoesBackAndEndsWithTheLast) {
   }
   writer.join();
   EXPECT_TRUE(good) << "torn or old value after " << last;
+}
+
+TEST(AtomicOptional, IsNoneUntilStoredAndThenAnyNumberButItsOwnSignOfNone) {
+  AtomicOptional<std::int64_t, INT64_MIN> at;
+  EXPECT_EQ(at.load(), std::nullopt);
+  for (const std::int64_t value : {std::int64_t{0}, std::int64_t{-1}, INT64_MIN + 1, INT64_MAX}) {
+    at.store(value);
+    EXPECT_EQ(at.load(), value);
+  }
 }
 
 TEST(RecordRing, RefusesWhatDoesNotFitAndCountsIt) {

@@ -14,7 +14,6 @@ namespace backwash::fuzz {
 namespace {
 
 using Kind = Event::Kind;
-using track::Mode;
 
 const Vec3 kRoomLow(-2.4, -1.2, 0.7), kRoomHigh(2.4, 1.2, 1.7);  // where an operator sends the vehicle
 constexpr int kMostFlights = 6;                                  // that he asks for: a plan costs 10 ms and more

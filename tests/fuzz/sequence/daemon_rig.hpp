@@ -38,7 +38,7 @@ class DaemonRig {
   int ticks() const { return tick_; }
   int plans() const { return plans_; }
   /// Ticks spent in each mode.
-  const std::array<long, track::kModes>& spent() const { return spent_; }
+  const std::array<long, kModes>& spent() const { return spent_; }
 
  private:
   /// What are threads in the daemon, and live as long as one start of it.
@@ -90,7 +90,7 @@ class DaemonRig {
   std::uint64_t session_ = 1;
   bool restarts_ = false, with_maps_ = false, with_switch_ = false;
   std::unique_ptr<const track::AcceptedSegment> late_;
-  std::array<long, track::kModes> spent_{};
+  std::array<long, kModes> spent_{};
 };
 
 }  // namespace backwash::fuzz

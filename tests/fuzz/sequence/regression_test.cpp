@@ -21,7 +21,7 @@ class Regression : public testing::Test {
     DaemonRig rig(events, daemon::test::Medium::udp);
     const auto violation = rig.run(ticks);
     EXPECT_FALSE(violation) << "tick " << violation->tick << ": " << violation->what;
-    EXPECT_GT(rig.spent()[static_cast<std::size_t>(track::Mode::tracking)], 50) << "it never flew";
+    EXPECT_GT(rig.spent()[static_cast<std::size_t>(Mode::tracking)], 50) << "it never flew";
   }
 };
 

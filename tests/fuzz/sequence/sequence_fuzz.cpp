@@ -118,7 +118,7 @@ class SequenceFuzz : public testing::TestWithParam<int> {
   void fuzz(double ticks, std::uint64_t first, Medium medium) {
     const double begun = cpu_seconds();
     const int most = static_cast<int>(number("BACKWASH_FUZZ_VIOLATIONS", 1));
-    std::array<long, track::kModes> spent{};
+    std::array<long, kModes> spent{};
     long done = 0, sequences = 0, plans = 0, replays = 0;
     int violations = 0;
     for (std::uint64_t seed = first; static_cast<double>(done) < ticks; ++seed, ++sequences) {
@@ -142,7 +142,7 @@ class SequenceFuzz : public testing::TestWithParam<int> {
     std::printf("%ld ticks in %ld sequences from %llu, %ld segments, %ld replays, %.1f s of processor time;", done,
                 sequences, static_cast<unsigned long long>(first), plans, replays, cpu_seconds() - begun);
     for (std::size_t m = 0; m < spent.size(); ++m)
-      std::printf(" %s %.0f %%", to_string(static_cast<track::Mode>(m)),
+      std::printf(" %s %.0f %%", to_string(static_cast<Mode>(m)),
                   100.0 * static_cast<double>(spent[m]) / static_cast<double>(std::max(1L, done)));
     std::printf("\n");
   }

@@ -9,8 +9,6 @@
 namespace backwash::fuzz {
 namespace {
 
-using track::Mode;
-
 constexpr int kRequests = 16 + 2;   // ticks until the control thread has taken every request that can wait
 constexpr int kBraking = 100;       // ticks that a verified stop takes at most, with the way to its branch
 constexpr int kRest = 25;           // ticks without motion: the way is over

@@ -12,7 +12,7 @@ namespace backwash::fuzz {
 /// What a tick of the daemon showed to the outside.
 struct Seen {
   int tick = 0;
-  track::Mode mode = track::Mode::passive;
+  Mode mode = Mode::passive;
   bool armed = false, offboard = false;  ///< as the autopilot's last heartbeat said
   std::size_t bytes = 0;                 ///< sent; 0 if it was odometry alone, a sensor and no command
   int setpoints = 0, commands = 0;       ///< sent; commands without those to disarm

@@ -9,8 +9,6 @@
 namespace backwash::fuzz {
 namespace {
 
-using track::Mode;
-
 constexpr double kStep = 0.02;  // m in a tick: 1 m/s
 
 /// A daemon that flies along x after a go-to, armed and followed.
