@@ -13,6 +13,7 @@ import sys
 
 SUFFIXES = {".cpp", ".hpp", ".c", ".h", ".md", ".sh", ".py", ".txt", ".idl", ".toml", ".in", ".cmake", ".inc",
             ".yml", ".yaml", ".cff", ".service", ".json", ".svg", ".html", ""}
+PLANTED = {pathlib.Path(__file__).name, "planted.py"}  # what these name is no citation
 LEFT_OUT = {".git", "build", "flight", "__pycache__"}
 NUMBER = r"\d\w?(?:\.\d)?"
 LIST = rf"{NUMBER}(?:(?:, and |, | and | to | or |–){NUMBER})*"
@@ -26,7 +27,7 @@ def texts(root: pathlib.Path):
         names[:] = sorted(n for n in names if n not in LEFT_OUT)
         for name in sorted(files):
             path = pathlib.Path(folder) / name
-            if path.suffix in SUFFIXES and path.stat().st_size < 1 << 20 and path.name != pathlib.Path(__file__).name:
+            if path.suffix in SUFFIXES and path.stat().st_size < 1 << 20 and path.name not in PLANTED:
                 try:
                     yield path.relative_to(root), path.read_text()
                 except UnicodeDecodeError:
@@ -116,13 +117,17 @@ def main() -> int:
                 if cited[1] not in interfaces:
                     wrong.append(f"{path}: interfaces.md has no heading '{cited[1]}'")
         if path.suffix in {".cpp", ".hpp", ".c", ".h", ".idl"}:
-            rows_in(path, re.sub(r"\n[ \t]*///?<?", " ", "".join(re.findall(r"//[^\n]*\n(?=[ \t]*//)|//[^\n]*", text))))
-            if found := re.findall(rf"//[^\n]*\b(?:equations?|Eqs?\.) ({EQUATION})", text):
+            comments = re.sub(r"\n[ \t]*///?<?", " ", "".join(re.findall(r"//[^\n]*\n(?=[ \t]*//)|//[^\n]*", text)))
+            comments += re.sub(r"\n[ \t]*\*?", " ", "".join(re.findall(r"/\*.*?\*/", text, re.S)))
+            rows_in(path, comments)
+            if found := re.findall(rf"\b(?:[Ee]quations?|Eqs?\.) \(?({EQUATION})", comments):
                 equations_in(path, " ".join(found))
         elif path.suffix == ".md":
             rows_in(path, joined)
-        elif path.suffix in {".sh", ".toml"}:
+        elif path.suffix in {".sh", ".toml", ".cmake", ".yml", ".yaml", ".txt"}:
             rows_in(path, " ".join(re.findall(r"#[^\n]*", text)))
+        elif path.suffix == ".py" and path.parts[:2] != ("tests", "docs"):
+            rows_in(path, " ".join(re.findall(r"#[^\n]*", text) + [" ".join(d.split()) for d in re.findall(r'""".*?"""', text, re.S)]))
         if path.parent == pathlib.Path("docs") and path.suffix == ".md":
             sections_in(path, joined)
         if path == pathlib.Path("docs/model.md"):

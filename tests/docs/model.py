@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/model.md: equations are numbered once each, and each is followed by the code that computes it, which exists.
+"""docs/model.md: equations are numbered once each, and each is followed by the code that computes it, which exists: in the code,
+not in a comment or a text. After an arrow stands nothing in code marks but `path:symbol`, and a number of an equation in bold
+begins its line: what is spelled otherwise would not be read.
 
 model.py SOURCE_DIR
 """
@@ -8,12 +10,18 @@ import pathlib
 import re
 import sys
 
-CITATION = re.compile(r"`((?:core|services|firmware_bridge)/[\w./]+\.(?:cpp|hpp)):([\w:]+)`")
+CITATION = re.compile(r"`((?:core|services|firmware_bridge)/[\w./]+\.(?:cpp|hpp|c|h)):([\w:~]+)`")
 NUMBER = re.compile(r"^(?:\*\*| {4,})(\d\w?(?:\.\d)?-\d+)\s")
+
+
+def bare(code: str) -> str:
+    """Code without its comments, of either kind, and without what its strings say."""
+    return re.sub(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', lambda m: '""' if m[0][0] == '"' else " ", code, flags=re.S)
 
 
 def names(code: str, symbol: str) -> bool:
     """Whether code has the symbol: Class::function as it is defined, or both names in a header."""
+    code = bare(code)
     if re.search(rf"\b{re.escape(symbol)}\b", code):
         return True
     return "::" in symbol and all(re.search(rf"\b{re.escape(part)}\b", code) for part in symbol.split("::"))
@@ -51,8 +59,10 @@ def main() -> int:
         citations = CITATION.findall(line)
         if line.startswith("→"):
             open_equations.clear()
-            if not citations:
-                wrong.append(f"{n}: no `path:symbol` after the arrow")
+            if not citations or len(citations) < line.count("`") // 2:
+                wrong.append(f"{n}: not only `path:symbol` after the arrow")
+        elif re.search(r"(?<!^)\*\*\d\w?(?:\.\d)?-\d+\b", line):
+            wrong.append(f"{n}: an equation's number that does not begin its line")
         for path, symbol in citations:
             file = source / path
             if not file.is_file():

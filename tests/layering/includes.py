@@ -6,7 +6,8 @@ includes.py SOURCE_DIR
 
 A source file below core, services or firmware_bridge that no folder of the table holds belongs to no layer, and fails. So does
 a folder of the table that is not there, or one that the table lets include a folder above it. Included is by the path from the
-project's root: a path from the file's own folder would hide where it leads. Either bracket counts.
+project's root: a path from the file's own folder would hide where it leads. Either bracket counts. Comments, continued lines and
+digraphs hide nothing, and an include that is no literal, an absolute path or an import of a module is refused as not to be read.
 """
 import pathlib
 import re
@@ -49,7 +50,9 @@ ASKS_THE_STUDY = {"anytime_main", "matrix", "null_size", "observe", "oracle", "s
 # DDS with what idl/ generates, MAVLink, GPIO and sockets, systemd, threads with all that only threads need; core/sync has <atomic>.
 FORBIDDEN = re.compile(r"(\w+/)*(dds|gpio|systemd|mavlink|c?thread|pthread|jthread|s?mutex|shared_mutex|future|condition_variable|"
                        r"semaphore|barrier|latch|stop_token|execution|omp\.h|tbb|termios|ros2\.h|backwash_msgs)|sys/socket|netinet/|linux/")
-INCLUDE = re.compile(r'^\s*(?:#|%:)(?:\s|/\*.*?\*/)*(?:include|include_next|import)\s*["<]([^">]+)[">]')
+INCLUDE = re.compile(r'^\s*(?:#|%:|\?\?=)\s*(?:include|include_next|import|embed)\b\s*(?:["<]([^">]+)[">])?')
+MODULE = re.compile(r"^\s*(?:export\s+)?(?:import\b(?!\s*[=.(,;])|module\b\s*[\w:;])")
+LITERAL = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.S)
 SOURCES = {".cpp", ".hpp", ".c", ".h", ".cc", ".cxx", ".hh", ".hxx", ".ipp", ".tpp", ".inl", ".inc"}
 
 
@@ -59,6 +62,18 @@ def below(path: str, folder: str) -> bool:
 
 def folder_of(path: str) -> str | None:
     return next((folder for folder in MAY if below(path, folder)), None)
+
+
+def lines_of(text: str) -> list[str]:
+    """The lines as a compiler reads them: continued ones joined, comments gone, raw strings empty; as many as there were."""
+    def kept(match: re.Match) -> str:
+        literal = match[0]
+        if literal.startswith('"'):
+            return literal
+        return ('""' if literal[0] == "R" else " ") + "\n" * literal.count("\n")
+    joined = re.sub(r"((?:[^\n]*\\[ \t]*\n)+)([^\n]*)",
+                    lambda m: re.sub(r"\\[ \t]*\n", "", m[1]) + m[2] + "\n" * m[1].count("\n"), text)
+    return LITERAL.sub(kept, joined).split("\n")
 
 
 def table_errors(root: pathlib.Path) -> list[str]:
@@ -72,10 +87,21 @@ def table_errors(root: pathlib.Path) -> list[str]:
 def file_errors(root: pathlib.Path, path: pathlib.Path) -> list[str]:
     name, wrong = path.relative_to(root).as_posix(), []
     folder = folder_of(name)
-    for n, line in enumerate(path.read_text().splitlines(), 1):
+    for n, line in enumerate(lines_of(path.read_text()), 1):
+        if MODULE.match(line):
+            wrong.append(f"{name}:{n}: modules are not read here")
         included = INCLUDE.match(line)
         if not included:
             continue
+        if not included[1] or included[1].startswith("/"):
+            wrong.append(f"{name}:{n}: shall include a path from the project's root, by name")
+            continue
+        # A C library that others copy, both files together, finds its header beside it.
+        copied = path.suffix == ".c" and included[1] == path.stem + ".h"
+        if not copied and (path.parent / included[1]).is_file() and not (root / included[1]).is_file():
+            wrong.append(f"{name}:{n}: {included[1]} shall be included by its path from the root")
+        if (root / included[1]).is_file() and pathlib.Path(included[1]).suffix not in SOURCES | {".inc"}:
+            wrong.append(f"{name}:{n}: {included[1]} has a suffix that is not read here")
         if below(name, "core") and FORBIDDEN.match(included[1]):
             wrong.append(f"{name}:{n}: core may not include DDS, MAVLink, GPIO, systemd or thread headers")
         if below(name, "core") and included[1] == "atomic" and folder != "core/sync":
