@@ -104,7 +104,7 @@ std::vector<reach::HoverSet> sets_at(const plan::World& world, const std::vector
 /// Without a map: Σ_0, and what the extension says of open air.
 std::vector<reach::HoverSet> sets_in_the_open(const Model& model, const Vehicle& vehicle) {
   const reach::Reachability reach(vehicle);
-  const field::Air air = field::air_moving(model.extension, Vec3::Zero());
+  const Air air = field::air_moving(model.extension, Vec3::Zero());
   const auto sigma =
       std::exp(air.ln_variance) * Variance::horizontal_vertical(model.base.horizontal, model.base.vertical);
   reach::HoverSet set;
