@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::study {
 namespace {
 
 std::optional<std::string> not_under_one(const Observations& seen) {
-  if (any(seen, [](auto& w) { return w.around.ceiling_gap < 1.5; })) return std::nullopt;
-  return "no ceiling within 1.5 m of the flights";
+  if (any(seen, [](auto& w) { return w.around.ceiling_gap < kEffectRules.under_ceiling; })) return std::nullopt;
+  return "no ceiling within " + to_text(kEffectRules.under_ceiling, 1) + " m of the flights";
 }
 
 double near_ceiling(double gap, double length) { return near_surface(gap, kCeilingReference, length); }
