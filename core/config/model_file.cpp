@@ -53,27 +53,9 @@ std::vector<NumberKey> model_keys(Model& m) {
   };
 }
 
-struct EffectKind {
-  const char* name;
-  ModelEffect::Kind kind;
-  std::size_t values;  // of `value` and `error`
-  bool scaled;
-};
-constexpr EffectKind kEffects[] = {
-    {"push", ModelEffect::Kind::push, 3, false},
-    {"push_over_surface", ModelEffect::Kind::push_over_surface, 1, true},
-    {"push_under_surface", ModelEffect::Kind::push_under_surface, 1, true},
-    {"push_to_walls", ModelEffect::Kind::push_to_walls, 1, true},
-    {"push_against_velocity", ModelEffect::Kind::push_against_velocity, 1, false},
-    {"push_with_speed", ModelEffect::Kind::push_with_speed, 1, false},
-    {"ln_variance", ModelEffect::Kind::ln_variance, 1, false},
-    {"ln_variance_under_surface", ModelEffect::Kind::ln_variance_under_surface, 1, true},
-    {"ln_variance_with_speed", ModelEffect::Kind::ln_variance_with_speed, 1, true},
-};
-
 std::string effect_names() {
   std::string names;
-  for (const auto& e : kEffects) names += (names.empty() ? "" : ", ") + std::string(e.name);
+  for (const LawEntry& law : kLaws) names += (names.empty() ? "" : ", ") + std::string(law.name);
   return names;
 }
 
@@ -96,21 +78,21 @@ tl::expected<ModelEffect, std::string> read_effect(const toml::node& node) {
   const auto* table = node.as_table();
   if (!table) return wrong("needs tables { kind, value, error }");
   const auto name = (*table)["kind"].value_or(std::string());
-  const auto kind = std::ranges::find_if(kEffects, [&](const auto& e) { return e.name == name; });
-  if (kind == std::end(kEffects)) return wrong("kind needs one of " + effect_names());
+  const auto law = std::ranges::find(kLaws, name, &LawEntry::name);
+  if (law == kLaws.end()) return wrong("kind needs one of " + effect_names());
   for (const auto& [key, value] : *table)
     if (key != "kind" && key != "value" && key != "error" && key != "scale")
       return wrong("has an unknown key '" + std::string(key.str()) + "'; known are kind, value, error, scale");
-  ModelEffect effect{kind->kind, {}, {}, 0};
-  const std::string count = std::to_string(kind->values);
-  const auto value = numbers(*table, "value", kind->values, -10);
+  ModelEffect effect{.kind = law->law};
+  const std::string count = std::to_string(law->values);
+  const auto value = numbers(*table, "value", law->values, -10);
   if (!value) return wrong(name + ": value needs a list of " + count + " in [-10, 10]");
   effect.value = *value;
-  const auto error = numbers(*table, "error", kind->values, 0);
+  const auto error = numbers(*table, "error", law->values, 0);
   if (!error) return wrong(name + ": error needs a list of " + count + " in [0, 10]");
   effect.error = *error;
-  if (kind->scaled) effect.scale = (*table)["scale"].value_or(0.0);
-  if (kind->scaled && !(effect.scale >= kLeastScale && effect.scale <= kMost))
+  if (law->scaled) effect.scale = (*table)["scale"].value_or(0.0);
+  if (law->scaled && !(effect.scale >= kLeastScale && effect.scale <= kMost))
     return wrong(name + ": scale needs a number in [0.01, 10]");
   return effect;
 }
@@ -154,15 +136,15 @@ toml::table model_table(const Model& model) {
 }
 
 toml::table effect_table(const ModelEffect& effect) {
-  const auto kind = std::ranges::find(kEffects, effect.kind, &EffectKind::kind);
+  const LawEntry& law = entry(effect.kind);
   const auto list = [&](const Vec3& v, double least) {
     toml::array numbers;
-    for (std::size_t i = 0; i < kind->values; ++i)
+    for (std::size_t i = 0; i < law.values; ++i)
       numbers.push_back(rounded(std::clamp(v[static_cast<Eigen::Index>(i)], least, kMost), 8));
     return numbers;
   };
-  toml::table table{{"kind", kind->name}, {"value", list(effect.value, -kMost)}, {"error", list(effect.error, 0)}};
-  if (kind->scaled) table.insert("scale", rounded(std::clamp(effect.scale, kLeastScale, kMost), 8));
+  toml::table table{{"kind", law.name}, {"value", list(effect.value, -kMost)}, {"error", list(effect.error, 0)}};
+  if (law.scaled) table.insert("scale", rounded(std::clamp(effect.scale, kLeastScale, kMost), 8));
   table.is_inline(true);
   return table;
 }

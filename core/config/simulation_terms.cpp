@@ -31,24 +31,15 @@ constexpr Range kKurtosis{0, 3};     // ln
 constexpr Range kShareOfMap{0, 2};   // of ln Σ
 
 struct TermKind {
-  const char* name;
-  Kind kind;
+  std::string_view name;
+  std::variant<Law, Kind> kind;
   std::vector<Range> value;
 };
 
-/// Another kind: its line here, in SimulationTerm and where core/sim computes it.
-const std::vector<TermKind>& kinds() {
-  static const std::vector<TermKind> all = {
-      {"push", Kind::push, {kPush, kPush, kPush}},
+/// Another kind: its line here, in SimulationTerm and where core/sim computes it. The laws are in core/types/law.hpp.
+std::vector<TermKind> simulations_own() {
+  return {
       {"push_of_heading", Kind::push_of_heading, {kPush, kPush}},
-      {"push_over_surface", Kind::push_over_surface, {kPush, kLength}},
-      {"push_under_surface", Kind::push_under_surface, {kPush, kLength}},
-      {"push_to_walls", Kind::push_to_walls, {kPush, kLength}},
-      {"push_against_velocity", Kind::push_against_velocity, {kPush}},
-      {"push_against_climb", Kind::push_against_climb, {kPush}},
-      {"push_with_speed", Kind::push_with_speed, {kPush}},
-      {"ln_variance_under_surface", Kind::ln_variance_under_surface, {kLn, kLength}},
-      {"ln_variance_with_speed", Kind::ln_variance_with_speed, {kLn, kLength}},
       {"ln_variance_with_time", Kind::ln_variance_with_time, {kLn, kTime}},
       {"variance_elsewhere", Kind::variance_elsewhere, {kShareOfMap, kOffset, kOffset}},
       {"kurtosis", Kind::kurtosis, {kKurtosis}},
@@ -67,6 +58,17 @@ const std::vector<TermKind>& kinds() {
       {"rotor_reading", Kind::rotor_reading, {kLn, kLn, kLn, kLn}},
       {"rotor_dropout", Kind::rotor_dropout, {kPart, kPart, kPart, kPart}},
   };
+}
+
+const std::vector<TermKind>& kinds() {
+  static const std::vector<TermKind> all = [] {
+    std::vector<TermKind> made = simulations_own();
+    for (const LawEntry& law : kLaws) {
+      made.push_back({law.name, law.law, std::vector<Range>(law.values, law.of_variance ? kLn : kPush)});
+      if (law.scaled) made.back().value.push_back(kLength);
+    }
+    return made;
+  }();
   return all;
 }
 

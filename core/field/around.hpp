@@ -1,27 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <limits>
-#include <utility>
-#include <vector>
-
 #include "core/map/occupancy_grid.hpp"
+#include "core/types/around.hpp"
 
 namespace backwash::field {
-
-inline constexpr double kNoSurface = std::numeric_limits<double>::infinity();  ///< m
-
-/// What stands around a point, by the map.
-struct Around {
-  double height = kNoSurface;                  ///< to the first occupied voxel straight down, m
-  double ceiling_gap = kNoSurface;             ///< … straight up, m
-  std::vector<std::pair<double, Vec3>> walls;  ///< distance, m, and unit direction of each local minimum around, level
-};
-
-/// How far it is looked, m; 0: not at all.
-struct Sight {
-  double down = 20, up = 20, level = 3;
-};
 
 /// By rays: one down, one up, 32 around. O(voxels on the rays); allocates for walls.
 Around around(const map::OccupancyGrid& grid, const Vec3& p_W, const Sight& sight = {});

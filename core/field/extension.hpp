@@ -13,19 +13,6 @@
 
 namespace backwash::field {
 
-/// e^{−(max(distance, 0.15 m) − reference)/length}; 0 where there is no surface. No shape of the study reaches nearer:
-/// what was flown does not say how it goes on.
-double near_surface(double distance, double reference, double length) noexcept;
-inline constexpr double kSurfaceReference = 0.4;  ///< m, floors and walls
-inline constexpr double kCeilingReference = 0.3;  ///< m
-
-/// What a model's extension says of the air: a mean push, what of it stays unknown, and a factor of Σ.
-struct Air {
-  Vec3 push_W = Vec3::Zero();      ///< m/s²
-  double level = 0, vertical = 0;  ///< the push is known up to this, horizontally and along z, m/s²
-  double ln_variance = 0;          ///< ln of the factor of Σ
-};
-
 /// Effects that depend on place, at a point.
 Air air_around(std::span<const ModelEffect> effects, const Around& around);
 /// Effects that depend on the velocity, and constant ones. Real-time: wait-free, no allocation; O(effects).

@@ -40,7 +40,7 @@ BoundField::BoundField(const map::OccupancyGrid& grid, const field::DisturbanceF
     if (!stored[grid.linear(v)]) return;
     DisturbanceBound w = bound(field.at(v), model);
     if (extension_.by_place()) {
-      const field::Air air = extension_.at(v);
+      const Air air = extension_.at(v);
       for (std::size_t d = 0; d < kDirections; ++d) w.w[d] += d == kZ ? air.vertical : air.level;
       least_push_ = least_push_.cwiseMin(air.push_W);
       largest_push_ = largest_push_.cwiseMax(air.push_W);
@@ -153,7 +153,7 @@ DisturbanceBound BoundField::max_about_voxels(const Vec3& push_W, const Vec3& v_
 PerDirection BoundField::push_spread(const Vec3& push_W, const Vec3& v_W, const Vec3& low_W,
                                      const Vec3& high_W) const noexcept {
   PerDirection spread{};
-  const field::Air moving = extension_.moving(v_W);
+  const Air moving = extension_.moving(v_W);
   const map::VoxelBox box = meeting(low_W, high_W);
   for (int k = std::max(box.low.z(), 0); extension_.by_place() && k <= std::min(box.high.z(), size_.z() - 1); ++k)
     for (int j = std::max(box.low.y(), 0); j <= std::min(box.high.y(), size_.y() - 1); ++j)
@@ -169,7 +169,7 @@ PerDirection BoundField::push_spread(const Vec3& push_W, const Vec3& v_W, const 
 
 // Σ's factor by speed, and what is not known of the pushes by velocity.
 DisturbanceBound BoundField::moving(DisturbanceBound w, const Vec3& v_W) const noexcept {
-  const field::Air air = extension_.moving(v_W);
+  const Air air = extension_.moving(v_W);
   const double factor = std::exp(air.ln_variance / 2);
   for (std::size_t d = 0; d < kDirections; ++d) {
     const double mean = d == kZ ? model_.mean_vertical : model_.mean_horizontal;

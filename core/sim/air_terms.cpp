@@ -4,55 +4,37 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/field/extension.hpp"
-
 namespace backwash::sim {
 namespace {
 
 using Kind = SimulationTerm::Kind;
-using field::kCeilingReference, field::kSurfaceReference, field::near_surface;
 
 constexpr double kMeanBurst = 0.06;  // s: shorter than what a window tells from another variance
 constexpr double kMostLoud = 0.07;   // of the time
 
-/// What a term pushes with, m/s² in W; zero for terms of other things.
-Vec3 push_of(const SimulationTerm& term, const Flying& now, const field::Around& around) {
-  const auto& x = term.value;
-  switch (term.kind) {
-    case Kind::push:
-      return {x[0], x[1], x[2]};
-    case Kind::push_of_heading:
-      return {x[0] * std::cos(now.yaw) - x[1] * std::sin(now.yaw), x[0] * std::sin(now.yaw) + x[1] * std::cos(now.yaw),
-              0};
-    case Kind::push_over_surface:
-      return {0, 0, x[0] * near_surface(around.height, kSurfaceReference, x[1])};
-    case Kind::push_under_surface:
-      return {0, 0, x[0] * near_surface(around.ceiling_gap, kCeilingReference, x[1])};
-    case Kind::push_to_walls: {
-      Vec3 sum = Vec3::Zero();
-      for (const auto& [distance, direction] : around.walls)
-        sum += x[0] * near_surface(distance, kSurfaceReference, x[1]) * direction;
-      return sum;
-    }
-    case Kind::push_against_velocity:
-      return {-x[0] * now.v_W.x(), -x[0] * now.v_W.y(), 0};
-    case Kind::push_against_climb:
-      return {0, 0, -x[0] * now.v_W.z()};
-    case Kind::push_with_speed:
-      return {0, 0, x[0] * now.v_W.squaredNorm()};
-    default:
-      return Vec3::Zero();
-  }
+/// A law as the simulation flies it: exactly as it was fitted.
+ModelEffect exact(Law law, const std::vector<double>& x) {
+  ModelEffect e{.kind = law};
+  const std::size_t values = entry(law).values;
+  for (std::size_t i = 0; i < values; ++i) e.value[static_cast<Eigen::Index>(i)] = x[i];
+  if (entry(law).scaled) e.scale = x[values];
+  return e;
 }
 
-/// What a term adds to ln Σ.
-double ln_variance_of(const SimulationTerm& term, const Flying& now, const field::Around& around) {
+/// What a term makes of the air; nothing for terms of other things. Walls count as far as they are seen.
+Air air_of(const SimulationTerm& term, const Flying& now, const Around& around) {
   const auto& x = term.value;
-  if (term.kind == Kind::ln_variance_under_surface)
-    return x[0] * near_surface(around.ceiling_gap, kCeilingReference, x[1]);
-  if (term.kind == Kind::ln_variance_with_speed) return x[0] * std::pow(now.v_W.norm(), x[1]);
-  if (term.kind == Kind::ln_variance_with_time) return x[0] * (1 - std::exp(-now.t / x[1]));
-  return 0;
+  Air air;
+  if (const auto* kind = std::get_if<Law>(&term.kind)) {
+    const LawEntry& law = entry(*kind);
+    law.at ? law.at(exact(*kind, x), around, kSurfaceSight.level, air) : law.moving(exact(*kind, x), now.v_W, air);
+  } else if (term.is(Kind::push_of_heading)) {
+    const double c = std::cos(now.yaw), s = std::sin(now.yaw);
+    air.push_W = {x[0] * c - x[1] * s, x[0] * s + x[1] * c, 0};
+  } else if (term.is(Kind::ln_variance_with_time)) {
+    air.ln_variance = x[0] * (1 - std::exp(-now.t / x[1]));
+  }
+  return air;
 }
 
 }  // namespace
@@ -60,10 +42,13 @@ double ln_variance_of(const SimulationTerm& term, const Flying& now, const field
 AirTerms::AirTerms(const map::OccupancyGrid& grid, std::span<const SimulationTerm> terms, std::uint64_t seed)
     : grid_(&grid), terms_(terms.begin(), terms.end()), rng_(seed) {
   for (const auto& term : terms_) {
-    if (term.kind == Kind::push_over_surface) sight_.down = 20;
-    if (term.kind == Kind::push_under_surface || term.kind == Kind::ln_variance_under_surface) sight_.up = 20;
-    if (term.kind == Kind::push_to_walls) sight_.level = 3;
-    if (term.kind != Kind::kurtosis || !(term.value[0] > 0)) continue;
+    if (const auto* law = std::get_if<Law>(&term.kind); law && entry(*law).sight) {
+      const Sight sight = entry(*law).sight(exact(*law, term.value));
+      if (sight.down > 0) sight_.down = kSurfaceSight.down;
+      if (sight.up > 0) sight_.up = kSurfaceSight.up;
+      if (sight.level > 0) sight_.level = kSurfaceSight.level;
+    }
+    if (!term.is(Kind::kurtosis) || !(term.value[0] > 0)) continue;
     // E m² = 1 and E m⁴ = e^K with m² = calm² + difference for a share of the time; calm² is not negative.
     const double excess = std::expm1(term.value[0]), share = std::min(kMostLoud, 0.8 / (1 + excess));
     const double difference = std::sqrt(excess / (share * (1 - share))), calm = 1 - share * difference;
@@ -71,7 +56,7 @@ AirTerms::AirTerms(const map::OccupancyGrid& grid, std::span<const SimulationTer
   }
 }
 
-const field::Around& AirTerms::around(const Vec3& p_W) {
+const Around& AirTerms::around(const Vec3& p_W) {
   if (!last_look_ || (p_W - last_look_->first).norm() > kRecast)
     last_look_.emplace(p_W, field::around(*grid_, p_W, sight_));
   return last_look_->second;
@@ -90,23 +75,22 @@ Vec3 AirTerms::moved(const Vec3& p_W, const Vec3& offset_W) const {
 }
 
 AirTerms::Now AirTerms::step(const Flying& now, double dt) {
-  Now air{.place_W = now.p_W};
-  if (terms_.empty()) return air;
-  const field::Around& seen = around(now.p_W);
+  if (terms_.empty()) return {.place_W = now.p_W};
+  const Around& seen = around(now.p_W);
+  Vec3 push_W = Vec3::Zero(), offset_W = Vec3::Zero();
   double ln_variance = 0;
-  Vec3 offset_W = Vec3::Zero();
   for (const auto& term : terms_) {
-    air.push_W += push_of(term, now, seen);
-    ln_variance += ln_variance_of(term, now, seen);
-    if (term.kind == Kind::variance_elsewhere) offset_W += term.value[0] * Vec3(term.value[1], term.value[2], 0);
+    const Air air = air_of(term, now, seen);
+    push_W += air.push_W;
+    ln_variance += air.ln_variance;
+    if (term.is(Kind::variance_elsewhere)) offset_W += term.value[0] * Vec3(term.value[1], term.value[2], 0);
   }
-  if (!offset_W.isZero()) air.place_W = moved(now.p_W, offset_W);
-  air.gust = std::exp(0.5 * ln_variance);
+  Now then{push_W, std::exp(0.5 * ln_variance), offset_W.isZero() ? now.p_W : moved(now.p_W, offset_W)};
   for (auto& b : bursts_) {
     if (std::generate_canonical<double, 53>(rng_) < 1 - std::exp(-dt / (b.on ? b.mean_on : b.mean_off))) b.on = !b.on;
-    air.gust *= b.on ? b.loud : b.calm;
+    then.gust *= b.on ? b.loud : b.calm;
   }
-  return air;
+  return then;
 }
 
 }  // namespace backwash::sim

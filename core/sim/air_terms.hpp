@@ -42,15 +42,15 @@ class AirTerms {
     bool on = false;
   };
   static constexpr double kRecast = 0.005;  // m
-  const field::Around& around(const Vec3& p_W);
+  const Around& around(const Vec3& p_W);
   Vec3 moved(const Vec3& p_W, const Vec3& offset_W) const;
 
   const map::OccupancyGrid* grid_;
   std::vector<SimulationTerm> terms_;
-  field::Sight sight_{0, 0, 0};
+  Sight sight_{0, 0, 0};
   std::vector<Bursts> bursts_;
   std::mt19937_64 rng_;
-  std::optional<std::pair<Vec3, field::Around>> last_look_;
+  std::optional<std::pair<Vec3, Around>> last_look_;
 };
 
 }  // namespace backwash::sim

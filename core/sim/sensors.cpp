@@ -27,7 +27,7 @@ double typical_hover_rpm(const Vehicle& v) {
 Vec3 bias_of(const SimulationTerm& term, double t, std::optional<double> temperature) {
   const auto& x = term.value;
   const Vec3 rate(x[0], x[1], x[2]), first(x[3], x[4], x[5]);
-  if (term.kind == Kind::sensor_drift_with_time) return first + rate * (t / 100);
+  if (term.is(Kind::sensor_drift_with_time)) return first + rate * (t / 100);
   return first + rate * ((temperature.value_or(x[6] + x[7] * t) - 25) / 10);
 }
 
@@ -37,15 +37,14 @@ Sensors::Sensors(const Vehicle& vehicle, std::span<const SimulationTerm> terms, 
                  std::uint64_t seed)
     : vehicle_(vehicle), hover_rpm_(hover_rpm.value_or(typical_hover_rpm(vehicle))), rng_(seed) {
   for (const auto& term : terms) {
-    if (term.kind == Kind::sensor_drift_with_time || term.kind == Kind::sensor_drift_with_temperature)
-      terms_.push_back(term);
+    if (term.is(Kind::sensor_drift_with_time) || term.is(Kind::sensor_drift_with_temperature)) terms_.push_back(term);
     for (std::size_t i = 0; i < 4; ++i) {
-      if (term.kind == Kind::rotor_needs) needs_[i] += term.value[i];
-      if (term.kind == Kind::rotor_reading) reads_[i] += term.value[i];
-      if (term.kind == Kind::rotor_dropout) missing_[i] += term.value[i];
-      if (term.kind == Kind::sensor_lines) lines_[i] = std::hypot(lines_[i], term.value[i]), built_[i] = kBuilt[i];
+      if (term.is(Kind::rotor_needs)) needs_[i] += term.value[i];
+      if (term.is(Kind::rotor_reading)) reads_[i] += term.value[i];
+      if (term.is(Kind::rotor_dropout)) missing_[i] += term.value[i];
+      if (term.is(Kind::sensor_lines)) lines_[i] = std::hypot(lines_[i], term.value[i]), built_[i] = kBuilt[i];
     }
-    if (term.kind == Kind::sensor_lines) floor_ = std::max(floor_, term.value[4]);
+    if (term.is(Kind::sensor_lines)) floor_ = std::max(floor_, term.value[4]);
   }
 }
 

@@ -21,7 +21,7 @@ double sagging(const std::vector<double>& x, double t, std::optional<double> vol
 double sum_of(std::span<const SimulationTerm> terms, Kind kind) {
   double sum = 0;
   for (const auto& term : terms)
-    if (term.kind == kind) sum += term.value[0];
+    if (term.is(kind)) sum += term.value[0];
   return sum;
 }
 
@@ -29,19 +29,19 @@ double sum_of(std::span<const SimulationTerm> terms, Kind kind) {
 
 ThrustTerms::ThrustTerms(std::span<const SimulationTerm> terms) {
   for (const auto& term : terms) {
-    if (term.kind == Kind::thrust_share || term.kind == Kind::thrust_slope || term.kind == Kind::thrust_with_voltage ||
-        term.kind == Kind::thrust_lag)
+    if (term.is(Kind::thrust_share) || term.is(Kind::thrust_slope) || term.is(Kind::thrust_with_voltage) ||
+        term.is(Kind::thrust_lag))
       terms_.push_back(term);
-    if (term.kind == Kind::thrust_lag) lag_ += term.value[0];
+    if (term.is(Kind::thrust_lag)) lag_ += term.value[0];
   }
 }
 
 double ThrustTerms::step(double nominal, double t, std::optional<double> voltage, double dt) {
   double slope = 1, factor = 1;
   for (const auto& term : terms_) {
-    if (term.kind == Kind::thrust_slope) slope += term.value[0];
-    if (term.kind == Kind::thrust_share) factor *= 1 - term.value[0];
-    if (term.kind == Kind::thrust_with_voltage) factor *= sagging(term.value, t, voltage);
+    if (term.is(Kind::thrust_slope)) slope += term.value[0];
+    if (term.is(Kind::thrust_share)) factor *= 1 - term.value[0];
+    if (term.is(Kind::thrust_with_voltage)) factor *= sagging(term.value, t, voltage);
   }
   const double wanted = std::max(0.0, factor * (kGravity + slope * (nominal - kGravity)));
   if (!(lag_ > 0)) return wanted;

@@ -4,27 +4,9 @@
 #include <vector>
 
 #include "core/types/disturbance.hpp"
+#include "core/types/law.hpp"
 
 namespace backwash {
-
-/// What an accepted cause of the study adds to the model (core/study/README.md, "Extension"): an entry of
-/// [[extension.term]].effect. `error`: half width of the value's 95 % interval, what stays unknown.
-struct ModelEffect {
-  enum class Kind {
-    push,                   ///< value: m/s² along x, y, z of W, everywhere
-    push_over_surface,      ///< z push value·e^{−(h − 0.4 m)/scale}, h the height over the surface below, m/s²
-    push_under_surface,     ///< z push value·e^{−(d − 0.3 m)/scale}, d the gap to the surface above, m/s²
-    push_to_walls,          ///< push value·e^{−(d − 0.4 m)/scale} towards each wall at distance d, m/s²
-    push_against_velocity,  ///< level push −value·v, 1/s
-    push_with_speed,        ///< z push value·(|v|/1 m/s)², m/s²
-    ln_variance,            ///< ln Σ + value, everywhere
-    ln_variance_under_surface,  ///< ln Σ + value·e^{−(d − 0.3 m)/scale}
-    ln_variance_with_speed,     ///< ln Σ + value·(|v|/1 m/s)^scale
-  };
-  Kind kind = Kind::push;
-  Vec3 value = Vec3::Zero(), error = Vec3::Zero();  ///< x alone, but for `push`
-  double scale = 0;                                 ///< m, or the exponent
-};
 
 /// Disturbance model, the content of a model file (docs/interfaces.md, "Model file"). The defaults are the documented
 /// default model of the 5-inch vehicle. Variances in (m/s²)², lengths in m, angles in rad.

@@ -1,30 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <variant>
 #include <vector>
+
+#include "core/types/law.hpp"
 
 namespace backwash {
 
 /// What an accepted cause of the study adds to the simulation: an entry of [[extension.term]].simulation of a model
-/// file (docs/model.md 6-10 to 6-17). `value` holds the numbers in the order given here. Field, reach and plan read
+/// file (docs/model.md 6-10 to 6-17): a law of the air, or what the simulation alone knows. Field, reach and plan read
 /// ModelEffect instead: a plan does not know battery, time or sensor.
 struct SimulationTerm {
   enum class Kind {
-    // Pushes on the vehicle.
-    push,                   ///< x, y, z of W, m/s²
+    // The air.
     push_of_heading,        ///< x, y of the body's heading, m/s²
-    push_over_surface,      ///< A m/s², L m: z push A e^{−(h − 0.4 m)/L}, h the height over the surface below
-    push_under_surface,     ///< A m/s², L m: z push A e^{−(d − 0.3 m)/L}, d the gap to the surface above
-    push_to_walls,          ///< A m/s², L m: A e^{−(d − 0.4 m)/L} towards each wall at distance d
-    push_against_velocity,  ///< k 1/s: −k v, level
-    push_against_climb,     ///< k 1/s: z push −k v_z
-    push_with_speed,        ///< C m/s²: z push C (|v|/1 m/s)²
-    // Gusts.
-    ln_variance_under_surface,  ///< B, L m: ln Σ + B e^{−(d − 0.3 m)/L}
-    ln_variance_with_speed,     ///< B, n: ln Σ + B (|v|/1 m/s)ⁿ
-    ln_variance_with_time,      ///< B, τ s: ln Σ + B (1 − e^{−t/τ}), t since the flight's start
-    variance_elsewhere,         ///< share, x, y m: ln Σ by that share as it is at the place moved by (x, y)
-    kurtosis,                   ///< K: bursts that raise ln kurtosis by K and leave Σ as it is
+    ln_variance_with_time,  ///< B, τ s: ln Σ + B (1 − e^{−t/τ}), t since the flight's start
+    variance_elsewhere,     ///< share, x, y m: ln Σ by that share as it is at the place moved by (x, y)
+    kurtosis,               ///< K: bursts that raise ln kurtosis by K and leave Σ as it is
     // Thrust and commands.
     thrust_share,         ///< m: thrust per mass times (1 − m)
     thrust_slope,         ///< s: a change of the thrust about hover is worth (1 + s) of it
@@ -41,8 +34,10 @@ struct SimulationTerm {
     rotor_reading,  ///< rotors 1 … 4: ln of rpm² as it is read over what it is
     rotor_dropout,  ///< rotors 1 … 4: share of rpm readings that are missing
   };
-  Kind kind = Kind::push;
-  std::vector<double> value;
+  std::variant<Law, Kind> kind = Law::push;
+  std::vector<double> value;  ///< of a law: its values, and its scale if it has one
+
+  bool is(Kind k) const noexcept { return kind == std::variant<Law, Kind>(k); }
 };
 
 }  // namespace backwash

@@ -102,11 +102,11 @@ std::vector<Value> interpolated(const field::ProximityField& exact, const std::v
 }
 
 /// What the model's extension says at a point, hovering.
-field::Air air_at(const field::ProximityField& exact, const Vec3& p_W) {
+Air air_at(const field::ProximityField& exact, const Vec3& p_W) {
   const auto& effects = exact.model().extension;
   if (effects.empty()) return {};
-  field::Air air = field::air_around(effects, field::around(exact.grid(), p_W));
-  const field::Air everywhere = field::air_moving(effects, Vec3::Zero());
+  Air air = field::air_around(effects, field::around(exact.grid(), p_W));
+  const Air everywhere = field::air_moving(effects, Vec3::Zero());
   air.push_W += everywhere.push_W;
   air.ln_variance += everywhere.ln_variance;
   return air;

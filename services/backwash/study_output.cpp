@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "core/study/calibrate/calibration_rules.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/words.hpp"
 
@@ -182,6 +183,13 @@ void print_text(const study::NamedCause& cause, const Vehicle& vehicle) {
   }
 }
 
+/// Of study and calibration.
+std::vector<study::Rule> all_rules() {
+  auto all = study::rules();
+  for (const auto& r : study::calibrate::rules()) all.push_back(r);
+  return all;
+}
+
 }  // namespace
 
 void print_text(const study::StudyResult& result, const study::Observations& seen, const Vehicle& vehicle,
@@ -210,7 +218,7 @@ void print_text(const study::StudyResult& result, const study::Observations& see
 void print_rules(bool json) {
   if (json) {
     Json all;
-    for (const auto& r : study::rules())
+    for (const auto& r : all_rules())
       all["rules"].push_back({{"name", r.name}, {"value", r.value}, {"unit", r.unit}, {"reason", r.reason}});
     for (const study::Form* f : study::catalogue()) {
       Json possible = Json::object();
@@ -226,7 +234,7 @@ void print_rules(bool json) {
     }
     return print(all);
   }
-  for (const auto& [name, value, unit, reason] : study::rules())
+  for (const auto& [name, value, unit, reason] : all_rules())
     std::printf("%-20.*s %10.7g  %-22.*s %.*s\n", static_cast<int>(name.size()), name.data(), value,
                 static_cast<int>(unit.size()), unit.data(), static_cast<int>(reason.size()), reason.data());
   std::printf("\nleast root mean square over the flown windows, least first parameter, of each form:\n");

@@ -197,7 +197,7 @@ TEST(LoadModel, ReadsTheEffectsOfAnExtensionAndRefusesWhatIsNone) {
   const auto model = load_model(file.path);
   ASSERT_TRUE(model) << model.error().message;
   ASSERT_EQ(model->extension.size(), 2u);
-  EXPECT_EQ(model->extension[0].kind, ModelEffect::Kind::push_under_surface);
+  EXPECT_EQ(model->extension[0].kind, Law::push_under_surface);
   EXPECT_EQ(model->extension[0].value.x(), 0.31);
   EXPECT_EQ(model->extension[0].error.x(), 0.05);
   EXPECT_EQ(model->extension[0].scale, 0.22);

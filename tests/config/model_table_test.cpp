@@ -69,21 +69,21 @@ TEST(ModelTable, NumbersAreAsShortAsTheyMayBeAndTextStaysAsItIs) {
 }
 
 TEST(ModelTable, EveryKindOfEffectIsReadBackAsItWasWritten) {
-  for (int k = 0; k <= static_cast<int>(ModelEffect::Kind::ln_variance_with_speed); ++k) {
-    const ModelEffect e{static_cast<ModelEffect::Kind>(k), Vec3(-0.125, 0.25, 0.5), Vec3(0.5, 0.25, 0.125), 0.75};
+  for (const LawEntry& law : kLaws) {
+    const ModelEffect e{law.law, Vec3(-0.125, 0.25, 0.5), Vec3(0.5, 0.25, 0.125), 0.75};
     const auto found = extended(e);
-    ASSERT_TRUE(found) << k << ": " << found.error().message;
-    ASSERT_EQ(found->extension.size(), 1u) << k;
+    ASSERT_TRUE(found) << law.name << ": " << found.error().message;
+    ASSERT_EQ(found->extension.size(), 1u) << law.name;
     EXPECT_EQ(found->extension[0].kind, e.kind);
-    EXPECT_EQ(found->extension[0].value.x(), -0.125) << k;
-    EXPECT_EQ(found->extension[0].error.x(), 0.5) << k;
-    EXPECT_EQ(effect_table(found->extension[0]), effect_table(e)) << k;
+    EXPECT_EQ(found->extension[0].value.x(), -0.125) << law.name;
+    EXPECT_EQ(found->extension[0].error.x(), 0.5) << law.name;
+    EXPECT_EQ(effect_table(found->extension[0]), effect_table(e)) << law.name;
   }
 }
 
 // What a study found may lie beyond what a file may hold; the file is readable all the same.
 TEST(ModelTable, NumbersOfAnEffectBeyondTheReadersRangeAreWrittenAtItsEnd) {
-  const auto found = extended({ModelEffect::Kind::push_to_walls, Vec3(-80, 0, 0), Vec3(70, 0, 0), 1e-4});
+  const auto found = extended({Law::push_to_walls, Vec3(-80, 0, 0), Vec3(70, 0, 0), 1e-4});
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_EQ(found->extension.at(0).value.x(), -10);
   EXPECT_EQ(found->extension.at(0).error.x(), 10);

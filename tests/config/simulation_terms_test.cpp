@@ -30,14 +30,17 @@ std::string with(const toml::table& entry) {
 }
 
 TEST(SimulationTerms, EveryKindIsReadBackAsItWasWritten) {
-  for (int k = 0; k <= static_cast<int>(SimulationTerm::Kind::rotor_dropout); ++k) {
-    const auto kind = static_cast<SimulationTerm::Kind>(k);
+  std::vector<std::variant<Law, SimulationTerm::Kind>> kinds;
+  for (const LawEntry& law : kLaws) kinds.emplace_back(law.law);
+  for (int k = 0; k <= static_cast<int>(SimulationTerm::Kind::rotor_dropout); ++k)
+    kinds.emplace_back(static_cast<SimulationTerm::Kind>(k));
+  for (const auto& kind : kinds) {
     const auto table = simulation_table({kind, std::vector<double>(8, 0.25)});
     const auto found = read(with(table));
-    ASSERT_TRUE(found) << k << ": " << found.error().message;
-    ASSERT_EQ(found->size(), 1u) << k;
+    ASSERT_TRUE(found) << table["kind"] << ": " << found.error().message;
+    ASSERT_EQ(found->size(), 1u) << table["kind"];
     EXPECT_EQ(found->front().kind, kind);
-    EXPECT_EQ(simulation_table(found->front()), table) << k;
+    EXPECT_EQ(simulation_table(found->front()), table) << table["kind"];
   }
 }
 

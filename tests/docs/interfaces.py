@@ -96,9 +96,6 @@ def check_keys(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, s
                 wrong.append(f"{heading}: {key} has the range {range_ or '(none)'}, not {documented[key][0]}")
             if (documented[key][1] == "needed") != needed:
                 wrong.append(f"{heading}: {key} is {'needed' if needed else 'not needed'}")
-    kinds = set(re.findall(r'\{"(\w+)", ModelEffect::Kind', (root / "core/config/model_file.cpp").read_text()))
-    table = [cells for cells in rows(sections_of["Model file"]) if len(cells) == 2]
-    expect("kinds of effects", {k for cells in table for k in quoted(cells[0])}, kinds)
     kinds = set(re.findall(r'\{"(\w+)",\s*Kind::', (root / "core/config/simulation_terms.cpp").read_text()))
     table = [cells for cells in rows(sections_of["Model file"]) if len(cells) == 3]
     expect("kinds of simulation terms", {k for cells in table for k in quoted(cells[0])}, kinds)

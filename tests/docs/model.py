@@ -3,6 +3,7 @@
 """docs/model.md: equations are numbered once each, and each is followed by the code that computes it, which exists: in the code,
 not in a comment or a text. After an arrow stands nothing in code marks but `path:symbol`, and a number of an equation in bold
 begins its line: what is spelled otherwise would not be read.
+Each law of core/types/law.hpp has its equation, "name:   what it computes", and no equation of a law names another.
 
 model.py SOURCE_DIR
 """
@@ -25,6 +26,16 @@ def names(code: str, symbol: str) -> bool:
     if re.search(rf"\b{re.escape(symbol)}\b", code):
         return True
     return "::" in symbol and all(re.search(rf"\b{re.escape(part)}\b", code) for part in symbol.split("::"))
+
+
+def laws(source: pathlib.Path, equations: list[str]) -> list[str]:
+    """What is wrong between the laws of the code and the equations 6-2 to 6-6 of the document."""
+    known = set(re.findall(r'\.name = "(\w+)"', (source / "core/types/law.hpp").read_text()))
+    heads = [head for line in equations if re.match(r" +6-[2-6] ", line) for head in re.findall(r"([a-z_]+(?:, [a-z_]+)*):   ", line)]
+    told = {name for head in heads for name in head.split(", ")}
+    wrong = [f"1: the law {name} has no equation" for name in sorted(known - told)]
+    wrong += [f"1: {name} is no law of core/types/law.hpp" for name in sorted(told - known)]
+    return wrong + ([] if len(known) >= 10 else [f"1: only {len(known)} laws were found"])
 
 
 def ranked(number: str) -> list[str]:
@@ -75,6 +86,7 @@ def main() -> int:
         ends = [min(group, key=ranked), max(group, key=ranked)] if group else []
         if ends != [first, last]:
             wrong.append(f"1: the table says {first} … {last}, there are {' … '.join(ends)}")
+    wrong += laws(source, (source / "docs/model.md").read_text().splitlines())
     if len(seen) < 50:
         wrong.append(f"1: only {len(seen)} equations were found")
     for line in wrong:

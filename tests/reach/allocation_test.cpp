@@ -62,9 +62,9 @@ TEST(RealTime, PushesAndBoundsOfAnExtendedModelDoNotAllocate) {
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (grid.at(n) == map::Cell::free) voxels.push_back(n);
   Model model;
-  model.extension = {{ModelEffect::Kind::push_under_surface, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
-                     {ModelEffect::Kind::push_to_walls, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
-                     {ModelEffect::Kind::ln_variance_with_speed, Vec3(0.5, 0, 0), Vec3::Zero(), 2}};
+  model.extension = {{Law::push_under_surface, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
+                     {Law::push_to_walls, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
+                     {Law::ln_variance_with_speed, Vec3(0.5, 0, 0), Vec3::Zero(), 2}};
   field::DisturbanceField field(grid);
   field.fill(field::ProximityField(grid, model), voxels);
   field::Extension extension(grid, model);

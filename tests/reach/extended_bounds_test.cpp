@@ -13,17 +13,15 @@
 namespace backwash::reach {
 namespace {
 
-using Kind = ModelEffect::Kind;
-
 constexpr double kDragError = 0.07, kLiftError = 0.05;
 
 /// Pushes that differ from place to place under the ceiling and along the wall, and pushes by velocity; none is exact.
 Model pushing_model() {
   Model model;
-  model.extension = {{Kind::push_under_surface, Vec3(0.6, 0, 0), Vec3(0.2, 0, 0), 0.4},
-                     {Kind::push_to_walls, Vec3(-0.4, 0, 0), Vec3(0.1, 0, 0), 0.5},
-                     {Kind::push_against_velocity, Vec3(0.3, 0, 0), Vec3(kDragError, 0, 0), 0},
-                     {Kind::push_with_speed, Vec3(0.2, 0, 0), Vec3(kLiftError, 0, 0), 0}};
+  model.extension = {{Law::push_under_surface, Vec3(0.6, 0, 0), Vec3(0.2, 0, 0), 0.4},
+                     {Law::push_to_walls, Vec3(-0.4, 0, 0), Vec3(0.1, 0, 0), 0.5},
+                     {Law::push_against_velocity, Vec3(0.3, 0, 0), Vec3(kDragError, 0, 0), 0},
+                     {Law::push_with_speed, Vec3(0.2, 0, 0), Vec3(kLiftError, 0, 0), 0}};
   return model;
 }
 
@@ -55,7 +53,7 @@ PerDirection brute_force(const Scene& scene, const Vec3& push, const Vec3& veloc
   for (std::size_t n = 0; n < scene.grid.cell_count(); ++n) {
     const Index3 v = scene.grid.voxel(n);
     if (!scene.field.has(v) || (v.array() < low.array()).any() || (v.array() > high.array()).any()) continue;
-    const field::Air air = scene.extension.at(v);
+    const Air air = scene.extension.at(v);
     const DisturbanceBound w = bound(scene.field.at(v), scene.model.bound);
     for (std::size_t d = 0; d < kDirections; ++d) {
       const double unknown = d == kZ ? air.vertical + kLiftError * velocity.squaredNorm()

@@ -227,7 +227,7 @@ TEST(HoverSet, ConstantMarginReplacesTheExtentAndNothingElse) {
 /// The bounds of a scene where the same mean push acts everywhere.
 BoundField pushed(const Scene& scene, const Vec3& push_W) {
   Model model = scene.model;
-  model.extension = {{ModelEffect::Kind::push, push_W, Vec3::Zero(), 0}};
+  model.extension = {{Law::push, push_W, Vec3::Zero(), 0}};
   return {scene.grid, scene.field, model.bound, field::Extension(scene.grid, model)};
 }
 

@@ -38,11 +38,11 @@ Model calm(std::vector<ModelEffect> extension) {
   return m;
 }
 
-ModelEffect effect(ModelEffect::Kind kind, const Vec3& value, double scale = 0, double error = 0) {
+ModelEffect effect(Law kind, const Vec3& value, double scale = 0, double error = 0) {
   return {kind, value, Vec3(error, 0, 0), scale};
 }
-const ModelEffect kSuction = effect(ModelEffect::Kind::push_under_surface, Vec3(0.6, 0, 0), 0.4);
-const ModelEffect kPull = effect(ModelEffect::Kind::push_to_walls, Vec3(-0.4, 0, 0), 0.5);
+const ModelEffect kSuction = effect(Law::push_under_surface, Vec3(0.6, 0, 0), 0.4);
+const ModelEffect kPull = effect(Law::push_to_walls, Vec3(-0.4, 0, 0), 0.5);
 
 Vec3 suction(const Vec3& p) { return {0, 0, 0.6 * std::exp(-(kCeiling - p.z() - 0.3) / 0.4)}; }
 Vec3 pushed_off(const Vec3& p) { return {0, -0.4 * std::exp(-(kWall - p.y() - 0.4) / 0.5), 0}; }
@@ -106,11 +106,10 @@ TEST(ExtendedModel, TubesFollowDraftAndDragAlongTheWay) {
   v.initial_error = {0, 0};
   const Vec3 draft(0.3, -0.2, -0.1);
   const double drag = 0.3, lift = 0.25;
-  const auto world = plan::build_world(
-      room(),
-      calm({effect(ModelEffect::Kind::push, draft), effect(ModelEffect::Kind::push_against_velocity, {drag, 0, 0}),
-            effect(ModelEffect::Kind::push_with_speed, {lift, 0, 0})}),
-      v);
+  const auto world = plan::build_world(room(),
+                                       calm({effect(Law::push, draft), effect(Law::push_against_velocity, {drag, 0, 0}),
+                                             effect(Law::push_with_speed, {lift, 0, 0})}),
+                                       v);
   const auto plain = plan::build_world(room(), calm({}), v);
   const State start{Vec3(0.7, 0, 1), Vec3::Zero()};
   const auto commands = way(start.p_W, Vec3(2.2, 1.8, 1.4));
@@ -164,14 +163,14 @@ TEST(ExtendedModel, SuctionTakesHoverPlacesUnderTheCeilingAndAPushAwayGivesSomeB
   };
   EXPECT_LT(safe_below_ceiling(0.05, {kSuction}), safe_below_ceiling(0.05, {}));
   // Sets of 10 cm: the voxels a quarter metre below the ceiling fit with the push alone.
-  EXPECT_GT(safe_below_ceiling(0.1, {effect(ModelEffect::Kind::push, {0, 0, -0.8})}), safe_below_ceiling(0.1, {}));
+  EXPECT_GT(safe_below_ceiling(0.1, {effect(Law::push, {0, 0, -0.8})}), safe_below_ceiling(0.1, {}));
 }
 
 TEST(ExtendedModel, VarianceByPlaceAndSpeedWidensTheSetsByItsRoot) {
   Model model;
   model.bound.kappa = 3;
   const auto plain = plan::build_world(room(), model, vehicle());
-  model.extension = {effect(ModelEffect::Kind::ln_variance_under_surface, {1, 0, 0}, 0.3)};
+  model.extension = {effect(Law::ln_variance_under_surface, {1, 0, 0}, 0.3)};
   const auto ceiling = plan::build_world(room(), model, vehicle());
   for (const int k : {10, 20}) {
     const Index3 v(15, 20, k);
@@ -180,7 +179,7 @@ TEST(ExtendedModel, VarianceByPlaceAndSpeedWidensTheSetsByItsRoot) {
     EXPECT_NEAR(ceiling->field.at(v).zz, factor * plain->field.at(v).zz, 1e-3 * plain->field.at(v).zz);
     EXPECT_NEAR(ceiling->bounds.at(v).w[kZ], std::sqrt(factor) * plain->bounds.at(v).w[kZ], 1e-3);
   }
-  model.extension = {effect(ModelEffect::Kind::ln_variance_with_speed, {0.8, 0, 0}, 2)};
+  model.extension = {effect(Law::ln_variance_with_speed, {0.8, 0, 0}, 2)};
   const auto fast = plan::build_world(room(), model, vehicle());
   const Index3 v(15, 20, 10);
   const auto at = [&](double speed) {
@@ -193,8 +192,7 @@ TEST(ExtendedModel, VarianceByPlaceAndSpeedWidensTheSetsByItsRoot) {
 TEST(ExtendedModel, EffectsOfNothingLeaveEveryTubeAndSetAsWithoutThem) {
   Model model;
   const auto plain = plan::build_world(room(), model, vehicle());
-  model.extension = {effect(ModelEffect::Kind::push, Vec3::Zero()),
-                     effect(ModelEffect::Kind::push_under_surface, Vec3::Zero(), 0.3)};
+  model.extension = {effect(Law::push, Vec3::Zero()), effect(Law::push_under_surface, Vec3::Zero(), 0.3)};
   const auto zero = plan::build_world(room(), model, vehicle());
   const State start{Vec3(1.5, 1, 1), Vec3(0.1, 0, 0)};
   const auto commands = way(start.p_W, Vec3(1.5, 2.2, 1.8));
@@ -210,7 +208,7 @@ TEST(ExtendedModel, EffectsOfNothingLeaveEveryTubeAndSetAsWithoutThem) {
 
 TEST(ExtendedModel, AnUpdatedWorldEqualsOneBuiltAnew) {
   Model model;
-  model.extension = {kSuction, kPull, effect(ModelEffect::Kind::ln_variance_under_surface, {0.5, 0, 0}, 0.3)};
+  model.extension = {kSuction, kPull, effect(Law::ln_variance_under_surface, {0.5, 0, 0}, 0.3)};
   const auto before = plan::build_world(room(), model, vehicle());
   map::OccupancyGrid changed = room();
   map::VoxelBox box;

@@ -33,25 +33,25 @@ AirTerms::Now now(const Terms& terms, const Flying& flying) {
 
 TEST(AirTermsOfAModel, PushAsTheirFormulasSay) {
   const Flying low{0, {2, 2, 0.5}, {0.6, -0.8, 0}, M_PI / 2};
-  EXPECT_NEAR(now({{Kind::push_over_surface, {0.3, 0.2}}}, low).push_W.z(), 0.3 * std::exp(-0.1 / 0.2), 1e-9);
-  EXPECT_NEAR(now({{Kind::push_under_surface, {0.3, 0.5}}}, {0, {2, 2, 2.5}, Vec3::Zero()}).push_W.z(),
+  EXPECT_NEAR(now({{Law::push_over_surface, {0.3, 0.2}}}, low).push_W.z(), 0.3 * std::exp(-0.1 / 0.2), 1e-9);
+  EXPECT_NEAR(now({{Law::push_under_surface, {0.3, 0.5}}}, {0, {2, 2, 2.5}, Vec3::Zero()}).push_W.z(),
               0.3 * std::exp(-0.2 / 0.5), 1e-9);
-  const Vec3 pull = now({{Kind::push_to_walls, {0.3, 0.1}}}, {0, {0.5, 2, 1.5}, Vec3::Zero()}).push_W;
+  const Vec3 pull = now({{Law::push_to_walls, {0.3, 0.1}}}, {0, {0.5, 2, 1.5}, Vec3::Zero()}).push_W;
   EXPECT_NEAR(pull.x(), -0.3 * std::exp(-0.1 / 0.1), 1e-3);
-  EXPECT_TRUE(now({{Kind::push, {0.1, 0.2, 0.3}}}, low).push_W.isApprox(Vec3(0.1, 0.2, 0.3)));
+  EXPECT_TRUE(now({{Law::push, {0.1, 0.2, 0.3}}}, low).push_W.isApprox(Vec3(0.1, 0.2, 0.3)));
   EXPECT_TRUE(now({{Kind::push_of_heading, {0.1, 0.2}}}, low).push_W.isApprox(Vec3(-0.2, 0.1, 0), 1e-9));
-  EXPECT_TRUE(now({{Kind::push_against_velocity, {0.5}}}, low).push_W.isApprox(Vec3(-0.3, 0.4, 0)));
-  EXPECT_TRUE(now({{Kind::push_against_climb, {0.5}}}, {0, {2, 2, 1}, {1, 1, 0.4}}).push_W.isApprox(Vec3(0, 0, -0.2)));
-  EXPECT_TRUE(now({{Kind::push_with_speed, {0.5}}}, low).push_W.isApprox(Vec3(0, 0, 0.5)));
+  EXPECT_TRUE(now({{Law::push_against_velocity, {0.5}}}, low).push_W.isApprox(Vec3(-0.3, 0.4, 0)));
+  EXPECT_TRUE(now({{Law::push_against_climb, {0.5}}}, {0, {2, 2, 1}, {1, 1, 0.4}}).push_W.isApprox(Vec3(0, 0, -0.2)));
+  EXPECT_TRUE(now({{Law::push_with_speed, {0.5}}}, low).push_W.isApprox(Vec3(0, 0, 0.5)));
 }
 
 TEST(AirTermsOfAModel, ScaleTheGustsAsTheirFormulasSay) {
   const Flying fast{20, {2, 2, 1}, {2, 0, 0}};
-  EXPECT_NEAR(now({{Kind::ln_variance_with_speed, {0.4, 1.5}}}, fast).gust, std::exp(0.2 * std::pow(2, 1.5)), 1e-9);
+  EXPECT_NEAR(now({{Law::ln_variance_with_speed, {0.4, 1.5}}}, fast).gust, std::exp(0.2 * std::pow(2, 1.5)), 1e-9);
   EXPECT_NEAR(now({{Kind::ln_variance_with_time, {0.8, 10}}}, fast).gust, std::exp(0.4 * (1 - std::exp(-2))), 1e-9);
-  EXPECT_NEAR(now({{Kind::ln_variance_under_surface, {0.6, 0.4}}}, {0, {2, 2, 2.5}, Vec3::Zero()}).gust,
+  EXPECT_NEAR(now({{Law::ln_variance_under_surface, {0.6, 0.4}}}, {0, {2, 2, 2.5}, Vec3::Zero()}).gust,
               std::exp(0.3 * std::exp(-0.2 / 0.4)), 1e-9);
-  EXPECT_EQ(now({{Kind::push, {1, 1, 1}}}, fast).gust, 1);
+  EXPECT_EQ(now({{Law::push, {1, 1, 1}}}, fast).gust, 1);
 }
 
 TEST(AirTermsOfAModel, LookSigmaUpElsewhereButNotInASolid) {

@@ -165,7 +165,7 @@ TEST(Study, ExtendedModelFilesAreAcceptedByTheReader) {
   ASSERT_FALSE(read->extension.empty());
   const auto& effect = read->extension.front();
   const auto& found = result.causes.front().found;
-  EXPECT_EQ(effect.kind, backwash::ModelEffect::Kind::push_under_surface);
+  EXPECT_EQ(effect.kind, backwash::Law::push_under_surface);
   EXPECT_NEAR(effect.value.x(), found.theta[0], 1e-6);
   EXPECT_NEAR(effect.scale, found.scale.value, 1e-6);
   EXPECT_GT(effect.error.x(), 0);

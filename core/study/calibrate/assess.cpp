@@ -6,13 +6,14 @@
 #include <limits>
 #include <map>
 
+#include "core/study/calibrate/calibration_rules.hpp"
+
 namespace backwash::study::calibrate {
 namespace {
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr double kWallEdges[] = {0, 0.35, 0.6, 1.0, 1.5, kFar};
 constexpr double kHeightEdges[] = {0, 0.4, 0.8, 1.3, 1.9, kFar};
-constexpr double kHeightStep = 0.25;  // m, of the height-only bound
 
 double quantile_of(std::vector<double>& values, double q) {
   const auto at = std::min(values.size() - 1, static_cast<std::size_t>(q * static_cast<double>(values.size())));
@@ -74,7 +75,9 @@ Assessment assess(const Data& data, std::span<const Vec3> ln_bound, double q) {
         covered[axis] = r <= 0 ? 1 : 0;
         a.loss += pinball(r, q);
         ratio[i].push_back(-r), all[i].push_back(v[axis]);
-        by_height[i][static_cast<int>(std::min(h.features.height, 100.0) / kHeightStep)].push_back(v[axis]);
+        by_height[i][static_cast<int>(std::min(h.features.height, kCalibrationRules.highest.value) /
+                                      kCalibrationRules.height_step)]
+            .push_back(v[axis]);
       }
       a.windows += 1, a.coverage += covered;
       a.flight_coverage[h.flight] += covered, a.flight_windows[h.flight] += 1;

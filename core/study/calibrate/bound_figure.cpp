@@ -37,7 +37,7 @@ std::string points(const Data& data, std::size_t place, int axis) {
 }
 
 std::string surface(const Extent& e, const map::OccupancyGrid& grid, const Model& model, int axis) {
-  constexpr double kStep = 0.1;
+  constexpr double kStep = kCalibrationRules.figure_step;
   const field::ProximityField field(grid, model);
   std::ostringstream text;
   const int rows = static_cast<int>((e.high.z() - e.low.z()) / kStep) + 1,

@@ -6,6 +6,8 @@
 #include <functional>
 #include <random>
 
+#include "core/study/calibrate/calibration_rules.hpp"
+
 namespace backwash::study::calibrate {
 namespace {
 
@@ -52,7 +54,7 @@ double push(const Data& data, std::span<const double> weights, Group g) {
     noise += weight * (g == kVertical ? h.push_noise.z() : h.push_noise.head<2>().sum());
   }
   const double kept = square > 0 ? std::max(0.0, 1 - noise / square) : 0;
-  return weighted_quantile(sizes, 0.95) * std::sqrt(kept);
+  return weighted_quantile(sizes, kCalibrationRules.push_quantile) * std::sqrt(kept);
 }
 
 double tau(const Data& data, std::span<const double> weights) {
@@ -67,7 +69,7 @@ double tau(const Data& data, std::span<const double> weights) {
 /// resampling n flights sees only (n − 1)/n of their variance, and few flights have Student's tails.
 double widening(std::size_t flights, std::size_t places) {
   const double n = static_cast<double>(flights), freedom = std::max(1.0, n - static_cast<double>(places));
-  constexpr double kZ = 1.959964;
+  constexpr double kZ = kCalibrationRules.interval_z;
   return std::sqrt(n / freedom) * (1 + (kZ * kZ + 1) / (4 * freedom));  // t/z to first order in 1/freedom
 }
 
@@ -83,7 +85,8 @@ Interval interval(double estimate, std::vector<double> refits, double wider) {
     return refits[i] + (position - static_cast<double>(i)) * (refits[j] - refits[i]);
   };
   const auto widened = [&](double end) { return end > 0 ? estimate * std::pow(end / estimate, wider) : 0; };
-  return {std::min(estimate, widened(at(0.025))), std::max(estimate, widened(at(0.975)))};
+  return {std::min(estimate, widened(at(kCalibrationRules.interval_tail))),
+          std::max(estimate, widened(at(1 - kCalibrationRules.interval_tail)))};
 }
 
 }  // namespace
@@ -142,7 +145,7 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
   std::vector<int> segment;
   for (const auto& w : flight.windows) {
     if ((w.variance.array() <= 0).any()) continue;
-    if (segment.empty() || segment.back() != w.segment || (w.p_W - at.back()).norm() > 0.1) {
+    if (segment.empty() || segment.back() != w.segment || (w.p_W - at.back()).norm() > kCalibrationRules.same_place) {
       hovers.push_back({number, Vec3::Zero(), {}, {}, Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
       at.push_back(Vec3::Zero()), segment.push_back(w.segment);
     }
@@ -156,7 +159,8 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
   const auto found = features(grid, gates, at);
   for (std::size_t i = 0; i < hovers.size(); ++i) {
     hovers[i].p_W = at[i], hovers[i].features = found[i];
-    hovers[i].push_noise /= 2.0 * static_cast<double>(hovers[i].ln_variance.size());  // over the seconds of 2 s windows
+    hovers[i].push_noise /=
+        kCalibrationRules.same_window * static_cast<double>(hovers[i].ln_variance.size());  // over its time
   }
   return hovers;
 }

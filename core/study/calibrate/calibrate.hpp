@@ -33,8 +33,8 @@ struct Estimate {
 
 struct Options {
   FitOptions fit;
-  int bootstraps = 200;
-  int folds = 5;
+  int bootstraps = static_cast<int>(kCalibrationRules.bootstraps);
+  int folds = static_cast<int>(kCalibrationRules.folds);
   std::uint64_t seed = 1;
 };
 

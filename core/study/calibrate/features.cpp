@@ -10,7 +10,7 @@
 namespace backwash::study::calibrate {
 namespace {
 
-constexpr double kLeastDecay = 0.3, kDecayRatio = 1.42;  // 0.3 … 58 1/m²
+constexpr double kLeastDecay = kCalibrationRules.least_decay, kDecayRatio = kCalibrationRules.decay_ratio;
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
 /// Pairs a value with its place in a model, both ways.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
+#include "core/study/calibrate/calibration_rules.hpp"
 #include "core/types/model.hpp"
 
 namespace backwash::study::calibrate {
@@ -40,7 +41,7 @@ Parameters parameters_of(const Model& model) noexcept;
 Model with_parameters(const Model& gates, const Parameters& parameters) noexcept;
 
 /// Values of k_g2 and k_w2 at which features are stored, 1/m²: between them features are interpolated.
-inline constexpr std::size_t kDecays = 16;
+inline constexpr auto kDecays = static_cast<std::size_t>(kCalibrationRules.decays);
 const std::array<double, kDecays>& decay_grid() noexcept;
 
 /// What the geometry around a point contributes to Σ for amplitude 1 (docs/model.md section 2), summed over visible

@@ -6,12 +6,13 @@
 #include <nlopt.hpp>
 #include <numbers>
 
+#include "core/study/calibrate/calibration_rules.hpp"
+
 namespace backwash::study::calibrate {
 namespace {
 
-constexpr double kSmoothing = 0.05;                      // of the pinball loss, in ln variance
-constexpr double kLeastBase = 1e-6;                      // (m/s²)²: keeps ln Σ finite
-constexpr double kLeastDecay = 0.3, kLargestDecay = 50;  // 1/m²
+constexpr double kSmoothing = kCalibrationRules.smoothing, kLeastBase = kCalibrationRules.least_base;
+constexpr double kLeastDecay = kCalibrationRules.least_decay, kLargestDecay = kCalibrationRules.largest_decay;
 
 /// Levels of the flights, per group.
 using Levels = std::vector<std::array<double, kGroups>>;
@@ -72,8 +73,9 @@ class Loss {
   void set_scales() {
     Parameters mean{};
     double ln_variance = 0, windows = 0;
+    const double ln_decay = std::log(kCalibrationRules.first_decay);
     for (const auto& h : data_.hovers) {
-      const FeaturesAt d = at_decays(h.features, std::log(3.0), std::log(3.0));
+      const FeaturesAt d = at_decays(h.features, ln_decay, ln_decay);
       for (int axis = 0; axis < 3; ++axis) {
         const auto f = factors(h.features, d, axis);
         for (std::size_t j = 0; j < kAmplitudes; ++j) mean[j] += f[j] / static_cast<double>(data_.hovers.size());
@@ -113,7 +115,7 @@ double evaluate(const std::vector<double>& x, std::vector<double>& gradient, voi
 /// Minimum near x; the best point seen stands if the solver stops early.
 Parameters minimised(const Loss& loss, const Parameters& x, const Free& free, double tolerance) {
   nlopt::opt solver(nlopt::LD_LBFGS, kParameters);
-  std::vector<double> low(kParameters, 0.0), high(kParameters, 1e4);
+  std::vector<double> low(kParameters, 0.0), high(kParameters, kCalibrationRules.largest_scaled);
   low[kBaseH] = kLeastBase / loss.scales()[kBaseH], low[kBaseZ] = kLeastBase / loss.scales()[kBaseZ];
   low[kGroundK2] = low[kWallK2] = std::log(kLeastDecay), high[kGroundK2] = high[kWallK2] = std::log(kLargestDecay);
   std::vector<double> at(x.begin(), x.end());
@@ -122,7 +124,7 @@ Parameters minimised(const Loss& loss, const Parameters& x, const Free& free, do
     at[j] = std::clamp(at[j], low[j], high[j]);
   }
   solver.set_lower_bounds(low), solver.set_upper_bounds(high);
-  solver.set_ftol_rel(tolerance), solver.set_maxeval(400);
+  solver.set_ftol_rel(tolerance), solver.set_maxeval(static_cast<int>(kCalibrationRules.evaluations));
   Call call{&loss, x, std::numeric_limits<double>::infinity()};
   std::copy(at.begin(), at.end(), call.best_x.begin());
   solver.set_min_objective(evaluate, &call);
@@ -213,14 +215,14 @@ double level_shift(const Data& data, std::span<const double> weights, const Para
     within.emplace_back(r - s.means[flight][g], weights[flight]);
     total += weights[flight];
   });
-  const double sd = std::max(s.between[g], 1e-3);
+  const double sd = std::max(s.between[g], kCalibrationRules.least_between.value);
   const auto covered = [&](double shift) {
     double sum = 0;
     for (const auto& [r, weight] : within) sum += weight * 0.5 * std::erfc((r - shift) / (sd * std::numbers::sqrt2));
     return sum / total;
   };
-  double low = -10, high = 10;
-  for (int i = 0; i < 40; ++i) {
+  double low = -kCalibrationRules.level_range, high = kCalibrationRules.level_range;
+  for (int i = 0; i < kCalibrationRules.level_halvings; ++i) {
     const double middle = 0.5 * (low + high);
     (covered(middle) < q ? low : high) = middle;
   }
@@ -254,7 +256,7 @@ Fit fit(const Data& data, std::span<const double> flight_weights, const Paramete
   Fit result{start, 0, {}, {}};
   for (int round = 0; round < options.rounds; ++round) {
     loss.set_levels(scatter(data, flight_weights, result.parameters).levels);
-    const double tolerance = round + 1 < options.rounds ? 1e-7 : 1e-9;
+    const double tolerance = round + 1 < options.rounds ? kCalibrationRules.rough : kCalibrationRules.fine;
     result.parameters = scaled(minimised(loss, scaled(result.parameters, 1), options.free, tolerance), -1);
   }
   const Scatter s = scatter(data, flight_weights, result.parameters);

@@ -43,9 +43,9 @@ struct Fit {
 using Free = std::bitset<kParameters>;
 
 struct FitOptions {
-  double quantile = 0.9;
+  double quantile = kCalibrationRules.quantile;
   Free free = Free().set();
-  int rounds = 3;  ///< of flight levels and bound in turn
+  int rounds = static_cast<int>(kCalibrationRules.rounds);  ///< of flight levels and bound in turn
 };
 
 /// Quantile regression of ln variance on ln Σ(p; θ) (docs/model.md section 2), θ ≥ 0:

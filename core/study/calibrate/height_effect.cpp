@@ -9,6 +9,8 @@
 #include <random>
 #include <set>
 
+#include "core/study/calibrate/calibration_rules.hpp"
+
 namespace backwash::study::calibrate {
 namespace {
 
@@ -62,7 +64,8 @@ class Regression {
     MatrixXd sum = MatrixXd::Zero(n, n);
     for (const auto& [day, g] : days)
       if (g(one, one) > 0) sum += g - g.col(one) * g.row(one) / g(one, one);  // the day's level
-    const MatrixXd A = sum.topLeftCorner(columns_, columns_) + 1e-9 * MatrixXd::Identity(columns_, columns_);
+    const MatrixXd A = sum.topLeftCorner(columns_, columns_) +
+                       kCalibrationRules.height_ridge.value * MatrixXd::Identity(columns_, columns_);
     return A.ldlt().solve(sum.topRightCorner(columns_, 1));
   }
 
@@ -115,6 +118,7 @@ Contrasts contrasts(const Regression& fit, const std::vector<std::pair<Eigen::In
     const auto refit = ratios(times);
     for (std::size_t k = 0; k < refit.size(); ++k) drawn[k].push_back(refit[k]);
   }
+  constexpr double kTail = kCalibrationRules.interval_tail;
   Contrasts all{{}, std::sqrt(sigma), std::sqrt(between)};
   const auto value = ratios({});
   for (std::size_t k = 0; k < value.size(); ++k) {
@@ -122,7 +126,7 @@ Contrasts contrasts(const Regression& fit, const std::vector<std::pair<Eigen::In
     std::sort(x.begin(), x.end());
     const auto n = static_cast<double>(x.size() - 1);
     all.ratios.push_back(
-        {value[k], {x[static_cast<std::size_t>(0.025 * n)], x[static_cast<std::size_t>(0.975 * n + 0.5)]}});
+        {value[k], {x[static_cast<std::size_t>(kTail * n)], x[static_cast<std::size_t>((1 - kTail) * n + 0.5)]}});
   }
   return all;
 }
@@ -135,13 +139,12 @@ std::vector<HeightRow> height_rows(const FlightWindows& windows, const log::Flig
   const auto first = [&](const char* column, double otherwise) {
     return log.has(column) && !log.column(column).empty() ? log.column(column).front() : otherwise;
   };
-  constexpr double kLeast = 0.005;  // m
   const double ceiling = first("ceiling", 0), stood = first("stood_z_m", 0);
   const Plate plate = ceiling < 0 ? Plate::not_said : ceiling > 0 ? Plate::above : Plate::none;
   std::vector<HeightRow> rows;
   for (const auto& w : windows.windows) {
     const double height = w.p_W.z() - stood;
-    if (height < kLeast || !(w.variance.z() > 0) || !(w.speed_mps > 0)) continue;
+    if (height < kCalibrationRules.least_height || !(w.variance.z() > 0) || !(w.speed_mps > 0)) continue;
     rows.push_back(
         {flight, static_cast<int>(first("day", 0)), std::log(w.variance.z()), std::log(w.speed_mps), height, plate});
   }
@@ -180,9 +183,10 @@ HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, dou
 }
 
 std::optional<HeightEffects> height_effects(const std::vector<HeightRow>& rows, std::uint64_t seed) {
-  constexpr std::size_t kFewest = 10;
+  constexpr auto kFewest = static_cast<std::size_t>(kCalibrationRules.fewest_height_rows);
   const auto effect = [seed](const std::vector<HeightRow>& some) {
-    return height_effect(some, 0.01, 0.8, 0.05, 500, seed);
+    return height_effect(some, kCalibrationRules.low_height, kCalibrationRules.high_height,
+                         kCalibrationRules.height_length, static_cast<int>(kCalibrationRules.height_draws), seed);
   };
   if (rows.size() < kFewest) return std::nullopt;
   std::vector<HeightRow> slow;

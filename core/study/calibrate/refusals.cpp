@@ -5,14 +5,15 @@
 #include <map>
 
 #include "core/study/calibrate/calibrate.hpp"
+#include "core/study/calibrate/calibration_rules.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::study::calibrate {
 namespace {
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
-constexpr std::size_t kLeastFlights = 3, kLeastHovers = 6;
-constexpr double kLeastSpread = 0.2;  // m, of heights and of wall distances
+constexpr auto kLeastHovers = static_cast<std::size_t>(kCalibrationRules.least_hovers);
+constexpr double kLeastSpread = kCalibrationRules.least_spread;
 const std::vector<Parameter> kGroundAll = {kGroundLambdaH, kGroundLambdaZ, kGroundK1H, kGroundK1Z, kGroundK2};
 const std::vector<Parameter> kCornerAll = {kCornerN, kCornerT, kCornerZ};
 const std::vector<Parameter> kWallAll = {kWallN, kWallT, kWallZ, kWallK2};
@@ -31,7 +32,9 @@ std::vector<Refusal> too_few_flights(const Data& data) {
   for (const auto place : data.place) flights[place] += 1;
   std::size_t fewest = data.place.size();
   for (const auto& [place, count] : flights) fewest = std::min(fewest, count);
-  if (data.place.size() >= kLeastFlights && fewest >= 2 && !data.hovers.empty()) return {};
+  if (static_cast<double>(data.place.size()) >= kCalibrationRules.least_flights &&
+      static_cast<double>(fewest) >= kCalibrationRules.least_of_place && !data.hovers.empty())
+    return {};
   std::vector<Parameter> all;
   for (std::size_t p = 0; p < kParameters; ++p) all.push_back(static_cast<Parameter>(p));
   return {{"all", all,

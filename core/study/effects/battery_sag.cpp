@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 #include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
@@ -9,7 +10,7 @@ namespace {
 
 /// The highest and the mean voltage flown.
 std::vector<double> voltages(const Windows& ws) {
-  double highest = 0, mean = 1e-6;
+  double highest = 0, mean = kEffectRules.no_sag;
   for (const auto& w : ws) highest = std::max(highest, w.voltage), mean += w.voltage / ws.size();
   return {highest, mean};
 }
@@ -26,7 +27,8 @@ std::vector<SimulationTerm> by_voltage(const FittedForm& fitted, const Observati
   const double s = fitted.theta[0], c = fitted.beside.empty() ? 0 : fitted.beside[0];
   const Course course = mean_course(seen, &WindowRow::voltage);
   return {{SimulationTerm::Kind::thrust_with_voltage,
-           {s, anchor[0] + (std::abs(s) > 1e-6 ? c * anchor[1] / s : 0), anchor[1], course.first, course.rate}}};
+           {s, anchor[0] + (std::abs(s) > kEffectRules.no_sag ? c * anchor[1] / s : 0), anchor[1], course.first,
+            course.rate}}};
 }
 
 }  // namespace

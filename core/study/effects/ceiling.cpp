@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/field/extension.hpp"
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::study {
 namespace {
 
-using field::kCeilingReference, field::near_surface;
-
 std::optional<std::string> not_under_one(const Observations& seen) {
-  if (any(seen, [](auto& w) { return w.around.ceiling_gap < 1.5; })) return std::nullopt;
-  return "no ceiling within 1.5 m of the flights";
+  if (any(seen, [](auto& w) { return w.around.ceiling_gap < kEffectRules.under_ceiling; })) return std::nullopt;
+  return "no ceiling within " + to_text(kEffectRules.under_ceiling, 1) + " m of the flights";
 }
 
 double near_ceiling(double gap, double length) { return near_surface(gap, kCeilingReference, length); }
@@ -52,8 +51,8 @@ Form pull() {
                           return power_of_distance(at.ceiling_gap, kCeilingReference, n.value);
                         })};
                       }}},
-      .extend = extends(ModelEffect::Kind::push_under_surface),
-      .simulate = simulates(SimulationTerm::Kind::push_under_surface)};
+      .extend = extends(Law::push_under_surface),
+      .simulate = simulates(Law::push_under_surface)};
 }
 
 Form gusts() {
@@ -70,8 +69,8 @@ Form gusts() {
               [](const Windows& ws, const Scale& length) {
                 return std::vector{in_variance(ws, [&](auto& w) { return by_gap(w, length, near_ceiling); })};
               },
-          .extend = extends(ModelEffect::Kind::ln_variance_under_surface),
-          .simulate = simulates(SimulationTerm::Kind::ln_variance_under_surface)};
+          .extend = extends(Law::ln_variance_under_surface),
+          .simulate = simulates(Law::ln_variance_under_surface)};
 }
 
 }  // namespace

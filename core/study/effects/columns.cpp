@@ -6,8 +6,7 @@
 namespace backwash::study {
 
 double power_of_distance(double distance, double reference, double n) {
-  constexpr double kNearest = 0.15;  // m: as in near_surface
-  return std::isfinite(distance) ? std::pow(reference / std::max(distance, kNearest), n) : 0.0;
+  return std::isfinite(distance) ? std::pow(reference / std::max(distance, kSurfaceNearest), n) : 0.0;
 }
 
 std::vector<Column> body_drift(const Windows& ws, const std::function<double(const WindowRow&)>& amount) {

@@ -80,7 +80,7 @@ Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {
   return sum;
 }
 
-/// (reference/distance)^n, nowhere nearer than field::near_surface goes; 0 where there is no surface.
+/// (reference/distance)^n, nowhere nearer than near_surface() goes; 0 where there is no surface.
 double power_of_distance(double distance, double reference, double n);
 
 /// A vector of the body, growing with `amount`, in all mean channels.

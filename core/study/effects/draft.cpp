@@ -7,11 +7,11 @@ namespace {
 
 std::vector<ModelEffect> as_told(const FittedForm& fitted, const Observations&) {
   const auto &x = fitted.parameters[0], &y = fitted.parameters[1];
-  return {{ModelEffect::Kind::push, Vec3(x.value, y.value, 0), Vec3(half_width(x), half_width(y), 0), 0}};
+  return {{Law::push, Vec3(x.value, y.value, 0), Vec3(half_width(x), half_width(y), 0), 0}};
 }
 
 std::vector<SimulationTerm> in_the_plane(const FittedForm& fitted, const Observations&) {
-  return {{SimulationTerm::Kind::push, {fitted.theta[0], fitted.theta[1], 0}}};
+  return {{Law::push, {fitted.theta[0], fitted.theta[1], 0}}};
 }
 
 }  // namespace

@@ -47,8 +47,8 @@ Effect forward_speed() {
                      [](const Windows& ws, const Scale&) {
                        return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })};
                      },
-                 .extend = extends(ModelEffect::Kind::push_with_speed),
-                 .simulate = simulates(SimulationTerm::Kind::push_with_speed)},
+                 .extend = extends(Law::push_with_speed),
+                 .simulate = simulates(Law::push_with_speed)},
                 {.formula = "ln variance + B (v/1 m/s)^n",
                  .parameters = {"B_ln"},
                  .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
@@ -68,8 +68,8 @@ Effect forward_speed() {
                                  [](const Windows& ws, const Scale& knee) {
                                    return std::vector{in_variance(ws, [&](auto& w) { return added(w, knee.value); })};
                                  }}},
-                 .extend = extends(ModelEffect::Kind::ln_variance_with_speed),
-                 .simulate = simulates(SimulationTerm::Kind::ln_variance_with_speed)}},
+                 .extend = extends(Law::ln_variance_with_speed),
+                 .simulate = simulates(Law::ln_variance_with_speed)}},
       .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},
       .manoeuvres = {{"fly fast and slow on one line at one height", [](WindowRow& w, double s) {
                         w.speed = 1.5 * s, w.speeds.fill(w.speed);

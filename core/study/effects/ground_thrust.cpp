@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/field/extension.hpp"
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
-
-using field::kSurfaceReference, field::near_surface;
 
 /// The wash that comes back from the surface below lifts.
 Effect ground_thrust() {
@@ -36,8 +33,8 @@ Effect ground_thrust() {
                              .scales = scales_of({1.0, 3.0}),
                              .columns =
                                  lift([](double h, double n) { return power_of_distance(h, kSurfaceReference, n); })}},
-                 .extend = extends(ModelEffect::Kind::push_over_surface),
-                 .simulate = simulates(SimulationTerm::Kind::push_over_surface)}},
+                 .extend = extends(Law::push_over_surface),
+                 .simulate = simulates(Law::push_over_surface)}},
       .axis = {"height over the surface, m", false, [](auto& w) { return w.around.height; }},
       .manoeuvres = {{"hover at three heights, 0.3, 0.8 and 1.3 m over the floor, away from walls and ceiling",
                       [](WindowRow& w, double s) {

@@ -19,7 +19,7 @@ Effect inflow() {
                                [](auto& w) { return -w.v_W.z(); })};
                          },
                      .extend = unknown_push,
-                     .simulate = simulates(SimulationTerm::Kind::push_against_climb)}},
+                     .simulate = simulates(Law::push_against_climb)}},
           .axis = {"climb, m/s", false, [](auto& w) { return w.v_W.z(); }},
           .manoeuvres = {
               {"climb and sink at one speed through the same heights, away from walls", [](WindowRow& w, double s) {

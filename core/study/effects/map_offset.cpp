@@ -2,16 +2,18 @@
 #include <cstdio>
 
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 
 namespace backwash::study {
 namespace {
 
-/// Eight directions, 0.15 and 0.3 m.
+/// Around, near and far.
 std::vector<Scale> tried_offsets() {
   std::vector<Scale> offsets;
-  for (const double length : {0.15, 0.3})
-    for (int k = 0; k < 8; ++k)
-      offsets.push_back({0, whole_millimetres(length * Vec3(std::cos(M_PI * k / 4), std::sin(M_PI * k / 4), 0))});
+  constexpr double kTurn = 2 * M_PI / kEffectRules.offset_directions;
+  for (const double length : {kEffectRules.offset_near.value, kEffectRules.offset_far.value})
+    for (int k = 0; k < kEffectRules.offset_directions; ++k)
+      offsets.push_back({0, whole_millimetres(length * Vec3(std::cos(kTurn * k), std::sin(kTurn * k), 0))});
   return offsets;
 }
 

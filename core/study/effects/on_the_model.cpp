@@ -6,8 +6,6 @@
 
 namespace backwash::study {
 
-using Kind = ModelEffect::Kind;
-
 double half_width(const Estimate& e) { return std::max(0.0, (e.high - e.low) / 2); }
 
 std::vector<double> added(const FittedForm& fitted, const Observations& seen, Channel channel) {
@@ -21,19 +19,19 @@ std::vector<double> added(const FittedForm& fitted, const Observations& seen, Ch
   return sum;
 }
 
-std::vector<ModelEffect> own_fit(Kind kind, const FittedForm& fitted) {
+std::vector<ModelEffect> own_fit(Law kind, const FittedForm& fitted) {
   const Estimate& e = fitted.parameters.front();
   const double value = fitted.theta[0], error = std::max({0.0, e.high - value, value - e.low});
   return {{kind, Vec3(value, 0, 0), Vec3(error, 0, 0), fitted.scale.value}};
 }
 
-std::function<std::vector<ModelEffect>(const FittedForm&, const Observations&)> extends(Kind kind) {
+std::function<std::vector<ModelEffect>(const FittedForm&, const Observations&)> extends(Law kind) {
   return [kind](const FittedForm& fitted, const Observations&) { return own_fit(kind, fitted); };
 }
 
 std::vector<ModelEffect> unknown_push(const FittedForm& fitted, const Observations& seen) {
   const auto x = added(fitted, seen, kMeanX), y = added(fitted, seen, kMeanY), z = added(fitted, seen, kMeanZ);
-  ModelEffect e{Kind::push, Vec3::Zero(), Vec3::Zero(), 0};
+  ModelEffect e{Law::push, Vec3::Zero(), Vec3::Zero(), 0};
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     e.error.x() = std::max(e.error.x(), std::hypot(x.empty() ? 0 : x[i], y.empty() ? 0 : y[i]));
     e.error.z() = std::max(e.error.z(), z.empty() ? 0 : std::abs(z[i]));
@@ -55,12 +53,12 @@ std::vector<ModelEffect> flown_range(const FittedForm& fitted, const Observation
   const auto [low, high] = std::minmax_element(z.begin(), z.end());
   const Estimate& first = fitted.parameters.front();
   const double size = std::abs(first.value), most = std::max(std::abs(*low), std::abs(*high));
-  return {{Kind::push, Vec3(0, 0, (*low + *high) / 2),
+  return {{Law::push, Vec3(0, 0, (*low + *high) / 2),
            Vec3(0, 0, (*high - *low) / 2 + (size > 0 ? most * half_width(first) / size : 0)), 0}};
 }
 
 std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulates(
-    SimulationTerm::Kind kind) {
+    std::variant<Law, SimulationTerm::Kind> kind) {
   return [kind](const FittedForm& fitted, const Observations&) {
     SimulationTerm term{kind, {fitted.theta.begin(), fitted.theta.end()}};
     if (!fitted.form.scale_name.empty()) term.value.push_back(fitted.scale.value);

@@ -13,9 +13,9 @@ double half_width(const Estimate& e);
 std::vector<double> added(const FittedForm& fitted, const Observations& seen, Channel channel);
 
 /// The form's own fit, which holds where it was flown; the error is of all shapes at the reference.
-std::vector<ModelEffect> own_fit(ModelEffect::Kind kind, const FittedForm& fitted);
+std::vector<ModelEffect> own_fit(Law kind, const FittedForm& fitted);
 /// A function for Form::extend that adds its own_fit().
-std::function<std::vector<ModelEffect>(const FittedForm&, const Observations&)> extends(ModelEffect::Kind kind);
+std::function<std::vector<ModelEffect>(const FittedForm&, const Observations&)> extends(Law kind);
 
 /// Largest |Σ θ x| flown, level and vertical, with the first parameter at the far end of its interval: a push of any
 /// direction up to that.
@@ -26,7 +26,8 @@ std::vector<ModelEffect> unknown_push(const FittedForm& fitted, const Observatio
 std::vector<ModelEffect> flown_range(const FittedForm& fitted, const Observations& seen);
 
 /// A function for Form::simulate: one term of a kind, its numbers θ and, if the form has scales, the scale.
-std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulates(SimulationTerm::Kind kind);
+std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulates(
+    std::variant<Law, SimulationTerm::Kind> kind);
 
 /// The rotors' lines as they were measured along z: root of their mean power, and of the noise beside them that the
 /// gusts leave.

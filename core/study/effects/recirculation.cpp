@@ -19,7 +19,7 @@ std::vector<ModelEffect> largest(const FittedForm& fitted, const Observations& s
   const double most = std::max(0.0, *std::max_element(ln.begin(), ln.end()));
   const Estimate& e = fitted.parameters.front();
   const double share = std::abs(e.value) > 0 ? half_width(e) / std::abs(e.value) : 0;
-  return {{ModelEffect::Kind::ln_variance, Vec3(most, 0, 0), Vec3(most * share, 0, 0), 0}};
+  return {{Law::ln_variance, Vec3(most, 0, 0), Vec3(most * share, 0, 0), 0}};
 }
 
 }  // namespace

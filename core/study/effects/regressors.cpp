@@ -5,11 +5,12 @@
 #include <cmath>
 
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 
 namespace backwash::study {
 namespace {
 
-constexpr double kStrayed = 0.1;  // m: a push that moves the craft farther is not believed
+constexpr double kStrayed = kEffectRules.strayed;
 
 }  // namespace
 
@@ -20,9 +21,11 @@ std::vector<Regressor> regressors(const Observations& seen) {
                                 {"speed_mps", false, [](const WindowRow& w) { return w.speed; }},
                                 {"t_s", false, [](const WindowRow& w) { return w.t; }}};
   if (seen.has(Source::map)) {
-    all.push_back({"ceiling_gap_m", false, [](const WindowRow& w) { return std::min(w.around.ceiling_gap, 9.0); }});
+    all.push_back({"ceiling_gap_m", false, [](const WindowRow& w) {
+                     return std::min(w.around.ceiling_gap, kEffectRules.no_wall_nearer.value);
+                   }});
     all.push_back({"wall_distance_m", false, [](const WindowRow& w) {
-                     double least = 9;
+                     double least = kEffectRules.no_wall_nearer;
                      for (const auto& [distance, direction] : w.around.walls) least = std::min(least, distance);
                      return least;
                    }});
@@ -77,9 +80,9 @@ Windows moved_by(const Windows& windows, const std::vector<Column>& columns, con
 }
 
 Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& scale, const Eigen::VectorXd& theta) {
-  constexpr int kTurns = 4;
   Windows moved = windows;
-  for (int i = 0; i < kTurns && form.by_place; ++i) moved = moved_by(windows, form.columns(moved, scale), theta);
+  for (int i = 0; i < kEffectRules.place_turns && form.by_place; ++i)
+    moved = moved_by(windows, form.columns(moved, scale), theta);
   return moved;
 }
 
@@ -100,7 +103,8 @@ std::vector<Column> offsets(const std::vector<Column>& columns, const Observatio
     for (const Channel c : kVariances) free.push_back(in(c, ws, [](auto&) { return 1.0; }));
     Column noise;
     for (const Channel c : kVariances)
-      noise.parts.push_back({c, values(ws, [&](auto& w) { return 0.005 / w.sigma[static_cast<int>(c - kVarX)]; })});
+      noise.parts.push_back(
+          {c, values(ws, [&](auto& w) { return kEffectRules.noise_unit / w.sigma[static_cast<int>(c - kVarX)]; })});
     free.push_back(std::move(noise));
   }
   return free;

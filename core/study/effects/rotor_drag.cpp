@@ -30,8 +30,8 @@ Effect rotor_drag() {
                      .by_speed = true,
                      .floor = 0.01,
                      .columns = against_velocity,
-                     .extend = extends(ModelEffect::Kind::push_against_velocity),
-                     .simulate = simulates(SimulationTerm::Kind::push_against_velocity)}},
+                     .extend = extends(Law::push_against_velocity),
+                     .simulate = simulates(Law::push_against_velocity)}},
           .axis = {"velocity along x, m/s", false, [](auto& w) { return w.v_W.x(); }}};
 }
 

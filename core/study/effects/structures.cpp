@@ -8,18 +8,16 @@
 #include <numbers>
 
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 
 namespace backwash::study {
 namespace {
 
 using std::numbers::pi;
 
-constexpr int kFew = 4, kMany = 8;  // cosines of a rank
-constexpr int kTurns = 6;           // of an angle
-constexpr double kHighest = 0.25;   // Hz: half of one over a window
-constexpr double kLowest = 1.5;     // periods of a tone in the longest flight: slower ones are cosines of the time
-constexpr double kStep = 0.5;       // of one over the longest flight
-constexpr int kMostTones = 400;     // of a long flight the lowest
+constexpr int kFew = static_cast<int>(kEffectRules.few_cosines), kMany = static_cast<int>(kEffectRules.many_cosines);
+constexpr int kTurns = static_cast<int>(kEffectRules.angle_turns);
+constexpr double kHighest = kEffectRules.tone_highest;
 
 std::vector<double> cosine(double k, const std::vector<double>& u) {
   std::vector<double> x;
@@ -100,8 +98,8 @@ void add_tones(std::vector<Structure>& all, const Windows& windows) {
     moments->emplace_back(w.t, w.duration);
     longest = std::max(longest, w.t + w.duration / 2);
   }
-  for (int k = 0; k < kMostTones && longest > 0; ++k) {
-    const double hz = (kLowest + kStep * k) / longest;
+  for (int k = 0; k < kEffectRules.most_tones && longest > 0; ++k) {
+    const double hz = (kEffectRules.tone_lowest + kEffectRules.tone_step * k) / longest;
     if (hz > kHighest) break;
     char shape[32];
     std::snprintf(shape, sizeof shape, "%.4f Hz", hz);

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 #include "core/study/effects/on_the_model.hpp"
 #include "core/study/windows/signals.hpp"
 #include "core/types/text.hpp"
@@ -9,15 +10,13 @@
 namespace backwash::study {
 namespace {
 
-constexpr double kEnough = 0.1;  // of the windows of all rotors: fewer lines are too few to speak for the flights
-
 /// Lines that sampling folds to where the gusts and the loop are, or next to half the rate, cannot be told.
 std::optional<std::string> folded_away(const Observations& seen) {
   double lines = 0;
   for (std::size_t rotor = 0; rotor < 4; ++rotor)
     for (const double w : seen.weight[kLine1 + rotor]) lines += w > 0 ? 1 : 0;
   const double all = 4 * static_cast<double>(seen.windows.size());
-  if (lines >= kEnough * all) return std::nullopt;
+  if (lines >= kEffectRules.line_share * all) return std::nullopt;
   return "sampled once in " + std::to_string(std::lround(1000 * seen.row_period)) +
          " ms the rotors' lines fold below " + to_text(kWindowRules.least_folded, 2) +
          " Hz, where gusts and loop are, or next to half the rate, in " +

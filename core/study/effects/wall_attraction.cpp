@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/field/extension.hpp"
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
 namespace {
-
-using field::kSurfaceReference, field::near_surface;
 
 double exponential(double d, double length) { return near_surface(d, kSurfaceReference, length); }
 double power(double d, double n) { return power_of_distance(d, kSurfaceReference, n); }
@@ -66,8 +63,8 @@ Effect wall_attraction() {
                                  .scale_name = "n",
                                  .scales = exponents,
                                  .columns = pull(true, power)}},
-                     .extend = extends(ModelEffect::Kind::push_to_walls),
-                     .simulate = simulates(SimulationTerm::Kind::push_to_walls)}},
+                     .extend = extends(Law::push_to_walls),
+                     .simulate = simulates(Law::push_to_walls)}},
           .axis = {"distance to the nearest wall, m", false, nearest},
           .towards_walls = true,
           .manoeuvres = {{"approach a wall to 0.35 m from both sides", [](WindowRow& w, double s) {

@@ -14,8 +14,6 @@
 namespace backwash::study {
 namespace {
 
-constexpr std::size_t kPlaces = 60;
-
 double quantile(std::vector<double> x, double q) {
   if (x.empty()) return 0;
   std::sort(x.begin(), x.end());
@@ -76,7 +74,7 @@ double inside(const Observations& seen, const BoundModel& bound, const Added* ad
 
 std::vector<Vec3> places_of(const Observations& seen) {
   std::vector<Vec3> places;
-  const std::size_t every = seen.windows.size() / kPlaces + 1;
+  const std::size_t every = seen.windows.size() / static_cast<std::size_t>(kRules.places) + 1;
   for (std::size_t i = 0; i < seen.windows.size(); i += every) places.push_back(seen.windows[i].p_W);
   return places;
 }
@@ -90,8 +88,8 @@ void describe(Outcome& outcome, const std::vector<reach::HoverSet>& sets) {
     shift.push_back(set.shift.norm());
     if (set.safe()) outcome.safe += 1 / static_cast<double>(sets.size());
   }
-  outcome.extent_median = quantile(extent, 0.5), outcome.extent_95 = quantile(extent, 0.95);
-  outcome.shift_median = quantile(shift, 0.5), outcome.shift_95 = quantile(shift, 0.95);
+  outcome.extent_median = quantile(extent, 0.5), outcome.extent_95 = quantile(extent, kRules.told_quantile);
+  outcome.shift_median = quantile(shift, 0.5), outcome.shift_95 = quantile(shift, kRules.told_quantile);
 }
 
 std::vector<reach::HoverSet> sets_at(const plan::World& world, const std::vector<Vec3>& places) {
@@ -104,7 +102,7 @@ std::vector<reach::HoverSet> sets_at(const plan::World& world, const std::vector
 /// Without a map: Σ_0, and what the extension says of open air.
 std::vector<reach::HoverSet> sets_in_the_open(const Model& model, const Vehicle& vehicle) {
   const reach::Reachability reach(vehicle);
-  const field::Air air = field::air_moving(model.extension, Vec3::Zero());
+  const Air air = field::air_moving(model.extension, Vec3::Zero());
   const auto sigma =
       std::exp(air.ln_variance) * Variance::horizontal_vertical(model.base.horizontal, model.base.vertical);
   reach::HoverSet set;
@@ -122,7 +120,7 @@ void try_plan(Outcome& outcome, const plan::World& world, const Vec3& start_W, c
   Setpoint hover;
   hover.p_W = start_W;
   const auto& limits = world.reach.vehicle.limits;
-  const plan::PlanOptions options{.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = 3};
+  const plan::PlanOptions options{.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kRules.plan_deadline};
   const auto plan = plan::plan(world, {{start_W, Vec3::Zero()}, hover}, goal_W, options);
   outcome.plan = plan.status;
   if (plan.status != plan::PlanStatus::ok) return;
@@ -163,7 +161,7 @@ Consequence consequence(const StudyResult& result, const Observations& seen, con
   describe(c.before, sets);
   describe(c.after, sets_at(*extended_world, places));
   std::tie(c.start_W, c.goal_W) = farthest(places, sets);
-  if ((c.goal_W - c.start_W).norm() > 0.3) {
+  if ((c.goal_W - c.start_W).norm() > kRules.least_route) {
     try_plan(c.before, *world, c.start_W, c.goal_W);
     try_plan(c.after, *extended_world, c.start_W, c.goal_W);
   }

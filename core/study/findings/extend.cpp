@@ -84,10 +84,7 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
   if (!f.form->extend) return {};
   auto effects = f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
   for (auto& e : effects) {
-    const bool variance = e.kind == ModelEffect::Kind::ln_variance ||
-                          e.kind == ModelEffect::Kind::ln_variance_under_surface ||
-                          e.kind == ModelEffect::Kind::ln_variance_with_speed;
-    if (variance || !cause.shift.refuted()) continue;
+    if (entry(e.kind).of_variance || !cause.shift.refuted()) continue;
     e.error += e.value.cwiseAbs(), e.value.setZero();  // the craft rests on its set-point: in the bound, not the centre
   }
   return effects;

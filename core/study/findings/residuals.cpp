@@ -105,7 +105,7 @@ tl::expected<std::string, report::PlotError> residual_section(const Observations
   for (std::size_t k = 0; k < kChannels; ++k) {
     const auto c = static_cast<Channel>(k);
     const auto b = channel_error(measured, before, c), a = channel_error(measured, after, c);
-    if (!b || !a || b->windows < 8) continue;
+    if (!b || !a || static_cast<double>(b->windows) < kRules.fewest_compared) continue;
     table += row(channel_name(c), number(b->value) + " → " + number(a->value));
     const auto drawn = picture(measured, before, after, c);
     if (!drawn) return drawn;

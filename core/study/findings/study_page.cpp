@@ -11,6 +11,7 @@
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/self_test.hpp"
 #include "core/study/findings/words.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 namespace {
@@ -79,7 +80,7 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
   std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
   std::ostringstream script, dots, lines;
   for (const auto& p : points) dots << p.x << ' ' << p.before << ' ' << p.after << '\n';
-  const std::size_t groups = std::min<std::size_t>(12, points.size());
+  const std::size_t groups = std::min(static_cast<std::size_t>(kRules.picture_groups), points.size());
   for (std::size_t g = 0; g < groups; ++g) {
     const std::size_t a = g * points.size() / groups, b = (g + 1) * points.size() / groups;
     Point mean{0, 0, 0};

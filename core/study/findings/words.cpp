@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/study/findings/page_sections.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 
@@ -15,9 +16,8 @@ Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
 }
 
 std::string odds(double nats) {
-  constexpr double kMost = 1e6;  // beyond, nobody weighs them
   const double ratio = std::exp(std::abs(nats));
-  const std::string told = ratio > kMost ? "more than a million" : number(ratio);
+  const std::string told = ratio > kRules.most_odds ? "more than a million" : number(ratio);
   return nats < 0 ? "1 to " + told : told + " to 1";
 }
 

@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "core/study/effects/regressors.hpp"
+#include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 
-inline constexpr int kMostColumns = 16;
+inline constexpr int kMostColumns = static_cast<int>(kRules.most_columns);
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
 

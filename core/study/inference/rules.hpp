@@ -8,7 +8,7 @@
 namespace backwash::study {
 
 /// Every constant that decides what a study says (`backwash study --rules`). Members are rules and nothing else: the
-/// printed list is the struct itself. Floors of single effects are in their files.
+/// printed list is the struct itself. What single forms alone have is in the files of the effects.
 struct Rules {
   // Search
   Rule flips{"flips", 1200, "draws", "derived: resolves a sixth of a third of accept_p, a further structure's level"};
@@ -61,6 +61,7 @@ struct Rules {
   Rule fewest_trimmed{"fewest_trimmed", 3, "flights", "derived: two parameters and a scatter"};
   Rule no_turn{"no_turn", 1e-9, "1", "derived: a determinant that rounding made"};
   // Normal equations
+  Rule most_columns{"most_columns", 16, "columns", "derived: many_cosines along both level axes"};
   Rule spanned{"spanned", 1e-4, "of a column's square", "chosen: what the nuisance explains up to 1 % has no say"};
   Rule least_square{"least_square", 1e-9, "1", "derived: a sum of squares that rounding made"};
   Rule left_out_share{"left_out_share", 0.02, "of a column's square",
@@ -121,10 +122,18 @@ struct Rules {
   Rule manoeuvre_windows{"manoeuvre_windows", 45, "windows", "derived: a flight of 90 s"};
   Rule manoeuvre_flights{"manoeuvre_flights", 12, "flights", "chosen: as many as the campaigns have"};
   Rule manoeuvre_nats{"manoeuvre_nats", 0.5, "nats", "derived: as least_threshold"};
+  // What it changes for a flight
+  Rule places{"places", 60, "windows", "chosen: of all that were flown, at which hover sets are computed"};
+  Rule told_quantile{"told_quantile", 0.95, "1", "chosen: of the hover sets, told beside the median"};
+  Rule plan_deadline{"plan_deadline", 3, "s", "chosen: of each of the two plans; both routes have the same"};
+  Rule least_route{"least_route", 0.3, "m", "chosen: between places that are nearer no plan is told"};
+  Rule fewest_compared{"fewest_compared", 8, "windows", "chosen: in which a channel is simulated beside measured"};
+  Rule picture_groups{"picture_groups", 12, "groups", "chosen: of windows, whose means a picture draws"};
+  Rule most_odds{"most_odds", 1e6, "1", "chosen: larger odds are told as more than a million"};
 };
 inline constexpr Rules kRules;
 
-/// All of them and those of the windows (WindowRules), in the order of the structs.
+/// All of them and those of the windows (WindowRules) and the effects (EffectRules), in the order of the structs.
 std::vector<Rule> rules();
 
 }  // namespace backwash::study

@@ -46,7 +46,7 @@ Spread spread(std::span<const double> x) {
     if (i > 0) product += x[i] * x[i - 1];
   }
   const double n = static_cast<double>(x.size());
-  if (!(square > 0) || n < 4) return {0, 0};
+  if (!(square > 0) || n < kWindowRules.fewest_spread) return {0, 0};
   const double rho = std::clamp(product / square, 0.0, kWindowRules.correlated.value);
   const double samples = std::max(2.0, (n - 2) * (1 - rho * rho) / (1 + rho * rho));
   return {square / (n - 2), samples};

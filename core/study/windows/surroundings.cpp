@@ -35,7 +35,7 @@ Place Surroundings::around(const Vec3& p_W) const {
   return place;
 }
 
-bool Surroundings::whole(const Vec3& p_W, const field::Around& around, const std::pair<double, Vec3>& wall) const {
+bool Surroundings::whole(const Vec3& p_W, const Around& around, const std::pair<double, Vec3>& wall) const {
   constexpr double kOpen = kWindowRules.whole_wall;
   const double a = grid_->resolution();
   const double down = std::isfinite(around.height) ? around.height : kOpen;

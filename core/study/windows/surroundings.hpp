@@ -9,11 +9,9 @@
 
 namespace backwash::study {
 
-using field::kNoSurface;
-
 /// What stands around a point, and which of the walls reach all the way from the surface below to the one above: the
 /// side of a table or of a lowered ceiling lets the air around it.
-struct Place : field::Around {
+struct Place : Around {
   std::vector<std::pair<double, Vec3>> whole_walls = {};
 };
 
@@ -32,7 +30,7 @@ class Surroundings {
   bool has_map() const noexcept { return grid_ != nullptr; }
 
  private:
-  bool whole(const Vec3& p_W, const field::Around& around, const std::pair<double, Vec3>& wall) const;
+  bool whole(const Vec3& p_W, const Around& around, const std::pair<double, Vec3>& wall) const;
   const Vec3& lattice_ln_sigma(const Index3& at);
 
   const map::OccupancyGrid* grid_;

@@ -103,6 +103,7 @@ struct WindowRules {
                  "derived: the unit of the weights, in which the scatter is estimated too"};
   Rule least_gusts{"least_gusts", 0.2, "of a window's variance",
                    "chosen: is left when noise is taken out: ln of less would be noise alone"};
+  Rule fewest_spread{"fewest_spread", 4, "rows", "derived: two more than a variance and a correlation take"};
   Rule correlated{"correlated", 0.98, "1", "derived: at it a window of 100 rows is worth 2 samples, the least"};
   Rule noise_near{"noise_near", 0.3, "s",
                   "measured: halved and doubled, a kurtosis of 1.09 becomes 1.07 and 1.32 "
