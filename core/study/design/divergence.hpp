@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "core/study/inference/rivals.hpp"
+
+namespace backwash::study {
+
+/// How well a rival copies what a cause predicts. Columns of both: the cause's own first, then all that is fitted: the
+/// rival's, free offsets, what was accepted beside it. XᵀV⁻¹X over the flights that were flown, and of one more.
+struct Imitation {
+  Eigen::MatrixXd flown, flight;  ///< p × p
+  Eigen::VectorXd theta;          ///< of the cause's own columns
+
+  /// Nats by which the best copy falls behind over the flown flights and `flights` more of the same kind:
+  /// min_η ½ ‖X θ − Z η‖², in V⁻¹.
+  double left(double flights) const;
+  /// Of one more flight, the rival fitted to the flown ones: ½ ‖X θ − Z η̂‖². Its least upper bound on how `left` grows.
+  double divergence() const;
+};
+
+/// P that a lead passes `needed` when it grows by N(growth, 2 growth), nats.
+double passes(double lead, double growth, double needed);
+
+/// One of the causes of a set.
+struct Explanation {
+  const Form* form;
+  Scale scale;
+  double behind;       ///< nats behind the one that is named
+  double probability;  ///< ∝ e^−behind
+};
+
+/// What one more flight would tell of a set.
+struct Told {
+  double divergence = 0;          ///< Σ_{i<j} π_i π_j ½ (T_ij + T_ji), nats a flight
+  std::vector<double> separated;  ///< P that the set is one name after 1, 2, … flights
+  std::vector<double> of_pair;    ///< ½ (T_ij + T_ji) by Contest::pairs()
+  /// The least number of flights with which P is at least `kDesignRules.separated`; 0: none up to most_flights.
+  int flights() const;
+};
+
+/// A named cause and its rivals, and what it takes to tell them apart. Keeps pointers to its arguments.
+class Contest {
+ public:
+  /// `flown` is whitened by the accepted causes; `which`: the number of the cause among them.
+  Contest(const Evidence& flown, const std::vector<Accepted>& accepted, std::size_t which);
+  const std::vector<Explanation>& explanations() const noexcept { return all_; }
+  /// Pairs i < j of explanations.
+  std::vector<std::pair<std::size_t, std::size_t>> pairs() const;
+  /// `next`: that evidence's next() of the flight's windows.
+  Told after(const Evidence& next) const;
+
+ private:
+  /// The columns that stand beside a pair, on some flights.
+  std::vector<Column> beside(const std::vector<Column>& both, bool constant, const Observations& seen) const;
+  /// The cause's columns, the rival's, and what stands beside both; nothing if they are more than normal equations
+  /// hold.
+  std::vector<Column> joint(const Explanation& truth, const Form& rival, const Scale& scale,
+                            const Observations& seen) const;
+  struct Copy {
+    const Form* form;
+    Scale scale;
+    Eigen::MatrixXd flown;
+  };
+  /// What decides whether `truth` is told from `rival`.
+  struct Duel {
+    std::size_t truth, rival;
+    double lead, error, gain;  // nats now; gain: 0 unless a delay or a slope
+    bool never;                // motors alone
+    Eigen::VectorXd theta;
+    std::vector<Copy> copies;
+  };
+  Duel duel(std::size_t truth, std::size_t rival) const;
+  /// Growth of the lead after 1, 2, … flights, and its divergence.
+  std::pair<std::vector<double>, double> growth(const Duel& duel, const Evidence& next) const;
+  double chance(const Duel& duel, double growth, int flights) const;
+
+  const Evidence* flown_;
+  const std::vector<Accepted>* accepted_;
+  std::size_t which_;
+  std::vector<Explanation> all_;
+  std::vector<Duel> duels_;  // ordered pairs
+};
+
+}  // namespace backwash::study
