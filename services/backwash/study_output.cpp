@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "core/study/design/design_rules.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/words.hpp"
 
@@ -208,9 +209,12 @@ void print_text(const study::StudyResult& result, const study::Observations& see
 }
 
 void print_rules(bool json) {
+  auto rules = study::rules();
+  const auto design = study::design_rules();
+  rules.insert(rules.end(), design.begin(), design.end());
   if (json) {
     Json all;
-    for (const auto& r : study::rules())
+    for (const auto& r : rules)
       all["rules"].push_back({{"name", r.name}, {"value", r.value}, {"unit", r.unit}, {"reason", r.reason}});
     for (const study::Form* f : study::catalogue()) {
       Json possible = Json::object();
@@ -226,7 +230,7 @@ void print_rules(bool json) {
     }
     return print(all);
   }
-  for (const auto& [name, value, unit, reason] : study::rules())
+  for (const auto& [name, value, unit, reason] : rules)
     std::printf("%-20.*s %10.7g  %-22.*s %.*s\n", static_cast<int>(name.size()), name.data(), value,
                 static_cast<int>(unit.size()), unit.data(), static_cast<int>(reason.size()), reason.data());
   std::printf("\nleast root mean square over the flown windows, least first parameter, of each form:\n");

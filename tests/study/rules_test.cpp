@@ -9,12 +9,16 @@
 #include <set>
 #include <sstream>
 
+#include "core/study/design/design_rules.hpp"
+
 namespace backwash::study {
 namespace {
 
 TEST(Rules, EachHasANameOfItsOwnAUnitAndAReasonOfAKnownKind) {
   std::set<std::string_view> names;
-  for (const Rule& r : rules()) {
+  auto all = rules();
+  for (const Rule& r : design_rules()) all.push_back(r);
+  for (const Rule& r : all) {
     EXPECT_TRUE(names.insert(r.name).second) << r.name << " twice";
     EXPECT_FALSE(r.unit.empty()) << r.name;
     const std::string_view kind = r.reason.substr(0, r.reason.find(':'));
@@ -22,6 +26,7 @@ TEST(Rules, EachHasANameOfItsOwnAUnitAndAReasonOfAKnownKind) {
     EXPECT_GT(r.reason.size(), kind.size() + 10) << r.name << " says no reason";
   }
   EXPECT_TRUE(names.contains("flips") && names.contains("manoeuvre_nats")) << "first and last of the struct";
+  EXPECT_TRUE(names.contains("design_flight_time") && names.contains("design_wall_distance")) << "and of the design";
   EXPECT_TRUE(names.contains("window_length") && names.contains("same_time")) << "and of the windows";
 }
 

@@ -5,7 +5,6 @@
 #include <climits>
 #include <cstdio>
 
-#include "core/study/design/design_rules.hpp"
 #include "core/study/design/imagined.hpp"
 #include "core/study/design/ways.hpp"
 
@@ -24,12 +23,12 @@ DesignedSet told_of(const Contest& contest) {
 void judge(NextFlight& flight, const std::vector<Contest>& contests, const Evidence& next) {
   std::vector<double> missed(static_cast<std::size_t>(kDesignRules.most_flights), 0);
   for (const Contest& contest : contests) {
-    Told told = contest.after(next);
+    Outlook told = contest.after(next);
     flight.divergence += told.divergence;
     for (std::size_t n = 0; n < missed.size(); ++n) missed[n] += 1 - told.separated[n];
     flight.of_pair.push_back(std::move(told.of_pair));
   }
-  Told all;
+  Outlook all;
   for (const double m : missed) all.separated.push_back(std::max(0.0, 1 - m));
   flight.flights = all.flights();
   flight.separated =
@@ -59,7 +58,7 @@ const NextFlight* Design::chosen() const {
 }
 
 Design design(const Observations& seen, const StudyResult& result, const plan::World& world, const Model& model,
-              const Vec3& start_W) {
+              const Vec3& start_W, double flight_time) {
   Design design;
   std::vector<Accepted> accepted;
   for (const auto& cause : result.causes) accepted.push_back(cause.found);
@@ -76,7 +75,7 @@ Design design(const Observations& seen, const StudyResult& result, const plan::W
   Surroundings surroundings(&world.grid, model);
   const Imagination imagination(seen, world.reach.vehicle, surroundings);
   for (const Way& way : ways(world, start_W)) {
-    const FlownWay flown = flown_way(world, start_W, way);
+    const FlownWay flown = flown_way(world, start_W, way, flight_time);
     if (flown.points_W.empty()) {
       design.left_out.emplace_back(way.name, flown.why_not);
       continue;

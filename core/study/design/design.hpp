@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/plan/world.hpp"
+#include "core/study/design/design_rules.hpp"
 #include "core/study/design/divergence.hpp"
 #include "core/study/findings/study.hpp"
 
@@ -42,9 +43,9 @@ struct Design {
 
 /// The next flight of a study that could not distinguish: of every manoeuvre that the planner verifies in this world
 /// from `start_W` (m), which tells the sets apart in the fewest flights (docs/model.md section 6). `seen`: what
-/// `result` was found in. Real-time status: offline, seconds.
+/// `result` was found in; `flight_time`: of each flight, s. Real-time status: offline, seconds.
 Design design(const Observations& seen, const StudyResult& result, const plan::World& world, const Model& model,
-              const Vec3& start_W);
+              const Vec3& start_W, double flight_time = kDesignRules.flight_time);
 
 /// As `backwashctl follow` reads it (docs/interfaces.md, "Points CSV").
 std::string points_csv(const std::vector<Vec3>& points_W);

@@ -55,7 +55,7 @@ double passes(double lead, double growth, double needed) {
   return 0.5 * std::erfc((needed - lead - growth) / (2 * std::sqrt(growth)));
 }
 
-int Told::flights() const {
+int Outlook::flights() const {
   const auto enough = std::ranges::find_if(separated, [](double p) { return p >= kDesignRules.separated; });
   return enough == separated.end() ? 0 : static_cast<int>(enough - separated.begin()) + 1;
 }
@@ -156,9 +156,9 @@ double Contest::chance(const Duel& d, double growth, int flights) const {
   return passes(d.lead, growth, needed_lead(error, d.gain * (1 + flights / flown)));
 }
 
-Told Contest::after(const Evidence& next) const {
+Outlook Contest::after(const Evidence& next) const {
   const auto most = static_cast<std::size_t>(kDesignRules.most_flights);
-  Told told;
+  Outlook told;
   std::vector<double> missed(all_.size() * most, 0);  // Σ over rivals of P that one stays in the set
   std::vector<double> of(all_.size() * all_.size(), 0);
   for (const Duel& d : duels_) {

@@ -34,7 +34,7 @@ struct Explanation {
 };
 
 /// What one more flight would tell of a set.
-struct Told {
+struct Outlook {
   double divergence = 0;          ///< Σ_{i<j} π_i π_j ½ (T_ij + T_ji), nats a flight
   std::vector<double> separated;  ///< P that the set is one name after 1, 2, … flights
   std::vector<double> of_pair;    ///< ½ (T_ij + T_ji) by Contest::pairs()
@@ -51,7 +51,7 @@ class Contest {
   /// Pairs i < j of explanations.
   std::vector<std::pair<std::size_t, std::size_t>> pairs() const;
   /// `next`: that evidence's next() of the flight's windows.
-  Told after(const Evidence& next) const;
+  Outlook after(const Evidence& next) const;
 
  private:
   /// The columns that stand beside a pair, on some flights.

@@ -5,7 +5,7 @@
 
 namespace backwash::study {
 
-FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way) {
+FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way, double flight_time) {
   const auto refused = [](std::string why) { return FlownWay{{}, {}, std::move(why)}; };
   if (way.points_W.empty()) return refused(way.why_not);
   for (const Vec3& p : way.points_W)
@@ -13,7 +13,7 @@ FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way
   const auto& limits = world.reach.vehicle.limits;
   const plan::PlanOptions options{
       .v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kDesignRules.plan_deadline, .polish = 0};
-  const auto most = static_cast<std::size_t>(kDesignRules.flight_time / kControlPeriod);
+  const auto most = static_cast<std::size_t>(flight_time / kControlPeriod);
   const std::size_t around = way.points_W.size();
   std::vector<std::vector<Setpoint>> legs(around);  // to each point, from the one before it
   FlownWay flown;

@@ -29,7 +29,7 @@ struct FlownWay {
 };
 
 /// Plans and verifies each leg, from `start_W` to the first point, and around until the flight is as long as
-/// kDesignRules.flight_time. Heading and rests are the daemon's: the path's heading, and a hold after each leg.
-FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way);
+/// `flight_time`, s. Heading and rests are the daemon's: the path's heading, and a hold after each leg.
+FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way, double flight_time);
 
 }  // namespace backwash::study
