@@ -138,7 +138,7 @@ TEST(Contest, OfTrimAndDraftIsDecidedByTurnsOfTheHeadingAndByNothingElse) {
   std::vector<Accepted> accepted{w.result.causes.front().found};
   Evidence evidence(w.seen);
   evidence.whiten(columns_of(accepted, w.seen));
-  const Contest contest(evidence, accepted, 0);
+  const Contest contest(evidence, accepted, 0, w.result.threshold);
   ASSERT_EQ(contest.explanations().size(), 2u);
   EXPECT_NEAR(contest.explanations()[0].probability + contest.explanations()[1].probability, 1, 1e-12);
   Surroundings surroundings(&w.grid, w.model);

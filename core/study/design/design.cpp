@@ -66,7 +66,7 @@ Design design(const Observations& seen, const StudyResult& result, const plan::W
   evidence.whiten(columns_of(accepted, seen));
   std::vector<Contest> contests;
   for (std::size_t k = 0; k < accepted.size(); ++k)
-    if (!accepted[k].rivals.empty()) contests.emplace_back(evidence, accepted, k);
+    if (!accepted[k].rivals.empty()) contests.emplace_back(evidence, accepted, k, result.threshold);
   for (const Contest& contest : contests) design.sets.push_back(told_of(contest));
   if (contests.empty()) {
     design.message = "nothing to tell apart: no cause has a rival";

@@ -60,8 +60,8 @@ int Outlook::flights() const {
   return enough == separated.end() ? 0 : static_cast<int>(enough - separated.begin()) + 1;
 }
 
-Contest::Contest(const Evidence& flown, const std::vector<Accepted>& accepted, std::size_t which)
-    : flown_(&flown), accepted_(&accepted), which_(which) {
+Contest::Contest(const Evidence& flown, const std::vector<Accepted>& accepted, std::size_t which, double threshold)
+    : flown_(&flown), accepted_(&accepted), which_(which), threshold_(threshold) {
   const Accepted& named = accepted[which];
   all_.push_back({named.form, anchored(*named.form, named.scale, flown.seen().windows), 0, 1});
   for (const Rival& r : named.rivals)
@@ -93,11 +93,11 @@ std::vector<Column> Contest::beside(const std::vector<Column>& both, bool consta
   return columns;
 }
 
-std::vector<Column> Contest::joint(const Explanation& truth, const Form& rival, const Scale& scale,
+std::vector<Column> Contest::joint(const Explanation& truth, const Form* rival, const Scale& scale,
                                    const Observations& seen) const {
   std::vector<Column> columns = truth.form->columns(seen.windows, truth.scale);
-  append(columns, rival.columns(seen.windows, scale));
-  append(columns, beside(columns, truth.form->constant || rival.constant, seen));
+  if (rival) append(columns, rival->columns(seen.windows, scale));
+  append(columns, beside(columns, truth.form->constant || (rival && rival->constant), seen));
   if (columns.size() > static_cast<std::size_t>(kMostColumns)) columns.clear();
   return columns;
 }
@@ -105,55 +105,67 @@ std::vector<Column> Contest::joint(const Explanation& truth, const Form& rival, 
 Contest::Duel Contest::duel(std::size_t truth, std::size_t rival) const {
   const Explanation &ours = all_[truth], &theirs = all_[rival];
   const Observations& seen = flown_->seen();
-  Duel d{truth, rival, theirs.behind - ours.behind, 0, 0, ours.form->motors_alone && theirs.form->motors_alone, {}, {}};
+  Duel d{truth, rival, theirs.behind - ours.behind, 0, 0, false, false, {}, {}, {}};
   const auto own = ours.form->columns(seen.windows, ours.scale),
              other = theirs.form->columns(seen.windows, theirs.scale);
   auto both = own;
   append(both, other);
   const auto nuisance = beside(both, ours.form->constant || theirs.form->constant, seen);
   const Normal we = flown_->normal(own, nuisance), they = flown_->normal(other, nuisance);
-  if (!we.solvable || !they.solvable) {
-    d.never = true;
-    return d;
-  }
-  d.theta = we.fit();
+  d.never = !we.solvable || !they.solvable || (ours.form->motors_alone && theirs.form->motors_alone);
+  if (d.never) return d;
+  d.theta = we.fit(), d.gain = we.gain();
   d.error = lead_over(we, they).error;
-  if (dynamic(own) || dynamic(other)) d.gain = we.gain();
+  d.dynamic = dynamic(own) || dynamic(other);
+  add_copies(d);
+  d.never = d.copies.empty() || d.alone.flown.size() == 0;
+  return d;
+}
+
+void Contest::add_copies(Duel& d) const {
+  const Explanation &ours = all_[d.truth], &theirs = all_[d.rival];
+  const Observations& seen = flown_->seen();
   for (const Form& form : theirs.form->effect->forms) {
     if (why_not_tested(form, seen)) continue;
     auto scales = form.scales;
     if (&form == theirs.form) scales.push_back(theirs.scale);
     for (const Scale& each : scales) {
       const Scale scale = anchored(form, each, seen.windows);
-      const auto columns = joint(ours, form, scale, seen);
+      const auto columns = joint(ours, &form, scale, seen);
       if (!columns.empty()) d.copies.push_back({&form, scale, gram_of(*flown_, columns)});
     }
   }
-  d.never = d.never || d.copies.empty();
-  return d;
+  const auto alone = joint(ours, nullptr, {}, seen);
+  if (!alone.empty()) d.alone = {nullptr, {}, gram_of(*flown_, alone)};
 }
 
-std::pair<std::vector<double>, double> Contest::growth(const Duel& d, const Evidence& next) const {
+Contest::Growth Contest::growth(const Duel& d, const Evidence& next) const {
   const auto most = static_cast<std::size_t>(kDesignRules.most_flights);
+  const auto with = [&](const Copy& copy) {
+    return Imitation{copy.flown, gram_of(next, joint(all_[d.truth], copy.form, copy.scale, next.seen())), d.theta};
+  };
+  Growth grown;
   std::vector<double> left(most + 1, INFINITY);
-  double divergence = 0;
   for (const Copy& copy : d.copies) {
-    const auto columns = joint(all_[d.truth], *copy.form, copy.scale, next.seen());
-    const Imitation imitation{copy.flown, gram_of(next, columns), d.theta};
+    const Imitation imitation = with(copy);
     const double now = imitation.left(0);
-    if (now < left[0]) divergence = imitation.divergence();
-    left[0] = std::min(left[0], now);
-    for (std::size_t n = 1; n <= most; ++n) left[n] = std::min(left[n], imitation.left(static_cast<double>(n)));
+    if (now < left[0]) grown.divergence = imitation.divergence();
+    for (std::size_t n = 0; n <= most; ++n)
+      left[n] = std::min(left[n], n == 0 ? now : imitation.left(static_cast<double>(n)));
   }
-  std::vector<double> grown;
-  for (std::size_t n = 1; n <= most; ++n) grown.push_back(left[n] - left[0]);
-  return {grown, divergence};
+  const Imitation alone = with(d.alone);
+  for (std::size_t n = 1; n <= most; ++n) {
+    grown.lead.push_back(left[n] - left[0]);
+    grown.gain.push_back(alone.left(static_cast<double>(n)) - alone.left(0));
+  }
+  return grown;
 }
 
-double Contest::chance(const Duel& d, double growth, int flights) const {
-  const double flown = static_cast<double>(flown_->seen().units.size());
-  const double error = std::sqrt(d.error * d.error + 2 * growth);
-  return passes(d.lead, growth, needed_lead(error, d.gain * (1 + flights / flown)));
+double Contest::chance(const Duel& d, double lead_growth, double gain_growth) const {
+  const double gain = d.gain + gain_growth, error = std::sqrt(d.error * d.error + 2 * lead_growth);
+  // What gains little itself is no rival, however little it is behind (find_rivals).
+  const double too_weak = std::max(gain - threshold_, (1 - kRules.rival_rest) * gain);
+  return passes(d.lead, lead_growth, std::min(needed_lead(error, d.dynamic ? gain : 0), too_weak));
 }
 
 Outlook Contest::after(const Evidence& next) const {
@@ -166,10 +178,9 @@ Outlook Contest::after(const Evidence& next) const {
       for (std::size_t n = 0; n < most; ++n) missed[d.truth * most + n] += 1;
       continue;
     }
-    const auto [grown, divergence] = growth(d, next);
-    of[d.truth * all_.size() + d.rival] = divergence;
-    for (std::size_t n = 0; n < most; ++n)
-      missed[d.truth * most + n] += 1 - chance(d, grown[n], static_cast<int>(n) + 1);
+    const Growth grown = growth(d, next);
+    of[d.truth * all_.size() + d.rival] = grown.divergence;
+    for (std::size_t n = 0; n < most; ++n) missed[d.truth * most + n] += 1 - chance(d, grown.lead[n], grown.gain[n]);
   }
   for (std::size_t n = 0; n < most; ++n) {
     double p = 0;

@@ -45,8 +45,9 @@ struct Outlook {
 /// A named cause and its rivals, and what it takes to tell them apart. Keeps pointers to its arguments.
 class Contest {
  public:
-  /// `flown` is whitened by the accepted causes; `which`: the number of the cause among them.
-  Contest(const Evidence& flown, const std::vector<Accepted>& accepted, std::size_t which);
+  /// `flown` is whitened by the accepted causes; `which`: the number of the cause among them; `threshold`: nats that
+  /// the null exceeds at its level, StudyResult::threshold.
+  Contest(const Evidence& flown, const std::vector<Accepted>& accepted, std::size_t which, double threshold);
   const std::vector<Explanation>& explanations() const noexcept { return all_; }
   /// Pairs i < j of explanations.
   std::vector<std::pair<std::size_t, std::size_t>> pairs() const;
@@ -56,31 +57,39 @@ class Contest {
  private:
   /// The columns that stand beside a pair, on some flights.
   std::vector<Column> beside(const std::vector<Column>& both, bool constant, const Observations& seen) const;
-  /// The cause's columns, the rival's, and what stands beside both; nothing if they are more than normal equations
-  /// hold.
-  std::vector<Column> joint(const Explanation& truth, const Form& rival, const Scale& scale,
+  /// The cause's columns, the rival's, and what stands beside both; without a rival's form what stands beside the
+  /// cause. Nothing if they are more than normal equations hold.
+  std::vector<Column> joint(const Explanation& truth, const Form* rival, const Scale& scale,
                             const Observations& seen) const;
   struct Copy {
-    const Form* form;
+    const Form* form;  // null: of the cause alone
     Scale scale;
     Eigen::MatrixXd flown;
   };
   /// What decides whether `truth` is told from `rival`.
   struct Duel {
     std::size_t truth, rival;
-    double lead, error, gain;  // nats now; gain: 0 unless a delay or a slope
-    bool never;                // motors alone
+    double lead, error, gain;  // nats now; the gain is the truth's
+    bool dynamic, never;       // a delay or a slope; motors alone
     Eigen::VectorXd theta;
     std::vector<Copy> copies;
+    Copy alone;
   };
   Duel duel(std::size_t truth, std::size_t rival) const;
-  /// Growth of the lead after 1, 2, … flights, and its divergence.
-  std::pair<std::vector<double>, double> growth(const Duel& duel, const Evidence& next) const;
-  double chance(const Duel& duel, double growth, int flights) const;
+  void add_copies(Duel& duel) const;
+  /// Of a duel after 1, 2, … flights: growth of the lead and of the truth's own gain, nats.
+  struct Growth {
+    std::vector<double> lead, gain;
+    double divergence = 0;
+  };
+  Growth growth(const Duel& duel, const Evidence& next) const;
+  /// P that the rival is out of the set.
+  double chance(const Duel& duel, double lead_growth, double gain_growth) const;
 
   const Evidence* flown_;
   const std::vector<Accepted>* accepted_;
   std::size_t which_;
+  double threshold_;
   std::vector<Explanation> all_;
   std::vector<Duel> duels_;  // ordered pairs
 };

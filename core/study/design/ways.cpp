@@ -68,7 +68,7 @@ class Room {
   Index3 open_ = Index3::Zero();
 };
 
-/// The corners of a level square about a point, or of an octagon.
+/// The corners of a level polygon about a point.
 Points ring(const Vec3& centre, double side, int corners) {
   Points points;
   const double radius = side / 2 / std::sin(M_PI / corners);
@@ -135,10 +135,11 @@ class List {
         {room_.end({-1, -1, 0}), room_.end({1, 1, 0}), room_.end({-1, 1, 0}), room_.end({1, -1, 0})});
   }
   void turns() {
-    for (const double side : {kDesignRules.small_side.value, kDesignRules.large_side.value}) {
-      add("turn the heading on a square of " + metres(side), ring(open_, side, 4));
-      add("turn the heading on an octagon, sides of " + metres(side), ring(open_, side, 8));
-    }
+    for (const double side : {kDesignRules.small_side.value, kDesignRules.large_side.value})
+      for (const auto& [name, corners] : {std::pair{"a triangle", 3}, {"a square", 4}, {"an octagon", 8}})
+        add(std::string("turn the heading on ") + name + ", sides of " + metres(side), ring(open_, side, corners));
+    const Vec3 half(kDesignRules.large_side, 0, 0);  // long enough a way to turn by π on
+    add("turn the heading to and fro on " + metres(2 * kDesignRules.large_side), {open_ - half, open_ + half});
     Points squares = ring(low(), kDesignRules.small_side, 4), upper = ring(high(), kDesignRules.small_side, 4);
     squares.insert(squares.end(), upper.begin(), upper.end());
     add("turn the heading on squares, low and high", squares);
