@@ -58,13 +58,13 @@ Json to_json(const study::Design& design, const DesignOptions& options) {
   for (const auto& f : design.flights) {
     flights.push_back({{"name", f.name},
                        {"used_battery", f.used_battery},
+                       {"start_voltage", f.voltage ? Json(*f.voltage) : Json()},
                        {"divergence_nats", f.divergence},
                        {"pairs_nats", f.of_pair},
                        {"flights", f.flights > 0 ? Json(f.flights) : Json()},
                        {"separated", f.separated},
                        {"rows", f.points_W.size()},
                        {"time_s", seconds(f)}});
-    flights.back()["start_voltage"] = f.voltage ? Json(*f.voltage) : Json();
   }
   for (const auto& [name, why] : design.left_out) left_out.push_back({{"name", name}, {"why", why}});
   return {{"message", design.message},
