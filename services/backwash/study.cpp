@@ -12,6 +12,7 @@
 #include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/study_anytime.hpp"
+#include "services/backwash/study_design.hpp"
 #include "services/backwash/study_flights.hpp"
 #include "services/backwash/study_output.hpp"
 #include "services/backwash/study_simulation.hpp"
@@ -28,6 +29,7 @@ struct Options {
   std::string group;
   unsigned seed = 1;
   std::vector<std::string> fleet;
+  DesignOptions design;
   bool json = false, force = false, quick = false, rules = false, residuals = false, anytime = false;
 };
 
@@ -141,6 +143,7 @@ void check(const Options& options) {
     throw Failure(kUsage, "--anytime takes flights one by one, in the order of --log: give it without --group");
   if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
   if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
+  check_design(options.design, options.map, options.force);
   refuse_to_overwrite(options.report, options.force);
   refuse_to_overwrite(options.out, options.force);
 }
@@ -168,17 +171,21 @@ void write_model(const Options& options, const Model& model, const study::StudyR
   write_file(options.out, text, options.force);
 }
 
-void print_beside(const Flights& flights, const std::optional<AnytimeReport>& anytime) {
+void print_beside(const Flights& flights, const std::optional<AnytimeReport>& anytime,
+                  const std::optional<study::Design>& design, const DesignOptions& asked) {
   for (const auto& [log, known] : flights.twice)
     std::printf("counted once: %s is %s again\n", log.c_str(), known.c_str());
   if (anytime) print_text(*anytime);
+  if (design) print_text(*design, asked);
+}
+
+void add_left_out(Json& json, const std::vector<study::Term>& terms, const Flights& flights) {
+  for (const auto& term : terms) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
 }
 
 int run(const Options& options) {
-  if (options.rules) {
-    print_rules(options.json);
-    return kOk;
-  }
+  if (options.rules) return print_rules(options.json), kOk;
   check(options);
   const auto vehicle = read_vehicle(options.vehicle);
   auto model = read_model(options.model);
@@ -191,8 +198,7 @@ int run(const Options& options) {
   const auto left = study::apply(read_terms(options.model), seen);
   const auto result = study::study(seen, study_options(options));
   Json json = to_json(result, seen, vehicle);
-  for (const auto& term : left) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
-  for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
+  add_left_out(json, left, flights);
   std::optional<AnytimeReport> anytime;
   if (options.anytime) {
     anytime = look_every_time(options, flights, vehicle, model, grid);
@@ -209,6 +215,8 @@ int run(const Options& options) {
     consequence = study::consequence(result, seen, model, vehicle, grid, run_parallel);
     json["consequence"] = to_json(*consequence);
   }
+  const auto design = designed(options.design, seen, result, model, vehicle, grid, options.force);
+  if (design) json["design"] = to_json(*design, options.design);
   if (!options.out.empty()) {
     write_model(options, model, result, seen);
     json["extended_model"] = options.out;
@@ -221,7 +229,7 @@ int run(const Options& options) {
                {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle});
   }
   options.json ? print(json) : print_text(result, seen, vehicle, consequence, rotors, height);
-  if (!options.json) print_beside(flights, anytime);
+  if (!options.json) print_beside(flights, anytime, design, options.design);
   return kOk;
 }
 
@@ -248,13 +256,14 @@ Verb study_verb(CLI::App& app) {
   command->add_option("--report", options->report, "HTML page to write");
   command->add_flag("--residuals", options->residuals,
                     "on the page, per channel: what the simulation of these flights says and what was measured");
+  add_design(*command, options->design);
   command->add_option("--out", options->out, "extended model file to write");
   command->add_option("--seed", options->seed, "of the null's sign draws")->capture_default_str();
   command->add_flag("--quick", options->quick, "without the smallest effects that could have been found");
   command->add_flag("--rules", options->rules,
                     "prints every constant of the inference with unit and reason, and nothing else");
   command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite --report and --out");
+  command->add_flag("--force", options->force, "overwrite --report, --out and --design");
   command->footer(
       "Example:\n  backwash study --map room.bt --model builtin:quad-5in --vehicle builtin:quad-5in --log flight*.csv "
       "--report study.html --out extended.toml");

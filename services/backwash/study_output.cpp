@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "core/study/calibrate/calibration_rules.hpp"
+#include "core/study/design/design_rules.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/words.hpp"
 
@@ -183,10 +184,11 @@ void print_text(const study::NamedCause& cause, const Vehicle& vehicle) {
   }
 }
 
-/// Of study and calibration.
+/// Of study, its next flight and calibration.
 std::vector<study::Rule> all_rules() {
   auto all = study::rules();
   for (const auto& r : study::calibrate::rules()) all.push_back(r);
+  for (const auto& r : study::design_rules()) all.push_back(r);
   return all;
 }
 

@@ -35,6 +35,8 @@ MAY = {
     STUDY + "inference": ["core/types", STUDY + "windows", STUDY + "effects"],
     STUDY + "findings": ["core/types", "core/config", "core/map", "core/field", "core/plan", "core/report",
                          STUDY + "windows", STUDY + "calibrate", STUDY + "effects", STUDY + "inference"],
+    STUDY + "design": ["core/types", "core/map", "core/plan", "core/log", STUDY + "windows", STUDY + "effects",
+                       STUDY + "inference", STUDY + "findings"],
     "firmware_bridge": ["core/types"],
     "services/parallel": [],
     "services/dds": ["idl"],
@@ -46,7 +48,7 @@ MAY = {
     "services/package": ["core/config", *FLIGHT],  # the library's example
 }
 # The worlds with hidden effects share no code with what looks for them. These ask the study, and no world includes them.
-ASKS_THE_STUDY = {"anytime_main", "matrix", "null_size", "observe", "oracle", "score", "simulation", "simulation_main", "summary"}
+ASKS_THE_STUDY = {"anytime_main", "design_main", "design_trial", "matrix", "null_size", "observe", "oracle", "score", "simulation", "simulation_main", "summary"}
 # DDS with what idl/ generates, MAVLink, GPIO and sockets, systemd, threads with all that only threads need; core/sync has <atomic>.
 FORBIDDEN = re.compile(r"(\w+/)*(dds|gpio|systemd|mavlink|c?thread|pthread|jthread|s?mutex|shared_mutex|future|condition_variable|"
                        r"semaphore|barrier|latch|stop_token|execution|omp\.h|tbb|termios|ros2\.h|backwash_msgs)|sys/socket|netinet/|linux/")

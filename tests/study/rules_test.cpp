@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/study/calibrate/calibration_rules.hpp"
+#include "core/study/design/design_rules.hpp"
 
 namespace backwash::study {
 namespace {
@@ -17,6 +18,7 @@ namespace {
 std::vector<Rule> all_rules() {
   auto all = rules();
   for (const Rule& r : calibrate::rules()) all.push_back(r);
+  for (const Rule& r : design_rules()) all.push_back(r);
   return all;
 }
 
@@ -30,6 +32,7 @@ TEST(Rules, EachHasANameOfItsOwnAUnitAndAReasonOfAKnownKind) {
     EXPECT_GT(r.reason.size(), kind.size() + 10) << r.name << " says no reason";
   }
   EXPECT_TRUE(names.contains("flips") && names.contains("most_odds")) << "first and last of the struct";
+  EXPECT_TRUE(names.contains("design_flight_time") && names.contains("design_wall_distance")) << "and of the design";
   EXPECT_TRUE(names.contains("window_length") && names.contains("same_time")) << "and of the windows";
   EXPECT_TRUE(names.contains("strayed") && names.contains("most_tones")) << "and of the effects";
   EXPECT_TRUE(names.contains("quantile") && names.contains("height_ridge")) << "and of calibration";

@@ -72,8 +72,12 @@ class Flight {
   }
 
   /// `replica`: 0, or which of the flights with other gusts along the same plan.
-  Table fly(unsigned replica = 0) {
-    const auto plan = draw_plan(world_, rng_);
+  Table fly(unsigned replica = 0) { return fly(draw_plan(world_, rng_), replica); }
+
+  /// A battery charged so far, 0 … 1.
+  void begin_with(double charge) { charge_ = charge; }
+
+  Table fly(const std::vector<Command>& plan, unsigned replica = 0) {
     p_ = plan.front().p;
     thrust_ = produced_ = kG * Vec3::UnitZ();
     Table table;
@@ -291,6 +295,12 @@ std::vector<Table> fly_all(const World& world) {
   std::vector<Table> flights;
   for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, gusts_of(world), i).fly());
   return flights;
+}
+
+Table fly_along(const World& world, int number, const std::vector<Command>& plan, double charge) {
+  Flight flight(world, gusts_of(world), number);
+  if (charge > 0) flight.begin_with(charge);
+  return flight.fly(plan);
 }
 
 Table fly_again(const World& world, int number, unsigned replica) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/study_worlds/observe.hpp"
 
+#include <memory>
 #include <optional>
 #include <tuple>
 
@@ -24,14 +25,18 @@ struct MapSeen {
   MapSeen(const MapSeen&) = delete;
 };
 
-}  // namespace
+backwash::log::FlightLog log_of(const Table& table) {
+  backwash::log::FlightLog log;
+  for (std::size_t c = 0; c < table.names.size(); ++c) {
+    std::vector<double> column;
+    for (const auto& row : table.rows) column.push_back(row[c]);
+    (table.names[c] == "t_s" ? log.t_s : log.columns[table.names[c]]) = std::move(column);
+  }
+  return log;
+}
 
-namespace {
-
-/// Gives `add` an observer of the world, and each flight as a log.
-template <typename Add>
-study::Observations look_at(const World& world, const std::vector<Table>& flights, const std::filesystem::path& folder,
-                            Add add) {
+/// An observer of the world; writes its map and vehicle to `folder`.
+std::unique_ptr<study::Observer> observer_of(const World& world, const std::filesystem::path& folder) {
   write_world_files(world, folder);
   const auto vehicle = backwash::config::load_vehicle((folder / "vehicle.toml").string()).value();
   auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
@@ -40,17 +45,7 @@ study::Observations look_at(const World& world, const std::vector<Table>& flight
   thread_local std::optional<MapSeen> last;
   const MapKey key{world.request.seed, world.request.confound, world.effects.of("map_offset")};
   if (!last || last->key != key) last.emplace(key, folder / "map.bt", model);
-  study::Observer observer(vehicle, last->surroundings);
-  for (const Table& table : flights) {
-    backwash::log::FlightLog log;
-    for (std::size_t c = 0; c < table.names.size(); ++c) {
-      std::vector<double> column;
-      for (const auto& row : table.rows) column.push_back(row[c]);
-      (table.names[c] == "t_s" ? log.t_s : log.columns[table.names[c]]) = std::move(column);
-    }
-    add(observer, log);
-  }
-  return observer.finish();
+  return std::make_unique<study::Observer>(vehicle, last->surroundings);
 }
 
 }  // namespace
@@ -61,15 +56,30 @@ study::Observations observe(const World& world, const std::filesystem::path& fol
 
 study::Observations observe(const World& world, const std::vector<Table>& flights,
                             const std::filesystem::path& folder) {
-  return look_at(world, flights, folder, [](study::Observer& observer, const auto& log) { observer.add(log); });
+  const auto observer = observer_of(world, folder);
+  for (const Table& table : flights) observer->add(log_of(table));
+  return observer->finish();
+}
+
+int observe_further(const World& world, const std::vector<Table>& first, const std::filesystem::path& folder, int most,
+                    const std::function<Table(int)>& flight,
+                    const std::function<bool(const study::Observations&)>& look) {
+  const auto observer = observer_of(world, folder);
+  for (const Table& table : first) observer->add(log_of(table));
+  for (int n = 1; n <= most; ++n) {
+    observer->add(log_of(flight(n)));
+    if (look(observer->so_far())) return n;
+  }
+  return most + 1;
 }
 
 void observe_each(const World& world, const std::filesystem::path& folder,
                   const std::function<void(const study::Observations&)>& look) {
-  look_at(world, fly_all(world), folder, [&](study::Observer& observer, const auto& log) {
-    observer.add(log);
-    look(observer.so_far());
-  });
+  const auto observer = observer_of(world, folder);
+  for (const Table& table : fly_all(world)) {
+    observer->add(log_of(table));
+    look(observer->so_far());
+  }
 }
 
 std::vector<std::vector<std::string>> sets_of(const study::StudyResult& result) {

@@ -15,6 +15,12 @@ backwash::study::Observations observe(const World& world, const std::filesystem:
 backwash::study::Observations observe(const World& world, const std::vector<Table>& flights,
                                       const std::filesystem::path& folder);
 
+/// `first`, and then one flight more at a time, up to `most`: flight(n), n from 1, until look(what is seen) says that
+/// it is enough. How many were flown; most + 1 if it never was.
+int observe_further(const World& world, const std::vector<Table>& first, const std::filesystem::path& folder, int most,
+                    const std::function<Table(int)>& flight,
+                    const std::function<bool(const backwash::study::Observations&)>& look);
+
 /// The same after every flight.
 void observe_each(const World& world, const std::filesystem::path& folder,
                   const std::function<void(const backwash::study::Observations&)>& look);

@@ -47,10 +47,8 @@ bool error_of_form(const Form& form, const std::vector<Column>& columns, double 
   return false;
 }
 
-namespace {
-
 /// Σ and standard error of the sum of per-flight differences.
-std::pair<double, double> difference(const Normal& a, const Normal& b) {
+Lead lead_over(const Normal& a, const Normal& b) {
   const auto ga = a.gain_per_flight(), gb = b.gain_per_flight();
   double sum = 0, square = 0;
   const double n = static_cast<double>(ga.size());
@@ -58,15 +56,11 @@ std::pair<double, double> difference(const Normal& a, const Normal& b) {
   return {sum, std::sqrt(std::max(0.0, (square - sum * sum / n) * n / (n - 1)))};
 }
 
-/// Whether these flights do not tell a rival that is `lead` nats behind, by a difference with this standard error, from
-/// a cause of this gain: a lead that is a small share of the gain is one that the error of a form makes.
-bool as_good(double lead, double error, double gain) {
+double needed_lead(double error, double gain) {
   const double share = kRules.rival_share * gain;
-  if (lead > std::max(kRules.rival_nats.value, share) && lead > kRules.rival_errors * error) return false;
-  return lead <= std::max(kRules.rival_most_nats.value, share);
+  return std::min(std::max({kRules.rival_nats.value, share, kRules.rival_errors * error}),
+                  std::max(kRules.rival_most_nats.value, share));
 }
-
-}  // namespace
 
 void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std::size_t which, double threshold) {
   Accepted& own = accepted[which];
@@ -96,14 +90,14 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       with_ours.insert(with_ours.end(), own.columns.begin(), own.columns.end());
       const Normal rest = evidence.normal(columns, with_ours);
       if (rest.solvable && rest.gain() > kRules.rival_rest * theirs.gain()) continue;
-      const auto [lead, error] = difference(ours, theirs);
+      const auto [lead, error] = lead_over(ours, theirs);
       // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
       // its rate does.
       if (own.form->motors_alone && form.motors_alone) {
         found.push_back({form.cause(), &form, scale, lead});
         continue;
       }
-      if (!as_good(lead, error, dynamic(own.columns) || dynamic(columns) ? ours.gain() : 0.0)) continue;
+      if (lead > needed_lead(error, dynamic(own.columns) || dynamic(columns) ? ours.gain() : 0.0)) continue;
       found.push_back({form.cause(), &form, scale, lead});
     }
   }

@@ -21,6 +21,17 @@ bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b)
 bool error_of_form(const Form& form, const std::vector<Column>& columns, double gain,
                    const std::vector<Accepted>& accepted, const Evidence& evidence, std::size_t itself = SIZE_MAX);
 
+/// Nats by which one set of columns leads another over the flights, and the standard error of that sum.
+struct Lead {
+  double nats, error;
+};
+Lead lead_over(const Normal& ours, const Normal& theirs);
+
+/// The lead, nats, above which a rival is told from a cause. `error`: the lead's; `gain`: the cause's where one of the
+/// two is a delay or a slope, else 0: there a lead that is a small share of the gain is one that the error of a form
+/// makes.
+double needed_lead(double error, double gain);
+
 /// Adds to an accepted cause those of the catalogue that these flights do not tell from it. `threshold`: nats that a
 /// rival gains itself, or half of the cause's gain.
 void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std::size_t which, double threshold);

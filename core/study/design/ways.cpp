@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/design/ways.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/study/design/design_rules.hpp"
+
+namespace backwash::study {
+namespace {
+
+using Points = std::vector<Vec3>;
+
+/// Voxels that are joined to the start by others at which hovering is safe, and what a way needs to know of them.
+class Room {
+ public:
+  Room(const plan::World& world, const Vec3& start_W)
+      : world_(world), region_(world.safe.region(world.grid.index(start_W))) {
+    double most = -1;
+    for (std::size_t n = 0; n < world.grid.cell_count(); ++n) {
+      const Index3 v = world.grid.voxel(n);
+      if (!holds(v)) continue;
+      voxels_.push_back(v);
+      const double room = world.distance.at(n) - 1e-3 * (world.grid.center(v) - start_W).norm();  // the nearest such
+      if (room > most) most = room, open_ = v;
+    }
+  }
+  bool empty() const { return voxels_.empty(); }
+  Vec3 at(const Index3& v) const { return world_.grid.center(v); }
+  Vec3 open() const { return at(open_); }
+
+  /// The last place in a straight line of steps from the open spot.
+  Vec3 end(const Index3& step) const {
+    Index3 v = open_;
+    while (holds(v + step)) v += step;
+    return at(v);
+  }
+  /// Metres from a voxel's centre to the solid face in the direction of a step; nothing within the map: none.
+  std::optional<double> to_solid(Index3 v, const Index3& step) const {
+    for (int n = 0; world_.grid.inside(v); v += step, ++n)
+      if (world_.grid.occupied(v)) return (n - 0.5) * world_.grid.resolution();
+    return std::nullopt;
+  }
+  Index3 open_voxel() const { return open_; }
+  /// The safe place with the nearest solid above it, and the one with the farthest at the same height.
+  std::optional<std::pair<Vec3, Vec3>> under_and_beside() const {
+    std::optional<std::pair<double, Index3>> under, beside;
+    for (const Index3& v : voxels_)
+      if (const auto gap = to_solid(v, up()); gap && (!under || *gap < under->first)) under = {*gap, v};
+    if (!under) return std::nullopt;
+    for (const Index3& v : voxels_) {
+      if (v.z() != under->second.z()) continue;
+      const double gap = to_solid(v, up()).value_or(INFINITY);
+      if (!beside || gap > beside->first) beside = {gap, v};
+    }
+    return std::pair(at(under->second), at(beside->second));
+  }
+  static Index3 up() { return {0, 0, 1}; }
+
+ private:
+  bool holds(const Index3& v) const {
+    return region_ != plan::SafeSpace::kNoRegion && world_.safe.region(v) == region_;
+  }
+  const plan::World& world_;
+  std::uint32_t region_;
+  std::vector<Index3> voxels_;
+  Index3 open_ = Index3::Zero();
+};
+
+/// The corners of a level polygon about a point.
+Points ring(const Vec3& centre, double side, int corners) {
+  Points points;
+  const double radius = side / 2 / std::sin(M_PI / corners);
+  for (int k = 0; k < corners; ++k) {
+    const double angle = 2 * M_PI * (k + 0.5) / corners;
+    points.push_back(centre + radius * Vec3(std::cos(angle), std::sin(angle), 0));
+  }
+  return points;
+}
+
+/// There and back in steps of about so much.
+Points steps(const Vec3& from, const Vec3& to, double length) {
+  const int n = std::max(1, static_cast<int>(std::lround((to - from).norm() / length)));
+  Points points;
+  for (int k = 0; k <= n; ++k) points.push_back(from + k * (to - from) / n);
+  for (int k = n - 1; k > 0; --k) points.push_back(from + k * (to - from) / n);
+  return points;
+}
+
+std::string metres(double x) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%.2g m", x);
+  return text;
+}
+
+class List {
+ public:
+  explicit List(const Room& room) : room_(room), open_(room.open()) {}
+  std::vector<Way> all() {
+    stand(), heights(), lines(), turns(), ceilings(), walls();
+    return std::move(ways_);
+  }
+
+ private:
+  void add(std::string name, Points points) { ways_.push_back({std::move(name), std::move(points), {}}); }
+  void cannot(std::string name, std::string why) { ways_.push_back({std::move(name), {}, std::move(why)}); }
+  Vec3 low() const { return room_.end({0, 0, -1}); }
+  Vec3 high() const { return room_.end({0, 0, 1}); }
+
+  void stand() {
+    add("stand still at an open spot", {open_});
+    add("stand still low", {low()});
+    add("stand still high", {high()});
+  }
+  void heights() {
+    const Vec3 middle = 0.5 * (low() + high());
+    add("hover low, in the middle and high", {low(), low(), middle, middle, high(), high()});
+    add("hover at many heights", steps(low(), high(), kDesignRules.slow_step / 2));
+    add("up and down, the whole height", {low(), high()});
+    add("up and down, about a low height", {low(), low() + Vec3(0, 0, kDesignRules.bob)});
+    const auto floor = room_.to_solid(room_.open_voxel(), {0, 0, -1});
+    if (!floor) return cannot("hover 0.3, 0.8 and 1.3 m over the floor", "the map shows no floor there");
+    Points points;
+    for (const double height : {0.3, 0.8, 1.3}) points.insert(points.end(), 2, open_ + Vec3(0, 0, height - *floor));
+    add("hover 0.3, 0.8 and 1.3 m over the floor", points);
+  }
+  void lines() {
+    for (const auto& [name, step] : {std::pair{"x", Index3(1, 0, 0)}, {"y", Index3(0, 1, 0)}}) {
+      const Vec3 from = room_.end(-step), to = room_.end(step);
+      add(std::string("side to side along ") + name + ", fast", {from, to});
+      add(std::string("side to side along ") + name + ", slowly", steps(from, to, kDesignRules.slow_step));
+    }
+    add("corner to corner",
+        {room_.end({-1, -1, 0}), room_.end({1, 1, 0}), room_.end({-1, 1, 0}), room_.end({1, -1, 0})});
+  }
+  void turns() {
+    for (const double side : {kDesignRules.small_side.value, kDesignRules.large_side.value})
+      for (const auto& [name, corners] : {std::pair{"a triangle", 3}, {"a square", 4}, {"an octagon", 8}})
+        add(std::string("turn the heading on ") + name + ", sides of " + metres(side), ring(open_, side, corners));
+    const Vec3 half(kDesignRules.large_side, 0, 0);  // long enough a way to turn by π on
+    add("turn the heading to and fro on " + metres(2 * kDesignRules.large_side), {open_ - half, open_ + half});
+    Points squares = ring(low(), kDesignRules.small_side, 4), upper = ring(high(), kDesignRules.small_side, 4);
+    squares.insert(squares.end(), upper.begin(), upper.end());
+    add("turn the heading on squares, low and high", squares);
+  }
+  void ceilings() {
+    const std::string name = "hover 0.25, 0.5 and 1 m below the ceiling";
+    if (const auto gap = room_.to_solid(room_.open_voxel(), Room::up())) {
+      Points points;
+      for (const double below : {0.25, 0.5, 1.0}) points.insert(points.end(), 2, open_ + Vec3(0, 0, *gap - below));
+      add(name, points);
+    } else {
+      cannot(name, "the map shows no ceiling there");
+    }
+    const auto both = room_.under_and_beside();
+    if (!both) return cannot("a spot without ceiling, then the same height under one", "the map shows no ceiling");
+    add("a spot without ceiling, then the same height under one",
+        {both->second, both->second, both->first, both->first});
+  }
+  void walls() {
+    for (const auto& [name, step] : {std::pair{"x", Index3(1, 0, 0)}, {"y", Index3(0, 1, 0)}}) {
+      const std::string of = std::string("approach the walls along ") + name;
+      const Vec3 from = room_.end(-step), to = room_.end(step);
+      add(of + ", as near as is safe", {open_, to, to, open_, from, from});
+      const auto a = room_.to_solid(room_.open_voxel(), -step), b = room_.to_solid(room_.open_voxel(), step);
+      const std::string near = of + " to " + metres(kDesignRules.wall_distance);
+      if (!a || !b) {
+        cannot(near, "the map shows no wall there");
+        continue;
+      }
+      const Vec3 along = step.cast<double>();
+      const Vec3 left = open_ - (*a - kDesignRules.wall_distance) * along,
+                 right = open_ + (*b - kDesignRules.wall_distance) * along;
+      add(near, {open_, right, right, open_, left, left});
+    }
+  }
+
+  const Room& room_;
+  Vec3 open_;
+  std::vector<Way> ways_;
+};
+
+}  // namespace
+
+std::vector<Way> ways(const plan::World& world, const Vec3& start_W) {
+  const Room room(world, start_W);
+  if (room.empty()) return {};
+  return List(room).all();
+}
+
+}  // namespace backwash::study
