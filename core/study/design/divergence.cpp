@@ -105,7 +105,8 @@ std::vector<Column> Contest::joint(const Explanation& truth, const Form* rival, 
 Contest::Duel Contest::duel(std::size_t truth, std::size_t rival) const {
   const Explanation &ours = all_[truth], &theirs = all_[rival];
   const Observations& seen = flown_->seen();
-  Duel d{truth, rival, theirs.behind - ours.behind, 0, 0, false, false, {}, {}, {}};
+  Duel d{};
+  d.truth = truth, d.rival = rival, d.lead = theirs.behind - ours.behind;
   const auto own = ours.form->columns(seen.windows, ours.scale),
              other = theirs.form->columns(seen.windows, theirs.scale);
   auto both = own;
@@ -118,7 +119,7 @@ Contest::Duel Contest::duel(std::size_t truth, std::size_t rival) const {
   d.error = lead_over(we, they).error;
   d.dynamic = dynamic(own) || dynamic(other);
   add_copies(d);
-  d.never = d.copies.empty() || d.alone.flown.size() == 0;
+  d.never = d.copies.empty() || d.alone.size() == 0;
   return d;
 }
 
@@ -136,24 +137,23 @@ void Contest::add_copies(Duel& d) const {
     }
   }
   const auto alone = joint(ours, nullptr, {}, seen);
-  if (!alone.empty()) d.alone = {nullptr, {}, gram_of(*flown_, alone)};
+  if (!alone.empty()) d.alone = gram_of(*flown_, alone);
 }
 
 Contest::Growth Contest::growth(const Duel& d, const Evidence& next) const {
   const auto most = static_cast<std::size_t>(kDesignRules.most_flights);
-  const auto with = [&](const Copy& copy) {
-    return Imitation{copy.flown, gram_of(next, joint(all_[d.truth], copy.form, copy.scale, next.seen())), d.theta};
-  };
+  const Explanation& truth = all_[d.truth];
   Growth grown;
   std::vector<double> left(most + 1, INFINITY);
   for (const Copy& copy : d.copies) {
-    const Imitation imitation = with(copy);
+    const auto columns = joint(truth, copy.form, copy.scale, next.seen());
+    const Imitation imitation{copy.flown, gram_of(next, columns), d.theta};
     const double now = imitation.left(0);
     if (now < left[0]) grown.divergence = imitation.divergence();
     for (std::size_t n = 0; n <= most; ++n)
       left[n] = std::min(left[n], n == 0 ? now : imitation.left(static_cast<double>(n)));
   }
-  const Imitation alone = with(d.alone);
+  const Imitation alone{d.alone, gram_of(next, joint(truth, nullptr, {}, next.seen())), d.theta};
   for (std::size_t n = 1; n <= most; ++n) {
     grown.lead.push_back(left[n] - left[0]);
     grown.gain.push_back(alone.left(static_cast<double>(n)) - alone.left(0));

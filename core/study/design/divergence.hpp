@@ -62,7 +62,7 @@ class Contest {
   std::vector<Column> joint(const Explanation& truth, const Form* rival, const Scale& scale,
                             const Observations& seen) const;
   struct Copy {
-    const Form* form;  // null: of the cause alone
+    const Form* form;
     Scale scale;
     Eigen::MatrixXd flown;
   };
@@ -73,7 +73,7 @@ class Contest {
     bool dynamic, never;       // a delay or a slope; motors alone
     Eigen::VectorXd theta;
     std::vector<Copy> copies;
-    Copy alone;
+    Eigen::MatrixXd alone;  // of the truth and what stands beside it, over the flown flights
   };
   Duel duel(std::size_t truth, std::size_t rival) const;
   void add_copies(Duel& duel) const;
