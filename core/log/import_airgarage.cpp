@@ -44,6 +44,7 @@ std::vector<double> frame_times(const std::vector<double>& stamps) {
   }
   const double phase = std::atan2(s, c) / (2 * std::numbers::pi) * kFrame;
   std::vector<double> frames;
+  frames.reserve(stamps.size());
   for (const double t : stamps) frames.push_back(std::round((t - stamps.front() - phase) / kFrame));
   for (std::size_t i = frames.size() - 1; i-- > 0;) frames[i] = std::min(frames[i], frames[i + 1] - 1);
   const double first = frames.front();
@@ -52,8 +53,7 @@ std::vector<double> frame_times(const std::vector<double>& stamps) {
 }
 
 void add(FlightLog& log, const std::string& prefix, const std::string& unit, const Vec3& value) {
-  for (int axis = 0; axis < 3; ++axis)
-    log.columns[prefix + std::string("xyz")[static_cast<std::size_t>(axis)] + unit].push_back(value[axis]);
+  for (int axis = 0; axis < 3; ++axis) log.columns[(prefix + "xyz"[axis]).append(unit)].push_back(value[axis]);
 }
 
 }  // namespace

@@ -29,7 +29,8 @@ std::string section(const std::string& title, const std::string& words, const st
 std::string no_path(const sim::MethodRow& row) {
   std::string reasons;
   for (const auto& [status, count] : row.status) {
-    if (status != plan::to_string(plan::PlanStatus::ok)) reasons += (reasons.empty() ? "" : ", ") + status + " " + std::to_string(count);
+    if (status != plan::to_string(plan::PlanStatus::ok))
+      reasons += (reasons.empty() ? "" : ", ") + status + " " + std::to_string(count);
   }
   return std::to_string(row.pairs - row.solved) + (reasons.empty() ? "" : " (" + reasons + ")");
 }
