@@ -11,7 +11,7 @@ namespace backwash::study {
 struct EffectRules {
   // Surfaces and the place of a window
   Rule strayed{"strayed", 0.1, "m", "chosen: a push that moves the craft farther is not believed"};
-  Rule place_turns{"place_turns", 4, "turns", "derived: as turns"};
+  Rule place_turns{"place_turns", 4, "turns", "derived: as turns: the same fixed point, of the same slope"};
   Rule no_wall_nearer{"no_wall_nearer", 9, "m", "derived: beyond sight: where there is no surface, a rank needs one"};
   Rule under_ceiling{"under_ceiling", 1.5, "m", "derived: e^-2 of the longest length searched, 0.6 m, is left there"};
   Rule noise_unit{"noise_unit", 0.005, "(m/s²)²", "derived: the unit of a free noise; its size is fitted"};
