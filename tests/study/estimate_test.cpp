@@ -13,6 +13,7 @@
 namespace {
 
 using namespace backwash::study;
+using backwash::kNoSurface;
 using backwash::Vec3;
 
 constexpr std::size_t kFlights = 12, kOfFlight = 24;
