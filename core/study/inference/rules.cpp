@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 
+#include "core/study/inference/rotor_rules.hpp"
 #include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
@@ -21,6 +22,7 @@ void append(std::vector<Rule>& told, const Struct& rules) {
 std::vector<Rule> rules() {
   std::vector<Rule> told;
   append(told, kRules);
+  append(told, kRotorRules);
   append(told, kWindowRules);
   return told;
 }
