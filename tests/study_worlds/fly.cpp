@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -57,6 +59,8 @@ class Flight {
  public:
   Flight(const World& world, Gusts& gusts, int number)
       : world_(world),
+        hidden_(world.effects),
+        since_(acts_since(world.request, number)),
         gusts_(gusts),
         rng_(world.request.seed * 1000003 + static_cast<std::uint64_t>(number) * 7717 + 5) {
     const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng_); };
@@ -93,6 +97,7 @@ class Flight {
     }
     for (std::size_t k = 0; k < plan.size(); ++k) {
       const double t = static_cast<double>(k) * kStep;
+      world_.effects = t >= since_ ? hidden_ : Effects();
       step(plan, k, t);
       if (t < next_row) continue;
       next_row += (1 + world_.jitter * std::uniform_real_distribution(-0.5, 0.5)(rng_)) / world_.rate_hz;
@@ -194,8 +199,9 @@ class Flight {
     for (int i = 0; i < 4; ++i) {
       const bool hurt = damage != 0 && i == damaged;
       const double need = produced_.norm() / kG / (hurt ? 1 - damage : 1.0);
-      spin_[i] = world_.rotor_rpm * std::sqrt(need) * (1 + 0.004 * offset_[i]);
-      motor_[i] = command_of(world_.craft, world_.craft.mass * kG * need) * (1 + 0.006 * offset_[i + 4]);
+      spin_[i] = world_.rotor_rpm * std::sqrt(need) * (1 + world_.craft.rotor_spread / 2 * offset_[i]);
+      motor_[i] =
+          command_of(world_.craft, world_.craft.mass * kG * need) * (1 + world_.craft.rotor_spread * offset_[i + 4]);
       phase_[i] += 2 * M_PI * spin_[i] / 60 * kStep;
     }
   }
@@ -244,7 +250,17 @@ class Flight {
     return row;
   }
 
-  const World& world_;
+  /// s; infinite in a flight in which nothing acts.
+  static double acts_since(const Request& request, int number) {
+    const auto& in = request.in_flights;
+    if (in.empty()) return 0;
+    if (std::find(in.begin(), in.end(), number) == in.end()) return std::numeric_limits<double>::infinity();
+    return number == *std::min_element(in.begin(), in.end()) ? request.since_s : 0;
+  }
+
+  World world_;
+  Effects hidden_;
+  double since_;
   Gusts& gusts_;
   Rng rng_;
   std::normal_distribution<double> normal_;

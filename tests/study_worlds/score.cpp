@@ -38,6 +38,7 @@ const std::vector<Cell>& cells() {
     for (const auto& name : cause_names()) list.push_back({name, {name}});
     list.insert(list.end(), {{"unknown", {"unknown"}},
                              {"none", {}},
+                             {"none, no reference flights", {}, "", false, false},
                              {"two causes", {}, "", true},
                              {"thrust_slope, up and down", {"thrust_slope"}, "bob"},
                              {"ground_thrust, up and down", {"ground_thrust"}, "bob"},
@@ -81,11 +82,11 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   out.cell = cell.name, out.seed = seed, out.size = size;
   out.truth = cell.two_drawn ? two_causes(seed) : cell.causes;
   const World world = draw_world({seed, out.truth, size, flights, cell.confound});
+  auto options = cell.reference ? with_reference(world, folder) : backwash::study::StudyOptions();
   const double start = cpu();
   const auto tables = fly_all(world);
   const auto seen = observe(world, tables, folder);
   const double observed = cpu();
-  backwash::study::StudyOptions options;
   options.minimum_detectable = false;
   const auto result = backwash::study::study(seen, options);
   out.world_s = observed - start, out.study_s = cpu() - observed;

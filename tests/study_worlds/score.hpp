@@ -16,6 +16,7 @@ struct Cell {
   std::vector<std::string> causes;  ///< hidden; empty: none
   std::string confound = "";
   bool two_drawn = false;  ///< two different causes drawn from the seed
+  bool reference = true;   ///< the study is given six sound flights
 };
 /// Every cause, unknown, none, two causes, and the confounded pairs of flights that cannot tell.
 const std::vector<Cell>& cells();
