@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
 
@@ -250,14 +248,6 @@ class Flight {
     return row;
   }
 
-  /// s; infinite in a flight in which nothing acts.
-  static double acts_since(const Request& request, int number) {
-    const auto& in = request.in_flights;
-    if (in.empty()) return 0;
-    if (std::find(in.begin(), in.end(), number) == in.end()) return std::numeric_limits<double>::infinity();
-    return number == *std::min_element(in.begin(), in.end()) ? request.since_s : 0;
-  }
-
   World world_;
   Effects hidden_;
   double since_;
@@ -272,21 +262,6 @@ class Flight {
   double offset_[8];  // the craft's own small asymmetry, the same in each of its flights
   double spin_[4] = {}, motor_[4] = {}, phase_[4] = {0.3, 1.9, 4.0, 5.5};
 };
-
-backwash::map::OccupancyGrid true_grid(const Room& room) {
-  const double a = 0.1;
-  const Vec3 low = room.inside.low - Vec3::Constant(0.4), high = room.inside.high + Vec3::Constant(0.4);
-  const Eigen::Vector3i size = ((high - low) / a).array().round().cast<int>();
-  backwash::map::OccupancyGrid grid(low, a, size);
-  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    const auto v = grid.voxel(n);
-    const Vec3 p = grid.center(v);
-    bool solid = !room.inside.contains(p);
-    for (const Box& b : room.solids) solid = solid || b.contains(p);
-    grid.set(v, solid ? backwash::map::Cell::occupied : backwash::map::Cell::free);
-  }
-  return grid;
-}
 
 /// The modelled gusts in a world's room. Worlds of one seed are pairs in one room: what was evaluated for the last one
 /// serves the next.

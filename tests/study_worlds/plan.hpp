@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "core/map/occupancy_grid.hpp"
 #include "tests/study_worlds/world.hpp"
 
 namespace study_worlds {
@@ -18,5 +19,11 @@ struct Command {
 
 /// A flight: dwells at places that the request's circumstances allow, and the ways between them, sampled at kStep.
 std::vector<Command> draw_plan(const World& world, Rng& rng);
+
+/// From when on the request's causes act in a flight, s; infinite where they do not.
+double acts_since(const Request& request, int flight);
+
+/// A room's voxels of 0.1 m, every cell known.
+backwash::map::OccupancyGrid true_grid(const Room& room);
 
 }  // namespace study_worlds

@@ -36,6 +36,7 @@ struct Outcome {
   double size = 1;
   std::vector<std::string> truth;              ///< hidden causes
   std::vector<std::vector<std::string>> sets;  ///< per told cause: its name, then its rivals
+  std::vector<std::string> where;              ///< of each: in which flights, if not in all
   std::vector<std::string> unknown;            ///< regressors of unknown structure
   std::vector<Compared> compared;              ///< of the hidden cause, if its name comes first in a set
   std::optional<double> error;                 ///< |parameters − truth| over |truth|

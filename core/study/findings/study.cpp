@@ -169,9 +169,9 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   Observations settled = seen;
   if (const double off = settle_rotors(options.sound, settled); off > 0)
     for (const char* name : {"propeller_damage", "rotor_sensor_fault"})
-      result.not_tested.emplace_back(name, "the same in all flights and no more than craft are built with: the rotors differ by " +
-                                               percent(off) +
-                                               ", as those of a sound craft may; give --reference flights");
+      result.not_tested.emplace_back(
+          name, "the same in all flights and no more than craft are built with: the rotors differ by " + percent(off) +
+                    ", as those of a sound craft may; give --reference flights");
   const WholeSearch whole = search_all(settled, options.search);
   const SearchResult& found = whole.found;
   result.threshold = found.threshold;

@@ -18,9 +18,9 @@ struct PageContext {
   std::optional<Consequence> consequence;  ///< of the accepted causes
   std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
   std::optional<calibrate::HeightEffects> height;
+  std::string residuals = {};  ///< residual_section(), or empty
   /// The file as read: what to change is told with its values. Without it nothing is.
   std::optional<Vehicle> read_vehicle = {};
-  std::string residuals = {};          ///< residual_section(), or empty
   std::vector<std::string> logs = {};  ///< names of the observed flights, in their order
 };
 

@@ -67,8 +67,6 @@ std::vector<SmallVector> directions(const Amplitudes& a) {
   const auto p = static_cast<Eigen::Index>(a.columns().size());
   std::vector<SmallVector> all;
   for (Eigen::Index k = 0; k < (a.form().one_sided ? 1 : p); ++k) all.push_back(SmallVector::Unit(p, k));
-  if (p == 2 && !a.form().integer_scale)
-    for (const double sign : {1.0, -1.0}) all.push_back(SmallVector(Eigen::Vector2d(1, sign).normalized()));
   return all;
 }
 
@@ -151,6 +149,17 @@ double gain(const Amplitudes& a, const std::vector<Segment>& segments, const Sma
          price(segments);
 }
 
+namespace {
+
+/// Whether a whole flight lies on the level that is not called acting.
+bool sound_flight(const std::vector<Segment>& segments) {
+  std::map<std::size_t, bool> sound;
+  for (const auto& s : segments) sound.emplace(s.unit, true).first->second &= !s.acting;
+  return std::any_of(sound.begin(), sound.end(), [](auto& flight) { return flight.second; });
+}
+
+}  // namespace
+
 bool sound_is_odd(const Located& l) {
   const Amplitudes& a = *l.finding.asked.amplitudes;
   if (a.form().one_sided) return false;
@@ -171,6 +180,7 @@ std::optional<Located> located(Finding finding, const Observations& seen) {
     auto d = difference(a, segments);
     if (!d) return std::nullopt;
     if (last && !a.effect(d->value())) return std::nullopt;
+    if (last && a.form().one_sided && !sound_flight(segments)) return std::nullopt;
     if (last) return Located{finding, std::move(segments), *d};
     if (!a.form().one_sided) finding.asked.direction = d->value().normalized();
     finding.low = finding.asked.direction.dot(d->sound), finding.high = finding.asked.direction.dot(d->acting);

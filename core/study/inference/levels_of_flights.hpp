@@ -15,7 +15,7 @@ struct Asked {
   SmallVector direction;
 };
 
-/// Each parameter by itself; of a push in the plane its diagonals too; of a one-sided form the first alone.
+/// Each parameter by itself; of a one-sided form the first alone.
 std::vector<SmallVector> directions(const Amplitudes& amplitudes);
 
 /// Windows [begin, end) of one unit, on one level.
@@ -58,7 +58,8 @@ struct Located {
   std::vector<Segment> segments;
   Difference difference;
 };
-/// Nothing where the levels' difference is below what the form calls an effect.
+/// Nothing where the levels' difference is below what the form calls an effect, or, of damage of one sign, where no
+/// flight was sound all along.
 std::optional<Located> located(Finding finding, const Observations& seen);
 
 /// Whether what was called sound is the odd level: farther from what the simulation says than craft are built, in fewer

@@ -13,12 +13,6 @@
 namespace backwash::study {
 namespace {
 
-bool moves(const std::vector<Column>& columns, Channel c) {
-  return std::any_of(columns.begin(), columns.end(), [c](const Column& column) {
-    return std::any_of(column.parts.begin(), column.parts.end(), [c](auto& part) { return part.channel == c; });
-  });
-}
-
 /// Accepted columns, but for constants of the form's own effect: their part is seen in every flight alike.
 std::vector<Column> others(const SearchResult& found, const Form& own, const Observations& seen) {
   std::vector<Column> all;
@@ -31,22 +25,14 @@ std::vector<Column> others(const SearchResult& found, const Form& own, const Obs
   return all;
 }
 
-bool unexplained(const SearchResult& found, const std::vector<Column>& own) {
-  for (const auto& u : found.unknown)
-    for (const auto& [name, channels] : channel_groups())
-      if (name == u.group && std::any_of(channels.begin(), channels.end(), [&](Channel c) { return moves(own, c); }))
-        return true;
-  return false;
-}
-
+/// Rotors tell by channels of their own what is the matter with them, and other flights' scatter there is small. Pushes
+/// and tails differ between flights for too many reasons (some_flights.md).
 std::vector<Amplitudes> all_amplitudes(const Evidence& evidence, const SearchResult& found) {
   std::vector<Amplitudes> all;
   for (const Form* form : catalogue()) {
     if (!form->constant || why_not_tested(*form, evidence.seen())) continue;
     for (const Scale& scale : form->scales) {
-      const auto own = form->columns(evidence.seen().windows, scale);
-      const Channel first = own.front().parts.front().channel;
-      if (unexplained(found, own) || (first >= kThrustDelay && first <= kTiltDelay)) break;
+      if (form->columns(evidence.seen().windows, scale).front().parts.front().channel < kLine1) break;
       all.emplace_back(evidence, *form, scale, evidence.residual(others(found, *form, evidence.seen())));
     }
   }
@@ -160,13 +146,9 @@ bool alike(const InSomeFlights& known, const std::vector<Segment>& segments) {
 /// Channels in which causes compete for the same scatter between flights: a question each.
 std::size_t kind_of(const Asked& asked) {
   const Channel c = asked.amplitudes->columns().front().parts.front().channel;
-  constexpr std::array kFirst = {kMeanX, kMeanZ, kVarX, kTail, kThrustDelay, kLine1, kMotor1, kRpm1, kDropout1};
+  constexpr std::array kFirst = {kLine1, kMotor1, kRpm1, kDropout1};
   return static_cast<std::size_t>(std::upper_bound(kFirst.begin(), kFirst.end(), c) - kFirst.begin());
 }
-bool of_rotors(const Asked& asked) { return asked.amplitudes->columns().front().parts.front().channel >= kLine1; }
-
-/// One window's fourth moment may be as large as all others': no step is told by it.
-bool tails(const Asked& asked) { return asked.amplitudes->columns().front().parts.front().channel == kTail; }
 
 /// What is asked of the flights, and at which share of the level.
 class Questions {
@@ -187,23 +169,20 @@ class Questions {
     return std::min(1.0, 2 * tried * p);
   }
 
-  /// Whether it was told already, or is so small beside what was told of the rotors that it may be the error of that.
-  /// Likewise a cause of the same channels, or of rotors as well, that divides the flights alike: it is what the form
-  /// of the first one leaves.
+  /// Whether it was told already, or may be what the form of something told leaves: it is small beside that, or divides
+  /// the flights alike. Two rotors may fail in flights of their own.
   bool left_out(const Located& place, double nats) const {
-    const Asked& one = place.finding.asked;
+    const Amplitudes& own = *place.finding.asked.amplitudes;
     return std::any_of(known_->begin(), known_->end(), [&](const InSomeFlights& k) {
-      const bool same = k.found.form == &one.amplitudes->form() && k.found.scale.value == one.amplitudes->scale().value;
-      const bool beside = of_rotors(one) && k.found.columns.front().parts.front().channel >= kLine1;
-      if (same || (beside && nats < kRules.least_share * k.found.gain)) return true;
-      return (beside || share_a_channel(k.found.columns, one.amplitudes->columns())) && alike(k, place.segments);
+      const bool same = k.found.form == &own.form() && k.found.scale.value == own.scale().value;
+      return same || nats < kRules.least_share * k.found.gain || alike(k, place.segments);
     });
   }
 
  private:
   bool accepted(const Asked& one) const {
     return std::any_of(found_->accepted.begin(), found_->accepted.end(),
-                       [&](auto& a) { return a.form->effect == one.amplitudes->form().effect; });
+                       [&](auto& a) { return a.form == &one.amplitudes->form(); });
   }
 
   const SearchResult* found_;
@@ -222,17 +201,17 @@ std::optional<InSomeFlights> in_some_flights(const Evidence& evidence, const Sea
   std::vector<Finding> findings;
   std::map<std::size_t, double> least;  // family-wise p, by kind
   for (const auto& one : questions.asked())
-    for (auto& finding : {across(one), tails(one) ? Finding{one} : within(one)}) {
+    for (auto& finding : {across(one), within(one)}) {
       const double chance = questions.chance(one, finding.p);
       findings.push_back(finding);
       const auto [at, fresh] = least.emplace(kind_of(one), chance);
       if (!fresh) at->second = std::min(at->second, chance);
     }
-  // Which cause it is the gain says, not the clearest p: a push of the body may show first along the world.
+  // Which cause it is the gain says, not the clearest p.
   std::vector<Fitting> places;
   for (const auto& finding : findings) {
     const double chance = least.at(kind_of(finding.asked));
-    if (chance > options.accept_p * kRules.further_level) continue;
+    if (chance > options.accept_p * kRotorRules.some_level) continue;
     auto place = located(finding, evidence.seen());
     if (!place) continue;
     const double nats = gain(*finding.asked.amplitudes, place->segments, place->difference.value());

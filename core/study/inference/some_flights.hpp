@@ -21,11 +21,10 @@ struct InSomeFlights {
   std::vector<Column> open = {};      ///< what it leaves open (Form::companions), 0 where it does not act
 };
 
-/// The clearest cause, of those that are a constant of the craft (Form::constant), that some flights have and others
-/// have not, after the accepted ones. Two routes share the level: flights' own amplitudes lie on two levels
-/// (two_levels.hpp), or one flight's windows do. p is family-wise over all causes, rotors, divisions and steps.
-/// Nothing beyond accept_p × further_level. Not asked: channels in which unknown structure was found, and what is
-/// `known` already.
+/// The clearest cause, of the constants of the craft (Form::constant) that its rotors' own channels tell, that some
+/// flights have and others have not, after the accepted ones. Two routes share the level: flights' own amplitudes lie
+/// on two levels (two_levels.hpp), or one flight's windows do. p is family-wise over all causes, rotors, divisions and
+/// steps. Nothing beyond accept_p × some_level. Not told: what the forms of those `known` already may leave.
 std::optional<InSomeFlights> in_some_flights(const Evidence& evidence, const SearchResult& found,
                                              const std::vector<InSomeFlights>& known, const SearchOptions& options);
 
