@@ -71,11 +71,13 @@ std::string earlier_terms(const std::string& path) {
 }
 
 /// The evidence after every flight, in the order of the logs, what the model holds taken out.
-AnytimeReport look_every_time(const Options& options, const Flights& flights, const Vehicle& vehicle,
-                              const Model& model, const map::OccupancyGrid* grid) {
+std::optional<AnytimeReport> look_every_time(const Options& options, const Flights& flights, const Vehicle& vehicle,
+                                             const Model& model, const map::OccupancyGrid* grid,
+                                             const std::optional<study::SoundRotors>& sound) {
+  if (!options.anytime) return std::nullopt;
   const auto terms = read_terms(options.model);
   study::Observer observer(vehicle, model, grid);
-  study::Anytime anytime;
+  study::Anytime anytime(sound);
   for (const auto& log : flights.logs) {
     observer.add(log);
     auto seen = observer.so_far();
@@ -83,6 +85,13 @@ AnytimeReport look_every_time(const Options& options, const Flights& flights, co
     anytime.look(seen);
   }
   return anytime_report(flights.paths, anytime, options.fleet);
+}
+
+/// The logs' names in the order in which the flights are observed.
+std::vector<std::string> names_of(const Flights& flights) {
+  std::vector<std::string> names;
+  for (const std::size_t k : flights.order()) names.push_back(flights.paths[k]);
+  return names;
 }
 
 /// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
@@ -111,15 +120,20 @@ void refuse_other_numbers(const std::vector<std::string>& logs) {
                               "import it and swap motor2 and motor3");
 }
 
-/// Motor shares of the flights against those of the reference flights; nothing without such.
-std::optional<study::RotorVerdict> against_reference(const Options& options, const Vehicle& vehicle, const Model& model,
-                                                     const study::Observations& seen) {
+/// Flights known to be sound; nothing without such.
+std::optional<study::Observations> sound_flights(const Options& options, const Vehicle& vehicle, const Model& model) {
   if (options.reference.empty()) return std::nullopt;
   study::Observer observer(vehicle, model, nullptr);
   for (const auto& path : options.reference) observer.add(read_flight(path));
-  const auto sound = study::rotor_contrasts(observer.finish());
-  const auto group = study::rotor_contrasts(seen);
-  const auto verdict = study::judge_rotors(sound, group);
+  return observer.finish();
+}
+
+/// Motor shares of the flights against those of the reference flights; nothing without such.
+std::optional<study::RotorVerdict> against_reference(const Options& options,
+                                                     const std::optional<study::Observations>& sound,
+                                                     const study::Observations& seen) {
+  if (!sound) return std::nullopt;
+  const auto verdict = study::judge_rotors(study::rotor_contrasts(*sound), study::rotor_contrasts(seen));
   if (!verdict)
     throw Failure(kBadData,
                   options.reference.front() +
@@ -171,6 +185,14 @@ void write_model(const Options& options, const Model& model, const study::StudyR
   write_file(options.out, text, options.force);
 }
 
+std::optional<study::Consequence> what_it_costs(const study::StudyResult& result, const study::Observations& seen,
+                                                const Model& model, const Vehicle& vehicle,
+                                                const map::OccupancyGrid* grid) {
+  if (result.causes.empty()) return std::nullopt;
+  progress("hover sets and a plan, before and after");
+  return study::consequence(result, seen, model, vehicle, grid, run_parallel);
+}
+
 void print_beside(const Flights& flights, const std::optional<AnytimeReport>& anytime,
                   const std::optional<study::Design>& design, const DesignOptions& asked) {
   for (const auto& [log, known] : flights.twice)
@@ -196,25 +218,22 @@ int run(const Options& options) {
   auto seen = observe(flights, vehicle, model, grid);
   const auto measured = seen;  // nothing that the model holds taken out
   const auto left = study::apply(read_terms(options.model), seen);
-  const auto result = study::study(seen, study_options(options));
-  Json json = to_json(result, seen, vehicle);
+  const auto sound = sound_flights(options, vehicle, model);
+  auto chosen = study_options(options);
+  if (sound) chosen.sound = study::sound_rotors(*sound);
+  const auto result = study::study(seen, chosen);
+  const auto names = names_of(flights);
+  Json json = to_json(result, seen, vehicle, names);
   add_left_out(json, left, flights);
-  std::optional<AnytimeReport> anytime;
-  if (options.anytime) {
-    anytime = look_every_time(options, flights, vehicle, model, grid);
-    json["anytime"] = to_json(*anytime);
-  }
+  const auto anytime = look_every_time(options, flights, vehicle, model, grid, chosen.sound);
+  if (anytime) json["anytime"] = to_json(*anytime);
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = to_json(*height);
-  const auto rotors = against_reference(options, vehicle, model, seen);
+  const auto rotors = against_reference(options, sound, seen);
   if (rotors) json["rotors_against_reference"] = to_json(*rotors);
-  std::optional<study::Consequence> consequence;
-  if (!result.causes.empty()) {
-    progress("hover sets and a plan, before and after");
-    consequence = study::consequence(result, seen, model, vehicle, grid, run_parallel);
-    json["consequence"] = to_json(*consequence);
-  }
+  const auto consequence = what_it_costs(result, seen, model, vehicle, grid);
+  if (consequence) json["consequence"] = to_json(*consequence);
   const auto design = designed(options.design, seen, result, model, vehicle, grid, options.force);
   if (design) json["design"] = to_json(*design, options.design);
   if (!options.out.empty()) {
@@ -225,10 +244,11 @@ int run(const Options& options) {
     std::string beside = anytime ? html(*anytime) : "";
     if (options.residuals)
       beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
-    write_page(options, result, seen,
-               {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle});
+    write_page(
+        options, result, seen,
+        {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle, names});
   }
-  options.json ? print(json) : print_text(result, seen, vehicle, consequence, rotors, height);
+  options.json ? print(json) : print_text(result, seen, vehicle, names, consequence, rotors, height);
   if (!options.json) print_beside(flights, anytime, design, options.design);
   return kOk;
 }

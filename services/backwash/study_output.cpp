@@ -6,6 +6,7 @@
 #include "core/study/calibrate/calibration_rules.hpp"
 #include "core/study/design/design_rules.hpp"
 #include "core/study/findings/page_sections.hpp"
+#include "core/study/findings/where_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 
 namespace backwash::services {
@@ -18,7 +19,20 @@ Json to_json(const study::Remedy& remedy) {
   return {{"file", remedy.file}, {"set", set}, {"words", remedy.words}};
 }
 
-Json to_json(const study::NamedCause& cause, const Vehicle& vehicle) {
+/// Flights in which a cause acts, counted from 1, with the names of their logs.
+Json to_json(const std::vector<study::ActingFlight>& flights, const std::vector<std::string>& logs) {
+  Json all = Json::array();
+  for (const auto& f : flights) {
+    Json one = {{"flight", f.flight + 1}};
+    if (f.flight < logs.size()) one["log"] = logs[f.flight];
+    if (f.since_s) one["since_s"] = *f.since_s;
+    if (f.until_s) one["until_s"] = *f.until_s;
+    all.push_back(one);
+  }
+  return all;
+}
+
+Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::vector<std::string>& logs) {
   const auto& found = cause.found;
   Json parameters = Json::object();
   for (const auto& e : found.parameters) parameters[e.name] = {{"value", e.value}, {"ci95", {e.low, e.high}}};
@@ -30,36 +44,40 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle) {
         {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
   const auto& g = cause.gain;
   const auto& a = cause.applied;
-  return {{"name", found.form->cause()},
-          {"set", set},
-          {"p", found.p},
-          {"form", found.form->formula},
-          {"parameters", parameters},
-          {"gain",
-           {{"held_out_nats", g.held_out_nats},
-            {"ci95_nats", {g.low_nats, g.high_nats}},
-            {"rmse_before", g.rmse_before},
-            {"rmse_after", g.rmse_after},
-            {"variance_coverage_before", g.coverage_before},
-            {"variance_coverage_after", g.coverage_after}}},
-          {"applied",
-           {{"held_out_nats", a.nats},
-            {"rmse_before", a.rmse_before},
-            {"rmse_after", a.rmse_after},
-            {"variance_coverage_before", a.coverage_before},
-            {"variance_coverage_after", a.coverage_after},
-            {"refused", a.refused}}},
-          {"hover_shift",
-           {{"predicted_m", cause.shift.predicted},
-            {"measured_m", cause.shift.measured},
-            {"slope", cause.shift.slope},
-            {"ci95", {cause.shift.low, cause.shift.high}},
-            {"refuted", cause.shift.refuted()}}},
-          {"extrapolated", cause.extrapolated},
-          {"largest_flown", cause.largest_flown},
-          {"odds", study::odds(g.held_out_nats)},
-          {"change", to_json(study::remedy_of(cause, vehicle))},
-          {"separate_by", separate}};
+  Json json = {{"name", found.form->cause()},
+               {"set", set},
+               {"p", found.p},
+               {"form", found.form->formula},
+               {"parameters", parameters},
+               {"gain",
+                {{"held_out_nats", g.held_out_nats},
+                 {"ci95_nats", {g.low_nats, g.high_nats}},
+                 {"rmse_before", g.rmse_before},
+                 {"rmse_after", g.rmse_after},
+                 {"variance_coverage_before", g.coverage_before},
+                 {"variance_coverage_after", g.coverage_after}}},
+               {"applied",
+                {{"held_out_nats", a.nats},
+                 {"rmse_before", a.rmse_before},
+                 {"rmse_after", a.rmse_after},
+                 {"variance_coverage_before", a.coverage_before},
+                 {"variance_coverage_after", a.coverage_after},
+                 {"refused", a.refused}}},
+               {"hover_shift",
+                {{"predicted_m", cause.shift.predicted},
+                 {"measured_m", cause.shift.measured},
+                 {"slope", cause.shift.slope},
+                 {"ci95", {cause.shift.low, cause.shift.high}},
+                 {"refuted", cause.shift.refuted()}}},
+               {"extrapolated", cause.extrapolated},
+               {"largest_flown", cause.largest_flown},
+               {"odds", study::odds(g.held_out_nats)},
+               {"change", to_json(study::remedy_of(cause, vehicle))},
+               {"separate_by", separate}};
+  if (cause.flights.empty()) return json;
+  json["where"] = study::where(cause);
+  json["in_flights"] = to_json(cause.flights, logs);
+  return json;
 }
 
 void print_text(const char* of, const study::calibrate::HeightEffect& h) {
@@ -88,7 +106,8 @@ Json to_json(const study::Outcome& o) {
 
 }  // namespace
 
-Json to_json(const study::StudyResult& result, const study::Observations& seen, const Vehicle& vehicle) {
+Json to_json(const study::StudyResult& result, const study::Observations& seen, const Vehicle& vehicle,
+             const std::vector<std::string>& logs) {
   Json json = {{"verdict", study::to_string(result.verdict)},
                {"flights", seen.flights},
                {"windows", seen.windows.size()},
@@ -99,7 +118,7 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                {"remaining_dependence", Json::array()},
                {"minimum_detectable", Json::object()}};
   for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
-  for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause, vehicle));
+  for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause, vehicle, logs));
   json["refused"] = Json::array();
   for (const auto& r : result.refused)
     json["refused"].push_back({{"name", r.name},
@@ -166,10 +185,13 @@ Json to_json(const study::calibrate::HeightEffects& effects) {
 
 namespace {
 
-void print_text(const study::NamedCause& cause, const Vehicle& vehicle) {
+void print_text(const study::NamedCause& cause, const Vehicle& vehicle, const std::vector<std::string>& logs) {
   std::printf("%s: %s\n  p %.4f, held-out gain %.1f nats: odds of %s\n", cause.found.form->cause().c_str(),
               cause.found.form->formula.c_str(), cause.found.p, cause.gain.held_out_nats,
               study::odds(cause.gain.held_out_nats).c_str());
+  if (!cause.flights.empty()) std::printf("  %s:", study::where(cause).c_str());
+  for (const auto& f : cause.flights) std::printf(" %s", f.flight < logs.size() ? logs[f.flight].c_str() : "?");
+  if (!cause.flights.empty()) std::printf("\n");
   if (!cause.applied.refused.empty()) std::printf("  does not join the model: %s\n", cause.applied.refused.c_str());
   if (cause.shift.refuted())
     std::printf("  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; has the loop an integrator?\n",
@@ -195,11 +217,12 @@ std::vector<study::Rule> all_rules() {
 }  // namespace
 
 void print_text(const study::StudyResult& result, const study::Observations& seen, const Vehicle& vehicle,
-                const std::optional<study::Consequence>& consequence, const std::optional<study::RotorVerdict>& rotors,
+                const std::vector<std::string>& logs, const std::optional<study::Consequence>& consequence,
+                const std::optional<study::RotorVerdict>& rotors,
                 const std::optional<study::calibrate::HeightEffects>& height) {
   std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
   if (result.verdict == study::Verdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
-  for (const auto& cause : result.causes) print_text(cause, vehicle);
+  for (const auto& cause : result.causes) print_text(cause, vehicle, logs);
   if (consequence) std::printf("%s\n", study::cost_sentence(*consequence).c_str());
   for (const auto& r : result.refused) std::printf("refused: %s\n", study::refusal(r).c_str());
   for (const auto& u : result.unknown)

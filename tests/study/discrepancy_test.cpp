@@ -50,7 +50,11 @@ StudyResult studied(const Observations& seen, bool detectable = false) {
 class NamesTheHiddenCause : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(NamesTheHiddenCause, AtOneAndAHalfTimesTheTablesSize) {
-  const auto result = studied(world_with({GetParam()}, 1.5));
+  const study_worlds::Request request{seed(), {GetParam()}, 1.5, 12, ""};
+  const auto world = study_worlds::draw_world(request);
+  auto options = study_worlds::with_reference(world, folder());
+  options.minimum_detectable = false;
+  const auto result = study::study(study_worlds::observe(world, folder()), options);
   ASSERT_FALSE(result.causes.empty()) << "seed " << seed() << ": " << study_worlds::told(result);
   const auto& found = result.causes.front().found;
   bool in_set = found.form->cause() == GetParam();

@@ -135,7 +135,7 @@ TEST(Study, TellsTrimAndDraftAsOneSetWhereNoFlightTurned) {
   const Outcome o = score(*cell, 4711, 1.5, 12, folder);
   std::filesystem::remove_all(folder);
   EXPECT_TRUE(o.in_sets()) << told(o.sets, o.unknown);
-  ASSERT_EQ(o.sets.size(), 1u);
+  ASSERT_EQ(o.sets.size(), 1u) << told(o.sets, o.unknown);
   EXPECT_EQ(o.sets.front().size(), 2u) << told(o.sets, o.unknown);
 }
 

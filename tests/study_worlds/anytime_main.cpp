@@ -38,12 +38,13 @@ Watched watch(const Options& options, std::uint64_t seed, const std::filesystem:
   Request request;
   request.seed = seed, request.flights = options.flights, request.size = options.size;
   if (!options.cause.empty()) request.causes = {options.cause};
-  study::Anytime anytime;
+  const World world = draw_world(request);
+  auto chosen = with_reference(world, folder);
+  chosen.minimum_detectable = false;
+  study::Anytime anytime(chosen.sound);
   Watched watched;
-  observe_each(draw_world(request), folder, [&](const study::Observations& seen) {
+  observe_each(world, folder, [&](const study::Observations& seen) {
     anytime.look(seen);
-    study::StudyOptions chosen;
-    chosen.minimum_detectable = false;
     if (options.studies) watched.named.push_back(told(study::study(seen, chosen)));
   });
   watched.log_e = anytime.log_e();

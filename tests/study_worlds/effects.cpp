@@ -132,39 +132,40 @@ std::map<std::string, Cause> pushes() {
 std::map<std::string, Cause> others() {
   // All surfaces are at whole decimetres and so are the map's voxels: it shows the offset to the nearest of them.
   const auto shown = [](double offset) { return 0.1 * std::round(offset / 0.1); };
-  return {{"recirculation",  // ln variance in the end; s
-           {.size = 0.8,
-            .shape = between(15, 50),
-            .ln_variance = [](auto& a) { return a.s * std::tanh(a.now.t / a.shape); },
-            .truth = {{"B_ln", same}}}},
-          {"forward_speed",  // ln variance at 1 m/s
-           {.size = 1.0,
-            .ln_variance = [](auto& a) { return a.s * std::log1p(std::pow(a.now.v.norm(), 1.5)) / std::log(2.0); },
-            .truth = {{"B_ln", same}}}},
-          {"thrust_slope", {.size = 0.12, .truth = {{"s", same}}}},  // relative slope of the thrust curve at hover
-          // s; integrated in steps at whose beginning the lag hears the command already: b − r = h/(e^(h/τ) − 1) ṙ.
-          {"actuator_lag",
-           {.size = 0.05,
-            .one_signed = true,
-            .truth = {{"tau_s", [](double s, double) { return kStep / std::expm1(kStep / s); }}, {"lag_s", same}}}},
-          {"command_latency", {.size = 0.06, .one_signed = true, .truth = {{"latency_s", same}}}},  // s
-          {"vibration", {.size = 0.25, .one_signed = true}},  // m/s², amplitude of the rotors' line
-          {"map_offset",                                      // m
-           {.size = 0.25,
-            .one_signed = true,
-            .truth = {{"x_m", [=](double s, double d) { return shown(s * std::cos(d)); }},
-                      {"y_m", [=](double s, double d) { return shown(s * std::sin(d)); }}}}},
-          {"heavy_tails", {.size = 1.0, .one_signed = true}},  // ln of the kurtosis over 3
-          {"propeller_damage",                                 // relative thrust of one rotor; which
-           {.size = 0.06,
-            .one_signed = true,
-            .shape = one_of_four,
-            .truth = {{"d", [](double s, double) { return -std::log(1 - s); }}}}},
-          {"rotor_sensor_fault",  // relative reading of one rotor, or share of dropouts; which
-           {.size = 0.05,
-            .shape = one_of_four,
-            .truth = {{"e", [](double s, double) { return s > 0 ? std::optional(2 * std::log(1 + s)) : std::nullopt; }},
-                      {"share", [](double s, double) { return s < 0 ? std::optional(-s) : std::nullopt; }}}}}};
+  return {
+      {"recirculation",  // ln variance in the end; s
+       {.size = 0.8,
+        .shape = between(15, 50),
+        .ln_variance = [](auto& a) { return a.s * std::tanh(a.now.t / a.shape); },
+        .truth = {{"B_ln", same}}}},
+      {"forward_speed",  // ln variance at 1 m/s
+       {.size = 1.0,
+        .ln_variance = [](auto& a) { return a.s * std::log1p(std::pow(a.now.v.norm(), 1.5)) / std::log(2.0); },
+        .truth = {{"B_ln", same}}}},
+      {"thrust_slope", {.size = 0.12, .truth = {{"s", same}}}},  // relative slope of the thrust curve at hover
+      // s; integrated in steps at whose beginning the lag hears the command already: b − r = h/(e^(h/τ) − 1) ṙ.
+      {"actuator_lag",
+       {.size = 0.05,
+        .one_signed = true,
+        .truth = {{"tau_s", [](double s, double) { return kStep / std::expm1(kStep / s); }}, {"lag_s", same}}}},
+      {"command_latency", {.size = 0.06, .one_signed = true, .truth = {{"latency_s", same}}}},  // s
+      {"vibration", {.size = 0.25, .one_signed = true}},  // m/s², amplitude of the rotors' line
+      {"map_offset",                                      // m
+       {.size = 0.25,
+        .one_signed = true,
+        .truth = {{"x_m", [=](double s, double d) { return shown(s * std::cos(d)); }},
+                  {"y_m", [=](double s, double d) { return shown(s * std::sin(d)); }}}}},
+      {"heavy_tails", {.size = 1.0, .one_signed = true}},  // ln of the kurtosis over 3
+      {"propeller_damage",                                 // relative thrust of one rotor; which
+       {.size = 0.06,
+        .one_signed = true,
+        .shape = one_of_four,
+        .truth = {{"d", [](double s, double) { return 1 / (1 - s) - 1; }}}}},
+      {"rotor_sensor_fault",  // relative reading of one rotor, or share of dropouts; which
+       {.size = 0.05,
+        .shape = one_of_four,
+        .truth = {{"e", [](double s, double) { return s > 0 ? std::optional((1 + s) * (1 + s) - 1) : std::nullopt; }},
+                  {"share", [](double s, double) { return s < 0 ? std::optional(-s) : std::nullopt; }}}}}};
 }
 
 }  // namespace

@@ -57,6 +57,8 @@ class Flight {
  public:
   Flight(const World& world, Gusts& gusts, int number)
       : world_(world),
+        hidden_(world.effects),
+        since_(acts_since(world.request, number)),
         gusts_(gusts),
         rng_(world.request.seed * 1000003 + static_cast<std::uint64_t>(number) * 7717 + 5) {
     const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng_); };
@@ -97,6 +99,7 @@ class Flight {
     }
     for (std::size_t k = 0; k < plan.size(); ++k) {
       const double t = static_cast<double>(k) * kStep;
+      world_.effects = t >= since_ ? hidden_ : Effects();
       step(plan, k, t);
       if (t < next_row) continue;
       next_row += (1 + world_.jitter * std::uniform_real_distribution(-0.5, 0.5)(rng_)) / world_.rate_hz;
@@ -198,8 +201,9 @@ class Flight {
     for (int i = 0; i < 4; ++i) {
       const bool hurt = damage != 0 && i == damaged;
       const double need = produced_.norm() / kG / (hurt ? 1 - damage : 1.0);
-      spin_[i] = world_.rotor_rpm * std::sqrt(need) * (1 + 0.004 * offset_[i]);
-      motor_[i] = command_of(world_.craft, world_.craft.mass * kG * need) * (1 + 0.006 * offset_[i + 4]);
+      spin_[i] = world_.rotor_rpm * std::sqrt(need) * (1 + world_.craft.rotor_spread / 2 * offset_[i]);
+      motor_[i] =
+          command_of(world_.craft, world_.craft.mass * kG * need) * (1 + world_.craft.rotor_spread * offset_[i + 4]);
       phase_[i] += 2 * M_PI * spin_[i] / 60 * kStep;
     }
   }
@@ -248,7 +252,9 @@ class Flight {
     return row;
   }
 
-  const World& world_;
+  World world_;
+  Effects hidden_;
+  double since_;
   Gusts& gusts_;
   Rng rng_;
   std::normal_distribution<double> normal_;
@@ -260,21 +266,6 @@ class Flight {
   double offset_[8];  // the craft's own small asymmetry, the same in each of its flights
   double spin_[4] = {}, motor_[4] = {}, phase_[4] = {0.3, 1.9, 4.0, 5.5};
 };
-
-backwash::map::OccupancyGrid true_grid(const Room& room) {
-  const double a = 0.1;
-  const Vec3 low = room.inside.low - Vec3::Constant(0.4), high = room.inside.high + Vec3::Constant(0.4);
-  const Eigen::Vector3i size = ((high - low) / a).array().round().cast<int>();
-  backwash::map::OccupancyGrid grid(low, a, size);
-  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    const auto v = grid.voxel(n);
-    const Vec3 p = grid.center(v);
-    bool solid = !room.inside.contains(p);
-    for (const Box& b : room.solids) solid = solid || b.contains(p);
-    grid.set(v, solid ? backwash::map::Cell::occupied : backwash::map::Cell::free);
-  }
-  return grid;
-}
 
 /// The modelled gusts in a world's room. Worlds of one seed are pairs in one room: what was evaluated for the last one
 /// serves the next.

@@ -82,6 +82,26 @@ void observe_each(const World& world, const std::filesystem::path& folder,
   }
 }
 
+study::SoundRotors sound_rotors(const World& world, const std::filesystem::path& folder) {
+  using Key = std::tuple<std::uint64_t, double, double>;  // worlds of one seed mostly have one craft
+  thread_local std::optional<std::pair<Key, study::SoundRotors>> last;
+  const Key craft(world.request.seed, world.craft.rotor_spread, world.craft.max_thrust);
+  if (last && last->first == craft) return last->second;
+  constexpr int kSound = 6, kOthers = 1000;
+  World sound = world;
+  sound.effects = {};
+  std::vector<Table> flights;
+  for (int f = 0; f < kSound; ++f) flights.push_back(fly_again(sound, kOthers + f, 0));
+  last.emplace(craft, study::sound_rotors(observe(sound, flights, folder)).value());
+  return last->second;
+}
+
+study::StudyOptions with_reference(const World& world, const std::filesystem::path& folder) {
+  study::StudyOptions options;
+  options.sound = sound_rotors(world, folder);
+  return options;
+}
+
 std::vector<std::vector<std::string>> sets_of(const study::StudyResult& result) {
   std::vector<std::vector<std::string>> sets;
   for (const auto& cause : result.causes) {

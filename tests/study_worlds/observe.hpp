@@ -24,6 +24,10 @@ int observe_further(const World& world, const std::vector<Table>& first, const s
 /// The same after every flight.
 void observe_each(const World& world, const std::filesystem::path& folder,
                   const std::function<void(const backwash::study::Observations&)>& look);
+/// What six sound flights of the world's craft say of its rotors.
+backwash::study::SoundRotors sound_rotors(const World& world, const std::filesystem::path& folder);
+/// Of a study that is given these.
+backwash::study::StudyOptions with_reference(const World& world, const std::filesystem::path& folder);
 
 /// Per told cause its name, then its rivals.
 std::vector<std::vector<std::string>> sets_of(const backwash::study::StudyResult& result);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace study_worlds {
 namespace {
@@ -110,6 +111,28 @@ std::vector<Command> draw_plan(const World& world, Rng& rng) {
     at = next, yaw = turned;
   }
   return plan;
+}
+
+double acts_since(const Request& request, int flight) {
+  const auto& in = request.in_flights;
+  if (in.empty()) return 0;
+  if (std::find(in.begin(), in.end(), flight) == in.end()) return std::numeric_limits<double>::infinity();
+  return flight == *std::min_element(in.begin(), in.end()) ? request.since_s : 0;
+}
+
+backwash::map::OccupancyGrid true_grid(const Room& room) {
+  const double a = 0.1;
+  const Vec3 low = room.inside.low - Vec3::Constant(0.4), high = room.inside.high + Vec3::Constant(0.4);
+  const Eigen::Vector3i size = ((high - low) / a).array().round().cast<int>();
+  backwash::map::OccupancyGrid grid(low, a, size);
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const auto v = grid.voxel(n);
+    const Vec3 p = grid.center(v);
+    bool solid = !room.inside.contains(p);
+    for (const Box& b : room.solids) solid = solid || b.contains(p);
+    grid.set(v, solid ? backwash::map::Cell::occupied : backwash::map::Cell::free);
+  }
+  return grid;
 }
 
 }  // namespace study_worlds

@@ -6,6 +6,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "core/study/findings/where_it_acts.hpp"
 #include "tests/study_worlds/observe.hpp"
 #include "tests/study_worlds/oracle.hpp"
 
@@ -38,6 +39,7 @@ const std::vector<Cell>& cells() {
     for (const auto& name : cause_names()) list.push_back({name, {name}});
     list.insert(list.end(), {{"unknown", {"unknown"}},
                              {"none", {}},
+                             {"none, no reference flights", {}, "", false, false},
                              {"two causes", {}, "", true},
                              {"thrust_slope, up and down", {"thrust_slope"}, "bob"},
                              {"ground_thrust, up and down", {"ground_thrust"}, "bob"},
@@ -81,15 +83,16 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   out.cell = cell.name, out.seed = seed, out.size = size;
   out.truth = cell.two_drawn ? two_causes(seed) : cell.causes;
   const World world = draw_world({seed, out.truth, size, flights, cell.confound});
+  auto options = cell.reference ? with_reference(world, folder) : backwash::study::StudyOptions();
   const double start = cpu();
   const auto tables = fly_all(world);
   const auto seen = observe(world, tables, folder);
   const double observed = cpu();
-  backwash::study::StudyOptions options;
   options.minimum_detectable = false;
   const auto result = backwash::study::study(seen, options);
   out.world_s = observed - start, out.study_s = cpu() - observed;
   out.sets = sets_of(result);
+  for (const auto& cause : result.causes) out.where.push_back(backwash::study::where(cause));
   for (const auto& u : result.unknown) out.unknown.push_back(u.along);
   if (holds(out.truth, "unknown"))
     out.structure = text_of(world.effects.structure), out.explained = explained(seen, tables);
@@ -113,6 +116,7 @@ nlohmann::json to_json(const Outcome& o) {
     if (c.best) one["best_of_form"] = *c.best;
     json["compared"].push_back(one);
   }
+  if (std::ranges::any_of(o.where, [](auto& w) { return !w.empty(); })) json["where"] = o.where;
   if (!o.structure.empty()) json["structure"] = o.structure, json["explained"] = o.explained;
   if (o.error) json["parameter_error"] = *o.error;
   if (o.gain_share) json["gain_share"] = *o.gain_share;
@@ -130,6 +134,7 @@ Outcome from_json(const nlohmann::json& json) {
     o.compared.push_back({c.at("name"), c.at("value"), c.at("ci95").at(0), c.at("ci95").at(1), c.at("truth"), {}});
     if (c.contains("best_of_form")) o.compared.back().best = c.at("best_of_form").get<double>();
   }
+  o.where = json.value("where", std::vector<std::string>());
   o.structure = json.value("structure", ""), o.explained = json.value("explained", 1.0);
   if (json.contains("parameter_error")) o.error = json.at("parameter_error").get<double>();
   if (json.contains("gain_share")) o.gain_share = json.at("gain_share").get<double>();

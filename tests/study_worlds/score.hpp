@@ -16,6 +16,7 @@ struct Cell {
   std::vector<std::string> causes;  ///< hidden; empty: none
   std::string confound = "";
   bool two_drawn = false;  ///< two different causes drawn from the seed
+  bool reference = true;   ///< the study is given six sound flights
 };
 /// Every cause, unknown, none, two causes, and the confounded pairs of flights that cannot tell.
 const std::vector<Cell>& cells();
@@ -35,6 +36,7 @@ struct Outcome {
   double size = 1;
   std::vector<std::string> truth;              ///< hidden causes
   std::vector<std::vector<std::string>> sets;  ///< per told cause: its name, then its rivals
+  std::vector<std::string> where;              ///< of each: in which flights, if not in all
   std::vector<std::string> unknown;            ///< regressors of unknown structure
   std::vector<Compared> compared;              ///< of the hidden cause, if its name comes first in a set
   std::optional<double> error;                 ///< |parameters − truth| over |truth|

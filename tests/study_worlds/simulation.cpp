@@ -25,8 +25,8 @@ namespace {
 
 constexpr double kAsTruth = 1.1;  // error over the truth's own that counts as reached
 
-study::StudyOptions quick() {
-  study::StudyOptions options;
+study::StudyOptions quick(const World& world, const std::filesystem::path& folder) {
+  auto options = with_reference(world, folder);
   options.minimum_detectable = options.dependence = false;
   return options;
 }
@@ -142,17 +142,18 @@ std::string number(double x) {
 Proof prove(const ProofRequest& request, const std::filesystem::path& folder) {
   Proof proof;
   proof.cause = request.cause, proof.seed = request.seed;
-  const World world = draw_world({request.seed, {request.cause}, 1, 2 * request.flights, ""});
+  World world = draw_world({request.seed, {request.cause}, 1, 2 * request.flights, ""});
+  world.craft.rotor_spread = 0.01;  // how a craft is built is no term of a simulation
   const auto all = fly_all(world);
   const std::vector<Table> fitted(all.begin(), all.begin() + request.flights),
       fresh(all.begin() + request.flights, all.end());
   const auto seen = observe(world, fitted, folder);
-  const auto result = study::study(seen, quick());
+  const auto result = study::study(seen, quick(world, folder));
   proof.told = told(result);
   auto further = observe(world, fresh, folder);
   auto extended = further;
   study::apply(study::terms_of(result), extended);
-  proof.told_after = told(study::study(extended, quick()));
+  proof.told_after = told(study::study(extended, quick(world, folder)));
   const auto named = std::find_if(result.causes.begin(), result.causes.end(),
                                   [&](auto& c) { return c.found.form->cause() == request.cause; });
   if (named == result.causes.end()) return proof;

@@ -29,6 +29,8 @@ struct Request {
   /// attitude, the thrust has none; "fold": the rotors' rate lies within 6 Hz of a multiple of the logging rate; empty:
   /// none.
   std::string confound;
+  std::vector<int> in_flights = {};  ///< in which the causes act, from 0; empty: all
+  double since_s = 0;                ///< in the first of these they begin so late
 };
 
 /// Axis-aligned room: the inside of a box, less solid boxes. Distances are closed forms.
@@ -47,7 +49,8 @@ struct Room {
 struct Craft {
   double mass, max_thrust, thr_mdl_fac, rotor_radius, radius, diagonal_radius;
   double kp_h, kd_h, kp_z, kd_z, latency, attitude_lag;
-  std::string model;  ///< builtin model's name
+  std::string model;        ///< builtin model's name
+  double rotor_spread = 0;  ///< by which the rotors of one craft differ, of their command
 };
 
 /// One number per cause, signed, in the table's units; what is absent is zero.

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/findings/where_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/coverage.hpp"
 #include "core/study/inference/estimate.hpp"
+#include "core/study/inference/rotor_rules.hpp"
 
 namespace backwash::study {
 namespace {
@@ -123,7 +125,31 @@ void look_at_what_remains(StudyResult& result, const Evidence& evidence, const s
   result.unknown.push_back({first.regressor, first.group, first.p_holm / kRules.dependence_share, 0, "any"});
 }
 
+std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
+
+/// Gain, worth as applied and hover shift of what acts in all flights.
+void name_causes(StudyResult& result, const Evidence& evidence, const std::vector<Accepted>& accepted) {
+  const auto applied = judge(evidence, accepted);
+  for (std::size_t i = 0; i < accepted.size(); ++i) {
+    NamedCause cause{accepted[i],
+                     gain_of(evidence, accepted, i),
+                     {},
+                     applied[i],
+                     extrapolated(accepted[i], evidence.seen()),
+                     largest_flown(accepted[i], evidence.seen()),
+                     check_shift(accepted[i], applied[i].beside, evidence.seen())};
+    if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(evidence.seen().windows);
+    result.causes.push_back(std::move(cause));
+  }
+}
+
 }  // namespace
+
+double coverage(const Observations& seen) {
+  Gain gain;
+  add_coverage(gain, seen, {});
+  return gain.coverage_before;
+}
 
 const char* to_string(Verdict verdict) {
   static const char* const kNames[] = {"cause_found", "cannot_distinguish", "unknown_structure", "nothing_found",
@@ -140,31 +166,35 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
     result.verdict = Verdict::insufficient;
     return result;
   }
-  const Evidence start(seen);
-  const SearchResult found = search(start, options.search);
+  Observations settled = seen;
+  if (const double off = settle_rotors(options.sound, settled); off > 0)
+    for (const char* name : {"propeller_damage", "rotor_sensor_fault"})
+      result.not_tested.emplace_back(
+          name, "the same in all flights and no more than craft are built with: the rotors differ by " + percent(off) +
+                    ", as those of a sound craft may; give --reference flights");
+  const WholeSearch whole = search_all(settled, options.search);
+  const SearchResult& found = whole.found;
   result.threshold = found.threshold;
   result.unknown = found.unknown, result.refused = found.refused;
-  Evidence evidence = start;
-  evidence.whiten(others_of(found.accepted, SIZE_MAX, seen));
+  Evidence evidence(whole.rest);
+  evidence.whiten(others_of(found.accepted, SIZE_MAX, whole.rest));
+  name_causes(result, evidence, found.accepted);
+  for (const auto& cause : whole.some) result.causes.push_back(named(cause, evidence));
   bool ambiguous = false;
-  const auto applied = judge(evidence, found.accepted);
-  for (std::size_t i = 0; i < found.accepted.size(); ++i) {
-    NamedCause cause{found.accepted[i],
-                     gain_of(evidence, found.accepted, i),
-                     {},
-                     applied[i],
-                     extrapolated(found.accepted[i], seen),
-                     largest_flown(found.accepted[i], seen),
-                     check_shift(found.accepted[i], applied[i].beside, seen)};
-    if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(seen.windows);
+  for (auto& cause : result.causes) {
+    const bool some = !cause.flights.empty();  // against the craft's own other flights
+    name_by_balance(cause.found, whole.rest, some,
+                    some            ? kRules.motor_scatter.value
+                    : options.sound ? options.sound->spread
+                                    : kRotorRules.rotor_spread.value);
+    tell_shares(cause.found);
     for (const Rival& rival : cause.found.rivals)
       cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
     ambiguous = ambiguous || !cause.found.rivals.empty();
-    result.causes.push_back(std::move(cause));
   }
   if (options.dependence) {
     options.search.progress("whether what remains depends on something");
-    look_at_what_remains(result, evidence, others_of(found.accepted, SIZE_MAX, seen), options.search);
+    look_at_what_remains(result, evidence, others_of(found.accepted, SIZE_MAX, whole.rest), options.search);
   }
   result.verdict = !result.causes.empty()    ? (ambiguous ? Verdict::cannot_distinguish : Verdict::cause_found)
                    : !result.unknown.empty() ? Verdict::unknown_structure

@@ -9,7 +9,8 @@
 #include "core/study/findings/applied.hpp"
 #include "core/study/findings/shift.hpp"
 #include "core/study/inference/dependence.hpp"
-#include "core/study/inference/search.hpp"
+#include "core/study/inference/sound_rotors.hpp"
+#include "core/study/inference/whole_search.hpp"
 
 namespace backwash::study {
 
@@ -33,16 +34,18 @@ struct NamedCause {
   Accepted found;
   Gain gain;
   std::vector<Separation> separate_by;
-  Applied applied = {};           ///< what the extension by it is worth; refused: it does not join the model
-  std::string extrapolated = {};  ///< why the size is none that was flown (words.hpp)
-  double largest_flown = 0;       ///< m/s² or ln: what the cause added at most, of its first channel
-  ShiftCheck shift = {};          ///< whether the craft hovers where its push would hold it
+  Applied applied = {};                    ///< what the extension by it is worth; refused: it does not join the model
+  std::string extrapolated = {};           ///< why the size is none that was flown (words.hpp)
+  double largest_flown = 0;                ///< m/s² or ln: what the cause added at most, of its first channel
+  ShiftCheck shift = {};                   ///< whether the craft hovers where its push would hold it
+  std::vector<ActingFlight> flights = {};  ///< in which it acts; empty: all
 };
 
 struct StudyOptions {
   SearchOptions search;
   bool minimum_detectable = true;
   bool dependence = true;  ///< whether what remains depends on something: where nothing is accepted, of the verdict too
+  std::optional<SoundRotors> sound = {};  ///< of reference flights; without, rotors may differ as craft are built
   std::size_t fewest_flights =
       static_cast<std::size_t>(kRules.fewest_flights);  ///< fewer do not warrant a name (core/study/README.md)
 };
@@ -60,6 +63,9 @@ struct StudyResult {
   /// unknown_structure; else they are hints. Empty with too few flights.
   std::vector<Dependence> remaining;
 };
+
+/// Share of the measured samples in the model's central 90 %.
+double coverage(const Observations& seen);
 
 /// The whole procedure on observed flights. About 1 s for 12 flights of 100 s, more with the minimum detectable
 /// effects.

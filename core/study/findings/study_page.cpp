@@ -10,6 +10,7 @@
 #include "core/report/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/self_test.hpp"
+#include "core/study/findings/where_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/rules.hpp"
 
@@ -35,6 +36,7 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
   for (const auto& cause : result.causes) {
     names += (names.empty() ? "" : ", ") + spoken(cause.found.form->cause());
     for (const auto& rival : cause.found.rivals) names += " or " + spoken(rival.name);
+    if (!cause.flights.empty()) names += " (" + where(cause) + ")";
   }
   const std::string of =
       " (" + std::to_string(seen.flights) + " flights, " + std::to_string(seen.windows.size()) + " windows of 2 s)";
@@ -56,11 +58,19 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
   }
 }
 
+/// Along the flights, for what acts in some of them only: each flight is one unit long.
+Regressor flight_by_flight(const Observations& seen) {
+  std::vector<double> longest(seen.flights, 1);
+  for (const auto& w : seen.windows) longest[w.flight] = std::max(longest[w.flight], w.t + w.duration);
+  return {"flight", false,
+          [longest](const WindowRow& w) { return static_cast<double>(w.flight) + 1 + w.t / longest[w.flight]; }};
+}
+
 /// Residual of the cause's first channel against its variable, before and after, with means of twelve groups.
 tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, const Observations& seen) {
   const auto& found = cause.found;
   const Channel channel = found.columns.front().parts.front().channel;
-  const Regressor& along = found.form->effect->axis;
+  const Regressor along = cause.flights.empty() ? found.form->effect->axis : flight_by_flight(seen);
   struct Point {
     double x, before, after;
   };
@@ -102,10 +112,19 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
   return report::draw(script.str(), report::Format::svg, 860, 380);
 }
 
-std::string figures(const NamedCause& cause, const std::optional<Vehicle>& vehicle) {
+/// In which flights it acts, by number and by log.
+std::string acting_rows(const NamedCause& cause, const std::vector<std::string>& logs) {
+  if (cause.flights.empty()) return "";
+  std::string names;
+  for (const auto& f : cause.flights)
+    if (f.flight < logs.size()) names += (names.empty() ? "" : ", ") + logs[f.flight];
+  return row("Acts in", where(cause)) + row("Their logs", names);
+}
+
+std::string figures(const NamedCause& cause, const PageContext& context) {
   const auto& g = cause.gain;
-  std::string text = "<table>\n";
-  if (vehicle) text += row("What to change", remedy_of(cause, *vehicle).words);
+  std::string text = "<table>\n" + acting_rows(cause, context.logs);
+  if (context.read_vehicle) text += row("What to change", remedy_of(cause, *context.read_vehicle).words);
   for (const auto& e : cause.found.parameters)
     text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
   if (!cause.extrapolated.empty()) text += row("The size is extrapolated", cause.extrapolated);
@@ -222,8 +241,7 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());
     page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause())) + "</h2>\n<p>" +
-            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause, context.read_vehicle) +
-            "</section>\n";
+            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause, context) + "</section>\n";
   }
   if (context.height) page += height_section(*context.height);
   if (context.rotors) {

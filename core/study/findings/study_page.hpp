@@ -21,6 +21,7 @@ struct PageContext {
   std::string residuals = {};  ///< residual_section(), or empty
   /// The file as read: what to change is told with its values. Without it nothing is.
   std::optional<Vehicle> read_vehicle = {};
+  std::vector<std::string> logs = {};  ///< names of the observed flights, in their order
 };
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/study/findings/page_sections.hpp"
+#include "core/study/findings/where_it_acts.hpp"
 #include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
@@ -12,7 +13,10 @@ namespace backwash::study {
 Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
   const Accepted& f = cause.found;
   const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
-  return f.form->effect->remedy({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, vehicle);
+  auto remedy =
+      f.form->effect->remedy({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, vehicle);
+  if (cause.flights.empty() || remedy.file == "craft") return remedy;
+  return {"craft", {}, "Look for what was different: " + where(cause) + "."};  // no file holds for some flights
 }
 
 std::string odds(double nats) {

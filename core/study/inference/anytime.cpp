@@ -154,12 +154,16 @@ void Anytime::look(const Observations& seen) {
   if (bets_.empty())
     for (const Form* form : catalogue()) bets_.resize(bets_.size() + form->scales.size());
   const std::size_t units = seen.units.size();
-  if (static_cast<double>(units) >= kRules.first_look)
+  Observations settled = seen;
+  if (static_cast<double>(units) >= kRules.first_look) {
+    if (!sound_) sound_ = sound_rotors(before(seen, static_cast<std::size_t>(kRules.first_look)));
+    if (sound_) settle_rotors(sound_, settled);
     for (; units_ < units; ++units_) {
       const std::size_t known = std::max<std::size_t>(units_, static_cast<std::size_t>(kRules.first_look));
-      const Observations past = before(seen, known);
-      add(Evidence(past), seen, units_);
+      const Observations past = before(settled, known);
+      add(Evidence(past), settled, units_);
     }
+  }
   std::vector<double> by_cause;
   std::size_t k = 0;
   for (const Effect& effect : effects()) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/study/inference/evidence.hpp"
+#include "core/study/inference/sound_rotors.hpp"
 
 namespace backwash::study {
 
@@ -43,9 +43,12 @@ double log_calibrated(double log_e);
 /// Evidence that flights hold an effect of the catalogue, told after every flight: "is there anything?" may be asked
 /// every day. Each form at each scale bets for itself (FlightScores) against everything below its effect floor; each
 /// one's highest Bayes factor so far is calibrated, and the mean over causes, forms and scales is an e-value at any
-/// number of flights: above 1/α with probability α at most in worlds without an effect.
+/// number of flights: above 1/α with probability α at most in worlds without an effect. Rotors of a sound craft differ:
+/// they are judged against `sound` flights, or, without these, against the first ones looked at.
 class Anytime {
  public:
+  explicit Anytime(std::optional<SoundRotors> sound = {}) : sound_(sound) {}
+
   /// Observations up to and with a new flight (or unit of flights). Below first_look flights nothing is bet; the
   /// scatter of a flight's channels is that of the flights before it, of the first ones their own.
   void look(const Observations& seen);
@@ -66,6 +69,7 @@ class Anytime {
   void add(const Evidence& scatter, const Observations& seen, std::size_t unit);
   static double highest(const Form& form, Bet& bet);  // calibrated, ln
 
+  std::optional<SoundRotors> sound_;
   std::vector<Bet> bets_;  // by form and scale
   std::size_t units_ = 0;  // taken in
   std::vector<double> log_e_;

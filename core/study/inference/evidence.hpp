@@ -73,6 +73,10 @@ class Evidence {
   /// flights: each flight's own mean and, in the level means, its own trim (shrunk by σ_t²) taken out; 0 where not
   /// measured.
   Column whitened(const std::vector<Column>& columns) const;
+  /// What `columns`, fitted to all flights, leave of each channel (decorrelated).
+  Column residual(const std::vector<Column>& columns) const;
+  /// Weight of a window in a channel (decorrelated): σ_w² over it is the variance of its noise; 0: not measured.
+  double weight(Channel c, std::size_t window) const { return weight_[c][window]; }
   /// Whether a window measures a channel (decorrelated).
   bool measured(Channel c, std::size_t window) const { return weight_[c][window] > 0; }
   Scatter scatter(Channel c) const { return {within_[c], between_[c], unit_[c]}; }
@@ -80,7 +84,6 @@ class Evidence {
  private:
   /// XᵀV⁻¹X of each flight, X the columns and last y.
   std::vector<Eigen::MatrixXd> grams(const std::vector<const Column*>& columns) const;
-  Column residual(const std::vector<Column>& columns) const;
   void take_flights_out(Column& residual) const;
   void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const;
   void anova(Channel c, const std::vector<double>& residual);

@@ -2,12 +2,14 @@
 #include "core/study/inference/rules.hpp"
 
 #include "core/study/effects/effect_rules.hpp"
+#include "core/study/inference/rotor_rules.hpp"
 #include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
 std::vector<Rule> rules() {
   std::vector<Rule> told;
   append_rules(told, kRules);
+  append_rules(told, kRotorRules);
   append_rules(told, kWindowRules);
   append_rules(told, kEffectRules);
   return told;

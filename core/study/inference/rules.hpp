@@ -100,6 +100,17 @@ struct Rules {
                          "derived: the size of core/study/confusion.md"};
   Rule normal_80{"normal_80", 0.8416212, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
+  // Causes in some flights only
+  Rule fewest_divided{"fewest_divided", 6, "flights", "derived: two levels and a scatter about each"};
+  Rule level_scatter{"level_scatter", 2, "degrees of freedom",
+                     "measured: so many taken off, equally spread values pass no more often than normal ones"};
+  Rule most_parts{"most_parts", 3, "causes", "chosen: as many as further causes"};
+  Rule side_windows{"side_windows", 4, "windows", "chosen: 8 s on either side of a step within a flight"};
+  Rule likeness_lags{"likeness_lags", 4, "windows", "chosen: neighbours that share a dwell"};
+  Rule step_price{"step_price", 8, "nats", "derived: of one of 45 windows in one of 12 flights, and one parameter"};
+  Rule column_price{"column_price", 3, "nats", "derived: as smooth_lead, for each further parameter of a form"};
+  Rule sound_first{"sound_first", 1, "nats", "chosen: craft are sound before they are broken"};
+  Rule sound_spread{"sound_spread", 0.03, "1", "chosen: farther off, a rotor is not as it was built"};
   // The extension
   Rule coverage_level{"coverage_level", 0.9, "of samples",
                       "derived: the interval is the central 90 %; more may be lost without harm"};

@@ -20,6 +20,10 @@ double student_quantile(double p, double degrees) {
   return quantile(boost::math::students_t_distribution<double, Policy>(degrees), p);
 }
 
+double student_tail(double t, double degrees) {
+  return cdf(complement(boost::math::students_t_distribution<double, Policy>(degrees), t));
+}
+
 double f_quantile(double p, double above, double below) {
   return quantile(boost::math::fisher_f_distribution<double, Policy>(above, below), p);
 }

@@ -6,6 +6,8 @@ namespace backwash::study {
 
 /// Quantile p of Student's t with `degrees` of freedom.
 double student_quantile(double p, double degrees);
+/// P(T > t) of Student's t with `degrees` of freedom.
+double student_tail(double t, double degrees);
 /// Quantile p of the F distribution with `above` and `below` degrees of freedom.
 double f_quantile(double p, double above, double below);
 /// ψ(x) = d ln Γ(x)/dx, and its derivative ψ'(x).

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "core/study/inference/search.hpp"
+#include "core/study/inference/two_levels.hpp"
+
+/// What each window and each flight says of a form's parameters.
+namespace backwash::study {
+
+/// A form at a scale and its normal equations per window and per unit (a flight, or the flights of a day): A = XᵀV⁻¹X,
+/// b = XᵀV⁻¹y with the noise within flights alone, y what the other causes leave.
+class Amplitudes {
+ public:
+  /// `rest`: Evidence::residual of the other causes. Real-time status: offline.
+  Amplitudes(const Evidence& evidence, const Form& form, const Scale& scale, const Column& rest);
+
+  const Form& form() const { return *form_; }
+  const Scale& scale() const { return scale_; }
+  const std::vector<Column>& columns() const { return columns_; }
+  std::size_t units() const { return units_->size(); }
+  /// Whether the unit's windows tell every parameter.
+  bool told(std::size_t unit) const;
+  /// Parameters and their inverse covariance from windows [begin, end).
+  SmallVector theta(std::size_t begin, std::size_t end) const;
+  SmallMatrix information(std::size_t begin, std::size_t end) const;
+  std::size_t begin(std::size_t unit) const { return units_->first[unit]; }
+  std::size_t end(std::size_t unit) const { return units_->first[unit + 1]; }
+  /// The unit's windows along a direction of the parameters, |direction| = 1.
+  Course course(std::size_t unit, const SmallVector& direction) const;
+  /// Whether a difference of parameters is an effect at all (Candidate::effect).
+  bool effect(const SmallVector& difference) const;
+
+ private:
+  const Form* form_;
+  Scale scale_;
+  const Units* units_;
+  std::vector<Column> columns_;
+  std::vector<SmallMatrix> A_;
+  std::vector<SmallVector> b_;
+  SmallMatrix size_;
+};
+
+}  // namespace backwash::study

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/inference/two_levels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/study/inference/rules.hpp"
+#include "core/study/windows/distributions.hpp"
+
+namespace backwash::study {
+namespace {
+
+constexpr std::size_t kFewestASide = 2;
+
+/// Sums of values on one side of a division.
+struct Side {
+  double n = 0, sum = 0, square = 0;
+  void add(double x) { n += 1, sum += x, square += x * x; }
+  double scatter() const { return square - sum * sum / n; }
+};
+
+/// Tries divisions and keeps the one of least p.
+class Divisions {
+ public:
+  Divisions(const std::vector<double>& values, double least_spread) : values_(values), least_(least_spread) {}
+
+  /// `tried`: how many of this kind there are; `lost`: degrees of freedom.
+  template <typename High>
+  void offer(High high, double tried, double lost) {
+    Side sides[2];
+    for (std::size_t f = 0; f < values_.size(); ++f) sides[high(f) ? 1 : 0].add(values_[f]);
+    const double n = static_cast<double>(values_.size()),
+                 between = sides[1].sum / sides[1].n - sides[0].sum / sides[0].n;
+    const double spread = std::max(least_, std::sqrt(std::max(0.0, sides[0].scatter() + sides[1].scatter()) / (n - 2)));
+    const double t = std::abs(between) / (spread * std::sqrt(1 / sides[0].n + 1 / sides[1].n));
+    const double p = std::min(1.0, kKinds * tried * 2 * student_tail(t, n - lost));
+    if (best_ && p >= best_->p) return;
+    best_ = TwoLevels{{}, p, spread};
+    for (std::size_t f = 0; f < values_.size(); ++f) best_->high.push_back(high(f) == (between > 0));
+  }
+
+  const std::optional<TwoLevels>& best() const { return best_; }
+
+ private:
+  static constexpr std::size_t kKinds = 3;  // of divisions
+  const std::vector<double>& values_;
+  double least_;
+  std::optional<TwoLevels> best_;
+};
+
+}  // namespace
+
+std::optional<TwoLevels> two_levels(const std::vector<double>& values, double least_spread) {
+  const std::size_t n = values.size();
+  if (static_cast<double>(n) < kRules.fewest_divided) return std::nullopt;
+  const double flights = static_cast<double>(n);
+  Divisions divisions(values, least_spread);
+  for (std::size_t a = kFewestASide; a + kFewestASide <= n; ++a)
+    divisions.offer([a](std::size_t f) { return f >= a; }, flights - 1, 2);
+  for (std::size_t a = 1; a + 1 < n; ++a)
+    for (std::size_t b = a + kFewestASide; b < n; ++b)
+      divisions.offer([a, b](std::size_t f) { return f >= a && f < b; }, (flights - 1) * (flights - 2) / 2, 2);
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t k = kFewestASide; k + kFewestASide <= n; ++k)
+    divisions.offer([&](std::size_t f) { return values[f] >= sorted[k]; }, std::exp2(flights - 1),
+                    2 + kRules.level_scatter);
+  return divisions.best();
+}
+
+Level level(const Course& course, std::size_t begin, std::size_t end) {
+  Level l;
+  for (std::size_t i = begin; i < end; ++i) l.value += course.weight[i] * course.value[i], l.weight += course.weight[i];
+  if (l.weight > 0) l.value /= l.weight;
+  return l;
+}
+
+Step largest_step(const Course& course, std::size_t fewest) {
+  const std::size_t n = course.value.size();
+  Step best;
+  for (std::size_t at = fewest; at + fewest <= n; ++at) {
+    const Level before = level(course, 0, at), after = level(course, at, n);
+    if (!(before.weight > 0) || !(after.weight > 0)) continue;
+    const double size = after.value - before.value;
+    const double t = std::abs(size) / std::sqrt(1 / before.weight + 1 / after.weight);
+    if (t > best.t) best = {at, size, t};
+  }
+  return best;
+}
+
+double inflation(const Course& course, std::size_t lags) {
+  const std::size_t n = course.value.size();
+  const double mean = level(course, 0, n).value;
+  std::vector<double> x(n);
+  for (std::size_t i = 0; i < n; ++i) x[i] = std::sqrt(course.weight[i]) * (course.value[i] - mean);
+  const double square = std::inner_product(x.begin(), x.end(), x.begin(), 0.0);
+  double sum = 1;
+  for (std::size_t k = 1; k <= lags && k < n && square > 0; ++k)
+    sum += 2 * std::inner_product(x.begin() + static_cast<std::ptrdiff_t>(k), x.end(), x.begin(), 0.0) / square;
+  return std::max(1.0, sum);
+}
+
+namespace {
+
+/// ln likelihood of windows about `low`, `high` in [begin, end), the flight's own offset integrated out.
+double likelihood(const Course& course, double low, double high, double between, Acting a) {
+  double square = 0, sum = 0, weight = 0;
+  for (std::size_t i = 0; i < course.value.size(); ++i) {
+    const double rest = course.value[i] - (i >= a.begin && i < a.end ? high : low), w = course.weight[i];
+    square += w * rest * rest, sum += w * rest, weight += w;
+  }
+  return -0.5 * (square - between * sum * sum / (1 + between * weight));
+}
+
+}  // namespace
+
+Acting acting(const Course& course, double low, double high, double between, double price, std::size_t fewest) {
+  const std::size_t n = course.value.size();
+  Acting best{0, 0};
+  double most = likelihood(course, low, high, between, best);
+  const auto offer = [&](Acting a, double cost) {
+    const double nats = likelihood(course, low, high, between, a) - cost;
+    if (nats > most) most = nats, best = a;
+  };
+  offer({0, n}, 0);
+  for (std::size_t at = fewest; at + fewest <= n; ++at) offer({at, n}, price), offer({0, at}, price);
+  return best;
+}
+
+}  // namespace backwash::study

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/inference/two_levels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include "core/study/windows/distributions.hpp"
+
+namespace backwash::study {
+namespace {
+
+std::vector<double> drawn(std::mt19937& rng, const std::function<double(std::mt19937&)>& value, int flights = 12) {
+  std::vector<double> all;
+  for (int f = 0; f < flights; ++f) all.push_back(value(rng));
+  return all;
+}
+
+/// What no division should be found in, however flights scatter.
+TEST(TwoLevels, OneLevelIsDividedNoMoreOftenThanTheLevelSays) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> even(-1, 1);
+  const std::vector<std::pair<const char*, std::function<double(std::mt19937&)>>> scatters = {
+      {"normal", [&](auto& rng) { return normal(rng); }}, {"even", [&](auto& rng) { return even(rng); }}};
+  for (const auto& [name, value] : scatters) {
+    std::mt19937 rng(7);
+    int divided = 0;
+    constexpr int kTrials = 4000;
+    for (int k = 0; k < kTrials; ++k) divided += two_levels(drawn(rng, value), 0)->p <= 0.05 ? 1 : 0;
+    EXPECT_LE(divided, 0.06 * kTrials) << name;
+  }
+}
+
+TEST(TwoLevels, FindsTheFlightsWhetherTheyFollowEachOtherOrNot) {
+  std::mt19937 rng(3);
+  std::normal_distribution<double> scatter(0, 0.01);
+  const std::vector<std::vector<bool>> sets = {
+      {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1}, {0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0}, {1, 0, 1, 0, 0, 1, 1, 0, 1, 0, 1, 0}};
+  for (const auto& high : sets) {
+    std::vector<double> values;
+    for (const bool h : high) values.push_back((h ? 0.2 : -0.1) + scatter(rng));
+    const auto found = two_levels(values, 0);
+    EXPECT_EQ(found->high, high);
+    EXPECT_LT(found->p, 1e-4);
+    EXPECT_NEAR(found->spread, 0.01, 0.006);
+  }
+}
+
+TEST(TwoLevels, ALevelBelowTheErrorOfTheFlightsIsNone) {
+  const std::vector<double> values = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1};
+  EXPECT_LT(two_levels(values, 1e-3)->p, 1e-9);
+  EXPECT_GT(two_levels(values, 1)->p, 0.5);
+  EXPECT_FALSE(two_levels({0, 0, 0, 1, 1}, 0)) << "two levels and a scatter need six";
+}
+
+Course course(std::mt19937& rng, std::size_t begin, std::size_t end, double offset) {
+  std::normal_distribution<double> noise(0, 0.1);
+  Course c;
+  for (std::size_t i = 0; i < 45; ++i) {
+    c.value.push_back(offset + (i >= begin && i < end ? 1 : 0) + noise(rng));
+    c.weight.push_back(i % 9 == 4 ? 0 : 100);
+  }
+  return c;
+}
+
+TEST(TwoLevels, AFlightTellsWhenItStepsAndThatItDoesNot) {
+  std::mt19937 rng(5);
+  for (const auto& [begin, end] : {std::pair<std::size_t, std::size_t>{17, 45}, {0, 30}, {0, 45}, {0, 0}})
+    for (int k = 0; k < 50; ++k) {
+      const auto at = acting(course(rng, begin, end, 0.05), 0, 1, 0.01, 8, 4);
+      EXPECT_NEAR(static_cast<double>(at.begin), static_cast<double>(begin), 1.1);
+      EXPECT_NEAR(static_cast<double>(at.end), static_cast<double>(end), 1.1);
+    }
+  const Step step = largest_step(course(rng, 17, 45, 0), 4);
+  EXPECT_NEAR(static_cast<double>(step.at), 17, 1.1);
+  EXPECT_NEAR(step.size, 1, 0.1);
+}
+
+TEST(TwoLevels, NeighboursThatAreAlikeInflateTheErrorOfAMean) {
+  std::mt19937 rng(9);
+  std::normal_distribution<double> noise;
+  Course white, red;
+  double x = 0;
+  for (int i = 0; i < 4000; ++i) {
+    white.value.push_back(noise(rng)), white.weight.push_back(1);
+    x = 0.5 * x + noise(rng);
+    red.value.push_back(x), red.weight.push_back(1);
+  }
+  EXPECT_NEAR(inflation(white, 4), 1, 0.15);
+  EXPECT_NEAR(inflation(red, 4), 1 + 2 * (0.5 + 0.25 + 0.125 + 0.0625), 0.3);
+}
+
+/// The density of Student's t with one degree is 1/π/(1 + t²).
+TEST(TwoLevels, StudentsTailIsThatOfTheDensity) {
+  for (const double t : {0.0, 0.7, 3.0, 40.0})
+    EXPECT_NEAR(student_tail(t, 1), 0.5 - std::atan(t) / std::numbers::pi, 1e-12) << t;
+}
+
+}  // namespace
+}  // namespace backwash::study
