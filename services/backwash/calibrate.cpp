@@ -26,7 +26,7 @@ struct Options {
 };
 
 Json to_json(const Interval& i) { return {i.low, i.high}; }
-Json to_json(const Estimate& e) { return {{"value", e.value}, {"ci95", to_json(e.ci95)}}; }
+Json to_json(const CalibratedValue& e) { return {{"value", e.value}, {"ci95", to_json(e.ci95)}}; }
 Json axes_to_json(const Vec3& v) { return {{"x", v.x()}, {"y", v.y()}, {"z", v.z()}}; }
 
 Json to_json(const std::vector<Bin>& bins) {

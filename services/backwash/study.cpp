@@ -34,8 +34,8 @@ struct Options {
 };
 
 /// The study's own terms of a model file that it has extended before; none in others.
-std::vector<study::Term> read_terms(const std::string& path) {
-  std::vector<study::Term> terms;
+std::vector<study::ExtensionTerm> read_terms(const std::string& path) {
+  std::vector<study::ExtensionTerm> terms;
   if (path.starts_with("builtin:")) return terms;
   const auto file = toml::parse_file(path);  // load_model has accepted it
   const auto* list = file.at_path("extension.term").as_array();
@@ -43,10 +43,10 @@ std::vector<study::Term> read_terms(const std::string& path) {
   for (const auto& entry : *list) {
     const auto* table = entry.as_table();
     if (!table) continue;
-    study::Term term{(*table)["cause"].value_or(std::string()),
-                     (*table)["form"].value_or(std::string()),
-                     {(*table)["scale"].value_or(0.0)},
-                     {}};
+    study::ExtensionTerm term{(*table)["cause"].value_or(std::string()),
+                              (*table)["form"].value_or(std::string()),
+                              {(*table)["scale"].value_or(0.0)},
+                              {}};
     if (const auto* offset = (*table)["offset_m"].as_array(); offset && offset->size() == 2)
       term.scale.offset_W = {(*offset)[0].value_or(0.0), (*offset)[1].value_or(0.0), 0};
     if (const auto* theta = (*table)["theta"].as_array())
@@ -201,7 +201,7 @@ void print_beside(const Flights& flights, const std::optional<AnytimeReport>& an
   if (design) print_text(*design, asked);
 }
 
-void add_left_out(Json& json, const std::vector<study::Term>& terms, const Flights& flights) {
+void add_left_out(Json& json, const std::vector<study::ExtensionTerm>& terms, const Flights& flights) {
   for (const auto& term : terms) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
   for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
 }

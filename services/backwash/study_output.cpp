@@ -81,7 +81,7 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
 }
 
 void print_text(const char* of, const study::calibrate::HeightEffect& h) {
-  const auto ratio = [](const char* name, const study::calibrate::Estimate& e) {
+  const auto ratio = [](const char* name, const study::calibrate::CalibratedValue& e) {
     if (e.value > 0) std::printf("  %s: x%.2f [%.2f, %.2f]\n", name, e.value, e.ci95.low, e.ci95.high);
   };
   std::printf("vertical variance, day and speed held fixed, %s: %zu windows, %zu flights, %zu days\n", of, h.windows,
@@ -91,7 +91,7 @@ void print_text(const char* of, const study::calibrate::HeightEffect& h) {
   ratio("under a plate against without", h.ceiling);
 }
 
-Json to_json(const study::Outcome& o) {
+Json to_json(const study::FlightOutcome& o) {
   Json json = {{"samples_inside_bound", o.inside},
                {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
                {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
@@ -161,7 +161,7 @@ Json to_json(const study::RotorVerdict& v) {
 }
 
 Json to_json(const study::calibrate::HeightEffects& effects) {
-  const auto ratio = [](const study::calibrate::Estimate& e) {
+  const auto ratio = [](const study::calibrate::CalibratedValue& e) {
     return Json{{"value", e.value}, {"ci95", {e.ci95.low, e.ci95.high}}};
   };
   const auto one = [&](const study::calibrate::HeightEffect& h) {
@@ -221,7 +221,7 @@ void print_text(const study::StudyResult& result, const study::Observations& see
                 const std::optional<study::RotorVerdict>& rotors,
                 const std::optional<study::calibrate::HeightEffects>& height) {
   std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
-  if (result.verdict == study::Verdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
+  if (result.verdict == study::StudyVerdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
   for (const auto& cause : result.causes) print_text(cause, vehicle, logs);
   if (consequence) std::printf("%s\n", study::cost_sentence(*consequence).c_str());
   for (const auto& r : result.refused) std::printf("refused: %s\n", study::refusal(r).c_str());

@@ -70,15 +70,15 @@ GainNames take_gains(const std::string& path, Vehicle& vehicle) {
 }
 
 /// Samples of a flight with the present gains, and how many of them lay in their set.
-struct Evidence {
+struct TuningEvidence {
   std::size_t judged = 0, inside = 0;
 };
 
-Evidence evidence_of(const std::string& path) {
+TuningEvidence evidence_of(const std::string& path) {
   const auto log = log::read_raw_log(path);
   if (!log)
     throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
-  Evidence evidence;
+  TuningEvidence evidence;
   for (const auto& record : log->records) {
     log::TickRecord tick;
     if (record.header.kind != log::RecordKind::tick || record.bytes.size() < sizeof tick) continue;
@@ -111,7 +111,7 @@ Json to_json(const plan::GainStep& s) {
   return json;
 }
 
-void print_text(const plan::GainSweep& sweep, const GainNames& names, const std::optional<Evidence>& evidence) {
+void print_text(const plan::GainSweep& sweep, const GainNames& names, const std::optional<TuningEvidence>& evidence) {
   if (evidence)
     std::printf(
         "the log: %zu of %zu samples inside the sets of the gains it was flown with%s\n", evidence->inside,
@@ -148,7 +148,7 @@ int run(const Options& options) {
   const auto model = read_model(options.model);
   GainNames names = kPx4;
   if (!options.parameters.empty()) names = take_gains(options.parameters, vehicle);
-  std::optional<Evidence> evidence;
+  std::optional<TuningEvidence> evidence;
   if (!options.log.empty()) evidence = evidence_of(options.log);
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
   progress("building the world");

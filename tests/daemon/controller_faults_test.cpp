@@ -20,7 +20,7 @@ TEST(ControllerSilenceFault, WithoutAHeartbeatOfTheControllerItIsQuietAfterOneAn
 
 TEST(OffboardLeftFault, WhenTheControllerLeavesOffboardItStopsInTheSameTickAndNeverAsksAgain) {
   InFlight rig;
-  rig.autopilot->take_over();
+  rig.in_hand().take_over();
   EXPECT_TRUE(rig.tick().silent());
   EXPECT_EQ(rig.mode(), Mode::passive);
   EXPECT_EQ(rig.reason(), Reason::offboard_left);
@@ -76,7 +76,7 @@ TEST(OtherHandsFault, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
 
 TEST(DisarmingFault, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
   InFlight rig;
-  rig.autopilot->disarm();
+  rig.in_hand().disarm();
   rig.tick();
   EXPECT_EQ(rig.mode(), Mode::passive);
   EXPECT_EQ(rig.reason(), Reason::disarmed);

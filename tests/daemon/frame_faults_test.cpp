@@ -97,7 +97,7 @@ TEST(EstimatorResetFault, WhenTheControllersEstimatorResetsTheVehicleHoldsInTheN
       rig.start_route(fly);
       const Setpoint before = rig.in_map(rig.wire().setpoints.at(0));
       rig.local_frame = {1.1, Vec3(5 - moved, -3, 0.2 + moved / 10)};
-      rig.autopilot->reset_estimator(rig.local_frame);
+      rig.in_hand().reset_estimator(rig.local_frame);
       const int ticks = rig.ticks_until(Mode::hold, 10);
       ASSERT_GT(ticks, 0);
       EXPECT_LE(ticks, 2);

@@ -122,7 +122,8 @@ class Lockstep {
   std::vector<std::uint8_t> inject_;
   bench::LocalFrame local_frame;  ///< the controller's true one
   std::shared_ptr<const plan::World> world_;
-  std::unique_ptr<HandledAutopilot> autopilot;
+  std::unique_ptr<bench::Autopilot> autopilot;  ///< a HandledAutopilot, unless a test sets a profile's
+  HandledAutopilot& in_hand() { return dynamic_cast<HandledAutopilot&>(*autopilot); }
   /// In shared memory, so that forget_pages() loses nothing.
   struct Unmap {
     void operator()(Channels* c) const;

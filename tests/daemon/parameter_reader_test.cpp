@@ -78,7 +78,7 @@ TEST_F(ParameterReading, InQuietItIsAskedOnlyForAnOperatorWhoAsksToEnable) {
   ASSERT_GE(rig_.ticks_until(Mode::quiet, 200), 0);
   rig_.ticks(50);
   rig_.autopilot->mute = false;
-  rig_.autopilot->disarm();
+  rig_.in_hand().disarm();
   EXPECT_EQ(commands_in(200), 0);
   ASSERT_EQ(rig_.mode(), Mode::quiet);
   EXPECT_TRUE(forbids(rig_).starts_with("no value of")) << forbids(rig_);

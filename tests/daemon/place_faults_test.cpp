@@ -34,7 +34,7 @@ TEST(EstimatorResetFault, AResetOfYawHeightOrOneAxisAloneIsHeldInTheNewFrameWith
     Setpoint last = rig.in_map(rig.wire().setpoints.at(0));
     rig.local_frame.yaw += yaw;
     rig.local_frame.origin += by;
-    rig.autopilot->reset_estimator(rig.local_frame);
+    rig.in_hand().reset_estimator(rig.local_frame);
     const int ticks = rig.ticks_until(Mode::hold, 10);
     EXPECT_TRUE(ticks == 1 || ticks == 2) << ticks << " ticks: yaw " << yaw << ", by " << by.transpose();
     EXPECT_EQ(rig.reason(), Reason::autopilot_reset);
@@ -58,7 +58,7 @@ TEST(EstimatorResetFault, ASmallResetThatIsCountedIsTakenIn) {
   rig.tick();
   const Vec3 before = rig.in_map(rig.wire().setpoints.at(0)).p_W;
   rig.local_frame.origin += Vec3(0.08, -0.06, 0);
-  rig.autopilot->reset_estimator(rig.local_frame);
+  rig.in_hand().reset_estimator(rig.local_frame);
   rig.say(mavlink::Odometry{.q = {1, 0, 0, 0}, .reset_counter = 4});
   EXPECT_EQ(rig.ticks_until(Mode::hold, 3), 1);
   EXPECT_EQ(rig.reason(), Reason::autopilot_reset);

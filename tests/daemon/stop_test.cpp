@@ -164,7 +164,7 @@ TEST(OnTheGround, AHoldThereSaysThatLandEndsItAndSoItDoes) {
   ASSERT_EQ(f.give(kEnable), kAccepted);
   for (int n = 0; n < 250 && f.rig_.mode() != Mode::tracking; ++n) f.tick();
   f.rig_.local_frame.origin += Vec3(0.4, 0, 0);
-  f.rig_.autopilot->reset_estimator(f.rig_.local_frame);
+  f.rig_.in_hand().reset_estimator(f.rig_.local_frame);
   f.ticks(50);
   ASSERT_EQ(f.rig_.mode(), Mode::hold);
   ASSERT_EQ(f.rig_.reason(), Reason::autopilot_reset);

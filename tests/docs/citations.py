@@ -118,7 +118,7 @@ def main() -> int:
                     wrong.append(f"{path}: interfaces.md has no heading '{cited[1]}'")
         if path.suffix in {".cpp", ".hpp", ".c", ".h", ".idl"}:
             comments = re.sub(r"\n[ \t]*///?<?", " ", "".join(re.findall(r"//[^\n]*\n(?=[ \t]*//)|//[^\n]*", text)))
-            comments += re.sub(r"\n[ \t]*\*?", " ", "".join(re.findall(r"/\*.*?\*/", text, re.S)))
+            comments += re.sub(r"\s*\n[ \t]*\*?[ \t]*", " ", "".join(re.findall(r"/\*.*?\*/", text, re.S)))
             rows_in(path, comments)
             if found := re.findall(rf"\b(?:[Ee]quations?|Eqs?\.) \(?({EQUATION})", comments):
                 equations_in(path, " ".join(found))

@@ -74,7 +74,7 @@ void damage(log::FlightLog& log, Mutator& mutator) {
 TEST(Fuzz, AStudyOfAnyFiniteNumbersEndsWithAVerdict) {
   Mutator mutator("study", 1);
   const map::OccupancyGrid room({-1.5, -1.5, 0}, 0.1, {30, 30, 22}, map::Cell::free);
-  Surroundings surroundings(&room, Model{});
+  MapView surroundings(&room, Model{});
   const auto whole = flown(mutator);
   int verdicts = 0, named = 0;
   for (bool more = true; more; more = mutator.spend(10'000)) {
@@ -93,7 +93,7 @@ TEST(Fuzz, AStudyOfAnyFiniteNumbersEndsWithAVerdict) {
       for (const auto& p : cause.found.parameters)
         EXPECT_TRUE(std::isfinite(p.value) && std::isfinite(p.low) && std::isfinite(p.high))
             << cause.found.form->cause() << ' ' << p.name;
-    ++verdicts, named += result.verdict == Verdict::insufficient ? 0 : 1;
+    ++verdicts, named += result.verdict == StudyVerdict::insufficient ? 0 : 1;
   }
   std::printf("%d verdicts, %d with flights enough\n", verdicts, named);
   EXPECT_GT(named, verdicts / 4);

@@ -106,7 +106,7 @@ TEST(HeightEffect, OfPlateAndStepsHoldsWhatWasMadeAndSeparatesTheScatterOfFlight
   constexpr int kWorlds = 40;
   for (std::uint64_t seed = 1; seed <= kWorlds; ++seed) {
     const auto effect = plated(seed, false), independent = plated(seed, true);
-    const auto holds = [](const Estimate& e, double truth) {
+    const auto holds = [](const CalibratedValue& e, double truth) {
       return e.ci95.low < truth && truth < e.ci95.high ? 1 : 0;
     };
     plate += holds(effect.ceiling, 1.6), bins += holds(effect.bins, 2), believed += holds(independent.ceiling, 1.6);
@@ -146,7 +146,9 @@ std::vector<HeightRow> recorded(const std::filesystem::path& folder, double leng
 }
 
 void print(const char* of, const HeightEffect& e) {
-  const auto one = [](const Estimate& r) { std::printf(" x%.2f [%.2f, %.2f]", r.value, r.ci95.low, r.ci95.high); };
+  const auto one = [](const CalibratedValue& r) {
+    std::printf(" x%.2f [%.2f, %.2f]", r.value, r.ci95.low, r.ci95.high);
+  };
   std::printf("%-38s", of), one(e.low_over_high), one(e.bins), one(e.ceiling);
   std::printf("  %3zu windows %2zu flights %2zu days, low in %zu high in %zu, sd %.2f %.2f\n", e.windows, e.flights,
               e.days, e.low_flights, e.high_flights, e.within, e.between);

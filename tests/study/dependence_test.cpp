@@ -124,10 +124,10 @@ TEST(Dependence, AutocorrelationAloneIsNotDependence) {
 std::vector<Dependence> remaining(const std::vector<std::string>& causes, double size) {
   const auto folder = std::filesystem::temp_directory_path() / ("study-dependence-" + std::to_string(::getpid()));
   auto world = study_worlds::draw_world({4711, causes, size, 12, ""});
-  using study_worlds::Structure;  // two waves of the vertical push along each turn of the heading
-  world.effects.structure = {Structure::Kind::heading,
-                             Structure::Where::up,
-                             {Structure::Quantity::yaw, Structure::Quantity::t},
+  using study_worlds::HiddenStructure;  // two waves of the vertical push along each turn of the heading
+  world.effects.structure = {HiddenStructure::Kind::heading,
+                             HiddenStructure::Where::up,
+                             {HiddenStructure::Quantity::yaw, HiddenStructure::Quantity::t},
                              {2, 0},
                              {0.4, 0},
                              0};

@@ -102,7 +102,7 @@ TEST(Lead, IsNeededByTheRuleOfRivals) {
 struct NeverTurned {
   std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("study-design-" + std::to_string(::getpid()));
-  study_worlds::World made = study_worlds::draw_world({1796100001, {"trim"}, 1, 12, "yaw"});
+  study_worlds::HiddenWorld made = study_worlds::draw_world({1796100001, {"trim"}, 1, 12, "yaw"});
   Observations seen = study_worlds::observe(made, folder);
   Vehicle vehicle = config::load_vehicle((folder / "vehicle.toml").string()).value();
   Model model = config::load_model("builtin:" + made.craft.model).value();
@@ -134,14 +134,14 @@ std::vector<Setpoint> hover(const Vec3& at, double rate) {
 
 TEST(Contest, OfTrimAndDraftIsDecidedByTurnsOfTheHeadingAndByNothingElse) {
   const auto& w = never_turned();
-  ASSERT_EQ(w.result.verdict, Verdict::cannot_distinguish) << study_worlds::told(w.result);
+  ASSERT_EQ(w.result.verdict, StudyVerdict::cannot_distinguish) << study_worlds::told(w.result);
   std::vector<Accepted> accepted{w.result.causes.front().found};
   Evidence evidence(w.seen);
   evidence.whiten(columns_of(accepted, w.seen));
   const Contest contest(evidence, accepted, 0, w.result.threshold);
   ASSERT_EQ(contest.explanations().size(), 2u);
   EXPECT_NEAR(contest.explanations()[0].probability + contest.explanations()[1].probability, 1, 1e-12);
-  Surroundings surroundings(&w.grid, w.model);
+  MapView surroundings(&w.grid, w.model);
   const Imagination imagination(w.seen, w.vehicle, surroundings);
   const Vec3 at = 0.5 * w.made.room.inside.high;
   const auto still = imagination.windows(hover(at, 0), false), turning = imagination.windows(hover(at, 0.5), false);
@@ -205,7 +205,7 @@ TEST(Design, OfRotorsThatMotorsAloneTellIsNone) {
   Accepted& found = result.causes.front().found;
   found.form = alone("propeller_damage"), found.scale = {0};
   found.columns = found.form->columns(w.seen.windows, found.scale);
-  found.rivals = {{"payload", alone("payload"), {0}, 0}};
+  found.rivals = {{"payload", alone("payload"), {0}, 40}};  // motors alone: however much it is behind
   const auto world = plan::build_world(w.grid, w.model, w.vehicle);
   const Vec3 start(0.5 * w.made.room.inside.high.x(), 0.5 * w.made.room.inside.high.y(), 1.2);
   const Design next = design(w.seen, result, *world, w.model, start);

@@ -60,7 +60,7 @@ TEST_P(NamesTheHiddenCause, AtOneAndAHalfTimesTheTablesSize) {
   bool in_set = found.form->cause() == GetParam();
   for (const auto& rival : found.rivals) in_set = in_set || rival.name == GetParam();
   EXPECT_TRUE(in_set) << "seed " << seed() << ": " << study_worlds::told(result);
-  EXPECT_LE(found.p, SearchOptions{}.accept_p);
+  EXPECT_LE(found.p, CauseSearchOptions{}.accept_p);
   EXPECT_GT(result.causes.front().gain.held_out_nats, 0);
 }
 
@@ -72,7 +72,7 @@ TEST(Study, FindsNothingInMostWorldsWithoutAnEffect) {
   std::string told;
   for (int k = 0; k < 4; ++k) {
     const auto result = studied(world_with({}, 1, 12, k));
-    alarms += result.verdict == Verdict::nothing_found ? 0 : 1;
+    alarms += result.verdict == StudyVerdict::nothing_found ? 0 : 1;
     told += study_worlds::told(result) + "; ";
   }
   EXPECT_LE(alarms, 1) << "seed " << seed() << ": " << told;
@@ -80,12 +80,12 @@ TEST(Study, FindsNothingInMostWorldsWithoutAnEffect) {
 
 TEST(Study, SaysUnknownStructureForACauseOutsideTheCatalogue) {
   const auto result = studied(world_with({"unknown"}, 1.5));
-  EXPECT_EQ(result.verdict, Verdict::unknown_structure) << "seed " << seed() << ": " << study_worlds::told(result);
+  EXPECT_EQ(result.verdict, StudyVerdict::unknown_structure) << "seed " << seed() << ": " << study_worlds::told(result);
 }
 
 TEST(Study, NamesNothingFromFewerThanTenFlights) {
   const auto result = studied(world_with({"ceiling"}, 3, 6));
-  EXPECT_EQ(result.verdict, Verdict::insufficient);
+  EXPECT_EQ(result.verdict, StudyVerdict::insufficient);
   EXPECT_TRUE(result.causes.empty());
 }
 

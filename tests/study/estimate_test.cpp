@@ -180,7 +180,7 @@ TEST(Refine, FindsAMapOffsetBetweenTheOnesTriedAndCoversBothOfItsCoordinates) {
   EXPECT_GE(covered, 0.87 * 2 * kWorlds);
 }
 
-TEST(Surroundings, TheSideOfALoweredCeilingIsAWallButNotFromFloorToCeiling) {
+TEST(MapView, TheSideOfALoweredCeilingIsAWallButNotFromFloorToCeiling) {
   using backwash::map::Cell;
   backwash::map::OccupancyGrid grid(Vec3::Zero(), 0.1, {30, 30, 26}, Cell::free);
   for (int i = 0; i < 30; ++i)
@@ -188,8 +188,8 @@ TEST(Surroundings, TheSideOfALoweredCeilingIsAWallButNotFromFloorToCeiling) {
       for (int k = 0; k < 26; ++k)
         if (i == 0 || j == 0 || i == 29 || j == 29 || k == 0 || k == 25 || (i < 12 && k >= 18))
           grid.set({i, j, k}, Cell::occupied);
-  Surroundings around(&grid, backwash::config::load_model("builtin:quad-5in").value());
-  const Place high = around.around({1.55, 1.05, 2.15}), low = around.around({1.55, 1.05, 1.0});
+  MapView around(&grid, backwash::config::load_model("builtin:quad-5in").value());
+  const PlaceAround high = around.around({1.55, 1.05, 2.15}), low = around.around({1.55, 1.05, 1.0});
   const auto nearest_along = [](const auto& walls, const Vec3& direction) {
     double least = kNoSurface;
     for (const auto& [distance, towards_it] : walls)

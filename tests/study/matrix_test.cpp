@@ -17,9 +17,9 @@ namespace {
 using namespace study_worlds;
 namespace study = backwash::study;
 
-Outcome told_of(const std::string& hidden, std::vector<std::vector<std::string>> sets,
-                std::vector<std::string> unknown = {}) {
-  Outcome o;
+WorldOutcome told_of(const std::string& hidden, std::vector<std::vector<std::string>> sets,
+                     std::vector<std::string> unknown = {}) {
+  WorldOutcome o;
   o.cell = hidden, o.sets = std::move(sets), o.unknown = std::move(unknown);
   if (hidden != "none") o.truth = {hidden};
   return o;
@@ -52,13 +52,13 @@ TEST(StudyMatrix, WilsonsIntervalSolvesItsDefiningEquation) {
 }
 
 TEST(StudyMatrix, GatesAreMissedByTheCellsThatMissThem) {
-  std::vector<Outcome> outcomes;
+  std::vector<WorldOutcome> outcomes;
   for (int i = 0; i < 100; ++i) {
     outcomes.push_back(told_of("trim", {{i < 79 ? "trim" : "draft"}}));
     outcomes.push_back(told_of("draft", {{"draft"}}));
     outcomes.push_back(told_of("none", {}));
   }
-  for (const Gate& gate : gates(summarise(outcomes))) {
+  for (const Requirement& gate : gates(summarise(outcomes))) {
     if (gate.name.starts_with("power") || gate.name.starts_with("wrong")) {
       EXPECT_FALSE(gate.held) << gate.name;
       EXPECT_NE(gate.figure.find("trim"), std::string::npos) << gate.figure;
@@ -76,7 +76,7 @@ TEST(StudyMatrix, GatesAreMissedByTheCellsThatMissThem) {
 TEST(StudyMatrix, ReadsTheOutcomesThatItWrote) {
   auto o = told_of("trim", {{"trim", "draft"}}, {"z_m"});
   o.seed = 12345678901234, o.error = 0.25, o.compared = {{"body_x_mps2", 0.1, 0.05, 0.15, 0.12, 0.11}};
-  const Outcome read = from_json(to_json(o));
+  const WorldOutcome read = from_json(to_json(o));
   EXPECT_EQ(to_json(read), to_json(o));
   EXPECT_FALSE(read.gain_share.has_value());
   EXPECT_DOUBLE_EQ(parameter_error(read.compared).value(), 0.02 / 0.12);
@@ -85,12 +85,12 @@ TEST(StudyMatrix, ReadsTheOutcomesThatItWrote) {
 TEST(Evidence, DecorrelatedAxesKeepEachWindowsSumOfSquares) {
   std::mt19937 rng(7);
   std::normal_distribution draw;
-  study::Column column{{{study::kVarZ, {}}, {study::kVarX, {}}, {study::kTail, {}}}};
+  study::DesignColumn column{{{study::kVarZ, {}}, {study::kVarX, {}}, {study::kTail, {}}}};
   for (auto& part : column.parts)
     for (int i = 0; i < 9; ++i) part.x.push_back(draw(rng));
   const auto turned = study::decorrelated(column);
   for (std::size_t i = 0; i < 9; ++i) {
-    const auto square = [i](const study::Column& c) {
+    const auto square = [i](const study::DesignColumn& c) {
       double sum = 0;
       for (const auto& part : c.parts) sum += part.x[i] * part.x[i];
       return sum;
@@ -118,7 +118,7 @@ double height_answers_gusts(const study::Observations& seen) {
 
 TEST(Observation, PlacesDoNotAnswerTheGustsThatTheResidualHolds) {
   const auto folder = std::filesystem::temp_directory_path() / ("study-places." + std::to_string(::getpid()));
-  const World world = draw_world({4711, {}, 1, 10, ""});
+  const HiddenWorld world = draw_world({4711, {}, 1, 10, ""});
   auto flights = fly_all(world);
   EXPECT_LT(height_answers_gusts(observe(world, flights, folder)), 0.02);
   for (auto& flight : flights)  // without set-points the measured place is all there is
@@ -132,7 +132,7 @@ TEST(Study, TellsTrimAndDraftAsOneSetWhereNoFlightTurned) {
   const auto folder = std::filesystem::temp_directory_path() / ("study-no-turn." + std::to_string(::getpid()));
   const auto cell = std::find_if(cells().begin(), cells().end(), [](auto& c) { return c.name == "trim, no yaw turn"; });
   ASSERT_NE(cell, cells().end());
-  const Outcome o = score(*cell, 4711, 1.5, 12, folder);
+  const WorldOutcome o = score(*cell, 4711, 1.5, 12, folder);
   std::filesystem::remove_all(folder);
   EXPECT_TRUE(o.in_sets()) << told(o.sets, o.unknown);
   ASSERT_EQ(o.sets.size(), 1u) << told(o.sets, o.unknown);

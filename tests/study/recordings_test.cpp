@@ -166,9 +166,9 @@ TEST(DaysOfFlights, NormalEquationsAreThoseOfTheWholeCovariance) {
   std::mt19937 rng(3);
   const auto made = days(rng);
   const Evidence evidence(made.seen);
-  Column column;
+  DesignColumn column;
   for (const Channel c : {kVarX, kVarY, kVarZ}) column.parts.push_back({c, made.x});
-  const Normal normal = evidence.normal({column}, {});
+  const NormalEquations normal = evidence.normal({column}, {});
   const auto n = static_cast<Eigen::Index>(made.x.size());
   const Scatter scatter = evidence.scatter(kVarX);
   Eigen::MatrixXd V = scatter.within * Eigen::MatrixXd::Identity(n, n);

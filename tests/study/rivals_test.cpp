@@ -46,8 +46,8 @@ bool in_every_set(const std::string& name, const StudyResult& result) {
 }
 
 /// Correlation over the windows of one channel.
-double correlation(const std::vector<Column>& a, const std::vector<Column>& b, Channel channel) {
-  const auto of = [&](const std::vector<Column>& columns) {
+double correlation(const std::vector<DesignColumn>& a, const std::vector<DesignColumn>& b, Channel channel) {
+  const auto of = [&](const std::vector<DesignColumn>& columns) {
     for (const auto& part : columns.front().parts)
       if (part.channel == channel) return part.x;
     return std::vector<double>();
@@ -80,12 +80,12 @@ TEST(Rivals, NeitherIsToldBesideTheOther) {
 
 TEST(Rivals, AWrongAttitudeLagIsToldFromLateCommandsByTheLoggedTilt) {
   const auto lagging = studied(world_with("actuator_lag", 0.8, "attitude", 1795800002));
-  ASSERT_EQ(lagging.verdict, Verdict::cause_found) << study_worlds::told(lagging);
+  ASSERT_EQ(lagging.verdict, StudyVerdict::cause_found) << study_worlds::told(lagging);
   const Accepted& lag = lagging.causes.front().found;
   EXPECT_EQ(lag.form->parameters.front(), "lag_s") << study_worlds::told(lagging);
   EXPECT_NEAR(lag.parameters.front().value, 0.04, 0.008);
   const auto late = studied(world_with("command_latency", 1.3, "", 1795800002));
-  ASSERT_EQ(late.verdict, Verdict::cause_found) << study_worlds::told(late);
+  ASSERT_EQ(late.verdict, StudyVerdict::cause_found) << study_worlds::told(late);
   EXPECT_EQ(late.causes.front().found.form->cause(), "command_latency");
 }
 
@@ -93,7 +93,7 @@ TEST(Rivals, WithoutTheTiltTheyAreOneSet) {
   auto seen = world_with("command_latency", 1.3, "", 1795800002);
   std::fill(seen.weight[kTiltDelay].begin(), seen.weight[kTiltDelay].end(), 0.0);
   const auto result = studied(seen);
-  ASSERT_EQ(result.verdict, Verdict::cannot_distinguish) << study_worlds::told(result);
+  ASSERT_EQ(result.verdict, StudyVerdict::cannot_distinguish) << study_worlds::told(result);
   EXPECT_TRUE(in_every_set("actuator_lag", result) && in_every_set("command_latency", result))
       << study_worlds::told(result);
 }
@@ -119,7 +119,7 @@ Observations moving_together(double push) {
 TEST(Rivals, ThatGoTogetherAtMinus094AreOneSetHoweverStrong) {
   for (const double push : {0.2, 0.6}) {
     const auto result = studied(moving_together(push));
-    EXPECT_EQ(result.verdict, Verdict::cannot_distinguish) << push << ": " << study_worlds::told(result);
+    EXPECT_EQ(result.verdict, StudyVerdict::cannot_distinguish) << push << ": " << study_worlds::told(result);
     ASSERT_FALSE(result.causes.empty());
     EXPECT_TRUE(in_every_set("ground_thrust", result)) << push << ": " << study_worlds::told(result);
     EXPECT_TRUE(in_every_set("thrust_slope", result)) << push << ": " << study_worlds::told(result);

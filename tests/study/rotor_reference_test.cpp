@@ -198,10 +198,10 @@ TEST(CrazyPad, NoSoundFlightNorSessionIsCalledDamagedByTheOthers) {
   }
 }
 
-struct Line {
+struct FittedLine {
   double offset, slope;
 };
-Line fitted(const std::vector<std::pair<double, double>>& points) {
+FittedLine fitted(const std::vector<std::pair<double, double>>& points) {
   const double n = static_cast<double>(points.size());
   double x = 0, y = 0, xx = 0, xy = 0;
   for (const auto& [a, b] : points) x += a / n, y += b / n;
@@ -228,7 +228,7 @@ TEST(CrazyPad, ShareOfMotorThreeIsPredictedByTheCutLengthHeldOutByCondition) {
       for (const double s : share.at(name))
         if (name != held_out) by_cut.emplace_back(other, s), by_share.emplace_back(s, other), mean += s;
     mean /= static_cast<double>(by_cut.size());
-    const Line of_share = fitted(by_cut), of_length = fitted(by_share);
+    const FittedLine of_share = fitted(by_cut), of_length = fitted(by_share);
     double predicted = 0, own = 0;
     for (const double s : share.at(held_out)) {
       without += std::pow(s - mean, 2), with += std::pow(s - of_share.offset - of_share.slope * mm, 2), count += 1;

@@ -45,7 +45,7 @@ std::vector<Residual> made(std::size_t windows, bool bursts, double noise, unsig
 
 /// 2 s of gusts and noise at 50 Hz with the line of a rotor whose rate wanders about `hz`, and its phase as rpm
 /// readings give it that are held for `held` samples and have 0.4 % of noise.
-std::optional<Line> made_line(double hz, double amplitude, int held, std::mt19937_64& rng) {
+std::optional<RotorLine> made_line(double hz, double amplitude, int held, std::mt19937_64& rng) {
   std::normal_distribution draw;
   const double phi = std::exp(-1 / (kRate * kCorrelation)), dt = 1 / kRate;
   std::vector<double> x, t, phase;
@@ -153,7 +153,7 @@ TEST(DelayStage, FindsADelayThatIsNotShortAgainstTheSetPoints) {
 }
 
 /// Estimate of a cause by its first form with all flights of a world.
-double estimate(const study_worlds::World& world, const std::string& cause) {
+double estimate(const study_worlds::HiddenWorld& world, const std::string& cause) {
   const auto folder = std::filesystem::temp_directory_path() / ("study-signals-" + std::to_string(::getpid()));
   const auto seen = study_worlds::observe(world, folder);
   std::filesystem::remove_all(folder);
@@ -182,7 +182,7 @@ TEST(StudyWorlds, IntervalsHoldTheTailThatWasFlown) {
 
 TEST(Study, TellsASaggingBatteryFromEqualStartsWithoutAFalseNameBesideIt) {
   const auto folder = std::filesystem::temp_directory_path() / ("study-battery-" + std::to_string(::getpid()));
-  const study_worlds::Cell cell{"battery_sag, equal batteries", {"battery_sag"}, "battery"};
+  const study_worlds::MatrixCell cell{"battery_sag, equal batteries", {"battery_sag"}, "battery"};
   const auto o = study_worlds::score(cell, 4711, 1, 12, folder);
   std::filesystem::remove_all(folder);
   EXPECT_TRUE(o.in_sets()) << study_worlds::told(o.sets, o.unknown);

@@ -16,10 +16,10 @@ namespace {
 
 using namespace backwash;
 using namespace backwash::study;
-using study_worlds::Structure;
-using Kind = Structure::Kind;
-using Quantity = Structure::Quantity;
-using Where = Structure::Where;
+using study_worlds::HiddenStructure;
+using Kind = HiddenStructure::Kind;
+using Quantity = HiddenStructure::Quantity;
+using Where = HiddenStructure::Where;
 
 std::filesystem::path folder() {
   return std::filesystem::temp_directory_path() / ("study-structures-" + std::to_string(::getpid()));
@@ -30,7 +30,7 @@ struct Seen {
   double explained;
 };
 
-Seen world_with(const Structure& structure, double size, std::uint64_t seed = 4711) {
+Seen world_with(const HiddenStructure& structure, double size, std::uint64_t seed = 4711) {
   auto world = study_worlds::draw_world({seed, {"unknown"}, size, 12, ""});
   world.effects.structure = structure;
   const auto flights = study_worlds::fly_all(world);
@@ -57,17 +57,17 @@ TEST(Structures, AGustOfOneFrequencyCommonToAllFlightsIsToldWithItsFrequency) {
       world_with({Kind::tone, Where::up, {Quantity::t, Quantity::t}, {2 * M_PI * 0.07, 0}, {0.8, 0}, 0}, 1);
   EXPECT_GT(seen.explained, 0.15);
   const auto result = studied(seen.observations);
-  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
   EXPECT_EQ(result.unknown.front().along, "t_s");
   EXPECT_NEAR(result.unknown.front().hz, 0.07, 0.006);
-  EXPECT_LE(result.unknown.front().p, SearchOptions{}.accept_p);
+  EXPECT_LE(result.unknown.front().p, CauseSearchOptions{}.accept_p);
 }
 
 TEST(Structures, AThirdHarmonicOfTheHeadingIsTold) {
   const auto seen = world_with({Kind::heading, Where::up, {Quantity::yaw, Quantity::t}, {3, 0}, {0.4, 0}, 0}, 1);
   EXPECT_GT(seen.explained, 0.15);
   const auto result = studied(seen.observations);
-  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
   EXPECT_EQ(result.unknown.front().along, "yaw_rad");
   EXPECT_EQ(result.unknown.front().shape, "turn 3");
 }
@@ -77,7 +77,7 @@ TEST(Structures, AProductOfTwoPlacesIsToldWithBoth) {
       {Kind::product, Where::level, {Quantity::x, Quantity::y}, {2 * M_PI / 3, 2 * M_PI / 3}, {0.3, 0.9}, 0.5}, 1);
   EXPECT_GT(seen.explained, 0.15);
   const auto result = studied(seen.observations);
-  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
   EXPECT_EQ(result.unknown.front().along, "x_m, y_m");
 }
 
@@ -86,7 +86,7 @@ TEST(Structures, HarmonicsAreAddedUntilTheGainEnds) {
   for (std::size_t i = 0; i < seen.windows.size(); ++i)
     seen.y[kMeanZ][i] += 0.3 * std::cos(3 * seen.windows[i].yaw) + 0.25 * std::cos(5 * seen.windows[i].yaw);
   const auto result = studied(seen);
-  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
   EXPECT_EQ(result.unknown.front().shape, "turn 3 and 1 more");
 }
 
@@ -104,9 +104,9 @@ TEST(Structures, ADependenceWithoutAMeanIsNeverNothingFound) {
   const auto result = studied(seen);
   ASSERT_FALSE(result.remaining.empty());
   EXPECT_TRUE(result.remaining.front().found);
-  ASSERT_EQ(result.verdict, Verdict::unknown_structure) << study_worlds::told(result);
+  ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
   EXPECT_EQ(result.unknown.front().shape, "any");
-  EXPECT_LE(result.unknown.front().p, SearchOptions{}.accept_p);
+  EXPECT_LE(result.unknown.front().p, CauseSearchOptions{}.accept_p);
 }
 
 TEST(Structures, ADependenceThatHalfOfTheFlightsDoNotShowIsNotFound) {
@@ -123,7 +123,7 @@ TEST(Structures, ADependenceThatHalfOfTheFlightsDoNotShowIsNotFound) {
 TEST(Structures, NothingFoundListsNoDependence) {
   for (std::uint64_t seed = 4711; seed < 4714; ++seed) {
     const auto result = studied(quiet(seed));
-    if (result.verdict != Verdict::nothing_found) continue;
+    if (result.verdict != StudyVerdict::nothing_found) continue;
     for (const auto& d : result.remaining) EXPECT_FALSE(d.found) << d.group << " on " << d.regressor;
   }
 }

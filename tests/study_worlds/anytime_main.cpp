@@ -38,7 +38,7 @@ Watched watch(const Options& options, std::uint64_t seed, const std::filesystem:
   Request request;
   request.seed = seed, request.flights = options.flights, request.size = options.size;
   if (!options.cause.empty()) request.causes = {options.cause};
-  const World world = draw_world(request);
+  const HiddenWorld world = draw_world(request);
   auto chosen = with_reference(world, folder);
   chosen.minimum_detectable = false;
   study::Anytime anytime(chosen.sound);

@@ -26,8 +26,8 @@ struct Options {
   std::string out;
 };
 
-const Cell& cell_of(const std::string& name) {
-  const auto at = std::ranges::find(cells(), name, &Cell::name);
+const MatrixCell& cell_of(const std::string& name) {
+  const auto at = std::ranges::find(cells(), name, &MatrixCell::name);
   if (at == cells().end()) throw CLI::ValidationError("--cell", "no cell '" + name + "'");
   return *at;
 }

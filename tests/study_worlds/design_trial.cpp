@@ -38,7 +38,7 @@ std::vector<Command> at_steps(const std::vector<backwash::Setpoint>& commands) {
 }
 
 /// The battery's charge where a flight of the world ends, by what a hover of its length takes.
-double used_charge(const World& world, const Table& flown) {
+double used_charge(const HiddenWorld& world, const Table& flown) {
   const double begun = world.request.confound == "battery" ? 1.0 : 0.5 * (0.55 + 1.0);
   return begun - 14 * flown.rows.back().front() / 3600 / 1.6;
 }
@@ -50,7 +50,7 @@ std::vector<Command> begun(std::vector<Command> plan, double seconds) {
 }
 
 struct Arms {
-  const World& world;
+  const HiddenWorld& world;
   const study::Design& design;
   double seconds, used;
   Rng rng;
@@ -58,7 +58,7 @@ struct Arms {
   Table flight(Further kind, int number) {
     if (kind == Further::same_kind) return fly_along(world, number, begun(draw_plan(world, rng), seconds));
     if (kind == Further::free_kind) {
-      World free = world;  // the same room, craft and cause
+      HiddenWorld free = world;  // the same room, craft and cause
       free.request.confound.clear();
       const double charge = std::uniform_real_distribution(0.55, 1.0)(rng);
       return fly_along(world, number, begun(draw_plan(free, rng), seconds), charge);
@@ -72,16 +72,17 @@ struct Arms {
 
 }  // namespace
 
-Trial trial(const Cell& cell, std::uint64_t seed, const TrialOptions& options, const std::filesystem::path& folder) {
+Trial trial(const MatrixCell& cell, std::uint64_t seed, const TrialOptions& options,
+            const std::filesystem::path& folder) {
   Trial out;
   out.cell = cell.name, out.seed = seed;
-  const World world = draw_world({seed, cell.causes, options.size, options.flights, cell.confound});
+  const HiddenWorld world = draw_world({seed, cell.causes, options.size, options.flights, cell.confound});
   const auto first = fly_all(world);
   const auto seen = observe(world, first, folder);
   const auto result = studied(seen);
   out.told = told(result);
   const auto sets = sets_of(result);
-  out.applies = result.verdict == study::Verdict::cannot_distinguish && sets.size() == 1 &&
+  out.applies = result.verdict == study::StudyVerdict::cannot_distinguish && sets.size() == 1 &&
                 std::ranges::find(sets.front(), cell.causes.front()) != sets.front().end();
   if (!out.applies) return out;
   const auto vehicle = backwash::config::load_vehicle((folder / "vehicle.toml").string()).value();

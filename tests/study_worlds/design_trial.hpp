@@ -37,7 +37,8 @@ struct TrialOptions {
 };
 
 /// One world. `folder` is written to.
-Trial trial(const Cell& cell, std::uint64_t seed, const TrialOptions& options, const std::filesystem::path& folder);
+Trial trial(const MatrixCell& cell, std::uint64_t seed, const TrialOptions& options,
+            const std::filesystem::path& folder);
 
 nlohmann::json to_json(const Trial& trial);
 Trial trial_from_json(const nlohmann::json& json);

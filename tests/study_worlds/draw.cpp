@@ -71,9 +71,9 @@ double Room::gap_to_ceiling(const Vec3& p) const {
   return bottom - p.z();
 }
 
-World draw_world(const Request& request) {
+HiddenWorld draw_world(const Request& request) {
   Rng rng(request.seed * 7919 + 17);  // independent of the cause: worlds with the same seed are pairs
-  World world;
+  HiddenWorld world;
   world.request = request;
   world.room =
       draw_room(rng, request.confound == "height" || request.confound == "bob", request.confound == "fast" ? 2 : 1);
@@ -84,7 +84,7 @@ World draw_world(const Request& request) {
   world.jitter = between(rng, 0, 0.3);
   world.ln_var_vehicle = 0.55 * std::normal_distribution()(rng);
   for (const auto& name : request.causes) {
-    const Cause& cause = causes().at(name);
+    const HiddenCause& cause = causes().at(name);
     const double sign = !cause.one_signed && between(rng, 0, 1) < 0.5 ? -1 : 1;
     world.effects.size[name] = sign * request.size * cause.size;
     world.effects.shape[name] = cause.shape ? cause.shape(rng) : between(rng, -M_PI, M_PI);
@@ -98,7 +98,7 @@ World draw_world(const Request& request) {
 
 namespace {
 
-void write_map(const World& world, const std::filesystem::path& path) {
+void write_map(const HiddenWorld& world, const std::filesystem::path& path) {
   const double a = 0.1;
   octomap::OcTree tree(a);
   const Room& room = world.room;
@@ -150,13 +150,13 @@ void write_flight(const Table& table, Rng& rng, const std::filesystem::path& pat
 
 }  // namespace
 
-void write_world_files(const World& world, const std::filesystem::path& folder) {
+void write_world_files(const HiddenWorld& world, const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   write_map(world, folder / "map.bt");
   write_vehicle(world.craft, folder / "vehicle.toml");
 }
 
-std::vector<std::filesystem::path> write_world(const World& world, const std::filesystem::path& folder) {
+std::vector<std::filesystem::path> write_world(const HiddenWorld& world, const std::filesystem::path& folder) {
   write_world_files(world, folder);
   Rng rng(world.request.seed ^ 0x9e3779b97f4a7c15u);
   std::vector<std::filesystem::path> paths;
@@ -169,7 +169,7 @@ std::vector<std::filesystem::path> write_world(const World& world, const std::fi
   return paths;
 }
 
-std::string truth_line(const World& world) {
+std::string truth_line(const HiddenWorld& world) {
   std::ostringstream text;
   text << "{\"seed\": " << world.request.seed << ", \"flights\": " << world.request.flights << ", \"confound\": \""
        << world.request.confound << "\", \"model\": \"builtin:" << world.craft.model << "\", \"causes\": [";

@@ -52,15 +52,16 @@ double more_inflow(const Craft& craft, double climb) {
 
 /// Outside the catalogue: a push along a direction.
 Vec3 unnamed_push(const Acting& a) {
-  const Structure& what = a.world.effects.structure;
-  if (what.where == Structure::Where::variance) return Vec3::Zero();
-  return a.s * value_at(what, a.now) * (what.where == Structure::Where::up ? Vec3::UnitZ() : level(what.direction));
+  const HiddenStructure& what = a.world.effects.structure;
+  if (what.where == HiddenStructure::Where::variance) return Vec3::Zero();
+  return a.s * value_at(what, a.now) *
+         (what.where == HiddenStructure::Where::up ? Vec3::UnitZ() : level(what.direction));
 }
 
 /// The same in ln variance, where 0.15 m/s² is 0.6.
 double unnamed_ln_variance(const Acting& a) {
-  const Structure& what = a.world.effects.structure;
-  return what.where == Structure::Where::variance ? 4 * a.s * value_at(what, a.now) : 0;
+  const HiddenStructure& what = a.world.effects.structure;
+  return what.where == HiddenStructure::Where::variance ? 4 * a.s * value_at(what, a.now) : 0;
 }
 
 Vec3 ceiling_push(const Acting& a) {
@@ -69,7 +70,7 @@ Vec3 ceiling_push(const Acting& a) {
 }
 
 /// Causes that push.
-std::map<std::string, Cause> pushes() {
+std::map<std::string, HiddenCause> pushes() {
   const auto after_100_s = [](double share) -> Truth {
     return [share](double s, double) { return 1.6 * (1 - std::exp(-1.0)) * s * share; };
   };
@@ -129,7 +130,7 @@ std::map<std::string, Cause> pushes() {
 }
 
 /// All others.
-std::map<std::string, Cause> others() {
+std::map<std::string, HiddenCause> others() {
   // All surfaces are at whole decimetres and so are the map's voxels: it shows the offset to the nearest of them.
   const auto shown = [](double offset) { return 0.1 * std::round(offset / 0.1); };
   return {
@@ -170,8 +171,8 @@ std::map<std::string, Cause> others() {
 
 }  // namespace
 
-const std::map<std::string, Cause>& causes() {
-  static const std::map<std::string, Cause> all = [] {
+const std::map<std::string, HiddenCause>& causes() {
+  static const std::map<std::string, HiddenCause> all = [] {
     auto each = pushes();
     each.merge(others());
     return each;
@@ -179,7 +180,7 @@ const std::map<std::string, Cause>& causes() {
   return all;
 }
 
-Vec3 hidden_push(const World& world, const Instant& now) {
+Vec3 hidden_push(const HiddenWorld& world, const Instant& now) {
   Vec3 push = Vec3::Zero();
   for (const auto& [name, s] : world.effects.size)
     if (const auto& cause = causes().at(name); cause.push && s != 0)
@@ -187,7 +188,7 @@ Vec3 hidden_push(const World& world, const Instant& now) {
   return push;
 }
 
-double hidden_ln_variance(const World& world, const Instant& now) {
+double hidden_ln_variance(const HiddenWorld& world, const Instant& now) {
   double ln = 0;
   for (const auto& [name, s] : world.effects.size)
     if (const auto& cause = causes().at(name); cause.ln_variance && s != 0)

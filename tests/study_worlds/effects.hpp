@@ -20,7 +20,7 @@ struct Instant {
 
 /// A cause with its size s (signed, in its unit) and its drawn shape in a world, and when it acts.
 struct Acting {
-  const World& world;
+  const HiddenWorld& world;
   const Instant& now;
   double s, shape;
 };
@@ -29,7 +29,7 @@ struct Acting {
 using Truth = std::function<std::optional<double>(double s, double shape)>;
 
 /// All that the generator knows of a cause. One that is no push and no factor on the variance acts in fly.cpp.
-struct Cause {
+struct HiddenCause {
   double size;              ///< that must be found at 12 flights; table and units: core/study/confusion.md
   bool one_signed = false;  ///< else its sign is drawn
   std::function<double(std::mt19937_64&)> shape = {};     ///< draws the second number; without it a direction, rad
@@ -38,11 +38,11 @@ struct Cause {
   std::map<std::string, Truth> truth = {};                ///< by the study's name of the parameter
 };
 /// By name; "unknown" is one that no name of the catalogue covers.
-const std::map<std::string, Cause>& causes();
+const std::map<std::string, HiddenCause>& causes();
 
 /// Push on the craft, m/s² in W, by every effect of the mean.
-Vec3 hidden_push(const World& world, const Instant& now);
+Vec3 hidden_push(const HiddenWorld& world, const Instant& now);
 /// ln of the factor on the disturbance's variance, by every effect of it.
-double hidden_ln_variance(const World& world, const Instant& now);
+double hidden_ln_variance(const HiddenWorld& world, const Instant& now);
 
 }  // namespace study_worlds

@@ -55,7 +55,7 @@ class Gusts {
 /// One craft in one flight, integrated with the midpoint rule at 5 ms.
 class Flight {
  public:
-  Flight(const World& world, Gusts& gusts, int number)
+  Flight(const HiddenWorld& world, Gusts& gusts, int number)
       : world_(world),
         hidden_(world.effects),
         since_(acts_since(world.request, number)),
@@ -99,7 +99,7 @@ class Flight {
     }
     for (std::size_t k = 0; k < plan.size(); ++k) {
       const double t = static_cast<double>(k) * kStep;
-      world_.effects = t >= since_ ? hidden_ : Effects();
+      world_.effects = t >= since_ ? hidden_ : HiddenEffects();
       step(plan, k, t);
       if (t < next_row) continue;
       next_row += (1 + world_.jitter * std::uniform_real_distribution(-0.5, 0.5)(rng_)) / world_.rate_hz;
@@ -252,8 +252,8 @@ class Flight {
     return row;
   }
 
-  World world_;
-  Effects hidden_;
+  HiddenWorld world_;
+  HiddenEffects hidden_;
   double since_;
   Gusts& gusts_;
   Rng rng_;
@@ -267,9 +267,8 @@ class Flight {
   double spin_[4] = {}, motor_[4] = {}, phase_[4] = {0.3, 1.9, 4.0, 5.5};
 };
 
-/// The modelled gusts in a world's room. Worlds of one seed are pairs in one room: what was evaluated for the last one
-/// serves the next.
-Gusts& gusts_of(const World& world) {
+/// The modelled gusts in a world's room, evaluated once for the worlds of one seed, which are pairs in one room.
+Gusts& gusts_of(const HiddenWorld& world) {
   thread_local std::unique_ptr<Gusts> gusts;
   thread_local std::pair<std::uint64_t, std::string> room;
   if (const std::pair now(world.request.seed, world.request.confound); !gusts || room != now) {
@@ -282,19 +281,19 @@ Gusts& gusts_of(const World& world) {
 
 }  // namespace
 
-std::vector<Table> fly_all(const World& world) {
+std::vector<Table> fly_all(const HiddenWorld& world) {
   std::vector<Table> flights;
   for (int i = 0; i < world.request.flights; ++i) flights.push_back(Flight(world, gusts_of(world), i).fly());
   return flights;
 }
 
-Table fly_along(const World& world, int number, const std::vector<Command>& plan, double charge) {
+Table fly_along(const HiddenWorld& world, int number, const std::vector<Command>& plan, double charge) {
   Flight flight(world, gusts_of(world), number);
   if (charge > 0) flight.begin_with(charge);
   return flight.fly(plan);
 }
 
-Table fly_again(const World& world, int number, unsigned replica) {
+Table fly_again(const HiddenWorld& world, int number, unsigned replica) {
   return Flight(world, gusts_of(world), number).fly(replica);
 }
 

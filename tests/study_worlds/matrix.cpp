@@ -34,9 +34,9 @@ double size_of(const Options& options, std::uint64_t seed) {
   return std::exp(std::uniform_real_distribution(low, high)(rng));
 }
 
-std::vector<Cell> chosen_cells(const Options& options) {
+std::vector<MatrixCell> chosen_cells(const Options& options) {
   if (options.cells.empty()) return cells();
-  std::vector<Cell> chosen;
+  std::vector<MatrixCell> chosen;
   for (const auto& name : options.cells) {
     const auto at = std::find_if(cells().begin(), cells().end(), [&](auto& c) { return c.name == name; });
     if (at == cells().end()) throw CLI::ValidationError("--cell", "no cell '" + name + "'");
@@ -46,9 +46,9 @@ std::vector<Cell> chosen_cells(const Options& options) {
 }
 
 /// Worlds outside, cells inside: a cut run has as many worlds of each cell.
-std::vector<Outcome> run(const Options& options) {
+std::vector<WorldOutcome> run(const Options& options) {
   const auto chosen = chosen_cells(options);
-  std::vector<Outcome> outcomes;
+  std::vector<WorldOutcome> outcomes;
   std::mutex writing;
   std::ofstream out(options.out, std::ios::app);
   in_parallel(options.jobs, chosen.size() * static_cast<std::size_t>(options.worlds), [&](std::size_t k, auto& folder) {
@@ -61,8 +61,8 @@ std::vector<Outcome> run(const Options& options) {
   return outcomes;
 }
 
-std::vector<Outcome> read(const std::vector<std::string>& files) {
-  std::vector<Outcome> outcomes;
+std::vector<WorldOutcome> read(const std::vector<std::string>& files) {
+  std::vector<WorldOutcome> outcomes;
   for (const auto& file : files) {
     std::ifstream in(file);
     for (std::string line; std::getline(in, line);) outcomes.push_back(from_json(nlohmann::json::parse(line)));

@@ -45,7 +45,7 @@ std::vector<double> course_of_time(const study::Windows& windows, std::mt19937_6
 }
 
 /// Share of flipped gains at least as large as the true one.
-double p_value(const study::Normal& normal, const std::vector<std::vector<int>>& draws) {
+double p_value(const study::NormalEquations& normal, const std::vector<std::vector<int>>& draws) {
   const double gain = normal.gain();
   int above = 0;
   for (const auto& signs : draws) above += normal.gain(signs) >= gain ? 1 : 0;
@@ -62,9 +62,9 @@ NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path&
   NullSize sizes;
   const auto test = [&](const std::string& name, const char* kind, const std::vector<study::Channel>& channels,
                         const std::vector<double>& x) {
-    study::Column column;
+    study::DesignColumn column;
     for (const auto c : channels) column.parts.push_back({c, x});
-    std::vector<study::Column> free = study::offsets({column}, seen);
+    std::vector<study::DesignColumn> free = study::offsets({column}, seen);
     if (free.empty())
       for (const auto c : channels) free.push_back({{{c, std::vector<double>(seen.windows.size(), 1.0)}}});
     const auto normal = evidence.normal({column}, free);

@@ -19,7 +19,7 @@ using MapKey = std::tuple<std::uint64_t, std::string, double>;  // seed, circums
 struct MapSeen {
   MapKey key;
   backwash::map::OccupancyGrid grid;
-  study::Surroundings surroundings;
+  study::MapView surroundings;
   MapSeen(const MapKey& of, const std::filesystem::path& file, const backwash::Model& model)
       : key(of), grid(backwash::map::load_map(file.string()).value()), surroundings(&grid, model) {}
   MapSeen(const MapSeen&) = delete;
@@ -36,7 +36,7 @@ backwash::log::FlightLog log_of(const Table& table) {
 }
 
 /// An observer of the world; writes its map and vehicle to `folder`.
-std::unique_ptr<study::Observer> observer_of(const World& world, const std::filesystem::path& folder) {
+std::unique_ptr<study::Observer> observer_of(const HiddenWorld& world, const std::filesystem::path& folder) {
   write_world_files(world, folder);
   const auto vehicle = backwash::config::load_vehicle((folder / "vehicle.toml").string()).value();
   auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
@@ -50,19 +50,19 @@ std::unique_ptr<study::Observer> observer_of(const World& world, const std::file
 
 }  // namespace
 
-study::Observations observe(const World& world, const std::filesystem::path& folder) {
+study::Observations observe(const HiddenWorld& world, const std::filesystem::path& folder) {
   return observe(world, fly_all(world), folder);
 }
 
-study::Observations observe(const World& world, const std::vector<Table>& flights,
+study::Observations observe(const HiddenWorld& world, const std::vector<Table>& flights,
                             const std::filesystem::path& folder) {
   const auto observer = observer_of(world, folder);
   for (const Table& table : flights) observer->add(log_of(table));
   return observer->finish();
 }
 
-int observe_further(const World& world, const std::vector<Table>& first, const std::filesystem::path& folder, int most,
-                    const std::function<Table(int)>& flight,
+int observe_further(const HiddenWorld& world, const std::vector<Table>& first, const std::filesystem::path& folder,
+                    int most, const std::function<Table(int)>& flight,
                     const std::function<bool(const study::Observations&)>& look) {
   const auto observer = observer_of(world, folder);
   for (const Table& table : first) observer->add(log_of(table));
@@ -73,7 +73,7 @@ int observe_further(const World& world, const std::vector<Table>& first, const s
   return most + 1;
 }
 
-void observe_each(const World& world, const std::filesystem::path& folder,
+void observe_each(const HiddenWorld& world, const std::filesystem::path& folder,
                   const std::function<void(const study::Observations&)>& look) {
   const auto observer = observer_of(world, folder);
   for (const Table& table : fly_all(world)) {
@@ -82,13 +82,13 @@ void observe_each(const World& world, const std::filesystem::path& folder,
   }
 }
 
-study::SoundRotors sound_rotors(const World& world, const std::filesystem::path& folder) {
+study::SoundRotors sound_rotors(const HiddenWorld& world, const std::filesystem::path& folder) {
   using Key = std::tuple<std::uint64_t, double, double>;  // worlds of one seed mostly have one craft
   thread_local std::optional<std::pair<Key, study::SoundRotors>> last;
   const Key craft(world.request.seed, world.craft.rotor_spread, world.craft.max_thrust);
   if (last && last->first == craft) return last->second;
   constexpr int kSound = 6, kOthers = 1000;
-  World sound = world;
+  HiddenWorld sound = world;
   sound.effects = {};
   std::vector<Table> flights;
   for (int f = 0; f < kSound; ++f) flights.push_back(fly_again(sound, kOthers + f, 0));
@@ -96,7 +96,7 @@ study::SoundRotors sound_rotors(const World& world, const std::filesystem::path&
   return last->second;
 }
 
-study::StudyOptions with_reference(const World& world, const std::filesystem::path& folder) {
+study::StudyOptions with_reference(const HiddenWorld& world, const std::filesystem::path& folder) {
   study::StudyOptions options;
   options.sound = sound_rotors(world, folder);
   return options;

@@ -10,24 +10,24 @@
 namespace study_worlds {
 
 /// What the study sees of a world: its logs (never written), its map and vehicle files (in `folder`), the model's name.
-backwash::study::Observations observe(const World& world, const std::filesystem::path& folder);
+backwash::study::Observations observe(const HiddenWorld& world, const std::filesystem::path& folder);
 
-backwash::study::Observations observe(const World& world, const std::vector<Table>& flights,
+backwash::study::Observations observe(const HiddenWorld& world, const std::vector<Table>& flights,
                                       const std::filesystem::path& folder);
 
 /// `first`, and then one flight more at a time, up to `most`: flight(n), n from 1, until look(what is seen) says that
 /// it is enough. How many were flown; most + 1 if it never was.
-int observe_further(const World& world, const std::vector<Table>& first, const std::filesystem::path& folder, int most,
-                    const std::function<Table(int)>& flight,
+int observe_further(const HiddenWorld& world, const std::vector<Table>& first, const std::filesystem::path& folder,
+                    int most, const std::function<Table(int)>& flight,
                     const std::function<bool(const backwash::study::Observations&)>& look);
 
 /// The same after every flight.
-void observe_each(const World& world, const std::filesystem::path& folder,
+void observe_each(const HiddenWorld& world, const std::filesystem::path& folder,
                   const std::function<void(const backwash::study::Observations&)>& look);
 /// What six sound flights of the world's craft say of its rotors.
-backwash::study::SoundRotors sound_rotors(const World& world, const std::filesystem::path& folder);
+backwash::study::SoundRotors sound_rotors(const HiddenWorld& world, const std::filesystem::path& folder);
 /// Of a study that is given these.
-backwash::study::StudyOptions with_reference(const World& world, const std::filesystem::path& folder);
+backwash::study::StudyOptions with_reference(const HiddenWorld& world, const std::filesystem::path& folder);
 
 /// Per told cause its name, then its rivals.
 std::vector<std::vector<std::string>> sets_of(const backwash::study::StudyResult& result);

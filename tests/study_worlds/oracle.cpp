@@ -41,7 +41,8 @@ double flown_tail(const std::vector<Table>& flights) {
 
 }  // namespace
 
-std::vector<Compared> compare(const World& world, const std::vector<Table>& flights, const study::Accepted& found) {
+std::vector<Compared> compare(const HiddenWorld& world, const std::vector<Table>& flights,
+                              const study::Accepted& found) {
   const std::string& cause = found.form->cause();
   std::vector<Compared> all;
   for (const auto& p : found.parameters) {
@@ -70,8 +71,8 @@ namespace {
 /// column is a mean over 18 s.
 constexpr double kBeyondOfBattery = 8;  // s
 
-study::Column oracle_column(const study::Observations& seen, const std::vector<Table>& flights, double beyond) {
-  study::Column column;
+study::DesignColumn oracle_column(const study::Observations& seen, const std::vector<Table>& flights, double beyond) {
+  study::DesignColumn column;
   const auto add = [&](study::Channel channel, const std::function<double(const Hidden&)>& value) {
     auto x = window_means(seen, flights, value, beyond);
     if (std::any_of(x.begin(), x.end(), [](double v) { return std::abs(v) > 1e-9; }))
@@ -84,7 +85,7 @@ study::Column oracle_column(const study::Observations& seen, const std::vector<T
 }
 
 /// The columns in those channels alone that the oracle moves.
-std::vector<study::Column> seen_by(const study::Column& oracle, std::vector<study::Column> columns) {
+std::vector<study::DesignColumn> seen_by(const study::DesignColumn& oracle, std::vector<study::DesignColumn> columns) {
   for (auto& column : columns)
     std::erase_if(column.parts, [&](const auto& part) {
       return std::none_of(oracle.parts.begin(), oracle.parts.end(), [&](auto& o) { return o.channel == part.channel; });
@@ -109,17 +110,17 @@ double explained(const study::Observations& seen, const std::vector<Table>& flig
   return most;
 }
 
-void compare_with_oracle(Outcome& outcome, const study::Accepted& found, const study::Observations& seen,
+void compare_with_oracle(WorldOutcome& outcome, const study::Accepted& found, const study::Observations& seen,
                          const std::vector<Table>& flights) {
   const double beyond = found.form->cause() == "battery_sag" ? kBeyondOfBattery : 0;
-  const study::Column column = oracle_column(seen, flights, beyond);
+  const study::DesignColumn column = oracle_column(seen, flights, beyond);
   if (column.parts.empty()) return;
   study::Evidence evidence(seen);
   evidence.whiten({column});
-  std::vector<study::Column> both = found.columns, free;
+  std::vector<study::DesignColumn> both = found.columns, free;
   both.push_back(column);
   if (!found.form->constant) free = study::offsets(both, seen);
-  const auto gain = [&](const std::vector<study::Column>& columns) {
+  const auto gain = [&](const std::vector<study::DesignColumn>& columns) {
     const auto normal = evidence.normal(columns, free);
     return normal.solvable ? normal.gain() : 0.0;
   };

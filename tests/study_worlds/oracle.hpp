@@ -8,7 +8,7 @@ namespace study_worlds {
 
 /// The estimated parameters of which the generator knows the value in the same unit (README.md of the study lists
 /// them); empty for a cause without one.
-std::vector<Compared> compare(const World& world, const std::vector<Table>& flights,
+std::vector<Compared> compare(const HiddenWorld& world, const std::vector<Table>& flights,
                               const backwash::study::Accepted& found);
 /// Share of a channel's variance between windows that the hidden effect's window means explain, largest of all
 /// channels.
@@ -21,7 +21,7 @@ std::optional<double> parameter_error(const std::vector<Compared>& compared);
 /// held-out gain of the found cause over that of the oracle with one factor fitted, and of each compared parameter
 /// `best`, where the estimate is of one shape alone (Form::shapes). Leaves them empty for effects that are neither a
 /// push nor a factor on the variance.
-void compare_with_oracle(Outcome& outcome, const backwash::study::Accepted& found,
+void compare_with_oracle(WorldOutcome& outcome, const backwash::study::Accepted& found,
                          const backwash::study::Observations& seen, const std::vector<Table>& flights);
 
 }  // namespace study_worlds

@@ -59,7 +59,7 @@ void append_bob(std::vector<Command>& plan, const Vec3& bottom, double amplitude
 }
 
 /// Flights that go up and down at six to eight spots, all about the same height.
-std::vector<Command> bobbing_plan(const World& world, Rng& rng) {
+std::vector<Command> bobbing_plan(const HiddenWorld& world, Rng& rng) {
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
   const Vec3& far = world.room.inside.high;
   const auto spot = [&] {
@@ -83,7 +83,7 @@ std::vector<Command> bobbing_plan(const World& world, Rng& rng) {
 
 }  // namespace
 
-std::vector<Command> draw_plan(const World& world, Rng& rng) {
+std::vector<Command> draw_plan(const HiddenWorld& world, Rng& rng) {
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
   if (world.request.confound == "bob") return bobbing_plan(world, rng);
   const bool turns = world.request.confound != "yaw", two_heights = world.request.confound == "height";

@@ -18,11 +18,11 @@ struct Command {
 };
 
 /// A flight: dwells at places that the request's circumstances allow, and the ways between them, sampled at kStep.
-std::vector<Command> draw_plan(const World& world, Rng& rng);
+std::vector<Command> draw_plan(const HiddenWorld& world, Rng& rng);
 
 /// Flight `number` of the world along this plan. `charge`: of the battery at the start, 0 … 1; 0: as the world draws
 /// it.
-Table fly_along(const World& world, int number, const std::vector<Command>& plan, double charge = 0);
+Table fly_along(const HiddenWorld& world, int number, const std::vector<Command>& plan, double charge = 0);
 /// From when on the request's causes act in a flight, s; infinite where they do not.
 double acts_since(const Request& request, int flight);
 

@@ -33,9 +33,9 @@ std::vector<std::string> two_causes(std::uint64_t seed) {
 
 }  // namespace
 
-const std::vector<Cell>& cells() {
-  static const std::vector<Cell> all = [] {
-    std::vector<Cell> list;
+const std::vector<MatrixCell>& cells() {
+  static const std::vector<MatrixCell> all = [] {
+    std::vector<MatrixCell> list;
     for (const auto& name : cause_names()) list.push_back({name, {name}});
     list.insert(list.end(), {{"unknown", {"unknown"}},
                              {"none", {}},
@@ -59,30 +59,31 @@ const std::vector<Cell>& cells() {
   return all;
 }
 
-bool Outcome::in_sets() const {
+bool WorldOutcome::in_sets() const {
   return std::all_of(truth.begin(), truth.end(), [&](const auto& name) {
     if (name == "unknown") return !unknown.empty();
     return std::any_of(sets.begin(), sets.end(), [&](const auto& set) { return holds(set, name); });
   });
 }
 
-bool Outcome::wrong_name() const {
+bool WorldOutcome::wrong_name() const {
   return std::any_of(sets.begin(), sets.end(), [&](const auto& set) {
     return std::none_of(set.begin(), set.end(), [&](const auto& name) { return holds(truth, name); });
   });
 }
 
-bool Outcome::right() const {
+bool WorldOutcome::right() const {
   const bool hidden_unknown = holds(truth, "unknown");
   const bool alone = std::all_of(sets.begin(), sets.end(), [](const auto& set) { return set.size() == 1; });
   return in_sets() && !wrong_name() && alone && (hidden_unknown || unknown.empty());
 }
 
-Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, const std::filesystem::path& folder) {
-  Outcome out;
+WorldOutcome score(const MatrixCell& cell, std::uint64_t seed, double size, int flights,
+                   const std::filesystem::path& folder) {
+  WorldOutcome out;
   out.cell = cell.name, out.seed = seed, out.size = size;
   out.truth = cell.two_drawn ? two_causes(seed) : cell.causes;
-  const World world = draw_world({seed, out.truth, size, flights, cell.confound});
+  const HiddenWorld world = draw_world({seed, out.truth, size, flights, cell.confound});
   auto options = cell.reference ? with_reference(world, folder) : backwash::study::StudyOptions();
   const double start = cpu();
   const auto tables = fly_all(world);
@@ -106,7 +107,7 @@ Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, co
   return out;
 }
 
-nlohmann::json to_json(const Outcome& o) {
+nlohmann::json to_json(const WorldOutcome& o) {
   nlohmann::json json = {{"cell", o.cell},       {"seed", o.seed},         {"size", o.size},
                          {"truth", o.truth},     {"sets", o.sets},         {"unknown", o.unknown},
                          {"study_s", o.study_s}, {"world_s", o.world_s},   {"told", told(o.sets, o.unknown)},
@@ -123,8 +124,8 @@ nlohmann::json to_json(const Outcome& o) {
   return json;
 }
 
-Outcome from_json(const nlohmann::json& json) {
-  Outcome o;
+WorldOutcome from_json(const nlohmann::json& json) {
+  WorldOutcome o;
   o.cell = json.at("cell"), o.seed = json.at("seed"), o.size = json.at("size");
   o.truth = json.at("truth").get<std::vector<std::string>>();
   o.sets = json.at("sets").get<std::vector<std::vector<std::string>>>();

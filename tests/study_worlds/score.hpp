@@ -11,7 +11,7 @@
 namespace study_worlds {
 
 /// One row of the confusion matrix: what its worlds hide and in what circumstances.
-struct Cell {
+struct MatrixCell {
   std::string name;                 ///< "ceiling", "none", "trim, no yaw", "two causes"
   std::vector<std::string> causes;  ///< hidden; empty: none
   std::string confound = "";
@@ -19,7 +19,7 @@ struct Cell {
   bool reference = true;   ///< the study is given six sound flights
 };
 /// Every cause, unknown, none, two causes, and the confounded pairs of flights that cannot tell.
-const std::vector<Cell>& cells();
+const std::vector<MatrixCell>& cells();
 
 /// A parameter that study and generator give in the same unit.
 struct Compared {
@@ -30,7 +30,7 @@ struct Compared {
 };
 
 /// How the study fared in one world.
-struct Outcome {
+struct WorldOutcome {
   std::string cell;
   std::uint64_t seed = 0;
   double size = 1;
@@ -52,9 +52,10 @@ struct Outcome {
 };
 
 /// Draws, flies, studies and compares one world. `folder` is written to.
-Outcome score(const Cell& cell, std::uint64_t seed, double size, int flights, const std::filesystem::path& folder);
+WorldOutcome score(const MatrixCell& cell, std::uint64_t seed, double size, int flights,
+                   const std::filesystem::path& folder);
 
-nlohmann::json to_json(const Outcome& outcome);
-Outcome from_json(const nlohmann::json& json);
+nlohmann::json to_json(const WorldOutcome& outcome);
+WorldOutcome from_json(const nlohmann::json& json);
 
 }  // namespace study_worlds

@@ -55,7 +55,7 @@ SharedOutcome score(const SharedFault& hidden, std::uint64_t seed, const std::fi
   const bool rpm = hidden.fault == "rpm";
   Request request{seed, {}, hidden.size, kFlights, "", out.truth, out.since_s};
   if (!rpm) request.causes = {hidden.fault};
-  const World world = draw_world(request);
+  const HiddenWorld world = draw_world(request);
   auto flights = fly_all(world);
   const std::size_t rotor = rpm ? rng() % 4 : static_cast<std::size_t>(std::abs(world.effects.shape_of(hidden.fault)));
   if (rpm) break_rotor(flights, out.truth, rotor, out.since_s);

@@ -25,7 +25,7 @@ namespace {
 
 constexpr double kAsTruth = 1.1;  // error over the truth's own that counts as reached
 
-study::StudyOptions quick(const World& world, const std::filesystem::path& folder) {
+study::StudyOptions quick(const HiddenWorld& world, const std::filesystem::path& folder) {
   auto options = with_reference(world, folder);
   options.minimum_detectable = options.dependence = false;
   return options;
@@ -46,8 +46,8 @@ struct Given {
   backwash::Model model;
   backwash::map::OccupancyGrid grid;
   sim::ModelField field;
-  study::Surroundings surroundings;
-  Given(const World& world, const std::filesystem::path& folder)
+  study::MapView surroundings;
+  Given(const HiddenWorld& world, const std::filesystem::path& folder)
       : vehicle(backwash::config::load_vehicle((folder / "vehicle.toml").string()).value()),
         model(model_of(world, vehicle)),
         grid(backwash::map::load_map((folder / "map.bt").string()).value()),
@@ -56,7 +56,7 @@ struct Given {
   Given(const Given&) = delete;
 
  private:
-  static backwash::Model model_of(const World& world, const backwash::Vehicle& vehicle) {
+  static backwash::Model model_of(const HiddenWorld& world, const backwash::Vehicle& vehicle) {
     auto model = backwash::config::load_model("builtin:" + world.craft.model).value();
     model.ground.r0 = vehicle.body.diagonal_radius;
     return model;
@@ -83,7 +83,8 @@ std::vector<study::Observations> simulated(Given& given, const std::vector<Table
 }
 
 /// The same flights by the generator itself, with other gusts and other scatter between flights.
-std::vector<study::Observations> truth_again(Given& given, const World& world, int first, int count, int replicas) {
+std::vector<study::Observations> truth_again(Given& given, const HiddenWorld& world, int first, int count,
+                                             int replicas) {
   std::vector<study::Observations> all;
   for (int r = 0; r < replicas; ++r) {
     study::Observer observer(given.vehicle, given.surroundings);
@@ -142,7 +143,7 @@ std::string number(double x) {
 Proof prove(const ProofRequest& request, const std::filesystem::path& folder) {
   Proof proof;
   proof.cause = request.cause, proof.seed = request.seed;
-  World world = draw_world({request.seed, {request.cause}, 1, 2 * request.flights, ""});
+  HiddenWorld world = draw_world({request.seed, {request.cause}, 1, 2 * request.flights, ""});
   world.craft.rotor_spread = 0.01;  // how a craft is built is no term of a simulation
   const auto all = fly_all(world);
   const std::vector<Table> fitted(all.begin(), all.begin() + request.flights),

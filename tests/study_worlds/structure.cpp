@@ -9,9 +9,9 @@
 namespace study_worlds {
 namespace {
 
-using Kind = Structure::Kind;
-using Quantity = Structure::Quantity;
-using Where = Structure::Where;
+using Kind = HiddenStructure::Kind;
+using Quantity = HiddenStructure::Quantity;
+using Where = HiddenStructure::Where;
 
 double between(std::mt19937_64& rng, double low, double high) { return std::uniform_real_distribution(low, high)(rng); }
 int one_of(std::mt19937_64& rng, int count) { return static_cast<int>(between(rng, 0, count)); }
@@ -41,7 +41,7 @@ double slow(Quantity q, std::mt19937_64& rng) {
   return 2 * M_PI / between(rng, 2, 5);
 }
 
-void draw_bump(Structure& s, std::mt19937_64& rng) {
+void draw_bump(HiddenStructure& s, std::mt19937_64& rng) {
   constexpr Quantity kAlong[] = {Quantity::z, Quantity::t, Quantity::temperature};
   s.along[0] = kAlong[one_of(rng, 3)];
   if (s.along[0] == Quantity::z) s.number = {between(rng, 0.6, 1.6), between(rng, 0.15, 0.3)};
@@ -51,8 +51,8 @@ void draw_bump(Structure& s, std::mt19937_64& rng) {
 
 }  // namespace
 
-Structure draw_structure(std::mt19937_64& rng) {
-  Structure s;
+HiddenStructure draw_structure(std::mt19937_64& rng) {
+  HiddenStructure s;
   s.kind = static_cast<Kind>(one_of(rng, 5));
   s.where = static_cast<Where>(one_of(rng, 3));
   s.direction = between(rng, -M_PI, M_PI);
@@ -73,7 +73,7 @@ Structure draw_structure(std::mt19937_64& rng) {
   return s;
 }
 
-double value_at(const Structure& s, const Instant& now) {
+double value_at(const HiddenStructure& s, const Instant& now) {
   const double first = value_of(s.along[0], now);
   if (s.kind == Kind::bump) return 2.2 * std::exp(-std::pow((first - s.number[0]) / s.number[1], 2));
   const double wave = std::sqrt(2.0) * std::cos(s.number[0] * first + s.phase[0]);
@@ -81,7 +81,7 @@ double value_at(const Structure& s, const Instant& now) {
   return wave * std::sqrt(2.0) * std::cos(s.number[1] * value_of(s.along[1], now) + s.phase[1]);
 }
 
-std::string text_of(const Structure& s) {
+std::string text_of(const HiddenStructure& s) {
   static const char* const kKinds[] = {"tone", "heading", "wave", "product", "bump"};
   static const char* const kQuantities[] = {"x", "y", "z", "yaw", "t", "temperature"};
   static const char* const kWhere[] = {"level", "up", "variance"};

@@ -10,7 +10,7 @@ namespace study_worlds {
 struct Instant;
 
 /// What "unknown" is in a world: something that no name of the catalogue covers, drawn at random.
-struct Structure {
+struct HiddenStructure {
   enum class Kind { tone, heading, wave, product, bump };
   enum class Quantity { x, y, z, yaw, t, temperature };
   enum class Where { level, up, variance };
@@ -23,10 +23,10 @@ struct Structure {
   double direction = 0;  ///< of a level push, rad
 };
 
-Structure draw_structure(std::mt19937_64& rng);
+HiddenStructure draw_structure(std::mt19937_64& rng);
 /// Its value where a craft is; about 1 root mean square over flights.
-double value_at(const Structure& structure, const Instant& now);
+double value_at(const HiddenStructure& structure, const Instant& now);
 /// "tone of t 0.071 Hz, up".
-std::string text_of(const Structure& structure);
+std::string text_of(const HiddenStructure& structure);
 
 }  // namespace study_worlds

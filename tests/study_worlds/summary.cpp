@@ -47,7 +47,8 @@ std::string names_of(const std::vector<std::string>& names) {
 
 /// Gate over every cell that `chosen` picks: the figure of the worst, and the cells that miss.
 template <typename Chosen, typename Figure, typename Holds>
-Gate over(const std::string& name, const std::vector<CellSummary>& cells, Chosen chosen, Figure figure, Holds holds) {
+Requirement over(const std::string& name, const std::vector<CellSummary>& cells, Chosen chosen, Figure figure,
+                 Holds holds) {
   std::vector<std::string> missed;
   int tested = 0;
   for (const auto& c : cells) {
@@ -82,23 +83,23 @@ std::string told_list(const CellSummary& c) {
 constexpr double kCounted = 0.15;  // of a channel's variance between windows
 const char* const kWeaker = "unknown below 0.15";
 
-std::string row_of(const Outcome& o) { return o.cell == "unknown" && o.explained < kCounted ? kWeaker : o.cell; }
+std::string row_of(const WorldOutcome& o) { return o.cell == "unknown" && o.explained < kCounted ? kWeaker : o.cell; }
 
 }  // namespace
 
 double Rate::low() const { return std::max(0.0, wilson(*this).first - wilson(*this).second); }
 double Rate::high() const { return std::min(1.0, wilson(*this).first + wilson(*this).second); }
 
-std::vector<CellSummary> summarise(const std::vector<Outcome>& outcomes) {
+std::vector<CellSummary> summarise(const std::vector<WorldOutcome>& outcomes) {
   std::vector<CellSummary> all;
   std::vector<std::string> names;
-  for (const Cell& cell : cells()) names.push_back(cell.name);
+  for (const MatrixCell& cell : cells()) names.push_back(cell.name);
   names.push_back(kWeaker);
   for (const auto& name : names) {
     CellSummary s;
     s.cell = name;
     std::map<std::string, int> told_counts;
-    for (const Outcome& o : outcomes) {
+    for (const WorldOutcome& o : outcomes) {
       if (row_of(o) != name) continue;
       s.right.count(o.right()), s.in_sets.count(o.in_sets()), s.wrong_name.count(o.wrong_name());
       s.silent.count(o.silent());
@@ -120,7 +121,7 @@ std::vector<CellSummary> summarise(const std::vector<Outcome>& outcomes) {
   return all;
 }
 
-std::vector<Gate> gates(const std::vector<CellSummary>& cells) {
+std::vector<Requirement> gates(const std::vector<CellSummary>& cells) {
   const auto is = [](const char* name) { return [name](const CellSummary& c) { return c.cell == name; }; };
   const auto known = [](const CellSummary& c) { return plain(c) || c.cell == "unknown"; };
   const auto error = [](const CellSummary& c) { return text("%.2f", median(c.errors)); };
@@ -129,7 +130,7 @@ std::vector<Gate> gates(const std::vector<CellSummary>& cells) {
   Rate covered, best;
   for (const auto& c : cells)
     if (plain(c)) covered.add(c.covered), best.add(c.covered_best);
-  std::vector<Gate> all = {
+  std::vector<Requirement> all = {
       over("false alarms: 95 % upper limit ≤ 0.08", cells, is("none"), alarms,
            [](auto& c) {
              return Rate{c.silent.n - c.silent.hits, c.silent.n}.high() <= 0.08;
@@ -161,7 +162,7 @@ std::vector<Gate> gates(const std::vector<CellSummary>& cells) {
   return all;
 }
 
-std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes) {
+std::string markdown(const std::vector<CellSummary>& cells, const std::vector<WorldOutcome>& outcomes) {
   std::string page =
       "| hidden | right name alone | truth in what is told | wrong name | parameter error | interval covers size | of "
       "form "

@@ -27,16 +27,16 @@ struct CellSummary {
   std::vector<double> errors, gain_shares;        ///< sorted
   std::vector<std::pair<int, std::string>> told;  ///< most frequent first
 };
-std::vector<CellSummary> summarise(const std::vector<Outcome>& outcomes);
+std::vector<CellSummary> summarise(const std::vector<WorldOutcome>& outcomes);
 
 /// One requirement over cells, its figure and whether it holds.
-struct Gate {
+struct Requirement {
   std::string name, figure;
   bool held;
 };
-std::vector<Gate> gates(const std::vector<CellSummary>& cells);
+std::vector<Requirement> gates(const std::vector<CellSummary>& cells);
 
 /// Tables of confusion.md: confusion, figures, gates.
-std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Outcome>& outcomes);
+std::string markdown(const std::vector<CellSummary>& cells, const std::vector<WorldOutcome>& outcomes);
 
 }  // namespace study_worlds

@@ -45,9 +45,9 @@ void change_thrust(std::vector<Table>& flights, const Craft& craft, const std::a
       }
 }
 
-World drawn_world(const RotorTrial& trial, const Request& request, std::mt19937_64& rng) {
+HiddenWorld drawn_world(const RotorTrial& trial, const Request& request, std::mt19937_64& rng) {
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
-  World world = draw_world(request);
+  HiddenWorld world = draw_world(request);
   Craft& c = world.craft;
   if (trial.craft == "quad-7in") c.mass = 1.9, c.max_thrust = 38, c.model = trial.craft;
   if (trial.craft == "quad-5in") c.mass = 0.9, c.max_thrust = 18, c.model = trial.craft;
@@ -66,7 +66,7 @@ RotorOutcome score(const RotorTrial& trial, std::uint64_t seed, const std::files
   const std::size_t rotor = rng() % 4;
   const std::uint64_t of_craft = trial.craft == "drawn" ? 2 : trial.craft == "quad-7in" ? 1 : 0;
   const Request request{3 * seed + of_craft, {}, 1, 12, ""};
-  World world = drawn_world(trial, request, rng);
+  HiddenWorld world = drawn_world(trial, request, rng);
   if (trial.hidden == "weight") {
     out.size = u(0.06, 0.2);
     world.effects.size["payload"] = out.size;

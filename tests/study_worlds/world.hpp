@@ -54,24 +54,24 @@ struct Craft {
 };
 
 /// One number per cause, signed, in the table's units; what is absent is zero.
-struct Effects {
+struct HiddenEffects {
   std::map<std::string, double> size;
   std::map<std::string, double> shape;  ///< a second, drawn number: length, time or direction
-  Structure structure{};                ///< of "unknown"
+  HiddenStructure structure{};          ///< of "unknown"
   double of(const std::string& name) const { return size.contains(name) ? size.at(name) : 0.0; }
   double shape_of(const std::string& name) const { return shape.contains(name) ? shape.at(name) : 0.0; }
 };
 
-struct World {
+struct HiddenWorld {
   Request request;
   Room room;
   Craft craft;
-  Effects effects;
+  HiddenEffects effects;
   double rate_hz, jitter, ln_var_vehicle;
   double rotor_rpm;  ///< at hover
 };
 
-World draw_world(const Request& request);
+HiddenWorld draw_world(const Request& request);
 /// What is hidden at a row: push by the effects of the mean, m/s² in W as the accelerometer tells it; ln of the factor
 /// on the variance; factor of the bursts on the gusts. Never written to a file: for the oracle fit alone.
 struct Hidden {
@@ -85,17 +85,17 @@ struct Table {
   std::vector<std::vector<double>> rows;
   std::vector<Hidden> hidden;  ///< one per row
 };
-std::vector<Table> fly_all(const World& world);
+std::vector<Table> fly_all(const HiddenWorld& world);
 /// Flight `number` of the world along its plan again, nothing frozen or missing, with the gusts and the scatter between
 /// flights of a replica (from 1 on); battery and temperature begin as they did.
-Table fly_again(const World& world, int number, unsigned replica);
+Table fly_again(const HiddenWorld& world, int number, unsigned replica);
 
 /// Writes map.bt and vehicle.toml.
-void write_world_files(const World& world, const std::filesystem::path& folder);
+void write_world_files(const HiddenWorld& world, const std::filesystem::path& folder);
 /// Writes those and the flights with shuffled names and columns; returns the flights' paths.
-std::vector<std::filesystem::path> write_world(const World& world, const std::filesystem::path& folder);
+std::vector<std::filesystem::path> write_world(const HiddenWorld& world, const std::filesystem::path& folder);
 /// The answer, one line of JSON; never written beside the flights.
-std::string truth_line(const World& world);
+std::string truth_line(const HiddenWorld& world);
 
 /// Those of the catalogue (causes() in effects.hpp).
 const std::vector<std::string>& cause_names();

@@ -6,8 +6,8 @@
 namespace backwash::study {
 
 /// Of the causes that join the model, what its file would hold.
-inline std::vector<Term> terms_of(const StudyResult& result) {
-  std::vector<Term> terms;
+inline std::vector<ExtensionTerm> terms_of(const StudyResult& result) {
+  std::vector<ExtensionTerm> terms;
   for (const auto& cause : result.causes) {
     const auto& f = cause.found;
     if (!cause.applied.refused.empty()) continue;

@@ -26,7 +26,7 @@ struct Interval {
 };
 
 /// A number with its 95 % interval from the bootstrap by flight.
-struct Estimate {
+struct CalibratedValue {
   double value;
   Interval ci95;
 };
@@ -43,11 +43,12 @@ struct Calibration {
   Model model;      ///< the gates' model with what was determined
   Free determined;  ///< parameters that the flights determine; the others are the gates' model's
   std::array<Interval, kParameters> ci95;
-  Estimate push_horizontal, push_vertical;  ///< [bound] mean, m/s²; value 0 and interval 0 … 0 if `pushes` is false
-  Estimate tau_w;                           ///< s
-  bool pushes;                              ///< whether the logs hold the steady push (set-points)
-  Assessment on_fitted;                     ///< on the flights fitted
-  Assessment held_out;                      ///< every flight against a fit without it (`folds`)
+  CalibratedValue push_horizontal,
+      push_vertical;      ///< [bound] mean, m/s²; value 0 and interval 0 … 0 if `pushes` is false
+  CalibratedValue tau_w;  ///< s
+  bool pushes;            ///< whether the logs hold the steady push (set-points)
+  Assessment on_fitted;   ///< on the flights fitted
+  Assessment held_out;    ///< every flight against a fit without it (`folds`)
 };
 
 /// Fits the model's bound at a quantile (fit.hpp), with intervals by resampling whole flights within each place

@@ -138,7 +138,7 @@ Parameters minimised(const Loss& loss, const Parameters& x, const Free& free, do
 }
 
 /// Level of each flight and the scatter between and within them.
-struct Scatter {
+struct LevelScatter {
   Levels levels;  ///< shrunk
   Levels means;   ///< mean residual less that of the place, not shrunk
   std::array<double, kGroups> between{}, within{};
@@ -150,7 +150,7 @@ struct Sums {
   explicit Sums(std::size_t flights) : first(flights), second(flights), count(flights) {}
 };
 
-void analyse(const Data& data, std::span<const double> weights, const Sums& r, Group g, Scatter& s) {
+void analyse(const Data& data, std::span<const double> weights, const Sums& r, Group g, LevelScatter& s) {
   const std::size_t flights = weights.size();
   const auto used = [&](std::size_t f) { return weights[f] > 0 && r.count[f] > 0; };
   std::vector<double> place_sum, place_weight;
@@ -193,9 +193,9 @@ void for_each_residual(const Data& data, std::span<const double> weights, const 
   }
 }
 
-Scatter scatter(const Data& data, std::span<const double> weights, const Parameters& parameters) {
+LevelScatter scatter(const Data& data, std::span<const double> weights, const Parameters& parameters) {
   const std::size_t flights = weights.size();
-  Scatter s{Levels(flights), Levels(flights), {}, {}};
+  LevelScatter s{Levels(flights), Levels(flights), {}, {}};
   std::array<Sums, kGroups> sums{Sums(flights), Sums(flights)};
   for_each_residual(data, weights, parameters, [&](std::size_t flight, int axis, double r) {
     auto& g = sums[group(axis)];
@@ -206,8 +206,8 @@ Scatter scatter(const Data& data, std::span<const double> weights, const Paramet
 }
 
 /// ln of the factor on a group's Σ that a new flight's windows stay below with probability q.
-double level_shift(const Data& data, std::span<const double> weights, const Parameters& parameters, const Scatter& s,
-                   Group g, double q) {
+double level_shift(const Data& data, std::span<const double> weights, const Parameters& parameters,
+                   const LevelScatter& s, Group g, double q) {
   std::vector<std::pair<double, double>> within;  // residual about its flight's level, weight
   double total = 0;
   for_each_residual(data, weights, parameters, [&](std::size_t flight, int axis, double r) {
@@ -259,7 +259,7 @@ Fit fit(const Data& data, std::span<const double> flight_weights, const Paramete
     const double tolerance = round + 1 < options.rounds ? kCalibrationRules.rough : kCalibrationRules.fine;
     result.parameters = scaled(minimised(loss, scaled(result.parameters, 1), options.free, tolerance), -1);
   }
-  const Scatter s = scatter(data, flight_weights, result.parameters);
+  const LevelScatter s = scatter(data, flight_weights, result.parameters);
   result.between_sd = s.between, result.within_sd = s.within;
   for (const Group g : {kHorizontal, kVertical}) {
     const double factor = std::exp(level_shift(data, flight_weights, result.parameters, s, g, options.quantile));

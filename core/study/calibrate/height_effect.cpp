@@ -94,7 +94,7 @@ class Regression {
 
 /// e^{c'β} of several contrasts with intervals over resampled flights; and the scatter.
 struct Contrasts {
-  std::vector<Estimate> ratios;
+  std::vector<CalibratedValue> ratios;
   double within, between;
 };
 Contrasts contrasts(const Regression& fit, const std::vector<std::pair<Eigen::Index, double>>& wanted, int bootstraps,

@@ -29,9 +29,9 @@ std::vector<HeightRow> height_rows(const FlightWindows& windows, const log::Flig
 
 /// Ratios of the vertical variance, day and speed held fixed. A ratio has the value 0 where no day or flight shows it.
 struct HeightEffect {
-  Estimate low_over_high;  ///< at `low_m` against `high_m`, by the law below
-  Estimate bins;           ///< heights within a factor of two of `low_m` against those of `high_m`: no law
-  Estimate ceiling;        ///< under the plate against without, at the same height
+  CalibratedValue low_over_high;  ///< at `low_m` against `high_m`, by the law below
+  CalibratedValue bins;           ///< heights within a factor of two of `low_m` against those of `high_m`: no law
+  CalibratedValue ceiling;        ///< under the plate against without, at the same height
   double low_m, high_m;
   std::size_t windows, flights, days;
   std::size_t low_flights, high_flights;  ///< that were within a factor of two of these heights

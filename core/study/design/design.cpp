@@ -72,7 +72,7 @@ Design design(const Observations& seen, const StudyResult& result, const plan::W
     design.message = "nothing to tell apart: no cause has a rival";
     return design;
   }
-  Surroundings surroundings(&world.grid, model);
+  MapView surroundings(&world.grid, model);
   const Imagination imagination(seen, world.reach.vehicle, surroundings);
   for (const Way& way : ways(world, start_W)) {
     const FlownWay flown = flown_way(world, start_W, way, flight_time);

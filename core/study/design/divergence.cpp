@@ -20,7 +20,7 @@ MatrixXd rest(const MatrixXd& gram, Eigen::Index own) {
          cross.transpose() * gram.bottomRightCorner(others, others).completeOrthogonalDecomposition().solve(cross);
 }
 
-MatrixXd gram_of(const Evidence& evidence, const std::vector<Column>& columns) {
+MatrixXd gram_of(const Evidence& evidence, const std::vector<DesignColumn>& columns) {
   return evidence.normal(columns, {}).total;
 }
 
@@ -29,7 +29,9 @@ Scale anchored(const Form& form, Scale scale, const Windows& flown) {
   return scale;
 }
 
-void append(std::vector<Column>& to, const std::vector<Column>& more) { to.insert(to.end(), more.begin(), more.end()); }
+void append(std::vector<DesignColumn>& to, const std::vector<DesignColumn>& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
 
 }  // namespace
 
@@ -82,8 +84,9 @@ std::vector<std::pair<std::size_t, std::size_t>> Contest::pairs() const {
   return all;
 }
 
-std::vector<Column> Contest::beside(const std::vector<Column>& both, bool constant, const Observations& seen) const {
-  std::vector<Column> columns = constant ? std::vector<Column>() : offsets(both, seen);
+std::vector<DesignColumn> Contest::beside(const std::vector<DesignColumn>& both, bool constant,
+                                          const Observations& seen) const {
+  std::vector<DesignColumn> columns = constant ? std::vector<DesignColumn>() : offsets(both, seen);
   for (std::size_t k = 0; k < accepted_->size(); ++k) {
     if (k == which_) continue;
     const Accepted& other = (*accepted_)[k];
@@ -93,9 +96,9 @@ std::vector<Column> Contest::beside(const std::vector<Column>& both, bool consta
   return columns;
 }
 
-std::vector<Column> Contest::joint(const Explanation& truth, const Form* rival, const Scale& scale,
-                                   const Observations& seen) const {
-  std::vector<Column> columns = truth.form->columns(seen.windows, truth.scale);
+std::vector<DesignColumn> Contest::joint(const Explanation& truth, const Form* rival, const Scale& scale,
+                                         const Observations& seen) const {
+  std::vector<DesignColumn> columns = truth.form->columns(seen.windows, truth.scale);
   if (rival) append(columns, rival->columns(seen.windows, scale));
   append(columns, beside(columns, truth.form->constant || (rival && rival->constant), seen));
   if (columns.size() > static_cast<std::size_t>(kMostColumns)) columns.clear();
@@ -112,7 +115,7 @@ Contest::Duel Contest::duel(std::size_t truth, std::size_t rival) const {
   auto both = own;
   append(both, other);
   const auto nuisance = beside(both, ours.form->constant || theirs.form->constant, seen);
-  const Normal we = flown_->normal(own, nuisance), they = flown_->normal(other, nuisance);
+  const NormalEquations we = flown_->normal(own, nuisance), they = flown_->normal(other, nuisance);
   d.never = !we.solvable || !they.solvable || (ours.form->motors_alone && theirs.form->motors_alone);
   if (d.never) return d;
   d.theta = we.fit(), d.gain = we.gain();

@@ -56,11 +56,12 @@ class Contest {
 
  private:
   /// The columns that stand beside a pair, on some flights.
-  std::vector<Column> beside(const std::vector<Column>& both, bool constant, const Observations& seen) const;
+  std::vector<DesignColumn> beside(const std::vector<DesignColumn>& both, bool constant,
+                                   const Observations& seen) const;
   /// The cause's columns, the rival's, and what stands beside both; without a rival's form what stands beside the
   /// cause. Nothing if they are more than normal equations hold.
-  std::vector<Column> joint(const Explanation& truth, const Form* rival, const Scale& scale,
-                            const Observations& seen) const;
+  std::vector<DesignColumn> joint(const Explanation& truth, const Form* rival, const Scale& scale,
+                                  const Observations& seen) const;
   struct Copy {
     const Form* form;
     Scale scale;

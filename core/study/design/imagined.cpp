@@ -64,7 +64,7 @@ double longest(const Observations& flown) {
 
 }  // namespace
 
-Imagination::Imagination(const Observations& flown, const Vehicle& vehicle, Surroundings& surroundings)
+Imagination::Imagination(const Observations& flown, const Vehicle& vehicle, MapView& surroundings)
     : flown_(&flown), vehicle_(vehicle), surroundings_(&surroundings) {}
 
 std::optional<double> Imagination::first_voltage(bool used_battery) const {

@@ -13,7 +13,7 @@ namespace backwash::study {
 class Imagination {
  public:
   /// Keeps a pointer to `flown`, and to `surroundings`, of the same map.
-  Imagination(const Observations& flown, const Vehicle& vehicle, Surroundings& surroundings);
+  Imagination(const Observations& flown, const Vehicle& vehicle, MapView& surroundings);
   /// `commands`: 20 ms apart. Voltage and temperature are those of the mean course of the flown flights;
   /// `used_battery`: the voltage goes on from where the longest of them ended.
   Observations windows(const std::vector<Setpoint>& commands, bool used_battery) const;
@@ -23,7 +23,7 @@ class Imagination {
  private:
   const Observations* flown_;
   Vehicle vehicle_;
-  Surroundings* surroundings_;
+  MapView* surroundings_;
 };
 
 }  // namespace backwash::study

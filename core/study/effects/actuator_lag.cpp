@@ -16,9 +16,9 @@ Form of_thrust() {
           .needs = {Source::attitude, Source::thrust, Source::setpoints},
           .columns =
               [](const Windows& ws, const Scale&) {
-                return std::vector{Column{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[0]; })},
-                                           {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[0]; })},
-                                           {kMeanZ, values(ws, [](auto& w) { return w.mean_gain[0]; })}}}};
+                return std::vector{DesignColumn{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[0]; })},
+                                                 {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[0]; })},
+                                                 {kMeanZ, values(ws, [](auto& w) { return w.mean_gain[0]; })}}}};
               },
           .simulate = simulates(SimulationTerm::Kind::thrust_lag)};
 }
@@ -35,8 +35,8 @@ Form of_attitude() {
           .unknowable = [](const Observations& seen) { return seen.row_period / 4; },
           .columns =
               [](const Windows& ws, const Scale&) {
-                return std::vector{Column{{{kCommandDelayH, values(ws, [](auto& w) { return w.lag_gain[0]; })},
-                                           {kTiltDelay, values(ws, [](auto& w) { return w.tilt_gain; })}}}};
+                return std::vector{DesignColumn{{{kCommandDelayH, values(ws, [](auto& w) { return w.lag_gain[0]; })},
+                                                 {kTiltDelay, values(ws, [](auto& w) { return w.tilt_gain; })}}}};
               },
           .simulate = simulates(SimulationTerm::Kind::attitude_lag)};
 }

@@ -16,7 +16,7 @@ std::vector<double> voltages(const Windows& ws) {
 }
 
 /// Relative to the mean voltage; that the thrust is as modelled at the highest one is the companion's to correct.
-std::vector<Column> sagging(const Windows& ws, const Scale& scale) {
+std::vector<DesignColumn> sagging(const Windows& ws, const Scale& scale) {
   const auto anchor = scale.anchor.size() == 2 ? scale.anchor : voltages(ws);
   return {missing_thrust(ws, [&](auto& w) { return (anchor[0] - w.voltage) / anchor[1]; })};
 }

@@ -9,17 +9,17 @@ double power_of_distance(double distance, double reference, double n) {
   return std::isfinite(distance) ? std::pow(reference / std::max(distance, kSurfaceNearest), n) : 0.0;
 }
 
-std::vector<Column> body_drift(const Windows& ws, const std::function<double(const WindowRow&)>& amount) {
-  std::vector<Column> columns;
+std::vector<DesignColumn> body_drift(const Windows& ws, const std::function<double(const WindowRow&)>& amount) {
+  std::vector<DesignColumn> columns;
   for (int i = 0; i < 3; ++i) {
-    Column c = level(ws, [&](auto& w) -> Vec3 { return amount(w) * w.R_WB.col(i); });
+    DesignColumn c = level(ws, [&](auto& w) -> Vec3 { return amount(w) * w.R_WB.col(i); });
     c.parts.push_back({kMeanZ, values(ws, [&](auto& w) { return amount(w) * w.R_WB(2, i); })});
     columns.push_back(std::move(c));
   }
   return columns;
 }
 
-Column missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
+DesignColumn missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
   // g for T/m: the measured thrust answers the mean gust, so it would explain the residual by itself.
   return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * kGravity; })},
            {kThrustDelay, values(ws, [&](auto& w) { return -share(w) * w.delay_gain[1]; })},
@@ -28,8 +28,8 @@ Column missing_thrust(const Windows& ws, const std::function<double(const Window
 
 std::vector<Scale> rotors() { return scales_of({0, 1, 2, 3}); }
 
-Column one_rotor(Channel first, const Windows& ws, const Scale& rotor, bool contrast) {
-  Column column;
+DesignColumn one_rotor(Channel first, const Windows& ws, const Scale& rotor, bool contrast) {
+  DesignColumn column;
   for (std::size_t i = 0; i < 4; ++i) {
     const double x = (i == static_cast<std::size_t>(rotor.value) ? 1.0 : 0.0) - (contrast ? 0.25 : 0.0);
     if (x != 0) column.parts.push_back({static_cast<Channel>(first + i), std::vector<double>(ws.size(), x)});

@@ -20,21 +20,21 @@ std::vector<double> values(const Windows& windows, F value) {
 }
 
 template <typename F>
-Column in(Channel channel, const Windows& windows, F value) {
+DesignColumn in(Channel channel, const Windows& windows, F value) {
   return {{{channel, values(windows, value)}}};
 }
 
 /// A level vector: its x and y in the mean channels.
 template <typename F>
-Column level(const Windows& windows, F vector) {
+DesignColumn level(const Windows& windows, F vector) {
   return {{{kMeanX, values(windows, [&](const WindowRow& w) { return vector(w).x(); })},
            {kMeanY, values(windows, [&](const WindowRow& w) { return vector(w).y(); })}}};
 }
 
 /// The same in ln variance along all axes.
 template <typename F>
-Column in_variance(const Windows& windows, F value) {
-  Column column;
+DesignColumn in_variance(const Windows& windows, F value) {
+  DesignColumn column;
   for (const Channel c : kVariances) column.parts.push_back({c, values(windows, value)});
   return column;
 }
@@ -52,7 +52,7 @@ auto along(const WindowRow& w, F value) {
 /// A vertical push that varies along the window, value(w, k) at its point k with mean mean(w): where the craft also
 /// accelerates by its set-points, what varies looks like a steeper or a later thrust, and is told as its part of those.
 template <typename F, typename M>
-Column lifting(const Windows& windows, F value, M mean) {
+DesignColumn lifting(const Windows& windows, F value, M mean) {
   const auto moment = [&](const std::array<double, kPoints>& weight, const WindowRow& w) {
     double sum = 0;
     for (std::size_t k = 0; k < kPoints; ++k)
@@ -66,7 +66,7 @@ Column lifting(const Windows& windows, F value, M mean) {
 
 /// The same of amount(place).
 template <typename F>
-Column lifting(const Windows& windows, F amount) {
+DesignColumn lifting(const Windows& windows, F amount) {
   return lifting(
       windows, [&](auto& w, std::size_t k) { return w.path.empty() ? 0.0 : amount(w.path[k]); },
       [&](auto& w) { return along(w, amount); });
@@ -84,20 +84,20 @@ Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {
 double power_of_distance(double distance, double reference, double n);
 
 /// A vector of the body, growing with `amount`, in all mean channels.
-std::vector<Column> body_drift(const Windows& windows, const std::function<double(const WindowRow&)>& amount);
+std::vector<DesignColumn> body_drift(const Windows& windows, const std::function<double(const WindowRow&)>& amount);
 
 /// −x T/m: a share of the thrust that is missing, seen in the mean and in what a change of the command is worth.
-Column missing_thrust(const Windows& windows, const std::function<double(const WindowRow&)>& share);
+DesignColumn missing_thrust(const Windows& windows, const std::function<double(const WindowRow&)>& share);
 
 /// An offset to whole millimetres, level.
 Vec3 whole_millimetres(const Vec3& offset_W);
 /// ln Σ with the map moved by an offset, less that as it is.
-std::vector<Column> displaced(const Windows& windows, const Vec3& offset_W);
+std::vector<DesignColumn> displaced(const Windows& windows, const Vec3& offset_W);
 
 /// The numbers of the rotors, from 0.
 std::vector<Scale> rotors();
 /// 1 in the channel of one of four rotors, from `first` on; contrast: less the mean of the four.
-Column one_rotor(Channel first, const Windows& windows, const Scale& rotor, bool contrast);
+DesignColumn one_rotor(Channel first, const Windows& windows, const Scale& rotor, bool contrast);
 
 /// Whether any window passes a test.
 template <typename F>

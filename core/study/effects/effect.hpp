@@ -16,7 +16,7 @@
 namespace backwash::study {
 
 /// One regressor: its value on each window, in the channels that it moves.
-struct Column {
+struct DesignColumn {
   struct Part {
     Channel channel;
     std::vector<double> x;
@@ -85,7 +85,7 @@ struct Reference {
 struct FittedForm {
   const Form& form;
   Scale scale;
-  const std::vector<Column>& columns;
+  const std::vector<DesignColumn>& columns;
   std::span<const double> theta;            ///< one per column
   const std::vector<Estimate>& parameters;  ///< of all shapes, at the form's reference
   std::span<const double> beside = {};      ///< of the form's companions, one each
@@ -115,10 +115,10 @@ struct Form {
   std::function<std::optional<std::string>(const Observations&)> not_flown = {};
   /// Half the range, in the first parameter's unit, in which the logs alone cannot tell the value.
   std::function<double(const Observations&)> unknowable = [](const Observations&) { return 0.0; };
-  std::function<std::vector<Column>(const Windows&, const Scale&)> columns = {};
+  std::function<std::vector<DesignColumn>(const Windows&, const Scale&)> columns = {};
   /// What it leaves open and no other cause may claim: the voltage at which the thrust is as modelled, the bias at
   /// which a drift begins.
-  std::function<std::vector<Column>(const Windows&)> companions = {};
+  std::function<std::vector<DesignColumn>(const Windows&)> companions = {};
   /// What `columns` take from the windows themselves and a later study must be told (Scale::anchor).
   std::function<std::vector<double>(const Windows&)> anchor = {};
   /// Other shapes, in the literature as good as this one: the same parameters at the same reference. They take no part

@@ -8,7 +8,7 @@ namespace backwash::study {
 namespace {
 
 /// The bias with which a drift begins.
-std::vector<Column> first_bias(const Windows& ws) {
+std::vector<DesignColumn> first_bias(const Windows& ws) {
   return {level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
           level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
 }

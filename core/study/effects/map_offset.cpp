@@ -24,8 +24,8 @@ Vec3 whole_millimetres(const Vec3& offset_W) {
           0};
 }
 
-std::vector<Column> displaced(const Windows& ws, const Vec3& offset_W) {
-  Column column;
+std::vector<DesignColumn> displaced(const Windows& ws, const Vec3& offset_W) {
+  DesignColumn column;
   for (const Channel c : kVariances)
     column.parts.push_back(
         {c, values(ws, [&](auto& w) { return w.ln_sigma_at(offset_W)[static_cast<int>(c - kVarX)]; })});

@@ -8,9 +8,9 @@ namespace {
 /// Which rotors face each other depends on the autopilot: 1-2 and 3-4, 1-3 and 2-4, or 1-4 and 2-3.
 constexpr std::size_t kFacing[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
 
-std::vector<Column> facing_rotors(const Windows& ws, const Scale& pairing) {
+std::vector<DesignColumn> facing_rotors(const Windows& ws, const Scale& pairing) {
   const auto& pair = kFacing[static_cast<std::size_t>(pairing.value)];
-  std::vector<Column> columns;
+  std::vector<DesignColumn> columns;
   for (const std::size_t k : {std::size_t{0}, std::size_t{2}}) {
     const auto first = static_cast<Channel>(kMotor1 + pair[k]), second = static_cast<Channel>(kMotor1 + pair[k + 1]);
     columns.push_back({{{first, std::vector<double>(ws.size(), 1.0)}, {second, std::vector<double>(ws.size(), -1.0)}}});

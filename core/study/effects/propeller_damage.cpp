@@ -21,7 +21,7 @@ std::vector<SimulationTerm> needs_more_and_shakes(const FittedForm& fitted, cons
 }
 
 /// A weak rotor takes up to d/4 of the collective thrust with it: no payload.
-std::vector<Column> lost_thrust(const Windows& ws) {
+std::vector<DesignColumn> lost_thrust(const Windows& ws) {
   return {missing_thrust(ws, [](auto&) { return 1.0; })};
 }
 

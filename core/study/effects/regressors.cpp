@@ -55,11 +55,11 @@ const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups(
   return all;
 }
 
-std::vector<Column> companions(const Form& form, const Observations& seen) {
-  return form.companions ? form.companions(seen.windows) : std::vector<Column>{};
+std::vector<DesignColumn> companions(const Form& form, const Observations& seen) {
+  return form.companions ? form.companions(seen.windows) : std::vector<DesignColumn>{};
 }
 
-Windows moved_by(const Windows& windows, const std::vector<Column>& columns, const Eigen::VectorXd& theta) {
+Windows moved_by(const Windows& windows, const std::vector<DesignColumn>& columns, const Eigen::VectorXd& theta) {
   Windows moved = windows;
   for (std::size_t i = 0; i < moved.size(); ++i) {
     Vec3 push = Vec3::Zero();
@@ -68,7 +68,7 @@ Windows moved_by(const Windows& windows, const std::vector<Column>& columns, con
         if (part.channel <= kMeanZ)
           push[static_cast<Eigen::Index>(part.channel)] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
     const Vec3 by = push.cwiseProduct(moved[i].give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
-    const auto move = [&](Place& place) {
+    const auto move = [&](PlaceAround& place) {
       place.height += by.z(), place.ceiling_gap -= by.z();
       for (auto* walls : {&place.walls, &place.whole_walls})
         for (auto& [distance, direction] : *walls) distance -= by.dot(direction);
@@ -86,12 +86,12 @@ Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& s
   return moved;
 }
 
-std::vector<Column> offsets(const std::vector<Column>& columns, const Observations& seen) {
+std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, const Observations& seen) {
   std::array<bool, kChannels> used{};
   for (const auto& column : columns)
     for (const auto& part : column.parts) used[part.channel] = true;
   const Windows& ws = seen.windows;
-  std::vector<Column> free;
+  std::vector<DesignColumn> free;
   if (used[kMeanX] || used[kMeanY]) {
     free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitX(); }));
     free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); }));
@@ -101,7 +101,7 @@ std::vector<Column> offsets(const std::vector<Column>& columns, const Observatio
   if (used[kMeanZ]) free.push_back(in(kMeanZ, ws, [](auto&) { return 1.0; }));
   if (used[kVarX] || used[kVarY] || used[kVarZ]) {
     for (const Channel c : kVariances) free.push_back(in(c, ws, [](auto&) { return 1.0; }));
-    Column noise;
+    DesignColumn noise;
     for (const Channel c : kVariances)
       noise.parts.push_back(
           {c, values(ws, [&](auto& w) { return kEffectRules.noise_unit / w.sigma[static_cast<int>(c - kVarX)]; })});

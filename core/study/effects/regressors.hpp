@@ -14,16 +14,16 @@ std::vector<double> ranks(const Regressor& along, const Windows& windows);
 const std::vector<std::pair<std::string, std::vector<Channel>>>& channel_groups();
 
 /// What an accepted form leaves open (Form::companions).
-std::vector<Column> companions(const Form& form, const Observations& seen);
+std::vector<DesignColumn> companions(const Form& form, const Observations& seen);
 
 /// Windows where a push Σ θ x, in the mean channels, has moved the craft: the loop gives way by push/k_p (e = w/k_p at
 /// rest), so that the craft is not where the set-points alone lead.
-Windows moved_by(const Windows& windows, const std::vector<Column>& columns, const Eigen::VectorXd& theta);
+Windows moved_by(const Windows& windows, const std::vector<DesignColumn>& columns, const Eigen::VectorXd& theta);
 /// The same by a form's own push, where it is one by place: push and place found in turns.
 Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& scale, const Eigen::VectorXd& theta);
 
 /// Free offsets of the channels that columns move: constants, and for level means those fixed to the body too; in
 /// variance channels also the noise of the accelerometer, a constant over Σ.
-std::vector<Column> offsets(const std::vector<Column>& columns, const Observations& seen);
+std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, const Observations& seen);
 
 }  // namespace backwash::study

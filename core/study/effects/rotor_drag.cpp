@@ -7,9 +7,9 @@ namespace {
 
 /// The drag at the velocity that it leaves, and what its course along a window adds to the variance there. Both go by
 /// the drag itself, scale.anchor: without it none.
-std::vector<Column> against_velocity(const Windows& ws, const Scale& scale) {
+std::vector<DesignColumn> against_velocity(const Windows& ws, const Scale& scale) {
   const double k = scale.anchor.empty() ? 0 : scale.anchor[0];
-  Column column = level(ws, [&](auto& w) -> Vec3 { return -(w.v_W - k * w.slowed); });
+  DesignColumn column = level(ws, [&](auto& w) -> Vec3 { return -(w.v_W - k * w.slowed); });
   for (std::size_t a = 0; a < 2 && k > 0; ++a)
     column.parts.push_back({kVariances[a], values(ws, [&](auto& w) {
                               const auto axis = static_cast<Eigen::Index>(a);

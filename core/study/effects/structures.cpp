@@ -129,8 +129,8 @@ std::vector<Structure> structures(const Observations& seen) {
   return all;
 }
 
-std::vector<Column> columns_in(const std::vector<Channel>& group, const Functions& functions) {
-  std::vector<Column> columns;
+std::vector<DesignColumn> columns_in(const std::vector<Channel>& group, const Functions& functions) {
+  std::vector<DesignColumn> columns;
   for (const auto& x : functions) {
     if (group.front() == kVarX) {
       columns.emplace_back();

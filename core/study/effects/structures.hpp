@@ -30,6 +30,6 @@ std::vector<Structure> structures(const Observations& seen);
 
 /// Functions as columns of one group of channels: level means each for themselves (a push may point anywhere in the
 /// plane), ln variance along all axes as one.
-std::vector<Column> columns_in(const std::vector<Channel>& group, const Functions& functions);
+std::vector<DesignColumn> columns_in(const std::vector<Channel>& group, const Functions& functions);
 
 }  // namespace backwash::study

@@ -33,9 +33,10 @@ Effect thrust_slope() {
                  .needs = {Source::attitude, Source::thrust, Source::setpoints},
                  .columns =
                      [](const Windows& ws, const Scale&) {
-                       return std::vector{Column{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[1]; })},
-                                                  {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[1]; })},
-                                                  {kMeanZ, values(ws, [](auto& w) { return w.mean_gain[1]; })}}}};
+                       return std::vector{
+                           DesignColumn{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[1]; })},
+                                         {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[1]; })},
+                                         {kMeanZ, values(ws, [](auto& w) { return w.mean_gain[1]; })}}}};
                      },
                  .simulate = simulates(SimulationTerm::Kind::thrust_slope)}},
       .remedy = steeper};

@@ -39,7 +39,7 @@ Effect vibration() {
                  .not_flown = folded_away,
                  .columns =
                      [](const Windows& ws, const Scale&) {
-                       Column c;
+                       DesignColumn c;
                        for (std::size_t rotor = 0; rotor < 4; ++rotor)
                          c.parts.push_back({static_cast<Channel>(kLine1 + rotor), std::vector<double>(ws.size(), 1.0)});
                        return std::vector{c};

@@ -14,8 +14,8 @@ namespace {
 
 /// θ and the companions' coefficients behind it.
 struct Parts {
-  std::vector<Column> columns;  // the form's, then its companions
-  std::size_t own;              // how many are the form's
+  std::vector<DesignColumn> columns;  // the form's, then its companions
+  std::size_t own;                    // how many are the form's
 };
 
 Parts parts_of(const Accepted& cause, const Observations& seen) {
@@ -25,13 +25,14 @@ Parts parts_of(const Accepted& cause, const Observations& seen) {
   return parts;
 }
 
-bool of_variance(const Column& column) {
+bool of_variance(const DesignColumn& column) {
   return std::all_of(column.parts.begin(), column.parts.end(),
                      [](auto& p) { return p.channel == kVarX || p.channel == kVarY || p.channel == kVarZ; });
 }
 
 /// Coefficients of the companions, given θ, from normal equations of both: without one flight, or of all (none).
-SmallVector with_companions(const Normal& normal, const SmallVector& theta, std::optional<std::size_t> without) {
+SmallVector with_companions(const NormalEquations& normal, const SmallVector& theta,
+                            std::optional<std::size_t> without) {
   SmallMatrix A = normal.total;
   SmallVector b = SmallVector::Zero(A.rows());
   for (std::size_t f = 0; f < normal.b.size(); ++f)
@@ -50,8 +51,8 @@ SmallVector with_companions(const Normal& normal, const SmallVector& theta, std:
 
 using Moved = std::array<std::vector<double>, kChannels>;
 
-void add(Moved& moved, const std::vector<Column>& columns, const SmallVector& by, std::size_t begin, std::size_t end,
-         std::size_t windows) {
+void add(Moved& moved, const std::vector<DesignColumn>& columns, const SmallVector& by, std::size_t begin,
+         std::size_t end, std::size_t windows) {
   for (std::size_t k = 0; k < columns.size(); ++k)
     for (const auto& part : columns[k].parts) {
       moved[part.channel].resize(windows, 0);
@@ -108,7 +109,7 @@ Applied judged(const Evidence& evidence, const std::vector<Accepted>& all, const
   const Accepted& cause = all[which];
   const std::size_t n = seen.windows.size();
   const Parts parts = parts_of(cause, seen);
-  std::vector<Column> beside;
+  std::vector<DesignColumn> beside;
   Moved own, others;
   for (std::size_t j = 0; j < all.size(); ++j) {
     if (j == which || !known[j].refused.empty()) continue;
@@ -121,13 +122,13 @@ Applied judged(const Evidence& evidence, const std::vector<Accepted>& all, const
       by[all[j].theta.size() + static_cast<Eigen::Index>(k)] = known[j].beside[k];
     add(others, other.columns, by, 0, n, n);
   }
-  std::vector<Column> free = beside, levels = beside;
+  std::vector<DesignColumn> free = beside, levels = beside;
   if (!cause.form->constant)
     for (const auto& column : offsets(cause.columns, seen)) {
       free.push_back(column);
       if (of_variance(column)) levels.push_back(column);
     }
-  const Normal theta = evidence.normal(cause.columns, free), joint = evidence.normal(parts.columns, levels);
+  const NormalEquations theta = evidence.normal(cause.columns, free), joint = evidence.normal(parts.columns, levels);
   Applied applied;
   const SmallVector whole = with_companions(joint, cause.theta, std::nullopt);
   for (auto k = cause.theta.size(); k < whole.size(); ++k) applied.beside.push_back(whole[k]);

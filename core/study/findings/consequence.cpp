@@ -29,13 +29,13 @@ Added held_out(const StudyResult& result, const Observations& seen) {
   for (auto* part : {&added.mean, &added.ln_variance})
     for (auto& axis : *part) axis.assign(seen.windows.size(), 0);
   Evidence evidence(seen);
-  std::vector<Column> all;
+  std::vector<DesignColumn> all;
   for (const auto& cause : result.causes) all.insert(all.end(), cause.found.columns.begin(), cause.found.columns.end());
   evidence.whiten(all);
   for (const auto& cause : result.causes) {
     const auto& columns = cause.found.columns;
-    const auto nuisance = cause.found.form->constant ? std::vector<Column>{} : offsets(columns, seen);
-    const Normal normal = evidence.normal(columns, nuisance);
+    const auto nuisance = cause.found.form->constant ? std::vector<DesignColumn>{} : offsets(columns, seen);
+    const NormalEquations normal = evidence.normal(columns, nuisance);
     if (!normal.solvable || !cause.applied.refused.empty()) continue;
     for (std::size_t f = 0; f < seen.units.size(); ++f) {
       const SmallVector theta = normal.fit_without(f);
@@ -79,7 +79,7 @@ std::vector<Vec3> places_of(const Observations& seen) {
   return places;
 }
 
-void describe(Outcome& outcome, const std::vector<reach::HoverSet>& sets) {
+void describe(FlightOutcome& outcome, const std::vector<reach::HoverSet>& sets) {
   std::vector<double> extent, shift;
   for (const auto& set : sets) {
     if (!set.bounded) continue;
@@ -116,7 +116,7 @@ std::vector<reach::HoverSet> sets_in_the_open(const Model& model, const Vehicle&
   return {set};
 }
 
-void try_plan(Outcome& outcome, const plan::World& world, const Vec3& start_W, const Vec3& goal_W) {
+void try_plan(FlightOutcome& outcome, const plan::World& world, const Vec3& start_W, const Vec3& goal_W) {
   Setpoint hover;
   hover.p_W = start_W;
   const auto& limits = world.reach.vehicle.limits;

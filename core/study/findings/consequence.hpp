@@ -11,7 +11,7 @@
 namespace backwash::study {
 
 /// What a model makes of the places that were flown, and of one plan between two of them.
-struct Outcome {
+struct FlightOutcome {
   double inside = 0;                        ///< share of samples of a − a_sim within push ± w̄, all axes together
   double extent_median = 0, extent_95 = 0;  ///< largest half width of the hover sets at flown places, m
   double shift_median = 0, shift_95 = 0;    ///< of those sets' centres, m
@@ -21,7 +21,7 @@ struct Outcome {
 };
 
 struct Consequence {
-  Outcome before, after;
+  FlightOutcome before, after;
   std::size_t places = 0;
   Vec3 start_W = Vec3::Zero(), goal_W = Vec3::Zero();  ///< of the plan
 };

@@ -48,9 +48,9 @@ toml::table table_of(const NamedCause& cause, const Observations& seen) {
 
 }  // namespace
 
-std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen) {
-  std::vector<Term> left;
-  for (const Term& term : terms) {
+std::vector<ExtensionTerm> apply(const std::vector<ExtensionTerm>& terms, Observations& seen) {
+  std::vector<ExtensionTerm> left;
+  for (const ExtensionTerm& term : terms) {
     const auto known = std::find_if(catalogue().begin(), catalogue().end(), [&](const Form* f) {
       return f->cause() == term.cause && f->formula == term.formula && f->parameters.size() == term.theta.size();
     });

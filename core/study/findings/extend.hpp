@@ -9,7 +9,7 @@
 namespace backwash::study {
 
 /// An accepted cause as it is stored in a model file, [[extension.term]].
-struct Term {
+struct ExtensionTerm {
   std::string cause, formula;  ///< name the catalogue's form
   Scale scale;
   std::vector<double> theta;        ///< its parameters, in their order
@@ -18,7 +18,7 @@ struct Term {
 
 /// Takes the terms out of the observations: the simulation is then the extended model's. A term whose form or columns
 /// are unknown here is returned.
-std::vector<Term> apply(const std::vector<Term>& terms, Observations& seen);
+std::vector<ExtensionTerm> apply(const std::vector<ExtensionTerm>& terms, Observations& seen);
 
 /// What a cause adds to the model for field, reach and plan (core/study/README.md, "Extension"): pushes and factors of
 /// Σ by place and velocity; what depends on things that a plan does not know (battery, time, heading) by its range over

@@ -23,11 +23,11 @@ Windows flown(const WindowRow& median, const Manoeuvre* manoeuvre) {
 }
 
 /// Columns the rival and free offsets have to copy the cause's prediction with.
-std::vector<Column> copies_of(const Form& ours, const std::vector<Column>& our_columns, const Rival& rival,
-                              const Observations& imagined) {
-  std::vector<Column> copies = rival.form->columns(imagined.windows, rival.scale);
+std::vector<DesignColumn> copies_of(const Form& ours, const std::vector<DesignColumn>& our_columns, const Rival& rival,
+                                    const Observations& imagined) {
+  std::vector<DesignColumn> copies = rival.form->columns(imagined.windows, rival.scale);
   if (ours.constant || rival.form->constant) return copies;
-  std::vector<Column> both = our_columns;
+  std::vector<DesignColumn> both = our_columns;
   both.insert(both.end(), copies.begin(), copies.end());
   const auto free = offsets(both, imagined);
   copies.insert(copies.end(), free.begin(), free.end());
@@ -42,7 +42,7 @@ double nats_apart(const Evidence& evidence, const Accepted& cause, const Rival& 
   const auto ours = cause.form->columns(imagined.windows, cause.scale);
   const auto copies = copies_of(*cause.form, ours, rival, imagined);
   const auto rows = static_cast<Eigen::Index>(kWindows * kChannels);
-  const auto weighted = [&](const Column& column) {
+  const auto weighted = [&](const DesignColumn& column) {
     Eigen::VectorXd all = Eigen::VectorXd::Zero(rows);
     for (const auto& part : decorrelated(column).parts) {
       const Scatter scatter = evidence.scatter(part.channel);

@@ -16,7 +16,7 @@ namespace {
 /// Push of a form and its companions in each window, m/s².
 std::vector<Vec3> pushes(const Accepted& cause, const std::vector<double>& beside, const Observations& seen) {
   std::vector<Vec3> push(seen.windows.size(), Vec3::Zero());
-  const auto add = [&](const Column& column, double by) {
+  const auto add = [&](const DesignColumn& column, double by) {
     for (const auto& part : column.parts)
       for (std::size_t i = 0; i < push.size() && part.channel <= kMeanZ; ++i)
         push[i][static_cast<Eigen::Index>(part.channel)] += by * part.x[i];

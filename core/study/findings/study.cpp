@@ -13,8 +13,8 @@
 namespace backwash::study {
 namespace {
 
-std::vector<Column> others_of(const std::vector<Accepted>& all, std::size_t but, const Observations& seen) {
-  std::vector<Column> columns;
+std::vector<DesignColumn> others_of(const std::vector<Accepted>& all, std::size_t but, const Observations& seen) {
+  std::vector<DesignColumn> columns;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (i == but) continue;
     columns.insert(columns.end(), all[i].columns.begin(), all[i].columns.end());
@@ -25,7 +25,8 @@ std::vector<Column> others_of(const std::vector<Accepted>& all, std::size_t but,
 }
 
 /// What the cause adds to a channel in each window, its parameters fitted without the window's flight.
-std::vector<double> held_out(const Accepted& cause, const Normal& normal, const Observations& seen, Channel channel) {
+std::vector<double> held_out(const Accepted& cause, const NormalEquations& normal, const Observations& seen,
+                             Channel channel) {
   std::vector<double> sum(seen.windows.size(), 0);
   for (std::size_t f = 0; f < seen.units.size(); ++f) {
     const SmallVector theta = normal.fit_without(f);
@@ -60,10 +61,10 @@ void add_coverage(Gain& gain, const Observations& seen, const std::array<std::ve
 Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::size_t which) {
   const Observations& seen = evidence.seen();
   const Accepted& cause = all[which];
-  auto nuisance = cause.form->constant ? std::vector<Column>{} : offsets(cause.columns, seen);
+  auto nuisance = cause.form->constant ? std::vector<DesignColumn>{} : offsets(cause.columns, seen);
   const auto others = others_of(all, which, seen);
   nuisance.insert(nuisance.end(), others.begin(), others.end());
-  const Normal normal = evidence.normal(cause.columns, nuisance);
+  const NormalEquations normal = evidence.normal(cause.columns, nuisance);
   Gain gain;
   if (!normal.solvable) return gain;
   const auto per_flight = normal.gain_per_flight();
@@ -115,8 +116,8 @@ std::vector<std::pair<std::string, std::string>> untested(const Observations& se
 
 /// Where nothing else was found, a dependence is a structure without a name, at its share of the verdict's level.
 /// Beside an accepted cause it is a hint: with enough flights the error of the cause's form is found as well.
-void look_at_what_remains(StudyResult& result, const Evidence& evidence, const std::vector<Column>& accepted,
-                          const SearchOptions& options) {
+void look_at_what_remains(StudyResult& result, const Evidence& evidence, const std::vector<DesignColumn>& accepted,
+                          const CauseSearchOptions& options) {
   const bool silent = result.causes.empty() && result.unknown.empty();
   const double level = silent ? kRules.dependence_share * options.accept_p : kRules.dependence_level.value;
   result.remaining = remaining_dependence(evidence, accepted, options.seed, level);
@@ -151,7 +152,7 @@ double coverage(const Observations& seen) {
   return gain.coverage_before;
 }
 
-const char* to_string(Verdict verdict) {
+const char* to_string(StudyVerdict verdict) {
   static const char* const kNames[] = {"cause_found", "cannot_distinguish", "unknown_structure", "nothing_found",
                                        "insufficient"};
   return kNames[static_cast<std::size_t>(verdict)];
@@ -163,7 +164,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   std::size_t flown = 0;
   for (std::size_t f = 0; f < seen.units.size(); ++f) flown += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
   if (flown < options.fewest_flights) {
-    result.verdict = Verdict::insufficient;
+    result.verdict = StudyVerdict::insufficient;
     return result;
   }
   Observations settled = seen;
@@ -173,7 +174,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
           name, "the same in all flights and no more than craft are built with: the rotors differ by " + percent(off) +
                     ", as those of a sound craft may; give --reference flights");
   const WholeSearch whole = search_all(settled, options.search);
-  const SearchResult& found = whole.found;
+  const CauseSearchResult& found = whole.found;
   result.threshold = found.threshold;
   result.unknown = found.unknown, result.refused = found.refused;
   Evidence evidence(whole.rest);
@@ -196,9 +197,9 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
     options.search.progress("whether what remains depends on something");
     look_at_what_remains(result, evidence, others_of(found.accepted, SIZE_MAX, whole.rest), options.search);
   }
-  result.verdict = !result.causes.empty()    ? (ambiguous ? Verdict::cannot_distinguish : Verdict::cause_found)
-                   : !result.unknown.empty() ? Verdict::unknown_structure
-                                             : Verdict::nothing_found;
+  result.verdict = !result.causes.empty() ? (ambiguous ? StudyVerdict::cannot_distinguish : StudyVerdict::cause_found)
+                   : !result.unknown.empty() ? StudyVerdict::unknown_structure
+                                             : StudyVerdict::nothing_found;
   if (options.minimum_detectable) {
     options.search.progress("smallest effects that these flights would show");
     result.minimum_detectable =
@@ -208,7 +209,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
 }
 
 std::map<std::string, std::map<std::string, double>> minimum_detectable(const Evidence& evidence,
-                                                                        const SearchOptions& options,
+                                                                        const CauseSearchOptions& options,
                                                                         double threshold) {
   constexpr int kFlips = static_cast<int>(kRules.power_flips);
   const auto draws = sign_draws(evidence.seen().units.size(), kFlips, options.seed + 1);
@@ -218,7 +219,7 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
     const auto power = [&](double size) {
       int found = 0;
       for (const auto& signs : draws) {
-        Normal injected = c.normal;
+        NormalEquations injected = c.normal;
         for (std::size_t f = 0; f < injected.b.size(); ++f)
           injected.b[f] = signs[f] * c.normal.b[f] + size * c.normal.A[f].col(0);
         if (injected.gain() >= threshold && c.effect(injected.fit())) ++found;

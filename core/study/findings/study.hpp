@@ -14,8 +14,8 @@
 
 namespace backwash::study {
 
-enum class Verdict { cause_found, cannot_distinguish, unknown_structure, nothing_found, insufficient };
-const char* to_string(Verdict verdict);
+enum class StudyVerdict { cause_found, cannot_distinguish, unknown_structure, nothing_found, insufficient };
+const char* to_string(StudyVerdict verdict);
 
 /// What a cause is worth on flights that its parameters were not fitted to.
 struct Gain {
@@ -42,7 +42,7 @@ struct NamedCause {
 };
 
 struct StudyOptions {
-  SearchOptions search;
+  CauseSearchOptions search;
   bool minimum_detectable = true;
   bool dependence = true;  ///< whether what remains depends on something: where nothing is accepted, of the verdict too
   std::optional<SoundRotors> sound = {};  ///< of reference flights; without, rotors may differ as craft are built
@@ -51,7 +51,7 @@ struct StudyOptions {
 };
 
 struct StudyResult {
-  Verdict verdict = Verdict::nothing_found;
+  StudyVerdict verdict = StudyVerdict::nothing_found;
   std::vector<NamedCause> causes;
   std::vector<UnknownStructure> unknown;
   std::vector<Refused> refused;  ///< causes that would have led, but for a size that no vehicle can have
@@ -79,6 +79,7 @@ std::vector<Separation> separations(const Evidence& evidence, const Accepted& ca
 /// Least first parameter of each testable cause that is found with 80 % power, by injection into sign-flipped
 /// residuals.
 std::map<std::string, std::map<std::string, double>> minimum_detectable(const Evidence& evidence,
-                                                                        const SearchOptions& options, double threshold);
+                                                                        const CauseSearchOptions& options,
+                                                                        double threshold);
 
 }  // namespace backwash::study

@@ -41,15 +41,15 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
   const std::string of =
       " (" + std::to_string(seen.flights) + " flights, " + std::to_string(seen.windows.size()) + " windows of 2 s)";
   switch (result.verdict) {
-    case Verdict::cause_found:
+    case StudyVerdict::cause_found:
       return "The simulation misses " + names + of + "; with it, flights that were not fitted are likelier by " +
              number(result.causes.front().gain.held_out_nats) +
              " nats. A nat is a factor e in odds: 3 nats are 20 to 1, 7 are 1,000 to 1.";
-    case Verdict::cannot_distinguish:
+    case StudyVerdict::cannot_distinguish:
       return "The simulation misses something that these flights cannot tell apart: " + names + of + ".";
-    case Verdict::unknown_structure:
+    case StudyVerdict::unknown_structure:
       return "The simulation is wrong along " + result.unknown.front().along + ", and no known cause fits" + of + ".";
-    case Verdict::insufficient:
+    case StudyVerdict::insufficient:
       return "Too little to name a cause: " + too_few(seen);
     default:
       return "Nothing found that the simulation gets wrong" + of + ", with " +
@@ -151,14 +151,14 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
 
 std::string share(double value) { return number(100 * value) + " %"; }
 
-std::string plan_text(const Outcome& o) {
+std::string plan_text(const FlightOutcome& o) {
   if (o.plan != plan::PlanStatus::ok) return o.plan ? plan::to_string(*o.plan) : "";
   return number(o.length_m) + " m in " + number(o.time_s) + " s, " + number(100 * o.clearance_m) + " cm clear";
 }
 
 /// What field, reach and plan make of the causes.
 std::string consequence_section(const Consequence& c) {
-  const Outcome &b = c.before, &a = c.after;
+  const FlightOutcome &b = c.before, &a = c.after;
   std::string text =
       "<section><h2>What it changes for a flight</h2>\n<table>\n<tr><th></th><td style=\"width:22%\"><b>before</b></td>"
       "<td><b>after</b></td></tr>\n";
@@ -229,14 +229,15 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
   std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
   if (context.height) beside = height_sentence(*context.height);
   if (!beside.empty()) beside.insert(0, " ");
-  page += "<p class=\"context\">Map " + report::escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
-          report::escaped(context.vehicle) + ", model " + report::escaped(context.model) + "; backwash " +
-          report::escaped(context.version) + "</p>\n<p class=\"verdict " +
-          (result.verdict == Verdict::cause_found || (result.verdict == Verdict::nothing_found && beside.empty())
-               ? "passed"
-               : "failed") +
-          "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
-          report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
+  page +=
+      "<p class=\"context\">Map " + report::escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
+      report::escaped(context.vehicle) + ", model " + report::escaped(context.model) + "; backwash " +
+      report::escaped(context.version) + "</p>\n<p class=\"verdict " +
+      (result.verdict == StudyVerdict::cause_found || (result.verdict == StudyVerdict::nothing_found && beside.empty())
+           ? "passed"
+           : "failed") +
+      "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
+      report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
   for (const auto& cause : result.causes) {
     const auto drawn = picture(cause, seen);
     if (!drawn) return tl::make_unexpected(drawn.error());

@@ -38,7 +38,7 @@ NamedCause named(const InSomeFlights& cause, const Evidence& rest) {
   const auto before = with(cause.found, rest.seen());
   measure_errors(told.gain, cause.found, before, rest.seen());
   told.gain.coverage_before = coverage(before), told.gain.coverage_after = coverage(rest.seen());
-  Normal normal = rest.normal(cause.found.columns, {});
+  NormalEquations normal = rest.normal(cause.found.columns, {});
   if (!normal.solvable) return told;  // one flight alone shows it
   for (std::size_t f = 0; f < normal.b.size(); ++f) normal.b[f] += normal.A[f] * cause.found.theta;
   const auto nats = normal.gain_per_flight();

@@ -3,7 +3,7 @@
 
 namespace backwash::study {
 
-Amplitudes::Amplitudes(const Evidence& evidence, const Form& form, const Scale& scale, const Column& rest)
+Amplitudes::Amplitudes(const Evidence& evidence, const Form& form, const Scale& scale, const DesignColumn& rest)
     : form_(&form), scale_(scale), units_(&evidence.seen().units) {
   const auto& windows = evidence.seen().windows;
   columns_ = form.columns(windows, scale);
@@ -11,7 +11,7 @@ Amplitudes::Amplitudes(const Evidence& evidence, const Form& form, const Scale& 
   const auto p = static_cast<Eigen::Index>(columns_.size());
   A_.assign(windows.size(), SmallMatrix::Zero(p, p));
   b_.assign(windows.size(), SmallVector::Zero(p));
-  std::vector<Column> turned;
+  std::vector<DesignColumn> turned;
   for (const auto& column : columns_) turned.push_back(decorrelated(column));
   SmallVector x(p);
   for (const auto& [channel, y] : rest.parts) {
@@ -59,7 +59,7 @@ Course Amplitudes::course(std::size_t unit, const SmallVector& direction) const 
 }
 
 bool Amplitudes::effect(const SmallVector& difference) const {
-  return Candidate{form_, form_->cause(), scale_, {}, {}, 0, size_}.effect(difference);
+  return SearchCandidate{form_, form_->cause(), scale_, {}, {}, 0, size_}.effect(difference);
 }
 
 }  // namespace backwash::study

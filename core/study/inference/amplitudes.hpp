@@ -14,11 +14,11 @@ namespace backwash::study {
 class Amplitudes {
  public:
   /// `rest`: Evidence::residual of the other causes. Real-time status: offline.
-  Amplitudes(const Evidence& evidence, const Form& form, const Scale& scale, const Column& rest);
+  Amplitudes(const Evidence& evidence, const Form& form, const Scale& scale, const DesignColumn& rest);
 
   const Form& form() const { return *form_; }
   const Scale& scale() const { return scale_; }
-  const std::vector<Column>& columns() const { return columns_; }
+  const std::vector<DesignColumn>& columns() const { return columns_; }
   std::size_t units() const { return units_->size(); }
   /// Whether the unit's windows tell every parameter.
   bool told(std::size_t unit) const;
@@ -29,14 +29,14 @@ class Amplitudes {
   std::size_t end(std::size_t unit) const { return units_->first[unit + 1]; }
   /// The unit's windows along a direction of the parameters, |direction| = 1.
   Course course(std::size_t unit, const SmallVector& direction) const;
-  /// Whether a difference of parameters is an effect at all (Candidate::effect).
+  /// Whether a difference of parameters is an effect at all (SearchCandidate::effect).
   bool effect(const SmallVector& difference) const;
 
  private:
   const Form* form_;
   Scale scale_;
   const Units* units_;
-  std::vector<Column> columns_;
+  std::vector<DesignColumn> columns_;
   std::vector<SmallMatrix> A_;
   std::vector<SmallVector> b_;
   SmallMatrix size_;

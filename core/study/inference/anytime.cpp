@@ -132,7 +132,8 @@ void Anytime::add(const Evidence& scatter, const Observations& seen, std::size_t
       if (form->anchor && bet.anchor.empty()) bet.anchor = form->anchor(flight.windows);
       own.anchor = bet.anchor;
       const auto columns = form->columns(flight.windows, own);
-      const Normal normal = evidence.normal(columns, form->constant ? std::vector<Column>{} : offsets(columns, flight));
+      const NormalEquations normal =
+          evidence.normal(columns, form->constant ? std::vector<DesignColumn>{} : offsets(columns, flight));
       if (!normal.excited) continue;
       bet.scores.add(normal.total, normal.b.front());
       const SmallMatrix size = evidence.size(columns);

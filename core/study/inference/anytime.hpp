@@ -31,8 +31,8 @@ class FlightScores {
 };
 
 /// θ̂ − θ₀ for the θ₀ nearest to θ̂ (in the metric `information`) that is no effect of the form: its first parameter
-/// below `least` or of an impossible sign, or a root mean square below `floor` (`size` as of Candidate). Zero if θ̂ is
-/// none itself.
+/// below `least` or of an impossible sign, or a root mean square below `floor` (`size` as of SearchCandidate). Zero if
+/// θ̂ is none itself.
 SmallVector off_no_effect(const Form& form, const SmallVector& theta, const SmallMatrix& information,
                           const SmallMatrix& size);
 

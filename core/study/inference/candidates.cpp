@@ -11,7 +11,7 @@ namespace backwash::study {
 namespace {
 
 /// Fits a candidate's columns; whether every flight can be left out.
-bool fitted(Candidate& c, const Evidence& evidence, const std::vector<Column>& nuisance) {
+bool fitted(SearchCandidate& c, const Evidence& evidence, const std::vector<DesignColumn>& nuisance) {
   if (c.columns.size() > static_cast<std::size_t>(kMostColumns)) return false;
   c.normal = evidence.normal(c.columns, nuisance);
   if (!c.normal.solvable) return false;
@@ -20,9 +20,9 @@ bool fitted(Candidate& c, const Evidence& evidence, const std::vector<Column>& n
   return true;
 }
 
-std::vector<Column> beside(const std::vector<Column>& columns, const std::vector<Column>& accepted,
-                           const Observations& seen) {
-  std::vector<Column> nuisance = offsets(columns, seen);
+std::vector<DesignColumn> beside(const std::vector<DesignColumn>& columns, const std::vector<DesignColumn>& accepted,
+                                 const Observations& seen) {
+  std::vector<DesignColumn> nuisance = offsets(columns, seen);
   nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
   return nuisance;
 }
@@ -31,7 +31,7 @@ std::vector<Column> beside(const std::vector<Column>& columns, const std::vector
 /// gain. Of most candidates that is already less than the largest gain so far.
 class Bound {
  public:
-  explicit Bound(const Normal& normal) : b_(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size())) {
+  explicit Bound(const NormalEquations& normal) : b_(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size())) {
     for (Eigen::Index f = 0; f < b_.cols(); ++f) b_.col(f) = normal.b[static_cast<std::size_t>(f)];
     SmallMatrix total = normal.total;
     total.diagonal() *= 1 - kRules.ridge;
@@ -50,7 +50,7 @@ class Bound {
 
 }  // namespace
 
-bool Candidate::large_enough(const SmallVector& theta) const {
+bool SearchCandidate::large_enough(const SmallVector& theta) const {
   const auto floor_of_structure = [&] {
     return columns.front().parts.front().channel == kVarX ? kRules.structure_floor_ln : kRules.structure_floor_mean;
   };
@@ -61,37 +61,37 @@ bool Candidate::large_enough(const SmallVector& theta) const {
   return square >= form->floor * form->floor;
 }
 
-std::optional<std::size_t> Candidate::beyond_possible(const SmallVector& theta) const {
+std::optional<std::size_t> SearchCandidate::beyond_possible(const SmallVector& theta) const {
   if (!form) return std::nullopt;
   for (std::size_t k = 0; k < form->possible.size() && k < static_cast<std::size_t>(theta.size()); ++k)
     if (!form->possible[k].holds(theta[static_cast<Eigen::Index>(k)])) return k;
   return std::nullopt;
 }
 
-std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& columns,
-                                const std::vector<Column>& accepted, const Observations& seen) {
+std::vector<DesignColumn> nuisance_of(const Form& form, const std::vector<DesignColumn>& columns,
+                                      const std::vector<DesignColumn>& accepted, const Observations& seen) {
   return form.constant ? accepted : beside(columns, accepted, seen);
 }
 
-std::vector<Candidate> named_candidates(const Evidence& evidence, const std::vector<Column>& accepted) {
-  std::vector<Candidate> all;
+std::vector<SearchCandidate> named_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted) {
+  std::vector<SearchCandidate> all;
   const Observations& seen = evidence.seen();
   for (const Form* form : catalogue()) {
     if (why_not_tested(*form, seen)) continue;
     for (const Scale& scale : form->scales) {
-      Candidate c{form, form->cause(), scale, form->columns(seen.windows, scale), {}, 0, {}};
+      SearchCandidate c{form, form->cause(), scale, form->columns(seen.windows, scale), {}, 0, {}};
       if (fitted(c, evidence, nuisance_of(*form, c.columns, accepted, seen))) all.push_back(std::move(c));
     }
   }
   return all;
 }
 
-std::vector<Candidate> structure_candidates(const Evidence& evidence, const std::vector<Column>& accepted) {
-  std::vector<Candidate> all;
+std::vector<SearchCandidate> structure_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted) {
+  std::vector<SearchCandidate> all;
   const Observations& seen = evidence.seen();
   for (const auto& structure : structures(seen))
     for (const auto& [name, channels] : channel_groups()) {
-      Candidate c;
+      SearchCandidate c;
       c.name = structure.along, c.columns = columns_in(channels, structure.functions);
       if (!fitted(c, evidence, beside(c.columns, accepted, seen))) continue;
       c.structure = {structure.along, structure.shape, structure.hz, {}, structure.further};
@@ -100,7 +100,8 @@ std::vector<Candidate> structure_candidates(const Evidence& evidence, const std:
   return all;
 }
 
-Candidate with_harmonics(Candidate found, const Evidence& evidence, const std::vector<Column>& accepted) {
+SearchCandidate with_harmonics(SearchCandidate found, const Evidence& evidence,
+                               const std::vector<DesignColumn>& accepted) {
   const Channel first = found.columns.front().parts.front().channel;
   const auto group = std::find_if(channel_groups().begin(), channel_groups().end(),
                                   [&](auto& g) { return g.second.front() == first; });
@@ -108,7 +109,7 @@ Candidate with_harmonics(Candidate found, const Evidence& evidence, const std::v
   for (int n = 1;; ++n) {
     const auto functions = found.structure.further(n);
     if (functions.empty()) break;
-    Candidate longer = found;
+    SearchCandidate longer = found;
     const auto columns = columns_in(group->second, functions);
     longer.columns.insert(longer.columns.end(), columns.begin(), columns.end());
     if (!fitted(longer, evidence, beside(longer.columns, accepted, evidence.seen())) ||
@@ -128,7 +129,7 @@ std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigne
   return draws;
 }
 
-std::vector<double> null_maxima(std::span<const Candidate> all, const std::vector<std::vector<int>>& draws) {
+std::vector<double> null_maxima(std::span<const SearchCandidate> all, const std::vector<std::vector<int>>& draws) {
   std::vector<double> maxima(draws.size(), 0);
   for (const auto& candidate : all) {
     const Bound bound(candidate.normal);

@@ -12,12 +12,12 @@
 namespace backwash::study {
 
 /// A form at a scale, or a structure without a name: something that may explain what the simulation gets wrong.
-struct Candidate {
+struct SearchCandidate {
   const Form* form = nullptr;  ///< null for a structure
   std::string name;            ///< of the cause, or of the structure's regressors
   Scale scale;
-  std::vector<Column> columns;
-  Normal normal;
+  std::vector<DesignColumn> columns;
+  NormalEquations normal;
   double gain = 0;        ///< held out, nats
   SmallMatrix size;       ///< θᵀ size θ: mean square of what the columns add
   Structure structure{};  ///< of a structure, its functions left out: they are the columns
@@ -30,20 +30,21 @@ struct Candidate {
 };
 
 /// Columns that stand beside a form's: free offsets, unless it is one itself, and what was accepted.
-std::vector<Column> nuisance_of(const Form& form, const std::vector<Column>& columns,
-                                const std::vector<Column>& accepted, const Observations& seen);
+std::vector<DesignColumn> nuisance_of(const Form& form, const std::vector<DesignColumn>& columns,
+                                      const std::vector<DesignColumn>& accepted, const Observations& seen);
 
 /// Every form of the catalogue that can be tested, at every scale, with the accepted columns as nuisance.
-std::vector<Candidate> named_candidates(const Evidence& evidence, const std::vector<Column>& accepted);
+std::vector<SearchCandidate> named_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted);
 /// Every structure in every group of channels.
-std::vector<Candidate> structure_candidates(const Evidence& evidence, const std::vector<Column>& accepted);
+std::vector<SearchCandidate> structure_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted);
 /// A structure's candidate with its further harmonics, as long as each adds kRules.harmonic_nats to the held-out gain.
-Candidate with_harmonics(Candidate found, const Evidence& evidence, const std::vector<Column>& accepted);
+SearchCandidate with_harmonics(SearchCandidate found, const Evidence& evidence,
+                               const std::vector<DesignColumn>& accepted);
 
 /// `flips` rows of ±1 per flight.
 std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigned seed);
 /// For each draw the largest gain of a candidate that would count as an effect, sorted; 0 where none gains.
-std::vector<double> null_maxima(std::span<const Candidate> all, const std::vector<std::vector<int>>& draws);
+std::vector<double> null_maxima(std::span<const SearchCandidate> all, const std::vector<std::vector<int>>& draws);
 /// Share of the null that is at least as large, the data counted.
 double p_value(const std::vector<double>& sorted_null, double gain);
 

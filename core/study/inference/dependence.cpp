@@ -97,7 +97,7 @@ MatrixXd points_of(const Regressor& along, const Windows& windows, const Rows& r
 }
 
 /// What remains of a group: ln variance moves as one, which is the first of its decorrelated channels.
-MatrixXd remainder(const Column& whitened, const std::vector<Channel>& group, const Rows& rows) {
+MatrixXd remainder(const DesignColumn& whitened, const std::vector<Channel>& group, const Rows& rows) {
   const std::size_t dimensions = group.front() == kVarX ? 1 : group.size();
   MatrixXd points = MatrixXd::Zero(static_cast<Index>(rows.window.size()), static_cast<Index>(dimensions));
   for (const auto& part : whitened.parts)
@@ -169,15 +169,15 @@ std::vector<double> holm(const std::vector<double>& p) {
   return corrected;
 }
 
-std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std::vector<Column>& accepted,
+std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
                                              unsigned seed, double level) {
   const Observations& seen = evidence.seen();
-  Column everything;
+  DesignColumn everything;
   for (const auto& [name, channels] : channel_groups())
     for (const Channel c : channels) everything.parts.push_back({c, {}});
-  std::vector<Column> explained = offsets({everything}, seen);
+  std::vector<DesignColumn> explained = offsets({everything}, seen);
   explained.insert(explained.end(), accepted.begin(), accepted.end());
-  const Column whitened = evidence.whitened(explained);
+  const DesignColumn whitened = evidence.whitened(explained);
   const auto along_all = regressors(seen);
   const double pairs = static_cast<double>(channel_groups().size() * along_all.size());
   const int draws = static_cast<int>(std::max(kRules.shift_draws.value, std::ceil(2 * pairs / level)));

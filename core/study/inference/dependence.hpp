@@ -44,7 +44,7 @@ struct Dependence {
 /// constant within every flight are not tested: the flights' means are taken out. `level` is family-wise. A pair's
 /// draws end as soon as kRules.enough_turns of them are as large, and there are enough of them for half of the level of
 /// the smallest p. About 0.1 s for 12 flights of 100 s.
-std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std::vector<Column>& accepted,
+std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
                                              unsigned seed, double level = kRules.dependence_level);
 
 }  // namespace backwash::study

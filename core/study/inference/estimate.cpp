@@ -18,7 +18,7 @@ struct Member {
   const Form* shape;
   Scale scale;
   double prior;
-  Normal normal;
+  NormalEquations normal;
   SmallVector theta, error;
   double height;  ///< ln likelihood over that without the cause
 };
@@ -40,7 +40,7 @@ Eigen::VectorXd jackknife(const Eigen::MatrixXd& left) {
 
 bool lower(const Member& a, const Member& b) { return a.height < b.height; }
 
-Member fitted(Normal normal, const Form* shape, const Scale& scale, double prior) {
+Member fitted(NormalEquations normal, const Form* shape, const Scale& scale, double prior) {
   Eigen::MatrixXd left(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size()));
   SmallVector sum = SmallVector::Zero(normal.total.rows());
   for (std::size_t f = 0; f < normal.b.size(); ++f) {
@@ -78,7 +78,7 @@ std::vector<double> polished(const std::vector<double>& start, double step, cons
 }
 
 /// What of a rotor's deviation is how the craft was built, the same in each of its flights: of θ = Σ x y / Σ x².
-double built_error(const Column& column) {
+double built_error(const DesignColumn& column) {
   const Channel c = column.parts.front().channel;
   double square = 0;
   for (const auto& part : column.parts)
@@ -87,21 +87,23 @@ double built_error(const Column& column) {
 }
 
 /// The form at a level offset.
-Column with_map_moved(const Windows& windows, double x, double y) { return displaced(windows, {x, y, 0}).front(); }
+DesignColumn with_map_moved(const Windows& windows, double x, double y) {
+  return displaced(windows, {x, y, 0}).front();
+}
 
 /// Standard errors of the offset (x, y) that fits best: jackknife of the fit's linearisation there.
-Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>& nuisance, double x, double y) {
+Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<DesignColumn>& nuisance, double x, double y) {
   constexpr double kDifference = kRules.offset_difference;
   const auto& windows = evidence.seen().windows;
   const auto slope = [&](double dx, double dy) {
-    Column high = with_map_moved(windows, x + dx, y + dy);
-    const Column low = with_map_moved(windows, x - dx, y - dy);
+    DesignColumn high = with_map_moved(windows, x + dx, y + dy);
+    const DesignColumn low = with_map_moved(windows, x - dx, y - dy);
     for (std::size_t k = 0; k < high.parts.size(); ++k)
       for (std::size_t i = 0; i < windows.size(); ++i)
         high.parts[k].x[i] = (high.parts[k].x[i] - low.parts[k].x[i]) / (2 * kDifference);
     return high;
   };
-  const Normal n =
+  const NormalEquations n =
       evidence.normal({slope(kDifference, 0), slope(0, kDifference), with_map_moved(windows, x, y)}, nuisance);
   Eigen::MatrixXd left(2, static_cast<Eigen::Index>(n.b.size()));
   for (std::size_t out = 0; out < n.b.size(); ++out) {
@@ -115,12 +117,12 @@ Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<Column>
 }
 
 /// The offset o at which ln Σ(p + o) − ln Σ(p), share 1, is likeliest.
-void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
+void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<DesignColumn>& others) {
   const auto& windows = evidence.seen().windows;
   auto nuisance = offsets(cause.columns, evidence.seen());
   nuisance.insert(nuisance.end(), others.begin(), others.end());
   const auto height = [&](const std::vector<double>& o) {
-    const Normal n = evidence.normal({with_map_moved(windows, o[0], o[1])}, nuisance);
+    const NormalEquations n = evidence.normal({with_map_moved(windows, o[0], o[1])}, nuisance);
     double sum = 0;
     for (std::size_t f = 0; f < n.b.size(); ++f) sum += n.b[f][0] - 0.5 * n.A[f](0, 0);
     return sum;
@@ -131,7 +133,7 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
   cause.scale.offset_W = whole_millimetres({best[0], best[1], 0});
   cause.columns = cause.form->columns(windows, cause.scale);
   cause.theta = SmallVector::Ones(1);
-  const Normal own = evidence.normal(cause.columns, nuisance);
+  const NormalEquations own = evidence.normal(cause.columns, nuisance);
   if (own.solvable) cause.gain = own.gain();
   const Eigen::VectorXd error =
       student_975(static_cast<double>(own.b.size()) - 1) * offset_error(evidence, nuisance, best[0], best[1]);
@@ -142,15 +144,15 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
 /// All shapes of a form at all scales, fitted where the craft was.
 struct Family {
   const Evidence& evidence;
-  const std::vector<Column>& others;
+  const std::vector<DesignColumn>& others;
   Scale scale;               ///< of a form without a grid of scales
   std::vector<Form> shapes;  ///< the form itself first
   Windows windows;
   std::vector<Member> members = {};  ///< in the order of shapes and scales
 
-  Normal normal_at(const Form& shape, const Scale& at) const {
+  NormalEquations normal_at(const Form& shape, const Scale& at) const {
     const auto columns = shape.columns(windows, at);
-    auto nuisance = shape.constant ? std::vector<Column>{} : offsets(columns, evidence.seen());
+    auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen());
     nuisance.insert(nuisance.end(), others.begin(), others.end());
     return evidence.normal(columns, nuisance);
   }
@@ -160,7 +162,7 @@ struct Family {
     for (const Form& shape : shapes) {
       const auto scales = fine_scales(shape, scale);
       for (const Scale& at : scales) {
-        Normal n = normal_at(shape, at);
+        NormalEquations n = normal_at(shape, at);
         if (n.solvable) members.push_back(fitted(std::move(n), &shape, at, 1.0 / static_cast<double>(scales.size())));
       }
     }
@@ -181,7 +183,7 @@ struct Family {
   /// The columns at the speed that the push itself leaves.
   void follow_speed() {
     for (int k = 0; k < kRules.turns; ++k) {
-      const Normal n = normal_at(shapes[0], scale);
+      const NormalEquations n = normal_at(shapes[0], scale);
       if (!n.solvable) return;
       scale.anchor = {n.fit()[0]};
     }
@@ -201,7 +203,7 @@ struct Family {
     if (n == 1) return start;
     const double low = std::log(members.front().scale.value), high = std::log(members[own() - 1].scale.value);
     const auto height = [&](const std::vector<double>& ln) {
-      Normal normal = normal_at(shapes[0], {std::exp(ln[0])});
+      NormalEquations normal = normal_at(shapes[0], {std::exp(ln[0])});
       return normal.solvable ? fitted(std::move(normal), nullptr, {}, 0).height : -HUGE_VAL;
     };
     const double at =
@@ -210,7 +212,7 @@ struct Family {
   }
 
   /// Each parameter, averaged over the members. `columns`: of the form itself.
-  std::vector<Estimate> parameters(const std::vector<Column>& columns) const {
+  std::vector<Estimate> parameters(const std::vector<DesignColumn>& columns) const {
     const double highest = std::max_element(members.begin(), members.end(), lower)->height;
     const double wide = student_975(static_cast<double>(members.front().normal.b.size()) - 1) / kRules.normal_975;
     std::vector<Estimate> all;
@@ -241,7 +243,7 @@ struct Family {
 
 }  // namespace
 
-void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>& others) {
+void refine(const Evidence& evidence, Accepted& cause, const std::vector<DesignColumn>& others) {
   const Form& form = *cause.form;
   if (form.displaces_map) return refine_offset(evidence, cause, others);
   Family family{evidence, others, cause.scale, form.shapes, evidence.seen().windows};
@@ -262,7 +264,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<Column>
   }
 }
 
-bool excludes_zero(const Normal& normal, const std::vector<Column>& columns) {
+bool excludes_zero(const NormalEquations& normal, const std::vector<DesignColumn>& columns) {
   const double t = student_975(static_cast<double>(normal.b.size()) - 1);
   const Member fit = fitted(normal, nullptr, {}, 0);
   for (Eigen::Index k = 0; k < fit.theta.size(); ++k)

@@ -7,20 +7,20 @@
 
 namespace backwash::study {
 
-SmallVector Normal::fit(const std::vector<int>& signs) const {
+SmallVector NormalEquations::fit(const std::vector<int>& signs) const {
   SmallVector sum = SmallVector::Zero(total.rows());
   for (std::size_t f = 0; f < b.size(); ++f) sum += (signs.empty() ? 1 : signs[f]) * b[f];
   return total.ldlt().solve(sum);
 }
 
-SmallVector Normal::fit_without(std::size_t flight) const {
+SmallVector NormalEquations::fit_without(std::size_t flight) const {
   SmallVector sum = SmallVector::Zero(total.rows());
   for (std::size_t f = 0; f < b.size(); ++f)
     if (f != flight) sum += b[f];
   return left_out[flight] * sum;
 }
 
-double Normal::gain(const std::vector<int>& signs) const {
+double NormalEquations::gain(const std::vector<int>& signs) const {
   SmallVector sum = SmallVector::Zero(total.rows());
   for (std::size_t f = 0; f < b.size(); ++f) sum += (signs.empty() ? 1 : signs[f]) * b[f];
   double nats = 0;
@@ -32,7 +32,7 @@ double Normal::gain(const std::vector<int>& signs) const {
   return nats;
 }
 
-std::vector<double> Normal::gain_per_flight() const {
+std::vector<double> NormalEquations::gain_per_flight() const {
   std::vector<double> nats;
   for (std::size_t f = 0; f < b.size(); ++f) {
     const SmallVector theta = fit_without(f);
@@ -41,8 +41,9 @@ std::vector<double> Normal::gain_per_flight() const {
   return nats;
 }
 
-Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const {
-  std::vector<const Column*> joint;
+NormalEquations Evidence::normal(const std::vector<DesignColumn>& columns,
+                                 const std::vector<DesignColumn>& nuisance) const {
+  std::vector<const DesignColumn*> joint;
   for (const auto& c : nuisance) joint.push_back(&c);
   for (const auto& c : columns) joint.push_back(&c);
   const auto q = static_cast<Eigen::Index>(nuisance.size()), p = static_cast<Eigen::Index>(columns.size());
@@ -56,7 +57,7 @@ Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Co
     const Eigen::MatrixXd N = sum.topLeftCorner(q, q);
     T.leftCols(q) = -N.completeOrthogonalDecomposition().solve(sum.topRightCorner(q, p + 1)).transpose();
   }
-  Normal normal;
+  NormalEquations normal;
   normal.total = SmallMatrix::Zero(p, p);
   for (const auto& g : G) {
     const Eigen::MatrixXd reduced = T * g * T.transpose();
@@ -81,7 +82,7 @@ Normal Evidence::normal(const std::vector<Column>& columns, const std::vector<Co
   return normal;
 }
 
-SmallMatrix Evidence::size(const std::vector<Column>& columns) const {
+SmallMatrix Evidence::size(const std::vector<DesignColumn>& columns) const {
   const auto p = static_cast<Eigen::Index>(columns.size());
   SmallMatrix sum = SmallMatrix::Zero(p, p);
   double n = 0;

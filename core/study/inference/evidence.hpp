@@ -17,7 +17,7 @@ using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>
 
 /// Normal equations of some columns per flight, with nuisance columns projected out of them and of the data:
 /// A_f = X̃ᵀV⁻¹X̃, b_f = X̃ᵀV⁻¹ỹ over the windows of flight f.
-struct Normal {
+struct NormalEquations {
   std::vector<SmallMatrix> A;
   std::vector<SmallVector> b;
   std::vector<SmallMatrix> left_out;  ///< (ΣA − A_f)⁻¹
@@ -45,7 +45,7 @@ double built_scatter(Channel c);
 
 /// A column seen in axes of which the scatter is independent: ln variance along x, y and z wanders as one (gusts are
 /// strong or weak along all axes), so its three channels become √3 times their mean, (x − y)/√2 and (x + y − 2z)/√6.
-Column decorrelated(const Column& column);
+DesignColumn decorrelated(const DesignColumn& column);
 
 /// Observations with the scatter of each channel (after `decorrelated`): within flights (σ_w²) and between them (σ_b²,
 /// a random intercept), by analysis of variance of what the accepted columns leave. V = diag(σ_w²/weight) + σ_b² 11ᵀ
@@ -59,22 +59,22 @@ class Evidence {
   const Observations& seen() const noexcept { return *seen_; }
 
   /// Takes the accepted columns (with the offsets of their channels) out and estimates the scatter of what is left.
-  void whiten(const std::vector<Column>& accepted);
+  void whiten(const std::vector<DesignColumn>& accepted);
 
   /// A flight that came after these, by itself, weighed with the scatter of these. Keeps a pointer to `flight`.
   Evidence next(const Observations& flight) const;
 
   /// Normal equations of `columns`, `nuisance` projected out (columns of it that others span are ignored).
-  Normal normal(const std::vector<Column>& columns, const std::vector<Column>& nuisance) const;
+  NormalEquations normal(const std::vector<DesignColumn>& columns, const std::vector<DesignColumn>& nuisance) const;
   /// Mean of x xᵀ, by weight, over the measured windows of the channels that the columns move: √(θᵀ size θ) is the root
   /// mean square of Σ θ x.
-  SmallMatrix size(const std::vector<Column>& columns) const;
+  SmallMatrix size(const std::vector<DesignColumn>& columns) const;
   /// What `columns`, fitted to all flights, leave of each channel (decorrelated), in units of its scatter within
   /// flights: each flight's own mean and, in the level means, its own trim (shrunk by σ_t²) taken out; 0 where not
   /// measured.
-  Column whitened(const std::vector<Column>& columns) const;
+  DesignColumn whitened(const std::vector<DesignColumn>& columns) const;
   /// What `columns`, fitted to all flights, leave of each channel (decorrelated).
-  Column residual(const std::vector<Column>& columns) const;
+  DesignColumn residual(const std::vector<DesignColumn>& columns) const;
   /// Weight of a window in a channel (decorrelated): σ_w² over it is the variance of its noise; 0: not measured.
   double weight(Channel c, std::size_t window) const { return weight_[c][window]; }
   /// Whether a window measures a channel (decorrelated).
@@ -83,17 +83,17 @@ class Evidence {
 
  private:
   /// XᵀV⁻¹X of each flight, X the columns and last y.
-  std::vector<Eigen::MatrixXd> grams(const std::vector<const Column*>& columns) const;
-  void take_flights_out(Column& residual) const;
-  void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const;
+  std::vector<Eigen::MatrixXd> grams(const std::vector<const DesignColumn*>& columns) const;
+  void take_flights_out(DesignColumn& residual) const;
+  void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<DesignColumn>& columns) const;
   void anova(Channel c, const std::vector<double>& residual);
   void weigh_means(const std::vector<double>& ln_variance);
-  double trim_scatter(const Column& residual) const;
+  double trim_scatter(const DesignColumn& residual) const;
 
   const Observations* seen_;
-  Column y_;  // every channel, decorrelated
+  DesignColumn y_;  // every channel, decorrelated
   std::array<std::vector<double>, kChannels> weight_;
-  std::vector<Column> tilts_;            // Z; empty without attitude
+  std::vector<DesignColumn> tilts_;      // Z; empty without attitude
   std::vector<std::size_t> flight_end_;  // per window, where its flight ends
   std::array<double, kChannels> within_{}, between_{}, unit_{};
   double tilt_ = 0;  // σ_t²

@@ -7,8 +7,8 @@
 
 namespace backwash::study {
 
-std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen, std::size_t but) {
-  std::vector<Column> all;
+std::vector<DesignColumn> columns_of(const std::vector<Accepted>& accepted, const Observations& seen, std::size_t but) {
+  std::vector<DesignColumn> all;
   for (std::size_t i = 0; i < accepted.size(); ++i) {
     if (i == but) continue;
     all.insert(all.end(), accepted[i].columns.begin(), accepted[i].columns.end());
@@ -18,21 +18,21 @@ std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Obse
   return all;
 }
 
-bool dynamic(const std::vector<Column>& columns) {
+bool dynamic(const std::vector<DesignColumn>& columns) {
   const Channel c = columns.front().parts.front().channel;
   return c >= kThrustDelay && c <= kTiltDelay;
 }
 
-bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b) {
+bool share_a_channel(const std::vector<DesignColumn>& a, const std::vector<DesignColumn>& b) {
   std::array<bool, kChannels> moved{};
   for (const auto& column : a)
     for (const auto& part : column.parts) moved[part.channel] = true;
-  return std::any_of(b.begin(), b.end(), [&](const Column& column) {
+  return std::any_of(b.begin(), b.end(), [&](const DesignColumn& column) {
     return std::any_of(column.parts.begin(), column.parts.end(), [&](auto& part) { return moved[part.channel]; });
   });
 }
 
-bool error_of_form(const Form& form, const std::vector<Column>& columns, double gain,
+bool error_of_form(const Form& form, const std::vector<DesignColumn>& columns, double gain,
                    const std::vector<Accepted>& accepted, const Evidence& evidence, std::size_t itself) {
   for (std::size_t i = 0; i < accepted.size(); ++i) {
     if (i == itself || gain > kRules.form_error * accepted[i].gain) continue;
@@ -41,14 +41,14 @@ bool error_of_form(const Form& form, const std::vector<Column>& columns, double 
     for (std::size_t k = 0; k < accepted.size(); ++k)
       if (k != i && k != itself) others.push_back(accepted[k]);
     const auto beside = nuisance_of(form, columns, columns_of(others, evidence.seen()), evidence.seen());
-    const Normal alone = evidence.normal(columns, beside);
+    const NormalEquations alone = evidence.normal(columns, beside);
     if (alone.solvable && gain < kRules.rival_rest * alone.gain()) return true;
   }
   return false;
 }
 
 /// Σ and standard error of the sum of per-flight differences.
-Lead lead_over(const Normal& a, const Normal& b) {
+Lead lead_over(const NormalEquations& a, const NormalEquations& b) {
   const auto ga = a.gain_per_flight(), gb = b.gain_per_flight();
   double sum = 0, square = 0;
   const double n = static_cast<double>(ga.size());
@@ -73,22 +73,22 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
     for (const Scale& scale : form.scales) {
       const auto columns = form.columns(evidence.seen().windows, scale);
       // Both with the same free offsets, unless one of them is an offset itself.
-      std::vector<Column> both = own.columns;
+      std::vector<DesignColumn> both = own.columns;
       both.insert(both.end(), columns.begin(), columns.end());
-      std::vector<Column> nuisance = others;
+      std::vector<DesignColumn> nuisance = others;
       if (!form.constant && !own.form->constant) {
         const auto free = offsets(both, evidence.seen());
         nuisance.insert(nuisance.end(), free.begin(), free.end());
       }
-      const Normal theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);
+      const NormalEquations theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);
       if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, kRules.rival_rest * ours.gain()))
         continue;
-      const Candidate rival{&form, form.cause(), scale, {}, {}, 0, evidence.size(columns)};
+      const SearchCandidate rival{&form, form.cause(), scale, {}, {}, 0, evidence.size(columns)};
       if (!rival.effect(theirs.fit())) continue;
       // Two causes that explain different data are two causes, not rivals: a rival gains less once ours is known.
-      std::vector<Column> with_ours = nuisance;
+      std::vector<DesignColumn> with_ours = nuisance;
       with_ours.insert(with_ours.end(), own.columns.begin(), own.columns.end());
-      const Normal rest = evidence.normal(columns, with_ours);
+      const NormalEquations rest = evidence.normal(columns, with_ours);
       if (rest.solvable && rest.gain() > kRules.rival_rest * theirs.gain()) continue;
       const auto [lead, error] = lead_over(ours, theirs);
       // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of

@@ -8,24 +8,24 @@
 namespace backwash::study {
 
 /// Everything accepted but one, with what it leaves open, as columns.
-std::vector<Column> columns_of(const std::vector<Accepted>& accepted, const Observations& seen,
-                               std::size_t but = SIZE_MAX);
+std::vector<DesignColumn> columns_of(const std::vector<Accepted>& accepted, const Observations& seen,
+                                     std::size_t but = SIZE_MAX);
 
 /// Whether a cause is a delay or a slope, told by the moments of what is commanded.
-bool dynamic(const std::vector<Column>& columns);
+bool dynamic(const std::vector<DesignColumn>& columns);
 
-bool share_a_channel(const std::vector<Column>& a, const std::vector<Column>& b);
+bool share_a_channel(const std::vector<DesignColumn>& a, const std::vector<DesignColumn>& b);
 
 /// Whether a cause of this gain beside the accepted ones is what the error of the form of one of them looks like: it
 /// lost more than half of its gain to that one, and what is left is little beside it. `itself`: its own number.
-bool error_of_form(const Form& form, const std::vector<Column>& columns, double gain,
+bool error_of_form(const Form& form, const std::vector<DesignColumn>& columns, double gain,
                    const std::vector<Accepted>& accepted, const Evidence& evidence, std::size_t itself = SIZE_MAX);
 
 /// Nats by which one set of columns leads another over the flights, and the standard error of that sum.
 struct Lead {
   double nats, error;
 };
-Lead lead_over(const Normal& ours, const Normal& theirs);
+Lead lead_over(const NormalEquations& ours, const NormalEquations& theirs);
 
 /// The lead, nats, above which a rival is told from a cause. `error`: the lead's; `gain`: the cause's where one of the
 /// two is a delay or a slope, else 0: there a lead that is a small share of the gain is one that the error of a form

@@ -18,8 +18,8 @@ double built_scatter(Channel c) {
   return c >= kDropout1 ? kRules.dropout_scatter : c >= kMotor1 ? kRules.motor_scatter.value : 0;
 }
 
-Column decorrelated(const Column& column) {
-  Column turned;
+DesignColumn decorrelated(const DesignColumn& column) {
+  DesignColumn turned;
   std::array<const std::vector<double>*, 3> axis{};
   std::size_t n = 0;
   for (const auto& part : column.parts) {
@@ -50,7 +50,7 @@ Evidence::Evidence(const Observations& seen)
       const bool last = i + 1 == seen.units.first[f + 1] || seen.windows[i + 1].flight != seen.windows[i].flight;
       flight_end_[i] = last ? i + 1 : flight_end_[i + 1];
     }
-  Column all;
+  DesignColumn all;
   for (std::size_t c = 0; c < kChannels; ++c) all.parts.push_back({static_cast<Channel>(c), seen.y[c]});
   y_ = decorrelated(all);
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
@@ -61,7 +61,7 @@ Evidence::Evidence(const Observations& seen)
   }
   if (seen.has(Source::attitude)) {
     for (int k = 0; k < 2; ++k) {
-      Column tilt{{{kMeanX, {}}, {kMeanY, {}}}};
+      DesignColumn tilt{{{kMeanX, {}}, {kMeanY, {}}}};
       for (const auto& w : seen.windows)
         for (int i = 0; i < 2; ++i) tilt.parts[static_cast<std::size_t>(i)].x.push_back(w.R_WB(i, k));
       tilts_.push_back(std::move(tilt));
@@ -79,7 +79,8 @@ Evidence Evidence::next(const Observations& flight) const {
 }
 
 /// Adds one channel's part of every flight's XᵀV⁻¹X, the random trim left aside.
-void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<Column>& columns) const {
+void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c,
+                           const std::vector<DesignColumn>& columns) const {
   std::vector<std::pair<Eigen::Index, const std::vector<double>*>> active;
   for (std::size_t k = 0; k < columns.size(); ++k)
     for (const auto& part : columns[k].parts)
@@ -121,10 +122,10 @@ void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const
   }
 }
 
-std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const Column*>& columns) const {
-  std::vector<Column> all;
+std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const DesignColumn*>& columns) const {
+  std::vector<DesignColumn> all;
   bool level = false;
-  for (const Column* c : columns) {
+  for (const DesignColumn* c : columns) {
     all.push_back(decorrelated(*c));
     for (const auto& part : c->parts) level = level || part.channel == kMeanX || part.channel == kMeanY;
   }
@@ -146,8 +147,8 @@ std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const Column*>& c
 
 /// σ_t² by moments: what the flights' own trims β_f scatter about their mean β̄ beyond their errors,
 /// E Σ (β_f − β̄)ᵀG_f(β_f − β̄) = 2(F − 1) + σ_t² (tr ΣG − tr (ΣG)⁻¹ΣG²).
-double Evidence::trim_scatter(const Column& residual) const {
-  std::vector<Column> all = tilts_;
+double Evidence::trim_scatter(const DesignColumn& residual) const {
+  std::vector<DesignColumn> all = tilts_;
   all.push_back(residual);
   std::vector<Eigen::MatrixXd> grams(seen_->units.size(), Eigen::MatrixXd::Zero(3, 3));
   for (const Channel c : {kMeanX, kMeanY}) add_channel(grams, c, all);
@@ -200,10 +201,10 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
 }
 
 /// y (decorrelated) less what the columns explain of it, by weighted least squares over all flights.
-Column Evidence::residual(const std::vector<Column>& columns) const {
-  Column residual = y_;
+DesignColumn Evidence::residual(const std::vector<DesignColumn>& columns) const {
+  DesignColumn residual = y_;
   if (columns.empty()) return residual;
-  std::vector<const Column*> pointers;
+  std::vector<const DesignColumn*> pointers;
   for (const auto& c : columns) pointers.push_back(&c);
   const auto p = static_cast<Eigen::Index>(columns.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p + 1, p + 1);
@@ -218,11 +219,11 @@ Column Evidence::residual(const std::vector<Column>& columns) const {
   return residual;
 }
 
-void Evidence::whiten(const std::vector<Column>& accepted) {
+void Evidence::whiten(const std::vector<DesignColumn>& accepted) {
   within_.fill(1), between_.fill(0), unit_.fill(0), tilt_ = 0;
-  std::vector<Column> columns = offsets(accepted, *seen_);
+  std::vector<DesignColumn> columns = offsets(accepted, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
-  const Column rest = residual(columns);
+  const DesignColumn rest = residual(columns);
   for (const auto& r : rest.parts)
     if (r.channel == kVarX) anova(kVarX, r.x), weigh_means(r.x);
   for (const auto& r : rest.parts) anova(r.channel, r.x);
@@ -230,7 +231,7 @@ void Evidence::whiten(const std::vector<Column>& accepted) {
 }
 
 /// Takes each flight's mean out of every channel, and with the level means' its own trim, ridge 1/σ_t².
-void Evidence::take_flights_out(Column& residual) const {
+void Evidence::take_flights_out(DesignColumn& residual) const {
   const bool trimmed = tilt_ > 0;
   for (std::size_t f = 0; f < seen_->units.size(); ++f) {
     Eigen::Matrix4d normal = Eigen::Vector4d(0, 0, trimmed ? 1 / tilt_ : 1, trimmed ? 1 / tilt_ : 1).asDiagonal();
@@ -260,8 +261,8 @@ void Evidence::take_flights_out(Column& residual) const {
   }
 }
 
-Column Evidence::whitened(const std::vector<Column>& columns) const {
-  Column rest = residual(columns);
+DesignColumn Evidence::whitened(const std::vector<DesignColumn>& columns) const {
+  DesignColumn rest = residual(columns);
   take_flights_out(rest);
   for (auto& [c, x] : rest.parts)
     for (std::size_t i = 0; i < x.size(); ++i) x[i] *= std::sqrt(weight_[c][i] / within_[c]);

@@ -14,7 +14,7 @@ namespace {
 
 /// What a cause may disturb besides the channels that its columns move: the error of its form is left over there too.
 /// Bits: level means; vertical mean; variance, tail and lines; delays and slope; single rotors.
-unsigned disturbs(const std::vector<Column>& columns) {
+unsigned disturbs(const std::vector<DesignColumn>& columns) {
   unsigned kinds = 0;
   for (const auto& column : columns) {
     for (const auto& part : column.parts) {
@@ -31,7 +31,7 @@ unsigned disturbs(const std::vector<Column>& columns) {
 
 /// Gain that a further cause needs: a share of that of each accepted one whose form's error it might be, a larger one
 /// where it repairs it in the same moments of the thrust's or the commands' delay.
-double needed_gain(const Candidate& candidate, const std::vector<Accepted>& accepted, double threshold) {
+double needed_gain(const SearchCandidate& candidate, const std::vector<Accepted>& accepted, double threshold) {
   double needed = threshold;
   for (const auto& a : accepted) {
     if (!(disturbs(a.columns) & disturbs(candidate.columns))) continue;
@@ -42,7 +42,7 @@ double needed_gain(const Candidate& candidate, const std::vector<Accepted>& acce
 }
 
 /// Gain that a structure needs beside the accepted causes.
-double needed_structure(const Candidate& structure, const std::vector<Accepted>& accepted) {
+double needed_structure(const SearchCandidate& structure, const std::vector<Accepted>& accepted) {
   double needed = 0;
   for (const auto& a : accepted)
     if (share_a_channel(structure.columns, a.columns))
@@ -58,7 +58,7 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
     double least = threshold;
     for (std::size_t i = 0; i < accepted.size(); ++i) {
       const auto& a = accepted[i];
-      const Normal n = evidence.normal(
+      const NormalEquations n = evidence.normal(
           a.columns, nuisance_of(*a.form, a.columns, columns_of(accepted, evidence.seen(), i), evidence.seen()));
       double gain = n.solvable ? n.gain() : 0;
       if (error_of_form(*a.form, a.columns, gain, accepted, evidence, i)) gain = std::min(gain, 0.0);
@@ -76,11 +76,11 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
 /// What one step tries: the catalogue and the structures, each with the null of its own maxima and its share of the
 /// level.
 struct Step {
-  std::vector<Candidate> named, structures;
+  std::vector<SearchCandidate> named, structures;
   std::vector<double> null_named, null_structures;
   double threshold, structure_threshold;  // nats
 
-  Step(const Evidence& evidence, const std::vector<Column>& accepted, const std::vector<std::vector<int>>& draws,
+  Step(const Evidence& evidence, const std::vector<DesignColumn>& accepted, const std::vector<std::vector<int>>& draws,
        double level)
       : named(named_candidates(evidence, accepted)),
         structures(structure_candidates(evidence, accepted)),
@@ -97,13 +97,13 @@ struct Step {
   }
 };
 
-bool is_known(const Candidate& c, const std::vector<Accepted>& accepted) {
+bool is_known(const SearchCandidate& c, const std::vector<Accepted>& accepted) {
   return std::any_of(accepted.begin(), accepted.end(),
                      [&](auto& a) { return c.form && a.form->effect == c.form->effect; });
 }
 
 /// The cause that gains most beside what is accepted, more than `led` nats, but is none that a vehicle can have.
-std::optional<Refused> impossible(const std::vector<Candidate>& all, const std::vector<Accepted>& accepted,
+std::optional<Refused> impossible(const std::vector<SearchCandidate>& all, const std::vector<Accepted>& accepted,
                                   double threshold, double led) {
   std::optional<Refused> found;
   for (const auto& c : all) {
@@ -118,9 +118,9 @@ std::optional<Refused> impossible(const std::vector<Candidate>& all, const std::
   return found;
 }
 
-const Candidate* best_of(const std::vector<Candidate>& all, const std::vector<Accepted>& accepted, double threshold,
-                         const Evidence& evidence) {
-  const Candidate* best = nullptr;
+const SearchCandidate* best_of(const std::vector<SearchCandidate>& all, const std::vector<Accepted>& accepted,
+                               double threshold, const Evidence& evidence) {
+  const SearchCandidate* best = nullptr;
   for (const auto& c : all) {
     if (is_known(c, accepted) || (best && c.gain <= best->gain)) continue;
     if (c.gain <= needed_gain(c, accepted, threshold) || !c.effect(c.normal.fit())) continue;
@@ -130,7 +130,7 @@ const Candidate* best_of(const std::vector<Candidate>& all, const std::vector<Ac
   return best;
 }
 
-UnknownStructure told(const Candidate& structure, double p) {
+UnknownStructure told(const SearchCandidate& structure, double p) {
   const auto group = std::find_if(channel_groups().begin(), channel_groups().end(), [&](auto& g) {
     return g.second.front() == structure.columns.front().parts.front().channel;
   });
@@ -138,26 +138,26 @@ UnknownStructure told(const Candidate& structure, double p) {
 }
 
 /// Whether a structure says more than any cause does, and more than the error of an accepted one could.
-bool leads(const Candidate& structure, const Candidate* cause, const std::vector<Accepted>& accepted) {
+bool leads(const SearchCandidate& structure, const SearchCandidate* cause, const std::vector<Accepted>& accepted) {
   if (structure.gain < needed_structure(structure, accepted)) return false;
   return !cause ||
          structure.gain - cause->gain > std::max(kRules.structure_lead.value, kRules.structure_margin * cause->gain);
 }
 
 /// A constant of which more than half as much again varies along a regressor is the structure's mean.
-void drop_means_of(const std::vector<Column>& structure, double gain, std::vector<Accepted>& accepted) {
+void drop_means_of(const std::vector<DesignColumn>& structure, double gain, std::vector<Accepted>& accepted) {
   std::erase_if(accepted, [&](const Accepted& a) {
     return a.form->constant && gain > kRules.left_of_constant * a.gain && share_a_channel(structure, a.columns);
   });
 }
 
 /// What reaches farther than its cause can is told as a structure in its place. False: it is the cause.
-bool reaches_too_far(const Accepted& a, SearchResult& result) {
+bool reaches_too_far(const Accepted& a, CauseSearchResult& result) {
   if (!a.form->reach || a.scale.value <= a.form->reach->most) return false;
   const Reach& reach = *a.form->reach;
   result.refused.push_back(
       {a.form->cause(), a.form->formula, a.form->scale_name, a.scale.value, {0, reach.most, reach.reason}});
-  Candidate as_structure;
+  SearchCandidate as_structure;
   as_structure.name = reach.regressor, as_structure.columns = a.columns, as_structure.gain = a.gain;
   as_structure.structure.shape = a.form->formula;
   result.unknown.push_back(told(as_structure, a.p));
@@ -166,7 +166,7 @@ bool reaches_too_far(const Accepted& a, SearchResult& result) {
 }
 
 /// What came out beyond what a vehicle can have, once averaged over the shapes, is refused; no interval holds it.
-void refuse_impossible(SearchResult& result) {
+void refuse_impossible(CauseSearchResult& result) {
   std::erase_if(result.accepted, [&](Accepted& a) {
     const auto& possible = a.form->possible;
     for (std::size_t k = 0; k < possible.size() && !a.form->displaces_map && k < a.parameters.size(); ++k) {
@@ -190,8 +190,8 @@ void refuse_impossible(SearchResult& result) {
 
 }  // namespace
 
-SearchResult search(const Evidence& start, const SearchOptions& options) {
-  SearchResult result;
+CauseSearchResult search(const Evidence& start, const CauseSearchOptions& options) {
+  CauseSearchResult result;
   Evidence evidence = start;
   const auto draws = sign_draws(evidence.seen().units.size(), options.flips, options.seed);
   while (result.accepted.size() < options.most_causes) {
@@ -203,8 +203,8 @@ SearchResult search(const Evidence& start, const SearchOptions& options) {
     if (step.named.empty() && step.structures.empty()) break;
     result.null_gain = step.null_named;
     result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
-    const Candidate* cause = best_of(step.named, result.accepted, step.threshold, evidence);
-    const Candidate* structure = best_of(step.structures, result.accepted, step.structure_threshold, evidence);
+    const SearchCandidate* cause = best_of(step.named, result.accepted, step.threshold, evidence);
+    const SearchCandidate* structure = best_of(step.structures, result.accepted, step.structure_threshold, evidence);
     if (const auto no = impossible(step.named, result.accepted, step.threshold, cause ? cause->gain : 0))
       result.refused.push_back(*no);
     if (structure && leads(*structure, cause, result.accepted)) {

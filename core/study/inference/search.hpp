@@ -11,7 +11,7 @@
 
 namespace backwash::study {
 
-struct SearchOptions {
+struct CauseSearchOptions {
   int flips = static_cast<int>(kRules.flips);  ///< sign draws of the null
   double accept_p = kRules.accept_p;           ///< family-wise, nominal; core/study/confusion.md says what it comes to
   unsigned seed = 1;
@@ -29,7 +29,7 @@ struct Rival {
 struct Accepted {
   const Form* form;
   Scale scale;
-  std::vector<Column> columns;
+  std::vector<DesignColumn> columns;
   SmallVector theta;
   double p;
   double gain;  ///< held out, nats, given the other accepted causes
@@ -52,7 +52,7 @@ struct Refused {
   Possible possible;
 };
 
-struct SearchResult {
+struct CauseSearchResult {
   std::vector<Accepted> accepted;  ///< in the order found
   std::vector<Refused> refused;
   std::vector<UnknownStructure> unknown;
@@ -62,6 +62,6 @@ struct SearchResult {
 };
 
 /// Greedy search under the null of whole flights' signs flipped (core/study/README.md says the rules).
-SearchResult search(const Evidence& evidence, const SearchOptions& options);
+CauseSearchResult search(const Evidence& evidence, const CauseSearchOptions& options);
 
 }  // namespace backwash::study

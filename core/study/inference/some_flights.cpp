@@ -14,8 +14,8 @@ namespace backwash::study {
 namespace {
 
 /// Accepted columns, but for constants of the form's own effect: their part is seen in every flight alike.
-std::vector<Column> others(const SearchResult& found, const Form& own, const Observations& seen) {
-  std::vector<Column> all;
+std::vector<DesignColumn> others(const CauseSearchResult& found, const Form& own, const Observations& seen) {
+  std::vector<DesignColumn> all;
   for (const auto& a : found.accepted) {
     if (a.form->constant && a.form->effect == own.effect) continue;
     all.insert(all.end(), a.columns.begin(), a.columns.end());
@@ -27,7 +27,7 @@ std::vector<Column> others(const SearchResult& found, const Form& own, const Obs
 
 /// Rotors tell by channels of their own what is the matter with them, and other flights' scatter there is small. Pushes
 /// and tails differ between flights for too many reasons (some_flights.md).
-std::vector<Amplitudes> all_amplitudes(const Evidence& evidence, const SearchResult& found) {
+std::vector<Amplitudes> all_amplitudes(const Evidence& evidence, const CauseSearchResult& found) {
   std::vector<Amplitudes> all;
   for (const Form* form : catalogue()) {
     if (!form->constant || why_not_tested(*form, evidence.seen())) continue;
@@ -99,7 +99,7 @@ std::vector<ActingFlight> flights_of(const std::vector<Segment>& segments, const
 }
 
 /// Columns that are 0 where no segment acts.
-std::vector<Column> masked(std::vector<Column> columns, const std::vector<Segment>& segments) {
+std::vector<DesignColumn> masked(std::vector<DesignColumn> columns, const std::vector<Segment>& segments) {
   for (const auto& s : segments)
     for (auto& column : columns)
       for (auto& part : column.parts)
@@ -153,7 +153,7 @@ std::size_t kind_of(const Asked& asked) {
 /// What is asked of the flights, and at which share of the level.
 class Questions {
  public:
-  Questions(const std::vector<Amplitudes>& all, const SearchResult& found, const std::vector<InSomeFlights>& known)
+  Questions(const std::vector<Amplitudes>& all, const CauseSearchResult& found, const std::vector<InSomeFlights>& known)
       : found_(&found), known_(&known) {
     for (const auto& a : all)
       for (const auto& direction : directions(a)) asked_.push_back({&a, direction});
@@ -185,7 +185,7 @@ class Questions {
                        [&](auto& a) { return a.form == &one.amplitudes->form(); });
   }
 
-  const SearchResult* found_;
+  const CauseSearchResult* found_;
   const std::vector<InSomeFlights>* known_;
   std::vector<Asked> asked_;
   std::map<std::size_t, double> count_;  // by kind
@@ -194,8 +194,9 @@ class Questions {
 
 }  // namespace
 
-std::optional<InSomeFlights> in_some_flights(const Evidence& evidence, const SearchResult& found,
-                                             const std::vector<InSomeFlights>& known, const SearchOptions& options) {
+std::optional<InSomeFlights> in_some_flights(const Evidence& evidence, const CauseSearchResult& found,
+                                             const std::vector<InSomeFlights>& known,
+                                             const CauseSearchOptions& options) {
   const auto all = all_amplitudes(evidence, found);
   const Questions questions(all, found, known);
   std::vector<Finding> findings;

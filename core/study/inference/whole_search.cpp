@@ -6,7 +6,7 @@
 namespace backwash::study {
 namespace {
 
-void subtract(const std::vector<Column>& columns, const SmallVector& theta, Observations& seen) {
+void subtract(const std::vector<DesignColumn>& columns, const SmallVector& theta, Observations& seen) {
   for (std::size_t k = 0; k < columns.size(); ++k)
     for (const auto& [channel, x] : columns[k].parts)
       for (std::size_t i = 0; i < x.size(); ++i) seen.y[channel][i] -= theta[static_cast<Eigen::Index>(k)] * x[i];
@@ -22,13 +22,13 @@ void take_out(const InSomeFlights& cause, const std::vector<Accepted>& accepted,
   auto all = known;
   all.insert(all.end(), cause.open.begin(), cause.open.end());
   evidence.whiten(all);
-  const Normal left = evidence.normal(cause.open, known);
+  const NormalEquations left = evidence.normal(cause.open, known);
   if (left.excited) subtract(cause.open, left.fit(), seen);
 }
 
 }  // namespace
 
-WholeSearch search_all(const Observations& seen, const SearchOptions& options) {
+WholeSearch search_all(const Observations& seen, const CauseSearchOptions& options) {
   WholeSearch all{{}, {}, seen};
   for (;;) {
     Evidence evidence(all.rest);

@@ -9,13 +9,13 @@ namespace backwash::study {
 
 /// The search, beside what acts in some flights only.
 struct WholeSearch {
-  SearchResult found;
+  CauseSearchResult found;
   std::vector<InSomeFlights> some;
   Observations rest;  ///< without those in some flights
 };
 
 /// Searches all flights, then flight by flight. Each cause that acts in some flights is taken out of those flights,
 /// with what it leaves open, and everything is searched anew, up to most_parts times. Real-time status: offline.
-WholeSearch search_all(const Observations& seen, const SearchOptions& options);
+WholeSearch search_all(const Observations& seen, const CauseSearchOptions& options);
 
 }  // namespace backwash::study

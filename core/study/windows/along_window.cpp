@@ -26,7 +26,7 @@ Vec3 WindowRow::ln_sigma_at(const Vec3& offset_W) const {
 }
 
 /// Σ along the window (a moving vehicle crosses different air), as it is and with the window moved; surfaces too.
-void Observer::look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v) {
+void Observer::look_along(WindowRow& row, SampleRange w, const std::vector<Vec3>& p, const std::vector<Vec3>& v) {
   const auto sample = [&](std::size_t k) { return w.begin + (2 * k + 1) * w.size() / (2 * kPoints); };
   const auto at = [&](std::size_t k) -> const Vec3& { return p[sample(k)]; };
   const bool still = (at(0) - at(kPoints - 1)).norm() + (at(0) - at(kPoints / 2)).norm() < kWindowRules.one_place;

@@ -20,7 +20,7 @@ double earlier(const Series& s, std::size_t i, double shift, int axis) {
 }  // namespace
 
 /// How late and how steeply thrust and commands act.
-void Observer::put_delays(const Series& s, Stretch w) {
+void Observer::put_delays(const Series& s, SampleRange w) {
   const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
   if (s.simulated_by_thrust) {
     // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
@@ -59,7 +59,7 @@ void Observer::put_delays(const Series& s, Stretch w) {
 /// How late the attitude follows what the loop asks of it, in hover: there the loop answers gusts alone, by the
 /// measured state, and set-points that act late change nothing. Slow answers alone count: there a loop of any order
 /// with the same mean lateness follows alike, and at 10 rad/s one of second order is 30 ms later than one of first.
-void Observer::put_tilt_delay(const Series& s, Stretch w) {
+void Observer::put_tilt_delay(const Series& s, SampleRange w) {
   double y = 0, square = 0;
   DelayStage::PerSecond design{};
   constexpr std::size_t kOwn = 2;  // of kShifts
@@ -86,7 +86,7 @@ void Observer::put_tilt_delay(const Series& s, Stretch w) {
 }
 
 /// Of axes `from` … `to` − 1, along the nominal rate of each.
-void Observer::put_command_delay(const Series& s, Stretch w, int from, int to) {
+void Observer::put_command_delay(const Series& s, SampleRange w, int from, int to) {
   double y = 0, square = 0, lagging = 0;
   DelayStage::PerSecond design{};
   for (int axis = from; axis < to; ++axis) {

@@ -37,14 +37,14 @@ const char* to_string(Gate gate) noexcept {
 
 bool ByName::operator()(Gate a, Gate b) const noexcept { return std::strcmp(to_string(a), to_string(b)) < 0; }
 
-std::vector<Stretch> unbroken(const std::vector<double>& t, const WindowOptions& options) {
+std::vector<SampleRange> unbroken(const std::vector<double>& t, const WindowOptions& options) {
   if (t.empty()) return {};
   std::vector<double> spacing;
   for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
   const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
   if (!spacing.empty()) std::nth_element(spacing.begin(), middle, spacing.end());
   const double longest = spacing.empty() ? 0 : std::max(options.gap_s, options.gap_periods * *middle);
-  std::vector<Stretch> stretches{{0, 1}};
+  std::vector<SampleRange> stretches{{0, 1}};
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] - t[i - 1] > longest) stretches.push_back({i, i});
     stretches.back().end = i + 1;
@@ -65,7 +65,7 @@ LogGates::LogGates(const log::FlightLog& log, std::vector<std::size_t> rows, con
   if (log.has("thrust")) commands_.push_back(&log.column("thrust"));
 }
 
-bool LogGates::rotors_rest(Stretch w) const {
+bool LogGates::rotors_rest(SampleRange w) const {
   if (motors_.size() < 4) return false;
   for (std::size_t k = w.begin; k < w.end; ++k)
     if (std::all_of(motors_.begin(), motors_.end(), [&](auto* m) { return (*m)[rows_[k]] <= options_.idle; }))
@@ -73,7 +73,7 @@ bool LogGates::rotors_rest(Stretch w) const {
   return false;
 }
 
-bool LogGates::perched(Stretch w) const {
+bool LogGates::perched(SampleRange w) const {
   const double n = static_cast<double>(w.size());
   const auto mean = [&](auto value) {
     double sum = 0;
@@ -98,7 +98,7 @@ bool LogGates::perched(Stretch w) const {
   return mean([&](std::size_t row) { return z[row] - stood[row]; }) < options_.clear_m;
 }
 
-std::optional<Gate> LogGates::operator()(Stretch w) const {
+std::optional<Gate> LogGates::operator()(SampleRange w) const {
   for (std::size_t k = w.begin; k < w.end; ++k)
     if (frozen_[k]) return Gate::frozen;
   if (perched(w)) return Gate::perched;
@@ -114,7 +114,7 @@ std::optional<Gate> LogGates::operator()(Stretch w) const {
 
 bool simulated(const Series& s) { return s.simulated_by_thrust || !s.a_nominal.empty(); }
 
-bool under_way(const Series& s, Stretch w, const WindowOptions& options) {
+bool under_way(const Series& s, SampleRange w, const WindowOptions& options) {
   for (std::size_t a = w.begin, b = w.begin; b < w.end; ++b) {
     while (s.t[b] - s.t[a] > options.still_s) ++a;
     const double time = s.t[b] - s.t[a];
@@ -124,7 +124,7 @@ bool under_way(const Series& s, Stretch w, const WindowOptions& options) {
   return false;
 }
 
-std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, Stretch w, const WindowOptions& options) {
+std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, SampleRange w, const WindowOptions& options) {
   if (!simulated(s) && !log.has("motor1") && under_way(s, w, options)) return Gate::transit;
   if (!s.has_velocity) return std::nullopt;
   const double time = s.t[w.end - 1] - s.t[w.begin];

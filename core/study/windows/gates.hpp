@@ -13,7 +13,7 @@
 namespace backwash::study {
 
 /// Stretches of rows without a gap, t their times, s, rising. O(rows).
-std::vector<Stretch> unbroken(const std::vector<double>& t, const WindowOptions& options);
+std::vector<SampleRange> unbroken(const std::vector<double>& t, const WindowOptions& options);
 
 /// What leaves a window out whatever it is for, calibration or study. The log must outlive it.
 class LogGates {
@@ -25,11 +25,11 @@ class LogGates {
   /// Why a window is left out, the first that holds: frozen (the position repeats in some of its rows); perched (no
   /// motion, mean thrust far below the weight, rotors told to rest in some row, or hardly above `stood_z_m`, where a
   /// recording says that it stood); saturated (a rotor command at either end). Nothing if it is good. O(rows of w).
-  std::optional<Gate> operator()(Stretch w) const;
+  std::optional<Gate> operator()(SampleRange w) const;
 
  private:
-  bool perched(Stretch w) const;
-  bool rotors_rest(Stretch w) const;
+  bool perched(SampleRange w) const;
+  bool rotors_rest(SampleRange w) const;
 
   const log::FlightLog& log_;
   std::vector<std::size_t> rows_;
@@ -45,10 +45,10 @@ class LogGates {
 bool simulated(const Series& s);
 
 /// Whether the vehicle goes somewhere in the window: faster than still_mps over still_s.
-bool under_way(const Series& s, Stretch w, const WindowOptions& options = {});
+bool under_way(const Series& s, SampleRange w, const WindowOptions& options = {});
 
 /// What leaves a window out of a study beside LogGates: transit (under way, not simulated, and without motor commands,
 /// which could be compared all the same); inconsistent (position and velocity). Nothing if it is good.
-std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, Stretch w, const WindowOptions& options);
+std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, SampleRange w, const WindowOptions& options);
 
 }  // namespace backwash::study

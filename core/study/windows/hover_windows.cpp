@@ -11,14 +11,14 @@
 namespace backwash::study {
 namespace {
 
-Vec3 mean_of(const std::vector<Vec3>& x, Stretch s) {
+Vec3 mean_of(const std::vector<Vec3>& x, SampleRange s) {
   Vec3 sum = Vec3::Zero();
   for (std::size_t k = s.begin; k < s.end; ++k) sum += x[k];
   return sum / static_cast<double>(s.size());
 }
 
 /// The rows of a stretch at times from … to.
-Stretch rows_between(const std::vector<double>& t, Stretch raw, double from, double to) {
+SampleRange rows_between(const std::vector<double>& t, SampleRange raw, double from, double to) {
   const auto at = [&](double time) {
     return static_cast<std::size_t>(std::lower_bound(t.begin() + static_cast<std::ptrdiff_t>(raw.begin),
                                                      t.begin() + static_cast<std::ptrdiff_t>(raw.end), time) -
@@ -28,7 +28,7 @@ Stretch rows_between(const std::vector<double>& t, Stretch raw, double from, dou
 }
 
 /// The windows of one unbroken stretch of good ones.
-void add_windows(const Even& e, Stretch stretch, std::size_t length, FlightWindows& flight) {
+void add_windows(const Even& e, SampleRange stretch, std::size_t length, FlightWindows& flight) {
   std::array<std::vector<double>, 3> filtered;
   std::array<Correlation, 3> rho;
   for (int axis = 0; axis < 3; ++axis) {
@@ -39,7 +39,7 @@ void add_windows(const Even& e, Stretch stretch, std::size_t length, FlightWindo
     rho[i] = correlation(filtered[i], e.rate);
   }
   for (std::size_t begin = stretch.begin; begin < stretch.end; begin += length) {
-    const Stretch s{begin, begin + length};
+    const SampleRange s{begin, begin + length};
     Window window{e.t0 + static_cast<double>(begin) / e.rate,
                   *e.segment[begin],
                   mean_of(e.p, s),
@@ -72,7 +72,7 @@ void add_windows(const Even& e, Stretch stretch, std::size_t length, FlightWindo
 }
 
 /// Windows of a stretch `raw` of the log, e at even times.
-void cut(const Even& e, const log::FlightLog& log, Stretch raw, const LogGates& gates, const WindowOptions& options,
+void cut(const Even& e, const log::FlightLog& log, SampleRange raw, const LogGates& gates, const WindowOptions& options,
          FlightWindows& flight) {
   const auto length = static_cast<std::size_t>(std::lround(options.length_s * e.rate));
   const auto in_windows = [length](std::size_t rows) { return (rows + length / 2) / length; };
@@ -88,7 +88,7 @@ void cut(const Even& e, const log::FlightLog& log, Stretch raw, const LogGates& 
     const auto settling = static_cast<std::size_t>(std::lround(options.settle_s * e.rate));
     const std::size_t first = hover ? std::min(end, begin + settling) : end;
     transit += in_windows(first - begin);
-    Stretch good{first, first};
+    SampleRange good{first, first};
     for (std::size_t at = first; at + length <= end; at += length) {
       if (const auto why = why_left_out(at)) {
         flight.gated[static_cast<std::size_t>(*why)] += 1;
@@ -129,7 +129,7 @@ void choose_signal(FlightWindows& flight, bool commanded, const std::optional<Ve
 }
 
 /// Windows that gaps between stretches swallowed; mean rate within them, Hz.
-std::pair<std::size_t, double> gaps_and_rate(const std::vector<double>& t, const std::vector<Stretch>& stretches,
+std::pair<std::size_t, double> gaps_and_rate(const std::vector<double>& t, const std::vector<SampleRange>& stretches,
                                              double length_s) {
   std::size_t lost = 0, intervals = 0;
   double seconds = 0;
@@ -174,7 +174,7 @@ tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& 
   if (!log.has("thrust") && !log.has("motor1"))
     flight.not_tested.emplace_back("saturated: no column 'thrust' or 'motor1' … 'motor4'");
   int next_segment = 0;
-  for (const Stretch raw : stretches) {
+  for (const SampleRange raw : stretches) {
     if (log.t_s[raw.end - 1] - log.t_s[raw.begin] < options.length_s) continue;
     const Even e = even_stretch(log, raw, flight.rate_hz, flight.signal, vehicle, options, next_segment);
     cut(e, log, raw, gates, options, flight);

@@ -8,7 +8,7 @@
 
 namespace backwash::study {
 
-std::vector<double> slow(const Series& s, Stretch w, const std::vector<double>& z, double width) {
+std::vector<double> slow(const Series& s, SampleRange w, const std::vector<double>& z, double width) {
   std::vector<double> out(z.size());
   for (std::size_t i = 0; i < z.size(); ++i) {
     double sum = 0, weights = 0;

@@ -14,7 +14,7 @@
 namespace backwash::study {
 
 template <typename F>
-std::vector<double> detrended_values(Stretch w, F value) {
+std::vector<double> detrended_values(SampleRange w, F value) {
   std::vector<double> x;
   for (std::size_t i = w.begin; i < w.end; ++i) x.push_back(value(i));
   return detrended(x);
@@ -22,7 +22,7 @@ std::vector<double> detrended_values(Stretch w, F value) {
 
 /// Slope over the neighbours.
 template <typename F>
-std::vector<double> rates(const Series& s, Stretch w, F value) {
+std::vector<double> rates(const Series& s, SampleRange w, F value) {
   std::vector<double> x;
   for (std::size_t i = w.begin; i < w.end; ++i) {
     const std::size_t a = i > 0 ? i - 1 : 0, b = std::min(i + 1, s.size() - 1);
@@ -32,7 +32,7 @@ std::vector<double> rates(const Series& s, Stretch w, F value) {
 }
 
 /// z weighted by a bell of standard deviation `width` in s over the window's own rows, detrended: what is slow in it.
-std::vector<double> slow(const Series& s, Stretch w, const std::vector<double>& z, double width);
+std::vector<double> slow(const Series& s, SampleRange w, const std::vector<double>& z, double width);
 
 /// Σ z·y and Σ z·x of detrended z over √Σz²: one row of an instrumental regression; nothing without excitation.
 struct Moment {

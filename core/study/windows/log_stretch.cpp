@@ -10,7 +10,7 @@ namespace {
 /// The rows of a log at even times.
 class Resampler {
  public:
-  Resampler(const log::FlightLog& log, Stretch rows, double rate) : log_(log) {
+  Resampler(const log::FlightLog& log, SampleRange rows, double rate) : log_(log) {
     const auto& t = log.t_s;
     const auto count = static_cast<std::size_t>((t[rows.end - 1] - t[rows.begin]) * rate + kWindowRules.row_error) + 1;
     std::size_t row = rows.begin;
@@ -103,7 +103,7 @@ std::vector<std::optional<int>> found_segments(const std::vector<Vec3>& path, do
 
 }  // namespace
 
-Even even_stretch(const log::FlightLog& log, Stretch raw, double rate, Signal signal,
+Even even_stretch(const log::FlightLog& log, SampleRange raw, double rate, Signal signal,
                   const std::optional<Vehicle>& vehicle, const WindowOptions& options, int& next_segment) {
   const Resampler rows(log, raw, rate);
   Even e{log.t_s[raw.begin], rate, rows.xyz("", "_m"), {}, rows.xyz("a", "_mps2"), {}, {}, {}};

@@ -24,7 +24,7 @@ struct Even {
 
 /// Rows `raw` of a log (no gap inside) at even spacing 1/rate, with the disturbance as `signal` defines it
 /// (flight_windows() has the equation). New hover positions are numbered from `next_segment` on.
-Even even_stretch(const log::FlightLog& log, Stretch raw, double rate, Signal signal,
+Even even_stretch(const log::FlightLog& log, SampleRange raw, double rate, Signal signal,
                   const std::optional<Vehicle>& vehicle, const WindowOptions& options, int& next_segment);
 
 }  // namespace backwash::study

@@ -18,7 +18,7 @@ namespace backwash::study {
 namespace {
 
 template <typename T, typename F>
-T mean(Stretch w, T sum, F value) {
+T mean(SampleRange w, T sum, F value) {
   for (std::size_t i = w.begin; i < w.end; ++i) sum += value(i) / static_cast<double>(w.size());
   return sum;
 }
@@ -78,8 +78,7 @@ Observer::Observer(const Vehicle& vehicle, const Model& model, const map::Occupa
   seen_.first.push_back(0);
 }
 
-Observer::Observer(const Vehicle& vehicle, Surroundings& surroundings)
-    : vehicle_(vehicle), surroundings_(surroundings) {
+Observer::Observer(const Vehicle& vehicle, MapView& surroundings) : vehicle_(vehicle), surroundings_(surroundings) {
   seen_.first.push_back(0);
 }
 
@@ -89,10 +88,10 @@ void Observer::add(const log::FlightLog& log) {
   ++seen_.flights;
   if (static_cast<double>(s.size()) >= kWindowRules.fewest_rows) {
     const auto rotors = rotor_phases(log, s);
-    std::vector<Stretch> good;
+    std::vector<SampleRange> good;
     const WindowOptions options;
     const LogGates gates(log, s.row, vehicle_, options);
-    for (const Stretch w : cut(s)) {
+    for (const SampleRange w : cut(s)) {
       auto why = gates(w);
       if (!why) why = unfit(s, log, w, options);
       if (!why) why = misplaced(s, w);
@@ -106,7 +105,7 @@ void Observer::add(const log::FlightLog& log) {
   seen_.first.push_back(seen_.windows.size());
 }
 
-std::optional<Gate> Observer::misplaced(const Series& s, Stretch w) const {
+std::optional<Gate> Observer::misplaced(const Series& s, SampleRange w) const {
   for (const auto* x : {&s.p, &s.p_nominal})
     for (std::size_t i = w.begin; i < w.end && !x->empty(); ++i)
       if (!surroundings_.near((*x)[i])) return Gate::outside;
@@ -136,7 +135,7 @@ void Observer::put(std::size_t channel, double y, double weight) {
   seen_.y[channel].back() = y, seen_.weight[channel].back() = weight;
 }
 
-WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w) {
+WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRange w) {
   WindowRow row{};
   const auto column_mean = [&](const char* name) {
     if (!log.has(name)) return 0.0;
@@ -180,7 +179,7 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, Stretch w
 }
 
 /// Means; returns the detrended residuals.
-Residual Observer::put_means(const WindowRow& row, const Series& s, Stretch w) {
+Residual Observer::put_means(const WindowRow& row, const Series& s, SampleRange w) {
   Residual rest{{}, row.sigma, simulated(s) || !under_way(s, w)};
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
@@ -217,9 +216,9 @@ void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_h
 }
 
 void Observer::add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
-                           const std::vector<Stretch>& good) {
+                           const std::vector<SampleRange>& good) {
   std::vector<Residual> residuals;
-  for (const Stretch w : good) {
+  for (const SampleRange w : good) {
     for (std::size_t c = 0; c < kChannels; ++c) seen_.y[c].push_back(0), seen_.weight[c].push_back(0);
     seen_.windows.push_back(placed(log, s, w));
     WindowRow& row = seen_.windows.back();

@@ -81,8 +81,8 @@ struct WindowRow {
   double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
   double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
   double temperature;
-  Place around;                 ///< of p_W
-  std::vector<Place> path;      ///< of points along the window; empty where it is one place
+  PlaceAround around;             ///< of p_W
+  std::vector<PlaceAround> path;  ///< of points along the window; empty where it is one place
   Vec3 give = Vec3::Zero();     ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
   Vec3 slowed = Vec3::Zero();   ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer; 0 where measured
   Vec3 varied2 = Vec3::Zero();  ///< (m/s)², variance of the velocity along the window, its trend taken out
@@ -100,7 +100,7 @@ struct WindowRow {
   std::array<double, 2> lag_gain{};      ///< the same of a longer lag of the attitude
   double tilt_gain = 0;                  ///< design of kTiltDelay
   Vec3 measured_variance;                ///< (m/s²)²
-  std::array<std::optional<Line>, 4>
+  std::array<std::optional<RotorLine>, 4>
       lines{};  ///< of the rotors along z, none that cannot be told, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
@@ -135,7 +135,7 @@ class Observer {
  public:
   Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);
   /// With surroundings that were looked at before, and are kept: studies of the same map share them.
-  Observer(const Vehicle& vehicle, Surroundings& surroundings);
+  Observer(const Vehicle& vehicle, MapView& surroundings);
   Observer(const Observer&) = delete;
   void add(const log::FlightLog& log);
   Observations finish();
@@ -144,15 +144,15 @@ class Observer {
 
  private:
   void add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
-                   const std::vector<Stretch>& good);
+                   const std::vector<SampleRange>& good);
   /// Why the map leaves a window out: far outside of it, or in a solid (map and log contradict each other).
-  std::optional<Gate> misplaced(const Series& s, Stretch w) const;
-  WindowRow placed(const log::FlightLog& log, const Series& s, Stretch w);
-  void look_along(WindowRow& row, Stretch w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
-  Residual put_means(const WindowRow& row, const Series& s, Stretch w);
-  void put_delays(const Series& s, Stretch w);
-  void put_command_delay(const Series& s, Stretch w, int from, int to);
-  void put_tilt_delay(const Series& s, Stretch w);
+  std::optional<Gate> misplaced(const Series& s, SampleRange w) const;
+  WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w);
+  void look_along(WindowRow& row, SampleRange w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
+  Residual put_means(const WindowRow& row, const Series& s, SampleRange w);
+  void put_delays(const Series& s, SampleRange w);
+  void put_command_delay(const Series& s, SampleRange w, int from, int to);
+  void put_tilt_delay(const Series& s, SampleRange w);
   void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
   void put(std::size_t channel, double y, double weight);
   void smooth_voltage();
@@ -173,8 +173,8 @@ class Observer {
   DelayStage tilt_stage_;
   std::vector<Fourth> tails_;   // of every window
   std::set<std::string> ever_;  // columns that some flight had
-  std::optional<Surroundings> own_;
-  Surroundings& surroundings_;
+  std::optional<MapView> own_;
+  MapView& surroundings_;
 };
 
 }  // namespace backwash::study

@@ -36,7 +36,7 @@ RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
 
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::array<std::optional<Line>, 4>& lines) {
+                                     std::size_t end, std::array<std::optional<RotorLine>, 4>& lines) {
   std::vector<RotorValue> values;
   std::array<double, 4> share{}, ratio{};
   bool motors = true, rpms = true;

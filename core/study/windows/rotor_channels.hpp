@@ -24,6 +24,6 @@ struct RotorValue {
 /// residual of those rows, m/s². `lines`: each rotor's, where the log tells its rate.
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::array<std::optional<Line>, 4>& lines);
+                                     std::size_t end, std::array<std::optional<RotorLine>, 4>& lines);
 
 }  // namespace backwash::study

@@ -100,12 +100,13 @@ std::pair<double, double> powers(const std::vector<double>& x, std::span<const d
 
 }  // namespace
 
-std::optional<Line> rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase) {
+std::optional<RotorLine> rotor_line(std::span<const double> x, std::span<const double> t,
+                                    std::span<const double> phase) {
   const double n = static_cast<double>(x.size()), seconds = t.back() - t.front(), rate = (n - 1) / seconds;
   const double hz_of_rotor = (phase.back() - phase.front()) / (2 * std::numbers::pi * seconds);
   const auto blocks = static_cast<std::size_t>(std::max(1L, std::lround(seconds / kWindowRules.line_block)));
   const Flattened flat = flattened(x);
-  Line found;
+  RotorLine found;
   double line = 0, beside = 0, count = 0;
   for (const double harmonic : {1.0, 2.0}) {
     const double folded = std::abs(std::remainder(harmonic * hz_of_rotor, rate));

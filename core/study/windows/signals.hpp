@@ -27,7 +27,7 @@ double ln_bias(double n);
 double ln_variance(double n);
 
 /// A rotor's line in a stretch.
-struct Line {
+struct RotorLine {
   /// ln of the power at the rotor's own phase over the mean power at phases detuned by ±1.5, ±2.5, ±3.5 and ±4.5 Hz,
   /// less its expectation for noise; twice the rotor's rate (two blades) is summed in, and blocks of 1 s, over which
   /// the phase from rpm readings does not drift. x is flattened first by a filter of first order.
@@ -39,6 +39,7 @@ struct Line {
 };
 /// Nothing where sampling folds the rotor's rate below least_folded or within from_half_rate of half the rate. `phase`:
 /// rad at each sample, `t`: s.
-std::optional<Line> rotor_line(std::span<const double> x, std::span<const double> t, std::span<const double> phase);
+std::optional<RotorLine> rotor_line(std::span<const double> x, std::span<const double> t,
+                                    std::span<const double> phase);
 
 }  // namespace backwash::study

@@ -7,10 +7,10 @@
 
 namespace backwash::study {
 
-std::vector<Stretch> cut(const Series& s) {
+std::vector<SampleRange> cut(const Series& s) {
   constexpr double kLength = kWindowRules.window_length;
   constexpr auto kFewest = static_cast<std::size_t>(kWindowRules.fewest_rows);
-  std::vector<Stretch> windows;
+  std::vector<SampleRange> windows;
   for (const auto& [from, to] : unbroken(s.t, {}))
     for (std::size_t begin = from; begin < to;) {
       std::size_t end = begin + 1;

@@ -9,13 +9,13 @@
 namespace backwash::study {
 
 /// Samples begin … end − 1.
-struct Stretch {
+struct SampleRange {
   std::size_t begin, end;
   std::size_t size() const { return end - begin; }
 };
 
 /// Windows of kWindowRules.window_length (to the nearest whole number in each run of rows without a gap and of one
 /// segment).
-std::vector<Stretch> cut(const Series& s);
+std::vector<SampleRange> cut(const Series& s);
 
 }  // namespace backwash::study

@@ -10,7 +10,7 @@
 
 namespace backwash::study {
 
-Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
+MapView::MapView(const map::OccupancyGrid* grid, const Model& model)
     : grid_(grid), base_(model.base.horizontal, model.base.horizontal, model.base.vertical) {
   if (!grid_) return;
   field_.emplace(*grid_, model);
@@ -20,22 +20,22 @@ Surroundings::Surroundings(const map::OccupancyGrid* grid, const Model& model)
   lattice_.resize(static_cast<std::size_t>(size_.prod()));
 }
 
-bool Surroundings::near(const Vec3& p_W) const {
+bool MapView::near(const Vec3& p_W) const {
   if (!grid_) return (p_W.array().abs() < kWindowRules.room).all();
   const Vec3 high = low_ + grid_->resolution() * grid_->size().cast<double>();
   return (p_W.array() > low_.array() - kWindowRules.sight).all() &&
          (p_W.array() < high.array() + kWindowRules.sight).all();
 }
 
-Place Surroundings::around(const Vec3& p_W) const {
+PlaceAround MapView::around(const Vec3& p_W) const {
   if (!grid_) return {{p_W.z(), kNoSurface, {}}, {}};
-  Place place{field::around(*grid_, p_W, {kWindowRules.sight_up, kWindowRules.sight_up, kWindowRules.sight}), {}};
+  PlaceAround place{field::around(*grid_, p_W, {kWindowRules.sight_up, kWindowRules.sight_up, kWindowRules.sight}), {}};
   for (const auto& wall : place.walls)
     if (whole(p_W, place, wall)) place.whole_walls.push_back(wall);
   return place;
 }
 
-bool Surroundings::whole(const Vec3& p_W, const Around& around, const std::pair<double, Vec3>& wall) const {
+bool MapView::whole(const Vec3& p_W, const Around& around, const std::pair<double, Vec3>& wall) const {
   constexpr double kOpen = kWindowRules.whole_wall;
   const double a = grid_->resolution();
   const double down = std::isfinite(around.height) ? around.height : kOpen;
@@ -46,7 +46,7 @@ bool Surroundings::whole(const Vec3& p_W, const Around& around, const std::pair<
   return true;
 }
 
-const Vec3& Surroundings::lattice_ln_sigma(const Index3& at) {
+const Vec3& MapView::lattice_ln_sigma(const Index3& at) {
   auto& stored = lattice_[map::linear(size_, at)];
   if (!stored) {
     const Variance s = field_->at(low_ + kWindowRules.sigma_lattice * at.cast<double>()).sigma();
@@ -55,7 +55,7 @@ const Vec3& Surroundings::lattice_ln_sigma(const Index3& at) {
   return *stored;
 }
 
-Vec3 Surroundings::sigma(const Vec3& p_W) {
+Vec3 MapView::sigma(const Vec3& p_W) {
   if (!field_) return base_;
   const Vec3 q = (p_W - low_) / kWindowRules.sigma_lattice;
   const Index3 corner = q.array().floor().cast<int>();

@@ -11,15 +11,15 @@ namespace backwash::study {
 
 /// What stands around a point, and which of the walls reach all the way from the surface below to the one above: the
 /// side of a table or of a lowered ceiling lets the air around it.
-struct Place : Around {
+struct PlaceAround : Around {
   std::vector<std::pair<double, Vec3>> whole_walls = {};
 };
 
 /// Surfaces and modelled Σ about a point. Without a map: a floor at z = 0, nothing else, and Σ = Σ_0.
-class Surroundings {
+class MapView {
  public:
-  Surroundings(const map::OccupancyGrid* grid, const Model& model);
-  Place around(const Vec3& p_W) const;
+  MapView(const map::OccupancyGrid* grid, const Model& model);
+  PlaceAround around(const Vec3& p_W) const;
   /// Diagonal of Σ at p, (m/s²)²: trilinear between points on a lattice of kWindowRules.sigma_lattice, evaluated
   /// exactly once each.
   Vec3 sigma(const Vec3& p_W);

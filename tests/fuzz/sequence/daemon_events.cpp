@@ -255,9 +255,9 @@ void DaemonRig::apply_to_line(const Event& e) {
                                  .system_status = 4,
                                  .mavlink_version = 3});
     case Kind::take_over:
-      return lock_.autopilot->take_over();
+      return lock_.in_hand().take_over();
     case Kind::disarm:
-      return lock_.autopilot->disarm();
+      return lock_.in_hand().disarm();
     case Kind::ack:
       return lock_.say(
           CommandAck{.command = static_cast<std::uint16_t>(e.n), .result = static_cast<std::uint8_t>(e.b)});
@@ -278,7 +278,7 @@ void DaemonRig::apply_to_line(const Event& e) {
     case Kind::reset:
       lock_.local_frame.origin += Vec3(e.a, e.b, e.c);
       lock_.local_frame.yaw += e.d;
-      lock_.autopilot->reset_estimator(lock_.local_frame);
+      lock_.in_hand().reset_estimator(lock_.local_frame);
       return watch_.frame_moved(tick_);
     case Kind::reset_counter:
       watch_.frame_moved(tick_);
