@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/log/median.hpp"
+#include "core/types/quantile.hpp"
 #include "core/study/inference/rotor_rules.hpp"
 
 namespace backwash::study {
@@ -26,7 +26,7 @@ double typical(const Observations& seen, std::size_t channel) {
   std::vector<double> all;
   for (std::size_t f = 0; f + 1 < seen.first.size(); ++f)
     if (const double m = mean(seen, channel, seen.first[f], seen.first[f + 1]); std::isfinite(m)) all.push_back(m);
-  return all.empty() ? std::nan("") : log::median(all);
+  return all.empty() ? std::nan("") : quantile(all, 0.5);
 }
 
 /// Whether one rotor's line stands above the others' mean.
