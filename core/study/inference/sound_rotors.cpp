@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/types/quantile.hpp"
 #include "core/study/inference/rotor_rules.hpp"
+#include "core/types/quantile.hpp"
 
 namespace backwash::study {
 namespace {
