@@ -31,7 +31,7 @@ Form pull() {
       .reference = under,
       .scale_name = "L_m",
       .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
-      .reach = Reach{0.85, "ceiling_gap_m",
+      .reach = Reach{kEffectRules.farthest_wash, "ceiling_gap_m",
                      "a wash is felt within two or three diameters of a rotor; farther it is a slope by height"},
       .by_place = true,
       .floor = 0.02,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
+#include "core/study/effects/effect_rules.hpp"
 #include "core/study/effects/on_the_model.hpp"
 
 namespace backwash::study {
@@ -22,7 +23,7 @@ Effect ground_thrust() {
                  .scale_name = "L_m",
                  .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
                  .reach =
-                     Reach{0.85, "z_m",
+                     Reach{kEffectRules.farthest_wash, "z_m",
                            "a wash is felt within two or three diameters of a rotor; farther it is a slope by height"},
                  .by_place = true,
                  .floor = 0.02,

@@ -102,6 +102,8 @@ struct Rules {
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
   // Causes in some flights only
   Rule fewest_divided{"fewest_divided", 6, "flights", "derived: two levels and a scatter about each"};
+  Rule fewest_a_side{"fewest_a_side", 2, "flights", "derived: one flight alone has no scatter of its own"};
+  Rule division_kinds{"division_kinds", 3, "1", "derived: from a flight on, a run of them, any set: each pays for all"};
   Rule level_scatter{"level_scatter", 2, "degrees of freedom",
                      "measured: so many taken off, equally spread values pass no more often than normal ones"};
   Rule most_parts{"most_parts", 3, "causes", "chosen: as many as further causes"};

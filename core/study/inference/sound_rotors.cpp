@@ -11,7 +11,7 @@
 namespace backwash::study {
 namespace {
 
-constexpr std::size_t kRotors = 4;
+constexpr std::size_t kRotors = kLine4 - kLine1 + 1;
 
 /// Mean of a channel over measured windows [begin, end); NaN without one.
 double mean(const Observations& seen, std::size_t channel, std::size_t begin, std::size_t end) {
@@ -51,7 +51,7 @@ std::optional<SoundRotors> sound_rotors(const Observations& reference) {
   if (n < kRules.fewest_sound) return std::nullopt;
   SoundRotors sound;
   double square = 0;
-  for (std::size_t k = 0; k < 8; ++k) {
+  for (std::size_t k = 0; k < 2 * kRotors; ++k) {
     for (const auto& f : flights) sound.mean[k] += f[k] / n;
     for (const auto& f : flights) square += k < kRotors ? std::pow(f[k] - sound.mean[k], 2) : 0;
     if (!std::isfinite(sound.mean[k])) sound.mean[k] = 0;

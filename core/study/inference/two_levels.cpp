@@ -11,7 +11,7 @@
 namespace backwash::study {
 namespace {
 
-constexpr std::size_t kFewestASide = 2;
+constexpr auto kFewestASide = static_cast<std::size_t>(kRules.fewest_a_side.value);
 
 /// Sums of values on one side of a division.
 struct Side {
@@ -34,7 +34,7 @@ class Divisions {
                  between = sides[1].sum / sides[1].n - sides[0].sum / sides[0].n;
     const double spread = std::max(least_, std::sqrt(std::max(0.0, sides[0].scatter() + sides[1].scatter()) / (n - 2)));
     const double t = std::abs(between) / (spread * std::sqrt(1 / sides[0].n + 1 / sides[1].n));
-    const double p = std::min(1.0, kKinds * tried * 2 * student_tail(t, n - lost));
+    const double p = std::min(1.0, kRules.division_kinds * tried * 2 * student_tail(t, n - lost));
     if (best_ && p >= best_->p) return;
     best_ = TwoLevels{{}, p, spread};
     for (std::size_t f = 0; f < values_.size(); ++f) best_->high.push_back(high(f) == (between > 0));
@@ -43,7 +43,6 @@ class Divisions {
   const std::optional<TwoLevels>& best() const { return best_; }
 
  private:
-  static constexpr std::size_t kKinds = 3;  // of divisions
   const std::vector<double>& values_;
   double least_;
   std::optional<TwoLevels> best_;
