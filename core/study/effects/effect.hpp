@@ -70,7 +70,7 @@ struct Possible {
 /// How far a push by distance can reach. One that the flights would draw out farther is none of this effect: what
 /// they show along `regressor` has no name.
 struct Reach {
-  double most;  ///< of the fitted scale, m
+  double most;  ///< of the lower end of the scale's interval, m
   std::string regressor, reason;
 };
 
