@@ -183,7 +183,10 @@ bool end(Flight& f) {
   if (!closed) f.failure.note("recorder", "the disk does not answer", kInputOutput);
   if (const auto lost = f.recorder->lost() + f.channels->records_lost())
     spdlog::warn("{}: {} records were lost", f.log, lost);
-  if (ended) spdlog::info("{}: {}", f.settings.daemon.link.device, traffic(f.link));
+  try {
+    if (ended) spdlog::info("{}: {}", f.settings.daemon.link.device, traffic(f.link));
+  } catch (const std::bad_alloc&) {  // nor may it keep the failure below from being told
+  }
   if (f.failure.happened())
     spdlog::critical("backwashd: {}; nothing more is sent", f.failure.text());
   else

@@ -68,7 +68,7 @@ std::string traffic(const AutopilotLink& link) {
   const auto& out = link.transmit();
   return fmt::format(
       "{} frames received; {} damaged, {} of other messages, {} with unknown flags, {} bytes between frames; {} "
-      "messages late, {} broken; {} frames sent, {} gave way, {} ODOMETRY left out",
+      "messages late, {} broken since the port was opened; {} frames sent, {} gave way, {} ODOMETRY left out in all",
       in.frames, in.bad_crc, in.unknown_id, in.unknown_incompat, in.skipped_bytes, heard.out_of_order, heard.broken,
       out.sent(), out.dropped(), link.thinned());
 }

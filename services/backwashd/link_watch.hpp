@@ -14,7 +14,8 @@ tl::expected<firmware_bridge::Port, firmware_bridge::PortError> open_port(const 
 /// change: less than a flight needs (firmware_bridge::least_rate).
 tl::expected<firmware_bridge::LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link);
 
-/// What went over the line since its port was opened last, and what did not, in one line for the operator.
+/// What went over the line, and what did not, in one line for the operator: received since its port was opened last,
+/// sent and left out since the daemon's start.
 std::string traffic(const firmware_bridge::AutopilotLink& link);
 
 /// What the operator is told of the control thread, and the work on its port that must not be done in a tick.
