@@ -144,6 +144,36 @@ void name_causes(StudyResult& result, const Evidence& evidence, const std::vecto
   }
 }
 
+/// `off`: by how much the rotors differ without being judged, ln.
+void leave_unjudged(StudyResult& result, double off) {
+  if (!(off > 0)) return;
+  for (const char* name : {"propeller_damage", "rotor_sensor_fault"})
+    result.not_tested.emplace_back(
+        name, "the same in all flights and no more than craft are built with: the rotors differ by " + percent(off) +
+                  ", as those of a sound craft may; give --reference flights");
+}
+
+/// A rotor that lost a share of its thrust costs a quarter of it in all. Where the rotors differ as such a one would,
+/// unjudged, a payload is not told from it. Whether one was doubted.
+bool doubt_payloads(std::vector<NamedCause>& causes, double off) {
+  bool doubted = false;
+  for (auto& cause : causes) {
+    Accepted& found = cause.found;
+    if (found.form->cause() != "payload" || found.form->motors_alone || !cause.flights.empty()) continue;
+    const double lost = found.parameters.front().value;
+    if (lost <= 0 || off < kRotorRules.unjudged_loss * lost) continue;
+    for (const Form* form : catalogue())
+      if (form->cause() == "propeller_damage" && !form->motors_alone) {
+        found.rivals.push_back({form->cause(), form, form->scales.front(), 0});
+        break;
+      }
+    cause.separate_by.push_back(
+        {"propeller_damage", "none: give --reference flights of the craft while its rotors were sound", std::nullopt});
+    doubted = true;
+  }
+  return doubted;
+}
+
 }  // namespace
 
 double coverage(const Observations& seen) {
@@ -168,11 +198,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
     return result;
   }
   Observations settled = seen;
-  if (const double off = settle_rotors(options.sound, settled); off > 0)
-    for (const char* name : {"propeller_damage", "rotor_sensor_fault"})
-      result.not_tested.emplace_back(
-          name, "the same in all flights and no more than craft are built with: the rotors differ by " + percent(off) +
-                    ", as those of a sound craft may; give --reference flights");
+  const double off = settle_rotors(options.sound, settled);
+  leave_unjudged(result, off);
   const WholeSearch whole = search_all(settled, options.search);
   const CauseSearchResult& found = whole.found;
   result.threshold = found.threshold;
@@ -193,6 +220,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
       cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
     ambiguous = ambiguous || !cause.found.rivals.empty();
   }
+  ambiguous = doubt_payloads(result.causes, off) || ambiguous;
   if (options.dependence) {
     options.search.progress("whether what remains depends on something");
     look_at_what_remains(result, evidence, others_of(found.accepted, SIZE_MAX, whole.rest), options.search);
