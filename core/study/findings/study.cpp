@@ -160,6 +160,7 @@ bool doubt_payloads(std::vector<NamedCause>& causes, double off) {
   for (auto& cause : causes) {
     Accepted& found = cause.found;
     if (found.form->cause() != "payload" || found.form->motors_alone || !cause.flights.empty()) continue;
+    if (found.parameters.empty()) continue;
     const double lost = found.parameters.front().value;
     if (lost <= 0 || off < kRotorRules.unjudged_loss * lost) continue;
     for (const Form* form : catalogue())

@@ -154,7 +154,7 @@ void drop_means_of(const std::vector<DesignColumn>& structure, double gain, std:
 /// What reaches farther than its cause can, all of its interval, is told as a structure in its place. False: it may be
 /// the cause.
 bool reaches_too_far(const Accepted& a, CauseSearchResult& result) {
-  if (!a.form->reach || a.parameters.back().low <= a.form->reach->most) return false;
+  if (!a.form->reach || a.parameters.empty() || a.parameters.back().low <= a.form->reach->most) return false;
   const Reach& reach = *a.form->reach;
   result.refused.push_back(
       {a.form->cause(), a.form->formula, a.form->scale_name, a.scale.value, {0, reach.most, reach.reason}});
