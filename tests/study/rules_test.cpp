@@ -78,10 +78,10 @@ INSTANTIATE_TEST_SUITE_P(OfARoom, NoConstant,
                          testing::Values("inference", "windows", "findings", "effects", "calibrate"));
 
 /// What the tables of a room say by a name of their own: the numbers of a form (Form in effect.hpp), whose manoeuvres
-/// end its file; bins that are told; counts of gates and of shifted set-points.
+/// end its file, or of a spectrum; bins that are told; counts of gates and of shifted set-points.
 bool is_an_entry(const std::string& line) {
   static const std::regex entry(
-      "\\.(least|floor|possible|scales) = |scales_of\\(|k(Wall|Height)Edges\\[\\] =|kHoverGates =|kOwn =|"
+      "\\.(least|floor|possible|scales) = |scales_of\\(|k(Wall|Height)Edges\\[\\] =|kHoverGates =|kShapes|kOwn =|"
       "motors_\\.size\\(\\) < 4");
   return std::regex_search(line, entry);
 }

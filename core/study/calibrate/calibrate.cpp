@@ -60,7 +60,7 @@ double push(const Data& data, std::span<const double> weights, Group g) {
 double tau(const Data& data, std::span<const double> weights) {
   std::vector<std::pair<double, double>> times;
   for (const auto& h : data.hovers) {
-    if (weights[h.flight] > 0) times.emplace_back(h.tau_w.mean(), weights[h.flight]);
+    if (weights[h.flight] > 0) times.emplace_back(h.tau_w, weights[h.flight]);
   }
   return weighted_quantile(times, 0.5);
 }
@@ -146,14 +146,16 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
   for (const auto& w : flight.windows) {
     if ((w.variance.array() <= 0).any()) continue;
     if (segment.empty() || segment.back() != w.segment || (w.p_W - at.back()).norm() > kCalibrationRules.same_place) {
-      hovers.push_back({number, Vec3::Zero(), {}, {}, Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
+      hovers.push_back({number, Vec3::Zero(), {}, {}, Vec3::Zero(), Vec3::Zero(), 0});
       at.push_back(Vec3::Zero()), segment.push_back(w.segment);
     }
     Hover& h = hovers.back();
     const double n = static_cast<double>(h.ln_variance.size() + 1);
     const auto include = [n](Vec3& mean, const Vec3& x) { mean += (x - mean) / n; };
-    include(at.back(), w.p_W), include(h.push, w.mean), include(h.tau_w, w.tau_w);
-    include(h.push_noise, 2 * w.tau_w.cwiseProduct(w.variance));
+    include(at.back(), w.p_W), include(h.push, w.mean);
+    const double tau_w = flight.tau_w(w);
+    h.tau_w += (tau_w - h.tau_w) / n;
+    include(h.push_noise, 2 * tau_w * w.variance);
     h.ln_variance.push_back(w.variance.array().log());
   }
   const auto found = features(grid, gates, at);

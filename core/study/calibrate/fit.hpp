@@ -19,7 +19,7 @@ struct Hover {
   std::vector<Vec3> ln_variance;   ///< per window: of the disturbance along the world axes, ln (m/s²)²
   Vec3 push = Vec3::Zero();        ///< mean disturbance over the hover, m/s²
   Vec3 push_noise = Vec3::Zero();  ///< variance of that mean as an estimate of the steady push, (m/s²)²
-  Vec3 tau_w = Vec3::Zero();       ///< correlation time, s
+  double tau_w = 0;                ///< correlation time, s
 };
 
 /// Hovers of several flights.

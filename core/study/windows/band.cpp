@@ -68,29 +68,31 @@ std::vector<double> band_passed(std::span<const double> signal, double rate_hz, 
   return {x.begin() + static_cast<std::ptrdiff_t>(pad), x.begin() + static_cast<std::ptrdiff_t>(pad + n)};
 }
 
-Correlation correlation(std::span<const double> signal, double rate_hz, double longest_s) {
+double variance_time(std::span<const double> signal, double rate_hz, double longest_s) {
   const std::size_t n = signal.size();
   const double dt = 1 / rate_hz;
   double mean = 0, power = 0;
   for (const double x : signal) mean += x / static_cast<double>(n);
   for (const double x : signal) power += (x - mean) * (x - mean) / static_cast<double>(n);
-  Correlation c{dt / 2, dt};
-  if (!(power > 0)) return c;
+  double time = dt;
+  if (!(power > 0)) return time;
   const std::size_t lags = std::min(n - 1, static_cast<std::size_t>(longest_s * rate_hz));
   for (std::size_t lag = 1; lag <= lags; ++lag) {
     double sum = 0;
     for (std::size_t k = lag; k < n; ++k) sum += (signal[k] - mean) * (signal[k - lag] - mean);
     const double rho = sum / (static_cast<double>(n - lag) * power);
     if (rho <= 0) break;
-    c.time_s += rho * dt;
-    c.variance_time_s += 2 * rho * rho * dt;
+    time += 2 * rho * rho * dt;
   }
-  return c;
+  return time;
 }
 
-double loop_attenuation(double k_p, double k_d, double delay_s, double lag_s, double tau_w,
-                        const std::optional<Band>& band) {
-  using Complex = std::complex<double>;
+double PositionLoop::passes(double f_hz) const {
+  const std::complex<double> s(0, 2 * std::numbers::pi * f_hz);
+  return std::norm(1.0 / (1.0 + (k_p + k_d * s) * std::exp(-s * delay_s) / (s * s * (1.0 + lag_s * s))));
+}
+
+double loop_attenuation(const PositionLoop& loop, double tau_w, const std::optional<Band>& band) {
   // Even steps in ln f: the integrand is smooth in it from far below to far above every corner.
   const double low = std::log(band ? band->low_hz : kWindowRules.integral_low),
                high = std::log(band ? band->high_hz : kWindowRules.integral_high / tau_w);
@@ -98,10 +100,8 @@ double loop_attenuation(double k_p, double k_d, double delay_s, double lag_s, do
   double passed = 0, whole = 0;
   for (int i = 0; i < steps; ++i) {
     const double f = std::exp(low + (high - low) * (i + 0.5) / steps), omega = 2 * std::numbers::pi * f;
-    const Complex s(0, omega);
-    const Complex feedback = (k_p + k_d * s) * std::exp(-s * delay_s) / (s * s * (1.0 + lag_s * s));
     const double density = f / (1 + omega * omega * tau_w * tau_w);
-    passed += density * std::norm(1.0 / (1.0 + feedback));
+    passed += density * loop.passes(f);
     whole += density;
   }
   return passed / whole;

@@ -25,20 +25,22 @@ struct Band {
 /// Precondition: rate_hz > 2·high_hz, n ≥ 2.
 std::vector<double> band_passed(std::span<const double> signal, double rate_hz, const Band& band);
 
-/// What a signal's autocorrelation ρ says, summed up to its first zero crossing.
-struct Correlation {
-  double time_s;           ///< correlation time ∫ρ dt from 0, s
-  double variance_time_s;  ///< ∫ρ² dt over all lags, both signs, s: T/this is the effective sample size of a variance
-};
-/// Autocorrelation of a signal about its mean, lags up to `longest_s`. Both times are at least half a sample (white
-/// noise). O(n·lags). A constant signal counts as white.
-Correlation correlation(std::span<const double> signal, double rate_hz, double longest_s = kWindowRules.window_length);
+/// ∫ρ² dt over all lags, both signs, s: T/this is the effective sample size of a variance. ρ: autocorrelation of the
+/// signal about its mean, summed up to its first zero crossing or `longest_s`. At least a sample (white noise).
+/// O(n·lags). A constant signal counts as white.
+double variance_time(std::span<const double> signal, double rate_hz, double longest_s = kWindowRules.window_length);
 
-/// var(a)/var(w) of a closed position loop held at rest, for a disturbance w of correlation time tau_w (s; spectrum
-/// 1/(1 + (2πfτ)²)): ∫|H|²S / ∫S with H(s) = 1/(1 + (k_p + k_d s) e^(−s·delay)/(s² (1 + lag s))) (docs/model.md section
-/// 3; 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both integrals run over it; without, over all
-/// frequencies. Numerical, relative error below 1e-4.
-double loop_attenuation(double k_p, double k_d, double delay_s, double lag_s, double tau_w,
-                        const std::optional<Band>& band);
+/// A closed position loop held at rest, along one axis: gains (1/s², 1/s), age of the state it feels, attitude lag (s).
+struct PositionLoop {
+  double k_p, k_d, delay_s, lag_s;
+  /// |H(f)|², what of a disturbance's power at f (Hz, > 0) is left in the acceleration:
+  /// H(s) = 1/(1 + (k_p + k_d s) e^(−s·delay)/(s² (1 + lag s))) (docs/model.md section 3).
+  double passes(double f_hz) const;
+};
+
+/// var(a)/var(w) of a loop, for a disturbance w of correlation time tau_w (s; spectrum 1/(1 + (2πfτ)²)): ∫|H|²S / ∫S
+/// (docs/model.md section 3; 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both integrals run
+/// over it; without, over all frequencies. Numerical, relative error below 1e-4.
+double loop_attenuation(const PositionLoop& loop, double tau_w, const std::optional<Band>& band);
 
 }  // namespace backwash::study

@@ -30,14 +30,15 @@ SampleRange rows_between(const std::vector<double>& t, SampleRange raw, double f
 /// The windows of one unbroken stretch of good ones.
 void add_windows(const Even& e, SampleRange stretch, std::size_t length, FlightWindows& flight) {
   std::array<std::vector<double>, 3> filtered;
-  std::array<Correlation, 3> rho;
+  std::array<std::vector<double>, 3> signal;
   for (int axis = 0; axis < 3; ++axis) {
-    Rows w;
-    for (std::size_t k = stretch.begin; k < stretch.end; ++k) w.push_back(e.w[k][axis]);
     const auto i = static_cast<std::size_t>(axis);
-    filtered[i] = band_passed(w, e.rate, flight.band);
-    rho[i] = correlation(filtered[i], e.rate);
+    for (std::size_t k = stretch.begin; k < stretch.end; ++k) signal[i].push_back(e.w[k][axis]);
+    filtered[i] = band_passed(signal[i], e.rate, flight.band);
   }
+  flight.gusts.push_back(gust_fits(signal, e.rate, flight.band, [&flight](std::size_t axis, double f_hz) {
+    return flight.loops.empty() ? 1 : flight.loops[axis].passes(f_hz);
+  }));
   for (std::size_t begin = stretch.begin; begin < stretch.end; begin += length) {
     const SampleRange s{begin, begin + length};
     Window window{e.t0 + static_cast<double>(begin) / e.rate,
@@ -48,7 +49,7 @@ void add_windows(const Even& e, SampleRange stretch, std::size_t length, FlightW
                   mean_of(e.w, s),
                   Vec3::Zero(),
                   Vec3::Zero(),
-                  Vec3::Zero()};
+                  flight.gusts.size() - 1};
     const double n = static_cast<double>(length);
     for (std::size_t k = s.begin; k < s.end; ++k) window.speed_mps += e.v[k].squaredNorm() / n;
     window.speed_mps = std::sqrt(window.speed_mps);
@@ -64,8 +65,7 @@ void add_windows(const Even& e, SampleRange stretch, std::size_t length, FlightW
         const double x = filtered[i][k - stretch.begin];
         window.variance[axis] += x * x / (n * flight.attenuation[axis]);
       }
-      window.effective_samples[axis] = std::max(1.0, n / e.rate / rho[i].variance_time_s);
-      window.tau_w[axis] = rho[i].time_s;
+      window.effective_samples[axis] = std::max(1.0, n / e.rate / variance_time(filtered[i], e.rate));
     }
     flight.windows.push_back(window);
   }
@@ -121,11 +121,11 @@ void choose_signal(FlightWindows& flight, bool commanded, const std::optional<Ve
   flight.signal = !vehicle ? Signal::raw : commanded ? Signal::commanded : Signal::divided;
   if (flight.signal != Signal::divided) return;
   const auto& c = vehicle->controller;
-  const auto of = [&](double kp, double kd) {
-    return loop_attenuation(kp, kd, c.feedback_delay, c.attitude_lag, tau_w, flight.band);
-  };
-  const double horizontal = of(c.kp.horizontal, c.kd.horizontal);
-  flight.attenuation = {horizontal, horizontal, of(c.kp.vertical, c.kd.vertical)};
+  const PositionLoop horizontal{c.kp.horizontal, c.kd.horizontal, c.feedback_delay, c.attitude_lag},
+      vertical{c.kp.vertical, c.kd.vertical, c.feedback_delay, c.attitude_lag};
+  flight.loops = {horizontal, horizontal, vertical};
+  for (std::size_t axis = 0; axis < flight.loops.size(); ++axis)
+    flight.attenuation[static_cast<Eigen::Index>(axis)] = loop_attenuation(flight.loops[axis], tau_w, flight.band);
 }
 
 /// Windows that gaps between stretches swallowed; mean rate within them, Hz.
@@ -154,6 +154,17 @@ const char* to_string(Signal signal) noexcept {
     default:
       return "raw acceleration";
   }
+}
+
+GustShape FlightWindows::gust_shape() const {
+  std::array<double, kGustShapes> sum{};
+  for (const auto& fits : gusts)
+    for (std::size_t k = 0; k < kGustShapes; ++k) sum[k] += fits[k].ln_likelihood;
+  return static_cast<GustShape>(std::max_element(sum.begin(), sum.end()) - sum.begin());
+}
+
+double FlightWindows::tau_w(const Window& window) const {
+  return gusts[window.stretch][static_cast<std::size_t>(gust_shape())].tau_s;
 }
 
 tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& log,

@@ -10,6 +10,7 @@
 
 #include "core/log/flight_log.hpp"
 #include "core/study/windows/gates.hpp"
+#include "core/study/windows/gust_spectrum.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -33,19 +34,25 @@ struct Window {
   Vec3 mean;                                   ///< of the disturbance, m/s²
   Vec3 variance;           ///< of the disturbance within the band, (m/s²)²; mean square of the filtered signal
   Vec3 effective_samples;  ///< independent samples that this variance is worth, from the autocorrelation
-  Vec3 tau_w;              ///< correlation time, s, of the stretch of windows it belongs to
+  std::size_t stretch;     ///< of FlightWindows::gusts, the unbroken one that it belongs to
 };
 
 /// A flight, cut into windows.
 struct FlightWindows {
   Signal signal = Signal::raw;
-  Band band;         ///< that the log's rate allows
-  double rate_hz{};  ///< mean rate of the rows
-  Vec3 attenuation;  ///< var(a)/var(w) that was divided out, per axis; 1 for Signal::commanded and raw
+  Band band;                        ///< that the log's rate allows
+  double rate_hz{};                 ///< mean rate of the rows
+  std::vector<PositionLoop> loops;  ///< per axis, those that were divided out; none for Signal::commanded and raw
+  Vec3 attenuation;                 ///< var(a)/var(w) of each; 1 without
   bool segments_from_log = false;
   std::array<std::size_t, kHoverGates> gated{};  ///< windows left out, by Gate
   std::vector<std::string> not_tested;           ///< gates without the columns they need, and which those are
   std::vector<Window> windows;
+  std::vector<GustFits> gusts;  ///< of each unbroken stretch of windows
+  /// The shape that is likeliest over all stretches.
+  GustShape gust_shape() const;
+  /// Correlation time of the gusts in a window's stretch, by the flight's shape, s; > 0.
+  double tau_w(const Window& window) const;
 };
 
 /// Cuts a flight into gated windows (docs/model.md section 3). Needs x_m y_m z_m and ax_mps2 ay_mps2 az_mps2.

@@ -59,6 +59,12 @@ struct WindowRules {
   Rule integral_low{"integral_low", 1e-4, "Hz", "derived: of a whole spectrum, far below every corner of a loop"};
   Rule integral_high{"integral_high", 1e5, "1/tau_w", "derived: 1e-5 of a first-order spectrum's variance is above"};
   Rule integral_step{"integral_step", 0.01, "ln of a frequency", "derived: an integral's relative error is below 1e-4"};
+  // Gusts by their spectrum
+  Rule tau_least{"tau_least", 0.01, "s", "derived: half a period of 50 Hz: shorter is white at a log's rate"};
+  Rule tau_most{"tau_most", 2, "s", "derived: a window; longer, the band's lowest frequency sees no corner"};
+  Rule noise_least{"noise_least", 1e-4, "of S(0)", "derived: a first-order spectrum of tau_least is above it at 20 Hz"};
+  Rule noise_most{"noise_most", 1, "of S(0)", "derived: more noise than gust at every frequency"};
+  Rule tau_told{"tau_told", 0.002, "ln", "derived: a tenth of the interval that 24 flights give"};
   // Flights by sample
   Rule held{"held", 0.1, "s", "chosen: between rows farther apart a set-point is held and not interpolated"};
   Rule restart{"restart", 0.2, "s", "chosen: after a gap so long the closed loop starts where the vehicle is"};
