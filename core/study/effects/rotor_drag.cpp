@@ -6,16 +6,29 @@ namespace backwash::study {
 namespace {
 
 /// The drag at the velocity that it leaves, and what its course along a window adds to the variance there. Both go by
-/// the drag itself, scale.anchor: without it none.
-std::vector<DesignColumn> against_velocity(const Windows& ws, const Scale& scale) {
+/// the drag itself, scale.anchor: without it none. `per_speed`: how the drag per speed goes with the speed.
+template <typename F>
+std::vector<DesignColumn> against(const Windows& ws, const Scale& scale, F per_speed) {
   const double k = scale.anchor.empty() ? 0 : scale.anchor[0];
-  DesignColumn column = level(ws, [&](auto& w) -> Vec3 { return -(w.v_W - k * w.slowed); });
+  DesignColumn column = level(ws, [&](auto& w) -> Vec3 {
+    const Vec3 v = w.v_W - k * w.slowed;
+    return -v * per_speed(v.template head<2>().norm());
+  });
   for (std::size_t a = 0; a < 2 && k > 0; ++a)
     column.parts.push_back({kVariances[a], values(ws, [&](auto& w) {
                               const auto axis = static_cast<Eigen::Index>(a);
                               return std::log1p(k * k * w.varied2[axis] / w.sigma[axis]) / k;
                             })});
   return {column};
+}
+
+std::vector<DesignColumn> against_velocity(const Windows& ws, const Scale& scale) {
+  return against(ws, scale, [](double) { return 1; });
+}
+
+/// The body's own drag beside the rotors': it grows with the square of the speed and is as large at `even`, m/s.
+std::vector<DesignColumn> with_body(const Windows& ws, const Scale& even) {
+  return against(ws, even, [&even](double v) { return (1 + v / even.value) / (1 + 1 / even.value); });
 }
 
 }  // namespace
@@ -30,6 +43,11 @@ Effect rotor_drag() {
                      .by_speed = true,
                      .floor = 0.01,
                      .columns = against_velocity,
+                     .shapes = {{.formula = "push -k v (1 + v/u)/(1 + 1 m/s/u), level: the body's drag beside it",
+                                 .parameters = {},
+                                 .scale_name = "u_mps",
+                                 .scales = scales_of({1, 3, 10}),
+                                 .columns = with_body}},
                      .extend = extends(Law::push_against_velocity),
                      .simulate = simulates(Law::push_against_velocity)}},
           .axis = {"velocity along x, m/s", false, [](auto& w) { return w.v_W.x(); }}};

@@ -17,7 +17,6 @@ constexpr int kFine = static_cast<int>(kRules.fine_scales);
 struct Member {
   const Form* shape;
   Scale scale;
-  double prior;
   NormalEquations normal;
   SmallVector theta, error;
   double height;  ///< ln likelihood over that without the cause
@@ -28,7 +27,8 @@ std::vector<Scale> fine_scales(const Form& form, const Scale& at) {
   const double beyond = kRules.beyond_scales;
   const double low = std::log(form.scales.front().value / beyond), high = std::log(form.scales.back().value * beyond);
   std::vector<Scale> scales;
-  for (int i = 0; i < kFine; ++i) scales.push_back({std::exp(low + (high - low) * i / (kFine - 1))});
+  for (int i = 0; i < kFine; ++i)
+    scales.push_back({std::exp(low + (high - low) * i / (kFine - 1)), at.offset_W, at.anchor});
   return scales;
 }
 
@@ -40,7 +40,7 @@ Eigen::VectorXd jackknife(const Eigen::MatrixXd& left) {
 
 bool lower(const Member& a, const Member& b) { return a.height < b.height; }
 
-Member fitted(NormalEquations normal, const Form* shape, const Scale& scale, double prior) {
+Member fitted(NormalEquations normal, const Form* shape, const Scale& scale) {
   Eigen::MatrixXd left(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size()));
   SmallVector sum = SmallVector::Zero(normal.total.rows());
   for (std::size_t f = 0; f < normal.b.size(); ++f) {
@@ -49,7 +49,7 @@ Member fitted(NormalEquations normal, const Form* shape, const Scale& scale, dou
   }
   SmallVector theta = normal.fit();
   const double height = 0.5 * theta.dot(sum);
-  return {shape, scale, prior, std::move(normal), theta, SmallVector(jackknife(left)), height};
+  return {shape, scale, std::move(normal), theta, SmallVector(jackknife(left)), height};
 }
 
 using Objective = std::function<double(const std::vector<double>&)>;
@@ -141,7 +141,20 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
                       {"y_m", best[1], best[1] - error[1], best[1] + error[1]}};
 }
 
-/// All shapes of a form at all scales, fitted where the craft was.
+/// Takes the parts that speak of variances out of a column, and returns them: what a push adds to a window's variance
+/// goes by its course along the window, which is known less well than its mean, and has a factor of its own in a size.
+DesignColumn without_variances(DesignColumn& column) {
+  DesignColumn taken;
+  std::erase_if(column.parts, [&](auto& part) {
+    const bool variance = std::find(kVariances.begin(), kVariances.end(), part.channel) != kVariances.end();
+    if (variance) taken.parts.push_back(part);
+    return variance;
+  });
+  return taken;
+}
+
+/// All shapes of a form at all scales, fitted where the craft was. Each of these is as likely beforehand as any other:
+/// a law without a scale is one member, as it is the limit of a shape whose scale grows.
 struct Family {
   const Evidence& evidence;
   const std::vector<DesignColumn>& others;
@@ -151,8 +164,9 @@ struct Family {
   std::vector<Member> members = {};  ///< in the order of shapes and scales
 
   NormalEquations normal_at(const Form& shape, const Scale& at) const {
-    const auto columns = shape.columns(windows, at);
+    auto columns = shape.columns(windows, at);
     auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen());
+    if (shapes[0].by_speed) nuisance.push_back(without_variances(columns[0]));
     nuisance.insert(nuisance.end(), others.begin(), others.end());
     return evidence.normal(columns, nuisance);
   }
@@ -163,7 +177,7 @@ struct Family {
       const auto scales = fine_scales(shape, scale);
       for (const Scale& at : scales) {
         NormalEquations n = normal_at(shape, at);
-        if (n.solvable) members.push_back(fitted(std::move(n), &shape, at, 1.0 / static_cast<double>(scales.size())));
+        if (n.solvable) members.push_back(fitted(std::move(n), &shape, at));
       }
     }
   }
@@ -204,11 +218,11 @@ struct Family {
     const double low = std::log(members.front().scale.value), high = std::log(members[own() - 1].scale.value);
     const auto height = [&](const std::vector<double>& ln) {
       NormalEquations normal = normal_at(shapes[0], {std::exp(ln[0])});
-      return normal.solvable ? fitted(std::move(normal), nullptr, {}, 0).height : -HUGE_VAL;
+      return normal.solvable ? fitted(std::move(normal), nullptr, {}).height : -HUGE_VAL;
     };
     const double at =
         std::exp(polished({std::log(start.scale.value)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
-    return fitted(normal_at(shapes[0], {at}), &shapes[0], {at}, 0);
+    return fitted(normal_at(shapes[0], {at}), &shapes[0], {at});
   }
 
   /// Each parameter, averaged over the members. `columns`: of the form itself.
@@ -222,7 +236,7 @@ struct Family {
       std::vector<Guess> guesses;
       for (const auto& m : members) {
         const auto i = static_cast<Eigen::Index>(k);
-        guesses.push_back({m.prior * std::exp(m.height - highest), m.theta[i],
+        guesses.push_back({std::exp(m.height - highest), m.theta[i],
                            wide * std::hypot(m.error[i], built_error(columns[k]), unknowable)});
       }
       all.push_back(averaged(shapes[0].parameters[k], guesses));
@@ -266,7 +280,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<DesignC
 
 bool excludes_zero(const NormalEquations& normal, const std::vector<DesignColumn>& columns) {
   const double t = student_975(static_cast<double>(normal.b.size()) - 1);
-  const Member fit = fitted(normal, nullptr, {}, 0);
+  const Member fit = fitted(normal, nullptr, {});
   for (Eigen::Index k = 0; k < fit.theta.size(); ++k)
     if (std::abs(fit.theta[k]) > t * std::hypot(fit.error[k], built_error(columns[static_cast<std::size_t>(k)])))
       return true;
