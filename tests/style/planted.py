@@ -40,6 +40,8 @@ PLANTED = [
     (CITATIONS, TRACK, "/* As row\n * 99 asks. */\n", "faults.md has no row 99"),
     (CITATIONS, TRACK, "/* By equation 9-9. */\n", "model.md has no equation 9-9"),
     (CITATIONS, TRACK, "// Equation 9-9.\n", "model.md has no equation 9-9"),
+    (CITATIONS, TRACK, '// As docs/model.md section 4, "The\n// loop".\n', "section 4 of model.md has no 'The loop'"),
+    (CITATIONS, TRACK, '// As docs/model.md section 4, "Loop", and section 1, "Visible".\n', ""),
     (CITATIONS, "services/package/sbom.py", '"""Against\nrow 99."""\n', "faults.md has no row 99"),
     (GLOSSARY, "README.md", "The GPHX is told by PHXQ. ", ""),
     (GLOSSARY, "README.md + core/README.md", "The PHXQ is told. ", "'PHXQ' is used by 2 documents"),
