@@ -4,8 +4,8 @@
 
 interfaces.py SOURCE_DIR BUILD_DIR
 
-Keys of the files, as the programs tell them, with range and presence by the strict tables of core/config; verbs and options by --help, names of JSON, exit codes, kinds of
-effects, columns of the flight log, topics with type and delivery, verbs and results of commands, MAVLink messages.
+Keys of the files, as the programs tell them, with range and presence by the strict tables of core/config; verbs and options by --help, names of JSON, exit codes,
+columns of the flight log, topics with type and delivery, verbs and results of commands, MAVLink messages.
 """
 import pathlib
 import re
@@ -96,9 +96,6 @@ def check_keys(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, s
                 wrong.append(f"{heading}: {key} has the range {range_ or '(none)'}, not {documented[key][0]}")
             if (documented[key][1] == "needed") != needed:
                 wrong.append(f"{heading}: {key} is {'needed' if needed else 'not needed'}")
-    kinds = set(re.findall(r'\{"(\w+)",\s*Kind::', (root / "core/config/simulation_terms.cpp").read_text()))
-    table = [cells for cells in rows(sections_of["Model file"]) if len(cells) == 3]
-    expect("kinds of simulation terms", {k for cells in table for k in quoted(cells[0])}, kinds)
     spec = (root / "services/backwash/flight_spec.cpp").read_text()
     known = re.search(r'only\(path, file, \{([^}]*)\}', spec)[1]
     expect("Flight specification", {quoted(c[0])[0] for c in rows(sections_of["Flight specification"])[1:]},
