@@ -114,35 +114,31 @@ struct SimulationKind {
   void (*air)(const std::vector<double>& value, const FlightInstant& now, Air& air) = nullptr;
 };
 
-namespace terms {
-
-using Kind = SimulationTerm::Kind;
-
-/// In the order of Kind.
-inline constexpr std::array<SimulationKind, static_cast<std::size_t>(Kind::count)> kAll = {{
-    {Kind::push_of_heading, "push_of_heading", {kPush, kPush}, push_of_heading},
-    {Kind::ln_variance_with_time, "ln_variance_with_time", {kLn, kTime}, ln_variance_with_time},
-    {Kind::variance_elsewhere, "variance_elsewhere", {kShareOfMap, kOffset, kOffset}},
-    {Kind::kurtosis, "kurtosis", {kKurtosis}},
-    {Kind::thrust_share, "thrust_share", {kShare}},
-    {Kind::thrust_slope, "thrust_slope", {kShare}},
-    {Kind::thrust_with_voltage, "thrust_with_voltage", {kSag, kVolts, kVolts, kVolts, kCourse}},
-    {Kind::thrust_lag, "thrust_lag", {kLag}},
-    {Kind::setpoint_delay, "setpoint_delay", {kDelay}},
-    {Kind::attitude_lag, "attitude_lag", {kDelay}},
-    {Kind::sensor_drift_with_time, "sensor_drift_with_time", {kPush, kPush, kPush, kPush, kPush, kPush}},
-    {Kind::sensor_drift_with_temperature,
-     "sensor_drift_with_temperature",
-     {kPush, kPush, kPush, kPush, kPush, kPush, kCelsius, kCourse}},
-    {Kind::sensor_lines, "sensor_lines", {kAmplitude, kAmplitude, kAmplitude, kAmplitude, kAmplitude}},
-    {Kind::rotor_needs, "rotor_needs", {kLn, kLn, kLn, kLn}},
-    {Kind::rotor_reading, "rotor_reading", {kLn, kLn, kLn, kLn}},
-    {Kind::rotor_dropout, "rotor_dropout", {kPart, kPart, kPart, kPart}},
-}};
-
-}  // namespace terms
-
-inline constexpr const auto& kSimulationKinds = terms::kAll;
+/// In the order of SimulationTerm::Kind.
+inline constexpr auto kSimulationKinds = [] {
+  using namespace terms;
+  using Kind = SimulationTerm::Kind;
+  return std::array<SimulationKind, static_cast<std::size_t>(Kind::count)>{{
+      {Kind::push_of_heading, "push_of_heading", {kPush, kPush}, push_of_heading},
+      {Kind::ln_variance_with_time, "ln_variance_with_time", {kLn, kTime}, ln_variance_with_time},
+      {Kind::variance_elsewhere, "variance_elsewhere", {kShareOfMap, kOffset, kOffset}},
+      {Kind::kurtosis, "kurtosis", {kKurtosis}},
+      {Kind::thrust_share, "thrust_share", {kShare}},
+      {Kind::thrust_slope, "thrust_slope", {kShare}},
+      {Kind::thrust_with_voltage, "thrust_with_voltage", {kSag, kVolts, kVolts, kVolts, kCourse}},
+      {Kind::thrust_lag, "thrust_lag", {kLag}},
+      {Kind::setpoint_delay, "setpoint_delay", {kDelay}},
+      {Kind::attitude_lag, "attitude_lag", {kDelay}},
+      {Kind::sensor_drift_with_time, "sensor_drift_with_time", {kPush, kPush, kPush, kPush, kPush, kPush}},
+      {Kind::sensor_drift_with_temperature,
+       "sensor_drift_with_temperature",
+       {kPush, kPush, kPush, kPush, kPush, kPush, kCelsius, kCourse}},
+      {Kind::sensor_lines, "sensor_lines", {kAmplitude, kAmplitude, kAmplitude, kAmplitude, kAmplitude}},
+      {Kind::rotor_needs, "rotor_needs", {kLn, kLn, kLn, kLn}},
+      {Kind::rotor_reading, "rotor_reading", {kLn, kLn, kLn, kLn}},
+      {Kind::rotor_dropout, "rotor_dropout", {kPart, kPart, kPart, kPart}},
+  }};
+}();
 
 constexpr const SimulationKind& entry(SimulationTerm::Kind kind) noexcept {
   return kSimulationKinds[static_cast<std::size_t>(kind)];
