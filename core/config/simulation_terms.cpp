@@ -11,61 +11,20 @@
 namespace backwash::config {
 namespace {
 
-using Kind = SimulationTerm::Kind;
-
-constexpr Range kPush{-10, 10};      // m/s², 1/s
-constexpr Range kLn{-10, 10};        // of a factor
-constexpr Range kLength{0.01, 10};   // m, exponents
-constexpr Range kTime{0.1, 1000};    // s
-constexpr Range kShare{-0.9, 0.9};   // of the thrust
-constexpr Range kPart{0, 1};         // of readings
-constexpr Range kLag{0, 1};          // s
-constexpr Range kDelay{-0.3, 0.3};   // s
-constexpr Range kVolts{0.1, 1000};   // V
-constexpr Range kCelsius{-50, 150};  // °C
-constexpr Range kAmplitude{0, 100};  // m/s²
-constexpr Range kOffset{-2, 2};      // m
-constexpr Range kCourse{-1, 1};      // V/s, °C/s
-constexpr Range kSag{-10, 10};       // relative thrust per relative voltage
-constexpr Range kKurtosis{0, 3};     // ln
-constexpr Range kShareOfMap{0, 2};   // of ln Σ
-
 struct TermKind {
   std::string_view name;
-  std::variant<Law, Kind> kind;
-  std::vector<Range> value;
+  std::variant<Law, SimulationTerm::Kind> kind;
+  std::vector<TermRange> value;
 };
-
-/// Another kind: its line here, in SimulationTerm and where core/sim computes it. The laws are in core/types/law.hpp.
-std::vector<TermKind> simulations_own() {
-  return {
-      {"push_of_heading", Kind::push_of_heading, {kPush, kPush}},
-      {"ln_variance_with_time", Kind::ln_variance_with_time, {kLn, kTime}},
-      {"variance_elsewhere", Kind::variance_elsewhere, {kShareOfMap, kOffset, kOffset}},
-      {"kurtosis", Kind::kurtosis, {kKurtosis}},
-      {"thrust_share", Kind::thrust_share, {kShare}},
-      {"thrust_slope", Kind::thrust_slope, {kShare}},
-      {"thrust_with_voltage", Kind::thrust_with_voltage, {kSag, kVolts, kVolts, kVolts, kCourse}},
-      {"thrust_lag", Kind::thrust_lag, {kLag}},
-      {"setpoint_delay", Kind::setpoint_delay, {kDelay}},
-      {"attitude_lag", Kind::attitude_lag, {kDelay}},
-      {"sensor_drift_with_time", Kind::sensor_drift_with_time, {kPush, kPush, kPush, kPush, kPush, kPush}},
-      {"sensor_drift_with_temperature",
-       Kind::sensor_drift_with_temperature,
-       {kPush, kPush, kPush, kPush, kPush, kPush, kCelsius, kCourse}},
-      {"sensor_lines", Kind::sensor_lines, {kAmplitude, kAmplitude, kAmplitude, kAmplitude, kAmplitude}},
-      {"rotor_needs", Kind::rotor_needs, {kLn, kLn, kLn, kLn}},
-      {"rotor_reading", Kind::rotor_reading, {kLn, kLn, kLn, kLn}},
-      {"rotor_dropout", Kind::rotor_dropout, {kPart, kPart, kPart, kPart}},
-  };
-}
 
 const std::vector<TermKind>& kinds() {
   static const std::vector<TermKind> all = [] {
-    std::vector<TermKind> made = simulations_own();
+    std::vector<TermKind> made;
+    for (const SimulationKind& own : kSimulationKinds)
+      made.push_back({own.name, own.kind, {own.numbers.begin(), own.numbers.end()}});
     for (const LawEntry& law : kLaws) {
-      made.push_back({law.name, law.law, std::vector<Range>(law.values, law.of_variance ? kLn : kPush)});
-      if (law.scaled) made.back().value.push_back(kLength);
+      made.push_back({law.name, law.law, std::vector(law.values, law.of_variance ? terms::kLn : terms::kPush)});
+      if (law.scaled) made.back().value.push_back(terms::kScale);
     }
     return made;
   }();
@@ -102,10 +61,10 @@ tl::expected<SimulationTerm, std::string> read_term(const toml::node& node) {
   for (std::size_t i = 0; i < kind->value.size(); ++i) {
     const auto* at = list->get(i);
     const auto x = at->is_number() ? at->value<double>() : std::nullopt;
-    const Range& range = kind->value[i];
-    if (!x || !(*x >= range.low) || !(*x <= range.high))
-      return wrong(name + ": number " + std::to_string(i + 1) + " of value needs to be in [" + number(range.low) +
-                   ", " + number(range.high) + "]");
+    const TermRange& range = kind->value[i];
+    if (!x || !(*x >= range.least) || !(*x <= range.most))
+      return wrong(name + ": number " + std::to_string(i + 1) + " of value needs to be in [" + number(range.least) +
+                   ", " + number(range.most) + "]");
     term.value.push_back(*x);
   }
   return term;
@@ -130,7 +89,7 @@ toml::table simulation_table(const SimulationTerm& term) {
   toml::array value;
   for (std::size_t i = 0; i < kind->value.size(); ++i) {
     const double x = i < term.value.size() && std::isfinite(term.value[i]) ? term.value[i] : 0.0;
-    value.push_back(rounded(std::clamp(x, kind->value[i].low, kind->value[i].high), 8));
+    value.push_back(rounded(std::clamp(x, kind->value[i].least, kind->value[i].most), 8));
   }
   toml::table table{{"kind", kind->name}, {"value", value}};
   table.is_inline(true);

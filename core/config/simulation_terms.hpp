@@ -13,9 +13,9 @@
 /// What an extended model file says for the simulation alone.
 namespace backwash::config {
 
-/// Reads the `simulation` lists of a model file's `[[extension.term]]` ({ kind, value }, docs/interfaces.md, "Model
-/// file"); none without an extension. The rest of the file is load_model's. Errors: not_found; invalid for an entry of
-/// an unknown kind, with an unknown key, or with other numbers than its kind has.
+/// Reads the `simulation` lists of a model file's `[[extension.term]]` ({ kind, value }, docs/model.md section 6, "In
+/// the simulation"); none without an extension. The rest of the file is load_model's. Errors: not_found; invalid for an
+/// entry of an unknown kind, with an unknown key, or with other numbers than its kind has.
 tl::expected<std::vector<SimulationTerm>, ConfigError> load_simulation(const std::string& path);
 
 /// An entry of `extension.term.simulation`: { kind, value }, eight significant digits, within what load_simulation

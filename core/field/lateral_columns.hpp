@@ -38,6 +38,7 @@ class LateralColumns {
   struct Tensor {
     float xx, xy, yy, zz;
   };
+  /// 64 bytes, a line of the cache, of which a sweep reads millions: absence is a number and no optional.
   struct ElementSegment {
     double m_x, m_y;      ///< unit normal
     Tensor wall, corner;  ///< per unit of the factors of ProximityModel
@@ -69,7 +70,7 @@ class LateralColumns {
   std::vector<double> wall_low_, wall_high_;  ///< limits of d_c² for the wall term n voxels below, m²
   struct Reach {
     int range;       ///< |z_e − z_q| at most, voxels: the gate |r| ≤ l̄_w
-    int wall_range;  ///< z_q − z_e at most for the wall term; −1: none
+    int wall_range;  ///< z_q − z_e at most for the wall term; −1: no height is within
   };
   /// The largest heights that the gates allow at the horizontal distance (d_c/a)² = flat2.
   Reach reach_of(double flat2) const noexcept {

@@ -10,7 +10,7 @@ namespace {
 using map::Cell;
 using map::OccupancyGrid;
 
-/// Lateral faces of a voxel in the order that breaks ties (docs/model.md section 2, corner).
+/// Lateral faces of a voxel in the order that breaks ties (docs/model.md 1-6).
 const std::array<Index3, 4> kFaces{Index3(1, 0, 0), Index3(-1, 0, 0), Index3(0, 1, 0), Index3(0, -1, 0)};
 using Exposed = std::array<bool, 4>;
 

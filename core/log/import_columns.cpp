@@ -8,6 +8,7 @@
 #include <span>
 
 #include "core/log/local_cubic.hpp"
+#include "core/log/log_columns.hpp"
 #include "core/log/median.hpp"
 #include "core/log/turned_attitude.hpp"
 
@@ -25,9 +26,6 @@ constexpr Names kWorld[] = {kPosition,
                             {"cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2"}};
 constexpr std::array<const char*, 4> kQuaternion{"qw", "qx", "qy", "qz"};
 
-bool has_all(const FlightLog& log, std::span<const char* const> names) {
-  return std::ranges::all_of(names, [&](const char* name) { return log.has(name); });
-}
 Vec3 at(const FlightLog& log, const Names& names, std::size_t row) {
   return {log.column(names[0])[row], log.column(names[1])[row], log.column(names[2])[row]};
 }

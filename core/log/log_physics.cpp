@@ -7,6 +7,7 @@
 
 #include "core/log/import_columns.hpp"
 #include "core/log/local_cubic.hpp"
+#include "core/log/log_columns.hpp"
 #include "core/log/median.hpp"
 #include "core/types/formatted.hpp"
 
@@ -25,10 +26,6 @@ constexpr double kMostThrust = 1.2, kLeastThrust = -0.05;
 
 using Names = std::array<const char*, 3>;
 using Rows = std::vector<Vec3>;
-
-bool has_all(const FlightLog& log, const Names& names) {
-  return std::ranges::all_of(names, [&](const char* name) { return log.has(name); });
-}
 
 Rows rows_of(const FlightLog& log, const Names& names) {
   Rows rows;
@@ -151,7 +148,7 @@ std::vector<std::string> contradictions(const FlightLog& log) {
     const auto a = known(measured, true);
     pair_up({"acceleration", "the second derivative", kA, kP, kLeastAcceleration, kAccelerationRight}, a.said,
             a.derived, wrong);
-    if (has_all(log, {"qx", "qy", "qz"}) && log.has("qw"))
+    if (has_all(log, std::array{"qw", "qx", "qy", "qz"}))
       pair_up({"attitude",
                "the tilt that accelerates along the axis",
                {"tilt along x", "tilt along y", ""},

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 #include <queue>
 #include <tuple>
 
@@ -31,7 +32,7 @@ double clearance_at_most(const World& world, const Index3& v) {
 const std::array<Index3, 6> kNeighbours = {Index3{1, 0, 0},  Index3{-1, 0, 0}, Index3{0, 1, 0},
                                            Index3{0, -1, 0}, Index3{0, 0, 1},  Index3{0, 0, -1}};
 
-Region flood(const World& world, std::size_t seed, int number, std::vector<int>& of_voxel) {
+Region flood(const World& world, std::size_t seed, std::uint32_t number, std::vector<Regions::Number>& of_voxel) {
   const auto& grid = world.grid;
   const Vec3 half = Vec3::Constant(grid.resolution() / 2);
   Region region;
@@ -53,7 +54,7 @@ Region flood(const World& world, std::size_t seed, int number, std::vector<int>&
     }
     for (const auto& step : kNeighbours) {
       const Index3 next = v + step;
-      if (!world.hover.safe(next) || of_voxel[grid.linear(next)] >= 0) continue;
+      if (!world.hover.safe(next) || of_voxel[grid.linear(next)]) continue;
       of_voxel[grid.linear(next)] = number;
       open.push_back(grid.linear(next));
     }
@@ -77,23 +78,22 @@ Width width(const World& world, const Index3& v) {
 }  // namespace
 
 Regions hover_regions(const World& world) {
-  Regions found{{}, std::vector<int>(world.grid.cell_count(), -1)};
+  Regions found{{}, std::vector<Regions::Number>(world.grid.cell_count())};
   for (std::size_t i = 0; i < found.of_voxel.size(); ++i) {
-    if (found.of_voxel[i] >= 0 || !world.hover.safe(world.grid.voxel(i))) continue;
-    found.regions.push_back(flood(world, i, static_cast<int>(found.regions.size()), found.of_voxel));
+    if (found.of_voxel[i] || !world.hover.safe(world.grid.voxel(i))) continue;
+    found.regions.push_back(flood(world, i, static_cast<std::uint32_t>(found.regions.size()), found.of_voxel));
   }
-  std::vector<int> order(found.regions.size()), rank(order.size());
-  for (std::size_t n = 0; n < order.size(); ++n) order[n] = static_cast<int>(n);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return found.regions[static_cast<std::size_t>(a)].voxels > found.regions[static_cast<std::size_t>(b)].voxels;
-  });
+  std::vector<std::uint32_t> order(found.regions.size()), rank(order.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return found.regions[a].voxels > found.regions[b].voxels; });
   std::vector<Region> sorted;
-  for (std::size_t n = 0; n < order.size(); ++n) {
-    sorted.push_back(found.regions[static_cast<std::size_t>(order[n])]);
-    rank[static_cast<std::size_t>(order[n])] = static_cast<int>(n);
+  for (std::uint32_t n = 0; n < order.size(); ++n) {
+    sorted.push_back(found.regions[order[n]]);
+    rank[order[n]] = n;
   }
-  for (int& region : found.of_voxel) {
-    if (region >= 0) region = rank[static_cast<std::size_t>(region)];
+  for (Regions::Number& region : found.of_voxel) {
+    if (region) region = rank[*region];
   }
   found.regions = std::move(sorted);
   return found;
@@ -217,7 +217,7 @@ std::optional<HoverPair> farthest_pair(const World& world, const Regions& region
       std::optional<Vec3> best;
       for (int k = 0; k < grid.size().z(); ++k) {
         const Index3 v(i, j, k);
-        if (regions.of_voxel[grid.linear(v)] != 0 || (best && clearance_at_most(world, v) <= widest)) continue;
+        if (regions.of_voxel[grid.linear(v)] != 0u || (best && clearance_at_most(world, v) <= widest)) continue;
         const double c = clearance(world, v);
         if (!best || c > widest) widest = c, best = grid.center(v);
       }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -19,8 +20,9 @@ struct Region {
 };
 
 struct Regions {
-  std::vector<Region> regions;  ///< by falling volume; ties by first voxel
-  std::vector<int> of_voxel;    ///< region of each voxel, −1 where hovering is not safe
+  using Number = std::optional<std::uint32_t>;
+  std::vector<Region> regions;   ///< by falling volume; ties by first voxel
+  std::vector<Number> of_voxel;  ///< in which of them each voxel is; in none where hovering is not safe
 };
 
 /// Connected components (6 neighbours) of the voxels where hovering is safe. O(cells).

@@ -14,7 +14,7 @@
 
 namespace backwash::reach {
 
-/// Which closed loop the sets are exact for (docs/model.md section 4, "The loop").
+/// Which closed loop the sets are exact for (docs/model.md section 4, "Loop").
 enum class Loop {
   vehicle,     ///< continuous feedback with the vehicle's feedback delay and attitude lag: what flies
   continuous,  ///< the paper's second-order loop ë = −k_p e − k_d ė + w

@@ -22,17 +22,14 @@ ModelEffect exact(Law law, const std::vector<double>& x) {
 }
 
 /// What a term makes of the air; nothing for terms of other things. Walls count as far as they are seen.
-Air air_of(const SimulationTerm& term, const Flying& now, const Around& around) {
+Air air_of(const SimulationTerm& term, const FlightInstant& now, const Around& around) {
   const auto& x = term.value;
   Air air;
   if (const auto* kind = std::get_if<Law>(&term.kind)) {
     const LawEntry& law = entry(*kind);
     law.at ? law.at(exact(*kind, x), around, kSurfaceSight.level, air) : law.moving(exact(*kind, x), now.v_W, air);
-  } else if (term.is(Kind::push_of_heading)) {
-    const double c = std::cos(now.yaw), s = std::sin(now.yaw);
-    air.push_W = {x[0] * c - x[1] * s, x[0] * s + x[1] * c, 0};
-  } else if (term.is(Kind::ln_variance_with_time)) {
-    air.ln_variance = x[0] * (1 - std::exp(-now.t / x[1]));
+  } else if (const SimulationKind& own = entry(std::get<Kind>(term.kind)); own.air) {
+    own.air(x, now, air);
   }
   return air;
 }
@@ -74,7 +71,7 @@ Vec3 AirTerms::moved(const Vec3& p_W, const Vec3& offset_W) const {
   return reached;
 }
 
-AirTerms::Now AirTerms::step(const Flying& now, double dt) {
+AirTerms::Now AirTerms::step(const FlightInstant& now, double dt) {
   if (terms_.empty()) return {.place_W = now.p_W};
   const Around& seen = around(now.p_W);
   Vec3 push_W = Vec3::Zero(), offset_W = Vec3::Zero();

@@ -12,13 +12,6 @@
 
 namespace backwash::sim {
 
-/// Where and how a vehicle flies at an instant.
-struct Flying {
-  double t;        ///< s since the flight's start
-  Vec3 p_W, v_W;   ///< m, m/s
-  double yaw = 0;  ///< rad
-};
-
 /// What an extended model's terms make of the air (docs/model.md 6-10 to 6-12): a push, a factor of the gusts, and
 /// where their variance is looked up. Without such terms: no push, 1, and the vehicle's own place.
 class AirTerms {
@@ -32,7 +25,7 @@ class AirTerms {
     Vec3 place_W;                ///< where Σ is looked up, m
   };
   /// The next dt (s).
-  Now step(const Flying& now, double dt);
+  Now step(const FlightInstant& now, double dt);
 
  private:
   /// Bursts of unit mean square: two states, short and loud, long and calm.

@@ -53,7 +53,7 @@ void ClosedLoop::set_conditions(double yaw, std::optional<double> voltage, std::
 }
 
 void ClosedLoop::step() {
-  const Flying now{quadrotor_.time(), quadrotor_.state().p_W, quadrotor_.state().v_W, quadrotor_.yaw()};
+  const FlightInstant now{quadrotor_.time(), quadrotor_.state().p_W, quadrotor_.state().v_W, quadrotor_.yaw()};
   const auto terms = air_terms_.step(now, Quadrotor::kStep);
   const Vec3 gust = std::visit([&](auto& air) { return air.step(terms.place_W, Quadrotor::kStep, terms.gust); }, air_);
   quadrotor_.step(gust + terms.push_W, estimated_);

@@ -10,7 +10,7 @@ struct LoggedFlight {
   std::vector<double> t_s;         ///< of the rows, rising, from 0
   std::vector<std::size_t> row;    ///< the log's row of each
   std::vector<Setpoint> commands;  ///< one per row; the yaw is the heading that was measured
-  std::vector<int> segment;        ///< −1 without the column
+  std::vector<int> segment;        ///< as the flight log has it; −1 without the column
   State start;                     ///< measured at the first row
   /// The battery's voltage and the sensor's temperature by row, as parabolas of time: the momentary ones answer the
   /// thrust. Empty where the log does not tell them.

@@ -16,11 +16,6 @@ constexpr double kLongestStep = 0.1;  // s: the velocity is not carried on for l
 // 10 Hz and below a turn would go unseen. A heading that changes its rate by 2 rad/s² within adds at most 2.6°.
 constexpr double kLongestTurn = 0.31;
 
-Vec3 turned(double yaw, const Vec3& v) noexcept {
-  const double c = std::cos(yaw), s = std::sin(yaw);
-  return {c * v.x() - s * v.y(), s * v.x() + c * v.y(), v.z()};
-}
-
 }  // namespace
 
 double wrap_angle(double angle) noexcept {
@@ -28,7 +23,7 @@ double wrap_angle(double angle) noexcept {
   return angle <= -std::numbers::pi ? std::numbers::pi : angle;
 }
 
-Vec3 FrameAlignment::rotate(const Vec3& v) const noexcept { return turned(yaw_, v); }
+Vec3 FrameAlignment::rotate(const Vec3& v) const noexcept { return RigidShift{yaw_, Vec3::Zero()}.rotate(v); }
 
 void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, double dt, bool learn) noexcept {
   watch_tilt(in_map, in_local);
@@ -100,7 +95,7 @@ bool FrameAlignment::agree(double position) const noexcept {
 }
 
 void FrameAlignment::correlate(const FramePose& in_map, const FramePose& in_local) noexcept {
-  cross_ = kFade * cross_ + turned(-yaw_, in_local.v) * in_map.v.transpose();
+  cross_ = kFade * cross_ + RigidShift{-yaw_, Vec3::Zero()}.rotate(in_local.v) * in_map.v.transpose();
   energy_ = kFade * energy_ + in_map.v.cwiseProduct(in_map.v);
 }
 

@@ -27,16 +27,15 @@ struct Sets {
 
 /// The question about one way: its ends' regions and its tightest place.
 struct Way {
-  std::optional<int> start_region, goal_region;  ///< none where an end is not hover-safe
+  plan::Regions::Number start_region, goal_region;  ///< none where an end is not hover-safe
   bool connected() const { return start_region && start_region == goal_region; }
   std::optional<plan::Bottleneck> bottleneck;
 };
 
-std::optional<int> region_of(const plan::World& world, const plan::Regions& regions, const Vec3& p) {
+plan::Regions::Number region_of(const plan::World& world, const plan::Regions& regions, const Vec3& p) {
   const auto v = world.grid.index(p);
   if (!world.grid.inside(v)) return std::nullopt;
-  const int region = regions.of_voxel[world.grid.linear(v)];
-  return region >= 0 ? std::optional(region) : std::nullopt;
+  return regions.of_voxel[world.grid.linear(v)];
 }
 
 Json to_json(const plan::Region& r, const plan::World&) {
@@ -112,7 +111,7 @@ void print_text(const plan::World& world, const plan::Regions& regions, const st
           a.margin_m, a.voxels, a.only_ball_safe, a.only_set_safe);
   }
   if (!way) return;
-  const auto name = [](std::optional<int> region) {
+  const auto name = [](plan::Regions::Number region) {
     return region ? "region " + std::to_string(*region) : std::string("no region");
   };
   std::printf("start in %s, goal in %s: %s\n", name(way->start_region).c_str(), name(way->goal_region).c_str(),

@@ -59,7 +59,7 @@ std::vector<sim::HoverFlight::Hover> listed_hovers(const std::string& path, cons
     only(path, *hover, {"p", "dwell"});
     const auto dwell = (*hover)["dwell"].value<double>();
     if (!dwell || !(*dwell > 0 && *dwell <= 3600))
-      wrong(path, hover->source(), "dwell must be a time from 0 to 3600 s");
+      wrong(path, hover->source(), "dwell must be a time above 0 and up to 3600 s");
     list.push_back({point(path, *hover, "p"), *dwell});
   }
   return list;

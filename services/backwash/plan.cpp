@@ -93,7 +93,7 @@ Verb plan_verb(CLI::App& app) {
   command->footer(
       "Exit code 0 when a trajectory was found and verified, 69 otherwise.\nExample:\n"
       "  backwash plan --map builtin:narrow-gap --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
-      "    --start 1,2,1 --goal 5,2,1 --json");
+      "    --start 1,0,1 --goal 5,0,1 --json");
   return {command, [options] { return run(*options); }};
 }
 

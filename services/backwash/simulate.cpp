@@ -118,7 +118,7 @@ Verb simulate_verb(CLI::App& app) {
       "where flight.toml holds\n  start = [1.5, 1.5, 1.0]\n  [[hover]]\n  p = [2.0, 1.5, 0.6]\n  dwell = 10.0\nWhat "
       "the simulation says of a "
       "flight that was measured:\n  backwash simulate --map room.bt --vehicle craft.toml --model extended.toml --air "
-      "model\n  --setpoints measured.csv --out simulated.csv");
+      "model \\\n    --setpoints measured.csv --out simulated.csv");
   return {command, [options] { return run(*options); }};
 }
 

@@ -280,8 +280,7 @@ Verb study_verb(CLI::App& app) {
   command->add_option("--out", options->out, "extended model file to write");
   command->add_option("--seed", options->seed, "of the null's sign draws")->capture_default_str();
   command->add_flag("--quick", options->quick, "without the smallest effects that could have been found");
-  command->add_flag("--rules", options->rules,
-                    "prints every constant of the inference with unit and reason, and nothing else");
+  command->add_flag("--rules", options->rules, "prints every constant with unit and reason, and nothing else");
   command->add_flag("--json", options->json, "one JSON object on stdout");
   command->add_flag("--force", options->force, "overwrite --report, --out and --design");
   command->footer(

@@ -61,7 +61,7 @@ Json to_json(const study::Design& design, const DesignOptions& options) {
                        {"start_voltage", f.voltage ? Json(*f.voltage) : Json()},
                        {"divergence_nats", f.divergence},
                        {"pairs_nats", f.of_pair},
-                       {"flights", f.flights > 0 ? Json(f.flights) : Json()},
+                       {"flights", f.flights ? Json(*f.flights) : Json()},
                        {"separated", f.separated},
                        {"rows", f.points_W.size()},
                        {"time_s", seconds(f)}});
@@ -86,8 +86,8 @@ void print_text(const study::Design& design, const DesignOptions& options) {
     const auto& f = design.flights[k];
     std::printf("  %s%s: %.3g nats a flight expected, ", f.name.c_str(), f.used_battery ? ", used battery" : "",
                 f.divergence);
-    if (f.flights > 0)
-      std::printf("%d flight%s of %.0f s\n", f.flights, f.flights > 1 ? "s" : "", seconds(f));
+    if (f.flights)
+      std::printf("%d flight%s of %.0f s\n", *f.flights, f.flights > 1 ? "s" : "", seconds(f));
     else
       std::printf("does not separate (P = %.2f)\n", f.separated);
   }

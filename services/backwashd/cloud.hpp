@@ -18,7 +18,7 @@ struct Cloud {
 };
 
 /// Largest cloud that is read: four times a dense depth image of 320 × 240, of points as drivers send them at most.
-inline constexpr std::size_t kMaxCloudPoints = 320 * 240 * 4, kMaxCloudFields = 32, kMaxPointBytes = 128;
+inline constexpr std::size_t kMaxCloudPoints = std::size_t{320} * 240 * 4, kMaxCloudFields = 32, kMaxPointBytes = 128;
 
 /// Reads x, y, z (float32 or float64) of every point; nothing is read outside `data`. Errors, one line: no such fields
 /// or another type, sizes that do not agree with each other or with the data (docs/faults.md row 27), big-endian data,

@@ -18,7 +18,7 @@ namespace backwash::daemon {
 namespace {
 
 constexpr std::int64_t kPeriod_ns = 20'000'000, kListen_ns = 2'000'000;
-constexpr std::size_t kStackToTouch = 256 * 1024;
+constexpr std::size_t kStackToTouch = 256u << 10;
 
 void sleep_until(std::int64_t when_ns) {
   const timespec wake{when_ns / 1'000'000'000, when_ns % 1'000'000'000};

@@ -31,7 +31,7 @@ const Profile kProfile{
     .intervals_ms = {{mavlink::AttitudeQuaternion::kId, 20}, {mavlink::LocalPositionNed::kId, 33},
                      {mavlink::ExtendedSysState::kId, 200}, {mavlink::BatteryStatus::kId, 2000},
                      {mavlink::Timesync::kId, 100}},  // px4-flight.csv:408–420
-    .drift = 0.10, .drift_rate = 0, .drift_speed = 0.27,  // docs/autopilots.md: 0.05, 0.23, 0.48, 1.02 m at 1, 2, 3, 5 s
+    .drift = 0.10, .drift_rate = 0, .drift_speed = 0.27,  // px4-vio.csv:190–235: 0.05, 0.23, 0.48, 1.02 m at 1, 2, 3, 5 s
     .drift_way = {0.75, 0.66, 0},            // px4-vio.csv:190–235, against the truth's way
     .fusion = 0.3,                           // right within 1 s: px4-vio.csv:244–252
     .estimator_lost = 4.4,                   // descends 4.6 s after, px4-vio.csv:190,222

@@ -32,8 +32,7 @@ std::string with(const toml::table& entry) {
 TEST(SimulationTerms, EveryKindIsReadBackAsItWasWritten) {
   std::vector<std::variant<Law, SimulationTerm::Kind>> kinds;
   for (const LawEntry& law : kLaws) kinds.emplace_back(law.law);
-  for (int k = 0; k <= static_cast<int>(SimulationTerm::Kind::rotor_dropout); ++k)
-    kinds.emplace_back(static_cast<SimulationTerm::Kind>(k));
+  for (const SimulationKind& own : kSimulationKinds) kinds.emplace_back(own.kind);
   for (const auto& kind : kinds) {
     const auto table = simulation_table({kind, std::vector<double>(8, 0.25)});
     const auto found = read(with(table));

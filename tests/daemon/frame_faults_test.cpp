@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 7 and 8 of docs/faults.md in lockstep: what the frames of VIO and controller can do wrong. Named after their
-// rows.
+// Rows 7 and 8 of docs/faults.md in lockstep: what the frames of VIO and controller can do wrong.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows 1 to 6, 16 and 30 of docs/faults.md in lockstep: what the VIO can do wrong. Named after their rows.
+// Rows 1 to 3, 5, 6, 16, 30, 43 and 49 of docs/faults.md in lockstep: what the VIO can do wrong.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Every citation of docs/ in code, scripts and documents leads somewhere: sections and equations of model.md, headings of
-interfaces.md, rows of faults.md, in either order ("row 3 of docs/faults.md"); bare rows in comments and documents, bare
+interfaces.md, named parts of model.md ("section 4, "Centre""), rows of faults.md, in either order ("row 3 of docs/faults.md"); bare rows in comments and documents, bare
 sections and equations in docs/; so do relative links, headings quoted after them, and paths of files that text names.
 
 citations.py SOURCE_DIR [--mend]    --mend: first makes docs/… of citations without a folder; format the code after it
@@ -50,6 +50,13 @@ def headings(text: str) -> list[str]:
     return re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M)
 
 
+def parts_of(model: str) -> dict[str, list[str]]:
+    """Section of model.md → what its headings and bold text call its parts: "1-4 Visible." is "Visible"."""
+    parts = re.split(rf"^#+ ({NUMBER})\.? (.*)$", model, flags=re.M)
+    return {section: [heading] + [re.sub(rf"^{NUMBER}-\d+ |\.$", "", bold) for bold in re.findall(r"\*\*([^*]+)\*\*", text)]
+            for section, heading, text in zip(parts[1::3], parts[2::3], parts[3::3])}
+
+
 def mended(text: str) -> str:
     text = re.sub(r"(?:\.\./)*\bshared/(model|interfaces|faults)\.md", r"docs/\1.md", text)
     return re.sub(r"(?<![\w./-])(?<!\]\()(model|interfaces|faults)\.md", r"docs/\1.md", text)
@@ -71,6 +78,7 @@ def main() -> int:
         s.rstrip(".") for s in re.findall(rf"^#+ ({NUMBER}\.?) ", model, re.M)}
     equations = set(re.findall(rf"^(?:\*\*| {{4,}})({NUMBER}-\d+)\s", model, re.M))
     rows = set(re.findall(r"^\| (\d+) \|", faults, re.M))
+    parts = parts_of(model)
     interfaces = set(headings((root / "docs/interfaces.md").read_text()))
     wrong, seen = [], 0
 
@@ -104,6 +112,9 @@ def main() -> int:
                 sections_in(path, f"section {cited[1]}")
             if page == "model" and (cited := re.match(rf"(?:, )?(?:sections? {LIST})?[ ,(]*(?:equations? )?({EQUATION}(?:(?:, | and | to ){EQUATION})*)", after)):
                 equations_in(path, cited[1])
+            if page == "model" and (cited := re.match(rf',? section ({NUMBER}),? \(?"([^"]+)"', after)):
+                if cited[2] not in parts.get(cited[1], []):
+                    wrong.append(f"{path}: section {cited[1]} of model.md has no '{cited[2]}'")
             if page == "interfaces" and re.match(r",? sections? \d", after):
                 wrong.append(f"{path}: interfaces.md has headings, no numbered sections")
             if page == "model" and (cited := re.match(rf",? (?:sections? )?({NUMBER}-\d+)", after)):

@@ -4,8 +4,8 @@
 
 interfaces.py SOURCE_DIR BUILD_DIR
 
-Keys of the files, as the programs tell them, with range and presence by the strict tables of core/config; verbs and options by --help, names of JSON, exit codes, kinds of
-effects, columns of the flight log, topics with type and delivery, verbs and results of commands, MAVLink messages.
+Keys of the files, as the programs tell them, with range and presence by the strict tables of core/config; verbs and options by --help, names of JSON, exit codes,
+columns of the flight log, topics with type and delivery, verbs and results of commands, MAVLink messages.
 """
 import pathlib
 import re
@@ -96,9 +96,6 @@ def check_keys(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, s
                 wrong.append(f"{heading}: {key} has the range {range_ or '(none)'}, not {documented[key][0]}")
             if (documented[key][1] == "needed") != needed:
                 wrong.append(f"{heading}: {key} is {'needed' if needed else 'not needed'}")
-    kinds = set(re.findall(r'\{"(\w+)",\s*Kind::', (root / "core/config/simulation_terms.cpp").read_text()))
-    table = [cells for cells in rows(sections_of["Model file"]) if len(cells) == 3]
-    expect("kinds of simulation terms", {k for cells in table for k in quoted(cells[0])}, kinds)
     spec = (root / "services/backwash/flight_spec.cpp").read_text()
     known = re.search(r'only\(path, file, \{([^}]*)\}', spec)[1]
     expect("Flight specification", {quoted(c[0])[0] for c in rows(sections_of["Flight specification"])[1:]},
@@ -113,6 +110,20 @@ def help_of(*command: str) -> tuple[set[str], set[str]]:
     verbs = re.findall(r"^  (\w+) {2,}", text.split("Subcommands:")[1], re.M) if "Subcommands:" in text else []
     options = {o for line in re.findall(r"^  (-\S+)", text, re.M) for o in line.split(",")}
     return set(verbs), options - {"-h", "--help", "--version"}
+
+
+def defaults_of(*command: str) -> list[tuple[str, str]]:
+    """Options with a default, and its first word, by --help; what differs from machine to machine is left out."""
+    text = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
+    found = re.findall(r"^  (?:-\w,)?(--[\w-]+) +[A-Z][A-Z, ]*(?:x \d+)?(?::\S+(?: in \[[^\]]*\])?)?=(\S+)", text, re.M)
+    return [(option, default.strip("[]").split(",")[0]) for option, default in found if option != "--station"]
+
+
+def check_defaults(where: str, command: list[str], cells: list[str]) -> None:
+    """Each default of --help stands in the line that documents its option."""
+    for option, default in defaults_of(*command):
+        if not any(option in options_in(c) and re.search(rf"(?<![\w.]){re.escape(default)}(?![\w])", c) for c in cells):
+            wrong.append(f"{where}: {option} has the default {default}, which is not documented")
 
 
 def options_in(text: str) -> set[str]:
@@ -134,14 +145,17 @@ def check_programs(root: pathlib.Path, build: pathlib.Path, sections_of: dict[st
             if f"`backwash {verb} {below}`" not in sections_of[f"backwash {verb}"]:
                 wrong.append(f"backwash {verb}: {below} is not documented")
         expect(f"backwash {verb}", {o for c in cells for o in options_in(c[0])}, options)
+        check_defaults(f"backwash {verb}", [str(services / "backwash"), verb], [" ".join(c) for c in cells])
     for program in ("backwashd", "backwash-bench"):
         _, options = help_of(str(services / program))
         expect(program, {o for c in rows(sections_of[program]) for o in options_in(c[0])}, options)
+        check_defaults(program, [str(services / program)], [" ".join(c) for c in rows(sections_of[program])])
     verbs, common = help_of(str(services / "backwashctl"))
     listed = [c for c in rows(sections_of["backwashctl"]) if len(c) == 3 and c[0].startswith("`")]
     expect("verbs of backwashctl", {v for c in listed for v in quoted(c[0])}, verbs)
     every, of_verbs = options_in(sections_of["backwashctl"].split("\n|")[0]), set()
     expect("backwashctl", every, common)
+    check_defaults("backwashctl", [str(services / "backwashctl")], [sections_of["backwashctl"].split("\n|")[0]])
     for cells in listed:
         actual = set()
         for verb in set(quoted(cells[0])) & verbs:
@@ -222,6 +236,20 @@ def check_columns(root: pathlib.Path, sections_of: dict[str, str]) -> None:
         wrong.append(f"Flight log, CSV: only {len(actual)} columns were found in core/log/column_units.cpp")
 
 
+def check_tables(root: pathlib.Path, text: str) -> None:
+    """The columns of every table that a program writes are somewhere in the page, as the code's first line names them."""
+    named = {part for q in quoted(text) for part in re.findall(r"\w+", q)}
+    found = 0
+    for file in sorted((root / "services").rglob("*.[ch]pp")):
+        code = re.sub(r'"\s*"', "", file.read_text())  # one text over several lines
+        for line in re.findall(r'"(\w+(?:,\w+){3,})(?:\\n|")', code):
+            found += 1
+            columns = {re.sub(r"^(.*_|[va]?)[yz](?=_m|$)", r"\1x", c) if c not in named else c for c in line.split(",")}
+            wrong.extend(f"{file.relative_to(root)}: the column {c} is not documented" for c in sorted(columns - named))
+    if found < 3:
+        wrong.append(f"only {found} tables were found in services")
+
+
 # --- DDS and MAVLink -------------------------------------------------------------------------------------------------
 
 DELIVERY = {"latest": "best effort, keep last 1", "scans": "best effort, keep last 8",
@@ -254,6 +282,12 @@ def check_mavlink(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     cells = " ".join(c[0] for c in rows(section))
     words = set(re.findall(r"\b[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*\b", cells + section.split("The codec knows more")[1].split("\n\n")[0]))
     expect("MAVLink messages", words, actual)
+    message = r"\b[A-Z][A-Z]+(?:_[A-Z]+)*\b"
+    bridge = rows(sections((root / "firmware_bridge/README.md").read_text())["Messages"])
+    for way, cell in (("out", 0), ("in", 2)):
+        table = section.split(f"| {way} |")[1].split("\n\n")[0]
+        told = {m for c in rows(table) for m in re.findall(message, c[0])}
+        expect(f"MAVLink messages {way} of firmware_bridge/README.md", {m for c in bridge for m in re.findall(message, c[cell])}, told)
 
 
 def main() -> int:
@@ -265,6 +299,7 @@ def main() -> int:
     check_json(root, text, sections_of)
     check_exit_codes(root, sections_of)
     check_columns(root, sections_of)
+    check_tables(root, text)
     check_dds(root, sections_of)
     check_mavlink(root, sections_of)
     for line in wrong:

@@ -3,10 +3,12 @@
 """docs/model.md: equations are numbered once each, and each is followed by the code that computes it, which exists: in the code,
 not in a comment or a text. After an arrow stands nothing in code marks but `path:symbol`, and a number of an equation in bold
 begins its line: what is spelled otherwise would not be read.
-Each law of core/types/law.hpp has its equation, "name:   what it computes", and no equation of a law names another.
+Each law of core/types/law.hpp has its equation, "name:   what it computes", and no equation of a law names another. Each kind of
+core/types/simulation_term.hpp has its line in the table of kinds, with the ranges of its numbers.
 
 model.py SOURCE_DIR
 """
+import itertools
 import pathlib
 import re
 import sys
@@ -36,6 +38,22 @@ def laws(source: pathlib.Path, equations: list[str]) -> list[str]:
     wrong = [f"1: the law {name} has no equation" for name in sorted(known - told)]
     wrong += [f"1: {name} is no law of core/types/law.hpp" for name in sorted(told - known)]
     return wrong + ([] if len(known) >= 10 else [f"1: only {len(known)} laws were found"])
+
+
+def kinds(source: pathlib.Path, text: str) -> list[str]:
+    """What is wrong between the kinds of terms that the simulation alone knows and their table in section 6."""
+    code = (source / "core/types/simulation_term.hpp").read_text()
+    ranges = {name: f"[{low}, {high}]" for name, low, high in re.findall(r"TermRange (k\w+)\{([\d.-]+), ([\d.-]+)\}", code)}
+    known = {}
+    for name, numbers in re.findall(r'\{Kind::\w+,\s*"(\w+)",\s*\{([^}]*)\}', code):
+        runs = [(ranges[r], len(list(same))) for r, same in itertools.groupby(re.split(r",\s*", numbers.strip()))]
+        known[name] = ", ".join(f"{count} × {r}" if count > 1 else r for r, count in runs)
+    table = text.partition("| kind | `value` |")[2].partition("\n\n")[0]
+    told = dict(re.findall(r"^\| `(\w+)` \| [^|]* \| ([^|]*) \|", table, re.M))
+    wrong = [f"1: the kind {name} has no line in the table of section 6" for name in sorted(known.keys() - told.keys())]
+    wrong += [f"1: {name} is no kind of core/types/simulation_term.hpp" for name in sorted(told.keys() - known.keys())]
+    wrong += [f"1: the kind {name} has the ranges {known[name]}" for name in sorted(known.keys() & told.keys()) if known[name] != told[name]]
+    return wrong + ([] if len(known) >= 10 else [f"1: only {len(known)} kinds were found"])
 
 
 def ranked(number: str) -> list[str]:
@@ -87,6 +105,7 @@ def main() -> int:
         if ends != [first, last]:
             wrong.append(f"1: the table says {first} … {last}, there are {' … '.join(ends)}")
     wrong += laws(source, (source / "docs/model.md").read_text().splitlines())
+    wrong += kinds(source, (source / "docs/model.md").read_text())
     if len(seen) < 50:
         wrong.append(f"1: only {len(seen)} equations were found")
     for line in wrong:

@@ -51,14 +51,14 @@ TEST(HoverRegions, AreTheConnectedComponentsOfTheSafeVoxels) {
   const auto& world = narrow_gap();
   const auto found = hover_regions(world);
   const auto label = labels_where(world, -1);
-  std::set<std::pair<int, std::size_t>> pairs;
+  std::set<std::pair<std::size_t, std::size_t>> pairs;
   std::vector<std::size_t> count(found.regions.size());
   for (std::size_t i = 0; i < label.size(); ++i) {
     const Index3 v = world.grid.voxel(i);
-    ASSERT_EQ(found.of_voxel[i] >= 0, world.hover.safe(v));
-    if (found.of_voxel[i] < 0) continue;
-    const auto n = static_cast<std::size_t>(found.of_voxel[i]);
-    pairs.insert({found.of_voxel[i], label[i]});
+    ASSERT_EQ(found.of_voxel[i].has_value(), world.hover.safe(v));
+    if (!found.of_voxel[i]) continue;
+    const std::size_t n = *found.of_voxel[i];
+    pairs.insert({n, label[i]});
     ++count[n];
     const Vec3 p = world.grid.center(v);
     EXPECT_TRUE((p.array() > found.regions[n].low_W.array()).all() &&
@@ -103,7 +103,7 @@ TEST(FarthestPair, IsSafeAndFarApartAndStartsWhereOneCanTakeOff) {
   const auto pair = farthest_pair(world, regions, [](const Vec3& p) { return p.x() < 5; });
   ASSERT_TRUE(pair);
   for (const Vec3& p : {pair->start_W, pair->goal_W}) {
-    EXPECT_EQ(regions.of_voxel[world.grid.linear(world.grid.index(p))], 0);
+    EXPECT_EQ(regions.of_voxel[world.grid.linear(world.grid.index(p))], 0u);
   }
   EXPECT_LT(pair->start_W.x(), 5) << "the start must pass the test of its take-off";
   EXPECT_FALSE(farthest_pair(world, regions, [](const Vec3&) { return false; }));

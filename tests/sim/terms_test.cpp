@@ -26,13 +26,45 @@ map::OccupancyGrid room() {
 
 Vehicle five_inch() { return config::load_vehicle("builtin:quad-5in").value(); }
 
-AirTerms::Now now(const Terms& terms, const Flying& flying) {
+AirTerms::Now now(const Terms& terms, const FlightInstant& flying) {
   static const auto grid = room();
   return AirTerms(grid, terms, 1).step(flying, 1e-3);
 }
 
+/// What air, thrust, set-points, sensors and rotors make of the terms in a moment of a flight.
+std::vector<double> all_that_is_simulated(const Terms& given) {
+  const auto grid = room();
+  AirTerms air(grid, given, 1);
+  ThrustTerms thrust(given);
+  Sensors sensors(five_inch(), given, {}, 1);
+  std::vector<double> all{setpoint_delay(given), more_attitude_lag(given)};
+  const FlightInstant at{20, {2, 2, 0.5}, {0.6, -0.8, 0.3}, 0.5};
+  const double acceleration = thrust.step(kGravity, 0, 15.0, 1e-3);
+  for (int i = 0; i < 50; ++i) {
+    const auto seen = air.step(at, 1e-2);
+    all.push_back(seen.gust);
+    sensors.step(acceleration, 1e-3);
+    for (const Vec3& v : {seen.push_W, seen.place_W, sensors.acceleration(Vec3::Zero(), at.yaw, at.t, 20.0)})
+      all.insert(all.end(), v.begin(), v.end());
+    const auto rotors = sensors.rotors();
+    all.insert(all.end(), rotors.motor.begin(), rotors.motor.end());
+    all.insert(all.end(), rotors.rpm.begin(), rotors.rpm.end());
+  }
+  all.push_back(thrust.step(kGravity + 1, at.t, 15.0, 1e-3));
+  return all;
+}
+
+TEST(SimulationTerms, EveryKindChangesWhatIsSimulated) {
+  const auto without = all_that_is_simulated({});
+  for (const SimulationKind& kind : kSimulationKinds) {
+    SimulationTerm term{kind.kind, {}};
+    for (const TermRange& r : kind.numbers) term.value.push_back(r.least + 0.6 * (r.most - r.least));
+    EXPECT_NE(all_that_is_simulated({term}), without) << kind.name << " is computed by nothing in core/sim";
+  }
+}
+
 TEST(AirTermsOfAModel, PushAsTheirFormulasSay) {
-  const Flying low{0, {2, 2, 0.5}, {0.6, -0.8, 0}, M_PI / 2};
+  const FlightInstant low{0, {2, 2, 0.5}, {0.6, -0.8, 0}, M_PI / 2};
   EXPECT_NEAR(now({{Law::push_over_surface, {0.3, 0.2}}}, low).push_W.z(), 0.3 * std::exp(-0.1 / 0.2), 1e-9);
   EXPECT_NEAR(now({{Law::push_under_surface, {0.3, 0.5}}}, {0, {2, 2, 2.5}, Vec3::Zero()}).push_W.z(),
               0.3 * std::exp(-0.2 / 0.5), 1e-9);
@@ -46,7 +78,7 @@ TEST(AirTermsOfAModel, PushAsTheirFormulasSay) {
 }
 
 TEST(AirTermsOfAModel, ScaleTheGustsAsTheirFormulasSay) {
-  const Flying fast{20, {2, 2, 1}, {2, 0, 0}};
+  const FlightInstant fast{20, {2, 2, 1}, {2, 0, 0}};
   EXPECT_NEAR(now({{Law::ln_variance_with_speed, {0.4, 1.5}}}, fast).gust, std::exp(0.2 * std::pow(2, 1.5)), 1e-9);
   EXPECT_NEAR(now({{Kind::ln_variance_with_time, {0.8, 10}}}, fast).gust, std::exp(0.4 * (1 - std::exp(-2))), 1e-9);
   EXPECT_NEAR(now({{Law::ln_variance_under_surface, {0.6, 0.4}}}, {0, {2, 2, 2.5}, Vec3::Zero()}).gust,

@@ -37,7 +37,7 @@ TEST(Effects, EveryFileWithAnEffectHasItsLineInTheTable) {
     const std::string text = text_of(file.path());
     for (std::sregex_iterator at(text.begin(), text.end(), definition), end; at != end; ++at, ++found) {
       EXPECT_EQ((*at)[1].str() + ".cpp", file.path().filename()) << "an effect's file has its name";
-      EXPECT_TRUE(names().contains((*at)[1])) << (*at)[1] << " is not in the table";
+      EXPECT_TRUE(names().contains((*at)[1])) << (*at)[1] << " is not in kEffects of core/study/effects/table.cpp";
     }
   }
   EXPECT_EQ(found, effects().size());
@@ -45,7 +45,8 @@ TEST(Effects, EveryFileWithAnEffectHasItsLineInTheTable) {
 
 TEST(Effects, EveryEffectIsHiddenByTheGenerator) {
   for (const Effect& e : effects())
-    EXPECT_EQ(std::ranges::count(study_worlds::cause_names(), e.name), 1) << e.name << " is not in tests/study_worlds";
+    EXPECT_EQ(std::ranges::count(study_worlds::cause_names(), e.name), 1)
+        << e.name << " is not in tests/study_worlds/effects.cpp";
   EXPECT_EQ(study_worlds::cause_names().size(), effects().size());
 }
 
@@ -64,6 +65,7 @@ TEST(Effects, EveryFormSaysWhatItAddsAndFromWhichSizeOnItIsAnEffect) {
   for (const Form* f : catalogue()) {
     EXPECT_TRUE(formulas.insert(f->formula).second) << f->cause() << ": two forms with the same formula";
     EXPECT_FALSE(f->parameters.empty()) << f->formula;
+    EXPECT_EQ(f->possible.size(), f->parameters.size()) << f->formula << ": not each parameter says what is possible";
     EXPECT_TRUE(f->columns) << f->formula;
     EXPECT_GT(f->floor + f->least, 0) << f->formula << ": neither floor nor least";
     EXPECT_EQ(f->scale_name.empty(), f->scales.size() == 1) << f->formula;

@@ -56,9 +56,9 @@ TEST(TwoLevels, ALevelBelowTheErrorOfTheFlightsIsNone) {
   EXPECT_FALSE(two_levels({0, 0, 0, 1, 1}, 0)) << "two levels and a scatter need six";
 }
 
-Course course(std::mt19937& rng, std::size_t begin, std::size_t end, double offset) {
+AmplitudeCourse course(std::mt19937& rng, std::size_t begin, std::size_t end, double offset) {
   std::normal_distribution<double> noise(0, 0.1);
-  Course c;
+  AmplitudeCourse c;
   for (std::size_t i = 0; i < 45; ++i) {
     c.value.push_back(offset + (i >= begin && i < end ? 1 : 0) + noise(rng));
     c.weight.push_back(i % 9 == 4 ? 0 : 100);
@@ -82,7 +82,7 @@ TEST(TwoLevels, AFlightTellsWhenItStepsAndThatItDoesNot) {
 TEST(TwoLevels, NeighboursThatAreAlikeInflateTheErrorOfAMean) {
   std::mt19937 rng(9);
   std::normal_distribution<double> noise;
-  Course white, red;
+  AmplitudeCourse white, red;
   double x = 0;
   for (int i = 0; i < 4000; ++i) {
     white.value.push_back(noise(rng)), white.weight.push_back(1);

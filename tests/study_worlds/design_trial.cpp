@@ -96,7 +96,7 @@ Trial trial(const MatrixCell& cell, std::uint64_t seed, const TrialOptions& opti
   if (design.flights.empty()) return out;
   const auto& best = design.flights.front();
   out.way = best.name + (best.used_battery ? ", used battery" : "");
-  out.expected = best.flights, out.separated = best.separated;
+  out.expected = best.flights.value_or(0), out.separated = best.separated;
   Arms arms{world, design, options.seconds, used_charge(world, first.front()), Rng(seed ^ 0x5eed)};
   const int before = options.flights + 1000;  // numbers, hence gusts, that no first flight has
   for (const Further kind : {Further::designed, Further::same_kind, Further::free_kind, Further::of_list})

@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 LAYERING, MODEL, GLOSSARY = "tests/layering/includes.py", "tests/docs/model.py", "tests/docs/glossary.py"
-CITATIONS = "tests/docs/citations.py"
+CITATIONS, TYPES = "tests/docs/citations.py", "tests/style/types_once.py"
 TRACK = "core/track/orders.cpp"  # of a folder that may include neither core/log nor the daemon
 LOG = '"core/log/raw_log.hpp"'
 # checker, file, what is put at its end (or in place of what stands before the arrow), what is said; "" where it shall pass
@@ -40,7 +40,13 @@ PLANTED = [
     (CITATIONS, TRACK, "/* As row\n * 99 asks. */\n", "faults.md has no row 99"),
     (CITATIONS, TRACK, "/* By equation 9-9. */\n", "model.md has no equation 9-9"),
     (CITATIONS, TRACK, "// Equation 9-9.\n", "model.md has no equation 9-9"),
+    (CITATIONS, TRACK, '// As docs/model.md section 4, "The\n// loop".\n', "section 4 of model.md has no 'The loop'"),
+    (CITATIONS, TRACK, '// As docs/model.md section 4, "Loop", and section 1, "Visible".\n', ""),
     (CITATIONS, "services/package/sbom.py", '"""Against\nrow 99."""\n', "faults.md has no row 99"),
+    (TYPES, TRACK, "namespace backwash {\nnamespace track {\nclass Tracker : A {};\n}\n}\n", "backwash::track::Tracker is defined in"),
+    (TYPES, TRACK, "namespace backwash::track {\nenum class Request : char { none };\n}\n", "backwash::track::Request is defined in"),
+    (TYPES, TRACK, "namespace backwash::track {\nnamespace {\nclass Tracker {};\n}\n}\n", ""),
+    (TYPES, TRACK, "namespace backwash::track {\nclass Tracker;\nvoid f() { struct Tracker {}; }\n}\n", ""),
     (GLOSSARY, "README.md", "The GPHX is told by PHXQ. ", ""),
     (GLOSSARY, "README.md + core/README.md", "The PHXQ is told. ", "'PHXQ' is used by 2 documents"),
     (GLOSSARY, "README.md + core/README.md + docs/faults.md", "A safe view of it. ", "'safe view' is a type and a word"),
@@ -67,7 +73,7 @@ def main() -> int:
             done = subprocess.run([sys.executable, copy / checker, copy], capture_output=True, text=True)
             return done.returncode, done.stdout + done.stderr
 
-        for checker in (LAYERING, MODEL, CITATIONS, GLOSSARY):
+        for checker in (LAYERING, MODEL, CITATIONS, TYPES, GLOSSARY):
             if told(checker)[0]:
                 wrong += 1
                 print(f"{checker} fails on the copy itself: {told(checker)[1]}")

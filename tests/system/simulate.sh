@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# An extended model changes what is simulated, in either air; the set-points of a log are flown again at its stamps.
+# An extended model changes what is simulated, in either air; the set-points of a log are flown again at its stamps. The
+# specifications of the README fly in the rooms that it names.
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 
 quad=builtin:quad-5in
@@ -20,6 +21,11 @@ fly --flight spec.toml --model heavy.toml --out heavy.csv
 fly --flight spec.toml --model plain.toml --air model --out still.csv
 fly --setpoints none.csv --model plain.toml --air model --out again.csv
 fly --setpoints none.csv --model heavy.toml --air model --out again_heavy.csv
+
+awk '/^## /{of = /^## Flight specification/} of && /^```toml/{file = "readme" ++n ".toml"; next} /^```/{file = ""} file {print >file}' \
+  "$here/../../services/backwash/README.md"
+"$backwash" simulate --map builtin:apartment --vehicle $quad --flight readme1.toml --out first.csv >/dev/null
+"$backwash" simulate --map builtin:parallel-walls-1m --vehicle $quad --flight readme2.toml --out grid.csv >/dev/null
 
 python3 - <<'PYTHON'
 import csv

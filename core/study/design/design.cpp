@@ -32,11 +32,11 @@ void judge(NextFlight& flight, const std::vector<Contest>& contests, const Evide
   for (const double m : missed) all.separated.push_back(std::max(0.0, 1 - m));
   flight.flights = all.flights();
   flight.separated =
-      flight.flights > 0 ? all.separated[static_cast<std::size_t>(flight.flights) - 1] : all.separated.back();
+      flight.flights ? all.separated[static_cast<std::size_t>(*flight.flights) - 1] : all.separated.back();
 }
 
 bool better(const NextFlight& a, const NextFlight& b) {
-  const auto needed = [](const NextFlight& f) { return f.flights > 0 ? f.flights : INT_MAX; };
+  const auto needed = [](const NextFlight& f) { return f.flights.value_or(INT_MAX); };
   return needed(a) != needed(b) ? needed(a) < needed(b) : a.divergence > b.divergence;
 }
 
@@ -46,7 +46,7 @@ std::string sentence(const Design& design) {
   if (!best) return "no flight of this list separates them";
   char text[240];
   std::snprintf(text, sizeof text, "fly: %s%s; %d flight%s separate%s them with P = %.2f", best->name.c_str(),
-                best->used_battery ? ", on the battery as the last flight left it" : "", best->flights,
+                best->used_battery ? ", on the battery as the last flight left it" : "", *best->flights,
                 best->flights == 1 ? "" : "s", best->flights == 1 ? "s" : "", best->separated);
   return text;
 }
@@ -54,7 +54,7 @@ std::string sentence(const Design& design) {
 }  // namespace
 
 const NextFlight* Design::chosen() const {
-  return flights.empty() || flights.front().flights == 0 ? nullptr : &flights.front();
+  return flights.empty() || !flights.front().flights ? nullptr : &flights.front();
 }
 
 Design design(const Observations& seen, const StudyResult& result, const plan::World& world, const Model& model,

@@ -28,8 +28,8 @@ struct NextFlight {
   std::vector<Setpoint> commands;            ///< 20 ms apart
   double divergence;                         ///< T, nats a flight, over all sets
   std::vector<std::vector<double>> of_pair;  ///< by set and pair: ½ (T_ij + T_ji), nats a flight
-  int flights;       ///< after so many every set is one name with P ≥ 0.9; 0: not up to most_flights
-  double separated;  ///< P after so many, or after most_flights
+  std::optional<int> flights;  ///< after so many every set is one name with P ≥ 0.9; not up to most_flights: none
+  double separated;            ///< P after so many, or after most_flights
 };
 
 struct Design {

@@ -57,9 +57,10 @@ double passes(double lead, double growth, double needed) {
   return 0.5 * std::erfc((needed - lead - growth) / (2 * std::sqrt(growth)));
 }
 
-int Outlook::flights() const {
+std::optional<int> Outlook::flights() const {
   const auto enough = std::ranges::find_if(separated, [](double p) { return p >= kDesignRules.separated; });
-  return enough == separated.end() ? 0 : static_cast<int>(enough - separated.begin()) + 1;
+  if (enough == separated.end()) return std::nullopt;
+  return static_cast<int>(enough - separated.begin()) + 1;
 }
 
 Contest::Contest(const Evidence& flown, const std::vector<Accepted>& accepted, std::size_t which, double threshold)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,8 +39,8 @@ struct Outlook {
   double divergence = 0;          ///< Σ_{i<j} π_i π_j ½ (T_ij + T_ji), nats a flight
   std::vector<double> separated;  ///< P that the set is one name after 1, 2, … flights
   std::vector<double> of_pair;    ///< ½ (T_ij + T_ji) by Contest::pairs()
-  /// The least number of flights with which P is at least `kDesignRules.separated`; 0: none up to most_flights.
-  int flights() const;
+  /// The least number of flights with which P is at least `kDesignRules.separated`; none up to most_flights.
+  std::optional<int> flights() const;
 };
 
 /// A named cause and its rivals, and what it takes to tell them apart. Keeps pointers to its arguments.

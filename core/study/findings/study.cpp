@@ -8,21 +8,11 @@
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/coverage.hpp"
 #include "core/study/inference/estimate.hpp"
+#include "core/study/inference/rivals.hpp"
 #include "core/study/inference/rotor_rules.hpp"
 
 namespace backwash::study {
 namespace {
-
-std::vector<DesignColumn> others_of(const std::vector<Accepted>& all, std::size_t but, const Observations& seen) {
-  std::vector<DesignColumn> columns;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i == but) continue;
-    columns.insert(columns.end(), all[i].columns.begin(), all[i].columns.end());
-    const auto open = companions(*all[i].form, seen);
-    columns.insert(columns.end(), open.begin(), open.end());
-  }
-  return columns;
-}
 
 /// What the cause adds to a channel in each window, its parameters fitted without the window's flight.
 std::vector<double> held_out(const Accepted& cause, const NormalEquations& normal, const Observations& seen,
@@ -62,7 +52,7 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
   const Observations& seen = evidence.seen();
   const Accepted& cause = all[which];
   auto nuisance = cause.form->constant ? std::vector<DesignColumn>{} : offsets(cause.columns, seen);
-  const auto others = others_of(all, which, seen);
+  const auto others = columns_of(all, seen, which);
   nuisance.insert(nuisance.end(), others.begin(), others.end());
   const NormalEquations normal = evidence.normal(cause.columns, nuisance);
   Gain gain;
@@ -206,7 +196,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   result.threshold = found.threshold;
   result.unknown = found.unknown, result.refused = found.refused;
   Evidence evidence(whole.rest);
-  evidence.whiten(others_of(found.accepted, SIZE_MAX, whole.rest));
+  evidence.whiten(columns_of(found.accepted, whole.rest));
   name_causes(result, evidence, found.accepted);
   for (const auto& cause : whole.some) result.causes.push_back(named(cause, evidence));
   bool ambiguous = false;
@@ -224,7 +214,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   ambiguous = doubt_payloads(result.causes, off) || ambiguous;
   if (options.dependence) {
     options.search.progress("whether what remains depends on something");
-    look_at_what_remains(result, evidence, others_of(found.accepted, SIZE_MAX, whole.rest), options.search);
+    look_at_what_remains(result, evidence, columns_of(found.accepted, whole.rest), options.search);
   }
   result.verdict = !result.causes.empty() ? (ambiguous ? StudyVerdict::cannot_distinguish : StudyVerdict::cause_found)
                    : !result.unknown.empty() ? StudyVerdict::unknown_structure

@@ -48,8 +48,8 @@ bool Amplitudes::told(std::size_t unit) const {
   return A.determinant() > kRules.no_turn * std::pow(A.trace(), static_cast<double>(A.rows()));
 }
 
-Course Amplitudes::course(std::size_t unit, const SmallVector& direction) const {
-  Course course;
+AmplitudeCourse Amplitudes::course(std::size_t unit, const SmallVector& direction) const {
+  AmplitudeCourse course;
   for (std::size_t i = begin(unit); i < end(unit); ++i) {
     const double w = direction.dot(A_[i] * direction);
     course.weight.push_back(w);

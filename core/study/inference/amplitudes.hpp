@@ -28,7 +28,7 @@ class Amplitudes {
   std::size_t begin(std::size_t unit) const { return units_->first[unit]; }
   std::size_t end(std::size_t unit) const { return units_->first[unit + 1]; }
   /// The unit's windows along a direction of the parameters, |direction| = 1.
-  Course course(std::size_t unit, const SmallVector& direction) const;
+  AmplitudeCourse course(std::size_t unit, const SmallVector& direction) const;
   /// Whether a difference of parameters is an effect at all (SearchCandidate::effect).
   bool effect(const SmallVector& difference) const;
 

@@ -45,7 +45,7 @@ std::vector<Segment> segments_of(const Finding& finding, const Observations& see
   const bool single = seen.units.size() == seen.flights;
   std::vector<Segment> all;
   for (std::size_t u = 0; u < a.units(); ++u) {
-    Course course = a.course(u, finding.asked.direction);
+    AmplitudeCourse course = a.course(u, finding.asked.direction);
     for (double& w : course.weight) w /= finding.inflation;
     const std::size_t n = course.value.size();
     const Acting at = acting(course, finding.low, finding.high, finding.spread * finding.spread, kRules.step_price,
@@ -89,7 +89,7 @@ Finding within(const Asked& asked) {
   finding.inflation = typical_inflation(asked);
   double steps = 0, most = 0;
   for (std::size_t u = 0; u < a.units(); ++u) {
-    const Course course = a.course(u, asked.direction);
+    const AmplitudeCourse course = a.course(u, asked.direction);
     const Step step = largest_step(course, kSide);
     if (course.value.size() >= 2 * kSide) steps += static_cast<double>(course.value.size() - 2 * kSide + 1);
     if (step.t <= most) continue;

@@ -68,14 +68,14 @@ std::optional<TwoLevels> two_levels(const std::vector<double>& values, double le
   return divisions.best();
 }
 
-Level level(const Course& course, std::size_t begin, std::size_t end) {
+Level level(const AmplitudeCourse& course, std::size_t begin, std::size_t end) {
   Level l;
   for (std::size_t i = begin; i < end; ++i) l.value += course.weight[i] * course.value[i], l.weight += course.weight[i];
   if (l.weight > 0) l.value /= l.weight;
   return l;
 }
 
-Step largest_step(const Course& course, std::size_t fewest) {
+Step largest_step(const AmplitudeCourse& course, std::size_t fewest) {
   const std::size_t n = course.value.size();
   Step best;
   for (std::size_t at = fewest; at + fewest <= n; ++at) {
@@ -88,7 +88,7 @@ Step largest_step(const Course& course, std::size_t fewest) {
   return best;
 }
 
-double inflation(const Course& course, std::size_t lags) {
+double inflation(const AmplitudeCourse& course, std::size_t lags) {
   const std::size_t n = course.value.size();
   const double mean = level(course, 0, n).value;
   std::vector<double> x(n);
@@ -103,7 +103,7 @@ double inflation(const Course& course, std::size_t lags) {
 namespace {
 
 /// ln likelihood of windows about `low`, `high` in [begin, end), the flight's own offset integrated out.
-double likelihood(const Course& course, double low, double high, double between, Acting a) {
+double likelihood(const AmplitudeCourse& course, double low, double high, double between, Acting a) {
   double square = 0, sum = 0, weight = 0;
   for (std::size_t i = 0; i < course.value.size(); ++i) {
     const double rest = course.value[i] - (i >= a.begin && i < a.end ? high : low), w = course.weight[i];
@@ -114,7 +114,8 @@ double likelihood(const Course& course, double low, double high, double between,
 
 }  // namespace
 
-Acting acting(const Course& course, double low, double high, double between, double price, std::size_t fewest) {
+Acting acting(const AmplitudeCourse& course, double low, double high, double between, double price,
+              std::size_t fewest) {
   const std::size_t n = course.value.size();
   Acting best{0, 0};
   double most = likelihood(course, low, high, between, best);

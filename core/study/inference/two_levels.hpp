@@ -21,7 +21,7 @@ struct TwoLevels {
 std::optional<TwoLevels> two_levels(const std::vector<double>& values, double least_spread);
 
 /// Windows of one flight, along one amplitude.
-struct Course {
+struct AmplitudeCourse {
   std::vector<double> value, weight;  ///< per window; weight: 1/variance of its noise, 0 where it is not measured
 };
 
@@ -29,7 +29,7 @@ struct Course {
 struct Level {
   double value = 0, weight = 0;
 };
-Level level(const Course& course, std::size_t begin, std::size_t end);
+Level level(const AmplitudeCourse& course, std::size_t begin, std::size_t end);
 
 /// A step within a flight: windows from `at` on lie elsewhere.
 struct Step {
@@ -38,11 +38,11 @@ struct Step {
   double t = 0;     ///< |size| over its error by the windows' noise
 };
 /// The step of largest t with at least `fewest` measured windows on either side; `at` 0: there is none.
-Step largest_step(const Course& course, std::size_t fewest);
+Step largest_step(const AmplitudeCourse& course, std::size_t fewest);
 
 /// By how much neighbouring windows' likeness multiplies the variance of a mean: 1 + 2 Σ ρ_k, at least 1, about the
 /// course's mean; lags 1 … `lags`.
-double inflation(const Course& course, std::size_t lags);
+double inflation(const AmplitudeCourse& course, std::size_t lags);
 
 /// Where in a flight the high level begins and ends: windows [begin, end); empty: nowhere.
 struct Acting {
@@ -50,6 +50,6 @@ struct Acting {
 };
 /// The likeliest of: nowhere, all along, from a window on, up to a window. Both levels may be off by the same random
 /// amount of variance `between`; a step costs `price` nats.
-Acting acting(const Course& course, double low, double high, double between, double price, std::size_t fewest);
+Acting acting(const AmplitudeCourse& course, double low, double high, double between, double price, std::size_t fewest);
 
 }  // namespace backwash::study
