@@ -195,24 +195,23 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb field_verb(CLI::App& app) {
+Verb field_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("field", "Variance of the disturbance at points or in a slice of a map");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
-  command->add_option("--vehicle", options->vehicle,
-                      "vehicle file or builtin:NAME: its diagonal_radius takes r0's place");
-  command->add_option("--points", options->points, "CSV with the columns x_m,y_m,z_m");
-  command->add_option("--slice", options->slice, "plane, as in z=0.5: the free voxels it cuts");
-  add_point(*command, "--at", options->at, "one point, m");
-  command->add_flag("--interpolated", options->interpolated,
-                    "from the stored field instead of exactly (slices always)");
-  command->add_option("--out", options->out, "picture of the slice, .svg or .png");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite --out");
-  command->footer(
+  auto& command = app.add_subcommand("field", "Variance of the disturbance at points or in a slice of a map");
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
+  command.add_option("--model", options->model, "model file or builtin:NAME").required();
+  command.add_option("--vehicle", options->vehicle,
+                     "vehicle file or builtin:NAME: its diagonal_radius takes r0's place");
+  command.add_option("--points", options->points, "CSV with the columns x_m,y_m,z_m");
+  command.add_option("--slice", options->slice, "plane, as in z=0.5: the free voxels it cuts");
+  add_point(command, "--at", options->at, "one point, m");
+  command.add_flag("--interpolated", options->interpolated, "from the stored field instead of exactly (slices always)");
+  command.add_option("--out", options->out, "picture of the slice, .svg or .png");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite --out");
+  command.footer(
       "Example:\n  backwash field --map builtin:apartment --model builtin:quad-5in --slice z=1.0 --out slice.svg");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

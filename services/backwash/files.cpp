@@ -43,7 +43,7 @@ log::FlightLog read_table(const std::string& path, const std::string& time_colum
   throw Failure(table.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, table.error().message);
 }
 
-CLI::Option* add_method(CLI::App& command, reach::Method& target) {
+Option add_method(Command& command, reach::Method& target) {
   const std::vector<std::pair<std::string, reach::Method>> methods = {{"tight", reach::Method::tight},
                                                                       {"paper", reach::Method::paper}};
   return add_choice(command, "--method", target, methods, "tight: exact supports; paper: ellipsoids");

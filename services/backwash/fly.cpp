@@ -106,30 +106,30 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb fly_verb(CLI::App& app) {
+Verb fly_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command =
+  auto& command =
       app.add_subcommand("fly", "One closed-loop flight in simulated airflow, judged against its reachable sets");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->capture_default_str();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->capture_default_str();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
-  add_point(*command, "--start", options->start, "hover point above the take-off, m; by default one of the map's");
-  add_point(*command, "--goal", options->goal, "hover point to reach, m; by default one of the map's");
-  command->add_option("--seed", options->seed, "of the airflow and of the VIO error")->capture_default_str();
-  command->add_option("--sigma-scale", options->sigma_scale, "judge with sets of the variance times this")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->add_option("--report", options->report, "HTML page to write");
-  command->add_option("--log", options->log, "flight log to write, CSV");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--ends", options->ends, "only print the start and the goal that would be flown");
-  command->add_flag("--force", options->force, "overwrite --report and --log");
-  command->footer(
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").capture_default_str();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();
+  command.add_option("--model", options->model, "model file or builtin:NAME; a built-in vehicle has its own");
+  add_point(command, "--start", options->start, "hover point above the take-off, m; by default one of the map's");
+  add_point(command, "--goal", options->goal, "hover point to reach, m; by default one of the map's");
+  command.add_option("--seed", options->seed, "of the airflow and of the VIO error").capture_default_str();
+  command.add_option("--sigma-scale", options->sigma_scale, "judge with sets of the variance times this")
+      .check(positive())
+      .capture_default_str();
+  command.add_option("--report", options->report, "HTML page to write");
+  command.add_option("--log", options->log, "flight log to write, CSV");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--ends", options->ends, "only print the start and the goal that would be flown");
+  command.add_flag("--force", options->force, "overwrite --report and --log");
+  command.footer(
       "Exit code 0 if the goal was reached, nothing was touched and every measured position lay inside the set "
       "predicted\n"
       "for it; 1 if not; 69 if the flight was refused.\nExample:\n  backwash fly --map builtin:apartment --report "
       "flight.html");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

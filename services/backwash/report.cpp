@@ -39,20 +39,20 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb report_verb(CLI::App& app) {
+Verb report_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
-  command->add_option("--log", options->log, "raw log of backwashd")->required();
-  command->add_option("--truth", options->truth, "log of the truth by backwash-bench, CSV")->required();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->capture_default_str();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
-  command->add_option("--out", options->out, "HTML page to write");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite --out");
-  command->footer(
+  auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
+  command.add_option("--log", options->log, "raw log of backwashd").required();
+  command.add_option("--truth", options->truth, "log of the truth by backwash-bench, CSV").required();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();
+  command.add_option("--model", options->model, "model file or builtin:NAME; a built-in vehicle has its own");
+  command.add_option("--out", options->out, "HTML page to write");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite --out");
+  command.footer(
       "The same judgement and exit codes as fly.\nExample:\n"
       "  backwash report --log flight.bwlog --truth truth.csv --out flight.html");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -18,14 +18,12 @@ double seconds(const study::NextFlight& flight) { return kControlPeriod * static
 
 }  // namespace
 
-void add_design(CLI::App& command, DesignOptions& options) {
+void add_design(Command& command, DesignOptions& options) {
   command.add_option("--design", options.points,
                      "points file of the flight that tells a set apart soonest, for backwashctl follow; needs --map "
                      "and --start");
   add_point(command, "--start", options.start, "where that flight begins, m");
-  command.add_option("--flight-time", options.flight_time, "of that flight, s")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+  command.add_option("--flight-time", options.flight_time, "of that flight, s").capture_default_str().check(positive());
 }
 
 void check_design(const DesignOptions& options, const std::string& map, bool force) {
