@@ -10,7 +10,7 @@
 
 namespace {
 
-constexpr int kUsage = 64, kSoftware = 70, kConfiguration = 78;
+constexpr int kSoftware = 70;
 
 int failed(int code, const std::string& message) {
   std::cerr << "backwashd: " << message << "\n";
@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
   app.version(backwash::kVersion);
   if (const auto code = app.parse(argc, argv)) return *code;
   const auto settings = backwash::daemon::load_settings(path);
-  if (!settings) return failed(kConfiguration, settings.error());
+  if (!settings) return failed(settings.error().code, settings.error().what);
   if (check) {
     std::cout << path << ": good\n";
     return backwash::services::finished(0, "backwashd");

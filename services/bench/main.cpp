@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <iostream>
 
 #include "core/config/config.hpp"
 #include "core/config/odometry_profile.hpp"
 #include "core/map/load_map.hpp"
 #include "services/bench/bench.hpp"
+#include "services/bench/start_error.hpp"
 #include "services/command_line/command_line.hpp"
+#include "services/dds/dds.hpp"
 #include "version.hpp"
 
 namespace {
@@ -43,12 +48,12 @@ void add_world(Command& app, Given& given) {
   app.add_option("--local-yaw", given.options.frame.yaw, "yaw of the controller's own frame, rad")
       .capture_default_str();
   app.add_option("--local-origin", given.origin, "the map's origin in the controller's own frame, m")
-      ->delimiter(',')
-      ->expected(3);
-  app.add_option("--domain", given.options.domain, "DDS domain")->capture_default_str();
-  app.add_option("--interface", given.options.interface, "network interface")->capture_default_str();
-  app.add_option("--namespace", given.options.name_space, "the daemon's name space")->capture_default_str();
-  app.add_option("--duration", given.options.duration_s, "s")->capture_default_str();
+      .delimiter(',')
+      .expected(3);
+  app.add_option("--domain", given.options.domain, "DDS domain").capture_default_str().check(within(0, 230));
+  app.add_option("--interface", given.options.interface, "network interface").capture_default_str();
+  app.add_option("--namespace", given.options.name_space, "the daemon's name space").capture_default_str();
+  app.add_option("--duration", given.options.duration_s, "s").capture_default_str().check(positive());
   app.add_option("--log", given.options.log, "flight log of the truth, CSV");
   app.add_option("--wire", given.options.wire, "what arrived from the daemon, frame by frame, CSV");
 }
@@ -121,10 +126,10 @@ int run(backwash::bench::Options& o, const std::string& timeline) {
   if (!grid)
     return failed(grid.error().kind == backwash::map::MapError::Kind::not_found ? 66 : 65, grid.error().message);
   const auto vehicle = backwash::config::load_vehicle(o.vehicle);
-  if (!vehicle) return failed(78, vehicle.error().message);
+  using Kind = backwash::config::ConfigError::Kind;
+  if (!vehicle) return failed(vehicle.error().kind == Kind::not_found ? 66 : 78, vehicle.error().message);
   if (!timeline.empty()) {
     auto loaded = backwash::bench::load_timeline(timeline);
-    using Kind = backwash::config::ConfigError::Kind;
     if (!loaded) return failed(loaded.error().kind == Kind::not_found ? 66 : 78, loaded.error().message);
     o.timeline = std::move(*loaded);
   }
@@ -153,8 +158,13 @@ int main(int argc, char** argv) {
     given.options.parameters.insert_or_assign(named->first, named->second);
   }
   set_places(given);
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is for what the timeline expects
   try {
-    return run(given.options, given.timeline);
+    return finished(run(given.options, given.timeline), "backwash-bench");
+  } catch (const backwash::bench::StartError& e) {
+    return failed(e.code, e.what());
+  } catch (const backwash::dds::Error& e) {
+    return failed(71, std::string(e.what()) + "; give an --interface and a --domain of this machine");
   } catch (const std::exception& e) {
     return failed(70, e.what());
   }
