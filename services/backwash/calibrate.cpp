@@ -161,8 +161,8 @@ int judge(const Campaign& campaign, const Model& model, const Options& options, 
 }
 
 int run(const Options& options) {
-  refuse_to_overwrite(options.out, options.force);
-  refuse_to_overwrite(options.report, options.force);
+  check_output(options.out, options.force);
+  check_output(options.report, options.force);
   std::optional<Vehicle> vehicle;
   if (!options.vehicle.empty()) vehicle = read_vehicle(options.vehicle);
   auto gates = read_model(options.base_model);

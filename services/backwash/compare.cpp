@@ -85,8 +85,8 @@ report::Comparison compare(const Options& options, const std::vector<std::string
 
 int run(const Options& options) {
   const auto models = models_of(options);
-  refuse_to_overwrite(options.report, options.force);
-  refuse_to_overwrite(options.out, options.force);
+  check_output(options.report, options.force);
+  check_output(options.out, options.force);
   std::vector<std::string> maps;
   for (const auto& scenes : options.scenes)
     for (auto& map : maps_of(scenes)) maps.push_back(std::move(map));

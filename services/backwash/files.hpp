@@ -27,8 +27,13 @@ log::FlightLog read_table(const std::string& path, const std::string& time_colum
 /// Adds `--method`: tight or paper.
 Option add_method(Command& command, reach::Method& target);
 
-/// Throws Failure 73 if the file exists and `force` is not given: asked before work is spent on it.
-void refuse_to_overwrite(const std::string& path, bool force);
+/// The model that a flight of this vehicle uses: the one given, or a built-in vehicle's own. Throws Failure 64 for
+/// another file.
+std::string model_of(const std::string& vehicle, const std::string& model);
+
+/// Throws Failure 73 if the file exists and `force` is not given, or could not be made: asked before work is spent on
+/// it. Without a name there is nothing to ask.
+void check_output(const std::string& path, bool force);
 /// Writes a whole file. Throws Failure 73 (exists, cannot be created) or 74 (cannot be written).
 void write_file(const std::string& path, const std::string& content, bool force);
 

@@ -15,7 +15,7 @@ namespace backwash::services {
 namespace {
 
 struct Options {
-  std::string map = "builtin:apartment", vehicle = "builtin:quad-5in", model = "builtin:quad-5in", report, log;
+  std::string map = "builtin:apartment", vehicle = "builtin:quad-5in", model, report, log;
   std::optional<Vec3> start, goal;
   std::uint64_t seed = 1;
   double sigma_scale = 1;
@@ -74,10 +74,11 @@ int print_ends(const plan::HoverPair& ends) {
 int run(const Options& options) {
   if (options.start.has_value() != options.goal.has_value())
     throw Failure(kUsage, "give both --start and --goal, or neither");
-  refuse_to_overwrite(options.report, options.force);
-  refuse_to_overwrite(options.log, options.force);
+  check_output(options.report, options.force);
+  check_output(options.log, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
-  const auto model = read_model(options.model);
+  const std::string model_path = model_of(options.vehicle, options.model);
+  const auto model = read_model(model_path);
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle,
                     options.vehicle);  // names an unstable loop first
   auto grid = read_map(options.map);
@@ -89,7 +90,7 @@ int run(const Options& options) {
                                     .goal_W = Vec3::Zero(),
                                     .seed = options.seed,
                                     .sigma_scale = options.sigma_scale,
-                                    .terms = read_simulation(options.model),
+                                    .terms = read_simulation(model_path),
                                     .limits = {.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max}};
   const auto ends = choose_ends(options, *world, flight_options);
   flight_options.start_W = ends.start_W, flight_options.goal_W = ends.goal_W;
@@ -98,8 +99,8 @@ int run(const Options& options) {
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
   if (!options.log.empty()) write_log(options, *flight);
-  const report::ReportContext context{options.map,  options.model, options.vehicle, kVersion,
-                                      ends.start_W, ends.goal_W,   options.seed,    options.sigma_scale};
+  const report::ReportContext context{options.map,  model_path,  options.vehicle, kVersion,
+                                      ends.start_W, ends.goal_W, options.seed,    options.sigma_scale};
   return conclude({*flight, *world, context, sim::summarise(*flight, *world, ends.goal_W)}, options.report,
                   options.json, options.force);
 }

@@ -99,7 +99,7 @@ int run(const Options& options) {
   std::filesystem::create_directories(options.folder, error);
   if (!std::filesystem::is_directory(options.folder))
     throw Failure(kCannotCreate, options.folder + ":1: cannot be created; name a folder that can be written");
-  for (const auto& file : files) refuse_to_overwrite(target(options.folder, file), options.force);
+  for (const auto& file : files) check_output(target(options.folder, file), options.force);
   Json logs = Json::array(), refused = Json::array();
   std::vector<std::pair<std::string, log::FlightMark>> known;
   std::vector<std::string> notes;

@@ -61,7 +61,7 @@ log::FlightLog fly_again(const Options& options, const map::OccupancyGrid& grid,
 void check(const Options& options) {
   if (options.flight.empty() == options.setpoints.empty()) throw Failure(kUsage, "give either --flight or --setpoints");
   if (options.air == Air::model && options.model.empty()) throw Failure(kUsage, "--air model needs --model");
-  refuse_to_overwrite(options.out, options.force);
+  check_output(options.out, options.force);
 }
 
 int run(const Options& options) {

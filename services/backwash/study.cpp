@@ -158,8 +158,8 @@ void check(const Options& options) {
   if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
   if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
   check_design(options.design, options.map, options.force);
-  refuse_to_overwrite(options.report, options.force);
-  refuse_to_overwrite(options.out, options.force);
+  check_output(options.report, options.force);
+  check_output(options.out, options.force);
 }
 
 study::StudyOptions study_options(const Options& options) {

@@ -30,7 +30,7 @@ void check_design(const DesignOptions& options, const std::string& map, bool for
   if (options.points.empty()) return;
   if (map.empty() || !options.start)
     throw Failure(kUsage, "--design needs --map, to fly in, and --start, where the flight begins");
-  refuse_to_overwrite(options.points, force);
+  check_output(options.points, force);
 }
 
 std::optional<study::Design> designed(const DesignOptions& options, const study::Observations& seen,
