@@ -21,7 +21,8 @@ std::string ratio_block(const Comparison& c, sim::Measure measure) {
   block << '$' << sim::name(measure) << " << EOD\n";
   for (std::size_t m = 1; m < c.methods.size(); ++m) {
     const auto& r = c.table.rows[m].on_common.total[measure];
-    block << m << ' ' << r.value << ' ' << r.low << ' ' << r.high << " \""
+    const double low = r.known() ? r.low : r.value, high = r.known() ? r.high : r.value;
+    block << m << ' ' << r.value << ' ' << low << ' ' << high << " \""
           << (c.methods[m].margin ? short_metres(*c.methods[m].margin) : c.methods[m].name) << "\"\n";
   }
   block << "EOD\n";

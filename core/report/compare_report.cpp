@@ -35,7 +35,9 @@ std::string no_path(const sim::MethodRow& row) {
   return std::to_string(row.pairs - row.solved) + (reasons.empty() ? "" : " (" + reasons + ")");
 }
 
-std::string with_interval(const sim::Interval& r) { return formatted("%.2f (%.2f to %.2f)", r.value, r.low, r.high); }
+std::string with_interval(const sim::Interval& r) {
+  return r.known() ? formatted("%.2f (%.2f to %.2f)", r.value, r.low, r.high) : formatted("%.2f (one pair)", r.value);
+}
 
 std::string table_one(const Comparison& c) {
   std::vector<std::vector<std::string>> rows;

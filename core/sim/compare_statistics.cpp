@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "core/types/formatted.hpp"
@@ -21,6 +22,7 @@ Interval bootstrap(std::size_t n, std::uint64_t seed, const Statistic& statistic
   std::vector<std::size_t> indices(n);
   for (std::size_t i = 0; i < n; ++i) indices[i] = i;
   const double value = statistic(indices);
+  if (n < 2) return {value, -std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   std::vector<double> drawn(kResamples);
   for (double& d : drawn) {
     for (auto& i : indices) i = random() % n;
@@ -173,8 +175,10 @@ std::vector<Demand> demands(const Table& table, const std::vector<CompareMethod>
       continue;
     }
     const Interval& jerk2 = row.on_common.total[kJerk2];
-    list.push_back({row.on_common.pairs == 0
-                        ? formatted("jerk2 below %s: no pair that all solve", row.method.c_str())
+    list.push_back({row.on_common.pairs == 0 ? formatted("jerk2 below %s: no pair that all solve", row.method.c_str())
+                    : !jerk2.known()
+                        ? formatted("jerk2 below %s: one pair that all solve, ratio %.2f, says nothing of others",
+                                    row.method.c_str(), jerk2.value)
                         : formatted("jerk2 below %s on %zu pairs that all solve: ratio %.2f (%.2f to %.2f)",
                                     row.method.c_str(), row.on_common.pairs, jerk2.value, jerk2.low, jerk2.high),
                     row.on_common.pairs > 0 && jerk2.high < 1});

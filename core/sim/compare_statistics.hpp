@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -12,9 +13,10 @@
 
 namespace backwash::sim {
 
-/// A value with its 95 % interval.
+/// A value with its 95 % interval: everything, from −∞ to ∞, where one pair says nothing about others.
 struct Interval {
   double value, low, high;
+  bool known() const { return std::isfinite(low) && std::isfinite(high); }
 };
 
 /// Ratio of totals Σ a / Σ b over pairs, and its percentile interval from 2,000 seeded bootstrap samples of the pairs.

@@ -161,8 +161,8 @@ int judge(const Campaign& campaign, const Model& model, const Options& options, 
 }
 
 int run(const Options& options) {
-  refuse_to_overwrite(options.out, options.force);
-  refuse_to_overwrite(options.report, options.force);
+  check_output(options.out, options.force);
+  check_output(options.report, options.force);
   std::optional<Vehicle> vehicle;
   if (!options.vehicle.empty()) vehicle = read_vehicle(options.vehicle);
   auto gates = read_model(options.base_model);
@@ -200,34 +200,33 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb calibrate_verb(CLI::App& app) {
+Verb calibrate_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command =
+  auto& command =
       app.add_subcommand("calibrate", "Model file from hover flights: a bound at a quantile, with intervals");
-  add_campaign_options(*command, options->files);
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME: gains, delays, r0");
-  command->add_option("--base-model", options->base_model, "model whose gates and kappa are kept")
-      ->capture_default_str();
-  command->add_option("--quantile", options->quantile, "share of windows that the bound shall hold")
-      ->check(CLI::Range(0.5, 0.99))
-      ->capture_default_str();
-  command->add_option("--out", options->out, "model file to write, TOML");
-  command->add_option("--report", options->report, "HTML page with the raw variances under the bound");
-  command->add_option("--bootstraps", options->bootstraps, "refits for the intervals")
-      ->check(CLI::Range(20, 10000))
-      ->capture_default_str();
-  command->add_option("--seed", options->seed, "of the bootstrap")->capture_default_str();
-  command->add_flag("--keep-base", options->keep_base,
-                    "constants that the flights cannot determine stay the base model's, named in [provenance]");
-  command->add_flag("--judge", options->judge, "fit nothing: how the base model does on these logs");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite --out and --report");
-  command->footer(
+  add_campaign_options(command, options->files);
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME: gains, delays, r0");
+  command.add_option("--base-model", options->base_model, "model whose gates and kappa are kept").capture_default_str();
+  command.add_option("--quantile", options->quantile, "share of windows that the bound shall hold")
+      .check(within(0.5, 0.99))
+      .capture_default_str();
+  command.add_option("--out", options->out, "model file to write, TOML");
+  command.add_option("--report", options->report, "HTML page with the raw variances under the bound");
+  command.add_option("--bootstraps", options->bootstraps, "refits for the intervals")
+      .check(within(20, 10000))
+      .capture_default_str();
+  command.add_option("--seed", options->seed, "of the bootstrap").capture_default_str();
+  command.add_flag("--keep-base", options->keep_base,
+                   "constants that the flights cannot determine stay the base model's, named in [provenance]");
+  command.add_flag("--judge", options->judge, "fit nothing: how the base model does on these logs");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite --out and --report");
+  command.footer(
       "Each --log belongs to the --map before it (or the only one); without a map, to a flat floor.\nExample:\n"
       "  backwash calibrate --map builtin:parallel-walls-2m --log a.csv b.csv --map builtin:parallel-walls-1m --log "
       "c.csv "
       "d.csv --vehicle builtin:quad-5in --out model.toml");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

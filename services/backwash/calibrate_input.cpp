@@ -42,22 +42,22 @@ std::size_t place_of(const CampaignFiles& files, const CampaignFiles::Log& log) 
 
 }  // namespace
 
-void add_campaign_options(CLI::App& command, CampaignFiles& files) {
+void add_campaign_options(Command& command, CampaignFiles& files) {
   command
-      .add_option_function<std::string>(
+      .add_text(
           "--map", [&files](const std::string& map) { files.maps.push_back(map); },
           "OctoMap file or builtin:NAME of the logs that follow; optional")
-      ->trigger_on_parse();
+      .trigger_on_parse();
   command
-      .add_option_function<std::vector<std::string>>(
+      .add_texts(
           "--log",
           [&files](const std::vector<std::string>& logs) {
             const auto map = files.maps.empty() ? std::nullopt : std::optional(files.maps.size() - 1);
             for (const auto& log : logs) files.logs.push_back({log, map});
           },
           "flight logs, CSV")
-      ->trigger_on_parse()
-      ->required();
+      .trigger_on_parse()
+      .required();
 }
 
 Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>& vehicle, const Model& gates,

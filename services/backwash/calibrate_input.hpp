@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/types/model.hpp"
+#include "services/command_line/command_line.hpp"
 
 namespace backwash::services {
 
@@ -21,7 +21,7 @@ struct CampaignFiles {
   std::vector<Log> logs;
 };
 /// --map and --log, both as often as wanted.
-void add_campaign_options(CLI::App& command, CampaignFiles& files);
+void add_campaign_options(Command& command, CampaignFiles& files);
 
 /// Flight logs, cut into windows.
 struct Campaign {

@@ -85,8 +85,8 @@ report::Comparison compare(const Options& options, const std::vector<std::string
 
 int run(const Options& options) {
   const auto models = models_of(options);
-  refuse_to_overwrite(options.report, options.force);
-  refuse_to_overwrite(options.out, options.force);
+  check_output(options.report, options.force);
+  check_output(options.out, options.force);
   std::vector<std::string> maps;
   for (const auto& scenes : options.scenes)
     for (auto& map : maps_of(scenes)) maps.push_back(std::move(map));
@@ -110,28 +110,28 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb compare_verb(CLI::App& app) {
+Verb compare_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command =
+  auto& command =
       app.add_subcommand("compare", "The paper's Table I: sets against constant margins, flown in closed loop");
   command
-      ->add_option("--scenes", options->scenes,
-                   "builtin (apartment, corridors, narrow-gap, two forests), a folder of OctoMap files, one such file, "
-                   "builtin:NAME; several may be given")
-      ->capture_default_str();
-  command->add_option("--flights", options->flights, "start-goal pairs a scene and vehicle")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->add_option("--seed", options->seed, "of the pairs, the air and the estimate's error")->capture_default_str();
-  command->add_option("--vehicle", options->vehicles, "vehicle files or builtin:NAME")->capture_default_str();
-  command->add_option("--model", options->models, "one model a vehicle; a built-in vehicle has its own");
-  command->add_option("--report", options->report, "self-contained HTML page");
-  command->add_option("--out", options->out, "CSV, one line a pair and method");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "replace existing files");
-  command->footer(
+      .add_option("--scenes", options->scenes,
+                  "builtin (apartment, corridors, narrow-gap, two forests), a folder of OctoMap files, one such file, "
+                  "builtin:NAME; several may be given")
+      .capture_default_str();
+  command.add_option("--flights", options->flights, "start-goal pairs a scene and vehicle")
+      .check(positive())
+      .capture_default_str();
+  command.add_option("--seed", options->seed, "of the pairs, the air and the estimate's error").capture_default_str();
+  command.add_option("--vehicle", options->vehicles, "vehicle files or builtin:NAME").capture_default_str();
+  command.add_option("--model", options->models, "one model a vehicle; a built-in vehicle has its own");
+  command.add_option("--report", options->report, "self-contained HTML page");
+  command.add_option("--out", options->out, "CSV, one line a pair and method");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "replace existing files");
+  command.footer(
       "Example:\n  backwash compare --scenes builtin --flights 4 --seed 1 --report compare.html --out compare.csv");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -12,7 +12,7 @@ namespace {
 Json axes(const Vec3& v) { return {{"x", v.x()}, {"y", v.y()}, {"z", v.z()}}; }
 
 Json to_json(const sim::Interval& interval) {
-  return {{"value", interval.value}, {"ci95", {interval.low, interval.high}}};
+  return {{"value", interval.value}, {"ci95", interval.known() ? Json{interval.low, interval.high} : Json()}};
 }
 
 Json to_json(const sim::MethodRatio& ratio) {
@@ -61,6 +61,7 @@ Json to_json(const sim::GapCampaign& gap) {
 }
 
 std::string interval(const sim::Interval& r) {
+  if (!r.known()) return to_text(r.value, 2) + " (one pair)";
   return to_text(r.value, 2) + " (" + to_text(r.low, 2) + ".." + to_text(r.high, 2) + ")";
 }
 

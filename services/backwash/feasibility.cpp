@@ -149,23 +149,22 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb feasibility_verb(CLI::App& app) {
+Verb feasibility_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("feasibility", "Where a vehicle can hover safely, and where a way is too tight");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  add_method(*command, options->method);
-  command->add_option("--margin", options->margin, "constant margin in place of the sets, m")
-      ->check(CLI::NonNegativeNumber);
-  add_point(*command, "--start", options->start, "one end of a way, m");
-  add_point(*command, "--goal", options->goal, "its other end, m");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->footer(
+  auto& command = app.add_subcommand("feasibility", "Where a vehicle can hover safely, and where a way is too tight");
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
+  command.add_option("--model", options->model, "model file or builtin:NAME").required();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").required();
+  add_method(command, options->method);
+  command.add_option("--margin", options->margin, "constant margin in place of the sets, m").check(not_negative());
+  add_point(command, "--start", options->start, "one end of a way, m");
+  add_point(command, "--goal", options->goal, "its other end, m");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.footer(
       "Example:\n  backwash feasibility --map builtin:apartment --model builtin:quad-5in --vehicle builtin:quad-5in "
       "\\\n"
       "    --start 4,2,1.2 --goal 8,2,1.2");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -18,7 +18,8 @@ struct Options {
   bool interpolated = false, json = false, force = false;
 };
 
-/// Σ at a point; parts only where it was evaluated exactly, nothing where no stored voxel is near.
+/// Σ at a point; parts only where it was evaluated exactly. Nothing where no stored voxel is near, or no free one for
+/// the exact.
 struct Value {
   Vec3 p_W;
   std::optional<Variance> sigma;
@@ -116,12 +117,22 @@ std::vector<Value> evaluated(const field::ProximityField& exact, const std::vect
   std::vector<Value> values(points.size());
   run_parallel(points.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
+      values[i].p_W = points[i];
+      if (!exact.grid().free(exact.grid().index(points[i]))) continue;
       const auto parts = exact.at(points[i]);
       const auto air = air_at(exact, points[i]);
       values[i] = {points[i], std::exp(air.ln_variance) * parts.sigma(), parts, air.push_W};
     }
   });
   return values;
+}
+
+/// Throws Failure 69 for a place that no air is known of.
+void check_free(const map::OccupancyGrid& grid, const Vec3& p_W, const std::string& map) {
+  const Index3 v = grid.index(p_W);
+  if (grid.free(v)) return;
+  const char* const is = grid.occupied(v) ? "occupied" : grid.inside(v) ? "unknown" : "outside the map";
+  throw Failure(kUnavailable, map + ":1: --at " + to_text(p_W) + " is " + is + "; choose a point of free space");
 }
 
 void print_json(const std::vector<Value>& values, bool extended) {
@@ -172,7 +183,9 @@ int run(const Options& options) {
     throw Failure(kUsage, "give exactly one of --points, --slice and --at");
   }
   if (!options.out.empty() && options.slice.empty()) throw Failure(kUsage, "--out is a picture of a --slice; give one");
-  refuse_to_overwrite(options.out, options.force);
+  check_output(options.out, options.force);
+  if (!options.out.empty() && !options.out.ends_with(".svg") && !options.out.ends_with(".png"))
+    throw Failure(kUsage, "--out " + options.out + " is no picture that can be drawn; name it .svg or .png");
   std::optional<report::Slice> slice;
   if (!options.slice.empty()) slice = read_slice(options.slice);
   const auto grid = read_map(options.map);
@@ -180,7 +193,7 @@ int run(const Options& options) {
   if (!options.vehicle.empty()) model.ground.r0 = read_vehicle(options.vehicle).body.diagonal_radius;
 
   std::vector<Vec3> points;
-  if (options.at) points = {*options.at};
+  if (options.at) check_free(grid, *options.at, options.map), points = {*options.at};
   if (!options.points.empty()) points = read_points(options.points);
   if (slice) points = slice_points(grid, *slice);
   if (slice && points.empty()) throw Failure(kBadData, options.map + ":1: no free voxel in the slice " + options.slice);
@@ -195,24 +208,23 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb field_verb(CLI::App& app) {
+Verb field_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("field", "Variance of the disturbance at points or in a slice of a map");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
-  command->add_option("--vehicle", options->vehicle,
-                      "vehicle file or builtin:NAME: its diagonal_radius takes r0's place");
-  command->add_option("--points", options->points, "CSV with the columns x_m,y_m,z_m");
-  command->add_option("--slice", options->slice, "plane, as in z=0.5: the free voxels it cuts");
-  add_point(*command, "--at", options->at, "one point, m");
-  command->add_flag("--interpolated", options->interpolated,
-                    "from the stored field instead of exactly (slices always)");
-  command->add_option("--out", options->out, "picture of the slice, .svg or .png");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite --out");
-  command->footer(
+  auto& command = app.add_subcommand("field", "Variance of the disturbance at points or in a slice of a map");
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
+  command.add_option("--model", options->model, "model file or builtin:NAME").required();
+  command.add_option("--vehicle", options->vehicle,
+                     "vehicle file or builtin:NAME: its diagonal_radius takes r0's place");
+  command.add_option("--points", options->points, "CSV with the columns x_m,y_m,z_m");
+  command.add_option("--slice", options->slice, "plane, as in z=0.5: the free voxels it cuts");
+  add_point(command, "--at", options->at, "one point, m");
+  command.add_flag("--interpolated", options->interpolated, "from the stored field instead of exactly (slices always)");
+  command.add_option("--out", options->out, "picture of the slice, .svg or .png");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite --out");
+  command.footer(
       "Example:\n  backwash field --map builtin:apartment --model builtin:quad-5in --slice z=1.0 --out slice.svg");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwash/files.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -43,20 +45,34 @@ log::FlightLog read_table(const std::string& path, const std::string& time_colum
   throw Failure(table.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, table.error().message);
 }
 
-CLI::Option* add_method(CLI::App& command, reach::Method& target) {
+Option add_method(Command& command, reach::Method& target) {
   const std::vector<std::pair<std::string, reach::Method>> methods = {{"tight", reach::Method::tight},
                                                                       {"paper", reach::Method::paper}};
   return add_choice(command, "--method", target, methods, "tight: exact supports; paper: ellipsoids");
 }
 
-void refuse_to_overwrite(const std::string& path, bool force) {
-  if (!path.empty() && !force && std::filesystem::exists(path)) {
+std::string model_of(const std::string& vehicle, const std::string& model) {
+  if (!model.empty()) return model;
+  if (vehicle.starts_with("builtin:")) return vehicle;
+  throw Failure(kUsage,
+                "--vehicle " + vehicle + " has no model of its own; give the one that belongs to it with --model");
+}
+
+void check_output(const std::string& path, bool force) {
+  if (path.empty()) return;
+  std::error_code unknown;
+  if (!force && std::filesystem::exists(path, unknown))
     throw Failure(kCannotCreate, path + ":1: exists already; give another name or --force");
-  }
+  const auto folder = std::filesystem::absolute(path, unknown).parent_path();
+  const bool folder_good = std::filesystem::is_directory(folder, unknown) && ::access(folder.c_str(), W_OK | X_OK) == 0;
+  const bool there = std::filesystem::exists(path, unknown);
+  const bool file_good = !std::filesystem::is_directory(path, unknown) && ::access(path.c_str(), W_OK) == 0;
+  if (there ? !file_good : !folder_good)
+    throw Failure(kCannotCreate, path + ":1: cannot be created; name a file in a folder that can be written");
 }
 
 void write_file(const std::string& path, const std::string& content, bool force) {
-  refuse_to_overwrite(path, force);
+  check_output(path, force);
   std::ofstream file(path, std::ios::binary);
   if (!file) {
     throw Failure(kCannotCreate, path + ":1: cannot be created; name a file in a folder that can be written");

@@ -11,11 +11,7 @@
 #include "core/types/model.hpp"
 #include "core/types/simulation_term.hpp"
 #include "core/types/vehicle.hpp"
-
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
+#include "services/command_line/command_line.hpp"
 
 namespace backwash::services {
 
@@ -29,10 +25,15 @@ Vehicle read_vehicle(const std::string& path);
 log::FlightLog read_table(const std::string& path, const std::string& time_column);
 
 /// Adds `--method`: tight or paper.
-CLI::Option* add_method(CLI::App& command, reach::Method& target);
+Option add_method(Command& command, reach::Method& target);
 
-/// Throws Failure 73 if the file exists and `force` is not given: asked before work is spent on it.
-void refuse_to_overwrite(const std::string& path, bool force);
+/// The model that a flight of this vehicle uses: the one given, or a built-in vehicle's own. Throws Failure 64 for
+/// another file.
+std::string model_of(const std::string& vehicle, const std::string& model);
+
+/// Throws Failure 73 if the file exists and `force` is not given, or could not be made: asked before work is spent on
+/// it. Without a name there is nothing to ask.
+void check_output(const std::string& path, bool force);
 /// Writes a whole file. Throws Failure 73 (exists, cannot be created) or 74 (cannot be written).
 void write_file(const std::string& path, const std::string& content, bool force);
 

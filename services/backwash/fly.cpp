@@ -15,7 +15,7 @@ namespace backwash::services {
 namespace {
 
 struct Options {
-  std::string map = "builtin:apartment", vehicle = "builtin:quad-5in", model = "builtin:quad-5in", report, log;
+  std::string map = "builtin:apartment", vehicle = "builtin:quad-5in", model, report, log;
   std::optional<Vec3> start, goal;
   std::uint64_t seed = 1;
   double sigma_scale = 1;
@@ -74,10 +74,11 @@ int print_ends(const plan::HoverPair& ends) {
 int run(const Options& options) {
   if (options.start.has_value() != options.goal.has_value())
     throw Failure(kUsage, "give both --start and --goal, or neither");
-  refuse_to_overwrite(options.report, options.force);
-  refuse_to_overwrite(options.log, options.force);
+  check_output(options.report, options.force);
+  check_output(options.log, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
-  const auto model = read_model(options.model);
+  const std::string model_path = model_of(options.vehicle, options.model);
+  const auto model = read_model(model_path);
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle,
                     options.vehicle);  // names an unstable loop first
   auto grid = read_map(options.map);
@@ -89,7 +90,7 @@ int run(const Options& options) {
                                     .goal_W = Vec3::Zero(),
                                     .seed = options.seed,
                                     .sigma_scale = options.sigma_scale,
-                                    .terms = read_simulation(options.model),
+                                    .terms = read_simulation(model_path),
                                     .limits = {.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max}};
   const auto ends = choose_ends(options, *world, flight_options);
   flight_options.start_W = ends.start_W, flight_options.goal_W = ends.goal_W;
@@ -98,38 +99,38 @@ int run(const Options& options) {
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
   if (!options.log.empty()) write_log(options, *flight);
-  const report::ReportContext context{options.map,  options.model, options.vehicle, kVersion,
-                                      ends.start_W, ends.goal_W,   options.seed,    options.sigma_scale};
+  const report::ReportContext context{options.map,  model_path,  options.vehicle, kVersion,
+                                      ends.start_W, ends.goal_W, options.seed,    options.sigma_scale};
   return conclude({*flight, *world, context, sim::summarise(*flight, *world, ends.goal_W)}, options.report,
                   options.json, options.force);
 }
 
 }  // namespace
 
-Verb fly_verb(CLI::App& app) {
+Verb fly_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command =
+  auto& command =
       app.add_subcommand("fly", "One closed-loop flight in simulated airflow, judged against its reachable sets");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->capture_default_str();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->capture_default_str();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
-  add_point(*command, "--start", options->start, "hover point above the take-off, m; by default one of the map's");
-  add_point(*command, "--goal", options->goal, "hover point to reach, m; by default one of the map's");
-  command->add_option("--seed", options->seed, "of the airflow and of the VIO error")->capture_default_str();
-  command->add_option("--sigma-scale", options->sigma_scale, "judge with sets of the variance times this")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->add_option("--report", options->report, "HTML page to write");
-  command->add_option("--log", options->log, "flight log to write, CSV");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--ends", options->ends, "only print the start and the goal that would be flown");
-  command->add_flag("--force", options->force, "overwrite --report and --log");
-  command->footer(
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").capture_default_str();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();
+  command.add_option("--model", options->model, "model file or builtin:NAME; a built-in vehicle has its own");
+  add_point(command, "--start", options->start, "hover point above the take-off, m; by default one of the map's");
+  add_point(command, "--goal", options->goal, "hover point to reach, m; by default one of the map's");
+  command.add_option("--seed", options->seed, "of the airflow and of the VIO error").capture_default_str();
+  command.add_option("--sigma-scale", options->sigma_scale, "judge with sets of the variance times this")
+      .check(positive())
+      .capture_default_str();
+  command.add_option("--report", options->report, "HTML page to write");
+  command.add_option("--log", options->log, "flight log to write, CSV");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--ends", options->ends, "only print the start and the goal that would be flown");
+  command.add_flag("--force", options->force, "overwrite --report and --log");
+  command.footer(
       "Exit code 0 if the goal was reached, nothing was touched and every measured position lay inside the set "
       "predicted\n"
       "for it; 1 if not; 69 if the flight was refused.\nExample:\n  backwash fly --map builtin:apartment --report "
       "flight.html");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -99,7 +99,7 @@ int run(const Options& options) {
   std::filesystem::create_directories(options.folder, error);
   if (!std::filesystem::is_directory(options.folder))
     throw Failure(kCannotCreate, options.folder + ":1: cannot be created; name a folder that can be written");
-  for (const auto& file : files) refuse_to_overwrite(target(options.folder, file), options.force);
+  for (const auto& file : files) check_output(target(options.folder, file), options.force);
   Json logs = Json::array(), refused = Json::array();
   std::vector<std::pair<std::string, log::FlightMark>> known;
   std::vector<std::string> notes;
@@ -137,25 +137,23 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb import_verb(CLI::App& app) {
+Verb import_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("import", "Recordings of others as flight logs");
-  command
-      ->add_option("kind", options->kind, "airgarage, ardupilot (.bin), crazypad or ulog; left out with a column map")
-      ->required();
-  command->add_option("files", options->files, "recordings");
-  command->add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each");
-  command->add_option("--map-columns", options->map_columns,
-                      "column map (TOML): recordings are tables, CSV or .csv.gz");
-  command->add_flag("--propose", options->propose,
-                    "print a column map for one table, guessed and checked; writes nothing");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite logs that exist");
-  command->footer(
+  auto& command = app.add_subcommand("import", "Recordings of others as flight logs");
+  command.add_option("kind", options->kind, "airgarage, ardupilot (.bin), crazypad or ulog; left out with a column map")
+      .required();
+  command.add_option("files", options->files, "recordings");
+  command.add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each");
+  command.add_option("--map-columns", options->map_columns, "column map (TOML): recordings are tables, CSV or .csv.gz");
+  command.add_flag("--propose", options->propose,
+                   "print a column map for one table, guessed and checked; writes nothing");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite logs that exist");
+  command.footer(
       "Example:\n  backwash import airgarage 20240823_16_23_49.csv -o logs\n"
       "  backwash import --propose flight.csv > map.toml\n  backwash import --map-columns map.toml flight*.csv -o "
       "logs");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

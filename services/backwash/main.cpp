@@ -18,27 +18,22 @@ int fail(const std::string& verb, int exit_code, std::string line) {
 
 int main(int argc, char** argv) {
   using namespace backwash::services;
-  CLI::App app{"backwash: reachable sets of a quadrotor in its own wash, from a voxel map", "backwash"};
+  Command app{"backwash: reachable sets of a quadrotor in its own wash, from a voxel map", "backwash"};
   std::vector<Verb> verbs;
   std::string verb;
   try {
-    app.set_version_flag("--version", std::string("backwash ") + backwash::kVersion);
-    app.require_subcommand(1);
+    app.version(backwash::kVersion);
+    app.require_subcommand();
     verbs = {fly_verb(app),         plan_verb(app),    reach_verb(app),  field_verb(app),     simulate_verb(app),
              feasibility_verb(app), compare_verb(app), report_verb(app), calibrate_verb(app), import_verb(app),
              replay_verb(app),      study_verb(app),   vehicle_verb(app)};
+    if (const auto code = app.parse(argc, argv)) return *code;
     for (const auto& v : verbs) {
-      v.command->preparse_callback([&verb, &v](std::size_t) { verb = " " + v.command->get_name(); });
-    }
-    app.parse(argc, argv);
-    for (const auto& v : verbs) {
-      if (v.command->parsed()) return v.run();
+      if (!v.command->parsed()) continue;
+      verb = " " + v.command->name();
+      return finished(v.run(), "backwash" + verb);
     }
     return kUsage;
-  } catch (const CLI::Success& help_or_version) {
-    return app.exit(help_or_version);
-  } catch (const CLI::ParseError& wrong) {
-    return fail(verb, kUsage, std::string(wrong.what()) + "; see backwash" + verb + " --help");
   } catch (const Failure& failure) {
     return fail(verb, failure.exit_code, failure.what());
   } catch (const std::exception& defect) {

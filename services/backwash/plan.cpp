@@ -74,27 +74,24 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb plan_verb(CLI::App& app) {
+Verb plan_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("plan", "Trajectory whose clearance is its reachable set");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  add_point(*command, "--start", options->start, "m")->required();
-  add_point(*command, "--goal", options->goal, "m")->required();
-  command->add_option("--margin", options->margin, "constant margin in place of the sets, m")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--vmax", options->v_max, "m/s per axis; the vehicle's limit by default")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--amax", options->a_max, "m/s2 per axis; the vehicle's limit by default")
-      ->check(CLI::PositiveNumber);
-  add_method(*command, options->method);
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->footer(
+  auto& command = app.add_subcommand("plan", "Trajectory whose clearance is its reachable set");
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
+  command.add_option("--model", options->model, "model file or builtin:NAME").required();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").required();
+  add_point(command, "--start", options->start, "m").required();
+  add_point(command, "--goal", options->goal, "m").required();
+  command.add_option("--margin", options->margin, "constant margin in place of the sets, m").check(not_negative());
+  command.add_option("--vmax", options->v_max, "m/s per axis; the vehicle's limit by default").check(positive());
+  command.add_option("--amax", options->a_max, "m/s2 per axis; the vehicle's limit by default").check(positive());
+  add_method(command, options->method);
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.footer(
       "Exit code 0 when a trajectory was found and verified, 69 otherwise.\nExample:\n"
       "  backwash plan --map builtin:narrow-gap --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
       "    --start 1,0,1 --goal 5,0,1 --json");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -204,22 +204,22 @@ int run(Options options) {
 
 }  // namespace
 
-Verb reach_verb(CLI::App& app) {
+Verb reach_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("reach", "Reachable sets of the position error along a track of commands");
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  command->add_option("--track", options->track, "CSV: t_s, cmd_x_m … cmd_az_mps2, and sigma_xx … sigma_zz or --map")
-      ->required();
-  add_choice(*command, "--method", options->kind, kKinds,
+  auto& command = app.add_subcommand("reach", "Reachable sets of the position error along a track of commands");
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").required();
+  command.add_option("--track", options->track, "CSV: t_s, cmd_x_m … cmd_az_mps2, and sigma_xx … sigma_zz or --map")
+      .required();
+  add_choice(command, "--method", options->kind, kKinds,
              "tight: exact supports; paper: ellipsoids; chance: left with --probability, no worst case");
-  command->add_option("--probability", options->probability, "chance only: of leaving the sets, per second of flight");
-  add_choice(*command, "--loop", options->loop, kLoops, "vehicle (default), continuous (always with paper) or sampled");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME, for tracks without sigma columns");
-  command->add_option("--model", options->model, "model file or builtin:NAME: its bound, and its field with --map");
-  add_point(*command, "--direction", options->direction, "also the support along this direction");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->footer("Example:\n  backwash reach --vehicle builtin:quad-5in --track track.csv --method paper --json");
-  return {command, [options] { return run(*options); }};
+  command.add_option("--probability", options->probability, "chance only: of leaving the sets, per second of flight");
+  add_choice(command, "--loop", options->loop, kLoops, "vehicle (default), continuous (always with paper) or sampled");
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME, for tracks without sigma columns");
+  command.add_option("--model", options->model, "model file or builtin:NAME: its bound, and its field with --map");
+  add_point(command, "--direction", options->direction, "also the support along this direction");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.footer("Example:\n  backwash reach --vehicle builtin:quad-5in --track track.csv --method paper --json");
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -68,18 +68,18 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb replay_verb(CLI::App& app) {
+Verb replay_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("replay", "Runs a raw log's inputs through the flight pipeline's tick again");
-  command->add_option("--log", options->log, "raw log of backwashd")->required();
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->footer(
+  auto& command = app.add_subcommand("replay", "Runs a raw log's inputs through the flight pipeline's tick again");
+  command.add_option("--log", options->log, "raw log of backwashd").required();
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.footer(
       "Every tick is decided again from its logged inputs (odometry, telemetry, segments, requests, map verdicts) and\n"
       "compared bit for bit: mode, reason, set-point in both frames, what was asked to be sent, the set and the "
       "verdict.\n"
       "Exit code 0: all equal; 1: something differs or is missing; 65: the log is damaged.\nExample:\n"
       "  backwash replay --log flight.bwlog --json");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

@@ -61,7 +61,7 @@ log::FlightLog fly_again(const Options& options, const map::OccupancyGrid& grid,
 void check(const Options& options) {
   if (options.flight.empty() == options.setpoints.empty()) throw Failure(kUsage, "give either --flight or --setpoints");
   if (options.air == Air::model && options.model.empty()) throw Failure(kUsage, "--air model needs --model");
-  refuse_to_overwrite(options.out, options.force);
+  check_output(options.out, options.force);
 }
 
 int run(const Options& options) {
@@ -95,31 +95,31 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb simulate_verb(CLI::App& app) {
+Verb simulate_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand(
+  auto& command = app.add_subcommand(
       "simulate", "Flight log of a simulated flight: between hover points, or the set-points of a log again");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  command->add_option("--model", options->model,
-                      "model file: what its extension says of vehicle, air and sensors is flown");
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").required();
+  command.add_option("--model", options->model,
+                     "model file: what its extension says of vehicle, air and sensors is flown");
   const std::vector<std::pair<std::string, Air>> airs = {{"truth", Air::truth}, {"model", Air::model}};
-  add_choice(*command, "--air", options->air, airs, "gusts: the airflow truth's own laws, or those of --model")
-      ->default_str("truth");
-  command->add_option("--flight", options->flight, "flight specification, TOML");
-  command->add_option("--setpoints", options->setpoints, "flight log, CSV, whose set-points are flown again");
-  command->add_option("--out", options->out, "flight log to write, CSV")->required();
-  command->add_option("--seed", options->seed, "in place of the specification's");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite --out");
-  command->footer(
+  add_choice(command, "--air", options->air, airs, "gusts: the airflow truth's own laws, or those of --model")
+      .default_str("truth");
+  command.add_option("--flight", options->flight, "flight specification, TOML");
+  command.add_option("--setpoints", options->setpoints, "flight log, CSV, whose set-points are flown again");
+  command.add_option("--out", options->out, "flight log to write, CSV").required();
+  command.add_option("--seed", options->seed, "in place of the specification's");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite --out");
+  command.footer(
       "Example:\n  backwash simulate --map builtin:apartment --vehicle builtin:quad-5in --flight flight.toml --out "
       "log.csv\n"
       "where flight.toml holds\n  start = [1.5, 1.5, 1.0]\n  [[hover]]\n  p = [2.0, 1.5, 0.6]\n  dwell = 10.0\nWhat "
       "the simulation says of a "
       "flight that was measured:\n  backwash simulate --map room.bt --vehicle craft.toml --model extended.toml --air "
       "model \\\n    --setpoints measured.csv --out simulated.csv");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

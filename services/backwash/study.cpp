@@ -158,8 +158,8 @@ void check(const Options& options) {
   if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
   if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
   check_design(options.design, options.map, options.force);
-  refuse_to_overwrite(options.report, options.force);
-  refuse_to_overwrite(options.out, options.force);
+  check_output(options.report, options.force);
+  check_output(options.out, options.force);
 }
 
 study::StudyOptions study_options(const Options& options) {
@@ -255,38 +255,38 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb study_verb(CLI::App& app) {
+Verb study_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("study", "What the simulation gets wrong, by name, with the gain");
-  command->add_option("--map", options->map,
-                      "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
-  command->add_option("--model", options->model, "model file or builtin:NAME")->capture_default_str();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
-  command->add_option("--log", options->logs, "flight logs, one flight each: CSV, PX4 (.ulg) or ArduPilot (.bin)");
-  command->add_option(
+  auto& command = app.add_subcommand("study", "What the simulation gets wrong, by name, with the gain");
+  command.add_option("--map", options->map,
+                     "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
+  command.add_option("--model", options->model, "model file or builtin:NAME").capture_default_str();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
+  command.add_option("--log", options->logs, "flight logs, one flight each: CSV, PX4 (.ulg) or ArduPilot (.bin)");
+  command.add_option(
       "--reference", options->reference,
       "flights of the same vehicle known to be sound, 4 or more: the --log flights' motor shares are judged against "
       "theirs, as one condition");
-  command->add_option("--group", options->group,
-                      "column, such as day: flights with one value of it are left out, flipped and scattered together");
-  command->add_flag("--anytime", options->anytime,
-                    "evidence that may be looked at after every flight, in the order of --log");
-  command->add_option("--fleet", options->fleet,
-                      "what --anytime --json printed for other vehicles: the evidence of all together");
-  command->add_option("--report", options->report, "HTML page to write");
-  command->add_flag("--residuals", options->residuals,
-                    "on the page, per channel: what the simulation of these flights says and what was measured");
-  add_design(*command, options->design);
-  command->add_option("--out", options->out, "extended model file to write");
-  command->add_option("--seed", options->seed, "of the null's sign draws")->capture_default_str();
-  command->add_flag("--quick", options->quick, "without the smallest effects that could have been found");
-  command->add_flag("--rules", options->rules, "prints every constant with unit and reason, and nothing else");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->add_flag("--force", options->force, "overwrite --report, --out and --design");
-  command->footer(
+  command.add_option("--group", options->group,
+                     "column, such as day: flights with one value of it are left out, flipped and scattered together");
+  command.add_flag("--anytime", options->anytime,
+                   "evidence that may be looked at after every flight, in the order of --log");
+  command.add_option("--fleet", options->fleet,
+                     "what --anytime --json printed for other vehicles: the evidence of all together");
+  command.add_option("--report", options->report, "HTML page to write");
+  command.add_flag("--residuals", options->residuals,
+                   "on the page, per channel: what the simulation of these flights says and what was measured");
+  add_design(command, options->design);
+  command.add_option("--out", options->out, "extended model file to write");
+  command.add_option("--seed", options->seed, "of the null's sign draws").capture_default_str();
+  command.add_flag("--quick", options->quick, "without the smallest effects that could have been found");
+  command.add_flag("--rules", options->rules, "prints every constant with unit and reason, and nothing else");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite --report, --out and --design");
+  command.footer(
       "Example:\n  backwash study --map room.bt --model builtin:quad-5in --vehicle builtin:quad-5in --log flight*.csv "
       "--report study.html --out extended.toml");
-  return {command, [options] { return run(*options); }};
+  return {&command, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

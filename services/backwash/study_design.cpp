@@ -18,21 +18,19 @@ double seconds(const study::NextFlight& flight) { return kControlPeriod * static
 
 }  // namespace
 
-void add_design(CLI::App& command, DesignOptions& options) {
+void add_design(Command& command, DesignOptions& options) {
   command.add_option("--design", options.points,
                      "points file of the flight that tells a set apart soonest, for backwashctl follow; needs --map "
                      "and --start");
   add_point(command, "--start", options.start, "where that flight begins, m");
-  command.add_option("--flight-time", options.flight_time, "of that flight, s")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+  command.add_option("--flight-time", options.flight_time, "of that flight, s").capture_default_str().check(positive());
 }
 
 void check_design(const DesignOptions& options, const std::string& map, bool force) {
   if (options.points.empty()) return;
   if (map.empty() || !options.start)
     throw Failure(kUsage, "--design needs --map, to fly in, and --start, where the flight begins");
-  refuse_to_overwrite(options.points, force);
+  check_output(options.points, force);
 }
 
 std::optional<study::Design> designed(const DesignOptions& options, const study::Observations& seen,

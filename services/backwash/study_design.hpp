@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 
 #include "core/study/design/design.hpp"
 #include "services/backwash/json.hpp"
+#include "services/command_line/command_line.hpp"
 
 namespace backwash::services {
 
@@ -16,7 +16,7 @@ struct DesignOptions {
   std::optional<Vec3> start;                             ///< m, W
   double flight_time = study::kDesignRules.flight_time;  ///< s
 };
-void add_design(CLI::App& command, DesignOptions& options);
+void add_design(Command& command, DesignOptions& options);
 /// Throws Failure: a usage error without map or start, 73 for a points file that exists.
 void check_design(const DesignOptions& options, const std::string& map, bool force);
 

@@ -172,26 +172,26 @@ int run(const Options& options) {
 
 }  // namespace
 
-Verb vehicle_verb(CLI::App& app) {
+Verb vehicle_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto* group = app.add_subcommand("vehicle", "What a vehicle's gains make of its sets");
-  group->require_subcommand(1);
-  auto* command = group->add_subcommand("tune", "The smallest gains with which a way is passable");
-  command->add_option("--map", options->map, "OctoMap file or builtin:NAME")->required();
-  command->add_option("--model", options->model, "model file or builtin:NAME")->required();
-  command->add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME")->required();
-  add_point(*command, "--start", options->start, "one end of the way, on one side of the door, m")->required();
-  add_point(*command, "--goal", options->goal, "its other end, m")->required();
-  command->add_option("--parameters", options->parameters,
-                      "the autopilot's parameter file, whose gains are taken in place of the vehicle file's");
-  command->add_option("--log", options->log, "raw log of a flight with these gains: whether its sets held");
-  command->add_flag("--json", options->json, "one JSON object on stdout");
-  command->footer(
+  auto& group = app.add_subcommand("vehicle", "What a vehicle's gains make of its sets");
+  group.require_subcommand();
+  auto& command = group.add_subcommand("tune", "The smallest gains with which a way is passable");
+  command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
+  command.add_option("--model", options->model, "model file or builtin:NAME").required();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").required();
+  add_point(command, "--start", options->start, "one end of the way, on one side of the door, m").required();
+  add_point(command, "--goal", options->goal, "its other end, m").required();
+  command.add_option("--parameters", options->parameters,
+                     "the autopilot's parameter file, whose gains are taken in place of the vehicle file's");
+  command.add_option("--log", options->log, "raw log of a flight with these gains: whether its sets held");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.footer(
       "Position and velocity gain are scaled together, so that damping stays. Faster gains need an attitude loop that "
       "follows:\nmeasure controller.attitude_lag and feedback_delay first.\nExample:\n"
       "  backwash vehicle tune --map builtin:apartment --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
       "    --start 3,4.2,1.2 --goal 7.4,3,1.2");
-  return {group, [options] { return run(*options); }};
+  return {&group, [options] { return run(*options); }};
 }
 
 }  // namespace backwash::services

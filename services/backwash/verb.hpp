@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +11,7 @@
 
 #include "core/types/geometry.hpp"
 #include "core/types/text.hpp"
+#include "services/command_line/command_line.hpp"
 
 namespace backwash::services {
 
@@ -37,40 +37,26 @@ struct Failure : std::runtime_error {
 
 /// A subcommand and what it does once its options are parsed; `run` returns the exit code.
 struct Verb {
-  CLI::App* command;
+  Command* command;
   std::function<int()> run;
 };
 
-Verb fly_verb(CLI::App& app);
-Verb field_verb(CLI::App& app);
-Verb reach_verb(CLI::App& app);
-Verb plan_verb(CLI::App& app);
-Verb simulate_verb(CLI::App& app);
-Verb feasibility_verb(CLI::App& app);
-Verb compare_verb(CLI::App& app);
-Verb report_verb(CLI::App& app);
-Verb calibrate_verb(CLI::App& app);
-Verb import_verb(CLI::App& app);
-Verb replay_verb(CLI::App& app);
-Verb study_verb(CLI::App& app);
-Verb vehicle_verb(CLI::App& app);
+Verb fly_verb(Command& app);
+Verb field_verb(Command& app);
+Verb reach_verb(Command& app);
+Verb plan_verb(Command& app);
+Verb simulate_verb(Command& app);
+Verb feasibility_verb(Command& app);
+Verb compare_verb(Command& app);
+Verb report_verb(Command& app);
+Verb calibrate_verb(Command& app);
+Verb import_verb(Command& app);
+Verb replay_verb(Command& app);
+Verb study_verb(Command& app);
+Verb vehicle_verb(Command& app);
 
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.
-CLI::Option* add_point(CLI::App& command, const std::string& name, std::optional<Vec3>& target,
-                       const std::string& help);
-
-/// Adds an option that takes one of some names, each of which stands for a value; anything else is a usage error.
-template <typename Target, typename Value>
-CLI::Option* add_choice(CLI::App& command, const std::string& name, Target& target,
-                        const std::vector<std::pair<std::string, Value>>& choices, const std::string& help) {
-  std::vector<std::string> names;
-  for (const auto& choice : choices) names.push_back(choice.first);
-  const auto take = [&target, choices](const std::string& said) {
-    for (const auto& [known, value] : choices)
-      if (known == said) target = value;
-  };
-  return command.add_option_function<std::string>(name, take, help)->check(CLI::IsMember(names));
-}
+Option add_point(Command& command, const std::string& name, std::optional<Vec3>& target, const std::string& help);
 
 /// A line on stderr if that is a terminal, nothing otherwise.
 void progress(const std::string& line);

@@ -44,36 +44,38 @@ bool risen(const StatusCopy& s) {
 
 }  // namespace
 
-Verbs::Verbs(CLI::App& app) {
+Verbs::Verbs(Command& app) {
   options_.station = default_station();
-  app.require_subcommand(1);
+  app.require_subcommand();
   app.fallthrough();
-  app.add_option("--domain", options_.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 230));
-  app.add_option("--interface", options_.interface, "network interface by name")->capture_default_str();
-  app.add_option("--namespace", options_.name_space, "the daemon's name space")->capture_default_str();
-  app.add_option("--station", options_.station, "this station's name: it holds the session")->capture_default_str();
-  app.add_option("--timeout", options_.timeout_s, "s to wait for an acknowledgement")->capture_default_str();
+  app.add_option("--domain", options_.domain, "DDS domain").capture_default_str().check(services::within(0, 230));
+  app.add_option("--interface", options_.interface, "network interface by name").capture_default_str();
+  app.add_option("--namespace", options_.name_space, "the daemon's name space").capture_default_str();
+  app.add_option("--station", options_.station, "this station's name: it holds the session").capture_default_str();
+  app.add_option("--timeout", options_.timeout_s, "s to wait for an acknowledgement")
+      .capture_default_str()
+      .check(services::positive());
   add_control(app);
   add_ways(app);
   add_ends(app);
   add_views(app);
 }
 
-CLI::App* Verbs::verb(CLI::App& app, const std::string& name, const std::string& what, const std::string& example,
-                      std::function<int()> run) {
-  auto* sub = app.add_subcommand(name, what);
-  sub->footer("Example: backwashctl " + example);
-  sub->callback([this, run = std::move(run)] { chosen_ = run; });
-  return sub;
+Command* Verbs::verb(Command& app, const std::string& name, const std::string& what, const std::string& example,
+                     std::function<int()> run) {
+  auto& sub = app.add_subcommand(name, what);
+  sub.footer("Example: backwashctl " + example);
+  sub.on_parsed([this, run = std::move(run)] { chosen_ = run; });
+  return &sub;
 }
 
-CLI::App* Verbs::waiting(CLI::App* sub, double patience_s) {
+Command* Verbs::waiting(Command* sub, double patience_s) {
   sub->add_flag("--wait", wait_, "return when it is done");
-  sub->parse_complete_callback([this, patience_s] { patience_s_ = patience_s; });
+  sub->on_complete([this, patience_s] { patience_s_ = patience_s; });
   return sub;
 }
 
-void Verbs::add_control(CLI::App& app) {
+void Verbs::add_control(Command& app) {
   waiting(verb(app, "enable", "take control: stream set-points until the autopilot follows", "enable --wait",
                [this] { return command("enable", backwash_msgs_msg_dds__COMMAND_ENABLE, Vec3::Zero(), tracking); }),
           10);
@@ -83,18 +85,18 @@ void Verbs::add_control(CLI::App& app) {
        [this] { return command("release", backwash_msgs_msg_dds__COMMAND_RELEASE, Vec3::Zero(), {}); });
 }
 
-void Verbs::add_ways(CLI::App& app) {
+void Verbs::add_ways(Command& app) {
   auto* takeoff = waiting(
       verb(app, "takeoff", "rise vertically to the lowest clear hover height, or higher", "takeoff --height 1.2 --wait",
            [this] {
              return command("takeoff", backwash_msgs_msg_dds__COMMAND_TAKEOFF, {0, 0, height_}, risen);
            }),
       60);
-  takeoff->add_option("--height", height_, "z in the map, m; 0: the lowest clear height")->capture_default_str();
+  takeoff->add_option("--height", height_, "z in the map, m; 0: the lowest clear height").capture_default_str();
   auto* go = waiting(verb(app, "goto", "plan to a point of the map and fly there", "goto 7.5,2.0,1.2 --wait",
                           [this] { return go_to(); }),
                      300);
-  go->add_option("goal", goal_, "x,y,z in the map, m")->required()->delimiter(',')->expected(3);
+  go->add_option("goal", goal_, "x,y,z in the map, m").required().delimiter(',').expected(3);
   go->add_option("--yaw", yaw_,
                  "heading to turn to at the goal, counter-clockwise from the map's x axis, rad; without: as the path "
                  "leads there");
@@ -104,10 +106,10 @@ void Verbs::add_ways(CLI::App& app) {
           "fly to each point of a CSV in turn (columns x_m,y_m,z_m), at rest at each; each leg is planned and verified",
           "follow route.csv --wait", [this] { return follow(); }),
       900);
-  follow_verb->add_option("file", route_, "points CSV: x_m,y_m,z_m, at most 64 rows")->required();
+  follow_verb->add_option("file", route_, "points CSV: x_m,y_m,z_m, at most 64 rows").required();
 }
 
-void Verbs::add_ends(CLI::App& app) {
+void Verbs::add_ends(Command& app) {
   waiting(verb(app, "hold", "slow down on the path and hover", "hold --wait",
                [this] { return command("hold", backwash_msgs_msg_dds__COMMAND_HOLD, Vec3::Zero(), rests); }),
           20);
@@ -128,7 +130,7 @@ void Verbs::add_ends(CLI::App& app) {
           60);
 }
 
-void Verbs::add_views(CLI::App& app) {
+void Verbs::add_views(Command& app) {
   verb(app, "check", "preflight: 0 when all is good, 69 otherwise; each failing line says what to do", "check", [this] {
     return check();
   })->add_flag("--json", json_, "one JSON object");

@@ -1,31 +1,33 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "services/backwashctl/station.hpp"
+#include "services/command_line/command_line.hpp"
 
 namespace backwash::ctl {
+
+using services::Command;
 
 /// The verbs of backwashctl: enable, disable, takeoff, goto, follow, hold, stop, land, release, status, watch, check.
 class Verbs {
  public:
-  explicit Verbs(CLI::App& app);
+  explicit Verbs(Command& app);
   /// Runs the chosen verb. 0: done (with --wait: reached); 69: refused, lost or not reached, with one line on stderr.
   int run();
 
  private:
-  void add_control(CLI::App& app);
-  void add_ways(CLI::App& app);
-  void add_ends(CLI::App& app);
-  void add_views(CLI::App& app);
-  CLI::App* verb(CLI::App& app, const std::string& name, const std::string& what, const std::string& example,
-                 std::function<int()> run);
-  CLI::App* waiting(CLI::App* sub, double patience_s);
+  void add_control(Command& app);
+  void add_ways(Command& app);
+  void add_ends(Command& app);
+  void add_views(Command& app);
+  Command* verb(Command& app, const std::string& name, const std::string& what, const std::string& example,
+                std::function<int()> run);
+  Command* waiting(Command* sub, double patience_s);
   int command(const std::string& name, std::uint8_t verb, const Vec3& position,
               const std::function<bool(const StatusCopy&)>& done);
   int go_to();

@@ -32,12 +32,6 @@ constexpr auto kToEnd = 700ms, kToRecord = 1500ms;
 constexpr double kToSay = 0.3;  // s
 constexpr std::uint64_t kTicksToBeReady = kTicksPerSecond / 2;
 
-/// What keeps the daemon from starting, and is not its own fault.
-struct StartError {
-  int code;
-  std::string what;
-};
-
 /// Calls `make` and gives what it throws its exit code.
 template <typename Make>
 auto made(int code, Make&& make) {
@@ -80,17 +74,22 @@ int reader_priority(const config::Daemon& daemon) {
 
 }  // namespace
 
-tl::expected<Settings, std::string> load_settings(const std::string& path) {
+tl::expected<Settings, StartError> load_settings(const std::string& path) {
+  const auto wrong = [](const config::ConfigError& e) {
+    const bool missing = e.kind == config::ConfigError::Kind::not_found;
+    return tl::make_unexpected(StartError{missing ? kNoInput : kConfiguration, e.message});
+  };
   auto daemon = config::load_daemon(path);
-  if (!daemon) return tl::unexpected(daemon.error().message);
-  if (const auto line = configured_line(daemon->link); !line) return tl::unexpected(path + ": " + line.error());
+  if (!daemon) return wrong(daemon.error());
+  if (const auto line = configured_line(daemon->link); !line)
+    return tl::make_unexpected(StartError{kConfiguration, path + ": " + line.error()});
   auto vehicle = config::load_vehicle(daemon->vehicle);
-  if (!vehicle) return tl::unexpected(vehicle.error().message);
+  if (!vehicle) return wrong(vehicle.error());
   // What a velocity from poses may be off is in the first set of every tube.
   if (daemon->odometry.twist == config::Twist::none)
     vehicle->initial_error.velocity += track::PoseVelocity::error(OdometryCheck::kLeastRate);
   auto model = config::load_model(daemon->model);
-  if (!model) return tl::unexpected(model.error().message);
+  if (!model) return wrong(model.error());
   return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model)};
 }
 

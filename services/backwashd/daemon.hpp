@@ -15,8 +15,15 @@ struct Settings {
   Model model;
 };
 
-/// Reads the daemon's file and the vehicle and model files that it names. Error: one line naming file, line and key.
-tl::expected<Settings, std::string> load_settings(const std::string& path);
+/// What keeps the daemon from starting and is not its own fault: the exit code, and one line.
+struct StartError {
+  int code;
+  std::string what;
+};
+
+/// Reads the daemon's file and the vehicle and model files that it names. Error: 66 where one of them is missing, 78
+/// where it is wrong, naming file, line and key.
+tl::expected<Settings, StartError> load_settings(const std::string& path);
 
 /// Runs until SIGINT or SIGTERM; returns the exit code: 0; 74 when the device is no port that can be
 /// used (one that is missing or busy is waited for), 73 when the log cannot be

@@ -47,9 +47,10 @@ Autopilot::Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, con
   parameters.merge(gain_parameters(firmware_bridge::Autopilot::kPx4, vehicle));
 }
 
-void Autopilot::log_wire(const std::string& path) {
+bool Autopilot::log_wire(const std::string& path) {
   wire_.open(path);
   wire_ << "t_s,id,sequence,type_mask,x,y,z\n" << std::setprecision(15);
+  return wire_.good();
 }
 
 const char* Autopilot::mode() const noexcept {

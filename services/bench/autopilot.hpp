@@ -73,7 +73,7 @@ class Autopilot {
   std::optional<double> battery;
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position; of a command
   /// its number and parameters 1, 2 and 7.
-  void log_wire(const std::string& path);
+  bool log_wire(const std::string& path);
 
  protected:
   // What a profile of a real firmware (firmware.hpp) does in its own way.

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <stdexcept>
 #include <thread>
 
 #include "core/map/distance_field.hpp"
@@ -19,6 +18,7 @@
 #include "services/bench/messages.hpp"
 #include "services/bench/pty.hpp"
 #include "services/bench/scans.hpp"
+#include "services/bench/start_error.hpp"
 #include "services/bench/truth_log.hpp"
 #include "services/dds/topics.hpp"
 #include "services/parallel/real_time.hpp"
@@ -39,9 +39,10 @@ double seconds(Clock::time_point t) { return std::chrono::duration<double>(t.tim
 /// Centre of the vehicle when it stands below `p`.
 Vec3 ground_below(const map::OccupancyGrid& grid, const Vehicle& vehicle, const Vec3& p) {
   Index3 v = grid.index(p);
-  if (!grid.free(v)) throw std::runtime_error("start is not in free space; choose a point above a floor");
+  if (!grid.free(v)) throw StartError(kUnavailable, "--start is not in free space; choose a point above a floor");
   while (grid.free(v)) --v.z();
-  if (!grid.occupied(v)) throw std::runtime_error("there is no known floor below start; choose a point above one");
+  if (!grid.occupied(v))
+    throw StartError(kUnavailable, "there is no known floor below --start; choose a point above one");
   return {p.x(), p.y(), grid.center(v).z() + grid.resolution() / 2 + vehicle.body.radius};
 }
 
@@ -163,7 +164,9 @@ class Bench {
         noise_(options.seed) {
     // It stands in for hardware: where it may, it runs before everything but the daemon's own real-time threads.
     if (priority_ > 0) set_fifo(priority_);
-    if (!o_.wire.empty()) autopilot_->log_wire(o_.wire);
+    if (!o_.wire.empty() && !autopilot_->log_wire(o_.wire))
+      throw StartError(kCannotCreate,
+                       "--wire " + o_.wire + ": cannot be created; name a file in a folder that can be written");
     if (o_.drift) closure_writer_.write(loop_closure(Vec3::Zero(), 0));
     send_map(MapMessage{known_}, o_.timeline.after_arming ? -1 : 0);
     if (o_.in_loop.empty()) pty_.emplace(o_.link);

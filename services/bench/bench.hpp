@@ -43,7 +43,7 @@ struct Options {
 };
 
 /// Runs the emulated flight controller, VIO (100 Hz) and mapper in real time until the duration has passed or SIGINT or
-/// SIGTERM. Returns the exit code, 1 when an expectation of the timeline failed; throws std::runtime_error at start.
+/// SIGTERM. Returns the exit code, 1 when an expectation of the timeline failed; throws StartError at start.
 int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle);
 
 }  // namespace backwash::bench

@@ -14,7 +14,7 @@
 namespace backwash::bench {
 
 /// Line to a controller that is simulated for: `tcpin:ADDRESS:PORT` is listened on (PX4's simulator_mavlink connects to
-/// 4560), anything else is a serial port at 921,600 baud (PX4's HITL). Throws std::runtime_error.
+/// 4560), anything else is a serial port at 921,600 baud (PX4's HITL). Throws StartError.
 class SimulationLine {
  public:
   explicit SimulationLine(const std::string& device);

@@ -3,6 +3,7 @@
 # One flight through the daemon, judged afterwards from its raw log.
 #   flight.sh BUILD_DIR OUT_DIR NAME MAP START GOAL [VEHICLE [SEED [AUTOPILOT [BENCH_OPTION …]]]]
 # AUTOPILOT: simple, ardupilot or px4, with what the daemon wants of the last two set.
+# $model: the model of daemon and report, if it is not the vehicle's own.
 # Writes OUT_DIR/NAME.{html,bwlog,truth.csv,wire.csv,status.json,log}; exits with the code of `backwash report`.
 set -euo pipefail
 mkdir -p "$2"
@@ -29,4 +30,4 @@ sleep 3 # hold at the goal
 ctl land --wait
 stop
 "$bin/backwash" report --log "$out/$name.bwlog" --truth "$out/$name.truth.csv" --vehicle "$vehicle" \
-  --model "$vehicle" --out "$out/$name.html" --force
+  --model "${model:-$vehicle}" --out "$out/$name.html" --force

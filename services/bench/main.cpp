@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <iostream>
 
 #include "core/config/config.hpp"
 #include "core/config/odometry_profile.hpp"
 #include "core/map/load_map.hpp"
 #include "services/bench/bench.hpp"
+#include "services/bench/start_error.hpp"
+#include "services/command_line/command_line.hpp"
+#include "services/dds/dds.hpp"
 #include "version.hpp"
 
 namespace {
 
+using namespace backwash::services;
 using backwash::Vec3;
 
 int failed(int code, const std::string& message) {
@@ -17,7 +23,7 @@ int failed(int code, const std::string& message) {
   return code;
 }
 
-/// The command line as CLI11 fills it.
+/// The command line as it is filled.
 struct Given {
   backwash::bench::Options options;
   std::vector<double> start, origin{12.0, -7.0, 0.3}, crate, drift, hidden;
@@ -25,69 +31,69 @@ struct Given {
   std::string timeline;
 };
 
-void add_world(CLI::App& app, Given& given) {
-  app.add_option("--map", given.options.map, "OctoMap file or builtin:NAME")->required();
-  app.add_option("--vehicle", given.options.vehicle, "vehicle file or builtin:NAME")->capture_default_str();
+void add_world(Command& app, Given& given) {
+  app.add_option("--map", given.options.map, "OctoMap file or builtin:NAME").required();
+  app.add_option("--vehicle", given.options.vehicle, "vehicle file or builtin:NAME").capture_default_str();
   app.add_option("--start", given.start, "x,y,z above the place where the vehicle stands, m")
-      ->required()
-      ->delimiter(',')
-      ->expected(3);
-  auto* const link =
+      .required()
+      .delimiter(',')
+      .expected(3);
+  const Option link =
       app.add_option("--link", given.options.link, "symbolic link to make to the controller's serial port");
   app.add_option(
          "--in-loop", given.options.in_loop,
          "a real controller, simulated for: tcpin:ADDRESS:PORT (PX4's simulator_mavlink) or a serial port (HITL)")
-      ->excludes(link);
-  app.add_option("--seed", given.options.seed, "of the airflow and of the VIO's drift")->capture_default_str();
+      .excludes(link);
+  app.add_option("--seed", given.options.seed, "of the airflow and of the VIO's drift").capture_default_str();
   app.add_option("--local-yaw", given.options.frame.yaw, "yaw of the controller's own frame, rad")
-      ->capture_default_str();
+      .capture_default_str();
   app.add_option("--local-origin", given.origin, "the map's origin in the controller's own frame, m")
-      ->delimiter(',')
-      ->expected(3);
-  app.add_option("--domain", given.options.domain, "DDS domain")->capture_default_str();
-  app.add_option("--interface", given.options.interface, "network interface")->capture_default_str();
-  app.add_option("--namespace", given.options.name_space, "the daemon's name space")->capture_default_str();
-  app.add_option("--duration", given.options.duration_s, "s")->capture_default_str();
+      .delimiter(',')
+      .expected(3);
+  app.add_option("--domain", given.options.domain, "DDS domain").capture_default_str().check(within(0, 230));
+  app.add_option("--interface", given.options.interface, "network interface").capture_default_str();
+  app.add_option("--namespace", given.options.name_space, "the daemon's name space").capture_default_str();
+  app.add_option("--duration", given.options.duration_s, "s").capture_default_str().check(positive());
   app.add_option("--log", given.options.log, "flight log of the truth, CSV");
   app.add_option("--wire", given.options.wire, "what arrived from the daemon, frame by frame, CSV");
 }
 
-void add_faults(CLI::App& app, Given& given) {
+void add_faults(Command& app, Given& given) {
   app.add_option("--stop-odometry", given.options.stop_odometry_s, "fault: VIO stops this long after arming, s");
   app.add_option("--stop-heartbeat", given.options.stop_heartbeat_s,
                  "fault: the controller goes silent this long after arming, s");
-  app.add_option_function<std::string>(
+  app.add_text(
          "--autopilot",
          [&given](const std::string& name) {
            using enum backwash::bench::Options::Profile;
            given.options.autopilot = name == "px4" ? px4 : name == "ardupilot" ? ardupilot : simple;
          },
          "simple, or as measured of a real one: ardupilot, px4")
-      ->check(CLI::IsMember({"simple", "ardupilot", "px4"}))
-      ->default_str("simple");
+      .check(one_of({"simple", "ardupilot", "px4"}))
+      .default_str("simple");
   app.add_option("--faults", given.timeline,
                  "timeline of faults and of what the flight shall keep, TOML; services/bench/README.md");
   std::vector<std::string> estimators;
   for (const auto& profile : backwash::config::odometry_profiles())
     if (!profile.child.empty()) estimators.emplace_back(profile.name);
   app.add_option("--estimator", given.options.estimator, "the odometry as this one fills it, and the map in its frame")
-      ->check(CLI::IsMember(estimators));
+      .check(one_of(estimators));
   app.add_option("--parameter", given.parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
   app.add_option(
          "--hide", given.hidden,
          "x,y,z,x,y,z: corners of a box that the map leaves out, m; a range sensor on the vehicle finds what is in it")
-      ->delimiter(',')
-      ->expected(6);
+      .delimiter(',')
+      .expected(6);
   app.add_option("--crate", given.crate,
                  "fault: x,y,z of the centre of a crate that the map does not have, m; it is scanned from the event on")
-      ->delimiter(',')
-      ->expected(3);
-  app.add_option("--crate-edge", given.options.crate_edge, "m")->capture_default_str();
+      .delimiter(',')
+      .expected(3);
+  app.add_option("--crate-edge", given.options.crate_edge, "m").capture_default_str();
   app.add_option("--drift", given.drift, "fault: x,y,z by which a loop closure corrects the VIO at the event, m")
-      ->delimiter(',')
-      ->expected(3);
+      .delimiter(',')
+      .expected(3);
   app.add_option("--event-x", given.options.event_x, "the event: the vehicle has passed this x of the map, m")
-      ->capture_default_str();
+      .capture_default_str();
 }
 
 /// NAME=NUMBER; without a value if it is not that.
@@ -120,10 +126,10 @@ int run(backwash::bench::Options& o, const std::string& timeline) {
   if (!grid)
     return failed(grid.error().kind == backwash::map::MapError::Kind::not_found ? 66 : 65, grid.error().message);
   const auto vehicle = backwash::config::load_vehicle(o.vehicle);
-  if (!vehicle) return failed(78, vehicle.error().message);
+  using Kind = backwash::config::ConfigError::Kind;
+  if (!vehicle) return failed(vehicle.error().kind == Kind::not_found ? 66 : 78, vehicle.error().message);
   if (!timeline.empty()) {
     auto loaded = backwash::bench::load_timeline(timeline);
-    using Kind = backwash::config::ConfigError::Kind;
     if (!loaded) return failed(loaded.error().kind == Kind::not_found ? 66 : 78, loaded.error().message);
     o.timeline = std::move(*loaded);
   }
@@ -133,22 +139,17 @@ int run(backwash::bench::Options& o, const std::string& timeline) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{
+  Command app{
       "backwash-bench: emulated flight controller on a pty, emulated VIO and mapper on DDS, in real time.\n"
-      "Example: backwash-bench --map builtin:apartment --start 2,2,1.2 --link /tmp/autopilot"};
-  app.set_version_flag("--version", std::string("backwash-bench ") + backwash::kVersion);
+      "Example: backwash-bench --map builtin:apartment --start 2,2,1.2 --link /tmp/autopilot",
+      "backwash-bench"};
+  app.version(backwash::kVersion);
   Given given;
   given.options.frame.yaw = 0.6;
   given.options.vehicle = "builtin:quad-5in";
   add_world(app, given);
   add_faults(app, given);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& asked) {
-    return app.exit(asked);
-  } catch (const CLI::ParseError& wrong) {
-    return failed(64, std::string(wrong.what()) + "; see backwash-bench --help");
-  }
+  if (const auto code = app.parse(argc, argv)) return *code;
   if (given.options.link.empty() && given.options.in_loop.empty())
     return failed(64, "--link or --in-loop is needed; see backwash-bench --help");
   for (const std::string& text : given.parameters) {
@@ -157,8 +158,13 @@ int main(int argc, char** argv) {
     given.options.parameters.insert_or_assign(named->first, named->second);
   }
   set_places(given);
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is for what the timeline expects
   try {
-    return run(given.options, given.timeline);
+    return finished(run(given.options, given.timeline), "backwash-bench");
+  } catch (const backwash::bench::StartError& e) {
+    return failed(e.code, e.what());
+  } catch (const backwash::dds::Error& e) {
+    return failed(71, std::string(e.what()) + "; give an --interface and a --domain of this machine");
   } catch (const std::exception& e) {
     return failed(70, e.what());
   }

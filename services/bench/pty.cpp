@@ -9,23 +9,26 @@
 
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
+
+#include "services/bench/start_error.hpp"
 
 namespace backwash::bench {
 
 Pty::Pty(const std::string& link) : fd_(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)), link_(link) {
   char name[128];
   if (fd_ < 0 || grantpt(fd_) != 0 || unlockpt(fd_) != 0 || ptsname_r(fd_, name, sizeof name) != 0)
-    throw std::runtime_error(std::string("no pseudo-terminal: ") + std::strerror(errno));
+    throw StartError(kSystem, std::string("no pseudo-terminal: ") + std::strerror(errno));
   // The other end stays open here too: then a companion that closes it does not look like a hang-up.
   other_ = open(name, O_RDWR | O_NOCTTY);
   termios raw{};
   if (other_ < 0 || tcgetattr(other_, &raw) != 0)
-    throw std::runtime_error(std::string(name) + ": " + std::strerror(errno));
+    throw StartError(kSystem, std::string(name) + ": " + std::strerror(errno));
   cfmakeraw(&raw);
   tcsetattr(other_, TCSANOW, &raw);
   unlink(link.c_str());
-  if (symlink(name, link.c_str()) != 0) throw std::runtime_error(link + ": cannot be made: " + std::strerror(errno));
+  if (symlink(name, link.c_str()) != 0)
+    throw StartError(kCannotCreate, "--link " + link + ": cannot be made: " + std::strerror(errno) +
+                                        "; name a file in a folder that can be written");
 }
 
 Pty::~Pty() {

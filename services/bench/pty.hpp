@@ -12,7 +12,7 @@ namespace backwash::bench {
 /// start and removed at the end.
 class Pty {
  public:
-  /// Throws std::runtime_error naming what failed.
+  /// Throws StartError naming what failed.
   explicit Pty(const std::string& link);
   ~Pty();
   Pty(const Pty&) = delete;

@@ -11,9 +11,9 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 
 #include "services/bench/controller_in_loop.hpp"
+#include "services/bench/start_error.hpp"
 
 namespace backwash::bench {
 namespace {
@@ -23,7 +23,7 @@ using firmware_bridge::FileDescriptor;
 constexpr int kWait_ms = 100;
 
 [[noreturn]] void fail(const std::string& device) {
-  throw std::runtime_error(device + ": " + std::strerror(errno != 0 ? errno : EINVAL));
+  throw StartError(kInputOutput, "--in-loop " + device + ": " + std::strerror(errno != 0 ? errno : EINVAL));
 }
 
 FileDescriptor listen_on(const std::string& device, const std::string& endpoint) {

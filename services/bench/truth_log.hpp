@@ -3,10 +3,10 @@
 
 #include <fstream>
 #include <iomanip>
-#include <stdexcept>
 #include <string>
 
 #include "services/bench/autopilot.hpp"
+#include "services/bench/start_error.hpp"
 
 namespace backwash::bench {
 
@@ -14,7 +14,9 @@ namespace backwash::bench {
 class TruthLog {
  public:
   explicit TruthLog(const std::string& path) : file_(path) {
-    if (!path.empty() && !file_) throw std::runtime_error(path + ": cannot be created");
+    if (!path.empty() && !file_)
+      throw StartError(kCannotCreate,
+                       "--log " + path + ": cannot be created; name a file in a folder that can be written");
     file_ << "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,qw,qx,qy,qz,thrust,vio_x_m,vio_y_m,vio_z_m,"
              "armed,landed\n"
           << std::setprecision(15);

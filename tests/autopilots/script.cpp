@@ -2,12 +2,12 @@
 // Plays a script against a real autopilot in its own simulator, in real time: session.hpp.
 #include <signal.h>
 
-#include <CLI/CLI.hpp>
 #include <fstream>
 #include <iostream>
 #include <thread>
 
 #include "services/backwashd/channels.hpp"
+#include "services/command_line/command_line.hpp"
 #include "services/parallel/real_time.hpp"
 #include "tests/autopilots/device.hpp"
 #include "tests/autopilots/session.hpp"
@@ -38,15 +38,16 @@ int main(int argc, char** argv) {
   backwash::autopilots::Session::Options o;
   std::string device, truth, trace;
   int pid = 0;
-  CLI::App app{"autopilot_script: plays a script against an autopilot and writes a trace"};
-  app.add_option("--device", device, "as in the daemon's [link]")->required();
-  app.add_option("--truth", truth, "see truth.hpp")->required();
-  app.add_option("--script", o.script)->required();
-  app.add_option("--trace", trace, "CSV")->required();
+  backwash::services::Command app{"autopilot_script: plays a script against an autopilot and writes a trace",
+                                  "autopilot_script"};
+  app.add_option("--device", device, "as in the daemon's [link]").required();
+  app.add_option("--truth", truth, "see truth.hpp").required();
+  app.add_option("--script", o.script).required();
+  app.add_option("--trace", trace, "CSV").required();
   app.add_option("--noise", o.noise, "of the odometry's position, m");
   app.add_flag("--px4", o.px4, "integer parameters bytewise, as PX4 has them");
   app.add_option("--pid", pid, "of the autopilot, for `signal`");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.parse(argc, argv)) return *code;
   try {
     backwash::set_fifo(backwash::allowed_fifo(70));
     return backwash::autopilots::play(device, truth, trace, pid, o);

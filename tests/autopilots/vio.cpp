@@ -5,7 +5,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <csignal>
 #include <fstream>
 #include <iomanip>
@@ -20,6 +19,7 @@
 #include "services/backwashd/channels.hpp"
 #include "services/bench/messages.hpp"
 #include "services/bench/scans.hpp"
+#include "services/command_line/command_line.hpp"
 #include "services/dds/topics.hpp"
 #include "services/parallel/real_time.hpp"
 #include "tests/autopilots/truth.hpp"
@@ -191,19 +191,20 @@ class Vio {
 
 int main(int argc, char** argv) {
   backwash::autopilots::Options o;
-  CLI::App app{"autopilot_vio: VIO and mapper beside a real autopilot in its simulator"};
-  app.add_option("--truth", o.truth, "see truth.hpp")->required();
-  app.add_option("--map", o.map)->required();
-  app.add_option("--vehicle", o.vehicle)->required();
+  backwash::services::Command app{"autopilot_vio: VIO and mapper beside a real autopilot in its simulator",
+                                  "autopilot_vio"};
+  app.add_option("--truth", o.truth, "see truth.hpp").required();
+  app.add_option("--map", o.map).required();
+  app.add_option("--vehicle", o.vehicle).required();
   app.add_option("--start", o.start, "x,y,z of the vehicle's centre as it stands, m")
-      ->required()
-      ->delimiter(',')
-      ->expected(3);
+      .required()
+      .delimiter(',')
+      .expected(3);
   app.add_option("--yaw", o.yaw, "of the map against east, rad");
   app.add_option("--noise", o.noise, "of the position, m");
-  app.add_option("--domain", o.domain)->required();
-  app.add_option("--log", o.log, "the truth, CSV")->required();
-  CLI11_PARSE(app, argc, argv);
+  app.add_option("--domain", o.domain).required();
+  app.add_option("--log", o.log, "the truth, CSV").required();
+  if (const auto code = app.parse(argc, argv)) return *code;
   std::signal(SIGTERM, [](int) { backwash::autopilots::stopped = 1; });
   std::signal(SIGINT, [](int) { backwash::autopilots::stopped = 1; });
   try {

@@ -39,12 +39,13 @@ MAY = {
                        STUDY + "inference", STUDY + "findings"],
     "firmware_bridge": ["core/types"],
     "services/parallel": [],
+    "services/command_line": [],
     "services/dds": ["idl"],
     # What flies sees neither the simulation nor what judges flights afterwards.
-    "services/backwashd": ["core/sync", "core/config", "core/log", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel"],
-    "services/backwashctl": ["core/types", "core/files", "services/dds"],
-    "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel"],
-    "services/backwash": ["core", "services/parallel"],
+    "services/backwashd": ["core/sync", "core/config", "core/log", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel", "services/command_line"],
+    "services/backwashctl": ["core/types", "core/files", "services/dds", "services/command_line"],
+    "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel", "services/command_line"],
+    "services/backwash": ["core", "services/parallel", "services/command_line"],
     "services/package": ["core/config", *FLIGHT],  # the library's example
 }
 # The worlds with hidden effects share no code with what looks for them. These ask the study, and no world includes them.

@@ -49,6 +49,15 @@ TEST(RatioOfTotals, IsTheQuotientAndItsIntervalHoldsItEqualPairsHaveNone) {
   EXPECT_DOUBLE_EQ(exact.high, 0.5);
 }
 
+TEST(RatioOfTotals, OfOnePairSaysNothingOfOthers) {
+  const std::vector<double> a = {1}, b = {2};
+  for (const Interval& r : {ratio_of_totals(a, b, 1), mean_ratio(a, b, 1)}) {
+    EXPECT_DOUBLE_EQ(r.value, 0.5);
+    EXPECT_FALSE(r.known());
+    EXPECT_FALSE(r.high < 1) << "no demand is held by one pair";
+  }
+}
+
 TEST(MeanRatio, IsGeometricAndUnchangedByTheScaleOfAPair) {
   const std::vector<double> a = {1, 8}, b = {2, 1}, scaled_a = {100, 8}, scaled_b = {200, 1};
   EXPECT_NEAR(mean_ratio(a, b, 1).value, 2, 1e-12);

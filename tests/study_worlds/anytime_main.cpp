@@ -2,7 +2,6 @@
 // study_anytime: worlds looked at after every flight. How often does the e-value ever pass 1/level, and, beside it, how
 // often does the study itself ever name something (--studies: it is run after every flight, too)? Every world is one
 // line of JSON in --out as soon as it is done; --from makes the table of such files.
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -10,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/study/inference/anytime.hpp"
+#include "services/command_line/command_line.hpp"
 #include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/observe.hpp"
 #include "tests/study_worlds/summary.hpp"
@@ -109,18 +109,18 @@ void report(const std::vector<Watched>& all) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Worlds looked at after every flight"};
+  backwash::services::Command app{"Worlds looked at after every flight", "study_anytime"};
   Options options;
-  app.add_option("--worlds", options.worlds)->capture_default_str();
-  app.add_option("--flights", options.flights)->capture_default_str();
-  app.add_option("--seed", options.seed, "of the first world")->capture_default_str();
+  app.add_option("--worlds", options.worlds).capture_default_str();
+  app.add_option("--flights", options.flights).capture_default_str();
+  app.add_option("--seed", options.seed, "of the first world").capture_default_str();
   app.add_option("--cause", options.cause, "hidden cause; default: none");
-  app.add_option("--size", options.size, "in units of the effect-size table")->capture_default_str();
-  app.add_option("--jobs", options.jobs)->capture_default_str();
+  app.add_option("--size", options.size, "in units of the effect-size table").capture_default_str();
+  app.add_option("--jobs", options.jobs).capture_default_str();
   app.add_option("--out", options.out, "JSON lines, appended to");
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
   app.add_flag("--studies", options.studies, "the study itself after every flight, too");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.parse(argc, argv)) return *code;
   if (options.from.empty()) {
     report(run(options));
     return 0;

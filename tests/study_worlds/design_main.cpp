@@ -2,13 +2,13 @@
 // study_design: worlds whose flights cannot tell some causes apart. How many further flights it takes until the hidden
 // one is told alone, by the designed way and by others. Every world is one line of JSON in --out as soon as it is done;
 // --from makes the tables of such files.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "services/command_line/command_line.hpp"
 #include "tests/study_worlds/design_trial.hpp"
 #include "tests/study_worlds/in_parallel.hpp"
 
@@ -28,7 +28,7 @@ struct Options {
 
 const MatrixCell& cell_of(const std::string& name) {
   const auto at = std::ranges::find(cells(), name, &MatrixCell::name);
-  if (at == cells().end()) throw CLI::ValidationError("--cell", "no cell '" + name + "'");
+  if (at == cells().end()) throw backwash::services::UsageError("--cell: no cell '" + name + "'");
   return *at;
 }
 
@@ -80,19 +80,19 @@ void report(const std::vector<Trial>& all) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Further flights until the hidden cause is told alone"};
+  backwash::services::Command app{"Further flights until the hidden cause is told alone", "study_design"};
   Options options;
-  app.add_option("--worlds", options.worlds, "per cell")->capture_default_str();
-  app.add_option("--flights", options.trial.flights, "at first")->capture_default_str();
-  app.add_option("--most", options.trial.most, "further ones of each kind")->capture_default_str();
-  app.add_option("--seconds", options.trial.seconds, "of each further flight")->capture_default_str();
-  app.add_option("--size", options.trial.size, "in units of the effect-size table")->capture_default_str();
-  app.add_option("--seed", options.seed, "of the first world")->capture_default_str();
+  app.add_option("--worlds", options.worlds, "per cell").capture_default_str();
+  app.add_option("--flights", options.trial.flights, "at first").capture_default_str();
+  app.add_option("--most", options.trial.most, "further ones of each kind").capture_default_str();
+  app.add_option("--seconds", options.trial.seconds, "of each further flight").capture_default_str();
+  app.add_option("--size", options.trial.size, "in units of the effect-size table").capture_default_str();
+  app.add_option("--seed", options.seed, "of the first world").capture_default_str();
   app.add_option("--cell", options.cells, "cells; default: the confounded ones");
-  app.add_option("--jobs", options.jobs)->capture_default_str();
+  app.add_option("--jobs", options.jobs).capture_default_str();
   app.add_option("--out", options.out, "JSON lines, appended to");
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.parse(argc, argv)) return *code;
   std::vector<Trial> all;
   for (const auto& file : options.from) {
     std::ifstream in(file);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // study_matrix: how often the study names what was hidden. Every world is one line of JSON in --out as soon as it is
 // done, so that a cut run counts; --from makes the tables of such files. --gate: exit 1 when a gate is missed.
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
@@ -9,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "services/command_line/command_line.hpp"
 #include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/null_size.hpp"
 #include "tests/study_worlds/summary.hpp"
@@ -39,7 +39,7 @@ std::vector<MatrixCell> chosen_cells(const Options& options) {
   std::vector<MatrixCell> chosen;
   for (const auto& name : options.cells) {
     const auto at = std::find_if(cells().begin(), cells().end(), [&](auto& c) { return c.name == name; });
-    if (at == cells().end()) throw CLI::ValidationError("--cell", "no cell '" + name + "'");
+    if (at == cells().end()) throw backwash::services::UsageError("--cell: no cell '" + name + "'");
     chosen.push_back(*at);
   }
   return chosen;
@@ -84,21 +84,21 @@ int report(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Confusion matrix of the study over worlds with hidden effects"};
+  backwash::services::Command app{"Confusion matrix of the study over worlds with hidden effects", "study_matrix"};
   Options options;
-  app.add_option("--worlds", options.worlds, "per cell")->capture_default_str();
+  app.add_option("--worlds", options.worlds, "per cell").capture_default_str();
   app.add_option("--seed", options.seed, "of the first world; default: the clock");
   app.add_option("--sizes", options.sizes, "in units of the effect-size table; two: log-uniform between")
-      ->expected(1, 2);
-  app.add_option("--flights", options.flights)->capture_default_str();
+      .expected(1, 2);
+  app.add_option("--flights", options.flights).capture_default_str();
   app.add_option("--cell", options.cells, "cells; default: all");
-  app.add_option("--jobs", options.jobs)->capture_default_str();
+  app.add_option("--jobs", options.jobs).capture_default_str();
   app.add_option("--out", options.out, "JSON lines, appended to");
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
   app.add_option("--markdown", options.markdown, "writes the tables there too");
   app.add_flag("--gate", options.gate, "exit 1 when a gate is missed");
   app.add_flag("--null-size", options.null_size, "instead: how often each channel rejects regressors without effect");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.parse(argc, argv)) return *code;
   if (options.from.empty())
     std::printf("seed %llu, %d worlds a cell, %d flights\n\n", static_cast<unsigned long long>(options.seed),
                 options.worlds, options.flights);

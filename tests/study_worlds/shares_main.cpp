@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // study_shares: how often the study tells a cause that acts in some of twelve flights, and which flights these are.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "services/command_line/command_line.hpp"
 #include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/shares.hpp"
 #include "tests/study_worlds/weights.hpp"
@@ -40,7 +40,8 @@ std::vector<RotorTrial> weights() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Causes in some flights only: a table of what the study tells of them"};
+  backwash::services::Command app{"Causes in some flights only: a table of what the study tells of them",
+                                  "study_shares"};
   std::uint64_t seed = 1;
   int worlds = 20, jobs = 1;
   std::vector<std::string> faults = {"rpm", "rotor_sensor_fault", "propeller_damage", "payload", "trim"};
@@ -48,17 +49,17 @@ int main(int argc, char** argv) {
   std::vector<int> counts = {4, 6, 8};
   double size = 1;
   std::string out;
-  app.add_option("--seed", seed, "of the first world")->capture_default_str();
-  app.add_option("--worlds", worlds, "per row")->capture_default_str();
-  app.add_option("--jobs", jobs)->capture_default_str();
+  app.add_option("--seed", seed, "of the first world").capture_default_str();
+  app.add_option("--worlds", worlds, "per row").capture_default_str();
+  app.add_option("--jobs", jobs).capture_default_str();
   app.add_option("--fault", faults, "causes of the generator, or rpm");
-  app.add_option("--layout", layouts)->check(CLI::IsMember({"run", "any", "since"}));
+  app.add_option("--layout", layouts).check(backwash::services::one_of({"run", "any", "since"}));
   app.add_option("--count", counts, "flights of 12");
-  app.add_option("--size", size, "in units of the effect-size table")->capture_default_str();
+  app.add_option("--size", size, "in units of the effect-size table").capture_default_str();
   app.add_option("--out", out, "JSON lines, appended to");
   bool by_weight = false;
   app.add_flag("--weights", by_weight, "instead: heavy weights near one rotor and damaged propellers, on three craft");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.parse(argc, argv)) return *code;
   std::ofstream lines(out, std::ios::app);
   std::string table;
   if (by_weight) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // study_simulation: whether a simulation that a study extended comes as near to further flights as the truth's own.
 // Every world is one line of JSON in --out as soon as it is done; --from makes the table of such files.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "services/command_line/command_line.hpp"
 #include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/simulation.hpp"
 
@@ -51,19 +51,21 @@ std::vector<Proof> read(const std::vector<std::string>& files) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Simulated against measured flights before and after an extension, over worlds with a hidden effect"};
+  backwash::services::Command app{
+      "Simulated against measured flights before and after an extension, over worlds with a hidden effect",
+      "study_simulation"};
   Options options;
   options.request.seed = 90001;
-  app.add_option("--worlds", options.worlds, "per cause")->capture_default_str();
-  app.add_option("--seed", options.request.seed, "of the first world")->capture_default_str();
+  app.add_option("--worlds", options.worlds, "per cause").capture_default_str();
+  app.add_option("--seed", options.request.seed, "of the first world").capture_default_str();
   app.add_option("--cause", options.causes, "hidden causes; default: all");
-  app.add_option("--flights", options.request.flights, "studied, and as many further ones")->capture_default_str();
-  app.add_option("--held-out", options.request.held_out, "further ones that are simulated")->capture_default_str();
-  app.add_option("--replicas", options.request.replicas, "flights with other gusts")->capture_default_str();
-  app.add_option("--jobs", options.jobs)->capture_default_str();
+  app.add_option("--flights", options.request.flights, "studied, and as many further ones").capture_default_str();
+  app.add_option("--held-out", options.request.held_out, "further ones that are simulated").capture_default_str();
+  app.add_option("--replicas", options.request.replicas, "flights with other gusts").capture_default_str();
+  app.add_option("--jobs", options.jobs).capture_default_str();
   app.add_option("--out", options.out, "JSON lines, appended to");
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.parse(argc, argv)) return *code;
   std::fputs(proof_table(options.from.empty() ? run(options) : read(options.from)).c_str(), stdout);
   return 0;
 }

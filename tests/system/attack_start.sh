@@ -76,23 +76,26 @@ cases = [
     ("namespace", {"namespace": "back wash"}, ":6: key 'dds.namespace' = "),
     ("topic", {"topic": "rt/9lives"}, ":7: key 'dds.odometry_topic' = "),
     ("not TOML", {"more": "]["}, ":16: not valid TOML"),
+    ("vehicle huge", {"vehicle": work + "/large.toml"}, "/large.toml: has 1048576 MiB, the cap is 1 MiB"),
+]
+no_files = [
     ("vehicle absent", {"vehicle": work + "/absent.toml"}, "/absent.toml: cannot be read: No such file"),
     ("vehicle FIFO", {"vehicle": work + "/fifo"}, "/fifo: is a FIFO; needs the path of a TOML file"),
     ("model endless", {"model": "/dev/zero"}, "/dev/zero: is a device; needs the path of a TOML file"),
     ("model a directory", {"model": work}, ": is a directory; needs the path of a TOML file"),
-    ("vehicle huge", {"vehicle": work + "/large.toml"}, "/large.toml: has 1048576 MiB, the cap is 1 MiB"),
 ]
-for name, changed, words in cases:
+for name, changed, words in cases + no_files:
     port = Port()
     open(path, "w").write(configuration(port.path, **changed))
     code, said = start(path)
-    assert code == 78 and words in said and said.count("\n") == 1, (name, code, said)
+    wanted = 66 if (name, changed, words) in no_files else 78
+    assert code == wanted and words in said and said.count("\n") == 1, (name, code, said)
     assert not port.was_opened(), f"{name}: the port was opened"
     assert not logs(), f"{name}: a log was made"
 for special, words in ((work + "/fifo", "is a FIFO"), ("/dev/zero", "is a device"), (work, "is a directory")):
     code, said = start(special)
-    assert code == 78 and words in said and said.count("\n") == 1, (special, code, said)
-print(f"{len(cases) + 3} invalid configurations: exit 78, no port opened")
+    assert code == 66 and words in said and said.count("\n") == 1, (special, code, said)
+print(f"{len(cases)} invalid configurations: exit 78; {len(no_files) + 3} that are no files: exit 66; no port opened")
 
 # What is not the configuration's fault has codes of its own; what an earlier flight left is not touched.
 open(log, "wb").write(b"an earlier flight")

@@ -22,6 +22,7 @@ refused() {
 
 quad=builtin:quad-5in
 fly=(fly --map builtin:narrow-gap)
+cp "$here/../../core/config/files/quad-5in.vehicle.toml" own.toml
 printf 'not a map at all\n' >corrupt.bt
 printf '[base]\nhorizontal = 0.004\nvertical = 0.006\nsideways = 1\n' >unknown_key.toml
 printf 't_s,cmd_x_m,cmd_y_m,cmd_z_m\n0,0,0,1\n0.02,0,0,1\n0.05,0,0,1\n' >gap.csv
@@ -32,7 +33,7 @@ printf 't_s,cmd_x_m,cmd_y_m\n0,0,0\n' >no_z.csv
 printf 'x_m,y_m\n0,0\n' >no_z_points.csv
 printf 'start = [1, 0, 1]\n[[hover]]\np = [2, 0, 1]\ndwel = 3\n' >spec_key.toml
 printf 'start = [1, 1.5, 1]\n[[hover]]\np = [5, 1.5, 1]\ndwell = 3\n' >spec_wall.toml
-touch exists
+touch exists a.csv
 mkfifo fifo
 # Column maps, and tables of others.
 table() { printf 't,x,y,z\n'; for n in $(seq 0 200); do echo "$(($1 * n)),0,0,0.$n"; done; }
@@ -59,6 +60,15 @@ printf 'vx_mps = "x"\n' | cat map.toml - >one_axis.toml
 refused 64 "--nonsense" fly --nonsense
 refused 64 "three numbers" fly --start 1,2 --goal 1,0,3
 refused 64 "both --start and --goal" fly --start 1,0,1
+refused 64 "'-3' is below 0" fly --seed -3
+refused 64 "takes a number above 0;" "${fly[@]}" --sigma-scale 0
+refused 64 "finite number" "${fly[@]}" --sigma-scale inf
+refused 64 "finite number" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1 --vmax nan
+refused 64 "takes a number from 0.5 to 0.99;" calibrate --log a.csv --vehicle $quad --quantile 2
+refused 64 "'none' is not one of tight, paper" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1 --method none
+refused 64 "no model of its own" "${fly[@]}" --vehicle own.toml
+refused 64 ".svg or .png" field --map builtin:narrow-gap --model $quad --slice z=1 --out s.jpg
+[[ ! -e s.jpg ]] || { echo "s.jpg was written"; failed=1; }
 refused 64 "--vehicle" reach --track gap.csv
 refused 64 "exactly one" field --map builtin:narrow-gap --model $quad
 refused 64 "z=0.5" field --map builtin:narrow-gap --model $quad --slice w=3
@@ -94,18 +104,51 @@ refused 78 "spec_key.toml:4:" simulate --map builtin:narrow-gap --vehicle $quad 
 # nothing is overwritten
 refused 73 "--force" fly --report exists
 refused 73 "--force" fly --log exists
+# what cannot be written is said before the work: no world was built
+for out in nowhere/out.html /dev/null/out.html; do
+  refused 73 "$out:1: cannot be created" fly --report $out
+  refused 73 "$out:1: cannot be created" fly --log $out
+  refused 73 "$out:1: cannot be created" compare --report $out
+  refused 73 "$out:1: cannot be created" compare --out $out
+  refused 73 "$out:1: cannot be created" calibrate --log a.csv --vehicle $quad --out $out
+  refused 73 "$out:1: cannot be created" study --log a.csv --vehicle $quad --report $out
+  refused 73 "$out:1: cannot be created" simulate --map gone.bt --vehicle gone.toml --flight gone.toml --out $out
+done
+refused 73 "cannot be created" fly --force --report .
 refused 73 "--force" field --map builtin:narrow-gap --model $quad --slice z=1 --out exists
 # places that cannot be flown from or to
 refused 69 "occupied" "${fly[@]}" --start 3,1.2,1 --goal 5,0,1
 refused 69 "unknown" fly --map two_rooms.bt --start 0.8,-0.8,0.8 --goal 0.8,0.8,0.8
 refused 69 "not hover-safe" "${fly[@]}" --start 1,-1.75,1 --goal 5,0,1
 refused 69 "outside the map" "${fly[@]}" --start 1,0,1 --goal 50,0,1
+refused 69 "is occupied" field --map builtin:narrow-gap --model $quad --at 3,1.2,1
+refused 69 "is outside the map" field --map builtin:narrow-gap --model $quad --at 50,0,1
+refused 69 "is unknown" field --map two_rooms.bt --model $quad --at 0.8,-0.8,0.8
 refused 69 "start_blocked" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 3,1.2,1 --goal 5,0,1
 grep -q '^status  *start_blocked' stdout || { echo "plan does not say its status on stdout"; failed=1; }
 refused 69 "goal_blocked" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 50,0,1 --json
 python3 -c 'import json, sys; assert json.load(open("stdout"))["status"] == "goal_blocked"' || { echo "plan --json is not JSON when refused"; failed=1; }
 
-# a bare call is a usage error as well, without a verb to name
+# a list of points says nothing of those inside a wall, and is not refused for them
+printf 'x_m,y_m,z_m\n1,0,1\n3,1.2,1\n' >points.csv
+"$backwash" field --map builtin:narrow-gap --model $quad --points points.csv --json >points.json || { echo "field --points is refused"; failed=1; }
+python3 -c 'import json; free, wall = json.load(open("points.json"))["points"]; assert free["sigma"] and wall["sigma"] is None' || failed=1
+
+# verbs that are none, and a bare call, without a verb to name
+for wrong in frobnicate "vehicle frobnicate"; do
+  "$backwash" $wrong >stdout 2>stderr
+  [[ $? == 64 && $(wc -l <stderr) == 1 && $(<stderr) == *"no verb 'frobnicate': one of "* ]] || { echo "$wrong: $(<stderr)"; failed=1; }
+done
+grep -q 'no verb .frobnicate.: one of fly, plan,' <("$backwash" frobnicate 2>&1) || { echo "frobnicate: the verbs are not named"; failed=1; }
+
+# standard output that cannot be written is told
+for full in "field --map builtin:narrow-gap --model $quad --at 1,0,1" "field --map builtin:narrow-gap --model $quad --at 1,0,1 --json" \
+  --help --version "fly --help"; do
+  "$backwash" $full >/dev/full 2>stderr
+  [[ $? == 74 && $(wc -l <stderr) == 1 && $(<stderr) == *"standard output"* ]] || { echo "$full on a full disk: $(<stderr)"; failed=1; }
+done
+
+# a bare call is a usage error as well
 "$backwash" >stdout 2>stderr
 [[ $? == 64 && $(wc -l <stderr) == 1 ]] || { echo "bare call: not 64 with one line"; failed=1; }
 refused 66 'absent.toml' import --map-columns absent.toml ms.csv -o logs

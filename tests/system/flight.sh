@@ -12,6 +12,17 @@ status=0
 [[ $status == 1 ]] || die "the mutant's exit code is $status"
 [[ $(wc -l <stderr) == 1 ]] && grep -q 'samples lay outside' stderr || die "the mutant's line: $(cat stderr)"
 
+# A vehicle that ships flies with its own model, and not with the 5-inch one's.
+for model in "" "--model builtin:quad-7in" "--model builtin:quad-5in"; do
+  "$backwash" fly --map builtin:narrow-gap --vehicle builtin:quad-7in $model --json >"seven${model#*:}.json" 2>stderr ||
+    [[ $? == 1 ]] || die "the flight of quad-7in failed: $(cat stderr)"
+done
+python3 - <<'PYTHON' || die "quad-7in is not flown with its own model"
+import json
+default, own, other = (json.load(open(f"seven{name}.json"))["tight"]["largest_half_axis_m"] for name in ("", "quad-7in", "quad-5in"))
+assert default == own != other, (default, own, other)
+PYTHON
+
 python3 - <<'PYTHON'
 import csv, json, re
 flight, mutant = json.load(open("flight.json")), json.load(open("mutant.json"))

@@ -25,7 +25,7 @@ for unit in backwashd.service backwashd@.service; do
   systemd-analyze security --offline=yes --no-pager --threshold=16 "$build/systemd/$unit" >"$work/security" ||
     die "$unit: $(tail -n 1 "$work/security")"
   echo "$unit: exposure $(sed -n 's/^.*Overall.*: \([0-9.]*\) .*/\1/p' "$work/security")"
-  for needed in Type=notify WatchdogSec=3s WatchdogSignal=SIGKILL Restart=on-failure 'RestartPreventExitStatus=64 78' LimitCORE=0 \
+  for needed in Type=notify WatchdogSec=3s WatchdogSignal=SIGKILL Restart=on-failure 'RestartPreventExitStatus=64 66 78' LimitCORE=0 \
     User=backwash DevicePolicy=closed MemorySwapMax=0; do
     grep -qxF "$needed" "$build/systemd/$unit" || die "$unit: no $needed"
   done

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/command_line/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <iostream>
+#include <sstream>
+#include <type_traits>
+
+namespace backwash::services {
+namespace {
+
+template <typename T>
+struct NumberOf {
+  using type = T;
+};
+template <typename T>
+struct NumberOf<std::optional<T>> {
+  using type = T;
+};
+template <typename T>
+struct NumberOf<std::vector<T>> {
+  using type = T;
+};
+
+std::string not_finite(const std::string& text) {
+  double value = 0;
+  const bool number = CLI::detail::lexical_cast(text, value);
+  return number && !std::isfinite(value) ? text + " is not finite; it takes a finite number" : "";
+}
+
+/// A check of a number, by what holds of a good one.
+template <typename Holds>
+Check number_that(Holds holds, const std::string& takes, const std::string& words) {
+  return {[=](const std::string& text) {
+            double value = 0;
+            const bool good = CLI::detail::lexical_cast(text, value) && holds(value);
+            return good ? "" : "'" + text + "' is not right; it takes " + takes;
+          },
+          words};
+}
+
+std::string shown(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+std::string signed_text(const std::string& text) {
+  return text.starts_with('-') ? "'" + text + "' is below 0; it takes 0 or more" : "";
+}
+
+}  // namespace
+
+Check positive() {
+  return number_that([](double x) { return x > 0; }, "a number above 0", "POSITIVE");
+}
+Check not_negative() {
+  return number_that([](double x) { return x >= 0; }, "a number of 0 or more", "NONNEGATIVE");
+}
+Check within(double low, double high) {
+  const std::string range = shown(low) + " to " + shown(high);
+  return number_that([=](double x) { return x >= low && x <= high; }, "a number from " + range, range);
+}
+Check one_of(std::vector<std::string> names) {
+  std::string all;
+  for (const auto& name : names) all += (all.empty() ? "" : ", ") + name;
+  const auto wrong = [names, all](const std::string& text) {
+    return std::ranges::find(names, text) != names.end() ? "" : "'" + text + "' is not one of " + all;
+  };
+  return {wrong, "{" + all + "}"};
+}
+
+Option Option::required() { return option_->required(), *this; }
+Option Option::check(Check check) { return option_->check(check.wrong, check.words), *this; }
+Option Option::capture_default_str() { return option_->capture_default_str(), *this; }
+Option Option::default_str(const std::string& text) { return option_->default_str(text), *this; }
+Option Option::delimiter(char between) { return option_->delimiter(between), *this; }
+Option Option::expected(int count) { return option_->expected(count), *this; }
+Option Option::expected(int least, int most) { return option_->expected(least, most), *this; }
+Option Option::excludes(Option other) { return option_->excludes(other.option_), *this; }
+Option Option::type_name(const std::string& name) { return option_->type_name(name), *this; }
+Option Option::trigger_on_parse() { return option_->trigger_on_parse(), *this; }
+
+Command::Command(const std::string& what, const std::string& name)
+    : owned_(std::make_unique<CLI::App>(what, name)), app_(owned_.get()) {}
+Command::Command(CLI::App* app) : app_(app) {}
+Command::~Command() = default;
+
+Command& Command::add_subcommand(const std::string& name, const std::string& what) {
+  CLI::App* const verb = app_->add_subcommand(name, what);
+  verb->preparse_callback([this, name](std::size_t) { begun_ = name; });
+  subcommands_.push_back(std::unique_ptr<Command>(new Command(verb)));
+  return *subcommands_.back();
+}
+
+template <typename T>
+Option Command::add_option(const std::string& name, T& target, const std::string& help) {
+  CLI::Option* const option = app_->add_option(name, target, help);
+  using Number = typename NumberOf<T>::type;
+  if constexpr (std::is_floating_point_v<Number>) option->check(not_finite, "");
+  if constexpr (std::is_unsigned_v<Number>) option->check(signed_text, "");
+  return Option(option);
+}
+template Option Command::add_option(const std::string&, std::string&, const std::string&);
+template Option Command::add_option(const std::string&, double&, const std::string&);
+template Option Command::add_option(const std::string&, int&, const std::string&);
+template Option Command::add_option(const std::string&, std::uint64_t&, const std::string&);
+template Option Command::add_option(const std::string&, std::uint32_t&, const std::string&);
+template Option Command::add_option(const std::string&, std::optional<double>&, const std::string&);
+template Option Command::add_option(const std::string&, std::optional<std::uint64_t>&, const std::string&);
+template Option Command::add_option(const std::string&, std::vector<std::string>&, const std::string&);
+template Option Command::add_option(const std::string&, std::vector<double>&, const std::string&);
+template Option Command::add_option(const std::string&, std::vector<int>&, const std::string&);
+
+Option Command::add_text(const std::string& name, std::function<void(const std::string&)> take,
+                         const std::string& help) {
+  return Option(app_->add_option_function<std::string>(name, take, help));
+}
+
+Option Command::add_texts(const std::string& name, std::function<void(const std::vector<std::string>&)> take,
+                          const std::string& help) {
+  return Option(app_->add_option_function<std::vector<std::string>>(name, take, help));
+}
+
+void Command::add_flag(const std::string& name, bool& target, const std::string& help) {
+  app_->add_flag(name, target, help);
+}
+void Command::version(const std::string& text) { app_->set_version_flag("--version", app_->get_name() + " " + text); }
+void Command::footer(const std::string& text) { app_->footer(text); }
+void Command::require_subcommand() { app_->require_subcommand(1); }
+void Command::fallthrough() { app_->fallthrough(); }
+void Command::on_parsed(std::function<void()> then) { app_->callback(std::move(then)); }
+void Command::on_complete(std::function<void()> then) { app_->parse_complete_callback(std::move(then)); }
+bool Command::parsed() const { return app_->parsed(); }
+std::string Command::name() const { return app_->get_name(); }
+
+std::string Command::line() const { return name() + (begun_.empty() ? "" : " " + begun_); }
+
+int Command::usage(const std::string& what) const {
+  std::string told = what;
+  std::replace(told.begin(), told.end(), '\n', ' ');
+  std::fprintf(stderr, "%s: %s; see %s --help\n", line().c_str(), told.c_str(), line().c_str());
+  return kUsageExit;
+}
+
+/// What to say where none of the verbs was begun.
+std::string Command::no_verb() const {
+  for (const auto& verb : subcommands_)
+    if (verb->parsed()) return verb->no_verb();
+  const std::vector<std::string> rest = app_->remaining();
+  std::string said =
+      rest.empty() || rest.front().starts_with('-') ? "a verb is needed" : "no verb '" + rest.front() + "'";
+  for (std::size_t i = 0; i < subcommands_.size(); ++i) said += (i == 0 ? ": one of " : ", ") + subcommands_[i]->name();
+  return said;
+}
+
+std::optional<int> Command::parse(int argc, const char* const* argv) {
+  try {
+    app_->parse(argc, argv);
+    return std::nullopt;
+  } catch (const CLI::Success& help_or_version) {
+    return finished(app_->exit(help_or_version), name());
+  } catch (const CLI::ParseError& wrong) {
+    const bool verbless = std::string_view(wrong.what()) == "A subcommand is required";
+    return usage(verbless ? no_verb() : wrong.what());
+  } catch (const UsageError& wrong) {
+    return usage(wrong.what());
+  }
+}
+
+int finished(int code, const std::string& program) {
+  std::cout.flush();
+  if (std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  std::fprintf(stderr, "%s: standard output cannot be written to its end; free some space\n", program.c_str());
+  return code == 0 ? kOutputExit : code;
+}
+
+}  // namespace backwash::services
