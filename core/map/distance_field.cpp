@@ -4,98 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 
+#include "core/map/distance_transform.hpp"
 #include "core/map/lattice.hpp"
 
 namespace backwash::map {
 namespace {
-
-// Squared distances are integers in units of half a voxel, so the transform is exact. On a line, voxel i has its centre
-// at 2i + 1 and face j lies at 2j.
-using Squared = std::uint32_t;  // at most (2·32768 − 1)²: the nearest side of the grid is never farther
-
-/// Work space for one line of n voxels.
-struct Line {
-  explicit Line(std::size_t n) : cost(n), face(n + 1), vertex(n + 1), from(n + 1) {}
-  std::vector<std::int64_t> cost;    // of the voxels: squared distance in the axes done so far
-  std::vector<std::int64_t> face;    // of the faces: the cheaper of the two voxels that share it
-  std::vector<std::int64_t> vertex;  // lower envelope: position 2j of its parabolas …
-  std::vector<std::int64_t> from;    // … and where each starts to be the lowest
-};
-
-/// In place: cost[i] ← min over voxels k of cost[k] + d(i, k)², d from i's centre to k's box. For k ≠ i that box is met
-/// at a face, so the minimum over all faces plus voxel i itself is enough, and the faces' parabolas have the usual
-/// lower envelope. Beyond both ends lie obstacles: the outermost faces cost nothing.
-void add_axis(Line& line) {
-  const std::size_t n = line.cost.size();
-  line.face[0] = line.face[n] = 0;
-  for (std::size_t j = 1; j < n; ++j) line.face[j] = std::min(line.cost[j - 1], line.cost[j]);
-
-  std::size_t last = 0;
-  line.vertex[0] = 0;
-  line.from[0] = 0;
-  const auto height = [&](std::int64_t x, std::int64_t q) {
-    return (x - q) * (x - q) + line.face[static_cast<std::size_t>(q / 2)];
-  };
-  const auto end = static_cast<std::int64_t>(2 * n);
-  for (std::int64_t q = 2; q <= end; q += 2) {
-    std::int64_t start = 0;
-    bool empty = false;
-    while (height(line.from[last], line.vertex[last]) > height(line.from[last], q)) {
-      if (last == 0) {
-        empty = true;
-        break;
-      }
-      --last;
-    }
-    if (!empty) {
-      const std::int64_t p = line.vertex[last];
-      const std::int64_t rise = q * q - p * p + line.face[static_cast<std::size_t>(q / 2)] -
-                                line.face[static_cast<std::size_t>(p / 2)];  // ≥ 0: q loses or ties where p starts
-      start = 1 + rise / (2 * (q - p));
-      if (start >= end) continue;
-      ++last;
-    }
-    line.vertex[last] = q;
-    line.from[last] = start;
-  }
-  for (std::size_t i = n; i-- > 0;) {
-    const auto x = static_cast<std::int64_t>(2 * i + 1);
-    while (line.from[last] > x) --last;
-    line.cost[i] = std::min(line.cost[i], height(x, line.vertex[last]));
-  }
-}
-
-/// First axis: distance along each x row to the nearest obstacle in that row.
-void start_rows(const OccupancyGrid& grid, std::vector<Squared>& squared) {
-  const auto nx = static_cast<std::size_t>(grid.size().x());
-  const auto cells = grid.cells();
-  const auto square = [](std::size_t steps) {
-    const auto d = static_cast<Squared>(steps == 0 ? 0 : 2 * std::min<std::size_t>(steps, 32768) - 1);
-    return d * d;
-  };
-  for (std::size_t row = 0; row < cells.size(); row += nx) {
-    std::size_t steps = 0;
-    for (std::size_t i = 0; i < nx; ++i) {
-      steps = cells[row + i] == Cell::free ? steps + 1 : 0;
-      squared[row + i] = square(steps);
-    }
-    steps = 0;
-    for (std::size_t i = nx; i-- > 0;) {
-      steps = cells[row + i] == Cell::free ? steps + 1 : 0;
-      squared[row + i] = std::min(squared[row + i], square(steps));
-    }
-  }
-}
-
-void transform_line(std::vector<Squared>& squared, std::size_t begin, std::size_t stride, Line& line) {
-  for (std::size_t i = 0, k = begin; i < line.cost.size(); ++i, k += stride) line.cost[i] = squared[k];
-  add_axis(line);
-  for (std::size_t i = 0, k = begin; i < line.cost.size(); ++i, k += stride) {
-    squared[k] = static_cast<Squared>(line.cost[i]);
-  }
-}
 
 /// The eight centres around a point and its position between them.
 struct Corners {
@@ -119,26 +33,39 @@ double gap(double q, int i) noexcept { return std::max({i - q, q - (i + 1), 0.0}
 }  // namespace
 
 DistanceField::DistanceField(const OccupancyGrid& grid)
-    : origin_W_(grid.origin()), resolution_(grid.resolution()), size_(grid.size()), distance_(grid.cell_count()) {
-  std::vector<Squared> squared(grid.cell_count());
-  start_rows(grid, squared);
-  const auto nx = static_cast<std::size_t>(size_.x());
-  const auto ny = static_cast<std::size_t>(size_.y());
-  const auto nz = static_cast<std::size_t>(size_.z());
-  Line along_y(ny);
-  for (std::size_t k = 0; k < nz; ++k) {
-    for (std::size_t i = 0; i < nx; ++i) transform_line(squared, i + nx * ny * k, nx, along_y);
-  }
-  Line along_z(nz);
-  for (std::size_t column = 0; column < nx * ny; ++column) transform_line(squared, column, nx * ny, along_z);
-  std::transform(squared.begin(), squared.end(), distance_.begin(), [this](Squared s) {
-    return static_cast<float>(0.5 * resolution_ * std::sqrt(static_cast<double>(s)));
-  });
+    : origin_W_(grid.origin()),
+      resolution_(grid.resolution()),
+      half_voxel_(0.5 * grid.resolution()),
+      size_(grid.size()),
+      squared_(grid.cell_count()) {
+  transform_distances(grid, {Index3::Zero(), size_ - Index3::Ones()}, squared_);
 }
 
-double DistanceField::at(const Index3& v) const noexcept {
-  return inside(size_, v) ? static_cast<double>(distance_[linear(size_, v)]) : 0.0;
+void DistanceField::update(const OccupancyGrid& grid, const VoxelBox& changed) {
+  if (changed.empty()) return;
+  const Index3 around = Index3::Constant(most_steps(size_));
+  const Index3 low = (changed.low - around).cwiseMax(0),
+               high = (changed.high + around).cwiseMin(size_ - Index3::Ones());
+  // Half voxels between a voxel's centre and the box along an axis.
+  const auto gap2 = [&](int axis, int i) {
+    const int gap = std::max({0, 2 * (changed.low[axis] - i) - 1, 2 * (i - changed.high[axis]) - 1});
+    return gap * gap;
+  };
+  VoxelBox affected;
+  for (int k = low.z(); k <= high.z(); ++k)
+    for (int j = low.y(); j <= high.y(); ++j) {
+      const int beside = gap2(2, k) + gap2(1, j);
+      const std::uint16_t* const row = &squared_[linear(size_, {0, j, k})];
+      const auto reached = [&](int i) { return beside + gap2(0, i) <= row[i]; };
+      int first = low.x(), last = high.x();
+      while (first <= last && !reached(first)) ++first;
+      while (first < last && !reached(last)) --last;
+      if (first <= last) affected.add({first, j, k}), affected.add({last, j, k});
+    }
+  transform_distances(grid, affected, squared_);
 }
+
+double DistanceField::at(const Index3& v) const noexcept { return inside(size_, v) ? at(linear(size_, v)) : 0.0; }
 
 bool DistanceField::covers(const Vec3& q) const noexcept {
   return (q.array() >= 0.0).all() && (q.array() < size_.cast<double>().array()).all();  // false for NaN

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 #include <queue>
-#include <tuple>
+#include <utility>
 
 #include "core/reach/clearance.hpp"
 
@@ -14,6 +14,12 @@ namespace backwash::plan {
 namespace {
 
 constexpr double kClearanceCap = 1.0;  // m, as hover_set's
+constexpr double kRounding = 1e-5;     // m, more than any of a distance, single precision included
+
+/// What is left of a distance for clearance starts beyond it, m.
+double body_and_estimation(const World& world) {
+  return world.reach.vehicle.body.radius + world.reach.vehicle.estimation.position;
+}
 
 /// Clearance of the hover set at a voxel's centre, m.
 double clearance(const World& world, const Index3& v) {
@@ -24,9 +30,29 @@ double clearance(const World& world, const Index3& v) {
 /// At least the clearance of the hover set at a voxel's centre, without looking for obstacles: the set holds a point no
 /// farther from the centre than a mean push shifts it, and with `distance` single precision.
 double clearance_at_most(const World& world, const Index3& v) {
-  const auto& vehicle = world.reach.vehicle;
   if (!world.bounds.extension().none()) return kClearanceCap;
-  return std::min(kClearanceCap, world.distance.at(v) + 1e-5 - vehicle.body.radius - vehicle.estimation.position);
+  return std::min(kClearanceCap, world.distance.at(v) + kRounding - body_and_estimation(world));
+}
+
+/// Whether sets are prisms around voxel centres.
+bool plain_sets(const World& world) { return !world.constant_margin && world.bounds.extension().none(); }
+
+/// Whether the clearance at a hover-safe voxel is larger than that. Precondition: plain_sets.
+bool clear_by(const World& world, const Index3& v, double metres) {
+  const Vec3 p_W = world.grid.center(v);
+  const auto h = reach::hover_extent(world.reach, world.grid, world.distance, world.bounds, p_W).half_widths;
+  const double least = metres + body_and_estimation(world);
+  const Vec3 half(h[kX], h[kY], h[kZ]), box = half + Vec3::Constant(std::max(0.0, least));  // holds all within that
+  return world.distance.at(v) - half.norm() - kRounding > least || world.sums.box_free(p_W - box, p_W + box) ||
+         reach::prism_clear(world.grid, world.sums, p_W, h, least);
+}
+
+/// The clearance at a hover-safe voxel, m, if it is larger than `metres`.
+std::optional<double> wider_than(const World& world, const Index3& v, double metres) {
+  if (clearance_at_most(world, v) <= metres) return std::nullopt;
+  if (plain_sets(world) && !clear_by(world, v, metres - kRounding)) return std::nullopt;
+  const double c = clearance(world, v);
+  return c > metres ? std::optional(c) : std::nullopt;
 }
 
 const std::array<Index3, 6> kNeighbours = {Index3{1, 0, 0},  Index3{-1, 0, 0}, Index3{0, 1, 0},
@@ -46,11 +72,9 @@ Region flood(const World& world, std::size_t seed, std::uint32_t number, std::ve
     const Vec3 p = grid.center(v);
     region.voxels += 1;
     region.low_W = region.low_W.cwiseMin(p - half), region.high_W = region.high_W.cwiseMax(p + half);
-    if (clearance_at_most(world, v) > region.widest_clearance_m) {
-      if (const double c = clearance(world, v); c > region.widest_clearance_m) {
-        region.widest_clearance_m = c;
-        region.widest_W = p;
-      }
+    if (const auto wider = wider_than(world, v, region.widest_clearance_m)) {
+      region.widest_clearance_m = *wider;
+      region.widest_W = p;
     }
     for (const auto& step : kNeighbours) {
       const Index3 next = v + step;
@@ -73,6 +97,17 @@ struct Width {
 Width width(const World& world, const Index3& v) {
   if (world.hover.safe(v)) return {true, clearance(world, v)};
   return {false, world.distance.at(v)};
+}
+
+/// At least that, without looking for obstacles.
+Width width_at_most(const World& world, const Index3& v) {
+  return world.hover.safe(v) ? Width{true, clearance_at_most(world, v) + kRounding} : width(world, v);
+}
+
+/// min(width, `cap`), by one look where the set is wider.
+Width width_up_to(const World& world, const Index3& v, const Width& cap) {
+  if (cap.safe && plain_sets(world) && clear_by(world, v, cap.metres + kRounding)) return cap;
+  return std::min(cap, width(world, v));
 }
 
 }  // namespace
@@ -105,23 +140,28 @@ std::optional<Bottleneck> widest_way(const World& world, const Vec3& from_W, con
   if (!grid.free(from) || !grid.free(to)) return std::nullopt;
   constexpr auto kNone = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> parent(grid.cell_count(), kNone);
-  std::vector<char> closed(grid.cell_count());
+  std::vector<char> exact(grid.cell_count()), closed = exact;
   using Entry = std::pair<Width, std::size_t>;
   std::priority_queue<Entry> open;
-  open.push({width(world, from), grid.linear(from)});
+  open.push({width_at_most(world, from), grid.linear(from)});
   parent[grid.linear(from)] = grid.linear(from);
   const std::size_t goal = grid.linear(to);
   while (!open.empty() && !closed[goal]) {
     const auto [widest, i] = open.top();
     open.pop();
     if (closed[i]) continue;
+    // Widths are looked at when they matter: an exact one on top is no narrower than all others can be.
+    if (!std::exchange(exact[i], 1)) {
+      open.push({width_up_to(world, grid.voxel(i), widest), i});
+      continue;
+    }
     closed[i] = 1;
     for (const auto& step : kNeighbours) {
       const Index3 next = grid.voxel(i) + step;
       if (!grid.free(next) || parent[grid.linear(next)] != kNone) continue;
       // The first parent popped is the widest one, so a voxel need not be pushed twice.
       parent[grid.linear(next)] = i;
-      open.push({std::min(widest, width(world, next)), grid.linear(next)});
+      open.push({std::min(widest, width_at_most(world, next)), grid.linear(next)});
     }
   }
   if (!closed[goal]) return std::nullopt;
@@ -137,75 +177,6 @@ std::optional<Bottleneck> widest_way(const World& world, const Vec3& from_W, con
                     world.distance.exact(grid, place), length};
 }
 
-SetCost cost_of_set(const World& world) {
-  const auto& [grid, reach] = std::tie(world.grid, world.reach);
-  const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
-  SetCost cost;
-  std::vector<double> given_up;
-  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    if (grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
-    const Index3 v = grid.voxel(n);
-    PerDirection h = world.bounds.at(v).w;
-    for (std::size_t d = 0; d < kDirections; ++d) h[d] *= d == kZ ? reach.vertical.h_inf : reach.horizontal.h_inf;
-    // The prism holds its centre, so it is no farther from obstacles, and no nearer than its circumradius makes it.
-    const double free = world.distance.at(n), circumradius = Vec3(h[kX], h[kY], h[kZ]).norm();
-    const double limit = std::min(kClearanceCap + taken, free + 1e-5);
-    const bool far = free - 1e-5 - circumradius >= kClearanceCap + taken;
-    const double at_centre = far ? kClearanceCap : reach::prism_distance(grid, grid.center(v), h, limit) - taken;
-    if (!(at_centre > 0)) continue;
-    ++cost.safe_at_centre;
-    if (!world.hover.safe(v)) {
-      ++cost.lost;
-    } else if (at_centre < kClearanceCap) {
-      given_up.push_back(at_centre - clearance(world, v));
-    }
-  }
-  if (given_up.empty()) return cost;
-  std::sort(given_up.begin(), given_up.end());
-  cost.median_m = given_up[given_up.size() / 2];
-  cost.quantile95_m = given_up[given_up.size() * 95 / 100];
-  return cost;
-}
-
-namespace {
-
-/// Whether the set's clearance is positive. A world by sets of method tight knows it; else it is looked for.
-bool safe_by_sets(const World& world, const reach::HoverSet& set, const Index3& v) {
-  if (!world.constant_margin && world.reach.method == reach::Method::tight) return world.hover.safe(v);
-  return set.bounded &&
-         reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v)).safe();
-}
-
-}  // namespace
-
-std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m) {
-  const auto& [grid, reach] = std::tie(world.grid, world.reach);
-  const double taken = reach.vehicle.body.radius + reach.vehicle.estimation.position;
-  std::vector<AgainstMargin> result;
-  for (const double margin : margins_m) result.push_back({margin});
-  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    if (grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
-    const Index3 v = grid.voxel(n);
-    const auto set = reach::hover_extent(reach, grid, world.distance, world.bounds, grid.center(v));
-    const bool set_safe = safe_by_sets(world, set, v);
-    const auto& h = set.half_widths;
-    const double nearest = std::ranges::min(h), corner = Vec3(h[kX], h[kY], h[kZ]).norm();  // at least the farthest
-    for (auto& against : result) {
-      ++against.voxels;
-      const bool ball_safe = world.distance.at(n) > taken + against.margin_m;
-      against.only_ball_safe += ball_safe && !set_safe;
-      against.only_set_safe += set_safe && !ball_safe;
-      if (!set.bounded) {
-        ++against.unbounded;
-      } else {
-        against.ball_inside_set += nearest >= against.margin_m;
-        against.set_inside_ball += corner <= against.margin_m;
-      }
-    }
-  }
-  return result;
-}
-
 std::optional<HoverPair> farthest_pair(const World& world, const Regions& regions,
                                        const std::function<bool(const Vec3&)>& can_take_off) {
   const auto& grid = world.grid;
@@ -217,9 +188,9 @@ std::optional<HoverPair> farthest_pair(const World& world, const Regions& region
       std::optional<Vec3> best;
       for (int k = 0; k < grid.size().z(); ++k) {
         const Index3 v(i, j, k);
-        if (regions.of_voxel[grid.linear(v)] != 0u || (best && clearance_at_most(world, v) <= widest)) continue;
-        const double c = clearance(world, v);
-        if (!best || c > widest) widest = c, best = grid.center(v);
+        if (regions.of_voxel[grid.linear(v)] != 0u) continue;
+        const auto wider = best ? wider_than(world, v, widest) : clearance(world, v);
+        if (wider) widest = *wider, best = grid.center(v);
       }
       if (best) candidates.push_back(*best);
     }

@@ -48,8 +48,9 @@ struct SetCost {
   std::size_t lost = 0;                   ///< of these, not hover-safe with Σ over the set
   double median_m = 0, quantile95_m = 0;  ///< clearance given up at the others with less than the cap, m
 };
-/// Precondition: method tight, no constant margin. O(voxels · prism_distance): offline.
-SetCost cost_of_set(const World& world);
+/// Precondition: method tight, no constant margin. Clearances are looked for where bounds on them leave the quantiles
+/// open. O(voxels · prism_distance): offline.
+SetCost cost_of_set(const World& world, const Parallel& parallel = run_serial);
 
 /// The hover set against a ball of constant radius in its place, over the free voxels where body and estimation fit
 /// (distance > body.radius + estimation.position): where one holds the other, hovering safely with the larger implies
@@ -64,7 +65,8 @@ struct AgainstMargin {
   std::size_t only_set_safe = 0;    ///< and the other way round
 };
 /// One entry a margin. Precondition: no constant margin in the world. O(voxels · prism_distance): offline.
-std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m);
+std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m,
+                                               const Parallel& parallel = run_serial);
 
 /// Two hover points far apart in the largest region, one a column where its clearance is largest; the first one passes
 /// `can_take_off`. Deterministic for a world.

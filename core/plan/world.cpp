@@ -124,7 +124,8 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
                                           const Model& model, const Parallel& parallel) {
   if (changed.empty()) return std::make_shared<const World>(old);
   const Model vehicle_model = with_vehicle(model, old.reach.vehicle);
-  map::DistanceField distance(grid);
+  map::DistanceField distance = old.distance;
+  distance.update(grid, changed);
   map::OccupancySums sums = old.sums;
   sums.update(grid, changed.low, changed.high);
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, old.reach.vehicle);

@@ -142,7 +142,8 @@ int run(const Options& options) {
   }
   std::optional<Sets> sets;
   if (options.method == reach::Method::tight && !options.margin)
-    sets = Sets{plan::cost_of_set(*world), plan::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4})};
+    sets = Sets{plan::cost_of_set(*world, run_parallel),
+                plan::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4}, run_parallel)};
   options.json ? print_json(*world, regions, way, sets) : print_text(*world, regions, way, sets);
   return kOk;
 }

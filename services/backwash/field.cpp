@@ -85,9 +85,8 @@ std::vector<Value> interpolated(const field::ProximityField& exact, const std::v
     if (wanted[i]) voxels.push_back(i);
   }
   field::DisturbanceField stored(grid);
-  run_parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
-    stored.fill(exact, std::span(voxels).subspan(begin, end - begin));
-  });
+  const field::WholeField whole(grid, exact.model(), voxels);
+  run_parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); });
   field::Extension extension(grid, exact.model());
   extension.fill(grid, voxels);
   if (extension.by_place()) stored.scale(extension, voxels);

@@ -116,6 +116,26 @@ TEST(StoredField, EqualsTheExactFieldInRoomsTurnedByAnyAngle) {
   }
 }
 
+TEST(StoredField, EqualsTheExactFieldInTheTwoLayersOfASliceOfATurnedRoom) {
+  const OccupancyGrid grid = scene::turned_room(23 * std::numbers::pi / 180, 0.08);
+  auto voxels = free_voxels(grid);
+  std::erase_if(voxels, [&](std::size_t n) { return grid.voxel(n).z() < 11 || grid.voxel(n).z() > 12; });
+  ASSERT_GT(voxels.size(), 500u);
+  const WholeField whole(grid, Model{}, voxels);
+  DisturbanceField by_blocks(grid), one_by_one(grid);
+  by_blocks.fill(whole, 0, whole.block_count());
+  one_by_one.fill(ProximityField(grid, Model{}), voxels);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> within(-0.5, 0.5);
+  for (int n = 0; n < 2000; ++n) {
+    const Index3 v = grid.voxel(voxels[random() % voxels.size()]);
+    Vec3 p = grid.center(v) + 0.08 * Vec3(within(random), within(random), 0);
+    p.z() = grid.origin().z() + 0.08 * (12 + within(random));  // between the layers' centres
+    const auto slice = by_blocks.interpolated(p, {}), exact = one_by_one.interpolated(p, {});
+    ASSERT_LE(difference(oracle::matrix(slice), oracle::matrix(exact)), 1e-6) << "at " << p.transpose();
+  }
+}
+
 // More layers than a word of heights has, and an edge so small that elements stand beyond one.
 TEST(StoredField, EqualsTheExactFieldInATallRoomAndAtASmallEdge) {
   expect_exact_at_samples(scene::turned_room(0.4, 0.1, 17), 1000);

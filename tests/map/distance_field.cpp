@@ -87,6 +87,50 @@ TEST(DistanceField, MeasuresToTheSidesOfAnEmptyGrid) {
   }
 }
 
+void expect_equal(const DistanceField& a, const DistanceField& b, std::size_t cells) {
+  for (std::size_t n = 0; n < cells; ++n) ASSERT_EQ(a.at(n), b.at(n)) << "voxel " << n;
+}
+
+TEST(DistanceField, FollowsChangesBitForBit) {
+  std::mt19937_64 random(6);
+  for (const Index3& size : {Index3(40, 35, 30), Index3(90, 20, 40), Index3(9, 80, 33), Index3(70, 65, 4)}) {
+    OccupancyGrid grid({-1, 2, -3}, 0.1, size, Cell::free);
+    for (int i = 0; i < 8; ++i) grid.set(grid.voxel(random() % grid.cell_count()), Cell::occupied);
+    DistanceField field(grid);
+    for (int round = 0; round < 40; ++round) {
+      const Index3 low = grid.voxel(random() % grid.cell_count());
+      VoxelBox changed;
+      for (int n = 0; n < 60; ++n) {
+        const Index3 v = (low + Index3(n % 5, n / 5 % 4, n / 20)).cwiseMin(size - Index3::Ones());
+        grid.set(v, round % 3 ? Cell::free : static_cast<Cell>(random() % 3));  // what came goes
+        changed.add(v);
+      }
+      field.update(grid, changed);
+      expect_equal(field, DistanceField(grid), grid.cell_count());
+    }
+    field.update(grid, VoxelBox{});
+    expect_equal(field, DistanceField(grid), grid.cell_count());
+  }
+}
+
+// Squares of 128 voxels and more do not fit into what is stored: the distance is never said to be larger than it is.
+TEST(DistanceField, IsTooSmallBeyondWhatIsStoredAndNeverTooLarge) {
+  OccupancyGrid grid({0, 0, 0}, 0.1, Index3(262, 264, 266), Cell::free);
+  grid.set({131, 131, 5}, Cell::occupied);
+  const DistanceField field(grid);
+  const auto expect_at = [&](const Index3& v, double expected) { EXPECT_NEAR(field.at(v), expected, 1e-5) << v; };
+  expect_at({131, 131, 132}, 12.65);
+  expect_at({131, 131, 133}, 12.75);
+  expect_at({131, 131, 134}, 12.79990);  // 12.85 in truth
+  for (const Index3& v : {Index3(131, 131, 134), Index3(130, 133, 140), Index3(131, 131, 133)}) {
+    for (const Vec3& off : {Vec3(0.04, -0.03, 0.02), Vec3(0.0, 0.0, -0.049)}) {
+      const Vec3 p = grid.center(v) + off;
+      EXPECT_LE(field.exact(grid, p), brute_force(grid, p) + 1e-9);
+      EXPECT_GT(field.exact(grid, p), 12.5);
+    }
+  }
+}
+
 TEST(DistanceField, InterpolatedStaysWithinSqrtThreeHalvesOfAVoxelOfExact) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> unit(0.0, 1.0);

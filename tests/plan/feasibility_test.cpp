@@ -9,6 +9,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
+#include "tests/support/cost_of_set.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -95,6 +96,41 @@ TEST(WidestWay, DoesNotExistThroughAWall) {
   const auto& world = narrow_gap();
   EXPECT_FALSE(widest_way(world, {1, 0, 1}, {3, 1.5, 1}));
   EXPECT_FALSE(widest_way(world, {1, 0, 1}, {30, 0, 1}));
+}
+
+/// A push on one side of the gap: sets around centres that are not their voxels'.
+const World& pushed_gap() {
+  static const auto world = [] {
+    auto model = *config::load_model("builtin:quad-5in");
+    model.extension = {{Law::push, Vec3(0.5, 0.2, 0), Vec3(0.05, 0.05, 0.05), 0}};
+    return build_world(*map::builtin_scene("narrow-gap", 0.2), model, *config::load_vehicle("builtin:quad-5in"));
+  }();
+  return *world;
+}
+
+TEST(CostOfSet, IsThatOfEveryClearanceLookedFor) {
+  for (const World* world : {&narrow_gap(), &pushed_gap()}) {
+    const auto found = cost_of_set(*world), expected = test::cost_of_set(*world);
+    EXPECT_GT(found.safe_at_centre, 1000u);
+    EXPECT_EQ(found.safe_at_centre, expected.safe_at_centre);
+    EXPECT_EQ(found.lost, expected.lost);
+    EXPECT_GT(expected.quantile95_m, 0.001);
+    EXPECT_NEAR(found.median_m, expected.median_m, 1e-12);
+    EXPECT_NEAR(found.quantile95_m, expected.quantile95_m, 1e-12);
+  }
+}
+
+TEST(CostOfSet, DoesNotDependOnHowTheWorkIsDivided) {
+  const Parallel backwards = [](std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
+    for (std::size_t n = count; n-- > 0;) work(n, n + 1);
+  };
+  const auto whole = cost_of_set(narrow_gap()), divided = cost_of_set(narrow_gap(), backwards);
+  EXPECT_EQ(whole.safe_at_centre, divided.safe_at_centre);
+  EXPECT_EQ(whole.lost, divided.lost);
+  EXPECT_EQ(whole.median_m, divided.median_m);
+  EXPECT_EQ(whole.quantile95_m, divided.quantile95_m);
+  EXPECT_EQ(set_against_margins(narrow_gap(), {0.2})[0].only_set_safe,
+            set_against_margins(narrow_gap(), {0.2}, backwards)[0].only_set_safe);
 }
 
 TEST(FarthestPair, IsSafeAndFarApartAndStartsWhereOneCanTakeOff) {

@@ -32,6 +32,17 @@ done
 "$backwash" field --map builtin:parallel-walls-1m --model $quad --vehicle $quad --at 0,0,1 --interpolated --json >stored.json
 "$backwash" field --map builtin:parallel-walls-1m --model $quad --slice z=1 --out slice.svg --json >slice.json
 grep -q '<svg' slice.svg || die "the slice's picture is not an SVG"
+# Through voxel centres a slice shows stored values themselves.
+"$backwash" field --map builtin:apartment --model $quad --slice z=1.05 --json >centres.json
+python3 - <<'PYTHON'
+import json, random
+points = json.load(open("centres.json"))["points"]
+random.seed(1)
+json.dump(random.sample(points, 300), open("sample.json", "w"))
+rows = (",".join(repr(x) for x in point["p"]) for point in json.load(open("sample.json")))
+open("sample.csv", "w").write("x_m,y_m,z_m\n" + "\n".join(rows) + "\n")
+PYTHON
+"$backwash" field --map builtin:apartment --model $quad --points sample.csv --json >asked.json
 printf 'start = [1, 0, 1]\n[[hover]]\np = [1.5, 0, 1]\ndwell = 1.0\n[[hover]]\np = [1, 0, 1.2]\ndwell = 2.0\n' >spec.toml
 "$backwash" simulate --map builtin:narrow-gap --vehicle $quad --flight spec.toml --seed 3 --out a.csv --json >simulate.json
 "$backwash" simulate --map builtin:narrow-gap --vehicle $quad --flight spec.toml --seed 3 --out b.csv >/dev/null
@@ -67,6 +78,9 @@ assert all(abs(a - b) < 1e-12 for a, b in zip(parts, exact["sigma"])), "parts do
 stored = json.load(open("stored.json"))["points"][0]["sigma"]
 assert abs(stored[5] - exact["sigma"][5]) < 0.1 * exact["sigma"][5], "stored and exact differ"
 assert len(json.load(open("slice.json"))["points"]) > 100
+for shown, asked in zip(json.load(open("sample.json")), json.load(open("asked.json"))["points"], strict=True):
+    off = max(abs(a - b) for a, b in zip(shown["sigma"], asked["sigma"]))
+    assert off <= 1e-6 * max(map(abs, asked["sigma"])), f"slice and exact query differ at {asked['p']}"
 rows = list(csv.DictReader(open("a.csv")))
 assert json.load(open("simulate.json"))["rows"] == len(rows)
 assert {row["segment"] for row in rows} == {"-1", "0", "1"}
