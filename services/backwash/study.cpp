@@ -241,7 +241,8 @@ int run(const Options& options) {
     json["extended_model"] = options.out;
   }
   if (!options.report.empty()) {
-    std::string beside = anytime ? html(*anytime) : "";
+    std::string beside = design ? html(*design, options.design) : "";
+    if (anytime) beside += html(*anytime);
     if (options.residuals)
       beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
     write_page(

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <span>
 
 #include "core/plan/ends.hpp"
+#include "core/report/page.hpp"
+#include "core/types/formatted.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/verb.hpp"
 #include "services/parallel/parallel.hpp"
@@ -15,6 +18,28 @@ namespace {
 constexpr std::size_t kTold = 3;  // flights, in the text
 
 double seconds(const study::NextFlight& flight) { return kControlPeriod * static_cast<double>(flight.commands.size()); }
+
+std::string name_of(const study::NextFlight& flight) {
+  return flight.name + (flight.used_battery ? ", used battery" : "");
+}
+
+std::string set_of(const study::DesignedSet& set) {
+  std::string text;
+  for (std::size_t i = 0; i < set.names.size(); ++i)
+    text += formatted("%s%s (%.2f)", i ? ", " : "", set.names[i].c_str(), set.probability[i]);
+  return text;
+}
+
+/// What so many of a flight tell.
+std::string outcome_of(const study::NextFlight& f) {
+  const auto nats = formatted("%.3g nats a flight expected, ", f.divergence);
+  if (!f.flights) return nats + formatted("does not separate (P = %.2f)", f.separated);
+  return nats + formatted("%d flight%s of %.0f s", *f.flights, f.flights > 1 ? "s" : "", seconds(f));
+}
+
+std::span<const study::NextFlight> told_flights(const study::Design& design) {
+  return std::span(design.flights).first(std::min(kTold, design.flights.size()));
+}
 
 }  // namespace
 
@@ -74,21 +99,8 @@ Json to_json(const study::Design& design, const DesignOptions& options) {
 
 void print_text(const study::Design& design, const DesignOptions& options) {
   std::printf("next flight: %s\n", design.message.c_str());
-  for (const auto& set : design.sets) {
-    std::printf("  of the set");
-    for (std::size_t i = 0; i < set.names.size(); ++i)
-      std::printf("%s %s (%.2f)", i ? "," : "", set.names[i].c_str(), set.probability[i]);
-    std::printf("\n");
-  }
-  for (std::size_t k = 0; k < std::min(kTold, design.flights.size()); ++k) {
-    const auto& f = design.flights[k];
-    std::printf("  %s%s: %.3g nats a flight expected, ", f.name.c_str(), f.used_battery ? ", used battery" : "",
-                f.divergence);
-    if (f.flights)
-      std::printf("%d flight%s of %.0f s\n", *f.flights, f.flights > 1 ? "s" : "", seconds(f));
-    else
-      std::printf("does not separate (P = %.2f)\n", f.separated);
-  }
+  for (const auto& set : design.sets) std::printf("  of the set %s\n", set_of(set).c_str());
+  for (const auto& f : told_flights(design)) std::printf("  %s: %s\n", name_of(f).c_str(), outcome_of(f).c_str());
   if (const auto* best = design.chosen()) {
     if (best->voltage) std::printf("  begin with the battery at about %.1f V\n", *best->voltage);
     std::printf("  %s: %zu rows, for backwashctl follow\n", options.points.c_str(), best->points_W.size());
@@ -96,6 +108,21 @@ void print_text(const study::Design& design, const DesignOptions& options) {
   if (!design.flights.empty() || !design.left_out.empty())
     std::printf("  %zu ways fit in the map, %zu do not\n", design.flights.size(), design.left_out.size());
   for (const auto& [name, why] : design.left_out) std::printf("  does not fit: %s (%s)\n", name.c_str(), why.c_str());
+}
+
+std::string html(const study::Design& design, const DesignOptions& options) {
+  std::string page = "<section><h2>The next flight</h2>\n<p>" + report::escaped(design.message) + "</p>\n<table>\n";
+  const auto row = [&](const std::string& name, const std::string& value) {
+    page += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value) + "</td></tr>\n";
+  };
+  for (const auto& set : design.sets) row("To tell apart, with their probabilities", set_of(set));
+  for (const auto& f : told_flights(design)) row(name_of(f), outcome_of(f));
+  if (const auto* best = design.chosen()) {
+    if (best->voltage) row("Begin with the battery at about", formatted("%.1f V", *best->voltage));
+    row("To fly it", "backwashctl follow " + options.points);
+  }
+  for (const auto& [name, why] : design.left_out) row("Does not fit in the map: " + name, why);
+  return page + "</table>\n</section>\n";
 }
 
 }  // namespace backwash::services

@@ -27,5 +27,7 @@ std::optional<study::Design> designed(const DesignOptions& options, const study:
                                       const map::OccupancyGrid* grid, bool force);
 Json to_json(const study::Design& design, const DesignOptions& options);
 void print_text(const study::Design& design, const DesignOptions& options);
+/// The same as a section of the page.
+std::string html(const study::Design& design, const DesignOptions& options);
 
 }  // namespace backwash::services

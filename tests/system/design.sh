@@ -9,7 +9,8 @@ worlds=${2:?} ctl=${3:?}
 "$worlds" --out world --seed 1796100001 --cause trim --confound yaw --flights 12 --truth truth.json >log 2>&1
 model=$(python3 -c 'import json; print(json.load(open("truth.json"))["model"])')
 study=("$backwash" study --map world/map.bt --vehicle world/vehicle.toml --model "$model" --quick --log world/*.csv)
-"${study[@]}" --design next.csv --start 1.6,1.5,1.2 --json >study.json 2>stderr || die "$(cat stderr)"
+"${study[@]}" --design next.csv --start 1.6,1.5,1.2 --report study.html --json >study.json 2>stderr || die "$(cat stderr)"
+grep -q "<h2>The next flight</h2>" study.html && grep -q "backwashctl follow next.csv" study.html || die "the page does not say what to fly"
 status=0
 "${study[@]}" --design other.csv 2>stderr || status=$?
 [[ $status == 64 && ! -e other.csv ]] || die "a design without a start: exit $status"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <sstream>
 
@@ -58,7 +59,18 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
   }
 }
 
-/// Along the flights, for what acts in some of them only: each flight is one unit long.
+/// Whether the windows differ in it by more than rounding.
+bool varies(const Regressor& along, const Observations& seen) {
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (const auto& w : seen.windows) {
+    const double x = along.value(w);
+    if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
+  }
+  return high - low > std::sqrt(std::numeric_limits<double>::epsilon()) * (std::abs(low) + 1);
+}
+
+/// Along the flights, for what acts in some of them only, or where its own axis stands still: each flight is one unit
+/// long.
 Regressor flight_by_flight(const Observations& seen) {
   std::vector<double> longest(seen.flights, 1);
   for (const auto& w : seen.windows) longest[w.flight] = std::max(longest[w.flight], w.t + w.duration);
@@ -70,7 +82,8 @@ Regressor flight_by_flight(const Observations& seen) {
 tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, const Observations& seen) {
   const auto& found = cause.found;
   const Channel channel = found.columns.front().parts.front().channel;
-  const Regressor along = cause.flights.empty() ? found.form->effect->axis : flight_by_flight(seen);
+  const Regressor own = found.form->effect->axis;
+  const Regressor along = cause.flights.empty() && varies(own, seen) ? own : flight_by_flight(seen);
   struct Point {
     double x, before, after;
   };
