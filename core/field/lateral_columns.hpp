@@ -38,7 +38,7 @@ class LateralColumns {
   struct Tensor {
     float xx, xy, yy, zz;
   };
-  /// 64 bytes, a line of the cache, of which a sweep reads millions: absence is a number and no optional.
+  /// 64 bytes, a line of the cache: absence is a number and no optional.
   struct ElementSegment {
     double m_x, m_y;      ///< unit normal
     Tensor wall, corner;  ///< per unit of the factors of ProximityModel

@@ -30,7 +30,7 @@ void tell(const ControlEvent& event, const ServiceManager& manager) {
 
 tl::expected<Port, PortError> open_port(const decltype(config::Daemon::link)& link) {
   const auto& [kind, address, port] = link.endpoint;
-  const auto as_port = [](auto&& open) { return Port(std::move(open)); };
+  const auto as_port = [](auto&& open) { return Port(std::forward<decltype(open)>(open)); };
   switch (kind) {
     case config::LinkDevice::Kind::serial:
       if (link.protocol == config::LinkProtocol::plain)
@@ -89,7 +89,7 @@ void LinkWatch::step() {
   channels_.ports.collect();
   if (losses == mended_) return;
   if (auto port = open_port(link_)) {
-    channels_.ports.offer(std::make_unique<const FreshPort>(std::move(*port)));
+    channels_.ports.offer(std::make_unique<const FreshPort>(FreshPort{std::move(*port)}));
     mended_ = losses;
   }
 }

@@ -73,12 +73,45 @@ def keys_of_code(source: str) -> dict[str, tuple[str, bool]]:
     return keys
 
 
+def members(code: str) -> dict[str, float]:
+    """Numbers that members of a struct begin with, by their path in it: map.max_mib → 512."""
+    found: list[tuple[int, str, float]] = []  # depth, path, number
+    depth = 0
+    for line in re.sub(r"//[^\n]*", "", code).splitlines():
+        if closed := re.match(r"\s*\} (\w+);", line):
+            found = [(depth - 1, f"{closed[1]}.{path}", x) if at >= depth else (at, path, x) for at, path, x in found]
+        if re.match(r"\s*(?:double|int)\b", line):
+            found += [(depth, name, float(x)) for name, x in re.findall(r"(\w+) = (-?[\d.]+)", line)]
+        depth += line.count("{") - line.count("}")
+    return {path: x for _, path, x in found}
+
+
+def check_key_defaults(root: pathlib.Path, heading: str, file: str, headers: tuple[str, ...], section: str) -> None:
+    source = (root / f"core/config/{file}.cpp").read_text()
+    values = members(source)
+    for header in headers:
+        values |= members((root / header).read_text())
+    compared = 0
+    for cells in rows(section):
+        told = re.match(r"(-?[\d.]+)(?:$|; pair)", cells[3]) if len(cells) == 6 and quoted(cells[0]) else None
+        target = told and re.search(rf'\{{"{re.escape(quoted(cells[0])[0])}", &\w+\.([\w.]+),', source)
+        path = target and re.sub(r"^bound\.", "", target[1])
+        if path in values:
+            compared += 1
+            if values[path] != float(told[1]):
+                wrong.append(f"{heading}: {quoted(cells[0])[0]} has the default {values[path]:g}, not {told[1]}")
+    if compared < 3:
+        wrong.append(f"{heading}: only {compared} defaults were compared")
+
+
 def check_keys(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, str]) -> None:
     backwash, backwashd = str(build / "services/backwash"), str(build / "services/backwashd")
     for heading, file, reads in (
             ("Vehicle file", "vehicle_file", [backwash, "reach", "--vehicle", "FILE", "--track", "none"]),
             ("Model file", "model_file", [backwash, "field", "--map", "builtin:narrow-gap", "--model", "FILE", "--at", "1,1,1"]),
             ("Daemon file", "daemon_file", [backwashd, "--check-config", "--config", "FILE"])):
+        check_key_defaults(root, heading, file, {"vehicle_file": ("core/types/vehicle.hpp",), "model_file": (
+            "core/types/model.hpp", "core/types/disturbance.hpp"), "daemon_file": ("core/config/daemon_config.hpp",)}[file], sections_of[heading])
         keys = keys_of_program(reads)
         actual = keys_of_code((root / f"core/config/{file}.cpp").read_text())
         documented = {}
