@@ -9,13 +9,12 @@ namespace backwash::plan {
 
 SafeSpace::SafeSpace(const map::OccupancyGrid& passable)
     : origin_W_(passable.origin()), resolution_(passable.resolution()), size_(passable.size()), sums_(passable) {
-  region_.resize(passable.cell_count());
-  for (std::size_t n = 0; n < region_.size(); ++n) region_[n] = passable.at(n) == map::Cell::free ? 1 : kNoRegion;
-  number_regions();
+  number_regions(passable);
 }
 
-// Two passes: provisional numbers from the neighbours before each voxel, joined in a forest, then the trees' roots.
-void SafeSpace::number_regions() {
+// Two passes: provisional numbers from the neighbours before each voxel, joined in a forest, then the trees' numbers.
+void SafeSpace::number_regions(const map::OccupancyGrid& passable) {
+  std::vector<std::uint32_t> tree(passable.cell_count(), kNoRegion);
   std::vector<std::uint32_t> parent{kNoRegion};
   const auto root = [&parent](std::uint32_t n) {
     while (parent[n] != n) n = parent[n] = parent[parent[n]];
@@ -27,11 +26,11 @@ void SafeSpace::number_regions() {
   for (int k = 0; k < size_.z(); ++k)
     for (int j = 0; j < size_.y(); ++j)
       for (int i = 0; i < size_.x(); ++i, ++n) {
-        if (region_[n] == 0) continue;
+        if (passable.at(n) != map::Cell::free) continue;
         std::uint32_t number = kNoRegion;
         const std::array<bool, 3> has{i > 0, j > 0, k > 0};
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          const std::uint32_t before = has[axis] ? region_[n - strides[axis]] : kNoRegion;
+          const std::uint32_t before = has[axis] ? tree[n - strides[axis]] : kNoRegion;
           if (before == kNoRegion || before == number) continue;
           if (number == kNoRegion)
             number = before;
@@ -39,9 +38,14 @@ void SafeSpace::number_regions() {
             parent[std::max(root(number), root(before))] = std::min(root(number), root(before));
         }
         if (number == kNoRegion) parent.push_back(number = static_cast<std::uint32_t>(parent.size()));
-        region_[n] = number;
+        tree[n] = number;
       }
-  for (std::uint32_t& region : region_) region = root(region);
+  std::vector<std::uint16_t> of_tree{kNoRegion};  // a root stands before all of its tree
+  std::uint16_t last = kNoRegion;
+  for (std::uint32_t t = 1; t < parent.size(); ++t)
+    of_tree.push_back(root(t) != t ? of_tree[root(t)] : last == kLastRegion ? last : ++last);
+  region_.resize(tree.size());
+  std::ranges::transform(tree, region_.begin(), [&](std::uint32_t t) { return of_tree[t]; });
 }
 
 SafeView::SafeView(const SafeSpace& space, const std::vector<Index3>& also) : space_(&space) {

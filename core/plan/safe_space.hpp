@@ -32,19 +32,20 @@ class SafeSpace {
   bool passable(const Index3& v) const noexcept { return inside(v) && region_[linear(v)] != kNoRegion; }
   /// Whether all voxels with low ≤ v ≤ high may be passed; true for none. O(1).
   bool passable(const Index3& low, const Index3& high) const noexcept { return sums_.voxels_free(low, high); }
-  /// The region of a voxel: two passable voxels have the same one exactly if passable voxels that share faces join
-  /// them. 0: may not be passed. A motion whose closed swept set is passable never leaves its region.
-  static constexpr std::uint32_t kNoRegion = 0;
+  /// The region of a voxel: passable voxels that share faces have the same one, those of two numbers are not joined.
+  /// The 65,535th region and all after it share kLastRegion. 0: may not be passed. A motion whose closed swept set is
+  /// passable never leaves its region.
+  static constexpr std::uint16_t kNoRegion = 0, kLastRegion = 0xffff;
   std::uint32_t region(const Index3& v) const noexcept { return inside(v) ? region_[linear(v)] : kNoRegion; }
 
  private:
-  void number_regions();
+  void number_regions(const map::OccupancyGrid& passable);
 
   Vec3 origin_W_;
   double resolution_;
   Index3 size_;
   map::OccupancySums sums_;
-  std::vector<std::uint32_t> region_;
+  std::vector<std::uint16_t> region_;
 };
 
 /// Number of moves to a goal from the voxels that a flood reached.

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a world holds, by counting what is allocated: the table of core/plan/README.md is read and held against it.
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <new>
+#include <sstream>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+#include "core/plan/world.hpp"
+#include "tests/bench/furnished_room.hpp"
+
+namespace {
+
+std::atomic<long> held{0};  // bytes
+
+void* hold(std::size_t size, std::size_t alignment) {
+  void* const p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  if (!p) throw std::bad_alloc();
+  held += static_cast<long>(malloc_usable_size(p));
+  return p;
+}
+
+void release(void* p) noexcept {
+  held -= static_cast<long>(malloc_usable_size(p));
+  std::free(p);
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return hold(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t a) { return hold(size, static_cast<std::size_t>(a)); }
+void operator delete(void* p) noexcept { release(p); }
+void operator delete(void* p, std::size_t) noexcept { release(p); }
+void operator delete(void* p, std::align_val_t) noexcept { release(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { release(p); }
+
+namespace backwash::plan {
+namespace {
+
+template <class Structure>
+double bytes_of(const Structure& structure) {
+  const long before = held;
+  const Structure copy = structure;
+  return static_cast<double>(held - before);
+}
+
+/// Bytes per voxel of a map's world, quad-5in and its model, in the table's order.
+std::vector<double> bytes_per_voxel(map::OccupancyGrid grid) {
+  const auto world =
+      build_world(std::move(grid), *config::load_model("builtin:quad-5in"), *config::load_vehicle("builtin:quad-5in"));
+  std::vector<double> bytes = {bytes_of(world->field),    bytes_of(world->bounds),
+                               bytes_of(world->distance), bytes_of(world->sums),
+                               bytes_of(world->safe),     bytes_of(world->grid),
+                               bytes_of(world->hover),    bytes_of(world->reach) + bytes_of(world->response)};
+  for (double& b : bytes) b /= static_cast<double>(world->grid.cell_count());
+  bytes.push_back(bytes_of(*world) / static_cast<double>(world->grid.cell_count()));
+  return bytes;
+}
+
+/// A column of the README's table, from the row of Σ on to that of all.
+std::vector<double> documented(int column) {
+  std::ifstream readme(BACKWASH_SOURCE_DIR "/core/plan/README.md");
+  std::vector<double> values;
+  bool within = false;
+  for (std::string line; std::getline(readme, line);) {
+    within = within || line.starts_with("| Σ, ");
+    if (!within || !line.starts_with("|")) continue;
+    std::istringstream cells(line);
+    std::string cell;
+    for (int n = 0; n <= column; ++n) std::getline(cells, cell, '|');
+    values.push_back(std::stod(cell));
+    if (line.starts_with("| all ")) break;
+  }
+  return values;
+}
+
+void expect_documented(const std::vector<double>& bytes, int column) {
+  const auto expected = documented(column);
+  ASSERT_EQ(bytes.size(), expected.size());
+  for (std::size_t n = 0; n < bytes.size(); ++n) EXPECT_NEAR(bytes[n], expected[n], 0.06) << "row " << n;
+}
+
+TEST(MemoryOfAWorld, IsThatOfTheTable) {
+  expect_documented(bytes_per_voxel(bench::furnished_room(0.1)), 3);
+  const std::string file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
+  if (std::filesystem::exists(file)) expect_documented(bytes_per_voxel(*map::load_map(file)), 4);
+}
+
+}  // namespace
+}  // namespace backwash::plan
