@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -49,8 +50,11 @@ std::string shown(double value) {
   return text.str();
 }
 
-std::string signed_text(const std::string& text) {
-  return text.starts_with('-') ? "'" + text + "' is below 0; it takes 0 or more" : "";
+std::string not_unsigned(const std::string& text) {
+  if (text.starts_with('-')) return "'" + text + "' is below 0; it takes 0 or more";
+  std::uint64_t value = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
+  return read.ec == std::errc::result_out_of_range ? "'" + text + "' is too large; it takes at most 2^64 - 1" : "";
 }
 
 }  // namespace
@@ -102,7 +106,7 @@ Option Command::add_option(const std::string& name, T& target, const std::string
   CLI::Option* const option = app_->add_option(name, target, help);
   using Number = typename NumberOf<T>::type;
   if constexpr (std::is_floating_point_v<Number>) option->check(not_finite, "");
-  if constexpr (std::is_unsigned_v<Number>) option->check(signed_text, "");
+  if constexpr (std::is_unsigned_v<Number>) option->check(not_unsigned, "");
   return Option(option);
 }
 template Option Command::add_option(const std::string&, std::string&, const std::string&);

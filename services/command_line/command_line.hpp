@@ -19,8 +19,8 @@ namespace backwash::services {
 
 constexpr int kUsageExit = 64, kOutputExit = 74;  ///< sysexits.h: EX_USAGE, EX_IOERR
 
-/// The exit code of a program that would end with `code`: 74, told on stderr, where all was good but what it wrote to standard
-/// output did not arrive.
+/// The exit code of a program that would end with `code`: 74, told on stderr, where all was good but what it wrote to
+/// standard output did not arrive.
 int finished(int code, const std::string& program);
 
 /// Thrown by an option's function: the text is no value for it. The message names the option.

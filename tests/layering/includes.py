@@ -42,9 +42,11 @@ MAY = {
     "services/command_line": [],
     "services/dds": ["idl"],
     # What flies sees neither the simulation nor what judges flights afterwards.
-    "services/backwashd": ["core/sync", "core/config", "core/log", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel", "services/command_line"],
+    "services/backwashd": ["core/sync", "core/config", "core/log", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel",
+                           "services/command_line"],
     "services/backwashctl": ["core/types", "core/files", "services/dds", "services/command_line"],
-    "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel", "services/command_line"],
+    "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel",
+                       "services/command_line"],
     "services/backwash": ["core", "services/parallel", "services/command_line"],
     "services/package": ["core/config", *FLIGHT],  # the library's example
 }

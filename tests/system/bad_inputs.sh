@@ -61,6 +61,7 @@ refused 64 "--nonsense" fly --nonsense
 refused 64 "three numbers" fly --start 1,2 --goal 1,0,3
 refused 64 "both --start and --goal" fly --start 1,0,1
 refused 64 "'-3' is below 0" fly --seed -3
+refused 64 "is too large" fly --seed 99999999999999999999 --ends
 refused 64 "takes a number above 0;" "${fly[@]}" --sigma-scale 0
 refused 64 "finite number" "${fly[@]}" --sigma-scale inf
 refused 64 "finite number" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1 --vmax nan
