@@ -36,18 +36,19 @@ int play(const std::string& device, const std::string& truth_at, const std::stri
 
 int main(int argc, char** argv) {
   backwash::autopilots::Session::Options o;
-  std::string device, truth, trace;
+  std::string device, truth, script, trace;
   int pid = 0;
   backwash::services::Command app{"autopilot_script: plays a script against an autopilot and writes a trace",
                                   "autopilot_script"};
   app.add_option("--device", device, "as in the daemon's [link]").required();
   app.add_option("--truth", truth, "see truth.hpp").required();
-  app.add_option("--script", o.script).required();
+  app.add_option("--script", script).required();
   app.add_option("--trace", trace, "CSV").required();
   app.add_option("--noise", o.noise, "of the odometry's position, m");
   app.add_flag("--px4", o.px4, "integer parameters bytewise, as PX4 has them");
   app.add_option("--pid", pid, "of the autopilot, for `signal`");
   if (const auto code = app.parse(argc, argv)) return *code;
+  o.script = script;
   try {
     backwash::set_fifo(backwash::allowed_fifo(70));
     return backwash::autopilots::play(device, truth, trace, pid, o);
