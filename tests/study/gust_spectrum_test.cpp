@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
 
 namespace backwash::study {
 namespace {
@@ -89,11 +90,17 @@ TEST_P(GustSpectrum, TellsShapeAndCorrelationTimeThroughBandAndNoise) {
   EXPECT_NEAR(tau, kTau, 0.1 * kTau);
 }
 
+std::string named(const testing::TestParamInfo<std::pair<GustShape, double>>& told) {
+  const std::string names[] = {"VonKarman", "FirstOrder", "SecondOrder"};
+  return names[static_cast<std::size_t>(told.param.first)] + (told.param.second > 0 ? "InNoise" : "");
+}
+
 INSTANTIATE_TEST_SUITE_P(Shapes, GustSpectrum,
                          testing::Values(std::pair{GustShape::karman, 0.0}, std::pair{GustShape::first_order, 0.0},
                                          std::pair{GustShape::second_order, 0.0},
                                          std::pair{GustShape::first_order, 0.2},
-                                         std::pair{GustShape::second_order, 0.2}));
+                                         std::pair{GustShape::second_order, 0.2}),
+                         named);
 
 TEST(GustSpectrum, AVehicleAtRestAndAStretchTooShortCountAsWhite) {
   const std::vector<std::vector<double>> still(3, std::vector<double>(100, 0.3)), brief(3, std::vector<double>(4, 1));
