@@ -25,7 +25,7 @@ TEST(VioFreezeFault, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway
       if (!frozen) frozen = s, frozen->state.v_W.setZero();
       s.state = frozen->state, s.q = frozen->q;
     };
-    EXPECT_GT(rig.ticks_until(Mode::hold, 60), 0) << "flown on a frozen pose";
+    EXPECT_GT(rig.ticks_until(Mode::hold, 7), 0) << "flown on a frozen pose";
     EXPECT_GT(rig.ticks_until(Mode::land, 60), 0);
   }
 }

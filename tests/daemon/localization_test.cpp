@@ -189,6 +189,10 @@ TEST(Localization, RefusesABrokenPose) {
   EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, about_z(0), {0, nan, 0}, 1.05), 0));
   EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(nan, 0, 0, 0), kZero, 1.05), 0));
   EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(2, 0, 0, 0), kZero, 1.05), 0));
+  for (const double norm : {0.989, 1.011})
+    EXPECT_FALSE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(norm, 0, 0, 0), kZero, 1.05), 0)) << norm;
+  EXPECT_TRUE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(0.991, 0, 0, 0), kZero, 1.05), 0));
+  EXPECT_TRUE(l.odometry(odometry(kMap, {0, 0, 1}, Quaternion(1.009, 0, 0, 0), kZero, 1.1), 0));
 }
 
 // docs/faults.md row 43: a float on the wire would be infinite, or too coarse.
