@@ -162,6 +162,8 @@ TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
   double in_band = 0;  // of the push itself
   for (const double x : band_passed(logged, 50, flight->band)) in_band += x * x / static_cast<double>(logged.size());
   EXPECT_NEAR(mean_variance(*flight).x(), in_band, 0.06 * in_band);
+  EXPECT_EQ(flight->gust_shape(), GustShape::first_order) << "the loop is no part of the gust";
+  EXPECT_NEAR(flight->tau_w(flight->windows.front()), 0.2, 0.02);
 }
 
 class Gates : public ::testing::Test {

@@ -105,13 +105,12 @@ class Flight {
       next_row += (1 + world_.jitter * std::uniform_real_distribution(-0.5, 0.5)(rng_)) / world_.rate_hz;
       if (next_row < t) next_row = t;
       if (t > dropout_at && t < dropout_at + 0.7) continue;
-      const double after = t + kStep;  // what a row holds is the state after the step
-      auto row = record(plan[std::min(k + 1, plan.size() - 1)], after);
-      const Instant now = instant(after);
-      table.hidden.push_back({hidden_push(world_, now) + drift(after), hidden_ln_variance(world_, now), burst_});
+      const Instant now = instant(t + kStep);  // what a row holds is the state after the step
+      auto row = record(plan[std::min(k + 1, plan.size() - 1)], now.t);
+      table.hidden.push_back({hidden_push(world_, now) + drift(now.t), hidden_ln_variance(world_, now), burst_});
       if (t > frozen_from && t < frozen_from + 1.5 && !table.rows.empty()) {
         row = table.rows.back();
-        row[0] = after;
+        row[0] = now.t;
       }
       table.rows.push_back(std::move(row));
     }

@@ -27,14 +27,13 @@ using GustFits = std::array<GustFit, kGustShapes>;  ///< by GustShape
 
 /// Fits each shape to one stretch of the disturbance by Whittle's likelihood (1953) within the band:
 ///
-///   minimise Σ_axes Σ_f ln S(f) + I(f)/S(f),   S(f) = |H(f)|² A_axis ((1 + (2πfT)²)^(−p) + r),   τ/T = √π Γ(p)/Γ(p −
-///   ½)
+///   minimise Σ_axes Σ_f ln S(f) + I(f)/S(f),   S(f) = |H(f)|² A_axis ((1 + (2πfT)²)^(−p) + r)
 ///
-/// with I the periodogram under a Hann taper. A per axis; τ and r, the share of white noise, are common. What the band
-/// leaves out, and noise of the accelerometer, thus do not shorten τ. `axes`: signals of equal length, evenly sampled
-/// at rate_hz. `passes(axis, f)`: |H|², what of a gust the signal holds. τ is sought in 0.01 … 2 s. O(samples ·
-/// frequencies). A stretch that holds none of the band's frequencies, or no axis that moves,
-/// counts as white: half a sample.
+/// with τ/T = √π Γ(p)/Γ(p − ½) (docs/model.md 3-3b) and I the periodogram under a Hann taper. A per axis; τ and r, the
+/// share of white noise, are common. What the band leaves out, and noise of the accelerometer, thus do not shorten τ.
+/// `axes`: signals of equal length, evenly sampled at rate_hz. `passes(axis, f)`: |H|², what of a gust the signal
+/// holds. τ is sought in 0.01 … 2 s. O(samples · frequencies). A stretch that holds none of the band's frequencies, or
+/// no axis that moves, counts as white: half a sample.
 GustFits gust_fits(std::span<const std::vector<double>> axes, double rate_hz, const Band& band,
                    const std::function<double(std::size_t axis, double f_hz)>& passes);
 

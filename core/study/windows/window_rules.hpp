@@ -62,7 +62,7 @@ struct WindowRules {
   // Gusts by their spectrum
   Rule tau_least{"tau_least", 0.01, "s", "derived: half a period of 50 Hz: shorter is white at a log's rate"};
   Rule tau_most{"tau_most", 2, "s", "derived: a window; longer, the band's lowest frequency sees no corner"};
-  Rule noise_least{"noise_least", 1e-4, "of S(0)", "derived: a first-order spectrum of tau_least is above it at 20 Hz"};
+  Rule noise_least{"noise_least", 1e-4, "of S(0)", "derived: 4 % of a first-order spectrum of tau_w at band_high"};
   Rule noise_most{"noise_most", 1, "of S(0)", "derived: more noise than gust at every frequency"};
   Rule tau_told{"tau_told", 0.002, "ln", "derived: a tenth of the interval that 24 flights give"};
   // Flights by sample
