@@ -13,13 +13,9 @@
 namespace backwash::plan {
 namespace {
 
-constexpr double kClearanceCap = 1.0;  // m, as hover_set's
-constexpr double kRounding = 1e-5;     // m, more than any of a distance, single precision included
+using reach::kHoverClearanceCap;
 
-/// What is left of a distance for clearance starts beyond it, m.
-double body_and_estimation(const World& world) {
-  return world.reach.vehicle.body.radius + world.reach.vehicle.estimation.position;
-}
+constexpr double kRounding = 1e-5;  // m, more than any of a distance, single precision included
 
 /// Clearance of the hover set at a voxel's centre, m.
 double clearance(const World& world, const Index3& v) {
@@ -30,8 +26,9 @@ double clearance(const World& world, const Index3& v) {
 /// At least the clearance of the hover set at a voxel's centre, without looking for obstacles: the set holds a point no
 /// farther from the centre than a mean push shifts it, and with `distance` single precision.
 double clearance_at_most(const World& world, const Index3& v) {
-  if (!world.bounds.extension().none()) return kClearanceCap;
-  return std::min(kClearanceCap, world.distance.at(v) + kRounding - body_and_estimation(world));
+  if (!world.bounds.extension().none()) return kHoverClearanceCap;
+  return std::min(kHoverClearanceCap,
+                  world.distance.at(v) + kRounding - reach::body_and_estimation(world.reach.vehicle));
 }
 
 /// Whether sets are prisms around voxel centres.
@@ -41,7 +38,7 @@ bool plain_sets(const World& world) { return !world.constant_margin && world.bou
 bool clear_by(const World& world, const Index3& v, double metres) {
   const Vec3 p_W = world.grid.center(v);
   const auto h = reach::hover_extent(world.reach, world.grid, world.distance, world.bounds, p_W).half_widths;
-  const double least = metres + body_and_estimation(world);
+  const double least = metres + reach::body_and_estimation(world.reach.vehicle);
   const Vec3 half(h[kX], h[kY], h[kZ]), box = half + Vec3::Constant(std::max(0.0, least));  // holds all within that
   return world.distance.at(v) - half.norm() - kRounding > least || world.sums.box_free(p_W - box, p_W + box) ||
          reach::prism_clear(world.grid, world.sums, p_W, h, least);

@@ -103,7 +103,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
 Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
   const auto& vehicle = world.reach.vehicle;
   const std::optional<double> ball = world.constant_margin;
-  const double taken = vehicle.body.radius + vehicle.estimation.position + ball.value_or(0.0);
+  const double taken = reach::body_and_estimation(vehicle) + ball.value_or(0.0);
   const auto half_widths = [&](std::size_t k) { return ball ? PerDirection{} : tube[k].half_widths_interval; };
   const auto next = [&](std::size_t k) { return std::min(k + 1, tube.size() - 1); };
   // Distance is 1-Lipschitz, so the interpolated one is off by a voxel diagonal at most:

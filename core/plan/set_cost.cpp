@@ -10,13 +10,10 @@
 namespace backwash::plan {
 namespace {
 
-constexpr double kClearanceCap = 1.0;  // m, as hover_set's
-constexpr double kRounding = 1e-9;     // m, more than any of a distance
+using reach::body_and_estimation, reach::kHoverClearanceCap;
 
-/// What is left of a distance for clearance starts beyond it, m.
-double body_and_estimation(const World& world) {
-  return world.reach.vehicle.body.radius + world.reach.vehicle.estimation.position;
-}
+constexpr double kRounding = 1e-9;        // m, more than any of a distance in double precision
+constexpr double kStoredRounding = 1e-5;  // m, more than any of a stored distance: single precision
 
 /// add(world, voxel, sum) for all voxels, with one sum a layer of them that starts as `empty`.
 template <class Sum, class Add>
@@ -48,11 +45,12 @@ PerDirection set_at_centre(const World& world, const Index3& v) {
 /// Clearance of the set with Σ at a voxel's centre, m, if it is below the cap. The prism holds its centre, so it is no
 /// farther from obstacles, and no nearer than its circumradius makes it.
 std::optional<double> clearance_at_centre(const World& world, std::size_t n, const PerDirection& h) {
-  const double taken = body_and_estimation(world), free = world.distance.at(n), cap = kClearanceCap + taken;
-  if (free - 1e-5 - Vec3(h[kX], h[kY], h[kZ]).norm() >= cap) return std::nullopt;
+  const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(n),
+               cap = kHoverClearanceCap + taken;
+  if (free - kStoredRounding - Vec3(h[kX], h[kY], h[kZ]).norm() >= cap) return std::nullopt;
   const Vec3 p_W = world.grid.center(world.grid.voxel(n));
-  const double found = reach::prism_distance(world.grid, p_W, h, std::min(cap, free + 1e-5)) - taken;
-  return found < kClearanceCap ? std::optional(found) : std::nullopt;
+  const double found = reach::prism_distance(world.grid, p_W, h, std::min(cap, free + kStoredRounding)) - taken;
+  return found < kHoverClearanceCap ? std::optional(found) : std::nullopt;
 }
 
 /// At most how far points of a set lie from one within it: shrunk by the least ratio of their half widths, level and
@@ -104,7 +102,7 @@ struct CostOfLayer {
 };
 
 void add_cost(const World& world, std::size_t n, CostOfLayer& cost) {
-  const double taken = body_and_estimation(world), free = world.distance.at(n);
+  const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(n);
   if (world.grid.at(n) != map::Cell::free || free <= taken) return;
   const Index3 v = world.grid.voxel(n);
   const Vec3 p_W = world.grid.center(v);
@@ -113,7 +111,7 @@ void add_cost(const World& world, std::size_t n, CostOfLayer& cost) {
              plain = world.bounds.extension().none();  // plain: the set holds that at its centre
   if (!(safe && plain) && !reach::prism_clear(world.grid, world.sums, p_W, h, taken)) return;
   ++cost.safe, cost.lost += !safe;
-  if (!safe || (free + 1e-5 - taken >= kClearanceCap && !clearance_at_centre(world, n, h))) return;
+  if (!safe || (free + kStoredRounding - taken >= kHoverClearanceCap && !clearance_at_centre(world, n, h))) return;
   if (!plain) return cost.some.push_back({std::numeric_limits<double>::infinity(), n});
   const auto set = reach::hover_extent(world.reach, world.grid, world.distance, world.bounds, p_W);
   if (set.half_widths == h) {
@@ -154,7 +152,7 @@ bool safe_by_sets(const World& world, const reach::HoverSet& set, const Index3& 
 }
 
 void add_comparison(const World& world, std::size_t n, std::vector<AgainstMargin>& result) {
-  const double taken = body_and_estimation(world);
+  const double taken = body_and_estimation(world.reach.vehicle);
   if (world.grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) return;
   const Index3 v = world.grid.voxel(n);
   const auto set = reach::hover_extent(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v));

@@ -147,7 +147,7 @@ SplineCost::SplineCost(const World& world, const BSpline& spline, const reach::R
 SplineCost::Sample SplineCost::sample(const reach::ReachTube& tube, std::size_t k, double margin) const {
   const auto& vehicle = world_.reach.vehicle;
   const std::optional<double> ball = world_.constant_margin;
-  const double taken = vehicle.body.radius + vehicle.estimation.position + ball.value_or(0.0);
+  const double taken = reach::body_and_estimation(vehicle) + ball.value_or(0.0);
   const reach::TubeStep& step = tube[k];
   const PerDirection h = ball ? PerDirection{} : step.half_widths_interval;
   Sample s{step.center.p_W, step.center.v_W, 0, world_.distance.interpolated(step.center.p_W), {}, {}};

@@ -218,6 +218,10 @@ double distance(const map::OccupancyGrid& grid, const Vec3& center_W, const Supp
 
 }  // namespace
 
+double body_and_estimation(const Vehicle& vehicle) noexcept {
+  return vehicle.body.radius + vehicle.estimation.position;
+}
+
 // A voxel is a box, so its distance to the prism is that of its centre to prism ⊕ box, whose supports are the sums.
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
                       double limit) {

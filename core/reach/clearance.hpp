@@ -12,6 +12,12 @@
 
 namespace backwash::reach {
 
+/// Clearances of hover sets are exact up to this, m; larger ones are told as this.
+inline constexpr double kHoverClearanceCap = 1.0;
+
+/// Of a set's distance to obstacles, what body and estimate take before clearance begins, m.
+double body_and_estimation(const Vehicle& vehicle) noexcept;
+
 /// Distance from an octagonal prism to the nearest face of an occupied or unknown voxel, m, 0 if they meet
 /// (docs/model.md section 4, "Clearance", before body and estimation are taken off). The prism is
 /// {center + e : |unit(d)·e| ≤ half_widths[d] for every Direction d}; outside the grid is unknown.

@@ -11,8 +11,6 @@
 namespace backwash::reach {
 namespace {
 
-constexpr double kClearanceCap = 1.0;  // m
-
 /// Half widths of the infinite-time set under a constant bound, m. Both kinds grow with the bound.
 struct ExactHalfWidths {
   explicit ExactHalfWidths(const Reachability& reach)
@@ -43,9 +41,6 @@ Vec3 static_shift(const Vehicle& vehicle, const Vec3& push_W) {
   return push_W.cwiseQuotient(Vec3(kp.horizontal, kp.horizontal, kp.vertical));
 }
 
-/// What is left of the distance to obstacles for clearance.
-double body_and_estimation(const Vehicle& vehicle) { return vehicle.body.radius + vehicle.estimation.position; }
-
 /// Clearance of a set, exact up to the cap. The distance field brackets the answer: the set holds p, so it is no
 /// farther from obstacles than p, and no nearer than p less the set's circumradius.
 double set_clearance(const Vehicle& vehicle, const map::OccupancyGrid& grid, const map::DistanceField& distance,
@@ -53,8 +48,8 @@ double set_clearance(const Vehicle& vehicle, const map::OccupancyGrid& grid, con
   const Index3 v = grid.index(p_W);
   const double off_center = (p_W - grid.center(v)).norm() + 1e-6;  // the field is stored in single precision
   const double taken = body_and_estimation(vehicle);
-  if (distance.at(v) - off_center - box(half_widths).norm() >= kClearanceCap + taken) return kClearanceCap;
-  const double limit = std::min(kClearanceCap + taken, distance.at(v) + off_center);
+  if (distance.at(v) - off_center - box(half_widths).norm() >= kHoverClearanceCap + taken) return kHoverClearanceCap;
+  const double limit = std::min(kHoverClearanceCap + taken, distance.at(v) + off_center);
   return prism_distance(grid, p_W, half_widths, limit) - taken;
 }
 
@@ -199,7 +194,7 @@ HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, co
   if (!set.bounded) return set;
   const Vec3 c_W = set.shift + p_W;
   const double taken = body_and_estimation(reach.vehicle);
-  set.clearance = constant_margin ? std::min(kClearanceCap, distance.exact(grid, c_W) - *constant_margin - taken)
+  set.clearance = constant_margin ? std::min(kHoverClearanceCap, distance.exact(grid, c_W) - *constant_margin - taken)
                                   : set_clearance(reach.vehicle, grid, distance, c_W, set.half_widths);
   return set;
 }
