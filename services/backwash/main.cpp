@@ -33,10 +33,10 @@ int main(int argc, char** argv) {
       verb = " " + v.command->name();
       return finished(v.run(), "backwash" + verb);
     }
-    return kUsage;
+    return backwash::kUsage;
   } catch (const Failure& failure) {
     return fail(verb, failure.exit_code, failure.what());
   } catch (const std::exception& defect) {
-    return fail(verb, kInternal, std::string("internal error: ") + defect.what() + "; please report it");
+    return fail(verb, backwash::kSoftware, std::string("internal error: ") + defect.what() + "; please report it");
   }
 }

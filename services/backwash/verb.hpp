@@ -12,27 +12,14 @@
 #include "core/types/geometry.hpp"
 #include "core/types/text.hpp"
 #include "services/command_line/command_line.hpp"
+#include "services/command_line/exit_code.hpp"
 
 namespace backwash::services {
 
-/// Exit codes of the program: sysexits.h, and 1 for a flight that was flown and failed.
-enum ExitCode {
-  kOk = 0,
-  kFlightFailed = 1,
-  kUsage = 64,
-  kBadData = 65,
-  kNoInput = 66,
-  kUnavailable = 69,  ///< no plan, or a start or goal that cannot be used
-  kInternal = 70,
-  kCannotCreate = 73,
-  kInputOutput = 74,
-  kConfiguration = 78,
-};
-
 /// Ends a verb: main() prints `backwash VERB: what()` on stderr and exits with the code.
 struct Failure : std::runtime_error {
-  Failure(int code, const std::string& line) : std::runtime_error(line), exit_code(code) {}
-  int exit_code;
+  Failure(ExitCode code, const std::string& line) : std::runtime_error(line), exit_code(code) {}
+  ExitCode exit_code;
 };
 
 /// A subcommand and what it does once its options are parsed; `run` returns the exit code.

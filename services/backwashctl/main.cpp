@@ -3,6 +3,7 @@
 
 #include "services/backwashctl/verbs.hpp"
 #include "services/command_line/command_line.hpp"
+#include "services/command_line/exit_code.hpp"
 #include "services/dds/dds.hpp"
 #include "version.hpp"
 
@@ -18,9 +19,9 @@ int main(int argc, char** argv) {
                                         "backwashctl");
   } catch (const backwash::dds::Error& e) {
     std::cerr << "backwashctl: " << e.what() << "; give an --interface and a --domain of this machine\n";
-    return 71;
+    return backwash::kSystem;
   } catch (const std::exception& e) {
     std::cerr << "backwashctl: " << e.what() << "\n";
-    return 70;
+    return backwash::kSoftware;
   }
 }

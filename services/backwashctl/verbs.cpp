@@ -12,11 +12,11 @@
 #include "core/files/read_file.hpp"
 #include "services/backwashctl/preflight.hpp"
 #include "services/backwashctl/status_output.hpp"
+#include "services/command_line/exit_code.hpp"
 
 namespace backwash::ctl {
 namespace {
 
-constexpr int kUnavailable = 69;
 constexpr std::size_t kMostWaypoints = 64;  // of the IDL's sequence
 
 std::string default_station() {
@@ -209,19 +209,20 @@ int Verbs::follow() {
     std::cerr << "backwashctl follow: " << where << ": " << why << "\n";
     return code;
   };
-  if (!content) return fail(66, route_, content.error().message);
+  if (!content) return fail(kNoInput, route_, content.error().message);
   std::istringstream file(std::move(*content));
   std::getline(file, line);
-  if (line != "x_m,y_m,z_m") return fail(65, route_ + ":1", "the first line is '" + line + "', expected x_m,y_m,z_m");
+  if (line != "x_m,y_m,z_m")
+    return fail(kBadData, route_ + ":1", "the first line is '" + line + "', expected x_m,y_m,z_m");
   for (int number = 2; std::getline(file, line); ++number) {
     Vec3 p;
     char rest;
     if (std::sscanf(line.c_str(), "%lf,%lf,%lf %c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
-      return fail(65, route_ + ":" + std::to_string(number), "'" + line + "' is not three numbers");
+      return fail(kBadData, route_ + ":" + std::to_string(number), "'" + line + "' is not three numbers");
     waypoints_.push_back(p);
   }
   if (waypoints_.empty() || waypoints_.size() > kMostWaypoints)
-    return fail(65, route_, std::to_string(waypoints_.size()) + " points, expected 1 to 64");
+    return fail(kBadData, route_, std::to_string(waypoints_.size()) + " points, expected 1 to 64");
   return command("follow", backwash_msgs_msg_dds__COMMAND_FOLLOW, Vec3::Zero(), rests_at(waypoints_.back()));
 }
 

@@ -34,11 +34,11 @@ constexpr std::uint64_t kTicksToBeReady = kTicksPerSecond / 2;
 
 /// Calls `make` and gives what it throws its exit code.
 template <typename Make>
-auto made(int code, Make&& make) {
+auto made(ExitCode code, Make&& make) {
   try {
     return make();
   } catch (const std::exception& e) {
-    throw StartError{code, e.what()};
+    throw StartError(code, e.what());
   }
 }
 
@@ -48,7 +48,7 @@ firmware_bridge::Port port_at_start(const decltype(config::Daemon::link)& link) 
   auto port = open_port(link);
   if (port) return std::move(*port);
   const std::string what = link.device + ": " + describe(port.error());
-  if (port.error().kind != Kind::kOpen && port.error().kind != Kind::kBusy) throw StartError{kInputOutput, what};
+  if (port.error().kind != Kind::kOpen && port.error().kind != Kind::kBusy) throw StartError(kInputOutput, what);
   spdlog::warn("{}; waiting for it", what);
   return firmware_bridge::ClosedPort{};
 }
@@ -77,12 +77,12 @@ int reader_priority(const config::Daemon& daemon) {
 tl::expected<Settings, StartError> load_settings(const std::string& path) {
   const auto wrong = [](const config::ConfigError& e) {
     const bool missing = e.kind == config::ConfigError::Kind::not_found;
-    return tl::make_unexpected(StartError{missing ? kNoInput : kConfiguration, e.message});
+    return tl::make_unexpected(StartError(missing ? kNoInput : kConfiguration, e.message));
   };
   auto daemon = config::load_daemon(path);
   if (!daemon) return wrong(daemon.error());
   if (const auto line = configured_line(daemon->link); !line)
-    return tl::make_unexpected(StartError{kConfiguration, path + ": " + line.error()});
+    return tl::make_unexpected(StartError(kConfiguration, path + ": " + line.error()));
   auto vehicle = config::load_vehicle(daemon->vehicle);
   if (!vehicle) return wrong(vehicle.error());
   // What a velocity from poses may be off is in the first set of every tube.
@@ -224,7 +224,7 @@ int run(const Settings& settings) {
     }
   } catch (const StartError& error) {
     code = error.code;
-    spdlog::error("backwashd: {}", error.what);
+    spdlog::error("backwashd: {}", error.what());
   } catch (const std::exception& e) {
     spdlog::critical("backwashd: {}", e.what());
   }

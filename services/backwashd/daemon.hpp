@@ -5,6 +5,7 @@
 #include <tl/expected.hpp>
 
 #include "core/config/daemon_config.hpp"
+#include "services/command_line/exit_code.hpp"
 
 namespace backwash::daemon {
 
@@ -13,12 +14,6 @@ struct Settings {
   config::Daemon daemon;
   Vehicle vehicle;
   Model model;
-};
-
-/// What keeps the daemon from starting and is not its own fault: the exit code, and one line.
-struct StartError {
-  int code;
-  std::string what;
 };
 
 /// Reads the daemon's file and the vehicle and model files that it names. Error: 66 where one of them is missing, 78

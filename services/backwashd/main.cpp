@@ -10,8 +10,6 @@
 
 namespace {
 
-constexpr int kSoftware = 70;
-
 int failed(int code, const std::string& message) {
   std::cerr << "backwashd: " << message << "\n";
   return code;
@@ -31,7 +29,7 @@ int main(int argc, char** argv) {
   app.version(backwash::kVersion);
   if (const auto code = app.parse(argc, argv)) return *code;
   const auto settings = backwash::daemon::load_settings(path);
-  if (!settings) return failed(settings.error().code, settings.error().what);
+  if (!settings) return failed(settings.error().code, settings.error().what());
   if (check) {
     std::cout << path << ": good\n";
     return backwash::services::finished(0, "backwashd");
@@ -39,6 +37,6 @@ int main(int argc, char** argv) {
   try {
     return backwash::daemon::run(*settings);
   } catch (const std::exception& e) {
-    return failed(kSoftware, e.what());
+    return failed(backwash::kSoftware, e.what());
   }
 }

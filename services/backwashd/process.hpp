@@ -11,12 +11,10 @@
 #include <thread>
 #include <vector>
 
+#include "services/command_line/exit_code.hpp"
+
 /// What ends the process, and what does not.
 namespace backwash::daemon {
-
-/// Exit codes of sysexits.h.
-inline constexpr int kNoInput = 66, kSoftware = 70, kSystem = 71, kCannotCreate = 73, kInputOutput = 74,
-                     kConfiguration = 78;
 
 /// The first thing that went wrong in any thread; it ends the flight. Setting `stop` is what makes the control thread
 /// silent: within a tick it sends nothing more.

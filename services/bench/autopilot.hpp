@@ -72,7 +72,7 @@ class Autopilot {
   /// Remaining share, sent once a second as BATTERY_STATUS while set.
   std::optional<double> battery;
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position; of a command
-  /// its number and parameters 1, 2 and 7.
+  /// its number and parameters 1, 2 and 7. False: the file cannot be made.
   bool log_wire(const std::string& path);
 
  protected:

@@ -18,8 +18,8 @@
 #include "services/bench/messages.hpp"
 #include "services/bench/pty.hpp"
 #include "services/bench/scans.hpp"
-#include "services/bench/start_error.hpp"
 #include "services/bench/truth_log.hpp"
+#include "services/command_line/exit_code.hpp"
 #include "services/dds/topics.hpp"
 #include "services/parallel/real_time.hpp"
 

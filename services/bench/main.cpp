@@ -8,15 +8,15 @@
 #include "core/config/odometry_profile.hpp"
 #include "core/map/load_map.hpp"
 #include "services/bench/bench.hpp"
-#include "services/bench/start_error.hpp"
 #include "services/command_line/command_line.hpp"
+#include "services/command_line/exit_code.hpp"
 #include "services/dds/dds.hpp"
 #include "version.hpp"
 
 namespace {
 
+using namespace backwash;
 using namespace backwash::services;
-using backwash::Vec3;
 
 int failed(int code, const std::string& message) {
   std::cerr << "backwash-bench: " << message << "\n";
@@ -25,7 +25,7 @@ int failed(int code, const std::string& message) {
 
 /// The command line as it is filled.
 struct Given {
-  backwash::bench::Options options;
+  bench::Options options;
   std::vector<double> start, origin{12.0, -7.0, 0.3}, crate, drift, hidden;
   std::vector<std::string> parameters;
   std::string timeline;
@@ -65,7 +65,7 @@ void add_faults(Command& app, Given& given) {
   app.add_text(
          "--autopilot",
          [&given](const std::string& name) {
-           using enum backwash::bench::Options::Profile;
+           using enum bench::Options::Profile;
            given.options.autopilot = name == "px4" ? px4 : name == "ardupilot" ? ardupilot : simple;
          },
          "simple, or as measured of a real one: ardupilot, px4")
@@ -74,7 +74,7 @@ void add_faults(Command& app, Given& given) {
   app.add_option("--faults", given.timeline,
                  "timeline of faults and of what the flight shall keep, TOML; services/bench/README.md");
   std::vector<std::string> estimators;
-  for (const auto& profile : backwash::config::odometry_profiles())
+  for (const auto& profile : config::odometry_profiles())
     if (!profile.child.empty()) estimators.emplace_back(profile.name);
   app.add_option("--estimator", given.options.estimator, "the odometry as this one fills it, and the map in its frame")
       .check(one_of(estimators));
@@ -109,7 +109,7 @@ std::optional<std::pair<std::string, double>> parameter(const std::string& text)
 
 /// The vectors of the command line as places.
 void set_places(Given& given) {
-  backwash::bench::Options& o = given.options;
+  bench::Options& o = given.options;
   const auto at = [](const std::vector<double>& v, std::size_t from = 0) {
     return Vec3(v[from], v[from + 1], v[from + 2]);
   };
@@ -121,19 +121,21 @@ void set_places(Given& given) {
 }
 
 /// Reads the files that the options name, and runs.
-int run(backwash::bench::Options& o, const std::string& timeline) {
-  const auto grid = backwash::map::load_map(o.map);
+int run(bench::Options& o, const std::string& timeline) {
+  const auto grid = map::load_map(o.map);
   if (!grid)
-    return failed(grid.error().kind == backwash::map::MapError::Kind::not_found ? 66 : 65, grid.error().message);
-  const auto vehicle = backwash::config::load_vehicle(o.vehicle);
-  using Kind = backwash::config::ConfigError::Kind;
-  if (!vehicle) return failed(vehicle.error().kind == Kind::not_found ? 66 : 78, vehicle.error().message);
+    return failed(grid.error().kind == map::MapError::Kind::not_found ? kNoInput : kBadData, grid.error().message);
+  const auto vehicle = config::load_vehicle(o.vehicle);
+  using Kind = config::ConfigError::Kind;
+  if (!vehicle)
+    return failed(vehicle.error().kind == Kind::not_found ? kNoInput : kConfiguration, vehicle.error().message);
   if (!timeline.empty()) {
-    auto loaded = backwash::bench::load_timeline(timeline);
-    if (!loaded) return failed(loaded.error().kind == Kind::not_found ? 66 : 78, loaded.error().message);
+    auto loaded = bench::load_timeline(timeline);
+    if (!loaded)
+      return failed(loaded.error().kind == Kind::not_found ? kNoInput : kConfiguration, loaded.error().message);
     o.timeline = std::move(*loaded);
   }
-  return backwash::bench::run(o, *grid, *vehicle);
+  return bench::run(o, *grid, *vehicle);
 }
 
 }  // namespace
@@ -143,7 +145,7 @@ int main(int argc, char** argv) {
       "backwash-bench: emulated flight controller on a pty, emulated VIO and mapper on DDS, in real time.\n"
       "Example: backwash-bench --map builtin:apartment --start 2,2,1.2 --link /tmp/autopilot",
       "backwash-bench"};
-  app.version(backwash::kVersion);
+  app.version(kVersion);
   Given given;
   given.options.frame.yaw = 0.6;
   given.options.vehicle = "builtin:quad-5in";
@@ -151,21 +153,21 @@ int main(int argc, char** argv) {
   add_faults(app, given);
   if (const auto code = app.parse(argc, argv)) return *code;
   if (given.options.link.empty() && given.options.in_loop.empty())
-    return failed(64, "--link or --in-loop is needed; see backwash-bench --help");
+    return failed(kUsage, "--link or --in-loop is needed; see backwash-bench --help");
   for (const std::string& text : given.parameters) {
     const auto named = parameter(text);
-    if (!named) return failed(64, "--parameter " + text + ": expected NAME=NUMBER");
+    if (!named) return failed(kUsage, "--parameter " + text + ": expected NAME=NUMBER");
     given.options.parameters.insert_or_assign(named->first, named->second);
   }
   set_places(given);
   spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is for what the timeline expects
   try {
     return finished(run(given.options, given.timeline), "backwash-bench");
-  } catch (const backwash::bench::StartError& e) {
+  } catch (const StartError& e) {
     return failed(e.code, e.what());
-  } catch (const backwash::dds::Error& e) {
-    return failed(71, std::string(e.what()) + "; give an --interface and a --domain of this machine");
+  } catch (const dds::Error& e) {
+    return failed(kSystem, std::string(e.what()) + "; give an --interface and a --domain of this machine");
   } catch (const std::exception& e) {
-    return failed(70, e.what());
+    return failed(kSoftware, e.what());
   }
 }

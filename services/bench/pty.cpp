@@ -10,7 +10,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "services/bench/start_error.hpp"
+#include "services/command_line/exit_code.hpp"
 
 namespace backwash::bench {
 

@@ -13,7 +13,7 @@
 #include <cstring>
 
 #include "services/bench/controller_in_loop.hpp"
-#include "services/bench/start_error.hpp"
+#include "services/command_line/exit_code.hpp"
 
 namespace backwash::bench {
 namespace {

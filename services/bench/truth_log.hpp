@@ -6,7 +6,7 @@
 #include <string>
 
 #include "services/bench/autopilot.hpp"
-#include "services/bench/start_error.hpp"
+#include "services/command_line/exit_code.hpp"
 
 namespace backwash::bench {
 

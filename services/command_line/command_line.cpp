@@ -11,6 +11,8 @@
 #include <sstream>
 #include <type_traits>
 
+#include "services/command_line/exit_code.hpp"
+
 namespace backwash::services {
 namespace {
 
@@ -148,7 +150,7 @@ int Command::usage(const std::string& what) const {
   std::string told = what;
   std::replace(told.begin(), told.end(), '\n', ' ');
   std::fprintf(stderr, "%s: %s; see %s --help\n", line().c_str(), told.c_str(), line().c_str());
-  return kUsageExit;
+  return kUsage;
 }
 
 /// What to say where none of the verbs was begun.
@@ -180,7 +182,7 @@ int finished(int code, const std::string& program) {
   std::cout.flush();
   if (std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   std::fprintf(stderr, "%s: standard output cannot be written to its end; free some space\n", program.c_str());
-  return code == 0 ? kOutputExit : code;
+  return code == 0 ? kInputOutput : code;
 }
 
 }  // namespace backwash::services

@@ -17,8 +17,6 @@ class Option;
 
 namespace backwash::services {
 
-constexpr int kUsageExit = 64, kOutputExit = 74;  ///< sysexits.h: EX_USAGE, EX_IOERR
-
 /// The exit code of a program that would end with `code`: 74, told on stderr, where all was good but what it wrote to
 /// standard output did not arrive.
 int finished(int code, const std::string& program);

@@ -125,8 +125,8 @@ TEST(Start, ALineThatCannotCarryAFlightIsRefusedBeforeAnyPortOpens) {
   const auto settings = load_settings(path);
   std::filesystem::remove(path);
   ASSERT_FALSE(settings);
-  EXPECT_NE(settings.error().what.find("slow.daemon.toml: key 'link.baud' = 19200"), std::string::npos)
-      << settings.error().what;
+  const std::string said = settings.error().what();
+  EXPECT_NE(said.find("slow.daemon.toml: key 'link.baud' = 19200"), std::string::npos) << said;
 }
 
 }  // namespace

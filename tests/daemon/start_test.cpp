@@ -10,7 +10,7 @@ TEST(Start, TheConfigurationThatShipsIsGoodAndAMissingOneIsNamed) {
   EXPECT_TRUE(load_settings("builtin:backwashd"));
   const auto missing = load_settings("/nowhere.toml");
   ASSERT_FALSE(missing);
-  EXPECT_NE(missing.error().what.find("/nowhere.toml"), std::string::npos);
+  EXPECT_NE(std::string(missing.error().what()).find("/nowhere.toml"), std::string::npos);
   EXPECT_EQ(missing.error().code, 66);
 }
 
