@@ -16,8 +16,8 @@
 #include "core/map/load_map.hpp"
 #include "services/parallel/parallel.hpp"
 #include "tests/bench/furnished_room.hpp"
+#include "tests/bench/naive_box_scan.hpp"
 #include "tests/support/changed_box.hpp"
-#include "tests/support/line_of_sight.hpp"
 
 namespace {
 
@@ -30,41 +30,6 @@ namespace bench = backwash::bench;
 namespace test = backwash::test;
 
 double edge_of(const benchmark::State& state) { return 1e-3 * static_cast<double>(state.range(0)); }
-
-/// What a query replaces: every voxel of the box in range, its elements known, one line of sight through the grid for
-/// each element with a term.
-class NaiveBoxScan {
- public:
-  explicit NaiveBoxScan(const OccupancyGrid& grid)
-      : grid_(grid), terms_(model_, grid.resolution()), of_voxel_(grid.cell_count()) {
-    for (const field::Element& e : field::surface_elements(grid)) {
-      const Vec3 inside = e.c_W - 0.5 * grid.resolution() * e.normal;
-      of_voxel_[grid.linear(grid.index(inside))].push_back(e);
-    }
-  }
-  backwash::Variance at(const Vec3& p) const {
-    const double wide = std::max(model_.ground.l_max, model_.wall.l_max);
-    const Vec3 below(wide, wide, std::max(wide, model_.ground.l_footprint_max)), above(wide, wide, model_.wall.l_max);
-    const Index3 low = grid_.index(p - below).cwiseMax(0);
-    const Index3 high = grid_.index(p + above).cwiseMin(grid_.size() - Index3::Ones());
-    backwash::Variance sum;
-    for (int k = low.z(); k <= high.z(); ++k)
-      for (int j = low.y(); j <= high.y(); ++j)
-        for (int i = low.x(); i <= high.x(); ++i)
-          for (const field::Element& e : of_voxel_[grid_.linear(Index3(i, j, k))]) {
-            if (e.normal.dot(p - e.c_W) <= 0) continue;
-            const backwash::Variance term = terms_.ground(e, p) + terms_.corner(e, p) + terms_.wall(e, p);
-            if (term.zz > 0 && field::line_of_sight(grid_, p, e.c_W)) sum += term;
-          }
-    return sum;
-  }
-
- private:
-  const OccupancyGrid& grid_;
-  backwash::Model model_;
-  field::ProximityModel terms_;
-  std::vector<std::vector<field::Element>> of_voxel_;
-};
 
 /// CPU time of one call of query(p) in the mean over the points, µs; every tenth of a second a look at the clock.
 template <typename Query>
@@ -81,7 +46,7 @@ double microseconds(const std::vector<Vec3>& points, const Query& query) {
 }
 
 double naive_microseconds(const OccupancyGrid& grid) {
-  const NaiveBoxScan naive(grid);
+  const bench::NaiveBoxScan naive(grid);
   return microseconds(bench::free_points(grid, 64), [&](const Vec3& p) { return naive.at(p); });
 }
 
