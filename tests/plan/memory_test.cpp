@@ -86,10 +86,12 @@ void expect_documented(const std::vector<double>& bytes, int column) {
   for (std::size_t n = 0; n < bytes.size(); ++n) EXPECT_NEAR(bytes[n], expected[n], 0.06) << "row " << n;
 }
 
-TEST(MemoryOfAWorld, IsThatOfTheTable) {
-  expect_documented(bytes_per_voxel(bench::furnished_room(0.1)), 3);
+TEST(MemoryOfAWorld, IsThatOfTheTable) { expect_documented(bytes_per_voxel(bench::furnished_room(0.1)), 3); }
+
+TEST(MemoryOfAWorld, OfABuildingIsThatOfTheTable) {
   const std::string file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
-  if (std::filesystem::exists(file)) expect_documented(bytes_per_voxel(*map::load_map(file)), 4);
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "geb079.bt is absent";
+  expect_documented(bytes_per_voxel(*map::load_map(file)), 4);
 }
 
 }  // namespace
