@@ -22,7 +22,7 @@ namespace {
 // Of a snapshot and of the live grid behind it, at most: grid 1, misses and marks 2, distance 4, Σ 24, bounds 4 + 64,
 // hover map 16.
 constexpr std::size_t kBytesPerVoxel = 115;
-// Resolutions for which the field is known to hold (tests/field, test_resolution_and_yaw), m.
+// Resolutions for which the field is known to hold (tests/field/resolution_and_yaw_test.cpp), m.
 constexpr int kBelowTheRest = 10;  // niceness
 constexpr double kFinest = 0.02, kCoarsest = 0.2;
 
