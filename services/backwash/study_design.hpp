@@ -12,9 +12,9 @@ namespace backwash::services {
 
 /// `--design`, `--start`, `--flight-time` of `backwash study`.
 struct DesignOptions {
-  std::string points;                                    ///< points file to write; empty: no design is asked for
-  std::optional<Vec3> start;                             ///< m, W
-  double flight_time = study::kDesignRules.flight_time;  ///< s
+  std::string points;                                           ///< points file to write; empty: no design is asked for
+  std::optional<Vec3> start;                                    ///< m, W
+  double flight_time = study::kDesignRules.design_flight_time;  ///< s
 };
 void add_design(Command& command, DesignOptions& options);
 /// Throws Failure: a usage error without map or start, 73 for a points file that exists.

@@ -256,7 +256,8 @@ Fit fit(const Data& data, std::span<const double> flight_weights, const Paramete
   Fit result{start, 0, {}, {}};
   for (int round = 0; round < options.rounds; ++round) {
     loss.set_levels(scatter(data, flight_weights, result.parameters).levels);
-    const double tolerance = round + 1 < options.rounds ? kCalibrationRules.rough : kCalibrationRules.fine;
+    const double tolerance =
+        round + 1 < options.rounds ? kCalibrationRules.rough_tolerance : kCalibrationRules.fine_tolerance;
     result.parameters = scaled(minimised(loss, scaled(result.parameters, 1), options.free, tolerance), -1);
   }
   const LevelScatter s = scatter(data, flight_weights, result.parameters);

@@ -45,7 +45,7 @@ using Free = std::bitset<kParameters>;
 struct FitOptions {
   double quantile = kCalibrationRules.quantile;
   Free free = Free().set();
-  int rounds = static_cast<int>(kCalibrationRules.rounds);  ///< of flight levels and bound in turn
+  int rounds = static_cast<int>(kCalibrationRules.fit_rounds);  ///< of flight levels and bound in turn
 };
 
 /// Quantile regression of ln variance on ln Σ(p; θ) (docs/model.md section 2), θ ≥ 0:

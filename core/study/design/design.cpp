@@ -21,7 +21,7 @@ DesignedSet told_of(const Contest& contest) {
 
 /// What a flight would tell of every set; all sets have to be told apart.
 void judge(NextFlight& flight, const std::vector<Contest>& contests, const Evidence& next) {
-  std::vector<double> missed(static_cast<std::size_t>(kDesignRules.most_flights), 0);
+  std::vector<double> missed(static_cast<std::size_t>(kDesignRules.design_most_flights), 0);
   for (const Contest& contest : contests) {
     Outlook told = contest.after(next);
     flight.divergence += told.divergence;

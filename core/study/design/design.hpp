@@ -45,7 +45,7 @@ struct Design {
 /// from `start_W` (m), which tells the sets apart in the fewest flights (docs/model.md section 6). `seen`: what
 /// `result` was found in; `flight_time`: of each flight, s. Real-time status: offline, seconds.
 Design design(const Observations& seen, const StudyResult& result, const plan::World& world, const Model& model,
-              const Vec3& start_W, double flight_time = kDesignRules.flight_time);
+              const Vec3& start_W, double flight_time = kDesignRules.design_flight_time);
 
 /// As `backwashctl follow` reads it (docs/interfaces.md, "Points CSV").
 std::string points_csv(const std::vector<Vec3>& points_W);

@@ -45,7 +45,7 @@ double Imitation::divergence() const {
   VectorXd gap = VectorXd::Zero(flown.rows());
   gap.head(own) = theta;
   if (others > 0) {
-    const MatrixXd all = flown + kDesignRules.refit * flight;
+    const MatrixXd all = flown + kDesignRules.design_refit * flight;
     const VectorXd asked = all.bottomLeftCorner(others, own) * theta;
     gap.tail(others) = -all.bottomRightCorner(others, others).completeOrthogonalDecomposition().solve(asked);
   }
@@ -58,7 +58,7 @@ double passes(double lead, double growth, double needed) {
 }
 
 std::optional<int> Outlook::flights() const {
-  const auto enough = std::ranges::find_if(separated, [](double p) { return p >= kDesignRules.separated; });
+  const auto enough = std::ranges::find_if(separated, [](double p) { return p >= kDesignRules.design_separated; });
   if (enough == separated.end()) return std::nullopt;
   return static_cast<int>(enough - separated.begin()) + 1;
 }
@@ -145,7 +145,7 @@ void Contest::add_copies(Duel& d) const {
 }
 
 Contest::Growth Contest::growth(const Duel& d, const Evidence& next) const {
-  const auto most = static_cast<std::size_t>(kDesignRules.most_flights);
+  const auto most = static_cast<std::size_t>(kDesignRules.design_most_flights);
   const Explanation& truth = all_[d.truth];
   Growth grown;
   std::vector<double> left(most + 1, INFINITY);
@@ -173,7 +173,7 @@ double Contest::chance(const Duel& d, double lead_growth, double gain_growth) co
 }
 
 Outlook Contest::after(const Evidence& next) const {
-  const auto most = static_cast<std::size_t>(kDesignRules.most_flights);
+  const auto most = static_cast<std::size_t>(kDesignRules.design_most_flights);
   Outlook told;
   std::vector<double> missed(all_.size() * most, 0);  // Σ over rivals of P that one stays in the set
   std::vector<double> of(all_.size() * all_.size(), 0);

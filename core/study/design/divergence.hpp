@@ -39,7 +39,7 @@ struct Outlook {
   double divergence = 0;          ///< Σ_{i<j} π_i π_j ½ (T_ij + T_ji), nats a flight
   std::vector<double> separated;  ///< P that the set is one name after 1, 2, … flights
   std::vector<double> of_pair;    ///< ½ (T_ij + T_ji) by Contest::pairs()
-  /// The least number of flights with which P is at least `kDesignRules.separated`; none up to most_flights.
+  /// The least number of flights with which P is at least `kDesignRules.design_separated`; none up to most_flights.
   std::optional<int> flights() const;
 };
 

@@ -12,14 +12,14 @@ FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way
     if (const auto why = plan::why_blocked(world, p, 0)) return refused(*why);
   const auto& limits = world.reach.vehicle.limits;
   const plan::PlanOptions options{
-      .v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kDesignRules.plan_deadline, .polish = 0};
+      .v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kDesignRules.design_plan_deadline, .polish = 0};
   const auto most = static_cast<std::size_t>(flight_time / kControlPeriod);
   const std::size_t around = way.points_W.size();
   std::vector<std::vector<Setpoint>> legs(around);  // to each point, from the one before it
   FlownWay flown;
   Setpoint now;
   now.p_W = start_W;
-  for (std::size_t k = 0; flown.points_W.size() < static_cast<std::size_t>(kDesignRules.most_rows); ++k) {
+  for (std::size_t k = 0; flown.points_W.size() < static_cast<std::size_t>(kDesignRules.design_most_rows); ++k) {
     const Vec3& goal = way.points_W[k % around];
     auto commands = k > 0 ? legs[k % around] : std::vector<Setpoint>();
     if (commands.empty()) {
@@ -31,7 +31,8 @@ FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way
     commands = plan::facing_ahead(std::move(commands), {now.yaw, 0}, options.yaw);
     flown.commands.insert(flown.commands.end(), commands.begin(), commands.end());
     now.p_W = goal, now.yaw = commands.back().yaw;
-    flown.commands.insert(flown.commands.end(), static_cast<std::size_t>(kDesignRules.hold / kControlPeriod), now);
+    flown.commands.insert(flown.commands.end(), static_cast<std::size_t>(kDesignRules.design_hold / kControlPeriod),
+                          now);
     flown.points_W.push_back(goal);
     if (flown.commands.size() >= most) break;
   }

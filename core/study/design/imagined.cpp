@@ -82,7 +82,7 @@ Observations Imagination::windows(const std::vector<Setpoint>& commands, bool us
   for (const char* name : {"x_m", "y_m", "z_m"}) log.columns[name].clear();
   for (std::size_t k = 0; k < nominal.size(); ++k) {
     const double sign = k % 2 == 0 ? 1 : -1;
-    put(log, "", "_m", nominal.p_nominal[k] + sign * kDesignRules.jitter * Vec3::Ones());
+    put(log, "", "_m", nominal.p_nominal[k] + sign * kDesignRules.design_jitter * Vec3::Ones());
     put(log, "v", "_mps", nominal.v_nominal[k]), put(log, "a", "_mps2", nominal.a_nominal[k]);
     if (attitude) put_thrust(log, nominal.a_nominal[k], commands[k].yaw, vehicle_);
     if (flown_->has(Source::battery))

@@ -22,7 +22,8 @@ class Room {
       const Index3 v = world.grid.voxel(n);
       if (!holds(v)) continue;
       voxels_.push_back(v);
-      const double room = world.distance.at(n) - 1e-3 * (world.grid.center(v) - start_W).norm();  // the nearest such
+      const double way = (world.grid.center(v) - start_W).norm();
+      const double room = world.distance.at(n) - kDesignRules.design_nearer * way;  // the nearest of the roomiest
       if (room > most) most = room, open_ = v;
     }
   }
@@ -116,9 +117,9 @@ class List {
   void heights() {
     const Vec3 middle = 0.5 * (low() + high());
     add("hover low, in the middle and high", {low(), low(), middle, middle, high(), high()});
-    add("hover at many heights", steps(low(), high(), kDesignRules.slow_step / 2));
+    add("hover at many heights", steps(low(), high(), kDesignRules.design_slow_step / 2));
     add("up and down, the whole height", {low(), high()});
-    add("up and down, about a low height", {low(), low() + Vec3(0, 0, kDesignRules.bob)});
+    add("up and down, about a low height", {low(), low() + Vec3(0, 0, kDesignRules.design_bob)});
     const auto floor = room_.to_solid(room_.open_voxel(), {0, 0, -1});
     if (!floor) return cannot("hover 0.3, 0.8 and 1.3 m over the floor", "the map shows no floor there");
     Points points;
@@ -129,18 +130,19 @@ class List {
     for (const auto& [name, step] : {std::pair{"x", Index3(1, 0, 0)}, {"y", Index3(0, 1, 0)}}) {
       const Vec3 from = room_.end(-step), to = room_.end(step);
       add(std::string("side to side along ") + name + ", fast", {from, to});
-      add(std::string("side to side along ") + name + ", slowly", steps(from, to, kDesignRules.slow_step));
+      add(std::string("side to side along ") + name + ", slowly", steps(from, to, kDesignRules.design_slow_step));
     }
     add("corner to corner",
         {room_.end({-1, -1, 0}), room_.end({1, 1, 0}), room_.end({-1, 1, 0}), room_.end({1, -1, 0})});
   }
   void turns() {
-    for (const double side : {kDesignRules.small_side.value, kDesignRules.large_side.value})
+    for (const double side : {kDesignRules.design_small_side.value, kDesignRules.design_large_side.value})
       for (const auto& [name, corners] : {std::pair{"a triangle", 3}, {"a square", 4}, {"an octagon", 8}})
         add(std::string("turn the heading on ") + name + ", sides of " + metres(side), ring(open_, side, corners));
-    const Vec3 half(kDesignRules.large_side, 0, 0);  // long enough a way to turn by π on
-    add("turn the heading to and fro on " + metres(2 * kDesignRules.large_side), {open_ - half, open_ + half});
-    Points squares = ring(low(), kDesignRules.small_side, 4), upper = ring(high(), kDesignRules.small_side, 4);
+    const Vec3 half(kDesignRules.design_large_side, 0, 0);  // long enough a way to turn by π on
+    add("turn the heading to and fro on " + metres(2 * kDesignRules.design_large_side), {open_ - half, open_ + half});
+    Points squares = ring(low(), kDesignRules.design_small_side, 4),
+           upper = ring(high(), kDesignRules.design_small_side, 4);
     squares.insert(squares.end(), upper.begin(), upper.end());
     add("turn the heading on squares, low and high", squares);
   }
@@ -164,14 +166,14 @@ class List {
       const Vec3 from = room_.end(-step), to = room_.end(step);
       add(of + ", as near as is safe", {open_, to, to, open_, from, from});
       const auto a = room_.to_solid(room_.open_voxel(), -step), b = room_.to_solid(room_.open_voxel(), step);
-      const std::string near = of + " to " + metres(kDesignRules.wall_distance);
+      const std::string near = of + " to " + metres(kDesignRules.design_wall_distance);
       if (!a || !b) {
         cannot(near, "the map shows no wall there");
         continue;
       }
       const Vec3 along = step.cast<double>();
-      const Vec3 left = open_ - (*a - kDesignRules.wall_distance) * along,
-                 right = open_ + (*b - kDesignRules.wall_distance) * along;
+      const Vec3 left = open_ - (*a - kDesignRules.design_wall_distance) * along,
+                 right = open_ + (*b - kDesignRules.design_wall_distance) * along;
       add(near, {open_, right, right, open_, left, left});
     }
   }

@@ -23,7 +23,7 @@ std::vector<Way> ways(const plan::World& world, const Vec3& start_W);
 
 /// A way as it would be flown.
 struct FlownWay {
-  std::vector<Vec3> points_W;      ///< rows of a points file, at most kDesignRules.most_rows
+  std::vector<Vec3> points_W;      ///< rows of a points file, at most kDesignRules.design_most_rows
   std::vector<Setpoint> commands;  ///< 20 ms apart, from rest at the start
   std::string why_not = {};        ///< why it does not fit; then there are no points
 };

@@ -14,12 +14,12 @@ struct Rules {
   Rule flips{"flips", 1200, "draws", "derived: resolves a sixth of a third of accept_p, a further structure's level"};
   Rule accept_p{
       "accept_p", 0.015, "1",
-      "measured: at 0.03 worlds without an effect raised alarms about three times as often (core/study/confusion.md)"};
+      "measured: at 0.03, 40 of 600 worlds without an effect raised alarms, now 5 of 249 (core/study/confusion.md)"};
   Rule structure_share{"structure_share", 1.0 / 6, "of accept_p",
                        "chosen: structures gain much or little, and the catalogue's names shall lose little"};
   Rule dependence_share{"dependence_share", 1.0 / 6, "of accept_p", "chosen: as structure_share"};
   Rule further_level{"further_level", 1.0 / 3, "of accept_p",
-                     "chosen: up to 3 further names beside a true one share the level of the first"};
+                     "derived: Bonferroni over the 3 further names that most_causes leaves beside the first"};
   Rule most_causes{"most_causes", 4, "causes", "chosen: worlds with more than two were never tried"};
   Rule least_threshold{"least_threshold", 0.5, "nats", "derived: what one parameter without effect gains on average"};
   Rule harmonic_nats{"harmonic_nats", 1, "nats", "derived: what two parameters without effect gain on average"};
@@ -52,10 +52,12 @@ struct Rules {
                     "chosen: a reference farther than a quarter outside of what was flown is an extrapolation"};
   // Scatter
   Rule motor_scatter{"motor_scatter", 0.01, "1",
-                     "chosen: rotors of one craft differ by 1 % (core/study/inference/README.md)"};
+                     "chosen: so well do reference flights tell a rotor's share (core/study/inference/README.md); "
+                     "craft differ by rotor_spread"};
   Rule dropout_scatter{"dropout_scatter", 0.003, "1", "chosen: of readings, lost by a sound sensor"};
   Rule least_scatter{"least_scatter", 1e-8, "channel²", "derived: so that an exact channel can be divided by"};
-  Rule least_rotor_scatter{"least_rotor_scatter", 1e-6, "1", "derived: the same for counted dropouts"};
+  Rule least_rotor_scatter{"least_rotor_scatter", 1e-6, "1",
+                           "derived: so that counted dropouts without scatter can be divided by"};
   Rule ln_variance_limit{"ln_variance_limit", 2, "ln variance",
                          "chosen: no window weighs more than 7 times as much as its modelled variance says"};
   Rule fewest_trimmed{"fewest_trimmed", 3, "flights", "derived: two parameters and a scatter"};
@@ -68,25 +70,29 @@ struct Rules {
                       "chosen: a column that one flight alone shows cannot be held out"};
   Rule ridge{"ridge", 1e-9, "1", "derived: keeps an inverse finite, changes no digit that is told"};
   // Estimates
-  Rule tail{"tail", 0.025, "1", "chosen: an interval of 95 % leaves so much beyond each end"};
+  Rule tail{"tail", 0.025, "1", "derived: an interval of 95 % leaves so much beyond each end"};
   Rule normal_975{"normal_975", 1.959964, "1", "derived: its quantile of the normal distribution"};
   Rule fine_scales{"fine_scales", 12, "scales", "chosen: the likelihood is averaged over so many"};
   Rule beyond_scales{"beyond_scales", 1.5, "1", "chosen: the finer grid goes so far beyond the searched scales"};
   Rule rounds{"rounds", 2, "rounds", "chosen: of the likeliest shape and where it pushes the craft"};
-  Rule turns{"turns", 4, "turns", "chosen: of place and push; each takes 1/k_p of the slope off the error"};
+  Rule turns{
+      "turns", 4, "turns",
+      "derived: each leaves the push's slope over k_p of the error: 0.15 at 0.3 m/s² over 0.2 m, 5e-4 after four"};
   Rule offset_difference{"offset_difference", 0.05, "m", "derived: half the spacing at which Σ is looked up"};
   Rule polish_evaluations{"polish_evaluations", 60, "evaluations", "chosen: of NLopt, in one or two dimensions"};
   Rule polish_divisor{"polish_divisor", 100, "1", "chosen: first step of NLopt over its tolerance"};
   // At any time
   Rule first_look{"first_look", 5, "flights", "chosen: the scatter of the first flights is that of so many"};
-  Rule prior_flights{"prior_flights", 0.1, "flights", "chosen: best for effects of 3 standard errors a flight"};
+  Rule prior_flights{"prior_flights", 0.1, "flights",
+                     "derived: the variance of one flight over that of effects of 3 standard errors a flight, 1/9"};
   Rule mixture_reach{"mixture_reach", 6, "standard errors", "derived: 1e-9 of a shape's estimate lies beyond"};
   Rule mixture_turns{"mixture_turns", 60, "halvings", "derived: more than a double's digits"};
   Rule null_range{"null_range", 40, "ln of a multiplier", "derived: both ends are beyond what doubles tell apart"};
   Rule null_turns{"null_turns", 60, "halvings", "derived: of that range, to a part in 1e16"};
   // What remains
   Rule shift_draws{"shift_draws", 1999, "draws", "derived: resolves a third of 0.05/30, which Holm asks of 30 pairs"};
-  Rule enough_turns{"enough_turns", 50, "draws", "chosen: a p so far from the level is known to a seventh of itself"};
+  Rule enough_turns{"enough_turns", 50, "draws",
+                    "derived: a p that so many draws tell is known to 1/√50, a seventh of itself"};
   Rule most_turns{"most_turns", 64, "turns a flight", "chosen: of 12 flights, 64^12 draws differ"};
   Rule median_of{"median_of", 400, "windows", "chosen: of which the kernel's width is the median distance"};
   Rule most_features{"most_features", 100, "features", "chosen: rank of a kernel; 30 suffice for a smooth one"};
@@ -106,19 +112,21 @@ struct Rules {
   Rule division_kinds{"division_kinds", 3, "1", "derived: from a flight on, a run of them, any set: each pays for all"};
   Rule level_scatter{"level_scatter", 2, "degrees of freedom",
                      "measured: so many taken off, equally spread values pass no more often than normal ones"};
-  Rule most_parts{"most_parts", 3, "causes", "chosen: as many as further causes"};
+  Rule most_parts{"most_parts", 3, "causes", "derived: as many further causes as most_causes leaves"};
   Rule side_windows{"side_windows", 4, "windows", "chosen: 8 s on either side of a step within a flight"};
   Rule likeness_lags{"likeness_lags", 4, "windows", "chosen: neighbours that share a dwell"};
   Rule step_price{"step_price", 8, "nats", "derived: of one of 45 windows in one of 12 flights, and one parameter"};
-  Rule column_price{"column_price", 3, "nats", "derived: as smooth_lead, for each further parameter of a form"};
+  Rule column_price{"column_price", 3, "nats", "derived: as structure_lead, for each further parameter of a form"};
   Rule sound_first{"sound_first", 1, "nats", "chosen: craft are sound before they are broken"};
   Rule sound_spread{"sound_spread", 0.03, "1", "chosen: farther off, a rotor is not as it was built"};
   // The extension
   Rule coverage_level{"coverage_level", 0.9, "of samples",
                       "derived: the interval is the central 90 %; more may be lost without harm"};
   Rule hovering{"hovering", 0.03, "m/s", "chosen: of the set-points' own motion; a lag of 0.1 s is 3 mm"};
-  Rule least_shift{"least_shift", 0.002, "m", "chosen: a tenth of a pose's error, which 100 windows average out"};
-  Rule refuted_shift{"refuted_shift", 0.5, "of the predicted shift", "chosen: below, no shift is nearer than this one"};
+  Rule least_shift{"least_shift", 0.002, "m",
+                   "derived: a pose's error of 0.02 m (vehicle file) over the root of 100 windows"};
+  Rule refuted_shift{"refuted_shift", 0.5, "of the predicted shift",
+                     "derived: below it what was measured is nearer to no shift than to the predicted one"};
   Rule shift_interval{"shift_interval", 1, "of the predicted shift", "derived: wider, it holds both answers"};
   Rule fewest_shifted{"fewest_shifted", 3, "flights", "derived: one slope and a scatter"};
   Rule window_match{"window_match", 0.15, "s", "chosen: a window of 2 s moved by less holds 90 % of the same gusts"};
@@ -126,19 +134,21 @@ struct Rules {
   Rule fewest_flights{"fewest_flights", 10, "flights",
                       "chosen: the campaigns have 12; with fewer no name is warranted"};
   Rule power{"power", 0.8, "1", "chosen: at which a minimum detectable effect is told"};
-  Rule power_flips{"power_flips", 50, "draws", "chosen: a power of 0.8 is known to 0.06"};
+  Rule power_flips{"power_flips", 50, "draws", "derived: a power of 0.8 is known to √(0.8·0.2/50) = 0.06"};
   Rule power_halvings{"power_halvings", 14, "1", "derived: the size is known to e^(13.8/2^14), 0.1 %"};
   Rule power_low{"power_low", -9.2, "ln of a parameter", "derived: 1e-4 of its unit, below every floor"};
   Rule power_high{"power_high", 4.6, "ln of a parameter", "derived: 100 of its unit, above every cause"};
   Rule normal_95{"normal_95", 1.644854, "1", "derived: of the central 90 %, whose share of samples is told"};
   Rule least_variance{"least_variance", 1e-12, "(m/s²)²", "derived: so that a still window can be divided by"};
   Rule manoeuvre_windows{"manoeuvre_windows", 45, "windows", "derived: a flight of 90 s"};
-  Rule manoeuvre_flights{"manoeuvre_flights", 12, "flights", "chosen: as many as the campaigns have"};
+  Rule manoeuvre_flights{"manoeuvre_flights", 12, "flights",
+                         "derived: the flights of the campaigns (core/study/confusion.md)"};
   Rule manoeuvre_nats{"manoeuvre_nats", 0.5, "nats", "derived: as least_threshold"};
   // What it changes for a flight
   Rule places{"places", 60, "windows", "chosen: of all that were flown, at which hover sets are computed"};
   Rule told_quantile{"told_quantile", 0.95, "1", "chosen: of the hover sets, told beside the median"};
-  Rule plan_deadline{"plan_deadline", 3, "s", "chosen: of each of the two plans; both routes have the same"};
+  Rule plan_deadline{"plan_deadline", 3, "s",
+                     "measured: twelve times what 95 % of backwash compare's plans take, 247 ms (core/sim/compare.md)"};
   Rule least_route{"least_route", 0.3, "m", "chosen: between places that are nearer no plan is told"};
   Rule fewest_compared{"fewest_compared", 8, "windows", "chosen: in which a channel is simulated beside measured"};
   Rule picture_groups{"picture_groups", 12, "groups", "chosen: of windows, whose means a picture draws"};

@@ -33,7 +33,7 @@ void FirstStage::add(const std::array<std::vector<double>, 2>& z, const std::arr
 }
 
 Eigen::Matrix2d FirstStage::coefficients() const {
-  if (!(instruments.determinant() > kWindowRules.no_turn * instruments(0, 0) * instruments(1, 1)))
+  if (!(instruments.determinant() > kWindowRules.no_first_stage * instruments(0, 0) * instruments(1, 1)))
     return Eigen::Matrix2d::Identity();
   return instruments.ldlt().solve(followed);
 }

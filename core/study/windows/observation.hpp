@@ -65,7 +65,7 @@ inline constexpr auto kOffsetsAside = static_cast<std::size_t>(kWindowRules.offs
 inline constexpr double kOffsetStep = kWindowRules.offset_step;  ///< m between them
 
 /// Places along a window: a moving vehicle crosses different air at different speeds.
-inline constexpr auto kPoints = static_cast<std::size_t>(kWindowRules.points);
+inline constexpr auto kPoints = static_cast<std::size_t>(kWindowRules.points_along);
 
 /// One window: where and how it was flown, and what the catalogue's columns are made of.
 struct WindowRow {

@@ -49,7 +49,7 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
       double sum = 0;
       for (std::size_t i = begin; i < end; ++i)
         sum += thrust_share(vehicle, motor[s.row[i]]) / static_cast<double>(end - begin);
-      share[rotor] = std::log(std::max(sum, kWindowRules.least_share.value));
+      share[rotor] = std::log(std::max(sum, kWindowRules.least_motor.value));
     }
     if (has_rpm) {
       const auto& rpm = log.column(name_of("rpm", rotor));

@@ -57,7 +57,7 @@ double ln_variance(double n) { return trigamma(n / 2); }
 
 namespace {
 
-constexpr int kBeside = static_cast<int>(kWindowRules.beside);  // on each side, 1 Hz apart from 1.5 Hz on
+constexpr int kBeside = static_cast<int>(kWindowRules.line_beside);  // on each side, 1 Hz apart from 1.5 Hz on
 
 /// x without what it shares with its last sample as a first-order process: the ratio of its second autocorrelation to
 /// its first, which white noise on top does not change. Gusts come out flat down to 0 Hz.

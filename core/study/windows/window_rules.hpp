@@ -18,13 +18,15 @@ struct WindowRules {
   Rule settle{"settle", 1, "s",
               "derived: two poles of the shipped gains (10, 5.5) leave e^-2.75, 6 %, of a step (calibration)"};
   Rule gap{"gap", 0.05, "s", "derived: the period of 20 Hz, the least rate of a log: farther apart is a gap"};
-  Rule gap_periods{"gap_periods", 5, "median periods",
-                   "chosen: more than four rows lost in a row; jitter and a late packet lose fewer"};
+  Rule gap_periods{
+      "gap_periods", 5, "median periods",
+      "measured: halved and doubled, up to 5 of 33 windows change and no name (core/study/windows/README.md)"};
   Rule frozen{"frozen", 0.1, "s",
               "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md); five "
               "control periods"};
   Rule frozen_rows{"frozen_rows", 4, "rows",
-                   "chosen: and in so many; a tracker of half the log's rate repeats each position once"};
+                   "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md); a "
+                   "tracker of half the log's rate repeats each position once"};
   Rule perched_spread{"perched_spread", 0.0003, "m",
                       "measured: halved and doubled no window of the recordings changes "
                       "(core/study/windows/README.md); hovers move by 10 mm"};
@@ -66,8 +68,10 @@ struct WindowRules {
   Rule noise_most{"noise_most", 1, "of S(0)", "derived: more noise than gust at every frequency"};
   Rule tau_told{"tau_told", 0.002, "ln", "derived: a tenth of the interval that 24 flights give"};
   // Flights by sample
-  Rule held{"held", 0.1, "s", "chosen: between rows farther apart a set-point is held and not interpolated"};
-  Rule restart{"restart", 0.2, "s", "chosen: after a gap so long the closed loop starts where the vehicle is"};
+  Rule held{"held", 0.1, "s",
+            "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md)"};
+  Rule restart{"restart", 0.2, "s",
+               "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md)"};
   Rule loop_step{"loop_step", 0.005, "s", "derived: a tenth of the shortest lag (0.05 s) that vehicles ship with"};
   Rule shift_step{"shift_step", 0.03, "s", "chosen: delays are about 0; designs are linear between 0, 1 and 2 steps"};
   Rule shift_far{"shift_far", 0.05, "s", "chosen: and on to 2, 3 and 4 of these, the longest that a loop survives"};
@@ -76,23 +80,29 @@ struct WindowRules {
   Rule loop_drag{"loop_drag", 0.2, "1/s", "derived: small enough that twice as much slows twice as much"};
   Rule command_age{"command_age", 0.25, "periods",
                    "derived: a held command is half a period old on the mean, a streamed one not: the middle"};
-  Rule slope_time{"slope_time", 0.06, "s", "chosen: a slope over so long loses 2 % of what moves at 2 Hz"};
+  Rule slope_time{"slope_time", 0.06, "s",
+                  "measured: halved and doubled nothing told of the recordings changes (core/study/windows/README.md); "
+                  "it loses 2 % of what moves at 2 Hz"};
   Rule slope_rows{"slope_rows", 1000, "rows", "derived: slope_time at 33 kHz, which no log has: a broken rate"};
   Rule stamp_error{"stamp_error", 1e-9, "s", "derived: rounding of a stamp, and no flight's rows are so near"};
   Rule row_error{"row_error", 1e-6, "rows", "derived: rounding of a stretch's length over its period"};
   Rule no_attitude{"no_attitude", 1e-6, "1", "derived: a quaternion that rounding made has no direction"};
   Rule segments{"segments", 1e9, "1", "derived: the largest number that an int is sure to hold"};
   // Where a window was flown
-  Rule stray{"stray", 0.3, "m", "chosen: a craft farther from where its set-points lead does not follow them"};
-  Rule one_place{"one_place", 0.05, "m", "chosen: a window whose ways are shorter is one place; Σ changes over 0.15 m"};
+  Rule stray{"stray", 0.3, "m",
+             "measured: halved, forward_speed is 1.041 in place of 1.030; doubled, nothing changes "
+             "(core/study/windows/README.md)"};
+  Rule one_place{
+      "one_place", 0.05, "m",
+      "measured: halved and doubled no window, name or size of the recordings changes (core/study/windows/README.md)"};
   Rule offset_retreat{"offset_retreat", 0.25, "of an offset",
                       "derived: 0.1 m of the farthest, a voxel: so far at a time back out of a solid"};
   Rule offset_limit{"offset_limit", 2, "ln variance", "chosen: as ln_variance_limit; the map is then wrong by more"};
   Rule offsets_aside{"offsets_aside", 9, "1", "derived: offset_step apart, from -0.4 m to 0.4 m"};
   Rule offset_step{"offset_step", 0.1, "m", "derived: the voxel of the maps that are shipped"};
-  Rule points{"points_along", 7, "1", "chosen: places along a window; at 1 m/s they are 0.3 m apart"};
+  Rule points_along{"points_along", 7, "1", "chosen: places along a window; at 1 m/s they are 0.3 m apart"};
   Rule sight{"sight", 3, "m", "derived: e^-5 is left of an effect of the longest length searched, 0.6 m"};
-  Rule sight_up{"sight_up", 20, "m", "chosen: surfaces below and above, in rooms higher than any that was flown"};
+  Rule sight_up{"sight_up", 20, "m", "derived: surfaces below and above, in rooms higher than any that was flown"};
   Rule room{"room", 1e5, "m", "derived: without a map, no flight is so far from its origin"};
   Rule sigma_lattice{"sigma_lattice", 0.15, "m", "chosen: Σ is evaluated so far apart and ln Σ interpolated"};
   Rule sigma_least{"sigma_least", 1e-9, "(m/s²)²", "derived: so that its logarithm is finite"};
@@ -103,12 +113,15 @@ struct WindowRules {
   Rule yes{"yes", 0.5, "1", "derived: the mean of a column of 0 and 1 is nearer to 1"};
   // Means and variances
   Rule scatter2{"scatter2", 0.16, "(ln variance)²",
-                "chosen: between windows beside the estimate's own; anova measures the scatter that counts"};
-  Rule mean_noise{"mean_noise", 0.002, "(m/s²)²", "chosen: what a mean scatters by beside Σ: 0.045 m/s² of offset"};
+                "measured: halved and doubled no name or size of the recordings changes "
+                "(core/study/windows/README.md); anova measures the scatter that counts"};
+  Rule mean_noise{"mean_noise", 0.002, "(m/s²)²",
+                  "measured: halved and doubled nothing told of the recordings changes (core/study/windows/README.md); "
+                  "0.045 m/s² of offset"};
   Rule mean_unit{"mean_unit", 0.01, "(m/s²)²",
                  "derived: the unit of the weights, in which the scatter is estimated too"};
   Rule least_gusts{"least_gusts", 0.2, "of a window's variance",
-                   "chosen: is left when noise is taken out: ln of less would be noise alone"};
+                   "measured: halved and doubled, sizes change by less than 0.1 % (core/study/windows/README.md)"};
   Rule fewest_spread{"fewest_spread", 4, "rows", "derived: two more than a variance and a correlation take"};
   Rule correlated{"correlated", 0.98, "1", "derived: at it a window of 100 rows is worth 2 samples, the least"};
   Rule noise_near{"noise_near", 0.3, "s",
@@ -120,16 +133,20 @@ struct WindowRules {
   Rule voltage_parabola{"voltage_parabola", 8, "windows", "chosen: of a flight, from which its course is a parabola"};
   Rule voltage_line{"voltage_line", 4, "windows", "chosen: from which it is a line; with fewer the mean"};
   // Thrust and command delays
-  Rule excited_level{"excited_level", 0.05, "m/s²",
-                     "chosen: root mean square of the set-points' acceleration; below, a slope of 10 % is 5 mm/s²"};
+  Rule excited_level{
+      "excited_level", 0.05, "m/s²",
+      "measured: halved and doubled, thrust_slope changes by at most 0.3 % (core/study/windows/README.md)"};
   Rule excited_rate{"excited_rate", 0.05, "m/s³",
-                    "chosen: root mean square of its rate; below, a delay of 0.05 s is 2.5 mm/s²"};
-  Rule slow_tilt{"slow_tilt", 0.45, "s",
-                 "measured: below 0.3 s the order of the attitude loop is told as a lag (other_worlds, sluggish)"};
-  Rule no_turn{"no_first_stage", 1e-6, "1", "derived: a determinant that rounding made"};
+                    "measured: halved and doubled, sizes change by less than 0.1 % (core/study/windows/README.md)"};
+  Rule slow_tilt{
+      "slow_tilt", 0.45, "s",
+      "measured: below 0.3 s the order of the attitude loop is told as a lag (tests/other_worlds, sluggish)"};
+  Rule no_first_stage{"no_first_stage", 1e-6, "1", "derived: a determinant that rounding made"};
   Rule delay_turns{"delay_turns", 20, "turns", "chosen: more than the fixed point of a delay below 0.2 s needs"};
   // Rotors
-  Rule beside{"line_beside", 4, "1", "chosen: neighbours on each side, 1 Hz apart: their mean is known to a third"};
+  Rule line_beside{
+      "line_beside", 4, "1",
+      "derived: neighbours on each side, 1 Hz apart: the mean of 8 exponential powers is known to 1/√8, a third"};
   Rule line_nearest{"line_nearest", 1.5, "Hz", "derived: what a line spreads over in line_block ends at 1 Hz"};
   Rule line_block{"line_block", 1, "s", "chosen: over more the phase that rpm readings give drifts"};
   Rule least_folded{"least_folded", 0.75, "Hz",
@@ -137,7 +154,7 @@ struct WindowRules {
   Rule from_half_rate{"from_half_rate", 1, "Hz", "derived: nearer to half the rate a line's neighbours are missing"};
   Rule dropout{"dropout", 0.3, "of the median rpm",
                "derived: a rotor that slow would lift 9 %: it is the reading that is wrong"};
-  Rule least_share{"least_motor", 1e-6, "of full thrust", "derived: so that its logarithm is finite"};
+  Rule least_motor{"least_motor", 1e-6, "of full thrust", "derived: so that its logarithm is finite"};
   Rule least_rpm{"least_rpm", 1, "rpm", "derived: so that its logarithm is finite"};
   // Flights that come twice
   Rule same_gusts{"same_gusts", 0.9, "1", "chosen: from this correlation of ln variances two flights are one"};
