@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files hold at most 300 lines, functions of production at most 50 (from the head to the closing brace). Files with tests are
+"""Files of code and scripts hold at most 300 lines, functions of production at most 50 (from the head to the closing brace). Files with tests are
 named X_test.cpp, in tests/fuzz also X_fuzz.cpp.
 
 sizes.py SOURCE_DIR [--longest]    --longest: the ten longest functions, too
@@ -39,12 +39,14 @@ def main() -> int:
     wrong, all_functions, files = [], [], 0
     for folder in ("core", "firmware_bridge", "services", "tests"):
         for path in sorted((root / folder).rglob("*")):
-            if path.suffix not in (".cpp", ".hpp", ".c", ".h"):
+            if path.suffix not in (".cpp", ".hpp", ".c", ".h", ".py", ".sh"):
                 continue
             text, name = path.read_text(), str(path.relative_to(root))
             files += 1
             if (lines := text.count("\n")) > 300:
                 wrong.append(f"{name} has {lines} lines")
+            if path.suffix in (".py", ".sh"):
+                continue
             if folder != "tests":
                 all_functions += [(count, name, head) for count, head in functions_of(text)]
             elif re.search(r"^(?:TYPED_)?TEST(?:_[FP])?\(", text, re.M):
