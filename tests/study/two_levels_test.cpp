@@ -74,9 +74,11 @@ TEST(TwoLevels, AFlightTellsWhenItStepsAndThatItDoesNot) {
       EXPECT_NEAR(static_cast<double>(at.begin), static_cast<double>(begin), 1.1);
       EXPECT_NEAR(static_cast<double>(at.end), static_cast<double>(end), 1.1);
     }
-  const Step step = largest_step(course(rng, 17, 45, 0), 4);
-  EXPECT_NEAR(static_cast<double>(step.at), 17, 1.1);
-  EXPECT_NEAR(step.size, 1, 0.1);
+  const auto step = largest_step(course(rng, 17, 45, 0), 4);
+  ASSERT_TRUE(step);
+  EXPECT_NEAR(static_cast<double>(step->at), 17, 1.1);
+  EXPECT_NEAR(step->size, 1, 0.1);
+  EXPECT_FALSE(largest_step(course(rng, 17, 45, 0), 23)) << "45 windows have no 23 on either side";
 }
 
 TEST(TwoLevels, NeighboursThatAreAlikeInflateTheErrorOfAMean) {

@@ -136,7 +136,6 @@ void name_causes(StudyResult& result, const Evidence& evidence, const std::vecto
 
 /// `off`: by how much the rotors differ without being judged, ln.
 void leave_unjudged(StudyResult& result, double off) {
-  if (!(off > 0)) return;
   for (const char* name : {"propeller_damage", "rotor_sensor_fault"})
     result.not_tested.emplace_back(
         name, "the same in all flights and no more than craft are built with: the rotors differ by " + percent(off) +
@@ -189,8 +188,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
     return result;
   }
   Observations settled = seen;
-  const double off = settle_rotors(options.sound, settled);
-  leave_unjudged(result, off);
+  const auto off = settle_rotors(options.sound, settled);
+  if (off) leave_unjudged(result, *off);
   const WholeSearch whole = search_all(settled, options.search);
   const CauseSearchResult& found = whole.found;
   result.threshold = found.threshold;
@@ -211,7 +210,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
       cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
     ambiguous = ambiguous || !cause.found.rivals.empty();
   }
-  ambiguous = doubt_payloads(result.causes, off) || ambiguous;
+  if (off) ambiguous = doubt_payloads(result.causes, *off) || ambiguous;
   if (options.dependence) {
     options.search.progress("whether what remains depends on something");
     look_at_what_remains(result, evidence, columns_of(found.accepted, whole.rest), options.search);

@@ -90,12 +90,12 @@ Finding within(const Asked& asked) {
   double steps = 0, most = 0;
   for (std::size_t u = 0; u < a.units(); ++u) {
     const AmplitudeCourse course = a.course(u, asked.direction);
-    const Step step = largest_step(course, kSide);
+    const auto step = largest_step(course, kSide);
     if (course.value.size() >= 2 * kSide) steps += static_cast<double>(course.value.size() - 2 * kSide + 1);
-    if (step.t <= most) continue;
-    most = step.t;
-    const double before = level(course, 0, step.at).value;
-    finding.low = std::min(before, before + step.size), finding.high = std::max(before, before + step.size);
+    if (!step || step->t <= most) continue;
+    most = step->t;
+    const double before = level(course, 0, step->at).value;
+    finding.low = std::min(before, before + step->size), finding.high = std::max(before, before + step->size);
   }
   std::vector<double> off = values_of(asked).of;
   if (!(most > 0) || off.empty()) return finding;

@@ -61,7 +61,7 @@ std::optional<SoundRotors> sound_rotors(const Observations& reference) {
   return sound;
 }
 
-double settle_rotors(const std::optional<SoundRotors>& sound, Observations& seen) {
+std::optional<double> settle_rotors(const std::optional<SoundRotors>& sound, Observations& seen) {
   double unjudged = 0;
   const bool shaking = !sound && shakes(seen);
   for (const std::size_t first : {std::size_t{kMotor1}, std::size_t{kRpm1}}) {
@@ -79,7 +79,7 @@ double settle_rotors(const std::optional<SoundRotors>& sound, Observations& seen
     for (std::size_t r = 0; r < kRotors; ++r)
       for (double& y : seen.y[first + r]) y -= own[r];
   }
-  return unjudged > kRules.motor_scatter ? unjudged : 0;
+  return unjudged > kRules.motor_scatter ? std::optional(unjudged) : std::nullopt;
 }
 
 bool YawBalance::weight() const { return std::abs(yaw) <= kRotorRules.balance_errors * error; }

@@ -23,8 +23,8 @@ std::optional<SoundRotors> sound_rotors(const Observations& reference);
 /// Takes the sound craft's own differences out of observations: as told by reference flights, or, without them, all
 /// that a sound craft may have (rotor_spread). What is larger stays, and the shares of a craft of which one rotor
 /// shakes.
-/// Returns by how much the rotors' shares differ without that being judged, ln; 0: nothing was left unjudged.
-double settle_rotors(const std::optional<SoundRotors>& sound, Observations& seen);
+/// Returns by how much the rotors' shares differ without that being judged, ln, if they do.
+std::optional<double> settle_rotors(const std::optional<SoundRotors>& sound, Observations& seen);
 
 /// Commanded thrusts against two patterns: a propeller that gives less twists the craft, a weight beside the middle
 /// does not.

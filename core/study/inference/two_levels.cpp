@@ -75,15 +75,15 @@ Level level(const AmplitudeCourse& course, std::size_t begin, std::size_t end) {
   return l;
 }
 
-Step largest_step(const AmplitudeCourse& course, std::size_t fewest) {
+std::optional<Step> largest_step(const AmplitudeCourse& course, std::size_t fewest) {
   const std::size_t n = course.value.size();
-  Step best;
+  std::optional<Step> best;
   for (std::size_t at = fewest; at + fewest <= n; ++at) {
     const Level before = level(course, 0, at), after = level(course, at, n);
     if (!(before.weight > 0) || !(after.weight > 0)) continue;
     const double size = after.value - before.value;
     const double t = std::abs(size) / std::sqrt(1 / before.weight + 1 / after.weight);
-    if (t > best.t) best = {at, size, t};
+    if (!best || t > best->t) best = {at, size, t};
   }
   return best;
 }

@@ -37,8 +37,9 @@ struct Step {
   double size = 0;  ///< after less before
   double t = 0;     ///< |size| over its error by the windows' noise
 };
-/// The step of largest t with at least `fewest` measured windows on either side; `at` 0: there is none.
-Step largest_step(const AmplitudeCourse& course, std::size_t fewest);
+/// The step of largest t with at least `fewest` measured windows on either side; none where no place has
+/// them.
+std::optional<Step> largest_step(const AmplitudeCourse& course, std::size_t fewest);
 
 /// By how much neighbouring windows' likeness multiplies the variance of a mean: 1 + 2 Σ ρ_k, at least 1, about the
 /// course's mean; lags 1 … `lags`.
