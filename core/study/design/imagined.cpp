@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/study/design/design_rules.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/types/quantile.hpp"
 #include "core/types/thrust.hpp"
 
 namespace backwash::study {
@@ -51,9 +53,7 @@ std::pair<double, double> typical(const Observations& flown, std::size_t channel
     sum += w * flown.y[channel][i], weight += w, weights.push_back(w);
   }
   if (weights.empty()) return {0, 0};
-  const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
-  std::nth_element(weights.begin(), middle, weights.end());
-  return {sum / weight, *middle};
+  return {sum / weight, quantile(std::move(weights), 0.5)};
 }
 
 double longest(const Observations& flown) {

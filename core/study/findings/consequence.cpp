@@ -10,15 +10,10 @@
 #include "core/plan/planner.hpp"
 #include "core/study/findings/extend.hpp"
 #include "core/study/inference/coverage.hpp"
+#include "core/types/quantile.hpp"
 
 namespace backwash::study {
 namespace {
-
-double quantile(std::vector<double> x, double q) {
-  if (x.empty()) return 0;
-  std::sort(x.begin(), x.end());
-  return x[static_cast<std::size_t>(q * static_cast<double>(x.size() - 1) + 0.5)];
-}
 
 /// What all causes add to the means and the ln variances of a window, fitted without its flight.
 struct Added {
@@ -88,6 +83,7 @@ void describe(FlightOutcome& outcome, const std::vector<reach::HoverSet>& sets) 
     shift.push_back(set.shift.norm());
     if (set.safe()) outcome.safe += 1 / static_cast<double>(sets.size());
   }
+  if (extent.empty()) return;  // no set is bounded
   outcome.extent_median = quantile(extent, 0.5), outcome.extent_95 = quantile(extent, kRules.told_quantile);
   outcome.shift_median = quantile(shift, 0.5), outcome.shift_95 = quantile(shift, kRules.told_quantile);
 }

@@ -6,6 +6,9 @@
 #include <numeric>
 #include <random>
 #include <tuple>
+#include <utility>
+
+#include "core/types/quantile.hpp"
 
 namespace backwash::study {
 namespace {
@@ -24,9 +27,7 @@ double median_distance(const MatrixXd& points) {
     for (Index j = 0; j < i; j += step)
       if (const double d = (points.row(i) - points.row(j)).norm(); d > kRules.least_square) distances.push_back(d);
   if (distances.empty()) return 1;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return quantile(std::move(distances), 0.5);
 }
 
 /// ΦᵀΨ of one flight with Ψ turned round, a column for each turn; the first is as flown.

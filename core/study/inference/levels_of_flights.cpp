@@ -6,6 +6,9 @@
 #include <cmath>
 #include <map>
 #include <tuple>
+#include <utility>
+
+#include "core/types/quantile.hpp"
 
 namespace backwash::study {
 namespace {
@@ -18,8 +21,7 @@ double typical_inflation(const Asked& asked) {
   std::vector<double> all;
   for (std::size_t u = 0; u < asked.amplitudes->units(); ++u)
     all.push_back(inflation(asked.amplitudes->course(u, asked.direction), kLags));
-  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
-  return all[all.size() / 2];
+  return quantile(std::move(all), 0.5);
 }
 
 /// Amplitude of every flight that tells it, and the mean square of its error by the windows' noise.
@@ -99,12 +101,9 @@ Finding within(const Asked& asked) {
   }
   std::vector<double> off = values_of(asked).of;
   if (!(most > 0) || off.empty()) return finding;
-  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-  std::nth_element(off.begin(), middle, off.end());
-  const double median = *middle;
+  const double median = quantile(off, 0.5);
   for (double& x : off) x = std::abs(x - median);
-  std::nth_element(off.begin(), middle, off.end());
-  finding.spread = *middle;
+  finding.spread = quantile(std::move(off), 0.5);
   finding.p = std::min(1.0, steps * std::erfc(most / std::sqrt(2 * finding.inflation)));
   return finding;
 }

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <utility>
+
+#include "core/types/quantile.hpp"
 namespace backwash::study {
 namespace {
 
@@ -41,9 +44,8 @@ std::vector<SampleRange> unbroken(const std::vector<double>& t, const WindowOpti
   if (t.empty()) return {};
   std::vector<double> spacing;
   for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
-  const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
-  if (!spacing.empty()) std::nth_element(spacing.begin(), middle, spacing.end());
-  const double longest = spacing.empty() ? 0 : std::max(options.gap_s, options.gap_periods * *middle);
+  const double longest =
+      spacing.empty() ? 0 : std::max(options.gap_s, options.gap_periods * quantile(std::move(spacing), 0.5));
   std::vector<SampleRange> stretches{{0, 1}};
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] - t[i - 1] > longest) stretches.push_back({i, i});
