@@ -68,10 +68,8 @@ struct WindowRules {
   Rule noise_most{"noise_most", 1, "of S(0)", "derived: more noise than gust at every frequency"};
   Rule tau_told{"tau_told", 0.002, "ln", "derived: a tenth of the interval that 24 flights give"};
   // Flights by sample
-  Rule held{"held", 0.1, "s",
-            "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md)"};
-  Rule restart{"restart", 0.2, "s",
-               "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md)"};
+  Rule held{"held", 0.1, "s", "chosen: between rows farther apart a set-point is held and not interpolated"};
+  Rule restart{"restart", 0.2, "s", "chosen: after a gap so long the closed loop starts where the vehicle is"};
   Rule loop_step{"loop_step", 0.005, "s", "derived: a tenth of the shortest lag (0.05 s) that vehicles ship with"};
   Rule shift_step{"shift_step", 0.03, "s", "chosen: delays are about 0; designs are linear between 0, 1 and 2 steps"};
   Rule shift_far{"shift_far", 0.05, "s", "chosen: and on to 2, 3 and 4 of these, the longest that a loop survives"};
