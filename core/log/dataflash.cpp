@@ -13,7 +13,7 @@ namespace backwash::log {
 namespace {
 
 constexpr std::uint8_t kHead[] = {0xA3, 0x95}, kFormat = 0x80;
-constexpr std::size_t kHeader = 3, kFormatSize = 89;
+constexpr std::size_t kMessageHeader = 3, kFormatSize = 89;
 constexpr std::size_t kNameAt = 5, kTypesAt = 9, kLabelsAt = 25;  // in a format message: 4, 16 and 64 characters
 
 /// Bytes of a field; 0: no such type.
@@ -87,7 +87,7 @@ Format format_of(const std::uint8_t* p) {
   Format f{text(p + kNameAt, 4), text(p + kTypesAt, 16), {}, p[4]};
   std::istringstream labels(text(p + kLabelsAt, 64));
   for (std::string label; std::getline(labels, label, ',');) f.labels.push_back(label);
-  std::size_t size = kHeader;
+  std::size_t size = kMessageHeader;
   for (const char type : f.types) size += size_of(type);
   const bool whole = size == f.size && f.labels.size() == f.types.size();
   f.timed = whole && f.types.starts_with('Q') && f.labels.front() == "TimeUS";
@@ -96,16 +96,16 @@ Format format_of(const std::uint8_t* p) {
   return f;
 }
 
-class Decoder {
+class DataflashDecoder {
  public:
   tl::expected<TopicLog, std::string> run(std::span<const std::uint8_t> bytes) {
     bool formats = false, damaged = false;
-    for (std::size_t at = 0; at + kHeader <= bytes.size();) {
+    for (std::size_t at = 0; at + kMessageHeader <= bytes.size();) {
       const std::uint8_t* p = bytes.data() + at;
       const std::uint8_t type = p[2];
       const bool is_format = type == kFormat;
       const std::size_t size = is_format ? kFormatSize : formats_[type].size;
-      if (p[0] != kHead[0] || p[1] != kHead[1] || size < kHeader) {
+      if (p[0] != kHead[0] || p[1] != kHead[1] || size < kMessageHeader) {
         if (!damaged) log_.dropouts += 1;
         damaged = true, at += 1;
         continue;
@@ -114,7 +114,7 @@ class Decoder {
       if (is_format)
         formats_[p[3]] = format_of(p), formats = true;
       else if (formats_[type].timed)
-        data(formats_[type], p + kHeader);
+        data(formats_[type], p + kMessageHeader);
       damaged = false, at += size;
     }
     if (!formats) return tl::unexpected<std::string>("no format message (FMT); give a .bin file of ArduPilot");
@@ -149,7 +149,7 @@ class Decoder {
 }  // namespace
 
 tl::expected<TopicLog, std::string> decode_dataflash(std::span<const std::uint8_t> bytes) {
-  return Decoder().run(bytes);
+  return DataflashDecoder().run(bytes);
 }
 
 }  // namespace backwash::log

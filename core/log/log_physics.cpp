@@ -25,18 +25,18 @@ constexpr double kGravityLeft = 2.5;         // m/s², of the median vertical ac
 constexpr double kMostThrust = 1.2, kLeastThrust = -0.05;
 
 using Names = std::array<const char*, 3>;
-using Rows = std::vector<Vec3>;
+using Vectors = std::vector<Vec3>;
 
-Rows rows_of(const FlightLog& log, const Names& names) {
-  Rows rows;
+Vectors rows_of(const FlightLog& log, const Names& names) {
+  Vectors rows;
   for (std::size_t i = 0; i < log.t_s.size(); ++i)
     rows.emplace_back(log.column(names[0])[i], log.column(names[1])[i], log.column(names[2])[i]);
   return rows;
 }
 
 /// Means over ± kSettled around each row.
-Rows averaged(const std::vector<double>& t, const Rows& rows) {
-  Rows means;
+Vectors averaged(const std::vector<double>& t, const Vectors& rows) {
+  Vectors means;
   std::size_t first = 0, last = 0;
   Vec3 sum = Vec3::Zero();
   for (std::size_t i = 0; i < t.size(); ++i) {
@@ -63,7 +63,7 @@ struct Match {
   int axis;
   double slope, correlation;
 };
-Match best_match(const Rows& said, const Rows& shown, int axis, int axes) {
+Match best_match(const Vectors& said, const Vectors& shown, int axis, int axes) {
   Match best{axis, 0, 0};
   const auto n = static_cast<double>(said.size());
   Vec3 mean_said = Vec3::Zero(), mean_shown = Vec3::Zero();
@@ -82,14 +82,14 @@ Match best_match(const Rows& said, const Rows& shown, int axis, int axes) {
   return best;
 }
 
-double rms(const Rows& rows, int axis) {
+double rms(const Vectors& rows, int axis) {
   double sum = 0, mean = 0;
   for (const Vec3& v : rows) mean += v[axis] / static_cast<double>(rows.size());
   for (const Vec3& v : rows) sum += (v[axis] - mean) * (v[axis] - mean);
   return std::sqrt(sum / static_cast<double>(rows.size()));
 }
 
-void pair_up(const Pairing& p, const Rows& said, const Rows& shown, std::vector<std::string>& wrong) {
+void pair_up(const Pairing& p, const Vectors& said, const Vectors& shown, std::vector<std::string>& wrong) {
   for (int axis = 0; axis < p.axes; ++axis) {
     if (rms(shown, axis) < p.least && rms(said, axis) < p.least) continue;
     const Match match = best_match(said, shown, axis, p.axes);
@@ -108,8 +108,8 @@ void pair_up(const Pairing& p, const Rows& said, const Rows& shown, std::vector<
 }
 
 /// Directions of the body's z axis, times gravity: what a thrust of the weight along it accelerates sideways.
-Rows tilts(const FlightLog& log) {
-  Rows rows;
+Vectors tilts(const FlightLog& log) {
+  Vectors rows;
   for (std::size_t i = 0; i < log.t_s.size(); ++i) {
     const double w = log.column("qw")[i], x = log.column("qx")[i], y = log.column("qy")[i], z = log.column("qz")[i];
     rows.push_back(kGravity * Vec3(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)));
@@ -117,9 +117,9 @@ Rows tilts(const FlightLog& log) {
   return rows;
 }
 
-/// Rows of both where the first is known.
+/// Vectors of both where the first is known.
 struct Both {
-  Rows derived, said;
+  Vectors derived, said;
 };
 
 }  // namespace
@@ -128,7 +128,7 @@ std::vector<std::string> contradictions(const FlightLog& log) {
   constexpr Names kP{"x_m", "y_m", "z_m"}, kV{"vx_mps", "vy_mps", "vz_mps"}, kA{"ax_mps2", "ay_mps2", "az_mps2"};
   std::vector<std::string> wrong;
   const auto motion = local_cubics(log.t_s, rows_of(log, kP));
-  const auto known = [&](const Rows& said, bool second) {
+  const auto known = [&](const Vectors& said, bool second) {
     Both both;
     for (std::size_t i = 0; i < said.size(); ++i)
       if (motion[i]) both.derived.push_back(second ? motion[i]->a : motion[i]->v), both.said.push_back(said[i]);
@@ -139,7 +139,7 @@ std::vector<std::string> contradictions(const FlightLog& log) {
     pair_up({"velocity", "the derivative", kV, kP, kLeastSpeed, kVelocityRight}, v.said, v.derived, wrong);
   }
   if (has_all(log, kA)) {
-    const Rows measured = averaged(log.t_s, rows_of(log, kA));
+    const Vectors measured = averaged(log.t_s, rows_of(log, kA));
     std::vector<double> up;
     for (const Vec3& a : measured) up.push_back(a.z());
     if (const double left = median(up); std::abs(left) > kGravityLeft)

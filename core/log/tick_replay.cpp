@@ -16,7 +16,7 @@ tl::unexpected<LogError> bad(const std::string& what) {
 // sets of 16, then each stop: branch, commands, sets, and its rows. Whole numbers up to 2^53 are exact.
 constexpr std::size_t kCommand = 10, kSet = 16;
 
-class Rows {
+class TickRows {
  public:
   void add(double value) { values_.push_back(value); }
   void add(const Vec3& v) { values_.insert(values_.end(), v.data(), v.data() + 3); }
@@ -134,7 +134,7 @@ tl::expected<Segments, LogError> segments_of(const RawLog& log, const std::strin
 }  // namespace
 
 std::vector<std::uint8_t> encode(const track::AcceptedSegment& s) {
-  Rows rows;
+  TickRows rows;
   for (const std::uint64_t n : {s.id, s.continues, std::uint64_t{s.branch}, std::uint64_t{s.closures}, s.epoch.order,
                                 s.epoch.lapse, std::uint64_t{s.arms}})
     rows.add(static_cast<double>(n));

@@ -17,9 +17,9 @@ constexpr double kLeastRate = 20, kMostRate = 100;  // Hz, of a flight's rows
 constexpr double kMostApart = 0.5;                  // s between messages; more is a gap
 
 /// Joins fields of other topics to the rows by the latest message before each.
-class Rows {
+class TopicRows {
  public:
-  Rows(const TopicLog::Topic& base, FlightLog& log) : base_(base), log_(log) {}
+  TopicRows(const TopicLog::Topic& base, FlightLog& log) : base_(base), log_(log) {}
 
   /// Column `to` = factor × field; left out unless the topic has the field and every row a finite value (rows before
   /// the first message take it).
@@ -55,7 +55,7 @@ void keep_whole(FlightLog& log, std::initializer_list<const char*> names) {
     }
 }
 
-void join_motors(const TopicLog& topics, Rows& rows, FlightLog& log) {
+void join_motors(const TopicLog& topics, TopicRows& rows, FlightLog& log) {
   const auto* motors = topics.find("actuator_motors");
   const TopicLog::Topic* outputs = nullptr;
   for (unsigned instance = 0; instance < 4 && !outputs; ++instance)  // of the output board that is there
@@ -171,7 +171,7 @@ std::optional<TopicLog::Topic> densified(const TopicLog& topics, const TopicLog:
 FlightLog flight_of(const TopicLog& topics, const TopicLog::Topic& position) {
   FlightLog log;
   for (const double t : position.t_s) log.t_s.push_back(t - position.t_s.front());
-  Rows rows(position, log);
+  TopicRows rows(position, log);
   // NED → east, north, up: x = east = y_ned, y = north = x_ned, z = −z_ned.
   rows.join(&position, "y", "x_m", 1), rows.join(&position, "x", "y_m", 1), rows.join(&position, "z", "z_m", -1);
   rows.join(&position, "vy", "vx_mps", 1), rows.join(&position, "vx", "vy_mps", 1);

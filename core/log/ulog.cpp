@@ -10,7 +10,7 @@ namespace backwash::log {
 namespace {
 
 constexpr std::uint8_t kMagic[] = {0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35};
-constexpr std::size_t kHeader = 16, kMostFields = 4096;
+constexpr std::size_t kFileHeader = 16, kMostFields = 4096;
 
 struct Field {
   std::string name;
@@ -27,14 +27,14 @@ constexpr Basic kBasics[] = {{"int8_t", 'b', 1},  {"uint8_t", 'B', 1},  {"int16_
                              {"int32_t", 'i', 4}, {"uint32_t", 'I', 4}, {"int64_t", 'q', 8}, {"uint64_t", 'Q', 8},
                              {"float", 'f', 4},   {"double", 'd', 8},   {"bool", 'B', 1},    {"char", 'B', 1}};
 
-class Decoder {
+class UlogDecoder {
  public:
-  explicit Decoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+  explicit UlogDecoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
   tl::expected<TopicLog, std::string> run() {
-    if (bytes_.size() < kHeader || std::memcmp(bytes_.data(), kMagic, sizeof kMagic) != 0)
+    if (bytes_.size() < kFileHeader || std::memcmp(bytes_.data(), kMagic, sizeof kMagic) != 0)
       return fail(0, "no ULog magic; give a .ulg file");
-    for (std::size_t at = kHeader; at + 3 <= bytes_.size();) {
+    for (std::size_t at = kFileHeader; at + 3 <= bytes_.size();) {
       const std::size_t size = little<std::uint16_t>(bytes_.data() + at);
       const char type = static_cast<char>(bytes_[at + 2]);
       if (at + 3 + size > bytes_.size()) break;  // cut short
@@ -176,7 +176,9 @@ class Decoder {
 
 }  // namespace
 
-tl::expected<TopicLog, std::string> decode_ulog(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
+tl::expected<TopicLog, std::string> decode_ulog(std::span<const std::uint8_t> bytes) {
+  return UlogDecoder(bytes).run();
+}
 
 tl::expected<FlightLog, LogError> read_ulog(const std::string& path) {
   return read_topics(path, "a .ulg file", decode_ulog);

@@ -15,7 +15,7 @@ namespace {
 
 using reach::kHoverClearanceCap;
 
-constexpr double kRounding = 1e-5;  // m, more than any of a distance, single precision included
+constexpr double kDistanceRounding = 1e-5;  // m, more than any of a distance, single precision included
 
 /// Clearance of the hover set at a voxel's centre, m.
 double clearance(const World& world, const Index3& v) {
@@ -28,7 +28,7 @@ double clearance(const World& world, const Index3& v) {
 double clearance_at_most(const World& world, const Index3& v) {
   if (!world.bounds.extension().none()) return kHoverClearanceCap;
   return std::min(kHoverClearanceCap,
-                  world.distance.at(v) + kRounding - reach::body_and_estimation(world.reach.vehicle));
+                  world.distance.at(v) + kDistanceRounding - reach::body_and_estimation(world.reach.vehicle));
 }
 
 /// Whether sets are prisms around voxel centres.
@@ -40,14 +40,14 @@ bool clear_by(const World& world, const Index3& v, double metres) {
   const auto h = reach::hover_extent(world.reach, world.grid, world.distance, world.bounds, p_W).half_widths;
   const double least = metres + reach::body_and_estimation(world.reach.vehicle);
   const Vec3 half(h[kX], h[kY], h[kZ]), box = half + Vec3::Constant(std::max(0.0, least));  // holds all within that
-  return world.distance.at(v) - half.norm() - kRounding > least || world.sums.box_free(p_W - box, p_W + box) ||
+  return world.distance.at(v) - half.norm() - kDistanceRounding > least || world.sums.box_free(p_W - box, p_W + box) ||
          reach::prism_clear(world.grid, world.sums, p_W, h, least);
 }
 
 /// The clearance at a hover-safe voxel, m, if it is larger than `metres`.
 std::optional<double> wider_than(const World& world, const Index3& v, double metres) {
   if (clearance_at_most(world, v) <= metres) return std::nullopt;
-  if (plain_sets(world) && !clear_by(world, v, metres - kRounding)) return std::nullopt;
+  if (plain_sets(world) && !clear_by(world, v, metres - kDistanceRounding)) return std::nullopt;
   const double c = clearance(world, v);
   return c > metres ? std::optional(c) : std::nullopt;
 }
@@ -98,12 +98,12 @@ Width width(const World& world, const Index3& v) {
 
 /// At least that, without looking for obstacles.
 Width width_at_most(const World& world, const Index3& v) {
-  return world.hover.safe(v) ? Width{true, clearance_at_most(world, v) + kRounding} : width(world, v);
+  return world.hover.safe(v) ? Width{true, clearance_at_most(world, v) + kDistanceRounding} : width(world, v);
 }
 
 /// min(width, `cap`), by one look where the set is wider.
 Width width_up_to(const World& world, const Index3& v, const Width& cap) {
-  if (cap.safe && plain_sets(world) && clear_by(world, v, cap.metres + kRounding)) return cap;
+  if (cap.safe && plain_sets(world) && clear_by(world, v, cap.metres + kDistanceRounding)) return cap;
   return std::min(cap, width(world, v));
 }
 

@@ -11,6 +11,9 @@
 namespace backwash::plan {
 
 using Clock = std::chrono::steady_clock;
+inline double ms_since(Clock::time_point t) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - t).count();
+}
 
 struct SearchOptions {
   double v_max;           ///< m/s per axis

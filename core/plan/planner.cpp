@@ -16,8 +16,6 @@ namespace {
 constexpr double kSearchShare = 0.9;   ///< of the limits: re-timing has little left to do
 constexpr double kClearanceCap = 2.0;  ///< m
 
-double ms_since(Clock::time_point t) { return std::chrono::duration<double, std::milli>(Clock::now() - t).count(); }
-
 Plan refused(Plan plan, PlanStatus status, std::string message) {
   plan.status = status;
   plan.message = std::move(message);

@@ -18,8 +18,6 @@ constexpr double kWorthwhile = 0.005;          ///< share of the cost that a rou
 constexpr std::size_t kHoldCommands = 50;      ///< verified hover at the goal: one second
 constexpr double kPaces[] = {1.0, 0.7, 0.45};  ///< share of the searched path's speed
 
-double ms_since(Clock::time_point t) { return std::chrono::duration<double, std::milli>(Clock::now() - t).count(); }
-
 /// Time between control points: 0.6 m of flight at full speed. Half of it costs 0.7 times more and smooths no better.
 double knot_span(double v_max) { return std::clamp(0.6 / v_max, 0.15, 0.6); }
 

@@ -12,7 +12,7 @@ namespace {
 
 using reach::body_and_estimation, reach::kHoverClearanceCap;
 
-constexpr double kRounding = 1e-9;        // m, more than any of a distance in double precision
+constexpr double kSetRounding = 1e-9;     // m, more than any of a distance in double precision
 constexpr double kStoredRounding = 1e-5;  // m, more than any of a stored distance: single precision
 
 /// add(world, voxel, sum) for all voxels, with one sum a layer of them that starts as `empty`.
@@ -117,7 +117,7 @@ void add_cost(const World& world, std::size_t n, CostOfLayer& cost) {
   if (set.half_widths == h) {
     ++cost.nothing;
   } else {
-    cost.some.push_back({farthest_between(h, set.half_widths) + kRounding, n});
+    cost.some.push_back({farthest_between(h, set.half_widths) + kSetRounding, n});
   }
 }
 

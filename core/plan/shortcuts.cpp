@@ -8,12 +8,12 @@
 namespace backwash::plan {
 namespace {
 
-constexpr double kSpeedTolerance = 1e-9;  // m/s
-constexpr double kLeastPiece = 1e-11;     // s: shorter ones are rounding
-constexpr double kRounding = 1e-12;       // m²/s²: in the least time itself the square is zero
-constexpr double kLeastShortcut = 0.05;   // s
-constexpr double kLeastGain = 1e-3;       // s
-constexpr double kWidestShortcut = 8;     // s: what is far apart can hardly be joined directly
+constexpr double kSpeedTolerance = 1e-9;   // m/s
+constexpr double kLeastPiece = 1e-11;      // s: shorter ones are rounding
+constexpr double kSquareRounding = 1e-12;  // m²/s²: in the least time itself the square is zero
+constexpr double kLeastShortcut = 0.05;    // s
+constexpr double kLeastGain = 1e-3;        // s
+constexpr double kWidestShortcut = 8;      // s: what is far apart can hardly be joined directly
 constexpr double kTriesPerSecond = 50;
 constexpr std::size_t kLeastTries = 300, kMostTries = 3000;
 
@@ -48,11 +48,11 @@ std::optional<AxisMotion> in_time(double d, double v, double w, const AxisLimits
   double c = low;
   if (d < at_low) {
     const double half = (T * A - v - w) / 2, square = half * half - (v * v + w * w) / 2 + d * A;
-    if (square < -kRounding) return std::nullopt;
+    if (square < -kSquareRounding) return std::nullopt;
     c = -half + std::sqrt(std::max(square, 0.0));
   } else if (d > at_high) {
     const double half = (T * A + v + w) / 2, square = half * half - (v * v + w * w) / 2 - d * A;
-    if (square < -kRounding) return std::nullopt;
+    if (square < -kSquareRounding) return std::nullopt;
     c = half - std::sqrt(std::max(square, 0.0));
   } else if (even > kLeastPiece) {
     c = low + (d - at_low) / even;

@@ -11,10 +11,10 @@ namespace backwash::plan {
 
 namespace {
 
-constexpr double kExact = 0.3;         ///< m: nearer than this the tube's clearance is measured with its prism
-constexpr double kNear = 0.12;         ///< m: farther than this beyond the margin a sample costs nothing
-constexpr double kForgotten = 0.1;     ///< share of the hover set whose oldest causes are left out of Δe
-constexpr std::size_t kSettling = 20;  ///< periods of the hold that count
+constexpr double kExact = 0.3;           ///< m: nearer than this the tube's clearance is measured with its prism
+constexpr double kNear = 0.12;           ///< m: farther than this beyond the margin a sample costs nothing
+constexpr double kForgottenShare = 0.1;  ///< share of the hover set whose oldest causes are left out of Δe
+constexpr std::size_t kSettling = 20;    ///< periods of the hold that count
 constexpr std::size_t kLongestStride = 5;
 
 /// Periods between samples: a voxel of flight at full speed.
@@ -27,7 +27,7 @@ std::size_t stride(double resolution, double v_max) {
 std::vector<double> coarse(const reach::AxisResponse& response, std::size_t stride) {
   std::vector<double> sums;
   double covered = 0;
-  for (std::size_t j = 0; j < response.G.size() && covered < (1 - kForgotten) * response.h_inf; j += stride) {
+  for (std::size_t j = 0; j < response.G.size() && covered < (1 - kForgottenShare) * response.h_inf; j += stride) {
     double sum = 0;
     for (std::size_t n = j; n < std::min(j + stride, response.G.size()); ++n) sum += response.G[n];
     sums.push_back(sum);

@@ -6,10 +6,11 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/reach/response_builder.hpp"
+
 namespace backwash::reach {
 namespace {
 
-constexpr int kPhases = AxisResponse::kPhases;
 constexpr double kSpent = 0.9;  // share of the probability that the levels spend
 const std::size_t kStepsPerSecond = static_cast<std::size_t>(std::lround(1 / kControlPeriod));
 

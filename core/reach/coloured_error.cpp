@@ -5,11 +5,10 @@
 #include <stdexcept>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "core/reach/response_builder.hpp"
+
 namespace backwash::reach {
 namespace {
-
-constexpr int kPhases = AxisResponse::kPhases;
-constexpr double kPhase = kControlPeriod / kPhases;
 
 constexpr int kAll = ColouredStep::kStates + 1;  // the states and ξ
 using MatrixAll = Eigen::Matrix<double, kAll, kAll>;

@@ -10,7 +10,6 @@ namespace {
 
 using Eigen::Vector3d;
 using Eigen::Vector4d;
-constexpr int kPhases = AxisResponse::kPhases;
 constexpr double kMicroStep = 0.25e-3;  // s: cubic interpolation of p is then within 1e-10 of it
 
 // Value and integral of a polynomial given by its derivatives at 0.

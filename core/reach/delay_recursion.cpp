@@ -6,18 +6,17 @@
 #include <numbers>
 
 #include "core/reach/axis_step.hpp"
+#include "core/reach/response_builder.hpp"
 
 namespace backwash::reach {
 namespace {
 
-constexpr double kTailShare = 1e-6;  // of the hover half width
-
-struct Step {
+struct HeldStep {
   Eigen::Matrix2d E;
   Eigen::Vector2d F;
 };
 // Over a time t under a constant input.
-Step step_over(double kp, double kd, double t) {
+HeldStep step_over(double kp, double kd, double t) {
   const AxisStep step = axis_step({kp, kd, 0, 0}, true, t);
   return {step.E.topLeftCorner<2, 2>(), step.F.topLeftCorner<2, 1>()};
 }
@@ -25,7 +24,7 @@ Step step_over(double kp, double kd, double t) {
 }  // namespace
 
 std::optional<DelayRecursion> delay_recursion(double kp, double kd) {
-  const Step whole = step_over(kp, kd, kControlPeriod);
+  const HeldStep whole = step_over(kp, kd, kControlPeriod);
   DelayRecursion recursion{whole.E, whole.F, {}, 1, 0};
   const double sigma = kd / 2, omega_squared = kp - sigma * sigma;
   if (omega_squared <= 0) return recursion;
@@ -44,7 +43,7 @@ std::optional<DelayRecursion> delay_recursion(double kp, double kd) {
   for (std::size_t m = 1; m <= M; ++m) {
     const double lag = static_cast<double>(m) * T;
     const double back = std::ceil(lag / kControlPeriod);
-    const Step part = step_over(kp, kd, back * kControlPeriod - lag);
+    const HeldStep part = step_over(kp, kd, back * kControlPeriod - lag);
     const double weight = 2 * std::pow(rho, static_cast<double>(m));
     recursion.echoes.push_back(
         {static_cast<std::size_t>(back), weight * part.E(0, 0), weight * part.E(0, 1), weight * part.F[0]});

@@ -12,8 +12,8 @@ namespace backwash::reach {
 namespace {
 
 /// Half widths of the infinite-time set under a constant bound, m. Both kinds grow with the bound.
-struct ExactHalfWidths {
-  explicit ExactHalfWidths(const Reachability& reach)
+struct ConstantHalfWidths {
+  explicit ConstantHalfWidths(const Reachability& reach)
       : horizontal(reach.horizontal.h_inf), vertical(reach.vertical.h_inf) {}
   PerDirection operator()(const DisturbanceBound& w_bar) const noexcept {
     PerDirection h;
@@ -180,7 +180,7 @@ HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid,
   };
   const NearbyVoxels around(grid, v, c_W);
   const auto h = reach.method == Method::tight
-                     ? fixed_point(ExactHalfWidths(reach), distance.at(v), bounds, around, v, push_W)
+                     ? fixed_point(ConstantHalfWidths(reach), distance.at(v), bounds, around, v, push_W)
                      : fixed_point(paper, distance.at(v), bounds, around, v, push_W);
   if (!h) return set;
   set.bounded = true;
@@ -244,7 +244,7 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
       return h && test.clear(around, c.p_W, free_distance - off, *h);
     };
   };
-  if (reach.method == Method::tight) return fill_where(safe_with(ExactHalfWidths(reach)));
+  if (reach.method == Method::tight) return fill_where(safe_with(ConstantHalfWidths(reach)));
   const HoverEllipsoid ellipsoid(reach.vehicle);
   fill_where(safe_with([&](const DisturbanceBound& w_bar) { return supports(ellipsoid.half_axes(channels(w_bar))); }));
 }

@@ -6,7 +6,8 @@
 // The two ways axis_response() computes a response, and what they share.
 namespace backwash::reach {
 
-inline constexpr double kPhase = kControlPeriod / AxisResponse::kPhases;  ///< s
+inline constexpr int kPhases = AxisResponse::kPhases;
+inline constexpr double kPhase = kControlPeriod / kPhases;  ///< s
 /// A loop that has not contracted after this is refused, s.
 inline constexpr double kLongestMemory = 120;
 /// Share of h_inf that the tail may hold.

@@ -10,7 +10,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
-constexpr int kPhases = AxisResponse::kPhases;
 
 // The sampled loop from one sample instant to the next: z = (p, v, a, measurements not yet used, newest first), a
 // measurement being q = −k_p p − k_d v at k dt + `measured_at`, used from (k + `delay`) dt on.

@@ -12,7 +12,7 @@
 namespace backwash::sim {
 namespace {
 
-using Rows = std::vector<std::size_t>;
+using RowNumbers = std::vector<std::size_t>;
 
 /// Zero where the log does not say.
 Vec3 said(const log::FlightLog& log, const std::string& prefix, const std::string& unit, std::size_t row) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "services/backwashd/dds_front.hpp"
+#include "services/backwashd/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
 #include "services/dds/packet_filter.hpp"
 
@@ -12,8 +13,6 @@ namespace backwash::daemon {
 namespace {
 
 constexpr double kNotKnown = -1;  // s: an age or a delay that nothing was measured for yet
-
-geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
 dds::Timing timing(const TimingHistogram& h) {
   return {static_cast<float>(h.quantile(0.5)), static_cast<float>(h.quantile(0.99)), static_cast<float>(h.max_us)};

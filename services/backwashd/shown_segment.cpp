@@ -6,11 +6,7 @@
 #include <utility>
 
 namespace backwash::daemon {
-namespace {
-
 geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
-
-}  // namespace
 
 ShownSegment::ShownSegment(const track::AcceptedSegment& segment, std::string map_frame)
     : map_frame_(std::move(map_frame)) {

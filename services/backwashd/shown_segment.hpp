@@ -9,6 +9,9 @@
 
 namespace backwash::daemon {
 
+/// The message of a point; same frame, m.
+geometry_msgs_msg_dds__Point_ point(const Vec3& p);
+
 /// What others are shown of a segment: its tube and its trajectory, in the frame that the configuration calls the
 /// map's. The messages point into it.
 class ShownSegment {

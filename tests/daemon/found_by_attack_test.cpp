@@ -10,8 +10,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 // Fresh stamps, the same pose to the last bit: the autopilot believes it and drifts, 0.6 m in 5 s and 25 m in a minute.
 // Nothing compares identical poses unless a velocity is commanded.
 TEST(VioFreezeFault, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {

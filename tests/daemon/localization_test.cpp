@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <limits>
 
+#include "tests/daemon/frames.hpp"
+
 namespace backwash::daemon {
 namespace {
 
@@ -25,8 +27,6 @@ dds::Odometry odometry(const std::string& frame, const Vec3& p, const Quaternion
   m.twist.twist.linear = {v_B.x(), v_B.y(), v_B.z()};
   return m;
 }
-
-const std::string kMap = "map", kOdom = "odom", kBody = "base_link", kOther = "camera";
 
 dds::TransformStamped closure(const Quaternion& q, const Vec3& t, const std::string& frame = kMap,
                               const std::string& child = kOdom) {

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@
 #include "services/bench/autopilot.hpp"
 
 namespace backwash::daemon::test {
+
+inline constexpr double kDegree = std::numbers::pi / 180;  ///< rad
 
 /// Shared by the tests of one program.
 std::shared_ptr<const plan::World> corridor();

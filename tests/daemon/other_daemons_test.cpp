@@ -8,7 +8,7 @@ namespace backwash::daemon {
 namespace {
 
 constexpr std::int64_t kStart = 5'000'000'000, kMoment = 1'000'000;
-const dds::Guid kOther{7};
+const dds::Guid kOtherWriter{7};
 
 TEST(OtherDaemonsTest, OneThatWouldNotBeKnownYetForbidsToEnable) {
   OtherDaemons others(kStart);
@@ -22,12 +22,12 @@ TEST(OtherDaemonsTest, OneThatWouldNotBeKnownYetForbidsToEnable) {
 
 TEST(OtherDaemonsTest, OneThatIsKnownForbidsToEnableUntilItIsGone) {
   OtherDaemons others(kStart);
-  const std::string named = "another daemon in this namespace, writer " + dds::text(kOther);
-  EXPECT_EQ(others.look(kOther, kStart), named) << "known at once";
+  const std::string named = "another daemon in this namespace, writer " + dds::text(kOtherWriter);
+  EXPECT_EQ(others.look(kOtherWriter, kStart), named) << "known at once";
   const std::int64_t later = kStart + 10 * OtherDaemons::kDiscovery_ns;
-  EXPECT_FALSE(others.look(kOther, later));
+  EXPECT_FALSE(others.look(kOtherWriter, later));
   EXPECT_EQ(others.look({}, later), "");
-  EXPECT_EQ(others.look(kOther, later + kMoment), named);
+  EXPECT_EQ(others.look(kOtherWriter, later + kMoment), named);
 }
 
 }  // namespace

@@ -15,8 +15,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 /// What a wrong frame makes of a sample, about the place where the vehicle was when it went wrong.
 struct Wrong {
   std::string name;

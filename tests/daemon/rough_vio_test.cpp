@@ -13,8 +13,6 @@
 namespace backwash::daemon::test {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 /// A VIO as bad as the vehicle file allows (estimation.position, and its velocity by σ / 0.5 s), delivered with up to
 /// 19 ms of delay and now and then not at all.
 class RoughVio {

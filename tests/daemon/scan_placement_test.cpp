@@ -7,10 +7,10 @@
 #include <cmath>
 #include <random>
 
+#include "tests/daemon/frames.hpp"
+
 namespace backwash::daemon {
 namespace {
-
-const std::string kMap = "map", kOdom = "odom", kBody = "base_link", kOther = "camera";
 
 OdometrySample pose(const Vec3& p, double yaw, double t) {
   OdometrySample s;

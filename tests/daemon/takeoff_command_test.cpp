@@ -8,7 +8,7 @@ namespace backwash::daemon::test {
 namespace {
 
 constexpr std::uint16_t kCommandTakeoff = 22;
-constexpr std::uint8_t kAccepted = 0, kFailed = 4;
+constexpr std::uint8_t kCommandAccepted = 0, kCommandFailed = 4;
 
 /// The rig's autopilot under an ArduCopter's heartbeat: in GUIDED, and armed when asked to be. It stays on the ground.
 struct LiftsItself : Lockstep {
@@ -64,15 +64,15 @@ struct LiftsItself : Lockstep {
 TEST(TakeoffCommand, IsRepeatedUntilTheAutopilotTakesThisOneWhateverItSaidToAnother) {
   LiftsItself rig;
   rig.ticks(60);
-  rig.answer(kAccepted);  // to somebody's take-off of before
+  rig.answer(kCommandAccepted);  // to somebody's take-off of before
   rig.ticks(10);
   ASSERT_TRUE(rig.link().telemetry().result_of(kCommandTakeoff)) << "it was heard";
   rig.lift();
   EXPECT_GE(rig.asked_within(100), 3) << "the answer of before says nothing";
-  rig.answer(kFailed);
+  rig.answer(kCommandFailed);
   rig.tick();
   EXPECT_GE(rig.asked_within(100), 3) << "it was refused";
-  rig.answer(kAccepted);
+  rig.answer(kCommandAccepted);
   rig.tick();
   EXPECT_EQ(rig.asked_within(100), 0);
   ASSERT_EQ(rig.mode(), Mode::lifting) << to_string(rig.reason());

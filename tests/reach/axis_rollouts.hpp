@@ -10,6 +10,9 @@
 
 namespace backwash::reach {
 
+inline constexpr double kRolloutStep = 2e-3;  ///< s
+inline constexpr int kRolloutSteps = 10;      ///< in a control period
+
 /// Independent oracle: many motions of one axis at once by the classical Runge–Kutta method of order 4,
 ///   ṗ = v, v̇ = a + w, lag·ȧ = u − a, u = r − k_p p(t − delay) − k_d v(t − delay),
 /// with w and r constant in a step. The delay and 20 ms must be multiples of the step h. `sampled`: the feedback part

@@ -26,8 +26,8 @@ Model pushing_model() {
 }
 
 /// 1.6 × 2 × 1.6 m with a floor, a ceiling and a wall at y = 2 m; everything free is stored.
-struct Scene {
-  Scene() : grid(Vec3::Zero(), 0.1, Index3(16, 20, 16), map::Cell::free), field(grid), extension(grid, model) {
+struct ExtendedScene {
+  ExtendedScene() : grid(Vec3::Zero(), 0.1, Index3(16, 20, 16), map::Cell::free), field(grid), extension(grid, model) {
     std::vector<std::size_t> voxels;
     for (std::size_t n = 0; n < grid.cell_count(); ++n) {
       const Index3 v = grid.voxel(n);
@@ -46,7 +46,7 @@ struct Scene {
 };
 
 /// Largest distance from `push` that the disturbance may have in the voxels from low to high, by its definition.
-PerDirection brute_force(const Scene& scene, const Vec3& push, const Vec3& velocity, const Index3& low,
+PerDirection brute_force(const ExtendedScene& scene, const Vec3& push, const Vec3& velocity, const Index3& low,
                          const Index3& high) {
   const Vec3 by_velocity(-0.3 * velocity.x(), -0.3 * velocity.y(), 0.2 * velocity.squaredNorm());
   PerDirection largest{};
@@ -66,7 +66,7 @@ PerDirection brute_force(const Scene& scene, const Vec3& push, const Vec3& veloc
 }
 
 TEST(ExtendedBounds, OverASmallBoxAreTheLargestDistanceOfAnyVoxelsDisturbanceFromThePush) {
-  const Scene scene;
+  const ExtendedScene scene;
   const BoundField bounds(scene.grid, scene.field, scene.model.bound, scene.extension);
   std::mt19937 random(1);
   std::uniform_int_distribution<int> at(1, 14), extent(0, 5);
@@ -83,7 +83,7 @@ TEST(ExtendedBounds, OverASmallBoxAreTheLargestDistanceOfAnyVoxelsDisturbanceFro
 }
 
 TEST(ExtendedBounds, OverALargeBoxAreNoLessThanThat) {
-  const Scene scene;
+  const ExtendedScene scene;
   const BoundField bounds(scene.grid, scene.field, scene.model.bound, scene.extension);
   std::mt19937 random(2);
   std::uniform_int_distribution<int> at(0, 6), extent(8, 12);

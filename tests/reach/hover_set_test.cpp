@@ -40,7 +40,7 @@ Model with_kappa(double kappa) {
   return model;
 }
 
-struct Scene {
+struct HoverScene {
   map::OccupancyGrid grid;
   map::DistanceField distance;
   field::DisturbanceField field;
@@ -49,7 +49,7 @@ struct Scene {
 };
 
 /// The field is stored in every free voxel, so that only the model decides what is near an obstacle.
-Scene make_scene(const Model& model) {
+HoverScene make_scene(const Model& model) {
   map::OccupancyGrid grid = room();
   std::vector<std::size_t> voxels;
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
@@ -79,7 +79,7 @@ double h_inf(const Reachability& reach, std::size_t d) {
 }
 
 /// F(h) = h_∞ × max w̄ over the voxels that meet p ± h, by a loop over the whole grid.
-PerDirection image(const Scene& scene, const Reachability& reach, const Vec3& p, const PerDirection& h) {
+PerDirection image(const HoverScene& scene, const Reachability& reach, const Vec3& p, const PerDirection& h) {
   PerDirection result{};
   const Vec3 reach_of_box = Vec3(h[kX], h[kY], h[kZ]) + Vec3::Constant(scene.grid.resolution() / 2);
   for (std::size_t n = 0; n < scene.grid.cell_count(); ++n) {
@@ -92,13 +92,13 @@ PerDirection image(const Scene& scene, const Reachability& reach, const Vec3& p,
 }
 
 /// The scene used by most claims; built once.
-const Scene& default_scene() {
-  static const Scene scene = make_scene(with_kappa(3));
+const HoverScene& default_scene() {
+  static const HoverScene scene = make_scene(with_kappa(3));
   return scene;
 }
 
 TEST(HoverSet, IsAFixedPointOfTheWorstBoundOverItself) {
-  const Scene& scene = default_scene();
+  const HoverScene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   int grown = 0, bounded = 0;
   for (const Vec3& p : random_points(scene.grid, 300, 1)) {
@@ -116,7 +116,7 @@ TEST(HoverSet, IsAFixedPointOfTheWorstBoundOverItself) {
 
 // Tarski: the smallest fixed point lies below every h with F(h) ≤ h, so no such h lies below it.
 TEST(HoverSet, IsTheSmallestFixedPoint) {
-  const Scene& scene = default_scene();
+  const HoverScene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   std::mt19937 random(2);
   std::uniform_real_distribution<double> shrink(0.3, 0.999);
@@ -135,8 +135,8 @@ TEST(HoverSet, IsTheSmallestFixedPoint) {
 }
 
 TEST(HoverSet, GrowsWithTheDisturbance) {
-  const Scene& weak = default_scene();
-  const Scene strong = make_scene(with_kappa(4));
+  const HoverScene& weak = default_scene();
+  const HoverScene strong = make_scene(with_kappa(4));
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   for (const Vec3& p : random_points(weak.grid, 300, 4)) {
     const HoverSet small = hover_set(reach, weak.grid, weak.distance, weak.bounds, p);
@@ -149,7 +149,7 @@ TEST(HoverSet, GrowsWithTheDisturbance) {
 }
 
 TEST(HoverSet, IsUnboundedWhereTheFieldIsTooStrong) {
-  const Scene scene = make_scene(with_kappa(200));
+  const HoverScene scene = make_scene(with_kappa(200));
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   const HoverSet at_wall = hover_set(reach, scene.grid, scene.distance, scene.bounds, Vec3(0.8, 0.35, 0.6));
   EXPECT_FALSE(at_wall.bounded);
@@ -158,7 +158,7 @@ TEST(HoverSet, IsUnboundedWhereTheFieldIsTooStrong) {
 }
 
 TEST(HoverSet, ClearanceIsTheDistanceOfThePrismLessBodyAndEstimation) {
-  const Scene& scene = default_scene();
+  const HoverScene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   int positive = 0;
   for (const Vec3& p : random_points(scene.grid, 300, 5)) {
@@ -198,7 +198,7 @@ TEST(HoverSet, ClearanceInTheOpenIsExactUpToItsCapOfOneMetre) {
 }
 
 TEST(HoverSet, IsNeverSafeOutsideFreeSpace) {
-  const Scene& scene = default_scene();
+  const HoverScene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   for (const Vec3& p : {Vec3(-1, 1, 1), Vec3(1, 1, 1.7), Vec3(1, 1, 0.05), Vec3(1, 0.05, 1)}) {
     for (const auto margin : {std::optional<double>(), std::optional(0.0)}) {
@@ -210,7 +210,7 @@ TEST(HoverSet, IsNeverSafeOutsideFreeSpace) {
 }
 
 TEST(HoverSet, ConstantMarginReplacesTheExtentAndNothingElse) {
-  const Scene& scene = default_scene();
+  const HoverScene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   for (const Vec3& p : random_points(scene.grid, 200, 6)) {
     double nearest = p.cwiseMin(Vec3(2.4, 2.4, 1.6) - p).minCoeff();
@@ -225,14 +225,14 @@ TEST(HoverSet, ConstantMarginReplacesTheExtentAndNothingElse) {
 }
 
 /// The bounds of a scene where the same mean push acts everywhere.
-BoundField pushed(const Scene& scene, const Vec3& push_W) {
+BoundField pushed(const HoverScene& scene, const Vec3& push_W) {
   Model model = scene.model;
   model.extension = {{Law::push, push_W, Vec3::Zero(), 0}};
   return {scene.grid, scene.field, model.bound, field::Extension(scene.grid, model)};
 }
 
 TEST(HoverSet, OfAPushedVehicleIsJudgedWhereThePushHoldsIt) {
-  const Scene& scene = default_scene();
+  const HoverScene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   const Vec3 push(0, -1.2, 0.8), shift = push.cwiseQuotient(Vec3(6, 6, 8));
   const BoundField bounds = pushed(scene, push);
@@ -254,7 +254,7 @@ TEST(HoverSet, OfAPushedVehicleIsJudgedWhereThePushHoldsIt) {
 }
 
 TEST(HoverSet, IsNotSafeInAnObstacleThatThePushWouldTakeTheVehicleOutOf) {
-  const Scene& scene = default_scene();
+  const HoverScene& scene = default_scene();
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   const BoundField bounds = pushed(scene, Vec3(0, 6 * 0.9, 0));
   const Vec3 in_wall(0.85, 0.05, 0.75);
@@ -264,7 +264,7 @@ TEST(HoverSet, IsNotSafeInAnObstacleThatThePushWouldTakeTheVehicleOutOf) {
 }
 
 TEST(HoverSet, OfThePaperContainsTheTightOneAlongTheAxes) {
-  const Scene scene = make_scene(with_kappa(1.5));  // the paper's larger sets must fit as well
+  const HoverScene scene = make_scene(with_kappa(1.5));  // the paper's larger sets must fit as well
   const Reachability tight(test_vehicle(), Method::tight, Loop::continuous);
   const Reachability paper(test_vehicle(), Method::paper, Loop::continuous);
   int compared = 0;

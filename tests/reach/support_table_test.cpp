@@ -12,8 +12,6 @@ namespace backwash::reach {
 namespace {
 
 using Batch = AxisRollouts::Batch;
-constexpr double kH = 2e-3;  // step of the rollouts, s
-constexpr int kPerStep = 10;
 
 TEST(SupportRecursion, BeyondTheTableTheTailKeepsTheSumCovered) {
   Vehicle vehicle;
@@ -50,10 +48,10 @@ TEST(SupportRecursion, BeyondTheTableTheFirstErrorsAreStillCovered) {
   for (const auto& [position, velocity] : {std::pair(1.0, 0.0), std::pair(0.0, 1.0)}) {
     vehicle.initial_error = {position, velocity};
     SupportRecursion support(response, response, vehicle);
-    AxisRollouts e(axis, false, kH, Batch{{position}}, Batch{{velocity}});
+    AxisRollouts e(axis, false, kRolloutStep, Batch{{position}}, Batch{{velocity}});
     for (std::size_t k = 0; k < response.G.size() + 40; ++k) {
       support.step(DisturbanceBound{});
-      for (int i = 0; i < kPerStep; ++i) e.step(Batch{{0.0}});
+      for (int i = 0; i < kRolloutSteps; ++i) e.step(Batch{{0.0}});
       ASSERT_GE(support.half_widths()[kX], (1 - 1e-3) * std::abs(e.p()[0])) << "step " << k;
     }
   }

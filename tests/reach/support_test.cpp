@@ -13,8 +13,6 @@ namespace backwash::reach {
 namespace {
 
 using Batch = AxisRollouts::Batch;
-constexpr double kH = 2e-3;  // step of the rollouts, s
-constexpr int kPerStep = 10;
 
 struct Case {
   Vehicle vehicle;
@@ -116,9 +114,9 @@ TEST(SupportRecursion, ContainsRandomRolloutsInEveryDirection) {
       }
       switching[static_cast<std::size_t>(i)] = std::pow(10.0, -2.5 * uniform(random));  // per 2 ms
     }
-    std::array<AxisRollouts, 3> e{AxisRollouts(c.axis(), c.sampled(), kH, p0[0], v0[0]),
-                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[1], v0[1]),
-                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[2], v0[2])};
+    std::array<AxisRollouts, 3> e{AxisRollouts(c.axis(), c.sampled(), kRolloutStep, p0[0], v0[0]),
+                                  AxisRollouts(c.axis(), c.sampled(), kRolloutStep, p0[1], v0[1]),
+                                  AxisRollouts(c.axis(), c.sampled(), kRolloutStep, p0[2], v0[2])};
     double worst = 0, worst_between = 0;  // |e|/h
     const auto check = [&](const PerDirection& h) {
       double largest = 0;
@@ -132,7 +130,7 @@ TEST(SupportRecursion, ContainsRandomRolloutsInEveryDirection) {
     std::array<Batch, 3> w{Batch::Zero(kRollouts), Batch::Zero(kRollouts), Batch::Zero(kRollouts)};
     for (std::size_t k = 0; k < kSteps; ++k) {
       worst = std::max(worst, check(tube.at[k]));
-      for (int i = 0; i < kPerStep; ++i) {
+      for (int i = 0; i < kRolloutSteps; ++i) {
         worst_between = std::max(worst_between, check(tube.until_next[k]));
         for (std::size_t n = 0; n < push.size(); ++n) {
           if (i == 0 && k == 0) push[n] = Vec3(normal(random), normal(random), normal(random));
@@ -163,20 +161,20 @@ TEST(SupportRecursion, ContainsRandomRolloutsInEveryDirection) {
 // the position at any time under any disturbance that is constant for 2 ms.
 struct PushResponse {
   PushResponse(const Case& c, std::size_t steps) {
-    AxisRollouts push(c.axis(), c.sampled(), kH, Batch::Zero(kPerStep), Batch::Zero(kPerStep));
-    AxisRollouts initial(c.axis(), c.sampled(), kH, Batch{{1, 0}}, Batch{{0, 1}});
-    for (std::size_t i = 0; i <= steps * kPerStep; ++i) {
+    AxisRollouts push(c.axis(), c.sampled(), kRolloutStep, Batch::Zero(kRolloutSteps), Batch::Zero(kRolloutSteps));
+    AxisRollouts initial(c.axis(), c.sampled(), kRolloutStep, Batch{{1, 0}}, Batch{{0, 1}});
+    for (std::size_t i = 0; i <= steps * kRolloutSteps; ++i) {
       position.push_back(push.p());
       from_initial.push_back(initial.p());
-      Batch w = Batch::Zero(kPerStep);
-      if (i < kPerStep) w[static_cast<Eigen::Index>(i)] = 1;
+      Batch w = Batch::Zero(kRolloutSteps);
+      if (i < kRolloutSteps) w[static_cast<Eigen::Index>(i)] = 1;
       push.step(w);
       initial.step(Batch{{0, 0}});
     }
   }
   // At time `to` (in 2 ms) after the push of the 2 ms that start at `from`.
   double at(std::size_t from, std::size_t to) const {
-    return position[to - from / kPerStep * kPerStep][static_cast<Eigen::Index>(from % kPerStep)];
+    return position[to - from / kRolloutSteps * kRolloutSteps][static_cast<Eigen::Index>(from % kRolloutSteps)];
   }
   std::vector<Batch> position, from_initial;
 };
@@ -207,7 +205,7 @@ TEST(SupportRecursion, IsReachedByTheWorstDisturbanceOfEachDirectionAndNeverLeft
   constexpr std::size_t kSteps = 100;
   constexpr Eigen::Index kTimes = 340;  // over the six loops: 2,040 per gain set
   std::mt19937 random(11);
-  std::uniform_int_distribution<std::size_t> any_step(3, kSteps), any_instant(30, kSteps * kPerStep - 1);
+  std::uniform_int_distribution<std::size_t> any_step(3, kSteps), any_instant(30, kSteps * kRolloutSteps - 1);
   for (const Case& c : cases()) {
     const auto variances = varying_variances(random, kSteps);
     const Tube tube = propagate(c, bounds_of(variances));
@@ -218,31 +216,31 @@ TEST(SupportRecursion, IsReachedByTheWorstDisturbanceOfEachDirectionAndNeverLeft
     std::array<Batch, 3> p0, v0;
     for (std::size_t axis = 0; axis < 3; ++axis) p0[axis] = v0[axis] = Batch::Zero(kTimes);
     for (Eigen::Index n = 0; n < kTimes; ++n) {
-      times.push_back(n % 2 == 0 ? any_step(random) * kPerStep : any_instant(random));
+      times.push_back(n % 2 == 0 ? any_step(random) * kRolloutSteps : any_instant(random));
       worst.push_back(worst_case(c, response, times.back()));
       for (std::size_t axis = 0; axis < 3; ++axis) {
         p0[axis][n] = worst.back().p0 * unit(direction_of(n))[static_cast<Eigen::Index>(axis)];
         v0[axis][n] = worst.back().v0 * unit(direction_of(n))[static_cast<Eigen::Index>(axis)];
       }
     }
-    std::array<AxisRollouts, 3> e{AxisRollouts(c.axis(), c.sampled(), kH, p0[0], v0[0]),
-                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[1], v0[1]),
-                                  AxisRollouts(c.axis(), c.sampled(), kH, p0[2], v0[2])};
-    for (std::size_t i = 0; i <= kSteps * kPerStep; ++i) {
-      const std::size_t k = std::min(i / kPerStep, kSteps - 1);
+    std::array<AxisRollouts, 3> e{AxisRollouts(c.axis(), c.sampled(), kRolloutStep, p0[0], v0[0]),
+                                  AxisRollouts(c.axis(), c.sampled(), kRolloutStep, p0[1], v0[1]),
+                                  AxisRollouts(c.axis(), c.sampled(), kRolloutStep, p0[2], v0[2])};
+    for (std::size_t i = 0; i <= kSteps * kRolloutSteps; ++i) {
+      const std::size_t k = std::min(i / kRolloutSteps, kSteps - 1);
       for (std::size_t d = 0; d < kDirections; ++d) {
         const Vec3 m = unit(static_cast<Direction>(d));
         const Batch along = m.x() * e[0].p() + m.y() * e[1].p() + m.z() * e[2].p();
         const double largest = along.abs().maxCoeff();
         ASSERT_LE(largest, tube.until_next[k][d] * (1 + 1e-7)) << name(c) << " at " << i;
-        if (i % kPerStep != 0) continue;
-        ASSERT_LE(largest, tube.at[i / kPerStep][d] * (1 + 1e-7)) << name(c) << " at " << i;
+        if (i % kRolloutSteps != 0) continue;
+        ASSERT_LE(largest, tube.at[i / kRolloutSteps][d] * (1 + 1e-7)) << name(c) << " at " << i;
         for (Eigen::Index n = 0; n < kTimes; ++n)
           if (direction_of(n) == d && i == times[static_cast<std::size_t>(n)]) {
-            ASSERT_GE(along[n], 0.999 * tube.at[i / kPerStep][d]) << name(c) << " at " << i << " direction " << d;
+            ASSERT_GE(along[n], 0.999 * tube.at[i / kRolloutSteps][d]) << name(c) << " at " << i << " direction " << d;
           }
       }
-      if (i == kSteps * kPerStep) break;
+      if (i == kSteps * kRolloutSteps) break;
       std::array<Batch, 3> w{Batch(kTimes), Batch(kTimes), Batch(kTimes)};
       std::array<Vec3, kDirections> push;
       for (std::size_t d = 0; d < kDirections; ++d) push[d] = farthest_push(variances[k], static_cast<Direction>(d));
@@ -266,10 +264,10 @@ TEST(SupportRecursion, IntervalIsTheLargestSupportWithinHalfAPerCent) {
     const PushResponse response(c, kSteps);
     for (std::size_t k = 0; k < kSteps; ++k) {
       double largest = 0;
-      for (std::size_t to = k * kPerStep; to <= (k + 1) * kPerStep; ++to) {
+      for (std::size_t to = k * kRolloutSteps; to <= (k + 1) * kRolloutSteps; ++to) {
         double h = std::hypot(c.vehicle.initial_error.position * response.from_initial[to][0],
                               c.vehicle.initial_error.velocity * response.from_initial[to][1]);
-        for (std::size_t i = 0; i < to; ++i) h += bounds[i / kPerStep].w[kX] * std::abs(response.at(i, to));
+        for (std::size_t i = 0; i < to; ++i) h += bounds[i / kRolloutSteps].w[kX] * std::abs(response.at(i, to));
         largest = std::max(largest, h);
       }
       ASSERT_GE(tube.until_next[k][kX], largest * (1 - 1e-7)) << name(c) << " step " << k;

@@ -11,7 +11,6 @@
 namespace backwash::study::calibrate {
 namespace {
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr double kWallEdges[] = {0, 0.35, 0.6, 1.0, 1.5, kFar};
 constexpr double kHeightEdges[] = {0, 0.4, 0.8, 1.3, 1.9, kFar};
 

@@ -11,7 +11,6 @@ namespace backwash::study::calibrate {
 namespace {
 
 constexpr double kLeastDecay = kCalibrationRules.least_decay, kDecayRatio = kCalibrationRules.decay_ratio;
-constexpr double kFar = std::numeric_limits<double>::infinity();
 
 /// Pairs a value with its place in a model, both ways.
 template <typename M, typename Visit>

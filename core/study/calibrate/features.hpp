@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -43,6 +44,9 @@ Model with_parameters(const Model& gates, const Parameters& parameters) noexcept
 /// Values of k_g2 and k_w2 at which features are stored, 1/m²: between them features are interpolated.
 inline constexpr auto kDecays = static_cast<std::size_t>(kCalibrationRules.decays);
 const std::array<double, kDecays>& decay_grid() noexcept;
+
+/// Distance to what is not there, m.
+inline constexpr double kFar = std::numeric_limits<double>::infinity();
 
 /// What the geometry around a point contributes to Σ for amplitude 1 (docs/model.md section 2), summed over visible
 /// elements.

@@ -12,7 +12,7 @@ namespace backwash::study::calibrate {
 namespace {
 
 constexpr double kSmoothing = kCalibrationRules.smoothing, kLeastBase = kCalibrationRules.least_base;
-constexpr double kLeastDecay = kCalibrationRules.least_decay, kLargestDecay = kCalibrationRules.largest_decay;
+constexpr double kLargestDecay = kCalibrationRules.largest_decay;
 
 /// Levels of the flights, per group.
 using Levels = std::vector<std::array<double, kGroups>>;
@@ -117,7 +117,8 @@ Parameters minimised(const Loss& loss, const Parameters& x, const Free& free, do
   nlopt::opt solver(nlopt::LD_LBFGS, kParameters);
   std::vector<double> low(kParameters, 0.0), high(kParameters, kCalibrationRules.largest_scaled);
   low[kBaseH] = kLeastBase / loss.scales()[kBaseH], low[kBaseZ] = kLeastBase / loss.scales()[kBaseZ];
-  low[kGroundK2] = low[kWallK2] = std::log(kLeastDecay), high[kGroundK2] = high[kWallK2] = std::log(kLargestDecay);
+  low[kGroundK2] = low[kWallK2] = std::log(kCalibrationRules.least_decay);
+  high[kGroundK2] = high[kWallK2] = std::log(kLargestDecay);
   std::vector<double> at(x.begin(), x.end());
   for (std::size_t j = 0; j < kParameters; ++j) {
     if (!free[j]) low[j] = high[j] = at[j];

@@ -6,12 +6,12 @@
 
 #include "core/study/calibrate/calibrate.hpp"
 #include "core/study/calibrate/calibration_rules.hpp"
+#include "core/study/calibrate/features.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::study::calibrate {
 namespace {
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr auto kLeastHovers = static_cast<std::size_t>(kCalibrationRules.least_hovers);
 constexpr double kLeastSpread = kCalibrationRules.least_spread;
 const std::vector<Parameter> kGroundAll = {kGroundLambdaH, kGroundLambdaZ, kGroundK1H, kGroundK1Z, kGroundK2};

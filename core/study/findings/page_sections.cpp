@@ -6,15 +6,10 @@
 
 #include "core/report/page.hpp"
 #include "core/study/findings/study.hpp"
+#include "core/study/findings/words.hpp"
 
 namespace backwash::study {
 namespace {
-
-std::string percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f %%", 100 * share);
-  return text;
-}
 
 std::string interval(const RotorVerdict& v) {
   return percent(v.d) + " [" + percent(v.low) + ", " + percent(v.high) + "]";

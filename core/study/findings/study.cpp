@@ -116,8 +116,6 @@ void look_at_what_remains(StudyResult& result, const Evidence& evidence, const s
   result.unknown.push_back({first.regressor, first.group, first.p_holm / kRules.dependence_share, 0, "any"});
 }
 
-std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
-
 /// Gain, worth as applied and hover shift of what acts in all flights.
 void name_causes(StudyResult& result, const Evidence& evidence, const std::vector<Accepted>& accepted) {
   const auto applied = judge(evidence, accepted);

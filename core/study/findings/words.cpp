@@ -19,6 +19,8 @@ Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
   return {"craft", {}, "Look for what was different: " + where(cause) + "."};  // no file holds for some flights
 }
 
+std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
+
 std::string odds(double nats) {
   const double ratio = std::exp(std::abs(nats));
   const std::string told = ratio > kRules.most_odds ? "more than a million" : number(ratio);

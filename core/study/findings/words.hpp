@@ -13,6 +13,9 @@ namespace backwash::study {
 /// What to change for a cause that was found: file, key, value, or what to do with the craft.
 Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle);
 
+/// A share in whole percent: "15 %".
+std::string percent(double share);
+
 /// Nats as odds: "20 to 1", "1 to 5", "more than a million to 1".
 std::string odds(double nats);
 

@@ -10,13 +10,13 @@
 namespace backwash::study {
 namespace {
 
-struct Member {
+struct Unit {
   std::size_t group;
   double weight, mean;
 };
 /// σ² of the members' means about those of their groups, by moments: Σw(m − m̄)² = (members − groups) s² + σ² (Σw −
 /// Σ_g Σw²/W_g), s²/w the error of a mean. Nothing where each group has one member.
-std::optional<double> between_by_moments(const std::vector<Member>& members, double s2) {
+std::optional<double> between_by_moments(const std::vector<Unit>& members, double s2) {
   std::map<std::size_t, Eigen::Array4d> groups;  // Σw, Σwm, Σwm², Σw²
   for (const auto& [group, w, m] : members)
     groups.try_emplace(group, Eigen::Array4d::Zero()).first->second += Eigen::Array4d(w, w * m, w * m * m, w * w);
@@ -31,7 +31,7 @@ std::optional<double> between_by_moments(const std::vector<Member>& members, dou
 
 void Evidence::anova(Channel c, const std::vector<double>& r) {
   double sse = 0, n = 0;
-  std::vector<Member> flights;
+  std::vector<Unit> flights;
   for (std::size_t f = 0; f < seen_->units.size(); ++f) {
     for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1];) {
       double weight = 0, sum = 0, square = 0, count = 0;
@@ -50,7 +50,7 @@ void Evidence::anova(Channel c, const std::vector<double>& r) {
   within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
   const double built = built_scatter(c);
   const auto inside = between_by_moments(flights, within_[c]);  // units of several flights: days
-  std::vector<Member> units;
+  std::vector<Unit> units;
   if (!inside)
     units = std::exchange(flights, {});
   else

@@ -43,13 +43,13 @@ MatrixXd turned_products(const MatrixXd& phi, const MatrixXd& psi) {
   return products;
 }
 
-/// Rows of the windows that measure every channel of a group, and where each flight begins among them.
-struct Rows {
+/// GroupRows of the windows that measure every channel of a group, and where each flight begins among them.
+struct GroupRows {
   std::vector<std::size_t> window, first;
 };
 
-Rows rows_of(const Evidence& evidence, const std::vector<Channel>& group) {
-  Rows rows;
+GroupRows rows_of(const Evidence& evidence, const std::vector<Channel>& group) {
+  GroupRows rows;
   const auto& windows = evidence.seen().windows;
   for (std::size_t i = 0; i < windows.size(); ++i) {
     if (!std::all_of(group.begin(), group.end(), [&](Channel c) { return evidence.measured(c, i); })) continue;
@@ -84,7 +84,7 @@ bool in_both_halves(const MatrixXd& phi, const MatrixXd& psi, const std::vector<
   return true;
 }
 
-MatrixXd points_of(const Regressor& along, const Windows& windows, const Rows& rows) {
+MatrixXd points_of(const Regressor& along, const Windows& windows, const GroupRows& rows) {
   const auto u = ranks(along, windows);
   MatrixXd points(static_cast<Index>(rows.window.size()), along.circular ? 2 : 1);
   for (Index i = 0; i < points.rows(); ++i) {
@@ -98,7 +98,7 @@ MatrixXd points_of(const Regressor& along, const Windows& windows, const Rows& r
 }
 
 /// What remains of a group: ln variance moves as one, which is the first of its decorrelated channels.
-MatrixXd remainder(const DesignColumn& whitened, const std::vector<Channel>& group, const Rows& rows) {
+MatrixXd remainder(const DesignColumn& whitened, const std::vector<Channel>& group, const GroupRows& rows) {
   const std::size_t dimensions = group.front() == kVarX ? 1 : group.size();
   MatrixXd points = MatrixXd::Zero(static_cast<Index>(rows.window.size()), static_cast<Index>(dimensions));
   for (const auto& part : whitened.parts)
@@ -186,7 +186,7 @@ std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std
   std::vector<double> p;
   std::vector<char> twice;  // in both halves; asked where p alone would do
   for (const auto& [name, channels] : channel_groups()) {
-    const Rows rows = rows_of(evidence, channels);
+    const GroupRows rows = rows_of(evidence, channels);
     if (rows.window.empty()) continue;
     const MatrixXd psi = kernel_features(remainder(whitened, channels, rows));
     for (const auto& along : along_all) {

@@ -14,7 +14,7 @@ namespace {
 constexpr int kFine = static_cast<int>(kRules.fine_scales);
 
 /// A shape of the cause at a scale, fitted to all flights, with its error by leaving each out.
-struct Member {
+struct FamilyMember {
   const Form* shape;
   Scale scale;
   NormalEquations normal;
@@ -38,9 +38,9 @@ Eigen::VectorXd jackknife(const Eigen::MatrixXd& left) {
   return ((n - 1) / n * (left.colwise() - left.rowwise().mean()).rowwise().squaredNorm()).cwiseSqrt();
 }
 
-bool lower(const Member& a, const Member& b) { return a.height < b.height; }
+bool lower(const FamilyMember& a, const FamilyMember& b) { return a.height < b.height; }
 
-Member fitted(NormalEquations normal, const Form* shape, const Scale& scale) {
+FamilyMember fitted(NormalEquations normal, const Form* shape, const Scale& scale) {
   Eigen::MatrixXd left(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size()));
   SmallVector sum = SmallVector::Zero(normal.total.rows());
   for (std::size_t f = 0; f < normal.b.size(); ++f) {
@@ -161,7 +161,7 @@ struct Family {
   Scale scale;               ///< of a form without a grid of scales
   std::vector<Form> shapes;  ///< the form itself first
   Windows windows;
-  std::vector<Member> members = {};  ///< in the order of shapes and scales
+  std::vector<FamilyMember> members = {};  ///< in the order of shapes and scales
 
   NormalEquations normal_at(const Form& shape, const Scale& at) const {
     auto columns = shape.columns(windows, at);
@@ -185,7 +185,7 @@ struct Family {
   /// Moves the craft to where the likeliest shape pushes it, and fits again there.
   void follow_push() {
     for (int i = 0; i < kRules.rounds && !members.empty(); ++i) {
-      Member now = *std::max_element(members.begin(), members.end(), lower);
+      FamilyMember now = *std::max_element(members.begin(), members.end(), lower);
       for (int k = 0; k < kRules.turns; ++k) {
         windows = moved_by(evidence.seen().windows, now.shape->columns(windows, now.scale), now.theta);
         now.theta = normal_at(*now.shape, now.scale).fit();
@@ -211,9 +211,9 @@ struct Family {
   }
 
   /// The form itself at its likeliest scale. Precondition: own() > 0.
-  Member best_own() const {
+  FamilyMember best_own() const {
     const auto n = static_cast<std::ptrdiff_t>(own());
-    const Member& start = *std::max_element(members.begin(), members.begin() + n, lower);
+    const FamilyMember& start = *std::max_element(members.begin(), members.begin() + n, lower);
     if (n == 1) return start;
     const double low = std::log(members.front().scale.value), high = std::log(members[own() - 1].scale.value);
     const auto height = [&](const std::vector<double>& ln) {
@@ -245,7 +245,7 @@ struct Family {
   }
 
   /// Interval of the form's own scale, by likelihood over its grid.
-  Estimate scale_interval(const Member& best) const {
+  Estimate scale_interval(const FamilyMember& best) const {
     std::vector<Guess> guesses;
     const double step = std::log(members[1].scale.value / members[0].scale.value);
     for (std::size_t i = 0; i < own(); ++i)
@@ -266,7 +266,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<DesignC
   if (form.by_place) family.follow_push();
   if (form.by_speed) family.follow_speed();
   if (family.own() == 0) return;
-  const Member best = family.best_own();
+  const FamilyMember best = family.best_own();
   cause.scale = best.scale, cause.theta = best.theta, cause.gain = best.normal.gain();
   cause.columns = form.columns(family.windows, cause.scale);
   cause.parameters = family.parameters(cause.columns);
@@ -280,7 +280,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<DesignC
 
 bool excludes_zero(const NormalEquations& normal, const std::vector<DesignColumn>& columns) {
   const double t = student_975(static_cast<double>(normal.b.size()) - 1);
-  const Member fit = fitted(normal, nullptr, {});
+  const FamilyMember fit = fitted(normal, nullptr, {});
   for (Eigen::Index k = 0; k < fit.theta.size(); ++k)
     if (std::abs(fit.theta[k]) > t * std::hypot(fit.error[k], built_error(columns[static_cast<std::size_t>(k)])))
       return true;

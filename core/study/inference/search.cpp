@@ -75,13 +75,13 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
 
 /// What one step tries: the catalogue and the structures, each with the null of its own maxima and its share of the
 /// level.
-struct Step {
+struct SearchStep {
   std::vector<SearchCandidate> named, structures;
   std::vector<double> null_named, null_structures;
   double threshold, structure_threshold;  // nats
 
-  Step(const Evidence& evidence, const std::vector<DesignColumn>& accepted, const std::vector<std::vector<int>>& draws,
-       double level)
+  SearchStep(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
+             const std::vector<std::vector<int>>& draws, double level)
       : named(named_candidates(evidence, accepted)),
         structures(structure_candidates(evidence, accepted)),
         null_named(null_maxima(named, draws)),
@@ -199,8 +199,8 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
     const auto accepted = columns_of(result.accepted, evidence.seen());
     evidence.whiten(accepted);
     options.progress("looking at every cause, step " + std::to_string(result.accepted.size() + 1));
-    const Step step(evidence, accepted, draws,
-                    options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value));
+    const SearchStep step(evidence, accepted, draws,
+                          options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value));
     if (step.named.empty() && step.structures.empty()) break;
     result.null_gain = step.null_named;
     result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
@@ -215,7 +215,7 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
       break;
     }
     if (!cause) break;
-    const double p = p_value(step.null_named, cause->gain) / Step::named_share();
+    const double p = p_value(step.null_named, cause->gain) / SearchStep::named_share();
     Accepted a{cause->form, cause->scale, cause->columns, {}, p, cause->gain, {}, {}};
     refine(evidence, a, accepted);
     if (reaches_too_far(a, result)) break;

@@ -22,7 +22,7 @@ double mean(const Observations& seen, std::size_t channel, std::size_t begin, st
 }
 
 /// Median of the flights' means of a channel: a fault in fewer than half of them does not move it. NaN without one.
-double typical(const Observations& seen, std::size_t channel) {
+double typical_level(const Observations& seen, std::size_t channel) {
   std::vector<double> all;
   for (std::size_t f = 0; f + 1 < seen.first.size(); ++f)
     if (const double m = mean(seen, channel, seen.first[f], seen.first[f + 1]); std::isfinite(m)) all.push_back(m);
@@ -68,7 +68,7 @@ std::optional<double> settle_rotors(const std::optional<SoundRotors>& sound, Obs
     std::array<double, kRotors> own{};
     double most = 0;
     for (std::size_t r = 0; r < kRotors; ++r) {
-      own[r] = sound ? sound->mean[first - kMotor1 + r] : typical(seen, first + r);
+      own[r] = sound ? sound->mean[first - kMotor1 + r] : typical_level(seen, first + r);
       if (!std::isfinite(own[r])) own[r] = 0;  // not measured
       most = std::max(most, std::abs(own[r]));
     }

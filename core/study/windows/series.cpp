@@ -10,9 +10,9 @@
 namespace backwash::study {
 namespace {
 
-using Rows = std::vector<std::size_t>;
+using RowNumbers = std::vector<std::size_t>;
 
-std::vector<Vec3> vectors(const log::FlightLog& log, const Rows& rows, const char* prefix, const char* unit) {
+std::vector<Vec3> vectors(const log::FlightLog& log, const RowNumbers& rows, const char* prefix, const char* unit) {
   std::vector<Vec3> out;
   out.reserve(rows.size());
   const std::string name(prefix);
@@ -36,7 +36,7 @@ struct Commands {
   std::vector<Vec3> p, v, a;
 };
 
-Commands commands_of(const log::FlightLog& log, const Rows& rows) {
+Commands commands_of(const log::FlightLog& log, const RowNumbers& rows) {
   const auto or_rest = [&](const char* prefix, const char* unit) {
     return has_xyz(log, prefix, unit) ? vectors(log, rows, prefix, unit) : std::vector<Vec3>(rows.size(), Vec3::Zero());
   };
@@ -116,14 +116,14 @@ std::array<std::vector<Vec3>, kShifts.size()> answers(const Series& s, const Com
   return out;
 }
 
-Rows rising_rows(const std::vector<double>& t) {
-  Rows rows;
+RowNumbers rising_rows(const std::vector<double>& t) {
+  RowNumbers rows;
   for (std::size_t i = 0; i < t.size(); ++i)
     if (rows.empty() || t[i] > t[rows.back()]) rows.push_back(i);
   return rows;
 }
 
-void read_motion(Series& s, const log::FlightLog& log, const Rows& rows) {
+void read_motion(Series& s, const log::FlightLog& log, const RowNumbers& rows) {
   s.p = vectors(log, rows, "", "_m");
   s.has_velocity = has_xyz(log, "v", "_mps");
   s.has_acceleration = has_xyz(log, "a", "_mps2");
@@ -135,7 +135,7 @@ void read_motion(Series& s, const log::FlightLog& log, const Rows& rows) {
   s.a = s.has_acceleration ? vectors(log, rows, "a", "_mps2") : derivative(s.t, s.v, reach(kWindowRules.slope_time));
 }
 
-void read_attitude(Series& s, const log::FlightLog& log, const Rows& rows) {
+void read_attitude(Series& s, const log::FlightLog& log, const RowNumbers& rows) {
   const auto &w = log.column("qw"), &x = log.column("qx"), &y = log.column("qy"), &z = log.column("qz");
   for (const auto i : rows) {
     Eigen::Quaterniond q(w[i], x[i], y[i], z[i]);
@@ -152,7 +152,7 @@ std::optional<int> segment_of(double logged) {
 
 Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
   Series s;
-  const Rows rows = rising_rows(log.t_s);
+  const RowNumbers rows = rising_rows(log.t_s);
   for (const auto i : rows) s.t.push_back(log.t_s[i] - log.t_s[rows.front()]);
   s.row = rows;
   if (s.size() < 2) return s;
