@@ -67,7 +67,7 @@ TEST(Rules, TheCodeCallsEachWhatThePrintCallsIt) {
     std::ifstream file(entry.path());
     const std::string text((std::istreambuf_iterator<char>(file)), {});
     for (std::sregex_iterator at(text.begin(), text.end(), rule), end; at != end; ++at, ++rules)
-      EXPECT_EQ((*at)[1], (*at)[2]) << entry.path();
+      EXPECT_EQ((*at)[1].str(), (*at)[2].str()) << entry.path();
   }
   EXPECT_EQ(rules, all_rules().size());
 }
