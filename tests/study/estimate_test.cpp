@@ -180,26 +180,4 @@ TEST(Refine, FindsAMapOffsetBetweenTheOnesTriedAndCoversBothOfItsCoordinates) {
   EXPECT_GE(covered, 0.87 * 2 * kWorlds);
 }
 
-TEST(MapView, TheSideOfALoweredCeilingIsAWallButNotFromFloorToCeiling) {
-  using backwash::map::Cell;
-  backwash::map::OccupancyGrid grid(Vec3::Zero(), 0.1, {30, 30, 26}, Cell::free);
-  for (int i = 0; i < 30; ++i)
-    for (int j = 0; j < 30; ++j)
-      for (int k = 0; k < 26; ++k)
-        if (i == 0 || j == 0 || i == 29 || j == 29 || k == 0 || k == 25 || (i < 12 && k >= 18))
-          grid.set({i, j, k}, Cell::occupied);
-  MapView around(&grid, backwash::config::load_model("builtin:quad-5in").value());
-  const PlaceAround high = around.around({1.55, 1.05, 2.15}), low = around.around({1.55, 1.05, 1.0});
-  const auto nearest_along = [](const auto& walls, const Vec3& direction) {
-    double least = kNoSurface;
-    for (const auto& [distance, towards_it] : walls)
-      if (towards_it.dot(direction) > 0.9) least = std::min(least, distance);
-    return least;
-  };
-  EXPECT_NEAR(nearest_along(high.walls, -Vec3::UnitX()), 0.35, 1e-6);
-  EXPECT_EQ(nearest_along(high.whole_walls, -Vec3::UnitX()), kNoSurface);
-  EXPECT_NEAR(nearest_along(low.whole_walls, -Vec3::UnitX()), 1.45, 1e-6);
-  EXPECT_NEAR(nearest_along(high.whole_walls, -Vec3::UnitY()), 0.95, 1e-6);
-}
-
 }  // namespace
