@@ -167,6 +167,8 @@ struct Family {
     auto columns = shape.columns(windows, at);
     auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen());
     if (shapes[0].by_speed) nuisance.push_back(without_variances(columns[0]));
+    const auto open = companions(shapes[0], evidence.seen());
+    nuisance.insert(nuisance.end(), open.begin(), open.end());
     nuisance.insert(nuisance.end(), others.begin(), others.end());
     return evidence.normal(columns, nuisance);
   }
