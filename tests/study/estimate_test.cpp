@@ -158,12 +158,12 @@ Observations on_sagging_batteries(double s, unsigned seed) {
   auto seen = flights();
   std::mt19937 rng(seed);
   std::normal_distribution noise(0.0, 0.01);
-  std::uniform_real_distribution charged(15.2, 16.2);
+  std::uniform_real_distribution charged(14.4, 15.4);
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     auto& w = seen.windows[i];
     w.voltage = i % kOfFlight == 0 ? charged(rng) : seen.windows[i - 1].voltage - 0.04;
     const double flown = std::pow(w.voltage / 16.8, s);
-    w.thrust_acc = backwash::kGravity / flown, w.slope_gain = {0, 4};
+    w.thrust_acc = backwash::kGravity / flown, w.slope_gain = {0, 2};
     measure(seen, kMeanZ, i, backwash::kGravity - w.thrust_acc + noise(rng));
     measure(seen, kThrustSlope, i, (flown - 1) * w.slope_gain[1] + noise(rng));
   }
@@ -224,7 +224,8 @@ TEST(Refine, FindsADragThatGrowsWithTheSpeedInWindowsThatStart) {
     auto seen = flights();
     for (std::size_t i = 0; i < seen.windows.size(); ++i) {
       auto& w = seen.windows[i];
-      const double most = pace(rng), push = 0.2 * (i % 2 ? most / 2 + 0.15 * most * most / 3 : most * (1 + 0.15 * most));
+      const double most = pace(rng),
+                   push = 0.2 * (i % 2 ? most / 2 + 0.15 * most * most / 3 : most * (1 + 0.15 * most));
       for (std::size_t k = 0; k < kPoints; ++k)
         w.speeds[k] = i % 2 ? most * (static_cast<double>(k) + 0.5) / kPoints : most;
       w.v_W = Vec3(i % 2 ? most / 2 : most, 0, 0);

@@ -21,8 +21,8 @@ std::vector<DesignColumn> sagging(const Windows& ws, const Scale& scale) {
   return {missing_thrust(ws, [&](auto& w) { return (anchor[0] - w.voltage) / anchor[1]; })};
 }
 
-/// The columns are of the thrust commanded on the mean, which is 1/F of what is flown at Vm: F = 1 − c − s (V0 − Vm)/Vm.
-/// As a factor on the commanded thrust, which changes with it, that is s F per Vm, and 1 at the voltage V*.
+/// The columns are of the thrust commanded on the mean, which is 1/F of what is flown at Vm: F = 1 − c − s (V0 −
+/// Vm)/Vm. As a factor on the commanded thrust, which changes with it, that is s F per Vm, and 1 at the voltage V*.
 std::vector<SimulationTerm> by_voltage(const FittedForm& fitted, const Observations& seen) {
   const auto anchor = fitted.scale.anchor.size() == 2 ? fitted.scale.anchor : voltages(seen.windows);
   const double s = fitted.theta[0], c = fitted.beside.empty() ? 0 : fitted.beside[0];

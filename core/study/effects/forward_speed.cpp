@@ -12,8 +12,8 @@ double speed_power(const WindowRow& w, double power) {
   return sum;
 }
 
-/// What gusts add to the square of the speed, (m/s)²: of a critically damped loop Σ τ_w/(2 √k_p) along each axis. Of the
-/// modelled Σ: what is measured answers the gusts.
+/// What gusts add to the square of the speed, (m/s)²: of a critically damped loop Σ τ_w/(2 √k_p) along each axis. Of
+/// the modelled Σ: what is measured answers the gusts.
 double sway2(const WindowRow& w) { return kWindowRules.tau_w * w.sigma.dot(w.give.cwiseSqrt()) / 2; }
 
 /// What is left of the gusts at a place along a window, a share of its length from the middle, when mean and trend are
@@ -59,46 +59,45 @@ const Reference pace = {1, "m/s", [](auto& w) { return w.speed; }};
 
 /// Thrust and gusts change with the speed.
 Effect forward_speed() {
-  return {
-      .name = "forward_speed",
-      .forms = {{.formula = "z push C (v/1 m/s)^2",
-                 .parameters = {"C_mps2"},
-                 .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, at a walking pace"}},
-                 .reference = pace,
-                 .floor = 0.02,
-                 .columns =
-                     [](const Windows& ws, const Scale&) {
-                       return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })};
-                     },
-                 .extend = extends(Law::push_with_speed),
-                 .simulate = simulates(Law::push_with_speed)},
-                {.formula = "ln variance + B (v/1 m/s)^n",
-                 .parameters = {"B_ln"},
-                 .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
-                 .reference = pace,
-                 .scale_name = "n",
-                 .scales = scales_of({1, 2}),
-                 .by_speed = true,
-                 .floor = 0.12,
-                 .columns =
-                     [](const Windows& ws, const Scale& n) {
-                       return std::vector{in_variance(ws, [&](auto& w) { return to_power(w, n); })};
-                     },
-                 .shapes = {{.formula = "ln variance + B ln(1 + (v/u)^2)/ln(1 + (1 m/s/u)^2): gusts that add",
-                             .parameters = {},
-                             .scale_name = "u_mps",
-                             .scales = scales_of({0.5, 1, 2}),
-                             .columns =
-                                 [](const Windows& ws, const Scale& knee) {
-                                   return std::vector{in_variance(ws, [&](auto& w) { return added(w, knee); })};
-                                 }}},
-                 .extend = extends(Law::ln_variance_with_speed),
-                 .simulate = simulates(Law::ln_variance_with_speed)}},
-      .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},
-      .manoeuvres = {{"fly fast and slow on one line at one height", [](WindowRow& w, double s) {
-                        w.speed = 1.5 * s, w.speeds.fill(w.speed);
-                        w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
-                      }}}};
+  return {.name = "forward_speed",
+          .forms = {{.formula = "z push C (v/1 m/s)^2",
+                     .parameters = {"C_mps2"},
+                     .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, at a walking pace"}},
+                     .reference = pace,
+                     .floor = 0.02,
+                     .columns =
+                         [](const Windows& ws, const Scale&) {
+                           return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })};
+                         },
+                     .extend = extends(Law::push_with_speed),
+                     .simulate = simulates(Law::push_with_speed)},
+                    {.formula = "ln variance + B (v/1 m/s)^n",
+                     .parameters = {"B_ln"},
+                     .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
+                     .reference = pace,
+                     .scale_name = "n",
+                     .scales = scales_of({1, 2}),
+                     .by_speed = true,
+                     .floor = 0.12,
+                     .columns =
+                         [](const Windows& ws, const Scale& n) {
+                           return std::vector{in_variance(ws, [&](auto& w) { return to_power(w, n); })};
+                         },
+                     .shapes = {{.formula = "ln variance + B ln(1 + (v/u)^2)/ln(1 + (1 m/s/u)^2): gusts that add",
+                                 .parameters = {},
+                                 .scale_name = "u_mps",
+                                 .scales = scales_of({0.5, 1, 2}),
+                                 .columns =
+                                     [](const Windows& ws, const Scale& knee) {
+                                       return std::vector{in_variance(ws, [&](auto& w) { return added(w, knee); })};
+                                     }}},
+                     .extend = extends(Law::ln_variance_with_speed),
+                     .simulate = simulates(Law::ln_variance_with_speed)}},
+          .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},
+          .manoeuvres = {{"fly fast and slow on one line at one height", [](WindowRow& w, double s) {
+                            w.speed = 1.5 * s, w.speeds.fill(w.speed);
+                            w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
+                          }}}};
 }
 
 }  // namespace backwash::study
