@@ -21,14 +21,15 @@ std::vector<DesignColumn> sagging(const Windows& ws, const Scale& scale) {
   return {missing_thrust(ws, [&](auto& w) { return (anchor[0] - w.voltage) / anchor[1]; })};
 }
 
-/// The voltage V* at which the thrust is as modelled takes the constant in: 1 − c − s (V0 − V)/Vm = 1 − s (V* − V)/Vm.
+/// The columns are of the thrust commanded on the mean, which is 1/F of what is flown at Vm: F = 1 − c − s (V0 −
+/// Vm)/Vm. As a factor on the commanded thrust, which changes with it, that is s F per Vm, and 1 at the voltage V*.
 std::vector<SimulationTerm> by_voltage(const FittedForm& fitted, const Observations& seen) {
   const auto anchor = fitted.scale.anchor.size() == 2 ? fitted.scale.anchor : voltages(seen.windows);
   const double s = fitted.theta[0], c = fitted.beside.empty() ? 0 : fitted.beside[0];
+  const double at_mean = 1 - c - s * (anchor[0] - anchor[1]) / anchor[1], slope = s * at_mean;
+  const double full = anchor[1] + (std::abs(slope) > kEffectRules.no_sag ? (1 - at_mean) * anchor[1] / slope : 0);
   const Course course = mean_course(seen, &WindowRow::voltage);
-  return {{SimulationTerm::Kind::thrust_with_voltage,
-           {s, anchor[0] + (std::abs(s) > kEffectRules.no_sag ? c * anchor[1] / s : 0), anchor[1], course.first,
-            course.rate}}};
+  return {{SimulationTerm::Kind::thrust_with_voltage, {slope, full, anchor[1], course.first, course.rate}}};
 }
 
 }  // namespace

@@ -20,8 +20,10 @@ std::vector<DesignColumn> body_drift(const Windows& ws, const std::function<doub
 }
 
 DesignColumn missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
-  // g for T/m: the measured thrust answers the mean gust, so it would explain the residual by itself.
-  return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * kGravity; })},
+  // T/m of all windows together: a window's own answers its mean gust, so it would explain the residual by itself.
+  double thrust_acc = 0;
+  for (const auto& w : ws) thrust_acc += w.thrust_acc / static_cast<double>(ws.size());
+  return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * thrust_acc; })},
            {kThrustDelay, values(ws, [&](auto& w) { return -share(w) * w.delay_gain[1]; })},
            {kThrustSlope, values(ws, [&](auto& w) { return -share(w) * w.slope_gain[1]; })}}};
 }

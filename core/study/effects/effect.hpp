@@ -106,7 +106,7 @@ struct Form {
   bool constant = false;           ///< is itself what a free offset would be: tested without one
   bool in_sensor = false;          ///< is told by a sensor and pushes nothing
   bool by_place = false;           ///< a push that differs by place: it moves the craft in itself
-  bool by_speed = false;           ///< a push that slows the craft, and by its size (Scale::anchor) changes its columns
+  bool by_speed = false;           ///< goes with the speed, and its size (Scale::anchor) changes its columns
   double floor = 0;                ///< least root mean square over the flown windows that is called an effect
   double least = 0;                ///< least magnitude of the first parameter that is called an effect
   bool one_sided = false;          ///< the first parameter cannot be negative

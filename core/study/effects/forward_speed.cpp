@@ -12,22 +12,45 @@ double speed_power(const WindowRow& w, double power) {
   return sum;
 }
 
-/// Mean of share(v) where the gusts are: a window that climbs away from the floor has most of its variance while it is
-/// slow.
-template <typename F>
-double of_gusts(const WindowRow& w, F share) {
-  double sum = 0;
-  for (std::size_t k = 0; k < kPoints; ++k) sum += w.shares[k] * share(w.speeds[k]);
-  return sum;
+/// What gusts add to the square of the speed, (m/s)²: of a critically damped loop Σ τ_w/(2 √k_p) along each axis. Of
+/// the modelled Σ: what is measured answers the gusts.
+double sway2(const WindowRow& w) { return kWindowRules.tau_w * w.sigma.dot(w.give.cwiseSqrt()) / 2; }
+
+/// What is left of the gusts at a place along a window, a share of its length from the middle, when mean and trend are
+/// taken out: 1 − (1 + 12 u²) 2τ_w/T, as far as their correlation lies within the window.
+double left_of_trend(const WindowRow& w, double u) {
+  const double tau = kWindowRules.tau_w / w.duration;
+  const double within = 1 - (std::exp((u - 0.5) / tau) + std::exp((-u - 0.5) / tau)) / 2;
+  return std::max(0.0, 1 - (1 + 12 * u * u) * 2 * tau * within);
 }
 
-double to_power(const WindowRow& w, double n) {
-  return of_gusts(w, [&](double v) { return std::pow(v, n); });
+/// Of what goes with the speed as B share(v), the ln of the mean factor e^{B share} along a window, over B: a window
+/// holds a start or a stop, and what is measured is the ln of its variance. Places count by the modelled variance that
+/// they have. B is scale.anchor; without it, the mean of share.
+template <typename F>
+double of_gusts(const WindowRow& w, const Scale& scale, F share) {
+  const double size = scale.anchor.empty() ? 0 : scale.anchor[0], sway = sway2(w);
+  std::array<double, kPoints> at, weight;
+  double total = 0, mean = 0, factor = 0;
+  for (std::size_t k = 0; k < kPoints; ++k) {
+    at[k] = share(std::sqrt(w.speeds[k] * w.speeds[k] + sway));
+    weight[k] = w.shares[k] * left_of_trend(w, (static_cast<double>(k) + 0.5) / kPoints - 0.5);
+    total += weight[k], mean += weight[k] * at[k];
+  }
+  if (!(total > 0)) return 0;
+  mean /= total;
+  for (std::size_t k = 0; k < kPoints; ++k) factor += weight[k] / total * std::expm1(size * (at[k] - mean));
+  return size != 0 && std::isfinite(factor) ? mean + std::log1p(factor) / size : mean;
+}
+
+double to_power(const WindowRow& w, const Scale& n) {
+  return of_gusts(w, n, [&](double v) { return std::pow(v, n.value); });
 }
 
 /// ln of variances that add, 1 + (v/knee)², over its value at 1 m/s.
-double added(const WindowRow& w, double knee) {
-  return of_gusts(w, [&](double v) { return std::log1p(std::pow(v / knee, 2)); }) / std::log1p(1 / (knee * knee));
+double added(const WindowRow& w, const Scale& knee) {
+  const double at_pace = std::log1p(1 / (knee.value * knee.value));
+  return of_gusts(w, knee, [&](double v) { return std::log1p(std::pow(v / knee.value, 2)) / at_pace; });
 }
 
 const Reference pace = {1, "m/s", [](auto& w) { return w.speed; }};
@@ -36,45 +59,45 @@ const Reference pace = {1, "m/s", [](auto& w) { return w.speed; }};
 
 /// Thrust and gusts change with the speed.
 Effect forward_speed() {
-  return {
-      .name = "forward_speed",
-      .forms = {{.formula = "z push C (v/1 m/s)^2",
-                 .parameters = {"C_mps2"},
-                 .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, at a walking pace"}},
-                 .reference = pace,
-                 .floor = 0.02,
-                 .columns =
-                     [](const Windows& ws, const Scale&) {
-                       return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })};
-                     },
-                 .extend = extends(Law::push_with_speed),
-                 .simulate = simulates(Law::push_with_speed)},
-                {.formula = "ln variance + B (v/1 m/s)^n",
-                 .parameters = {"B_ln"},
-                 .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
-                 .reference = pace,
-                 .scale_name = "n",
-                 .scales = scales_of({1, 2}),
-                 .floor = 0.12,
-                 .columns =
-                     [](const Windows& ws, const Scale& n) {
-                       return std::vector{in_variance(ws, [&](auto& w) { return to_power(w, n.value); })};
-                     },
-                 .shapes = {{.formula = "ln variance + B ln(1 + (v/u)^2)/ln(1 + (1 m/s/u)^2): gusts that add",
-                             .parameters = {},
-                             .scale_name = "u_mps",
-                             .scales = scales_of({0.5, 1, 2}),
-                             .columns =
-                                 [](const Windows& ws, const Scale& knee) {
-                                   return std::vector{in_variance(ws, [&](auto& w) { return added(w, knee.value); })};
-                                 }}},
-                 .extend = extends(Law::ln_variance_with_speed),
-                 .simulate = simulates(Law::ln_variance_with_speed)}},
-      .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},
-      .manoeuvres = {{"fly fast and slow on one line at one height", [](WindowRow& w, double s) {
-                        w.speed = 1.5 * s, w.speeds.fill(w.speed);
-                        w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
-                      }}}};
+  return {.name = "forward_speed",
+          .forms = {{.formula = "z push C (v/1 m/s)^2",
+                     .parameters = {"C_mps2"},
+                     .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, at a walking pace"}},
+                     .reference = pace,
+                     .floor = 0.02,
+                     .columns =
+                         [](const Windows& ws, const Scale&) {
+                           return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })};
+                         },
+                     .extend = extends(Law::push_with_speed),
+                     .simulate = simulates(Law::push_with_speed)},
+                    {.formula = "ln variance + B (v/1 m/s)^n",
+                     .parameters = {"B_ln"},
+                     .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
+                     .reference = pace,
+                     .scale_name = "n",
+                     .scales = scales_of({1, 2}),
+                     .by_speed = true,
+                     .floor = 0.12,
+                     .columns =
+                         [](const Windows& ws, const Scale& n) {
+                           return std::vector{in_variance(ws, [&](auto& w) { return to_power(w, n); })};
+                         },
+                     .shapes = {{.formula = "ln variance + B ln(1 + (v/u)^2)/ln(1 + (1 m/s/u)^2): gusts that add",
+                                 .parameters = {},
+                                 .scale_name = "u_mps",
+                                 .scales = scales_of({0.5, 1, 2}),
+                                 .columns =
+                                     [](const Windows& ws, const Scale& knee) {
+                                       return std::vector{in_variance(ws, [&](auto& w) { return added(w, knee); })};
+                                     }}},
+                     .extend = extends(Law::ln_variance_with_speed),
+                     .simulate = simulates(Law::ln_variance_with_speed)}},
+          .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},
+          .manoeuvres = {{"fly fast and slow on one line at one height", [](WindowRow& w, double s) {
+                            w.speed = 1.5 * s, w.speeds.fill(w.speed);
+                            w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
+                          }}}};
 }
 
 }  // namespace backwash::study

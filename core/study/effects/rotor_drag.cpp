@@ -6,13 +6,21 @@ namespace backwash::study {
 namespace {
 
 /// The drag at the velocity that it leaves, and what its course along a window adds to the variance there. Both go by
-/// the drag itself, scale.anchor: without it none. `per_speed`: how the drag per speed goes with the speed.
+/// the drag itself, scale.anchor: without it none. `per_speed`: how the drag per speed goes with the speed, a mean over
+/// the way: a window holds a start or a stop.
 template <typename F>
 std::vector<DesignColumn> against(const Windows& ws, const Scale& scale, F per_speed) {
   const double k = scale.anchor.empty() ? 0 : scale.anchor[0];
   DesignColumn column = level(ws, [&](auto& w) -> Vec3 {
     const Vec3 v = w.v_W - k * w.slowed;
-    return -v * per_speed(v.template head<2>().norm());
+    const double told = w.v_W.template head<2>().norm(), speed = v.template head<2>().norm();
+    double way = 0, dragged = 0;
+    for (std::size_t i = 0; i < kPoints && told > 0; ++i) {
+      const double level2 = w.speeds[i] * w.speeds[i] - w.climbs[i] * w.climbs[i];
+      const double along = speed / told * std::sqrt(std::max(0.0, level2));
+      way += along, dragged += along * per_speed(along);
+    }
+    return -v * (way > 0 ? dragged / way : per_speed(speed));
   });
   for (std::size_t a = 0; a < 2 && k > 0; ++a)
     column.parts.push_back({kVariances[a], values(ws, [&](auto& w) {

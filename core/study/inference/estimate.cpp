@@ -143,8 +143,10 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
 
 /// Takes the parts that speak of variances out of a column, and returns them: what a push adds to a window's variance
 /// goes by its course along the window, which is known less well than its mean, and has a factor of its own in a size.
+/// Of a column that speaks of variances alone nothing is taken.
 DesignColumn without_variances(DesignColumn& column) {
   DesignColumn taken;
+  if (column.parts.front().channel > kMeanZ) return taken;
   std::erase_if(column.parts, [&](auto& part) {
     const bool variance = std::find(kVariances.begin(), kVariances.end(), part.channel) != kVariances.end();
     if (variance) taken.parts.push_back(part);
@@ -167,6 +169,8 @@ struct Family {
     auto columns = shape.columns(windows, at);
     auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen());
     if (shapes[0].by_speed) nuisance.push_back(without_variances(columns[0]));
+    const auto open = companions(shapes[0], evidence.seen());
+    nuisance.insert(nuisance.end(), open.begin(), open.end());
     nuisance.insert(nuisance.end(), others.begin(), others.end());
     return evidence.normal(columns, nuisance);
   }
@@ -194,7 +198,7 @@ struct Family {
     }
   }
 
-  /// The columns at the speed that the push itself leaves.
+  /// The columns at what the cause's own size leaves: of the speed, of the gusts within a window.
   void follow_speed() {
     for (int k = 0; k < kRules.turns; ++k) {
       const NormalEquations n = normal_at(shapes[0], scale);
@@ -217,12 +221,13 @@ struct Family {
     if (n == 1) return start;
     const double low = std::log(members.front().scale.value), high = std::log(members[own() - 1].scale.value);
     const auto height = [&](const std::vector<double>& ln) {
-      NormalEquations normal = normal_at(shapes[0], {std::exp(ln[0])});
+      NormalEquations normal = normal_at(shapes[0], {std::exp(ln[0]), scale.offset_W, scale.anchor});
       return normal.solvable ? fitted(std::move(normal), nullptr, {}).height : -HUGE_VAL;
     };
     const double at =
         std::exp(polished({std::log(start.scale.value)}, 0.5 * (high - low) / kFine, {low}, {high}, height)[0]);
-    return fitted(normal_at(shapes[0], {at}), &shapes[0], {at});
+    const Scale polished_at{at, scale.offset_W, scale.anchor};
+    return fitted(normal_at(shapes[0], polished_at), &shapes[0], polished_at);
   }
 
   /// Each parameter, averaged over the members. `columns`: of the form itself.

@@ -57,17 +57,25 @@ const Vec3& MapView::lattice_ln_sigma(const Index3& at) {
 
 Vec3 MapView::sigma(const Vec3& p_W) {
   if (!field_) return base_;
+  const auto exactly = [this](const Vec3& at_W) -> Vec3 {
+    const Variance s = field_->at(at_W).sigma();
+    return {s.xx, s.yy, s.zz};
+  };
   const Vec3 q = (p_W - low_) / kWindowRules.sigma_lattice;
   const Index3 corner = q.array().floor().cast<int>();
   if ((corner.array() < 0).any() || ((corner + Index3::Ones()).array() >= size_.array()).any()) {
-    const Variance s = field_->at(p_W).sigma();
-    return {s.xx, s.yy, s.zz};
+    return exactly(p_W);
   }
+  // A corner within a solid says nothing of the air beside it.
   Vec3 ln = Vec3::Zero();
+  double free = 0;
+  const bool buried = inside_solid(p_W);
   map::for_corners(q, [&](const Index3& v, const Vec3& share) {
-    if (share.prod() > kWindowRules.corner_least) ln += share.prod() * lattice_ln_sigma(v);
+    if (!(share.prod() > kWindowRules.corner_least)) return;
+    if (!buried && inside_solid(low_ + kWindowRules.sigma_lattice * v.cast<double>())) return;
+    ln += share.prod() * lattice_ln_sigma(v), free += share.prod();
   });
-  return ln.array().exp();
+  return free > 0 ? Vec3((ln / free).array().exp()) : exactly(p_W);
 }
 
 }  // namespace backwash::study
