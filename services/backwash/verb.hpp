@@ -40,6 +40,7 @@ Verb calibrate_verb(Command& app);
 Verb import_verb(Command& app);
 Verb replay_verb(Command& app);
 Verb study_verb(Command& app);
+Verb adapt_verb(Command& app);
 Verb vehicle_verb(Command& app);
 
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.

@@ -189,7 +189,8 @@ Vec3 hidden_push(const HiddenWorld& world, const Instant& now) {
 }
 
 double hidden_ln_variance(const HiddenWorld& world, const Instant& now) {
-  double ln = 0;
+  const Vec3 wall = (now.p - world.room.inside.low).cwiseMin(world.room.inside.high - now.p);
+  double ln = wall.head<2>().minCoeff() < 0.7 ? std::log(world.request.rough_walls) : 0;
   for (const auto& [name, s] : world.effects.size)
     if (const auto& cause = causes().at(name); cause.ln_variance && s != 0)
       ln += cause.ln_variance({world, now, s, world.effects.shape_of(name)});

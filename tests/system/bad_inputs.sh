@@ -166,6 +166,11 @@ refused 64 'no kind of recording' import nanobench ms.csv -o logs
 refused 64 'no recording given' import ulog -o logs
 refused 65 'no format message (FMT)' import ardupilot corrupt.bt -o logs
 refused 64 'in this log 1 faces 2' study --vehicle $quad --log flight.bin --reference sound.csv
+printf 't_s,x_m,y_m,z_m\n0,1,1,1\n0.02,1,1,1\n' >sparse.csv
+refused 64 'adapt needs logs and --vehicle' adapt --vehicle $quad
+refused 66 'absent.csv' adapt absent.csv --vehicle $quad
+refused 65 "no columns 'vx_mps'" adapt sparse.csv --vehicle $quad
+refused 64 '--gusts' adapt absent.csv --vehicle $quad --gusts strong
 refused 64 '--out' import --map-columns map.toml ms.csv
 gzip -k ms.csv && head -c 100 ms.csv.gz >short.csv.gz
 refused 65 'cut short' import --map-columns map.toml short.csv.gz -o logs

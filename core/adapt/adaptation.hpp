@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/adapt/bets.hpp"
+
+namespace backwash::adapt {
+
+/// What a flight learns of its air, class by class (docs/model.md section 7). Starts with nothing; of two with equal
+/// samples every number is equal, bit for bit. Made before the flight: the constructor takes 10 ms.
+class Adaptation {
+ public:
+  explicit Adaptation(const Gusts& gusts) : innovations_(gusts) {}
+
+  /// One tick; whether a class's factor or limit may have changed. Real-time: wait-free, no allocation.
+  bool add(const AirSample& sample) noexcept {
+    const auto innovation = innovations_.add(sample);
+    if (!innovation) return false;
+    auto& bets = bets_[static_cast<std::size_t>(innovation->air)];
+    const auto above = bets.above(), below = bets.below();
+    bets.add(*innovation);
+    return bets.above() != above || bets.below() != below;
+  }
+  /// Factor on Σ in a class, max(1, v_lo): never below 1, never falls. Sets grow by its root.
+  double factor(AirClass air) const noexcept { return std::max(1.0, of(air).above().value_or(1)); }
+  const Bets& of(AirClass air) const noexcept { return bets_[static_cast<std::size_t>(air)]; }
+  std::uint64_t refused() const noexcept { return innovations_.refused(); }  ///< samples
+
+ private:
+  Innovations innovations_;
+  std::array<Bets, kAirClasses> bets_;
+};
+
+}  // namespace backwash::adapt

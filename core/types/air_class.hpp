@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/types/disturbance.hpp"
+
+namespace backwash {
+
+/// The term of Σ that is largest at a place (docs/model.md 7-1): what makes the air rough there.
+enum class AirClass : std::uint8_t {
+  free_air,  ///< Σ_0
+  ground,
+  wall,
+  corner,
+  none  ///< not known: no Σ at the place, or no attitude
+};
+inline constexpr std::size_t kAirClasses = 5;
+
+constexpr const char* to_string(AirClass air) noexcept {
+  constexpr std::array<const char*, kAirClasses> kNames{"free_air", "ground", "wall", "corner", "none"};
+  return kNames[static_cast<std::size_t>(air)];
+}
+
+/// The term with the largest trace, (m/s²)²; of equal ones the first. A term that is not finite: none.
+inline AirClass dominant(const Variance& base, const Variance& ground, const Variance& wall,
+                         const Variance& corner) noexcept {
+  const auto trace = [](const Variance& v) { return v.xx + v.yy + v.zz; };
+  const std::array<double, kAirClasses - 1> traces{trace(base), trace(ground), trace(wall), trace(corner)};
+  std::size_t largest = 0;
+  double sum = 0;
+  for (std::size_t k = 0; k < traces.size(); ++k) {
+    sum += traces[k];
+    if (traces[k] > traces[largest]) largest = k;
+  }
+  return std::isfinite(sum) ? static_cast<AirClass>(largest) : AirClass::none;
+}
+
+}  // namespace backwash

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/adapt/bets.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/adapt/adaptation.hpp"
+
+namespace backwash::adapt {
+namespace {
+
+/// An innovation whose square over its expectation is x on every axis.
+Innovation of_square(double x, AirClass air = AirClass::wall) {
+  return {air, 0.06, Vec3::Constant(x), Vec3::Zero(), 0.06, 1, 1};
+}
+
+TEST(Bets, NoSquareMakesTheEvidenceLessThanNothing) {
+  for (const double x : {0.0, 1.0, 15.9, 16.0, 1e9, 1e300}) {
+    Bets bets;
+    for (int k = 0; k < 5000; ++k) bets.add(of_square(x));
+    EXPECT_FALSE(std::isnan(bets.ln_evidence())) << x;
+    EXPECT_FALSE(std::isnan(bets.ln_changed())) << x;
+    EXPECT_GE(bets.ln_evidence(), 0) << x;
+    EXPECT_EQ(bets.above().has_value(), x > 1) << x;
+    EXPECT_EQ(bets.below().has_value(), x < 0.9) << x;
+  }
+}
+
+/// Share of flights of 2000 squares that are ever called rougher; squares are `high` with probability 1/high, else 0.
+double alarms(double high, int flights) {
+  std::mt19937_64 rng(5);
+  int count = 0;
+  for (int f = 0; f < flights; ++f) {
+    Bets bets;
+    for (int k = 0; k < 2000 && !bets.above(); ++k)
+      bets.add(of_square(std::generate_canonical<double, 53>(rng) < 1 / high ? high : 0));
+    count += bets.above().has_value();
+  }
+  return static_cast<double>(count) / flights;
+}
+
+TEST(Bets, SquaresOfMeanOneRaiseNoMoreAlarmsThanIsSaidWhateverTheirTails) {
+  // Ville's bound of one class and the detector's of 120 s.
+  for (const double high : {1.5, 2.0, 5.0, 16.0, 100.0})
+    EXPECT_LE(alarms(high, 1000), kAlpha / kAirClasses + 120 / kRunLength + 0.003) << high;
+}
+
+TEST(Bets, TheEvidenceOfOneLargeSquareIsItsBetNoMore) {
+  Bets bets;
+  bets.add(of_square(1e6));  // counts 16: mean of 1 + 15 λ
+  double expected = 0;
+  for (const double stake : Bets::kStakes) expected += (1 + 15 * stake) / Bets::kStakes.size();
+  EXPECT_NEAR(std::exp(bets.ln_evidence()), expected, 1e-12);
+}
+
+TEST(Bets, AFactorIsRefutedOnlyBelowWhatTheSquaresHold) {
+  for (const double v : {1.5, 2.5, 5.0}) {
+    std::mt19937_64 rng(7);
+    std::normal_distribution<double> normal;
+    int wrong = 0, near = 0;
+    for (int f = 0; f < 60; ++f) {
+      Bets bets;
+      for (int k = 0; k < 2000; ++k) {
+        Innovation i = of_square(0);
+        for (int axis = 0; axis < 3; ++axis) i.square[axis] = v * std::pow(normal(rng), 2);
+        bets.add(i);
+      }
+      wrong += bets.above().value_or(0) > v, near += bets.above().value_or(0) > 0.7 * v;
+    }
+    EXPECT_LE(wrong, 1) << v;
+    EXPECT_GE(near, 57) << v;
+  }
+}
+
+TEST(Bets, CalmerAirIsSaidAfterAMinuteAndNeverTooCalm) {
+  std::mt19937_64 rng(9);
+  std::normal_distribution<double> normal;
+  int early = 0, too_calm = 0, near = 0;
+  for (int f = 0; f < 60; ++f) {
+    Bets bets;
+    for (int k = 0; k < 3000; ++k) {
+      Innovation i = of_square(0);
+      for (int axis = 0; axis < 3; ++axis) i.square[axis] = 0.4 * std::pow(normal(rng), 2);
+      bets.add(i);
+      early += bets.seconds() < kLeastCalm && bets.below();
+    }
+    too_calm += bets.below().value_or(1) < 0.4, near += bets.below().value_or(1) < 0.6;
+    EXPECT_FALSE(bets.above());
+  }
+  EXPECT_EQ(early, 0);
+  EXPECT_LE(too_calm, 1);
+  EXPECT_GE(near, 57);
+}
+
+TEST(Bets, NoiseAndPushAreGrantedToTheRougherSideAlone) {
+  Bets granted, calm;
+  for (int k = 0; k < 2000; ++k) {
+    auto i = of_square(1.8);
+    i.beside = Vec3::Ones();
+    granted.add(i);
+    i.square = Vec3::Constant(1.1);
+    calm.add(i);
+  }
+  EXPECT_FALSE(granted.above());
+  EXPECT_FALSE(calm.below());
+}
+
+TEST(Adaptation, SamplesWithoutAnAttitudeCountForNoClassThatHasAName) {
+  Adaptation adaptation{Gusts{}};
+  for (int k = 0; k < 2000; ++k)
+    adaptation.add({0.02 * k, Vec3::Constant(k % 6 < 3 ? 9 : -9), Vec3::Ones(), AirClass::none});
+  EXPECT_GT(adaptation.factor(AirClass::none), 2);
+  for (const AirClass air : {AirClass::free_air, AirClass::ground, AirClass::wall, AirClass::corner}) {
+    EXPECT_EQ(adaptation.factor(air), 1);
+    EXPECT_EQ(adaptation.of(air).seconds(), 0);
+  }
+}
+
+TEST(AirClass, IsTheTermWithTheLargestTrace) {
+  const Variance small{1, 0, 0, 1, 0, 1}, large{1, 0, 0, 1, 0, 2}, nothing{};
+  EXPECT_EQ(dominant(large, small, small, small), AirClass::free_air);
+  EXPECT_EQ(dominant(small, large, small, small), AirClass::ground);
+  EXPECT_EQ(dominant(small, nothing, large, small), AirClass::wall);
+  EXPECT_EQ(dominant(small, nothing, small, large), AirClass::corner);
+  EXPECT_EQ(dominant(small, small, nothing, nothing), AirClass::free_air);
+  EXPECT_EQ(dominant({std::nan(""), 0, 0, 0, 0, 0}, small, nothing, nothing), AirClass::none);
+  EXPECT_STREQ(to_string(AirClass::corner), "corner");
+}
+
+}  // namespace
+}  // namespace backwash::adapt

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Cost of a tick of core/adapt beside the same bets with a logarithm each, in one run.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <random>
+#include <vector>
+
+#include "core/adapt/adaptation.hpp"
+
+namespace {
+
+using namespace backwash;
+using namespace backwash::adapt;
+
+std::vector<AirSample> samples() {
+  std::mt19937_64 rng(1);
+  std::normal_distribution<double> normal;
+  std::vector<AirSample> all;
+  for (int k = 0; k < 6000; ++k)
+    all.push_back(
+        {0.02 * k, 0.1 * Vec3(normal(rng), normal(rng), normal(rng)), Vec3(0.01, 0.02, 0.01), AirClass::wall});
+  return all;
+}
+
+/// As the equations are written: every bet's logarithm in every innovation, every mean of exponentials.
+class LogEachBet {
+ public:
+  double add(const Innovation& i) {
+    double told = 0;
+    for (std::size_t k = 0; k < Bets::kRougher.size(); ++k) {
+      double x = 0, sum = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        x += std::min(kMostSquare, i.square[axis] / (Bets::kRougher[k] * i.most + i.beside[axis])) / 3;
+      for (std::size_t j = 0; j < Bets::kStakes.size(); ++j) {
+        ln_[k][j] += std::log1p(Bets::kStakes[j] * (x - 1));
+        since_[k][j] = std::log(std::exp(since_[k][j]) + i.seconds) + std::log1p(Bets::kStakes[j] * (x - 1));
+        sum += std::exp(ln_[k][j]) + std::exp(since_[k][j]);
+      }
+      told += sum;
+    }
+    for (std::size_t k = 0; k < Bets::kCalmer.size(); ++k) {
+      double x = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        x += std::min(kMostSquare, i.square[axis] / (Bets::kCalmer[k] * i.least)) / 3;
+      for (std::size_t j = 0; j < Bets::kCalmStakes.size(); ++j)
+        told += std::exp(calm_[k][j] += std::log1p(Bets::kCalmStakes[j] / 15.05 * (0.95 - x)));
+    }
+    return told;
+  }
+
+ private:
+  std::array<std::array<double, 3>, Bets::kRougher.size()> ln_{}, since_{};
+  std::array<std::array<double, 3>, Bets::kCalmer.size()> calm_{};
+};
+
+constexpr const char* kBaseline = "log_each_bet";
+
+void log_each_bet(benchmark::State& state) {
+  const auto all = samples();
+  Innovations innovations{Gusts{}};
+  LogEachBet bets;
+  double t = 0;
+  for (auto _ : state)
+    for (AirSample sample : all) {
+      sample.t_s = t += 0.02;
+      if (const auto i = innovations.add(sample)) benchmark::DoNotOptimize(bets.add(*i));
+    }
+  state.counters["ticks"] = static_cast<double>(all.size());
+}
+
+void tick(benchmark::State& state) {
+  const auto all = samples();
+  Adaptation adaptation{Gusts{}};
+  double t = 0;
+  for (auto _ : state)
+    for (AirSample sample : all) {
+      sample.t_s = t += 0.02;
+      benchmark::DoNotOptimize(adaptation.add(sample));
+    }
+  state.counters["ticks"] = static_cast<double>(all.size());
+}
+
+BENCHMARK(log_each_bet)->Name(kBaseline);
+BENCHMARK(tick)->Name("adaptation_add");
+
+/// Adds the cost of a tick, and what the baseline costs in it.
+class Ratios : public benchmark::ConsoleReporter {
+ public:
+  Ratios() : ConsoleReporter(OO_None) {}
+  void ReportRuns(const std::vector<Run>& runs) override {
+    ConsoleReporter::ReportRuns(runs);
+    for (const Run& run : runs) {
+      const double seconds = run.cpu_accumulated_time / static_cast<double>(run.iterations);
+      const double ns = 1e9 * seconds / run.counters.at("ticks");
+      if (run.benchmark_name() == kBaseline) baseline_ = ns;
+      std::printf("%-20s %8.1f ns/tick, baseline/this %.1f\n", run.benchmark_name().c_str(), ns, baseline_ / ns);
+    }
+  }
+
+ private:
+  double baseline_ = 0;
+};
+
+/// Single ticks by the monotonic clock, its own cost in them.
+void spread() {
+  const auto all = samples();
+  Adaptation adaptation{Gusts{}};
+  std::vector<double> ns, empty;
+  const auto now = [] {
+    timespec t{};
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e9 * static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_nsec);
+  };
+  double t = 0;
+  for (int turn = 0; turn < 20; ++turn)
+    for (AirSample sample : all) {
+      sample.t_s = t += 0.02;
+      const double before = now();
+      benchmark::DoNotOptimize(adaptation.add(sample));
+      const double after = now();
+      ns.push_back(after - before), empty.push_back(now() - after);
+    }
+  std::ranges::sort(ns), std::ranges::sort(empty);
+  const auto at = [](const std::vector<double>& x, double share) {
+    return x[static_cast<std::size_t>(share * x.size())];
+  };
+  std::printf("single ticks, ns: p50 %.0f, p99 %.0f, p99.9 %.0f; the clock alone: p50 %.0f, p99 %.0f\n", at(ns, 0.5),
+              at(ns, 0.99), at(ns, 0.999), at(empty, 0.5), at(empty, 0.99));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  Ratios reporter;
+  benchmark::RunSpecifiedBenchmarks(&reporter);
+  spread();
+  return 0;
+}
