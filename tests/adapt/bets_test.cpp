@@ -106,6 +106,17 @@ TEST(Bets, NoiseAndPushAreGrantedToTheRougherSideAlone) {
   EXPECT_FALSE(calm.below());
 }
 
+TEST(Bets, CalmerAirIsThatOfTheFormThatSaysLeastOfIt) {
+  Bets bets, calm;
+  auto i = of_square(0.6);
+  i.least = 0.5;
+  for (int k = 0; k < 2000; ++k) bets.add(i);
+  i.square = Vec3::Constant(0.3);
+  for (int k = 0; k < 2000; ++k) calm.add(i);
+  EXPECT_FALSE(bets.below());
+  EXPECT_TRUE(calm.below());
+}
+
 TEST(Adaptation, SamplesWithoutAnAttitudeCountForNoClassThatHasAName) {
   Adaptation adaptation{Gusts{}};
   for (int k = 0; k < 2000; ++k)
