@@ -9,6 +9,7 @@
 #include "core/config/key_file.hpp"
 #include "core/config/link_device.hpp"
 #include "core/config/odometry_profile.hpp"
+#include "core/types/odometry_timing.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::config {
@@ -32,6 +33,7 @@ struct Daemon {
     std::string child;                  ///< child frame of odometry; empty: frames.body
     Vec3 sensor_B = Vec3::Zero();       ///< origin of what the estimator tells the pose of, in the body, m
     Vec3 sensor_turned = Vec3::Zero();  ///< its axes in the body: roll, pitch, yaw about fixed axes, rad
+    OdometryTiming timing;              ///< of the profile, unless the file says it
   } odometry;
   struct {
     bool live = false;           ///< a mapper is declared: a late map is a fault (docs/faults.md row 13)

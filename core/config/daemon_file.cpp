@@ -15,6 +15,7 @@ constexpr std::string_view kShare = "link.share";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
 constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", "odometry.child"};
 constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2];
+constexpr std::string_view kRateLeast = "odometry.rate_least";
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
 bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
@@ -133,6 +134,7 @@ tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d
   }
   if (!file.has("frames.odometry") && d.frames.map != profile->frame) d.frames.odometry = profile->frame;
   d.odometry.twist = profile->twist;
+  if (!file.has(kRateLeast)) d.odometry.timing.rate_least = profile->rate_least;
   if (twist.empty()) return {};
   for (const Twist t : {Twist::body, Twist::world, Twist::none}) {
     d.odometry.twist = t;
@@ -184,6 +186,8 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {"odometry.sensor_roll", &d.odometry.sensor_turned.x(), {-3.15, 3.15}, kOptional},
       {"odometry.sensor_pitch", &d.odometry.sensor_turned.y(), {-3.15, 3.15}, kOptional},
       {"odometry.sensor_yaw", &d.odometry.sensor_turned.z(), {-3.15, 3.15}, kOptional},
+      {kRateLeast, &d.odometry.timing.rate_least, {9, 500}, kOptional},
+      {"odometry.latency", &d.odometry.timing.latency, {0, 0.2}, kOptional},
       {"control.cpu", &c.cpu, {-1, 1023}},
       {"control.battery_land", &d.control.battery_land, {0, 1}},
   };

@@ -11,7 +11,7 @@ std::span<const OdometryProfile> odometry_profiles() noexcept {
   static constexpr OdometryProfile kProfiles[] = {
       {"ros", "odom", "", Twist::body, "an estimator that keeps to the message's definition"},
       {"vins_fusion", "world", "world", Twist::world, "VINS-Fusion"},
-      {"fast_lio", "camera_init", "body", Twist::none, "FAST-LIO"},
+      {"fast_lio", "camera_init", "body", Twist::none, "FAST-LIO", 9},  // of a lidar at 10 Hz, jitter and all
       {"openvins", "global", "imu", Twist::body, "OpenVINS"},
       {"isaac_vslam", "odom", "base_link", Twist::body, "Isaac VSLAM"},
       {"custom", "odom", "", Twist::body, "an estimator of your own"},

@@ -5,6 +5,8 @@
 #include <span>
 #include <string_view>
 
+#include "core/types/odometry_timing.hpp"
+
 namespace backwash::config {
 
 /// In which frame the linear velocity of a nav_msgs/Odometry is.
@@ -22,7 +24,8 @@ struct OdometryProfile {
   std::string_view frame;  ///< header.frame_id, unless [frames] says otherwise
   std::string_view child;  ///< child_frame_id; empty: frames.body
   Twist twist = Twist::body;
-  std::string_view told;  ///< the estimator, in messages
+  std::string_view told;                       ///< the estimator, in messages
+  double rate_least = OdometryTiming::kUsual;  ///< odometry.rate_least, unless the file says it, Hz
 };
 
 /// All of them; the first is the default.

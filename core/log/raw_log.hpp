@@ -93,6 +93,11 @@ static_assert(sizeof(TickRecord) == 352);
 struct ConstantsRecord {
   double v_max, estimation_position, initial_position, initial_velocity, battery_land;
 };
+/// In its place where the odometry's timing is not the usual one (OdometryTiming).
+struct TimedConstantsRecord {
+  ConstantsRecord constants;
+  double rate_least, latency;  ///< Hz, s
+};
 
 struct LostRecord {
   std::uint64_t records;  ///< lost since the start of the log

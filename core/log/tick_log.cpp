@@ -142,9 +142,11 @@ void decided(const track::FlightTick& flight, const track::TickOutput& out, Tick
   each_decision([&](const auto& decision) { decision.write({flight, out}, r); });
 }
 
-ConstantsRecord constants(const Vehicle& vehicle, double battery_land) noexcept {
-  return {vehicle.limits.v_max, vehicle.estimation.position, vehicle.initial_error.position,
-          vehicle.initial_error.velocity, battery_land};
+TimedConstantsRecord constants(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing) noexcept {
+  return {{vehicle.limits.v_max, vehicle.estimation.position, vehicle.initial_error.position,
+           vehicle.initial_error.velocity, battery_land},
+          timing.rate_least,
+          timing.latency};
 }
 
 }  // namespace backwash::log

@@ -32,7 +32,8 @@ track::TickInput decode(const TickInputRecord& record, const track::AcceptedSegm
 /// wait-free, no allocation.
 void decided(const track::FlightTick& flight, const track::TickOutput& out, TickRecord& record) noexcept;
 
-ConstantsRecord constants(const Vehicle& vehicle, double battery_land) noexcept;
+/// Of the usual timing its `constants` alone are the record.
+TimedConstantsRecord constants(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing) noexcept;
 
 /// A segment with its sets and stops as bytes of an `offer` record, and back. Error: bad_data if sizes disagree.
 std::vector<std::uint8_t> encode(const track::AcceptedSegment& segment);

@@ -182,10 +182,14 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
   vehicle.limits.v_max = constants->v_max;
   vehicle.estimation.position = constants->estimation_position;
   vehicle.initial_error = {constants->initial_position, constants->initial_velocity};
+  OdometryTiming timing;
+  if (const auto* timed = payload<TimedConstantsRecord>(*first)) timing = {timed->rate_least, timed->latency};
+  // Written so that what is no number is refused: of a damaged record no window or limit is made.
+  if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, *first) + "is no timing of odometry");
   const auto segments = segments_of(log, name);
   if (!segments) return tl::unexpected(segments.error());
 
-  track::FlightTick flight(vehicle, constants->battery_land);
+  track::FlightTick flight(vehicle, constants->battery_land, timing);
   Replay result;
   result.segments = segments->size();
   result.state_hash = 0xcbf29ce484222325u;

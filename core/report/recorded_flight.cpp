@@ -11,6 +11,8 @@
 namespace backwash::report {
 namespace {
 
+constexpr std::size_t kMostLate = 20;  // ticks that a pose that was judged may be old
+
 tl::unexpected<log::LogError> bad(const std::string& what) {
   return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, "raw log: " + what});
 }
@@ -72,6 +74,45 @@ class Truth {
   const log::FlightLog& log_;
 };
 
+/// Whether the odometry's timing is stated, so that each pose was judged for its own moment (docs/model.md 4-15).
+bool timed(std::span<const log::RawRecord> log) {
+  return std::ranges::any_of(log, [](const log::RawRecord& r) {
+    return r.header.kind == log::RecordKind::constants && log::payload<log::TimedConstantsRecord>(r);
+  });
+}
+
+track::Inside judged_against(const Vec3& p_W, const Vec3& center_W, const PerDirection& half_widths) {
+  track::Inside judged{true, true, {}, half_widths, center_W};
+  for (std::size_t d = 0; d < kDirections; ++d) {
+    judged.error[d] = unit(static_cast<Direction>(d)).dot(p_W - center_W);
+    if (!(std::abs(judged.error[d]) <= half_widths[d])) judged.inside = false;
+  }
+  return judged;
+}
+
+/// Whether the tube passes there on the way to its entry k, from at most `back` entries before.
+bool passes(const reach::ReachTube& tube, std::size_t k, std::size_t back, const Vec3& p_W) {
+  for (std::size_t n = k - std::min(k, back); n <= k; ++n) {
+    const Vec3 &from = tube[n].center.p_W, &to = tube[std::min(n + 1, tube.size() - 1)].center.p_W;
+    const double length2 = (to - from).squaredNorm();
+    const double share = length2 > 0 ? std::clamp((p_W - from).dot(to - from) / length2, 0.0, 1.0) : 0;
+    if ((from + share * (to - from) - p_W).norm() < 1e-6) return true;
+  }
+  return false;
+}
+
+sim::FlightSample sample_of(const log::TickRecord& tick, double t, double t_zero, const Truth& truth) {
+  sim::FlightSample s{};
+  s.t = t - t_zero;
+  s.segment = -1;
+  s.truth = {truth.at(t, "x_m", "y_m", "z_m"), truth.at(t, "vx_mps", "vy_mps", "vz_mps")};
+  s.estimated = {vec(tick.p), vec(tick.v)};
+  s.acceleration = truth.at(t, "ax_mps2", "ay_mps2", "az_mps2");
+  s.attitude = Eigen::Quaterniond::Identity();
+  s.command = {vec(tick.cmd_p), vec(tick.cmd_v), vec(tick.cmd_a), tick.cmd_yaw};
+  return s;
+}
+
 tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawRecord> log,
                                                        const RecordedSegment& segment, const Truth& truth,
                                                        const plan::World& world, double t_zero, double z_safe) {
@@ -84,6 +125,11 @@ tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawR
   std::vector<std::int64_t> times;
   const auto ticks = ticks_of(log, segment.head.id, times);
   if (ticks.empty()) return bad("no tick of segment " + std::to_string(segment.head.id));
+  // It may have begun with a later command: as much later as its first pose was old.
+  const auto begun =
+      static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(ticks.front()->index, segment.commands.size() - 1));
+  tube.erase(tube.begin(), tube.begin() + begun);
+  piece.accepted.commands.erase(piece.accepted.commands.begin(), piece.accepted.commands.begin() + begun);
   // Past the end the last set holds.
   reach::TubeStep last = tube.back();
   last.half_widths = last.half_widths_interval;
@@ -92,25 +138,24 @@ tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawR
     tube.push_back(last);
     piece.accepted.commands.push_back(piece.accepted.commands.back());
   }
+  const std::size_t back = timed(log) ? kMostLate : 0;
+  track::Inside judged;
   for (std::size_t k = 0; k < ticks.size(); ++k) {
     const log::TickRecord& tick = *ticks[k];
     const reach::TubeStep& set = tube[k];
-    if (tick.judged && (vec(tick.center) - set.center.p_W).norm() > 1e-6)
+    const bool fits =
+        back > 0 ? passes(tube, k, back, vec(tick.center)) : (vec(tick.center) - set.center.p_W).norm() <= 1e-6;
+    if (tick.judged && !fits)
       return bad("tick " + std::to_string(tick.tick) + " was judged against another set than its commands give");
     const double t = static_cast<double>(times[k]) * 1e-9;
-    track::Inside judged{true, true, {}, set.half_widths, set.center.p_W};
-    for (std::size_t d = 0; d < kDirections; ++d) {
-      judged.error[d] = unit(static_cast<Direction>(d)).dot(vec(tick.p) - set.center.p_W);
-      if (!(std::abs(judged.error[d]) <= set.half_widths[d])) judged.inside = false;
+    if (back == 0) {
+      judged = judged_against(vec(tick.p), set.center.p_W, set.half_widths);
+    } else if (tick.judged) {  // what was found holds until the next pose
+      PerDirection half_widths;
+      std::copy_n(tick.half_widths, kDirections, half_widths.begin());
+      judged = judged_against(vec(tick.p), vec(tick.center), half_widths);
     }
-    sim::FlightSample s{};
-    s.t = t - t_zero;
-    s.segment = -1;
-    s.truth = {truth.at(t, "x_m", "y_m", "z_m"), truth.at(t, "vx_mps", "vy_mps", "vz_mps")};
-    s.estimated = {vec(tick.p), vec(tick.v)};
-    s.acceleration = truth.at(t, "ax_mps2", "ay_mps2", "az_mps2");
-    s.attitude = Eigen::Quaterniond::Identity();
-    s.command = {vec(tick.cmd_p), vec(tick.cmd_v), vec(tick.cmd_a), tick.cmd_yaw};
+    const sim::FlightSample s = sample_of(tick, t, t_zero, truth);
     piece.samples.push_back(s);
     piece.judged.push_back(judged);
     piece.clearance_m.push_back(sim::true_clearance(world, s.truth.p_W, z_safe));

@@ -24,8 +24,20 @@ bool finite(const Setpoint& s) noexcept {
 
 }  // namespace
 
-FlightTick::FlightTick(const Vehicle& vehicle, double battery_land)
-    : battery_land_(battery_land), sigma_(vehicle.estimation.position), gate_(vehicle), tracker_(Setpoint{}, vehicle) {}
+FlightTick::FlightTick(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing)
+    : battery_land_(battery_land),
+      sigma_(vehicle.estimation.position),
+      timing_(timing),
+      gate_(vehicle, timing),
+      alignment_(timing),
+      supervisor_(timing),
+      tracker_(Setpoint{}, vehicle) {}
+
+// Since the newest good sample was taken, as far as the sets are to know it: of the usual timing it is in the vehicle
+// file's first set (docs/model.md 4-13).
+double FlightTick::sample_age(std::int64_t now_ns) const noexcept {
+  return timing_.usual() ? 0 : seconds(now_ns - *last_good_ns_) + timing_.latency;
+}
 
 void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   if (!in.segment) return;
@@ -34,18 +46,21 @@ void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
   const bool lasts = frames_apart(in) || Supervisor::silent(in.autopilot.pose_age(in.now_ns));
   const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms && !lasts);
   out.accepted = following && closure_refused_ == closures_ && in.segment->epoch == epoch_ && gate_.last() &&
-                 tracker_.accept(*in.segment, gate_.last()->state);
+                 tracker_.accept(*in.segment, gate_.last()->state, in.segment->arms ? 0 : sample_age(in.now_ns));
+  if (out.accepted) verdict_ = {};
   out.refused = !out.accepted;
   out.released[0] = out.accepted ? std::exchange(segment_, in.segment) : in.segment;
 }
 
-// The set predicted for this tick against the position measured for it.
-void FlightTick::judge(TickOutput& out) noexcept {
+// The set predicted for this tick against the position measured for it; what was found holds until the next sample.
+void FlightTick::judge(const TickInput& in, TickOutput& out) noexcept {
   const bool on_sets = mode() == Mode::tracking || (mode() == Mode::hold && tracker_.braking());
+  if (mode() == Mode::lifting && out.fresh) verdict_.inside = tracker_.within(gate_.last()->state.p_W);
+  if (!on_sets && mode() != Mode::lifting) verdict_ = {};
   if (!on_sets || !gate_.last()) return;
   out.judged_segment = tracker_.segment();
   out.judged_index = tracker_.index();
-  if (out.fresh) out.inside = tracker_.judge(gate_.last()->state.p_W);
+  if (out.fresh) verdict_ = out.inside = tracker_.judge(gate_.last()->state.p_W, sample_age(in.now_ns));
 }
 
 SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
@@ -68,7 +83,7 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) no
   facts.closure_refused = closure_refused_now_;
   facts.pose_age = in.autopilot.pose_age(in.now_ns);
   facts.mismatch = alignment_.mismatch();
-  facts.inside = mode() == Mode::lifting ? !out.fresh || tracker_.within(gate_.last()->state.p_W) : out.inside.inside;
+  facts.inside = verdict_.inside;
   facts.new_segment = out.accepted;
   facts.takeoff = out.accepted && in.segment->arms;
   facts.lifts_itself = in.autopilot.lifts_itself;
@@ -159,7 +174,7 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   take_odometry(in, sample, out);
   align(in, out.fresh);
   take_segment(in, out);
-  judge(out);
+  judge(in, out);
   odometry_age_ = last_good_ns_ ? seconds(in.now_ns - *last_good_ns_) : std::numeric_limits<double>::infinity();
   const Mode before = mode();
   out.supervisor = supervisor_.step(facts(in, out));

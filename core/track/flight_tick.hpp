@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+
 #include "core/track/frame_alignment.hpp"
 #include "core/track/odometry_gate.hpp"
 #include "core/track/supervisor.hpp"
@@ -91,8 +93,8 @@ class FlightTick {
   /// the millimetre, and one that knows nothing excuses nothing.
   static constexpr double kLeastApart = 0.10, kMostApart = 0.25;
 
-  /// `battery_land`: remaining share below which LAND is asked for once; 0: never.
-  FlightTick(const Vehicle& vehicle, double battery_land);
+  /// `battery_land`: remaining share below which LAND is asked for once; 0: never. `timing`: of the odometry.
+  FlightTick(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing = {});
 
   /// One tick. Real-time: wait-free, no allocation.
   TickOutput step(const TickInput& in) noexcept;
@@ -102,7 +104,9 @@ class FlightTick {
   const std::optional<OdometrySample>& odometry() const noexcept { return gate_.last(); }
   const FrameAlignment& alignment() const noexcept { return alignment_; }
   const Tracker& tracker() const noexcept { return tracker_; }
-  double odometry_age() const noexcept { return odometry_age_; }  ///< s, at the last tick
+  double odometry_age() const noexcept { return odometry_age_; }  ///< s, at the last tick, beyond the latency
+  /// s without a good sample until HOLD.
+  double odometry_lost_after() const noexcept { return supervisor_.hold_after(); }
   /// A segment of another one is refused.
   const Epoch& epoch() const noexcept { return epoch_; }
 
@@ -111,7 +115,7 @@ class FlightTick {
   void take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample, TickOutput& out) noexcept;
   void align(const TickInput& in, bool fresh) noexcept;
   void take_segment(const TickInput& in, TickOutput& out) noexcept;
-  void judge(TickOutput& out) noexcept;
+  void judge(const TickInput& in, TickOutput& out) noexcept;
   SupervisorInput facts(const TickInput& in, const TickOutput& out) noexcept;
   void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
   void ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept;
@@ -119,10 +123,20 @@ class FlightTick {
   void feed(const TickInput& in, TickOutput& out) noexcept;
   void drop_segment(TickOutput& out) noexcept;
 
+  double sample_age(std::int64_t now_ns) const noexcept;
+  void remember_tilt(const AutopilotFacts::Pose& pose, const Vec3& up_B) noexcept;
+  Vec3 tilt_at(std::int64_t ns, const Vec3& newest_B) const noexcept;
   double apart(const TickInput& in) const noexcept;
   bool frames_apart(const TickInput& in) const noexcept;
 
+  struct Tilt {
+    std::int64_t at_ns = 0;
+    Vec3 up_B = Vec3::UnitZ();
+  };
+  static constexpr std::size_t kTilts = 16;  ///< 0.3 s of the autopilot's attitude at 50 Hz
+
   double battery_land_, sigma_;
+  OdometryTiming timing_;
   OdometryGate gate_;
   FrameAlignment alignment_;
   Supervisor supervisor_;
@@ -149,6 +163,9 @@ class FlightTick {
   std::optional<std::int64_t> last_pose_ns_, last_attitude_ns_;
   std::optional<std::uint8_t> reset_counter_;
   double odometry_age_ = std::numeric_limits<double>::infinity();
+  Inside verdict_;                    ///< of the newest sample that was judged against what flies
+  std::array<Tilt, kTilts> tilts_{};  ///< the autopilot's newest, as a ring; of late odometry alone
+  std::size_t next_tilt_ = 0;
 };
 
 }  // namespace backwash::track

@@ -89,7 +89,7 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
   }
   const bool elsewhere = out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent ||
                          disorder_ > kDisorder ||
-                         (out.fresh && seconds(in.now_ns - *last_good_ns_) > Supervisor::kHoldAfter);
+                         (out.fresh && seconds(in.now_ns - *last_good_ns_) > supervisor_.hold_after());
   if (!elsewhere || was_commanding_) return;
   gate_.forget();
   if (out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent) ++odometry_resets_;
@@ -102,15 +102,18 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
 void FlightTick::align(const TickInput& in, bool fresh) noexcept {
   reset_ = false;
   const auto& pose = in.autopilot.pose;
+  if (timing_.latency > 0 && pose) remember_tilt(*pose, up_in_body(pose->q));
   if (!pose || !gate_.last() || !fresh || pose->at_ns <= last_pose_ns_ || pose->attitude_at_ns <= last_attitude_ns_)
     return;
   const double dt = last_pose_ns_ ? seconds(pose->at_ns - *last_pose_ns_) : 0;  // the first pair ends no step
   last_pose_ns_ = pose->at_ns;
   last_attitude_ns_ = pose->attitude_at_ns;
-  const FramePose in_local = local_pose(*pose);
+  FramePose in_local = local_pose(*pose);
   FramePose in_map = pose_of(gate_.last()->state, gate_.last()->q);
-  in_map.p += seconds(pose->at_ns - *last_good_ns_) * in_map.v;
-  in_map.yaw += seconds(pose->attitude_at_ns - *last_good_ns_) * in_local.yaw_rate;
+  const std::int64_t taken_ns = *last_good_ns_ - nanoseconds(timing_.latency);
+  in_map.p += seconds(pose->at_ns - taken_ns) * in_map.v;
+  in_map.yaw += seconds(pose->attitude_at_ns - taken_ns) * in_local.yaw_rate;
+  if (timing_.latency > 0) in_local.up_B = tilt_at(taken_ns, in_local.up_B);
   const bool counted = reset_counter_ && in.autopilot.reset_counter && *reset_counter_ != *in.autopilot.reset_counter;
   if (in.autopilot.reset_counter) reset_counter_ = in.autopilot.reset_counter;
   const bool may_move = mode() != Mode::land && !(mode() == Mode::hold && !supervisor_.pose_trusted());
@@ -121,6 +124,19 @@ void FlightTick::align(const TickInput& in, bool fresh) noexcept {
     reset_ = was_commanding_;
   }
   alignment_.update(in_map, in_local, dt, !was_commanding_);
+}
+
+// A tilt is not carried on, but compared where it belongs: with the autopilot's of the moment that the odometry is of.
+void FlightTick::remember_tilt(const AutopilotFacts::Pose& pose, const Vec3& up_B) noexcept {
+  if (pose.attitude_at_ns == tilts_[(next_tilt_ + kTilts - 1) % kTilts].at_ns) return;  // told again
+  tilts_[next_tilt_++ % kTilts] = {pose.attitude_at_ns, up_B};
+}
+
+Vec3 FlightTick::tilt_at(std::int64_t ns, const Vec3& newest_B) const noexcept {
+  const Tilt* nearest = nullptr;
+  for (const Tilt& tilt : tilts_)
+    if (tilt.at_ns > 0 && (!nearest || std::abs(tilt.at_ns - ns) < std::abs(nearest->at_ns - ns))) nearest = &tilt;
+  return nearest ? nearest->up_B : newest_B;
 }
 
 // What enabling allows, and three standard deviations of the two estimates against each other.

@@ -9,14 +9,26 @@
 namespace backwash::track {
 namespace {
 
-// Low-pass weights at 50 Hz: the transform averages over 1 s, the residuals over 0.2 s; velocities fade over 5 s.
+// Low-pass weights of a pair, at 50 Hz: the transform averages over 1 s, the residuals over 0.2 s; velocities fade over
+// 5 s.
 constexpr double kLearn = 0.02, kWatch = 0.1, kFade = 0.996;
 constexpr double kLongestStep = 0.1;  // s: the velocity is not carried on for longer
 // s: gyros are, by the mean of both ends, as long as the autopilot's pose is used at all (Supervisor::kPoseSilent): at
 // 10 Hz and below a turn would go unseen. A heading that changes its rate by 2 rad/s² within adds at most 2.6°.
 constexpr double kLongestTurn = 0.31;
 
+/// The weight of the newest of `samples` that are one.
+double of_several(double weight, double samples) noexcept {
+  return samples > 1 ? 1 - std::pow(1 - weight, samples) : weight;
+}
+
 }  // namespace
+
+FrameAlignment::FrameAlignment(const OdometryTiming& timing) noexcept
+    : learn_(of_several(kLearn, timing.usual_samples())),
+      watch_(of_several(kWatch, timing.usual_samples())),
+      fade_(std::pow(kFade, timing.usual_samples())),
+      longest_step_(kLongestStep + timing.longer_gap()) {}
 
 double wrap_angle(double angle) noexcept {
   angle = std::remainder(angle, 2 * std::numbers::pi);
@@ -33,15 +45,15 @@ void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, 
   const double yaw = wrap_angle(in_local.yaw - in_map.yaw);
   if (learn) {
     // A running mean first, then a low-pass: the first samples count as much as later ones.
-    const double weight = std::max(kLearn, 1.0 / (samples_ + 1));
+    const double weight = std::max(learn_, 1.0 / (samples_ + 1));
     yaw_ = wrap_angle(yaw_ + weight * wrap_angle(yaw - yaw_));
     translation_ += weight * (in_local.p - rotate(in_map.p) - translation_);
     correlate(in_map, in_local);
   }
   const double position_error = (in_local.p - rotate(in_map.p) - translation_).norm();
   const double yaw_error = std::abs(wrap_angle(yaw - yaw_));
-  position_residual_ += kWatch * (position_error - position_residual_);
-  yaw_residual_ += kWatch * (yaw_error - yaw_residual_);
+  position_residual_ += watch_ * (position_error - position_residual_);
+  yaw_residual_ += watch_ * (yaw_error - yaw_residual_);
   samples_ = std::min(samples_ + 1, 1'000'000);
 }
 
@@ -56,8 +68,8 @@ void FrameAlignment::watch_turn(const FramePose& in_map, const FramePose& in_loc
 void FrameAlignment::watch_tilt(const FramePose& in_map, const FramePose& in_local) noexcept {
   const Vec3 axis = in_map.up_B.cross(in_local.up_B);
   const bool upside_down = in_map.up_B.dot(in_local.up_B) < 0;
-  roll_ += kWatch * ((upside_down ? std::numbers::pi : std::asin(std::clamp(axis.x(), -1.0, 1.0))) - roll_);
-  pitch_ += kWatch * (std::asin(std::clamp(axis.y(), -1.0, 1.0)) - pitch_);
+  roll_ += watch_ * ((upside_down ? std::numbers::pi : std::asin(std::clamp(axis.x(), -1.0, 1.0))) - roll_);
+  pitch_ += watch_ * (std::asin(std::clamp(axis.y(), -1.0, 1.0)) - pitch_);
 }
 
 void FrameAlignment::rebase(const FramePose& in_map, const FramePose& in_local) noexcept {
@@ -80,7 +92,7 @@ bool FrameAlignment::reset_between(const FramePose& in_map, const FramePose& in_
 
 // As far as a pair may lie from the transform already may hide a part of the reset.
 bool FrameAlignment::local_jumped(const FramePose& in_local, double dt) const noexcept {
-  if (samples_ == 0 || !(dt > 0 && dt < kLongestStep)) return false;
+  if (samples_ == 0 || !(dt > 0 && dt < longest_step_)) return false;
   const Vec3 carried = local_.p + dt / 2 * (local_.v + in_local.v);
   const double turned = local_.yaw + dt / 2 * (local_.yaw_rate + in_local.yaw_rate);
   return (in_local.p - carried).norm() > kResetPosition - kMaxPosition ||
@@ -95,8 +107,8 @@ bool FrameAlignment::agree(double position) const noexcept {
 }
 
 void FrameAlignment::correlate(const FramePose& in_map, const FramePose& in_local) noexcept {
-  cross_ = kFade * cross_ + RigidShift{-yaw_, Vec3::Zero()}.rotate(in_local.v) * in_map.v.transpose();
-  energy_ = kFade * energy_ + in_map.v.cwiseProduct(in_map.v);
+  cross_ = fade_ * cross_ + RigidShift{-yaw_, Vec3::Zero()}.rotate(in_local.v) * in_map.v.transpose();
+  energy_ = fade_ * energy_ + in_map.v.cwiseProduct(in_map.v);
 }
 
 Mismatch FrameAlignment::mismatch() const noexcept {

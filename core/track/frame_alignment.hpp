@@ -6,6 +6,7 @@
 
 #include "core/track/rebase.hpp"
 #include "core/types/mode.hpp"
+#include "core/types/odometry_timing.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::track {
@@ -36,6 +37,9 @@ class FrameAlignment {
   static constexpr double kMaxTurn = 10.0 * 3.14159265358979 / 180;  ///< rad, between the velocities' directions
   static constexpr double kExcited = 25 * 0.15 * 0.15;               ///< (m/s)²: half a second at 0.15 m/s
   static constexpr double kLeastGain = 0.5, kLeastRotation = 0.8;    ///< of velocity, both 1 in a perfect match
+
+  /// Of slower odometry each pair counts for as many as would have come at OdometryTiming::kUsual.
+  explicit FrameAlignment(const OdometryTiming& timing = {}) noexcept;
 
   /// One pair of poses, `dt` s after the last. Real-time: wait-free, no allocation.
   void update(const FramePose& in_map, const FramePose& in_local, double dt, bool learn) noexcept;
@@ -72,6 +76,7 @@ class FrameAlignment {
   void correlate(const FramePose& in_map, const FramePose& in_local) noexcept;
   Mismatch horizontal_mismatch() const noexcept;
 
+  double learn_, watch_, fade_, longest_step_;
   int samples_ = 0;
   double yaw_ = 0;
   Vec3 translation_ = Vec3::Zero();

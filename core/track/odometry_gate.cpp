@@ -43,7 +43,7 @@ bool OdometryGate::jumps(const OdometrySample& sample, double dt) const noexcept
 bool OdometryGate::contradicts(const OdometrySample& sample, double dt) noexcept {
   const Vec3 claimed = dt / 2 * (last_->state.v_W + sample.state.v_W);
   Vec3 drift = std::exp(-dt / kConsistentOver) * drift_ + (sample.state.p_W - last_->state.p_W - claimed);
-  if (dt > kLongestStep) drift = Vec3::Zero();
+  if (dt > longest_step_) drift = Vec3::Zero();
   if (!(drift.norm() <= 3 * sigma_ + sigma_ / kSettle * kConsistentOver)) return true;
   drift_ = drift;
   return false;
@@ -81,8 +81,8 @@ OdometryGate::Verdict OdometryGate::take(const OdometrySample& sample, bool movi
   // Counts the samples that repeat the last good pose, which is the first of the row. At rest an estimator may well
   // stand still.
   const bool repeats = sample.state.p_W == last_->state.p_W && q == last_->q;
-  identical_ = moving && repeats ? std::min(identical_ + 1, kFrozen) : 0;
-  if (identical_ >= kFrozen - 1) return Verdict::frozen;
+  identical_ = moving && repeats ? std::min(identical_ + 1, frozen_) : 0;
+  if (identical_ >= frozen_ - 1) return Verdict::frozen;
   if (jumps(sample, dt)) return Verdict::jump;
   if (contradicts(sample, dt)) return Verdict::inconsistent;
   last_ = sample;

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
 #include "core/track/rebase.hpp"
+#include "core/types/odometry_timing.hpp"
 #include "core/types/state.hpp"
 #include "core/types/time.hpp"
 #include "core/types/vehicle.hpp"
@@ -36,11 +38,12 @@ class OdometryGate {
     good,
     rejected,      ///< not a number, or the quaternion is not unit
     disorder,      ///< the stamp does not rise
-    frozen,        ///< the kFrozen-th identical pose in a row, or a later one, while the vehicle is commanded to move
+    frozen,        ///< too many identical poses in a row while the vehicle is commanded to move: the kFrozen-th, and of
+                   ///< slower odometry an earlier one
     jump,          ///< in position, velocity or attitude: further from the last good sample than the vehicle can get
     inconsistent,  ///< the way that the positions went is not what the velocities claim
   };
-  static constexpr int kFrozen = 5;          ///< row 6
+  static constexpr int kFrozen = 5;          ///< row 6, at OdometryTiming::kUsual: 0.2 s from the first to the last
   static constexpr double kClockStep = 0.5;  ///< s
   /// rad/s about the vertical: autopilots turn at most at 200°/s (PX4's MC_YAWRATE_MAX), our flights at 1 rad/s.
   static constexpr double kMaxYawRate = 3;
@@ -53,8 +56,11 @@ class OdometryGate {
   static constexpr double kSettle = 0.5;          ///< s, of σ_v
   static constexpr double kLongestStep = 0.1;     ///< s between two samples that are still held against each other
 
-  explicit OdometryGate(const Vehicle& vehicle) noexcept
-      : v_max_(vehicle.limits.v_max), sigma_(vehicle.estimation.position) {}
+  explicit OdometryGate(const Vehicle& vehicle, const OdometryTiming& timing = {}) noexcept
+      : v_max_(vehicle.limits.v_max),
+        sigma_(vehicle.estimation.position),
+        longest_step_(kLongestStep + timing.longer_gap()),
+        frozen_(1 + static_cast<int>(std::ceil((kFrozen - 1) / timing.usual_samples()))) {}
 
   /// Judges one sample; only a good one becomes last(). dt is the stamps' difference, at most the receptions' and what
   /// the last sample was late: a stamp ahead of that widens nothing (row 49). Where the two are more than kClockStep
@@ -75,7 +81,8 @@ class OdometryGate {
   bool contradicts(const OdometrySample& sample, double dt) noexcept;
   void time(const OdometrySample& sample, bool clock_was_set) noexcept;
 
-  double v_max_, sigma_;
+  double v_max_, sigma_, longest_step_;
+  int frozen_;  ///< identical poses that are one too many: of slower odometry fewer, in no more than the same time
   std::optional<OdometrySample> last_;
   int identical_ = 0;
   std::optional<std::int64_t> fastest_ns_;  ///< least reception − stamp, which is the clocks' difference and the way

@@ -75,8 +75,9 @@ void Supervisor::note_poses(const SupervisorInput& in, Occurring& now) const noe
   now[Reason::odometry_inconsistent] = in.odometry_inconsistent;  // row 41
   now[Reason::odometry_frozen] = in.odometry_frozen;              // row 6
   now[Reason::odometry_disorder] = in.odometry_disorder;          // row 5
-  now[Reason::odometry_lost] = in.odometry_age > kHoldAfter;      // rows 1, 2
-  now[Reason::pose_untrusted] = in.odometry_age > kLandAfter || (!pose_trusted() && seconds_in_mode() > kUntrusted);
+  now[Reason::odometry_lost] = in.odometry_age > hold_after();    // rows 1, 2
+  now[Reason::pose_untrusted] =
+      in.odometry_age > kLandAfter + longer_gap_ || (!pose_trusted() && seconds_in_mode() > kUntrusted);
   now[Reason::pose_silent] = silent(in.pose_age);  // row 42
   now[Reason::pose_lost] = in.pose_age > kPoseLost - kControlPeriod / 2;
   now[Reason::closure_refused] = in.closure_refused;

@@ -9,6 +9,7 @@
 #include "core/track/frame_alignment.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/mode.hpp"
+#include "core/types/odometry_timing.hpp"
 
 namespace backwash::track {
 
@@ -106,8 +107,9 @@ class Occurring {
 /// The daemon's explicit states and reactions: a pure function of the facts of each tick (docs/faults.md).
 class Supervisor {
  public:
-  static constexpr double kHoldAfter = 0.08;     ///< s without odometry until HOLD (docs/faults.md row 1: 100 ms)
-  static constexpr double kLandAfter = 0.38;     ///< s without odometry until LAND (row 1: 400 ms)
+  /// s without odometry until HOLD and LAND (docs/faults.md row 1: 100 and 400 ms), of slower odometry the longer gap
+  /// later.
+  static constexpr double kHoldAfter = OdometryTiming::kHoldAfter, kLandAfter = 0.38;
   static constexpr double kUntrusted = 0.30;     ///< s of hold with an untrusted pose until LAND
   static constexpr double kHeartbeatLost = 1.5;  ///< s (row 21)
   static constexpr double kPoseSilent = 0.3;     ///< s without the autopilot's position or attitude (row 42)
@@ -121,12 +123,16 @@ class Supervisor {
   /// LAND is asked for twice in these, one command may be lost; and twice more each time that an operator asks again.
   static constexpr int kLandTicks = 10;
 
+  explicit Supervisor(const OdometryTiming& timing = {}) noexcept : longer_gap_(timing.longer_gap()) {}
+
   /// Real-time: wait-free, no allocation.
   SupervisorOutput step(const SupervisorInput& in) noexcept;
   Mode mode() const noexcept { return mode_; }
   Reason reason() const noexcept { return reason_; }
   /// Whether the autopilot's pose is too old to be flown by, at this age, s (row 42).
   static constexpr bool silent(double pose_age) noexcept { return pose_age > kPoseSilent - kControlPeriod / 2; }
+  /// s without odometry until HOLD.
+  double hold_after() const noexcept { return kHoldAfter + longer_gap_; }
   /// False in a hold whose cause speaks against the pose.
   bool pose_trusted() const noexcept;
 
@@ -140,6 +146,7 @@ class Supervisor {
   double seconds_in_mode() const noexcept;
   SupervisorOutput output(const SupervisorInput& in) noexcept;
 
+  double longer_gap_;
   Mode mode_ = Mode::passive;
   Reason reason_ = Reason::started;
   bool changed_ = true;

@@ -9,12 +9,20 @@ namespace {
 
 Setpoint at_rest(const Setpoint& s) noexcept { return {s.p_W, Vec3::Zero(), Vec3::Zero(), s.yaw}; }
 
+/// Whether the first n commands rest at one place, and others follow.
+bool waits(const std::vector<Setpoint>& commands, std::size_t n) noexcept {
+  return n < commands.size() &&
+         std::all_of(commands.begin(), commands.begin() + static_cast<std::ptrdiff_t>(n), [&](const Setpoint& c) {
+           return c.p_W == commands.front().p_W && c.yaw == commands.front().yaw && c.v_W.isZero(0) && c.a_W.isZero(0);
+         });
+}
+
 }  // namespace
 
 Tracker::Tracker(const Setpoint& hold, const Vehicle& vehicle)
     : hold_(at_rest(hold)), position_(vehicle.initial_error.position), velocity_(vehicle.initial_error.velocity) {}
 
-bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noexcept {
+bool Tracker::accept(const AcceptedSegment& segment, const State& measured, double age) noexcept {
   if (segment.commands.empty() || segment.tube.size() != segment.commands.size() + 1) return false;
   if (segment.closures != closures_) return false;
   if (segment.continues != 0) {
@@ -25,8 +33,12 @@ bool Tracker::accept(const AcceptedSegment& segment, const State& measured) noex
     const double p = (measured.p_W - start.p_W).norm(), v = (measured.v_W - start.v_W).norm();
     // Written so that a state that is not a number, or a start without uncertainty, is refused.
     if (!(std::hypot(p / position_, v / velocity_) <= 1)) return false;
-    next_ = 0;
+    constexpr double kRounding = 1e-6;  // of a period
+    const auto gone = static_cast<std::size_t>(std::ceil(std::max(0.0, age / kControlPeriod - kRounding)));
+    if (!waits(segment.commands, gone)) return false;
+    next_ = gone;
   }
+  past_ = 0;
   segment_ = &segment;
   stop_ = nullptr;
   shift_ = {};
@@ -44,7 +56,7 @@ bool Tracker::leaves_stop(const AcceptedSegment& segment) const noexcept {
 void Tracker::hold_at(const Setpoint& setpoint) noexcept {
   segment_ = nullptr;
   stop_ = nullptr;
-  next_ = 0;
+  next_ = past_ = 0;
   hold_ = at_rest(setpoint);
   shift_ = {};
 }
@@ -94,16 +106,28 @@ std::array<std::span<const reach::TubeStep>, 2> Tracker::ahead() const noexcept 
   return {tube.subspan(from, stop_->branch - from), tail};
 }
 
-Inside Tracker::judge(const Vec3& measured_W) const noexcept {
+// Entry k is the set at the tick of command k. The last one is exact at its instant only: later its interval is meant.
+// So it is between two ticks.
+Inside Tracker::judge(const Vec3& measured_W, double age) const noexcept {
+  if (!segment_) return {};
+  if (!(age > 0)) {
+    const reach::TubeStep& predicted = set(next_);
+    return judge(measured_W, predicted.center.p_W,
+                 next_ > end() ? predicted.half_widths_interval : predicted.half_widths);
+  }
+  const double at = std::max(0.0, static_cast<double>(next_ + past_) - age / kControlPeriod);
+  const auto before = static_cast<std::size_t>(at);
+  const double share = at - static_cast<double>(before);
+  const Vec3 &from = set(before).center.p_W, &to = set(before + 1).center.p_W;
+  return judge(measured_W, from + share * (to - from), set(before).half_widths_interval);
+}
+
+Inside Tracker::judge(const Vec3& measured_W, const Vec3& center, const PerDirection& half_widths) const noexcept {
   Inside result;
-  if (!segment_) return result;
-  // Entry k is the set at the tick of command k. The last one is exact at its instant only: later its interval is
-  // meant.
-  const reach::TubeStep& predicted = set(next_);
   result.judged = true;
-  result.half_widths = next_ > end() ? predicted.half_widths_interval : predicted.half_widths;
+  result.half_widths = half_widths;
   // A loop closure moves the map and not the vehicle: the error is judged in the frame that the sets are in.
-  result.center = shift_.point(predicted.center.p_W);
+  result.center = shift_.point(center);
   const Vec3 e = shift_.inverse().rotate(measured_W - result.center);
   for (std::size_t d = 0; d < kDirections; ++d) {
     result.error[d] = unit(static_cast<Direction>(d)).dot(e);
@@ -132,6 +156,7 @@ Setpoint Tracker::command(std::size_t k) const noexcept {
 
 Setpoint Tracker::step() noexcept {
   if (!segment_ || next_ >= end()) {
+    if (segment_ && next_ > end()) past_ = std::min(past_ + 1, kMostPast);
     next_ = segment_ ? end() + 1 : 1;  // past the tube's last entry
     return hold_;
   }

@@ -63,8 +63,10 @@ class Tracker {
   /// Takes a segment over, or refuses it: a new one must start where the vehicle is now (its state within the ellipsoid
   /// Q_0 around the tube's start), a continued one must be of the current segment and not yet past its branch. While
   /// braking it must leave the stop on its way, with the commands that are flown until then: one that was made before
-  /// the stop began is refused. The segment must outlive its use. Real-time: wait-free, no allocation.
-  bool accept(const AcceptedSegment& segment, const State& measured) noexcept;
+  /// the stop began is refused. The segment must outlive its use. `age`: of the state, s. A new segment is then begun
+  /// so many commands late, all of which must be at rest where the vehicle was held (docs/model.md 4-14). Real-time:
+  /// wait-free, no allocation.
+  bool accept(const AcceptedSegment& segment, const State& measured, double age = 0) noexcept;
   /// Holds this command's position from now on; the set of the last segment is no longer judged. Real-time: wait-free,
   /// no allocation.
   void hold_at(const Setpoint& setpoint) noexcept;
@@ -84,8 +86,9 @@ class Tracker {
   /// loop closure and the next segment.
   const RigidShift& shift() const noexcept { return shift_; }
   std::uint32_t closures() const noexcept { return closures_; }
-  /// Judges the measured position at this tick against the set predicted for it. Real-time: wait-free, no allocation.
-  Inside judge(const Vec3& measured_W) const noexcept;
+  /// Judges the measured position against the set predicted for the moment that it is of, `age` s before this tick
+  /// (docs/model.md 4-15). Real-time: wait-free, no allocation.
+  Inside judge(const Vec3& measured_W, double age = 0) const noexcept;
   /// Judges the measured position against the accepted tube as a whole: the region that was found clear, whenever the
   /// vehicle is where in it. Real-time: wait-free, no allocation; 3 ns per set.
   bool within(const Vec3& measured_W) const noexcept;
@@ -110,10 +113,13 @@ class Tracker {
   Setpoint command(std::size_t k) const noexcept;  // in the segment's frame, at rest past the end
   bool leaves_stop(const AcceptedSegment& segment) const noexcept;
   const reach::TubeStep& set(std::size_t k) const noexcept;
+  Inside judge(const Vec3& measured_W, const Vec3& center, const PerDirection& half_widths) const noexcept;
 
   const AcceptedSegment* segment_ = nullptr;
   const plan::Stop* stop_ = nullptr;  ///< of segment_: what is flown from its branch on
+  static constexpr std::size_t kMostPast = 1000;
   std::size_t next_ = 0;
+  std::size_t past_ = 0;  ///< commands given after next_ came to lie past the end, at most kMostPast
   Setpoint hold_;
   RigidShift shift_;  ///< map ← the segment's frame
   std::uint32_t closures_ = 0;

@@ -4,11 +4,15 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/types/odometry_timing.hpp"
+
 namespace backwash::ctl {
 namespace {
 
+constexpr double kRounding = 1e-6;  // s
+
 std::string number(const char* format, double value) {
-  char text[64];
+  char text[128];
   std::snprintf(text, sizeof text, format, value);
   return text;
 }
@@ -23,14 +27,18 @@ std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after
     findings.push_back({name, good, found, good ? "" : advice});
   };
   const double odometry = rate(before.numbers.odometry_received, n.odometry_received);
-  add("odometry rate", odometry >= 30, number("%.1f Hz used", odometry),
-      "send nav_msgs/Odometry at 30 Hz or more on dds.odometry_topic");
+  // What the daemon was told of a slower one is in the age that it flies by (docs/model.md 4-13).
+  const double longer_gap = n.odometry_lost_after - OdometryTiming::kHoldAfter;
+  const double wanted = longer_gap > kRounding ? 1 / (1 / OdometryTiming::kUsual + longer_gap) : 30;
+  add("odometry rate", odometry >= wanted, number("%.1f Hz used", odometry),
+      number("send nav_msgs/Odometry at %.0f Hz or more on dds.odometry_topic; slower: odometry.rate_least", wanted));
   const double rejected = rate(before.numbers.odometry_rejected + before.numbers.odometry_refused,
                                n.odometry_rejected + n.odometry_refused);
   add("odometry good", rejected == 0, number("%.1f rejected a second", rejected),
       "see the daemon's warnings: frames, covariance, stamps or jumps are wrong");
-  add("odometry age", n.odometry_age < 0.08, number("%.3f s", n.odometry_age),
-      "the VIO or the network is late: 80 ms without odometry is HOLD");
+  const double lost_after = OdometryTiming::kHoldAfter + std::max(0.0, longer_gap);
+  add("odometry age", n.odometry_age < lost_after, number("%.3f s", n.odometry_age),
+      number("the VIO or the network is late: %.3f s without odometry is HOLD", lost_after));
   add("heartbeat", n.heartbeat_age < 1.5, number("%.1f s old", std::min(n.heartbeat_age, 1e6)),
       "check link.device, link.baud and link.system, and that the autopilot is on");
   add("frames, position", n.frames_aligned != 0, number("residual %.3f m", n.frame_residual_m),

@@ -47,6 +47,7 @@ constexpr Member<std::uint64_t> kCounts[] = {
 
 constexpr Member<double> kMeasures[] = {
     {"odometry_age_s", &dds::Status::odometry_age},
+    {"odometry_lost_after_s", &dds::Status::odometry_lost_after},
     {"map_age_s", &dds::Status::map_age},
     {"heartbeat_age_s", &dds::Status::heartbeat_age},
     {"frame_residual_m", &dds::Status::frame_residual_m},

@@ -126,6 +126,7 @@ struct ControlView {
   std::optional<firmware_bridge::ClockOffset> clock;                         ///< the autopilot's
   static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< an age before the first, s
   double odometry_age = kNever, heartbeat_age = kNever, pose_age = kNever;   ///< s; pose: the autopilot's
+  double odometry_lost_after = OdometryTiming::kHoldAfter;                   ///< age that is not flown by any more, s
   State state;                                                               ///< newest good odometry
   Setpoint command;                                                          ///< sent or held this tick, map frame
   track::Epoch epoch;                 ///< what is planned under another one is refused

@@ -38,11 +38,12 @@ firmware_bridge::Signal signal_of(Mode mode) noexcept {
 }  // namespace
 
 ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle,
-                         double battery_land, const MapSettings& map)
-    : channels_(channels), link_(link), flight_(vehicle, battery_land), lookout_(channels, vehicle, map) {
+                         double battery_land, const MapSettings& map, const OdometryTiming& timing)
+    : channels_(channels), link_(link), flight_(vehicle, battery_land, timing), lookout_(channels, vehicle, map) {
   link_.tap(&ControlLoop::on_frame, this);
-  const auto constants = log::constants(vehicle, battery_land);
-  record(log::RecordKind::constants, now_ns(), &constants, sizeof constants);
+  const auto constants = log::constants(vehicle, battery_land, timing);
+  record(log::RecordKind::constants, now_ns(), &constants,
+         timing.usual() ? sizeof constants.constants : sizeof constants);
 }
 
 void ControlLoop::record(log::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept {
@@ -213,6 +214,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.aligned = flight_.alignment().aligned();
   view_.mismatch = flight_.alignment().mismatch();
   view_.odometry_age = flight_.odometry_age();
+  view_.odometry_lost_after = flight_.odometry_lost_after();
   view_.heartbeat_age = in.autopilot.heartbeat_age;
   view_.clock = link_.clock();
   view_.untold_delay = link_.untold_delay();

@@ -20,7 +20,7 @@ namespace backwash::daemon {
 class ControlLoop {
  public:
   ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle, double battery_land,
-              const MapSettings& map = {});
+              const MapSettings& map = {}, const OdometryTiming& timing = {});
 
   /// One tick at `now_ns` (CLOCK_MONOTONIC), `missed` whole periods after it was due, `lateness_us` after its own
   /// period began. Real-time: wait-free, no allocation; system calls: non-blocking reads and writes of the port,

@@ -81,13 +81,14 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
   };
   auto daemon = config::load_daemon(path);
   if (!daemon) return wrong(daemon.error());
-  if (const auto line = configured_line(daemon->link); !line)
+  if (const auto line = configured_line(daemon->link, daemon->odometry.timing); !line)
     return tl::make_unexpected(StartError(kConfiguration, path + ": " + line.error()));
   auto vehicle = config::load_vehicle(daemon->vehicle);
   if (!vehicle) return wrong(vehicle.error());
   // What a velocity from poses may be off is in the first set of every tube.
   if (daemon->odometry.twist == config::Twist::none)
-    vehicle->initial_error.velocity += track::PoseVelocity::error(OdometryCheck::kLeastRate);
+    vehicle->initial_error.velocity +=
+        track::PoseVelocity::error(std::min(OdometryTiming::kUsual, daemon->odometry.timing.rate_least));
   auto model = config::load_model(daemon->model);
   if (!model) return wrong(model.error());
   return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model)};
@@ -110,8 +111,8 @@ struct Flight {
             [&] { return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels); })),
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
         mission(s.vehicle),
-        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map) {
-    link.pace(configured_line(s.daemon.link).value());
+        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map, s.daemon.odometry.timing) {
+    link.pace(configured_line(s.daemon.link, s.daemon.odometry.timing).value());
     if (!s.daemon.gpio.chip.empty()) gpio.emplace(*channels, s.daemon.gpio);
   }
 
@@ -142,7 +143,9 @@ void start(Flight& f) {
   f.threads.start("map worker",
                   [&] { run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map); });
   f.threads.start("planner", [&] {
-    run_planner(channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.maps->send(segment); });
+    run_planner(
+        channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.maps->send(segment); },
+        daemon.odometry.timing);
   });
   f.threads.start("mission", [&] {
     run_mission(channels, f.mission, [&](const CommandMessage& c, const Answer& a) {

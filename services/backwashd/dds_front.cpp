@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <iterator>
 #include <thread>
@@ -23,13 +24,24 @@ std::string topic_of(const config::Daemon& config) {
   return dds::topic(config.dds.name_space, dds::TopicOf<T>::kName);
 }
 
+/// From a stamp to now by the clock that the sender stamps with, s: this machine's monotonic one, or its wall clock.
+/// Nothing: it is neither. For what is told before a flight alone: nothing that flies asks the wall clock.
+std::optional<double> on_the_way(std::int64_t stamp_ns) {
+  constexpr double kSame = 1;  // s that a message is on its way at most
+  const std::int64_t wall_ns =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  for (const std::int64_t clock_ns : {now_ns(), wall_ns})
+    if (const double way = seconds(clock_ns - stamp_ns); way >= 0 && way < kSame) return way;
+  return std::nullopt;
+}
+
 }  // namespace
 
 DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels)
     : channels_(channels),
       priority_(priority),
       localization_(config, vehicle.estimation.position),
-      check_(config.odometry.twist),
+      check_(config.odometry.twist, config.odometry.timing),
       refusals_(channels.refused),
       malformed_({{config.dds.odometry_topic, &channels.odometry_refused},
                   {topic_of<dds::Octomap>(config), &channels.maps_rejected},
@@ -61,8 +73,8 @@ void DdsFront::look_at_odometry(const dds::Odometry& m) {
   const auto& p = m.pose.pose.position;
   const auto& q = m.pose.pose.orientation;
   const auto& v = m.twist.twist.linear;
-  const auto why =
-      check_.look(dds::nanoseconds(m.header.stamp), {p.x, p.y, p.z}, {q.w, q.x, q.y, q.z}, {v.x, v.y, v.z});
+  const std::int64_t stamp_ns = dds::nanoseconds(m.header.stamp);
+  const auto why = check_.look(stamp_ns, {p.x, p.y, p.z}, {q.w, q.x, q.y, q.z}, {v.x, v.y, v.z}, on_the_way(stamp_ns));
   if (!why) return;
   Line line{};
   std::snprintf(line.data(), line.size(), "%s", why->c_str());

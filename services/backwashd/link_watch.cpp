@@ -4,9 +4,13 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <thread>
 #include <utility>
+
+#include "firmware_bridge/mavlink/frame.hpp"
+#include "firmware_bridge/mavlink/messages.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -24,6 +28,21 @@ void tell(const ControlEvent& event, const ServiceManager& manager) {
     case ControlEvent::Kind::page_fault:
       return spdlog::warn("{} page faults in a control tick", event.count);
   }
+}
+
+/// kLongestOdometryTicks, or fewer of odometry below 20 Hz: what its own interval leaves of PX4's 200 ms.
+int longest_odometry_ticks(const OdometryTiming& timing) {
+  constexpr double kMaxInterval = 0.2, kRounding = 1e-9;  // s, periods
+  if (timing.longer_gap() == 0) return kLongestOdometryTicks;
+  const double left = (kMaxInterval - 1 / timing.rate_least) / kControlPeriod + kRounding;
+  return std::clamp(static_cast<int>(left), 1, kLongestOdometryTicks);
+}
+
+/// Bytes per second beyond least_rate() of an ODOMETRY every so many ticks.
+double more_odometry(const LineRate& line, const decltype(config::Daemon::link)& link, int ticks) {
+  const std::size_t around = mavlink::kHeaderV2 + mavlink::kChecksum + (link.signing_key ? mavlink::kSignature : 0);
+  const std::size_t bytes = line.frame > 0 ? line.frame : mavlink::info<mavlink::Odometry>().full_length + around;
+  return static_cast<double>(bytes) * (1.0 / ticks - 1.0 / kLongestOdometryTicks) / kControlPeriod;
 }
 
 }  // namespace
@@ -48,17 +67,19 @@ tl::expected<Port, PortError> open_port(const decltype(config::Daemon::link)& li
   return tl::unexpected(PortError{PortError::Kind::kAddress});
 }
 
-tl::expected<LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link) {
+tl::expected<LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link,
+                                                    const OdometryTiming& timing) {
   constexpr double kRound = 100;
   if (link.endpoint.kind != config::LinkDevice::Kind::serial && !link.share) return LineRate{};
+  const int ticks = longest_odometry_ticks(timing);
   const double share = link.share.value_or(kSerialShare);
   const LineRate line = serial_line(link.baud, share, link.protocol == config::LinkProtocol::plain);
-  const double least = least_rate(line.frame, link.signing_key.has_value());
+  const double least = least_rate(line.frame, link.signing_key.has_value()) + more_odometry(line, link, ticks);
   if (line.bytes_per_second >= least) return line;
   return tl::unexpected(fmt::format(
       "key 'link.baud' = {}: {:.0f} bytes/s at a share of {:g}, and set-points at 50 Hz with ODOMETRY every {} ms need "
       "{:.0f}: a baud of {:.0f}, or a larger link.share",
-      link.baud, line.bytes_per_second, share, kLongestOdometryTicks * 20, least,
+      link.baud, line.bytes_per_second, share, ticks * 20, least,
       std::ceil(least / line.bytes_per_second * link.baud / kRound) * kRound));
 }
 

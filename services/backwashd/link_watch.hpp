@@ -12,7 +12,8 @@ tl::expected<firmware_bridge::Port, firmware_bridge::PortError> open_port(const 
 
 /// What the line of [link] carries; that of a socket for which no share is given, everything. Error, by the key to
 /// change: less than a flight needs (firmware_bridge::least_rate).
-tl::expected<firmware_bridge::LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link);
+tl::expected<firmware_bridge::LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link,
+                                                                     const OdometryTiming& timing = {});
 
 /// What went over the line, and what did not, in one line for the operator: received since its port was opened last,
 /// sent and left out since the daemon's start.

@@ -191,7 +191,7 @@ Decision Mission::enable() {
   if (!world_) return refused("no map was received yet");
   if (view_.mismatch != Mismatch::none)
     return refused(std::string("map and autopilot disagree: ") + to_string(view_.mismatch));
-  if (view_.odometry_age > track::Supervisor::kHoldAfter) return refused("no odometry");
+  if (view_.odometry_age > view_.odometry_lost_after) return refused("no odometry");
   if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");
   if (view_.pose_age > track::Supervisor::kPoseSilent)
     return refused("no pose from the autopilot: its estimator does not follow the VIO yet, or its stream is off");

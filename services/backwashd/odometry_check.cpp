@@ -10,9 +10,10 @@ namespace {
 
 using config::Twist;
 
-constexpr double kLongestGap = 0.5;  // s: after a longer one the comparison begins anew
-constexpr int kIntervals = 20;       // messages until their rate is known
-constexpr double kSmooth = 0.1;      // share of the newest interval
+constexpr double kLongestGap = 0.5;   // s: after a longer one the comparison begins anew
+constexpr int kIntervals = 20;        // messages until their rate is known
+constexpr double kSmooth = 0.1;       // share of the newest interval
+constexpr double kMostLatency = 0.2;  // s, of the key odometry.latency
 
 std::string line(const char* format, auto... values) {
   char text[192];
@@ -23,19 +24,16 @@ std::string line(const char* format, auto... values) {
 }  // namespace
 
 std::optional<std::string> OdometryCheck::look(std::int64_t stamp_ns, const Vec3& p, const Eigen::Quaterniond& q,
-                                               const Vec3& v) {
+                                               const Vec3& v, std::optional<double> latency) {
   if (!p.allFinite() || !v.allFinite() || !q.coeffs().allFinite()) return std::nullopt;
   const double dt = stamp_ns_ ? static_cast<double>(stamp_ns - *stamp_ns_) * 1e-9 : 0;
   const bool goes_on = stamp_ns_ && dt > 0 && dt < kLongestGap;
   if (stamp_ns_ && dt == 0) return std::nullopt;
   stamp_ns_ = stamp_ns;
+  time(goes_on ? std::optional(dt) : std::nullopt, latency);
   if (goes_on) {
-    interval_ = interval_ ? (1 - kSmooth) * *interval_ + kSmooth * dt : dt;
-    intervals_ = std::min(intervals_ + 1, kIntervals);
     compare(dt, p, q, v);
   } else {
-    interval_.reset();
-    intervals_ = 0;
     zero_from_.reset();
     zero_way_ = 0, count_ = 0;
     from_ = p, by_body_ = by_world_ = Vec3::Zero(), lasted_ = 0;
@@ -43,6 +41,15 @@ std::optional<std::string> OdometryCheck::look(std::int64_t stamp_ns, const Vec3
   std::string now = doubt();
   if (now == told_) return std::nullopt;
   return told_ = std::move(now);
+}
+
+void OdometryCheck::time(std::optional<double> dt, std::optional<double> latency) {
+  intervals_ = dt ? std::min(intervals_ + 1, kIntervals) : 0;
+  interval_ = dt && interval_ ? (1 - kSmooth) * *interval_ + kSmooth * *dt : dt;
+  if (latency)
+    latency_[latencies_++ % kLatencies] = *latency;
+  else
+    latencies_ = 0;
 }
 
 void OdometryCheck::compare(double dt, const Vec3& p, const Eigen::Quaterniond& q, const Vec3& v) {
@@ -60,11 +67,30 @@ void OdometryCheck::compare(double dt, const Vec3& p, const Eigen::Quaterniond& 
   if (long_enough || lasted_ > kLongest) from_ = p, by_body_ = by_world_ = Vec3::Zero(), lasted_ = 0;
 }
 
-std::string OdometryCheck::doubt() const {
-  if (intervals_ == kIntervals && 1 / *interval_ < kLeastRate)
-    return line("odometry comes at less than %.0f Hz: each gap would be a HOLD; raise the rate of the estimator",
-                kLeastRate);
+std::string OdometryCheck::doubt() {
+  if (std::string timing = timing_doubt(); !timing.empty()) return timing;
   return twist_ == Twist::none ? "" : twist_doubt();
+}
+
+// Told with the value that was seen first, so that a cause is told once.
+std::string OdometryCheck::timing_doubt() {
+  const bool slow = intervals_ == kIntervals && 1 / *interval_ < timing_.rate_least;
+  const double latency = latencies_ < kLatencies ? timing_.latency : *std::ranges::min_element(latency_);
+  const bool off = std::abs(latency - timing_.latency) > kLatencyOff;
+  const Timing now = slow ? Timing::slow : off ? Timing::other_latency : Timing::right;
+  if (now == timing_now_) return timing_told_;
+  timing_now_ = now;
+  timing_told_.clear();
+  if (slow)
+    timing_told_ = line(
+        "odometry comes at %.1f Hz, less than odometry.rate_least = %g: each gap would be a HOLD; raise the "
+        "estimator's rate, or set the key to its least, 9 or more",
+        1 / *interval_, timing_.rate_least);
+  else if (off)
+    timing_told_ =
+        line("odometry comes %.0f ms after its stamp, and odometry.latency says %.0f: set it to %.3f%s", latency * 1e3,
+             timing_.latency * 1e3, latency, latency > kMostLatency ? ", which is too late to fly by" : "");
+  return timing_told_;
 }
 
 std::string OdometryCheck::twist_doubt() const {

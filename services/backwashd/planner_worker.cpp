@@ -18,6 +18,8 @@ constexpr std::size_t kBrakeAfter = 15;     // commands (0.3 s) that a stop on r
 constexpr double kLeastLift = 0.3;          // m: what an autopilot can tell from standing
 constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a segment or not
 
+Setpoint at_rest(const Setpoint& s) { return {s.p_W, Vec3::Zero(), Vec3::Zero(), s.yaw}; }
+
 std::string not_clear(const std::string& what, double clearance) {
   char line[128];
   std::snprintf(line, sizeof line, "%s is not clear enough: %.3f m", what.c_str(), clearance);
@@ -142,6 +144,8 @@ std::optional<std::string> PlannerWorker::brake() {
 std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
                                               std::optional<double> z_safe, std::uint32_t closures, bool lifts) {
   append_hold(commands);
+  // A lift-off begins on the ground, where nothing moves however old the pose is.
+  if (!lifts) commands.insert(commands.begin(), lead_, at_rest(commands.front()));
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (!current()) return kEnded;
     if (view_.mode != Mode::tracking && view_.mode != Mode::hold) return "control was lost meanwhile";
@@ -191,9 +195,11 @@ bool PlannerWorker::offer(Flying next) {
   return false;
 }
 
-void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted) {
+void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted,
+                 const OdometryTiming& timing) {
   using namespace std::chrono_literals;
-  PlannerWorker planner(channels, recorder, accepted, [] { std::this_thread::sleep_for(1ms); });
+  PlannerWorker planner(
+      channels, recorder, accepted, [] { std::this_thread::sleep_for(1ms); }, timing);
   while (!channels.stop)
     if (!planner.step()) std::this_thread::sleep_for(2ms);
 }

@@ -28,9 +28,14 @@ using SegmentAccepted = std::function<void(const track::AcceptedSegment&)>;
 /// is closed by something new goes on around it, also while it already brakes for it.
 class PlannerWorker {
  public:
-  /// `pause`: lets some time pass while the control thread works, 1 ms or so.
-  PlannerWorker(Channels& channels, Recorder& recorder, SegmentAccepted accepted, std::function<void()> pause)
-      : channels_(channels), recorder_(recorder), accepted_(std::move(accepted)), pause_(std::move(pause)) {}
+  /// `pause`: lets some time pass while the control thread works, 1 ms or so. `timing`: of the odometry.
+  PlannerWorker(Channels& channels, Recorder& recorder, SegmentAccepted accepted, std::function<void()> pause,
+                const OdometryTiming& timing = {})
+      : channels_(channels),
+        recorder_(recorder),
+        accepted_(std::move(accepted)),
+        pause_(std::move(pause)),
+        lead_(timing.lead()) {}
 
   /// One job of the mission, or, if there is none, watch(). False: there was none.
   bool step();
@@ -75,6 +80,7 @@ class PlannerWorker {
   Recorder& recorder_;
   SegmentAccepted accepted_;
   std::function<void()> pause_;
+  std::size_t lead_;  // commands at rest before a segment moves
   ControlView view_;
   std::shared_ptr<const plan::World> world_;
   std::int64_t seen_ns_ = 0;  // of that world
@@ -86,6 +92,6 @@ class PlannerWorker {
 };
 
 /// Thread body.
-void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted);
+void run_planner(Channels& channels, Recorder& recorder, const SegmentAccepted& accepted, const OdometryTiming& timing);
 
 }  // namespace backwash::daemon

@@ -92,6 +92,7 @@ void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
   s.frame_residual_m = view.residual_m;
   s.frame_residual_rad = view.residual_rad;
   s.odometry_age = view.odometry_age;
+  s.odometry_lost_after = view.odometry_lost_after;
   s.heartbeat_age = view.heartbeat_age;
   s.clock_offset = view.clock ? seconds(view.clock->offset_ns) : 0;
   s.clock_delay = view.clock ? 0.5 * seconds(view.clock->round_trip_ns) : kNotKnown;

@@ -27,7 +27,6 @@ namespace backwash::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr int kOdometryEvery = 10;  // steps of 1 ms
 constexpr int kMapEvery = 5000;     // steps, when the map has faults; otherwise it is sent once
 constexpr int kPriority = 60;       // SCHED_FIFO
 constexpr double kVioShare = 0.75;  // of the vehicle's estimation.position
@@ -201,9 +200,10 @@ class Bench {
     close_loop(t);
     send_scans(n, t);
     std::optional<VioSample> sample;
-    if (n % kOdometryEvery == 0 && !passed(o_.stop_odometry_s, t)) sample = {estimate, autopilot_->attitude(), t};
-    for (const VioSample& s : faults_.odometry.pass(sample, timeline_t))
-      odometry_writer_.write(estimator_ ? odometry(s, *estimator_) : odometry(s, o_.drift.has_value()));
+    if (transit_.due(n) && !passed(o_.stop_odometry_s, t)) sample = {estimate, autopilot_->attitude(), t};
+    for (const VioSample& s : faults_.odometry.pass(sample, timeline_t)) transit_.send(s, t);
+    while (const auto s = transit_.arrived(t))
+      odometry_writer_.write(estimator_ ? odometry(*s, *estimator_) : odometry(*s, o_.drift.has_value()));
     if (n % 20 == 0) log_.row(t, *autopilot_, estimate);
   }
 
@@ -254,6 +254,7 @@ class Bench {
   Faults faults_;
   TruthLog log_;
   sim::EmulatedVio vio_;
+  Transit<VioSample> transit_{o_.odometry, o_.seed + 2};
   int priority_;
   dds::Participant participant_;
   dds::Writer<dds::Odometry> odometry_writer_ = dds::make_writer<dds::Odometry>(participant_, o_.name_space);

@@ -10,6 +10,7 @@
 #include "core/types/vehicle.hpp"
 #include "services/bench/autopilot.hpp"
 #include "services/bench/faults.hpp"
+#include "services/bench/transit.hpp"
 
 namespace backwash::bench {
 
@@ -38,11 +39,12 @@ struct Options {
   /// As which estimator of config::odometry_profiles() the odometry is filled, with the map in its frame; empty: in
   /// `map`, as the message's definition says.
   std::string estimator;
+  Pace odometry;  ///< of the emulated VIO
   Timeline timeline;
   double event_x = 0;  ///< the event: the armed vehicle has passed this x of the map, m
 };
 
-/// Runs the emulated flight controller, VIO (100 Hz) and mapper in real time until the duration has passed or SIGINT or
+/// Runs the emulated flight controller, VIO and mapper in real time until the duration has passed or SIGINT or
 /// SIGTERM. Returns the exit code, 1 when an expectation of the timeline failed; throws StartError at start.
 int run(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle);
 

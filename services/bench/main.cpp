@@ -58,6 +58,16 @@ void add_world(Command& app, Given& given) {
   app.add_option("--wire", given.options.wire, "what arrived from the daemon, frame by frame, CSV");
 }
 
+void add_pace(Command& app, backwash::bench::Pace& pace) {
+  app.add_option("--odometry-rate", pace.rate, "of the VIO, Hz").capture_default_str().check(within(1, 1000));
+  app.add_option("--odometry-latency", pace.latency, "from a pose to its message, s")
+      .capture_default_str()
+      .check(within(0, 1));
+  app.add_option("--odometry-jitter", pace.jitter, "on top of it, at random up to this, s")
+      .capture_default_str()
+      .check(within(0, 1));
+}
+
 void add_faults(Command& app, Given& given) {
   app.add_option("--stop-odometry", given.options.stop_odometry_s, "fault: VIO stops this long after arming, s");
   app.add_option("--stop-heartbeat", given.options.stop_heartbeat_s,
@@ -78,6 +88,7 @@ void add_faults(Command& app, Given& given) {
     if (!profile.child.empty()) estimators.emplace_back(profile.name);
   app.add_option("--estimator", given.options.estimator, "the odometry as this one fills it, and the map in its frame")
       .check(one_of(estimators));
+  add_pace(app, given.options.odometry);
   app.add_option("--parameter", given.parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
   app.add_option(
          "--hide", given.hidden,

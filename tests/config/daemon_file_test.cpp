@@ -89,6 +89,15 @@ TEST(DaemonFile, ASensorsPlaceAndTurnStandBesideItsProfile) {
   EXPECT_DOUBLE_EQ(d.odometry.sensor_turned.x(), 3.14159);
 }
 
+TEST(DaemonFile, TheRateIsTheProfilesUnlessItIsSaid) {
+  EXPECT_EQ(with_odometry("profile = \"ros\"").odometry.timing.rate_least, 20);
+  EXPECT_TRUE(with_odometry("profile = \"vins_fusion\"").odometry.timing.usual());
+  EXPECT_EQ(with_odometry("profile = \"fast_lio\"").odometry.timing.rate_least, 9) << "its lidar's 10 Hz, and jitter";
+  const auto d = with_odometry("profile = \"fast_lio\"\nrate_least = 20\nlatency = 0.04");
+  EXPECT_EQ(d.odometry.timing.rate_least, 20);
+  EXPECT_EQ(d.odometry.timing.latency, 0.04);
+}
+
 TEST(DaemonFile, AMapInTheEstimatorsOwnFrameKeepsItsName) {
   const auto d = with_odometry("profile = \"openvins\"", "global");
   EXPECT_EQ(d.frames.map, "global");
@@ -103,6 +112,8 @@ TEST(DaemonFile, AProfileThatIsNoneAndKeysThatItDoesNotTakeAreNamed) {
   EXPECT_THAT(error_after("profile = \"ros\"", "profile = \"custom\"\ntwist = \"map\""),
               HasSubstr("\"body\", \"world\" or \"none\""));
   EXPECT_THAT(error_after("profile = \"ros\"", "sensor_x = 6.0"), HasSubstr("odometry.sensor_x"));
+  EXPECT_THAT(error_after("profile = \"ros\"", "rate_least = 8.9"), HasSubstr("odometry.rate_least"));
+  EXPECT_THAT(error_after("profile = \"ros\"", "latency = 0.21"), HasSubstr("odometry.latency"));
 }
 
 TEST(DaemonFile, AShareOfTheLineIsAboveNothingAndAtMostAllOfIt) {

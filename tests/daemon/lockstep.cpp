@@ -67,12 +67,14 @@ bool Wire::commanded(std::uint16_t command) const {
   return false;
 }
 
-Lockstep::Lockstep(const bench::LocalFrame& local, Medium medium, std::shared_ptr<const plan::World> world)
+Lockstep::Lockstep(const bench::LocalFrame& local, Medium medium, std::shared_ptr<const plan::World> world,
+                   const OdometryTiming& timing)
     : local_frame(local),
       world_(std::move(world)),
       vehicle_(vehicle_5in()),
       vio_(0.75 * vehicle_.estimation.position, 2),
-      medium_(medium) {
+      medium_(medium),
+      timing_(timing) {
   const Vec3 ground(kStart.x(), kStart.y(), vehicle_.body.radius);
   autopilot = std::make_unique<HandledAutopilot>(world_->grid, vehicle_, ground, local_frame, 1, 1);
   restart();
@@ -92,7 +94,7 @@ void Lockstep::restart(bool with_map) {
   channels.reset(new (memory) Channels);
   link_ = std::make_unique<firmware_bridge::AutopilotLink>(line_->open(), std::uint8_t{1},
                                                            firmware_bridge::Time(std::chrono::nanoseconds(now_ns_)));
-  loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand);
+  loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand, MapSettings{}, timing_);
   if (with_map) channels->worlds.offer({world_, now_ns_});
   log.clear();
 }
@@ -227,6 +229,8 @@ std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops, b
   segment->epoch = view().epoch;
   segment->arms = arms;
   segment->seen_ns = now_ns_;
+  const Setpoint& here = view().command;
+  if (!arms) commands.insert(commands.begin(), timing_.lead(), {here.p_W, Vec3::Zero(), Vec3::Zero(), here.yaw});
   const State start = view().state;
   segment->tube = reach::tube_over_field(world_->reach, start, view().command, commands, world_->bounds);
   if (with_stops)
@@ -249,7 +253,7 @@ void Lockstep::take_off() {
   auto commands = rise();
   const auto count = static_cast<int>(commands.size());
   offer(std::move(commands));
-  ticks(count + 5);
+  ticks(count + static_cast<int>(timing_.lead()) + 5);
   ASSERT_EQ(mode(), Mode::tracking) << to_string(reason());
   ASSERT_TRUE(view().finished);
   ASSERT_LT((autopilot->truth().p_W - kStart).norm(), 0.2);

@@ -68,7 +68,7 @@ enum class Medium { serial, udp };
 class Lockstep {
  public:
   explicit Lockstep(const bench::LocalFrame& frame = {0.7, Vec3(5, -3, 0.2)}, Medium medium = Medium::serial,
-                    std::shared_ptr<const plan::World> world = corridor());
+                    std::shared_ptr<const plan::World> world = corridor(), const OdometryTiming& timing = {});
   ~Lockstep();
 
   /// One control period: 20 steps of physics, then one tick of the daemon.
@@ -153,6 +153,7 @@ class Lockstep {
   Vehicle vehicle_;
   sim::EmulatedVio vio_;
   Medium medium_;
+  OdometryTiming timing_;
   std::unique_ptr<Line> line_;
   std::unique_ptr<firmware_bridge::AutopilotLink> link_;
   std::unique_ptr<ControlLoop> loop_;

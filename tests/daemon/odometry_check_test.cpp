@@ -77,8 +77,57 @@ TEST(OdometryCheck, StandingStillSaysNothing) {
 
 TEST(OdometryCheck, NamesARateAtWhichEachGapWouldBeAHold) {
   OdometryCheck slow(Twist::body), enough(Twist::body);
-  EXPECT_THAT(walk(slow, in_body, 0, 0.4, 5, 10), HasSubstr("comes at less than 20 Hz"));
+  EXPECT_THAT(walk(slow, in_body, 0, 0.4, 5, 10),
+              testing::AllOf(HasSubstr("comes at 10.0 Hz"), HasSubstr("odometry.rate_least = 20:")));
   EXPECT_EQ(walk(enough, in_body, 0, 0.4, 5, 21), "");
+}
+
+TEST(OdometryCheck, TakesTheRateThatWasStated) {
+  OdometryCheck ten(Twist::body, {9, 0}), fast(Twist::body, {100, 0});
+  EXPECT_EQ(walk(ten, in_body, 0, 0.4, 5, 9.2), "");
+  EXPECT_THAT(walk(ten, in_body, 0, 0.4, 5, 8.7), HasSubstr("odometry.rate_least = 9:"));
+  EXPECT_THAT(walk(fast, in_body, 0, 0.4, 5, 60), HasSubstr("odometry.rate_least = 100:"));
+}
+
+/// The last doubt of 2 s of messages of a vehicle that stands, each `late(n)` seconds after its stamp.
+std::string stands(OdometryCheck& check, const std::function<std::optional<double>(int)>& late, double from) {
+  std::string doubt;
+  for (int n = 0; n < 100; ++n)
+    if (const auto now = check.look(static_cast<std::int64_t>((from + n * 0.02) * 1e9), Vec3::Zero(),
+                                    Eigen::Quaterniond::Identity(), Vec3::Zero(), late(n)))
+      doubt = *now;
+  return doubt;
+}
+
+TEST(OdometryCheck, NamesALatencyThatWasNotStated) {
+  const auto always = [](double s) { return [=](int) { return std::optional(s); }; };
+  OdometryCheck unstated(Twist::body), stated(Twist::body, {20, 0.12}), hopeless(Twist::body);
+  EXPECT_EQ(stands(unstated, always(0.025), 10), "");
+  EXPECT_THAT(
+      stands(unstated, always(0.12), 20),
+      testing::AllOf(HasSubstr("120 ms after its stamp"), HasSubstr("odometry.latency says 0: set it to 0.120")));
+  EXPECT_EQ(stands(stated, always(0.12), 30), "");
+  EXPECT_EQ(stands(
+                stated, [](int n) { return n % 4 ? 0.16 : 0.12; }, 40),
+            "")
+      << "the least of them is the latency";
+  EXPECT_THAT(stands(stated, always(0.001), 50), HasSubstr("set it to 0.001")) << "too old a set would be asked";
+  EXPECT_EQ(stands(
+                stated, [](int) { return std::nullopt; }, 60),
+            "")
+      << "of another clock nothing is known";
+  EXPECT_THAT(stands(hopeless, always(0.35), 70), HasSubstr("too late to fly by"));
+}
+
+TEST(OdometryCheck, TellsACauseOnceWhateverItsValueDoes) {
+  OdometryCheck check(Twist::body);
+  int told = 0;
+  for (int n = 0; n < 400; ++n)
+    told += check
+                .look(static_cast<std::int64_t>((5 + 0.1 * n + 0.0001 * n * n) * 1e9), Vec3::Zero(),
+                      Eigen::Quaterniond::Identity(), Vec3::Zero(), 0.1 + 0.001 * (n % 7))
+                .has_value();
+  EXPECT_LE(told, 3) << "nothing; the latency or the rate; then the other";
 }
 
 TEST(OdometryCheck, WhatIsNoNumberChangesNothing) {

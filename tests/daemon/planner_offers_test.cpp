@@ -62,6 +62,29 @@ TEST_F(PlannerOffers, AFlightWithItsTubeClearanceStopsAndHoverThatDoesNotArm) {
   }
 }
 
+// docs/model.md 4-14: the pose that the tube begins with may be as old as that.
+TEST_F(PlannerOffers, OfSlowOrLateOdometryAFlightThatWaitsForItsPosesAge) {
+  const OdometryTiming timing{9, 0.12};
+  PlannerWorker slow{*channels_, recorder_, [](const auto&) {}, [this] { control(); }, timing};
+  know(room());
+  stand({3.05, 2.05, 0.3});
+  ASSERT_EQ(ask(PlanJob::Kind::takeoff, {0, 0, 1.0}, {7, 2}, &slow), "");
+  ASSERT_EQ(offers_.size(), 2u);
+  const auto rests = [](const track::AcceptedSegment& s) {
+    std::size_t n = 0;
+    while (s.commands[n].v_W.isZero(0) && s.commands[n].p_W == s.commands[0].p_W) ++n;
+    return n;
+  };
+  EXPECT_LE(rests(offers_[0]), 1u) << "it stands";
+  EXPECT_GE(static_cast<double>(rests(offers_[1])) * kControlPeriod, timing.oldest());
+  stand(offers_[1].commands.back().p_W);
+  ASSERT_EQ(ask(PlanJob::Kind::go_to, {4.05, 2.05, 1.05}, {7, 2}, &slow), "");
+  const auto& s = offers_.back();
+  EXPECT_GE(static_cast<double>(rests(s)) * kControlPeriod, timing.oldest());
+  EXPECT_LT((s.commands.front().p_W - view_.command.p_W).norm(), 1e-9);
+  EXPECT_NEAR(s.clearance, plan::tube_clearance(*world_, s.tube), 1e-9) << "verified with what it waits";
+}
+
 // Its controller does not see that error: what a set leaves to the walls has to be more.
 TEST_F(PlannerOffers, NoFlightThatIsClearByLessThanTheAutopilotsFrameIsOff) {
   know(room());

@@ -87,9 +87,10 @@ class PlannerOffers : public testing::Test {
     show();
   }
   /// "", or why not.
-  std::string ask(PlanJob::Kind kind, const Vec3& position, const track::Epoch& epoch = {7, 2}) {
+  std::string ask(PlanJob::Kind kind, const Vec3& position, const track::Epoch& epoch = {7, 2},
+                  PlannerWorker* by = nullptr) {
     channels_->jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, 1, position, {}, epoch}));
-    EXPECT_TRUE(planner_.step());
+    EXPECT_TRUE((by ? *by : planner_).step());
     const auto outcome = channels_->outcomes.pop();
     return outcome->ok ? "" : outcome->reason.data();
   }

@@ -116,6 +116,16 @@ TEST_F(ConfiguredLine, ASharedRadioAndSignaturesNeedMore) {
   EXPECT_TRUE(configured_line(link)) << "its frames are shorter";
 }
 
+// PX4 begins with external vision only while samples are less than 200 ms apart.
+TEST_F(ConfiguredLine, SlowOdometryLeavesTheLineTheRestOfTwoHundredMilliseconds) {
+  EXPECT_TRUE(configured_line(link, {20, 0}));
+  const auto refused = configured_line(link, {10, 0});
+  ASSERT_FALSE(refused) << "100 ms between samples and 160 ms on this line";
+  EXPECT_NE(refused.error().find("every 100 ms"), std::string::npos) << refused.error();
+  link.baud = 115'200;
+  EXPECT_TRUE(configured_line(link, {9, 0}));
+}
+
 TEST(Start, ALineThatCannotCarryAFlightIsRefusedBeforeAnyPortOpens) {
   const std::string path = testing::TempDir() + "slow.daemon.toml";
   std::ifstream shipped(std::string(BACKWASH_SOURCE_DIR) + "/core/config/files/backwashd.daemon.toml");
