@@ -182,8 +182,8 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
   vehicle.limits.v_max = constants->v_max;
   vehicle.estimation.position = constants->estimation_position;
   vehicle.initial_error = {constants->initial_position, constants->initial_velocity};
-  OdometryTiming timing;
-  if (const auto* timed = payload<TimedConstantsRecord>(*first)) timing = {timed->rate_least, timed->latency};
+  const auto* timed = payload<TimedConstantsRecord>(*first);
+  const OdometryTiming timing = timed ? OdometryTiming{timed->rate_least, timed->latency} : OdometryTiming{};
   // Written so that what is no number is refused: of a damaged record no window or limit is made.
   if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, *first) + "is no timing of odometry");
   const auto segments = segments_of(log, name);
@@ -207,8 +207,7 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
     if (input->segment != 0) {
       const auto found = segments->find(input->segment);
       if (found == segments->end())
-        return bad(at(name, record) + "segment " + std::to_string(input->segment) +
-                   " was offered but is not in the log");
+        return bad(at(name, record) + "offers segment " + std::to_string(input->segment) + ", which is not in the log");
       segment = found->second.get();
     }
     TickRecord replayed{};
