@@ -66,13 +66,21 @@ Vec3 MapView::sigma(const Vec3& p_W) {
   if ((corner.array() < 0).any() || ((corner + Index3::Ones()).array() >= size_.array()).any()) {
     return exactly(p_W);
   }
-  // A corner within a solid says nothing of the air beside it.
+  // A corner within a solid, or on its face, says nothing of the air beside it.
+  const auto in_solid = [&](const Index3& v) {
+    const Vec3 at_W = low_ + kWindowRules.sigma_lattice * v.cast<double>();
+    for (int n = 0; n < 8; ++n) {
+      const Vec3 aside(n & 1 ? 1 : -1, n >> 1 & 1 ? 1 : -1, n >> 2 ? 1 : -1);
+      if (inside_solid(at_W + kWindowRules.corner_least * aside)) return true;
+    }
+    return false;
+  };
   Vec3 ln = Vec3::Zero();
   double free = 0;
   const bool buried = inside_solid(p_W);
   map::for_corners(q, [&](const Index3& v, const Vec3& share) {
     if (!(share.prod() > kWindowRules.corner_least)) return;
-    if (!buried && inside_solid(low_ + kWindowRules.sigma_lattice * v.cast<double>())) return;
+    if (!buried && in_solid(v)) return;
     ln += share.prod() * lattice_ln_sigma(v), free += share.prod();
   });
   return free > 0 ? Vec3((ln / free).array().exp()) : exactly(p_W);
