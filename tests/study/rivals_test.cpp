@@ -69,8 +69,8 @@ TEST(Rivals, APushByHeightAndASteeperThrustMoveTogetherWhereTheCraftGoesUpAndDow
   EXPECT_TRUE(in_every_set("thrust_slope", result)) << study_worlds::told(result);
 }
 
-/// The hidden drag is 0.2 1/s at rest and grows with the speed; 0.23 1/s at 1 m/s, 0.27 at the speeds flown. Half of the
-/// intervals begin a little above 0.23 (core/study/confusion.md); before, they began above 0.25.
+/// The hidden drag is 0.2 1/s at rest and grows with the speed; 0.23 1/s at 1 m/s, 0.27 at the speeds flown. Half of
+/// the intervals begin a little above 0.23 (core/study/confusion.md); before, they began above 0.25.
 TEST(Sizes, ADragOfFastFlightsIsToldAtOneMetrePerSecond) {
   double mean = 0;
   for (const std::uint64_t seed : {1796030000, 1796030012, 1796030014}) {
