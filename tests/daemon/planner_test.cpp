@@ -22,7 +22,7 @@ namespace {
 using map::Cell;
 using map::OccupancyGrid;
 
-void fill(OccupancyGrid& grid, const Vec3& low, const Vec3& high, Cell cell) {
+void fill_box(OccupancyGrid& grid, const Vec3& low, const Vec3& high, Cell cell) {
   const Index3 a = grid.index(low + Vec3::Constant(1e-6)), b = grid.index(high - Vec3::Constant(1e-6));
   for (int k = a.z(); k <= b.z(); ++k)
     for (int j = a.y(); j <= b.y(); ++j)
@@ -50,7 +50,7 @@ class PlannerFlight : public testing::Test {
   ~PlannerFlight() override { std::filesystem::remove(log_); }
 
   void stands(const Vec3& low, const Vec3& high) {
-    fill(truth_, low, high, Cell::occupied);
+    fill_box(truth_, low, high, Cell::occupied);
     distance_ = map::DistanceField(truth_);
   }
 
@@ -233,7 +233,7 @@ class UnknownRoom : public PlannerFlight {
     stands({0.4, -2, 0}, {0.6, 0.7, 3.5});
     rig_.take_off();
     OccupancyGrid known = truth_;
-    fill(known, {-0.2, -2.1, 0}, {2.6, 2.1, 3.5}, Cell::unknown);
+    fill_box(known, {-0.2, -2.1, 0}, {2.6, 2.1, 3.5}, Cell::unknown);
     know(known);
     scan_every_ = 20;
   }

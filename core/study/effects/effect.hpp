@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -133,10 +134,14 @@ struct Form {
   const std::string& cause() const;  ///< the effect's name
 };
 
+/// Where an effect is that rotors differ by. Those of a sound craft differ too: without sound flights it is not told.
+enum class AtRotors : std::uint8_t { no, weight, propeller, sensor };
+
 /// Something physical that a simulation may lack: all that other code must know of it. One file each, and its line in
 /// table.cpp.
 struct Effect {
-  std::string name;         ///< of the JSON; its file's, too
+  std::string name;  ///< of the JSON; its file's, too
+  AtRotors at_rotors = AtRotors::no;
   std::vector<Form> forms;  ///< in the order in which they are tried
   Regressor axis = {"time since the flight began, s", false,
                     [](const WindowRow& w) { return w.t; }};  ///< of its picture

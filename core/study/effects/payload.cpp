@@ -32,6 +32,7 @@ std::vector<SimulationTerm> needed_of_rotors(const FittedForm& fitted, const Obs
 Effect payload() {
   return {
       .name = "payload",
+      .at_rotors = AtRotors::weight,
       .forms = {{.formula = "thrust per mass (1 - m), m the relative excess of mass",
                  .parameters = {"m"},
                  .possible = {{-0.5, 0.5, "a craft of half or of twice its mass is another vehicle"}},

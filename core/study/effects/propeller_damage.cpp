@@ -30,6 +30,7 @@ std::vector<DesignColumn> lost_thrust(const Windows& ws) {
 /// One rotor gives less for the same command, and may shake.
 Effect propeller_damage() {
   return {.name = "propeller_damage",
+          .at_rotors = AtRotors::propeller,
           .forms = {{.formula = "one rotor needs (1 + d) of the others' thrust command",
                      .parameters = {"d"},
                      .possible = {{0, 1, "a rotor that needs twice the command has none to spare"}},

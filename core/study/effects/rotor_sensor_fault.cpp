@@ -17,6 +17,7 @@ auto of_one_rotor(SimulationTerm::Kind kind) {
 /// One rotor's rpm reading is wrong, or fails now and then.
 Effect rotor_sensor_fault() {
   return {.name = "rotor_sensor_fault",
+          .at_rotors = AtRotors::sensor,
           .forms = {{.formula = "one rotor's rpm^2 reads (1 + e) of what its command gives",
                      .parameters = {"e"},
                      .possible = {{-3, 3, "ln of rpm² as read: beyond, it is another unit"}},

@@ -134,10 +134,11 @@ void name_causes(StudyResult& result, const Evidence& evidence, const std::vecto
 
 /// `off`: by how much the rotors differ without being judged, ln.
 void leave_unjudged(StudyResult& result, double off) {
-  for (const char* name : {"propeller_damage", "rotor_sensor_fault"})
-    result.not_tested.emplace_back(
-        name, "the same in all flights and no more than craft are built with: the rotors differ by " + percent(off) +
-                  ", as those of a sound craft may; give --reference flights");
+  for (const Effect& effect : effects())
+    if (effect.at_rotors == AtRotors::propeller || effect.at_rotors == AtRotors::sensor)
+      result.not_tested.emplace_back(
+          effect.name, "the same in all flights and no more than craft are built with: the rotors differ by " +
+                           percent(off) + ", as those of a sound craft may; give --reference flights");
 }
 
 /// A rotor that lost a share of its thrust costs a quarter of it in all. Where the rotors differ as such a one would,
@@ -146,17 +147,18 @@ bool doubt_payloads(std::vector<NamedCause>& causes, double off) {
   bool doubted = false;
   for (auto& cause : causes) {
     Accepted& found = cause.found;
-    if (found.form->cause() != "payload" || found.form->motors_alone || !cause.flights.empty()) continue;
+    if (found.form->effect->at_rotors != AtRotors::weight || found.form->motors_alone || !cause.flights.empty())
+      continue;
     if (found.parameters.empty()) continue;
     const double lost = found.parameters.front().value;
     if (lost <= 0 || off < kRotorRules.unjudged_loss * lost) continue;
     for (const Form* form : catalogue())
-      if (form->cause() == "propeller_damage" && !form->motors_alone) {
+      if (form->effect->at_rotors == AtRotors::propeller && !form->motors_alone) {
         found.rivals.push_back({form->cause(), form, form->scales.front(), 0});
+        cause.separate_by.push_back(
+            {form->cause(), "none: give --reference flights of the craft while its rotors were sound", std::nullopt});
         break;
       }
-    cause.separate_by.push_back(
-        {"propeller_damage", "none: give --reference flights of the craft while its rotors were sound", std::nullopt});
     doubted = true;
   }
   return doubted;

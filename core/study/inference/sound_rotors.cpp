@@ -119,7 +119,7 @@ void name_by_balance(Accepted& cause, const Observations& rest, bool taken_out, 
   const YawBalance balance = yaw_balance(ln, spread);
   const Form *propeller = nullptr, *weight = nullptr;
   for (const Form* form : catalogue())
-    if (form->motors_alone) (form->cause() == "payload" ? weight : propeller) = form;
+    if (form->motors_alone) (form->effect->at_rotors == AtRotors::weight ? weight : propeller) = form;
   const bool is_weight = cause.form->effect == weight->effect;
   const bool sure = balance.weight() != balance.propeller() && balance.weight() == is_weight;
   std::erase_if(cause.rivals, [&](auto& r) { return r.form->effect == propeller->effect || r.form == weight; });
