@@ -164,8 +164,8 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
                {"cpu = -1", "cpu = 0.5", 21, "control.cpu"},
                {"battery_land = 0.15", "battery_land = 15", 22, "control.battery_land"},
                {"[control]", "[controls]", 19, "controls"},
-               {"live = false", "live = 0", 40, "map.live"},
-               {"max_mib = 512", "max_mib = 0", 43, "map.max_mib"},
+               {"live = false", "live = 0", 42, "map.live"},
+               {"max_mib = 512", "max_mib = 0", 45, "map.max_mib"},
                {"body = \"base_link\"", "body = \"map\"", 27, "frames"}};
   for (const auto& c : cases)
     EXPECT_THAT(error_after(c.right, c.wrong), HasSubstr(".toml:" + std::to_string(c.line) + ": key '" + c.key + "'"));

@@ -68,11 +68,12 @@ Vec3 MapView::sigma(const Vec3& p_W) {
   }
   // A corner within a solid, or on its face, says nothing of the air beside it.
   const auto in_solid = [&](const Index3& v) {
-    const Vec3 at_W = low_ + kWindowRules.sigma_lattice * v.cast<double>();
-    for (int n = 0; n < 8; ++n) {
-      const Vec3 aside(n & 1 ? 1 : -1, n >> 1 & 1 ? 1 : -1, n >> 2 ? 1 : -1);
-      if (inside_solid(at_W + kWindowRules.corner_least * aside)) return true;
-    }
+    for (const double x : {-1, 1})
+      for (const double y : {-1, 1})
+        for (const double z : {-1, 1}) {
+          const Vec3 beside = v.cast<double>() + kWindowRules.corner_least * Vec3(x, y, z);
+          if (inside_solid(low_ + kWindowRules.sigma_lattice * beside)) return true;
+        }
     return false;
   };
   Vec3 ln = Vec3::Zero();
