@@ -113,6 +113,12 @@ sim::FlightSample sample_of(const log::TickRecord& tick, double t, double t_zero
   return s;
 }
 
+track::Inside as_recorded(const log::TickRecord& tick) {
+  PerDirection half_widths;
+  std::copy_n(tick.half_widths, kDirections, half_widths.begin());
+  return judged_against(vec(tick.p), vec(tick.center), half_widths);
+}
+
 tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawRecord> log,
                                                        const RecordedSegment& segment, const Truth& truth,
                                                        const plan::World& world, double t_zero, double z_safe) {
@@ -128,6 +134,7 @@ tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawR
   // It may have begun with a later command: as much later as its first pose was old.
   const auto begun =
       static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(ticks.front()->index, segment.commands.size() - 1));
+  reach::ReachTube whole(tube.begin(), tube.begin() + begun);  // its first poses are of before
   tube.erase(tube.begin(), tube.begin() + begun);
   piece.accepted.commands.erase(piece.accepted.commands.begin(), piece.accepted.commands.begin() + begun);
   // Past the end the last set holds.
@@ -138,23 +145,21 @@ tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawR
     tube.push_back(last);
     piece.accepted.commands.push_back(piece.accepted.commands.back());
   }
+  whole.insert(whole.end(), tube.begin(), tube.end());
   const std::size_t back = timed(log) ? kMostLate : 0;
   track::Inside judged;
   for (std::size_t k = 0; k < ticks.size(); ++k) {
     const log::TickRecord& tick = *ticks[k];
     const reach::TubeStep& set = tube[k];
-    const bool fits =
-        back > 0 ? passes(tube, k, back, vec(tick.center)) : (vec(tick.center) - set.center.p_W).norm() <= 1e-6;
+    const bool fits = back > 0 ? passes(whole, k + whole.size() - tube.size(), back, vec(tick.center))
+                               : (vec(tick.center) - set.center.p_W).norm() <= 1e-6;
     if (tick.judged && !fits)
       return bad("tick " + std::to_string(tick.tick) + " was judged against another set than its commands give");
     const double t = static_cast<double>(times[k]) * 1e-9;
-    if (back == 0) {
+    if (back == 0)
       judged = judged_against(vec(tick.p), set.center.p_W, set.half_widths);
-    } else if (tick.judged) {  // what was found holds until the next pose
-      PerDirection half_widths;
-      std::copy_n(tick.half_widths, kDirections, half_widths.begin());
-      judged = judged_against(vec(tick.p), vec(tick.center), half_widths);
-    }
+    else if (tick.judged)  // what was found holds until the next pose
+      judged = as_recorded(tick);
     const sim::FlightSample s = sample_of(tick, t, t_zero, truth);
     piece.samples.push_back(s);
     piece.judged.push_back(judged);

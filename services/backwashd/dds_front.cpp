@@ -65,7 +65,8 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
   waitset_.add(odometry_);
   waitset_.add(closures_);
   waitset_.add(commands_);
-  look_for_other_daemons();  // before the mission hears a command
+  waitset_.add_departures(commands_);  // or the next process's first command would find the session held
+  look_for_other_daemons();            // before the mission hears a command
 }
 
 // As it came, also where it is refused: a doubt says why, and what to set.

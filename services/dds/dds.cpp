@@ -266,6 +266,12 @@ void WaitSet::add(const detail::ReaderBase& reader) {
   checked(dds_waitset_attach(waitset_, condition, condition), "wait set");
 }
 
+void WaitSet::add_departures(const detail::ReaderBase& reader) {
+  checked(dds_set_status_mask(reader.handle(), DDS_SUBSCRIPTION_MATCHED_STATUS | DDS_LIVELINESS_CHANGED_STATUS),
+          "statuses of a reader");
+  checked(dds_waitset_attach(waitset_, reader.handle(), reader.handle()), "wait set");
+}
+
 void WaitSet::wait(double timeout_s) {
   dds_waitset_wait(waitset_, nullptr, 0, static_cast<dds_duration_t>(timeout_s * 1e9));
 }

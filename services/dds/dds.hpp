@@ -173,6 +173,8 @@ class WaitSet {
  public:
   explicit WaitSet(const Participant& participant);
   void add(const detail::ReaderBase& reader);
+  /// wait() returns as well when a writer of it has come or gone, until departed() is asked.
+  void add_departures(const detail::ReaderBase& reader);
   /// Returns when data has arrived or after `timeout_s`.
   void wait(double timeout_s);
 
