@@ -13,8 +13,6 @@ namespace backwash::firmware_bridge::test {
 namespace {
 
 using mavlink::test::operator+;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr auto kTick = 20ms;
 
 TEST_F(LinkTest, SendsNothingBeforeTheVehicleIsHeard) {
   EXPECT_FALSE(link_.send_setpoint({}, kStart));
@@ -74,7 +72,8 @@ TEST_F(LinkTest, PutsThePositionVelocityAccelerationAndYawOfASetpointOnTheWireIn
 TEST_F(LinkTest, NeverSendsAValueThatIsNotFinite) {
   introduce_vehicle();
   const double inf = std::numeric_limits<double>::infinity();
-  for (const double bad : {kNan, inf, -inf, 1e39, -1e39}) {  // the last two are finite but as floats
+  for (const double bad :
+       {static_cast<double>(kNan), inf, -inf, 1e39, -1e39}) {  // the last two are finite but as floats
     for (int i = 0; i < 10; ++i) {
       Setpoint s;
       (i < 3 ? s.p_W[i] : i < 6 ? s.v_W[i - 3] : i < 9 ? s.a_W[i - 6] : s.yaw) = bad;

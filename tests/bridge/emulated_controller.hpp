@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <limits>
 
 #include "firmware_bridge/autopilot_link.hpp"
 #include "tests/bridge/pseudo_terminal.hpp"
@@ -12,6 +13,8 @@ using namespace std::chrono_literals;
 
 inline constexpr std::uint8_t kVehicle = 42;  // system id
 inline const Time kStart = Time{} + 1000s;
+inline constexpr auto kTick = 20ms;
+inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 inline mavlink::Heartbeat px4_heartbeat(bool armed, std::uint32_t main_mode) {
   return {.custom_mode = main_mode << 16,

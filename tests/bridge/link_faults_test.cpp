@@ -12,8 +12,6 @@ namespace backwash::firmware_bridge::test {
 namespace {
 
 using mavlink::test::operator+;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr auto kTick = 20ms;
 
 TEST_F(LinkTest, NamesALostHeartbeatAfterOneAndAHalfSeconds) {
   introduce_vehicle();

@@ -13,8 +13,6 @@
 namespace backwash::firmware_bridge::test {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
 TEST_F(LinkTest, BelievesNoTelemetryBeforeTheVehiclesHeartbeat) {
   say_and_poll(mavlink::LocalPositionNed{.time_boot_ms = 1, .x = 3});
   EXPECT_FALSE(link_.telemetry().local_state);

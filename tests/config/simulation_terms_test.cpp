@@ -12,7 +12,7 @@
 namespace backwash::config {
 namespace {
 
-tl::expected<std::vector<SimulationTerm>, ConfigError> read(const std::string& text) {
+tl::expected<std::vector<SimulationTerm>, ConfigError> terms_in(const std::string& text) {
   const auto path = testing::TempDir() + "backwash_simulation_" + std::to_string(getpid()) + ".toml";
   std::ofstream(path) << text;
   auto terms = load_simulation(path);
@@ -35,7 +35,7 @@ TEST(SimulationTerms, EveryKindIsReadBackAsItWasWritten) {
   for (const SimulationKind& own : kSimulationKinds) kinds.emplace_back(own.kind);
   for (const auto& kind : kinds) {
     const auto table = simulation_table({kind, std::vector<double>(8, 0.25)});
-    const auto found = read(with(table));
+    const auto found = terms_in(with(table));
     ASSERT_TRUE(found) << table["kind"] << ": " << found.error().message;
     ASSERT_EQ(found->size(), 1u) << table["kind"];
     EXPECT_EQ(found->front().kind, kind);
@@ -51,7 +51,7 @@ TEST(SimulationTerms, AWrongEntryIsRefusedByFileLineAndWhatWouldBeRight) {
         {toml::table{{"kind", "push"}, {"value", toml::array{1.0}}}, "a list of 3"},
         {toml::table{{"kind", "thrust_lag"}, {"value", toml::array{7.0}}}, "[0, 1]"},
         {toml::table{{"kind", "thrust_lag"}, {"value", toml::array{0.1}}, {"scale", 1.0}}, "unknown key 'scale'"}}) {
-    const auto found = read(with(entry));
+    const auto found = terms_in(with(entry));
     ASSERT_FALSE(found) << said;
     EXPECT_NE(found.error().message.find(said), std::string::npos) << found.error().message;
     EXPECT_NE(found.error().message.find(".toml:"), std::string::npos) << found.error().message;

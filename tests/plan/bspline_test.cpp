@@ -4,14 +4,10 @@
 #include <random>
 
 #include "core/plan/bspline.hpp"
+#include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {
 namespace {
-
-Vec3 random_vector(std::mt19937& random, double size) {
-  std::uniform_real_distribution<double> u(-size, size);
-  return {u(random), u(random), u(random)};
-}
 
 BSpline random_spline(std::mt19937& random, std::size_t control_points, double knot_span) {
   BSpline spline{{}, knot_span};

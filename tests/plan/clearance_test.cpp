@@ -22,13 +22,13 @@ const Vehicle& vehicle() {
 double body() { return vehicle().body.radius + vehicle().estimation.position; }
 
 /// 4 × 4 × 2 m of free space at 0.1 m; outside it nothing is known.
-OccupancyGrid room() { return {Vec3::Zero(), 0.1, {40, 40, 20}, Cell::free}; }
-void fill(OccupancyGrid& grid, const Index3& low, const Index3& high, Cell cell = Cell::occupied) {
+OccupancyGrid open_room() { return {Vec3::Zero(), 0.1, {40, 40, 20}, Cell::free}; }
+void fill_voxels(OccupancyGrid& grid, const Index3& low, const Index3& high, Cell cell = Cell::occupied) {
   for (int k = low.z(); k <= high.z(); ++k)
     for (int j = low.y(); j <= high.y(); ++j)
       for (int i = low.x(); i <= high.x(); ++i) grid.set({i, j, k}, cell);
 }
-std::shared_ptr<const World> world_of(OccupancyGrid grid, std::optional<double> margin = std::nullopt) {
+std::shared_ptr<const World> world_around(OccupancyGrid grid, std::optional<double> margin = std::nullopt) {
   return build_world(std::move(grid), Model{}, vehicle(), reach::Method::tight, margin);
 }
 
@@ -49,11 +49,11 @@ reach::ReachTube tube_along(const std::vector<Vec3>& centers, double half_width 
 void expect_equal_to_each_step_by_itself(std::optional<double> margin) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> u(0, 1);
-  OccupancyGrid grid = room();
+  OccupancyGrid grid = open_room();
   for (int n = 0; n < 60; ++n)
     grid.set(grid.index({4 * u(random), 4 * u(random), 2 * u(random)}),
              u(random) < 0.5 ? Cell::occupied : Cell::unknown);
-  const auto world = world_of(grid, margin);
+  const auto world = world_around(grid, margin);
   int positive = 0;
   for (int flight = 0; flight < 60; ++flight) {
     Vec3 p(0.5 + 3 * u(random), 0.5 + 3 * u(random), 0.4 + 1.2 * u(random));
@@ -81,13 +81,13 @@ TEST(TubeClearance, WithAConstantMarginIsTheLeastOfItsStepsToo) { expect_equal_t
 
 /// A pillar whose near face is at x = 2.5, in the given layers.
 OccupancyGrid pillar(int lowest, int highest) {
-  OccupancyGrid grid = room();
-  fill(grid, {25, 19, lowest}, {26, 20, highest});
+  OccupancyGrid grid = open_room();
+  fill_voxels(grid, {25, 19, lowest}, {26, 20, highest});
   return grid;
 }
 
 TEST(LateralClearance, BesideAPillarIsTheGapLessSetBodyAndEstimation) {
-  const auto world = world_of(pillar(0, 19));
+  const auto world = world_around(pillar(0, 19));
   const auto at = [&](double x, double half_width) {
     return lateral_clearance(*world, tube_along({{x, 2, 0.6}, {x, 2, 0.6}}, half_width));
   };
@@ -97,7 +97,7 @@ TEST(LateralClearance, BesideAPillarIsTheGapLessSetBodyAndEstimation) {
       << "the set is swept to the next one";
   // Past the pillar at x = 2.3 in one step, neither end nor the middle of which is beside it.
   EXPECT_NEAR(lateral_clearance(*world, tube_along({{2.3, 0.8, 0.6}, {2.3, 2.5, 0.6}})), 0.2 - 0.05 - body(), 1e-9);
-  const auto with_margin = world_of(pillar(0, 19), 0.3);
+  const auto with_margin = world_around(pillar(0, 19), 0.3);
   EXPECT_NEAR(lateral_clearance(*with_margin, tube_along({{1.6, 2, 0.6}, {1.6, 2, 0.6}})), 0.9 - 0.3 - body(), 1e-9);
 }
 
@@ -105,16 +105,17 @@ TEST(LateralClearance, CountsTheLayersBesideBodyAndSetAndNoOthers) {
   // The body's upper edge at 0.6 + 0.05 + 0.18 = 0.83 m: layer 8.
   const auto tube = tube_along({{1.6, 2, 0.6}, {1.6, 2, 0.6}});
   const double beside = 0.9 - 0.05 - body();
-  for (const int layer : {4, 6, 8}) EXPECT_NEAR(lateral_clearance(*world_of(pillar(layer, layer)), tube), beside, 1e-9);
-  for (const int layer : {2, 9, 12}) EXPECT_NEAR(lateral_clearance(*world_of(pillar(layer, layer)), tube), 1, 1e-9);
+  for (const int layer : {4, 6, 8})
+    EXPECT_NEAR(lateral_clearance(*world_around(pillar(layer, layer)), tube), beside, 1e-9);
+  for (const int layer : {2, 9, 12}) EXPECT_NEAR(lateral_clearance(*world_around(pillar(layer, layer)), tube), 1, 1e-9);
 }
 
 TEST(LateralClearance, IsThatOfTouchingWhereTheCentreIsNotInFreeSpace) {
   for (const Cell cell : {Cell::occupied, Cell::unknown}) {
-    OccupancyGrid grid = room();
-    fill(grid, {16, 20, 10}, {16, 20, 10}, cell);
+    OccupancyGrid grid = open_room();
+    fill_voxels(grid, {16, 20, 10}, {16, 20, 10}, cell);
     const auto tube = tube_along({{1.65, 2.05, 0.6}, {1.65, 2.05, 1.05}, {1.65, 2.05, 1.05}});
-    EXPECT_NEAR(lateral_clearance(*world_of(grid), tube), -body(), 1e-9);
+    EXPECT_NEAR(lateral_clearance(*world_around(grid), tube), -body(), 1e-9);
   }
 }
 
@@ -122,21 +123,21 @@ TEST(TakeoffClearance, IsBesideItBelowTheSafeHeightAndAllAroundAboveIt) {
   std::vector<Vec3> up;
   for (int k = 0; k <= 20; ++k) up.emplace_back(1.5, 2, 0.2 + 0.05 * k);  // to 1.2 m
   const auto tube = tube_along(up, 0.05);
-  OccupancyGrid low = room();
-  fill(low, {19, 20, 0}, {19, 20, 3});  // beside it, below the safe height
+  OccupancyGrid low = open_room();
+  fill_voxels(low, {19, 20, 0}, {19, 20, 3});  // beside it, below the safe height
   // The last set below it, swept up to the next, is beside the pillar; above it the pillar's top is farther away.
-  EXPECT_NEAR(takeoff_clearance(*world_of(low), tube, 0.63), 0.4 - 0.05 - body(), 1e-9);
-  OccupancyGrid ceiling = room();
-  fill(ceiling, {13, 18, 16}, {17, 22, 16});
-  EXPECT_NEAR(takeoff_clearance(*world_of(ceiling), tube, 0.53), 1.6 - 1.2 - 0.05 - body(), 1e-9);
-  EXPECT_NEAR(takeoff_clearance(*world_of(ceiling), tube_along({up.begin(), up.begin() + 5}), 0.53), 1.0, 1e-9)
+  EXPECT_NEAR(takeoff_clearance(*world_around(low), tube, 0.63), 0.4 - 0.05 - body(), 1e-9);
+  OccupancyGrid ceiling = open_room();
+  fill_voxels(ceiling, {13, 18, 16}, {17, 22, 16});
+  EXPECT_NEAR(takeoff_clearance(*world_around(ceiling), tube, 0.53), 1.6 - 1.2 - 0.05 - body(), 1e-9);
+  EXPECT_NEAR(takeoff_clearance(*world_around(ceiling), tube_along({up.begin(), up.begin() + 5}), 0.53), 1.0, 1e-9)
       << "a tube that stays below the safe height is judged beside it";
 }
 
 TEST(TakeoffColumn, IsTheSameFromEveryHeightAboveItsFloor) {
-  OccupancyGrid grid = room();
-  fill(grid, {0, 0, 0}, {39, 39, 2});  // the floor's top at 0.3 m
-  const auto world = world_of(grid);
+  OccupancyGrid grid = open_room();
+  fill_voxels(grid, {0, 0, 0}, {39, 39, 2});  // the floor's top at 0.3 m
+  const auto world = world_around(grid);
   const auto lowest = takeoff_column(*world, {1.5, 2, 0.35});
   ASSERT_TRUE(lowest);
   EXPECT_NEAR(lowest->z_floor, 0.3, 1e-9);

@@ -9,7 +9,7 @@ namespace {
 using map::Cell;
 using map::OccupancyGrid;
 
-Vehicle vehicle() {
+Vehicle slow_loop() {
   Vehicle v;
   v.body = {0.15, 0.17, 0.06, 0.7};
   v.controller.kp = {10, 12};
@@ -32,7 +32,7 @@ std::shared_ptr<const World> room_with_door(double width, double variance) {
       if (j < 15 - half || j >= 15 + half) grid.set({30, j, k}, Cell::occupied);
   Model model;
   model.base.horizontal = model.base.vertical = variance;
-  return build_world(std::move(grid), model, vehicle());
+  return build_world(std::move(grid), model, slow_loop());
 }
 const Vec3 kStart(1.55, 1.55, 1.25), kGoal(4.55, 1.55, 1.25);
 
@@ -60,7 +60,7 @@ TEST(GainSweep, FasterGainsMakeSmallerSetsUntilDelayMakesTheLoopUnstable) {
 // Without delay, gains (f² k_p, f k_d) are the same loop f times as fast, and its response to w is 1/f² as large: where
 // the air is the same everywhere, the set of a disturbance of any course within its bound is a quarter at f = 2.
 TEST(GainSweep, WithoutDelayTwiceAsFastIsAQuarterOfTheSet) {
-  Vehicle v = vehicle();
+  Vehicle v = slow_loop();
   v.controller.latency = v.controller.feedback_delay = v.controller.attitude_lag = 0;
   v.estimation.position = 0;
   Model model;

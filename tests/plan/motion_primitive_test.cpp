@@ -5,14 +5,10 @@
 #include <random>
 
 #include "core/plan/motion_primitive.hpp"
+#include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {
 namespace {
-
-Vec3 random_vector(std::mt19937& random, double size) {
-  std::uniform_real_distribution<double> u(-size, size);
-  return {u(random), u(random), u(random)};
-}
 
 Motion random_motion(std::mt19937& random) {
   return {{random_vector(random, 1), random_vector(random, 1), random_vector(random, 1), random_vector(random, 1)},

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "core/plan/planner.hpp"
+#include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -25,13 +26,6 @@ Model short_ranged_model() {
   m.ground.l_max = m.ground.l_footprint_max = m.corner.l_max = m.wall.l_max = 0.5;
   m.wall.k1 = {1.0, 0.4, 0.4};
   return m;
-}
-
-void fill(OccupancyGrid& grid, const Vec3& low, const Vec3& high, Cell cell) {
-  const Index3 a = grid.index(low + Vec3::Constant(1e-6)), b = grid.index(high - Vec3::Constant(1e-6));
-  for (int k = a.z(); k <= b.z(); ++k)
-    for (int j = a.y(); j <= b.y(); ++j)
-      for (int i = a.x(); i <= b.x(); ++i) grid.set({i, j, k}, cell);
 }
 
 /// Free room 0…6 × 0…4 × 0…1.6 m, walled on all sides, with a 0.1 m wall at x = 3 that leaves y > gap_from open.

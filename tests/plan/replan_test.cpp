@@ -5,19 +5,13 @@
 
 #include "core/config/config.hpp"
 #include "core/sim/flight.hpp"
+#include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {
 namespace {
 
 using map::Cell;
 using map::OccupancyGrid;
-
-void fill(OccupancyGrid& grid, const Vec3& low, const Vec3& high, Cell cell) {
-  const Index3 a = grid.index(low + Vec3::Constant(1e-6)), b = grid.index(high - Vec3::Constant(1e-6));
-  for (int k = a.z(); k <= b.z(); ++k)
-    for (int j = a.y(); j <= b.y(); ++j)
-      for (int i = a.x(); i <= b.x(); ++i) grid.set({i, j, k}, cell);
-}
 
 /// Room 0…6 × 0…4 × 0…1.8 m with a 0.1 m wall at x = 3 that leaves y > 2.6 open: the straight way is a dead end.
 OccupancyGrid truth() {

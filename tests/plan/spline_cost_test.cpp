@@ -5,6 +5,7 @@
 
 #include "core/plan/bspline_optimizer.hpp"
 #include "core/plan/planner.hpp"
+#include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -20,11 +21,6 @@ Vehicle test_vehicle(double latency, double attitude_lag, double feedback_delay 
   v.limits = {1.5, 2};
   v.initial_error = {0.02, 0.05};
   return v;
-}
-
-Vec3 random_vector(std::mt19937& random, double size) {
-  std::uniform_real_distribution<double> u(-size, size);
-  return {u(random), u(random), u(random)};
 }
 
 TEST(CentreResponse, BasisEqualsThePredictionOfAMovedControlPoint) {

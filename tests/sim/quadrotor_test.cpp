@@ -7,11 +7,10 @@
 
 #include "core/config/config.hpp"
 #include "core/reach/error_dynamics.hpp"
+#include "tests/sim/five_inch.hpp"
 
 namespace backwash::sim {
 namespace {
-
-Vehicle five_inch() { return config::load_vehicle("builtin:quad-5in").value(); }
 
 const State kStart{.p_W = Vec3(1, 2, 1.5), .v_W = Vec3::Zero()};
 

@@ -7,6 +7,7 @@
 
 #include "core/config/config.hpp"
 #include "core/sim/setpoint_flight.hpp"
+#include "tests/sim/five_inch.hpp"
 
 namespace backwash::sim {
 namespace {
@@ -23,8 +24,6 @@ map::OccupancyGrid room() {
   }
   return grid;
 }
-
-Vehicle five_inch() { return config::load_vehicle("builtin:quad-5in").value(); }
 
 AirTerms::Now now(const Terms& terms, const FlightInstant& flying) {
   static const auto grid = room();

@@ -21,7 +21,7 @@ using Kind = HiddenStructure::Kind;
 using Quantity = HiddenStructure::Quantity;
 using Where = HiddenStructure::Where;
 
-std::filesystem::path folder() {
+std::filesystem::path own_folder() {
   return std::filesystem::temp_directory_path() / ("study-structures-" + std::to_string(::getpid()));
 }
 
@@ -34,15 +34,15 @@ Seen world_with(const HiddenStructure& structure, double size, std::uint64_t see
   auto world = study_worlds::draw_world({seed, {"unknown"}, size, 12, ""});
   world.effects.structure = structure;
   const auto flights = study_worlds::fly_all(world);
-  Seen seen{study_worlds::observe(world, flights, folder()), 0};
+  Seen seen{study_worlds::observe(world, flights, own_folder()), 0};
   seen.explained = study_worlds::explained(seen.observations, flights);
-  std::filesystem::remove_all(folder());
+  std::filesystem::remove_all(own_folder());
   return seen;
 }
 
 Observations quiet(std::uint64_t seed = 4711) {
-  auto seen = study_worlds::observe(study_worlds::draw_world({seed, {}, 1, 12, ""}), folder());
-  std::filesystem::remove_all(folder());
+  auto seen = study_worlds::observe(study_worlds::draw_world({seed, {}, 1, 12, ""}), own_folder());
+  std::filesystem::remove_all(own_folder());
   return seen;
 }
 

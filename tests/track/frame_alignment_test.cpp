@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/track/frame_alignment.hpp"
+#include "tests/track/frames.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,16 +11,6 @@
 
 namespace backwash::track {
 namespace {
-
-// The truth of the test: an isometry built by Eigen, applied to a vehicle that hovers with some noise.
-struct Frames {
-  Eigen::Isometry3d local_from_map;
-  double yaw;
-  Frames(double yaw_offset, const Vec3& t) : local_from_map(Eigen::Isometry3d::Identity()), yaw(yaw_offset) {
-    local_from_map.rotate(Eigen::AngleAxisd(yaw_offset, Vec3::UnitZ())).pretranslate(t);
-  }
-  FramePose local(const FramePose& map) const { return {local_from_map * map.p, map.yaw + yaw}; }
-};
 
 TEST(FrameAlignment, FindsYawAndTranslationAcrossTheWrap) {
   std::mt19937_64 rng(1);

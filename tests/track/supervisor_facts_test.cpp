@@ -5,19 +5,12 @@
 #include <functional>
 
 #include "core/track/supervisor.hpp"
+#include "tests/track/healthy.hpp"
 
 namespace backwash::track {
 namespace {
 
 using Change = std::function<void(SupervisorInput&)>;
-
-SupervisorInput healthy() {
-  SupervisorInput in;
-  in.odometry_age = 0.01;
-  in.heartbeat_age = 0.5;
-  in.armed = in.offboard = in.frames_aligned = true;
-  return in;
-}
 
 /// Enabled on the ground, disarmed and not yet followed.
 Supervisor enabling() {
@@ -29,7 +22,7 @@ Supervisor enabling() {
   return s;
 }
 
-Supervisor flying() {
+Supervisor flying_after_takeoff() {
   Supervisor s = enabling();
   EXPECT_EQ(s.step(healthy()).mode, Mode::tracking);
   s.step(healthy());
@@ -71,9 +64,9 @@ TEST(SupervisorFacts, EachEndsTrackingInItsOwnWay) {
       {Mode::hold, Reason::outside_map, [](auto& in) { in.outside_map = true; }},
       {Mode::hold, Reason::map_late, [](auto& in) { in.map_late = true; }},
   };
-  EXPECT_EQ(after(flying(), [](auto&) {}).mode, Mode::tracking);
+  EXPECT_EQ(after(flying_after_takeoff(), [](auto&) {}).mode, Mode::tracking);
   for (const auto& row : rows) {
-    const auto out = after(flying(), row.change);
+    const auto out = after(flying_after_takeoff(), row.change);
     EXPECT_EQ(out.mode, row.mode) << to_string(row.reason);
     EXPECT_EQ(out.reason, row.reason) << to_string(row.reason);
   }
@@ -92,7 +85,7 @@ TEST(SupervisorFacts, WhatSpeaksAgainstThePoseFreezesTheSetPointAndNothingElseDo
       {false, [](auto& in) { in.obstacle_ahead = true; }}, {false, [](auto& in) { in.autopilot_reset = true; }},
   };
   for (const auto& row : rows) {
-    const auto out = after(flying(), row.change);
+    const auto out = after(flying_after_takeoff(), row.change);
     EXPECT_EQ(out.mode, Mode::hold);
     EXPECT_EQ(out.freeze, row.freezes) << to_string(out.reason);
   }
@@ -102,7 +95,7 @@ TEST(SupervisorFacts, AHoldLandsByOrderAndOnALowBattery) {
   const std::pair<Reason, Change> rows[] = {{Reason::land_requested, [](auto& in) { in.request = Request::land; }},
                                             {Reason::battery_low, [](auto& in) { in.battery_low = true; }}};
   for (const auto& [reason, change] : rows) {
-    Supervisor s = flying();
+    Supervisor s = flying_after_takeoff();
     SupervisorInput stop = healthy();
     stop.request = Request::stop;
     EXPECT_EQ(s.step(stop).mode, Mode::hold);
@@ -114,7 +107,7 @@ TEST(SupervisorFacts, AHoldLandsByOrderAndOnALowBattery) {
 
 /// A take-off was accepted a tick ago, and the motors run.
 Supervisor lifting() {
-  Supervisor s = flying();
+  Supervisor s = flying_after_takeoff();
   SupervisorInput in = healthy();
   in.armed = false;
   EXPECT_EQ(s.step(in).mode, Mode::passive) << "nobody flies yet";
@@ -245,7 +238,7 @@ TEST(SupervisorFacts, FramesThatAreNotAlignedSendNothingAndAreNotFollowed) {
 TEST(SupervisorFacts, ADisableLetsGoOnlyOfAVehicleThatStands) {
   SupervisorInput in = healthy();
   in.request = Request::disable;
-  EXPECT_EQ(flying().step(in).mode, Mode::hold) << "armed: it may fly";
+  EXPECT_EQ(flying_after_takeoff().step(in).mode, Mode::hold) << "armed: it may fly";
   in.armed = false;
   in.arming = true;
   Supervisor s = enabling();
@@ -258,14 +251,14 @@ TEST(SupervisorFacts, ADisableLetsGoOnlyOfAVehicleThatStands) {
 }
 
 TEST(SupervisorFacts, LandIsAskedForTwiceAndNeverOfAPilot) {
-  Supervisor s = flying();
+  Supervisor s = flying_after_takeoff();
   SupervisorInput in = healthy();
   in.request = Request::land;
   int asked = s.step(in).request_land;
   in.request = Request::none;
   for (int tick = 0; tick < 40; ++tick) asked += s.step(in).request_land;
   EXPECT_EQ(asked, 2);
-  Supervisor left = flying();
+  Supervisor left = flying_after_takeoff();
   in.request = Request::land;
   EXPECT_TRUE(left.step(in).request_land);
   in.request = Request::none;
@@ -275,7 +268,7 @@ TEST(SupervisorFacts, LandIsAskedForTwiceAndNeverOfAPilot) {
 
 // Row 24: an operator who enables again on a low battery is not landed again.
 TEST(SupervisorFacts, ALowBatteryLandsOnce) {
-  Supervisor s = flying();
+  Supervisor s = flying_after_takeoff();
   SupervisorInput in = healthy();
   in.battery_low = true;
   EXPECT_EQ(s.step(in).mode, Mode::land);

@@ -10,17 +10,10 @@
 #include <string>
 
 #include "core/types/geometry.hpp"
+#include "tests/track/healthy.hpp"
 
 namespace backwash::track {
 namespace {
-
-SupervisorInput healthy() {
-  SupervisorInput in;
-  in.odometry_age = 0.01;
-  in.heartbeat_age = 0.5;
-  in.armed = in.offboard = in.frames_aligned = true;
-  return in;
-}
 
 // A supervisor that an operator enabled and the autopilot follows.
 Supervisor flying() {

@@ -4,15 +4,10 @@
 #include <numbers>
 
 #include "core/track/tracker.hpp"
+#include "tests/track/first_set.hpp"
 
 namespace backwash::track {
 namespace {
-
-Vehicle vehicle() {
-  Vehicle v;
-  v.initial_error = {0.1, 0.5};
-  return v;
-}
 
 AcceptedSegment along_x(std::uint64_t id) {
   AcceptedSegment s;
@@ -32,19 +27,19 @@ TEST(TrackerLimits, ASegmentHasASetForEachCommandAndOneForItsEnd) {
   for (const int more : {-1, 1}) {
     AcceptedSegment s = along_x(1);
     s.tube.resize(s.tube.size() + static_cast<std::size_t>(more));
-    EXPECT_FALSE(Tracker({}, vehicle()).accept(s, kStart)) << more;
+    EXPECT_FALSE(Tracker({}, first_set()).accept(s, kStart)) << more;
   }
   AcceptedSegment empty;
   empty.id = 1;
   empty.tube.resize(1);
   empty.tube[0].center = kStart;
-  EXPECT_FALSE(Tracker({}, vehicle()).accept(empty, kStart));
+  EXPECT_FALSE(Tracker({}, first_set()).accept(empty, kStart));
 }
 
 TEST(TrackerLimits, ASegmentContinuesTheOneThatIsFlownAndNoOther) {
   const AcceptedSegment flown = along_x(1);
   for (const std::uint64_t continued : {1u, 2u}) {
-    Tracker tracker({}, vehicle());
+    Tracker tracker({}, first_set());
     ASSERT_TRUE(tracker.accept(flown, kStart));
     for (int n = 0; n < 20; ++n) tracker.step();
     AcceptedSegment on = along_x(3);
@@ -57,7 +52,7 @@ TEST(TrackerLimits, ASegmentContinuesTheOneThatIsFlownAndNoOther) {
 
 TEST(TrackerLimits, ASegmentOfAnotherMapFrameIsRefused) {
   AcceptedSegment s = along_x(1);
-  Tracker tracker({}, vehicle());
+  Tracker tracker({}, first_set());
   tracker.rebase({}, 3);
   EXPECT_FALSE(tracker.accept(s, kStart));
   s.closures = 3;
@@ -67,7 +62,7 @@ TEST(TrackerLimits, ASegmentOfAnotherMapFrameIsRefused) {
 TEST(TrackerLimits, TheClearanceIsThatOfTheSecondThatIsFlownNow) {
   AcceptedSegment s = along_x(1);
   s.clearance = 0.05;
-  Tracker tracker({}, vehicle());
+  Tracker tracker({}, first_set());
   ASSERT_TRUE(tracker.accept(s, kStart));
   EXPECT_EQ(tracker.clearance(), 0.05) << "without more, the least of all";
   s.clearance_ahead = {0.1, 0.3, 0.9};
@@ -78,7 +73,7 @@ TEST(TrackerLimits, TheClearanceIsThatOfTheSecondThatIsFlownNow) {
 // A quarter turn of the map: what was an error along the wide x of the sets is one along the new y.
 TEST(TrackerLimits, AfterALoopClosureTheErrorIsJudgedAlongTheSetsOwnDirections) {
   const AcceptedSegment s = along_x(1);
-  Tracker tracker({}, vehicle());
+  Tracker tracker({}, first_set());
   ASSERT_TRUE(tracker.accept(s, kStart));
   const RigidShift D{std::numbers::pi / 2, {5, 6, 7}};
   tracker.rebase(D, 1);
@@ -98,7 +93,7 @@ TEST(TrackerLimits, AfterALoopClosureTheErrorIsJudgedAlongTheSetsOwnDirections) 
 // What is planned after a loop closure is in the map as it is now: it must not be moved by it once more.
 TEST(TrackerLimits, ASegmentOfTheNewMapFrameIsFlownWhereItWasPlanned) {
   const AcceptedSegment before = along_x(1);
-  Tracker tracker({}, vehicle());
+  Tracker tracker({}, first_set());
   ASSERT_TRUE(tracker.accept(before, kStart));
   const RigidShift D{0.5, {5, 6, 7}};
   tracker.rebase(D, 1);

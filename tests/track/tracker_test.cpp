@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tests/support/allocations.hpp"
+#include "tests/track/first_set.hpp"
 
 namespace backwash::track {
 namespace {
@@ -28,13 +29,6 @@ AcceptedSegment segment(int n) {
   return s;
 }
 
-/// First set of 0.1 m and 0.5 m/s.
-Vehicle vehicle() {
-  Vehicle v;
-  v.initial_error = {0.1, 0.5};
-  return v;
-}
-
 /// Where the segments start.
 const State kAtStart{Vec3(0, 0, 1), Vec3::Zero()};
 
@@ -48,14 +42,14 @@ void expect_rest(const Setpoint& s, const Vec3& p_W, double yaw) {
 }
 
 TEST(Tracker, HoldsAtRestBeforeTheFirstSegment) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   EXPECT_TRUE(tracker.finished());
   for (int i = 0; i < 3; ++i) expect_rest(tracker.step(), Vec3(-1, -2, 3), 0.5);
   EXPECT_TRUE(tracker.judge(Vec3(9, 9, 9)).inside);  // nothing was claimed
 }
 
 TEST(Tracker, GivesOneCommandATickThenHoldsTheLastAtRest) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   const auto s4 = segment(4);
   ASSERT_TRUE(tracker.accept(s4, kAtStart));
   for (int k = 0; k < 4; ++k) {
@@ -70,7 +64,7 @@ TEST(Tracker, GivesOneCommandATickThenHoldsTheLastAtRest) {
 }
 
 TEST(Tracker, JudgesAgainstTheSetOfTheTick) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   const auto s4 = segment(4);
   ASSERT_TRUE(tracker.accept(s4, kAtStart));
   for (int k = 0; k <= 4; ++k) {
@@ -86,7 +80,7 @@ TEST(Tracker, JudgesAgainstTheSetOfTheTick) {
 }
 
 TEST(Tracker, HoldsTheIntervalOfTheLastSetPastTheEnd) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   const auto s4 = segment(4);
   ASSERT_TRUE(tracker.accept(s4, kAtStart));
   for (int i = 0; i < 5; ++i) tracker.step();
@@ -103,7 +97,7 @@ TEST(Tracker, EveryDirectionCanPutItOutside) {
     const Vec3 n = unit(static_cast<Direction>(d));
     auto s = segment(1);
     for (std::size_t other = 0; other < kDirections; ++other) s.tube[0].half_widths[other] = other == d ? 0.1 : 10;
-    Tracker tracker(start(), vehicle());
+    Tracker tracker(start(), first_set());
     ASSERT_TRUE(tracker.accept(s, kAtStart));
     for (const double side : {-1.0, 1.0}) {
       EXPECT_TRUE(tracker.judge(Vec3(0, 0, 1) + side * 0.099 * n).inside);
@@ -114,14 +108,14 @@ TEST(Tracker, EveryDirectionCanPutItOutside) {
 }
 
 TEST(Tracker, AMeasurementThatIsNoNumberIsNotInside) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   const auto s1 = segment(1);
   ASSERT_TRUE(tracker.accept(s1, kAtStart));
   EXPECT_FALSE(tracker.judge(Vec3(0, 0, std::numeric_limits<double>::quiet_NaN())).inside);
 }
 
 TEST(Tracker, ANewSegmentTakesOverAtTheNextStep) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   const auto s4 = segment(4);
   ASSERT_TRUE(tracker.accept(s4, kAtStart));
   tracker.step();
@@ -135,7 +129,7 @@ TEST(Tracker, ANewSegmentTakesOverAtTheNextStep) {
 }
 
 TEST(Tracker, NeitherStepNorJudgeAllocates) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   const auto s50 = segment(50);
   ASSERT_TRUE(tracker.accept(s50, kAtStart));
   bool inside = true;
@@ -145,14 +139,14 @@ TEST(Tracker, NeitherStepNorJudgeAllocates) {
       tracker.step();
     }
   };
-  EXPECT_EQ(test::allocations_during(fly), 0);
+  EXPECT_EQ(backwash::test::allocations_during(fly), 0);
   EXPECT_TRUE(inside);
   // The trap works: what is not real-time is counted.
-  EXPECT_GT(test::allocations_during([] { segment(2); }), 0);
+  EXPECT_GT(backwash::test::allocations_during([] { segment(2); }), 0);
 }
 
 TEST(Tracker, RefusesASegmentThatStartsElsewhereThanTheVehicleIs) {
-  Tracker tracker(start(), vehicle());
+  Tracker tracker(start(), first_set());
   const auto s = segment(4);
   const auto moved = [](double dx, double dv) { return State{Vec3(dx, 0, 1), Vec3(0, dv, 0)}; };
   // The ellipsoid of the first set: half axes 0.1 m and 0.5 m/s.
@@ -172,7 +166,7 @@ TEST(Tracker, AContinuedSegmentTakesOverWhereItBranchesAndNotLater) {
   next.commands[2].p_W.y() = 5;
   const auto s4 = segment(4);
   for (const int flown : {0, 1, 2, 3}) {
-    Tracker tracker(start(), vehicle());
+    Tracker tracker(start(), first_set());
     EXPECT_FALSE(tracker.accept(next, kAtStart));  // there is nothing to continue
     ASSERT_TRUE(tracker.accept(s4, kAtStart));
     for (int k = 0; k < flown; ++k) tracker.step();
