@@ -20,6 +20,7 @@ struct TermKind {
 const std::vector<TermKind>& kinds() {
   static const std::vector<TermKind> all = [] {
     std::vector<TermKind> made;
+    made.reserve(std::size(kSimulationKinds) + std::size(kLaws));
     for (const SimulationKind& own : kSimulationKinds)
       made.push_back({own.name, own.kind, {own.numbers.begin(), own.numbers.end()}});
     for (const LawEntry& law : kLaws) {

@@ -21,8 +21,8 @@ FlightMark::FlightMark(const FlightLog& log) {
 }
 
 double FlightMark::shared(const FlightMark& other) const {
-  const auto& [fewer, more] =
-      std::minmax(positions_, other.positions_, [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  const bool ours = positions_.size() <= other.positions_.size();
+  const auto &fewer = ours ? positions_ : other.positions_, &more = ours ? other.positions_ : positions_;
   if (fewer.size() < kLeast) return 0;
   const auto both = std::ranges::count_if(fewer, [&](std::size_t p) { return more.contains(p); });
   return static_cast<double>(both) / static_cast<double>(fewer.size());

@@ -33,6 +33,10 @@ struct Decision {
   }
 };
 
+// clang 14 does not deduce it from the aggregate's initializers.
+template <typename Member, typename Source>
+Decision(const char*, Member TickRecord::*, Source) -> Decision<Member, Source>;
+
 /// Bits of TickRecord::asked.
 inline std::uint32_t asked(const track::TickOutput& out) noexcept {
   const auto bit = [](bool set, std::uint32_t flag) { return set ? flag : 0; };

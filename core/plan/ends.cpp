@@ -69,7 +69,7 @@ reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& mod
 std::optional<std::string> why_blocked(const map::OccupancyGrid& grid, const Model& model,
                                        const reach::Reachability& reach, std::optional<double> constant_margin,
                                        const Vec3& p_W, double least_clearance) {
-  if (const auto why = why_not_free(grid, p_W)) return why;
+  if (auto why = why_not_free(grid, p_W)) return why;
   if (constant_margin || !model.extension.empty()) return std::nullopt;
   for (double within = kFirstReach; within < kMostReach; within *= 2) {
     const auto set = set_from_around(grid, model, reach, p_W, within);
@@ -82,7 +82,7 @@ std::optional<std::string> why_blocked(const map::OccupancyGrid& grid, const Mod
 }  // namespace
 
 std::optional<std::string> why_blocked(const World& world, const Vec3& p_W, double least_clearance) {
-  if (const auto why = why_not_free(world.grid, p_W)) return why;
+  if (auto why = why_not_free(world.grid, p_W)) return why;
   const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin);
   return why_not_clear(set, p_W, least_clearance);
 }

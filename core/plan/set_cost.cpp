@@ -178,6 +178,7 @@ void add_comparison(const World& world, std::size_t n, std::vector<AgainstMargin
 std::vector<AgainstMargin> set_against_margins(const World& world, const std::vector<double>& margins_m,
                                                const Parallel& parallel) {
   std::vector<AgainstMargin> result;
+  result.reserve(margins_m.size());
   for (const double margin : margins_m) result.push_back({margin});
   for (const auto& layer : by_layers(world, parallel, result, add_comparison)) {
     for (std::size_t n = 0; n < result.size(); ++n) {

@@ -70,7 +70,7 @@ double lateral_clearance(const World& world, const reach::ReachTube& tube) {
           if (grid.free({i, j, k})) continue;
           // Largest separation along the octagon's normals: its sign is exact, its value never too large.
           const Vec3 to_voxel = grid.center({i, j, k}) - middle;
-          double gap = -INFINITY;
+          double gap = -std::numeric_limits<double>::infinity();
           for (const Direction d : {kX, kY, kXyPlus, kXyMinus}) {
             const Vec3 n_d = unit(d);
             gap = std::max(gap, std::abs(n_d.dot(to_voxel)) - h[d] - a / 2 * (std::abs(n_d.x()) + std::abs(n_d.y())));

@@ -18,7 +18,7 @@ void SupportGroup<Lanes>::look_up_initial(std::size_t first) noexcept {
   using Phases = Eigen::Array<double, kPhases, 1>;
   const auto& r_p = response_->from_position;
   const auto& r_v = response_->from_velocity;
-  if (first >= r_p.size() + 2 * kPhases) return;  // all of them are the tails already
+  if (first >= r_p.size() + 2UL * kPhases) return;  // all of them are the tails already
   Phases p, v;
   if (first + kPhases <= r_p.size()) {
     p = Eigen::Map<const Phases>(r_p.data() + first);

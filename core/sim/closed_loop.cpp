@@ -100,9 +100,8 @@ std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds) {
 log::FlightLog to_log(const std::vector<FlightSample>& samples, bool rotors) {
   log::FlightLog log;
   const auto add = [&](const std::string& prefix, const std::string& unit, const Vec3& value) {
-    for (int axis = 0; axis < 3; ++axis) {
-      log.columns[prefix + std::string("xyz")[static_cast<std::size_t>(axis)] + unit].push_back(value[axis]);
-    }
+    for (int axis = 0; axis < 3; ++axis)
+      log.columns[std::string(prefix).append(1, "xyz"[axis]).append(unit)].push_back(value[axis]);
   };
   for (const auto& s : samples) {
     log.t_s.push_back(s.t);

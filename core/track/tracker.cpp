@@ -160,7 +160,7 @@ Setpoint Tracker::step() noexcept {
     next_ = segment_ ? end() + 1 : 1;  // past the tube's last entry
     return hold_;
   }
-  const Setpoint now = shift_.setpoint(command(next_++));
+  Setpoint now = shift_.setpoint(command(next_++));
   hold_ = at_rest(now);
   return now;
 }

@@ -105,6 +105,7 @@ Contrasts contrasts(const Regression& fit, const std::vector<std::pair<Eigen::In
   const auto ratios = [&](const std::vector<double>& times) {
     const VectorXd beta = fit.fit(lambda, times);
     std::vector<double> all;
+    all.reserve(wanted.size());
     for (const auto& [column, span] : wanted) all.push_back(std::exp(span * beta[column]));
     return all;
   };
@@ -126,7 +127,8 @@ Contrasts contrasts(const Regression& fit, const std::vector<std::pair<Eigen::In
     std::sort(x.begin(), x.end());
     const auto n = static_cast<double>(x.size() - 1);
     all.ratios.push_back(
-        {value[k], {x[static_cast<std::size_t>(kTail * n)], x[static_cast<std::size_t>((1 - kTail) * n + 0.5)]}});
+        {value[k],
+         {x[static_cast<std::size_t>(kTail * n)], x[static_cast<std::size_t>(std::lround((1 - kTail) * n))]}});
   }
   return all;
 }

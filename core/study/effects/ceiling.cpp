@@ -82,7 +82,7 @@ Effect ceiling() {
           .axis = {"gap to the ceiling, m", false, [](auto& w) { return w.around.ceiling_gap; }},
           .manoeuvres = {{"hover 0.25, 0.5 and 1 m below the ceiling, high above the floor",
                           [](WindowRow& w, double s) {
-                            w.around = {2.0, 0.25 * std::pow(2, std::floor(2.999 * s)), {}};
+                            w.around = {{2.0, 0.25 * std::pow(2, std::floor(2.999 * s)), {}}};
                           }},
                          {"a spot without ceiling, then the same height under one",
                           [](WindowRow& w, double s) { w.around.ceiling_gap = s < 0.5 ? kNoSurface : 0.3; }}}};

@@ -39,7 +39,7 @@ Effect ground_thrust() {
       .axis = {"height over the surface, m", false, [](auto& w) { return w.around.height; }},
       .manoeuvres = {{"hover at three heights, 0.3, 0.8 and 1.3 m over the floor, away from walls and ceiling",
                       [](WindowRow& w, double s) {
-                        w.around = {0.3 + 0.5 * std::floor(2.999 * s), 2.0, {}};
+                        w.around = {{0.3 + 0.5 * std::floor(2.999 * s), 2.0, {}}};
                         w.p_W.z() = w.around.height;
                       }}}};
 }

@@ -90,6 +90,7 @@ void describe(FlightOutcome& outcome, const std::vector<reach::HoverSet>& sets) 
 
 std::vector<reach::HoverSet> sets_at(const plan::World& world, const std::vector<Vec3>& places) {
   std::vector<reach::HoverSet> sets;
+  sets.reserve(places.size());
   for (const Vec3& p : places)
     sets.push_back(reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p));
   return sets;

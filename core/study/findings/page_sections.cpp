@@ -87,7 +87,7 @@ tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& v
             "1 lc rgb '#888888'\n"
          << "plot " << 100 * v.minimum << " with lines dt 2 lw 2 lc rgb '#c0561d' title 'named four times in five', "
          << "$each using 1:2:3:4 with yerrorbars lw 2 pt 7 lc rgb '#1f6f9f' title 'if this rotor alone, 95 %'\n";
-  const auto drawn = report::draw(script.str(), report::Format::svg, 860, 300);
+  auto drawn = report::draw(script.str(), report::Format::svg, 860, 300);
   if (!drawn) return drawn;
   return "<section><h2>Rotors against sound flights</h2>\n<p>" + report::escaped(rotor_sentence(v)) + "</p>\n" +
          *drawn + "<table>\n" +

@@ -107,7 +107,7 @@ tl::expected<std::string, report::PlotError> residual_section(const Observations
     const auto b = channel_error(measured, before, c), a = channel_error(measured, after, c);
     if (!b || !a || static_cast<double>(b->windows) < kRules.fewest_compared) continue;
     table += row(channel_name(c), number(b->value) + " → " + number(a->value));
-    const auto drawn = picture(measured, before, after, c);
+    auto drawn = picture(measured, before, after, c);
     if (!drawn) return drawn;
     pictures += *drawn;
   }

@@ -228,7 +228,8 @@ std::string limits_sections(const StudyResult& result, const Observations& seen)
       "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
   if (result.minimum_detectable.empty()) page += row("Not computed, or none would show", "");
   for (const auto& [cause, sizes] : result.minimum_detectable)
-    for (const auto& [parameter, size] : sizes) page += row(cause + ", " + parameter, number(size));
+    for (const auto& [parameter, size] : sizes)
+      page += row(std::string(cause).append(", ").append(parameter), number(size));
   page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
   for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
   page += "</table>\n</section>\n";

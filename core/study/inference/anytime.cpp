@@ -100,7 +100,7 @@ double FlightScores::log_bayes_factor(const SmallVector& off) const {
 
 SmallVector off_no_effect(const Form& form, const SmallVector& theta, const SmallMatrix& information,
                           const SmallMatrix& size) {
-  const SmallVector none = SmallVector::Zero(theta.size());
+  SmallVector none = SmallVector::Zero(theta.size());
   if (form.one_sided && theta[0] <= 0) return none;
   double least = form.least;
   const bool first_alone = form.integer_scale && form.one_sided;

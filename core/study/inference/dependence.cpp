@@ -194,7 +194,7 @@ std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std
       if (!(phi.squaredNorm() > kRules.constant_regressor)) continue;  // constant within every flight
       const auto test = turn_test(phi, psi, rows.first, draws, static_cast<int>(kRules.enough_turns), seed);
       all.push_back({along.name, name, test.hsic, test.p, 1, false}), p.push_back(test.p);
-      twice.push_back(test.p <= level && in_both_halves(phi, psi, rows.first, seed));
+      twice.push_back(test.p <= level && in_both_halves(phi, psi, rows.first, seed) ? 1 : 0);
     }
   }
   const auto corrected = holm(p);

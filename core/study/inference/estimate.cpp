@@ -27,6 +27,7 @@ std::vector<Scale> fine_scales(const Form& form, const Scale& at) {
   const double beyond = kRules.beyond_scales;
   const double low = std::log(form.scales.front().value / beyond), high = std::log(form.scales.back().value * beyond);
   std::vector<Scale> scales;
+  scales.reserve(kFine);
   for (int i = 0; i < kFine; ++i)
     scales.push_back({std::exp(low + (high - low) * i / (kFine - 1)), at.offset_W, at.anchor});
   return scales;

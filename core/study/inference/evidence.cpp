@@ -44,6 +44,7 @@ std::vector<double> NormalEquations::gain_per_flight() const {
 NormalEquations Evidence::normal(const std::vector<DesignColumn>& columns,
                                  const std::vector<DesignColumn>& nuisance) const {
   std::vector<const DesignColumn*> joint;
+  joint.reserve(nuisance.size() + columns.size());
   for (const auto& c : nuisance) joint.push_back(&c);
   for (const auto& c : columns) joint.push_back(&c);
   const auto q = static_cast<Eigen::Index>(nuisance.size()), p = static_cast<Eigen::Index>(columns.size());

@@ -205,6 +205,7 @@ DesignColumn Evidence::residual(const std::vector<DesignColumn>& columns) const 
   DesignColumn residual = y_;
   if (columns.empty()) return residual;
   std::vector<const DesignColumn*> pointers;
+  pointers.reserve(columns.size());
   for (const auto& c : columns) pointers.push_back(&c);
   const auto p = static_cast<Eigen::Index>(columns.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p + 1, p + 1);

@@ -50,9 +50,10 @@ void Observer::look_along(WindowRow& row, SampleRange w, const std::vector<Vec3>
   for (std::size_t k = 0; k < kPoints && !still && surroundings_.has_map(); ++k)
     row.path.push_back(surroundings_.around(at(k)));
   for (std::size_t n = 0; n < row.ln_sigma_moved.size(); ++n) {
-    constexpr double kMiddle = (kOffsetsAside - 1) / 2;
-    const Vec3 offset_W = kOffsetStep * Vec3(static_cast<double>(n / kOffsetsAside) - kMiddle,
-                                             static_cast<double>(n % kOffsetsAside) - kMiddle, 0);
+    constexpr std::size_t kMiddle = (kOffsetsAside - 1) / 2;
+    const std::size_t x = n / kOffsetsAside, y = n % kOffsetsAside;
+    const Vec3 offset_W = kOffsetStep * (Vec3(static_cast<double>(x), static_cast<double>(y), 0) -
+                                         Vec3(static_cast<double>(kMiddle), static_cast<double>(kMiddle), 0));
     row.ln_sigma_moved[n] = (along(offset_W).array() / row.sigma.array())
                                 .log()
                                 .max(-kWindowRules.offset_limit)

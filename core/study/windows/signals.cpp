@@ -83,7 +83,7 @@ std::pair<double, double> powers(const std::vector<double>& x, std::span<const d
   double at = 0, beside = 0;
   for (std::size_t b = 0; b < blocks; ++b) {
     Complex own = 0;
-    std::array<Complex, 2 * kBeside> detunings{};
+    std::array<Complex, 2UL * kBeside> detunings{};
     for (std::size_t i = b * x.size() / blocks; i < (b + 1) * x.size() / blocks; ++i) {
       const Complex line = std::polar(x[i], harmonic * phase[i + 1]),
                     hz = std::polar(1.0, 2 * std::numbers::pi * t[i + 1]);

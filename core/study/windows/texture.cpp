@@ -83,6 +83,7 @@ std::vector<double> tails(const std::vector<Fourth>& windows) {
   for (const auto& w : windows) mean.at_once += w.at_once / n, mean.apart += w.apart / n;
   if (!(mean.at_once > 0) || !(mean.apart > 0)) return {};
   std::vector<double> y;
+  y.reserve(windows.size());
   for (const auto& w : windows)
     y.push_back(std::log(mean.at_once / mean.apart) + w.at_once / mean.at_once - w.apart / mean.apart);
   return y;
