@@ -76,10 +76,10 @@ Json to_json(const Campaign& campaign, const Options& options) {
     json["height_effect"] = {
         {"low_m", h.low_m},     {"high_m", h.high_m},   {"variance_ratio_z", to_json(h.low_over_high)},
         {"windows", h.windows}, {"flights", h.flights}, {"days", h.days}};
-    if (h.ceiling.value > 0)
+    if (h.ceiling)
       json["lacking"] = Json::array({{{"name", "ceiling"},
                                       {"why", "the model has no term for a surface above the vehicle"},
-                                      {"variance_ratio_z", to_json(h.ceiling)}}});
+                                      {"variance_ratio_z", to_json(*h.ceiling)}}});
   }
   return json;
 }

@@ -81,8 +81,8 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
 }
 
 void print_text(const char* of, const study::calibrate::HeightEffect& h) {
-  const auto ratio = [](const char* name, const study::calibrate::CalibratedValue& e) {
-    if (e.value > 0) std::printf("  %s: x%.2f [%.2f, %.2f]\n", name, e.value, e.ci95.low, e.ci95.high);
+  const auto ratio = [](const char* name, const std::optional<study::calibrate::CalibratedValue>& e) {
+    if (e) std::printf("  %s: x%.2f [%.2f, %.2f]\n", name, e->value, e->ci95.low, e->ci95.high);
   };
   std::printf("vertical variance, day and speed held fixed, %s: %zu windows, %zu flights, %zu days\n", of, h.windows,
               h.flights, h.days);
@@ -174,8 +174,8 @@ Json to_json(const study::calibrate::HeightEffects& effects) {
                  {"high_flights", h.high_flights},
                  {"days", h.days},
                  {"sd_ln_variance", {{"within_flights", h.within}, {"between_flights", h.between}}}};
-    if (h.bins.value > 0) json["variance_ratio_z_without_law"] = ratio(h.bins);
-    if (h.ceiling.value > 0) json["plate_variance_ratio_z"] = ratio(h.ceiling);
+    if (h.bins) json["variance_ratio_z_without_law"] = ratio(*h.bins);
+    if (h.ceiling) json["plate_variance_ratio_z"] = ratio(*h.ceiling);
     return json;
   };
   Json json = one(effects.all);
