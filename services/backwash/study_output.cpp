@@ -96,7 +96,7 @@ Json to_json(const study::FlightOutcome& o) {
                {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
                {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
   if (o.plan) {
-    json["hover_safe_share"] = o.safe;
+    json["hover_safe_share"] = o.safe.value();
     json["plan"] = {{"status", plan::to_string(*o.plan)}};
     if (o.plan == plan::PlanStatus::ok)
       json["plan"].update({{"length_m", o.length_m}, {"time_s", o.time_s}, {"min_clearance_m", o.clearance_m}});
@@ -128,8 +128,12 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                                {"possible", {r.possible.least, r.possible.most}},
                                {"why", r.possible.reason}});
   for (const auto& u : result.unknown)
-    json["unknown"].push_back(
-        {{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}, {"shape", u.shape}, {"hz", u.hz}});
+    json["unknown"].push_back({{"along", u.along},
+                               {"of", u.group},
+                               {"p", u.p},
+                               {"held_out_nats", u.gain.value_or(0)},
+                               {"shape", u.shape},
+                               {"hz", u.hz}});
   for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
   for (const auto& d : result.remaining)
     if (d.found)
