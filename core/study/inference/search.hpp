@@ -60,7 +60,6 @@ struct CauseSearchResult {
   std::vector<UnknownStructure> unknown;
   double threshold = 0;            ///< nats that the null of the catalogue exceeds at its level, last step
   double structure_threshold = 0;  ///< the same of the structures
-  std::vector<double> null_gain;   ///< sorted maxima of the catalogue's null, last step
 };
 
 /// Greedy search under the null of whole flights' signs flipped (core/study/README.md says the rules).
