@@ -16,7 +16,7 @@ namespace {
 Json to_json(const study::Remedy& remedy) {
   Json set = Json::array();
   for (const auto& [key, from, to] : remedy.set) set.push_back({{"key", key}, {"from", from}, {"to", to}});
-  return {{"file", remedy.file}, {"set", set}, {"words", remedy.words}};
+  return {{"file", study::to_string(remedy.in)}, {"set", set}, {"words", remedy.words}};
 }
 
 /// Flights in which a cause acts, counted from 1, with the names of their logs.
