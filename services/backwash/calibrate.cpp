@@ -93,8 +93,8 @@ void add(Json& json, const Calibration& c, const Campaign& campaign) {
   }
   json["parameters"] = parameters;
   json["bound"] = {{"tau_w", to_json(c.tau_w)}};
-  if (c.pushes)
-    json["bound"]["mean"] = {{"horizontal", to_json(c.push_horizontal)}, {"vertical", to_json(c.push_vertical)}};
+  if (c.push)
+    json["bound"]["mean"] = {{"horizontal", to_json(c.push->horizontal)}, {"vertical", to_json(c.push->vertical)}};
   json["between_flights_sd"] = {{"horizontal", c.fitted.between_sd[0]}, {"vertical", c.fitted.between_sd[1]}};
   json["within_flight_sd"] = {{"horizontal", c.fitted.within_sd[0]}, {"vertical", c.fitted.within_sd[1]}};
   json["held_out"] = to_json(c.held_out, campaign.logs);
