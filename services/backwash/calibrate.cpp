@@ -76,10 +76,10 @@ Json to_json(const Campaign& campaign, const Options& options) {
     json["height_effect"] = {
         {"low_m", h.low_m},     {"high_m", h.high_m},   {"variance_ratio_z", to_json(h.low_over_high)},
         {"windows", h.windows}, {"flights", h.flights}, {"days", h.days}};
-    if (h.ceiling.value > 0)
+    if (h.ceiling)
       json["lacking"] = Json::array({{{"name", "ceiling"},
                                       {"why", "the model has no term for a surface above the vehicle"},
-                                      {"variance_ratio_z", to_json(h.ceiling)}}});
+                                      {"variance_ratio_z", to_json(*h.ceiling)}}});
   }
   return json;
 }
@@ -93,8 +93,8 @@ void add(Json& json, const Calibration& c, const Campaign& campaign) {
   }
   json["parameters"] = parameters;
   json["bound"] = {{"tau_w", to_json(c.tau_w)}};
-  if (c.pushes)
-    json["bound"]["mean"] = {{"horizontal", to_json(c.push_horizontal)}, {"vertical", to_json(c.push_vertical)}};
+  if (c.push)
+    json["bound"]["mean"] = {{"horizontal", to_json(c.push->horizontal)}, {"vertical", to_json(c.push->vertical)}};
   json["between_flights_sd"] = {{"horizontal", c.fitted.between_sd[0]}, {"vertical", c.fitted.between_sd[1]}};
   json["within_flight_sd"] = {{"horizontal", c.fitted.within_sd[0]}, {"vertical", c.fitted.within_sd[1]}};
   json["held_out"] = to_json(c.held_out, campaign.logs);

@@ -16,7 +16,7 @@ namespace {
 Json to_json(const study::Remedy& remedy) {
   Json set = Json::array();
   for (const auto& [key, from, to] : remedy.set) set.push_back({{"key", key}, {"from", from}, {"to", to}});
-  return {{"file", remedy.file}, {"set", set}, {"words", remedy.words}};
+  return {{"file", study::to_string(remedy.in)}, {"set", set}, {"words", remedy.words}};
 }
 
 /// Flights in which a cause acts, counted from 1, with the names of their logs.
@@ -81,8 +81,8 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
 }
 
 void print_text(const char* of, const study::calibrate::HeightEffect& h) {
-  const auto ratio = [](const char* name, const study::calibrate::CalibratedValue& e) {
-    if (e.value > 0) std::printf("  %s: x%.2f [%.2f, %.2f]\n", name, e.value, e.ci95.low, e.ci95.high);
+  const auto ratio = [](const char* name, const std::optional<study::calibrate::CalibratedValue>& e) {
+    if (e) std::printf("  %s: x%.2f [%.2f, %.2f]\n", name, e->value, e->ci95.low, e->ci95.high);
   };
   std::printf("vertical variance, day and speed held fixed, %s: %zu windows, %zu flights, %zu days\n", of, h.windows,
               h.flights, h.days);
@@ -96,7 +96,7 @@ Json to_json(const study::FlightOutcome& o) {
                {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
                {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
   if (o.plan) {
-    json["hover_safe_share"] = o.safe;
+    json["hover_safe_share"] = o.safe.value();
     json["plan"] = {{"status", plan::to_string(*o.plan)}};
     if (o.plan == plan::PlanStatus::ok)
       json["plan"].update({{"length_m", o.length_m}, {"time_s", o.time_s}, {"min_clearance_m", o.clearance_m}});
@@ -128,8 +128,12 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                                {"possible", {r.possible.least, r.possible.most}},
                                {"why", r.possible.reason}});
   for (const auto& u : result.unknown)
-    json["unknown"].push_back(
-        {{"along", u.along}, {"of", u.group}, {"p", u.p}, {"held_out_nats", u.gain}, {"shape", u.shape}, {"hz", u.hz}});
+    json["unknown"].push_back({{"along", u.along},
+                               {"of", u.group},
+                               {"p", u.p},
+                               {"held_out_nats", u.gain.value_or(0)},
+                               {"shape", u.shape},
+                               {"hz", u.hz}});
   for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
   for (const auto& d : result.remaining)
     if (d.found)
@@ -174,8 +178,8 @@ Json to_json(const study::calibrate::HeightEffects& effects) {
                  {"high_flights", h.high_flights},
                  {"days", h.days},
                  {"sd_ln_variance", {{"within_flights", h.within}, {"between_flights", h.between}}}};
-    if (h.bins.value > 0) json["variance_ratio_z_without_law"] = ratio(h.bins);
-    if (h.ceiling.value > 0) json["plate_variance_ratio_z"] = ratio(h.ceiling);
+    if (h.bins) json["variance_ratio_z_without_law"] = ratio(*h.bins);
+    if (h.ceiling) json["plate_variance_ratio_z"] = ratio(*h.ceiling);
     return json;
   };
   Json json = one(effects.all);

@@ -26,7 +26,7 @@ void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
 namespace backwash::firmware_bridge::test {
 namespace {
 
-TEST(AllocationCounter, Counts) {
+TEST(AllocationCounter, CountsAnAllocation) {
   const auto before = allocations;
   delete new int(1);
   EXPECT_EQ(allocations, before + 1);

@@ -55,7 +55,7 @@ asan_build() {
 }
 
 asan() {
-  local programs=(sync files map field reach plan track sim study config bridge daemon) status=0
+  local programs=(types sync files map field reach adapt plan track log sim report study config bridge daemon) status=0
   asan_build "${programs[@]/#/test_}"
   for program in "${programs[@]}"; do build/asan/tests/test_"$program" --gtest_brief=1 || status=$?; done
   return "$status"

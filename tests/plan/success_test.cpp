@@ -55,14 +55,14 @@ void expect_success(const World& world, std::size_t count, std::uint64_t seed) {
   EXPECT_GE(static_cast<double>(found), 0.99 * static_cast<double>(exists)) << found << " of " << exists << failures;
 }
 
-TEST(Success, InTheFurnishedApartment) {
+TEST(Success, InTheFurnishedApartmentAWayIsFoundWhereverOneExists) {
   const auto world =
       build_world(map::builtin_scene("apartment").value(), config::load_model("builtin:quad-5in").value(),
                   config::load_vehicle("builtin:quad-5in").value());
   expect_success(*world, 100, 1);
 }
 
-TEST(Success, InClutterThatLeavesNarrowPassages) {
+TEST(Success, InClutterAWayIsFoundThroughNarrowPassages) {
   map::OccupancyGrid grid({0, 0, 0}, 0.1, {60, 60, 20}, map::Cell::free);
   std::mt19937_64 random(5);
   for (int n = 0; n < 45; ++n) {

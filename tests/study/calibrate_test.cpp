@@ -210,8 +210,9 @@ TEST(CalibrateFlights, LogsOfSimulatedFlightsGiveABoundThatHoldsForOtherFlights)
   EXPECT_LT(c.tau_w.ci95.low, tau_w);
   EXPECT_GT(c.tau_w.ci95.high, tau_w);
   // What the simulator's own documentation says of its airflow: pushes of at most 0.04 m/s².
-  EXPECT_GT(c.push_horizontal.value, 0.01);
-  EXPECT_LT(c.push_horizontal.value, 0.08);
+  ASSERT_TRUE(c.push);
+  EXPECT_GT(c.push->horizontal.value, 0.01);
+  EXPECT_LT(c.push->horizontal.value, 0.08);
   EXPECT_GT(c.fitted.within_sd[kHorizontal], 0.4);
   EXPECT_LT(c.fitted.within_sd[kHorizontal], 0.9);
 }

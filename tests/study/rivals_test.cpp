@@ -276,7 +276,7 @@ TEST(Words, EveryCauseSaysWhatToChange) {
     named.found.theta = SmallVector::Constant(static_cast<Eigen::Index>(f->parameters.size()), 0.1);
     const auto remedy = remedy_of(named, vehicle());
     EXPECT_TRUE(remedy.words.ends_with(".")) << f->formula;
-    EXPECT_EQ(remedy.file == "vehicle", !remedy.set.empty()) << f->formula;
+    EXPECT_EQ(remedy.in == RemedyIn::vehicle, !remedy.set.empty()) << f->formula;
   }
 }
 

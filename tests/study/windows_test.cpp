@@ -117,23 +117,6 @@ std::vector<double> autoregressive(double rho, std::size_t n, std::uint64_t seed
   return x;
 }
 
-TEST(Windows, EffectiveSampleSizePredictsTheScatterOfTheVariance) {
-  // 1000 windows of 2 s of AR(1) noise at 50 Hz: var(mean square) = 2σ⁴/n_eff, known in closed form from Σρ²ᵏ.
-  constexpr double kRho = 0.88;
-  const auto x = autoregressive(kRho, 100000, 5);
-  const double time = variance_time(x, 50);
-  const double closed = (1 + 2 * kRho * kRho / (1 - kRho * kRho)) * 0.02;
-  EXPECT_NEAR(time, closed, 0.05 * closed);
-  double sum = 0, square = 0;
-  for (std::size_t w = 0; w < 1000; ++w) {
-    double power = 0;
-    for (std::size_t k = 0; k < 100; ++k) power += x[100 * w + k] * x[100 * w + k] / 100;
-    sum += power / 1000, square += power * power / 1000;
-  }
-  const double scatter = square - sum * sum;
-  EXPECT_NEAR(2 / scatter, 2 / time, 0.15 * 2 / time);
-}
-
 TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
   // The two figures of docs/model.md section 3, from residues (closed form) for a second-order loop without band.
   EXPECT_NEAR(loop_attenuation({6, 4, 0, 0}, 0.2, {}), 0.64, 0.005);

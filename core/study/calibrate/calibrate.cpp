@@ -103,7 +103,6 @@ Calibration calibrate(const Data& data, const Model& gates, std::span<const Refu
   c.determined = first.free;
   const std::vector<double> all(data.place.size(), 1.0);
   c.fitted = fit(data, all, parameters_of(gates), first);
-  c.pushes = pushes;
 
   FitOptions again = first;
   again.rounds = 1;
@@ -122,14 +121,14 @@ Calibration calibrate(const Data& data, const Model& gates, std::span<const Refu
   for (std::size_t j = 0; j < kParameters; ++j) c.ci95[j] = interval(c.fitted.parameters[j], samples[j], wider);
   if (pushes) {
     const double h = push(data, all, kHorizontal), v = push(data, all, kVertical);
-    c.push_horizontal = {h, interval(h, horizontal, wider)}, c.push_vertical = {v, interval(v, vertical, wider)};
+    c.push = SteadyPush{{h, interval(h, horizontal, wider)}, {v, interval(v, vertical, wider)}};
   }
   const double typical_tau = tau(data, all);
   c.tau_w = {typical_tau, interval(typical_tau, times, wider)};
   c.model = with_parameters(gates, c.fitted.parameters);
-  if (pushes) {
-    c.model.bound.mean_horizontal = c.push_horizontal.value;
-    c.model.bound.mean_vertical = c.push_vertical.value;
+  if (c.push) {
+    c.model.bound.mean_horizontal = c.push->horizontal.value;
+    c.model.bound.mean_vertical = c.push->vertical.value;
   }
   c.model.bound.tau_w = c.tau_w.value;
   c.on_fitted = assess(data, ln_bounds(data, c.fitted.parameters), first.quantile);

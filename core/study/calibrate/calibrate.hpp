@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/study/calibrate/assess.hpp"
@@ -38,17 +39,20 @@ struct Options {
   std::uint64_t seed = 1;
 };
 
+/// [bound] mean, m/s².
+struct SteadyPush {
+  CalibratedValue horizontal, vertical;
+};
+
 struct Calibration {
   Fit fitted;
   Model model;      ///< the gates' model with what was determined
   Free determined;  ///< parameters that the flights determine; the others are the gates' model's
   std::array<Interval, kParameters> ci95;
-  CalibratedValue push_horizontal,
-      push_vertical;      ///< [bound] mean, m/s²; value 0 and interval 0 … 0 if `pushes` is false
-  CalibratedValue tau_w;  ///< s
-  bool pushes;            ///< whether the logs hold the steady push (set-points)
-  Assessment on_fitted;   ///< on the flights fitted
-  Assessment held_out;    ///< every flight against a fit without it (`folds`)
+  std::optional<SteadyPush> push;  ///< none where the logs do not hold it (no set-points)
+  CalibratedValue tau_w;           ///< s
+  Assessment on_fitted;            ///< on the flights fitted
+  Assessment held_out;             ///< every flight against a fit without it (`folds`)
 };
 
 /// Fits the model's bound at a quantile (fit.hpp), with intervals by resampling whole flights within each place

@@ -49,7 +49,8 @@ struct CalibrationRules {
   Rule fewest_height_rows{"fewest_height_rows", 10, "windows", "chosen: the regression has 6 columns"};
   Rule low_height{"low_height", 0.01, "m", "derived: the lowest height of the recordings (core/study/recordings.md)"};
   Rule high_height{"high_height", 0.8, "m", "derived: the highest height of the recordings"};
-  Rule height_length{"height_length", 0.05, "m", "chosen: e^(-h/L) with two rotor radii of the recorded craft"};
+  Rule height_length{"height_length", 0.05, "m",
+                     "chosen: where half of the wash returns, two rotor radii of the recorded craft"};
   Rule height_draws{"height_draws", 500, "draws", "derived: 2.5 % of them are the 12th value from each end"};
   Rule height_ridge{"height_ridge", 1e-9, "1", "derived: keeps an inverse finite, changes no digit that is told"};
 };

@@ -163,8 +163,8 @@ HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, dou
     if (within_two(r.height, high_m)) high.insert(r.flight);
     if (r.plate != Plate::not_said) (r.plate == Plate::above ? plated : bare).insert(r.flight);
   }
-  HeightEffect effect{{},          {},         {},          low_m, high_m, rows.size(), flights.size(),
-                      days.size(), low.size(), high.size(), 0,     0};
+  HeightEffect effect{{},          std::nullopt, std::nullopt, low_m, high_m, rows.size(), flights.size(),
+                      days.size(), low.size(),   high.size(),  0,     0};
   const Regression law(rows, [&](auto& r) { return std::vector{returned(r.height, length_m)}; });
   const auto by_law =
       contrasts(law, {{0, returned(low_m, length_m) - returned(high_m, length_m)}, {law.plate(), 1}}, bootstraps, seed);

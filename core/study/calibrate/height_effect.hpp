@@ -27,11 +27,13 @@ struct HeightRow {
 /// less than 5 mm above where it stood may touch the ground and are left out.
 std::vector<HeightRow> height_rows(const FlightWindows& windows, const log::FlightLog& log, std::size_t flight);
 
-/// Ratios of the vertical variance, day and speed held fixed. A ratio has the value 0 where no day or flight shows it.
+/// Ratios of the vertical variance, day and speed held fixed.
 struct HeightEffect {
-  CalibratedValue low_over_high;  ///< at `low_m` against `high_m`, by the law below
-  CalibratedValue bins;           ///< heights within a factor of two of `low_m` against those of `high_m`: no law
-  CalibratedValue ceiling;        ///< under the plate against without, at the same height
+  CalibratedValue low_over_high;           ///< at `low_m` against `high_m`, by the law below
+  std::optional<CalibratedValue> bins;     ///< heights within a factor of two of `low_m` against those of `high_m`:
+                                           ///< no law; none where no flight was that low or that high
+  std::optional<CalibratedValue> ceiling;  ///< under the plate against without, at the same height; none where no
+                                           ///< flight is known to be the one or the other
   double low_m, high_m;
   std::size_t windows, flights, days;
   std::size_t low_flights, high_flights;  ///< that were within a factor of two of these heights

@@ -31,9 +31,9 @@ toml::table confidence(const Calibration& c) {
   toml::table table;
   for (std::size_t p = 0; p < kParameters; ++p)
     if (c.determined[p]) table.insert(key(static_cast<Parameter>(p)), interval(c.ci95[p]));
-  if (c.pushes) {
-    table.insert("bound.mean.horizontal", interval(c.push_horizontal.ci95));
-    table.insert("bound.mean.vertical", interval(c.push_vertical.ci95));
+  if (c.push) {
+    table.insert("bound.mean.horizontal", interval(c.push->horizontal.ci95));
+    table.insert("bound.mean.vertical", interval(c.push->vertical.ci95));
   }
   table.insert("bound.tau_w", interval(c.tau_w.ci95));
   table.insert("coverage_held_out", axes(c.held_out.coverage));

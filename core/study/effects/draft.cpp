@@ -33,7 +33,7 @@ Effect draft() {
                      .simulate = in_the_plane}},
           .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }},
           .remedy = [](auto&, auto&) {
-            return Remedy{"place", {}, "Find what moves the air: a fan, a vent, a window or a door."};
+            return Remedy{RemedyIn::place, {}, "Find what moves the air: a fan, a vent, a window or a door."};
           }};
 }
 

@@ -101,7 +101,7 @@ struct Form {
   std::string scale_name = {};              ///< "L_m" …; empty without a scale
   std::vector<Scale> scales = {Scale()};
   std::optional<Reach> reach = {};
-  bool integer_scale = false;      ///< a rotor's number: not polished
+  bool integer_scale = false;      ///< a number of a rotor or pairing, or an offset of its own search: not polished
   bool displaces_map = false;      ///< its scale is an offset, fitted along x and y
   bool motors_alone = false;       ///< seen in motor commands alone: which of such forms it is they do not tell
   bool constant = false;           ///< is itself what a free offset would be: tested without one

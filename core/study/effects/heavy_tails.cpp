@@ -20,7 +20,7 @@ Effect heavy_tails() {
                                const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; },
                  .simulate = simulates(SimulationTerm::Kind::kurtosis)}},
       .remedy = [](auto&, auto&) {
-        return Remedy{"model", {}, "Raise bound.kappa of the model file: gusts come in bursts."};
+        return Remedy{RemedyIn::model, {}, "Raise bound.kappa of the model file: gusts come in bursts."};
       }};
 }
 

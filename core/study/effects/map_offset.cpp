@@ -56,7 +56,7 @@ Effect map_offset() {
             char text[96];
             const Vec3& by = fitted.scale.offset_W;
             std::snprintf(text, sizeof text, "Move the map by %.2f m along x and %.2f m along y.", -by.x(), -by.y());
-            return Remedy{"map", {}, text};
+            return Remedy{RemedyIn::map, {}, text};
           }};
 }
 

@@ -8,11 +8,27 @@
 
 namespace backwash::study {
 
-Remedy by_extension(const FittedForm& fitted) {
-  return {"model", {}, "Fly with the model that --out writes: it holds " + fitted.form.cause() + "."};
+const char* to_string(RemedyIn in) noexcept {
+  switch (in) {
+    case RemedyIn::vehicle:
+      return "vehicle";
+    case RemedyIn::model:
+      return "model";
+    case RemedyIn::map:
+      return "map";
+    case RemedyIn::craft:
+      return "craft";
+    case RemedyIn::place:
+      return "place";
+  }
+  return "";
 }
 
-Remedy with_craft(std::string words) { return {"craft", {}, std::move(words)}; }
+Remedy by_extension(const FittedForm& fitted) {
+  return {RemedyIn::model, {}, "Fly with the model that --out writes: it holds " + fitted.form.cause() + "."};
+}
+
+Remedy with_craft(std::string words) { return {RemedyIn::craft, {}, std::move(words)}; }
 
 Remedy in_vehicle(std::vector<Remedy::Set> set) {
   std::string words;
@@ -22,7 +38,7 @@ Remedy in_vehicle(std::vector<Remedy::Set> set) {
                   to);
     words += text;
   }
-  return {"vehicle", std::move(set), words + " in the vehicle file."};
+  return {RemedyIn::vehicle, std::move(set), words + " in the vehicle file."};
 }
 
 std::string rotor_of(const FittedForm& fitted) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -8,13 +9,18 @@ namespace backwash::study {
 
 struct FittedForm;
 
+/// Where a remedy is made: in a file, in the craft itself or in the place where it flies.
+enum class RemedyIn : std::uint8_t { vehicle, model, map, craft, place };
+/// "vehicle" …, as written above.
+const char* to_string(RemedyIn in) noexcept;
+
 /// What an engineer changes where a cause is found: a key of a file with its value, or what to do with the craft.
 struct Remedy {
   struct Set {
     std::string key;  ///< of the file: "controller.latency"
     double from, to;  ///< in the unit of docs/interfaces.md
   };
-  std::string file;           ///< "vehicle", "model", "map", "craft" or "place"
+  RemedyIn in;
   std::vector<Set> set = {};  ///< of the vehicle file; empty otherwise
   std::string words;          ///< one sentence, an order
 };

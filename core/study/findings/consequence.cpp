@@ -81,11 +81,17 @@ void describe(FlightOutcome& outcome, const std::vector<reach::HoverSet>& sets) 
     const auto& h = set.half_widths;
     extent.push_back(std::max({h[kX], h[kY], h[kZ]}));
     shift.push_back(set.shift.norm());
-    if (set.safe()) outcome.safe += 1 / static_cast<double>(sets.size());
   }
   if (extent.empty()) return;  // no set is bounded
   outcome.extent_median = quantile(extent, 0.5), outcome.extent_95 = quantile(extent, kRules.told_quantile);
   outcome.shift_median = quantile(shift, 0.5), outcome.shift_95 = quantile(shift, kRules.told_quantile);
+}
+
+double safe_share(const std::vector<reach::HoverSet>& sets) {
+  double share = 0;
+  for (const auto& set : sets)
+    if (set.safe()) share += 1 / static_cast<double>(sets.size());
+  return share;
 }
 
 std::vector<reach::HoverSet> sets_at(const plan::World& world, const std::vector<Vec3>& places) {
@@ -149,14 +155,13 @@ Consequence consequence(const StudyResult& result, const Observations& seen, con
   if (!grid || places.empty()) {
     describe(c.before, sets_in_the_open(model, vehicle));
     describe(c.after, sets_in_the_open(after, vehicle));
-    c.before.safe = c.after.safe = 0;
     return c;
   }
   const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, parallel);
   const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, std::nullopt, parallel);
-  const auto sets = sets_at(*world, places);
-  describe(c.before, sets);
-  describe(c.after, sets_at(*extended_world, places));
+  const auto sets = sets_at(*world, places), sets_after = sets_at(*extended_world, places);
+  describe(c.before, sets), describe(c.after, sets_after);
+  c.before.safe = safe_share(sets), c.after.safe = safe_share(sets_after);
   std::tie(c.start_W, c.goal_W) = farthest(places, sets);
   if ((c.goal_W - c.start_W).norm() > kRules.least_route) {
     try_plan(c.before, *world, c.start_W, c.goal_W);

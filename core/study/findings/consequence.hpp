@@ -15,8 +15,8 @@ struct FlightOutcome {
   double inside = 0;                        ///< share of samples of a − a_sim within push ± w̄, all axes together
   double extent_median = 0, extent_95 = 0;  ///< largest half width of the hover sets at flown places, m
   double shift_median = 0, shift_95 = 0;    ///< of those sets' centres, m
-  double safe = 0;                          ///< share of the places where hovering is safe; 0 without a map
-  std::optional<plan::PlanStatus> plan;     ///< none was tried without two places and a map
+  std::optional<double> safe;               ///< share of the places where hovering is safe; none without a map
+  std::optional<plan::PlanStatus> plan;     ///< none was tried without two safe places apart and a map
   double length_m = 0, time_s = 0, clearance_m = 0;  ///< of the plan, if ok
 };
 

@@ -15,9 +15,9 @@ std::string interval(const RotorVerdict& v) {
   return percent(v.d) + " [" + percent(v.low) + ", " + percent(v.high) + "]";
 }
 
-std::string ratio(const calibrate::CalibratedValue& e) {
-  if (!(e.value > 0)) return "not shown by these flights";
-  return "×" + number(e.value) + "  [" + number(e.ci95.low) + ", " + number(e.ci95.high) + "]";
+std::string ratio(const std::optional<calibrate::CalibratedValue>& e) {
+  if (!e) return "not shown by these flights";
+  return "×" + number(e->value) + "  [" + number(e->ci95.low) + ", " + number(e->ci95.high) + "]";
 }
 
 }  // namespace
@@ -102,8 +102,8 @@ tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& v
 std::string height_sentence(const calibrate::HeightEffects& effects) {
   const auto& h = effects.hovers ? *effects.hovers : effects.all;
   std::string text;
-  const auto differs = [](const calibrate::CalibratedValue& e) {
-    return e.value > 0 && (e.ci95.low > 1 || e.ci95.high < 1);
+  const auto differs = [](const std::optional<calibrate::CalibratedValue>& e) {
+    return e && (e->ci95.low > 1 || e->ci95.high < 1);
   };
   if (differs(h.bins)) text += " near the surface " + ratio(h.bins);
   if (differs(h.ceiling)) text += std::string(text.empty() ? "" : ",") + " under a plate " + ratio(h.ceiling);

@@ -186,7 +186,7 @@ std::string consequence_section(const Consequence& c) {
   line("Hover sets: largest half width, median (95 %)",
        number(100 * b.extent_median) + " (" + number(100 * b.extent_95) + ") cm",
        number(100 * a.extent_median) + " (" + number(100 * a.extent_95) + ") cm");
-  if (b.safe + a.safe > 0) line("Flown places where hovering is safe", share(b.safe), share(a.safe));
+  if (b.safe && a.safe) line("Flown places where hovering is safe", share(*b.safe), share(*a.safe));
   if (b.plan) {
     const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
     line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
@@ -213,7 +213,7 @@ std::string unknown_section(const std::vector<UnknownStructure>& unknown) {
   std::string text = "<section><h2>Without a name</h2>\n<table>\n";
   for (const auto& u : unknown)
     text += row(u.group + " along " + u.along + " (" + u.shape + ")",
-                "p " + number(u.p) + ", " + number(u.gain) + " nats held out");
+                "p " + number(u.p) + (u.gain ? ", " + number(*u.gain) + " nats held out" : ""));
   return text + "</table>\n</section>\n";
 }
 

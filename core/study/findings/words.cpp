@@ -15,8 +15,8 @@ Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
   const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
   auto remedy =
       f.form->effect->remedy({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, vehicle);
-  if (cause.flights.empty() || remedy.file == "craft") return remedy;
-  return {"craft", {}, "Look for what was different: " + where(cause) + "."};  // no file holds for some flights
+  if (cause.flights.empty() || remedy.in == RemedyIn::craft) return remedy;
+  return {RemedyIn::craft, {}, "Look for what was different: " + where(cause) + "."};  // no file holds for some flights
 }
 
 std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }

@@ -202,7 +202,6 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
     const SearchStep step(evidence, accepted, draws,
                           options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value));
     if (step.named.empty() && step.structures.empty()) break;
-    result.null_gain = step.null_named;
     result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
     const SearchCandidate* cause = best_of(step.named, result.accepted, step.threshold, evidence);
     const SearchCandidate* structure = best_of(step.structures, result.accepted, step.structure_threshold, evidence);

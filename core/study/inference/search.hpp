@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,11 +39,12 @@ struct Accepted {
 };
 
 struct UnknownStructure {
-  std::string along;  ///< regressor; two, "x_m, y_m", if their products are meant
-  std::string group;  ///< channels: "mean x, y", "mean z", "ln variance"
-  double p, gain;     ///< family-wise; held out, nats, 0 where only the dependence was found
-  std::string shape;  ///< Structure::shape; "any" where only the dependence was found
-  double hz = 0;      ///< of a tone
+  std::string along;           ///< regressor; two, "x_m, y_m", if their products are meant
+  std::string group;           ///< channels: "mean x, y", "mean z", "ln variance"
+  double p;                    ///< family-wise
+  std::optional<double> gain;  ///< held out, nats; none where only the dependence was found
+  std::string shape;           ///< Structure::shape; "any" where only the dependence was found
+  double hz = 0;               ///< of a tone
 };
 
 /// A cause that would have led, but for a size that no vehicle can have.
@@ -58,7 +60,6 @@ struct CauseSearchResult {
   std::vector<UnknownStructure> unknown;
   double threshold = 0;            ///< nats that the null of the catalogue exceeds at its level, last step
   double structure_threshold = 0;  ///< the same of the structures
-  std::vector<double> null_gain;   ///< sorted maxima of the catalogue's null, last step
 };
 
 /// Greedy search under the null of whole flights' signs flipped (core/study/README.md says the rules).

@@ -68,25 +68,6 @@ std::vector<double> band_passed(std::span<const double> signal, double rate_hz, 
   return {x.begin() + static_cast<std::ptrdiff_t>(pad), x.begin() + static_cast<std::ptrdiff_t>(pad + n)};
 }
 
-double variance_time(std::span<const double> signal, double rate_hz, double longest_s) {
-  const std::size_t n = signal.size();
-  const double dt = 1 / rate_hz;
-  double mean = 0, power = 0;
-  for (const double x : signal) mean += x / static_cast<double>(n);
-  for (const double x : signal) power += (x - mean) * (x - mean) / static_cast<double>(n);
-  double time = dt;
-  if (!(power > 0)) return time;
-  const std::size_t lags = std::min(n - 1, static_cast<std::size_t>(longest_s * rate_hz));
-  for (std::size_t lag = 1; lag <= lags; ++lag) {
-    double sum = 0;
-    for (std::size_t k = lag; k < n; ++k) sum += (signal[k] - mean) * (signal[k - lag] - mean);
-    const double rho = sum / (static_cast<double>(n - lag) * power);
-    if (rho <= 0) break;
-    time += 2 * rho * rho * dt;
-  }
-  return time;
-}
-
 double PositionLoop::passes(double f_hz) const {
   const std::complex<double> s(0, 2 * std::numbers::pi * f_hz);
   return std::norm(1.0 / (1.0 + (k_p + k_d * s) * std::exp(-s * delay_s) / (s * s * (1.0 + lag_s * s))));

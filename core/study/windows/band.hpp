@@ -25,11 +25,6 @@ struct Band {
 /// Precondition: rate_hz > 2·high_hz, n ≥ 2.
 std::vector<double> band_passed(std::span<const double> signal, double rate_hz, const Band& band);
 
-/// ∫ρ² dt over all lags, both signs, s: T/this is the effective sample size of a variance. ρ: autocorrelation of the
-/// signal about its mean, summed up to its first zero crossing or `longest_s`. At least a sample (white noise).
-/// O(n·lags). A constant signal counts as white.
-double variance_time(std::span<const double> signal, double rate_hz, double longest_s = kWindowRules.window_length);
-
 /// A closed position loop held at rest, along one axis: gains (1/s², 1/s), age of the state it feels, attitude lag (s).
 struct PositionLoop {
   double k_p, k_d, delay_s, lag_s;

@@ -48,7 +48,6 @@ void add_windows(const Even& e, SampleRange stretch, std::size_t length, FlightW
                   0,
                   mean_of(e.w, s),
                   Vec3::Zero(),
-                  Vec3::Zero(),
                   flight.gusts.size() - 1};
     const double n = static_cast<double>(length);
     for (std::size_t k = s.begin; k < s.end; ++k) window.speed_mps += e.v[k].squaredNorm() / n;
@@ -65,7 +64,6 @@ void add_windows(const Even& e, SampleRange stretch, std::size_t length, FlightW
         const double x = filtered[i][k - stretch.begin];
         window.variance[axis] += x * x / (n * flight.attenuation[axis]);
       }
-      window.effective_samples[axis] = std::max(1.0, n / e.rate / variance_time(filtered[i], e.rate));
     }
     flight.windows.push_back(window);
   }
@@ -181,7 +179,6 @@ tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& 
       gaps_and_rate(log.t_s, stretches, options.length_s);
   flight.band = options.band.within(flight.rate_hz);
   choose_signal(flight, has_xyz(log, "cmd_", "_m"), vehicle, options.tau_w);
-  flight.segments_from_log = log.has("segment");
   if (!log.has("thrust") && !log.has("motor1"))
     flight.not_tested.emplace_back("saturated: no column 'thrust' or 'motor1' … 'motor4'");
   int next_segment = 0;

@@ -32,9 +32,8 @@ struct Window {
   std::optional<Eigen::Quaterniond> attitude;  ///< mean, body to world; nothing without qw … qz
   double speed_mps;                            ///< root mean square of the velocity
   Vec3 mean;                                   ///< of the disturbance, m/s²
-  Vec3 variance;           ///< of the disturbance within the band, (m/s²)²; mean square of the filtered signal
-  Vec3 effective_samples;  ///< independent samples that this variance is worth, from the autocorrelation
-  std::size_t stretch;     ///< of FlightWindows::gusts, the unbroken one that it belongs to
+  Vec3 variance;        ///< of the disturbance within the band, (m/s²)²; mean square of the filtered signal
+  std::size_t stretch;  ///< of FlightWindows::gusts, the unbroken one that it belongs to
 };
 
 /// A flight, cut into windows.
@@ -44,7 +43,6 @@ struct FlightWindows {
   double rate_hz{};                 ///< mean rate of the rows
   std::vector<PositionLoop> loops;  ///< per axis, those that were divided out; none for Signal::commanded and raw
   Vec3 attenuation;                 ///< var(a)/var(w) of each; 1 without
-  bool segments_from_log = false;
   std::array<std::size_t, kHoverGates> gated{};  ///< windows left out, by Gate
   std::vector<std::string> not_tested;           ///< gates without the columns they need, and which those are
   std::vector<Window> windows;
