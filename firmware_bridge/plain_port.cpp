@@ -14,7 +14,7 @@ using namespace std::chrono;
 
 // A refused frame of two bytes becomes 21, two states 900: what is read at once always has room.
 constexpr std::size_t kRead = 96, kReads = 16;
-constexpr std::size_t kNoFrame = 4 * PLAIN_LARGEST_SIZE;  // bytes without a delimiter: no plain link
+constexpr std::size_t kNoFrame = 4UL * PLAIN_LARGEST_SIZE;  // bytes without a delimiter: no plain link
 constexpr std::uint8_t kOnboardComputer = 191, kController = 1;
 
 // Values of common.xml.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/map/lattice.hpp"
 
@@ -73,7 +74,8 @@ Breakdown ProximityField::at(const Vec3& p_W) const {
   PendingTerms pending(sight_, p_W);
   const auto add_ground = [&](const Variance& ground, const Variance&) { b.ground += ground; };
   const auto& g = model_.ground;
-  const double slope = g.theta_max < 1.5 ? std::tan(g.theta_max + 1e-6) : Reach::kNoCone;
+  std::optional<double> slope;
+  if (g.theta_max < 1.5) slope = std::tan(g.theta_max + 1e-6);
   up_.for_each_near(p_W, {g.l_max, g.r0, g.l_footprint_max, slope}, [&](const Element& e) {
     const Variance ground = terms_.ground(e, p_W);
     if (nonzero(ground)) pending.take(e.c_W, ground, {}, add_ground);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "core/field/surface.hpp"
@@ -13,11 +14,10 @@ namespace backwash::field {
 /// larger ball.
 /// The ball's part outside the column may be cut to a cone that opens downwards from p.
 struct Reach {
-  double ball = 0;              ///< radius, m
-  double column_radius = 0;     ///< m
-  double column_length = 0;     ///< radius of the larger ball, m
-  double cone_slope = kNoCone;  ///< horizontal over vertical extent of the cone
-  static constexpr double kNoCone = 1e9;
+  double ball = 0;                        ///< radius, m
+  double column_radius = 0;               ///< m
+  double column_length = 0;               ///< radius of the larger ball, m
+  std::optional<double> cone_slope = {};  ///< horizontal over vertical extent of the cone, where there is one
 };
 
 /// Elements sorted into cubes so that those near a point are found without looking at the others.
@@ -34,8 +34,8 @@ class ElementBuckets {
     const auto squared = [](double x) { return (x + kSlack) * (x + kSlack); };
     const double ball2 = squared(reach.ball), column2 = squared(reach.column_radius),
                  length2 = squared(reach.column_length);
-    const bool cone = reach.cone_slope < Reach::kNoCone;
-    const double slope2 = cone ? reach.cone_slope * reach.cone_slope : 0;
+    const bool cone = reach.cone_slope.has_value();
+    const double slope2 = cone ? *reach.cone_slope * *reach.cone_slope : 0;
     const Vec3 extent(horizontal, horizontal, vertical);
     const Index3 low = bucket_of(p_W - extent), high = bucket_of(p_W + extent);
     for (int j = low.y(); j <= high.y(); ++j)

@@ -104,7 +104,6 @@ bool passes(const reach::ReachTube& tube, std::size_t k, std::size_t back, const
 sim::FlightSample sample_of(const log::TickRecord& tick, double t, double t_zero, const Truth& truth) {
   sim::FlightSample s{};
   s.t = t - t_zero;
-  s.segment = -1;
   s.truth = {truth.at(t, "x_m", "y_m", "z_m"), truth.at(t, "vx_mps", "vy_mps", "vz_mps")};
   s.estimated = {vec(tick.p), vec(tick.v)};
   s.acceleration = truth.at(t, "ax_mps2", "ay_mps2", "az_mps2");

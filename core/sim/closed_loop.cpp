@@ -34,7 +34,7 @@ ClosedLoop::ClosedLoop(const map::OccupancyGrid& grid, const Vehicle& vehicle, c
   quadrotor_.set_thrust_terms(ThrustTerms(simulation.terms));
 }
 
-FlightSample ClosedLoop::sample(const Setpoint& command, int segment) {
+FlightSample ClosedLoop::sample(const Setpoint& command, std::optional<int> segment) {
   return {quadrotor_.time(),
           segment,
           quadrotor_.state(),
@@ -116,7 +116,7 @@ log::FlightLog to_log(const std::vector<FlightSample>& samples, bool rotors) {
     log.columns["qy"].push_back(s.attitude.y());
     log.columns["qz"].push_back(s.attitude.z());
     log.columns["thrust"].push_back(s.thrust);
-    log.columns["segment"].push_back(s.segment);
+    log.columns["segment"].push_back(s.segment.value_or(-1));  // the file format's number for none
     for (std::size_t i = 0; rotors && i < 4; ++i) {
       log.columns["motor" + std::to_string(i + 1)].push_back(s.rotors.motor[i]);
       log.columns["rpm" + std::to_string(i + 1)].push_back(s.rotors.rpm[i]);

@@ -65,7 +65,7 @@ FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::Accepte
   for (std::size_t k = 0; k < piece.accepted.tube.size(); ++k) {
     piece.judged.push_back(tracker.judge(loop.estimated().p_W));
     const Setpoint command = tracker.step();
-    auto sample = loop.sample(command, k >= hover_from ? hover_number : -1);
+    auto sample = loop.sample(command, k >= hover_from ? std::optional(hover_number) : std::nullopt);
     sample.t = t_start + static_cast<double>(k) * kControlPeriod;
     piece.clearance_m.push_back(true_clearance(world, sample.truth.p_W, z_safe));
     piece.samples.push_back(sample);

@@ -23,7 +23,7 @@ namespace backwash::sim {
 /// What a log row holds: the vehicle at a tick and the command it gets there.
 struct FlightSample {
   double t;                     ///< s
-  int segment;                  ///< hover position number, −1 in transit
+  std::optional<int> segment;   ///< hover position number; none in transit
   State truth;                  ///< where the vehicle really is
   State estimated;              ///< what VIO says: feeds the controller and is judged
   Vec3 acceleration;            ///< m/s², W, gravity removed
@@ -49,7 +49,7 @@ class ClosedLoop {
   const State& estimated() const noexcept { return estimated_; }
   double time() const noexcept { return quadrotor_.time(); }  ///< s
   /// The vehicle now; `command` and `segment` are what the caller is about to fly.
-  FlightSample sample(const Setpoint& command, int segment);
+  FlightSample sample(const Setpoint& command, std::optional<int> segment);
   /// Issues a command and moves on by one control period (20 ms).
   void fly(const Setpoint& command);
 
@@ -100,7 +100,7 @@ struct FlightPiece {
 
 /// Flies a piece whose tube was propagated from the loop's estimate at its acceptance, and judges every measured
 /// position against it. `t_start`: of its first sample, s; `z_safe`: see true_clearance; samples from `hover_from` on
-/// carry the segment `hover_number`, those before −1.
+/// carry the segment `hover_number`, those before none.
 FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
                       double z_safe, std::size_t hover_from, int hover_number);
 

@@ -35,7 +35,7 @@ std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehic
   simulation.strength = std::exp(flight.strength_sd * normal(random));
   ClosedLoop loop(grid, vehicle, {flight.start_W, Vec3::Zero()}, flight.seed, simulation);
   std::vector<FlightSample> samples;
-  const auto follow = [&](const std::vector<Setpoint>& commands, int segment) {
+  const auto follow = [&](const std::vector<Setpoint>& commands, std::optional<int> segment) {
     for (const auto& command : commands) {
       samples.push_back(loop.sample(command, segment));
       loop.fly(command);
@@ -45,7 +45,7 @@ std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehic
   int number = 0;
   for (const auto& hover : flight.hovers) {
     if ((hover.p_W - at).norm() > 0)
-      follow(straight_commands(at, hover.p_W, vehicle.limits.v_max, vehicle.limits.a_max), -1);
+      follow(straight_commands(at, hover.p_W, vehicle.limits.v_max, vehicle.limits.a_max), {});
     follow(hold_commands(hover.p_W, hover.dwell_s), number++);
     at = hover.p_W;
   }

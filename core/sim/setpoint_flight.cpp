@@ -94,8 +94,8 @@ tl::expected<LoggedFlight, log::LogError> logged_flight(const log::FlightLog& lo
     flight.t_s.push_back(log.t_s[i] - log.t_s[flight.row.front()]);
     flight.commands.push_back(
         {said(log, "cmd_", "_m", i), said(log, "cmd_v", "_mps", i), said(log, "cmd_a", "_mps2", i), heading(log, i)});
-    flight.segment.push_back(log.has("segment") ? static_cast<int>(std::clamp(log.column("segment")[i], -1.0, 1e9))
-                                                : -1);
+    const double segment = log.has("segment") ? log.column("segment")[i] : -1;
+    flight.segment.push_back(segment >= 0 ? std::optional(static_cast<int>(std::min(segment, 1e9))) : std::nullopt);
   }
   if (flight.row.size() < 2) return wrong("fewer than 2 rows with rising stamps");
   flight.start = {said(log, "", "_m", flight.row.front()), said(log, "v", "_mps", flight.row.front())};

@@ -7,11 +7,11 @@ namespace backwash::sim {
 
 /// A logged flight as it can be flown again: its set-points, and what a simulation takes as given.
 struct LoggedFlight {
-  std::vector<double> t_s;         ///< of the rows, rising, from 0
-  std::vector<std::size_t> row;    ///< the log's row of each
-  std::vector<Setpoint> commands;  ///< one per row; the yaw is the heading that was measured
-  std::vector<int> segment;        ///< as the flight log has it; −1 without the column
-  State start;                     ///< measured at the first row
+  std::vector<double> t_s;                  ///< of the rows, rising, from 0
+  std::vector<std::size_t> row;             ///< the log's row of each
+  std::vector<Setpoint> commands;           ///< one per row; the yaw is the heading that was measured
+  std::vector<std::optional<int>> segment;  ///< hover position number; none in transit and without the column
+  State start;                              ///< measured at the first row
   /// The battery's voltage and the sensor's temperature by row, as parabolas of time: the momentary ones answer the
   /// thrust. Empty where the log does not tell them.
   std::vector<double> voltage, temperature;

@@ -68,6 +68,7 @@ std::vector<Vec3> slice_points(const map::OccupancyGrid& grid, const report::Sli
 std::vector<Index3> corners(const map::OccupancyGrid& grid, const Vec3& p) {
   const Index3 low = grid.index(p - Vec3::Constant(0.5 * grid.resolution()));
   std::vector<Index3> around;
+  around.reserve(8);
   for (int n = 0; n < 8; ++n) around.push_back(low + Index3(n & 1, n >> 1 & 1, n >> 2 & 1));
   return around;
 }

@@ -92,14 +92,16 @@ void print_text(const char* of, const study::calibrate::HeightEffect& h) {
 }
 
 Json to_json(const study::FlightOutcome& o) {
-  Json json = {{"samples_inside_bound", o.inside},
-               {"hover_half_width_m", {{"median", o.extent_median}, {"q95", o.extent_95}}},
-               {"hover_shift_m", {{"median", o.shift_median}, {"q95", o.shift_95}}}};
+  Json json = {{"samples_inside_bound", o.inside}, {"hover_half_width_m", nullptr}, {"hover_shift_m", nullptr}};
+  if (const auto& h = o.hover) {
+    json["hover_half_width_m"] = {{"median", h->extent_median}, {"q95", h->extent_95}};
+    json["hover_shift_m"] = {{"median", h->shift_median}, {"q95", h->shift_95}};
+  }
   if (o.plan) {
     json["hover_safe_share"] = o.safe.value();
     json["plan"] = {{"status", plan::to_string(*o.plan)}};
-    if (o.plan == plan::PlanStatus::ok)
-      json["plan"].update({{"length_m", o.length_m}, {"time_s", o.time_s}, {"min_clearance_m", o.clearance_m}});
+    if (const auto& f = o.flown)
+      json["plan"].update({{"length_m", f->length_m}, {"time_s", f->time_s}, {"min_clearance_m", f->min_clearance_m}});
   }
   return json;
 }
@@ -133,7 +135,7 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                                {"p", u.p},
                                {"held_out_nats", u.gain.value_or(0)},
                                {"shape", u.shape},
-                               {"hz", u.hz}});
+                               {"hz", u.hz.value_or(0)}});
   for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
   for (const auto& d : result.remaining)
     if (d.found)

@@ -71,7 +71,7 @@ Check within(double low, double high) {
   const std::string range = shown(low) + " to " + shown(high);
   return number_that([=](double x) { return x >= low && x <= high; }, "a number from " + range, range);
 }
-Check one_of(std::vector<std::string> names) {
+Check one_of(const std::vector<std::string>& names) {
   std::string all;
   for (const auto& name : names) all += (all.empty() ? "" : ", ") + name;
   const auto wrong = [names, all](const std::string& text) {
@@ -81,7 +81,7 @@ Check one_of(std::vector<std::string> names) {
 }
 
 Option Option::required() { return option_->required(), *this; }
-Option Option::check(Check check) { return option_->check(check.wrong, check.words), *this; }
+Option Option::check(const Check& check) { return option_->check(check.wrong, check.words), *this; }
 Option Option::capture_default_str() { return option_->capture_default_str(), *this; }
 Option Option::default_str(const std::string& text) { return option_->default_str(text), *this; }
 Option Option::delimiter(char between) { return option_->delimiter(between), *this; }
@@ -122,12 +122,12 @@ template Option Command::add_option(const std::string&, std::vector<std::string>
 template Option Command::add_option(const std::string&, std::vector<double>&, const std::string&);
 template Option Command::add_option(const std::string&, std::vector<int>&, const std::string&);
 
-Option Command::add_text(const std::string& name, std::function<void(const std::string&)> take,
+Option Command::add_text(const std::string& name, const std::function<void(const std::string&)>& take,
                          const std::string& help) {
   return Option(app_->add_option_function<std::string>(name, take, help));
 }
 
-Option Command::add_texts(const std::string& name, std::function<void(const std::vector<std::string>&)> take,
+Option Command::add_texts(const std::string& name, const std::function<void(const std::vector<std::string>&)>& take,
                           const std::string& help) {
   return Option(app_->add_option_function<std::vector<std::string>>(name, take, help));
 }

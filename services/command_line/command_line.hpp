@@ -34,14 +34,14 @@ struct Check {
 Check positive();
 Check not_negative();
 Check within(double low, double high);
-Check one_of(std::vector<std::string> names);
+Check one_of(const std::vector<std::string>& names);
 
 /// An option of a command; a handle to copy. The names of its settings are CLI11's.
 class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
   Option required();
-  Option check(Check check);
+  Option check(const Check& check);
   Option capture_default_str();  ///< --help prints the value that the target has now
   Option default_str(const std::string& text);
   Option delimiter(char between);
@@ -69,8 +69,9 @@ class Command {
   /// a number.
   template <typename T>
   Option add_option(const std::string& name, T& target, const std::string& help = "");
-  Option add_text(const std::string& name, std::function<void(const std::string&)> take, const std::string& help);
-  Option add_texts(const std::string& name, std::function<void(const std::vector<std::string>&)> take,
+  Option add_text(const std::string& name, const std::function<void(const std::string&)>& take,
+                  const std::string& help);
+  Option add_texts(const std::string& name, const std::function<void(const std::vector<std::string>&)>& take,
                    const std::string& help);
   void add_flag(const std::string& name, bool& target, const std::string& help);
   void version(const std::string& text);  ///< --version prints it
@@ -103,6 +104,7 @@ template <typename Target, typename Value>
 Option add_choice(Command& command, const std::string& name, Target& target,
                   const std::vector<std::pair<std::string, Value>>& choices, const std::string& help) {
   std::vector<std::string> names;
+  names.reserve(choices.size());
   for (const auto& choice : choices) names.push_back(choice.first);
   const auto take = [&target, choices](const std::string& said) {
     for (const auto& [known, value] : choices)

@@ -89,7 +89,7 @@ TEST(Replan, FliesThroughAnUnknownRoomToAGoalBehindAWallWithoutContact) {
     expect_continuous(last, command, options.limits.yaw.rate);
     last = command;
     loop.fly(command);
-    const Vec3 p_W = loop.sample(command, -1).truth.p_W;
+    const Vec3 p_W = loop.sample(command, {}).truth.p_W;
     contacts += distance.exact(room, p_W) <= vehicle.body.radius;
     arrived = (p_W - goal_W).norm() < 0.1 && command.v_W.isZero();
   }

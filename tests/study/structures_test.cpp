@@ -59,7 +59,7 @@ TEST(Structures, AGustOfOneFrequencyCommonToAllFlightsIsToldWithItsFrequency) {
   const auto result = studied(seen.observations);
   ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
   EXPECT_EQ(result.unknown.front().along, "t_s");
-  EXPECT_NEAR(result.unknown.front().hz, 0.07, 0.006);
+  EXPECT_NEAR(result.unknown.front().hz.value(), 0.07, 0.006);
   EXPECT_LE(result.unknown.front().p, CauseSearchOptions{}.accept_p);
 }
 

@@ -43,7 +43,7 @@ std::vector<double> product(const std::vector<double>& a, const std::vector<doub
 Functions turn(int k, const std::vector<double>& angle) { return {cosine(k, angle), sine(k, angle)}; }
 
 void add_rank(std::vector<Structure>& all, const Regressor& along, const std::vector<double>& q) {
-  Structure few{along.name, std::to_string(kFew) + " cosines", 0, {}};
+  Structure few{along.name, std::to_string(kFew) + " cosines", {}, {}};
   for (int k = 1; k <= kFew; ++k) few.functions.push_back(cosine(pi * k, q));
   Structure many = few;
   many.shape = std::to_string(kMany) + " cosines";
@@ -52,11 +52,11 @@ void add_rank(std::vector<Structure>& all, const Regressor& along, const std::ve
 }
 
 void add_turns(std::vector<Structure>& all, const Regressor& along, const std::vector<double>& angle) {
-  Structure both{along.name, "turns 1 and 2", 0, turn(1, angle)};
+  Structure both{along.name, "turns 1 and 2", {}, turn(1, angle)};
   for (auto& x : turn(2, angle)) both.functions.push_back(std::move(x));
   all.push_back(std::move(both));
   for (int k = 1; k <= kTurns; ++k) {
-    Structure one{along.name, "turn " + std::to_string(k), 0, turn(k, angle)};
+    Structure one{along.name, "turn " + std::to_string(k), {}, turn(k, angle)};
     // The others in the order of their number.
     one.further = [k, angle](int n) {
       const int other = n < k ? n : n + 1;
@@ -70,7 +70,7 @@ void add_products(std::vector<Structure>& all, const std::vector<std::string>& n
                   const std::vector<Functions>& bases) {
   for (std::size_t a = 0; a < bases.size(); ++a)
     for (std::size_t b = a + 1; b < bases.size(); ++b) {
-      Structure pair{names[a] + ", " + names[b], "products", 0, bases[a]};
+      Structure pair{names[a] + ", " + names[b], "products", {}, bases[a]};
       for (const auto& y : bases[b]) pair.functions.push_back(y);
       for (const auto& x : bases[a])
         for (const auto& y : bases[b]) pair.functions.push_back(product(x, y));

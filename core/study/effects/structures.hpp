@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,9 @@ using Functions = std::vector<std::vector<double>>;
 
 /// Something that varies along one regressor or two, whatever its shape.
 struct Structure {
-  std::string along;  ///< a regressor's name; of two "x_m, y_m"
-  std::string shape;  ///< what its functions are: "4 cosines", "turn 3", "products", "0.0714 Hz"
-  double hz = 0;      ///< of a tone in the time since the flight began, its phase common to all flights; else 0
+  std::string along;              ///< a regressor's name; of two "x_m, y_m"
+  std::string shape;              ///< what its functions are: "4 cosines", "turn 3", "products", "0.0714 Hz"
+  std::optional<double> hz = {};  ///< of a tone in the time since the flight began, its phase common to all flights
   Functions functions;
   /// The functions of its n-th further harmonic, n = 1, 2, …; none where there is no more.
   std::function<Functions(int n)> further = [](int) { return Functions{}; };

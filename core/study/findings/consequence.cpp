@@ -83,8 +83,8 @@ void describe(FlightOutcome& outcome, const std::vector<reach::HoverSet>& sets) 
     shift.push_back(set.shift.norm());
   }
   if (extent.empty()) return;  // no set is bounded
-  outcome.extent_median = quantile(extent, 0.5), outcome.extent_95 = quantile(extent, kRules.told_quantile);
-  outcome.shift_median = quantile(shift, 0.5), outcome.shift_95 = quantile(shift, kRules.told_quantile);
+  outcome.hover = {quantile(extent, 0.5), quantile(extent, kRules.told_quantile), quantile(shift, 0.5),
+                   quantile(shift, kRules.told_quantile)};
 }
 
 double safe_share(const std::vector<reach::HoverSet>& sets) {
@@ -126,9 +126,7 @@ void try_plan(FlightOutcome& outcome, const plan::World& world, const Vec3& star
   const plan::PlanOptions options{.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kRules.plan_deadline};
   const auto plan = plan::plan(world, {{start_W, Vec3::Zero()}, hover}, goal_W, options);
   outcome.plan = plan.status;
-  if (plan.status != plan::PlanStatus::ok) return;
-  outcome.length_m = plan.metrics.length_m, outcome.time_s = plan.metrics.time_s;
-  outcome.clearance_m = plan.metrics.min_clearance_m;
+  if (plan.status == plan::PlanStatus::ok) outcome.flown = plan.metrics;
 }
 
 /// The two safe places farthest apart.

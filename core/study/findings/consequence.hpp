@@ -12,12 +12,16 @@ namespace backwash::study {
 
 /// What a model makes of the places that were flown, and of one plan between two of them.
 struct FlightOutcome {
-  double inside = 0;                        ///< share of samples of a − a_sim within push ± w̄, all axes together
-  double extent_median = 0, extent_95 = 0;  ///< largest half width of the hover sets at flown places, m
-  double shift_median = 0, shift_95 = 0;    ///< of those sets' centres, m
-  std::optional<double> safe;               ///< share of the places where hovering is safe; none without a map
-  std::optional<plan::PlanStatus> plan;     ///< none was tried without two safe places apart and a map
-  double length_m = 0, time_s = 0, clearance_m = 0;  ///< of the plan, if ok
+  /// Of the hover sets at flown places, m.
+  struct HoverSizes {
+    double extent_median, extent_95;  ///< largest half width
+    double shift_median, shift_95;    ///< of the centre from its set-point
+  };
+  double inside = 0;                       ///< share of samples of a − a_sim within push ± w̄, all axes together
+  std::optional<HoverSizes> hover;         ///< none where no set is bounded
+  std::optional<double> safe;              ///< share of the places where hovering is safe; none without a map
+  std::optional<plan::PlanStatus> plan;    ///< none was tried without two safe places apart and a map
+  std::optional<plan::PlanMetrics> flown;  ///< of the plan, if ok
 };
 
 struct Consequence {

@@ -113,7 +113,7 @@ void look_at_what_remains(StudyResult& result, const Evidence& evidence, const s
   result.remaining = remaining_dependence(evidence, accepted, options.seed, level);
   if (!silent || result.remaining.empty() || !result.remaining.front().found) return;
   const Dependence& first = result.remaining.front();
-  result.unknown.push_back({first.regressor, first.group, first.p_holm / kRules.dependence_share, std::nullopt, "any"});
+  result.unknown.push_back({first.regressor, first.group, first.p_holm / kRules.dependence_share, {}, "any", {}});
 }
 
 /// Gain, worth as applied and hover shift of what acts in all flights.

@@ -165,8 +165,9 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
 std::string share(double value) { return number(100 * value) + " %"; }
 
 std::string plan_text(const FlightOutcome& o) {
-  if (o.plan != plan::PlanStatus::ok) return o.plan ? plan::to_string(*o.plan) : "";
-  return number(o.length_m) + " m in " + number(o.time_s) + " s, " + number(100 * o.clearance_m) + " cm clear";
+  if (!o.flown) return o.plan ? plan::to_string(*o.plan) : "";
+  return number(o.flown->length_m) + " m in " + number(o.flown->time_s) + " s, " +
+         number(100 * o.flown->min_clearance_m) + " cm clear";
 }
 
 /// What field, reach and plan make of the causes.
@@ -180,12 +181,15 @@ std::string consequence_section(const Consequence& c) {
             report::escaped(after) + "</td></tr>\n";
   };
   line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
-  line("Hover sets: centre off its set-point, median (95 %)",
-       number(100 * b.shift_median) + " (" + number(100 * b.shift_95) + ") cm",
-       number(100 * a.shift_median) + " (" + number(100 * a.shift_95) + ") cm");
-  line("Hover sets: largest half width, median (95 %)",
-       number(100 * b.extent_median) + " (" + number(100 * b.extent_95) + ") cm",
-       number(100 * a.extent_median) + " (" + number(100 * a.extent_95) + ") cm");
+  using Sizes = FlightOutcome::HoverSizes;
+  const auto sizes = [](const FlightOutcome& o, double Sizes::*median, double Sizes::*most) {
+    if (!o.hover) return std::string("none is bounded");
+    return number(100 * ((*o.hover).*median)) + " (" + number(100 * ((*o.hover).*most)) + ") cm";
+  };
+  line("Hover sets: centre off its set-point, median (95 %)", sizes(b, &Sizes::shift_median, &Sizes::shift_95),
+       sizes(a, &Sizes::shift_median, &Sizes::shift_95));
+  line("Hover sets: largest half width, median (95 %)", sizes(b, &Sizes::extent_median, &Sizes::extent_95),
+       sizes(a, &Sizes::extent_median, &Sizes::extent_95));
   if (b.safe && a.safe) line("Flown places where hovering is safe", share(*b.safe), share(*a.safe));
   if (b.plan) {
     const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };

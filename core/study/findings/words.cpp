@@ -59,17 +59,23 @@ std::string refusal(const Refused& r) {
 }
 
 std::optional<double> clearance_cost(const Consequence& c) {
-  if (c.before.plan != plan::PlanStatus::ok || c.after.plan != plan::PlanStatus::ok) return std::nullopt;
-  return c.before.clearance_m - c.after.clearance_m;
+  if (!c.before.flown || !c.after.flown) return std::nullopt;
+  return c.before.flown->min_clearance_m - c.after.flown->min_clearance_m;
 }
 
 std::string cost_sentence(const Consequence& c) {
-  const double wider = c.after.extent_95 - c.before.extent_95 + c.after.shift_95 - c.before.shift_95;
-  std::string text = "Hover sets reach " + number(100 * wider) + " cm farther (95 % of the flown places)";
+  const auto &before = c.before.hover, &after = c.after.hover;
+  std::string text = !before && !after ? "No hover set is bounded, before or after"
+                     : !before         ? "No hover set was bounded before"
+                                       : "No hover set is bounded any more";
+  if (before && after)
+    text = "Hover sets reach " +
+           number(100 * (after->extent_95 - before->extent_95 + after->shift_95 - before->shift_95)) +
+           " cm farther (95 % of the flown places)";
   if (const auto cost = clearance_cost(c))
     return text + "; the plan between two of them has " + number(100 * std::abs(*cost)) +
            (*cost < 0 ? " cm more clearance." : " cm less clearance.");
-  if (c.before.plan == plan::PlanStatus::ok && c.after.plan)
+  if (c.before.flown && c.after.plan)
     return text + "; the plan between two of them is none any more: " + plan::to_string(*c.after.plan) + ".";
   return text + ".";
 }

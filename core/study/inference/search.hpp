@@ -44,7 +44,7 @@ struct UnknownStructure {
   double p;                    ///< family-wise
   std::optional<double> gain;  ///< held out, nats; none where only the dependence was found
   std::string shape;           ///< Structure::shape; "any" where only the dependence was found
-  double hz = 0;               ///< of a tone
+  std::optional<double> hz;    ///< of a tone
 };
 
 /// A cause that would have led, but for a size that no vehicle can have.
