@@ -72,7 +72,7 @@ struct FromRecord {
   void optional(std::optional<T>& to, std::uint32_t known, Members members) const noexcept {
     bool there = false;
     flag(there, known);
-    if (there) members(to.emplace());
+    if (there) members(to.emplace(T{}));  // clang 14 takes no emplace() of a nested aggregate
   }
 };
 

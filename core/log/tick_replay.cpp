@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 
@@ -97,10 +98,10 @@ class Cursor {
 std::optional<Difference> compare(const TickRecord& logged, const TickRecord& replayed, std::uint64_t& hash) {
   std::optional<Difference> first;
   const auto number = [&](const char* name, auto a, auto b) {
-    std::uint8_t bytes[sizeof b];
-    std::memcpy(bytes, &b, sizeof b);
+    using Bytes = std::array<std::uint8_t, sizeof b>;
+    const auto bytes = std::bit_cast<Bytes>(b);
     for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
-    if (std::memcmp(&a, &b, sizeof a) != 0 && !first)
+    if (std::bit_cast<Bytes>(a) != bytes && !first)  // bit for bit
       first = Difference{logged.tick, 0, name, static_cast<double>(a), static_cast<double>(b)};
   };
   each_decision([&](const auto& decision) {

@@ -42,6 +42,7 @@ study::Observations look_at(const Flights& flights, const Vehicle& vehicle, cons
   auto seen = observer.finish();
   if (flights.group.empty()) return seen;
   std::vector<double> by_flight;
+  by_flight.reserve(order.size());
   for (const std::size_t k : order) by_flight.push_back(flights.group[k]);
   seen.group(by_flight);
   return seen;

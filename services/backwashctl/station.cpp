@@ -52,6 +52,7 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
   command.position = {position.x(), position.y(), position.z()};
   command.yaw = yaw;
   std::vector<geometry_msgs_msg_dds__Point_> points;
+  points.reserve(waypoints.size());
   for (const Vec3& p : waypoints) points.push_back({p.x(), p.y(), p.z()});
   const auto count = static_cast<std::uint32_t>(points.size());
   command.waypoints = {count, count, points.data(), false};

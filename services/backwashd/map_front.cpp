@@ -54,7 +54,7 @@ void MapFront::take_scans() {
                                                 std::to_string(fresh) + " new voxels");
     auto owned = std::make_unique<Scan>(std::move(*scan));
     if (channels_.scans.push(owned.get()))
-      owned.release();
+      static_cast<void>(owned.release());  // the ring holds it
     else
       refusals_.add(channels_.scans_rejected, [] { return "a scan: the map worker has 16 waiting"; });
   });

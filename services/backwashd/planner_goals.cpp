@@ -107,7 +107,7 @@ std::optional<std::string> PlannerWorker::explore(const PlanJob& job) {
     why = next.message;
     if (next.kind == plan::Replan::Kind::extended) {
       spdlog::info("towards a goal that is not known to be clear yet: {} commands", next.route.commands.size());
-      const auto refused = fly(std::move(next.route.commands), next.metrics, std::nullopt, closures);
+      auto refused = fly(std::move(next.route.commands), next.metrics, std::nullopt, closures);
       if (!refused) pursuit_ = Pursuit{job.position, job.yaw};
       return refused;
     }

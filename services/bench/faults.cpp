@@ -34,7 +34,7 @@ VioSample garbled(VioSample in, std::mt19937_64& random) {
   in.q.coeffs() *= wild(random);
   return in;
 }
-VioSample shifted(VioSample in, const Fault& fault, std::mt19937_64&) {
+VioSample shifted(const VioSample& in, const Fault& fault, std::mt19937_64&) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(fault.yaw, Vec3::UnitZ()));
   return {{turn * in.estimate.p_W + fault.offset, turn * in.estimate.v_W}, turn * in.q, in.stamp};
 }
@@ -47,7 +47,7 @@ MapMessage garbled(MapMessage in, std::mt19937_64&) {
   in.garbage = true;
   return in;
 }
-MapMessage shifted(MapMessage in, const Fault& fault, std::mt19937_64&) {
+MapMessage shifted(const MapMessage& in, const Fault& fault, std::mt19937_64&) {
   // By whole voxels: only such a grid can be an OctoMap.
   const Vec3 voxels = (fault.offset / in.grid.resolution()).array().round();
   map::OccupancyGrid moved(in.grid.origin() + in.grid.resolution() * voxels, in.grid.resolution(), in.grid.size());
