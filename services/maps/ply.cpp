@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // assimp reads PLY too, but takes one that is cut short as whole (corners that it never read), and doubles as floats.
 #include <algorithm>
-#include <cmath>
+#include <cstdio>
 #include <map>
 
 #include "core/files/read_file.hpp"
@@ -135,7 +135,6 @@ class Numbers {
   }
   const std::string& wrong() const { return wrong_; }
   std::size_t left() const { return rest_.find_first_not_of(" \t\r\n") == rest_.npos ? 0 : rest_.size(); }
-  bool can_hold(std::size_t numbers) const { return numbers <= rest_.size() + text_.size(); }
 
  private:
   std::optional<double> next_word() {
@@ -153,6 +152,12 @@ class Numbers {
   std::size_t line_;
   std::string wrong_;
 };
+
+std::string plain(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.12g", value);
+  return text;
+}
 
 /// Takes elements in: corners of faces as triangles around their first one, vertices as points.
 class Taker {
@@ -184,8 +189,8 @@ class Taker {
  private:
   /// What is wrong: '@' and what follows the element's name, or what comes before it.
   std::string list(const Element& element, const Property& property, double length, Numbers& numbers) {
-    if (!(length >= 0 && numbers.can_hold(static_cast<std::size_t>(length))))
-      return "@: a list of " + std::to_string(static_cast<long long>(length)) + " is longer than the file";
+    if (!(length >= 0 && length <= static_cast<double>(kMostPoints)))
+      return "@: a list of " + plain(length) + " numbers is no list";
     const bool face = element.name == "face" && property.name.starts_with("vertex_ind");
     std::vector<std::uint32_t> corners;
     for (std::size_t n = 0; n < static_cast<std::size_t>(length); ++n) {
@@ -193,8 +198,7 @@ class Taker {
       if (!value) return numbers.wrong();
       if (!face) continue;
       if (!(*value >= 0 && *value < static_cast<double>(vertices_)))
-        return "@: names vertex " + std::to_string(static_cast<long long>(*value)) + ", and there are 0 to " +
-               std::to_string(static_cast<long long>(vertices_) - 1);
+        return "@: names vertex " + plain(*value) + ", and there are 0 to " + plain(static_cast<double>(vertices_) - 1);
       corners.push_back(static_cast<std::uint32_t>(*value));
     }
     for (std::size_t n = 2; n < corners.size(); ++n)

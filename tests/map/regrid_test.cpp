@@ -78,8 +78,12 @@ TEST(Regrid, CallsNoPlaceFreeThatWasNotByAnyTurnScaleOrResolution) {
       // The share of a voxel that only touches is no place to ask.
       const Vec3 q = (p - source.origin()) / 0.1;
       if (((q.array() - q.array().round()).abs() < 0.01).any()) continue;
-      if (here == Cell::occupied) ASSERT_EQ(there, Cell::occupied);
-      if (here == Cell::unknown) ASSERT_NE(there, Cell::free);
+      if (here == Cell::occupied) {
+        ASSERT_EQ(there, Cell::occupied);
+      }
+      if (here == Cell::unknown) {
+        ASSERT_NE(there, Cell::free);
+      }
     }
   }
 }

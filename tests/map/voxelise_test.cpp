@@ -66,8 +66,8 @@ TEST(MeetsCube, SaysWhatCuttingTheTriangleBySixPlanesSays) {
     ASSERT_EQ(meets_cube(t, center, half), *expected) << n;
     ++(*expected ? met : apart);
   }
-  EXPECT_GT(met, 20000);
-  EXPECT_GT(apart, 20000);
+  EXPECT_GT(met, 10000);
+  EXPECT_GT(apart, 10000);
 }
 
 TEST(AddTriangle, OccupiesExactlyTheVoxelsThatItTouches) {
@@ -80,10 +80,12 @@ TEST(AddTriangle, OccupiesExactlyTheVoxelsThatItTouches) {
     for (std::size_t i = 0; i < grid.cell_count(); ++i) {
       const auto expected = cut_meets(t, grid.center(grid.voxel(i)), grid.resolution() * (0.5 + kOnFace));
       occupied += grid.at(i) == Cell::occupied;
-      if (expected) ASSERT_EQ(grid.at(i) == Cell::occupied, *expected) << n;
+      if (expected) {
+        ASSERT_EQ(grid.at(i) == Cell::occupied, *expected) << n;
+      }
     }
   }
-  EXPECT_GT(occupied, 3000);
+  EXPECT_GT(occupied, 2000);
 }
 
 TEST(AddTriangle, OccupiesAShellOfACubeAndNothingInsideOfIt) {
@@ -111,8 +113,12 @@ TEST(AddTriangle, MakesASlantedWallThatNoFloodPasses) {
     flood_free(grid, std::array{Index3(0, 0, 0)});
     for (std::size_t i = 0; i < grid.cell_count(); ++i) {
       const double distance = normal.dot(grid.center(grid.voxel(i)) - middle);
-      if (grid.at(i) == Cell::free) ASSERT_GT(distance * off, 0) << n;
-      if (grid.at(i) == Cell::occupied) ASSERT_LE(std::abs(distance), 0.1 * std::sqrt(0.75) * 1.01);
+      if (grid.at(i) == Cell::free) {
+        ASSERT_GT(distance * off, 0) << n;
+      }
+      if (grid.at(i) == Cell::occupied) {
+        ASSERT_LE(std::abs(distance), 0.1 * std::sqrt(0.75) * 1.01);
+      }
     }
   }
 }

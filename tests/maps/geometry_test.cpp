@@ -113,7 +113,9 @@ TEST_F(Geometries, EndInAnAnswerWhateverBytesOfAMeshAreDamaged) {
       for (int k = 0; k < 3; ++k) content[draw(content.size())] ^= static_cast<char>(1 << draw(8));
       const auto got = read(name, content);
       refusals += !got;
-      if (!got) EXPECT_EQ(got.error().message.find(folder_ + name), 0u);
+      if (!got) {
+        EXPECT_EQ(got.error().message.find(folder_ + name), 0u);
+      }
     }
   }
   EXPECT_GT(refusals, 10);

@@ -63,7 +63,7 @@ TEST_F(Ply, IsRefusedCutShortAtAnyByteOfABinaryBody) {
 TEST_F(Ply, IsRefusedCutShortInAsciiByTheLine) {
   const std::string head = header("ascii", "float"), body = kAscii;
   refused("cut.ply", head + body.substr(0, body.find("1 2 0 1e1")), "ends too early in vertex 3 of 4");
-  refused("cut.ply", head + body.substr(0, body.find("1 2 3")), "cut.ply:22: ends too early in face 2 of 2");
+  refused("cut.ply", head + body.substr(0, body.find("1 2 3")), "cut.ply:23: ends too early in face 2 of 2");
 }
 
 TEST_F(Ply, NamesTheElementAndTheValueThatIsWrong) {
@@ -71,7 +71,7 @@ TEST_F(Ply, NamesTheElementAndTheValueThatIsWrong) {
   refused("a.ply", head + "0\n0\n0 0 1 2\n0 zero 1 2\n", "a.ply:18: 'zero' is no number in vertex 2 of 4");
   refused("b.ply", head + "0\n0\n0 0 1 2\n0 0 1 2\n0 0 1 2\n0 0 1 2\n0 3 0 1 4\n",
           "face 1 of 2: names vertex 4, and there are 0 to 3");
-  refused("c.ply", head + "99999999999 1\n", "is longer than the file");
+  refused("c.ply", head + "99999999999 1\n", "camera 1 of 2: a list of 99999999999 numbers is no list");
   refused("d.ply", "plyx\n", ":1: the first line should be 'ply'");
   refused("e.ply", "ply\nformat xml 1.0\n", ":2: format 'xml' should be ascii");
   refused("f.ply", "ply\nformat ascii 1.0\nelement vertex -3\n", ":3: element 'vertex' has the count '-3'");
