@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
     app.require_subcommand();
     verbs = {fly_verb(app),         plan_verb(app),    reach_verb(app),  field_verb(app),     simulate_verb(app),
              feasibility_verb(app), compare_verb(app), report_verb(app), calibrate_verb(app), import_verb(app),
-             replay_verb(app),      study_verb(app),   adapt_verb(app),  vehicle_verb(app)};
+             replay_verb(app),      study_verb(app),   adapt_verb(app),  vehicle_verb(app),   map_verb(app)};
     if (const auto code = app.parse(argc, argv)) return *code;
     for (const auto& v : verbs) {
       if (!v.command->parsed()) continue;

@@ -5,8 +5,24 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 namespace backwash::services {
+
+std::vector<double> read_numbers(const std::string& option, const std::string& text, std::size_t count,
+                                 const std::string& are) {
+  std::vector<double> numbers;
+  const char* at = text.c_str();
+  char* end = nullptr;
+  for (double value = std::strtod(at, &end); end != at; value = std::strtod(at, &end)) {
+    if (std::isfinite(value)) numbers.push_back(value);
+    if (*end != ',') break;
+    at = end + 1;
+  }
+  if (numbers.size() != count || end != text.c_str() + text.size() || end == at)
+    throw UsageError(option + ": '" + text + "' must be " + are);
+  return numbers;
+}
 
 Option add_point(Command& command, const std::string& name, std::optional<Vec3>& target, const std::string& help) {
   const auto parse = [&target, name](const std::string& text) {

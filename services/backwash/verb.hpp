@@ -42,7 +42,11 @@ Verb replay_verb(Command& app);
 Verb study_verb(Command& app);
 Verb adapt_verb(Command& app);
 Verb vehicle_verb(Command& app);
+Verb map_verb(Command& app);
 
+/// So many finite numbers with commas between them; anything else is a usage error that says what they `are`.
+std::vector<double> read_numbers(const std::string& option, const std::string& text, std::size_t count,
+                                 const std::string& are);
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.
 Option add_point(Command& command, const std::string& name, std::optional<Vec3>& target, const std::string& help);
 

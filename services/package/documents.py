@@ -48,8 +48,9 @@ def page(name: str, section: str, texts: dict[str, str]) -> str:
 
 def completion(name: str, texts: dict[str, str]) -> str:
     function = "_" + name.replace("-", "_")
-    cases = "".join(f"    {verb}) words='{' '.join(options_of(text))}' ;;\n" for verb, text in texts.items() if verb)
-    first = " ".join([*(v for v in texts if v), *options_of(texts[""])])
+    cases = "".join(f"    {verb.split()[-1]}) words='{' '.join([*verbs_of(text), *options_of(text)])}' ;;\n"
+                    for verb, text in texts.items() if verb)
+    first = " ".join([*(v for v in texts if v and " " not in v), *options_of(texts[""])])
     return f"""# bash completion of {name}: verbs and options; values that are files
 {function}() {{
   local word=${{COMP_WORDS[COMP_CWORD]}} words='{first}' verb
@@ -71,7 +72,9 @@ def main() -> int:
         return 64
     (name, section), out, program = sys.argv[1].rsplit(".", 1), pathlib.Path(sys.argv[2]), sys.argv[3]
     texts = {"": help_of(program, name)}
-    texts |= {verb: help_of(program, name, verb) for verb in verbs_of(texts[""])}
+    for verb in verbs_of(texts[""]):
+        texts[verb] = help_of(program, name, verb)
+        texts |= {f"{verb} {inner}": help_of(program, name, verb, inner) for inner in verbs_of(texts[verb])}
     (out / f"{sys.argv[1]}.gz").write_bytes(gzip.compress(page(name, section, texts).encode(), 9, mtime=0))
     (out / name).write_text(completion(name, texts))
     return 0

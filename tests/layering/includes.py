@@ -42,13 +42,14 @@ MAY = {
     "services/parallel": [],
     "services/command_line": [],
     "services/dds": ["idl"],
+    "services/maps": ["core/types", "core/files", "core/map", "core/log"],
     # What flies sees neither the simulation nor what judges flights afterwards.
     "services/backwashd": ["core/sync", "core/config", "core/log", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel",
                            "services/command_line"],
     "services/backwashctl": ["core/types", "core/files", "services/dds", "services/command_line"],
     "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel",
                        "services/command_line"],
-    "services/backwash": ["core", "services/parallel", "services/command_line"],
+    "services/backwash": ["core", "services/maps", "services/parallel", "services/command_line"],
     "services/package": ["core/config", *FLIGHT],  # the library's example
 }
 # The worlds with hidden effects share no code with what looks for them. These ask the study, and no world includes them.
@@ -56,7 +57,7 @@ ASKS_THE_STUDY = {"anytime_main", "design_main", "design_trial", "matrix", "null
                   "simulation_main", "summary", "weights"}
 # DDS with what idl/ generates, MAVLink, GPIO and sockets, systemd, threads with all that only threads need; core/sync has <atomic>.
 FORBIDDEN = re.compile(r"(\w+/)*(dds|gpio|systemd|mavlink|c?thread|pthread|jthread|s?mutex|shared_mutex|future|condition_variable|"
-                       r"semaphore|barrier|latch|stop_token|execution|omp\.h|tbb|termios|ros2\.h|backwash_msgs)|sys/socket|netinet/|linux/")
+                       r"semaphore|barrier|latch|stop_token|execution|omp\.h|tbb|termios|ros2\.h|backwash_msgs|assimp|liblzf)|sys/socket|netinet/|linux/")
 INCLUDE = re.compile(r'^\s*(?:#|%:|\?\?=)\s*(?:include|include_next|import|embed)\b\s*(?:["<]([^">]+)[">])?')
 MODULE = re.compile(r"^\s*(?:export\s+)?(?:import\b(?!\s*[=.(,;])|module\b\s*[\w:;])")
 LITERAL = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.S)
@@ -110,7 +111,7 @@ def file_errors(root: pathlib.Path, path: pathlib.Path) -> list[str]:
         if (root / included[1]).is_file() and pathlib.Path(included[1]).suffix not in SOURCES | {".inc"}:
             wrong.append(f"{name}:{n}: {included[1]} has a suffix that is not read here")
         if below(name, "core") and FORBIDDEN.match(included[1]):
-            wrong.append(f"{name}:{n}: core may not include DDS, MAVLink, GPIO, systemd or thread headers")
+            wrong.append(f"{name}:{n}: core may not include DDS, MAVLink, GPIO, systemd, thread or mesh headers")
         if below(name, "core") and included[1] == "atomic" and folder != "core/sync":
             wrong.append(f"{name}:{n}: of core only core/sync may include <atomic>")
         if ".." in included[1].split("/"):

@@ -5,13 +5,14 @@ source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 
 mapfile -t verbs < <("$backwash" --help | sed -n '/^Subcommands:/,$ s/^  \([a-z]\+\) .*/\1/p')
 [[ ${#verbs[@]} -ge 13 ]] || die "only ${#verbs[@]} verbs in --help"
-for verb in "${verbs[@]/vehicle/vehicle tune}"; do
+verbs=("${verbs[@]/vehicle/vehicle tune}")
+for verb in "${verbs[@]/#map/map info}" "map convert"; do
   read -ra words <<<"$verb"
   "$backwash" "${words[@]}" --help >help || die "$verb --help fails"
   grep -q "^  backwash $verb " help || die "$verb --help has no example"
   # One that needs no file of the reader's works as it stands. compare's takes minutes.
   sed -n '/^Example:/,$ { /^  /p; }' help >example.sh
-  [[ $verb == compare ]] || grep -qE '[a-z*]+\.(csv|bwlog|toml|bt|ulg)' example.sh && continue
+  [[ $verb == compare ]] || grep -qE '[a-z*]+\.(csv|bwlog|toml|bt|ulg|obj|pcd)' example.sh && continue
   mkdir -p examples
   (cd examples && PATH=$(dirname "$backwash"):$PATH bash -e ../example.sh) >/dev/null || die "the example of $verb --help fails"
   examples+=("$verb")

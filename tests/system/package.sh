@@ -62,7 +62,9 @@ in_root backwash vehicle --help >/dev/null
 [[ $(in_root stat -c '%U %a' /var/lib/backwash) == 'backwash 750' ]] || die "/var/lib/backwash: $(in_root stat -c '%U %a' /var/lib/backwash)"
 in_root bash -c 'source /usr/share/bash-completion/completions/backwash &&
   COMP_WORDS=(backwash pl) COMP_CWORD=1 && _backwash && [[ ${COMPREPLY[*]} == plan ]] &&
-  COMP_WORDS=(backwash plan --vm) COMP_CWORD=2 && _backwash && [[ ${COMPREPLY[*]} == --vmax ]]' || die "the completion completes nothing"
+  COMP_WORDS=(backwash plan --vm) COMP_CWORD=2 && _backwash && [[ ${COMPREPLY[*]} == --vmax ]] &&
+  COMP_WORDS=(backwash map co) COMP_CWORD=2 && _backwash && [[ ${COMPREPLY[*]} == convert ]] &&
+  COMP_WORDS=(backwash map convert --points) COMP_CWORD=3 && _backwash && [[ ${COMPREPLY[*]} == --points-least ]]' || die "the completion completes nothing"
 [[ ! -e $root/etc/systemd/system/multi-user.target.wants/backwashd.service ]] || die "installing enabled the daemon"
 
 echo '# mine' >>"$root/etc/backwash/backwashd.toml"

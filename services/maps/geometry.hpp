@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/map/load_map.hpp"
+#include "core/types/geometry.hpp"
+
+/// Readers of what others make maps of: meshes and point clouds. They see neither OctoMap nor the command line.
+namespace backwash::maps {
+
+/// Most points, or corners of triangles, that are taken from one file: 1.5 GiB of them.
+inline constexpr std::size_t kMostPoints = std::size_t{64} << 20;
+
+/// What a file holds, in its own unit and frame.
+struct Geometry {
+  std::vector<Vec3> points;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< by position in `points`; none: a cloud
+  std::vector<Vec3> sensors;                            ///< of a cloud: where each point was seen from, or empty
+  std::size_t not_finite = 0;                           ///< points of a cloud that were left out
+  std::optional<std::size_t> first_not_finite;          ///< which was the first of them, counted from 1
+  bool single = false;                                  ///< coordinates had 32 bits
+  std::string up = "z";                                 ///< the axis that its format says is up; z where it says none
+  std::vector<std::string> notes;                       ///< what was found and not used, a sentence each
+};
+
+using Read = tl::expected<Geometry, map::MapError>;
+
+/// Reads a file by the ending of its name: .ply, .pcd, .csv, .obj, .gltf, .glb or .stl, in either case. Errors, with
+/// the file's name: not_found; unknown_name (another ending; of LAS, E57 and the like the command that makes a file for
+/// us); corrupt (line, byte or element, the value seen and what would be right); too_large.
+Read read_geometry(const std::string& path);
+
+/// The formats by themselves. PLY: ascii and both binary ones, any property types, faces of three and more corners.
+Read read_ply(const std::string& path);
+/// PCD 0.6 and 0.7: ascii, binary and binary_compressed; x, y, z of any type.
+Read read_pcd(const std::string& path);
+/// Columns x_m, y_m, z_m or x, y, z (m), with sensor_x_m, sensor_y_m, sensor_z_m for where each was seen from.
+Read read_point_csv(const std::string& path);
+/// OBJ, glTF and STL by assimp in a process of its own: a damaged file ends that, or its time, and not the caller.
+Read read_mesh(const std::string& path);
+
+/// An error of a file; `where` is empty, ":LINE" or what else follows its name.
+tl::unexpected<map::MapError> corrupt(const std::string& path, const std::string& what);
+tl::unexpected<map::MapError> too_large(const std::string& path, std::size_t points);
+
+}  // namespace backwash::maps

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <csignal>
+
+#include "services/maps/in_child.hpp"
+#include "tests/maps/files.hpp"
+
+namespace backwash::maps {
+namespace {
+
+class Geometries : public MapFiles {};
+
+/// A tetrahedron, by each format's own words.
+const Vec3 kCorners[] = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
+constexpr int kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+
+std::string obj() {
+  std::string out = "mtllib nowhere.mtl\n";
+  for (const Vec3& p : kCorners)
+    out += "v " + std::to_string(p.x()) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) + "\n";
+  for (const auto& f : kFaces)
+    out += "f " + std::to_string(f[0] + 1) + " " + std::to_string(f[1] + 1) + " " + std::to_string(f[2] + 1) + "\n";
+  return out;
+}
+
+std::string stl() {
+  std::string out(80, ' ');
+  out += bytes_of<std::uint32_t>(4);
+  for (const auto& f : kFaces) {
+    for (int n = 0; n < 3; ++n) out += bytes_of(n == 2 ? 1.f : 0.f);
+    for (const int corner : f)
+      for (int axis = 0; axis < 3; ++axis) out += bytes_of(static_cast<float>(kCorners[corner][axis]));
+    out += std::string(2, '\0');
+  }
+  return out;
+}
+
+/// Binary glTF, its mesh moved by its node to (10, 0, 0).
+std::string glb() {
+  std::string bin;
+  for (const Vec3& p : kCorners)
+    for (int axis = 0; axis < 3; ++axis) bin += bytes_of(static_cast<float>(p[axis]));
+  for (const auto& f : kFaces)
+    for (const int corner : f) bin += bytes_of(static_cast<std::uint16_t>(corner));
+  std::string json =
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":[10,0,0]}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"accessors":[{"bufferView":0,)"
+      R"("componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,2,3]},{"bufferView":1,"componentType":5123,)"
+      R"("count":12,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,)"
+      R"("byteLength":24}],"buffers":[{"byteLength":72}]})";
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const auto chunk = [](const std::string& data, const std::string& type) {
+    return bytes_of(static_cast<std::uint32_t>(data.size())) + type + data;
+  };
+  const std::string body = chunk(json, "JSON") + chunk(bin, std::string("BIN\0", 4));
+  return "glTF" + bytes_of<std::uint32_t>(2) + bytes_of(static_cast<std::uint32_t>(12 + body.size())) + body;
+}
+
+/// The corners of all triangles, sorted: formats number them in their own ways.
+std::vector<std::array<double, 9>> triangles_of(const Geometry& geometry) {
+  std::vector<std::array<double, 9>> all;
+  for (const auto& t : geometry.triangles) {
+    std::vector<std::array<double, 3>> corners;
+    for (const auto c : t) corners.push_back({geometry.points[c].x(), geometry.points[c].y(), geometry.points[c].z()});
+    std::ranges::sort(corners);
+    std::array<double, 9> flat;
+    for (std::size_t n = 0; n < 9; ++n) flat[n] = corners[n / 3][n % 3];
+    all.push_back(flat);
+  }
+  std::ranges::sort(all);
+  return all;
+}
+
+TEST_F(Geometries, AreTheSameTetrahedronByEveryMeshFormat) {
+  Geometry expected;
+  expected.points.assign(std::begin(kCorners), std::end(kCorners));
+  for (const auto& f : kFaces)
+    expected.triangles.push_back(
+        {static_cast<std::uint32_t>(f[0]), static_cast<std::uint32_t>(f[1]), static_cast<std::uint32_t>(f[2])});
+  for (const auto& [name, content] : {std::pair{"a.obj", obj()}, {"a.stl", stl()}}) {
+    const auto got = read(name, content);
+    ASSERT_TRUE(got) << got.error().message;
+    EXPECT_EQ(triangles_of(*got), triangles_of(expected)) << name;
+    EXPECT_EQ(got->up, "z");
+  }
+  for (Vec3& p : expected.points) p.x() += 10;
+  const auto got = read("a.glb", glb());
+  ASSERT_TRUE(got) << got.error().message;
+  EXPECT_EQ(triangles_of(*got), triangles_of(expected));
+  EXPECT_EQ(got->up, "y");
+}
+
+TEST_F(Geometries, RefuseMeshesThatAreDamagedOrEmpty) {
+  refused("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "vertex index out of range");
+  refused("b.obj", "", "export it again");
+  refused("c.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "");
+  refused("d.stl", stl().substr(0, 200), "STL");
+  refused("e.glb", glb().substr(0, 300), "export it again");
+  refused("f.gltf", "{", "export it again");
+  refused("g.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", "no finite place");
+}
+
+TEST_F(Geometries, EndInAnAnswerWhateverBytesOfAMeshAreDamaged) {
+  std::uint64_t state = 88172645463325252u;
+  const auto draw = [&](std::size_t below) {
+    state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+    return static_cast<std::size_t>(state % below);
+  };
+  int refusals = 0;
+  for (const auto& [name, whole] : {std::pair{"x.obj", obj()}, {"x.stl", stl()}, {"x.glb", glb()}}) {
+    for (int n = 0; n < 40; ++n) {
+      std::string content = whole;
+      for (int k = 0; k < 3; ++k) content[draw(content.size())] ^= static_cast<char>(1 << draw(8));
+      const auto got = read(name, content);
+      refusals += !got;
+      if (!got) {
+        EXPECT_EQ(got.error().message.find(folder_ + name), 0u);
+      }
+    }
+  }
+  EXPECT_GT(refusals, 10);
+}
+
+TEST_F(Geometries, TakePointsAndTheirSensorsFromATable) {
+  const auto got =
+      read("a.csv",
+           "label,x_m,y_m,z_m,sensor_x_m,sensor_y_m,sensor_z_m\nchair,1,2,3,0,0,1\n,nan,0,0,0,0,1\nwall,4,5,6,0,1,1\n");
+  ASSERT_TRUE(got) << got.error().message;
+  EXPECT_EQ(got->points, (std::vector<Vec3>{{1, 2, 3}, {4, 5, 6}}));
+  EXPECT_EQ(got->sensors, (std::vector<Vec3>{{0, 0, 1}, {0, 1, 1}}));
+  EXPECT_EQ(got->not_finite, 1u);
+  EXPECT_EQ(read("b.csv", "X,Y,Z\n1,2,3\n")->points.size(), 1u);
+  refused("c.csv", "x_m,y_m\n1,2\n", ":1: no columns x_m,y_m,z_m");
+  refused("d.csv", "x_m,y_m,z_m\n1,2,three\n", "d.csv:2:");
+  refused("e.csv", "x,y,z,sensor_x_m,sensor_y_m,sensor_z_m\n1,2,3,,,\n",
+          "e.csv:2: a point without the place of its sensor");
+  refused("f.csv", "x,y,z\n", "holds no point");
+}
+
+TEST_F(Geometries, TellHowToConvertWhatIsNotRead) {
+  refused("room.las", "LASF", "pdal translate " + folder_ + "room.las " + folder_ + "room.ply");
+  refused("room.E57", "ASTM-E57", "pdal translate ");
+  refused("room.mcap", "", "octomap_saver_node");
+  refused("room.dwg", "", "ends in .dwg; known are .bt");
+  refused("room", "", "ends in nothing");
+}
+
+TEST_F(Geometries, WaitForNoFifoAndNameAFileThatIsNotThere) {
+  for (const char* name : {"a.ply", "a.pcd", "a.csv", "a.obj"}) {
+    const auto got = read_geometry(folder_ + name);
+    ASSERT_FALSE(got);
+    EXPECT_EQ(got.error().kind, map::MapError::Kind::not_found) << name;
+  }
+  std::filesystem::create_directory(folder_ + "folder.ply");
+  EXPECT_NE(read_geometry(folder_ + "folder.ply").error().message.find("is a directory; needs a PLY file"),
+            std::string::npos);
+}
+
+TEST(InChild, ReturnsAllThatWasSaidAndTellsHowAChildEnded) {
+  constexpr std::size_t kMemory = std::size_t{1} << 30;
+  const std::string said(3u << 20, 'x');
+  EXPECT_EQ(in_child([&](const Sink& sink) { sink(said.data(), said.size()); }, 5, kMemory), said);
+  const auto crashed = in_child([](const Sink&) { ::raise(SIGSEGV); }, 5, kMemory);
+  ASSERT_FALSE(crashed);
+  EXPECT_EQ(crashed.error(), "ended with signal 11");
+  const auto threw = in_child([](const Sink&) { throw std::bad_alloc(); }, 5, kMemory);
+  ASSERT_FALSE(threw);
+  const auto endless = in_child(
+      [](const Sink&) {
+        for (volatile int n = 0;;) n = n + 1;
+      },
+      1, kMemory);
+  ASSERT_FALSE(endless);
+  EXPECT_NE(endless.error().find("was ended after 1 s"), std::string::npos) << endless.error();
+}
+
+}  // namespace
+}  // namespace backwash::maps

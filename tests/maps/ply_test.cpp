@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tests/maps/files.hpp"
+
+namespace backwash::maps {
+namespace {
+
+class Ply : public MapFiles {
+ protected:
+  /// Two cameras (a foreign element), four vertices with a colour between y and z, a triangle and a square.
+  static std::string header(const std::string& format, const std::string& real) {
+    return "ply\nformat " + format +
+           " 1.0\ncomment by hand\nelement camera 2\nproperty list uchar short view\nelement vertex 4\nproperty " +
+           real + " x\nproperty " + real + " y\nproperty uchar red\nproperty " + real +
+           " z\nelement face 2\nproperty uchar flags\nproperty list uchar int vertex_indices\nend_header\n";
+  }
+  static constexpr const char* kAscii =
+      "2 -7 300\n0\n0 0 255 -0.5\n1 0 255 0.25\n\n1 2 0 1e1\n0 2 0 +3\n7 3 0 1 2\n0 4 0 1 2 3\n";
+  template <typename Real>
+  static std::string binary(bool turned) {
+    std::string out =
+        bytes_of<std::uint8_t>(2) + bytes_of<std::int16_t>(-7, turned) + bytes_of<std::int16_t>(300, turned) + '\0';
+    const double v[4][3] = {{0, 0, -0.5}, {1, 0, 0.25}, {1, 2, 10}, {0, 2, 3}};
+    for (const auto& p : v)
+      out += bytes_of(static_cast<Real>(p[0]), turned) + bytes_of(static_cast<Real>(p[1]), turned) + '\xff' +
+             bytes_of(static_cast<Real>(p[2]), turned);
+    for (const std::vector<std::int32_t>& face : {std::vector{0, 1, 2}, {0, 1, 2, 3}}) {
+      out += '\7' + bytes_of(static_cast<std::uint8_t>(face.size()));
+      for (const auto corner : face) out += bytes_of(corner, turned);
+    }
+    return out;
+  }
+  static void expect_scene(const Read& got) {
+    ASSERT_TRUE(got) << got.error().message;
+    const std::vector<Vec3> points = {{0, 0, -0.5}, {1, 0, 0.25}, {1, 2, 10}, {0, 2, 3}};
+    EXPECT_EQ(got->points, points);
+    const std::vector<std::array<std::uint32_t, 3>> triangles = {{0, 1, 2}, {0, 1, 2}, {0, 2, 3}};
+    EXPECT_EQ(got->triangles, triangles);
+  }
+};
+
+TEST_F(Ply, IsTheSameSceneInAsciiAndBothByteOrders) {
+  expect_scene(read("a.ply", header("ascii", "float") + kAscii));
+  expect_scene(read("b.ply", header("binary_little_endian", "float32") + binary<float>(false)));
+  expect_scene(read("c.PLY", header("binary_big_endian", "double") + binary<double>(true)));
+}
+
+TEST_F(Ply, KeepsTheDigitsOfDoublesFarFromTheOrigin) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+  const auto got = read("utm.ply", head + "500000.123 5600000.456 101.5\n");
+  ASSERT_TRUE(got) << got.error().message;
+  EXPECT_EQ(got->points[0], Vec3(500000.123, 5600000.456, 101.5));
+  EXPECT_FALSE(got->single);
+}
+
+TEST_F(Ply, IsRefusedCutShortAtAnyByteOfABinaryBody) {
+  const std::string head = header("binary_little_endian", "float"), body = binary<float>(false);
+  for (std::size_t n = 0; n < body.size(); ++n)
+    refused("cut.ply", head + body.substr(0, n),
+            "ends at byte " + std::to_string(head.size() + n) + " in the middle of ");
+}
+
+TEST_F(Ply, IsRefusedCutShortInAsciiByTheLine) {
+  const std::string head = header("ascii", "float"), body = kAscii;
+  refused("cut.ply", head + body.substr(0, body.find("1 2 0 1e1")), "ends too early in vertex 3 of 4");
+  refused("cut.ply", head + body.substr(0, body.find("1 2 3")), "cut.ply:23: ends too early in face 2 of 2");
+}
+
+TEST_F(Ply, NamesTheElementAndTheValueThatIsWrong) {
+  const std::string head = header("ascii", "float");
+  refused("a.ply", head + "0\n0\n0 0 1 2\n0 zero 1 2\n", "a.ply:18: 'zero' is no number in vertex 2 of 4");
+  refused("b.ply", head + "0\n0\n0 0 1 2\n0 0 1 2\n0 0 1 2\n0 0 1 2\n0 3 0 1 4\n",
+          "face 1 of 2: names vertex 4, and there are 0 to 3");
+  refused("c.ply", head + "99999999999 1\n", "camera 1 of 2: a list of 99999999999 numbers is no list");
+  refused("d.ply", "plyx\n", ":1: the first line should be 'ply'");
+  refused("e.ply", "ply\nformat xml 1.0\n", ":2: format 'xml' should be ascii");
+  refused("f.ply", "ply\nformat ascii 1.0\nelement vertex -3\n", ":3: element 'vertex' has the count '-3'");
+  refused("g.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\n",
+          ":4: property quad x: should be TYPE NAME");
+  refused("h.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n",
+          "element vertex has no property y");
+  refused("i.ply",
+          "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\nproperty float y\nproperty float "
+          "z\nend_header\n",
+          "are the most");
+  refused("j.ply", "ply\nformat ascii 1.0\n", "the header ends without a line 'end_header'");
+}
+
+TEST_F(Ply, LosesNotFinitePointsOfACloudWithACountAndRefusesThemInAMesh) {
+  const std::string cloud =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  const auto got = read("cloud.ply", cloud + "1 2 3\nnan 0 0\n0 inf 1\n");
+  ASSERT_TRUE(got) << got.error().message;
+  EXPECT_EQ(got->points.size(), 1u);
+  EXPECT_EQ(got->not_finite, 2u);
+  EXPECT_EQ(got->first_not_finite, 2u);
+  refused("none.ply", cloud + "nan 0 0\nnan 0 0\n0 inf 1\n", "none of its 3 points has finite coordinates");
+  refused("mesh.ply", header("ascii", "float") + "0\n0\n0 0 0 1\n1 0 0 nan\n1 1 0 0\n0 1 0 0\n0 3 0 2 3\n0 3 0 1 2\n",
+          "corner 2, of triangle 2, is no finite place");
+}
+
+}  // namespace
+}  // namespace backwash::maps
