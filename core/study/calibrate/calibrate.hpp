@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "core/study/calibrate/assess.hpp"
@@ -36,6 +37,7 @@ struct Options {
   int bootstraps = static_cast<int>(kCalibrationRules.bootstraps);
   int folds = static_cast<int>(kCalibrationRules.folds);
   std::uint64_t seed = 1;
+  std::function<void(std::size_t done, std::size_t of)> progress = [](std::size_t, std::size_t) {};  ///< of the refits
 };
 
 struct Calibration {
