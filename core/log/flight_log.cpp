@@ -59,6 +59,8 @@ tl::unexpected<LogError> bad(const std::string& path, std::size_t line, const st
 tl::expected<std::vector<std::string>, LogError> read_names(std::istream& file, const std::string& path) {
   std::string text;
   if (!std::getline(file, text)) return bad(path, 1, "the file is empty; the first line must name the columns");
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // spreadsheets write it
+  if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
   std::vector<std::string> names;
   for (const auto cell : cells_of(text)) {
     if (cell.empty())

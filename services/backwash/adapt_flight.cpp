@@ -15,7 +15,6 @@
 #include "core/types/mode.hpp"
 #include "services/backwash/study_flights.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {
@@ -100,7 +99,7 @@ struct Place {
 };
 std::vector<Place> places_of(const std::vector<Vec3>& path, const field::ProximityField& field) {
   std::vector<Place> places(path.size());
-  run_parallel(path.size(), [&](std::size_t begin, std::size_t end) {
+  run_shown(path.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       if (!field.grid().free(field.grid().index(path[k]))) continue;
       const auto parts = field.at(path[k]);

@@ -161,8 +161,9 @@ int judge(const Campaign& campaign, const Model& model, const Options& options, 
 }
 
 int run(const Options& options) {
-  check_output(options.out, options.force);
-  check_output(options.report, options.force);
+  if (options.judge && !(options.out.empty() && options.report.empty()))
+    throw Failure(kUsage, "--judge fits nothing that --out or --report could hold; give it without them");
+  check_outputs({options.out, options.report}, options.force);
   std::optional<Vehicle> vehicle;
   if (!options.vehicle.empty()) vehicle = read_vehicle(options.vehicle);
   auto gates = read_model(options.base_model);
@@ -181,6 +182,7 @@ int run(const Options& options) {
   progress("fitting " + std::to_string(campaign.windows) + " windows");
   study::calibrate::Options how;
   how.fit.quantile = options.quantile, how.seed = options.seed, how.bootstraps = options.bootstraps;
+  how.progress = [](std::size_t done, std::size_t of) { progress(done, of); };
   const auto calibration = calibrate(campaign.data, gates, refused, campaign.pushes, how);
   const Provenance provenance{kVersion,      options.vehicle,    options.base_model, campaign.map_names,
                               campaign.logs, campaign.signal,    campaign.windows,   campaign.gated,

@@ -6,13 +6,13 @@
 #include "services/backwash/compare_output.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
 namespace {
 
 constexpr std::size_t kGapFlights = 10;
+constexpr double kMostFlights = 100'000;  // of a scene and vehicle: weeks
 const char* const kGapScene = "builtin:narrow-gap";
 
 struct Options {
@@ -59,24 +59,35 @@ std::vector<std::string> models_of(const Options& options) {
   return options.models;
 }
 
+/// Flies one scene with the vehicle of that number. Throws Interrupted after Ctrl-C, and then nothing of it is kept.
+void fly_scene(report::Comparison& c, const Options& options, const std::string& map, std::size_t n,
+               const std::string& model) {
+  const std::string scene = map.starts_with("builtin:") ? map : std::filesystem::path(map).filename().string();
+  const auto vehicle = read_vehicle(options.vehicles[n]);
+  progress(scene + ", " + vehicle.name + ": building the world");
+  const auto world =
+      plan::build_world(read_map(map), read_model(model), vehicle, reach::Method::tight, std::nullopt, run_shown);
+  const auto pairs = sim::draw_pairs(world->grid, world->distance, vehicle, options.flights,
+                                     seed_for(options.seed, scene, vehicle.name));
+  if (!pairs)
+    throw Failure(kUnavailable, map + ":1: no two hover points 3 m apart; choose a wider map or a smaller vehicle");
+  std::optional<sim::GapCampaign> gap;
+  if (map == kGapScene) gap = sim::fly_narrow_gap(*world, kGapFlights, options.seed);
+  progress(scene + ", " + vehicle.name + ": planning and flying");
+  c.scenes.push_back(sim::compare_scene(scene, *world, *pairs, c.methods, run_shown));
+  if (gap) c.gaps.push_back(*std::move(gap));
+}
+
 report::Comparison compare(const Options& options, const std::vector<std::string>& maps,
                            const std::vector<std::string>& models) {
   report::Comparison c{sim::compare_methods(), {}, {}, {}, {}, options.seed, options.flights, kVersion};
-  for (const auto& map : maps) {
-    const std::string scene = map.starts_with("builtin:") ? map : std::filesystem::path(map).filename().string();
-    for (std::size_t n = 0; n < options.vehicles.size(); ++n) {
-      const auto vehicle = read_vehicle(options.vehicles[n]);
-      progress(scene + ", " + vehicle.name + ": building the world");
-      const auto world = plan::build_world(read_map(map), read_model(models[n]), vehicle, reach::Method::tight,
-                                           std::nullopt, run_parallel);
-      const auto pairs = sim::draw_pairs(world->grid, world->distance, vehicle, options.flights,
-                                         seed_for(options.seed, scene, vehicle.name));
-      if (!pairs)
-        throw Failure(kUnavailable, map + ":1: no two hover points 3 m apart; choose a wider map or a smaller vehicle");
-      if (map == kGapScene) c.gaps.push_back(sim::fly_narrow_gap(*world, kGapFlights, options.seed));
-      progress(scene + ", " + vehicle.name + ": planning and flying");
-      c.scenes.push_back(sim::compare_scene(scene, *world, *pairs, c.methods, run_parallel));
-    }
+  finish_what_is_done();
+  try {
+    for (const auto& map : maps)
+      for (std::size_t n = 0; n < options.vehicles.size(); ++n) fly_scene(c, options, map, n, models[n]);
+  } catch (const Interrupted&) {
+    if (c.scenes.empty())
+      throw Failure(kInterrupted, "interrupted before the first scene was flown; nothing is written");
   }
   c.table = sim::tabulate(c.scenes, c.methods, options.seed);
   c.demands = sim::demands(c.table, c.methods);
@@ -85,8 +96,7 @@ report::Comparison compare(const Options& options, const std::vector<std::string
 
 int run(const Options& options) {
   const auto models = models_of(options);
-  check_output(options.report, options.force);
-  check_output(options.out, options.force);
+  check_outputs({options.report, options.out}, options.force);
   std::vector<std::string> maps;
   for (const auto& scenes : options.scenes)
     for (auto& map : maps_of(scenes)) maps.push_back(std::move(map));
@@ -105,6 +115,10 @@ int run(const Options& options) {
     write_file(options.report, *page, options.force);
   }
   options.json ? print(to_json(comparison)) : print_text(comparison);
+  if (interrupted())
+    throw Failure(kInterrupted, "interrupted after " + std::to_string(comparison.scenes.size()) + " of " +
+                                    std::to_string(maps.size() * models.size()) +
+                                    " scenes and vehicles; these are judged and written");
   return kOk;
 }
 
@@ -120,7 +134,7 @@ Verb compare_verb(Command& app) {
                   "builtin:NAME; several may be given")
       .capture_default_str();
   command.add_option("--flights", options->flights, "start-goal pairs a scene and vehicle")
-      .check(positive())
+      .check(within(1, kMostFlights))
       .capture_default_str();
   command.add_option("--seed", options->seed, "of the pairs, the air and the estimate's error").capture_default_str();
   command.add_option("--vehicle", options->vehicles, "vehicle files or builtin:NAME").capture_default_str();

@@ -6,7 +6,6 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {
@@ -133,7 +132,7 @@ int run(const Options& options) {
   const auto model = read_model(options.model);
   auto grid = read_map(options.map);
   progress("building the world");
-  const auto world = plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_parallel);
+  const auto world = plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_shown);
   const auto regions = plan::hover_regions(*world);
   std::optional<Way> way;
   if (options.start) {
@@ -142,8 +141,8 @@ int run(const Options& options) {
   }
   std::optional<Sets> sets;
   if (options.method == reach::Method::tight && !options.margin)
-    sets = Sets{plan::cost_of_set(*world, run_parallel),
-                plan::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4}, run_parallel)};
+    sets =
+        Sets{plan::cost_of_set(*world, run_shown), plan::set_against_margins(*world, {0.1, 0.2, 0.3, 0.4}, run_shown)};
   options.json ? print_json(*world, regions, way, sets) : print_text(*world, regions, way, sets);
   return kOk;
 }

@@ -7,7 +7,6 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {
@@ -36,6 +35,7 @@ std::vector<Vec3> read_points(const std::string& path) {
   for (std::size_t i = 0; i < table.column("x_m").size(); ++i) {
     points.emplace_back(table.column("x_m")[i], table.column("y_m")[i], table.column("z_m")[i]);
   }
+  if (points.empty()) throw Failure(kBadData, path + ":1: has no point below its first line; give one or more");
   return points;
 }
 
@@ -45,6 +45,7 @@ report::Slice read_slice(const std::string& text) {
   if (std::sscanf(text.c_str(), "%c=%lf%c", &axis, &slice.coordinate, &rest) != 2 || axis < 'x' || axis > 'z') {
     throw Failure(kUsage, "--slice: '" + text + "' must be x=, y= or z= and a number in metres, as in z=0.5");
   }
+  if (!std::isfinite(slice.coordinate)) throw Failure(kUsage, "--slice: '" + text + "' is not finite; give a number");
   slice.axis = axis - 'x';
   return slice;
 }
@@ -62,6 +63,14 @@ std::vector<Vec3> slice_points(const map::OccupancyGrid& grid, const report::Sli
     points.back()[slice.axis] = slice.coordinate;
   }
   return points;
+}
+
+/// What is wrong with a slice that cuts no free voxel.
+std::string empty_slice(const Options& options, const map::OccupancyGrid& grid, const report::Slice& slice) {
+  const double low = grid.origin()[slice.axis];
+  const double high = low + grid.resolution() * grid.size()[slice.axis];
+  return options.map + ":1: no free voxel in the slice " + options.slice + "; the map spans " + "xyz"[slice.axis] +
+         " from " + to_text(low, 2) + " to " + to_text(high, 2) + " m";
 }
 
 /// The eight voxels around a point whose centres trilinear interpolation uses.
@@ -87,7 +96,7 @@ std::vector<Value> interpolated(const field::ProximityField& exact, const std::v
   }
   field::DisturbanceField stored(grid);
   const field::WholeField whole(grid, exact.model(), voxels);
-  run_parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); });
+  run_shown(whole.block_count(), [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); });
   field::Extension extension(grid, exact.model());
   extension.fill(grid, voxels);
   if (extension.by_place()) stored.scale(extension, voxels);
@@ -115,7 +124,7 @@ Air air_at(const field::ProximityField& exact, const Vec3& p_W) {
 
 std::vector<Value> evaluated(const field::ProximityField& exact, const std::vector<Vec3>& points) {
   std::vector<Value> values(points.size());
-  run_parallel(points.size(), [&](std::size_t begin, std::size_t end) {
+  run_shown(points.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       values[i].p_W = points[i];
       if (!exact.grid().free(exact.grid().index(points[i]))) continue;
@@ -196,7 +205,7 @@ int run(const Options& options) {
   if (options.at) check_free(grid, *options.at, options.map), points = {*options.at};
   if (!options.points.empty()) points = read_points(options.points);
   if (slice) points = slice_points(grid, *slice);
-  if (slice && points.empty()) throw Failure(kBadData, options.map + ":1: no free voxel in the slice " + options.slice);
+  if (slice && points.empty()) throw Failure(kBadData, empty_slice(options, grid, *slice));
 
   progress("evaluating " + std::to_string(points.size()) + " points");
   const field::ProximityField exact(grid, model);

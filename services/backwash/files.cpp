@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <set>
 
 #include "core/config/config.hpp"
 #include "core/config/simulation_terms.hpp"
@@ -42,6 +44,12 @@ Vehicle read_vehicle(const std::string& path) { return read_configuration(config
 log::FlightLog read_table(const std::string& path, const std::string& time_column) {
   auto table = log::read_csv(path, time_column);
   if (table) return std::move(*table);
+  if (table.error().kind == log::LogError::Kind::bad_data) {
+    if (path.ends_with(".bwlog"))
+      throw Failure(kBadData, path + ":1: is no table but a raw log of backwashd; report, replay and adapt read it");
+    if (path.ends_with(".ulg") || path.ends_with(".bin") || path.ends_with(".BIN"))
+      throw Failure(kBadData, path + ":1: is no table but an autopilot's log; make one of it with backwash import");
+  }
   throw Failure(table.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, table.error().message);
 }
 
@@ -71,14 +79,45 @@ void check_output(const std::string& path, bool force) {
     throw Failure(kCannotCreate, path + ":1: cannot be created; name a file in a folder that can be written");
 }
 
-void write_file(const std::string& path, const std::string& content, bool force) {
-  check_output(path, force);
-  std::ofstream file(path, std::ios::binary);
-  if (!file) {
-    throw Failure(kCannotCreate, path + ":1: cannot be created; name a file in a folder that can be written");
+void check_outputs(const std::vector<std::string>& paths, bool force) {
+  std::set<std::filesystem::path> seen;
+  for (const auto& path : paths) {
+    check_output(path, force);
+    std::error_code unknown;
+    if (!path.empty() && !seen.insert(std::filesystem::weakly_canonical(path, unknown)).second)
+      throw Failure(kUsage, path + " is given for two outputs; give each a file of its own");
   }
-  file << content << std::flush;
-  if (!file) throw Failure(kInputOutput, path + ":1: cannot be written to its end; free some space");
+}
+
+namespace {
+
+/// Lets `write` write a file beside `path`, which takes its place when it is whole; a device is written to itself.
+void write_whole(const std::string& path, bool force, const std::function<bool(const std::string& to)>& write) {
+  check_output(path, force);
+  std::error_code wrong;
+  const bool device = std::filesystem::exists(path, wrong) && !std::filesystem::is_regular_file(path, wrong);
+  const std::string to = device ? path : path + ".part";
+  wrong.clear();
+  const bool whole = write(to);
+  if (whole && !device) std::filesystem::rename(to, path, wrong);
+  if (whole && !wrong) return;
+  if (!device) std::filesystem::remove(to, wrong);
+  throw Failure(kInputOutput, path + ":1: cannot be written to its end; free some space");
+}
+
+}  // namespace
+
+void write_file(const std::string& path, const std::string& content, bool force) {
+  write_whole(path, force, [&](const std::string& to) {
+    std::ofstream file(to, std::ios::binary);
+    file << content;
+    file.close();
+    return file.good();
+  });
+}
+
+void write_log(const std::string& path, const log::FlightLog& log, bool force) {
+  write_whole(path, force, [&](const std::string& to) { return log::write_csv(to, log, true).has_value(); });
 }
 
 reach::Reachability read_reachability(const Vehicle& vehicle, reach::Method method, reach::Loop loop,

@@ -34,8 +34,13 @@ std::string model_of(const std::string& vehicle, const std::string& model);
 /// Throws Failure 73 if the file exists and `force` is not given, or could not be made: asked before work is spent on
 /// it. Without a name there is nothing to ask.
 void check_output(const std::string& path, bool force);
-/// Writes a whole file. Throws Failure 73 (exists, cannot be created) or 74 (cannot be written).
+/// The same of all that one call writes; throws Failure 64 where two of them are one file.
+void check_outputs(const std::vector<std::string>& paths, bool force);
+/// Writes a whole file; one that is replaced stays until the new one is complete. Throws Failure 73 (exists, cannot be
+/// created) or 74 (cannot be written).
 void write_file(const std::string& path, const std::string& content, bool force);
+/// The same of a flight log.
+void write_log(const std::string& path, const log::FlightLog& log, bool force);
 
 /// Reach sets of a vehicle; an unstable loop is a configuration failure (78).
 reach::Reachability read_reachability(const Vehicle& vehicle, reach::Method method, reach::Loop loop,

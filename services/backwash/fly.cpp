@@ -8,7 +8,6 @@
 #include "services/backwash/flight_output.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -58,12 +57,11 @@ plan::HoverPair choose_ends(const Options& options, const plan::World& world, si
   return *pair;
 }
 
-void write_log(const Options& options, const sim::Flight& flight) {
+void write_flight(const Options& options, const sim::Flight& flight) {
   auto samples = flight.take_off.samples;
   // The route's first sample is the take-off's last tick again.
   samples.insert(samples.end(), flight.route.samples.begin() + 1, flight.route.samples.end());
-  const auto written = log::write_csv(options.log, sim::to_log(samples), options.force);
-  if (!written) throw Failure(kCannotCreate, written.error().message);
+  services::write_log(options.log, sim::to_log(samples), options.force);
 }
 
 int print_ends(const plan::HoverPair& ends) {
@@ -74,8 +72,7 @@ int print_ends(const plan::HoverPair& ends) {
 int run(const Options& options) {
   if (options.start.has_value() != options.goal.has_value())
     throw Failure(kUsage, "give both --start and --goal, or neither");
-  check_output(options.report, options.force);
-  check_output(options.log, options.force);
+  check_outputs({options.report, options.log}, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   const std::string model_path = model_of(options.vehicle, options.model);
   const auto model = read_model(model_path);
@@ -84,8 +81,7 @@ int run(const Options& options) {
   auto grid = read_map(options.map);
   if (const auto known = known_ends(options); options.ends && known) return print_ends(*known);
   progress("building the world");
-  const auto world =
-      plan::build_world(std::move(grid), model, vehicle, reach::Method::tight, std::nullopt, run_parallel);
+  const auto world = plan::build_world(std::move(grid), model, vehicle, reach::Method::tight, std::nullopt, run_shown);
   sim::FlightOptions flight_options{.start_W = Vec3::Zero(),
                                     .goal_W = Vec3::Zero(),
                                     .seed = options.seed,
@@ -98,7 +94,7 @@ int run(const Options& options) {
   progress("flying");
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
-  if (!options.log.empty()) write_log(options, *flight);
+  if (!options.log.empty()) write_flight(options, *flight);
   const report::ReportContext context{options.map,  model_path,  options.vehicle, kVersion,
                                       ends.start_W, ends.goal_W, options.seed,    options.sigma_scale};
   return conclude({*flight, *world, context, sim::summarise(*flight, *world, ends.goal_W)}, options.report,
@@ -118,7 +114,7 @@ Verb fly_verb(Command& app) {
   add_point(command, "--goal", options->goal, "hover point to reach, m; by default one of the map's");
   command.add_option("--seed", options->seed, "of the airflow and of the VIO error").capture_default_str();
   command.add_option("--sigma-scale", options->sigma_scale, "judge with sets of the variance times this")
-      .check(positive())
+      .check(within(1e-6, 1e6))
       .capture_default_str();
   command.add_option("--report", options->report, "HTML page to write");
   command.add_option("--log", options->log, "flight log to write, CSV");

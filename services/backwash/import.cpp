@@ -51,8 +51,9 @@ Importer importer(const std::string& kind) {
 /// The importer that the options name, and the recordings.
 std::pair<Importer, std::vector<std::string>> importer_of(const Options& options) {
   if (options.map_columns.empty()) {
+    auto import = importer(options.kind);
     if (options.files.empty()) throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
-    return {importer(options.kind), options.files};
+    return {std::move(import), options.files};
   }
   const auto map = read_column_map(options.map_columns);
   if (!map)
@@ -69,6 +70,7 @@ std::pair<Importer, std::vector<std::string>> importer_of(const Options& options
 
 int propose(const Options& options) {
   if (!options.files.empty()) throw Failure(kUsage, "--propose looks at one table; give one");
+  if (!options.folder.empty()) throw Failure(kUsage, "--propose prints and writes nothing; give it without --out");
   const auto text = proposed_column_map(options.kind);
   if (!text) fail(text.error());
   std::fputs(text->c_str(), stdout);
@@ -99,7 +101,9 @@ int run(const Options& options) {
   std::filesystem::create_directories(options.folder, error);
   if (!std::filesystem::is_directory(options.folder))
     throw Failure(kCannotCreate, options.folder + ":1: cannot be created; name a folder that can be written");
-  for (const auto& file : files) check_output(target(options.folder, file), options.force);
+  std::vector<std::string> targets;
+  for (const auto& file : files) targets.push_back(target(options.folder, file));
+  check_outputs(targets, options.force);
   Json logs = Json::array(), refused = Json::array();
   std::vector<std::pair<std::string, log::FlightMark>> known;
   std::vector<std::string> notes;
@@ -117,8 +121,7 @@ int run(const Options& options) {
       continue;
     }
     known.emplace_back(file, std::move(mark));
-    const auto written = log::write_csv(target(options.folder, file), *log, options.force);
-    if (!written) throw Failure(kCannotCreate, written.error().message);
+    write_log(target(options.folder, file), *log, options.force);
     logs.push_back(Json{{"log", target(options.folder, file)}, {"rows", log->t_s.size()}});
   }
   if (logs.empty()) throw Failure(kBadData, refused.front().get<std::string>());

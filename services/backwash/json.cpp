@@ -52,6 +52,9 @@ Json to_json(const plan::PlanMetrics& m) {
           {"evaluations", m.evaluations}};
 }
 
-void print(const Json& json) { std::printf("%s\n", json.dump().c_str()); }
+void print(const Json& json) {
+  // A file's name may be no UTF-8; JSON is.
+  std::printf("%s\n", json.dump(-1, ' ', false, Json::error_handler_t::replace).c_str());
+}
 
 }  // namespace backwash::services

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 
 #include "services/backwash/verb.hpp"
+#include "services/command_line/words.hpp"
 #include "version.hpp"
 
 namespace {
 
-int fail(const std::string& verb, int exit_code, std::string line) {
-  std::replace(line.begin(), line.end(), '\n', ' ');
-  std::fprintf(stderr, "backwash%s: %s\n", verb.c_str(), line.c_str());
+int fail(const std::string& line, int exit_code, const std::string& what) {
+  backwash::services::end_progress();
+  std::fflush(stdout);
+  backwash::services::say_error(line, what);
   return exit_code;
 }
 
@@ -20,23 +21,28 @@ int main(int argc, char** argv) {
   using namespace backwash::services;
   Command app{"backwash: reachable sets of a quadrotor in its own wash, from a voxel map", "backwash"};
   std::vector<Verb> verbs;
-  std::string verb;
+  bool quiet = false;
+  std::setvbuf(stdout, nullptr, _IOFBF, BUFSIZ);  // results come when the progress is taken away
   try {
     app.version(backwash::kVersion);
     app.require_subcommand();
     verbs = {fly_verb(app),         plan_verb(app),    reach_verb(app),  field_verb(app),     simulate_verb(app),
              feasibility_verb(app), compare_verb(app), report_verb(app), calibrate_verb(app), import_verb(app),
              replay_verb(app),      study_verb(app),   adapt_verb(app),  vehicle_verb(app),   map_verb(app)};
+    app.each_verb([&](Command& verb) { verb.add_flag("--quiet", quiet, "no progress on stderr"); });
     if (const auto code = app.parse(argc, argv)) return *code;
+    if (quiet) be_quiet();
     for (const auto& v : verbs) {
       if (!v.command->parsed()) continue;
-      verb = " " + v.command->name();
-      return finished(v.run(), "backwash" + verb);
+      const int code = v.run();
+      end_progress();
+      return finished(code, app.line());
     }
     return backwash::kUsage;
   } catch (const Failure& failure) {
-    return fail(verb, failure.exit_code, failure.what());
+    return fail(app.line(), failure.exit_code, failure.what());
   } catch (const std::exception& defect) {
-    return fail(verb, backwash::kSoftware, std::string("internal error: ") + defect.what() + "; please report it");
+    return fail(app.line(), backwash::kSoftware,
+                std::string("internal error: ") + defect.what() + "; please report it");
   }
 }

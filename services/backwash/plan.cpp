@@ -5,7 +5,6 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {
@@ -63,8 +62,7 @@ int run(const Options& options) {
       plan::refused_at_once(grid, model, vehicle, options.method, options.margin, start, *options.goal, limits);
   if (!refused) progress("building the world");
   const auto world =
-      refused ? nullptr
-              : plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_parallel);
+      refused ? nullptr : plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_shown);
   if (world) progress("planning");
   const auto plan = world ? plan::plan(*world, start, *options.goal, limits) : *std::move(refused);
   options.json ? print_json(plan, options.method) : print_text(plan);

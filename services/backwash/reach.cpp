@@ -9,7 +9,6 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {
@@ -153,7 +152,7 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
     throw Failure(kConfiguration, options.model + ":1: --method chance over a map needs bound.kappa above 0");
   progress("building the world");
   const auto world =
-      plan::build_world(read_map(options.map), model, reach.vehicle, reach.method, std::nullopt, run_parallel);
+      plan::build_world(read_map(options.map), model, reach.vehicle, reach.method, std::nullopt, run_shown);
   if (chance) {
     return chance_tube_over_field(reach, start, commands[0], commands, world->bounds, model.bound,
                                   *options.probability);

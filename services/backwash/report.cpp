@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include "core/report/recorded_flight.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/flight_output.hpp"
+#include "services/backwash/flight_story_output.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
 namespace {
 
 struct Options {
-  std::string log, truth, vehicle = "builtin:quad-5in", model, out;
+  std::string log, truth, vehicle = "builtin:quad-5in", model, because, out;
   bool json = false, force = false;
 };
 
@@ -21,21 +23,63 @@ T take(tl::expected<T, log::LogError> value) {
   throw Failure(value.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, value.error().message);
 }
 
-int run(const Options& options) {
-  check_output(options.out, options.force);
+/// One take-off and one route, recorded to their end with the truth beside them: what `fly` flies.
+bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
+  const auto segments = std::ranges::count_if(
+      log.records, [](const log::RawRecord& r) { return r.header.kind == log::RecordKind::segment; });
+  return story.by_truth && segments == 2 && story.pieces.size() >= 2;
+}
+
+/// Any flight, by what the daemon recorded of it.
+int tell(const Options& options, const FlightStory& story, const map::OccupancyGrid* map) {
+  if (!options.out.empty()) {
+    progress("drawing the report");
+    write_file(options.out, story_page(story, map, options.log), options.force);
+  }
+  options.json ? print(to_json(story, options.log)) : print_text(story, options.log);
+  if (story.ok()) return kOk;
+  std::string line;
+  for (const auto& reason : story.wrong) line += (line.empty() ? "" : "; ") + reason;
+  throw Failure(kFlightFailed, options.log + ":1: " + line);
+}
+
+/// A flight such as `fly`'s: its sets are propagated again and must be those that were logged.
+int judge(const Options& options, const std::vector<log::RawRecord>& log, const log::FlightLog& truth) {
   const auto vehicle = read_vehicle(options.vehicle);
   const std::string model_path = model_of(options.vehicle, options.model);
   const auto model = read_model(model_path);
-  const auto log = take(log::read_raw_log(options.log)).records;
-  const auto truth = take(log::read_csv(options.truth));
   progress("building the world");
-  const auto world = plan::build_world(take(report::recorded_map(log)), model, vehicle, reach::Method::tight,
-                                       std::nullopt, run_parallel);
+  const auto world =
+      plan::build_world(take(report::recorded_map(log)), model, vehicle, reach::Method::tight, std::nullopt, run_shown);
   const auto flight = take(report::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
   const report::ReportContext context{options.log, model_path, options.vehicle, kVersion, start, goal, {}, 1};
   return conclude({flight, *world, context, sim::summarise(flight, *world, goal)}, options.out, options.json,
                   options.force);
+}
+
+/// The truth of the flight, where it is given.
+std::optional<log::FlightLog> read_truth(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  auto truth = take(log::read_csv(path));
+  for (const char* name : {"x_m", "y_m", "z_m"})
+    if (!truth.has(name)) throw Failure(kBadData, path + ":1: no column '" + name + "'; give backwash-bench's --log");
+  if (truth.t_s.size() < 2) throw Failure(kBadData, path + ":1: has fewer than two rows; give the whole log");
+  return truth;
+}
+
+int run(const Options& options) {
+  check_output(options.out, options.force);
+  const auto vehicle = read_vehicle(options.vehicle);
+  read_model(model_of(options.vehicle, options.model));
+  const auto log = take(log::read_raw_log(options.log));
+  const auto truth = read_truth(options.truth);
+  const auto map = report::recorded_map(log.records);
+  const auto* grid = map ? &*map : nullptr;
+  progress("reading the log");
+  const auto story = flight_story(log, grid, vehicle.body.radius, truth ? &*truth : nullptr, options.because);
+  if (options.because.empty() && as_fly_flies(log, story)) return judge(options, log.records, *truth);
+  return tell(options, story, grid);
 }
 
 }  // namespace
@@ -44,13 +88,16 @@ Verb report_verb(Command& app) {
   auto options = std::make_shared<Options>();
   auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
   command.add_option("--log", options->log, "raw log of backwashd").required();
-  command.add_option("--truth", options->truth, "log of the truth by backwash-bench, CSV").required();
+  command.add_option("--truth", options->truth,
+                     "log of the truth by backwash-bench, CSV; without it measured positions are judged");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();
   command.add_option("--model", options->model, "model file or builtin:NAME; a built-in vehicle has its own");
+  command.add_option("--because", options->because, "what ended the flight, as you know it: told first");
   command.add_option("--out", options->out, "HTML page to write");
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.add_flag("--force", options->force, "overwrite --out");
   command.footer(
+      "Any raw log: several take-offs and routes, holds, refusals, one that never took off or was cut short.\n"
       "The same judgement and exit codes as fly.\nExample:\n"
       "  backwash report --log flight.bwlog --truth truth.csv --out flight.html");
   return {&command, [options] { return run(*options); }};

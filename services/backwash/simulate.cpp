@@ -82,8 +82,7 @@ int run(const Options& options) {
   const std::uint64_t seed = spec ? spec->seed : options.seed.value_or(1);
   const auto log = spec ? fly_specified(options, grid, vehicle, *spec, simulation)
                         : fly_again(options, grid, vehicle, seed, simulation);
-  const auto written = log::write_csv(options.out, log, options.force);
-  if (!written) throw Failure(kCannotCreate, written.error().message);
+  write_log(options.out, log, options.force);
   const double time = log.t_s.back() - (spec ? 0 : log.t_s.front());
   if (options.json) {
     print(Json{{"log", options.out}, {"rows", log.t_s.size()}, {"time_s", time}, {"seed", seed}});

@@ -17,7 +17,6 @@
 #include "services/backwash/study_output.hpp"
 #include "services/backwash/study_simulation.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -158,8 +157,7 @@ void check(const Options& options) {
   if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
   if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
   check_design(options.design, options.map, options.force);
-  check_output(options.report, options.force);
-  check_output(options.out, options.force);
+  check_outputs({options.report, options.out, options.design.points}, options.force);
 }
 
 study::StudyOptions study_options(const Options& options) {
@@ -190,7 +188,7 @@ std::optional<study::Consequence> what_it_costs(const study::StudyResult& result
                                                 const map::OccupancyGrid* grid) {
   if (result.causes.empty()) return std::nullopt;
   progress("hover sets and a plan, before and after");
-  return study::consequence(result, seen, model, vehicle, grid, run_parallel);
+  return study::consequence(result, seen, model, vehicle, grid, run_shown);
 }
 
 void print_beside(const Flights& flights, const std::optional<AnytimeReport>& anytime,

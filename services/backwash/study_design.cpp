@@ -10,7 +10,6 @@
 #include "core/types/formatted.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {
@@ -52,7 +51,10 @@ void add_design(Command& command, DesignOptions& options) {
 }
 
 void check_design(const DesignOptions& options, const std::string& map, bool force) {
-  if (options.points.empty()) return;
+  if (options.points.empty()) {
+    if (options.start) throw Failure(kUsage, "--start is where the flight of --design begins; give that too");
+    return;
+  }
   if (map.empty() || !options.start)
     throw Failure(kUsage, "--design needs --map, to fly in, and --start, where the flight begins");
   check_output(options.points, force);
@@ -63,7 +65,7 @@ std::optional<study::Design> designed(const DesignOptions& options, const study:
                                       const map::OccupancyGrid* grid, bool force) {
   if (options.points.empty()) return std::nullopt;
   progress("the next flight");
-  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, run_parallel);
+  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, run_shown);
   if (const auto why = plan::why_blocked(*world, *options.start, 0))
     throw Failure(kUnavailable, "--start " + *why + ": begin where hovering is safe");
   auto design = study::design(seen, result, *world, model, *options.start, options.flight_time);

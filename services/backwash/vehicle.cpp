@@ -3,16 +3,15 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <sstream>
 
+#include "core/files/read_file.hpp"
 #include "core/log/raw_log.hpp"
 #include "core/plan/gain_sweep.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
-#include "services/parallel/parallel.hpp"
 
 namespace backwash::services {
 namespace {
@@ -33,8 +32,9 @@ constexpr GainNames kArduPilot{"PSC_POSXY_P", "PSC_VELXY_P", "PSC_POSZ_P", "PSC_
 /// NAME and number of each line of a parameter file: ArduPilot's (NAME,1 or NAME 1), PX4's (NAME=1), or a ground
 /// station's with NAME and value in the third and fourth column.
 std::map<std::string, double> read_parameters(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw Failure(kNoInput, path + ":1: cannot be read; name the autopilot's parameter file");
+  const auto text = files::read_file(path, files::kLargestConfiguration, "the autopilot's parameter file");
+  if (!text) throw Failure(kNoInput, path + ":1: " + text.error().message);
+  std::istringstream file(*text);
   std::map<std::string, double> values;
   for (std::string line; std::getline(file, line);) {
     for (char& c : line)
@@ -153,10 +153,10 @@ int run(const Options& options) {
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
   progress("building the world");
   const auto world =
-      plan::build_world(read_map(options.map), model, vehicle, reach::Method::tight, std::nullopt, run_parallel);
+      plan::build_world(read_map(options.map), model, vehicle, reach::Method::tight, std::nullopt, run_shown);
   // Half an octave apart, from half of what flies to four times as much.
   const std::vector<double> factors{0.5, 0.71, 1, 1.41, 2, 2.83, 4};
-  const auto sweep = plan::sweep_gains(*world, *options.start, *options.goal, factors, run_parallel);
+  const auto sweep = plan::sweep_gains(*world, *options.start, *options.goal, factors, run_shown);
   if (options.json) {
     Json steps = Json::array();
     for (const auto& s : sweep.steps) steps.push_back(to_json(s));

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwash/verb.hpp"
 
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -35,10 +33,6 @@ Option add_point(Command& command, const std::string& name, std::optional<Vec3>&
     target = p;
   };
   return command.add_text(name, parse, help).type_name("X,Y,Z");
-}
-
-void progress(const std::string& line) {
-  if (::isatty(STDERR_FILENO)) std::fprintf(stderr, "%s\n", line.c_str());
 }
 
 }  // namespace backwash::services

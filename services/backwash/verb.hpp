@@ -11,6 +11,7 @@
 
 #include "core/types/geometry.hpp"
 #include "core/types/text.hpp"
+#include "services/backwash/progress.hpp"
 #include "services/command_line/command_line.hpp"
 #include "services/command_line/exit_code.hpp"
 
@@ -49,8 +50,5 @@ std::vector<double> read_numbers(const std::string& option, const std::string& t
                                  const std::string& are);
 /// Adds an option that takes `x,y,z` in m (W); anything else is a usage error.
 Option add_point(Command& command, const std::string& name, std::optional<Vec3>& target, const std::string& help);
-
-/// A line on stderr if that is a terminal, nothing otherwise.
-void progress(const std::string& line);
 
 }  // namespace backwash::services

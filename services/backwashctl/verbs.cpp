@@ -10,9 +10,11 @@
 #include <sstream>
 
 #include "core/files/read_file.hpp"
+#include "services/backwashctl/answer.hpp"
 #include "services/backwashctl/preflight.hpp"
 #include "services/backwashctl/status_output.hpp"
 #include "services/command_line/exit_code.hpp"
+#include "services/command_line/words.hpp"
 
 namespace backwash::ctl {
 namespace {
@@ -24,6 +26,11 @@ std::string default_station() {
   gethostname(host, sizeof host - 1);
   const char* user = std::getenv("USER");
   return std::string(user ? user : "operator") + "@" + host;
+}
+
+/// What others said may be no UTF-8; JSON is.
+std::string text_of(const nlohmann::json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 bool tracking(const StatusCopy& s) { return s.in(Mode::tracking); }
@@ -50,11 +57,14 @@ Verbs::Verbs(Command& app) {
   app.fallthrough();
   app.add_option("--domain", options_.domain, "DDS domain").capture_default_str().check(services::within(0, 230));
   app.add_option("--interface", options_.interface, "network interface by name").capture_default_str();
-  app.add_option("--namespace", options_.name_space, "the daemon's name space").capture_default_str();
+  app.add_option("--namespace", options_.name_space, "the daemon's name space")
+      .capture_default_str()
+      .check(services::name_space());
   app.add_option("--station", options_.station, "this station's name: it holds the session").capture_default_str();
   app.add_option("--timeout", options_.timeout_s, "s to wait for an acknowledgement")
       .capture_default_str()
       .check(services::positive());
+  app.add_flag("--json", json_, "one JSON object on stdout");
   add_control(app);
   add_ways(app);
   add_ends(app);
@@ -131,13 +141,11 @@ void Verbs::add_ends(Command& app) {
 }
 
 void Verbs::add_views(Command& app) {
-  verb(app, "check", "preflight: 0 when all is good, 69 otherwise; each failing line says what to do", "check", [this] {
-    return check();
-  })->add_flag("--json", json_, "one JSON object");
-  verb(app, "status", "print the daemon's status once", "status --json", [this] {
-    return status();
-  })->add_flag("--json", json_, "one JSON object");
-  verb(app, "watch", "print the status until interrupted", "watch", [this] { return watch(); });
+  verb(app, "check", "preflight: 0 when all is good, 69 otherwise; each failing line says what to do", "check",
+       [this] { return check(); });
+  verb(app, "status", "print the daemon's status once", "status --json", [this] { return status(); });
+  verb(app, "watch", "print the status until interrupted; with --json an object a line", "watch",
+       [this] { return watch(); });
 }
 
 int Verbs::run() { return chosen_(); }
@@ -145,9 +153,11 @@ int Verbs::run() { return chosen_(); }
 int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& position,
                    const std::function<bool(const StatusCopy&)>& done) {
   Station station(options_);
+  Outcome outcome{name, false, std::nullopt, ""};
   const auto fail = [&](const std::string& why) {
-    std::cerr << "backwashctl " << name << ": " << why << "\n";
-    return kUnavailable;
+    outcome.why = why;
+    if (outcome.accepted && wait_) outcome.done = false;
+    return say(outcome, json_);
   };
   const auto answer = station.send(verb, position, yaw_.value_or(0), waypoints_);
   if (interrupted()) return fail("interrupted");
@@ -155,7 +165,8 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     return fail("no daemon answered in domain " + std::to_string(options_.domain) + " on interface " +
                 options_.interface + ", namespace " + options_.name_space + "; is backwashd running?");
   if (answer->result != backwash_msgs_msg_dds__ACK_ACCEPTED) return fail("refused: " + answer->reason);
-  if (!wait_ || !done) return 0;
+  outcome.accepted = true;
+  if (!wait_ || !done) return say(outcome, json_);
   // The first status after the acknowledgement may still be from before it.
   station.status(1.0);
   station.status(1.0);
@@ -177,7 +188,9 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
   });
   if (interrupted()) return fail("interrupted; the session is over, the daemon is " + last);
   if (superseded) return fail("a later command took its place; the daemon is " + last);
-  return reached ? 0 : fail("not reached; the daemon is " + last);
+  if (!reached) return fail("not reached; the daemon is " + last);
+  outcome.done = true;
+  return say(outcome, json_);
 }
 
 int Verbs::status() {
@@ -189,7 +202,7 @@ int Verbs::status() {
     return kUnavailable;
   }
   if (json_)
-    std::cout << json_of(*now).dump(2) << "\n";
+    std::cout << text_of(json_of(*now), 2) << "\n";
   else
     print(*now);
   return 0;
@@ -206,15 +219,20 @@ int Verbs::follow() {
   auto content = files::read_file(route_, files::kLargestConfiguration, "a points CSV file");
   std::string line;
   const auto fail = [&](int code, const std::string& where, const std::string& why) {
-    std::cerr << "backwashctl follow: " << where << ": " << why << "\n";
+    services::say_error("backwashctl follow", where + ": " + why);
     return code;
   };
   if (!content) return fail(kNoInput, route_, content.error().message);
   std::istringstream file(std::move(*content));
-  std::getline(file, line);
+  const auto next = [&] {
+    const bool more = static_cast<bool>(std::getline(file, line));
+    if (line.ends_with('\r')) line.pop_back();
+    return more;
+  };
+  next();
   if (line != "x_m,y_m,z_m")
     return fail(kBadData, route_ + ":1", "the first line is '" + line + "', expected x_m,y_m,z_m");
-  for (int number = 2; std::getline(file, line); ++number) {
+  for (int number = 2; next(); ++number) {
     Vec3 p;
     char rest;
     if (std::sscanf(line.c_str(), "%lf,%lf,%lf %c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
@@ -248,14 +266,17 @@ int Verbs::check() {
       std::cout << (f.good ? "good  " : "FAIL  ") << f.name << ": " << f.found << (f.good ? "" : " -> " + f.advice)
                 << "\n";
   }
-  if (json_) std::cout << nlohmann::json{{"good", all}, {"findings", lines}}.dump(2) << "\n";
+  if (json_) std::cout << text_of({{"good", all}, {"findings", lines}}, 2) << "\n";
   return all ? 0 : kUnavailable;
 }
 
 int Verbs::watch() {
   Station station(options_);
   while (!interrupted()) {
-    if (const auto now = station.status(2.0))
+    const auto now = station.status(2.0);
+    if (now && json_)
+      std::cout << text_of(json_of(*now), -1) << std::endl;
+    else if (now)
       print(*now);
     else if (!interrupted())
       std::cerr << "no status for 2 s\n";

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,13 +22,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kCheckEvery_ns = 500'000'000;  // that the file is still in its directory
+constexpr std::int64_t kCheckEvery_ns = 500'000'000;  // that the file is still in its directory, and on the disk
+constexpr std::uint64_t kFloor = 64u << 20;           // bytes that others on this disk keep, but no more than
+constexpr std::uint64_t kFloorShare = 20;             // one part in so many of it
 constexpr std::size_t kChunk = 1u << 20;              // bytes written at once
 constexpr int kMostNumbers = 1'000'000;
 
 std::string numbered(const fs::path& name, int number) {
   return (name.parent_path() / (name.stem().string() + "-" + std::to_string(number) + name.extension().string()))
       .string();
+}
+
+/// Whether so many bytes may still be written there: a log that takes the last of a disk takes the system with it.
+bool room_for(int fd, std::size_t bytes) {
+  struct statvfs disk {};
+  if (::fstatvfs(fd, &disk) != 0) return true;  // the write itself will tell
+  const std::uint64_t whole = std::uint64_t{disk.f_blocks} * disk.f_frsize;
+  return std::uint64_t{disk.f_bavail} * disk.f_frsize >= bytes + std::min(kFloor, whole / kFloorShare);
 }
 
 /// The highest N of the files STEM-N.EXTENSION beside `name`; 1 if there is none.
@@ -91,6 +102,7 @@ bool Recorder::still_there() const {
 }
 
 bool Recorder::write(const std::vector<std::uint8_t>& bytes) {
+  if (!room_for(file_.get(), bytes.size())) return errno = ENOSPC, false;
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t n = ::write(file_.get(), bytes.data() + done, bytes.size() - done);
@@ -151,7 +163,10 @@ void Recorder::fail(const char* why) {
 /// directory that is gone stays so for a while.
 bool Recorder::open_again(std::int64_t now) {
   const bool check = now - checked_ns_ > kCheckEvery_ns;
-  if (check) checked_ns_ = now;
+  if (check) {
+    sync_due_ = sync_due_ || checked_ns_ != 0;
+    checked_ns_ = now;
+  }
   if (file_.get() >= 0 && !(check && !still_there())) return true;
   if (!check || !create()) {
     file_ = firmware_bridge::FileDescriptor();

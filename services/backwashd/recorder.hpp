@@ -20,7 +20,8 @@ namespace backwash::daemon {
 ///
 /// A file that exists is never opened (row 45). `name` itself is taken if nothing has it, otherwise the next number
 /// above those in its directory: flight.bwlog, flight-2.bwlog, flight-3.bwlog … The file is 0640, and no link is
-/// followed. It is on the disk as far as the last change of the mode.
+/// followed. It is on the disk as far as the last change of the mode, and no more than a second back: a power cut costs
+/// that, a kill the 20 ms since the last batch. Of the disk 64 MiB are left to others, or a twentieth of a small one.
 class Recorder {
  public:
   static constexpr std::size_t kMostPending = 64u << 20;  ///< bytes of other threads' records that wait for the disk

@@ -2,7 +2,8 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include <iostream>
+#include <cmath>
+#include <filesystem>
 
 #include "core/config/config.hpp"
 #include "core/config/odometry_profile.hpp"
@@ -10,6 +11,7 @@
 #include "services/bench/bench.hpp"
 #include "services/command_line/command_line.hpp"
 #include "services/command_line/exit_code.hpp"
+#include "services/command_line/words.hpp"
 #include "services/dds/dds.hpp"
 #include "version.hpp"
 
@@ -19,7 +21,7 @@ using namespace backwash;
 using namespace backwash::services;
 
 int failed(int code, const std::string& message) {
-  std::cerr << "backwash-bench: " << message << "\n";
+  say_error("backwash-bench", message);
   return code;
 }
 
@@ -29,6 +31,7 @@ struct Given {
   std::vector<double> start, origin{12.0, -7.0, 0.3}, crate, drift, hidden;
   std::vector<std::string> parameters;
   std::string timeline;
+  bool force = false;
 };
 
 void add_world(Command& app, Given& given) {
@@ -52,10 +55,13 @@ void add_world(Command& app, Given& given) {
       .expected(3);
   app.add_option("--domain", given.options.domain, "DDS domain").capture_default_str().check(within(0, 230));
   app.add_option("--interface", given.options.interface, "network interface").capture_default_str();
-  app.add_option("--namespace", given.options.name_space, "the daemon's name space").capture_default_str();
+  app.add_option("--namespace", given.options.name_space, "the daemon's name space")
+      .capture_default_str()
+      .check(name_space());
   app.add_option("--duration", given.options.duration_s, "s").capture_default_str().check(positive());
   app.add_option("--log", given.options.log, "flight log of the truth, CSV");
   app.add_option("--wire", given.options.wire, "what arrived from the daemon, frame by frame, CSV");
+  app.add_flag("--force", given.force, "overwrite --log and --wire");
 }
 
 void add_pace(Command& app, backwash::bench::Pace& pace) {
@@ -69,9 +75,11 @@ void add_pace(Command& app, backwash::bench::Pace& pace) {
 }
 
 void add_faults(Command& app, Given& given) {
-  app.add_option("--stop-odometry", given.options.stop_odometry_s, "fault: VIO stops this long after arming, s");
+  app.add_option("--stop-odometry", given.options.stop_odometry_s, "fault: VIO stops this long after arming, s")
+      .check(not_negative());
   app.add_option("--stop-heartbeat", given.options.stop_heartbeat_s,
-                 "fault: the controller goes silent this long after arming, s");
+                 "fault: the controller goes silent this long after arming, s")
+      .check(not_negative());
   app.add_text(
          "--autopilot",
          [&given](const std::string& name) {
@@ -99,7 +107,7 @@ void add_faults(Command& app, Given& given) {
                  "fault: x,y,z of the centre of a crate that the map does not have, m; it is scanned from the event on")
       .delimiter(',')
       .expected(3);
-  app.add_option("--crate-edge", given.options.crate_edge, "m").capture_default_str();
+  app.add_option("--crate-edge", given.options.crate_edge, "m").capture_default_str().check(positive());
   app.add_option("--drift", given.drift, "fault: x,y,z by which a loop closure corrects the VIO at the event, m")
       .delimiter(',')
       .expected(3);
@@ -110,11 +118,11 @@ void add_faults(Command& app, Given& given) {
 /// NAME=NUMBER; without a value if it is not that.
 std::optional<std::pair<std::string, double>> parameter(const std::string& text) {
   const auto equals = text.find('=');
-  if (equals == text.npos) return std::nullopt;
+  if (equals == text.npos || equals == 0) return std::nullopt;
   const char* const number = text.c_str() + equals + 1;
   char* end = nullptr;
   const double value = std::strtod(number, &end);
-  if (end == number || *end != 0) return std::nullopt;
+  if (end == number || *end != 0 || !std::isfinite(value)) return std::nullopt;
   return std::pair{text.substr(0, equals), value};
 }
 
@@ -131,11 +139,21 @@ void set_places(Given& given) {
   if (!given.hidden.empty()) o.hidden = {at(given.hidden), at(given.hidden, 3)};
 }
 
+bool missing(map::MapError::Kind kind) {
+  return kind == map::MapError::Kind::not_found || kind == map::MapError::Kind::unknown_name;
+}
+
+/// Throws StartError 73 for a file that is there and may not be replaced.
+void keep(const char* option, const std::string& path, bool force) {
+  if (!force && !path.empty() && std::filesystem::is_regular_file(path))
+    throw StartError(kCannotCreate,
+                     std::string(option) + " " + path + ": exists already; give another name or --force");
+}
+
 /// Reads the files that the options name, and runs.
 int run(bench::Options& o, const std::string& timeline) {
   const auto grid = map::load_map(o.map);
-  if (!grid)
-    return failed(grid.error().kind == map::MapError::Kind::not_found ? kNoInput : kBadData, grid.error().message);
+  if (!grid) return failed(missing(grid.error().kind) ? kNoInput : kBadData, grid.error().message);
   const auto vehicle = config::load_vehicle(o.vehicle);
   using Kind = config::ConfigError::Kind;
   if (!vehicle)
@@ -167,12 +185,13 @@ int main(int argc, char** argv) {
     return failed(kUsage, "--link or --in-loop is needed; see backwash-bench --help");
   for (const std::string& text : given.parameters) {
     const auto named = parameter(text);
-    if (!named) return failed(kUsage, "--parameter " + text + ": expected NAME=NUMBER");
+    if (!named) return failed(kUsage, "--parameter " + text + ": is not NAME=NUMBER, as in MPC_XY_P=0.9");
     given.options.parameters.insert_or_assign(named->first, named->second);
   }
   set_places(given);
   spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is for what the timeline expects
   try {
+    keep("--log", given.options.log, given.force), keep("--wire", given.options.wire, given.force);
     return finished(run(given.options, given.timeline), "backwash-bench");
   } catch (const StartError& e) {
     return failed(e.code, e.what());

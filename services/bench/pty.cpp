@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -25,6 +26,11 @@ Pty::Pty(const std::string& link) : fd_(posix_openpt(O_RDWR | O_NOCTTY | O_NONBL
     throw StartError(kSystem, std::string(name) + ": " + std::strerror(errno));
   cfmakeraw(&raw);
   tcsetattr(other_, TCSANOW, &raw);
+  // A link of an earlier bench, and nothing else, is taken out of the way.
+  struct stat there {};
+  if (lstat(link.c_str(), &there) == 0 && !S_ISLNK(there.st_mode))
+    throw StartError(kCannotCreate,
+                     "--link " + link + ": exists and is no symbolic link; name a file that is not there yet");
   unlink(link.c_str());
   if (symlink(name, link.c_str()) != 0)
     throw StartError(kCannotCreate, "--link " + link + ": cannot be made: " + std::strerror(errno) +

@@ -29,7 +29,7 @@ start_bench() {
   bin=$1 log=$2
   local map=$3 start=$4 vehicle=$5
   shift 5
-  nice -n "${BENCH_NICE:-0}" "$bin/backwash-bench" --map "$map" --vehicle "$vehicle" --start "$start" --link "$work/autopilot" --domain "$domain" \
+  nice -n "${BENCH_NICE:-0}" "$bin/backwash-bench" --map "$map" --vehicle "$vehicle" --start "$start" --link "$work/autopilot" --domain "$domain" --force \
     "$@" >>"$log" 2>&1 &
   bench_pid=$!
   for _ in $(seq 200); do [[ -e $work/autopilot ]] && return; sleep 0.05; done

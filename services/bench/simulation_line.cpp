@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 
 #include "services/bench/controller_in_loop.hpp"
@@ -23,7 +24,8 @@ using firmware_bridge::FileDescriptor;
 constexpr int kWait_ms = 100;
 
 [[noreturn]] void fail(const std::string& device) {
-  throw StartError(kInputOutput, "--in-loop " + device + ": " + std::strerror(errno != 0 ? errno : EINVAL));
+  throw StartError(kInputOutput, "--in-loop " + device + ": " + std::strerror(errno != 0 ? errno : EINVAL) +
+                                     "; give tcpin:ADDRESS:PORT, ADDRESS an IPv4 of this machine, or a serial port");
 }
 
 FileDescriptor listen_on(const std::string& device, const std::string& endpoint) {
@@ -31,9 +33,12 @@ FileDescriptor listen_on(const std::string& device, const std::string& endpoint)
   sockaddr_in address{};
   address.sin_family = AF_INET;
   errno = 0;
-  if (colon == endpoint.npos || ::inet_pton(AF_INET, endpoint.substr(0, colon).c_str(), &address.sin_addr) != 1)
-    fail(device);
-  address.sin_port = htons(static_cast<std::uint16_t>(std::atoi(endpoint.c_str() + colon + 1)));
+  std::uint16_t port = 0;
+  const char* const last = endpoint.data() + endpoint.size();
+  const bool good = colon != endpoint.npos && std::from_chars(endpoint.data() + colon + 1, last, port).ptr == last &&
+                    port > 0 && ::inet_pton(AF_INET, endpoint.substr(0, colon).c_str(), &address.sin_addr) == 1;
+  if (!good) fail(device);
+  address.sin_port = htons(port);
   FileDescriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const int yes = 1;
   ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <set>
 #include <sstream>
 
@@ -130,6 +131,9 @@ const char* name_of(Fault::Kind kind) { return kKinds[static_cast<std::size_t>(k
 
 tl::expected<Timeline, config::ConfigError> load_timeline(const std::string& path) {
   using enum config::ConfigError::Kind;
+  if (std::error_code unknown; !std::filesystem::is_regular_file(path, unknown))
+    return tl::unexpected(
+        config::ConfigError{not_found, path + ": is no file that can be read; needs a timeline of faults, TOML"});
   try {
     const toml::table root = toml::parse_file(path);
     Reader r(path, root);

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -12,6 +13,7 @@
 #include <type_traits>
 
 #include "services/command_line/exit_code.hpp"
+#include "services/command_line/words.hpp"
 
 namespace backwash::services {
 namespace {
@@ -31,8 +33,19 @@ struct NumberOf<std::vector<T>> {
 
 std::string not_finite(const std::string& text) {
   double value = 0;
-  const bool number = CLI::detail::lexical_cast(text, value);
-  return number && !std::isfinite(value) ? text + " is not finite; it takes a finite number" : "";
+  if (text.empty() || !CLI::detail::lexical_cast(text, value)) return "'" + text + "' is no number; it takes one";
+  return std::isfinite(value) ? "" : text + " is not finite; it takes a finite number";
+}
+
+std::string not_integer(const std::string& text) {
+  int value = 0;
+  const bool good = !text.empty() && CLI::detail::lexical_cast(text, value);
+  return good ? "" : "'" + text + "' is no whole number; it takes one";
+}
+
+/// A file, a folder or a name: an empty one is a variable that was not set.
+std::string empty_text(const std::string& text) {
+  return text.empty() ? "is empty; give it a value or leave it out" : "";
 }
 
 /// A check of a number, by what holds of a good one.
@@ -56,7 +69,9 @@ std::string not_unsigned(const std::string& text) {
   if (text.starts_with('-')) return "'" + text + "' is below 0; it takes 0 or more";
   std::uint64_t value = 0;
   const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  return read.ec == std::errc::result_out_of_range ? "'" + text + "' is too large; it takes at most 2^64 - 1" : "";
+  if (read.ec == std::errc::result_out_of_range) return "'" + text + "' is too large; it takes at most 2^64 - 1";
+  const bool good = !text.empty() && CLI::detail::lexical_cast(text, value);
+  return good ? "" : "'" + text + "' is no whole number of 0 or more; it takes one";
 }
 
 }  // namespace
@@ -78,6 +93,16 @@ Check one_of(const std::vector<std::string>& names) {
     return std::ranges::find(names, text) != names.end() ? "" : "'" + text + "' is not one of " + all;
   };
   return {wrong, "{" + all + "}"};
+}
+
+Check name_space() {
+  const auto wrong = [](const std::string& text) {
+    const auto fits = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '/'; };
+    const bool good = !text.empty() && !std::isdigit(static_cast<unsigned char>(text[0])) && text[0] != '/' &&
+                      text.back() != '/' && std::ranges::all_of(text, fits);
+    return good ? "" : "'" + text + "' is no namespace; it takes letters, digits, _ and / between them";
+  };
+  return {wrong, "NAMESPACE"};
 }
 
 Option Option::required() { return option_->required(), *this; }
@@ -109,6 +134,8 @@ Option Command::add_option(const std::string& name, T& target, const std::string
   using Number = typename NumberOf<T>::type;
   if constexpr (std::is_floating_point_v<Number>) option->check(not_finite, "");
   if constexpr (std::is_unsigned_v<Number>) option->check(not_unsigned, "");
+  if constexpr (std::is_same_v<Number, int>) option->check(not_integer, "");
+  if constexpr (std::is_same_v<Number, std::string>) option->check(empty_text, "");
   return Option(option);
 }
 template Option Command::add_option(const std::string&, std::string&, const std::string&);
@@ -133,7 +160,7 @@ Option Command::add_texts(const std::string& name, const std::function<void(cons
 }
 
 void Command::add_flag(const std::string& name, bool& target, const std::string& help) {
-  app_->add_flag(name, target, help);
+  app_->add_flag(name, target, help)->disable_flag_override();
 }
 void Command::version(const std::string& text) { app_->set_version_flag("--version", app_->get_name() + " " + text); }
 void Command::footer(const std::string& text) { app_->footer(text); }
@@ -143,25 +170,54 @@ void Command::on_parsed(std::function<void()> then) { app_->callback(std::move(t
 void Command::on_complete(std::function<void()> then) { app_->parse_complete_callback(std::move(then)); }
 bool Command::parsed() const { return app_->parsed(); }
 std::string Command::name() const { return app_->get_name(); }
+void Command::each_verb(const std::function<void(Command&)>& with) {
+  if (subcommands_.empty()) with(*this);
+  for (const auto& verb : subcommands_) verb->each_verb(with);
+}
 
-std::string Command::line() const { return name() + (begun_.empty() ? "" : " " + begun_); }
+const Command* Command::begun() const {
+  for (const auto& verb : subcommands_)
+    if (verb->name() == begun_) return verb.get();
+  return nullptr;
+}
+
+std::string Command::line() const { return name() + (begun() ? " " + begun()->line() : ""); }
 
 int Command::usage(const std::string& what) const {
-  std::string told = what;
-  std::replace(told.begin(), told.end(), '\n', ' ');
-  std::fprintf(stderr, "%s: %s; see %s --help\n", line().c_str(), told.c_str(), line().c_str());
+  say_error(line(), what + "; see " + line() + " --help");
   return kUsage;
 }
 
 /// What to say where none of the verbs was begun.
 std::string Command::no_verb() const {
-  for (const auto& verb : subcommands_)
-    if (verb->parsed()) return verb->no_verb();
+  if (begun()) return begun()->no_verb();
   const std::vector<std::string> rest = app_->remaining();
-  std::string said =
-      rest.empty() || rest.front().starts_with('-') ? "a verb is needed" : "no verb '" + rest.front() + "'";
-  for (std::size_t i = 0; i < subcommands_.size(); ++i) said += (i == 0 ? ": one of " : ", ") + subcommands_[i]->name();
+  std::vector<std::string> names;
+  for (const auto& verb : subcommands_) names.push_back(verb->name());
+  std::string said = "a verb is needed";
+  if (!rest.empty() && rest.front().starts_with('-')) said += " before '" + rest.front() + "'";
+  if (!rest.empty() && !rest.front().starts_with('-')) {
+    const std::string meant = nearest(rest.front(), names);
+    said = "no verb '" + rest.front() + "'" + (meant.empty() ? "" : ", did you mean '" + meant + "'?");
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) said += (i == 0 ? ": one of " : ", ") + names[i];
   return said;
+}
+
+/// What to say of the first argument that neither this command nor the verb in the line takes; empty: each is taken.
+std::string Command::not_taken() const {
+  const std::vector<std::string> rest = app_->remaining(true);
+  if (rest.empty()) return "";
+  const std::string& first = rest.front();
+  if (!first.starts_with('-') || first.find_first_not_of("-.0123456789") == first.npos)
+    return "'" + first + "' is not expected here";
+  const std::string said = first.substr(0, first.find('='));
+  std::vector<std::string> names;
+  for (const Command* at = this; at; at = at->begun())
+    for (const auto* option : at->app_->get_options())
+      for (const auto& name : option->get_lnames()) names.push_back("--" + name);
+  const std::string meant = nearest(said, names);
+  return "there is no option '" + said + "'" + (meant.empty() ? "" : ", did you mean " + meant + "?");
 }
 
 std::optional<int> Command::parse(int argc, const char* const* argv) {
@@ -171,8 +227,12 @@ std::optional<int> Command::parse(int argc, const char* const* argv) {
   } catch (const CLI::Success& help_or_version) {
     return finished(app_->exit(help_or_version), name());
   } catch (const CLI::ParseError& wrong) {
-    const bool verbless = std::string_view(wrong.what()) == "A subcommand is required";
-    return usage(verbless ? no_verb() : wrong.what());
+    if (std::string_view(wrong.what()) == "A subcommand is required") return usage(no_verb());
+    // An argument that nobody takes is told before what is missing: it may be that, misspelt.
+    const bool misspelt =
+        dynamic_cast<const CLI::RequiredError*>(&wrong) || dynamic_cast<const CLI::ExtrasError*>(&wrong);
+    const std::string unknown = misspelt ? not_taken() : "";
+    return usage(unknown.empty() ? in_plain_words(wrong.what()) : unknown);
   } catch (const UsageError& wrong) {
     return usage(wrong.what());
   }
@@ -181,7 +241,7 @@ std::optional<int> Command::parse(int argc, const char* const* argv) {
 int finished(int code, const std::string& program) {
   std::cout.flush();
   if (std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-  std::fprintf(stderr, "%s: standard output cannot be written to its end; free some space\n", program.c_str());
+  say_error(program, "standard output cannot be written to its end; free some space");
   return code == 0 ? kInputOutput : code;
 }
 

@@ -35,6 +35,7 @@ Check positive();
 Check not_negative();
 Check within(double low, double high);
 Check one_of(const std::vector<std::string>& names);
+Check name_space();  ///< of DDS topics, as ROS 2 writes one
 
 /// An option of a command; a handle to copy. The names of its settings are CLI11's.
 class Option {
@@ -83,6 +84,9 @@ class Command {
 
   bool parsed() const;
   std::string name() const;
+  std::string line() const;  ///< its name and those of the verbs that the line names below it
+  /// Calls `with` for itself, or for each of the verbs below it that have none of their own.
+  void each_verb(const std::function<void(Command&)>& with);
   /// Without a value the program goes on. Otherwise it ends with it: 0 after --help and --version, 64 after a usage
   /// error, told on stderr as `PROGRAM VERB: what; see PROGRAM VERB --help`.
   std::optional<int> parse(int argc, const char* const* argv);
@@ -90,8 +94,9 @@ class Command {
  private:
   explicit Command(CLI::App* app);
   int usage(const std::string& what) const;
-  std::string line() const;  ///< program and verb
+  const Command* begun() const;  ///< the verb below it that the line names; null: none
   std::string no_verb() const;
+  std::string not_taken() const;
 
   std::unique_ptr<CLI::App> owned_;
   CLI::App* app_;

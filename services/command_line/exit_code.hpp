@@ -20,6 +20,7 @@ enum ExitCode {
   kCannotCreate = 73,
   kInputOutput = 74,
   kConfiguration = 78,
+  kInterrupted = 130,  ///< Ctrl-C: what was finished by then is told and written
 };
 
 /// What keeps a program from starting and is not its own fault: the exit code, and one line.

@@ -28,7 +28,7 @@ log=$out/hil.log
 vehicle=$root/tests/autopilots/px4.vehicle.toml
 
 "$bin/backwash-bench" --map builtin:apartment --vehicle "$vehicle" --start 3.0,4.2,1.2 --in-loop tcpin:127.0.0.1:4560 \
-  --domain "$domain" --log "$out/hil.truth.csv" >"$out/hil.bench.log" 2>&1 &
+  --domain "$domain" --log "$out/hil.truth.csv" --force >"$out/hil.bench.log" 2>&1 &
 bench_pid=$!
 pids+=("$bench_pid")
 mapfile -t settings < <(grep -v '^#' "$root/tests/autopilots/hil.params")

@@ -48,6 +48,7 @@ def check_programs(root: pathlib.Path, build: pathlib.Path, sections_of: dict[st
     usage = subprocess.run(["bash", str(root / "fly"), "--help"], capture_output=True, text=True, check=True).stdout
     expect("fly", options_in(sections_of["fly"]), set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", usage)))
     verbs, _ = help_of(str(services / "backwash"))
+    every = options_in(sections_of["backwash"].split("\n|")[0].split(".")[0])
     expect("verbs of backwash", {h.split()[1] for h in sections_of if h.startswith("backwash ")}, verbs)
     for verb in verbs & {h.split()[1] for h in sections_of if h.startswith("backwash ")}:
         # Options stand in the tables' first column.
@@ -57,7 +58,7 @@ def check_programs(root: pathlib.Path, build: pathlib.Path, sections_of: dict[st
             options |= help_of(str(services / "backwash"), verb, below)[1]
             if f"`backwash {verb} {below}`" not in sections_of[f"backwash {verb}"]:
                 wrong.append(f"backwash {verb}: {below} is not documented")
-        expect(f"backwash {verb}", {o for c in cells for o in options_in(c[0])}, options)
+        expect(f"backwash {verb}", {o for c in cells for o in options_in(c[0])} | every, options)
         check_defaults(f"backwash {verb}", [str(services / "backwash"), verb], [" ".join(c) for c in cells])
     for program in ("backwashd", "backwash-bench"):
         _, options = help_of(str(services / program))

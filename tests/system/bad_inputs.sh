@@ -10,9 +10,10 @@ refused() {
   local code=$1 words=$2 line
   shift 2
   timeout 20 "$backwash" "$@" >stdout 2>stderr
-  local got=$?
+  local got=$? below=
+  [[ ${1:-} != vehicle ]] || below=" tune"
   line=$(cat stderr)
-  if [[ $got != "$code" || $(wc -l <stderr) != 1 || $line != "backwash${1:+ }${1:-}:"* || $line != *"$words"* ]]; then
+  if [[ $got != "$code" || $(wc -l <stderr) != 1 || $line != "backwash${1:+ }${1:-}$below:"* || $line != *"$words"* ]]; then
     echo "backwash $*"
     echo "  wanted exit $code and one line with '$words'; got exit $got and:"
     sed 's/^/  /' stderr
@@ -33,7 +34,10 @@ printf 't_s,cmd_x_m,cmd_y_m\n0,0,0\n' >no_z.csv
 printf 'x_m,y_m\n0,0\n' >no_z_points.csv
 printf 'start = [1, 0, 1]\n[[hover]]\np = [2, 0, 1]\ndwel = 3\n' >spec_key.toml
 printf 'start = [1, 1.5, 1]\n[[hover]]\np = [5, 1.5, 1]\ndwell = 3\n' >spec_wall.toml
+printf 'start = [1, 0, 1]\n[[hover]]\np = [1.2, 0, 1]\ndwell = 1\n' >spec_good.toml
 touch exists a.csv
+cp corrupt.bt corrupt.ulg
+cp corrupt.bt corrupt.bwlog
 mkfifo fifo
 # Column maps, and tables of others.
 table() { printf 't,x,y,z\n'; for n in $(seq 0 200); do echo "$(($1 * n)),0,0,0.$n"; done; }
@@ -62,7 +66,7 @@ refused 64 "three numbers" fly --start 1,2 --goal 1,0,3
 refused 64 "both --start and --goal" fly --start 1,0,1
 refused 64 "'-3' is below 0" fly --seed -3
 refused 64 "is too large" fly --seed 99999999999999999999 --ends
-refused 64 "takes a number above 0;" "${fly[@]}" --sigma-scale 0
+refused 64 "takes a number from 1e-06" "${fly[@]}" --sigma-scale 0
 refused 64 "finite number" "${fly[@]}" --sigma-scale inf
 refused 64 "finite number" plan --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1 --vmax nan
 refused 64 "takes a number from 0.5 to 0.99;" calibrate --log a.csv --vehicle $quad --quantile 2
@@ -135,11 +139,55 @@ printf 'x_m,y_m,z_m\n1,0,1\n3,1.2,1\n' >points.csv
 "$backwash" field --map builtin:narrow-gap --model $quad --points points.csv --json >points.json || { echo "field --points is refused"; failed=1; }
 python3 -c 'import json; free, wall = json.load(open("points.json"))["points"]; assert free["sigma"] and wall["sigma"] is None' || failed=1
 
+# What is misspelt is told before what is missing, and what was meant; values that are none, twice or empty.
+refused 64 "no option '--modle', did you mean --model?" plan --map builtin:narrow-gap --modle $quad
+for verb in plan reach field feasibility report import replay adapt; do
+  refused 64 "no option '--seed'" $verb --seed -3
+done
+for verb in fly simulate compare calibrate study; do refused 64 "--seed: '-3' is below 0" $verb --seed -3; done
+refused 64 "'extra' is not expected here" fly extra
+refused 64 "--seed: '1.5' is no whole number of 0 or more" fly --seed 1.5
+refused 64 "--seed: '' is no whole number" fly --seed ""
+refused 64 "--seed is given 2 times; give it once" fly --seed 1 --seed 2
+refused 64 "--report needs a value" fly --report
+refused 64 "--report: is empty" fly --report ""
+refused 64 "--json takes no value" fly --json=3
+refused 64 "from 1e-06 to 1e+06" fly --sigma-scale 1e308
+refused 64 "from 1 to 100000" compare --flights 0
+refused 64 "two outputs" fly --report both.html --log both.html
+refused 64 "two outputs" study --log a.csv --vehicle $quad --report both.html --out ./both.html
+refused 64 "--judge fits nothing" calibrate --log a.csv --vehicle $quad --judge --out model.toml
+refused 64 "--design" study --log a.csv --vehicle $quad --start 1,0,1
+refused 64 "not finite" field --map builtin:narrow-gap --model $quad --slice z=nan
+refused 65 "the map spans z from" field --map builtin:narrow-gap --model $quad --slice z=100
+printf 'x_m,y_m,z_m\n' >none.csv
+refused 65 "has no point" field --map builtin:narrow-gap --model $quad --points none.csv
+refused 64 "is no kind of recording; known are airgarage" import nanobench
+refused 64 "without --out" import --propose ms.csv -o logs
+refused 65 "import" calibrate --log corrupt.ulg --vehicle $quad
+refused 65 "raw log of backwashd; report" study --log corrupt.bwlog --vehicle $quad
+tune=(vehicle tune --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1)
+refused 66 "is a directory; needs the autopilot's parameter file" "${tune[@]}" --parameters .
+refused 66 "is a device; needs the autopilot's parameter file" "${tune[@]}" --parameters /dev/zero
+refused 74 "cannot be written to its end" simulate --map builtin:narrow-gap --vehicle $quad --flight spec_good.toml --out /dev/full --force
+[[ ! -e both.html ]] || { echo "one of two outputs was written"; failed=1; }
+
+# A name that is no UTF-8: escaped in messages, replaced in JSON, never a defect; a table as a spreadsheet writes it.
+foreign=$(printf 'f\xffn.csv')
+refused 66 'f\xffn.csv' adapt "$foreign" --vehicle $quad
+"$backwash" simulate --map builtin:narrow-gap --vehicle $quad --flight spec_good.toml --out "$foreign" --json >simulated.json ||
+  { echo "simulate into a foreign name fails"; failed=1; }
+python3 -c 'import json; assert json.load(open("simulated.json"))["log"] == "f\ufffdn.csv"' || failed=1
+{ printf '\xef\xbb\xbf'; sed 's/$/\r/' "$foreign"; } >sheet.csv
+"$backwash" simulate --map builtin:narrow-gap --vehicle $quad --setpoints sheet.csv --out again.csv >/dev/null ||
+  { echo "a table with a byte order mark is refused"; failed=1; }
+
 # verbs that are none, and a bare call, without a verb to name
 for wrong in frobnicate "vehicle frobnicate"; do
   "$backwash" $wrong >stdout 2>stderr
   [[ $? == 64 && $(wc -l <stderr) == 1 && $(<stderr) == *"no verb 'frobnicate': one of "* ]] || { echo "$wrong: $(<stderr)"; failed=1; }
 done
+grep -q "no verb 'stdy', did you mean 'study'?: one of fly" <("$backwash" stdy 2>&1) || { echo "stdy: study was meant"; failed=1; }
 grep -q 'no verb .frobnicate.: one of fly, plan,' <("$backwash" frobnicate 2>&1) || { echo "frobnicate: the verbs are not named"; failed=1; }
 
 # standard output that cannot be written is told

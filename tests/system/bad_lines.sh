@@ -45,6 +45,21 @@ refused 64 "number above 0" backwashctl --timeout 0 status
 refused 64 "finite" backwashctl goto 1,2,nan
 refused 64 "finite" backwashctl takeoff --height inf
 refused 71 "nowhere0" backwashctl --interface nowhere0 status
+refused 64 "no verb 'enabl', did you mean 'enable'?" backwashctl enabl
+refused 64 "no option '--jaw', did you mean --yaw?" backwashctl goto 1,2,3 --jaw 1
+refused 64 "goal has 2 values; it takes 3" backwashctl goto 1,2
+refused 64 "goal: 'b' is no number" backwashctl goto 1,b,3
+refused 64 "'-1' is not expected here" backwashctl enable -1
+refused 64 "'a b' is no namespace" backwashctl --namespace "a b" status
+refused 64 "is empty" backwashctl --station "" status
+printf 'x,y\xff\n1,2\n' >foreign.csv
+refused 65 'x,y\xff' backwashctl follow foreign.csv
+printf 'x_m,y_m,z_m\r\n1,2,3\r\n' >crlf.csv
+refused 69 "no daemon answered" backwashctl --timeout 0.2 follow crlf.csv
+# With --json what became of a command is on standard output too.
+"$bin/backwashctl" --timeout 0.2 land --wait --json >stdout 2>stderr
+[[ $? == 69 && $(<stderr) == *"no daemon answered"* ]] || { echo "land --json: $(<stderr)"; failed=1; }
+python3 -c 'import json; a = json.load(open("stdout")); assert a["verb"] == "land" and not a["accepted"] and a["done"] is None and "no daemon" in a["reason"]' || failed=1
 
 bench=(backwash-bench --map builtin:apartment --duration 1 --domain "$BACKWASH_DOMAIN")
 at=(--start 2,2,1.2)
@@ -59,6 +74,27 @@ refused 73 "--link /nowhere/link" "${bench[@]}" "${at[@]}" --link /nowhere/link
 refused 73 "--log /nowhere/log.csv" "${bench[@]}" "${at[@]}" --link link --log /nowhere/log.csv
 refused 73 "--wire /nowhere/wire.csv" "${bench[@]}" "${at[@]}" --link link --wire /nowhere/wire.csv
 refused 74 "--in-loop /dev/absent" "${bench[@]}" "${at[@]}" --in-loop /dev/absent
+refused 74 "tcpin:ADDRESS:PORT" "${bench[@]}" "${at[@]}" --in-loop tcpin:127.0.0.1:port
+refused 66 "no such world" backwash-bench --map builtin:nowhere "${at[@]}" --link link
+refused 64 "takes a number above 0" "${bench[@]}" "${at[@]}" --link link --crate 1,2,1 --crate-edge 0
+refused 64 "0 or more" "${bench[@]}" "${at[@]}" --link link --stop-odometry -3
+refused 64 "--start has 2 values; it takes 3" "${bench[@]}" --start 2,2 --link link
+refused 64 "--start: 'a' is no number" "${bench[@]}" --start a,b,c --link link
+refused 64 "--seed: '1.5' is no whole number" "${bench[@]}" "${at[@]}" --link link --seed 1.5
+refused 64 "--link and --in-loop exclude each other" "${bench[@]}" "${at[@]}" --link link --in-loop tcpin:127.0.0.1:4560
+refused 64 "is no namespace" "${bench[@]}" "${at[@]}" --link link --namespace ""
+for wrong in MPC_XY_P =3 MPC_XY_P=nan MPC_XY_P=; do
+  refused 64 "--parameter $wrong: is not NAME=NUMBER" "${bench[@]}" "${at[@]}" --link link --parameter $wrong
+done
+mkdir folder
+refused 66 "folder: is no file that can be read; needs a timeline" "${bench[@]}" "${at[@]}" --link link --faults folder
+refused 66 "absent.toml: is no file that can be read" "${bench[@]}" "${at[@]}" --link link --faults absent.toml
+# What is there stays: a file in the link's place, and logs without --force.
+echo "of somebody else" >kept
+refused 73 "kept: exists and is no symbolic link" "${bench[@]}" "${at[@]}" --link kept
+refused 73 "--log kept: exists already" "${bench[@]}" "${at[@]}" --link link --log kept
+refused 73 "--wire kept: exists already" "${bench[@]}" "${at[@]}" --link link --wire kept
+[[ $(<kept) == "of somebody else" ]] || { echo "a file in the way was replaced"; failed=1; }
 
 # What a program has to say where standard output is full.
 for program in backwashd backwashctl backwash-bench; do

@@ -116,6 +116,7 @@ Calibration calibrate(const Data& data, const Model& gates, std::span<const Refu
     horizontal.push_back(push(data, weights, kHorizontal));
     vertical.push_back(push(data, weights, kVertical));
     times.push_back(tau(data, weights));
+    options.progress(horizontal.size(), static_cast<std::size_t>(options.bootstraps));
   }
   const double wider = widening(data.place.size(), 1 + *std::max_element(data.place.begin(), data.place.end()));
   for (std::size_t j = 0; j < kParameters; ++j) c.ci95[j] = interval(c.fitted.parameters[j], samples[j], wider);

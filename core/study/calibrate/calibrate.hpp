@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -37,6 +38,7 @@ struct Options {
   int bootstraps = static_cast<int>(kCalibrationRules.bootstraps);
   int folds = static_cast<int>(kCalibrationRules.folds);
   std::uint64_t seed = 1;
+  std::function<void(std::size_t done, std::size_t of)> progress = [](std::size_t, std::size_t) {};  ///< of the refits
 };
 
 /// [bound] mean, m/s².

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/flight_story.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "core/log/tick_log.hpp"
+#include "core/map/distance_field.hpp"
+#include "core/types/text.hpp"
+
+namespace backwash::services {
+namespace {
+
+constexpr double kVertical = 0.01;  // m across: what stays within it rises or sinks on one line
+constexpr std::array kVerbs{"",     "enable",          "disable", "take off", "go to",           "hold",
+                            "land", "end the session", "stop",    "follow",   "go to, then turn"};
+
+Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
+
+/// Changes of the mode that are part of a flight that goes as it was asked for.
+bool as_asked(Reason reason) {
+  using enum Reason;
+  constexpr std::array kAsked{started, enabled,   operator_request, autopilot_follows, segment_accepted, disarmed,
+                              landed,  land_sent, land_requested,   stop_requested,    takeoff_accepted, lifted_off};
+  return std::ranges::find(kAsked, reason) != kAsked.end();
+}
+
+/// What the log holds of a trajectory.
+struct Segment {
+  std::uint64_t id = 0, continues = 0;
+  std::vector<Vec3> p_W;
+  bool vertical() const {
+    return !p_W.empty() &&
+           std::ranges::all_of(p_W, [&](const Vec3& p) { return (p - p_W.front()).head<2>().norm() < kVertical; }) &&
+           p_W.back().z() > p_W.front().z() + kVertical;
+  }
+};
+
+std::vector<Segment> segments_of(const log::RawLog& log) {
+  std::vector<Segment> segments;
+  for (const auto& record : log.records) {
+    const auto* head = log::payload<log::SegmentRecord>(record);
+    if (record.header.kind != log::RecordKind::segment || !head) continue;
+    Segment s{head->id, head->continues, {}};
+    constexpr std::size_t kRow = 10 * sizeof(double);
+    for (std::size_t at = sizeof *head + kRow; at + kRow <= record.bytes.size(); at += kRow) {
+      double p[3];
+      std::memcpy(p, record.bytes.data() + at, sizeof p);
+      s.p_W.push_back(vec(p));
+    }
+    segments.push_back(std::move(s));
+  }
+  return segments;
+}
+
+/// The true position at a time, linear in between.
+Vec3 true_position(const log::FlightLog& truth, double t) {
+  const auto after = std::upper_bound(truth.t_s.begin(), truth.t_s.end(), t) - truth.t_s.begin();
+  const auto i =
+      static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(after, 1, static_cast<std::ptrdiff_t>(truth.t_s.size()) - 1));
+  const double f = std::clamp((t - truth.t_s[i - 1]) / (truth.t_s[i] - truth.t_s[i - 1]), 0.0, 1.0);
+  const auto at = [&](const char* name) {
+    const auto& column = truth.column(name);
+    return (1 - f) * column[i - 1] + f * column[i];
+  };
+  return {at("x_m"), at("y_m"), at("z_m")};
+}
+
+bool airborne(const log::TickInputRecord& record) {
+  const auto facts = log::decode(record, nullptr).autopilot;
+  if (!facts.armed) return false;
+  return facts.landed ? !*facts.landed : facts.in_air.value_or(false);
+}
+
+/// Goes through the records in their order.
+class Teller {
+ public:
+  Teller(FlightStory& story, const log::RawLog& log, const map::OccupancyGrid* map, double radius,
+         const log::FlightLog* truth)
+      : story_(story), segments_(segments_of(log)), map_(map), radius_(radius), truth_(truth) {
+    if (map_) distance_.emplace(*map_);
+    const auto first =
+        std::ranges::find(log.records, log::RecordKind::tick, [](const log::RawRecord& r) { return r.header.kind; });
+    if (first != log.records.end())
+      zero_ns_ = first->header.t_ns;
+    else if (!log.records.empty())
+      zero_ns_ = log.records.front().header.t_ns;
+  }
+
+  void take(const log::RawRecord& record) {
+    now_s_ = 1e-9 * static_cast<double>(record.header.t_ns - zero_ns_);
+    using enum log::RecordKind;
+    const auto kind = record.header.kind;
+    const std::string text(record.bytes.begin(), record.bytes.end());
+    if (kind == tick_input)
+      if (const auto* input = log::payload<log::TickInputRecord>(record)) in_air_ = airborne(*input);
+    if (kind == tick)
+      if (const auto* row = log::payload<log::TickRecord>(record)) take_tick(*row, record.header.t_ns);
+    if (kind == command) take_command(text);
+    if (kind == ack) take_answer(text);
+    if (kind == failure) failure_ = text, say("the daemon ended itself: " + text);
+    if (kind == lost)
+      if (const auto* lost_records = log::payload<log::LostRecord>(record)) {
+        story_.records_lost = lost_records->records;
+        say(std::to_string(lost_records->records) + " records were lost by now: the disk did not take them");
+      }
+    if (kind == log::RecordKind::map)
+      if (const auto* head = log::payload<log::MapRecord>(record))
+        say(head->accepted ? "a map was accepted" : "a map was refused");
+  }
+
+  void finish(bool cut, const std::string& because) {
+    close_piece();
+    story_.time_s = story_.samples.empty() ? std::max(now_s_, 0.0) : last_tick_s_;
+    if (last_tick_s_ < 0)
+      story_.ended = "no control tick was recorded";
+    else if (in_air_)
+      story_.ended = "in the air, in mode " + mode() + " (" + reason() + ")";
+    else
+      story_.ended = "on the ground, in mode " + mode() + " (" + reason() + ")";
+    if (cut) story_.ended += "; the last record is cut short: the process or the power was gone";
+    judge(because);
+  }
+
+ private:
+  std::string mode() const { return kModeNames[std::min<std::size_t>(mode_, kModeNames.size() - 1)]; }
+  std::string reason() const { return kReasonNames[std::min<std::size_t>(reason_, kReasonNames.size() - 1)]; }
+  void say(const std::string& text) { story_.events.push_back({now_s_, text}); }
+
+  void take_command(const std::string& text) {
+    const auto at = text.find(" verb ");
+    unsigned verb = 0;
+    double x = 0, y = 0, z = 0;
+    if (at == text.npos || std::sscanf(text.c_str() + at, " verb %u (%lf, %lf, %lf)", &verb, &x, &y, &z) != 4) return;
+    if (verb == 0 || verb >= kVerbs.size()) return;
+    const bool place = verb == 3 || verb == 4 || verb == 10;
+    const std::string asked = std::string("asked to ") + kVerbs[verb] + (place ? " " + to_text(Vec3(x, y, z)) : "");
+    if (asked != asked_) say(asked);  // a station repeats itself until it is answered
+    asked_ = asked;
+    ordered_ = verb != 1 && verb != 7;
+  }
+
+  void take_answer(const std::string& text) {
+    const auto at = text.find(" result ");
+    unsigned result = 0;
+    asked_.clear();
+    if (at == text.npos || std::sscanf(text.c_str() + at, " result %u:", &result) != 1 || result == 0) return;
+    ordered_ = false;
+    ++story_.refusals;
+    const auto why = text.find(": ", at);
+    last_refusal_ = why == text.npos ? text : text.substr(why + 2);
+    say("refused: " + last_refusal_);
+  }
+
+  void take_tick(const log::TickRecord& tick, std::int64_t t_ns) {
+    if (last_tick_s_ < 0 || tick.mode != mode_ || tick.reason != reason_) take_mode(tick);
+    last_tick_s_ = now_s_;
+    const bool flying = tick.segment != 0 && (tick.judged || in_air_);
+    StorySample s{now_s_, vec(tick.p), vec(tick.cmd_p), tick.judged != 0, tick.inside != 0, in_air_, Vec3::Zero(), {}};
+    if (truth_) s.p_W = true_position(*truth_, 1e-9 * static_cast<double>(t_ns));
+    if (s.judged) take_verdict(tick, s);
+    if (in_air_ && !was_in_air_) ++story_.take_offs, say("in the air");
+    if (!in_air_ && was_in_air_) ++story_.landings, say("on the ground");
+    if (in_air_ && was_in_air_ && !story_.samples.empty())
+      story_.length_m += (s.p_W - story_.samples.back().p_W).norm();
+    was_in_air_ = in_air_;
+    if (flying) take_piece(tick, s);
+    const auto m = static_cast<Mode>(tick.mode);
+    // On its way up and down a vehicle comes as near to the floor as it will.
+    if (distance_ && in_air_ && !story_.pieces.empty() && !story_.pieces.back().take_off && open_ &&
+        (m == Mode::tracking || m == Mode::hold)) {
+      s.clearance_m = distance_->exact(*map_, s.p_W) - radius_;
+      story_.clearance_m = std::min(story_.clearance_m.value_or(*s.clearance_m), *s.clearance_m);
+    }
+    story_.samples.push_back(s);
+  }
+
+  void take_mode(const log::TickRecord& tick) {
+    const auto said = static_cast<Reason>(tick.reason);
+    if (last_tick_s_ < 0 || tick.mode != mode_) {
+      const std::string from = last_tick_s_ < 0 ? "" : mode() + " → ";
+      mode_ = tick.mode, reason_ = tick.reason;
+      say(from + mode() + ": " + reason());
+      story_.holds += static_cast<Mode>(tick.mode) == Mode::hold;
+      if (in_air_ && static_cast<Mode>(tick.mode) != Mode::passive) fault_ = as_asked(said) ? "" : reason();
+    }
+    mode_ = tick.mode, reason_ = tick.reason;
+    if (!as_asked(said) && static_cast<Mode>(tick.mode) != Mode::tracking) last_fault_ = reason();
+  }
+
+  void take_verdict(const log::TickRecord& tick, StorySample& s) {
+    ++story_.judged, story_.inside += s.inside;
+    const Vec3 error = vec(tick.p) - vec(tick.center);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double h = tick.half_widths[axis];
+      s.error_over_bound[axis] = h > 0 ? std::abs(error[axis]) / h : 0;
+      story_.largest_ratio[axis] = std::max(story_.largest_ratio[axis], s.error_over_bound[axis]);
+    }
+  }
+
+  void take_piece(const log::TickRecord& tick, const StorySample& s) {
+    if (!open_ || tick.segment != segment_) {
+      const auto known = std::ranges::find(segments_, tick.segment, &Segment::id);
+      const bool goes_on = open_ && known != segments_.end() && known->continues != 0;
+      if (!goes_on) {
+        close_piece();
+        story_.pieces.push_back({});
+        auto& piece = story_.pieces.back();
+        piece.take_off = known != segments_.end() ? known->vertical() : true;  // a lift-off alone is no segment
+        piece.from_s = now_s_;
+      }
+      open_ = true, ordered_ = false, segment_ = tick.segment;
+      commands_ = known != segments_.end() ? known->p_W.size() : 0;
+      story_.pieces.back().goal_W = commands_ > 0 ? known->p_W.back() : s.command_W;
+    }
+    auto& piece = story_.pieces.back();
+    piece.until_s = now_s_;
+    piece.samples += s.judged, piece.inside += s.judged && s.inside;
+    const auto m = static_cast<Mode>(tick.mode);
+    if (m == Mode::tracking && commands_ > 0 && tick.index + 1 >= commands_) {
+      piece.to_its_end = true;
+      piece.goal_error_m = (s.p_W - piece.goal_W).norm();
+      const Vec3 h(tick.half_widths[kX], tick.half_widths[kY], tick.half_widths[kZ]);
+      piece.reached = piece.goal_error_m <= h.norm() || !tick.judged;
+    } else if (!piece.to_its_end) {
+      piece.goal_error_m = (s.p_W - piece.goal_W).norm();
+    }
+    piece.by_order = !piece.to_its_end && (piece.by_order || ordered_);
+  }
+
+  void close_piece() { open_ = false; }
+
+  void judge(const std::string& because) {
+    auto& wrong = story_.wrong;
+    if (!because.empty()) wrong.push_back(because);
+    if (!failure_.empty()) wrong.push_back("the daemon ended itself: " + failure_);
+    if (story_.take_offs == 0) {
+      const std::string why = !last_refusal_.empty() ? "refused: " + last_refusal_
+                              : !last_fault_.empty() ? last_fault_
+                                                     : "nothing asked it to";
+      wrong.push_back("the vehicle never took off: " + why);
+    }
+    if (in_air_) wrong.push_back("the log ends " + story_.ended);
+    if (story_.touched())
+      wrong.push_back("an obstacle was touched (clearance " + to_text(*story_.clearance_m, 3) + " m)");
+    if (story_.inside != story_.judged)
+      wrong.push_back(std::to_string(story_.judged - story_.inside) + " of " + std::to_string(story_.judged) +
+                      " samples lay outside the set predicted for them; all must lie inside");
+    for (const auto& piece : story_.pieces)
+      if (!piece.take_off && !piece.reached && !piece.by_order)
+        wrong.push_back("the goal " + to_text(piece.goal_W) + " was missed by " + to_text(piece.goal_error_m, 2) +
+                        " m" + (last_fault_.empty() ? "" : ": " + last_fault_));
+    if (!fault_.empty()) wrong.push_back("the flight did not end as it was asked to: " + fault_);
+  }
+
+  FlightStory& story_;
+  const std::vector<Segment> segments_;
+  const map::OccupancyGrid* map_;
+  std::optional<map::DistanceField> distance_;
+  double radius_;
+  const log::FlightLog* truth_;
+  std::int64_t zero_ns_ = 0;
+  double now_s_ = 0, last_tick_s_ = -1;
+  std::uint32_t mode_ = 0, reason_ = 0;
+  bool in_air_ = false, was_in_air_ = false;
+  bool open_ = false;     ///< a piece is being flown
+  bool ordered_ = false;  ///< an operator has asked for something since the piece began
+  std::uint64_t segment_ = 0;
+  std::size_t commands_ = 0;  ///< of the segment
+  std::string asked_, last_refusal_, failure_;
+  std::string fault_;       ///< why the last change of the mode in the air was none that was asked for
+  std::string last_fault_;  ///< the newest of them at all
+};
+
+}  // namespace
+
+bool FlightStory::goal_reached() const noexcept {
+  const auto route = [](const StoryPiece& p) { return !p.take_off; };
+  return std::ranges::any_of(pieces, route) &&
+         std::ranges::all_of(pieces, [&](const StoryPiece& p) { return p.take_off || p.reached || p.by_order; });
+}
+
+FlightStory flight_story(const log::RawLog& log, const map::OccupancyGrid* map, double radius,
+                         const log::FlightLog* truth, const std::string& because) {
+  FlightStory story;
+  story.by_truth = truth != nullptr;
+  story.cut_at = log.cut_at;
+  Teller teller(story, log, map, radius, truth);
+  for (const auto& record : log.records) teller.take(record);
+  teller.finish(log.cut_at.has_value(), because);
+  return story;
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/log/flight_log.hpp"
+#include "core/log/raw_log.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/types/geometry.hpp"
+#include "core/types/mode.hpp"
+
+namespace backwash::services {
+
+/// A trajectory that was flown, with all that extended it.
+struct StoryPiece {
+  bool take_off = false;           ///< its commands rise on one vertical line
+  double from_s = 0, until_s = 0;  ///< of its ticks, since the log's first tick
+  Vec3 goal_W = Vec3::Zero();      ///< its last command, m
+  std::size_t samples = 0, inside = 0;
+  bool to_its_end = false;  ///< its last command was sent
+  bool by_order = false;    ///< an operator ended it before
+  double goal_error_m = 0;  ///< of the position at its last tick
+  bool reached = false;     ///< flown to its end, and the position then within the set around it
+};
+
+struct StoryEvent {
+  double t_s;  ///< since the log's first tick
+  std::string text;
+};
+
+/// A tick with a judged position, or one in the air.
+struct StorySample {
+  double t_s;
+  Vec3 p_W, command_W;  ///< measured (or true) and commanded position, m
+  bool judged, inside, in_air;
+  Vec3 error_over_bound;              ///< per axis; 0 where nothing was judged
+  std::optional<double> clearance_m;  ///< body to obstacle, where it is judged
+};
+
+/// What a raw log tells of a flight, whatever kind it was: any number of take-offs, routes, holds and landings, or
+/// none.
+struct FlightStory {
+  std::vector<StoryPiece> pieces;
+  std::vector<StoryEvent> events;  ///< commands, refusals, changes of the mode, what the daemon could not go on with
+  std::vector<StorySample> samples;
+  bool by_truth = false;  ///< positions are the truth's; otherwise those that the vehicle measured itself
+  std::size_t take_offs = 0, landings = 0, holds = 0, refusals = 0;
+  std::size_t judged = 0, inside = 0;
+  double time_s = 0, length_m = 0;    ///< of the log; of the way in the air
+  std::optional<double> clearance_m;  ///< least; none without a map or a route
+  Vec3 largest_ratio = Vec3::Zero();  ///< largest |e|/h per axis
+  std::string ended;                  ///< how the log ends, in words
+  std::uint64_t records_lost = 0;
+  std::optional<std::uint64_t> cut_at;  ///< byte from which on a last record was cut short
+  std::vector<std::string> wrong;       ///< why the flight was not good, the gravest first; empty: it was
+
+  bool ok() const noexcept { return wrong.empty(); }
+  bool goal_reached() const noexcept;  ///< each route that nobody ended was; false without one
+  bool touched() const noexcept { return clearance_m && *clearance_m <= 0; }
+};
+
+/// Reads the story out of a raw log. `map`: what clearances are measured to, null: none are. `radius`: of the body, m.
+/// `truth`: the bench's log of the same flight, columns t_s, x_m, y_m, z_m on the same monotonic clock; null: the
+/// positions are those that the vehicle measured, and clearances hold up to the error of its estimate. The sets are
+/// those that the daemon logged; nothing is propagated again. `because`: what ended the flight, as others saw it.
+FlightStory flight_story(const log::RawLog& log, const map::OccupancyGrid* map, double radius,
+                         const log::FlightLog* truth = nullptr, const std::string& because = "");
+
+}  // namespace backwash::services

@@ -1,0 +1,143 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# `backwash report` on every kind of raw log: many take-offs and routes, an order that ends one, a fault, refusals, none that took
+# off, a daemon that ended itself, samples outside, something touched, and a kill at any byte. What was flown is written here,
+# so what has to be told is known.
+#   report.sh BACKWASH
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
+command -v gnuplot >/dev/null && drawn=yes || drawn=no
+PYTHONPATH=$here python3 - "$backwash" "$drawn" <<'PYTHON'
+import json, random, subprocess, sys
+from raw_log_maker import *
+
+backwash, drawn = sys.argv[1], sys.argv[2] == "yes"
+
+
+def told(log, code, *options, most=None):
+    """What report says of a log: JSON, and the line on stderr."""
+    log.write("flight.bwlog", most)
+    ran = subprocess.run([backwash, "report", "--log", "flight.bwlog", "--json", "--quiet", *options], capture_output=True, text=True, timeout=60)
+    assert ran.returncode in ([code] if code is not None else [0, 1]), (ran.returncode, ran.stderr)
+    assert ran.stderr.count("\n") == (ran.returncode != 0), ran.stderr
+    return json.loads(ran.stdout), ran.stderr
+
+
+def good_flight():
+    log = RawLog()
+    log.wait()
+    for _ in range(2):
+        x, y, _ = log.at
+        log.fly((x, y, 1))
+        log.command(GO_TO, (x + 2, y, 1))
+        log.fly((x + 2, y, 1))
+        log.fly((x + 2, y + 1, 1), ticks=30)
+        log.command(STOP)
+        for _ in range(20):
+            log.tick("hold", STOP_REQUESTED, log.segments, 29)
+        log.land()
+    return log
+
+
+log = good_flight()
+story, said = told(log, 0)
+assert story["ok"] and story["reason"] == "" and said == "" and story["judged_by"] == "measured"
+assert [story[k] for k in ("take_offs", "landings", "holds", "refusals")] == [2, 2, 2, 0], story
+assert [p["kind"] for p in story["pieces"]] == ["take-off", "route", "route"] * 2
+assert all(p["end"] == "reached" and p["samples"] == p["samples_inside"] > 0 for p in story["pieces"]), story["pieces"]
+assert abs(story["length_m"] - 2 * (1 + 2 + 1)) < 0.2 and story["min_clearance_m"] is None
+assert abs(story["time_s"] - 0.02 * (log.number - 1)) < 1e-9 and story["ended"].startswith("on the ground")
+text = subprocess.run([backwash, "report", "--log", "flight.bwlog"], capture_output=True, text=True, check=True).stdout
+assert "judged by measured positions" in text and "4 " not in text.split("\n")[0]
+
+# With the truth beside it clearances and goals are the truth's.
+open("truth.csv", "w").write("t_s,x_m,y_m,z_m\n" + "".join(f"{1 + 0.02 * k},9,9,9\n" for k in range(log.number)))
+story, said = told(log, 1, "--truth", "truth.csv")
+assert story["judged_by"] == "truth" and "was missed by" in story["reason"] and story["samples_inside"] == story["samples"]
+
+# One that never took off, by what was refused.
+log = RawLog()
+log.wait()
+log.command(GO_TO, (1, 1, 1), result=1, reason="no map was received")
+log.wait()
+story, said = told(log, 1)
+assert story["reason"] == "the vehicle never took off: refused: no map was received" and story["reason"] in said
+assert story["refusals"] == 1 and not story["goal_reached"] and story["pieces"] == []
+
+# Nothing but the first line, as after a start that was killed.
+assert told(RawLog(), 1)[0]["ended"] == "no control tick was recorded"
+
+# An order ends a route: that is no miss. A fault does not.
+log = RawLog()
+log.fly((0, 0, 1))
+log.fly((4, 0, 1), ticks=100, until=40)
+log.command(STOP)
+for k in range(10):
+    log.tick("hold", STOP_REQUESTED, log.segments, 40 + k)
+log.land()
+story, _ = told(log, 0)
+assert story["pieces"][1]["end"] == "ended by an order", story["pieces"]
+log = RawLog()
+log.fly((0, 0, 1))
+log.fly((4, 0, 1), ticks=100, until=40)
+for k in range(20):
+    log.tick("hold", ODOMETRY_LOST, log.segments, 40)
+for k in range(20):
+    log.tick("land", ODOMETRY_LOST)
+log.in_air = False
+log.wait()
+story, _ = told(log, 1)
+assert "missed by 2.40 m: odometry lost" in story["reason"] and story["holds"] == 1, story["reason"]
+
+# Samples outside, and their number.
+log = RawLog()
+log.fly((0, 0, 1))
+log.fly((4, 0, 1), ticks=90)
+log.fly((5, 0, 1), ticks=10, error=0.15)
+log.land()
+story, _ = told(log, 1)
+assert story["reason"].startswith("10 of 150 samples lay outside") and abs(story["largest_error_over_bound"]["x"] - 1.5) < 1e-9, story
+
+# A daemon that ended itself in the air, a record that was lost before.
+log = RawLog()
+log.fly((0, 0, 1))
+log.record(LOST, struct.pack("<Q", 12))
+log.record(FAILURE, b"planner: out of memory")
+story, _ = told(log, 1)
+assert story["reason"].startswith("the daemon ended itself: planner: out of memory; the log ends in the air"), story["reason"]
+assert story["records_lost"] == 12
+
+# By the map: 5 cm to what nobody knows is less than the body.
+log = RawLog()
+log.free_cube()
+log.at = (-0.8, -0.8, -1.2)
+log.fly((-0.8, -0.8, -0.8))
+log.fly((-0.8, -0.5, -0.8))
+log.land()
+story, _ = told(log, 0)
+assert 0 < story["min_clearance_m"] < 0.5
+log.fly((-0.8, -0.05, -0.8))
+log.fly((-0.05, -0.05, -0.8))
+log.land()
+story, _ = told(log, 1)
+assert story["touched"] and story["min_clearance_m"] < 0 and story["reason"].startswith("an obstacle was touched"), story["reason"]
+
+# What others know of the end comes first, on the page too.
+story, said = told(good_flight(), 1, "--because", "the battery fell out", *(["--out", "page.html"] if drawn else []))
+assert story["reason"] == "the battery fell out" and not story["ok"]
+if drawn:
+    page = open("page.html").read()
+    assert "Not good: the battery fell out" in page and page.count("<svg") == 2 and "asked to go to" in page
+
+# Killed at any byte: all whole records before it are told, and nothing is a defect or bad data.
+log, chance = good_flight(), random.Random(20261123)
+ends = [19]
+while ends[-1] < len(log.bytes):
+    ends.append(ends[-1] + 16 + struct.unpack_from("<I", log.bytes, ends[-1] + 12)[0])
+for cut in sorted(chance.sample(range(19, len(log.bytes)), 200)):
+    story, _ = told(log, None, most=cut)
+    whole = max(e for e in ends if e <= cut)
+    assert story["cut_at"] == (whole if whole < cut else None), (cut, story["cut_at"])
+    assert story["ok"] or story["reason"]
+told_at = [story["time_s"] for story in (told(log, None, most=n)[0] for n in ends[100::100])]
+assert told_at == sorted(told_at)
+PYTHON
