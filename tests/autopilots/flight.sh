@@ -2,6 +2,7 @@
 # Sourced by ardupilot.sh and px4.sh: one flight of the daemon with a given build of a real autopilot in its own
 # simulator, with our VIO fed by that simulator's truth: take off, fly through builtin:apartment's door, land.
 #   NAME.sh PATH_OF_BUILD [BUILD_DIR [OUT_DIR [GOAL]]]
+# VIO_RATE: Hz of the odometry, which the daemon is told less a tenth; without it as the truth comes, about 100 Hz.
 # LINE_BAUD: the daemon's line to the autopilot carries no more than this.
 # Exits 77 without a build to fly, otherwise with the judgement of `backwash report`, or 1 after a contact.
 
@@ -27,11 +28,12 @@ fly_real() {
   "start_$name" "$path" "${settings[@]}"
   [[ -z ${RELAY:-}${LINE_BAUD:-} ]] || relay
   [[ -z ${STATION:-} ]] || helper ground_station.py $STATION
+  [[ -z ${VIO_RATE:-} ]] || more_tables=$'[odometry]\nrate_least = '$(python3 -c "print(0.9 * $VIO_RATE)")
   vehicle=${VEHICLE:-$root/tests/autopilots/$name.vehicle.toml}
   mkfifo "$work/faults"
   exec 7<>"$work/faults"
   "$build/tests/autopilot_vio" --truth "$truth" --map builtin:apartment --vehicle "$vehicle" --start "${START:-3.0,4.2,0.26}" \
-    --yaw "${MAP_YAW:-0.6}" --domain "$domain" --log "$out/$name.truth.csv" <&7 >"$out/$name.vio.log" 2>&1 &
+    --yaw "${MAP_YAW:-0.6}" --rate "${VIO_RATE:-0}" --domain "$domain" --log "$out/$name.truth.csv" <&7 >"$out/$name.vio.log" 2>&1 &
   vio_pid=$!
   pids+=("$vio_pid")
   daemon "$vehicle" "$out/$name.bwlog"

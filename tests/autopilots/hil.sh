@@ -33,6 +33,7 @@ bench_pid=$!
 pids+=("$bench_pid")
 mapfile -t settings < <(grep -v '^#' "$root/tests/autopilots/hil.params")
 model_of_px4=none_iris start_px4 "$path" "${settings[@]}"
+kill -0 "$bench_pid" 2>/dev/null || { cat "$out/hil.bench.log" >&2; exit 1; }
 daemon "$vehicle" "$out/hil.bwlog"
 take_off
 sleep 3

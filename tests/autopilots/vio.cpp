@@ -29,12 +29,14 @@ namespace {
 
 volatile std::sig_atomic_t stopped = 0;
 const std::string kMap = "map";
+constexpr std::int64_t kHalfTruthStep_ns = 5'000'000;
 
 struct Options {
   std::string truth, map, vehicle, log;
   std::vector<double> start;  // the vehicle's centre as it stands, m
   double yaw = 0;             // map <- east, north, up
   double noise = 0.001;       // m
+  double rate = 0;            // of the odometry, Hz; 0: each sample of the truth
   int domain = 0;
 };
 
@@ -130,7 +132,16 @@ class Vio {
     log_ << static_cast<double>(t.at_ns) * 1e-9;
     for (const Vec3& v : {p.p, p.v, a}) log_ << ',' << v.x() << ',' << v.y() << ',' << v.z();
     log_ << ',' << p.q.w() << ',' << p.q.x() << ',' << p.q.y() << ',' << p.q.z() << '\n';
-    if (!fault_.stopped) send(in_map(fault_.frozen ? *fault_.frozen : t), t.at_ns);
+    if (!fault_.stopped && due(t.at_ns)) send(in_map(fault_.frozen ? *fault_.frozen : t), t.at_ns);
+  }
+
+  /// The sample nearest to each whole period of o_.rate; the truth comes at about 100 Hz.
+  bool due(std::int64_t at_ns) {
+    if (o_.rate <= 0) return true;
+    if (at_ns < due_ns_ - kHalfTruthStep_ns) return false;
+    const auto period = static_cast<std::int64_t>(1e9 / o_.rate);
+    due_ns_ = std::max(due_ns_ + period, at_ns + period / 2);
+    return true;
   }
 
   /// The vehicle's ball against the map; the floor that it stands on is no obstacle below half its radius above.
@@ -179,6 +190,7 @@ class Vio {
   std::string heard_;
   Fault fault_;
   Truth last_;
+  std::int64_t due_ns_ = 0;  // of the next odometry
   long samples_ = 0, contacts_ = 0;
   bool touching_ = false;
   double closest_ = 1e9;
@@ -202,6 +214,7 @@ int main(int argc, char** argv) {
       .expected(3);
   app.add_option("--yaw", o.yaw, "of the map against east, rad");
   app.add_option("--noise", o.noise, "of the position, m");
+  app.add_option("--rate", o.rate, "of the odometry, Hz; default: as the truth comes");
   app.add_option("--domain", o.domain).required();
   app.add_option("--log", o.log, "the truth, CSV").required();
   if (const auto code = app.parse(argc, argv)) return *code;
