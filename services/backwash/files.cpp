@@ -84,7 +84,8 @@ void check_outputs(const std::vector<std::string>& paths, bool force) {
   for (const auto& path : paths) {
     check_output(path, force);
     std::error_code unknown;
-    if (!path.empty() && !seen.insert(std::filesystem::weakly_canonical(path, unknown)).second)
+    const auto whole = std::filesystem::weakly_canonical(std::filesystem::absolute(path, unknown), unknown);
+    if (!path.empty() && !seen.insert(whole).second)
       throw Failure(kUsage, path + " is given for two outputs; give each a file of its own");
   }
 }

@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr auto kFirst = 2s;   // what takes less is not shown
+constexpr auto kFirst = 2s;   // what takes less is not shown on a terminal
 constexpr auto kBar = 200ms;  // between two pictures of the bar
 constexpr auto kLine = 10s;   // between two lines where there is no terminal
 constexpr std::size_t kCells = 24;
@@ -42,7 +42,7 @@ class Display {
     begun_ = Clock::now();
     done_ = of_ = 0;
     if (thread_.joinable()) return;
-    shown_ = begun_ + kFirst - (terminal_ ? Clock::duration{kBar} : Clock::duration{kLine});
+    shown_ = terminal_ ? begun_ + kFirst - kBar : begun_;
     thread_ = std::jthread([this](const std::stop_token& end) { run(end); });
   }
   void set(std::size_t done, std::size_t of) {

@@ -141,6 +141,7 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
     if (chance)
       return chance_tube_with_variances(reach, start, commands[0], commands, sigma, model, *options.probability);
     std::vector<DisturbanceBound> bounds;
+    bounds.reserve(sigma.size());
     for (const Variance& s : sigma) bounds.push_back(bound(s, model));
     return {tube_with_bounds(reach, start, commands[0], commands, bounds), {}};
   }

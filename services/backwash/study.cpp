@@ -132,7 +132,7 @@ std::optional<study::RotorVerdict> against_reference(const Options& options,
                                                      const std::optional<study::Observations>& sound,
                                                      const study::Observations& seen) {
   if (!sound) return std::nullopt;
-  const auto verdict = study::judge_rotors(study::rotor_contrasts(*sound), study::rotor_contrasts(seen));
+  auto verdict = study::judge_rotors(study::rotor_contrasts(*sound), study::rotor_contrasts(seen));
   if (!verdict)
     throw Failure(kBadData,
                   options.reference.front() +

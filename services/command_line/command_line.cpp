@@ -229,8 +229,9 @@ std::optional<int> Command::parse(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& wrong) {
     if (std::string_view(wrong.what()) == "A subcommand is required") return usage(no_verb());
     // An argument that nobody takes is told before what is missing: it may be that, misspelt.
-    const bool misspelt =
-        dynamic_cast<const CLI::RequiredError*>(&wrong) || dynamic_cast<const CLI::ExtrasError*>(&wrong);
+    const bool misspelt = dynamic_cast<const CLI::RequiredError*>(&wrong) ||
+                          dynamic_cast<const CLI::ExtrasError*>(&wrong) ||
+                          dynamic_cast<const CLI::ArgumentMismatch*>(&wrong);
     const std::string unknown = misspelt ? not_taken() : "";
     return usage(unknown.empty() ? in_plain_words(wrong.what()) : unknown);
   } catch (const UsageError& wrong) {

@@ -82,7 +82,7 @@ refused 64 "--start has 2 values; it takes 3" "${bench[@]}" --start 2,2 --link l
 refused 64 "--start: 'a' is no number" "${bench[@]}" --start a,b,c --link link
 refused 64 "--seed: '1.5' is no whole number" "${bench[@]}" "${at[@]}" --link link --seed 1.5
 refused 64 "--link and --in-loop exclude each other" "${bench[@]}" "${at[@]}" --link link --in-loop tcpin:127.0.0.1:4560
-refused 64 "is no namespace" "${bench[@]}" "${at[@]}" --link link --namespace ""
+refused 64 "--namespace: is empty" "${bench[@]}" "${at[@]}" --link link --namespace ""
 for wrong in MPC_XY_P =3 MPC_XY_P=nan MPC_XY_P=; do
   refused 64 "--parameter $wrong: is not NAME=NUMBER" "${bench[@]}" "${at[@]}" --link link --parameter $wrong
 done

@@ -34,7 +34,7 @@ def read(fd, seconds, until=None):
 
 
 # A terminal: the bar, and the first of two scenes after Ctrl-C in the second.
-child, fd = started(*TWO, "--flights", "6", "--out", "two.csv", terminal=True)
+child, fd = started(*TWO, "--flights", "150", "--out", "two.csv", terminal=True)
 said = read(fd, 120, until=r"corridors, [^\r]*planning and flying")
 child.send_signal(signal.SIGINT)
 said += read(fd, 120, until=r"interrupted after[^\n]*\n")
@@ -42,11 +42,11 @@ assert child.wait(60) == 130, said
 assert re.search(r"\r\x1b\[K[^\r]* \[#*\.*\] \d+ %, \d+ of \d+, [\d.]+/s, \d+ s left", said), said
 assert said.count("\n") == 1 and "interrupted after 1 of 2 scenes and vehicles" in said.rsplit("\r\x1b[K", 1)[1], said
 rows = list(csv.DictReader(open("two.csv")))
-assert {r["scene"] for r in rows} == {"builtin:narrow-gap"} and len(rows) % 6 == 0 and rows, len(rows)
+assert {r["scene"] for r in rows} == {"builtin:narrow-gap"} and len(rows) % 150 == 0 and rows, len(rows)
 assert "pairs that all methods solve" in open("stdout").read()
 
 # No terminal: a line after 10 s, none before. In the first scene nothing is finished yet.
-child, fd = started(*TWO, "--flights", "400", "--out", "none.csv", terminal=False)
+child, fd = started(*TWO, "--flights", "1200", "--out", "none.csv", terminal=False)
 begun = time.monotonic()
 said = read(fd, 60, until=r"\n")
 assert time.monotonic() - begun > 9.5, said
@@ -56,7 +56,7 @@ said = read(fd, 60)
 assert child.wait(60) == 130 and "interrupted before the first scene" in said and not os.path.exists("none.csv"), said
 
 # --quiet shows nothing, on a terminal neither.
-child, fd = started(*TWO, "--flights", "400", "--quiet", terminal=True)
+child, fd = started(*TWO, "--flights", "1200", "--quiet", terminal=True)
 assert read(fd, 5) == ""
 child.kill()
 child.wait()
