@@ -11,13 +11,12 @@
 namespace backwash::sim {
 namespace {
 
-constexpr double kLeastDistance = 3;                                      // m
-constexpr double kLowest = 0.5, kHighest = 2;                             // m above what lies under a hover point
-constexpr int kTries = 10'000;                                            // per pair
-constexpr double kSettle = 1;                                             // s
-constexpr double kNoDeadline = 1e6;                                       // s
-constexpr double kAirDensity = 1.225;                                     // kg/m³
-constexpr double kEverywhere = -std::numeric_limits<double>::infinity();  // no take-off: clearance counts all around
+constexpr double kLeastDistance = 3;           // m
+constexpr double kLowest = 0.5, kHighest = 2;  // m above what lies under a hover point
+constexpr int kTries = 10'000;                 // per pair
+constexpr double kSettle = 1;                  // s
+constexpr double kNoDeadline = 1e6;            // s
+constexpr double kAirDensity = 1.225;          // kg/m³
 
 /// Largest set of voxels with `open` that are joined through faces, in ascending order.
 std::vector<std::size_t> largest_region(const map::OccupancyGrid& grid, const std::vector<std::uint8_t>& open) {

@@ -151,7 +151,6 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   flight.paper = method_tube(world, paper, start, hover, commands);
   tube = flight.tight.tube;
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, hover, commands, bounds, options.sigma_scale);
-  constexpr double kEverywhere = -std::numeric_limits<double>::infinity();  // the take-off's exception ends with it
   flight.route =
       fly_piece(loop, world, {2, 0, 0, commands, tube, {}}, flight.take_off.samples.back().t, kEverywhere, arrived, 1);
   return flight;

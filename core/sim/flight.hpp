@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <limits>
 #include <optional>
 #include <string>
 #include <tl/expected.hpp>
@@ -97,6 +98,9 @@ struct FlightPiece {
   std::vector<track::Inside> judged;  ///< one per sample
   std::vector<double> clearance_m;    ///< truth to the obstacles that count − body radius, one per sample
 };
+
+/// `z_safe` of what is no take-off: clearance counts all around.
+inline constexpr double kEverywhere = -std::numeric_limits<double>::infinity();
 
 /// Flies a piece whose tube was propagated from the loop's estimate at its acceptance, and judges every measured
 /// position against it. `t_start`: of its first sample, s; `z_safe`: see true_clearance; samples from `hover_from` on

@@ -26,7 +26,8 @@ std::string name_of(const StoryPiece& piece) { return piece.take_off ? "take-off
 
 std::string end_of(const StoryPiece& piece) {
   if (piece.reached) return "reached";
-  return piece.by_order ? "ended by an order" : "missed by " + to_text(piece.goal_error_m, 2) + " m";
+  return piece.by_order ? "ended by an order"
+                        : "not flown to its end, " + to_text(piece.goal_error_m, 2) + " m from it";
 }
 
 /// What positions and clearances are, and what they are worth.
@@ -150,7 +151,7 @@ void print_text(const FlightStory& s, const std::string& log) {
   for (const auto& p : s.pieces)
     std::printf("%-20s %.2f to %.2f s, to %s: %s; %zu of %zu samples inside\n", name_of(p).c_str(), p.from_s, p.until_s,
                 to_text(p.goal_W).c_str(), end_of(p).c_str(), p.inside, p.samples);
-  std::printf("path, time           %.2f m, %.2f s; %zu take-offs, %zu landings, %zu holds, %zu refusals\n", s.length_m,
+  std::printf("path, time           %.2f m, %.2f s; take-offs %zu, landings %zu, holds %zu, refusals %zu\n", s.length_m,
               s.time_s, s.take_offs, s.landings, s.holds, s.refusals);
   if (s.clearance_m)
     std::printf("clearance            %.3f m at least on the routes, body to obstacle%s\n", *s.clearance_m,
