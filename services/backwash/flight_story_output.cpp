@@ -51,7 +51,8 @@ std::string path_figure(const FlightStory& story, const map::OccupancyGrid* map)
     low = low.cwiseMin(s.p_W), high = high.cwiseMax(s.p_W);
     if (s.in_air) data << s.p_W.x() << ' ' << s.p_W.y() << ' ' << s.command_W.x() << ' ' << s.command_W.y() << '\n';
   }
-  data << low.x() << ' ' << low.y() << ' ' << low.x() << ' ' << low.y() << "\nEOD\n" << report::kAxes;
+  // A row apart, to which no line leads: a flight that never took off has no other.
+  data << '\n' << low.x() << ' ' << low.y() << ' ' << low.x() << ' ' << low.y() << "\nEOD\n" << report::kAxes;
   std::string cells;
   if (map) {
     const auto inside = [&](const Vec3& p) {
@@ -73,8 +74,11 @@ std::string path_figure(const FlightStory& story, const map::OccupancyGrid* map)
 std::string time_figure(const FlightStory& story) {
   std::ostringstream data;
   data << "$rows << EOD\n";
-  for (const auto& s : story.samples)
-    data << s.t_s << ' ' << s.p_W.z() << ' ' << s.command_W.z() << ' ' << s.error_over_bound.maxCoeff() << '\n';
+  for (const auto& s : story.samples) {
+    data << s.t_s << ' ' << s.p_W.z() << ' ';
+    s.in_air ? data << s.command_W.z() : data << "NaN";  // on the ground nothing is commanded
+    data << ' ' << s.error_over_bound.maxCoeff() << '\n';
+  }
   data << "EOD\n"
        << report::kAxes << "set xrange [0:" << std::max(story.time_s, 0.02)
        << "]\nset lmargin 10\nset key outside top center horizontal\nset multiplot layout 2,1\nset ylabel 'height, m'\n"
