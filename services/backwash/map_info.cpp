@@ -33,7 +33,8 @@ double middle_height(const map::OccupancyGrid& grid) {
 
 void write_picture(const Options& options, const map::OccupancyGrid& grid) {
   const double z = options.height.value_or(middle_height(grid));
-  const Vec3& low = grid.origin(), high = low + grid.resolution() * grid.size().cast<double>();
+  const Vec3& low = grid.origin();
+  const Vec3 high = low + grid.resolution() * grid.size().cast<double>();
   if (z < low.z() || z >= high.z())
     throw Failure(kUnavailable, options.map + ": --height " + to_text(z, 2) +
                                     " is outside the map, whose heights are " + to_text(low.z(), 2) + " to " +
