@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "core/map/octomap_message.hpp"
+#include "core/report/recorded_parts.hpp"
 
 namespace backwash::report {
 namespace {
@@ -15,28 +15,6 @@ constexpr std::size_t kMostLate = 20;  // ticks that a pose that was judged may 
 
 tl::unexpected<log::LogError> bad(const std::string& what) {
   return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, "raw log: " + what});
-}
-
-struct RecordedSegment {
-  log::SegmentRecord head;
-  Setpoint previous;
-  std::vector<Setpoint> commands;
-};
-
-RecordedSegment segment_of(const log::RawRecord& record) {
-  RecordedSegment s;
-  std::memcpy(&s.head, record.bytes.data(), sizeof s.head);
-  const std::size_t rows = (record.bytes.size() - sizeof s.head) / (10 * sizeof(double));
-  for (std::size_t r = 0; r < rows; ++r) {
-    double v[10];
-    std::memcpy(v, record.bytes.data() + sizeof s.head + r * sizeof v, sizeof v);
-    const Setpoint c{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, {v[6], v[7], v[8]}, v[9]};
-    if (r == 0)
-      s.previous = c;
-    else
-      s.commands.push_back(c);
-  }
-  return s;
 }
 
 std::vector<const log::TickRecord*> ticks_of(std::span<const log::RawRecord> log, std::uint64_t id,
@@ -53,26 +31,6 @@ std::vector<const log::TickRecord*> ticks_of(std::span<const log::RawRecord> log
 }
 
 Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
-
-/// Rows of the truth at a time, linear in between.
-class Truth {
- public:
-  explicit Truth(const log::FlightLog& log) : log_(log) {}
-  Vec3 at(double t, const char* x, const char* y, const char* z) const {
-    const auto after = std::upper_bound(log_.t_s.begin(), log_.t_s.end(), t);
-    const auto i = static_cast<std::size_t>(
-        std::clamp<std::ptrdiff_t>(after - log_.t_s.begin(), 1, static_cast<std::ptrdiff_t>(log_.t_s.size()) - 1));
-    const double f = std::clamp((t - log_.t_s[i - 1]) / (log_.t_s[i] - log_.t_s[i - 1]), 0.0, 1.0);
-    const auto value = [&](const char* name) {
-      const auto& column = log_.column(name);
-      return (1 - f) * column[i - 1] + f * column[i];
-    };
-    return {value(x), value(y), value(z)};
-  }
-
- private:
-  const log::FlightLog& log_;
-};
 
 /// Whether the odometry's timing is stated, so that each pose was judged for its own moment (docs/model.md 4-15).
 bool timed(std::span<const log::RawRecord> log) {
@@ -101,7 +59,7 @@ bool passes(const reach::ReachTube& tube, std::size_t k, std::size_t back, const
   return false;
 }
 
-sim::FlightSample sample_of(const log::TickRecord& tick, double t, double t_zero, const Truth& truth) {
+sim::FlightSample sample_of(const log::TickRecord& tick, double t, double t_zero, const TruthRows& truth) {
   sim::FlightSample s{};
   s.t = t - t_zero;
   s.truth = {truth.at(t, "x_m", "y_m", "z_m"), truth.at(t, "vx_mps", "vy_mps", "vz_mps")};
@@ -119,7 +77,7 @@ track::Inside as_recorded(const log::TickRecord& tick) {
 }
 
 tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawRecord> log,
-                                                       const RecordedSegment& segment, const Truth& truth,
+                                                       const RecordedSegment& segment, const TruthRows& truth,
                                                        const plan::World& world, double t_zero, double z_safe) {
   sim::FlightPiece piece;
   piece.accepted.id = segment.head.id;
@@ -191,8 +149,7 @@ tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::Ra
   if (truth.t_s.size() < 2) return bad("the truth has fewer than two rows");
   std::vector<RecordedSegment> segments;
   for (const log::RawRecord& record : log)
-    if (record.header.kind == log::RecordKind::segment && record.bytes.size() >= sizeof(log::SegmentRecord))
-      segments.push_back(segment_of(record));
+    if (auto segment = recorded_segment(record)) segments.push_back(*std::move(segment));
   if (segments.size() != 2) return bad("needs one take-off and one route, has " + std::to_string(segments.size()));
   for (const RecordedSegment& s : segments)
     if (s.commands.empty() || s.commands.size() != s.head.commands)
@@ -208,11 +165,11 @@ tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::Ra
 
   sim::Flight flight{};
   flight.column = *column;
-  const Truth rows(truth);
+  const TruthRows rows(truth);
   auto take_off = piece_of(log, up, rows, world, t_zero, column->z_safe);
   if (!take_off) return tl::unexpected(take_off.error());
   flight.take_off = std::move(*take_off);
-  auto flown = piece_of(log, route, rows, world, t_zero, -std::numeric_limits<double>::infinity());
+  auto flown = piece_of(log, route, rows, world, t_zero, sim::kEverywhere);
   if (!flown) return tl::unexpected(flown.error());
   flight.route = std::move(*flown);
   flight.plan.status = plan::PlanStatus::ok;

@@ -97,10 +97,11 @@ void write_whole(const std::string& path, bool force, const std::function<bool(c
   check_output(path, force);
   std::error_code wrong;
   const bool device = std::filesystem::exists(path, wrong) && !std::filesystem::is_regular_file(path, wrong);
-  const std::string to = device ? path : path + ".part";
+  const std::string name = device ? path : std::filesystem::weakly_canonical(path, wrong).string();  // a link stays
+  const std::string to = device ? path : name + ".part-" + std::to_string(::getpid());
   wrong.clear();
   const bool whole = write(to);
-  if (whole && !device) std::filesystem::rename(to, path, wrong);
+  if (whole && !device) std::filesystem::rename(to, name, wrong);
   if (whole && !wrong) return;
   if (!device) std::filesystem::remove(to, wrong);
   throw Failure(kInputOutput, path + ":1: cannot be written to its end; free some space");

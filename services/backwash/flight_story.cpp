@@ -5,16 +5,18 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 
 #include "core/log/tick_log.hpp"
 #include "core/map/distance_field.hpp"
+#include "core/report/recorded_parts.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::services {
 namespace {
 
 constexpr double kVertical = 0.01;  // m across: what stays within it rises or sinks on one line
+// Numbers of idl/backwash_msgs.idl, as the raw log's command records have them.
+constexpr unsigned kEnable = 1, kTakeOff = 3, kGoTo = 4, kRelease = 7, kGoToFacing = 10;
 constexpr std::array kVerbs{"",     "enable",          "disable", "take off", "go to",           "hold",
                             "land", "end the session", "stop",    "follow",   "go to, then turn"};
 
@@ -28,45 +30,18 @@ bool as_asked(Reason reason) {
   return std::ranges::find(kAsked, reason) != kAsked.end();
 }
 
-/// What the log holds of a trajectory.
-struct Segment {
-  std::uint64_t id = 0, continues = 0;
-  std::vector<Vec3> p_W;
-  bool vertical() const {
-    return !p_W.empty() &&
-           std::ranges::all_of(p_W, [&](const Vec3& p) { return (p - p_W.front()).head<2>().norm() < kVertical; }) &&
-           p_W.back().z() > p_W.front().z() + kVertical;
-  }
-};
-
-std::vector<Segment> segments_of(const log::RawLog& log) {
-  std::vector<Segment> segments;
-  for (const auto& record : log.records) {
-    const auto* head = log::payload<log::SegmentRecord>(record);
-    if (record.header.kind != log::RecordKind::segment || !head) continue;
-    Segment s{head->id, head->continues, {}};
-    constexpr std::size_t kRow = 10 * sizeof(double);
-    for (std::size_t at = sizeof *head + kRow; at + kRow <= record.bytes.size(); at += kRow) {
-      double p[3];
-      std::memcpy(p, record.bytes.data() + at, sizeof p);
-      s.p_W.push_back(vec(p));
-    }
-    segments.push_back(std::move(s));
-  }
-  return segments;
+/// Whether a trajectory rises on one line.
+bool vertical(const report::RecordedSegment& s) {
+  const auto beside = [&](const Setpoint& c) { return (c.p_W - s.commands.front().p_W).head<2>().norm(); };
+  return !s.commands.empty() && std::ranges::all_of(s.commands, [&](auto& c) { return beside(c) < kVertical; }) &&
+         s.commands.back().p_W.z() > s.commands.front().p_W.z() + kVertical;
 }
 
-/// The true position at a time, linear in between.
-Vec3 true_position(const log::FlightLog& truth, double t) {
-  const auto after = std::upper_bound(truth.t_s.begin(), truth.t_s.end(), t) - truth.t_s.begin();
-  const auto i =
-      static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(after, 1, static_cast<std::ptrdiff_t>(truth.t_s.size()) - 1));
-  const double f = std::clamp((t - truth.t_s[i - 1]) / (truth.t_s[i] - truth.t_s[i - 1]), 0.0, 1.0);
-  const auto at = [&](const char* name) {
-    const auto& column = truth.column(name);
-    return (1 - f) * column[i - 1] + f * column[i];
-  };
-  return {at("x_m"), at("y_m"), at("z_m")};
+std::vector<report::RecordedSegment> segments_of(const log::RawLog& log) {
+  std::vector<report::RecordedSegment> segments;
+  for (const auto& record : log.records)
+    if (auto segment = report::recorded_segment(record)) segments.push_back(*std::move(segment));
+  return segments;
 }
 
 bool airborne(const log::TickInputRecord& record) {
@@ -80,7 +55,8 @@ class Teller {
  public:
   Teller(FlightStory& story, const log::RawLog& log, const map::OccupancyGrid* map, double radius,
          const log::FlightLog* truth)
-      : story_(story), segments_(segments_of(log)), map_(map), radius_(radius), truth_(truth) {
+      : story_(story), segments_(segments_of(log)), map_(map), radius_(radius) {
+    if (truth) truth_.emplace(*truth);
     if (map_) distance_.emplace(*map_);
     const auto first =
         std::ranges::find(log.records, log::RecordKind::tick, [](const log::RawRecord& r) { return r.header.kind; });
@@ -114,8 +90,8 @@ class Teller {
 
   void finish(bool cut, const std::string& because) {
     close_piece();
-    story_.time_s = story_.samples.empty() ? std::max(now_s_, 0.0) : last_tick_s_;
-    if (last_tick_s_ < 0)
+    story_.time_s = story_.samples.empty() ? std::max(now_s_, 0.0) : last_tick_s_.value();
+    if (!last_tick_s_)
       story_.ended = "no control tick was recorded";
     else if (in_air_)
       story_.ended = "in the air, in mode " + mode() + " (" + reason() + ")";
@@ -136,11 +112,11 @@ class Teller {
     double x = 0, y = 0, z = 0;
     if (at == text.npos || std::sscanf(text.c_str() + at, " verb %u (%lf, %lf, %lf)", &verb, &x, &y, &z) != 4) return;
     if (verb == 0 || verb >= kVerbs.size()) return;
-    const bool place = verb == 3 || verb == 4 || verb == 10;
+    const bool place = verb == kTakeOff || verb == kGoTo || verb == kGoToFacing;
     const std::string asked = std::string("asked to ") + kVerbs[verb] + (place ? " " + to_text(Vec3(x, y, z)) : "");
     if (asked != asked_) say(asked);  // a station repeats itself until it is answered
     asked_ = asked;
-    ordered_ = verb != 1 && verb != 7;
+    ordered_ = verb != kEnable && verb != kRelease;
   }
 
   void take_answer(const std::string& text) {
@@ -156,11 +132,11 @@ class Teller {
   }
 
   void take_tick(const log::TickRecord& tick, std::int64_t t_ns) {
-    if (last_tick_s_ < 0 || tick.mode != mode_ || tick.reason != reason_) take_mode(tick);
+    if (!last_tick_s_ || tick.mode != mode_ || tick.reason != reason_) take_mode(tick);
     last_tick_s_ = now_s_;
     const bool flying = tick.segment != 0 && (tick.judged || in_air_);
     StorySample s{now_s_, vec(tick.p), vec(tick.cmd_p), tick.judged != 0, tick.inside != 0, in_air_, Vec3::Zero(), {}};
-    if (truth_) s.p_W = true_position(*truth_, 1e-9 * static_cast<double>(t_ns));
+    if (truth_) s.p_W = truth_->at(1e-9 * static_cast<double>(t_ns), "x_m", "y_m", "z_m");
     if (s.judged) take_verdict(tick, s);
     if (in_air_ && !was_in_air_) ++story_.take_offs, say("in the air");
     if (!in_air_ && was_in_air_) ++story_.landings, say("on the ground");
@@ -180,8 +156,8 @@ class Teller {
 
   void take_mode(const log::TickRecord& tick) {
     const auto said = static_cast<Reason>(tick.reason);
-    if (last_tick_s_ < 0 || tick.mode != mode_) {
-      const std::string from = last_tick_s_ < 0 ? "" : mode() + " → ";
+    if (!last_tick_s_ || tick.mode != mode_) {
+      const std::string from = !last_tick_s_ ? "" : mode() + " → ";
       mode_ = tick.mode, reason_ = tick.reason;
       say(from + mode() + ": " + reason());
       story_.holds += static_cast<Mode>(tick.mode) == Mode::hold;
@@ -203,18 +179,18 @@ class Teller {
 
   void take_piece(const log::TickRecord& tick, const StorySample& s) {
     if (!open_ || tick.segment != segment_) {
-      const auto known = std::ranges::find(segments_, tick.segment, &Segment::id);
-      const bool goes_on = open_ && known != segments_.end() && known->continues != 0;
+      const auto known = std::ranges::find(segments_, tick.segment, [](auto& known_one) { return known_one.head.id; });
+      const bool goes_on = open_ && known != segments_.end() && known->head.continues != 0;
       if (!goes_on) {
         close_piece();
         story_.pieces.push_back({});
         auto& piece = story_.pieces.back();
-        piece.take_off = known != segments_.end() ? known->vertical() : true;  // a lift-off alone is no segment
+        piece.take_off = known != segments_.end() ? vertical(*known) : true;  // a lift-off alone is no segment
         piece.from_s = now_s_;
       }
       open_ = true, ordered_ = false, segment_ = tick.segment;
-      commands_ = known != segments_.end() ? known->p_W.size() : 0;
-      story_.pieces.back().goal_W = commands_ > 0 ? known->p_W.back() : s.command_W;
+      commands_ = known != segments_.end() ? known->commands.size() : 0;
+      story_.pieces.back().goal_W = commands_ > 0 ? known->commands.back().p_W : s.command_W;
     }
     auto& piece = story_.pieces.back();
     piece.until_s = now_s_;
@@ -257,13 +233,14 @@ class Teller {
   }
 
   FlightStory& story_;
-  const std::vector<Segment> segments_;
+  const std::vector<report::RecordedSegment> segments_;
   const map::OccupancyGrid* map_;
   std::optional<map::DistanceField> distance_;
   double radius_;
-  const log::FlightLog* truth_;
+  std::optional<report::TruthRows> truth_;
   std::int64_t zero_ns_ = 0;
-  double now_s_ = 0, last_tick_s_ = -1;
+  double now_s_ = 0;
+  std::optional<double> last_tick_s_;
   std::uint32_t mode_ = 0, reason_ = 0;
   bool in_air_ = false, was_in_air_ = false;
   bool open_ = false;     ///< a piece is being flown

@@ -74,7 +74,6 @@ int run(const Options& options) {
   if (!options.out.ends_with(".bt"))
     throw Failure(kUsage, "--out " + options.out + " is a binary OctoMap file; name it .bt");
   check_output(options.out, options.force);
-  progress("reading " + options.map.file);
   MadeMap made = make_map(options.map);
   const auto flooded = flood(options, made.grid);
   note_edges(flooded, made);

@@ -108,6 +108,7 @@ MadeMap from_geometry(const MapOptions& options) {
   if (!read)
     throw Failure(read.error().kind == map::MapError::Kind::not_found ? kNoInput : kBadData, read.error().message);
   maps::Geometry& geometry = *read;
+  progress("voxels of " + options.file);  // not before: what shows it is a thread, and a mesh is read by a fork
   const double resolution = options.resolution.value_or(kResolution);
   const auto place = placement(options, geometry.up);
   check_precision(options, geometry, resolution, place.scale);

@@ -8,6 +8,8 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
+#include <iterator>
 
 namespace backwash::maps {
 namespace {
@@ -47,6 +49,11 @@ std::string how(int status, std::size_t seconds) {
 
 tl::expected<std::string, std::string> in_child(const std::function<void(const Sink&)>& work, std::size_t seconds,
                                                 std::size_t most_bytes) {
+  using Tasks = std::filesystem::directory_iterator;
+  std::error_code unknown;
+  if (std::distance(Tasks("/proc/self/task", unknown), Tasks()) > 1)
+    return tl::make_unexpected(
+        "cannot be started: this process has other threads, whose locks a fork would keep for ever");
   int pipe[2];
   const auto no = [] { return tl::make_unexpected("cannot be started: " + std::string(std::strerror(errno))); };
   if (::pipe(pipe) != 0) return no();

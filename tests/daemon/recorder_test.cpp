@@ -18,25 +18,14 @@
 #include "core/log/raw_log.hpp"
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
+#include "tests/daemon/recorded_folder.hpp"
 #include "tests/daemon/traps.hpp"
 
 namespace backwash::daemon {
 namespace {
 
-class RecorderFault : public testing::Test {
+class RecorderFault : public RecordedFolder {
  protected:
-  void SetUp() override {
-    folder_ = testing::TempDir() + "recorder_" + std::to_string(::getpid());
-    std::filesystem::create_directory(folder_);
-    path_ = folder_ + "/flight.bwlog";
-    channels_ = std::make_unique<Channels>();
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  void put(int records) {
-    ControlRecord r;
-    r.header = {now_ns(), log::RecordKind::frame_out, 100};
-    for (int n = 0; n < records; ++n) channels_->control_log.push(r);
-  }
   /// Number of records in the file, and what its last `lost` record says.
   std::pair<std::size_t, std::uint64_t> read() const {
     const auto log = log::read_raw_log(path_).value();
@@ -46,9 +35,6 @@ class RecorderFault : public testing::Test {
       if (r.header.kind == log::RecordKind::lost) lost = log::payload<log::LostRecord>(r)->records;
     return {log.records.size(), lost};
   }
-
-  std::string folder_, path_;
-  std::unique_ptr<Channels> channels_;
 };
 
 TEST_F(RecorderFault, AFullDiskLosesWholeBatchesAndTheLogSaysHowManyOnceItCanBeWrittenAgain) {

@@ -13,32 +13,18 @@
 
 #include "core/log/raw_log.hpp"
 #include "services/backwashd/recorder.hpp"
+#include "tests/daemon/recorded_folder.hpp"
 #include "tests/daemon/traps.hpp"
 
 namespace backwash::daemon {
 namespace {
 
-class WrittenLog : public testing::Test {
+class WrittenLog : public RecordedFolder {
  protected:
-  void SetUp() override {
-    folder_ = testing::TempDir() + "written_log_" + std::to_string(::getpid());
-    std::filesystem::create_directory(folder_);
-    path_ = folder_ + "/flight.bwlog";
-    channels_ = std::make_unique<Channels>();
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  void put(int records) {
-    ControlRecord r;
-    r.header = {now_ns(), log::RecordKind::frame_out, 100};
-    for (int n = 0; n < records; ++n) channels_->control_log.push(r);
-  }
   std::string content() const {
     std::ifstream in(path_, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-
-  std::string folder_, path_;
-  std::unique_ptr<Channels> channels_;
 };
 
 TEST_F(WrittenLog, WhatIsRecordedIsOnTheDiskASecondLaterInWhateverMode) {
