@@ -24,7 +24,8 @@ for _ in $(seq 240); do
   python3 - "$work/status.json" <<'PYTHON' && break
 import json, math, sys
 s = json.load(open(sys.argv[1]))
-sys.exit(0 if s["state"] == "tracking" and not s["moving"] and math.dist(s["setpoint"], [2, 0, 1.2]) < 0.01 else 1)
+over = s["state"] in ("quiet", "passive")
+sys.exit(0 if over or (s["state"] == "tracking" and not s["moving"] and math.dist(s["setpoint"], [2, 0, 1.2]) < 0.01) else 1)
 PYTHON
 done
 sleep 1
