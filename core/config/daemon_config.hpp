@@ -29,11 +29,12 @@ struct Daemon {
     std::string body = "base_link";  ///< child frame of odometry; clouds
   } frames;
   struct Odometry {
-    Twist twist = Twist::body;          ///< of the profile, or of a custom one
-    std::string child;                  ///< child frame of odometry; empty: frames.body
-    Vec3 sensor_B = Vec3::Zero();       ///< origin of what the estimator tells the pose of, in the body, m
-    Vec3 sensor_turned = Vec3::Zero();  ///< its axes in the body: roll, pitch, yaw about fixed axes, rad
-    OdometryTiming timing;              ///< of the profile, unless the file says it
+    PoseMessage message = PoseMessage::odometry;  ///< that the poses come in; without a twist unless it is odometry
+    Twist twist = Twist::body;                    ///< of the profile, or of a custom one
+    std::string child;                            ///< child frame of odometry; empty: frames.body
+    Vec3 sensor_B = Vec3::Zero();                 ///< origin of what the estimator tells the pose of, in the body, m
+    Vec3 sensor_turned = Vec3::Zero();            ///< its axes in the body: roll, pitch, yaw about fixed axes, rad
+    OdometryTiming timing;                        ///< of the profile, unless the file says it
   } odometry;
   struct {
     bool live = false;           ///< a mapper is declared: a late map is a fault (docs/faults.md row 13)

@@ -13,8 +13,9 @@ constexpr std::string_view kLive = "map.live";
 constexpr std::string_view kProtocol = "link.protocol";
 constexpr std::string_view kShare = "link.share";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
-constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", "odometry.child"};
-constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2];
+constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", "odometry.child", "odometry.message"};
+constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2],
+                           kMessage = kOdometry[3];
 constexpr std::string_view kRateLeast = "odometry.rate_least";
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
@@ -115,10 +116,36 @@ tl::expected<void, ConfigError> read_texts(const StrictTable& file, std::span<co
   return {};
 }
 
+/// One of the names of an enumeration.
+template <typename Enum>
+std::optional<Enum> named(std::string_view text, std::span<const Enum> all) {
+  const auto found = std::ranges::find(all, text, [](Enum e) { return config::name(e); });
+  return found == all.end() ? std::nullopt : std::optional(*found);
+}
+
+/// What a custom estimator sends: messages of poses alone have no twist.
+tl::expected<void, ConfigError> read_custom(const StrictTable& file, const std::string& twist,
+                                            const std::string& message, Daemon::Odometry& odometry) {
+  constexpr Twist kTwists[] = {Twist::body, Twist::world, Twist::none};
+  const auto type = named<PoseMessage>(message, kPoseMessages);
+  if (!type)
+    return tl::unexpected(file.error(kMessage, "needs \"odometry\", \"pose\", \"pose_with_covariance\" or \"tf\""));
+  odometry.message = *type;
+  const bool poses = *type != PoseMessage::odometry;
+  if (poses) odometry.twist = Twist::none;
+  if (twist.empty()) return {};
+  const auto frame = named<Twist>(twist, kTwists);
+  if (!frame) return tl::unexpected(file.error(kTwist, "needs \"body\", \"world\" or \"none\""));
+  if (poses && *frame != Twist::none)
+    return tl::unexpected(file.error(kTwist, "needs \"none\": message = \"" + message + "\" has poses alone"));
+  odometry.twist = *frame;
+  return {};
+}
+
 /// The profile's frames where none are given, and its twist; a custom one's own.
 tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d) {
-  std::string name = "ros", twist;
-  const TextKey own[] = {{kProfile, &name}, {kTwist, &twist}, {kChild, &d.odometry.child}};
+  std::string name = "ros", twist, message = "odometry";
+  const TextKey own[] = {{kProfile, &name}, {kTwist, &twist}, {kChild, &d.odometry.child}, {kMessage, &message}};
   if (auto read = read_texts(file, own, false); !read) return read;
   const auto profiles = odometry_profiles();
   const auto profile = std::ranges::find(profiles, name, &OdometryProfile::name);
@@ -128,19 +155,14 @@ tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d
     return tl::unexpected(file.error(kProfile, "needs one of " + all));
   }
   if (name != "custom") {
-    for (const auto key : {kTwist, kChild})
+    for (const auto key : {kTwist, kChild, kMessage})
       if (file.has(key)) return tl::unexpected(file.error(key, "needs profile = \"custom\""));
     d.odometry.child = profile->child;
   }
   if (!file.has("frames.odometry") && d.frames.map != profile->frame) d.frames.odometry = profile->frame;
   d.odometry.twist = profile->twist;
   if (!file.has(kRateLeast)) d.odometry.timing.rate_least = profile->rate_least;
-  if (twist.empty()) return {};
-  for (const Twist t : {Twist::body, Twist::world, Twist::none}) {
-    d.odometry.twist = t;
-    if (twist == config::name(t)) return {};
-  }
-  return tl::unexpected(file.error(kTwist, "needs \"body\", \"world\" or \"none\""));
+  return read_custom(file, twist, message, d.odometry);
 }
 
 tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {

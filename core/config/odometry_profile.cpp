@@ -7,6 +7,20 @@ std::string_view name(Twist twist) noexcept {
   return twist == Twist::body ? "body" : twist == Twist::world ? "world" : "none";
 }
 
+std::string_view name(PoseMessage message) noexcept {
+  switch (message) {
+    case PoseMessage::pose:
+      return "pose";
+    case PoseMessage::pose_with_covariance:
+      return "pose_with_covariance";
+    case PoseMessage::tf:
+      return "tf";
+    case PoseMessage::odometry:
+      break;
+  }
+  return "odometry";
+}
+
 std::span<const OdometryProfile> odometry_profiles() noexcept {
   static constexpr OdometryProfile kProfiles[] = {
       {"ros", "odom", "", Twist::body, "an estimator that keeps to the message's definition"},

@@ -18,6 +18,18 @@ enum class Twist : std::uint8_t {
 /// "body", "world" or "none".
 std::string_view name(Twist twist) noexcept;
 
+/// Type of the messages that the poses come in.
+enum class PoseMessage : std::uint8_t {
+  odometry,              ///< nav_msgs/Odometry
+  pose,                  ///< geometry_msgs/PoseStamped, as motion capture sends it
+  pose_with_covariance,  ///< geometry_msgs/PoseWithCovarianceStamped
+  tf,                    ///< tf2_msgs/TFMessage
+};
+constexpr PoseMessage kPoseMessages[] = {PoseMessage::odometry, PoseMessage::pose, PoseMessage::pose_with_covariance,
+                                         PoseMessage::tf};
+/// "odometry", "pose", "pose_with_covariance" or "tf".
+std::string_view name(PoseMessage message) noexcept;
+
 /// How an estimator fills its nav_msgs/Odometry, read from its sources.
 struct OdometryProfile {
   std::string_view name;   ///< of the key odometry.profile

@@ -53,16 +53,15 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
                  }),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface,
                    {.priority = priority, .max_sample_bytes = kMaxSampleBytes}),
-      odometry_(participant_, dds::TopicOf<dds::Odometry>::type(), config.dds.odometry_topic,
-                dds::TopicOf<dds::Odometry>::kDelivery),
+      poses_(participant_, config),
       closures_(dds::make_reader<dds::TransformStamped>(participant_, config.dds.name_space)),
       commands_(dds::make_reader<dds::Command>(participant_, config.dds.name_space)),
-      foreign_(participant_, {&odometry_, &closures_, &commands_}),
+      foreign_(participant_, {&poses_.reader(), &closures_, &commands_}),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
       statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {
-  waitset_.add(odometry_);
+  waitset_.add(poses_.reader());
   waitset_.add(closures_);
   waitset_.add(commands_);
   waitset_.add_departures(commands_);  // or the next process's first command would find the session held
@@ -83,32 +82,44 @@ void DdsFront::look_at_odometry(const dds::Odometry& m) {
   if (!why->empty()) spdlog::warn("{}; nothing is enabled meanwhile", *why);
 }
 
-void DdsFront::take_odometry() {
-  odometry_.take([&](const dds::Odometry& m, const dds::Guid& writer) {
-    if (!odometry_writer_.hears(writer))
-      return refusals_.add(channels_.odometry_refused, [&] { return odometry_writer_.refusal(writer); });
-    look_at_odometry(m);
-    const auto sample = localization_.odometry(m, now_ns());
-    if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
-    if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
-    channels_.odometry.write(*sample);
-    channels_.poses.push(*sample);
-  });
-  odometry_writer_.let_go(odometry_.departed(), !commanding_, now_ns());
+void DdsFront::take_odometry(const dds::Odometry& m, const dds::Guid& writer) {
+  if (!odometry_writer_.hears(writer))
+    return refusals_.add(channels_.odometry_refused, [&] { return odometry_writer_.refusal(writer); });
+  look_at_odometry(m);
+  const auto sample = localization_.odometry(m, now_ns());
+  if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
+  if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
+  channels_.odometry.write(*sample);
+  channels_.poses.push(*sample);
+}
+
+void DdsFront::take_poses() {
+  const auto refuse = [&](const std::string& why) { refusals_.add(channels_.odometry_refused, [&] { return why; }); };
+  poses_.take({[&](const auto& m, const auto& writer) { take_odometry(m, writer); },
+               [&](const auto& m, const auto& writer) { take_closure(m, writer); }, refuse});
+  const auto departed = poses_.departed();
+  odometry_writer_.let_go(departed, !commanding_, now_ns());
+  let_closures_go(departed);  // a TFMessage may have held them
+}
+
+void DdsFront::take_closure(const dds::TransformStamped& m, const dds::Guid& writer) {
+  if (!closure_writer_.hears(writer))
+    return refusals_.add(channels_.closures_refused, [&] { return closure_writer_.refusal(writer); });
+  const auto taken = localization_.loop_closure(m);
+  if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
+  if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
+  channels_.loop_closures = localization_.closures();
+  channels_.map_from_odom.write(*localization_.map_from_odom());
+}
+
+// What the next writer said was refused while this one was not known to be gone; it is said once.
+void DdsFront::let_closures_go(std::span<const dds::Guid> departed) {
+  if (closure_writer_.let_go(departed, !commanding_, now_ns())) closures_.renew(waitset_);
 }
 
 void DdsFront::take_closures() {
-  closures_.take([&](const dds::TransformStamped& m, const dds::Guid& writer) {
-    if (!closure_writer_.hears(writer))
-      return refusals_.add(channels_.closures_refused, [&] { return closure_writer_.refusal(writer); });
-    const auto taken = localization_.loop_closure(m);
-    if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
-    if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
-    channels_.loop_closures = localization_.closures();
-    channels_.map_from_odom.write(*localization_.map_from_odom());
-  });
-  // What the next writer said was refused while this one was not known to be gone; it is said once.
-  if (closure_writer_.let_go(closures_.departed(), !commanding_, now_ns())) closures_.renew(waitset_);
+  closures_.take([&](const dds::TransformStamped& m, const dds::Guid& writer) { take_closure(m, writer); });
+  let_closures_go(closures_.departed());
 }
 
 // A writer that floods us is cut to what can be carried out, before it costs anything: else it would fill the mission's
@@ -181,7 +192,7 @@ void DdsFront::run_readers() {
   while (!channels_.stop) {
     waitset_.wait(0.1);
     take_closures();  // before the odometry that it is about
-    take_odometry();
+    take_poses();
     look_for_other_daemons();
     take_commands();
     if (const auto writers = foreign_.take_new()) {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/config/daemon_config.hpp"
@@ -15,6 +16,7 @@
 #include "services/backwashd/mission.hpp"
 #include "services/backwashd/odometry_check.hpp"
 #include "services/backwashd/other_daemons.hpp"
+#include "services/backwashd/pose_source.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/dds/topics.hpp"
@@ -39,9 +41,12 @@ class DdsFront {
   void send(const CommandMessage& command, const Answer& answer);
 
  private:
-  void take_odometry();
+  void take_poses();
+  void take_odometry(const dds::Odometry& message, const dds::Guid& writer);
   void look_at_odometry(const dds::Odometry& message);
   void take_closures();
+  void take_closure(const dds::TransformStamped& message, const dds::Guid& writer);
+  void let_closures_go(std::span<const dds::Guid> departed);
   void take_commands();
   void take_command(const dds::Command& message, const dds::Guid& writer);
   void tell_of_departed();
@@ -60,7 +65,7 @@ class DdsFront {
   std::vector<dds::Guid> gone_;  // writers of commands, of which the mission has not been told yet
   dds::Malformed malformed_;     // before the middleware's threads
   dds::Participant participant_;
-  dds::Reader<dds::Odometry> odometry_;
+  PoseSource poses_;
   dds::Reader<dds::TransformStamped> closures_;
   dds::Reader<dds::Command> commands_;
   dds::ForeignWriters foreign_;

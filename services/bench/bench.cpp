@@ -203,7 +203,7 @@ class Bench {
     if (transit_.due(n) && !passed(o_.stop_odometry_s, t)) sample = {estimate, autopilot_->attitude(), t};
     for (const VioSample& s : faults_.odometry.pass(sample, timeline_t)) transit_.send(s, t);
     while (const auto s = transit_.arrived(t))
-      odometry_writer_.write(estimator_ ? odometry(*s, *estimator_) : odometry(*s, o_.drift.has_value()));
+      pose_writer_.write(estimator_ ? odometry(*s, *estimator_) : odometry(*s, o_.drift.has_value()));
     if (n % 20 == 0) log_.row(t, *autopilot_, estimate);
   }
 
@@ -257,7 +257,7 @@ class Bench {
   Transit<VioSample> transit_{o_.odometry, o_.seed + 2};
   int priority_;
   dds::Participant participant_;
-  dds::Writer<dds::Odometry> odometry_writer_ = dds::make_writer<dds::Odometry>(participant_, o_.name_space);
+  PoseWriter pose_writer_{participant_, o_.name_space, o_.message};
   dds::Writer<dds::Octomap> map_writer_ = dds::make_writer<dds::Octomap>(participant_, o_.name_space);
   dds::Writer<dds::TransformStamped> closure_writer_ =
       dds::make_writer<dds::TransformStamped>(participant_, o_.name_space);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "core/config/odometry_profile.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/vehicle.hpp"
 #include "services/bench/autopilot.hpp"
@@ -39,7 +40,8 @@ struct Options {
   /// As which estimator of config::odometry_profiles() the odometry is filled, with the map in its frame; empty: in
   /// `map`, as the message's definition says.
   std::string estimator;
-  Pace odometry;  ///< of the emulated VIO
+  config::PoseMessage message = config::PoseMessage::odometry;  ///< that the poses go out in
+  Pace odometry;                                                ///< of the emulated VIO
   Timeline timeline;
   double event_x = 0;  ///< the event: the armed vehicle has passed this x of the map, m
 };

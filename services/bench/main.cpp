@@ -2,6 +2,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -74,6 +75,19 @@ void add_pace(Command& app, backwash::bench::Pace& pace) {
       .check(within(0, 1));
 }
 
+void add_message(Command& app, config::PoseMessage& message) {
+  std::vector<std::string> messages;
+  for (const auto m : config::kPoseMessages) messages.emplace_back(config::name(m));
+  app.add_text(
+         "--pose-message",
+         [&message](const std::string& name) {
+           message = *std::ranges::find(config::kPoseMessages, name, [](auto m) { return config::name(m); });
+         },
+         "type of the messages that the VIO's poses go out in, as odometry.message has it")
+      .check(one_of(messages))
+      .default_str("odometry");
+}
+
 void add_faults(Command& app, Given& given) {
   app.add_option("--stop-odometry", given.options.stop_odometry_s, "fault: VIO stops this long after arming, s")
       .check(not_negative());
@@ -96,6 +110,7 @@ void add_faults(Command& app, Given& given) {
     if (!profile.child.empty()) estimators.emplace_back(profile.name);
   app.add_option("--estimator", given.options.estimator, "the odometry as this one fills it, and the map in its frame")
       .check(one_of(estimators));
+  add_message(app, given.options.message);
   add_pace(app, given.options.odometry);
   app.add_option("--parameter", given.parameters, "NAME=NUMBER: an autopilot's parameter, in place of its own");
   app.add_option(

@@ -55,4 +55,50 @@ dds::Odometry odometry(const VioSample& sample, const config::OdometryProfile& p
   return m;
 }
 
+namespace {
+
+void write(dds::Writer<dds::Odometry>& writer, const dds::Odometry& m) { writer.write(m); }
+void write(dds::Writer<dds::PoseStamped>& writer, const dds::Odometry& m) { writer.write({m.header, m.pose.pose}); }
+void write(dds::Writer<dds::PoseWithCovarianceStamped>& writer, const dds::Odometry& m) {
+  writer.write({m.header, m.pose});
+}
+
+// A joint's transform goes before it, as a robot's tree of them holds many.
+void write(dds::Writer<dds::TfMessage>& writer, const dds::Odometry& m) {
+  static const std::string joint = "camera_mount";
+  const auto& p = m.pose.pose.position;
+  dds::TransformStamped transforms[2] = {
+      {{m.header.stamp, m.child_frame_id}, dds::c_string(joint), {{0.1, 0, 0}, {0, 0, 0, 1}}},
+      {m.header, m.child_frame_id, {{p.x, p.y, p.z}, m.pose.pose.orientation}}};
+  writer.write({{2, 2, transforms, false}});
+}
+
+}  // namespace
+
+PoseWriter::Writers PoseWriter::made(const dds::Participant& to, const std::string& name_space,
+                                     config::PoseMessage message) {
+  const std::string topic = dds::topic(name_space, dds::TopicOf<dds::Odometry>::kName);
+  using enum config::PoseMessage;
+  using dds::Delivery;
+  switch (message) {
+    case pose:
+      return dds::Writer<dds::PoseStamped>(to, geometry_msgs_msg_dds__PoseStamped__desc, topic, Delivery::latest);
+    case pose_with_covariance:
+      return dds::Writer<dds::PoseWithCovarianceStamped>(to, geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc,
+                                                         topic, Delivery::latest);
+    case tf:  // reliable, as tf2's broadcasters are
+      return dds::Writer<dds::TfMessage>(to, tf2_msgs_msg_dds__TFMessage__desc, topic, Delivery::reliable);
+    case odometry:
+      break;
+  }
+  return dds::make_writer<dds::Odometry>(to, name_space);
+}
+
+PoseWriter::PoseWriter(const dds::Participant& participant, const std::string& name_space, config::PoseMessage message)
+    : writers_(made(participant, name_space, message)) {}
+
+void PoseWriter::write(const dds::Odometry& m) {
+  std::visit([&](auto& writer) { bench::write(writer, m); }, writers_);
+}
+
 }  // namespace backwash::bench

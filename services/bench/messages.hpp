@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/config/odometry_profile.hpp"
@@ -23,5 +24,19 @@ dds::TransformStamped loop_closure(const Vec3& t_map_odom, double t);
 dds::Odometry odometry(const VioSample& sample, bool drifting);
 /// The same as an estimator fills it; the message points into `profile`, whose names end with a 0.
 dds::Odometry odometry(const VioSample& sample, const config::OdometryProfile& profile);
+
+/// What a topic of poses carries (config::PoseMessage), said by the same estimate; their frames are the odometry's.
+class PoseWriter {
+ public:
+  PoseWriter(const dds::Participant& participant, const std::string& name_space, config::PoseMessage message);
+  void write(const dds::Odometry& odometry);
+
+ private:
+  using Writers = std::variant<dds::Writer<dds::Odometry>, dds::Writer<dds::PoseStamped>,
+                               dds::Writer<dds::PoseWithCovarianceStamped>, dds::Writer<dds::TfMessage>>;
+  static Writers made(const dds::Participant& participant, const std::string& name_space, config::PoseMessage message);
+
+  Writers writers_;
+};
 
 }  // namespace backwash::bench

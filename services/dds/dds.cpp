@@ -80,12 +80,12 @@ Entity make_topic(Entity participant, const dds_topic_descriptor& type, const st
 
 dds_qos_t* make_qos(Delivery delivery) {
   dds_qos_t* qos = dds_create_qos();
-  const bool best_effort = delivery == Delivery::latest || delivery == Delivery::scans;
+  const bool best_effort = delivery == Delivery::latest || delivery == Delivery::scans || delivery == Delivery::tf;
   dds_qset_reliability(qos, best_effort ? DDS_RELIABILITY_BEST_EFFORT : DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST,
-                   delivery == Delivery::reliable ? 64
-                   : delivery == Delivery::scans  ? 8
-                                                  : 1);
+                   delivery == Delivery::reliable || delivery == Delivery::tf ? 64
+                   : delivery == Delivery::scans                              ? 8
+                                                                              : 1);
   dds_qset_durability(qos, delivery == Delivery::state ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   return qos;
 }

@@ -31,6 +31,7 @@ constexpr double kLease_s = 2;
 /// Delivery of a topic.
 enum class Delivery {
   latest,    ///< best effort, keep last 1: odometry, status
+  tf,        ///< best effort, keep last 64: transforms of all, ours among them
   scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data
   reliable,  ///< reliable, keep last 64, a writer's liveliness has a lease of kLease_s: commands and acknowledgements
   state,     ///< reliable, transient local, keep last 1: late joiners get the newest: map, trajectory, tube

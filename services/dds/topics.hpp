@@ -14,6 +14,8 @@ namespace backwash::dds {
 using Odometry = nav_msgs_msg_dds__Odometry_;
 using Path = nav_msgs_msg_dds__Path_;
 using PoseStamped = geometry_msgs_msg_dds__PoseStamped_;
+using PoseWithCovarianceStamped = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
+using TfMessage = tf2_msgs_msg_dds__TFMessage_;
 using PointCloud = sensor_msgs_msg_dds__PointCloud2_;
 using PointField = sensor_msgs_msg_dds__PointField_;
 using TransformStamped = geometry_msgs_msg_dds__TransformStamped_;

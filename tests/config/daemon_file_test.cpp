@@ -83,6 +83,23 @@ TEST(DaemonFile, AnEstimatorsProfileSetsItsFramesAndItsTwist) {
   }
 }
 
+TEST(DaemonFile, MessagesOfPosesAloneHaveNoTwist) {
+  const auto custom = [](const std::string& lines) { return "profile = \"custom\"\n" + lines; };
+  for (const auto message : {PoseMessage::pose, PoseMessage::pose_with_covariance, PoseMessage::tf}) {
+    const std::string line = "message = \"" + std::string(name(message)) + "\"";
+    for (const auto& lines : {line, line + "\ntwist = \"none\""}) {
+      const auto d = with_odometry(custom(lines));
+      EXPECT_TRUE(d.odometry.message == message && d.odometry.twist == Twist::none) << lines;
+    }
+    EXPECT_THAT(error_after("profile = \"ros\"", custom(line + "\ntwist = \"world\"")),
+                testing::AllOf(HasSubstr("odometry.twist"), HasSubstr("poses alone")));
+  }
+  EXPECT_THAT(error_after("profile = \"ros\"", "message = \"pose\""),
+              testing::AllOf(HasSubstr("odometry.message"), HasSubstr("profile = \"custom\"")));
+  EXPECT_THAT(error_after("profile = \"ros\"", custom("message = \"PoseStamped\"")),
+              testing::AllOf(HasSubstr("odometry.message"), HasSubstr("\"pose_with_covariance\"")));
+}
+
 TEST(DaemonFile, ASensorsPlaceAndTurnStandBesideItsProfile) {
   const auto d = with_odometry("profile = \"fast_lio\"\nsensor_roll = 3.14159\nsensor_x = 0.1");
   EXPECT_DOUBLE_EQ(d.odometry.sensor_B.x(), 0.1);
@@ -164,8 +181,8 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
                {"cpu = -1", "cpu = 0.5", 21, "control.cpu"},
                {"battery_land = 0.15", "battery_land = 15", 22, "control.battery_land"},
                {"[control]", "[controls]", 19, "controls"},
-               {"live = false", "live = 0", 42, "map.live"},
-               {"max_mib = 512", "max_mib = 0", 45, "map.max_mib"},
+               {"live = false", "live = 0", 43, "map.live"},
+               {"max_mib = 512", "max_mib = 0", 46, "map.max_mib"},
                {"body = \"base_link\"", "body = \"map\"", 27, "frames"}};
   for (const auto& c : cases)
     EXPECT_THAT(error_after(c.right, c.wrong), HasSubstr(".toml:" + std::to_string(c.line) + ": key '" + c.key + "'"));

@@ -1,18 +1,19 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Odometry as estimators really fill it (docs/faults.md row 53). A daemon that is told who it is flies: VINS-Fusion's twist is
-# in the frame of the pose, FAST-LIO's is zero. One that takes FAST-LIO for an estimator by the letter enables nothing.
+# in the frame of the pose, FAST-LIO's is zero, motion capture sends poses alone, others transforms among those of joints. One
+# that takes FAST-LIO for an estimator by the letter enables nothing.
 #   daemon_estimators.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/services/bench/session.sh"
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json" 2>>"$log"; }
 
-# flies PROFILE FRAME: takes off and goes 3 m, every sample inside its set.
+# flies NAME TABLES OPTION …, of the bench: takes off and goes 3 m, every sample inside its set.
 flies() {
   rm -f "$work/autopilot"
-  start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --estimator "$1"
-  more_tables=$(printf '[odometry]\nprofile = "%s"\n[frames]\nmap = "%s"' "$1" "$2")
+  start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in "${@:3}"
+  more_tables=$(printf "$2")
   start_daemon builtin:quad-5in "$work/$1.bwlog"
   enable
   ctl takeoff --height 1.2 --wait
@@ -29,8 +30,13 @@ assert s["samples_inside"] > 100 and s["samples_outside"] == 0 and off < 0.15, s
 PYTHON
 }
 
-flies vins_fusion world
-flies fast_lio camera_init
+for estimator in vins_fusion:world fast_lio:camera_init; do
+  profile=${estimator%:*}
+  flies "$profile" "[odometry]\nprofile = \"$profile\"\n[frames]\nmap = \"${estimator#*:}\"" --estimator "$profile"
+done
+for message in pose tf; do
+  flies $message "[odometry]\nprofile = \"custom\"\nmessage = \"$message\"" --pose-message $message
+done
 
 rm -f "$work/autopilot"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --estimator fast_lio
