@@ -40,6 +40,7 @@ std::optional<double> on_the_way(std::int64_t stamp_ns) {
 DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& vehicle, Channels& channels)
     : channels_(channels),
       priority_(priority),
+      name_space_(config.dds.name_space),
       localization_(config, vehicle.estimation.position),
       check_(config.odometry.twist, config.odometry.timing),
       refusals_(channels.refused),
@@ -59,6 +60,8 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       foreign_(participant_, {&poses_.reader(), &closures_, &commands_}),
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
+      diagnostics_(participant_, diagnostic_msgs_msg_dds__DiagnosticArray__desc, dds::kDiagnostics,
+                   dds::Delivery::reliable),
       statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {
   waitset_.add(poses_.reader());

@@ -35,7 +35,7 @@ class DdsFront {
   /// Thread body. Odometry is taken from one writer, and loop closures from one: the first whose sample was good, until
   /// it is gone and nothing is commanded any more; those of others are refused by identity (docs/faults.md row 48).
   void run_readers();
-  /// Thread body: status out at 10 Hz.
+  /// Thread body: status out at 10 Hz, diagnostics at 1 Hz.
   void run_status(const Vehicle& vehicle, const Recorder& recorder);
   /// Called by the mission thread.
   void send(const CommandMessage& command, const Answer& answer);
@@ -54,6 +54,7 @@ class DdsFront {
 
   Channels& channels_;
   int priority_;
+  std::string name_space_;
   Localization localization_;
   OdometryCheck check_;
   Refusals refusals_;
@@ -71,6 +72,7 @@ class DdsFront {
   dds::ForeignWriters foreign_;
   dds::Writer<dds::Ack> acks_;
   dds::Writer<dds::Status> status_;
+  dds::Writer<dds::DiagnosticArray> diagnostics_;
   dds::OtherWriters statuses_;
   dds::WaitSet waitset_;
 };

@@ -24,6 +24,7 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       foreign_(participant_, {&maps_, &scans_}),
       tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
       trajectory_(dds::make_writer<dds::Path>(participant_, config.dds.name_space)),
+      markers_(dds::make_writer<dds::MarkerArray>(participant_, config.dds.name_space)),
       waitset_(participant_) {
   waitset_.add(maps_);
   waitset_.add(scans_);
@@ -113,6 +114,7 @@ void MapFront::send(const track::AcceptedSegment& segment) {
   const ShownSegment shown(segment, map_frame_);
   tube_.write(shown.tube());
   trajectory_.write(shown.trajectory());
+  markers_.write(shown.markers());
 }
 
 }  // namespace backwash::daemon

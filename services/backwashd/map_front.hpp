@@ -14,9 +14,9 @@
 
 namespace backwash::daemon {
 
-/// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube and trajectory out. Its
-/// participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here, odometry and commands
-/// (DdsFront) do not wait for it (docs/faults.md row 46).
+/// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube, trajectory and markers out.
+/// Its participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here, odometry and
+/// commands (DdsFront) do not wait for it (docs/faults.md row 46).
 ///
 /// Maps are taken from one writer, and scans from one: the first whose sample was good, until it is gone (row 48). Its
 /// successor is listened to in flight too: without it what appears in the way would stay unseen.
@@ -31,7 +31,7 @@ class MapFront {
 
   /// Thread body: new voxels of a scan go straight to the control thread, the scan to the map worker.
   void run_readers();
-  /// Called by the planner thread: tube and trajectory out.
+  /// Called by the planner thread: tube, trajectory and markers out.
   void send(const track::AcceptedSegment& segment);
 
  private:
@@ -55,6 +55,7 @@ class MapFront {
   dds::ForeignWriters foreign_;
   dds::Writer<dds::Tube> tube_;
   dds::Writer<dds::Path> trajectory_;
+  dds::Writer<dds::MarkerArray> markers_;
   dds::WaitSet waitset_;
 };
 

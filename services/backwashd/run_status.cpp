@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "services/backwashd/dds_front.hpp"
+#include "services/backwashd/shown_diagnostics.hpp"
 #include "services/backwashd/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
 #include "services/dds/packet_filter.hpp"
@@ -128,6 +129,8 @@ void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
   CommandId accepted;
   Line task{}, place{}, refused{};
   auto next = std::chrono::steady_clock::now();
+  constexpr int kDiagnosticsEvery = 10;
+  int rounds = 0;
   while (!channels_.stop) {
     next += std::chrono::milliseconds(100);
     std::this_thread::sleep_until(next);
@@ -151,6 +154,7 @@ void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
     s.session = accepted.session;
     s.sequence_number = accepted.sequence;
     status_.write(s);
+    if (rounds++ % kDiagnosticsEvery == 0) diagnostics_.write(ShownDiagnostics(s, name_space_).message());
   }
 }
 

@@ -3,9 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace backwash::daemon {
+namespace {
+
+// Of visualization_msgs/Marker.
+constexpr std::int32_t kCube = 1, kLineStrip = 4, kDeleteAll = 3;
+
+}  // namespace
+
 geometry_msgs_msg_dds__Point_ point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
 ShownSegment::ShownSegment(const track::AcceptedSegment& segment, std::string map_frame)
@@ -23,6 +31,54 @@ ShownSegment::ShownSegment(const track::AcceptedSegment& segment, std::string ma
   tube_.steps = {steps, steps, steps_.data(), false};
   trajectory_.header = header;
   trajectory_.poses = {poses, poses, poses_.data(), false};
+  shapes_.push_back(marker(0, kCube));
+  shapes_.back().action = kDeleteAll;
+  show_line();
+  show_boxes();
+  const auto shapes = static_cast<std::uint32_t>(shapes_.size());
+  markers_.markers = {shapes, shapes, shapes_.data(), false};
+}
+
+dds::Marker ShownSegment::marker(std::int32_t id, std::int32_t type) {
+  static const std::string name = "backwash", none;
+  dds::Marker m{};
+  m.header = tube_.header;
+  m.ns = dds::c_string(name);
+  m.id = id;
+  m.type = type;
+  m.pose.orientation.w = 1;
+  m.texture.header.frame_id = m.texture.format = m.texture_resource = m.text = m.mesh_resource = m.mesh_file.filename =
+      dds::c_string(none);
+  return m;
+}
+
+void ShownSegment::show_line() {
+  constexpr double kWide = 0.02;  // m
+  for (const auto& pose : poses_) line_.push_back(pose.pose.position);
+  dds::Marker m = marker(0, kLineStrip);
+  const auto points = static_cast<std::uint32_t>(line_.size());
+  m.points = {points, points, line_.data(), false};
+  m.scale.x = kWide;
+  m.color = {0.1F, 0.4F, 0.9F, 1};
+  shapes_.push_back(m);
+}
+
+void ShownSegment::show_boxes() {
+  const std::size_t each = (steps_.size() + kBoxes - 1) / kBoxes;
+  for (std::size_t from = 0; from < steps_.size(); from += each) {
+    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+    for (std::size_t n = from; n < std::min(from + each, steps_.size()); ++n) {
+      const auto& s = steps_[n];
+      const Vec3 c(s.center.x, s.center.y, s.center.z), half(s.half_widths[0], s.half_widths[1], s.half_widths[2]);
+      low = low.cwiseMin(c - half);
+      high = high.cwiseMax(c + half);
+    }
+    dds::Marker m = marker(static_cast<std::int32_t>(shapes_.size()), kCube);
+    m.pose.position = point((low + high) / 2);
+    m.scale = {high.x() - low.x(), high.y() - low.y(), high.z() - low.z()};
+    m.color = {0.9F, 0.6F, 0.1F, 0.25F};
+    shapes_.push_back(m);
+  }
 }
 
 }  // namespace backwash::daemon

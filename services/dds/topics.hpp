@@ -20,6 +20,11 @@ using PointCloud = sensor_msgs_msg_dds__PointCloud2_;
 using PointField = sensor_msgs_msg_dds__PointField_;
 using TransformStamped = geometry_msgs_msg_dds__TransformStamped_;
 using Octomap = octomap_msgs_msg_dds__Octomap_;
+using Marker = visualization_msgs_msg_dds__Marker_;
+using MarkerArray = visualization_msgs_msg_dds__MarkerArray_;
+using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
+using DiagnosticStatus = diagnostic_msgs_msg_dds__DiagnosticStatus_;
+using DiagnosticArray = diagnostic_msgs_msg_dds__DiagnosticArray_;
 using Command = backwash_msgs_msg_dds__Command_;
 using Ack = backwash_msgs_msg_dds__Ack_;
 using Status = backwash_msgs_msg_dds__Status_;
@@ -103,6 +108,16 @@ struct TopicOf<Path> {
   static constexpr const char* kName = "trajectory";
   static constexpr Delivery kDelivery = Delivery::state;
 };
+
+template <>
+struct TopicOf<MarkerArray> {
+  static const dds_topic_descriptor& type() { return visualization_msgs_msg_dds__MarkerArray__desc; }
+  static constexpr const char* kName = "markers";
+  static constexpr Delivery kDelivery = Delivery::state;
+};
+
+/// ROS 2's one topic of diagnostics: of all robots of a domain, outside every name space.
+constexpr const char* kDiagnostics = "rt/diagnostics";
 
 template <typename T>
 Reader<T> make_reader(const Participant& participant, const std::string& name_space) {

@@ -49,6 +49,13 @@ printf 'x_m,y_m,z_m\n1.5,0.8,1.2\n1.5,-0.8,1.4\n-1,0,1.2\n' >"$work/route.csv"
 ctl follow "$work/route.csv" --wait
 sleep 0.5
 status
+# What RViz and the tools of diagnostics are shown, as another middleware reads it.
+if [[ -x $build/tests/fastdds_viewer ]]; then
+  "$build/tests/fastdds_viewer" "$domain" rt/backwash/markers 4 >"$work/seen" || die "markers or diagnostics did not come: $(cat "$work/seen")"
+  cat "$work/seen"
+  grep -q '^diagnostics [01] backwash backwashd: quad-5in: tracking: ' "$work/seen" || die "other diagnostics"
+  grep -Eq '^markers [0-9]{2,3} in map: line of [0-9]{2,4}, boxes up to 0\.[1-9][0-9]* m wide$' "$work/seen" || die "other markers"
+fi
 # Whoever waits for a flight that another station stopped is told so, and does not wait on.
 "$bin/backwashctl" --domain "$domain" goto 1.5,0.8,1.2 --wait >"$work/waiting" 2>&1 &
 waiting=$!

@@ -4,18 +4,7 @@
 //   fastdds_peer DOMAIN ODOMETRY_TOPIC STATUS_TOPIC X Y Z SECONDS odometry|pose|pose_with_covariance|tf|cut
 // With `cut` its odometry breaks off after the stamp: bytes that are no sample of the type they claim to be.
 // Prints the last status that it read: "vehicle state"; 1 if there was none.
-#include <fastcdr/Cdr.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/publisher/DataWriter.hpp>
-#include <fastdds/dds/publisher/Publisher.hpp>
-#include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/subscriber/SampleInfo.hpp>
-#include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <fastdds/dds/topic/TopicDataType.hpp>
-#include <fastdds/dds/topic/TypeSupport.hpp>
+#include "tests/system/fastdds_local.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -24,11 +13,6 @@
 #include <iterator>
 #include <string>
 #include <thread>
-
-namespace fast = eprosima::fastdds::dds;
-using eprosima::fastcdr::Cdr;
-using eprosima::fastcdr::FastBuffer;
-using Payload = eprosima::fastrtps::rtps::SerializedPayload_t;
 
 namespace {
 
@@ -51,20 +35,6 @@ struct Status {
 };
 
 std::chrono::nanoseconds monotonic() { return std::chrono::steady_clock::now().time_since_epoch(); }
-
-/// What the two types share. XCDR1 as ROS 2 uses it.
-class Type : public fast::TopicDataType {
- public:
-  Type(const char* name, std::uint32_t size) {
-    setName(name);
-    m_typeSize = size;
-    m_isGetKeyDefined = false;
-  }
-  std::function<std::uint32_t()> getSerializedSizeProvider(void*) override {
-    return [this] { return m_typeSize; };
-  }
-  bool getKey(void*, eprosima::fastrtps::rtps::InstanceHandle_t*, bool) override { return false; }
-};
 
 /// Members in the order of the .msg files of common_interfaces and geometry2.
 class PosesType : public Type {
@@ -129,23 +99,6 @@ class StatusType : public Type {
   void* createData() override { return new Status; }
   void deleteData(void* data) override { delete static_cast<Status*>(data); }
 };
-
-/// Over UDP on the loopback interface, which has no multicast: others are looked for by their ports.
-fast::DomainParticipantQos local_only(unsigned domain) {
-  fast::DomainParticipantQos qos;
-  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList.emplace_back("127.0.0.1");
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  for (unsigned index = 0; index < 10; ++index) {
-    eprosima::fastrtps::rtps::Locator_t peer;
-    peer.kind = LOCATOR_KIND_UDPv4;
-    eprosima::fastrtps::rtps::IPLocator::setIPv4(peer, "127.0.0.1");
-    peer.port = 7410 + 250 * domain + 2 * index;
-    qos.wire_protocol().builtin.initialPeersList.push_back(peer);
-  }
-  return qos;
-}
 
 }  // namespace
 

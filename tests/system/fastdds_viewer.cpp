@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What RViz and ROS 2's diagnostic tools see, through Fast DDS with types written by hand, member by member.
+//   fastdds_viewer DOMAIN MARKERS_TOPIC SECONDS
+// Prints the last of both: "diagnostics LEVEL HARDWARE NAME: MESSAGE" and "markers COUNT in FRAME: line of POINTS,
+// boxes up to LARGEST m wide"; 1 if one of them did not come.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+
+#include "tests/system/fastdds_local.hpp"
+
+namespace {
+
+struct Seen {
+  std::string line;
+};
+
+std::string text(Cdr& cdr) {
+  std::string s;
+  cdr >> s;
+  return s;
+}
+template <typename T>
+T number(Cdr& cdr) {
+  T n{};
+  cdr >> n;
+  return n;
+}
+std::string header(Cdr& cdr) {
+  number<std::int32_t>(cdr);
+  number<std::uint32_t>(cdr);
+  return text(cdr);
+}
+template <typename T>
+void skip(Cdr& cdr, std::size_t count) {
+  for (; count > 0; --count) number<T>(cdr);
+}
+
+class ReadType : public Type {
+ public:
+  using Type::Type;
+  bool serialize(void*, Payload*) override { return false; }
+  bool deserialize(Payload* payload, void* data) override {
+    FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
+    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+    cdr.read_encapsulation();
+    static_cast<Seen*>(data)->line = read(cdr);
+    return true;
+  }
+  void* createData() override { return new Seen; }
+  void deleteData(void* data) override { delete static_cast<Seen*>(data); }
+  virtual std::string read(Cdr& cdr) = 0;
+};
+
+class DiagnosticsType : public ReadType {
+ public:
+  DiagnosticsType() : ReadType("diagnostic_msgs::msg::dds_::DiagnosticArray_", 16384) {}
+  std::string read(Cdr& cdr) override {
+    header(cdr);
+    if (number<std::uint32_t>(cdr) != 1) return "not one status";
+    const int level = number<std::uint8_t>(cdr);
+    const std::string name = text(cdr), message = text(cdr), hardware = text(cdr);
+    for (auto values = number<std::uint32_t>(cdr); values > 0; --values) text(cdr), text(cdr);
+    return "diagnostics " + std::to_string(level) + " " + hardware + " " + name + ": " + message;
+  }
+};
+
+class MarkersType : public ReadType {
+ public:
+  MarkersType() : ReadType("visualization_msgs::msg::dds_::MarkerArray_", 1 << 20) {}
+  std::string read(Cdr& cdr) override {
+    std::string frame;
+    std::uint32_t line = 0;
+    double widest = 0;
+    const auto count = number<std::uint32_t>(cdr);
+    for (std::uint32_t n = 0; n < count; ++n) {
+      frame = header(cdr);
+      text(cdr);                  // ns
+      number<std::int32_t>(cdr);  // id
+      const auto type = number<std::int32_t>(cdr), action = number<std::int32_t>(cdr);
+      skip<double>(cdr, 7);  // pose
+      std::array<double, 3> scale{};
+      for (double& s : scale) s = number<double>(cdr);
+      skip<float>(cdr, 4);         // colour
+      skip<std::int32_t>(cdr, 2);  // lifetime
+      number<bool>(cdr);           // frame_locked
+      const auto points = number<std::uint32_t>(cdr);
+      skip<double>(cdr, std::size_t{3} * points);
+      skip<float>(cdr, std::size_t{4} * number<std::uint32_t>(cdr));  // colours
+      text(cdr);                                                      // texture_resource
+      header(cdr), text(cdr);                                         // texture
+      skip<std::uint8_t>(cdr, number<std::uint32_t>(cdr));
+      skip<float>(cdr, std::size_t{2} * number<std::uint32_t>(cdr));  // uv_coordinates
+      text(cdr), text(cdr), text(cdr);                                // text, mesh_resource, mesh_file.filename
+      skip<std::uint8_t>(cdr, number<std::uint32_t>(cdr));
+      number<bool>(cdr);  // mesh_use_embedded_materials
+      if (action == 0 && type == 4) line = points;
+      if (action == 0 && type == 1) widest = std::max(widest, *std::max_element(scale.begin(), scale.end()));
+    }
+    char said[160];
+    std::snprintf(said, sizeof said, "markers %u in %s: line of %u, boxes up to %.3f m wide", count, frame.c_str(),
+                  line, widest);
+    return said;
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 4) return 64;
+  const auto domain = static_cast<unsigned>(std::atoi(argv[1]));
+  auto* participant = fast::DomainParticipantFactory::get_instance()->create_participant(domain, local_only(domain));
+  if (!participant) return 70;
+  auto* subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
+  const auto reader_of = [&](fast::TopicDataType* made, const char* name) {
+    fast::TypeSupport type(made);
+    type.register_type(participant);
+    fast::DataReaderQos qos;
+    qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
+    if (std::string(name) != "rt/diagnostics")  // the markers of a plan stay for who comes later
+      qos.durability().kind = fast::TRANSIENT_LOCAL_DURABILITY_QOS;
+    return subscriber->create_datareader(participant->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT),
+                                         qos);
+  };
+  fast::DataReader* readers[] = {reader_of(new DiagnosticsType, "rt/diagnostics"), reader_of(new MarkersType, argv[2])};
+  Seen seen[2];
+  for (int n = 0; n < 20 * std::atoi(argv[3]); ++n) {
+    fast::SampleInfo info;
+    for (int r = 0; r < 2; ++r)
+      while (readers[r]->take_next_sample(&seen[r], &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+      }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  for (const Seen& s : seen) std::printf("%s\n", s.line.c_str());
+  return seen[0].line.empty() || seen[1].line.empty() ? 1 : 0;
+}
