@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
-#include <set>
 
 #include "core/log/local_cubic.hpp"
 #include "core/log/median.hpp"
@@ -15,24 +14,7 @@ namespace {
 
 constexpr double kFrame = 0.01;          // s
 constexpr double kMarkerHeight = 0.027;  // m, marker above the feet
-
-/// What the notes that accompany the data say of a flight: hovers under a plate (1), nothing above (0), or a pass
-/// through a tunnel or no note at all (−1).
-double plate_above(const std::string& name) {
-  static const std::set<std::string> under = {
-      "20240822_21_32_29", "20240822_22_02_30", "20240822_22_17_21", "20240823_17_35_08", "20240823_17_47_21",
-      "20240823_19_37_29", "20240827_18_45_10", "20240827_18_48_44", "20240827_18_56_52", "20240827_19_51_43",
-      "20240827_19_56_47", "20240907_15_52_28", "20240907_16_06_12", "20240907_22_27_02", "20240907_23_24_55",
-      "20240907_23_32_12", "20240907_23_43_25", "20240907_23_47_39"};
-  static const std::set<std::string> open = {
-      "20240814_23_40_43", "20240814_23_52_49", "20240815_00_29_10", "20240815_00_45_16", "20240815_19_57_56",
-      "20240815_20_00_27", "20240815_20_09_19", "20240815_22_05_06", "20240816_00_03_47", "20240816_00_22_16",
-      "20240821_16_44_07", "20240821_17_23_10", "20240821_17_48_25", "20240821_18_01_45", "20240822_17_29_40",
-      "20240822_17_48_07", "20240822_17_56_30", "20240822_18_03_19", "20240822_18_23_29", "20240822_21_49_06",
-      "20240822_22_22_43", "20240823_16_23_49", "20240823_16_48_25", "20240823_17_17_04", "20240827_16_07_17",
-      "20240827_16_23_24", "20240827_16_41_48", "20240906_16_04_39", "20240907_15_21_48"};
-  return under.contains(name) ? 1 : open.contains(name) ? 0 : -1;
-}
+constexpr double kNotSaid = -1;          // of a plate above: no file of this format says it
 
 /// Times of the frames behind the stamps, from 0.
 std::vector<double> frame_times(const std::vector<double>& stamps) {
@@ -75,7 +57,6 @@ tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
   const std::vector<double> at_first(raw->column("z").begin(), raw->column("z").begin() + 50);
   const double stood = median(at_first);
   const std::string name = std::filesystem::path(path).stem().string();
-  const double ceiling = plate_above(name);
   const double day =
       name.size() >= 8 && std::all_of(name.begin(), name.begin() + 8, ::isdigit) ? std::stod(name.substr(0, 8)) : 0;
 
@@ -88,7 +69,7 @@ tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
     for (const char* q : {"qw", "qx", "qy", "qz"}) log.columns[q].push_back(raw->column(q)[i]);
     log.columns["stood_z_m"].push_back(stood);
     log.columns["surface_z_m"].push_back(stood - kMarkerHeight);
-    log.columns["ceiling"].push_back(ceiling);
+    log.columns["ceiling"].push_back(kNotSaid);
     log.columns["day"].push_back(day);
   }
   return log;

@@ -16,9 +16,9 @@ namespace backwash::log {
 /// them are left out: a gap.
 ///
 /// Four columns are added: `stood_z_m` (the marker's height while it stood at first), `surface_z_m` (what it stood on
-/// then, the marker 27 mm above the feet), `ceiling` (1 hovering under a plate, 0 nothing above, −1 not said, by the
-/// notes that accompany the data) and `day` (date as yyyymmdd, from the file's name; flights after midnight keep their
-/// date). Errors: missing file, columns or rows.
+/// then, the marker 27 mm above the feet), `ceiling` (−1: not said; labels say 1 hovering under a plate, 0 nothing
+/// above) and `day` (date as yyyymmdd, from the file's name; flights after midnight keep their date). Errors: missing
+/// file, columns or rows.
 tl::expected<FlightLog, LogError> import_airgarage(const std::string& path);
 
 }  // namespace backwash::log

@@ -8,6 +8,7 @@
 #include "core/log/import_airgarage.hpp"
 #include "core/log/import_columns.hpp"
 #include "core/log/import_crazypad.hpp"
+#include "core/log/labels.hpp"
 #include "core/log/same_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "services/backwash/column_map.hpp"
@@ -34,7 +35,7 @@ constexpr struct {
 };
 
 struct Options {
-  std::string kind, folder, map_columns;
+  std::string kind, folder, map_columns, labels;
   std::vector<std::string> files;  ///< after `kind`, which is the first of them with a column map
   bool propose = false, json = false, force = false;
 };
@@ -70,7 +71,8 @@ std::pair<Importer, std::vector<std::string>> importer_of(const Options& options
 
 int propose(const Options& options) {
   if (!options.files.empty()) throw Failure(kUsage, "--propose looks at one table; give one");
-  if (!options.folder.empty()) throw Failure(kUsage, "--propose prints and writes nothing; give it without --out");
+  if (!options.folder.empty() || !options.labels.empty())
+    throw Failure(kUsage, "--propose prints and writes nothing; give it without --out and --labels");
   const auto text = proposed_column_map(options.kind);
   if (!text) fail(text.error());
   std::fputs(text->c_str(), stdout);
@@ -88,9 +90,23 @@ std::string known_as(const log::FlightMark& mark, const std::vector<std::pair<st
 
 /// FOLDER/NAME.csv; of NAME.csv.gz as well.
 std::string target(const std::string& folder, const std::string& file) {
-  auto stem = std::filesystem::path(file).stem();
-  if (stem.extension() == ".csv") stem = stem.stem();
-  return (std::filesystem::path(folder) / stem).string() + ".csv";
+  return (std::filesystem::path(folder) / log::recording_name(file)).string() + ".csv";
+}
+
+log::Labels labels_of(const Options& options) {
+  if (options.labels.empty()) return {};
+  auto labels = log::read_labels(options.labels);
+  if (!labels) fail(labels.error());
+  return std::move(*labels);
+}
+
+/// Puts what the labels say of a recording into its log; of one that they do not hold, a note.
+void add_labels(log::FlightLog& log, const log::Labels& labels, const std::string& labels_file, const std::string& file,
+                std::vector<std::string>& notes) {
+  if (labels_file.empty()) return;
+  const auto of = labels.find(log::recording_name(file));
+  if (of == labels.end()) return notes.push_back(file + ": " + labels_file + " has no row for it");
+  if (const auto added = log::add_labels(log, of->second, labels_file); !added) fail(added.error());
 }
 
 int run(const Options& options) {
@@ -104,11 +120,12 @@ int run(const Options& options) {
   std::vector<std::string> targets;
   for (const auto& file : files) targets.push_back(target(options.folder, file));
   check_outputs(targets, options.force);
+  const auto labels = labels_of(options);
   Json logs = Json::array(), refused = Json::array();
   std::vector<std::pair<std::string, log::FlightMark>> known;
   std::vector<std::string> notes;
   for (const auto& file : files) {
-    const auto log = read(file, notes);
+    auto log = read(file, notes);
     if (!log) {
       // A recording without rows is not the end of a hundred others; alone it is an error.
       if (files.size() == 1 || log.error().kind == log::LogError::Kind::not_found) fail(log.error());
@@ -121,6 +138,7 @@ int run(const Options& options) {
       continue;
     }
     known.emplace_back(file, std::move(mark));
+    add_labels(*log, labels, options.labels, file, notes);
     write_log(target(options.folder, file), *log, options.force);
     logs.push_back(Json{{"log", target(options.folder, file)}, {"rows", log->t_s.size()}});
   }
@@ -148,6 +166,8 @@ Verb import_verb(Command& app) {
   command.add_option("files", options->files, "recordings");
   command.add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each");
   command.add_option("--map-columns", options->map_columns, "column map (TOML): recordings are tables, CSV or .csv.gz");
+  command.add_option("--labels", options->labels,
+                     "table (CSV) of what is known of each recording: its name under recording, and a column a label");
   command.add_flag("--propose", options->propose,
                    "print a column map for one table, guessed and checked; writes nothing");
   command.add_flag("--json", options->json, "one JSON object on stdout");

@@ -69,7 +69,7 @@ std::optional<study::Design> designed(const DesignOptions& options, const study:
   if (const auto why = plan::why_blocked(*world, *options.start, 0))
     throw Failure(kUnavailable, "--start " + *why + ": begin where hovering is safe");
   auto design = study::design(seen, result, *world, model, *options.start, options.flight_time);
-  if (const auto* chosen = design.chosen()) write_file(options.points, study::points_csv(chosen->points_W), force);
+  if (const auto* chosen = design.chosen()) write_file(options.points, study::points_csv(chosen->points), force);
   return design;
 }
 
@@ -88,7 +88,7 @@ Json to_json(const study::Design& design, const DesignOptions& options) {
                        {"pairs_nats", f.of_pair},
                        {"flights", f.flights ? Json(*f.flights) : Json()},
                        {"separated", f.separated},
-                       {"rows", f.points_W.size()},
+                       {"rows", f.points.size()},
                        {"time_s", seconds(f)}});
   }
   for (const auto& [name, why] : design.left_out) left_out.push_back({{"name", name}, {"why", why}});
@@ -105,7 +105,7 @@ void print_text(const study::Design& design, const DesignOptions& options) {
   for (const auto& f : told_flights(design)) std::printf("  %s: %s\n", name_of(f).c_str(), outcome_of(f).c_str());
   if (const auto* best = design.chosen()) {
     if (best->voltage) std::printf("  begin with the battery at about %.1f V\n", *best->voltage);
-    std::printf("  %s: %zu rows, for backwashctl follow\n", options.points.c_str(), best->points_W.size());
+    std::printf("  %s: %zu rows, for backwashctl follow\n", options.points.c_str(), best->points.size());
   }
   if (!design.flights.empty() || !design.left_out.empty())
     std::printf("  %zu ways fit in the map, %zu do not\n", design.flights.size(), design.left_out.size());

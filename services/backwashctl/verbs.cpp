@@ -7,19 +7,16 @@
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
-#include "core/files/read_file.hpp"
 #include "services/backwashctl/answer.hpp"
 #include "services/backwashctl/preflight.hpp"
+#include "services/backwashctl/route.hpp"
 #include "services/backwashctl/status_output.hpp"
 #include "services/command_line/exit_code.hpp"
 #include "services/command_line/words.hpp"
 
 namespace backwash::ctl {
 namespace {
-
-constexpr std::size_t kMostWaypoints = 64;  // of the IDL's sequence
 
 std::string default_station() {
   char host[64] = "station";
@@ -35,10 +32,11 @@ std::string text_of(const nlohmann::json& json, int indent) {
 
 bool tracking(const StatusCopy& s) { return s.in(Mode::tracking); }
 bool rests(const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }
+/// A task that is not done counts: a route may pass its last place on the way, and a turn begins where it ends.
 std::function<bool(const StatusCopy&)> rests_at(const Vec3& goal) {
   return [goal](const StatusCopy& s) {
     const auto& p = s.numbers.setpoint;
-    return rests(s) && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
+    return rests(s) && s.task.empty() && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
   };
 }
 
@@ -110,13 +108,14 @@ void Verbs::add_ways(Command& app) {
   go->add_option("--yaw", yaw_,
                  "heading to turn to at the goal, counter-clockwise from the map's x axis, rad; without: as the path "
                  "leads there");
-  auto* follow_verb = waiting(
-      verb(
-          app, "follow",
-          "fly to each point of a CSV in turn (columns x_m,y_m,z_m), at rest at each; each leg is planned and verified",
-          "follow route.csv --wait", [this] { return follow(); }),
-      900);
-  follow_verb->add_option("file", route_, "points CSV: x_m,y_m,z_m, at most 64 rows").required();
+  auto* follow_verb = waiting(verb(app, "follow",
+                                   "fly to each point of a CSV in turn (columns x_m,y_m,z_m; yaw_rad: a heading to "
+                                   "turn to there), at rest at each; "
+                                   "each leg is planned and verified",
+                                   "follow route.csv --wait", [this] { return follow(); }),
+                              900);
+  follow_verb->add_option("file", route_, "points CSV: x_m,y_m,z_m, at most 64 rows; with yaw_rad at most 32")
+      .required();
 }
 
 void Verbs::add_ends(Command& app) {
@@ -178,9 +177,9 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     superseded = station.superseded(s);
     if (superseded || s.task.starts_with(kRefusedTask)) return true;
     // On its way to a goal it goes on by itself after an obstacle.
-    const bool on_its_way = verb == backwash_msgs_msg_dds__COMMAND_GOTO ||
-                            verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING ||
-                            verb == backwash_msgs_msg_dds__COMMAND_FOLLOW;
+    const bool on_its_way =
+        verb == backwash_msgs_msg_dds__COMMAND_GOTO || verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING ||
+        verb == backwash_msgs_msg_dds__COMMAND_FOLLOW || verb == backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING;
     const bool held = s.in(Mode::hold) && !(on_its_way && s.because(Reason::obstacle_ahead));
     const bool lands = verb == backwash_msgs_msg_dds__COMMAND_LAND;
     const bool lost = s.in(Mode::quiet) || held || (s.in(Mode::passive) && !lands);
@@ -214,34 +213,16 @@ int Verbs::go_to() {
                  rests_at(goal));
 }
 
-// The file is the points CSV of the other programs.
 int Verbs::follow() {
-  auto content = files::read_file(route_, files::kLargestConfiguration, "a points CSV file");
-  std::string line;
-  const auto fail = [&](int code, const std::string& where, const std::string& why) {
-    services::say_error("backwashctl follow", where + ": " + why);
-    return code;
-  };
-  if (!content) return fail(kNoInput, route_, content.error().message);
-  std::istringstream file(std::move(*content));
-  const auto next = [&] {
-    const bool more = static_cast<bool>(std::getline(file, line));
-    if (line.ends_with('\r')) line.pop_back();
-    return more;
-  };
-  next();
-  if (line != "x_m,y_m,z_m")
-    return fail(kBadData, route_ + ":1", "the first line is '" + line + "', expected x_m,y_m,z_m");
-  for (int number = 2; next(); ++number) {
-    Vec3 p;
-    char rest;
-    if (std::sscanf(line.c_str(), "%lf,%lf,%lf %c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
-      return fail(kBadData, route_ + ":" + std::to_string(number), "'" + line + "' is not three numbers");
-    waypoints_.push_back(p);
+  const auto route = read_route(route_);
+  if (!route) {
+    services::say_error("backwashctl follow", route.error().message);
+    return route.error().code;
   }
-  if (waypoints_.empty() || waypoints_.size() > kMostWaypoints)
-    return fail(kBadData, route_, std::to_string(waypoints_.size()) + " points, expected 1 to 64");
-  return command("follow", backwash_msgs_msg_dds__COMMAND_FOLLOW, Vec3::Zero(), rests_at(waypoints_.back()));
+  waypoints_ = waypoints_of(*route);
+  const auto verb =
+      has_headings(*route) ? backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING : backwash_msgs_msg_dds__COMMAND_FOLLOW;
+  return command("follow", verb, Vec3::Zero(), rests_at(route->back().p_W));
 }
 
 int Verbs::check() {

@@ -39,7 +39,7 @@ class Verbs {
   Options options_;
   std::vector<double> goal_;
   std::optional<double> yaw_;
-  std::vector<Vec3> waypoints_;
+  std::vector<Vec3> waypoints_;  ///< of the command: of a route with headings pairs
   std::string route_;
   double height_ = 0, patience_s_ = 0;
   bool wait_ = false, json_ = false;

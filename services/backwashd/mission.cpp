@@ -2,6 +2,7 @@
 #include "services/backwashd/mission.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/plan/planner.hpp"
@@ -37,7 +38,8 @@ Decision Mission::observe(const MissionInput& in) {
   for (const PlanOutcome& outcome : in.outcomes) {
     if (job_ != outcome.job) continue;  // a newer command took its place
     job_.reset();
-    task_ = outcome.ok ? "" : std::string(kRefusedTask) + outcome.reason.data();
+    task_ = outcome.ok ? (route_.size() > 1 ? kToGo + std::to_string(route_.size()) : "")
+                       : std::string(kRefusedTask) + outcome.reason.data();
     retry_at_s_ = in.now_s + kRetry;
     if (!outcome.ok && view_.reason != Reason::obstacle_ahead) route_.clear();
   }
@@ -57,24 +59,6 @@ std::string Mission::judge_place() const {
   if (view_.landed && !plan::takeoff_column(*world_, view_.state.p_W))
     return "there is no clear hover height above a known floor here";
   return "";
-}
-
-// To the next goal of a route at rest at the last one; and to the same goal again where the flight came to rest on the
-// way: something stood in it, or the map did not show more of it yet.
-std::optional<PlanJob> Mission::continue_route(double now_s) {
-  constexpr double kAtGoal = 0.01, kRest = 0.1;  // m, m/s
-  const bool tracking = view_.mode == Mode::tracking;
-  const bool obstacle = view_.mode == Mode::hold && view_.reason == Reason::obstacle_ahead;
-  // Any other mode, and any other hold, is an operator's to end.
-  if (!tracking && !obstacle) route_.clear();
-  if (route_.empty() || job_ || order_under_way() || !view_.finished) return std::nullopt;
-  if (tracking && (view_.command.p_W - route_.front().position).norm() < kAtGoal) {
-    route_.pop_front();
-    if (!route_.empty()) return start(PlanJob::Kind::go_to, route_.front()).job;
-  } else if (view_.state.v_W.norm() < kRest && now_s > retry_at_s_) {
-    return start(PlanJob::Kind::go_to, route_.front()).job;
-  }
-  return std::nullopt;
 }
 
 std::string Mission::station(double now_s) const {
@@ -148,6 +132,7 @@ Decision Mission::decide(const CommandMessage& command) {
     case backwash_msgs_msg_dds__COMMAND_GOTO_FACING:
       return go_to(command);
     case backwash_msgs_msg_dds__COMMAND_FOLLOW:
+    case backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING:
       return follow(command);
     case backwash_msgs_msg_dds__COMMAND_HOLD:
       return hold();
@@ -211,29 +196,18 @@ Decision Mission::take_off(const CommandMessage& command) {
 }
 
 Decision Mission::go_to(const CommandMessage& command) {
+  Goal goal{command.position, {}};
+  if (command.verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING) goal.yaw = command.yaw;
+  return fly({goal});
+}
+
+/// To the first goal, and from each to the next one.
+Decision Mission::fly(std::deque<Goal> route) {
   if (view_.mode == Mode::lifting) return refused("taking off: wait until it is in the air");
   if (!flies(view_.mode)) return refused("not enabled");
   if (view_.landed) return refused("on the ground: take off first");
   if (!view_.finished) return refused("flying: hold first");
-  Goal goal{command.position, {}};
-  if (command.verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING) goal.yaw = command.yaw;
-  Decision decision = start(PlanJob::Kind::go_to, goal);
-  if (decision.job) route_ = {goal};
-  return decision;
-}
-
-Decision Mission::follow(const CommandMessage& command) {
-  if (command.waypoints == 0 || command.waypoints > command.kMostWaypoints)
-    return only(kInvalid, "follow needs 1 to " + std::to_string(command.kMostWaypoints) + " waypoints");
-  CommandMessage first = command;
-  std::deque<Goal> route;
-  for (std::size_t n = 0; n < command.waypoints; ++n) {
-    const auto& p = command.waypoint[n];
-    route.push_back({{p[0], p[1], p[2]}, {}});
-    if (!route.back().position.allFinite()) return only(kInvalid, "a waypoint is not finite");
-  }
-  first.position = route.front().position;
-  Decision decision = go_to(first);
+  Decision decision = start(PlanJob::Kind::go_to, route.front());
   if (decision.job) route_ = std::move(route);
   return decision;
 }

@@ -44,6 +44,7 @@ struct MissionInput {
 /// land, disable or hold thereby ends whatever was planned before it, wherever that is by then (docs/faults.md row 39).
 class Mission {
  public:
+  static constexpr const char* kToGo = "waypoints to go: ";  ///< with their number: a task
   static constexpr double kLease = 10.0;  ///< s after a station's last command until another may take over
 
   /// `vehicle`: whose gains and limits the autopilot's parameters have to be.
@@ -59,7 +60,7 @@ class Mission {
   /// Holder of the lease, empty if none.
   std::string station(double now_s) const;
   const ControlView& view() const noexcept { return view_; }
-  /// What became of the last task: "", "planning", or "refused: why".
+  /// What became of the last task: "", "planning", "waypoints to go: N" of a route's more than one, or "refused: why".
   const std::string& task() const noexcept { return task_; }
   /// The newest command that was accepted; releases are none.
   const CommandId& accepted() const noexcept { return accepted_; }
@@ -77,6 +78,7 @@ class Mission {
   Decision enable();
   Decision take_off(const CommandMessage& command);
   Decision go_to(const CommandMessage& command);
+  Decision fly(std::deque<Goal> route);
   Decision follow(const CommandMessage& command);
   Decision hold();
   Decision land();

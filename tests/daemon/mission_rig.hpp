@@ -19,6 +19,7 @@ inline constexpr std::uint8_t kEnable = backwash_msgs_msg_dds__COMMAND_ENABLE,
                               kTakeoff = backwash_msgs_msg_dds__COMMAND_TAKEOFF,
                               kGoto = backwash_msgs_msg_dds__COMMAND_GOTO,
                               kFollow = backwash_msgs_msg_dds__COMMAND_FOLLOW,
+                              kFollowFacing = backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING,
                               kHold = backwash_msgs_msg_dds__COMMAND_HOLD, kStop = backwash_msgs_msg_dds__COMMAND_STOP,
                               kLand = backwash_msgs_msg_dds__COMMAND_LAND,
                               kRelease = backwash_msgs_msg_dds__COMMAND_RELEASE;

@@ -41,6 +41,69 @@ TEST_F(Route, GoesOnFromTheEndOfAFlightAndNotFromARestOnTheWay) {
   EXPECT_TRUE(look().job);
 }
 
+/// Three places, of which the first and the last are one: east is faced from the first, nothing from the second, and
+/// from the last what is behind and below.
+CommandMessage turned_route(Station& station) {
+  CommandMessage follow = station.next(kFollowFacing);
+  follow.waypoints = 6;
+  follow.waypoint[0] = {0, 0, 1.2}, follow.waypoint[1] = {1, 0, 1.2};
+  follow.waypoint[2] = {1, 0, 1.2}, follow.waypoint[3] = {1, 0, 5};
+  follow.waypoint[4] = {0, 0, 1.2}, follow.waypoint[5] = {-3, -3, 0};
+  return follow;
+}
+
+TEST_F(MissionTest, ARouteWithHeadingsTurnsToWhatIsFacedFromEachPlaceAndTellsHowFarItIs) {
+  const Decision planned = give(turned_route(gcs_));
+  ASSERT_TRUE(planned.job) << planned.answer->reason;
+  std::vector<PlanJob> jobs{*planned.job};
+  for (const char* to_go : {"waypoints to go: 3", "waypoints to go: 2"}) {
+    const PlanOutcome flies{jobs.back().id, true, {}};
+    view_.finished = false;
+    EXPECT_FALSE(look({&flies, 1}).job);
+    EXPECT_EQ(mission_.task(), to_go);
+    view_.finished = true;
+    view_.command.p_W = jobs.back().position;
+    const Decision next = look();
+    ASSERT_TRUE(next.job);
+    EXPECT_EQ(mission_.task(), "planning");
+    jobs.push_back(*next.job);
+  }
+  const PlanOutcome last{jobs.back().id, true, {}};
+  view_.finished = false;
+  look({&last, 1});
+  EXPECT_EQ(mission_.task(), "") << "on the way to the last place nothing more is to come";
+  EXPECT_EQ(jobs[0].position, Vec3(0, 0, 1.2));
+  EXPECT_EQ(jobs[1].position, Vec3(1, 0, 1.2));
+  EXPECT_EQ(jobs[2].position, Vec3(0, 0, 1.2));
+  ASSERT_TRUE(jobs[0].yaw && jobs[2].yaw);
+  EXPECT_NEAR(*jobs[0].yaw, 0, 1e-12);
+  EXPECT_EQ(jobs[1].yaw, std::nullopt) << "what is straight above is faced from every heading";
+  EXPECT_NEAR(*jobs[2].yaw, -0.75 * M_PI, 1e-12);
+}
+
+TEST_F(MissionTest, ARouteThatAHoldEndsTellsOfNoWaypointsToGo) {
+  const Decision planned = give(turned_route(gcs_));
+  ASSERT_TRUE(planned.job);
+  const PlanOutcome flies{planned.job->id, true, {}};
+  view_.finished = false;
+  look({&flies, 1});
+  view_.mode = Mode::hold;
+  view_.reason = Reason::odometry_lost;
+  look();
+  EXPECT_EQ(mission_.task(), "");
+}
+
+TEST_F(MissionTest, ARouteOfHalfPairsOrOfWhatIsNoNumberIsInvalid) {
+  CommandMessage odd = turned_route(gcs_);
+  odd.waypoints = 5;
+  EXPECT_EQ(result(give(odd)), kInvalid);
+  CommandMessage faced = turned_route(gcs_);
+  faced.waypoint[3] = {NAN, 0, 0};
+  const Decision d = give(faced);
+  EXPECT_EQ(result(d), kInvalid);
+  EXPECT_FALSE(d.job);
+}
+
 TEST_F(MissionTest, AStopThatALandingCannotObeyIsNotToldToBeDone) {
   view_.mode = Mode::land;
   look();

@@ -94,7 +94,9 @@ def make_inputs(build: pathlib.Path, folder: pathlib.Path, raw: str, truth: str)
     (inputs / "variances.csv").write_text("\n".join([header, *(line + ",0.02,0.001,0,0.03,0,0.04" for line in lines)]) + "\n")
     for kind in ("airgarage", "crazypad"):
         if files := sorted((DATA / kind).glob("*.csv"))[:24]:
-            made([backwash, "import", kind, *files, "-o", kind], inputs)
+            labels = ROOT / "tests/data" / kind / "labels.csv"
+            beside = ["--labels", labels] if labels.is_file() else []
+            made([backwash, "import", kind, *files, *beside, "-o", kind], inputs)
     if not raw:
         made(lockstep(build), inputs)
     for name, path in (("flight.bwlog", raw), ("truth.csv", truth)):

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "core/log/import_airgarage.hpp"
+#include "core/log/labels.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 
 namespace backwash::study::calibrate {
@@ -134,9 +135,13 @@ std::vector<HeightRow> recorded(const std::filesystem::path& folder, double leng
   options.length_s = length_s;
   std::vector<HeightRow> rows;
   std::size_t number = 0;
+  const auto labels = log::read_labels(std::string(BACKWASH_SOURCE_DIR) + "/tests/data/airgarage/labels.csv").value();
   for (const auto& file : files) {
-    const auto log = log::import_airgarage(file);
+    auto log = log::import_airgarage(file);
     if (!log) continue;
+    if (const auto of = labels.find(log::recording_name(file)); of != labels.end()) {
+      EXPECT_TRUE(log::add_labels(*log, of->second, file));
+    }
     const auto flight = flight_windows(*log, std::nullopt, options, file);
     if (!flight) continue;
     perched += flight->gated[static_cast<std::size_t>(Gate::perched)];

@@ -166,8 +166,10 @@ TEST(Design, TurnsTheHeadingWhereTheRoomHasPlaceForItAndStartsWhereItIsTold) {
   EXPECT_NEAR((next.chosen()->commands.front().p_W - start).norm(), 0, 0.02);
   EXPECT_GE(next.chosen()->separated, 0.9);
   for (const NextFlight& flight : next.flights) {
-    EXPECT_LE(flight.points_W.size(), 64u) << flight.name;
-    for (const Vec3& p : flight.points_W) EXPECT_FALSE(plan::why_blocked(*world, p, 0)) << flight.name;
+    const bool faces = std::ranges::any_of(flight.points, [](const Waypoint& p) { return p.yaw.has_value(); });
+    EXPECT_LE(flight.points.size(), faces ? 32u : 64u) << flight.name << ": no more than follow takes";
+    EXPECT_EQ(faces, flight.name.find("on the spot") != std::string::npos) << flight.name;
+    for (const Waypoint& p : flight.points) EXPECT_FALSE(plan::why_blocked(*world, p.p_W, 0)) << flight.name;
     if (flight.name.starts_with("stand still")) {
       EXPECT_EQ(flight.flights, std::nullopt) << flight.name;
     }
@@ -179,12 +181,47 @@ TEST(Design, LeavesOutWhatDoesNotFit) {
   const auto& w = never_turned();
   const auto world = plan::build_world(w.grid, w.model, w.vehicle);
   const Vec3 start(0.5 * w.made.room.inside.high.x(), 0.5 * w.made.room.inside.high.y(), 1.2);
-  const FlownWay through = flown_way(*world, start, {"through the wall", {start, Vec3(-1, 1, 1)}}, 90);
-  EXPECT_TRUE(through.points_W.empty());
+  const FlownWay through = flown_way(*world, start, {"through the wall", {{start}, {Vec3(-1, 1, 1)}}}, 90);
+  EXPECT_TRUE(through.points.empty());
   EXPECT_FALSE(through.why_not.empty());
-  const FlownWay there = flown_way(*world, start, {"there and back", {start + Vec3(0.3, 0, 0), start}}, 90);
+  const FlownWay there = flown_way(*world, start, {"there and back", {{start + Vec3(0.3, 0, 0)}, {start}}}, 90);
   EXPECT_EQ(there.why_not, "");
-  EXPECT_GT(there.points_W.size(), 10u);
+  EXPECT_GT(there.points.size(), 10u);
+}
+
+/// How many runs of commands stand still at a heading for longer than a second, and the largest rate between, rad/s.
+std::pair<std::vector<double>, double> headings(const std::vector<Setpoint>& commands) {
+  std::vector<double> rested;
+  double fastest = 0;
+  int still = 0;
+  for (std::size_t k = 1; k < commands.size(); ++k) {
+    const double rate = std::remainder(commands[k].yaw - commands[k - 1].yaw, 2 * M_PI) / kControlPeriod;
+    fastest = std::max(fastest, std::abs(rate));
+    still = rate == 0 ? still + 1 : 0;
+    if (still == 60) rested.push_back(commands[k].yaw);
+  }
+  return {rested, fastest};
+}
+
+TEST(Design, AWaypointsHeadingIsTurnedToOnTheSpotAndRestedAt) {
+  const auto& w = never_turned();
+  const auto world = plan::build_world(w.grid, w.model, w.vehicle);
+  const Vec3 start(0.5 * w.made.room.inside.high.x(), 0.5 * w.made.room.inside.high.y(), 1.2);
+  const FlownWay flown =
+      flown_way(*world, start, {"turns", {{start, 1.0}, {start, -2.5}, {start + Vec3(0, 0, 0.2)}, {start, 3.0}}}, 25);
+  ASSERT_EQ(flown.why_not, "");
+  const auto [rested, fastest] = headings(flown.commands);
+  ASSERT_GE(rested.size(), 4u);
+  const double expected[] = {1.0, -2.5, 3.0, 1.0};  // the one without a heading keeps what was: its path leads nowhere
+  for (std::size_t k = 0, seen = 0; k < 4; ++k, ++seen) {
+    while (seen + 1 < rested.size() && std::abs(std::remainder(rested[seen] - expected[k], 2 * M_PI)) > 1e-3) ++seen;
+    EXPECT_NEAR(std::remainder(rested[seen] - expected[k], 2 * M_PI), 0, 1e-3) << "heading " << k;
+  }
+  EXPECT_LE(fastest, 1.0 + 1e-9) << "rad/s, as the daemon turns";
+  EXPECT_GT(fastest, 0.5);
+  for (const Setpoint& c : flown.commands) EXPECT_LT((c.p_W - start).head<2>().norm(), 1e-6) << "on the spot";
+  EXPECT_EQ(flown.points[1].yaw, -2.5);
+  EXPECT_EQ(flown.points[2].yaw, std::nullopt);
 }
 
 TEST(Design, IsNothingWhereNothingHasARival) {
@@ -215,7 +252,10 @@ TEST(Design, OfRotorsThatMotorsAloneTellIsNone) {
 }
 
 TEST(Design, WritesThePointsThatOtherProgramsRead) {
-  EXPECT_EQ(points_csv({{1, 2, 3}, {-0.5, 0.25, 1.2}}), "x_m,y_m,z_m\n1.0000,2.0000,3.0000\n-0.5000,0.2500,1.2000\n");
+  EXPECT_EQ(points_csv({{{1, 2, 3}}, {{-0.5, 0.25, 1.2}}}),
+            "x_m,y_m,z_m\n1.0000,2.0000,3.0000\n-0.5000,0.2500,1.2000\n");
+  EXPECT_EQ(points_csv({{{1, 2, 3}, -1.5}, {{-0.5, 0.25, 1.2}}}),
+            "x_m,y_m,z_m,yaw_rad\n1.0000,2.0000,3.0000,-1.5000\n-0.5000,0.2500,1.2000,\n");
 }
 
 }  // namespace

@@ -83,7 +83,8 @@ RotorOutcome score(const RotorTrial& trial, std::uint64_t seed, const std::files
   if (trial.reference) options = with_reference(world, folder);
   options.minimum_detectable = options.dependence = false;
   const auto result = backwash::study::study(observe(world, flights, folder), options);
-  out.told = told(result);
+  const bool flew = result.verdict != backwash::study::StudyVerdict::insufficient;  // else a rotor is at its limit
+  out.told = flew ? told(result) : "insufficient";
   const std::string truth = trial.hidden == "weight"      ? "payload"
                             : trial.hidden == "propeller" ? "propeller_damage"
                                                           : "";

@@ -210,6 +210,12 @@ refused 78 'give this or qw' import --map-columns two_attitudes.toml ms.csv -o l
 refused 65 'is the unit of the time right?' import --map-columns too_fast.toml ms.csv -o logs
 refused 65 "no column 't', which the column map takes for t_s" import --map-columns map.toml no_z_points.csv -o logs
 refused 65 'called like a time' import --propose no_z_points.csv
+printf 'recording,ceiling\nms,yes\n' >no_number.csv
+printf 'recording,z_m\nms,1\n' >measured.csv
+refused 66 'absent.csv' import --map-columns map.toml ms.csv -o logs --labels absent.csv
+refused 65 "no_number.csv:2: column 'ceiling' holds 'yes'" import --map-columns map.toml ms.csv -o logs --labels no_number.csv
+refused 65 "measured.csv:1: the recording measures 'z_m' itself" import --map-columns map.toml ms.csv -o logs --labels measured.csv
+refused 64 "without --out and --labels" import --propose ms.csv --labels measured.csv
 refused 64 'no kind of recording' import nanobench ms.csv -o logs
 refused 64 'no recording given' import ulog -o logs
 refused 65 'no format message (FMT)' import ardupilot corrupt.bt -o logs

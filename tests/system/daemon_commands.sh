@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# What the ground station may ask for, with real processes: a take-off that is refused arms nothing, hold in flight stops on the way with every sample inside its set, and follow flies each leg of a file.
+# What the ground station may ask for, with real processes: a take-off that is refused arms nothing, hold in flight stops on the way with every sample inside its set, and follow flies each leg of a file and turns where that says so.
 #   daemon_commands.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
@@ -56,6 +56,14 @@ if [[ -x $build/tests/fastdds_viewer ]]; then
   grep -q '^diagnostics [01] backwash backwashd: quad-5in: tracking: ' "$work/seen" || die "other diagnostics"
   grep -Eq '^markers [0-9]{2,3} in map: line of [0-9]{2,4}, boxes up to 0\.[1-9][0-9]* m wide$' "$work/seen" || die "other markers"
 fi
+# With headings: two at one place, the last place on the way as well, one row without.
+printf 'x_m,y_m,z_m,yaw_rad\n-1,0,1.2,1.2\n-1,0,1.2,-1.9\n0,0,1.2,\n-1,0,1.2,0.5\n' >"$work/turns.csv"
+sed 's/0.5$/north/' "$work/turns.csv" >"$work/bad.csv"
+refused "bad.csv:5: '-1,0,1.2,north' is not three numbers and a heading" follow "$work/bad.csv"
+for row in $(seq 33); do [[ $row == 1 ]] && head -1 "$work/turns.csv"; echo 1,0,1.2,0; done >"$work/bad.csv"
+refused 'bad.csv: 33 points with headings, expected 1 to 32' follow "$work/bad.csv"
+ctl follow "$work/turns.csv" --wait
+sleep 0.5
 # Whoever waits for a flight that another station stopped is told so, and does not wait on.
 "$bin/backwashctl" --domain "$domain" goto 1.5,0.8,1.2 --wait >"$work/waiting" 2>&1 &
 waiting=$!
@@ -79,5 +87,12 @@ for point in route:  # in their order, at rest at each
     assert near, f"the vehicle was never at rest at {goal}"
     at = near[0]
     print(f"at {goal} at {truth[at]['t_s'] - truth[0]['t_s']:.1f} s")
+heading = lambda row: math.atan2(2 * (row["qw"] * row["qz"] + row["qx"] * row["qy"]), 1 - 2 * (row["qy"] ** 2 + row["qz"] ** 2))
+for place, yaw in (((-1, 0), 1.2), ((-1, 0), -1.9), ((0, 0), None), ((-1, 0), 0.5)):  # turned to, at that place, in their order
+    near = [n for n in range(at, len(truth)) if math.dist((truth[n]["x_m"], truth[n]["y_m"]), place) < 0.12 and truth[n]["z_m"] > 1
+            and (yaw is None or abs(math.remainder(heading(truth[n]) - yaw, math.tau)) < 0.1)]
+    assert near, f"the vehicle was never at {place} with heading {yaw}"
+    at = near[0]
+    print(f"at {place}, heading {yaw}, at {truth[at]['t_s'] - truth[0]['t_s']:.1f} s")
 assert status["samples_outside"] == 0 and status["state"] == "tracking" and not status["moving"], status
 PYTHON

@@ -7,6 +7,7 @@
 
 #include "core/study/design/imagined.hpp"
 #include "core/study/design/ways.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::study {
 namespace {
@@ -76,14 +77,14 @@ Design design(const Observations& seen, const StudyResult& result, const plan::W
   const Imagination imagination(seen, world.reach.vehicle, surroundings);
   for (const Way& way : ways(world, start_W)) {
     const FlownWay flown = flown_way(world, start_W, way, flight_time);
-    if (flown.points_W.empty()) {
+    if (flown.points.empty()) {
       design.left_out.emplace_back(way.name, flown.why_not);
       continue;
     }
     for (const bool used : {false, true}) {
       if (used && !seen.has(Source::battery)) continue;
       const Observations windows = imagination.windows(flown.commands, used);
-      NextFlight flight{way.name, used, imagination.first_voltage(used), flown.points_W, flown.commands, 0, {}, 0, 0};
+      NextFlight flight{way.name, used, imagination.first_voltage(used), flown.points, flown.commands, 0, {}, 0, 0};
       judge(flight, contests, evidence.next(windows));
       design.flights.push_back(std::move(flight));
     }
@@ -93,12 +94,13 @@ Design design(const Observations& seen, const StudyResult& result, const plan::W
   return design;
 }
 
-std::string points_csv(const std::vector<Vec3>& points_W) {
-  std::string text = "x_m,y_m,z_m\n";
-  char row[96];
-  for (const Vec3& p : points_W) {
-    std::snprintf(row, sizeof row, "%.4f,%.4f,%.4f\n", p.x(), p.y(), p.z());
-    text += row;
+std::string points_csv(const std::vector<Waypoint>& points) {
+  const bool facing = std::ranges::any_of(points, [](const Waypoint& p) { return p.yaw.has_value(); });
+  std::string text = facing ? "x_m,y_m,z_m,yaw_rad\n" : "x_m,y_m,z_m\n";
+  for (const auto& [p, yaw] : points) {
+    text += formatted("%.4f,%.4f,%.4f", p.x(), p.y(), p.z());
+    if (facing) text += yaw ? formatted(",%.4f", *yaw) : ",";
+    text += '\n';
   }
   return text;
 }

@@ -9,6 +9,7 @@
 #include "core/study/design/design_rules.hpp"
 #include "core/study/design/divergence.hpp"
 #include "core/study/findings/study.hpp"
+#include "core/types/waypoint.hpp"
 
 namespace backwash::study {
 
@@ -24,7 +25,7 @@ struct NextFlight {
   std::string name;
   bool used_battery;                         ///< to be begun where the flights at hand ended
   std::optional<double> voltage;             ///< V at take-off
-  std::vector<Vec3> points_W;                ///< m, rows of the points file
+  std::vector<Waypoint> points;              ///< rows of the points file
   std::vector<Setpoint> commands;            ///< 20 ms apart
   double divergence;                         ///< T, nats a flight, over all sets
   std::vector<std::vector<double>> of_pair;  ///< by set and pair: ½ (T_ij + T_ji), nats a flight
@@ -47,7 +48,7 @@ struct Design {
 Design design(const Observations& seen, const StudyResult& result, const plan::World& world, const Model& model,
               const Vec3& start_W, double flight_time = kDesignRules.design_flight_time);
 
-/// As `backwashctl follow` reads it (docs/interfaces.md, "Points CSV").
-std::string points_csv(const std::vector<Vec3>& points_W);
+/// As `backwashctl follow` reads it (docs/interfaces.md, "Points CSV"). Headings have a column where there is one.
+std::string points_csv(const std::vector<Waypoint>& points);
 
 }  // namespace backwash::study

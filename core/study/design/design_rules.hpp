@@ -12,6 +12,7 @@ struct DesignRules {
   Rule design_flight_time{"design_flight_time", 90, "s",
                           "derived: manoeuvre_windows windows, as the flights of the campaigns"};
   Rule design_most_rows{"design_most_rows", 64, "rows", "derived: what backwashctl follow takes"};
+  Rule design_most_facing{"design_most_facing", 32, "rows", "derived: what it takes of places with headings"};
   Rule design_separated{"design_separated", 0.9, "1",
                         "chosen: the probability with which the told number of flights separates"};
   Rule design_most_flights{"design_most_flights", 40, "flights",

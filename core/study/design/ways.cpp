@@ -104,7 +104,11 @@ class List {
   }
 
  private:
-  void add(std::string name, Points points) { ways_.push_back({std::move(name), std::move(points), {}}); }
+  void add(std::string name, const Points& points) {
+    std::vector<Waypoint> way;
+    for (const Vec3& p : points) way.push_back({p, {}});
+    ways_.push_back({std::move(name), std::move(way), {}});
+  }
   void cannot(std::string name, std::string why) { ways_.push_back({std::move(name), {}, std::move(why)}); }
   Vec3 low() const { return room_.end({0, 0, -1}); }
   Vec3 high() const { return room_.end({0, 0, 1}); }
@@ -145,6 +149,22 @@ class List {
            upper = ring(high(), kDesignRules.design_small_side, 4);
     squares.insert(squares.end(), upper.begin(), upper.end());
     add("turn the heading on squares, low and high", squares);
+    turns_on_the_spot();
+  }
+  /// Each place with all headings, or with one of them in turn.
+  void turns_on_the_spot() {
+    const std::string name = "turn the heading on the spot, ";
+    for (const auto& [step, parts] : {std::pair{"by a quarter", 4}, {"by a third", 3}, {"to and fro", 2}})
+      ways_.push_back({name + step, headings({open_}, parts), {}});
+    ways_.push_back({name + "by a quarter, low and high", headings({low(), high()}, 4), {}});
+    ways_.push_back({name + "to and fro, low and high", headings({low(), high()}, 2), {}});
+  }
+  /// The parts of a whole turn, at each of the places in turn. The start's own heading is the last one.
+  static std::vector<Waypoint> headings(const Points& places, int parts) {
+    std::vector<Waypoint> points;
+    for (int k = 1; k <= parts; ++k)
+      for (const Vec3& p : places) points.push_back({p, std::remainder(2 * M_PI * k / parts, 2 * M_PI)});
+    return points;
   }
   void ceilings() {
     const std::string name = "hover 0.25, 0.5 and 1 m below the ceiling";
