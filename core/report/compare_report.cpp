@@ -47,7 +47,7 @@ std::string table_one(const Comparison& c) {
                     formatted("%zu", row.contacts), no_path(row),
                     formatted("%zu of %zu", row.solved_of_eligible, row.eligible),
                     formatted("%zu of %zu", row.outside, row.samples), formatted("%.0f", row.flown_m),
-                    formatted("%.0f / %.0f", row.planning_ms_median, row.planning_ms_p95)});
+                    c.timed ? formatted("%.0f / %.0f", row.planning_ms_median, row.planning_ms_p95) : "not timed"});
   }
   const auto head = {std::string("method"),
                      std::string("length, m"),

@@ -22,6 +22,7 @@ struct Comparison {
   std::uint64_t seed;
   std::size_t flights;  ///< pairs a scene and vehicle
   std::string version;
+  bool timed = true;  ///< planning times were taken, and are shown
 };
 
 /// Jerk² of the proposed method over a margin in the paper's Table I; nothing for margins that it does not have.

@@ -25,7 +25,7 @@ Json to_json(const sim::MethodRatio& ratio) {
   return json;
 }
 
-Json to_json(const sim::MethodRow& row, const sim::CompareMethod& method) {
+Json to_json(const sim::MethodRow& row, const sim::CompareMethod& method, bool timed) {
   Json common;
   for (std::size_t i = 0; i < sim::kMeasures; ++i) common[sim::name(static_cast<sim::Measure>(i))] = row.common[i];
   const auto paper = report::paper_jerk2_ratio(method);
@@ -46,7 +46,7 @@ Json to_json(const sim::MethodRow& row, const sim::CompareMethod& method) {
           {"samples_outside", row.outside},
           {"min_clearance_m", flew ? Json(row.smallest_clearance_m) : Json()},
           {"largest_error_over_bound", flew && sets ? Json(row.largest_ratio) : Json()},
-          {"planning_ms", {{"median", row.planning_ms_median}, {"p95", row.planning_ms_p95}}},
+          {"planning_ms", timed ? Json{{"median", row.planning_ms_median}, {"p95", row.planning_ms_p95}} : Json()},
           {"common", std::move(common)},
           {"first_over_this",
            {{"common", to_json(row.on_common)},
@@ -60,6 +60,13 @@ Json to_json(const sim::GapCampaign& gap) {
           {"samples_outside", gap.outside}, {"largest_error_over_bound", axes(gap.largest_ratio)}};
 }
 
+/// As the other numbers of the table.
+std::string shown(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", value);
+  return text;
+}
+
 std::string interval(const sim::Interval& r) {
   if (!r.known()) return to_text(r.value, 2) + " (one pair)";
   return to_text(r.value, 2) + " (" + to_text(r.low, 2) + ".." + to_text(r.high, 2) + ")";
@@ -69,7 +76,7 @@ std::string interval(const sim::Interval& r) {
 
 Json to_json(const report::Comparison& c) {
   Json methods = Json::array(), scenes = Json::array(), demands = Json::array(), gaps = Json::array();
-  for (std::size_t m = 0; m < c.methods.size(); ++m) methods.push_back(to_json(c.table.rows[m], c.methods[m]));
+  for (std::size_t m = 0; m < c.methods.size(); ++m) methods.push_back(to_json(c.table.rows[m], c.methods[m], c.timed));
   for (const auto& scene : c.scenes) {
     Json solved, contacts;
     for (const auto& row : sim::tabulate(std::span(&scene, 1), c.methods, c.seed).rows)
@@ -97,10 +104,10 @@ void print_text(const report::Comparison& c) {
   std::printf("%-12s %9s %8s %10s %9s %9s %8s %9s %9s %8s %12s\n", "method", "length m", "time s", "jerk2", "energy kJ",
               "contacts", "no path", "outside", "samples", "flown m", "planning ms");
   for (const auto& row : c.table.rows) {
-    std::printf("%-12s %9.1f %8.1f %10.1f %9.2f %9zu %8zu %9zu %9zu %8.0f %12.0f\n", row.method.c_str(),
+    std::printf("%-12s %9.1f %8.1f %10.1f %9.2f %9zu %8zu %9zu %9zu %8.0f %12s\n", row.method.c_str(),
                 row.common[sim::kLength], row.common[sim::kTime], row.common[sim::kJerk2],
                 row.common[sim::kEnergy] / 1000, row.contacts, row.pairs - row.solved, row.outside, row.samples,
-                row.flown_m, row.planning_ms_median);
+                row.flown_m, c.timed ? to_text(row.planning_ms_median, 0).c_str() : "not timed");
   }
   for (std::size_t m = 1; m < c.methods.size(); ++m) {
     const auto& row = c.table.rows[m];
@@ -132,6 +139,7 @@ std::string to_csv(const report::Comparison& c) {
          "jerk2,flown_m,flown_jerk2,energy_J,clearance_m,samples,contact_samples,outside_samples,ratio_x,ratio_y,ratio_"
          "z,"
          "planning_ms\n";
+  const auto planning = [&](const sim::RouteOutcome& o) { return c.timed ? shown(o.planning_ms) : ""; };
   for (const auto& scene : c.scenes)
     for (std::size_t m = 0; m < c.methods.size(); ++m)
       for (std::size_t n = 0; n < scene.pairs.size(); ++n) {
@@ -141,14 +149,14 @@ std::string to_csv(const report::Comparison& c) {
         for (const Vec3& p : {pair.start_W, pair.goal_W}) csv << ',' << p.x() << ',' << p.y() << ',' << p.z();
         csv << ',' << plan::to_string(o.status);
         if (o.status != plan::PlanStatus::ok) {
-          csv << ",,,,,,,,,,,,,," << o.planning_ms << '\n';
+          csv << ",,,,,,,,,,,,,," << planning(o) << '\n';
           continue;
         }
         csv << ',' << o.planned.length_m << ',' << o.planned.time_s << ',' << o.planned.jerk2 << ',' << o.flown_m << ','
             << o.flown_jerk2 << ',' << o.energy_J << ',' << o.clearance_m << ',' << o.samples << ',' << o.contacts
             << ',' << o.outside;
         for (int axis = 0; axis < 3; ++axis) csv << ',' << o.largest_ratio[axis];
-        csv << ',' << o.planning_ms << '\n';
+        csv << ',' << planning(o) << '\n';
       }
   return csv.str();
 }

@@ -9,6 +9,18 @@
 #include <vector>
 
 namespace backwash {
+namespace {
+
+std::atomic<unsigned> most_threads{0};
+
+unsigned thread_count() {
+  const unsigned all = std::max(1u, std::thread::hardware_concurrency()), most = most_threads;
+  return most == 0 ? all : std::min(all, most);
+}
+
+}  // namespace
+
+void limit_threads(unsigned most) noexcept { most_threads = most; }
 
 void run_parallel(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
   const std::size_t chunk = std::clamp<std::size_t>(count / 64, 1, 1024);  // balances rooms against walls
@@ -25,7 +37,7 @@ void run_parallel(std::size_t count, const std::function<void(std::size_t, std::
   };
   {
     std::vector<std::jthread> threads;
-    for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(loop);
+    for (unsigned i = 1, most = thread_count(); i < most; ++i) threads.emplace_back(loop);
     loop();
   }
   if (failure) std::rethrow_exception(failure);

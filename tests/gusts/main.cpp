@@ -64,6 +64,16 @@ Trial trial_of(const Air& air, Form form, bool told, std::uint64_t seed, std::si
   return trial;
 }
 
+/// One flight without a change, the `number`-th of all airs and forms in turn, as a line of JSON.
+void print_row(bool told, double seconds, std::uint64_t seed, std::size_t number) {
+  const std::size_t air = number / kForms.size() % kAirs.size(), form = number % kForms.size();
+  auto trial = trial_of(kAirs[air], kForms[form], told, seed, number);
+  trial.seconds = seconds;
+  const auto learned = fly(trial);
+  std::printf("{\"number\": %zu, \"air\": \"%s\", \"form\": \"%s\", \"alarm\": %s}\n", number, kAirs[air].name.c_str(),
+              kFormNames[form], learned.alarm_s ? "true" : "false");
+}
+
 bool null_gate(bool told, std::size_t flights, double seconds, std::uint64_t seed, int jobs) {
   std::size_t all = 0, alarms_all = 0, number = 0;
   std::printf("no change, tau 0.14 ... 0.16 s, %.0f s\n%-26s%-14s%8s%8s%10s%10s\n", seconds, "air", "form", "flights",
@@ -138,13 +148,16 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 20261123;
   int jobs = 2;
   bool told = false;
+  std::optional<std::uint64_t> row;
   app.add_flag("--form-told", told, "the form of the gusts is known");
   app.add_option("--flights", flights, "without a change").capture_default_str();
   app.add_option("--changed", changed, "flights of each cell with one").capture_default_str();
   app.add_option("--seconds", seconds, "of a flight without a change").capture_default_str();
   app.add_option("--seed", seed, "of the first flight").capture_default_str();
   app.add_option("--jobs", jobs, "threads").capture_default_str();
+  app.add_option("--row", row, "only the flight without a change of this number, as a line of JSON");
   if (const auto code = app.parse(argc, argv)) return *code;
+  if (row) return print_row(told, seconds, seed, *row), 0;
   std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
   const bool null = null_gate(told, flights, seconds, seed, jobs);
   const bool power = power_gate(told, changed, seed + 1000000, jobs);

@@ -35,7 +35,7 @@ for m in methods:
     ms = m["planning_ms"]
     row(f"`{m['method']}`", f"{m['flown_m']:.0f}", str(m["contacts"]), f"{m['no_path']} ({ends})",
         f"{m['solved_of_eligible']} of {m['eligible']}", f"{m['samples_outside']} of {m['samples']}",
-        f"{ms['median']:.0f} / {ms['p95']:.0f}")
+        f"{ms['median']:.0f} / {ms['p95']:.0f}" if ms else "not timed")
 
 print(f"\nRatios, `{first}` over the method, on the pairs that all solve and on those that both solve:\n")
 header("over", "pairs", "jerk², totals", "the paper's", "jerk², geometric mean", "shape, geometric mean", "length", "time",

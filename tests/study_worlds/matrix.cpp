@@ -23,7 +23,7 @@ struct Options {
   std::vector<double> sizes = {1};
   std::vector<std::string> cells, from;
   std::string out, markdown;
-  bool gate = false, null_size = false;
+  bool gate = false, null_size = false, rows = false, names = false;
 };
 
 /// The one size, or log-uniform between the two by the world's seed.
@@ -54,7 +54,9 @@ std::vector<WorldOutcome> run(const Options& options) {
   in_parallel(options.jobs, chosen.size() * static_cast<std::size_t>(options.worlds), [&](std::size_t k, auto& folder) {
     const std::uint64_t seed = options.seed + k / chosen.size();
     auto outcome = score(chosen[k % chosen.size()], seed, size_of(options, seed), options.flights, folder);
+    if (options.rows) outcome.study_s = outcome.world_s = 0;
     const std::lock_guard lock(writing);
+    if (options.rows) std::printf("%s\n", to_json(outcome).dump().c_str());
     if (out) out << to_json(outcome).dump() << std::endl;
     outcomes.push_back(std::move(outcome));
   });
@@ -71,6 +73,11 @@ std::vector<WorldOutcome> read(const std::vector<std::string>& files) {
 }
 
 int report(const Options& options) {
+  if (options.names) {
+    for (const auto& cell : cells()) std::printf("%s\n", cell.name.c_str());
+    return 0;
+  }
+  if (options.rows) return run(options), 0;
   const auto outcomes = options.from.empty() ? run(options) : read(options.from);
   const auto summary = summarise(outcomes);
   const std::string page = markdown(summary, outcomes);
@@ -96,10 +103,12 @@ int main(int argc, char** argv) {
   app.add_option("--out", options.out, "JSON lines, appended to");
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
   app.add_option("--markdown", options.markdown, "writes the tables there too");
+  app.add_flag("--rows", options.rows, "prints the worlds as lines of JSON, times as 0, and nothing else");
+  app.add_flag("--names", options.names, "prints the names of all cells, and nothing else");
   app.add_flag("--gate", options.gate, "exit 1 when a gate is missed");
   app.add_flag("--null-size", options.null_size, "instead: how often each channel rejects regressors without effect");
   if (const auto code = app.parse(argc, argv)) return *code;
-  if (options.from.empty())
+  if (options.from.empty() && !options.rows && !options.names)
     std::printf("seed %llu, %d worlds a cell, %d flights\n\n", static_cast<unsigned long long>(options.seed),
                 options.worlds, options.flights);
   if (!options.null_size) return report(options);
