@@ -2,6 +2,8 @@
 #include "core/field/disturbance_field.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cassert>
 #include <cmath>
 #include <optional>
 
@@ -90,11 +92,27 @@ Breakdown ProximityField::at(const Vec3& p_W) const {
   return b;
 }
 
-DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid)
+DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels)
     : origin_W_(grid.origin()),
       resolution_(grid.resolution()),
       size_(grid.size()),
-      sigma_(grid.cell_count(), {-1, 0, 0, 0, 0, 0}) {}
+      listed_((grid.cell_count() + kWord - 1) / kWord) {
+  for (const std::size_t n : voxels) listed_[n / kWord] |= std::uint64_t{1} << n % kWord;
+  std::uint32_t count = 0;
+  before_.reserve(listed_.size());
+  for (const std::uint64_t word : listed_) {
+    before_.push_back(count);
+    count += static_cast<std::uint32_t>(std::popcount(word));
+  }
+  sigma_.assign(count, {-1, 0, 0, 0});
+}
+
+DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels,
+                                   const DisturbanceField& old, const map::VoxelBox& anew)
+    : DisturbanceField(grid, voxels) {
+  for (const std::size_t n : voxels)
+    if (old.has(n) && !anew.contains(voxel(n))) sigma_[slot(n)] = old.sigma_[old.slot(n)];
+}
 
 void DisturbanceField::fill(const ProximityField& exact, std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) set(n, exact.at(exact.grid().center(exact.grid().voxel(n))).sigma());
@@ -106,34 +124,35 @@ void DisturbanceField::fill(const WholeField& whole, std::size_t begin, std::siz
 
 void DisturbanceField::scale(const Extension& extension, std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) {
-    if (sigma_[n][0] < 0) continue;
-    const auto x = static_cast<std::size_t>(size_.x()), y = static_cast<std::size_t>(size_.y());
-    const Index3 v(static_cast<int>(n % x), static_cast<int>(n / x % y), static_cast<int>(n / (x * y)));
-    const auto factor = static_cast<float>(std::exp(extension.at(v).ln_variance));
-    for (float& s : sigma_[n]) s *= factor;
+    if (!has(n)) continue;
+    const auto factor = static_cast<float>(std::exp(extension.at(voxel(n)).ln_variance));
+    for (float& s : sigma_[slot(n)]) s *= factor;
   }
 }
 
 void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
-  sigma_[n] = {static_cast<float>(s.xx), static_cast<float>(s.xy), static_cast<float>(s.xz),
-               static_cast<float>(s.yy), static_cast<float>(s.yz), static_cast<float>(s.zz)};
+  assert(listed(n) && s.xz == 0 && s.yz == 0);
+  sigma_[slot(n)] = {static_cast<float>(s.xx), static_cast<float>(s.xy), static_cast<float>(s.yy),
+                     static_cast<float>(s.zz)};
 }
 
-std::size_t DisturbanceField::linear(const Index3& v) const noexcept { return map::linear(size_, v); }
+std::size_t DisturbanceField::slot(std::size_t n) const noexcept {
+  const std::uint64_t lower = (std::uint64_t{1} << n % kWord) - 1;
+  return before_[n / kWord] + static_cast<std::size_t>(std::popcount(listed_[n / kWord] & lower));
+}
 
-void DisturbanceField::clear(const map::VoxelBox& box) noexcept {
-  for (int k = box.low.z(); k <= box.high.z(); ++k)
-    for (int j = box.low.y(); j <= box.high.y(); ++j)
-      for (int i = box.low.x(); i <= box.high.x(); ++i) sigma_[linear({i, j, k})] = {-1, 0, 0, 0, 0, 0};
+Index3 DisturbanceField::voxel(std::size_t n) const noexcept {
+  const auto x = static_cast<std::size_t>(size_.x()), y = static_cast<std::size_t>(size_.y());
+  return {static_cast<int>(n % x), static_cast<int>(n / x % y), static_cast<int>(n / (x * y))};
 }
 
 bool DisturbanceField::has(const Index3& v) const noexcept {
-  return map::inside(size_, v) && sigma_[linear(v)][0] >= 0;
+  return map::inside(size_, v) && has(map::linear(size_, v));
 }
 
 Variance DisturbanceField::at(const Index3& v) const noexcept {
-  const auto& s = sigma_[linear(v)];
-  return {s[0], s[1], s[2], s[3], s[4], s[5]};
+  const Stored& s = sigma_[slot(map::linear(size_, v))];
+  return {s[0], s[1], 0, s[2], 0, s[3]};
 }
 
 Variance DisturbanceField::interpolated(const Vec3& p_W, const Variance& fallback) const noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -42,41 +43,49 @@ class ProximityField {
   ElementBuckets up_, lateral_;
 };
 
-/// Σ stored at free voxel centres, (m/s²)² (docs/model.md section 2, last paragraph).
+/// Σ stored at free voxel centres, (m/s²)² (docs/model.md section 2, last paragraph): xx, xy, yy and zz in single
+/// precision at the listed voxels alone, since xz and yz are zero in every term of the model. 16 bytes per listed
+/// voxel, 3/16 per voxel of the grid.
 class DisturbanceField {
  public:
-  /// Empty field over the grid's extent: every voxel's Σ is unset.
-  explicit DisturbanceField(const map::OccupancyGrid& grid);
+  /// Room for Σ at the listed voxels (linear indices of the grid, any order), where it is unset. O(voxels of the grid).
+  DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels);
+  /// The same, with Σ of `old` at those listed voxels outside the box `anew` where it has one. With affected_columns()
+  /// and fill(), a field follows its map, bit for bit as if it were made anew. Precondition: of grids of one size.
+  DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels, const DisturbanceField& old,
+                   const map::VoxelBox& anew);
 
-  /// Evaluates Σ at the centres of the listed free voxels (linear indices of the grid). Distinct voxels may be filled
-  /// from several threads at once.
+  /// Evaluates Σ at the centres of some of the listed voxels. Distinct ones may be filled from several threads at once.
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
 
-  /// Multiplies Σ at the listed voxels, where it is stored, by the factor that an extended model has there.
+  /// Multiplies Σ at the given voxels, where it is stored, by the factor that an extended model has there.
   void scale(const Extension& extension, std::span<const std::size_t> voxels);
 
-  /// Unsets Σ in a box of voxels inside the grid. With affected_columns() and fill(), a field follows its map, bit for
-  /// bit as if it were made anew.
-  void clear(const map::VoxelBox& box) noexcept;
-
-  /// Whether Σ is stored at a voxel; false outside the grid.
+  /// Whether Σ is stored at a voxel; false outside the grid. Real-time: wait-free, no allocation.
   bool has(const Index3& v) const noexcept;
-  /// Σ at a voxel centre. Precondition: has(v).
+  /// Σ at a voxel centre. Precondition: has(v). Real-time: wait-free, no allocation.
   Variance at(const Index3& v) const noexcept;
   /// Trilinear interpolation, weights of the stored voxels renormalised; `fallback` where none of the eight is stored.
   /// Real-time: wait-free, no allocation.
   Variance interpolated(const Vec3& p_W, const Variance& fallback) const noexcept;
 
  private:
+  using Stored = std::array<float, 4>;  // xx, xy, yy, zz; xx < 0: not filled
+  static constexpr std::size_t kWord = 64;
   void set(std::size_t n, const Variance& s) noexcept;
-  std::size_t linear(const Index3& v) const noexcept;
+  bool listed(std::size_t n) const noexcept { return listed_[n / kWord] >> n % kWord & 1; }
+  std::size_t slot(std::size_t n) const noexcept;  // of a listed voxel in sigma_
+  bool has(std::size_t n) const noexcept { return listed(n) && sigma_[slot(n)][0] >= 0; }
+  Index3 voxel(std::size_t n) const noexcept;
 
   Vec3 origin_W_;
   double resolution_;
   Index3 size_;
-  std::vector<std::array<float, 6>> sigma_;  // xx < 0: not stored
+  std::vector<std::uint64_t> listed_;  // a bit per voxel of the grid
+  std::vector<std::uint32_t> before_;  // per word: listed voxels in the words before it
+  std::vector<Stored> sigma_;          // of the listed voxels
 };
 
 }  // namespace backwash::field

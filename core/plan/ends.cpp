@@ -57,7 +57,7 @@ reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& mod
   const map::DistanceField distance(part);
   std::vector<std::size_t> voxels = voxels_for_centre(part, distance, reach.vehicle);
   std::erase_if(voxels, [&](std::size_t n) { return !read.contains(needed.low + part.voxel(n)); });
-  field::DisturbanceField field(part);
+  field::DisturbanceField field(part, voxels);
   const field::WholeField whole(part, model, voxels);
   field.fill(whole, 0, whole.block_count());
   const reach::BoundField bounds(part, field, model.bound);

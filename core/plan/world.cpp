@@ -87,7 +87,7 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
   map::OccupancySums sums(grid);
 
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
-  field::DisturbanceField field(grid);
+  field::DisturbanceField field(grid, voxels);
   fill_field(field, grid, vehicle_model, voxels, parallel);
   field::Extension air(grid, vehicle_model);
   extend(air, field, grid, voxels, voxels, parallel);
@@ -131,8 +131,7 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, old.reach.vehicle);
 
   const map::VoxelBox columns = field::affected_columns(grid, vehicle_model, changed);
-  field::DisturbanceField field = old.field;
-  field.clear(columns);
+  field::DisturbanceField field(grid, voxels, old.field, columns);
   fill_field(field, grid, vehicle_model, field::voxels_within(grid, voxels, columns), parallel);
 
   field::Extension air = old.bounds.extension();

@@ -94,7 +94,7 @@ std::vector<Value> interpolated(const field::ProximityField& exact, const std::v
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (wanted[i]) voxels.push_back(i);
   }
-  field::DisturbanceField stored(grid);
+  field::DisturbanceField stored(grid, voxels);
   const field::WholeField whole(grid, exact.model(), voxels);
   run_shown(whole.block_count(), [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); });
   field::Extension extension(grid, exact.model());

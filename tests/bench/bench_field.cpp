@@ -73,7 +73,7 @@ void stored_lookup(benchmark::State& state) {
   const double naive_us = naive_microseconds(grid);
   const auto voxels = bench::free_voxels(grid);
   const field::WholeField whole(grid, {}, voxels);
-  field::DisturbanceField stored(grid);
+  field::DisturbanceField stored(grid, voxels);
   stored.fill(whole, 0, whole.block_count());
   const auto points = bench::free_points(grid, 4096);
   std::size_t n = 0;
@@ -97,7 +97,7 @@ void whole_field_of(benchmark::State& state, const OccupancyGrid& grid, bool par
   const auto voxels = bench::free_voxels(grid);
   const auto begun = std::clock();
   for (auto _ : state) {
-    field::DisturbanceField stored(grid);
+    field::DisturbanceField stored(grid, voxels);
     const field::WholeField whole(grid, {}, voxels);
     const auto fill = [&](std::size_t begin, std::size_t end) { stored.fill(whole, begin, end); };
     parallel ? backwash::run_parallel(whole.block_count(), fill) : fill(0, whole.block_count());
@@ -130,7 +130,7 @@ void whole_field_turned(benchmark::State& state) {
   const auto evaluate = [](const OccupancyGrid& grid) {
     const auto voxels = bench::free_voxels(grid);
     const auto begun = std::clock();
-    field::DisturbanceField stored(grid);
+    field::DisturbanceField stored(grid, voxels);
     const field::WholeField whole(grid, {}, voxels);
     stored.fill(whole, 0, whole.block_count());
     benchmark::DoNotOptimize(stored.has(Index3::Zero()));
@@ -158,7 +158,7 @@ void slice(benchmark::State& state) {
   const double query_us = microseconds(some, [&](const Vec3& p) { return exact.at(p); });
   const auto begun = std::clock();
   for (auto _ : state) {
-    field::DisturbanceField stored(grid);
+    field::DisturbanceField stored(grid, voxels);
     const field::WholeField whole(grid, {}, voxels);
     stored.fill(whole, 0, whole.block_count());
     benchmark::DoNotOptimize(stored.has(Index3::Zero()));
@@ -187,7 +187,7 @@ void two_threads(benchmark::State& state) {
   const auto clock = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
   double prepared = 0, at_once = 0, one_by_one = 0, longer = 0, longest = 0;
   for (auto _ : state) {
-    field::DisturbanceField stored(grid);
+    field::DisturbanceField stored(grid, voxels);
     const double begun = clock();
     const field::WholeField whole(grid, {}, voxels);
     const double filling = clock();
@@ -217,7 +217,7 @@ void interpolation(benchmark::State& state) {
   if (!grid) return state.SkipWithError("geb079.bt is absent");
   const backwash::map::DistanceField distance(*grid);
   const field::ProximityField exact(*grid, {});
-  field::DisturbanceField stored(*grid);
+  field::DisturbanceField stored(*grid, bench::free_voxels(*grid));
   std::vector<double> deviations;
   double largest = -1;
   Vec3 where = Vec3::Zero();
@@ -258,15 +258,16 @@ void region_update(benchmark::State& state) {
     const field::WholeField whole(grid, {}, part);
     stored.fill(whole, 0, whole.block_count());
   };
-  field::DisturbanceField stored(before);
+  field::DisturbanceField stored(before, bench::free_voxels(before));
   const auto rebuild = std::clock();
   fill(stored, before, bench::free_voxels(before));
   const auto rebuild_clocks = static_cast<double>(std::clock() - rebuild);
   const auto begun = std::clock();
   for (auto _ : state) {
     const auto columns = field::affected_columns(after, {}, test::changed_box(before, after));
-    stored.clear(columns);
-    fill(stored, after, field::voxels_within(after, bench::free_voxels(after), columns));
+    const auto voxels = bench::free_voxels(after);
+    field::DisturbanceField updated(after, voxels, stored, columns);
+    fill(updated, after, field::voxels_within(after, voxels, columns));
   }
   state.counters["of_rebuild"] =
       static_cast<double>(std::clock() - begun) / static_cast<double>(state.iterations()) / rebuild_clocks;

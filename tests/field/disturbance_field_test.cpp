@@ -39,7 +39,7 @@ Mat3 hat_average(const OccupancyGrid& grid, const ProximityField& exact, const V
 TEST(DisturbanceField, InterpolatesWithTheWeightsOfFreeVoxelsRenormalised) {
   const OccupancyGrid grid = scene::random_map(3, 0.15);
   const ProximityField exact(grid, Model{});
-  DisturbanceField field(grid);
+  DisturbanceField field(grid, free_voxels(grid));
   field.fill(exact, free_voxels(grid));
   std::mt19937 random(1);
   std::uniform_real_distribution<double> u(-0.1, 1.1);
@@ -59,8 +59,8 @@ TEST(DisturbanceField, InterpolatesWithTheWeightsOfFreeVoxelsRenormalised) {
 TEST(DisturbanceField, HoldsTheExactValueAtTheCentresOfFilledVoxelsOnly) {
   const OccupancyGrid grid = scene::random_map(4, 0.15);
   const ProximityField exact(grid, Model{});
-  DisturbanceField field(grid);
   const auto voxels = free_voxels(grid);
+  DisturbanceField field(grid, voxels);
   field.fill(exact, std::span(voxels).first(voxels.size() / 2));
   for (std::size_t n = 0; n < voxels.size(); ++n) {
     const Index3 v = grid.voxel(voxels[n]);
@@ -78,7 +78,7 @@ TEST(DisturbanceField, HoldsTheExactValueAtTheCentresOfFilledVoxelsOnly) {
 
 TEST(DisturbanceField, GivesTheFallbackWhereNothingIsStored) {
   const OccupancyGrid grid(Vec3::Zero(), 0.1, Index3(5, 5, 5), Cell::free);
-  DisturbanceField field(grid);
+  DisturbanceField field(grid, free_voxels(grid));
   const Vec3 inside(0.22, 0.27, 0.31);
   EXPECT_EQ(field.interpolated(inside, kFallback).zz, 9);
   const ProximityField exact(grid, Model{});

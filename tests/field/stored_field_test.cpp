@@ -47,7 +47,7 @@ TEST(StoredField, EqualsBruteForceOnRandomMaps) {
     const Model model = models()[seed % 3];
     const auto voxels = free_voxels(grid);
     const WholeField whole(grid, model, voxels);
-    DisturbanceField field(grid);
+    DisturbanceField field(grid, voxels);
     field.fill(whole, 0, whole.block_count());
     const auto pieces = oracle::pieces(grid);
     const auto occupied = oracle::occupied_centers(grid);
@@ -88,7 +88,7 @@ void expect_exact_at_samples(const OccupancyGrid& grid, std::size_t samples) {
   std::shuffle(voxels.begin(), voxels.end(), std::mt19937(7));
   voxels.resize(samples);
   const WholeField whole(grid, model, voxels);
-  DisturbanceField field(grid);
+  DisturbanceField field(grid, voxels);
   field.fill(whole, 0, whole.block_count());
   for (const std::size_t n : voxels) {
     const Index3 q = grid.voxel(n);
@@ -122,7 +122,7 @@ TEST(StoredField, EqualsTheExactFieldInTheTwoLayersOfASliceOfATurnedRoom) {
   std::erase_if(voxels, [&](std::size_t n) { return grid.voxel(n).z() < 11 || grid.voxel(n).z() > 12; });
   ASSERT_GT(voxels.size(), 500u);
   const WholeField whole(grid, Model{}, voxels);
-  DisturbanceField by_blocks(grid), one_by_one(grid);
+  DisturbanceField by_blocks(grid, voxels), one_by_one(grid, voxels);
   by_blocks.fill(whole, 0, whole.block_count());
   one_by_one.fill(ProximityField(grid, Model{}), voxels);
   std::mt19937 random(3);
@@ -195,13 +195,14 @@ void expect_update_equals_rebuild(const OccupancyGrid& before, const OccupancyGr
     const WholeField whole(grid, Model{}, voxels);
     field.fill(whole, 0, whole.block_count());
   };
-  DisturbanceField updated(before), rebuilt(after);
-  store(updated, before, free_voxels(before)), store(rebuilt, after, free_voxels(after));
-  const DisturbanceField old = updated;
+  DisturbanceField old(before, free_voxels(before)), rebuilt(after, free_voxels(after));
+  store(old, before, free_voxels(before)), store(rebuilt, after, free_voxels(after));
   const auto changed = test::changed_box(before, after);
   ASSERT_FALSE(changed.empty());
   const map::VoxelBox columns = affected_columns(after, Model{}, changed);
-  updated.clear(columns);
+  DisturbanceField updated(after, free_voxels(after), old, columns);
+  for (const std::size_t n : voxels_within(after, free_voxels(after), columns))
+    EXPECT_FALSE(updated.has(after.voxel(n)));
   store(updated, after, voxels_within(after, free_voxels(after), columns));
   std::size_t stored = 0, differ = 0;
   for (std::size_t n = 0; n < after.cell_count(); ++n) {

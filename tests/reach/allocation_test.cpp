@@ -65,7 +65,7 @@ TEST(RealTime, PushesAndBoundsOfAnExtendedModelDoNotAllocate) {
   model.extension = {{Law::push_under_surface, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
                      {Law::push_to_walls, Vec3(0.3, 0, 0), Vec3::Zero(), 0.2},
                      {Law::ln_variance_with_speed, Vec3(0.5, 0, 0), Vec3::Zero(), 2}};
-  field::DisturbanceField field(grid);
+  field::DisturbanceField field(grid, voxels);
   field.fill(field::ProximityField(grid, model), voxels);
   field::Extension extension(grid, model);
   extension.fill(grid, voxels);

@@ -27,7 +27,7 @@ Scene random_scene(std::mt19937& random, const Index3& size, double resolution) 
       voxels.push_back(n);
     }
   }
-  field::DisturbanceField field(grid);
+  field::DisturbanceField field(grid, voxels);
   field.fill(field::ProximityField(grid, Model{}), voxels);
   return {std::move(grid), std::move(field)};
 }

@@ -227,7 +227,7 @@ TEST(ChanceTube, OverAFieldCoversTheVarianceOfEveryVoxelItsSetReaches) {
   std::vector<std::size_t> voxels;
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (grid.at(n) == map::Cell::free) voxels.push_back(n);
-  field::DisturbanceField field(grid);
+  field::DisturbanceField field(grid, voxels);
   Model model;
   model.bound = {3, 0.1, 0.05, 0.15};
   field.fill(field::ProximityField(grid, model), voxels);

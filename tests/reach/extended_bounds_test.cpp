@@ -27,8 +27,18 @@ Model pushing_model() {
 
 /// 1.6 × 2 × 1.6 m with a floor, a ceiling and a wall at y = 2 m; everything free is stored.
 struct ExtendedScene {
-  ExtendedScene() : grid(Vec3::Zero(), 0.1, Index3(16, 20, 16), map::Cell::free), field(grid), extension(grid, model) {
-    std::vector<std::size_t> voxels;
+  ExtendedScene()
+      : grid(Vec3::Zero(), 0.1, Index3(16, 20, 16), map::Cell::free), field(stored()), extension(grid, model) {
+    extension.fill(grid, voxels);
+  }
+  Model model = pushing_model();
+  map::OccupancyGrid grid;
+  std::vector<std::size_t> voxels;
+  field::DisturbanceField field;
+  field::Extension extension;
+
+ private:
+  field::DisturbanceField stored() {
     for (std::size_t n = 0; n < grid.cell_count(); ++n) {
       const Index3 v = grid.voxel(n);
       if (v.z() == 0 || v.z() == 15 || v.y() == 19)
@@ -36,13 +46,10 @@ struct ExtendedScene {
       else
         voxels.push_back(n);
     }
-    field.fill(field::ProximityField(grid, model), voxels);
-    extension.fill(grid, voxels);
+    field::DisturbanceField result(grid, voxels);
+    result.fill(field::ProximityField(grid, model), voxels);
+    return result;
   }
-  Model model = pushing_model();
-  map::OccupancyGrid grid;
-  field::DisturbanceField field;
-  field::Extension extension;
 };
 
 /// Largest distance from `push` that the disturbance may have in the voxels from low to high, by its definition.

@@ -55,7 +55,7 @@ HoverScene make_scene(const Model& model) {
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     if (grid.at(n) == map::Cell::free) voxels.push_back(n);
   }
-  field::DisturbanceField field(grid);
+  field::DisturbanceField field(grid, voxels);
   field.fill(field::ProximityField(grid, model), voxels);
   map::DistanceField distance(grid);
   BoundField bounds(grid, field, model.bound);
@@ -179,7 +179,7 @@ TEST(HoverSet, ClearanceInTheOpenIsExactUpToItsCapOfOneMetre) {
   const Reachability reach(test_vehicle(), Method::tight, Loop::continuous);
   std::vector<std::size_t> voxels(grid.cell_count());
   std::iota(voxels.begin(), voxels.end(), 0u);
-  field::DisturbanceField field(grid);
+  field::DisturbanceField field(grid, voxels);
   field.fill(field::ProximityField(grid, Model{}), voxels);
   int capped = 0, near_cap = 0;
   for (const double kappa : {0.0, 3.0}) {

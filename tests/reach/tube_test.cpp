@@ -39,20 +39,24 @@ std::vector<Setpoint> straight(const Vec3& from, const Vec3& to, double speed, s
 
 // A corridor of 1.2 m between walls that face y, with Σ at every free voxel; the variance rises towards the walls.
 struct Corridor {
-  Corridor() : grid(Vec3(0, -1, 0), 0.1, Index3(30, 20, 20), map::Cell::free), field(grid) {
-    for (int x = 0; x < 30; ++x)
-      for (int z = 0; z < 20; ++z) {
-        for (const int y : {0, 1, 2, 3, 16, 17, 18, 19}) grid.set({x, y, z}, map::Cell::occupied);
-        if (z == 0)
-          for (int y = 0; y < 20; ++y) grid.set({x, y, z}, map::Cell::occupied);
-      }
-    std::vector<std::size_t> voxels;
-    for (std::size_t n = 0; n < grid.cell_count(); ++n)
-      if (grid.at(n) == map::Cell::free) voxels.push_back(n);
-    field.fill(field::ProximityField(grid, Model{}), voxels);
-  }
+  Corridor() : grid(Vec3(0, -1, 0), 0.1, Index3(30, 20, 20), map::Cell::free), field(stored()) {}
   map::OccupancyGrid grid;
   field::DisturbanceField field;
+
+ private:
+  field::DisturbanceField stored() {
+    std::vector<std::size_t> voxels;
+    for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+      const Index3 v = grid.voxel(n);
+      if (v.z() == 0 || v.y() < 4 || v.y() > 15)
+        grid.set(v, map::Cell::occupied);
+      else
+        voxels.push_back(n);
+    }
+    field::DisturbanceField result(grid, voxels);
+    result.fill(field::ProximityField(grid, Model{}), voxels);
+    return result;
+  }
 };
 
 TEST(ReachTube, HasOneEntryMoreThanCommandsEachTwentyMillisecondsApart) {
@@ -244,10 +248,10 @@ TEST(ReachTube, BoundCoversItsOwnSetWhereTheFieldRunsAway) {
   Model model;
   model.wall.k1 = {3e8, 3e8, 3e8};
   model.wall.l_max = 3;
-  field::DisturbanceField field(grid);
   std::vector<std::size_t> voxels;
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (grid.at(n) == map::Cell::free) voxels.push_back(n);
+  field::DisturbanceField field(grid, voxels);
   field.fill(field::ProximityField(grid, model), voxels);
   const std::vector<Setpoint> commands(3, Setpoint{Vec3(0.05, 0.03, 0.03)});
   bool settled = false, ran_away = false;
