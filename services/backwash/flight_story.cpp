@@ -17,8 +17,9 @@ namespace {
 constexpr double kVertical = 0.01;  // m across: what stays within it rises or sinks on one line
 // Numbers of idl/backwash_msgs.idl, as the raw log's command records have them.
 constexpr unsigned kEnable = 1, kTakeOff = 3, kGoTo = 4, kRelease = 7, kGoToFacing = 10;
-constexpr std::array kVerbs{"",     "enable",          "disable", "take off", "go to",           "hold",
-                            "land", "end the session", "stop",    "follow",   "go to, then turn"};
+constexpr std::array kVerbs{
+    "",     "enable", "disable",          "take off",       "go to", "hold", "land", "end the session",
+    "stop", "follow", "go to, then turn", "follow, turning"};
 
 Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 
