@@ -214,7 +214,6 @@ printf 'recording,ceiling\nms,yes\n' >no_number.csv
 printf 'recording,z_m\nms,1\n' >measured.csv
 refused 66 'absent.csv' import --map-columns map.toml ms.csv -o logs --labels absent.csv
 refused 65 "no_number.csv:2: column 'ceiling' holds 'yes'" import --map-columns map.toml ms.csv -o logs --labels no_number.csv
-refused 65 "measured.csv:1: the recording measures 'z_m' itself" import --map-columns map.toml ms.csv -o logs --labels measured.csv
 refused 64 "without --out and --labels" import --propose ms.csv --labels measured.csv
 refused 64 'no kind of recording' import nanobench ms.csv -o logs
 refused 64 'no recording given' import ulog -o logs
