@@ -165,6 +165,16 @@ tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d
   return read_custom(file, twist, message, d.odometry);
 }
 
+tl::expected<void, ConfigError> check_frames(const StrictTable& file, const Daemon& d) {
+  if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
+    return tl::unexpected(file.error("frames", "needs three different names"));
+  // Of odometry a child frame says nothing of what is placed: VINS-Fusion's is its world.
+  const std::string& child = d.odometry.child;
+  if (d.odometry.message == PoseMessage::tf && (child == d.frames.map || child == d.frames.odometry))
+    return tl::unexpected(file.error(kChild, "needs the vehicle's frame, none of the map or of the odometry"));
+  return {};
+}
+
 tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {
   if (auto good = read_signing_key(file, d); !good) return good;
   const auto endpoint = link_device(d.link.device);
@@ -264,8 +274,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (auto read = read_odometry(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
-  if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
-    return tl::unexpected(file->error("frames", "needs three different names"));
+  if (auto good = check_frames(*file, d); !good) return tl::unexpected(good.error());
   if (auto read = read_live(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = convert(*file, converted, d); !good) return tl::unexpected(good.error());
   return d;

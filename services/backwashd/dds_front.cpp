@@ -97,7 +97,7 @@ void DdsFront::take_odometry(const dds::Odometry& m, const dds::Guid& writer) {
 }
 
 void DdsFront::take_poses() {
-  const auto refuse = [&](const std::string& why) { refusals_.add(channels_.odometry_refused, [&] { return why; }); };
+  const auto refuse = [&](const PoseTakers::Why& why) { refusals_.add(channels_.odometry_refused, why); };
   poses_.take({[&](const auto& m, const auto& writer) { take_odometry(m, writer); },
                [&](const auto& m, const auto& writer) { take_closure(m, writer); }, refuse});
   const auto departed = poses_.departed();

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "services/backwashd/text.hpp"
 
@@ -90,7 +91,12 @@ std::string Localization::unusable(const dds::Odometry& m) const {
 /// Nothing: it comes from poses, of which too few are known yet.
 std::optional<Vec3> Localization::velocity(const dds::Odometry& m, std::int64_t stamp_ns, const Vec3& p_W,
                                            const Eigen::Quaterniond& attitude, const Vec3& lever) {
-  if (told_.twist == config::Twist::none) return within(p_W, kFarthest) ? velocity_.add(stamp_ns, p_W) : Vec3::Zero();
+  if (told_.twist == config::Twist::none) {
+    const bool of_odometry = text(m.header.frame_id) == frames_.odometry;
+    // Between poses in different frames lies no way that was flown.
+    if (std::exchange(velocity_of_odometry_, of_odometry) != of_odometry) velocity_ = {};
+    return within(p_W, kFarthest) ? velocity_.add(stamp_ns, p_W) : Vec3::Zero();
+  }
   const auto& v = m.twist.twist.linear;
   const auto& w = m.twist.twist.angular;
   const bool in_body = told_.twist == config::Twist::body;

@@ -43,7 +43,8 @@ class Localization {
   config::Daemon::Odometry told_;
   Eigen::Quaterniond body_from_sensor_;
   double max_sigma_;
-  track::PoseVelocity velocity_;  // in the VIO's own frame: no loop closure moves it
+  track::PoseVelocity velocity_;       // in the VIO's own frame: no loop closure moves it
+  bool velocity_of_odometry_ = false;  // whether that is frames.odometry
   std::optional<track::RigidShift> map_from_odom_;
   std::uint32_t closures_ = 0;
 };

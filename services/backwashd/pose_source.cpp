@@ -41,6 +41,27 @@ std::string_view text(const char* s) { return s ? s : ""; }
 
 }  // namespace
 
+OurTransforms::OurTransforms(const config::Daemon& config)
+    : map_(config.frames.map),
+      odometry_(config.frames.odometry),
+      child_(config.odometry.child.empty() ? config.frames.body : config.odometry.child) {}
+
+void OurTransforms::take(const dds::TransformStamped& m, const dds::Guid& writer, const PoseTakers& takers) {
+  const std::string_view frame = text(m.header.frame_id), child = text(m.child_frame_id);
+  if (child == child_ && (frame == map_ || frame == odometry_)) {
+    heard_ = true;
+    return takers.odometry(as_odometry(m, child_), writer);
+  }
+  if (frame == map_ && child == odometry_) return takers.closure(m, writer);
+  if (heard_) return;
+  const auto why = [&] {
+    return "the transform of '" + printable(child) + "' in '" + printable(frame) +
+           "' is not the vehicle's: expected '" + child_ + "' in '" + map_ + "' or '" + odometry_ +
+           "'; see odometry.child and [frames] of the configuration";
+  };
+  takers.other(std::ref(why));
+}
+
 PoseSource::Readers PoseSource::made(const dds::Participant& participant, const config::Daemon& config) {
   const std::string& topic = config.dds.odometry_topic;
   using enum config::PoseMessage;
@@ -62,10 +83,7 @@ PoseSource::Readers PoseSource::made(const dds::Participant& participant, const 
 }
 
 PoseSource::PoseSource(const dds::Participant& participant, const config::Daemon& config)
-    : map_(config.frames.map),
-      odometry_(config.frames.odometry),
-      child_(config.odometry.child.empty() ? config.frames.body : config.odometry.child),
-      readers_(made(participant, config)) {}
+    : ours_(config), readers_(made(participant, config)) {}
 
 dds::detail::ReaderBase& PoseSource::base() {
   return std::visit([](auto& r) -> dds::detail::ReaderBase& { return r; }, readers_);
@@ -74,30 +92,16 @@ const dds::detail::ReaderBase& PoseSource::reader() const {
   return std::visit([](const auto& r) -> const dds::detail::ReaderBase& { return r; }, readers_);
 }
 
-void PoseSource::take_transform(const dds::TransformStamped& m, const dds::Guid& writer, const Takers& takers) {
-  const std::string_view frame = text(m.header.frame_id), child = text(m.child_frame_id);
-  if (child == child_) {
-    heard_ = true;
-    return takers.odometry(as_odometry(m, child_), writer);
-  }
-  if (frame == map_ && child == odometry_) return takers.closure(m, writer);
-  if (!heard_)
-    takers.other("the transform of '" + printable(child) + "' in '" + printable(frame) +
-                 "' is not the vehicle's: expected '" + child_ + "' in '" + map_ + "' or '" + odometry_ +
-                 "'; see odometry.child and [frames] of the configuration");
-}
-
-void PoseSource::take(const Takers& takers) {
+void PoseSource::take(const PoseTakers& takers) {
   std::visit(
       [&]<typename T>(dds::Reader<T>& reader) {
         reader.take([&](const T& m, const dds::Guid& writer) {
           if constexpr (std::is_same_v<T, dds::TfMessage>)
-            for (const auto& t : std::span(m.transforms._buffer, m.transforms._length))
-              take_transform(t, writer, takers);
+            for (const auto& t : std::span(m.transforms._buffer, m.transforms._length)) ours_.take(t, writer, takers);
           else if constexpr (std::is_same_v<T, dds::Odometry>)
             takers.odometry(m, writer);
           else
-            takers.odometry(as_odometry(m, child_), writer);
+            takers.odometry(as_odometry(m, ours_.child()), writer);
         });
       },
       readers_);

@@ -161,6 +161,17 @@ TEST(Localization, WithoutATwistTheVelocityComesFromThePoses) {
   EXPECT_NE(refused.find("velocity is not known yet"), std::string::npos) << refused;
 }
 
+// Of one vehicle in two frames, half a metre apart: differences between them are no velocity.
+TEST(Localization, PosesOfTwoFramesInTurnHaveNoVelocity) {
+  Localization l(told(config::Twist::none), 0.02);
+  ASSERT_TRUE(l.loop_closure(closure(Quaternion::Identity(), {0.5, 0, 0})));
+  for (int n = 0; n < 60; ++n) {
+    const double t = 1 + 0.02 * n;
+    const bool in_map = n % 2 == 0;
+    EXPECT_FALSE(l.odometry(odometry(in_map ? kMap : kOdom, {in_map ? 0.5 : 0, 0, 1}, about_z(0), kZero, t), 0)) << n;
+  }
+}
+
 // A lidar upside down, 0.1 m ahead of and 0.05 m above the body's origin, on a vehicle that turns at 2 rad/s.
 TEST(Localization, ASensorBesideTheBodyTellsTheBodysPoseAndVelocity) {
   const Vec3 at(0.1, 0, 0.05), v_W(0.3, -0.2, 0.1), w_W(0, 0, 2), p(1, 2, 3);
