@@ -12,9 +12,9 @@ namespace backwash::study {
 struct Rules {
   // Search
   Rule flips{"flips", 1200, "draws", "derived: resolves a sixth of a third of accept_p, a further structure's level"};
-  Rule accept_p{
-      "accept_p", 0.015, "1",
-      "measured: at 0.03, 40 of 600 worlds without an effect raised alarms, at 0.015 5 of 249 (core/study/confusion.md)"};
+  Rule accept_p{"accept_p", 0.015, "1",
+                "measured: at 0.03, 40 of 600 worlds without an effect raised alarms, at 0.015 5 of 249 "
+                "(core/study/confusion.md)"};
   Rule structure_share{"structure_share", 1.0 / 6, "of accept_p",
                        "chosen: structures gain much or little, and the catalogue's names shall lose little"};
   Rule dependence_share{"dependence_share", 1.0 / 6, "of accept_p", "chosen: as structure_share"};
