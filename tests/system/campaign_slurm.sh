@@ -34,6 +34,7 @@ fi
 
 for program in slurmctld slurmd munged sbatch; do command -v $program >/dev/null || skip "no $program"; done
 [[ $(id -u) == 0 ]] || skip "slurmd needs root"
+getent hosts "$(hostname -s)" >/dev/null || skip "the name of this machine has no address"
 
 # Everything of it lies in $work, and listens on ports of its own.
 host=$(hostname -s) port=$((20000 + $$ % 20000))

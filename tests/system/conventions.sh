@@ -6,6 +6,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 mapfile -t verbs < <("$backwash" --help | sed -n '/^Subcommands:/,$ s/^  \([a-z]\+\) .*/\1/p')
 [[ ${#verbs[@]} -ge 13 ]] || die "only ${#verbs[@]} verbs in --help"
 verbs=("${verbs[@]/vehicle/vehicle tune}")
+verbs=("${verbs[@]/campaign/campaign plan}")
 for verb in "${verbs[@]/#map/map info}" "map convert"; do
   read -ra words <<<"$verb"
   "$backwash" "${words[@]}" --help >help || die "$verb --help fails"

@@ -53,6 +53,7 @@ void Watch::acknowledged(std::uint8_t verb, int tick) {
     case backwash_msgs_msg_dds__COMMAND_GOTO:
     case backwash_msgs_msg_dds__COMMAND_GOTO_FACING:
     case backwash_msgs_msg_dds__COMMAND_FOLLOW:
+    case backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING:
       licence_ = Licence::flying;
       stopped_ = -1;
       may_arm_ = verb == backwash_msgs_msg_dds__COMMAND_TAKEOFF;
