@@ -73,7 +73,8 @@ std::string Localization::unusable(const dds::Odometry& m) const {
     return wrong_frame("the twist of the odometry", child, "'" + told_.child + "'" + looks_like(frame, child)).value();
   if (frame != frames_.map && frame != frames_.odometry)
     return wrong_frame("the odometry", frame,
-                       "'" + frames_.map + "' or '" + frames_.odometry + "'" + looks_like(frame, child))
+                       "'" + frames_.map + "' or '" + frames_.odometry + "'" +
+                           (told_.message == config::PoseMessage::odometry ? looks_like(frame, child) : ""))
         .value();
   if (frame == frames_.odometry && !map_from_odom_)
     return "odometry in frame '" + frame + "' before the first loop_closure from it to '" + frames_.map + "'";

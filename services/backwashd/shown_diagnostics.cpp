@@ -19,6 +19,7 @@ std::string number(const char* format, double value) {
 /// What is wrong beside the mode, if anything; the first of them.
 std::string doubt(const dds::Status& s) {
   if (!(s.odometry_age <= s.odometry_lost_after)) return "no odometry";
+  if (const std::string in = text(s.mismatch); !in.empty() && in != "none") return "map and autopilot disagree: " + in;
   if (s.samples_outside > 0) return std::to_string(s.samples_outside) + " samples outside their sets";
   if (s.advice._length > 0)
     return "parameter " + text(s.advice._buffer[0].name) + ": " + text(s.advice._buffer[0].text);

@@ -136,6 +136,20 @@ TEST(Localization, WhoseFramesTheyAreIsSaid) {
   EXPECT_NE(refused.error().find("FAST-LIO: odometry.profile = \"fast_lio\""), std::string::npos) << refused.error();
 }
 
+TEST(Localization, APoseAloneNamesNoChildThatAnEstimatorIsKnownBy) {
+  config::Daemon config;
+  config.odometry.message = config::PoseMessage::pose;
+  config.odometry.child = "world";
+  Localization l(config, 0.02);
+  const std::string world = "world";
+  auto m = odometry(world, kZero);
+  m.child_frame_id = dds::c_string(world);
+  const auto refused = l.odometry(m, 0);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().find("'world'"), std::string::npos) << refused.error();
+  EXPECT_EQ(refused.error().find("looks like"), std::string::npos) << refused.error();
+}
+
 TEST(Localization, ATwistInTheFrameOfThePoseIsNotTurned) {
   Localization l(told(config::Twist::world), 0.02);
   ASSERT_TRUE(l.loop_closure(closure(about_z(0.3), {5, 6, 7})));

@@ -55,6 +55,11 @@ TEST(ShownDiagnostics, NameWhatIsDoubtful) {
   }
   EXPECT_EQ(said("tracking", [](auto& s) { s.samples_outside = 3; }).message,
             "tracking: asked; 3 samples outside their sets");
+  for (const std::string& in : {std::string("none"), std::string("yaw")}) {
+    const Said said_of = said("passive", [&](auto& s) { s.mismatch = dds::c_string(in); });
+    EXPECT_EQ(said_of.level, in == "none" ? 0 : 1);
+    EXPECT_EQ(said_of.message, in == "none" ? "passive: asked" : "passive: asked; map and autopilot disagree: yaw");
+  }
   static const std::string name = "MPC_XY_P", what = "set 2";
   dds::Advice advice{dds::c_string(name), dds::c_string(what)};
   const Said parameter = said("passive", [&](auto& s) { s.advice = {1, 1, &advice, false}; });
