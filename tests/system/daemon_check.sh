@@ -42,3 +42,10 @@ start_daemon builtin:quad-5in "$work/second.bwlog"
 check safe
 [[ $code == 0 ]] || die "check exited with $code although all is safe"
 ! grep -q ^FAIL "$work/safe" || die "check failed something that is good"
+# What is locked is resident: no thread has the 8 MiB of stack that it would have by itself.
+if [[ $(ulimit -s) == 8192 ]]; then
+  large=$(grep -c '^Size: *8192 kB' "/proc/$daemon_pid/smaps" || true)
+  small=$(grep -c '^Size: *512 kB' "/proc/$daemon_pid/smaps" || true)
+  echo "stacks of 8 MiB: $large, of 512 KiB: $small"
+  [[ $large == 0 && $small -ge 10 ]] || die "a thread has a stack of 8 MiB"
+fi
