@@ -60,6 +60,23 @@ void write_same(const std::string& path, const std::string& content, bool force)
   if (!there || *there != content) write_file(path, content, force);
 }
 
+/// Throws Failure, as run_missing does, or says what other processes do.
+void tell_end(const std::string& folder, const CampaignPlan& plan, std::vector<std::size_t> failed, int first_code,
+              std::vector<std::size_t> elsewhere) {
+  std::ranges::sort(failed);
+  if (interrupted())
+    throw Failure(kInterrupted, "interrupted; " + std::to_string(survey(folder, plan).done.size()) + " of " +
+                                    std::to_string(plan.shards.size()) + " shards are done, and stay; run it again");
+  if (!failed.empty())
+    throw Failure(code_as_ours(first_code), folder + ": shards " + ranges(failed) + " failed, the first " +
+                                                end_in_words(first_code) + "; see what they said above");
+  std::erase_if(elsewhere, [&](auto k) { return std::filesystem::exists(shard_path(folder, k)); });
+  std::ranges::sort(elsewhere);
+  if (!elsewhere.empty())
+    std::printf("shards %s are at work in other processes; wait for them before the merge\n",
+                ranges(elsewhere).c_str());
+}
+
 }  // namespace
 
 bool run_shard(const std::string& folder, const CampaignPlan& plan, std::size_t shard) {
@@ -126,18 +143,7 @@ void run_missing(const std::string& folder, const CampaignPlan& plan, std::size_
     at_work.erase(ended);
     progress(next - at_work.size(), todo.size());
   }
-  std::ranges::sort(failed);
-  if (interrupted())
-    throw Failure(kInterrupted, "interrupted; " + std::to_string(survey(folder, plan).done.size()) + " of " +
-                                    std::to_string(plan.shards.size()) + " shards are done, and stay; run it again");
-  if (!failed.empty())
-    throw Failure(code_as_ours(first_code), folder + ": shards " + ranges(failed) + " failed, the first " +
-                                                end_in_words(first_code) + "; see what they said above");
-  std::erase_if(elsewhere, [&](auto k) { return std::filesystem::exists(shard_path(folder, k)); });
-  std::ranges::sort(elsewhere);
-  if (!elsewhere.empty())
-    std::printf("shards %s are at work in other processes; wait for them before the merge\n",
-                ranges(elsewhere).c_str());
+  tell_end(folder, plan, failed, first_code, elsewhere);
 }
 
 std::size_t merge_shards(const std::string& folder, const CampaignPlan& plan, bool force) {

@@ -41,7 +41,7 @@ for count, expected in ((39, [117]), (40, [60, 60]), (48, [72, 72]), (70, [105, 
     assert f"{max(work):.0f} s at best: on {len(work)} cores" in said, said
 planned("coarse", ROWS % (0, 3))
 assert work_of("coarse") == [60] * 3  # two of them would take two processors as long, and three longer
-planned("forest", 'scenes = ["builtin:forest-dense"]\nvehicles = ["builtin:quad-5in"]\nflights = 200', "", "compare")
+planned("forest", 'scenes = ["builtin:forest-1"]\nvehicles = ["builtin:quad-5in"]\nflights = 200', "", "compare")
 assert max(work_of("forest")) < 1.1 * min(work_of("forest")), work_of("forest")
 
 # Two `run --jobs` of one campaign at once: each shard once, neither fails.
