@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
@@ -27,6 +28,12 @@ double estimate_s(const CampaignPlan& plan) {
   return all;
 }
 
+double longest_shard_s(const CampaignPlan& plan) {
+  double longest = 0;
+  for (std::size_t k = 0; k < plan.shards.size(); ++k) longest = std::max(longest, plan.seconds(k));
+  return longest;
+}
+
 int plan(const Options& options) {
   const auto made = read_campaign_spec(options.spec);
   std::error_code wrong;
@@ -35,16 +42,22 @@ int plan(const Options& options) {
     throw Failure(kCannotCreate, manifest_path(options.folder) + ":1: exists already; give another folder or --force");
   write_file(manifest_path(options.folder), manifest_text(made), options.force);
   const auto read = read_plan(options.folder);
+  const double all_s = estimate_s(read), each_s = all_s / static_cast<double>(read.shards.size());
+  const double longest_s = longest_shard_s(read);
   if (options.json) {
     print({{"manifest", read.sha256},
            {"kind", read.kind},
            {"inputs", read.inputs.size()},
            {"items", read.items.size()},
            {"shards", read.shards.size()},
-           {"estimate_s", estimate_s(read)}});
+           {"estimate_s", all_s},
+           {"longest_s", longest_s}});
   } else {
-    std::printf("manifest %s\n%zu items that read %zu files, in %zu shards; estimated %.0f s of one processor\n",
-                read.sha256.c_str(), read.items.size(), read.inputs.size(), read.shards.size(), estimate_s(read));
+    std::printf(
+        "manifest %s\n%zu items that read %zu files\n%zu shards of about %.0f s; estimated %.0f s on one core "
+        "of a laptop, %.0f s at best: on %zu cores\n",
+        read.sha256.c_str(), read.items.size(), read.inputs.size(), read.shards.size(), each_s, all_s, longest_s,
+        read.shards.size());
   }
   return kOk;
 }

@@ -36,7 +36,8 @@ struct CampaignPlan {
 };
 
 /// Cuts items into shards of `least_s` or more each, as even as whole items and their order allow, and at most 1000:
-/// Slurm's arrays end at 1001. One shard where all is less.
+/// Slurm's arrays end at 1001. Few shards are an even number where two processors end sooner so. One shard where all is
+/// less than two.
 std::vector<std::size_t> shards_of(const std::vector<CampaignItem>& items, double least_s);
 
 /// The manifest: the same text for the same plan.
@@ -47,5 +48,7 @@ std::string manifest_path(const std::string& folder);
 CampaignPlan read_plan(const std::string& folder);
 /// Throws Failure 65 that names the first input of these items that is not what it was.
 void check_inputs(const CampaignPlan& plan, std::size_t first_item, std::size_t end_item);
+/// The same of the inputs that the last command names.
+void check_last(const CampaignPlan& plan);
 
 }  // namespace backwash::services

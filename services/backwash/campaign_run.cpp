@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <map>
 
@@ -39,6 +40,7 @@ std::string rows_of(const std::string& folder, const CampaignPlan& plan, std::si
       throw wrong(kBadData, "printed what is no line of JSON; it must print nothing else");
     at = end + 1;
   }
+  if (text.empty()) throw wrong(kBadData, "printed no row; it must print one or more");
   return text;
 }
 
@@ -56,6 +58,23 @@ Survey good_survey(
 void write_same(const std::string& path, const std::string& content, bool force) {
   const auto there = files::read_file(path, content.size(), "");
   if (!there || *there != content) write_file(path, content, force);
+}
+
+/// Throws Failure, as run_missing does, or says what other processes do.
+void tell_end(const std::string& folder, const CampaignPlan& plan, std::vector<std::size_t> failed, int first_code,
+              std::vector<std::size_t> elsewhere) {
+  std::ranges::sort(failed);
+  if (interrupted())
+    throw Failure(kInterrupted, "interrupted; " + std::to_string(survey(folder, plan).done.size()) + " of " +
+                                    std::to_string(plan.shards.size()) + " shards are done, and stay; run it again");
+  if (!failed.empty())
+    throw Failure(code_as_ours(first_code), folder + ": shards " + ranges(failed) + " failed, the first " +
+                                                end_in_words(first_code) + "; see what they said above");
+  std::erase_if(elsewhere, [&](auto k) { return std::filesystem::exists(shard_path(folder, k)); });
+  std::ranges::sort(elsewhere);
+  if (!elsewhere.empty())
+    std::printf("shards %s are at work in other processes; wait for them before the merge\n",
+                ranges(elsewhere).c_str());
 }
 
 }  // namespace
@@ -79,6 +98,7 @@ bool run_shard(const std::string& folder, const CampaignPlan& plan, std::size_t 
     progress(k - first, end - first);
     writer->add(rows_of(folder, plan, k));
   }
+  check_inputs(plan, first, end);  // one that was edited meanwhile is in some of the rows
   writer->finish(std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
   return true;
 }
@@ -87,13 +107,17 @@ void run_missing(const std::string& folder, const CampaignPlan& plan, std::size_
   const auto begin = good_survey(folder, plan);
   const auto& todo = begin.missing;
   std::map<pid_t, std::size_t> at_work;
-  std::vector<std::size_t> failed;
+  std::vector<std::size_t> failed, elsewhere;
   int first_code = 0;
   finish_what_is_done();
   progress("campaign, shards");
   progress(0, todo.size());
   for (std::size_t next = 0; next < todo.size() || !at_work.empty();) {
     for (; next < todo.size() && at_work.size() < jobs && !interrupted(); ++next) {
+      if (taken(folder, todo[next])) {
+        elsewhere.push_back(todo[next]);
+        continue;
+      }
       const auto child =
           start({"backwash", "campaign", "run", folder, std::to_string(todo[next]), "--quiet"}, "", false);
       at_work.emplace(child.process, todo[next]);
@@ -102,6 +126,7 @@ void run_missing(const std::string& folder, const CampaignPlan& plan, std::size_
       for (const auto& [process, shard] : at_work) ::kill(process, SIGTERM);
       next = todo.size();
     }
+    if (at_work.empty()) break;
     int status = 0;
     const pid_t ended = ::waitpid(-1, &status, 0);
     if (ended < 0) {
@@ -109,20 +134,16 @@ void run_missing(const std::string& folder, const CampaignPlan& plan, std::size_
       continue;
     }
     const int code = code_of(status);
-    if (code != 0 && !interrupted()) {
+    if (code == kUnavailable && taken(folder, at_work[ended])) {
+      elsewhere.push_back(at_work[ended]);
+    } else if (code != 0 && !interrupted()) {
       failed.push_back(at_work[ended]);
       if (first_code == 0) first_code = code;
     }
     at_work.erase(ended);
     progress(next - at_work.size(), todo.size());
   }
-  std::ranges::sort(failed);
-  if (interrupted())
-    throw Failure(kInterrupted, "interrupted; " + std::to_string(survey(folder, plan).done.size()) + " of " +
-                                    std::to_string(plan.shards.size()) + " shards are done, and stay; run it again");
-  if (!failed.empty())
-    throw Failure(code_as_ours(first_code), folder + ": shards " + ranges(failed) + " failed, the first " +
-                                                end_in_words(first_code) + "; see what they said above");
+  tell_end(folder, plan, failed, first_code, elsewhere);
 }
 
 std::size_t merge_shards(const std::string& folder, const CampaignPlan& plan, bool force) {
@@ -143,6 +164,7 @@ std::size_t merge_shards(const std::string& folder, const CampaignPlan& plan, bo
   const std::string rows = std::filesystem::absolute(folder + "/rows.jsonl").string();
   write_same(rows, all, force);
   if (plan.last.empty()) return count;
+  check_last(plan);
   auto command = plan.last;
   for (auto& word : command)
     if (word == "{rows}") word = rows;

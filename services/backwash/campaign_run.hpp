@@ -13,8 +13,8 @@ namespace backwash::services {
 bool run_shard(const std::string& folder, const CampaignPlan& plan, std::size_t shard);
 
 /// Does every shard that is missing, `jobs` processes at a time, and shows how far it is and how long it takes yet.
-/// Ctrl-C ends those at work; what is done stays. Throws Failure: 130 then, or what the first shard failed with once
-/// all others were tried.
+/// What another process does meanwhile is left to it. Ctrl-C ends those at work; what is done stays. Throws Failure:
+/// 130 then, or what the first shard failed with once all others were tried.
 void run_missing(const std::string& folder, const CampaignPlan& plan, std::size_t jobs);
 
 /// Puts the rows together in their order, into `rows.jsonl`, and runs the campaign's last command over them, into

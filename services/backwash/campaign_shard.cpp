@@ -2,7 +2,6 @@
 #include "services/backwash/campaign_shard.hpp"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -40,11 +39,20 @@ bool still_named(int file, const std::string& path) {
   return ::fstat(file, &ours) == 0 && ::stat(path.c_str(), &named) == 0 && ours.st_ino == named.st_ino;
 }
 
-/// Whether some process holds the part's lock.
+/// Of a whole file, against every other open file.
+struct flock whole_lock() {
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  return lock;
+}
+
+/// Whether some process holds the part's lock. Asks alone: a lock taken to find out would turn away who begins now.
 bool locked(const std::string& path) {
-  const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+  const int file = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
   if (file < 0) return false;
-  const bool held = ::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  auto lock = whole_lock();
+  const bool held = ::fcntl(file, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
   ::close(file);
   return held;
 }
@@ -61,14 +69,20 @@ void sync_folder(const std::string& folder) {
 
 std::string shard_path(const std::string& folder, std::size_t shard) { return path_of(folder, shard, ".jsonl"); }
 
+bool taken(const std::string& folder, std::size_t shard) {
+  return std::filesystem::exists(shard_path(folder, shard)) || locked(part_path(folder, shard));
+}
+
 std::optional<ShardWriter> ShardWriter::begin(const std::string& folder, const CampaignPlan& plan, std::size_t shard) {
   const std::string path = part_path(folder, shard), whole = shard_path(folder, shard);
   for (;;) {
     if (std::filesystem::exists(whole)) return std::nullopt;
-    const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    // A link in a folder from elsewhere must not empty a file of the user's.
+    const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (file < 0) throw Failure(kCannotCreate, path + ":1: cannot be created; give the campaign a folder to write to");
     // File systems without locks are taken as they are: two who do one shard write the same bytes.
-    if (::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    auto lock = whole_lock();
+    if (::fcntl(file, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
       ::close(file);
       throw Failure(kUnavailable, path + ":1: is being written by another process; wait for it, or end it first");
     }
@@ -115,7 +129,9 @@ void ShardWriter::add(const std::string& rows) {
 void ShardWriter::finish(double seconds) {
   const std::string path = part_path(folder_, shard_), whole = shard_path(folder_, shard_);
   write(foot_of(rows_, text_));
-  std::ofstream(path_of(folder_, shard_, ".seconds")) << seconds << '\n';
+  const std::string took = path_of(folder_, shard_, ".seconds");
+  ::unlink(took.c_str());
+  std::ofstream(took) << seconds << '\n';
   if (::fsync(file_) != 0 || ::rename(path.c_str(), whole.c_str()) != 0)
     throw Failure(kInputOutput, whole + ":1: cannot be written to its end; free some space");
   sync_folder(folder_);

@@ -15,6 +15,9 @@ namespace backwash::services {
 /// Path of shard `shard` of the campaign in `folder`, whole.
 std::string shard_path(const std::string& folder, std::size_t shard);
 
+/// Whether there is nothing to begin: it is whole, or another process does it.
+bool taken(const std::string& folder, std::size_t shard);
+
 /// A shard while it is being done: `shard-I.part`, locked against others who would do it, of this machine or over a
 /// file system whose locks reach them.
 class ShardWriter {

@@ -18,9 +18,11 @@ namespace {
 using Words = std::vector<std::string>;
 
 constexpr double kLeastShard = 60;  // s of estimated work: a task of Slurm costs 0.4 to 1 s of its own
-constexpr double kShard = 120;      // s, where the specification does not say
+constexpr double kChunk = 120;      // s of one compare: a forest takes 12 s to build, a tenth of it
 constexpr double kDay = 86'400;     // s
 constexpr double kMost = 10'000'000;
+constexpr double kLargestSeed = 9e15;  // below 2^53: a row keeps it exactly, whoever reads its JSON
+constexpr std::size_t kMostItems = 1'000'000;
 
 /// Seconds of one processor, measured on one of 3 GHz in November 2026; `seconds` of a specification replaces that of a
 /// pair, an item or a log.
@@ -36,6 +38,15 @@ SceneCost cost_of(const std::string& map) {
   return map.starts_with("builtin:") && !map.starts_with("builtin:forest") ? kRoom : kForest;
 }
 
+/// The manifest is JSON, whose texts are UTF-8.
+void check_name(const std::string& name) {
+  try {
+    static_cast<void>(Json(name).dump());
+  } catch (const Json::type_error&) {
+    throw Failure(kBadData, name + ":1: its name is no UTF-8; give it another");
+  }
+}
+
 /// The plan while it is made: each file is hashed once.
 class Draft {
  public:
@@ -43,11 +54,17 @@ class Draft {
   /// Number of a file; nothing for what is built in.
   void read(CampaignItem& item, const std::string& path) {
     if (path.empty() || path.starts_with("builtin:")) return;
+    check_name(path);
     const auto [at, fresh] = number_.try_emplace(path, plan_.inputs.size());
     if (fresh) progress("hashing " + path), plan_.inputs.push_back({path, sha256_of_file(path)});
     item.inputs.push_back(at->second);
   }
-  void add(CampaignItem item) { plan_.items.push_back(std::move(item)); }
+  void add(CampaignItem item) {
+    for (const auto& word : item.command) check_name(word);
+    if (plan_.items.size() >= kMostItems)
+      throw Failure(kConfiguration, "a campaign has a million items at most; plan it in parts");
+    plan_.items.push_back(std::move(item));
+  }
 
  private:
   CampaignPlan& plan_;
@@ -71,12 +88,13 @@ void plan_compare(const SpecTable& spec, CampaignPlan& plan, Draft& draft) {
   const auto models = models_of(vehicles, table.texts("models", Words{}));
   const auto flights = table.count("flights", 1, 100'000, 10);
   const Words common = {"--flights", std::to_string(flights), "--seed",
-                        std::to_string(table.count("seed", 0, kMost, 1))};
-  const double shard_s = spec.number("shard_seconds", kLeastShard, kDay, kShard);
+                        std::to_string(table.count("seed", 0, kLargestSeed, 1))};
+  const double chunk_s = spec.number("shard_seconds", kLeastShard, kDay, kChunk);
   for (const auto& map : maps) {
     const double pair_s = spec.number("seconds", 1e-3, kDay, cost_of(map).pair);
-    // Each command builds the world anew: as many pairs as make that a small share of it.
-    const auto chunk = static_cast<std::size_t>(std::max(1.0, std::floor(shard_s / pair_s)));
+    // Each command builds the world anew: as many pairs as make that a small share of it, and each nearly the same.
+    const auto most = static_cast<std::size_t>(std::max(1.0, std::floor(chunk_s / pair_s)));
+    const std::size_t commands = (flights + most - 1) / most, chunk = (flights + commands - 1) / commands;
     for (std::size_t n = 0; n < vehicles.size(); ++n)
       for (std::size_t first = 0; first < flights; first += chunk) {
         const std::size_t end = std::min(flights, first + chunk);
@@ -101,9 +119,16 @@ std::string replaced(std::string word, const std::string& from, const std::strin
 void plan_program(const SpecTable& spec, CampaignPlan& plan, Draft& draft) {
   const auto table = spec.table("program", {"command", "seed", "count", "each", "name", "inputs", "last"});
   const auto command = table.texts("command", std::nullopt);
-  const auto seed = table.count("seed", 0, 9e15, 1), count = table.count("count", 1, kMost, 1);
+  const auto seed = table.count("seed", 0, kLargestSeed, 1), count = table.count("count", 1, kMost, 1);
   const auto name = "{" + table.text("name", "each") + "}";
   const auto each = table.texts("each", Words{""});
+  const auto last = table.texts("last", Words{});
+  const auto names = [&](const std::string& what) {
+    return std::ranges::any_of(command, [&](const auto& word) { return word.find(what) != word.npos; });
+  };
+  if (name == "{seed}" || name == "{rows}") table.wrong("name", "must be another name: " + name + " has a meaning");
+  if (count > 1 && !names("{seed}")) table.wrong("count", "needs {seed} in the command, or its rows are all the same");
+  if (each.size() > 1 && !names(name)) table.wrong("each", "needs " + name + " in the command");
   const double seconds = spec.number("seconds", 1e-3, kDay, kProgram);
   for (std::size_t k = 0; k < count; ++k)
     for (const auto& one : each) {
@@ -114,7 +139,9 @@ void plan_program(const SpecTable& spec, CampaignPlan& plan, Draft& draft) {
       for (const auto& path : table.texts("inputs", Words{})) draft.read(item, path);
       draft.add(std::move(item));
     }
-  plan.last = table.texts("last", Words{});
+  CampaignItem merge{last, {}, 0};
+  if (!last.empty() && last.front().find('/') != std::string::npos) draft.read(merge, last.front());
+  plan.last = last;
 }
 
 void plan_feasibility(const SpecTable& spec, CampaignPlan&, Draft& draft) {
@@ -210,9 +237,10 @@ CampaignPlan read_campaign_spec(const std::string& path) {
   if (known == kinds.end()) file.wrong("kind", "must be adapt, compare, feasibility, program or study");
   file.only({"kind", "seconds", "shard_seconds", kind});
   CampaignPlan plan{kVersion, kind, std::filesystem::current_path().string(), {}, {}, {}, {}};
+  check_name(plan.folder);
   Draft draft(plan);
   known->second(file, plan, draft);
-  plan.shards = shards_of(plan.items, file.number("shard_seconds", kLeastShard, kDay, kShard));
+  plan.shards = shards_of(plan.items, file.number("shard_seconds", kLeastShard, kDay, kLeastShard));
   return plan;
 }
 

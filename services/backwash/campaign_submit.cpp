@@ -3,6 +3,8 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
 #include "services/backwash/campaign_run.hpp"
 #include "services/backwash/campaign_shard.hpp"
@@ -34,6 +36,20 @@ std::string script(const std::string& folder, const std::string& name, const Wor
          ".log 2>&1\n";
 }
 
+/// Throws Failure 69 where Slurm has not ended with the array that was given to it last: its shards are missing yet.
+void check_queue(const std::string& folder) {
+  std::string job;
+  if (!(std::ifstream(folder + "/slurm.job") >> job)) return;
+  Words question(1, "squeue");
+  for (const char* option : {"--noheader", "--format=%F"}) question.push_back(option);
+  auto child = start(question, "", true);
+  std::istringstream queue(read_to_end(child));
+  const bool answered = wait_for(child) == 0;
+  for (std::string other; answered && queue >> other;)
+    if (other == job)
+      throw Failure(kUnavailable, folder + "/slurm.job:1: array " + job + " is in Slurm's queue; wait, or scancel it");
+}
+
 void to_slurm(const std::string& folder, const std::vector<std::size_t>& missing, const Submission& how) {
   const Words program = {own_program(), "campaign"};
   const auto line = [&](const char* verb) { return shell_line(program) + " " + verb + " " + shell_line({folder}); };
@@ -54,9 +70,11 @@ void to_slurm(const std::string& folder, const std::vector<std::size_t>& missing
                 merge.c_str(), shell_line(first).c_str(), shell_line(second).c_str());
     return;
   }
+  check_queue(folder);
   write_file(folder + "/array.sh", array, true);
   write_file(folder + "/merge.sh", merge, true);
   const std::string job = answer_of(first, "Slurm");
+  write_file(folder + "/slurm.job", job + "\n", true);
   second.insert(second.end(), {"--dependency=afterany:" + job, folder + "/merge.sh"});
   std::printf("array %s of %zu shards, merge %s after it\n", job.c_str(), missing.size(),
               answer_of(second, "Slurm").c_str());
@@ -67,8 +85,10 @@ void to_parallel(const std::string& folder, const CampaignPlan& plan, const std:
   Words command = {"parallel", "--joblog", folder + "/parallel.log"};
   if (how.jobs > 0) command.insert(command.end(), {"--jobs", std::to_string(how.jobs)});
   if (!how.sshlogin.empty()) command.insert(command.end(), {"--sshlogin", how.sshlogin});
-  command.push_back(shell_line({own_program(), "campaign", "run", folder}) + " {} --quiet");
-  command.push_back(":::");
+  // As arguments of parallel's, which it quotes: in its command line it would run Perl that a folder's name has.
+  for (const auto& word :
+       Words{"--null", "exec {1} campaign run {2} {3} --quiet", ":::", own_program(), ":::", folder, ":::"})
+    command.push_back(word);
   for (const auto shard : missing) command.push_back(std::to_string(shard));
   if (how.dry_run) {
     std::printf("%s\n%s\n", shell_line(command).c_str(),

@@ -18,7 +18,8 @@ struct Submission {
 
 /// Slurm: writes `array.sh` and `merge.sh` into the campaign's folder and gives both to sbatch, one array over the
 /// missing shards and a merge after it. GNU parallel: runs it over the missing shards, with its job log in
-/// `parallel.log`, and merges. Throws Failure: 69 where the program is not there, or fails.
+/// `parallel.log`, and merges. Throws Failure: 69 where the program is not there, or fails, or Slurm has the array that
+/// was submitted before.
 void submit(const std::string& folder, const CampaignPlan& plan, const Submission& how);
 
 }  // namespace backwash::services

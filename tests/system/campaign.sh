@@ -47,7 +47,7 @@ for seconds in (0.5, 7, 59, 61, 500):
     first = manifest["shards"] + [len(manifest["items"])]
     work = [sum(i["seconds"] for i in manifest["items"][a:b]) for a, b in zip(first, first[1:])]
     least = seconds * math.ceil(60 / seconds)  # of whole items
-    assert first[0] == 0 and min(work) >= 60 and max(work) < 2 * least and len(work) >= 0.9 * (sum(work) // least), (seconds, work)
+    assert len(work) > 1 and first[0] == 0 and min(work) >= 60 and max(work) < 2 * least and len(work) >= 0.9 * (sum(work) // least), (seconds, work)
     assert manifest["inputs"] == [{"path": "./rows.py", "sha256": hashlib.sha256(open("rows.py", "rb").read()).hexdigest()}]
     assert [i["command"][1:3] for i in manifest["items"][:4]] == [["1", "a"], ["1", "b c"], ["1", "d"], ["2", "a"]]
 
@@ -95,7 +95,8 @@ for cut in (1, 30, 100, 10**6):  # within the last line, before it, within a row
     refused(lambda f: (f / "shard-1.jsonl").write_bytes((f / "shard-1.jsonl").read_bytes()[:-cut]), "shard-1.jsonl:1: ")
 refused(lambda f: edit(f / "shard-9.jsonl", b'"value": ', b'"value": 1'), "shard-9.jsonl:1: was changed")
 refused(lambda f: edit(f / "shard-9.jsonl", b'"shard":9', b'"shard":8'), "shard-9.jsonl")
-refused(lambda f: edit(f / "manifest.json", b'"kind": "program"', b'"kind": "study"'), "shard-0.jsonl:1: is a shard of another campaign")
+refused(lambda f: edit(f / "manifest.json", b'"seconds":60.0', b'"seconds":61.0'), "shard-0.jsonl:1: is a shard of another campaign")
+refused(lambda f: edit(f / "manifest.json", b'"kind": "program"', b'"kind": "study"'), "manifest.json:1: is no manifest")  # runs a program that no study is
 refused(lambda f: edit(f / "manifest.json", b'"version": "', b'"version": "9'), "manifest.json:1: was planned by version 9")
 refused(lambda f: (f / "manifest.json").write_text("{}"), "manifest.json:1: is no manifest")
 
