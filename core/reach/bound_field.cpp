@@ -11,7 +11,7 @@ namespace backwash::reach {
 namespace {
 
 template <std::size_t N>
-void raise(std::array<float, N>& maximum, const std::array<float, N>& other) noexcept {
+void raise(std::array<BoundCode, N>& maximum, const std::array<BoundCode, N>& other) noexcept {
   for (std::size_t d = 0; d < N; ++d) maximum[d] = std::max(maximum[d], other[d]);
 }
 
@@ -45,7 +45,7 @@ BoundField::BoundField(const map::OccupancyGrid& grid, const field::DisturbanceF
       least_push_ = least_push_.cwiseMin(air.push_W);
       largest_push_ = largest_push_.cwiseMax(air.push_W);
     }
-    std::copy(w.w.begin(), w.w.end(), entries_[entry_of_[grid.linear(v)]].level[0].begin());
+    std::ranges::transform(w.w, entries_[entry_of(grid.linear(v))].level[0].begin(), code_of);
   });
   for (int level = 1; level < kLevels; ++level) pool(level);
 }
@@ -61,12 +61,25 @@ void BoundField::number_entries(std::vector<std::uint8_t> stored) {
       }
     }
   }
-  entry_of_.assign(stored.size(), 0);
-  std::uint32_t count = 1;
+  rank_.assign(stored.size(), 0);
+  before_.reserve((stored.size() + kRun - 1) / kRun);
+  std::uint32_t count = 0;
   for (std::size_t n = 0; n < stored.size(); ++n) {
-    if (stored[n]) entry_of_[n] = count++;
+    if (n % kRun == 0) before_.push_back(count);
+    if (stored[n]) rank_[n] = static_cast<std::uint8_t>(++count - before_.back());
   }
-  entries_.resize(count);
+  entries_.resize(count + std::size_t{1});
+}
+
+std::size_t BoundField::entry_of(std::size_t n) const noexcept {
+  const std::uint32_t rank = rank_[n], some = 0u - std::uint32_t{rank != 0};  // all bits or none
+  return (before_[n / kRun] + rank) & some;
+}
+
+DisturbanceBound BoundField::decoded(const Maximum& codes) noexcept {
+  DisturbanceBound result;
+  for (std::size_t d = 0; d < kDirections; ++d) result.w[d] = bound_of(codes[d]);
+  return result;
 }
 
 // The cube of level L is the union of the eight cubes of level L − 1 at its octants.
@@ -79,22 +92,18 @@ void BoundField::pool(int level) noexcept {
   std::size_t n = 0;
   for_each_voxel(size_, [&](const Index3& v) {
     const std::size_t here = n++;
-    const std::uint32_t e = entry_of_[here];
+    const std::size_t e = entry_of(here);
     if (e == 0) return;
     const std::size_t beyond = (v.x() + half < size_.x() ? 0u : 1u) | (v.y() + half < size_.y() ? 0u : 2u) |
                                (v.z() + half < size_.z() ? 0u : 4u);  // axes along which the octant is outside
     Maximum maximum{};
     for (std::size_t octant = 0; octant < 8; ++octant)
-      if (!(octant & beyond)) raise(maximum, entries_[entry_of_[here + ahead[octant]]].level[level - 1]);
+      if (!(octant & beyond)) raise(maximum, entries_[entry_of(here + ahead[octant])].level[level - 1]);
     entries_[e].level[level] = maximum;
   });
 }
 
 bool BoundField::inside(const Index3& v) const noexcept { return map::inside(size_, v); }
-
-const BoundField::Entry& BoundField::entry(const Index3& v) const noexcept {
-  return entries_[entry_of_[map::linear(size_, v)]];
-}
 
 // Closed voxels: one that only touches the box counts. Compared before the casts, so that any box is in range.
 map::VoxelBox BoundField::meeting(const Vec3& low_W, const Vec3& high_W) const noexcept {
@@ -179,10 +188,9 @@ DisturbanceBound BoundField::moving(DisturbanceBound w, const Vec3& v_W) const n
 }
 
 DisturbanceBound BoundField::max_over_voxels(Index3 low, Index3 high) const noexcept {
-  DisturbanceBound result;
   low = low.cwiseMax(0);
   high = high.cwiseMin(size_ - Index3::Ones());
-  if ((low.array() > high.array()).any()) return result;
+  if ((low.array() > high.array()).any()) return {};
   const int narrowest = (high - low).minCoeff() + 1;
   int level = 0;
   while (level + 1 < kLevels && narrowest >= 2 << level) ++level;
@@ -194,22 +202,18 @@ DisturbanceBound BoundField::max_over_voxels(Index3 low, Index3 high) const noex
   Maximum maximum{};
   for (int k = low.z(); k <= high.z(); k += edge) {
     for (int j = low.y(); j <= high.y(); j += edge) {
-      const std::uint32_t* const row = entry_of_.data() + sx * (static_cast<std::size_t>(std::min(j, end.y())) +
-                                                                sy * static_cast<std::size_t>(std::min(k, end.z())));
+      const std::size_t row =
+          sx * (static_cast<std::size_t>(std::min(j, end.y())) + sy * static_cast<std::size_t>(std::min(k, end.z())));
       for (int i = low.x(); i <= high.x(); i += edge)
-        raise(maximum, entries_[row[std::min(i, end.x())]].level[at_level]);
+        raise(maximum, entries_[entry_of(row + static_cast<std::size_t>(std::min(i, end.x())))].level[at_level]);
     }
   }
-  std::copy(maximum.begin(), maximum.end(), result.w.begin());
-  return result;
+  return decoded(maximum);
 }
 
 DisturbanceBound BoundField::at(const Index3& v) const noexcept {
-  DisturbanceBound result;
-  if (!inside(v)) return result;
-  const Maximum& w = entry(v).level[0];
-  std::copy(w.begin(), w.end(), result.w.begin());
-  return result;
+  if (!inside(v)) return {};
+  return decoded(entries_[entry_of(map::linear(size_, v))].level[0]);
 }
 
 }  // namespace backwash::reach

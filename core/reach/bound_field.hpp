@@ -9,14 +9,16 @@
 #include "core/field/extension.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/voxel_box.hpp"
+#include "core/reach/bound_code.hpp"
 #include "core/types/disturbance.hpp"
 
 namespace backwash::reach {
 
 /// w̄ at every voxel of a stored field, for maxima over sets (docs/model.md section 3, "Over the set, not at its
 /// centre"), and the mean push that an extended model has there: the disturbance at p is push(p, v) ± w̄. Keeps the
-/// maxima over all cubes of 1, 2 and 4 voxels whose lowest voxel is v, for the v where one is not zero: 64 bytes per
-/// entry, 4 bytes per voxel of the grid.
+/// maxima over all cubes of 1, 2 and 4 voxels whose lowest voxel is v, for the v where one is not zero: 32 bytes per
+/// entry, 1.03 bytes per voxel of the grid. They are kept in 16 bits and rounded up (bound_code.hpp): what is read is
+/// w̄ to w̄·(1 + kBoundGrowth).
 class BoundField {
  public:
   /// Unstored voxels count as 0 (the vehicle's centre cannot be there).
@@ -37,8 +39,8 @@ class BoundField {
   DisturbanceBound max_about_voxels(const Vec3& push_W, const Vec3& v_W, const Index3& low,
                                     const Index3& high) const noexcept;
   /// Component-wise maximum of w̄ over the voxels, closed cubes, that meet the closed box [low, high], m in W; 0 if none
-  /// does. Exact. 1 look-up for boxes over 1, 2 or 4 voxels per axis, 8 up to 8 per axis, then O(voxels/64).
-  /// Real-time: wait-free, no allocation.
+  /// does. Exact but for the rounding up. 1 look-up for boxes over 1, 2 or 4 voxels per axis, 8 up to 8 per axis, then
+  /// O(voxels/64). Real-time: wait-free, no allocation.
   DisturbanceBound max_over(const Vec3& low_W, const Vec3& high_W) const noexcept;
   /// The same over the voxels from low to high, both included; what lies outside the grid counts as 0.
   DisturbanceBound max_over_voxels(Index3 low, Index3 high) const noexcept;
@@ -46,23 +48,26 @@ class BoundField {
   DisturbanceBound at(const Index3& v) const noexcept;
 
  private:
-  static constexpr int kFew = 512;   // voxels
-  static constexpr int kLevels = 3;  // cubes of 1 << level voxels
-  using Maximum = std::array<float, kDirections>;
-  struct alignas(64) Entry {
+  static constexpr int kFew = 512;          // voxels
+  static constexpr int kLevels = 3;         // cubes of 1 << level voxels
+  static constexpr std::size_t kRun = 128;  // voxels whose entries are numbered from one base
+  using Maximum = std::array<BoundCode, kDirections>;
+  struct alignas(32) Entry {
     std::array<Maximum, kLevels> level{};
   };
   bool inside(const Index3& v) const noexcept;
   map::VoxelBox meeting(const Vec3& low_W, const Vec3& high_W) const noexcept;
   DisturbanceBound moving(DisturbanceBound w, const Vec3& v_W) const noexcept;
-  const Entry& entry(const Index3& v) const noexcept;
+  static DisturbanceBound decoded(const Maximum& codes) noexcept;
+  std::size_t entry_of(std::size_t n) const noexcept;  // of a voxel in entries_; 0: every cube at it is zero
   void number_entries(std::vector<std::uint8_t> stored);
   void pool(int level) noexcept;
 
   Vec3 origin_W_;
   double resolution_;
   Index3 size_;
-  std::vector<std::uint32_t> entry_of_;  // per voxel; 0: every cube at v is zero
+  std::vector<std::uint8_t> rank_;     // per voxel: its entry's number within the run, from 1; 0: none
+  std::vector<std::uint32_t> before_;  // per run: entries of the runs before it
   std::vector<Entry> entries_;
   field::Extension extension_;
   BoundModel model_;

@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "tests/support/rounded_up.hpp"
+
 namespace backwash::reach {
 namespace {
 
@@ -32,7 +34,7 @@ Scene random_scene(std::mt19937& random, const Index3& size, double resolution) 
   return {std::move(grid), std::move(field)};
 }
 
-/// Definition: every voxel of the grid, closed, against the closed box.
+/// Definition: every voxel of the grid, closed, against the closed box; the largest rounded up as it is stored.
 PerDirection brute_force(const Scene& scene, const BoundModel& model, const Vec3& low, const Vec3& high) {
   PerDirection maximum{};
   const double a = scene.grid.resolution();
@@ -44,6 +46,7 @@ PerDirection brute_force(const Scene& scene, const BoundModel& model, const Vec3
     const DisturbanceBound w = bound(scene.field.at(v), model);
     for (std::size_t d = 0; d < kDirections; ++d) maximum[d] = std::max(maximum[d], w.w[d]);
   }
+  for (double& w : maximum) w = rounded_up(w);
   return maximum;
 }
 
@@ -85,7 +88,8 @@ TEST(BoundField, IsZeroOutsideTheGridAndAtUnstoredVoxels) {
   const BoundField bounds(scene.grid, scene.field, BoundModel{});
   for (std::size_t n = 0; n < scene.grid.cell_count(); ++n) {
     const Index3 v = scene.grid.voxel(n);
-    const PerDirection expected = scene.field.has(v) ? bound(scene.field.at(v), BoundModel{}).w : PerDirection{};
+    PerDirection expected = scene.field.has(v) ? bound(scene.field.at(v), BoundModel{}).w : PerDirection{};
+    for (double& w : expected) w = rounded_up(w);
     expect_equal(bounds.at(v).w, expected);
   }
   EXPECT_EQ(bounds.at(Index3(-1, 0, 0)).w, PerDirection{});

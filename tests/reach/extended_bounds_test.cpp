@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/reach/bound_field.hpp"
+#include "tests/support/rounded_up.hpp"
 
 namespace backwash::reach {
 namespace {
@@ -63,10 +64,11 @@ PerDirection brute_force(const ExtendedScene& scene, const Vec3& push, const Vec
     const Air air = scene.extension.at(v);
     const DisturbanceBound w = bound(scene.field.at(v), scene.model.bound);
     for (std::size_t d = 0; d < kDirections; ++d) {
-      const double unknown = d == kZ ? air.vertical + kLiftError * velocity.squaredNorm()
-                                     : air.level + kDragError * std::hypot(velocity.x(), velocity.y());
+      const double stored = rounded_up(w.w[d] + (d == kZ ? air.vertical : air.level));
+      const double unknown =
+          d == kZ ? kLiftError * velocity.squaredNorm() : kDragError * std::hypot(velocity.x(), velocity.y());
       const double off = unit(static_cast<Direction>(d)).dot(air.push_W + by_velocity - push);
-      largest[d] = std::max(largest[d], std::abs(off) + w.w[d] + unknown);
+      largest[d] = std::max(largest[d], std::abs(off) + stored + unknown);
     }
   }
   return largest;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/reach/clearance.hpp"
+#include "tests/support/rounded_up.hpp"
 
 namespace backwash::reach {
 namespace {
@@ -86,7 +87,7 @@ PerDirection image(const HoverScene& scene, const Reachability& reach, const Vec
     const Index3 v = scene.grid.voxel(n);
     if (!scene.field.has(v) || ((scene.grid.center(v) - p).cwiseAbs().array() > reach_of_box.array()).any()) continue;
     const DisturbanceBound w = bound(scene.field.at(v), scene.model.bound);
-    for (std::size_t d = 0; d < kDirections; ++d) result[d] = std::max(result[d], h_inf(reach, d) * w.w[d]);
+    for (std::size_t d = 0; d < kDirections; ++d) result[d] = std::max(result[d], h_inf(reach, d) * rounded_up(w.w[d]));
   }
   return result;
 }
