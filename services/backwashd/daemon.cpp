@@ -199,7 +199,7 @@ bool end(Flight& f) {
 }  // namespace
 
 int run(const Settings& settings) {
-  limit_stacks();
+  limit_memory();
   const sigset_t signals = shield_process();
   const auto manager = ServiceManager::of_environment(STDERR_FILENO);
   const auto sink =

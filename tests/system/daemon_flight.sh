@@ -10,13 +10,25 @@ if [[ $map != builtin:* && ! -e $map ]]; then
   echo "SKIPPED: $map is not there"
   exit 77
 fi
-"$source_dir/services/bench/flight.sh" "$build" "$out" "$name" "$map" "$5" "$6" || { cat "$out/$name.log"; exit 1; }
+# The most that the daemon held so far, kB.
+while sleep 0.5; do
+  for daemon in $(pgrep -x backwashd); do
+    ! grep -q "FLIGHT_OUT=$out" "/proc/$daemon/environ" || sed -n 's/^VmHWM:[^0-9]*\([0-9]*\) kB/\1/p' "/proc/$daemon/status" >>"$out/held"
+  done
+done 2>/dev/null &
+watch=$!
+trap 'kill "$watch" 2>/dev/null || true; rm -rf "$out"' EXIT
+FLIGHT_OUT=$out "$source_dir/services/bench/flight.sh" "$build" "$out" "$name" "$map" "$5" "$6" || { cat "$out/$name.log"; exit 1; }
+kill "$watch"
 pgrep -f "$out" && { echo "something was left running"; exit 1; }
 
-PYTHONPATH=$source_dir/tests/system python3 - "$out/$name" <<'PYTHON'
+PYTHONPATH=$source_dir/tests/system python3 - "$out/$name" "$out/held" <<'PYTHON'
 import json, sys
 import raw_log
 base = sys.argv[1]
+held = max(int(line) for line in open(sys.argv[2])) * 1024e-6
+print(f"the daemon held {held:.0f} MB")
+assert held < 160, "the daemon holds more than 160 MB"
 status = json.load(open(base + ".status.json"))
 assert status["state"] == "tracking" and status["samples_outside"] == 0 and status["records_lost"] == 0, status
 assert status["frames_bad"] == 0 and status["odometry_rejected"] == 0 and status["maps_rejected"] == 0, status
