@@ -16,6 +16,11 @@ double since(Clock::time_point t) { return std::chrono::duration<double>(Clock::
 
 std::string text(const char* s) { return s ? s : ""; }
 
+std::uint64_t draw_session() {
+  std::random_device random;
+  return std::uint64_t{random()} << 32 | random();
+}
+
 volatile std::sig_atomic_t signal_that_came = 0;
 
 }  // namespace
@@ -28,7 +33,7 @@ int interrupted() noexcept { return signal_that_came; }
 
 Station::Station(const Options& options)
     : options_(options),
-      session_(std::uint64_t{std::random_device{}()} << 32 | std::random_device{}()),
+      session_(draw_session()),
       participant_(static_cast<std::uint32_t>(options.domain), options.interface),
       commands_(dds::make_writer<dds::Command>(participant_, options.name_space)),
       acks_(dds::make_reader<dds::Ack>(participant_, options.name_space)),
@@ -71,6 +76,12 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
     });
   }
   return result;
+}
+
+void Station::release() {
+  send(backwash_msgs_msg_dds__COMMAND_RELEASE);
+  session_ = draw_session();
+  sequence_ = 0;
 }
 
 std::optional<StatusCopy> Station::status(double timeout_s) {

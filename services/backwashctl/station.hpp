@@ -73,6 +73,10 @@ class Station {
   /// Sends a command and repeats it, with the same sequence number, until it is acknowledged; nothing if it never is.
   std::optional<Result> send(std::uint8_t verb, const Vec3& position = Vec3::Zero(), double yaw = 0,
                              const std::vector<Vec3>& waypoints = {});
+  /// Ends the session. What is sent next begins a new one.
+  void release();
+  /// For further readers of this process.
+  const dds::Participant& participant() const noexcept { return participant_; }
   /// Whether this status knows of a later command than ours, whoever gave it.
   bool superseded(const StatusCopy& s) const noexcept {
     return s.numbers.session != session_ || s.numbers.sequence_number != sequence_;

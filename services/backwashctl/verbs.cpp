@@ -65,6 +65,7 @@ Verbs::Verbs(Command& app) {
   app.add_flag("--json", json_, "one JSON object on stdout");
   add_control(app);
   add_ways(app);
+  add_goals(app);
   add_ends(app);
   add_views(app);
 }
@@ -116,6 +117,21 @@ void Verbs::add_ways(Command& app) {
                               900);
   follow_verb->add_option("file", route_, "points CSV: x_m,y_m,z_m, at most 64 rows; with yaw_rad at most 32")
       .required();
+}
+
+void Verbs::add_goals(Command& app) {
+  auto* goals_verb =
+      verb(app, "goals", "fly to each goal of a ROS 2 topic until interrupted: what RViz's \"2D Goal Pose\" sends",
+           "goals --height 1.2", [this] { return goals(); });
+  goals_verb->add_option("--topic", goal_topic_, "of geometry_msgs/PoseStamped")
+      .capture_default_str()
+      .check(services::topic());
+  goals_verb->add_option("--frame", goal_rules_.frame, "that goals are in: the daemon's frames.map")
+      .capture_default_str();
+  goals_verb->add_option("--height", goal_rules_.height, "z of every goal in the map, m; without: each has its own");
+  goals_verb->add_option("--heading", heading_, "goal: turn to the goal's own; path: as the path leads there")
+      .capture_default_str()
+      .check(services::one_of({"goal", "path"}));
 }
 
 void Verbs::add_ends(Command& app) {
@@ -223,6 +239,12 @@ int Verbs::follow() {
   const auto verb =
       has_headings(*route) ? backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING : backwash_msgs_msg_dds__COMMAND_FOLLOW;
   return command("follow", verb, Vec3::Zero(), rests_at(route->back().p_W));
+}
+
+int Verbs::goals() {
+  Station station(options_);
+  goal_rules_.facing = heading_ == "goal";
+  return serve_goals(station, "rt" + goal_topic_, goal_rules_, json_);
 }
 
 int Verbs::check() {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "services/backwashctl/goals.hpp"
 #include "services/backwashctl/station.hpp"
 #include "services/command_line/command_line.hpp"
 
@@ -13,7 +14,8 @@ namespace backwash::ctl {
 
 using services::Command;
 
-/// The verbs of backwashctl: enable, disable, takeoff, goto, follow, hold, stop, land, release, status, watch, check.
+/// The verbs of backwashctl: enable, disable, takeoff, goto, follow, hold, stop, land, release, goals, status, watch,
+/// check.
 class Verbs {
  public:
   explicit Verbs(Command& app);
@@ -23,6 +25,7 @@ class Verbs {
  private:
   void add_control(Command& app);
   void add_ways(Command& app);
+  void add_goals(Command& app);
   void add_ends(Command& app);
   void add_views(Command& app);
   Command* verb(Command& app, const std::string& name, const std::string& what, const std::string& example,
@@ -32,6 +35,7 @@ class Verbs {
               const std::function<bool(const StatusCopy&)>& done);
   int go_to();
   int follow();
+  int goals();
   int status();
   int check();
   int watch();
@@ -41,6 +45,8 @@ class Verbs {
   std::optional<double> yaw_;
   std::vector<Vec3> waypoints_;  ///< of the command: of a route with headings pairs
   std::string route_;
+  GoalRules goal_rules_;
+  std::string goal_topic_ = "/goal_pose", heading_ = "goal";
   double height_ = 0, patience_s_ = 0;
   bool wait_ = false, json_ = false;
   std::function<int()> chosen_;

@@ -74,6 +74,13 @@ std::string not_unsigned(const std::string& text) {
   return good ? "" : "'" + text + "' is no whole number of 0 or more; it takes one";
 }
 
+/// Whether ROS 2 takes it as a name, without a / before or behind.
+bool named(const std::string& text) {
+  const auto fits = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '/'; };
+  return !text.empty() && !std::isdigit(static_cast<unsigned char>(text[0])) && text[0] != '/' && text.back() != '/' &&
+         std::ranges::all_of(text, fits);
+}
+
 }  // namespace
 
 Check positive() {
@@ -97,12 +104,17 @@ Check one_of(const std::vector<std::string>& names) {
 
 Check name_space() {
   const auto wrong = [](const std::string& text) {
-    const auto fits = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '/'; };
-    const bool good = !text.empty() && !std::isdigit(static_cast<unsigned char>(text[0])) && text[0] != '/' &&
-                      text.back() != '/' && std::ranges::all_of(text, fits);
-    return good ? "" : "'" + text + "' is no namespace; it takes letters, digits, _ and / between them";
+    return named(text) ? "" : "'" + text + "' is no namespace; it takes letters, digits, _ and / between them";
   };
   return {wrong, "NAMESPACE"};
+}
+Check topic() {
+  const auto wrong = [](const std::string& text) {
+    return text.starts_with('/') && named(text.substr(1))
+               ? ""
+               : "'" + text + "' is no topic; it takes a / first, then letters, digits, _ and / between them";
+  };
+  return {wrong, "TOPIC"};
 }
 
 Option Option::required() { return option_->required(), *this; }

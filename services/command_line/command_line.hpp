@@ -36,6 +36,7 @@ Check not_negative();
 Check within(double low, double high);
 Check one_of(const std::vector<std::string>& names);
 Check name_space();  ///< of DDS topics, as ROS 2 writes one
+Check topic();       ///< by its whole name, as ROS 2 writes one: /goal_pose
 
 /// An option of a command; a handle to copy. The names of its settings are CLI11's.
 class Option {

@@ -26,7 +26,8 @@ def members_of(idl: str) -> dict[str, dict[str, str]]:
     return {name: {m[1]: m[0] for m in re.findall(r"(\S+)\s+(\w+)\s*;", body)} for name, body in structs}
 
 
-def wrong_in_rviz(text: str, topics: dict) -> list[str]:
+def wrong_in_rviz(text: str, interfaces: str) -> list[str]:
+    topics = topics_of(interfaces)
     wrong = []
     blocks = re.findall(r"Topic:\n((?: {8}.*\n)+)", text)
     if not blocks:
@@ -34,6 +35,10 @@ def wrong_in_rviz(text: str, topics: dict) -> list[str]:
     for block in blocks:
         said = dict(re.findall(r"^ +([\w ]+): (.+)$", block, re.M))
         name = said["Value"].removeprefix("/backwash/")
+        if name == "/goal_pose" and "reliable, on `--topic` (/goal_pose)" in interfaces:  # RViz writes, backwashctl reads
+            if said["Reliability Policy"] != "Reliable":
+                wrong.append("rviz: its goals would not be read")
+            continue
         if name not in topics:
             wrong.append(f"rviz: {said['Value']} is no topic of docs/interfaces.md")
             continue
@@ -90,7 +95,7 @@ def main() -> int:
     rviz, launch = (package / "rviz/backwash.rviz").read_text(), (package / "launch/backwash.launch.py").read_text()
     foxglove = json.loads((package / "foxglove/backwash.json").read_text())
     idl = members_of((root / "idl/backwash_msgs.idl").read_text())
-    wrong = wrong_in_rviz(rviz, topics_of(interfaces)) + wrong_in_foxglove(foxglove, interfaces, idl) + wrong_in_launch(launch, rviz)
+    wrong = wrong_in_rviz(rviz, interfaces) + wrong_in_foxglove(foxglove, interfaces, idl) + wrong_in_launch(launch, rviz)
     manifest = (package / "package.xml").read_text()
     for module in re.findall(r"^from (\w+)", launch, re.M):
         if f"<exec_depend>{module}</exec_depend>" not in manifest:
