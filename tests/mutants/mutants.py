@@ -28,7 +28,6 @@ WORK = ROOT / "build" / "mutants"
 TREE = WORK / "tree"
 DRAWN = WORK / "drawn.json"
 BIN = TREE / "build" / "release" / "tests"
-COPIED = ["CMakeLists.txt", "CMakePresets.json", "README.md", "core", "firmware_bridge", "idl", "services", "tests"]
 # Those that a mutant must survive to count as living.
 PROGRAMS = ["test_config", "test_files", "test_track", "test_bridge", "test_map", "test_field", "test_reach", "test_adapt", "test_daemon",
             "test_plan", "test_sim"]
@@ -38,11 +37,8 @@ LEAST_SCORE = 0.97
 def prepare(mutants: list[table.Mutant]) -> None:
     """Copies what changed and rewrites. A file is written only if its content differs: little is compiled."""
     files = table.by_file(mutants)
-    wanted = {}
-    for top in COPIED:
-        for path in [ROOT / top] if (ROOT / top).is_file() else sorted((ROOT / top).rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts:
-                wanted[str(path.relative_to(ROOT))] = path
+    listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"], cwd=ROOT, check=True, stdout=subprocess.PIPE)
+    wanted = {name: ROOT / name for name in listed.stdout.decode().split("\0") if name and (ROOT / name).is_file()}
     for name, path in wanted.items():
         content = table.rewritten(files[name], path.read_text()).encode() if name in files else path.read_bytes()
         copy = TREE / name
