@@ -122,6 +122,12 @@ void DisturbanceField::fill(const WholeField& whole, std::size_t begin, std::siz
   whole.evaluate(begin, end, [this](std::size_t n, const Variance& s) { set(n, s); });
 }
 
+void DisturbanceField::fill(const WholeField& whole, const map::OccupancyGrid& part, const Index3& low,
+                            std::size_t begin, std::size_t end) {
+  whole.evaluate(begin, end,
+                 [&](std::size_t n, const Variance& s) { set(map::linear(size_, low + part.voxel(n)), s); });
+}
+
 void DisturbanceField::scale(const Extension& extension, std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) {
     if (!has(n)) continue;

@@ -59,6 +59,9 @@ class DisturbanceField {
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
+  /// The same where `whole` is of a part of this grid, whose voxel (0, 0, 0) is `low` here.
+  void fill(const WholeField& whole, const map::OccupancyGrid& part, const Index3& low, std::size_t begin,
+            std::size_t end);
 
   /// Multiplies Σ at the given voxels, where it is stored, by the factor that an extended model has there.
   void scale(const Extension& extension, std::span<const std::size_t> voxels);

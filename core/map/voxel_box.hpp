@@ -22,4 +22,7 @@ struct VoxelBox {
   }
 };
 
+/// The voxels of a box within the grid as a grid of their own, at the same place.
+OccupancyGrid part_of(const OccupancyGrid& grid, const VoxelBox& box);
+
 }  // namespace backwash::map

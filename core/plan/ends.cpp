@@ -32,13 +32,6 @@ std::optional<std::string> why_not_clear(const reach::HoverSet& set, const Vec3&
   return std::nullopt;
 }
 
-map::OccupancyGrid part_of(const map::OccupancyGrid& grid, const map::VoxelBox& box) {
-  const Vec3 origin_W = grid.origin() + grid.resolution() * box.low.cast<double>();
-  map::OccupancyGrid part(origin_W, grid.resolution(), box.high - box.low + Index3::Ones());
-  for (std::size_t n = 0; n < part.cell_count(); ++n) part.set(part.voxel(n), grid.at(box.low + part.voxel(n)));
-  return part;
-}
-
 /// The hover set at a free place, from Σ within `within` metres of it alone. Beyond, the disturbance counts as none: a
 /// set that leaves that box is too small. `model`: with the vehicle's r0.
 reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& model, const reach::Reachability& reach,
@@ -53,7 +46,7 @@ reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& mod
   const map::VoxelBox near =
       box_about(std::sqrt(3.0) * within + kAround + reach.vehicle.body.radius + reach.vehicle.estimation.position);
   needed.add(near.low), needed.add(near.high);
-  const map::OccupancyGrid part = part_of(grid, needed);
+  const map::OccupancyGrid part = map::part_of(grid, needed);
   const map::DistanceField distance(part);
   std::vector<std::size_t> voxels = voxels_for_centre(part, distance, reach.vehicle);
   std::erase_if(voxels, [&](std::size_t n) { return !read.contains(needed.low + part.voxel(n)); });

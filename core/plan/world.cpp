@@ -23,6 +23,19 @@ void fill_field(field::DisturbanceField& field, const map::OccupancyGrid& grid, 
   parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
 }
 
+/// Stores Σ at the listed voxels of some columns, from what can reach them alone.
+void fill_columns(field::DisturbanceField& field, const map::OccupancyGrid& grid, const Model& model,
+                  const map::VoxelBox& columns, std::span<const std::size_t> voxels, const Parallel& parallel) {
+  const map::VoxelBox around = field::affected_columns(grid, model, columns);
+  const map::OccupancyGrid part = map::part_of(grid, around);
+  std::vector<std::size_t> listed;
+  listed.reserve(voxels.size());
+  for (const std::size_t n : voxels) listed.push_back(part.linear(grid.voxel(n) - around.low));
+  const field::WholeField whole(part, model, listed);
+  parallel(whole.block_count(),
+           [&](std::size_t begin, std::size_t end) { field.fill(whole, part, around.low, begin, end); });
+}
+
 /// Stores a model's extension at voxels where it may have changed, and multiplies Σ where it was computed anew.
 void extend(field::Extension& air, field::DisturbanceField& field, const map::OccupancyGrid& grid,
             std::span<const std::size_t> moved, std::span<const std::size_t> fresh, const Parallel& parallel) {
@@ -130,9 +143,13 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
   sums.update(grid, changed.low, changed.high);
   const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, old.reach.vehicle);
 
-  const map::VoxelBox columns = field::affected_columns(grid, vehicle_model, changed);
+  map::VoxelBox columns = field::affected_columns(grid, vehicle_model, changed);
+  // A wide body's centre gets places, or loses them, beyond the field's range.
+  const int body = static_cast<int>(std::ceil(old.reach.vehicle.body.radius / grid.resolution())) + 1;
+  const map::VoxelBox beside = grown(changed, {body, body, grid.size().z()}, grid.size());
+  columns.add(beside.low), columns.add(beside.high);
   field::DisturbanceField field(grid, voxels, old.field, columns);
-  fill_field(field, grid, vehicle_model, field::voxels_within(grid, voxels, columns), parallel);
+  fill_columns(field, grid, vehicle_model, columns, field::voxels_within(grid, voxels, columns), parallel);
 
   field::Extension air = old.bounds.extension();
   const auto sideways = static_cast<int>(std::ceil(air.level_range() / grid.resolution())) + 1;
@@ -142,7 +159,8 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
          parallel);
   const bool everywhere = air.by_place();  // pushes of anywhere widen the largest sets
 
-  reach::BoundField bounds(grid, field, model.bound, std::move(air));
+  reach::BoundField bounds = everywhere ? reach::BoundField(grid, field, model.bound, std::move(air))
+                                        : reach::BoundField(old.bounds, field, columns);
   const map::VoxelBox hover_box = everywhere ? map::VoxelBox{Index3::Zero(), grid.size() - Index3::Ones()}
                                              : reached_by_hover(old, bounds, columns, changed);
   const std::vector<std::size_t> hover_voxels = field::voxels_within(grid, voxels, hover_box);

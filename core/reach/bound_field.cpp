@@ -16,12 +16,25 @@ void raise(std::array<BoundCode, N>& maximum, const std::array<BoundCode, N>& ot
 }
 
 template <class Visit>
-void for_each_voxel(const Index3& size, const Visit& visit) {
-  for (int k = 0; k < size.z(); ++k) {
-    for (int j = 0; j < size.y(); ++j) {
-      for (int i = 0; i < size.x(); ++i) visit(Index3(i, j, k));
+void for_each_voxel(const map::VoxelBox& box, const Visit& visit) {
+  for (int k = box.low.z(); k <= box.high.z(); ++k) {
+    for (int j = box.low.y(); j <= box.high.y(); ++j) {
+      for (int i = box.low.x(); i <= box.high.x(); ++i) visit(Index3(i, j, k));
     }
   }
+}
+
+/// All voxels of a grid of that size.
+map::VoxelBox all_of(const Index3& size) { return {Index3::Zero(), size - Index3::Ones()}; }
+
+/// Of each voxel whether a cube of `edge` voxels on from it holds a stored one: dilation, axis by axis. Running over
+/// the end of a row only marks voxels that nobody needs.
+void dilate(std::vector<std::uint8_t>& stored, const Index3& size, std::size_t edge) {
+  const auto sx = static_cast<std::size_t>(size.x()), sy = static_cast<std::size_t>(size.y());
+  for (const std::size_t stride : {std::size_t{1}, sx, sx * sy})
+    for (std::size_t n = 0; n < stored.size(); ++n)
+      for (std::size_t step = 1; step < edge && n + step * stride < stored.size(); ++step)
+        stored[n] |= stored[n + step * stride];
 }
 
 }  // namespace
@@ -34,10 +47,11 @@ BoundField::BoundField(const map::OccupancyGrid& grid, const field::DisturbanceF
       extension_(std::move(extension)),
       model_(model) {
   std::vector<std::uint8_t> stored(grid.cell_count(), 0);
-  for_each_voxel(size_, [&](const Index3& v) { stored[grid.linear(v)] = field.has(v); });
+  for_each_voxel(all_of(size_), [&](const Index3& v) { stored[grid.linear(v)] = field.has(v); });
+  dilate(stored, size_, kLargest);
   number_entries(stored);
-  for_each_voxel(size_, [&](const Index3& v) {
-    if (!stored[grid.linear(v)]) return;
+  for_each_voxel(all_of(size_), [&](const Index3& v) {
+    if (!field.has(v)) return;
     DisturbanceBound w = bound(field.at(v), model);
     if (extension_.by_place()) {
       const Air air = extension_.at(v);
@@ -47,26 +61,55 @@ BoundField::BoundField(const map::OccupancyGrid& grid, const field::DisturbanceF
     }
     std::ranges::transform(w.w, entries_[entry_of(grid.linear(v))].level[0].begin(), code_of);
   });
-  for (int level = 1; level < kLevels; ++level) pool(level);
+  for (int level = 1; level < kLevels; ++level) pool(level, all_of(size_));
 }
 
-// An entry for each voxel whose largest cube holds a stored voxel: dilation by the cube, axis by axis. Running over the
-// end of a row only adds entries that nobody needs.
-void BoundField::number_entries(std::vector<std::uint8_t> stored) {
-  const auto sx = static_cast<std::size_t>(size_.x()), sy = static_cast<std::size_t>(size_.y());
-  for (const std::size_t stride : {std::size_t{1}, sx, sx * sy}) {
-    for (std::size_t n = 0; n < stored.size(); ++n) {
-      for (std::size_t step = 1; step < (1u << (kLevels - 1)) && n + step * stride < stored.size(); ++step) {
-        stored[n] |= stored[n + step * stride];
-      }
-    }
+BoundField::BoundField(const BoundField& old, const field::DisturbanceField& field, const map::VoxelBox& changed)
+    : origin_W_(old.origin_W_),
+      resolution_(old.resolution_),
+      size_(old.size_),
+      extension_(old.extension_),
+      model_(old.model_),
+      least_push_(old.least_push_),
+      largest_push_(old.largest_push_) {
+  constexpr int kAhead = static_cast<int>(kLargest) - 1;  // of a cube's lowest voxel
+  const map::VoxelBox anew{(changed.low - Index3::Constant(kAhead)).cwiseMax(0), changed.high};
+  const map::VoxelBox read{anew.low, anew.high + Index3::Constant(kAhead)};
+  std::vector<std::uint8_t> stored, entered(old.rank_.size());
+  for_each_voxel(read, [&](const Index3& v) { stored.push_back(field.has(v)); });
+  const Index3 extent = read.high - read.low + Index3::Ones();
+  dilate(stored, extent, kLargest);
+  std::ranges::transform(old.rank_, entered.begin(), [](std::uint8_t rank) { return rank != 0; });
+  for_each_voxel(anew,
+                 [&](const Index3& v) { entered[map::linear(size_, v)] = stored[map::linear(extent, v - read.low)]; });
+  number_entries(entered);
+  copy_entries(old);
+  for_each_voxel(anew, [&](const Index3& v) {
+    const std::size_t e = entry_of(map::linear(size_, v));
+    if (e == 0) return;
+    entries_[e] = {};
+    if (field.has(v)) std::ranges::transform(bound(field.at(v), model_).w, entries_[e].level[0].begin(), code_of);
+  });
+  for (int level = 1; level < kLevels; ++level) pool(level, anew);
+}
+
+// Of the voxels that have one in both.
+void BoundField::copy_entries(const BoundField& old) noexcept {
+  std::size_t from = 0, to = 0;
+  for (std::size_t n = 0; n < rank_.size(); ++n) {
+    const bool was = old.rank_[n] != 0, is = rank_[n] != 0;
+    from += was, to += is;
+    if (was && is) entries_[to] = old.entries_[from];
   }
-  rank_.assign(stored.size(), 0);
-  before_.reserve((stored.size() + kRun - 1) / kRun);
+}
+
+void BoundField::number_entries(const std::vector<std::uint8_t>& entered) {
+  rank_.assign(entered.size(), 0);
+  before_.reserve((entered.size() + kRun - 1) / kRun);
   std::uint32_t count = 0;
-  for (std::size_t n = 0; n < stored.size(); ++n) {
+  for (std::size_t n = 0; n < entered.size(); ++n) {
     if (n % kRun == 0) before_.push_back(count);
-    if (stored[n]) rank_[n] = static_cast<std::uint8_t>(++count - before_.back());
+    if (entered[n]) rank_[n] = static_cast<std::uint8_t>(++count - before_.back());
   }
   entries_.resize(count + std::size_t{1});
 }
@@ -83,16 +126,14 @@ DisturbanceBound BoundField::decoded(const Maximum& codes) noexcept {
 }
 
 // The cube of level L is the union of the eight cubes of level L − 1 at its octants.
-void BoundField::pool(int level) noexcept {
+void BoundField::pool(int level, const map::VoxelBox& box) noexcept {
   const int half = 1 << (level - 1);
   const auto sx = static_cast<std::size_t>(size_.x()), sy = static_cast<std::size_t>(size_.y());
   std::array<std::size_t, 8> ahead;  // of an octant, in cells
   for (std::size_t octant = 0; octant < 8; ++octant)
     ahead[octant] = static_cast<std::size_t>(half) * ((octant & 1) + sx * ((octant >> 1 & 1) + sy * (octant >> 2)));
-  std::size_t n = 0;
-  for_each_voxel(size_, [&](const Index3& v) {
-    const std::size_t here = n++;
-    const std::size_t e = entry_of(here);
+  for_each_voxel(box, [&](const Index3& v) {
+    const std::size_t here = map::linear(size_, v), e = entry_of(here);
     if (e == 0) return;
     const std::size_t beyond = (v.x() + half < size_.x() ? 0u : 1u) | (v.y() + half < size_.y() ? 0u : 2u) |
                                (v.z() + half < size_.z() ? 0u : 4u);  // axes along which the octant is outside

@@ -26,6 +26,9 @@ class BoundField {
   /// expected in `field`.
   BoundField(const map::OccupancyGrid& grid, const field::DisturbanceField& field, const BoundModel& model,
              field::Extension extension = {});
+  /// The same as BoundField(grid, field, …) from `old`, whose field differed at the voxels of `changed` alone.
+  /// Precondition: of a model whose extension is not by place. O(voxels of the grid) to copy, the rest O(changed).
+  BoundField(const BoundField& old, const field::DisturbanceField& field, const map::VoxelBox& changed);
   const field::Extension& extension() const noexcept { return extension_; }
   /// Mean push on a vehicle that moves with v at p, m/s². Real-time: wait-free, no allocation.
   Vec3 push(const Vec3& p_W, const Vec3& v_W) const noexcept { return extension_.push(p_W, v_W); }
@@ -48,9 +51,10 @@ class BoundField {
   DisturbanceBound at(const Index3& v) const noexcept;
 
  private:
-  static constexpr int kFew = 512;          // voxels
-  static constexpr int kLevels = 3;         // cubes of 1 << level voxels
-  static constexpr std::size_t kRun = 128;  // voxels whose entries are numbered from one base
+  static constexpr int kFew = 512;                              // voxels
+  static constexpr int kLevels = 3;                             // cubes of 1 << level voxels
+  static constexpr std::size_t kLargest = 1u << (kLevels - 1);  // edge of the largest, voxels
+  static constexpr std::size_t kRun = 128;                      // voxels whose entries are numbered from one base
   using Maximum = std::array<BoundCode, kDirections>;
   struct alignas(32) Entry {
     std::array<Maximum, kLevels> level{};
@@ -60,8 +64,9 @@ class BoundField {
   DisturbanceBound moving(DisturbanceBound w, const Vec3& v_W) const noexcept;
   static DisturbanceBound decoded(const Maximum& codes) noexcept;
   std::size_t entry_of(std::size_t n) const noexcept;  // of a voxel in entries_; 0: every cube at it is zero
-  void number_entries(std::vector<std::uint8_t> stored);
-  void pool(int level) noexcept;
+  void number_entries(const std::vector<std::uint8_t>& entered);
+  void copy_entries(const BoundField& old) noexcept;
+  void pool(int level, const map::VoxelBox& box) noexcept;
 
   Vec3 origin_W_;
   double resolution_;

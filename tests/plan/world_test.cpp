@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <random>
 
 #include "core/config/config.hpp"
@@ -141,8 +142,54 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnew) {
       ASSERT_EQ(world->hover.safe(v), anew->hover.safe(v)) << "round " << round;
       differ += before->hover.safe(v) != anew->hover.safe(v);
     }
+    for (int box = 0; box < 2000; ++box) {  // over one voxel, the cubes that are kept, and several of them
+      Index3 first, last;
+      for (int axis = 0; axis < 3; ++axis) {
+        first[axis] = std::uniform_int_distribution<int>(0, grid.size()[axis] - 1)(random);
+        last[axis] = first[axis] + std::uniform_int_distribution<int>(0, 9)(random);
+      }
+      ASSERT_EQ(world->bounds.max_over_voxels(first, last).w, anew->bounds.max_over_voxels(first, last).w)
+          << "round " << round << ": " << first.transpose() << " to " << last.transpose();
+    }
   }
   EXPECT_GT(differ, 30u);  // the changes did change something
+}
+
+// Walls at any angle: 3,657 normals.
+TEST(World, OfABuildingUpdatedByRegionIsTheOneBuiltAnew) {
+  const std::string file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "geb079.bt is absent";
+  const auto before = build_world(*map::load_map(file), Model{}, vehicle_5in());
+  std::mt19937 random(3);
+  for (int round = 0; round < 2; ++round) {
+    map::OccupancyGrid grid = before->grid;
+    map::VoxelBox changed;
+    Index3 low;
+    do {
+      low = grid.voxel(random() % grid.cell_count());
+    } while (!before->hover.safe(low));
+    for (int n = 0; n < 1000; ++n) {  // a crate of which a scan sees parts
+      const Index3 v = low + Index3(n % 10, n / 10 % 10, n / 100);
+      if (!grid.free(v) || random() % 4 == 0) continue;
+      grid.set(v, map::Cell::occupied), changed.add(v);
+    }
+    const auto updated = update_world(*before, grid, changed, Model{});
+    const auto anew = build_world(grid, Model{}, vehicle_5in());
+    std::size_t differ = 0;
+    for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+      const Index3 v = grid.voxel(n);
+      ASSERT_EQ(updated->field.has(v), anew->field.has(v)) << v.transpose();
+      if (anew->field.has(v)) {
+        const Variance is = updated->field.at(v), was = anew->field.at(v);
+        ASSERT_TRUE(is.xx == was.xx && is.xy == was.xy && is.yy == was.yy && is.zz == was.zz) << v.transpose();
+      }
+      ASSERT_EQ(updated->bounds.max_over_voxels(v, v + Index3(1, 3, 2)).w,
+                anew->bounds.max_over_voxels(v, v + Index3(1, 3, 2)).w);
+      ASSERT_EQ(updated->hover.safe(v), anew->hover.safe(v)) << v.transpose();
+      differ += before->hover.safe(v) != anew->hover.safe(v);
+    }
+    EXPECT_GT(differ, 300u);
+  }
 }
 
 // A body that is wider than the field's range: a new obstacle takes hover places where no disturbance changes.
@@ -164,6 +211,16 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnewForAWideVehicleToo) {
     far += before->hover.safe(v) && !anew->hover.safe(v) && v.x() > 20 + 10;
   }
   EXPECT_GT(far, 10);
+
+  // And what goes gives places back.
+  map::OccupancyGrid empty = before->grid;
+  const auto back = update_world(*anew, empty, changed, model);
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const Index3 v = grid.voxel(n);
+    ASSERT_EQ(back->field.has(v), before->field.has(v)) << v.transpose();
+    ASSERT_EQ(back->bounds.at(v).w, before->bounds.at(v).w) << v.transpose();
+    ASSERT_EQ(back->hover.safe(v), before->hover.safe(v)) << v.transpose();
+  }
 }
 
 }  // namespace
