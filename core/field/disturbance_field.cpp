@@ -107,13 +107,6 @@ DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid, std::span<con
   sigma_.assign(count, {-1, 0, 0, 0});
 }
 
-DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels,
-                                   const DisturbanceField& old, const map::VoxelBox& anew)
-    : DisturbanceField(grid, voxels) {
-  for (const std::size_t n : voxels)
-    if (old.has(n) && !anew.contains(voxel(n))) sigma_[slot(n)] = old.sigma_[old.slot(n)];
-}
-
 void DisturbanceField::fill(const ProximityField& exact, std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) set(n, exact.at(exact.grid().center(exact.grid().voxel(n))).sigma());
 }
@@ -122,16 +115,10 @@ void DisturbanceField::fill(const WholeField& whole, std::size_t begin, std::siz
   whole.evaluate(begin, end, [this](std::size_t n, const Variance& s) { set(n, s); });
 }
 
-void DisturbanceField::fill(const WholeField& whole, const map::OccupancyGrid& part, const Index3& low,
-                            std::size_t begin, std::size_t end) {
-  whole.evaluate(begin, end,
-                 [&](std::size_t n, const Variance& s) { set(map::linear(size_, low + part.voxel(n)), s); });
-}
-
 void DisturbanceField::scale(const Extension& extension, std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) {
     if (!has(n)) continue;
-    const auto factor = static_cast<float>(std::exp(extension.at(voxel(n)).ln_variance));
+    const auto factor = static_cast<float>(std::exp(extension.at(map::voxel(size_, n)).ln_variance));
     for (float& s : sigma_[slot(n)]) s *= factor;
   }
 }
@@ -145,11 +132,6 @@ void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
 std::size_t DisturbanceField::slot(std::size_t n) const noexcept {
   const std::uint64_t lower = (std::uint64_t{1} << n % kWord) - 1;
   return before_[n / kWord] + static_cast<std::size_t>(std::popcount(listed_[n / kWord] & lower));
-}
-
-Index3 DisturbanceField::voxel(std::size_t n) const noexcept {
-  const auto x = static_cast<std::size_t>(size_.x()), y = static_cast<std::size_t>(size_.y());
-  return {static_cast<int>(n % x), static_cast<int>(n / x % y), static_cast<int>(n / (x * y))};
 }
 
 bool DisturbanceField::has(const Index3& v) const noexcept {

@@ -12,7 +12,6 @@
 #include "core/field/sight.hpp"
 #include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
-#include "core/map/voxel_box.hpp"
 #include "core/types/model.hpp"
 
 namespace backwash::field {
@@ -50,18 +49,11 @@ class DisturbanceField {
  public:
   /// Room for Σ at the listed voxels (linear indices of the grid, any order), where it is unset. O(voxels of the grid).
   DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels);
-  /// The same, with Σ of `old` at those listed voxels outside the box `anew` where it has one. With affected_columns()
-  /// and fill(), a field follows its map, bit for bit as if it were made anew. Precondition: of grids of one size.
-  DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels, const DisturbanceField& old,
-                   const map::VoxelBox& anew);
 
   /// Evaluates Σ at the centres of some of the listed voxels. Distinct ones may be filled from several threads at once.
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
-  /// The same where `whole` is of a part of this grid, whose voxel (0, 0, 0) is `low` here.
-  void fill(const WholeField& whole, const map::OccupancyGrid& part, const Index3& low, std::size_t begin,
-            std::size_t end);
 
   /// Multiplies Σ at the given voxels, where it is stored, by the factor that an extended model has there.
   void scale(const Extension& extension, std::span<const std::size_t> voxels);
@@ -81,7 +73,6 @@ class DisturbanceField {
   bool listed(std::size_t n) const noexcept { return listed_[n / kWord] >> n % kWord & 1; }
   std::size_t slot(std::size_t n) const noexcept;  // of a listed voxel in sigma_
   bool has(std::size_t n) const noexcept { return listed(n) && sigma_[slot(n)][0] >= 0; }
-  Index3 voxel(std::size_t n) const noexcept;
 
   Vec3 origin_W_;
   double resolution_;

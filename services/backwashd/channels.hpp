@@ -227,11 +227,13 @@ struct Channels {
   sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
   sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
-  sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
-  sync::RecordRing<ControlRecord, 256> command_log;                        // DDS reader → recorder
-  sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
-  sync::Handover<FreshPort> ports;                                         // link watch → control
-  std::atomic<std::optional<firmware_bridge::LinkFault>> link_fault;       // control → link watch
+  std::atomic<bool> map_partial{false};  // map worker → planner: the newest world is what is around the vehicle alone
+  sync::LatestValue<Vec3> vehicle_W;     // control → map worker: where the newest good odometry is, in the map
+  sync::RecordRing<ControlRecord, 2048> control_log;                  // control → recorder
+  sync::RecordRing<ControlRecord, 256> command_log;                   // DDS reader → recorder
+  sync::RecordRing<ControlEvent, 256> events;                         // control → link watch
+  sync::Handover<FreshPort> ports;                                    // link watch → control
+  std::atomic<std::optional<firmware_bridge::LinkFault>> link_fault;  // control → link watch
   static_assert(decltype(link_fault)::is_always_lock_free);
   std::atomic<std::uint32_t> port_losses{0};  // control → link watch: times that a good port was lost
   sync::AtomicOptional<mavlink::SigningTime, 0> signing_time;  // control → signing time: of the newest signature

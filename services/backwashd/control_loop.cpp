@@ -261,6 +261,7 @@ void ControlLoop::report(const track::TickInput& in, const track::TickOutput& ou
   channels_.view_mission.write(view_);
   channels_.view_planner.write(view_);
   channels_.view_status.write(view_);
+  if (out.fresh) channels_.vehicle_W.write(view_.state.p_W);
 }
 
 void ControlLoop::tick(std::int64_t now_ns, int missed, double lateness_us) noexcept {

@@ -24,6 +24,8 @@ namespace {
 constexpr std::size_t kBytesPerVoxel = 115;
 // Resolutions for which the field is known to hold (tests/field/resolution_and_yaw_test.cpp), m.
 constexpr int kBelowTheRest = 10;  // niceness
+constexpr double kMadeFirst = 5;   // m level from the vehicle to the sides of what is made first
+constexpr int kWorthIt = 4;        // times as many voxels as that has a map of which a part is made first
 constexpr double kFinest = 0.02, kCoarsest = 0.2;
 
 // 64-bit FNV-1a.
@@ -65,7 +67,7 @@ map::ScanChange difference(const map::OccupancyGrid& before, const map::Occupanc
 struct Ended {};
 
 /// run_parallel, given up with Ended as soon as the daemon ends: a world may take minutes.
-plan::Parallel until_the_end(const std::atomic<bool>& stop) {
+Parallel until_the_end(const std::atomic<bool>& stop) {
   return [&stop](std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
     run_parallel(count, [&](std::size_t begin, std::size_t end) {
       if (stop) throw Ended{};
@@ -147,12 +149,31 @@ void MapWorker::take_map(const MapMessage& message) {
     publish(plan::update_world(*world_, std::move(*grid), change.box, model_, parallel_), message.received_ns);
   } else {
     live_.emplace(*grid);
+    if (!world_) publish_near(*grid, message.received_ns);  // what flies in another world is not cut short
     publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_),
             message.received_ns);
+    channels_.map_partial = false;
   }
   ++channels_.maps_accepted;
   spdlog::info("map accepted: {} x {} x {} voxels, world {} in {} ms", size.x(), size.y(), size.z(),
                update ? "updated" : "built", (now_ns() - begun) / 1'000'000);
+}
+
+// Σ takes seconds in a building and longer on an office floor. Until then the vehicle may fly in what is around it.
+void MapWorker::publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns) {
+  if (const auto newest = channels_.vehicle_W.read_new()) vehicle_W_ = *newest;
+  if (!vehicle_W_ || !model_.extension.empty() || !grid.inside(grid.index(*vehicle_W_))) return;
+  const auto begun = now_ns();
+  const int by = static_cast<int>(std::ceil(kMadeFirst / grid.resolution()));
+  const Index3 v = grid.index(*vehicle_W_), last = grid.size() - Index3::Ones();
+  const map::VoxelBox columns{(v - Index3(by, by, v.z())).cwiseMax(0), (v + Index3(by, by, last.z())).cwiseMin(last)};
+  const Index3 extent = columns.high - columns.low + Index3::Ones();
+  if (static_cast<std::size_t>(extent.prod()) * kWorthIt > grid.cell_count()) return;
+  auto near = plan::build_part(grid, columns, model_, vehicle_, parallel_);
+  channels_.map_partial = true;
+  publish(std::move(near), received_ns);
+  spdlog::info("map: {:.0f} m around the vehicle can be flown after {} ms, the rest follows", kMadeFirst,
+               (now_ns() - begun) / 1'000'000);
 }
 
 bool MapWorker::take_scans() {

@@ -16,7 +16,8 @@ namespace backwash::daemon {
 /// that has nothing free, another resolution than the one in use, or a snapshot above map.max_mib, is rejected whole
 /// and counted, and the old world stays (docs/faults.md rows 10 to 12); so is one of another writer than the first good
 /// one of its term (row 48). Scans that came meanwhile are taken in
-/// together, and the world is updated where they changed something.
+/// together, and the world is updated where they changed something. Of a map that is far larger than what is around
+/// the vehicle, that part is made and handed out first.
 class MapWorker {
  public:
   MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
@@ -32,6 +33,7 @@ class MapWorker {
   void take_map(const MapMessage& message);
   bool take_scans();
   void reject(const std::string& why);
+  void publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns);
   void publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns);
 
   Channels& channels_;
@@ -39,9 +41,10 @@ class MapWorker {
   Model model_;
   Vehicle vehicle_;
   MapSettings settings_;
-  plan::Parallel parallel_;
+  Parallel parallel_;
   std::optional<MapWriter> writer_;  // of the maps in use
   std::optional<map::LiveMap> live_;
+  std::optional<Vec3> vehicle_W_;  // where the vehicle was last
   std::shared_ptr<const plan::World> world_;
 };
 

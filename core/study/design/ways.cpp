@@ -61,7 +61,7 @@ class Room {
 
  private:
   bool holds(const Index3& v) const {
-    return region_ != plan::SafeSpace::kNoRegion && world_.safe.region(v) == region_;
+    return region_ != plan::Components::kNone && world_.safe.region(v) == region_;
   }
   const plan::World& world_;
   std::uint32_t region_;
