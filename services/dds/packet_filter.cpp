@@ -72,9 +72,11 @@ bool filter_data(Bytes body, std::uint8_t id, std::uint8_t flags) noexcept {
   constexpr std::uint32_t kBuiltin = 0xc0;
   if ((writer & kBuiltin) != kBuiltin && (reader & kBuiltin) != kBuiltin) return true;
   // The type lookup service has the entities 0x000300.. and 0x000301...
-  if (writer >> 9 == 0x000300u >> 1 || reader >> 9 == 0x000300u >> 1 || id == kDataFragment) return false;
+  if (writer >> 9 == 0x000300u >> 1 || reader >> 9 == 0x000300u >> 1) return false;
+  // A handshake of DDS Security carries a certificate and permissions: several fragments.
   const bool secured = writer == kStatelessMessage || writer >> 24 == 0xff;
-  return !(flags & kPayload) || secured || filter_builtin(rest, writer);
+  if (secured) return true;
+  return id == kData && (!(flags & kPayload) || filter_builtin(rest, writer));
 }
 
 }  // namespace

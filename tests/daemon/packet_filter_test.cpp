@@ -113,6 +113,15 @@ TEST(PacketFilter, ShutsOutTheTypeLookupServiceAndDiscoveryInFragments) {
   }
 }
 
+// A handshake has a certificate and permissions in it; what comes after it is authenticated.
+TEST(PacketFilter, LetsDdsSecurityThroughInFragmentsToo) {
+  constexpr std::uint32_t kHandshake = 0x000201c3, kVolatile = 0xff0202c3, kSecurePublications = 0xff0003c2;
+  for (const std::uint32_t writer : {kHandshake, kVolatile, kSecurePublications}) {
+    const std::vector<Packet> good{data(writer, Packet(8, 0xf2)), data(writer, Packet(8, 0xf2), kFragment)};
+    EXPECT_EQ(filtered(good), whole(good)) << writer;
+  }
+}
+
 TEST(PacketFilter, ShutsOutDiscoveryThatIsNotWellFormed) {
   const auto padded = [](Packet bad) {
     const Packet seen = filtered({bad, submessage(kHeartbeat, Packet(28))});
