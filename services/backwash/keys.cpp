@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/files/read_file.hpp"
@@ -79,10 +83,10 @@ security::Authority authority_of(const Options& o) {
   return *authority;
 }
 
+/// One that is there stays as it is.
 void make_folder(const std::string& folder) {
   std::error_code wrong;
-  fs::create_directories(folder, wrong);
-  if (!wrong) fs::permissions(folder, fs::perms::owner_all, wrong);
+  if (fs::create_directories(folder, wrong)) fs::permissions(folder, fs::perms::owner_all, wrong);
   if (wrong) throw Failure(kCannotCreate, folder + ":1: cannot be made: " + wrong.message());
 }
 

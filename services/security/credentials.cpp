@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <ctime>
 #include <system_error>
 
 #include "services/security/openssl.hpp"
@@ -77,10 +78,19 @@ std::string refusal(X509* certificate, X509* authority, X509_CRL* revoked) {
   return X509_verify_cert_error_string(X509_STORE_CTX_get_error(check.get()));
 }
 
+/// By this computer's clock, which may be what is wrong.
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  ::gmtime_r(&now, &parts);
+  std::array<char, 16> text;
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%d", &parts)};
+}
+
 /// What a signed document says; an error if its signature is not the authority's.
 Text signed_text(const std::string& path, X509* authority, const std::string& authority_path) {
   const Text text = read(path);
-  if (!text) return text;
+  if (!text) return tl::unexpected(text.error());
   BIO* content = nullptr;
   const Signed document(SMIME_read_PKCS7(reading(*text).get(), &content));
   const Bio owned(content), out = writing();
@@ -135,7 +145,7 @@ tl::expected<Credentials, std::string> read_credentials(const std::string& folde
   if (X509_check_private_key(certificate->get(), key->get()) != 1)
     return wrong(in(kCertificate), std::string("is of another key than ") + kKey);
   if (const auto why = refusal(certificate->get(), authority->get(), revoked->get()); !why.empty())
-    return wrong(in(kCertificate), why + "; needs one of " + kIdentityCa + " that counts now");
+    return wrong(in(kCertificate), why + "; needs one of " + kIdentityCa + " that counts now, " + today());
   if (const auto governance = signed_text(in(kGovernance), permissions_ca->get(), kPermissionsCa); !governance)
     return tl::unexpected(governance.error());
   const auto permissions = signed_text(in(kPermissions), permissions_ca->get(), kPermissionsCa);

@@ -159,16 +159,6 @@ TEST(DaemonFile, ReadsTheFormsOfALinkDevice) {
     EXPECT_FALSE(link_device(bad)) << bad;
 }
 
-TEST(DaemonFile, CredentialsMayBeLeftOutOrHaveAFolder) {
-  EXPECT_EQ(loaded(shipped()).value().dds.security, "");
-  const auto with = [](const std::string& value) { return "security = " + value + "\n\n[link]"; };
-  std::string text = shipped();
-  text.replace(text.find("[link]"), 6, with("\"/etc/backwash/security\""));
-  EXPECT_EQ(loaded(text).value().dds.security, "/etc/backwash/security");
-  for (const char* bad : {"\"\"", "true", "7"})
-    EXPECT_THAT(error_after("[link]", with(bad)), HasSubstr(".toml:13: key 'dds.security' = ")) << bad;
-}
-
 TEST(DaemonFile, FramesAndMapMayBeLeftOut) {
   std::string text = shipped();
   text.resize(text.find("\n[frames]"));

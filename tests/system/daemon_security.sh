@@ -52,7 +52,10 @@ run_daemon() { # run_daemon NAME: until it knows whether there is another daemon
   die 'the daemon does not run'
 }
 
-# Odometry and maps of one who may command and nothing else: none arrives.
+# Odometry and maps of one who may command and nothing else: its own program refuses, and without that none arrives.
+code=0
+said=$("$bin/backwash-bench" --map builtin:parallel-walls-4m --start -2,0,1.2 --link "$work/autopilot" --domain "$domain" --security "$keys/pilot" 2>&1) || code=$?
+[[ $code == 78 && $said == *'the permissions of its credentials do not allow it'* ]] || die "a bench sends what it may not: $code $said"
 bench=("$bin" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --log "$work/truth.csv")
 LD_PRELOAD=$no_permissions start_bench "${bench[@]}" --security "$keys/pilot"
 run_daemon first
