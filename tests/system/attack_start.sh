@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # What a start must not do (docs/faults.md rows 29, 38, 45): with an invalid configuration, or with credentials that no
-# peer would take, no port is opened, no file is waited for and nothing is made; a start that fails, and one that does not, leaves every earlier log byte for byte.
+# peer would take, no port is opened, no file is waited for and nothing is made; a start that fails, and one that does not,
+# leaves every earlier log byte for byte.
 #   attack_start.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 work=$(mktemp -d)

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Who may speak (docs/faults.md row 29), with real processes. A station commands a flight from take-off to landing while
 # all others try: a process without credentials, one of another authority, an observer, one whose certificate was revoked
-# or has ended. Nobody's odometry is taken but the VIO's. Those who obey no rule of their own (no_permissions.c, a clock
-# set back, a list of revoked certificates that is not there) are refused by the daemon; the permitted are served meanwhile.
+# or has ended. Nobody's odometry is taken but the VIO's, and plain packets under its name change nothing. Those who obey no
+# rule of their own (no_permissions.c, a clock set back, a list of revoked certificates that is not there) are refused by
+# the daemon; the permitted are served meanwhile.
 #   daemon_security.sh SOURCE_DIR BUILD_DIR encrypt|sign
 set -euo pipefail
 source_dir=$1 build=$2 protect=$3
@@ -110,12 +111,16 @@ how=(env)
 ctl goto 2,0,1.2 --wait
 ctl land --wait
 
-# In plain text under the VIO's own name: not a packet is heard.
-spoof() { python3 "$source_dir/tests/system/spoofed_odometry.py" "$domain" "$(sed -n 's/.*odometry is taken from writer //p' "$log" | tail -n 1)"; }
+# In plain text under the VIO's own name: neither what it says is heard, nor that it is gone.
+spoof() { python3 "$source_dir/tests/system/spoofed_packets.py" "$domain" "$(sed -n 's/.*odometry is taken from writer //p' "$log" | tail -n 1)" "$1"; }
 status() { as pilot status --json && python3 -c 'import json, sys; print(json.loads(sys.argv[1])[sys.argv[2]])' "$said" "$1"; }
-refused=$(status odometry_refused)
-spoof
+bound() { grep -c 'odometry is taken from writer' "$log"; }
+refused=$(status odometry_refused) writers=$(bound)
+spoof odometry
+spoof gone
+sleep 1
 [[ $(status odometry_refused) == "$refused" ]] || die 'plain odometry under the name of the VIO was heard'
+[[ $(bound) == "$writers" && $(status odometry_age_s) == 0.0* ]] || die 'the VIO was lost by a plain packet under its name'
 
 # A certificate that ends: heard until then, also by a process that does not look at its clock; not after.
 credentials add "$keys" ended --role station --until "$(date -u -d '+12 seconds' +%Y-%m-%dT%H:%M:%SZ)"
@@ -133,13 +138,17 @@ unheard late stop
 [[ $(wc -l <"$work/watched") == "$watched" ]] && ((watched > 20)) || die "one whose certificate ended still sees the status"
 stop
 
-# Without security the same odometry is heard: as what it is, of a frame that nobody has.
+# Without security both are heard: the odometry as what it is, of a frame that nobody has.
 rm -rf "$keys" "$work/autopilot"
-more_dds='' ctl_options=()
+more_dds='' ctl_options=() writers=$(bound)
 start_bench "${bench[@]}"
 run_daemon open
-for _ in $(seq 100); do [[ $(grep -c 'odometry is taken' "$log") -ge 2 ]] && break; sleep 0.1; done
-spoof
+for _ in $(seq 100); do (($(bound) > writers)) && break; sleep 0.1; done
+writers=$(bound)
+spoof gone
+for _ in $(seq 100); do (($(bound) > writers)) && break; sleep 0.1; done
+(($(bound) > writers)) || die 'a spoofed end was not heard without security: it proves nothing above'
+spoof odometry
 (($(status odometry_refused) > 0)) || die 'spoofed odometry was not heard without security: it proves nothing above'
 stop
 grep -E "packets of 1 s|not root" "$log"
