@@ -11,8 +11,8 @@ model = "${model:-$1}"
 domain = $domain
 interface = "lo"
 namespace = "backwash"
-odometry_topic = "${3:-rt/backwash/odometry}"
-${more_dds:-}
+odometry_topic = "${3:-rt/backwash/odometry}"${more_dds:+
+$more_dds}
 [link]
 device = "${device:-$work/autopilot}"
 baud = ${baud:-921600}

