@@ -22,6 +22,7 @@ struct Daemon {
     std::string interface;       ///< network interface by name
     std::string name_space;      ///< topics are rt/NAMESPACE/…: several vehicles share a domain
     std::string odometry_topic;  ///< whole name on the wire, for any VIO
+    std::string security;        ///< folder of credentials of DDS Security; empty: everyone may speak
   } dds;
   struct {
     std::string map = "map";         ///< of maps, clouds, odometry and what the daemon sends

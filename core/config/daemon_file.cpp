@@ -260,17 +260,19 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"link.device", &d.link.device},
       {"log.file", &d.log.file},
   };
-  const TextKey frames[] = {
-      {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
+  const TextKey optional[] = {{"dds.security", &d.dds.security},
+                              {"frames.map", &d.frames.map},
+                              {"frames.odometry", &d.frames.odometry},
+                              {"frames.body", &d.frames.body}};
   std::vector<std::string_view> others{kLive, kProtocol, kSigningKeyFile};
   others.insert(others.end(), std::begin(kOdometry), std::end(kOdometry));
   others.insert(others.end(), std::begin(kGpio), std::end(kGpio));
   for (const auto& [key, target] : texts) others.push_back(key);
-  for (const auto& [key, target] : frames) others.push_back(key);
+  for (const auto& [key, target] : optional) others.push_back(key);
   if (auto read = read_numbers(*file, others, d, converted); !read) return tl::unexpected(read.error());
   if (auto read = read_texts(*file, texts, true); !read) return tl::unexpected(read.error());
   if (auto good = check_names(*file, d); !good) return tl::unexpected(good.error());
-  if (auto read = read_texts(*file, frames, false); !read) return tl::unexpected(read.error());
+  if (auto read = read_texts(*file, optional, false); !read) return tl::unexpected(read.error());
   if (auto read = read_odometry(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <ctime>
 #include <new>
 #include <system_error>
 
@@ -83,6 +84,12 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
   if (!daemon) return wrong(daemon.error());
   if (const auto line = configured_line(daemon->link, daemon->odometry.timing); !line)
     return tl::make_unexpected(StartError(kConfiguration, path + ": " + line.error()));
+  std::optional<security::Credentials> credentials;
+  if (!daemon->dds.security.empty()) {
+    auto read = security::read_credentials(daemon->dds.security);
+    if (!read) return tl::make_unexpected(StartError(kConfiguration, path + ": dds.security: " + read.error()));
+    credentials = std::move(*read);
+  }
   auto vehicle = config::load_vehicle(daemon->vehicle);
   if (!vehicle) return wrong(vehicle.error());
   // What a velocity from poses may be off is in the first set of every tube.
@@ -91,7 +98,7 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
         track::PoseVelocity::error(std::min(OdometryTiming::kUsual, daemon->odometry.timing.rate_least));
   auto model = config::load_model(daemon->model);
   if (!model) return wrong(model.error());
-  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model)};
+  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials)};
 }
 
 namespace {
@@ -196,6 +203,17 @@ bool end(Flight& f) {
   return ended && closed;
 }
 
+/// The middleware ends what speaks by a certificate with that certificate, in flight too.
+void tell_of(const security::Credentials& c) {
+  constexpr std::int64_t kSoon_s = 30 * 86400;
+  const std::int64_t left_s = c.ends - std::time(nullptr);
+  if (left_s < kSoon_s)
+    spdlog::warn("DDS Security as {}: its certificate ends in {} days and {} h; a flight then ends with it", c.subject,
+                 left_s / 86400, left_s / 3600 % 24);
+  else
+    spdlog::info("DDS Security as {}", c.subject);
+}
+
 }  // namespace
 
 int run(const Settings& settings) {
@@ -213,6 +231,7 @@ int run(const Settings& settings) {
       spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}, raw log {}", settings.vehicle.name,
                    settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space,
                    flight->log);
+      if (const auto& c = settings.credentials) tell_of(*c);
       bool ready = false;  // the first ticks are on time only if the rest has started
       wait_for_end(signals, flight->failure, [&] {
         if (!ready && (ready = flight->channels->pulse.ticks >= kTicksToBeReady)) manager.ready();

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 
 #include "core/config/daemon_config.hpp"
 #include "services/command_line/exit_code.hpp"
+#include "services/security/credentials.hpp"
 
 namespace backwash::daemon {
 
@@ -14,6 +16,7 @@ struct Settings {
   config::Daemon daemon;
   Vehicle vehicle;
   Model model;
+  std::optional<security::Credentials> credentials;  ///< of DDS Security; absent: everyone may speak
 };
 
 /// Reads the daemon's file and the vehicle and model files that it names. Error: 66 where one of them is missing, 78

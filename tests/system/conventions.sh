@@ -7,6 +7,7 @@ mapfile -t verbs < <("$backwash" --help | sed -n '/^Subcommands:/,$ s/^  \([a-z]
 [[ ${#verbs[@]} -ge 13 ]] || die "only ${#verbs[@]} verbs in --help"
 verbs=("${verbs[@]/vehicle/vehicle tune}")
 verbs=("${verbs[@]/campaign/campaign plan}")
+verbs=("${verbs[@]/keys/keys init}")
 for verb in "${verbs[@]/#map/map info}" "map convert"; do
   read -ra words <<<"$verb"
   "$backwash" "${words[@]}" --help >help || die "$verb --help fails"
