@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/log/mcap_export.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <utility>
@@ -29,12 +31,13 @@ enum Channel : std::size_t {
   kEvents,
   kMap,
   kRaw,
+  kAutopilot,  ///< the last: without its poses there is no such channel
 };
 struct ChannelName {
   std::string_view topic, package, type;
 };
 /// In the order of Channel. odometry, trajectory and markers are named as the daemon's own topics.
-constexpr std::array<ChannelName, kRaw + 1> kChannels{
+constexpr std::array<ChannelName, kAutopilot + 1> kChannels{
     {{"/tf", "tf2_msgs", "TFMessage"},
      {"/backwash/odometry", "nav_msgs", "Odometry"},
      {"/backwash/setpoint", "geometry_msgs", "PoseStamped"},
@@ -45,7 +48,9 @@ constexpr std::array<ChannelName, kRaw + 1> kChannels{
      {"/backwash/reason", "std_msgs", "String"},
      {"/backwash/events", "rcl_interfaces", "Log"},
      {"/backwash/voxels", "visualization_msgs", "MarkerArray"},
-     {kRawTopic, "std_msgs", "UInt8MultiArray"}}};
+     {kRawTopic, "std_msgs", "UInt8MultiArray"},
+     {kAutopilotTopic, "nav_msgs", "Odometry"}}};
+constexpr std::string_view kAutopilotFrame = "autopilot", kAutopilotBody = "autopilot_body";
 
 constexpr std::uint32_t kSentSetpoint = 1;  // of TickRecord::sent
 
@@ -54,8 +59,9 @@ Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 /// Goes through the records in their order.
 class Exporter {
  public:
-  Exporter(std::ostream& out, const RawLog& log, std::string_view library) : writer_(out, library) {
-    for (std::size_t n = 0; n < kChannels.size(); ++n) {
+  Exporter(std::ostream& out, const RawLog& log, std::string_view library, std::span<const AutopilotPose> autopilot)
+      : writer_(out, library), autopilot_(autopilot), channels_(autopilot.empty() ? kAutopilot : kChannels.size()) {
+    for (std::size_t n = 0; n < channels_; ++n) {
       const auto& [topic, package, type] = kChannels[n];
       numbers_[n] = writer_.add_channel(topic, std::string(package) + "/msg/" + std::string(type),
                                         ros_schema(std::string(package) + "/" + std::string(type)));
@@ -72,6 +78,7 @@ class Exporter {
   }
 
   void take(const RawRecord& record) {
+    take_poses_until(record.header.t_ns);
     now_ns_ = record.header.t_ns + wall_ns_;
     newest_ns_ = std::max(newest_ns_, now_ns_);
     Bytes raw(sizeof record.header);
@@ -93,7 +100,7 @@ class Exporter {
   std::map<std::string, std::uint64_t> finish() {
     writer_.finish();
     std::map<std::string, std::uint64_t> messages;
-    for (std::size_t n = 0; n < kChannels.size(); ++n) messages[std::string(kChannels[n].topic)] = messages_[n];
+    for (std::size_t n = 0; n < channels_; ++n) messages[std::string(kChannels[n].topic)] = messages_[n];
     return messages;
   }
 
@@ -108,6 +115,28 @@ class Exporter {
     ++messages_[channel];
   }
 
+  /// The autopilot's poses up to a record; none before the first record.
+  void take_poses_until(std::int64_t t_ns) {
+    for (; !autopilot_.empty() && autopilot_.front().t_ns <= t_ns; autopilot_ = autopilot_.subspan(1)) {
+      if (newest_ns_ == 0) continue;
+      now_ns_ = autopilot_.front().t_ns + wall_ns_;
+      newest_ns_ = std::max(newest_ns_, now_ns_);
+      say(kAutopilot, ros::odometry(now_ns_, autopilot_.front().moving, {kAutopilotFrame, kAutopilotBody}));
+    }
+  }
+
+  /// Where the autopilot's frame lies in the map, by one set-point in both.
+  void place_autopilot(const TickRecord& row) {
+    constexpr int kEvery = 50;  // ticks
+    if (channels_ <= kAutopilot || placed_++ % kEvery != 0) return;
+    const double yaw = row.cmd_yaw - row.local_yaw;
+    const Eigen::AngleAxisd turn(yaw, Vec3::UnitZ());
+    say(kTransform,
+        ros::transform(now_ns_,
+                       {{vec(row.cmd_p) - turn * vec(row.local_p)}, {std::cos(yaw / 2), 0, 0, std::sin(yaw / 2)}},
+                       {ros::kMapFrame, kAutopilotFrame}));
+  }
+
   void take_odometry(const OdometryRecord& row) {
     const ros::Moving vehicle{{vec(row.p), vec(row.v)}, {row.q[0], row.q[1], row.q[2], row.q[3]}};
     say(kOdometry, ros::odometry(now_ns_, vehicle));
@@ -116,7 +145,7 @@ class Exporter {
 
   void take_tick(const TickRecord& row) {
     const Setpoint command{vec(row.cmd_p), vec(row.cmd_v), vec(row.cmd_a), row.cmd_yaw};
-    if ((row.sent & kSentSetpoint) != 0) say(kSetpoint, ros::pose(now_ns_, command));
+    if ((row.sent & kSentSetpoint) != 0) say(kSetpoint, ros::pose(now_ns_, command)), place_autopilot(row);
     if (row.judged != 0) {
       const Vec3 half(row.half_widths[kX], row.half_widths[kY], row.half_widths[kZ]);
       say(kError, ros::vector(now_ns_, (vec(row.p) - vec(row.center)).cwiseQuotient(half)));
@@ -151,6 +180,9 @@ class Exporter {
   }
 
   McapWriter writer_;
+  std::span<const AutopilotPose> autopilot_;  ///< those that are still to come
+  const std::size_t channels_;
+  int placed_ = 0;
   std::array<std::uint16_t, kChannels.size()> numbers_{};
   std::array<std::uint64_t, kChannels.size()> messages_{};
   std::int64_t wall_ns_ = 0, now_ns_ = 0, newest_ns_ = 0;
@@ -161,8 +193,9 @@ class Exporter {
 
 }  // namespace
 
-std::map<std::string, std::uint64_t> export_mcap(std::ostream& out, const RawLog& log, std::string_view library) {
-  Exporter exporter(out, log, library);
+std::map<std::string, std::uint64_t> export_mcap(std::ostream& out, const RawLog& log, std::string_view library,
+                                                 std::span<const AutopilotPose> autopilot) {
+  Exporter exporter(out, log, library, autopilot);
   for (const RawRecord& record : log.records) exporter.take(record);
   return exporter.finish();
 }

@@ -94,10 +94,10 @@ bool at_surface(const map::OccupancyGrid& grid, const Index3& v) {
 
 }  // namespace
 
-Bytes odometry(std::int64_t stamp_ns, const Moving& vehicle) {
+Bytes odometry(std::int64_t stamp_ns, const Moving& vehicle, const Frames& frames) {
   CdrWriter cdr;
-  put_header(cdr, stamp_ns, kMapFrame);
-  cdr.text(kBodyFrame);
+  put_header(cdr, stamp_ns, frames.in);
+  cdr.text(frames.of);
   put_pose(cdr, vehicle.state.p_W, vehicle.q);
   for (std::size_t n = 0; n < kCovariance; ++n) cdr.number(0.0);
   put(cdr, in_body(vehicle.q, vehicle.state.v_W));
@@ -106,11 +106,11 @@ Bytes odometry(std::int64_t stamp_ns, const Moving& vehicle) {
   return cdr.bytes();
 }
 
-Bytes transform(std::int64_t stamp_ns, const Moving& vehicle) {
+Bytes transform(std::int64_t stamp_ns, const Moving& vehicle, const Frames& frames) {
   CdrWriter cdr;
   cdr.count(1);
-  put_header(cdr, stamp_ns, kMapFrame);
-  cdr.text(kBodyFrame);
+  put_header(cdr, stamp_ns, frames.in);
+  cdr.text(frames.of);
   put_pose(cdr, vehicle.state.p_W, vehicle.q);
   return cdr.bytes();
 }

@@ -26,11 +26,16 @@ struct Moving {
   std::array<double, 4> q{1, 0, 0, 0};  ///< body to W: w, x, y, z
 };
 
+/// Of a pose: the frame that it is in, and the one that it is of.
+struct Frames {
+  std::string_view in = kMapFrame, of = kBodyFrame;
+};
+
 /// nav_msgs/Odometry; its twist is in the body's frame, as there. What is not recorded is marked so: variances are 0
 /// (unknown), and −1 of the angular velocity (not measured).
-Bytes odometry(std::int64_t stamp_ns, const Moving& vehicle);
-/// tf2_msgs/TFMessage: the body in the map.
-Bytes transform(std::int64_t stamp_ns, const Moving& vehicle);
+Bytes odometry(std::int64_t stamp_ns, const Moving& vehicle, const Frames& frames = {});
+/// tf2_msgs/TFMessage of one.
+Bytes transform(std::int64_t stamp_ns, const Moving& vehicle, const Frames& frames = {});
 /// geometry_msgs/PoseStamped of a set-point.
 Bytes pose(std::int64_t stamp_ns, const Setpoint& command);
 /// nav_msgs/Path of commands.

@@ -177,6 +177,9 @@ refused 65 "does not begin as a raw log" export ms.csv --mcap none.mcap
 refused 65 "does not say which part" export begun.bwlog begun.bwlog --mcap none.mcap
 printf '\x89MCAP0\r\n' >begun.mcap
 refused 65 "byte 8: no channel /backwash/raw_log" replay --log begun.mcap
+refused 64 "needs two logs" merge begun.bwlog -o both.mcap
+refused 64 "is no autopilot's log by its name" merge begun.bwlog begun.mcap -o both.mcap
+refused 65 "no answer of the autopilot to TIMESYNC" merge begun.bwlog corrupt.ulg -o both.mcap
 refused 74 "cannot be written to its end" export begun.bwlog --mcap /dev/full --force
 tune=(vehicle tune --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1)
 refused 66 "is a directory; needs the autopilot's parameter file" "${tune[@]}" --parameters .

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # `backwash export` of a flight of the real processes, against independent readers of MCAP and of ROS 2's messages from the npm
-# registry (tests/log/peer). What is in the file is what the raw log, read by other code, and the CSV say; replay, report and adapt
-# take the file as they take the raw log. Skipped without node, npm or the registry.
+# registry (tests/log/peer). What is in the file is what the raw log, read by other code, and the CSV say; replay, report, adapt and study
+# take the file as they take the raw log. Then `backwash merge` with a ULog of what the emulated PX4 said. Skipped without node, npm or the registry.
 #   mcap_peer.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
@@ -13,22 +13,26 @@ out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 backwash=$build/services/backwash
 before=$(date +%s)
-"$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 >/dev/null || { cat "$out/flight.log"; exit 1; }
+"$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 builtin:quad-5in 1 px4 >/dev/null || { cat "$out/flight.log"; exit 1; }
 cd "$out"
 "$backwash" export flight.bwlog --mcap flight.mcap --csv flight.csv --json --quiet >export.json
 node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" flight.mcap >peer.json
 
 # A raw log and its MCAP are one flight to every verb.
-for log in flight.bwlog flight.mcap; do
+for log in flight.bwlog flight.mcap flight.csv; do
+  for verb in "adapt $log" "study --quick --log $log"; do
+    "$backwash" $verb --vehicle builtin:quad-5in --map builtin:apartment --json --quiet | sed "s/$log/LOG/" >$log.${verb%% *}
+  done
+  [[ $log != *.csv ]] || continue
   "$backwash" replay --log $log --json >$log.replay
   "$backwash" report --log $log --json --quiet | sed "s/$log/LOG/" >$log.report
-  "$backwash" adapt $log --vehicle builtin:quad-5in --map builtin:apartment --json --quiet | sed "s/$log/LOG/" >$log.adapt
 done
-"$backwash" adapt flight.csv --vehicle builtin:quad-5in --map builtin:apartment --json --quiet | sed "s/flight.csv/LOG/" >flight.csv.adapt
-for answer in replay report adapt; do
+for answer in replay report adapt study; do
   [[ -s flight.bwlog.$answer ]] && cmp flight.bwlog.$answer flight.mcap.$answer || { echo "$answer: the MCAP is another flight"; exit 1; }
 done
-cmp flight.bwlog.adapt flight.csv.adapt || { echo "adapt: the CSV is another flight"; exit 1; }
+for answer in adapt study; do
+  cmp flight.bwlog.$answer flight.csv.$answer || { echo "$answer: the CSV is another flight"; exit 1; }
+done
 grep -q '"equal": *true' flight.mcap.replay
 
 PYTHONPATH=$source_dir/tests/system python3 - "$before" <<'PYTHON'
@@ -94,4 +98,45 @@ for line, shown in zip(said["/backwash/trajectory"], said["/backwash/markers"]):
     assert all(box["type"] == 1 and min(box["scale"]) > 0 for box in boxes)
 (cubes,) = said["/backwash/voxels"][0]["shapes"]
 assert cubes["type"] == 6 and len(cubes["points"]) > 1000 and len({tuple(p) for p in cubes["points"]}) == len(cubes["points"])
+PYTHON
+
+# With the autopilot's own log: its poses are where they were heard, but for the way, and where the VIO has the vehicle.
+PYTHONPATH=$source_dir/tests/system python3 -c 'import ulog_maker; ulog_maker.write("fc.ulg", "flight.bwlog")'
+"$backwash" merge flight.mcap fc.ulg -o both.mcap --json --quiet >merge.json
+node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" both.mcap >both.json
+"$backwash" replay --log both.mcap --json | cmp - flight.bwlog.replay
+PYTHONPATH=$source_dir/tests/system python3 - <<'PYTHON'
+import bisect, json, math, statistics
+import raw_log, ulog_maker
+
+alone, both, told = (json.load(open(name)) for name in ("peer.json", "both.json", "merge.json"))
+clock = told["clock"]
+print("merge", clock, "outside", told["outside"])
+assert both["raw"] == alone["raw"] and both["counts"] | {"/tf": 0} == alone["counts"] | {"/tf": 0, "/autopilot/odometry": both["counts"]["/autopilot/odometry"]}
+heard = list(ulog_maker.said("flight.bwlog", ulog_maker.LOCAL_POSITION))
+poses, odometry = both["said"]["/autopilot/odometry"], both["said"]["/backwash/odometry"]
+assert len(heard) - 60 < len(poses) <= len(heard) and len(poses) == told["messages"]["/autopilot/odometry"], (len(heard), len(poses))
+first = next(t for t, kind, _ in raw_log.records("flight.bwlog") if kind == raw_log.ODOMETRY)
+whole = first - odometry[0]["t"]
+by_place = {}
+for t, (_, *place) in heard:
+    by_place.setdefault(tuple(place[:3]), t)
+ways, off = [], []
+placed = [row for row in both["said"]["/tf"] if row["child"] == "autopilot"]
+assert len(placed) >= 10 and all(row["parent"] == "map" for row in placed)
+times = [row["t"] for row in odometry]
+for row in poses:
+    x, y, z = row["p"]
+    ways.append(by_place[(y, x, -z)] - whole - row["t"])  # east, north, up
+    tf = [p for p in placed if p["t"] <= row["t"]]
+    at = bisect.bisect(times, row["t"])
+    if not tf or at in (0, len(times)):
+        continue
+    c, s = math.cos(tf[-1]["yaw"]), math.sin(tf[-1]["yaw"])
+    in_map = [tf[-1]["p"][0] + c * x - s * y, tf[-1]["p"][1] + s * x + c * y, tf[-1]["p"][2] + z]
+    off.append(math.dist(in_map, odometry[at]["p"]))
+print(f"heard {1e3 * statistics.median(ways):.1f} ms later at the median, {1e3 * min(ways):.1f} to {1e3 * max(ways):.1f}; "
+      f"{statistics.median(off):.3f} m from the VIO at the median, {max(off):.3f} at most")
+assert len(off) > 400 and -0.005 < statistics.median(ways) < 0.010 and statistics.median(off) < 0.05 and max(off) < 0.25
+assert clock["pairs"] >= 2 and clock["rms_ms"] <= clock["largest_ms"] <= clock["round_trip_ms"]
 PYTHON

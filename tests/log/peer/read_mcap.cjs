@@ -104,7 +104,10 @@ async function main() {
 /// What the test compares with other sources.
 function shown(topic, m) {
   const xyz = (v) => [v.x, v.y, v.z]
-  if (topic === '/tf') return { p: xyz(m.transforms[0].transform.translation), parent: m.transforms[0].header.frame_id, child: m.transforms[0].child_frame_id }
+  if (topic === '/tf') {
+    const { header, child_frame_id, transform } = m.transforms[0], { z, w } = transform.rotation
+    return { p: xyz(transform.translation), yaw: 2 * Math.atan2(z, w), parent: header.frame_id, child: child_frame_id }
+  }
   if (topic.endsWith('/odometry')) {
     const { x, y, z, w } = m.pose.pose.orientation
     return { p: xyz(m.pose.pose.position), q: [w, x, y, z], v: xyz(m.twist.twist.linear), stamp: m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 }
