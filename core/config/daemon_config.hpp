@@ -62,7 +62,8 @@ struct Daemon {
     std::string stop_switch, strobe, led;  ///< lines by name; empty: there is none
   } gpio;
   struct {
-    std::string file;  ///< raw log; a start that finds it makes the next of NAME-2, NAME-3 …
+    std::string file;       ///< raw log; a start that finds it makes the next of NAME-2, NAME-3 …
+    double max_mib = 1024;  ///< a file that has become larger is followed by the next, once the mode is passive
   } log;
 };
 

@@ -212,6 +212,7 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {"map.closing_speed", &d.map.closing_speed, {0, 5}, kOptional},
       {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, kOptional},
       {"map.max_mib", &d.map.max_mib, {1, 65536}, kOptional},
+      {"log.max_mib", &d.log.max_mib, {1, 4096}, kOptional},
       {"odometry.sensor_x", &d.odometry.sensor_B.x(), {-5, 5}, kOptional},
       {"odometry.sensor_y", &d.odometry.sensor_B.y(), {-5, 5}, kOptional},
       {"odometry.sensor_z", &d.odometry.sensor_B.z(), {-5, 5}, kOptional},

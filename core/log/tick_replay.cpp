@@ -120,6 +120,19 @@ std::string at(const std::string& name, const RawRecord& record) {
   return name + ": byte " + std::to_string(record.offset) + ": ";
 }
 
+/// The constants of the daemon's start. A log must begin there: a tick's decisions rest on all ticks since then.
+tl::expected<const RawRecord*, LogError> constants_of(const RawLog& log, const std::string& name) {
+  const bool says = !log.records.empty() && log.records.front().header.kind == RecordKind::part;
+  const auto* part = says ? payload<PartRecord>(log.records.front()) : nullptr;
+  if (part && part->part != 1)
+    return bad(name + ": begins with part " + std::to_string(part->part) +
+               " of its log; give all parts from the first on, in their order");
+  const auto first = std::ranges::find(log.records, RecordKind::constants, [](const auto& r) { return r.header.kind; });
+  if (first == log.records.end() || !payload<ConstantsRecord>(*first))
+    return bad(name + ": has no constants record: not a log of backwashd's start");
+  return &*first;
+}
+
 tl::expected<Segments, LogError> segments_of(const RawLog& log, const std::string& name) {
   Segments segments;
   for (const RawRecord& record : log.records) {
@@ -176,17 +189,17 @@ tl::expected<std::unique_ptr<track::AcceptedSegment>, LogError> decode_offer(std
 }
 
 tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name) {
-  const auto first = std::ranges::find(log.records, RecordKind::constants, [](const auto& r) { return r.header.kind; });
-  const auto* constants = first == log.records.end() ? nullptr : payload<ConstantsRecord>(*first);
-  if (!constants) return bad(name + ": has no constants record: not a log of backwashd's start");
+  const auto first = constants_of(log, name);
+  if (!first) return tl::unexpected(first.error());
+  const auto* constants = payload<ConstantsRecord>(**first);
   Vehicle vehicle;
   vehicle.limits.v_max = constants->v_max;
   vehicle.estimation.position = constants->estimation_position;
   vehicle.initial_error = {constants->initial_position, constants->initial_velocity};
-  const auto* timed = payload<TimedConstantsRecord>(*first);
+  const auto* timed = payload<TimedConstantsRecord>(**first);
   const OdometryTiming timing = timed ? OdometryTiming{timed->rate_least, timed->latency} : OdometryTiming{};
   // Written so that what is no number is refused: of a damaged record no window or limit is made.
-  if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, *first) + "is no timing of odometry");
+  if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, **first) + "is no timing of odometry");
   const auto segments = segments_of(log, name);
   if (!segments) return tl::unexpected(segments.error());
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/log/dataflash.hpp"
+#include "core/log/raw_flight.hpp"
 #include "core/log/same_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "core/study/windows/same_gusts.hpp"
@@ -55,10 +56,9 @@ bool is_autopilots_log(const std::string& path) {
 }
 
 log::FlightLog read_flight(const std::string& path) {
+  if (log::is_raw_log(path)) return read_or_fail(log::flight_of_raw_log(read_or_fail(log::read_raw_log(path)), path));
   if (!is_autopilots_log(path)) return read_table(path, "t_s");
-  auto log = path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path);
-  if (log) return std::move(*log);
-  throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  return read_or_fail(path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path));
 }
 
 Flights read_flights(const std::vector<std::string>& paths, const std::string& group) {

@@ -40,6 +40,8 @@ Verb report_verb(Command& app);
 Verb calibrate_verb(Command& app);
 Verb import_verb(Command& app);
 Verb replay_verb(Command& app);
+Verb export_verb(Command& app);
+Verb merge_verb(Command& app);
 Verb study_verb(Command& app);
 Verb adapt_verb(Command& app);
 Verb vehicle_verb(Command& app);

@@ -43,6 +43,11 @@ auto made(ExitCode code, Make&& make) {
   }
 }
 
+std::int64_t part_bytes(const config::Daemon& daemon) {
+  constexpr double kMib = 1 << 20;
+  return static_cast<std::int64_t>(daemon.log.max_mib * kMib);
+}
+
 /// A port that is missing or busy may be plugged in, or its simulator started, later: the link watch goes on trying.
 firmware_bridge::Port port_at_start(const decltype(config::Daemon::link)& link) {
   using Kind = firmware_bridge::PortError::Kind;
@@ -109,7 +114,8 @@ struct Flight {
       : settings(s),
         manager(m),
         port(port_at_start(s.daemon.link)),  // first: a start that fails there leaves no log behind
-        recorder(made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file); })),
+        recorder(
+            made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file, part_bytes(s.daemon)); })),
         log(recorder->path()),
         link(std::move(port), static_cast<std::uint8_t>(s.daemon.link.system), std::chrono::steady_clock::now()),
         signing_time(sign(s.daemon, link)),

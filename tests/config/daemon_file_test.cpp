@@ -183,9 +183,9 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
                {"cpu = -1", "cpu = 0.5", 22, "control.cpu"},
                {"battery_land = 0.15", "battery_land = 15", 23, "control.battery_land"},
                {"[control]", "[controls]", 20, "controls"},
-               {"live = false", "live = 0", 44, "map.live"},
-               {"max_mib = 512", "max_mib = 0", 47, "map.max_mib"},
-               {"body = \"base_link\"", "body = \"map\"", 28, "frames"}};
+               {"live = false", "live = 0", 45, "map.live"},
+               {"max_mib = 512", "max_mib = 0", 48, "map.max_mib"},
+               {"body = \"base_link\"", "body = \"map\"", 29, "frames"}};
   for (const auto& c : cases)
     EXPECT_THAT(error_after(c.right, c.wrong), HasSubstr(".toml:" + std::to_string(c.line) + ": key '" + c.key + "'"));
 }

@@ -165,7 +165,22 @@ refused 65 "has no point" field --map builtin:narrow-gap --model $quad --points 
 refused 64 "is no kind of recording; known are airgarage" import nanobench
 refused 64 "without --out" import --propose ms.csv -o logs
 refused 65 "import" calibrate --log corrupt.ulg --vehicle $quad
-refused 65 "raw log of backwashd; report" study --log corrupt.bwlog --vehicle $quad
+refused 65 "backwash export --csv" study --log corrupt.bwlog --vehicle $quad
+refused 65 "backwash export --csv" calibrate --log corrupt.bwlog --vehicle $quad
+printf 'backwash raw log 3\n' >begun.bwlog
+refused 65 "no tick flew a set-point" study --log begun.bwlog --vehicle $quad
+refused 65 "no tick flew a set-point" export begun.bwlog --csv begun.csv
+refused 64 "give --mcap, --csv or both" export begun.bwlog
+refused 64 "two outputs" export begun.bwlog --mcap both.out --csv ./both.out
+refused 66 "" export none.bwlog --mcap none.mcap
+refused 65 "does not begin as a raw log" export ms.csv --mcap none.mcap
+refused 65 "does not say which part" export begun.bwlog begun.bwlog --mcap none.mcap
+printf '\x89MCAP0\r\n' >begun.mcap
+refused 65 "byte 8: no channel /backwash/raw_log" replay --log begun.mcap
+refused 64 "needs two logs" merge begun.bwlog -o both.mcap
+refused 64 "is no autopilot's log by its name" merge begun.bwlog begun.mcap -o both.mcap
+refused 65 "no answer of the autopilot to TIMESYNC" merge begun.bwlog corrupt.ulg -o both.mcap
+refused 74 "cannot be written to its end" export begun.bwlog --mcap /dev/full --force
 tune=(vehicle tune --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1)
 refused 66 "is a directory; needs the autopilot's parameter file" "${tune[@]}" --parameters .
 refused 66 "is a device; needs the autopilot's parameter file" "${tune[@]}" --parameters /dev/zero
