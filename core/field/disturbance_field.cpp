@@ -136,6 +136,12 @@ void DisturbanceField::scale(const Extension& extension, std::span<const std::si
   }
 }
 
+void DisturbanceField::scale(std::span<const AirClass> classes, const AirFactors& factors) {
+  for (std::size_t n = 0; n < classes.size(); ++n)
+    if (has(n))
+      for (float& s : sigma_[slot(n)]) s *= static_cast<float>(factor_of(factors, classes[n]));
+}
+
 void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
   assert(listed(n) && s.xz == 0 && s.yz == 0);
   sigma_[slot(n)] = {static_cast<float>(s.xx), static_cast<float>(s.xy), static_cast<float>(s.yy),

@@ -36,6 +36,18 @@ void fill_columns(field::DisturbanceField& field, const map::OccupancyGrid& grid
            [&](std::size_t begin, std::size_t end) { field.fill(whole, part, around.low, begin, end); });
 }
 
+/// The classes of air, found again in some columns.
+AirScale classified(AirScale air, const map::OccupancyGrid& grid, const field::DisturbanceField& field,
+                    const Model& model, const map::VoxelBox& columns, std::span<const std::size_t> voxels,
+                    const Parallel& parallel) {
+  if (!air.known()) return air;
+  const std::vector<std::size_t> inside = field::voxels_within(grid, voxels, columns);
+  air.classify(grid, field, model, inside, [&](field::DisturbanceField& to, const Model& term) {
+    fill_columns(to, grid, term, columns, inside, parallel);
+  });
+  return air;
+}
+
 /// Stores a model's extension at voxels where it may have changed, and multiplies Σ where it was computed anew.
 void extend(field::Extension& air, field::DisturbanceField& field, const map::OccupancyGrid& grid,
             std::span<const std::size_t> moved, std::span<const std::size_t> fresh, const Parallel& parallel) {
@@ -133,6 +145,24 @@ World with_clearance_by(World world, reach::Method method, std::optional<double>
   return world;
 }
 
+std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
+                                      const Parallel& parallel) {
+  World world = old;
+  if (!world.air.known()) {
+    const std::vector<std::size_t> voxels = voxels_for_centre(world.grid, world.distance, world.reach.vehicle);
+    world.air.classify(
+        world.grid, world.field, with_vehicle(model, world.reach.vehicle), voxels,
+        [&](field::DisturbanceField& to, const Model& term) { fill_field(to, world.grid, term, voxels, parallel); });
+  }
+  if (world.air.factors == factors) return std::make_shared<const World>(std::move(world));
+  world.air.factors = factors;
+  const auto rougher = world.air.flown(world.field);
+  world.bounds = reach::BoundField(world.grid, rougher ? *rougher : world.field, model.bound, old.bounds.extension());
+  const reach::Method method = world.reach.method;
+  const std::optional<double> margin = world.constant_margin;
+  return std::make_shared<const World>(with_clearance_by(std::move(world), method, margin, parallel));
+}
+
 std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
                                           const Model& model, const Parallel& parallel) {
   if (changed.empty()) return std::make_shared<const World>(old);
@@ -159,8 +189,11 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
          parallel);
   const bool everywhere = air.by_place();  // pushes of anywhere widen the largest sets
 
-  reach::BoundField bounds = everywhere ? reach::BoundField(grid, field, model.bound, std::move(air))
-                                        : reach::BoundField(old.bounds, field, columns);
+  AirScale scale = classified(old.air, grid, field, vehicle_model, columns, voxels, parallel);
+  const auto rougher = scale.flown(field);
+  const field::DisturbanceField& flown = rougher ? *rougher : field;
+  reach::BoundField bounds = everywhere ? reach::BoundField(grid, flown, model.bound, std::move(air))
+                                        : reach::BoundField(old.bounds, flown, columns);
   const map::VoxelBox hover_box = everywhere ? map::VoxelBox{Index3::Zero(), grid.size() - Index3::Ones()}
                                              : reached_by_hover(old, bounds, columns, changed);
   const std::vector<std::size_t> hover_voxels = field::voxels_within(grid, voxels, hover_box);
@@ -173,7 +206,7 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
   SafeSpace safe(hover.safe_voxels());
   return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field),
                                              std::move(bounds), std::move(hover), std::move(safe), old.reach,
-                                             old.response, old.constant_margin});
+                                             old.response, old.constant_margin, std::move(scale)});
 }
 
 }  // namespace backwash::plan

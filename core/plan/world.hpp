@@ -10,6 +10,7 @@
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/occupancy_sums.hpp"
 #include "core/map/voxel_box.hpp"
+#include "core/plan/air_scale.hpp"
 #include "core/plan/centre_response.hpp"
 #include "core/plan/safe_space.hpp"
 #include "core/reach/hover_set.hpp"
@@ -43,6 +44,7 @@ struct World {
   reach::Reachability reach;
   CentreResponse response;                ///< of the predicted motion, for the optimiser
   std::optional<double> constant_margin;  ///< m: a ball in place of the reachable sets
+  AirScale air{};                         ///< what bounds and hover map hold beside the model; `field` is the model's
 };
 
 /// Builds all of it. Σ is stored at every free voxel where the vehicle's centre can be (distance ≥ body radius less one
@@ -56,6 +58,12 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
 /// hover map are made anew. Equal to building with that method and margin.
 World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
                         const Parallel& parallel = run_serial);
+
+/// The same surroundings in air that is rougher by these factors, each at least what it is in `old`: Σ is taken over,
+/// its bounds and the hover map are made anew. Finds the classes where `old` has none. `old` must have been built with
+/// this model. What update_world() makes of it keeps both.
+std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
+                                      const Parallel& parallel = run_serial);
 
 /// The same as build_world(grid, …), from a world of which only the voxels in `changed` differ: Σ and the hover map are
 /// computed anew where a change can reach them and copied elsewhere. `old` must have been built with this model;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 
+#include "core/adapt/in_flight.hpp"
 #include "core/config/daemon_config.hpp"
 #include "services/command_line/exit_code.hpp"
 
@@ -14,6 +16,7 @@ struct Settings {
   config::Daemon daemon;
   Vehicle vehicle;
   Model model;
+  std::optional<adapt::InFlightConstants> air{};  ///< none: nothing is learnt of the air
 };
 
 /// Reads the daemon's file and the vehicle and model files that it names. Error: 66 where one of them is missing, 78
