@@ -12,6 +12,8 @@
 #include "core/field/sight.hpp"
 #include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/map/voxel_box.hpp"
+#include "core/types/air_class.hpp"
 #include "core/types/model.hpp"
 
 namespace backwash::field {
@@ -49,14 +51,24 @@ class DisturbanceField {
  public:
   /// Room for Σ at the listed voxels (linear indices of the grid, any order), where it is unset. O(voxels of the grid).
   DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels);
+  /// The same, with Σ of `old` at those listed voxels outside the box `anew` where it has one. With affected_columns()
+  /// and fill(), a field follows its map, bit for bit as if it were made anew. Precondition: of grids of one size.
+  DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels, const DisturbanceField& old,
+                   const map::VoxelBox& anew);
 
   /// Evaluates Σ at the centres of some of the listed voxels. Distinct ones may be filled from several threads at once.
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
+  /// The same where `whole` is of a part of this grid, whose voxel (0, 0, 0) is `low` here.
+  void fill(const WholeField& whole, const map::OccupancyGrid& part, const Index3& low, std::size_t begin,
+            std::size_t end);
 
   /// Multiplies Σ at the given voxels, where it is stored, by the factor that an extended model has there.
   void scale(const Extension& extension, std::span<const std::size_t> voxels);
+
+  /// Multiplies Σ where it is stored by the factor of each voxel's class, of the grid's voxels in linear order.
+  void scale(std::span<const AirClass> classes, const AirFactors& factors);
 
   /// Whether Σ is stored at a voxel; false outside the grid. Real-time: wait-free, no allocation.
   bool has(const Index3& v) const noexcept;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/log/flight_log.hpp"
+#include "core/types/air_class.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::log {
@@ -36,8 +37,10 @@ enum class RecordKind : std::uint32_t {
   world = 15,       ///< text, one line: a new snapshot was handed out
   failure = 16,     ///< text, one line: an exception in a thread, which ended the daemon
   part = 17,        ///< PartRecord: the first of each file
+  air_constants = 18,  ///< AirConstantsRecord: the daemon learns in flight (core/log/air_log.hpp)
+  air = 19,            ///< AirRecord: what the tick whose record follows added to what was learnt
 };
-inline constexpr auto kLastKind = RecordKind::part;
+inline constexpr auto kLastKind = RecordKind::air;
 
 struct RecordHeader {
   std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
@@ -100,6 +103,22 @@ struct TimedConstantsRecord {
   ConstantsRecord constants;
   double rate_least, latency;  ///< Hz, s
 };
+
+/// What the updates of the air depend on beside their ticks (core/adapt/in_flight.hpp).
+struct AirConstantsRecord {
+  double kp[2], kd[2];  ///< horizontal, vertical
+  double latency, feedback_delay, attitude_lag;
+  double tau_low, tau_high, mean[2], alpha;
+  double start[kAirClasses];
+};
+struct AirRecord {
+  std::uint64_t tick;
+  double sigma[3];             ///< of the model at the place, (m/s²)²
+  std::uint32_t air, padding;  ///< AirClass of the place
+  double factors[kAirClasses];
+  double ln_evidence, ln_changed, seconds;  ///< of that class (core/adapt/bets.hpp)
+};
+static_assert(sizeof(AirRecord) == 104);
 
 struct LostRecord {
   std::uint64_t records;  ///< lost since the start of the log

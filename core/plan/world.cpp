@@ -173,6 +173,22 @@ World with_clearance_by(World world, reach::Method method, std::optional<double>
   return world;
 }
 
+std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
+                                      const Parallel& parallel) {
+  World world = old;
+  if (!world.air.known()) {
+    const map::VoxelBox all = map::all_of(world.grid.size());
+    const auto voxels = voxels_for_centre(world.grid, world.distance, world.reach.vehicle, all);
+    world.air.update(world.grid, with_vehicle(model, world.reach.vehicle), all, voxels, voxels, parallel);
+  }
+  if (world.air.factors == factors) return std::make_shared<const World>(std::move(world));
+  world.air.factors = factors;
+  world.bounds = reach::BoundField(world.grid, world.air.flown(), model.bound, old.bounds.extension());
+  const reach::Method method = world.reach.method;
+  const std::optional<double> margin = world.constant_margin;
+  return std::make_shared<const World>(with_clearance_by(std::move(world), method, margin, parallel));
+}
+
 std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
                                           const Model& model, const Parallel& parallel) {
   if (changed.empty()) return std::make_shared<const World>(old);
@@ -199,7 +215,17 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
     fill_air(air, grid, listed(columns), parallel);
     bounds.extend(std::move(air));
   }
-  update_bounds(bounds, grid, Index3::Zero(), grid.size(), vehicle_model, columns, listed(columns), parallel);
+  const std::vector<std::size_t> inside = listed(columns);
+  AirScale scale = old.air;
+  if (scale.known()) {
+    scale.update(grid, vehicle_model, columns, listed(map::all_of(grid.size())), inside, parallel);
+    const field::DisturbanceField flown = scale.flown();
+    bounds.update(columns, inside, [&](const auto& store) {
+      for (const std::size_t n : inside) store(n, flown.at(grid.voxel(n)));
+    });
+  } else {
+    update_bounds(bounds, grid, Index3::Zero(), grid.size(), vehicle_model, columns, inside, parallel);
+  }
 
   // Pushes of anywhere widen the largest sets.
   const map::VoxelBox hover_box = by_place ? map::all_of(grid.size()) : reached_by_hover(old, bounds, columns, changed);
@@ -210,7 +236,7 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
   safe.update(hover.safe_voxels(), hover_box);
   return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(bounds),
                                              std::move(hover), std::move(safe), old.reach, old.response,
-                                             old.constant_margin});
+                                             old.constant_margin, std::move(scale)});
 }
 
 }  // namespace backwash::plan

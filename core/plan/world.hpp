@@ -8,6 +8,7 @@
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/occupancy_sums.hpp"
 #include "core/map/voxel_box.hpp"
+#include "core/plan/air_scale.hpp"
 #include "core/plan/centre_response.hpp"
 #include "core/plan/safe_space.hpp"
 #include "core/reach/hover_set.hpp"
@@ -37,6 +38,7 @@ struct World {
   reach::Reachability reach;
   CentreResponse response;                ///< of the predicted motion, for the optimiser
   std::optional<double> constant_margin;  ///< m: a ball in place of the reachable sets
+  AirScale air{};                         ///< what bounds and hover map hold beside the model
 };
 
 /// Builds all of it, Σ and its bounds by pieces of the map. Σ is computed at every free voxel where the vehicle's
@@ -58,6 +60,12 @@ std::shared_ptr<const World> build_part(const map::OccupancyGrid& grid, const ma
 /// hover map are made anew. Equal to building with that method and margin.
 World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
                         const Parallel& parallel = run_serial);
+
+/// The same surroundings in air that is rougher by these factors, each at least what it is in `old`: bounds and
+/// hover map are made anew. Σ and the classes are found where `old` has none, and kept from then on. `old` must have
+/// been built with this model. What update_world() makes of it keeps both.
+std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
+                                      const Parallel& parallel = run_serial);
 
 /// The same as build_world(grid, …), from a world of which only the voxels in `changed` differ: Σ and the hover map are
 /// computed anew where a change can reach them, and the rest is shared with `old` or copied. `old` must have been built

@@ -30,7 +30,7 @@ struct Options {
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its members that own memory are null
-  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says;
+  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says, air;
   std::vector<std::pair<std::string, double>> parameters;   ///< that the autopilot has told
   std::vector<std::pair<std::string, std::string>> advice;  ///< on those that are not good
 
@@ -57,6 +57,7 @@ inline constexpr StatusText kStatusTexts[] = {
     {"refused", &dds::Status::refused, &StatusCopy::refused},
     {"autopilot", &dds::Status::autopilot, &StatusCopy::autopilot},
     {"autopilot_says", &dds::Status::autopilot_says, &StatusCopy::autopilot_says},
+    {"air", &dds::Status::air, &StatusCopy::air},
 };
 
 /// An age or a delay of the status, s; −1 on the wire: nothing was measured for it yet.

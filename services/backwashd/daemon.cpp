@@ -9,6 +9,8 @@
 #include <new>
 #include <system_error>
 
+#include "core/config/file_hash.hpp"
+#include "services/backwashd/air_file.hpp"
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/gpio_worker.hpp"
@@ -71,6 +73,20 @@ std::unique_ptr<SigningTimeFile> sign(const config::Daemon& daemon, firmware_bri
   return time;
 }
 
+/// What earlier flights have learnt of the air, where a file is configured for it.
+std::unique_ptr<AirFile> air_file(const Settings& s) {
+  if (!s.air || s.daemon.adaptation.file.empty()) return nullptr;
+  const auto files = config::hash_of_files(s.daemon.vehicle, s.daemon.model);
+  if (!files) throw StartError(kNoInput, files.error().message);
+  return std::make_unique<AirFile>(s.daemon.adaptation.file, *files);
+}
+
+std::optional<adapt::InFlightConstants> learns_from(const Settings& s, const AirFile* file) {
+  auto air = s.air;
+  if (air && file) air->start = file->start();
+  return air;
+}
+
 // What carries odometry and the stop switch to the control thread comes right below it, before the middleware starts
 // its threads.
 int reader_priority(const config::Daemon& daemon) {
@@ -103,7 +119,23 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
         track::PoseVelocity::error(std::min(OdometryTiming::kUsual, daemon->odometry.timing.rate_least));
   auto model = config::load_model(daemon->model);
   if (!model) return wrong(model.error());
-  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials)};
+  if (!daemon->adaptation.enabled)
+    return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials)};
+  if (!model->extension.empty())
+    return tl::make_unexpected(
+        StartError(kConfiguration, daemon->model +
+                                       ": is an extended model, whose effects are not in what a flight learns: give "
+                                       "the one before, or adaptation.enabled = false in " +
+                                       path));
+  const auto tau = config::load_tau_interval(daemon->model);
+  if (!tau) return wrong(tau.error());
+  const adapt::InFlightConstants air{vehicle->controller,
+                                     {.tau_low_s = (*tau)[0],
+                                      .tau_high_s = (*tau)[1],
+                                      .mean_horizontal = model->bound.mean_horizontal,
+                                      .mean_vertical = model->bound.mean_vertical},
+                                     daemon->adaptation.alpha};
+  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials), air};
 }
 
 namespace {
@@ -114,6 +146,8 @@ struct Flight {
       : settings(s),
         manager(m),
         port(port_at_start(s.daemon.link)),  // first: a start that fails there leaves no log behind
+        factors(air_file(s)),
+        air(learns_from(s, factors.get())),
         recorder(
             made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file, part_bytes(s.daemon)); })),
         log(recorder->path()),
@@ -124,7 +158,7 @@ struct Flight {
             [&] { return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels); })),
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
         mission(s.vehicle),
-        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map, s.daemon.odometry.timing) {
+        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map, s.daemon.odometry.timing, air) {
     link.pace(configured_line(s.daemon.link, s.daemon.odometry.timing).value());
     if (!s.daemon.gpio.chip.empty()) gpio.emplace(*channels, s.daemon.gpio);
   }
@@ -133,6 +167,8 @@ struct Flight {
   const ServiceManager& manager;
   std::unique_ptr<Channels> channels = std::make_unique<Channels>();
   firmware_bridge::Port port;
+  std::unique_ptr<AirFile> factors;  ///< null: none are kept
+  std::optional<adapt::InFlightConstants> air;
   std::unique_ptr<Recorder> recorder;
   const std::string log;  ///< file that the recorder began with
   firmware_bridge::AutopilotLink link;
@@ -153,8 +189,11 @@ void start(Flight& f) {
   const auto& daemon = f.settings.daemon;
   f.writer.start("recorder", [&] { f.recorder->run(channels, f.recorded); });
   if (f.signing_time) f.writer.start("signing time", [&] { run_signing_time(*f.signing_time, channels, f.recorded); });
-  f.threads.start("map worker",
-                  [&] { run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map); });
+  if (f.factors) f.writer.start("air file", [&] { run_air_file(*f.factors, channels, f.recorded); });
+  f.threads.start("map worker", [&] {
+    run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map,
+                   f.air ? std::optional(f.air->start) : std::nullopt);
+  });
   f.threads.start("planner", [&] {
     run_planner(
         channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.maps->send(segment); },

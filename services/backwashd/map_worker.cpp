@@ -11,6 +11,7 @@
 #include <span>
 #include <thread>
 
+#include "core/config/file_hash.hpp"
 #include "core/map/octomap_message.hpp"
 #include "services/backwashd/scan_placement.hpp"
 #include "services/dds/dds.hpp"
@@ -28,17 +29,12 @@ constexpr double kMadeFirst = 5;   // m level from the vehicle to the sides of w
 constexpr int kWorthIt = 4;        // times as many voxels as that has a map of which a part is made first
 constexpr double kFinest = 0.02, kCoarsest = 0.2;
 
-// 64-bit FNV-1a.
-std::uint64_t hash(const std::vector<std::int8_t>& data) {
-  std::uint64_t h = 0xcbf29ce484222325;
-  for (const std::int8_t byte : data) h = (h ^ static_cast<std::uint8_t>(byte)) * 0x100000001b3;
-  return h;
-}
-
 // A rejected map is told apart by its hash: whoever sends 40 MB of anything does not fill the disk with it.
 void record(Recorder& recorder, const MapMessage& message, bool accepted) {
   const log::MapRecord head{message.resolution, message.binary, accepted};
-  const log::RejectedMap rejected{message.data.size(), accepted ? 0 : hash(message.data)};
+  const log::RejectedMap rejected{
+      message.data.size(),
+      accepted ? 0 : config::fnv1a({reinterpret_cast<const char*>(message.data.data()), message.data.size()})};
   const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
   const auto rest = accepted ? std::as_bytes(std::span(message.data)) : bytes_of(rejected);
   std::vector<std::uint8_t> bytes(sizeof head + rest.size());
@@ -87,13 +83,14 @@ NewVoxels as_new_voxels(const map::OccupancyGrid& before, const map::ScanChange&
 }  // namespace
 
 MapWorker::MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
-                     const MapSettings& settings)
+                     const MapSettings& settings, const std::optional<AirFactors>& air)
     : channels_(channels),
       recorder_(recorder),
       model_(model),
       vehicle_(vehicle),
       settings_(settings),
-      parallel_(until_the_end(channels.stop)) {}
+      parallel_(until_the_end(channels.stop)),
+      air_(air) {}
 
 MapWorker::~MapWorker() {
   while (const auto scan = channels_.scans.pop()) delete *scan;
@@ -150,8 +147,9 @@ void MapWorker::take_map(const MapMessage& message) {
   } else {
     live_.emplace(*grid);
     if (!world_) publish_near(*grid, message.received_ns);  // what flies in another world is not cut short
-    publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_),
-            message.received_ns);
+    auto world = plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_);
+    if (air_) world = plan::with_air(*world, *air_, model_, parallel_);
+    publish(std::move(world), message.received_ns);
     channels_.map_partial = false;
   }
   ++channels_.maps_accepted;
@@ -162,7 +160,7 @@ void MapWorker::take_map(const MapMessage& message) {
 // Σ takes seconds in a building and longer on an office floor. Until then the vehicle may fly in what is around it.
 void MapWorker::publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns) {
   if (const auto newest = channels_.vehicle_W.read_new()) vehicle_W_ = *newest;
-  if (!vehicle_W_ || !model_.extension.empty() || !grid.inside(grid.index(*vehicle_W_))) return;
+  if (!vehicle_W_ || air_ || !model_.extension.empty() || !grid.inside(grid.index(*vehicle_W_))) return;
   const auto begun = now_ns();
   const int by = static_cast<int>(std::ceil(kMadeFirst / grid.resolution()));
   const Index3 v = grid.index(*vehicle_W_), last = grid.size() - Index3::Ones();
@@ -206,22 +204,42 @@ bool MapWorker::take_scans() {
   return true;
 }
 
+/// Factors that have grown enough: the world of the newest data, in rougher air.
+bool MapWorker::take_air() {
+  const auto said = channels_.air.read_new();
+  if (!said || !air_) return false;
+  air_ = larger(*air_, *said);
+  if (!world_) return false;
+  bool grew = false;
+  for (std::size_t k = 0; k < kAirClasses; ++k) grew = grew || (*air_)[k] >= (1 + kStep) * world_->air.factors[k];
+  if (!grew) return false;
+  const auto begun = now_ns();
+  publish(plan::with_air(*world_, *air_, model_, parallel_), channels_.map_ns.load().value_or(begun));
+  std::string line = "air";
+  for (std::size_t k = 0; k < kAirClasses; ++k)
+    line += std::string(" ") + to_string(static_cast<AirClass>(k)) + " " + std::to_string((*air_)[k]);
+  recorder_.append(log::RecordKind::world, line);
+  spdlog::info("world made anew in {} ms for rougher {}", (now_ns() - begun) / 1'000'000, line);
+  return true;
+}
+
 bool MapWorker::step() {
   const MapMessage* message = channels_.maps.take();
-  bool scanned = false;
+  bool scanned = false, rougher = false;
   try {
     if (message) take_map(*message);
     scanned = take_scans();
+    rougher = take_air();
   } catch (const Ended&) {  // the old world stays
   }
   if (message) channels_.maps.give_back(message);
   channels_.worlds.collect();
-  return message || scanned;
+  return message || scanned || rougher;
 }
 
 void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
-                    const MapSettings& settings) {
-  MapWorker worker(channels, recorder, model, vehicle, settings);
+                    const MapSettings& settings, const std::optional<AirFactors>& air) {
+  MapWorker worker(channels, recorder, model, vehicle, settings, air);
   bool below = false;
   while (!channels.stop) {
     if (!worker.step()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
