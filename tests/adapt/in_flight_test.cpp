@@ -141,6 +141,10 @@ TEST(InFlight, BeginsWithWhatWasLearntAndNeverFallsBelowIt) {
   EXPECT_EQ(flight.learnt.factors(), (AirFactors{1, 1, 1.5, 1, 1})) << "below 1 nothing begins";
   flight.fly(60);
   EXPECT_EQ(flight.wall(), 1.5);
+  flight.factor = 4;
+  EXPECT_GE(flight.fly(2).wall(), 1.5) << "also while less than that is shown";
+  flight.fly(60);
+  EXPECT_GT(flight.wall(), 1.5);
 }
 
 TEST(InFlight, WhatIsNoNumberAndWhatHasNoModelIsLeftOut) {
@@ -181,6 +185,7 @@ TEST(InFlight, AClockThatIsSetAFrameThatMovesAndAGapAreNoRoughAir) {
     EXPECT_EQ(flight.fly(40).rises, 0) << fault;
     flight.factor = 4;
     EXPECT_GT(flight.fly(40).rises, 0) << fault;
+    EXPECT_LT(flight.learnt.of(AirClass::wall).seconds(), 70) << "each time it begins anew, fault " << fault;
   }
 }
 
