@@ -70,6 +70,15 @@ TEST(Rivals, APushByHeightAndASteeperThrustMoveTogetherWhereTheCraftGoesUpAndDow
 }
 
 /// The hidden drag is 0.2 1/s at rest and grows with the speed; 0.23 1/s at 1 m/s, 0.27 at the speeds flown.
+TEST(Rivals, ASteeperThrustOfFlightsUpAndDownIsToldByTheTrendOfItsWindows) {
+  // In 3 to 5 s once up and down: half of what was asked for is a trend within 2 s. Without it all four say nothing.
+  for (const std::uint64_t seed : {1797000006, 1797000009, 1797000012, 1797000018}) {
+    const auto result = studied(world_with("thrust_slope", 1, "bob", seed));
+    EXPECT_FALSE(result.causes.empty()) << seed;
+    EXPECT_TRUE(in_every_set("thrust_slope", result)) << seed << ": " << study_worlds::told(result);
+  }
+}
+
 TEST(Sizes, ADragOfFastFlightsIsToldAtOneMetrePerSecond) {
   double mean = 0;
   for (const std::uint64_t seed : {1796030000, 1796030012, 1796030014}) {
