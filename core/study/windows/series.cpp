@@ -116,14 +116,17 @@ std::array<std::vector<Vec3>, kShifts.size()> answers(const Series& s, const Com
   return out;
 }
 
-/// Whether the craft flew where the loop would have led it, in half of the rows at least. Zeros beside commanded
-/// velocities, or positions of another frame, are no set-points that a loop has heard.
-bool follows(const Series& s, const Loop& nominal, const Vehicle& vehicle) {
+/// Whether the craft flew where its set-points are, or where the loop would have led it, in half of the rows at least.
+/// Zeros beside commanded velocities, or positions of another frame, are no set-points that a loop has heard.
+bool follows(const Series& s, const Commands& cmd, const Loop& nominal, const Vehicle& vehicle) {
   const double sunk = kWindowRules.stray + kWindowRules.sunk * kGravity / vehicle.controller.kp.vertical;
   std::size_t far = 0;
   for (std::size_t i = 0; i < s.size(); ++i) {
-    const Vec3 off = s.p[i] - nominal.p[i];
-    far += off.head<2>().norm() > kWindowRules.stray || std::abs(off.z()) > sunk ? 1u : 0u;
+    const auto near = [&](const Vec3& p_W) {
+      const Vec3 off = s.p[i] - p_W;
+      return off.head<2>().norm() <= kWindowRules.stray && std::abs(off.z()) <= sunk;
+    };
+    far += near(cmd.p[i]) || near(nominal.p[i]) ? 0u : 1u;
   }
   return 2 * far <= s.size();
 }
@@ -158,7 +161,7 @@ void read_attitude(Series& s, const log::FlightLog& log, const RowNumbers& rows)
 /// What the set-points lead to, unless the craft flew elsewhere.
 void read_commands(Series& s, const Commands& cmd, const Vehicle& vehicle) {
   Loop nominal = loop_of(s, cmd, vehicle, true);
-  s.strayed = !follows(s, nominal, vehicle);
+  s.strayed = !follows(s, cmd, nominal, vehicle);
   if (s.strayed) return;
   if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
   Vehicle lagging = vehicle;
