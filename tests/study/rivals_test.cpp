@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/study/effects/columns.hpp"
 #include "core/study/effects/table.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/types/thrust.hpp"
@@ -196,11 +197,13 @@ TEST(Plausible, ASizeThatNoVehicleCanHaveIsRefusedByName) {
   EXPECT_NE(refusal(result.refused.front()).find("battery sag would have to be"), std::string::npos);
 }
 
-/// kMeanZ moved by `push` of each window's height over the surface below.
+/// Lifted by `push` of the height over the surface below, along each window: in its mean and in the thrust's moments.
 template <typename F>
 Observations pushed_by_height(F push) {
   auto seen = quiet();
-  for (std::size_t i = 0; i < seen.windows.size(); ++i) seen.y[kMeanZ][i] += push(seen.windows[i].around.height);
+  const auto column = lifting(seen.windows, [&](const PlaceAround& at) { return push(at.height); });
+  for (const auto& [channel, x] : column.parts)
+    for (std::size_t i = 0; i < x.size(); ++i) seen.y[channel][i] += x[i];
   return seen;
 }
 
