@@ -6,10 +6,13 @@
 #include <numeric>
 
 #include "core/log/dataflash.hpp"
+#include "core/log/import_columns.hpp"
+#include "core/log/median.hpp"
 #include "core/log/raw_flight.hpp"
 #include "core/log/same_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "core/study/windows/same_gusts.hpp"
+#include "core/types/formatted.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/verb.hpp"
 
@@ -33,6 +36,16 @@ bool leave_out_twins(Flights& flights, const study::Observations& seen) {
     if (!flights.group.empty()) flights.group.erase(flights.group.begin() + at);
   }
   return !twins.empty();
+}
+
+/// A flight that is below the map's lowest voxel most of the time has its heights downwards, or another map.
+void refuse_below(const Flights& flights, const map::OccupancyGrid& grid) {
+  for (std::size_t k = 0; k < flights.logs.size(); ++k) {
+    const auto& z = flights.logs[k].column("z_m");
+    if (!z.empty() && log::median(z) < grid.origin().z())
+      throw Failure(kBadData, flights.paths[k] + ":1: z_m is below the map in most rows (median " +
+                                  formatted("%.2f", log::median(z)) + " m): heights are upwards, in the map's frame");
+  }
 }
 
 study::Observations look_at(const Flights& flights, const Vehicle& vehicle, const Model& model,
@@ -61,15 +74,23 @@ log::FlightLog read_flight(const std::string& path) {
   return read_or_fail(path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path));
 }
 
+log::FlightLog read_studied(const std::string& path) {
+  auto log = read_flight(path);
+  for (const char* name : {"x_m", "y_m", "z_m"})
+    if (!log.has(name))
+      throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
+  for (const auto& name : log::silent_columns(log)) log.columns.erase(name);
+  if (is_autopilots_log(path)) return log;
+  if (const auto wrong = log::impossible(log); !wrong.empty()) throw Failure(kBadData, path + ":1: " + wrong.front());
+  return log;
+}
+
 Flights read_flights(const std::vector<std::string>& paths, const std::string& group) {
   Flights flights;
   std::vector<log::FlightMark> marks;
   const auto read = [&](const std::string& path) {
     progress("reading " + path);
-    auto log = read_flight(path);
-    for (const char* name : {"x_m", "y_m", "z_m"})
-      if (!log.has(name))
-        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
+    auto log = read_studied(path);
     if (!group.empty() && (!log.has(group) || log.column(group).empty()))
       throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
     const log::FlightMark mark(log);
@@ -97,6 +118,7 @@ std::vector<std::size_t> Flights::order() const {
 
 study::Observations observe(Flights& flights, const Vehicle& vehicle, const Model& model,
                             const map::OccupancyGrid* grid) {
+  if (grid) refuse_below(flights, *grid);
   auto seen = look_at(flights, vehicle, model, grid);
   return leave_out_twins(flights, seen) ? look_at(flights, vehicle, model, grid) : seen;
 }
