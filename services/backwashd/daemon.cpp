@@ -87,8 +87,7 @@ std::optional<adapt::InFlightConstants> learns_from(const Settings& s, const Air
   return air;
 }
 
-// What carries odometry and the stop switch to the control thread comes right below it, before the middleware starts
-// its threads.
+// What carries odometry and the stop switch to the control thread comes right below it, before the middleware starts.
 int reader_priority(const config::Daemon& daemon) {
   const int control = daemon.control.priority;
   return allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0));
@@ -122,11 +121,9 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
   if (!daemon->adaptation.enabled)
     return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials)};
   if (!model->extension.empty())
-    return tl::make_unexpected(
-        StartError(kConfiguration, daemon->model +
-                                       ": is an extended model, whose effects are not in what a flight learns: give "
-                                       "the one before, or adaptation.enabled = false in " +
-                                       path));
+    return tl::make_unexpected(StartError(
+        kConfiguration, daemon->model + ": is an extended model, whose effects are not in what a flight learns: give " +
+                            "the one before, or adaptation.enabled = false in " + path));
   const auto tau = config::load_tau_interval(daemon->model);
   if (!tau) return wrong(tau.error());
   const adapt::InFlightConstants air{vehicle->controller,
