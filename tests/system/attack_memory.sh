@@ -14,8 +14,9 @@ more_pids+=("$mapper")
 start_daemon builtin:quad-5in "$work/flight.bwlog" rt/bench/odometry
 enable
 sleep 0.5
-used=$(awk '$1 == "VmSize:" {print $2}' "/proc/$daemon_pid/status")
-prlimit --pid "$daemon_pid" --as=$((used * 1024))
+held() { awk -v what="$1:" '$1 == what {print $2 * 1024}' "/proc/$daemon_pid/status"; }
+# Of addresses, and of what may be written: a heap that was reserved before grows without an address more.
+prlimit --pid "$daemon_pid" --as="$(held VmSize)" --data="$(held VmData)"
 kill -USR1 "$mapper"
 wait "$mapper" || die 'dds_probe failed'
 code=0

@@ -85,7 +85,7 @@ as guest stop
 
 # On its way to the goal it is told to stop by all who may not; STOP would be anybody's. Meanwhile the wire is looked at.
 ctl goto 2,0,1.2
-python3 - "$protect" >>"$log" <<'PYTHON' || die 'what is on the wire is not as it is protected'
+python3 - "$protect" "$domain" >>"$log" <<'PYTHON' || die 'what is on the wire is not as it is protected'
 import socket, sys, time
 try:
     lo = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(3))
@@ -94,8 +94,11 @@ except PermissionError:
 lo.bind(("lo", 0))
 lo.settimeout(0.1)
 packets, end = [], time.monotonic() + 1
+port = 7400 + 250 * int(sys.argv[2])  # of this domain: others may fly beside it
 while time.monotonic() < end:
-    packets.append(lo.recv(65536))
+    packet = lo.recv(65536)
+    if packet[12:14] == b"\x08\0" and port <= int.from_bytes(packet[36:38], "big") < port + 250:
+        packets.append(packet)
 plain = sum(b"base_link" in p for p in packets)
 print(f"{len(packets)} packets of 1 s, {plain} with odometry in plain text")
 assert len(packets) > 100 and (plain > 20) == (sys.argv[1] == "sign") and (plain == 0) == (sys.argv[1] == "encrypt"), plain

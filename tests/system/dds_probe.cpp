@@ -175,13 +175,17 @@ int closure(const dds::Participant& participant, const std::string& name_space) 
   return 0;
 }
 
-// A good map of two free cubes of 6.4 m: a box of 128 x 128 x 128 voxels, whose snapshot needs 240 MB.
-void write_roomy(dds::Writer<dds::Octomap>& writer, std::string frame = "map") {
-  std::vector<std::uint8_t> data{0x03, 0xc0};
+// A good map in a box of 128 x 128 x 128 voxels: of two free cubes of 6.4 m, or all of it free, which takes 90 MB.
+void write_roomy(dds::Writer<dds::Octomap>& writer, std::string frame = "map", bool all_free = false) {
+  std::vector<std::uint8_t> data{0x03, static_cast<std::uint8_t>(all_free ? 0 : 0xc0)};
   for (int n = 0; n < 8; ++n) data.insert(data.end(), {0x00, 0xc0});
-  data.insert(data.end(), {0x00, 0x40});
-  for (int n = 0; n < 8; ++n) data.insert(data.end(), {0x03, 0x00});
-  data.insert(data.end(), {0x01, 0x00});
+  if (all_free) {
+    data.insert(data.end(), {0x55, 0x55});
+  } else {
+    data.insert(data.end(), {0x00, 0x40});
+    for (int n = 0; n < 8; ++n) data.insert(data.end(), {0x03, 0x00});
+    data.insert(data.end(), {0x01, 0x00});
+  }
   char id[] = "OcTree";
   dds::Octomap m{};
   m.header.frame_id = frame.data();
@@ -211,7 +215,7 @@ void hand_map_on(const dds::Participant& participant, dds::Writer<dds::Octomap>&
 int mapper(const dds::Participant& participant, const std::string& name_space) {
   auto writer = dds::make_writer<dds::Octomap>(participant, name_space);
   hand_map_on(participant, writer);
-  write_roomy(writer);
+  write_roomy(writer, "map", true);
   std::this_thread::sleep_for(1s);
   return 0;
 }
