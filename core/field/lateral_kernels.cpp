@@ -125,27 +125,36 @@ void decide(const Elements& elements, std::size_t count, const std::uint64_t* hi
   }
 }
 
-BACKWASH_CLONES
+namespace {
+
+struct LookInside {
+  template <std::size_t kPiece>
+  [[gnu::always_inline]] static Inside run(const std::uint64_t* words, std::size_t count, int turn, std::uint64_t band,
+                                           std::uint64_t* inside) noexcept {
+    using Piece = typename Native<kPiece>::Words;
+    constexpr std::size_t kWords = kPiece / sizeof(std::uint64_t);
+    constexpr std::array<std::uint64_t, kEight> kFirst{1, 2, 4, 8, 16, 32, 64, 128};
+    const auto up = static_cast<unsigned>(turn) & 63, down = (64 - up) & 63;
+    Piece at, some{}, full{};
+    load(at, kFirst.data());
+    for (std::size_t n = 0; n < count; n += kWords, at <<= kWords) {
+      Piece word;
+      load(word, words + n);
+      word = (word << up | word >> down) & band;
+      store(word, inside + n);
+      some |= word != 0 ? at : Piece{}, full |= word == band ? at : Piece{};
+    }
+    Inside all{};
+    for (std::size_t n = 0; n < kWords; ++n) all.some |= some[n], all.full |= full[n];
+    return all;
+  }
+};
+
+}  // namespace
+
 Inside look_inside(const std::uint64_t* words, std::size_t count, int turn, std::uint64_t band,
                    std::uint64_t* inside) noexcept {
-  constexpr Words kSome{1, 2, 4, 8, 16, 32, 64, 128};
-  const auto up = static_cast<unsigned>(turn) & 63, down = (64 - up) & 63;
-  Inside all{};
-  for (std::size_t n = 0; n < count; n += kEight) {
-    Words word;
-    load(word, words + n);
-    word = (word << up | word >> down) & band;
-    store(word, inside + n);
-    // All bits of a number that is not 0; what lacks of the band.
-    const auto filled = [](Words& number) { number = -((number | -number) >> 63U); };
-    Words lacking = word ^ band;
-    filled(word), filled(lacking);
-    const Words bits = (word & kSome) | (~lacking & (kSome << 8));
-    std::uint64_t any = 0;
-    for (std::size_t lane = 0; lane < kEight; ++lane) any |= bits[lane];
-    all.some |= (any & 255) << n, all.full |= (any >> 8) << n;
-  }
-  return all;
+  return run_native<LookInside>(words, count, turn, band, inside);
 }
 
 namespace {
@@ -200,27 +209,17 @@ template <std::size_t kPiece>
   }
 }
 
-#ifdef BACKWASH_LEVELS
-[[gnu::target("avx512f")]] void hide_by_64(const LineFromAbove* lines, const Hiding& hiding,
-                                           std::size_t count) noexcept {
-  hide_by<64>(lines, hiding, count);
-}
-[[gnu::target("avx2")]] void hide_by_32(const LineFromAbove* lines, const Hiding& hiding, std::size_t count) noexcept {
-  hide_by<32>(lines, hiding, count);
-}
-#endif
-void hide_by_16(const LineFromAbove* lines, const Hiding& hiding, std::size_t count) noexcept {
-  hide_by<16>(lines, hiding, count);
-}
+struct Hide {
+  template <std::size_t kPiece>
+  [[gnu::always_inline]] static void run(const LineFromAbove* lines, const Hiding& hiding, std::size_t count) noexcept {
+    hide_by<kPiece>(lines, hiding, count);
+  }
+};
 
 }  // namespace
 
 void hide(const LineFromAbove* lines, const Hiding& hiding, std::size_t count) noexcept {
-#ifdef BACKWASH_LEVELS
-  if (__builtin_cpu_supports("avx512f")) return hide_by_64(lines, hiding, count);
-  if (__builtin_cpu_supports("avx2")) return hide_by_32(lines, hiding, count);
-#endif
-  hide_by_16(lines, hiding, count);
+  run_native<Hide>(lines, hiding, count);
 }
 
 BACKWASH_CLONES
@@ -237,17 +236,19 @@ void add_corner(const CornerTerms& terms, std::uint64_t heights, const float* co
   while (heights) {
     const int z = std::countr_zero(heights);
     const auto at = static_cast<std::size_t>(z);
-    const EightFloats h = a * (kSteps + (static_cast<float>(z - terms.floor) - 0.5F)), height = h < 0 ? -h : h,
-                      h2 = h * h;
+    const EightFloats h = a * (kSteps + (static_cast<float>(z - terms.floor) - 0.5F)), h2 = h * h;
+    EightFloats height = h, above, below = d2 + h2 * h2 * h2, seen;
+    choose_negative(h, -h, height, height);
     const EightFloats x = (d - height) / (d + height), x2 = x * x;
     EightFloats series = EightFloats{} + kSeries[0];
     for (std::size_t k = 1; k < kSeries.size(); ++k) series = series * x2 + kSeries[k];
-    const EightFloats acute = (x + x * x2 * series) + kPi / 4, phi = h > 0 ? acute : kPi - acute;
-    EightFloats above = phi_max - phi, below = d2 + h2 * h2 * h2, seen;
-    above = above < 0 ? EightFloats{} : above, below = below < least ? EightFloats{} + least : below;
+    const EightFloats acute = (x + x * x2 * series) + kPi / 4;
+    choose_negative(h, phi_max - (kPi - acute), phi_max - acute, above);
+    choose_negative(above, EightFloats{}, above, above);
+    choose_negative(below - least, EightFloats{} + least, below, below);
     load(seen, count + at);
-    const EightInts wanted = ((EightInts{} + static_cast<std::int32_t>(heights >> z & 0xff)) & kBit) != 0;
-    seen = wanted ? seen * (above / below) : EightFloats{};
+    const EightInts wanted = -((EightInts{} + static_cast<std::int32_t>(heights >> z & 0xff)) & kBit) >> 31;
+    seen = reinterpret_cast<EightFloats>(reinterpret_cast<EightInts>(seen * (above / below)) & wanted);
     const Doubles factor = __builtin_convertvector(seen, Doubles);
     const auto add = [&](double per_unit, std::array<double, kPadded>& to) {
       Doubles sum;

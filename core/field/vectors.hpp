@@ -24,6 +24,31 @@ using EightInts = std::int32_t __attribute__((vector_size(32)));
 using Quad = double __attribute__((vector_size(32)));
 using EightFloats = float __attribute__((vector_size(32)));
 
+/// Vectors of kPiece bytes, for run_native().
+template <std::size_t kPiece>
+struct Native;
+template <>
+struct Native<16> {
+  using Words = std::uint64_t __attribute__((vector_size(16)));
+  using Floats = float __attribute__((vector_size(16)));
+  using Ints = std::int32_t __attribute__((vector_size(16)));
+  using Doubles = double __attribute__((vector_size(16)));
+};
+template <>
+struct Native<32> {
+  using Words = std::uint64_t __attribute__((vector_size(32)));
+  using Floats = vectors::EightFloats;
+  using Ints = vectors::EightInts;
+  using Doubles = vectors::Quad;
+};
+template <>
+struct Native<64> {
+  using Words = vectors::Words;
+  using Floats = vectors::Floats;
+  using Ints = vectors::Ints;
+  using Doubles = vectors::Doubles;
+};
+
 constexpr double kHalf = 0.5 + kTouch;  // of a closed box with its tolerance, voxel edges
 constexpr double kRound = 0x1.8p52;     // x + kRound has the nearest integer to x in its last bits
 
@@ -46,28 +71,12 @@ template <typename Vector, typename Number>
   for (double& lane : lanes) lane = std::sqrt(lane);
   load(x, lanes.data());
 }
-// Compilers take a choice between vectors that the processor does not have to single numbers: `kPiece` is the size of
-// those that it has, bytes.
-template <std::size_t kPiece>
-struct Pieces;
-template <>
-struct Pieces<16> {
-  using Type = double __attribute__((vector_size(16)));
-};
-template <>
-struct Pieces<32> {
-  using Type = double __attribute__((vector_size(32)));
-};
-template <>
-struct Pieces<64> {
-  using Type = Doubles;
-};
 /// yes where a < b, no elsewhere.
 template <std::size_t kPiece>
 [[gnu::always_inline]] inline void choose_less(const Doubles& a, const Doubles& b, const Doubles& yes,
                                                const Doubles& no, Doubles& chosen) noexcept {
   constexpr std::size_t kCount = sizeof(Doubles) / kPiece;
-  std::array<typename Pieces<kPiece>::Type, kCount> less, more, first, second;
+  std::array<typename Native<kPiece>::Doubles, kCount> less, more, first, second;
   std::memcpy(less.data(), &a, sizeof a), std::memcpy(more.data(), &b, sizeof b);
   std::memcpy(first.data(), &yes, sizeof yes), std::memcpy(second.data(), &no, sizeof no);
   for (std::size_t n = 0; n < kCount; ++n) first[n] = less[n] < more[n] ? first[n] : second[n];
@@ -86,6 +95,13 @@ template <std::size_t kPiece>
 [[gnu::always_inline]] inline void take_floor(Doubles& x) noexcept {
   const Doubles nearest = (x + kRound) - kRound;
   choose_less<kPiece>(x, nearest, nearest - 1.0, nearest, x);
+}
+/// yes where x has the sign −, no elsewhere: a choice for all processors alike, without a comparison.
+[[gnu::always_inline]] inline void choose_negative(const EightFloats& x, const EightFloats& yes, const EightFloats& no,
+                                                   EightFloats& chosen) noexcept {
+  const EightInts mask = reinterpret_cast<EightInts>(x) >> 31;
+  chosen = reinterpret_cast<EightFloats>((reinterpret_cast<EightInts>(yes) & mask) |
+                                         (reinterpret_cast<EightInts>(no) & ~mask));
 }
 
 /// Bits 0 … x of words: none for x < 0, all for x ≥ 63.
