@@ -9,7 +9,7 @@ namespace backwash::adapt {
 /// samples every number is equal, bit for bit. Made before the flight: the constructor takes 10 ms.
 class Adaptation {
  public:
-  explicit Adaptation(const Gusts& gusts) : innovations_(gusts) {}
+  explicit Adaptation(const Gusts& gusts, double alpha = kAlpha) : innovations_(gusts) { bets_.fill(Bets(alpha)); }
 
   /// One tick; whether a class's factor or limit may have changed. Real-time: wait-free, no allocation.
   bool add(const AirSample& sample) noexcept {
@@ -22,6 +22,11 @@ class Adaptation {
   }
   /// Factor on Σ in a class, max(1, v_lo): never below 1, never falls. Sets grow by its root.
   double factor(AirClass air) const noexcept { return std::max(1.0, of(air).above().value_or(1)); }
+  AirFactors factors() const noexcept {
+    AirFactors all;
+    for (std::size_t k = 0; k < kAirClasses; ++k) all[k] = factor(static_cast<AirClass>(k));
+    return all;
+  }
   const Bets& of(AirClass air) const noexcept { return bets_[static_cast<std::size_t>(air)]; }
   std::uint64_t refused() const noexcept { return innovations_.refused(); }  ///< samples
 

@@ -6,9 +6,8 @@
 namespace backwash::adapt {
 namespace {
 
-constexpr double kRefuted = static_cast<double>(kAirClasses) / kAlpha;  // α is shared by the classes
-constexpr double kNearly = 0.9;                                         // of a block: groups end on samples
-constexpr double kFull = 1e200;                                         // a detector says no more
+constexpr double kNearly = 0.9;  // of a block: groups end on samples
+constexpr double kFull = 1e200;  // a detector says no more
 
 /// Mean over the axes of the squared innovation over its largest expectation under the factor v.
 double excess(const Innovation& i, double v) noexcept {
@@ -48,7 +47,7 @@ void Bets::bet_rougher(const Innovation& innovation, bool ends) noexcept {
     }
     const double value = mean_value(rougher_[k]);
     if (k == 0) highest_ = std::max(highest_, value), highest_change_ = std::max(highest_change_, change);
-    if (k == above_ && (value >= kRefuted || change >= kRunLength)) ++above_;
+    if (k == above_ && (value >= refuted_ || change >= kRunLength)) ++above_;
   }
 }
 
@@ -60,7 +59,7 @@ void Bets::bet_calmer(const Innovation& innovation, bool ends) noexcept {
     calm_square_[k] = 0;
     for (std::size_t j = 0; j < kCalmStakes.size(); ++j)
       calmer_[k][j].times(1 + kCalmStakes[j] / (kMostSquare - 1 + kBeyond) * (1 - kBeyond - x));
-    if (k == below_ && mean_value(calmer_[k]) >= kRefuted) ++below_;
+    if (k == below_ && mean_value(calmer_[k]) >= refuted_) ++below_;
   }
 }
 

@@ -10,7 +10,8 @@
 
 namespace backwash::adapt {
 
-/// Of one flight: "the air is rougher than v" is wrong in some class at some time with at most this probability.
+/// Of one flight: "the air is rougher than v" is wrong in some class at some time with at most this probability, if
+/// nothing else is configured.
 inline constexpr double kAlpha = 0.01;
 /// s: the mean time to the first false "it became rougher in flight", of all classes together.
 inline constexpr double kRunLength = 36000;
@@ -48,6 +49,9 @@ class Bets {
   /// Of the variance this share at most lies beyond what a square may count (kMostSquare).
   static constexpr double kBeyond = 0.05;
 
+  /// `alpha`: of all classes together, in (0, 1).
+  explicit Bets(double alpha = kAlpha) : refuted_(static_cast<double>(kAirClasses) / alpha) {}
+
   void add(const Innovation& innovation) noexcept;
   double seconds() const noexcept { return seconds_; }  ///< of data
   /// The largest v of the grid that was refuted: the variance is more than v times the model's. Nothing: none was.
@@ -63,6 +67,7 @@ class Bets {
   void bet_rougher(const Innovation& innovation, bool ends) noexcept;
   void bet_calmer(const Innovation& innovation, bool ends) noexcept;
 
+  double refuted_;  // a martingale that reaches it; the classes share α
   std::array<std::array<Wealth, kStakes.size()>, kRougher.size()> rougher_;
   std::array<std::array<double, kStakes.size()>, kRougher.size()> since_{};  // Shiryaev–Roberts, s
   std::array<std::array<Wealth, kCalmStakes.size()>, kCalmer.size()> calmer_;

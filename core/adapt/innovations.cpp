@@ -7,7 +7,8 @@
 namespace backwash::adapt {
 
 std::optional<Innovation> Innovations::add(const AirSample& s) noexcept {
-  const bool usable = std::isfinite(s.t_s) && s.w_W.allFinite() && s.sigma.allFinite() && s.sigma.minCoeff() > 0;
+  const bool usable =
+      std::isfinite(s.t_s) && s.w_W.allFinite() && s.sigma.allFinite() && s.noise.allFinite() && s.sigma.minCoeff() > 0;
   if (!usable || (last_t_ && !(s.t_s > *last_t_))) {
     ++refused_;
     return std::nullopt;
@@ -26,13 +27,13 @@ std::optional<Innovation> Innovations::add(const AirSample& s) noexcept {
   group_.mixed = group_.mixed || group_.air != s.air;
   group_.samples += 1, group_.seconds += interval;
   group_.y += s.w_W.cwiseProduct(inverse), group_.inverse += inverse;
-  group_.noise += gusts_.noise.cwiseQuotient(s.sigma);
+  group_.noise += (gusts_.noise + s.noise).cwiseQuotient(s.sigma);
   return group_.seconds >= law_.group_s() - interval / 2 ? ended() : std::nullopt;
 }
 
 std::optional<Innovation> Innovations::ended() noexcept {
   const double n = group_.samples;
-  group_.y /= n, group_.inverse /= n, group_.noise /= n * n;
+  group_.y /= n, group_.inverse /= n, group_.noise /= n * n * (gusts_.differences ? n : 1);
   const std::optional<Group> before = before_;
   const Group now = group_;
   before_ = now, group_ = {};

@@ -15,6 +15,7 @@ struct Gusts {
   std::optional<GustForm> form{};                 ///< the likeliest, if it was told
   double mean_horizontal = 0, mean_vertical = 0;  ///< largest steady push, m/s² (BoundModel)
   Vec3 noise = Vec3::Zero();                      ///< variance of the sensor per sample and axis, (m/s²)²
+  bool differences = false;  ///< of a velocity, over the samples' intervals: a group's noise is that of its two ends
 };
 
 /// The disturbance at one tick.
@@ -23,6 +24,7 @@ struct AirSample {
   Vec3 w_W = Vec3::Zero();    ///< m/s²
   Vec3 sigma = Vec3::Zero();  ///< modelled variance along x, y, z of W, (m/s²)²
   AirClass air = AirClass::none;
+  Vec3 noise = Vec3::Zero();  ///< of this sample beside Gusts::noise, (m/s²)²
 };
 
 /// What a group of samples says beyond the group before it. Vectors per axis of W; all per unit of the modelled Σ.

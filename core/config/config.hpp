@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <string>
 #include <tl/expected.hpp>
 
@@ -26,5 +27,9 @@ tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path);
 /// Of the study's `[[extension.term]]` the `effect` list is read ({ kind, value, error, scale }, ModelEffect; README.md
 /// of core/study); the rest of a term is the study's own.
 tl::expected<Model, ConfigError> load_model(const std::string& path);
+
+/// The interval of τ_w that calibration wrote into a model file, s: `[confidence] "bound.tau_w"`, else `[bound] tau_w`
+/// twice. Error: of load_model(); an interval that is not two rising times above 0.
+tl::expected<std::array<double, 2>, ConfigError> load_tau_interval(const std::string& path);
 
 }  // namespace backwash::config

@@ -22,6 +22,7 @@ struct Daemon {
     std::string interface;       ///< network interface by name
     std::string name_space;      ///< topics are rt/NAMESPACE/…: several vehicles share a domain
     std::string odometry_topic;  ///< whole name on the wire, for any VIO
+    std::string security;        ///< folder of credentials of DDS Security; empty: everyone may speak
   } dds;
   struct {
     std::string map = "map";         ///< of maps, clouds, odometry and what the daemon sends
@@ -60,15 +61,21 @@ struct Daemon {
     std::string chip;                      ///< device of the chip, or its label; empty: no line is used
     std::string stop_switch, strobe, led;  ///< lines by name; empty: there is none
   } gpio;
+  struct Adaptation {
+    bool enabled = false;  ///< sets grow in flight where the air is shown to be rougher than modelled
+    double alpha = 0.01;   ///< probability of a flight in which that is said wrongly (docs/model.md section 7)
+    std::string file;      ///< where the factors are kept over restarts; empty: they are not
+  } adaptation;
   struct {
-    std::string file;  ///< raw log; a start that finds it makes the next of NAME-2, NAME-3 …
+    std::string file;       ///< raw log; a start that finds it makes the next of NAME-2, NAME-3 …
+    double max_mib = 1024;  ///< a file that has become larger is followed by the next, once the mode is passive
   } log;
 };
 
 /// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
-/// The tables frames, odometry, map and gpio, link.protocol and link.signing_key_file may be left out: their defaults
-/// are above. The key file is read here, so that a start with a bad one ends before any port opens. `builtin:backwashd`
-/// is the shipped example.
+/// The tables frames, odometry, map, gpio and adaptation, link.protocol and link.signing_key_file may be left out:
+/// their defaults are above. The key file is read here, so that a start with a bad one ends before any port opens.
+/// `builtin:backwashd` is the shipped example.
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
 
 }  // namespace backwash::config

@@ -17,6 +17,7 @@ constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", 
 constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2],
                            kMessage = kOdometry[3];
 constexpr std::string_view kRateLeast = "odometry.rate_least";
+constexpr std::string_view kAdaptation[] = {"adaptation.enabled", "adaptation.file"};
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
 bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
@@ -186,11 +187,14 @@ tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {
   return read_protocol(file, d);
 }
 
-tl::expected<void, ConfigError> read_live(const StrictTable& file, Daemon& d) {
-  if (!file.has(kLive)) return {};
-  const auto live = file.flag(kLive);
-  if (!live) return tl::unexpected(live.error());
-  d.map.live = *live;
+tl::expected<void, ConfigError> read_flags(const StrictTable& file, Daemon& d) {
+  const std::pair<std::string_view, bool*> flags[] = {{kLive, &d.map.live}, {kAdaptation[0], &d.adaptation.enabled}};
+  for (const auto& [key, target] : flags) {
+    if (!file.has(key)) continue;
+    const auto flag = file.flag(key);
+    if (!flag) return tl::unexpected(flag.error());
+    *target = *flag;
+  }
   return {};
 }
 
@@ -212,6 +216,7 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {"map.closing_speed", &d.map.closing_speed, {0, 5}, kOptional},
       {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, kOptional},
       {"map.max_mib", &d.map.max_mib, {1, 65536}, kOptional},
+      {"log.max_mib", &d.log.max_mib, {1, 4096}, kOptional},
       {"odometry.sensor_x", &d.odometry.sensor_B.x(), {-5, 5}, kOptional},
       {"odometry.sensor_y", &d.odometry.sensor_B.y(), {-5, 5}, kOptional},
       {"odometry.sensor_z", &d.odometry.sensor_B.z(), {-5, 5}, kOptional},
@@ -220,6 +225,7 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {"odometry.sensor_yaw", &d.odometry.sensor_turned.z(), {-3.15, 3.15}, kOptional},
       {kRateLeast, &d.odometry.timing.rate_least, {9, 500}, kOptional},
       {"odometry.latency", &d.odometry.timing.latency, {0, 0.2}, kOptional},
+      {"adaptation.alpha", &d.adaptation.alpha, {1e-6, 0.1}, kOptional},
       {"control.cpu", &c.cpu, {-1, 1023}},
       {"control.battery_land", &d.control.battery_land, {0, 1}},
   };
@@ -260,22 +266,25 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"link.device", &d.link.device},
       {"log.file", &d.log.file},
   };
-  const TextKey frames[] = {
-      {"frames.map", &d.frames.map}, {"frames.odometry", &d.frames.odometry}, {"frames.body", &d.frames.body}};
-  std::vector<std::string_view> others{kLive, kProtocol, kSigningKeyFile};
+  const TextKey optional[] = {{"dds.security", &d.dds.security},
+                              {"frames.map", &d.frames.map},
+                              {"frames.odometry", &d.frames.odometry},
+                              {"frames.body", &d.frames.body},
+                              {kAdaptation[1], &d.adaptation.file}};
+  std::vector<std::string_view> others{kLive, kAdaptation[0], kAdaptation[1], kProtocol, kSigningKeyFile};
   others.insert(others.end(), std::begin(kOdometry), std::end(kOdometry));
   others.insert(others.end(), std::begin(kGpio), std::end(kGpio));
   for (const auto& [key, target] : texts) others.push_back(key);
-  for (const auto& [key, target] : frames) others.push_back(key);
+  for (const auto& [key, target] : optional) others.push_back(key);
   if (auto read = read_numbers(*file, others, d, converted); !read) return tl::unexpected(read.error());
   if (auto read = read_texts(*file, texts, true); !read) return tl::unexpected(read.error());
   if (auto good = check_names(*file, d); !good) return tl::unexpected(good.error());
-  if (auto read = read_texts(*file, frames, false); !read) return tl::unexpected(read.error());
+  if (auto read = read_texts(*file, optional, false); !read) return tl::unexpected(read.error());
   if (auto read = read_odometry(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = check_frames(*file, d); !good) return tl::unexpected(good.error());
-  if (auto read = read_live(*file, d); !read) return tl::unexpected(read.error());
+  if (auto read = read_flags(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = convert(*file, converted, d); !good) return tl::unexpected(good.error());
   return d;
 }

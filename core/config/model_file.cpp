@@ -3,6 +3,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
@@ -111,6 +112,18 @@ tl::expected<Model, ConfigError> load_model(const std::string& path) {
     model.extension.push_back(*read);
   }
   return model;
+}
+
+tl::expected<std::array<double, 2>, ConfigError> load_tau_interval(const std::string& path) {
+  const auto model = load_model(path);
+  if (!model) return tl::unexpected(model.error());
+  const auto file = StrictTable::open(path, ".model.toml");
+  if (!file) return tl::unexpected(file.error());
+  const auto ends = file->numbers("confidence", "bound.tau_w");
+  if (!ends) return std::array{model->bound.tau_w, model->bound.tau_w};
+  if (ends->size() == 2 && ends->front() > 0 && ends->back() >= ends->front() && std::isfinite(ends->back()))
+    return std::array{ends->front(), ends->back()};
+  return tl::unexpected(file->error("confidence", "needs \"bound.tau_w\" = two rising times above 0, in s"));
 }
 
 double rounded(double value, int digits) {

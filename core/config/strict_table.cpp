@@ -2,11 +2,13 @@
 #include "core/config/strict_table.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <set>
 #include <sstream>
 
 #include "core/config/builtin_files.hpp"
+#include "core/config/file_hash.hpp"
 #include "core/files/read_file.hpp"
 
 namespace backwash::config {
@@ -79,6 +81,13 @@ std::string names_below(std::string_view prefix, std::span<const NumberKey> keys
 
 }  // namespace
 
+tl::expected<std::uint64_t, ConfigError> hash_of_files(const std::string& vehicle, const std::string& model) {
+  const auto first = contents(vehicle, ".vehicle.toml"), second = contents(model, ".model.toml");
+  if (!first) return tl::unexpected(first.error());
+  if (!second) return tl::unexpected(second.error());
+  return fnv1a(*second, fnv1a(std::string_view("\0", 1), fnv1a(*first)));
+}
+
 tl::expected<StrictTable, ConfigError> StrictTable::open(const std::string& path, std::string_view suffix) {
   const auto text = contents(path, suffix);
   if (!text) return tl::unexpected(text.error());
@@ -100,6 +109,16 @@ ConfigError StrictTable::error(std::string_view path, const std::string& what_wo
   message << file_ << ":" << (line > 0 ? line : 1) << ": key '" << path
           << "' = " << (node ? value_text(*node) : "(missing)") << ": " << what_would_be_right;
   return {ConfigError::Kind::invalid, message.str()};
+}
+
+std::optional<std::vector<double>> StrictTable::numbers(std::string_view path, std::string_view key) const {
+  const toml::table* table = root_.at_path(path).as_table();
+  const toml::node* entry = table ? table->get(key) : nullptr;
+  const toml::array* list = entry ? entry->as_array() : nullptr;
+  if (!list) return std::nullopt;
+  std::vector<double> all;
+  for (const auto& number : *list) all.push_back(number.value<double>().value_or(NAN));
+  return all;
 }
 
 std::vector<const toml::node*> StrictTable::nodes(std::string_view path, std::string_view key) const {

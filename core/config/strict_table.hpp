@@ -2,6 +2,7 @@
 #pragma once
 
 #include <toml++/toml.h>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -45,6 +46,8 @@ class StrictTable {
   tl::expected<std::string, ConfigError> text(std::string_view path) const;
   /// true or false.
   tl::expected<bool, ConfigError> flag(std::string_view path) const;
+  /// The numbers of the list `key`, which may hold dots, in the table at `path`; nothing where there is no such list.
+  std::optional<std::vector<double>> numbers(std::string_view path, std::string_view key) const;
   /// The entries of the lists `key` in every table of the list of tables at `path`; a `key` that is no list is returned
   /// itself.
   std::vector<const toml::node*> nodes(std::string_view path, std::string_view key) const;

@@ -111,7 +111,7 @@ DisturbanceField::DisturbanceField(const map::OccupancyGrid& grid, std::span<con
                                    const DisturbanceField& old, const map::VoxelBox& anew)
     : DisturbanceField(grid, voxels) {
   for (const std::size_t n : voxels)
-    if (old.has(n) && !anew.contains(voxel(n))) sigma_[slot(n)] = old.sigma_[old.slot(n)];
+    if (old.has(n) && !anew.contains(map::voxel(size_, n))) sigma_[slot(n)] = old.sigma_[old.slot(n)];
 }
 
 void DisturbanceField::fill(const ProximityField& exact, std::span<const std::size_t> voxels) {
@@ -131,9 +131,15 @@ void DisturbanceField::fill(const WholeField& whole, const map::OccupancyGrid& p
 void DisturbanceField::scale(const Extension& extension, std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) {
     if (!has(n)) continue;
-    const auto factor = static_cast<float>(std::exp(extension.at(voxel(n)).ln_variance));
+    const auto factor = static_cast<float>(std::exp(extension.at(map::voxel(size_, n)).ln_variance));
     for (float& s : sigma_[slot(n)]) s *= factor;
   }
+}
+
+void DisturbanceField::scale(std::span<const AirClass> classes, const AirFactors& factors) {
+  for (std::size_t n = 0; n < classes.size(); ++n)
+    if (has(n))
+      for (float& s : sigma_[slot(n)]) s *= static_cast<float>(factor_of(factors, classes[n]));
 }
 
 void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
@@ -145,11 +151,6 @@ void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {
 std::size_t DisturbanceField::slot(std::size_t n) const noexcept {
   const std::uint64_t lower = (std::uint64_t{1} << n % kWord) - 1;
   return before_[n / kWord] + static_cast<std::size_t>(std::popcount(listed_[n / kWord] & lower));
-}
-
-Index3 DisturbanceField::voxel(std::size_t n) const noexcept {
-  const auto x = static_cast<std::size_t>(size_.x()), y = static_cast<std::size_t>(size_.y());
-  return {static_cast<int>(n % x), static_cast<int>(n / x % y), static_cast<int>(n / (x * y))};
 }
 
 bool DisturbanceField::has(const Index3& v) const noexcept {

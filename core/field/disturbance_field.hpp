@@ -13,6 +13,7 @@
 #include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/voxel_box.hpp"
+#include "core/types/air_class.hpp"
 #include "core/types/model.hpp"
 
 namespace backwash::field {
@@ -66,6 +67,9 @@ class DisturbanceField {
   /// Multiplies Σ at the given voxels, where it is stored, by the factor that an extended model has there.
   void scale(const Extension& extension, std::span<const std::size_t> voxels);
 
+  /// Multiplies Σ where it is stored by the factor of each voxel's class, of the grid's voxels in linear order.
+  void scale(std::span<const AirClass> classes, const AirFactors& factors);
+
   /// Whether Σ is stored at a voxel; false outside the grid. Real-time: wait-free, no allocation.
   bool has(const Index3& v) const noexcept;
   /// Σ at a voxel centre. Precondition: has(v). Real-time: wait-free, no allocation.
@@ -81,7 +85,6 @@ class DisturbanceField {
   bool listed(std::size_t n) const noexcept { return listed_[n / kWord] >> n % kWord & 1; }
   std::size_t slot(std::size_t n) const noexcept;  // of a listed voxel in sigma_
   bool has(std::size_t n) const noexcept { return listed(n) && sigma_[slot(n)][0] >= 0; }
-  Index3 voxel(std::size_t n) const noexcept;
 
   Vec3 origin_W_;
   double resolution_;

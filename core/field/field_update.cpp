@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 namespace backwash::field {
 
@@ -17,13 +16,6 @@ map::VoxelBox affected_columns(const map::OccupancyGrid& grid, const Model& mode
   box.low = box.low.cwiseMax(0), box.high = box.high.cwiseMin(grid.size() - Index3::Ones());
   box.low.z() = 0, box.high.z() = grid.size().z() - 1;
   return box;
-}
-
-std::vector<std::size_t> voxels_within(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels,
-                                       const map::VoxelBox& box) {
-  std::vector<std::size_t> within;
-  std::ranges::copy_if(voxels, std::back_inserter(within), [&](std::size_t n) { return box.contains(grid.voxel(n)); });
-  return within;
 }
 
 }  // namespace backwash::field

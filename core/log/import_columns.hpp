@@ -49,5 +49,12 @@ tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, cons
 /// velocity, gravity is still in it, the attitude does not tilt where the craft accelerates, thrust is no share of 1.
 /// A signed or scaled axis that would fit is named. Says nothing about what the flight did not move enough to show.
 std::vector<std::string> contradictions(const FlightLog& log);
+/// Those of them that no noise, estimator or accident of a flight explains: a factor of 3, a sign or another axis. And
+/// stamps that do not rise or are no seconds, velocities or accelerations that are 0 in every row while the craft
+/// moves, attitudes of no length or in another order.
+std::vector<std::string> impossible(const FlightLog& log);
+
+/// The columns of sensors that never spoke: the rpm, the motors' commands, the thrust or the battery, 0 in every row.
+std::vector<std::string> silent_columns(const FlightLog& log);
 
 }  // namespace backwash::log

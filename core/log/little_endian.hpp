@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <vector>
 
 namespace backwash::log {
 
@@ -13,6 +14,13 @@ T little(const std::uint8_t* p) noexcept {
   T value;
   std::memcpy(&value, p, sizeof value);
   return value;
+}
+
+/// Appends a number, little-endian.
+template <typename T>
+void put_little(std::vector<std::uint8_t>& bytes, T value) {
+  const auto* first = reinterpret_cast<const std::uint8_t*>(&value);
+  bytes.insert(bytes.end(), first, first + sizeof value);
 }
 
 /// The number at p of a type by its letter, as ULog's reader and DataFlash name them: b, h, i, q are integers of 1, 2,

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <span>
 
 #include "core/log/import_columns.hpp"
 #include "core/log/local_cubic.hpp"
@@ -19,9 +21,17 @@ constexpr double kLeastAcceleration = 0.25;  // m/s², rms
 constexpr double kSettled = 0.06;            // s on each side: what measured accelerations are averaged over
 constexpr double kFollows = 0.7;             // correlation from which an axis follows another
 constexpr double kStranger = 0.3;            // below it two that moved have nothing to do with each other
-constexpr double kVelocityRight[] = {0.8, 1.25}, kAccelerationRight[] = {0.6, 1.6};
-constexpr double kTiltRight[] = {0.4, 2.5};  // thrust differs from weight, and drag tilts as well
-constexpr double kGravityLeft = 2.5;         // m/s², of the median vertical acceleration
+/// Slopes that are right, and whether what has nothing to do with its derivative is wrong.
+struct Bounds {
+  double velocity[2], acceleration[2];
+  double tilt[2];  // thrust differs from weight, and drag tilts as well
+  bool strangers;
+};
+constexpr Bounds kImported{{0.8, 1.25}, {0.6, 1.6}, {0.4, 2.5}, true};
+constexpr Bounds kPossible{{1 / 3.0, 3}, {1 / 3.0, 3}, {0.2, 5}, false};
+constexpr double kLongestStep = 0.5;      // s, between rows on the median
+constexpr double kLength[] = {0.9, 1.1};  // of an attitude
+constexpr double kGravityLeft = 2.5;      // m/s², of the median vertical acceleration
 constexpr double kMostThrust = 1.2, kLeastThrust = -0.05;
 
 using Names = std::array<const char*, 3>;
@@ -54,6 +64,7 @@ struct Pairing {
   Names wanted;         ///< of what it should follow
   double least;         ///< rms of an axis that says something
   const double (&right)[2];
+  bool strangers;
   int axes = 3;
 };
 
@@ -99,7 +110,7 @@ void pair_up(const Pairing& p, const Vectors& said, const Vectors& shown, std::v
       if (match.axis == axis && match.slope >= p.right[0] && match.slope <= p.right[1]) continue;
       wrong.push_back(std::string(p.said[i]) + " is " + formatted("%.3g", match.slope) + " times " + p.of_what +
                       " of " + p.wanted[j] + ": a wrong unit, sign, axis or frame");
-    } else if (r < kStranger && rms(shown, axis) > 2 * p.least && rms(said, axis) > 2 * p.least) {
+    } else if (p.strangers && r < kStranger && rms(shown, axis) > 2 * p.least && rms(said, axis) > 2 * p.least) {
       wrong.push_back(std::string(p.said[i]) + " has nothing to do with " + p.of_what + " of " + p.wanted[i] +
                       " (correlation " + formatted("%.2f", match.correlation) + "): are the " + p.what +
                       "'s columns named rightly?");
@@ -122,21 +133,24 @@ struct Both {
   Vectors derived, said;
 };
 
-}  // namespace
+constexpr Names kP{"x_m", "y_m", "z_m"}, kV{"vx_mps", "vy_mps", "vz_mps"}, kA{"ax_mps2", "ay_mps2", "az_mps2"};
+constexpr std::array kQ{"qw", "qx", "qy", "qz"};
 
-std::vector<std::string> contradictions(const FlightLog& log) {
-  constexpr Names kP{"x_m", "y_m", "z_m"}, kV{"vx_mps", "vy_mps", "vz_mps"}, kA{"ax_mps2", "ay_mps2", "az_mps2"};
+/// Both where the motion is known.
+Both where_known(const std::vector<std::optional<LocalMotion>>& motion, const Vectors& said, bool second) {
+  Both both;
+  for (std::size_t i = 0; i < said.size(); ++i)
+    if (motion[i]) both.derived.push_back(second ? motion[i]->a : motion[i]->v), both.said.push_back(said[i]);
+  return both;
+}
+
+std::vector<std::string> contradictions(const FlightLog& log, const Bounds& bounds) {
   std::vector<std::string> wrong;
   const auto motion = local_cubics(log.t_s, rows_of(log, kP));
-  const auto known = [&](const Vectors& said, bool second) {
-    Both both;
-    for (std::size_t i = 0; i < said.size(); ++i)
-      if (motion[i]) both.derived.push_back(second ? motion[i]->a : motion[i]->v), both.said.push_back(said[i]);
-    return both;
-  };
   if (has_all(log, kV)) {
-    const auto v = known(rows_of(log, kV), false);
-    pair_up({"velocity", "the derivative", kV, kP, kLeastSpeed, kVelocityRight}, v.said, v.derived, wrong);
+    const auto v = where_known(motion, rows_of(log, kV), false);
+    pair_up({"velocity", "the derivative", kV, kP, kLeastSpeed, bounds.velocity, bounds.strangers}, v.said, v.derived,
+            wrong);
   }
   if (has_all(log, kA)) {
     const Vectors measured = averaged(log.t_s, rows_of(log, kA));
@@ -145,16 +159,18 @@ std::vector<std::string> contradictions(const FlightLog& log) {
     if (const double left = median(up); std::abs(left) > kGravityLeft)
       wrong.push_back("az_mps2 has a median of " + formatted("%.2f", left) +
                       " m/s²: gravity is in it, or its unit, sign or frame is wrong");
-    const auto a = known(measured, true);
-    pair_up({"acceleration", "the second derivative", kA, kP, kLeastAcceleration, kAccelerationRight}, a.said,
-            a.derived, wrong);
-    if (has_all(log, std::array{"qw", "qx", "qy", "qz"}))
+    const auto a = where_known(motion, measured, true);
+    pair_up(
+        {"acceleration", "the second derivative", kA, kP, kLeastAcceleration, bounds.acceleration, bounds.strangers},
+        a.said, a.derived, wrong);
+    if (has_all(log, kQ))
       pair_up({"attitude",
                "the tilt that accelerates along the axis",
                {"tilt along x", "tilt along y", ""},
                kA,
                kLeastAcceleration,
-               kTiltRight,
+               bounds.tilt,
+               bounds.strangers,
                2},
               averaged(log.t_s, tilts(log)), measured, wrong);
   }
@@ -165,6 +181,105 @@ std::vector<std::string> contradictions(const FlightLog& log) {
                       ": it is a share, 0 … 1; give its unit");
   }
   return wrong;
+}
+
+/// Stamps that are none of a flight.
+std::optional<std::string> wrong_stamps(const FlightLog& log) {
+  std::vector<double> steps;
+  std::size_t rising = 0;
+  for (std::size_t i = 1; i < log.t_s.size(); ++i) {
+    steps.push_back(log.t_s[i] - log.t_s[i - 1]);
+    rising += steps.back() > 0 ? 1u : 0u;
+  }
+  if (steps.empty()) return std::nullopt;
+  if (2 * rising < steps.size()) return "t_s does not rise from row to row; give the rows in their order";
+  if (const double step = median(steps); step > kLongestStep)
+    return "t_s goes on by " + formatted("%.3g", step) +
+           " a row: it is in s, and a flight has 10 rows a second or more";
+  return std::nullopt;
+}
+
+bool silent(const FlightLog& log, std::span<const char* const> names) {
+  return has_all(log, names) && std::ranges::all_of(names, [&](const char* name) {
+           return std::ranges::all_of(log.column(name), [](double x) { return x == 0; });
+         });
+}
+
+/// Velocities or accelerations that are 0 while the positions move.
+void zeros(const FlightLog& log, std::vector<std::string>& wrong) {
+  const auto motion = local_cubics(log.t_s, rows_of(log, kP));
+  for (const bool second : {false, true}) {
+    const Names& names = second ? kA : kV;
+    if (!silent(log, names)) continue;
+    const auto both = where_known(motion, rows_of(log, names), second);
+    for (int axis = 0; axis < 3 && !both.derived.empty(); ++axis)
+      if (rms(both.derived, axis) > 2 * (second ? kLeastAcceleration : kLeastSpeed)) {
+        wrong.push_back(std::string(names[0]) + ", " + names[1] + " and " + names[2] +
+                        " are 0 in every row, and the craft moves; leave out columns that nothing has measured");
+        break;
+      }
+  }
+}
+
+/// How the tilts go with the accelerations along x and y: the smaller correlation of the two. Nothing of a flight that
+/// does not accelerate along both.
+std::optional<double> tilts_along(const FlightLog& log) {
+  const Vectors measured = averaged(log.t_s, rows_of(log, kA)), tilted = averaged(log.t_s, tilts(log));
+  double least = 1;
+  for (int axis = 0; axis < 2; ++axis) {
+    if (rms(measured, axis) < kLeastAcceleration) return std::nullopt;
+    const Match match = best_match(tilted, measured, axis, 2);
+    least = std::min(least, match.axis == axis ? match.correlation : 0.0);
+  }
+  return least;
+}
+
+void attitudes(const FlightLog& log, std::vector<std::string>& wrong) {
+  if (!has_all(log, kQ)) return;
+  std::size_t bad = 0;
+  for (std::size_t i = 0; i < log.t_s.size(); ++i) {
+    double square = 0;
+    for (const char* name : kQ) square += std::pow(log.column(name)[i], 2);
+    bad += std::sqrt(square) < kLength[0] || std::sqrt(square) > kLength[1] ? 1u : 0u;
+  }
+  if (bad > 0) {
+    wrong.push_back("qw, qx, qy and qz have no length of 1 in " + std::to_string(bad) + " of " +
+                    std::to_string(log.t_s.size()) + " rows; leave out rows, or columns, without an attitude");
+    return;
+  }
+  if (!has_all(log, kA)) return;
+  const auto as_it_is = tilts_along(log);
+  if (!as_it_is || *as_it_is >= kStranger) return;
+  for (const auto& [order, w] : {std::pair{"x, y, z, w", 3UL}, {"z, w, x, y", 1UL}}) {
+    FlightLog turned = log;  // the scalar is in column w, and x, y, z are in those after it
+    for (std::size_t k = 0; k < 4; ++k) turned.columns[kQ[k]] = log.column(kQ[(w + k) % 4]);
+    if (*tilts_along(turned) >= kFollows)
+      wrong.push_back(std::string("qw, qx, qy and qz tilt the craft where it accelerates if they are read as ") +
+                      order + ": are they named rightly?");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> contradictions(const FlightLog& log) { return contradictions(log, kImported); }
+
+std::vector<std::string> impossible(const FlightLog& log) {
+  if (log.t_s.size() < 2) return {};
+  if (const auto stamps = wrong_stamps(log)) return {*stamps};
+  auto wrong = contradictions(log, kPossible);
+  zeros(log, wrong);
+  attitudes(log, wrong);
+  return wrong;
+}
+
+std::vector<std::string> silent_columns(const FlightLog& log) {
+  constexpr std::array kRpm{"rpm1", "rpm2", "rpm3", "rpm4"}, kMotors{"motor1", "motor2", "motor3", "motor4"};
+  std::vector<std::string> all;
+  const auto look = [&](std::span<const char* const> names) {
+    if (silent(log, names)) all.insert(all.end(), names.begin(), names.end());
+  };
+  look(kRpm), look(kMotors), look(std::array{"thrust"}), look(std::array{"battery_v"});
+  return all;
 }
 
 }  // namespace backwash::log

@@ -1,40 +1,95 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/log/raw_log.hpp"
 
-#include <cstring>
+#include <algorithm>
+#include <iterator>
 #include <string_view>
 
+#include "core/log/little_endian.hpp"
 #include "core/log/log_file.hpp"
+#include "core/log/mcap_reader.hpp"
 
 namespace backwash::log {
 
-tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
+namespace {
+
+constexpr std::string_view kMagic(kRawLogMagic);
+
+std::optional<RecordHeader> header_at(std::span<const std::uint8_t> bytes) {
   constexpr std::uint32_t kLargest = 1u << 30;
-  constexpr std::string_view kMagic(kRawLogMagic);
+  if (bytes.size() < sizeof(RecordHeader)) return std::nullopt;
+  const auto header = little<RecordHeader>(bytes.data());
+  const auto kind = static_cast<std::uint32_t>(header.kind);
+  if (kind < 1 || kind > static_cast<std::uint32_t>(kLastKind) || header.size > kLargest) return std::nullopt;
+  return header;
+}
+
+}  // namespace
+
+std::optional<RawRecord> raw_record(std::span<const std::uint8_t> bytes) {
+  const auto header = header_at(bytes);
+  if (!header || header->size > bytes.size() - sizeof *header) return std::nullopt;
+  const auto body = bytes.subspan(sizeof *header, header->size);
+  return RawRecord{*header, {body.begin(), body.end()}};
+}
+
+tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
   const auto content = read_log_file(path, files::kLargestLog, "a raw log");
   if (!content) return tl::unexpected(content.error());
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
+  if (is_mcap(bytes)) return raw_log_of_mcap(path, bytes);
   if (!content->starts_with(kMagic))
-    return tl::unexpected(LogError{LogError::Kind::bad_data,
-                                   path + ": byte 0: does not begin as a raw log of this version of backwashd"});
+    return tl::unexpected(
+        LogError{LogError::Kind::bad_data,
+                 path + ": byte 0: does not begin as a raw log of this version of backwashd, nor as an MCAP file"});
 
   RawLog log;
   std::uint64_t offset = kMagic.size();
   while (content->size() - offset >= sizeof(RecordHeader)) {
-    RawRecord record{{}, {}, offset};
-    std::memcpy(&record.header, content->data() + offset, sizeof record.header);
-    const auto kind = static_cast<std::uint32_t>(record.header.kind);
-    if (kind < 1 || kind > static_cast<std::uint32_t>(kLastKind) || record.header.size > kLargest)
+    const auto here = bytes.subspan(offset);
+    if (!header_at(here))
       return tl::unexpected(LogError{LogError::Kind::bad_data,
                                      path + ": byte " + std::to_string(offset) + ": is not the head of a record"});
-    const auto body = offset + sizeof record.header;
-    if (record.header.size > content->size() - body) break;
-    record.bytes.assign(content->begin() + static_cast<std::ptrdiff_t>(body),
-                        content->begin() + static_cast<std::ptrdiff_t>(body + record.header.size));
-    offset = body + record.header.size;
-    log.records.push_back(std::move(record));
+    auto record = raw_record(here);
+    if (!record) break;
+    record->offset = offset;
+    offset += sizeof record->header + record->bytes.size();
+    log.records.push_back(*std::move(record));
   }
   if (offset < content->size()) log.cut_at = offset;
   return log;
+}
+
+std::optional<PartRecord> last_part(const RawLog& log) {
+  for (auto record = log.records.rbegin(); record != log.records.rend(); ++record)
+    if (const auto* part = record->header.kind == RecordKind::part ? payload<PartRecord>(*record) : nullptr)
+      return *part;
+  return std::nullopt;
+}
+
+tl::expected<RawLog, LogError> read_raw_logs(std::span<const std::string> paths) {
+  const auto bad = [](const std::string& path, const std::string& what) {
+    return tl::unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + what});
+  };
+  RawLog whole;
+  std::optional<PartRecord> before;
+  for (const auto& path : paths) {
+    auto log = read_raw_log(path);
+    if (!log) return log;
+    if (paths.size() == 1) return log;
+    const auto first = log->records.empty() ? std::nullopt : last_part({{log->records.front()}, {}});
+    if (!first) return bad(path, "does not say which part of a log it is; give it alone");
+    if (before && (first->log != before->log || first->part != before->part + 1))
+      return bad(path, "is part " + std::to_string(first->part) + (first->log == before->log ? "" : " of another log") +
+                           "; needs part " + std::to_string(before->part + 1) + " of the one before it");
+    if (whole.cut_at) return bad(path, "the part before it is cut short; give those from here on apart");
+    const std::size_t repeated = before ? std::min<std::size_t>(first->repeated, log->records.size() - 1) : 0;
+    log->records.erase(log->records.begin() + 1, log->records.begin() + 1 + static_cast<std::ptrdiff_t>(repeated));
+    before = last_part(*log);
+    whole.cut_at = log->cut_at;
+    std::ranges::move(log->records, std::back_inserter(whole.records));
+  }
+  return whole;
 }
 
 }  // namespace backwash::log

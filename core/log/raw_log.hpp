@@ -4,11 +4,13 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
 
 #include "core/log/flight_log.hpp"
+#include "core/types/air_class.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::log {
@@ -34,8 +36,11 @@ enum class RecordKind : std::uint32_t {
   scan = 14,        ///< text, one line: a scan was handed to the control thread and to the map worker
   world = 15,       ///< text, one line: a new snapshot was handed out
   failure = 16,     ///< text, one line: an exception in a thread, which ended the daemon
+  part = 17,        ///< PartRecord: the first of each file
+  air_constants = 18,  ///< AirConstantsRecord: the daemon learns in flight (core/log/air_log.hpp)
+  air = 19,            ///< AirRecord: what the tick whose record follows added to what was learnt
 };
-inline constexpr auto kLastKind = RecordKind::failure;
+inline constexpr auto kLastKind = RecordKind::air;
 
 struct RecordHeader {
   std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
@@ -99,9 +104,34 @@ struct TimedConstantsRecord {
   double rate_least, latency;  ///< Hz, s
 };
 
+/// What the updates of the air depend on beside their ticks (core/adapt/in_flight.hpp).
+struct AirConstantsRecord {
+  double kp[2], kd[2];  ///< horizontal, vertical
+  double latency, feedback_delay, attitude_lag;
+  double tau_low, tau_high, mean[2], alpha;
+  double start[kAirClasses];
+};
+struct AirRecord {
+  std::uint64_t tick;
+  double sigma[3];             ///< of the model at the place, (m/s²)²
+  std::uint32_t air, padding;  ///< AirClass of the place
+  double factors[kAirClasses];
+  double ln_evidence, ln_changed, seconds;  ///< of that class (core/adapt/bets.hpp)
+};
+static_assert(sizeof(AirRecord) == 104);
+
 struct LostRecord {
   std::uint64_t records;  ///< lost since the start of the log
 };
+
+/// Which file this is of those that one start of the daemon wrote.
+struct PartRecord {
+  std::int64_t log;        ///< the same in all of them: CLOCK_REALTIME at the start, ns
+  std::int64_t wall_ns;    ///< CLOCK_REALTIME less CLOCK_MONOTONIC when this file was begun
+  std::uint32_t part;      ///< 1, 2, 3 …
+  std::uint32_t repeated;  ///< records behind this one that an earlier part holds: what a flight cannot be read without
+};
+static_assert(sizeof(PartRecord) == 24);
 
 /// track::TickInput, flat.
 struct TickInputRecord {
@@ -123,7 +153,7 @@ static_assert(sizeof(TickInputRecord) == 312);
 struct RawRecord {
   RecordHeader header;
   std::vector<std::uint8_t> bytes;
-  std::uint64_t offset = 0;  ///< of its header in the file
+  std::uint64_t offset = 0;  ///< of its header in the file that was read
 };
 
 struct RawLog {
@@ -131,8 +161,19 @@ struct RawLog {
   std::optional<std::uint64_t> cut_at;  ///< offset of a last record that a crash cut short; it is not in `records`
 };
 
-/// Reads a raw log. Errors: not_found; bad_data with the byte offset.
+/// The record that these bytes begin with. Nothing: they begin with none, or with part of one.
+std::optional<RawRecord> raw_record(std::span<const std::uint8_t> bytes);
+
+/// Reads a raw log, or the one in an MCAP file of `backwash export` (core/log/mcap_reader.hpp). Errors: not_found;
+/// bad_data with the byte offset.
 tl::expected<RawLog, LogError> read_raw_log(const std::string& path);
+
+/// Reads the parts of one log, in their order, as one: what a later part repeats of an earlier one is left out. Errors:
+/// those of read_raw_log; bad_data naming a file that is not the part that comes next, or that is cut short before one.
+tl::expected<RawLog, LogError> read_raw_logs(std::span<const std::string> paths);
+
+/// Which part a log ends with. Nothing: it is of a daemon that wrote no parts.
+std::optional<PartRecord> last_part(const RawLog& log);
 
 /// The payload as T, or nothing if it is shorter.
 template <typename T>

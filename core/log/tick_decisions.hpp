@@ -6,6 +6,7 @@
 #include <tuple>
 #include <type_traits>
 
+#include "core/log/air_log.hpp"
 #include "core/log/tick_log.hpp"
 
 namespace backwash::log {
@@ -16,14 +17,22 @@ struct Decided {
   const track::TickOutput& out;
 };
 
-/// One decided member of a TickRecord: its name, and where it comes from. An array takes a container of its length.
-template <typename Member, typename Source>
+/// What a tick's air was taken for.
+struct Learnt {
+  const adapt::InFlight& air;
+  AirClass place;
+  const adapt::Bets& here() const noexcept { return air.of(place); }
+};
+
+/// One decided member of a record: its name, and where it comes from. An array takes a container of its length.
+template <typename Record, typename Member, typename Source>
 struct Decision {
   const char* name;
-  Member TickRecord::*member;
-  Source source;  ///< (const Decided&) → what the member is set to
+  Member Record::*member;
+  Source source;  ///< (what was decided) → what the member is set to
 
-  void write(const Decided& decided, TickRecord& record) const noexcept {
+  template <typename From>
+  void write(const From& decided, Record& record) const noexcept {
     auto& to = record.*member;
     const auto from = source(decided);
     if constexpr (std::is_array_v<Member>)
@@ -34,8 +43,8 @@ struct Decision {
 };
 
 // clang 14 does not deduce it from the aggregate's initializers.
-template <typename Member, typename Source>
-Decision(const char*, Member TickRecord::*, Source) -> Decision<Member, Source>;
+template <typename Record, typename Member, typename Source>
+Decision(const char*, Member Record::*, Source) -> Decision<Record, Member, Source>;
 
 /// Bits of TickRecord::asked.
 inline std::uint32_t asked(const track::TickOutput& out) noexcept {
@@ -78,10 +87,18 @@ inline constexpr auto kDecisions = std::tuple{
     Decision{"half_widths", &TickRecord::half_widths, [](const Decided& d) { return d.out.inside.half_widths; }},
 };
 
-/// Calls each(decision) for all of them.
-template <typename Each>
-void each_decision(const Each& each) {
-  std::apply([&](const auto&... decision) { (each(decision), ...); }, kDecisions);
+/// The same of the air: the factors, and the evidence of the class at the place.
+inline constexpr auto kAirDecisions = std::tuple{
+    Decision{"factors", &AirRecord::factors, [](const Learnt& l) { return l.air.factors(); }},
+    Decision{"ln_evidence", &AirRecord::ln_evidence, [](const Learnt& l) { return l.here().ln_evidence(); }},
+    Decision{"ln_changed", &AirRecord::ln_changed, [](const Learnt& l) { return l.here().ln_changed(); }},
+    Decision{"seconds", &AirRecord::seconds, [](const Learnt& l) { return l.here().seconds(); }},
+};
+
+/// Calls each(decision) for all of a list.
+template <typename List, typename Each>
+void each_decision(const List& list, const Each& each) {
+  std::apply([&](const auto&... decision) { (each(decision), ...); }, list);
 }
 
 }  // namespace backwash::log

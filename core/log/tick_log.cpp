@@ -29,6 +29,7 @@ enum Flag : std::uint32_t {
   kInAir = 1u << 17,
   kLiftsItself = 1u << 18,
   kTakeoffTaken = 1u << 19,
+  kRougher = 1u << 20,
 };
 
 /// Members of a TickInput into its record.
@@ -120,6 +121,7 @@ void each_member(Input& in, Record& r, const Direction& direction) noexcept {
   direction.flag(s.late, kMapLate);
   direction.flag(s.tube_blocked, kTubeBlocked);
   direction.flag(s.stop_blocked, kStopBlocked);
+  direction.flag(s.rougher, kRougher);
 }
 
 }  // namespace
@@ -139,7 +141,7 @@ track::TickInput decode(const TickInputRecord& r, const track::AcceptedSegment* 
 }
 
 void decided(const track::FlightTick& flight, const track::TickOutput& out, TickRecord& r) noexcept {
-  each_decision([&](const auto& decision) { decision.write({flight, out}, r); });
+  each_decision(kDecisions, [&](const auto& decision) { decision.write(Decided{flight, out}, r); });
 }
 
 TimedConstantsRecord constants(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing) noexcept {

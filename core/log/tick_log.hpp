@@ -56,7 +56,8 @@ struct Replay {
 };
 
 /// Runs the logged inputs through track::FlightTick again and compares every decision bit for bit. Errors: bad_data
-/// with the byte offset: no constants, an input without its tick, an offered segment that is not in the log.
+/// with the byte offset: a part of a log that is not its first, no constants, an input without its tick, an offered
+/// segment that is not in the log.
 tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name);
 
 }  // namespace backwash::log

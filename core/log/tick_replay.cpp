@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <utility>
 
 #include "core/log/tick_decisions.hpp"
 
@@ -94,8 +95,9 @@ class Cursor {
   std::span<const std::uint8_t> left_;
 };
 
-/// Compares a tick, and mixes what was replayed into the hash.
-std::optional<Difference> compare(const TickRecord& logged, const TickRecord& replayed, std::uint64_t& hash) {
+/// Compares what a list has of a tick, and mixes what was replayed into the hash.
+template <typename List, typename Record>
+std::optional<Difference> compare(const List& list, const Record& logged, const Record& replayed, std::uint64_t& hash) {
   std::optional<Difference> first;
   const auto number = [&](const char* name, auto a, auto b) {
     using Bytes = std::array<std::uint8_t, sizeof b>;
@@ -104,7 +106,7 @@ std::optional<Difference> compare(const TickRecord& logged, const TickRecord& re
     if (std::bit_cast<Bytes>(a) != bytes && !first)  // bit for bit
       first = Difference{logged.tick, 0, name, static_cast<double>(a), static_cast<double>(b)};
   };
-  each_decision([&](const auto& decision) {
+  each_decision(list, [&](const auto& decision) {
     const auto &a = logged.*decision.member, &b = replayed.*decision.member;
     if constexpr (std::is_array_v<std::remove_cvref_t<decltype(a)>>)
       for (std::size_t i = 0; i < std::size(a); ++i) number(decision.name, a[i], b[i]);
@@ -120,6 +122,19 @@ std::string at(const std::string& name, const RawRecord& record) {
   return name + ": byte " + std::to_string(record.offset) + ": ";
 }
 
+/// The constants of the daemon's start. A log must begin there: a tick's decisions rest on all ticks since then.
+tl::expected<const RawRecord*, LogError> constants_of(const RawLog& log, const std::string& name) {
+  const bool says = !log.records.empty() && log.records.front().header.kind == RecordKind::part;
+  const auto* part = says ? payload<PartRecord>(log.records.front()) : nullptr;
+  if (part && part->part != 1)
+    return bad(name + ": begins with part " + std::to_string(part->part) +
+               " of its log; give all parts from the first on, in their order");
+  const auto first = std::ranges::find(log.records, RecordKind::constants, [](const auto& r) { return r.header.kind; });
+  if (first == log.records.end() || !payload<ConstantsRecord>(*first))
+    return bad(name + ": has no constants record: not a log of backwashd's start");
+  return &*first;
+}
+
 tl::expected<Segments, LogError> segments_of(const RawLog& log, const std::string& name) {
   Segments segments;
   for (const RawRecord& record : log.records) {
@@ -131,6 +146,60 @@ tl::expected<Segments, LogError> segments_of(const RawLog& log, const std::strin
   }
   return segments;
 }
+
+/// The tick as the daemon started it.
+tl::expected<track::FlightTick, LogError> tick_of(const RawLog& log, const std::string& name) {
+  const auto first = constants_of(log, name);
+  if (!first) return tl::unexpected(first.error());
+  const auto* constants = payload<ConstantsRecord>(**first);
+  Vehicle vehicle;
+  vehicle.limits.v_max = constants->v_max;
+  vehicle.estimation.position = constants->estimation_position;
+  vehicle.initial_error = {constants->initial_position, constants->initial_velocity};
+  const auto* timed = payload<TimedConstantsRecord>(**first);
+  const OdometryTiming timing = timed ? OdometryTiming{timed->rate_least, timed->latency} : OdometryTiming{};
+  // Written so that what is no number is refused: of a damaged record no window or limit is made.
+  if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, **first) + "is no timing of odometry");
+  return track::FlightTick(vehicle, constants->battery_land, timing);
+}
+
+/// The air's part of a replay: what is learnt, and the record that the next tick is compared with.
+class ReplayedAir {
+ public:
+  /// Takes a record of the air. Says what is wrong with it.
+  std::optional<std::string> take(const RawRecord& record) {
+    if (record.header.kind == RecordKind::air_constants) {
+      const auto* start = payload<AirConstantsRecord>(record);
+      const auto constants = start ? decode(*start) : std::nullopt;
+      if (!constants) return "is no start of what is learnt of the air";
+      air_.emplace(*constants);
+    } else if (record.header.kind == RecordKind::air) {
+      next_ = payload<AirRecord>(record), offset_ = record.offset;
+      if (!next_) return "is too short for the air of a tick";
+      if (!air_) return "learns of the air, and no record before it says from what";
+    }
+    return std::nullopt;
+  }
+  /// The air of a tick that the log has no input of is not replayed either.
+  void skip() { next_ = nullptr; }
+  std::optional<Difference> step(const track::TickInput& in, const track::FlightTick& flight,
+                                 const track::TickOutput& out, std::uint64_t tick, std::uint64_t& hash) {
+    const AirRecord* logged = std::exchange(next_, nullptr);
+    if (const bool adds = air_ && flown(in, out); adds != (logged != nullptr))
+      return Difference{tick, offset_, "air", adds ? 0.0 : 1.0, adds ? 1.0 : 0.0};
+    if (!logged) return std::nullopt;
+    AirRecord again = *logged;
+    learn(*air_, flight, out, again);
+    auto difference = compare(kAirDecisions, *logged, again, hash);
+    if (difference) difference->offset = offset_;
+    return difference;
+  }
+
+ private:
+  std::optional<adapt::InFlight> air_;
+  const AirRecord* next_ = nullptr;
+  std::uint64_t offset_ = 0;
+};
 
 }  // namespace
 
@@ -176,34 +245,30 @@ tl::expected<std::unique_ptr<track::AcceptedSegment>, LogError> decode_offer(std
 }
 
 tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name) {
-  const auto first = std::ranges::find(log.records, RecordKind::constants, [](const auto& r) { return r.header.kind; });
-  const auto* constants = first == log.records.end() ? nullptr : payload<ConstantsRecord>(*first);
-  if (!constants) return bad(name + ": has no constants record: not a log of backwashd's start");
-  Vehicle vehicle;
-  vehicle.limits.v_max = constants->v_max;
-  vehicle.estimation.position = constants->estimation_position;
-  vehicle.initial_error = {constants->initial_position, constants->initial_velocity};
-  const auto* timed = payload<TimedConstantsRecord>(*first);
-  const OdometryTiming timing = timed ? OdometryTiming{timed->rate_least, timed->latency} : OdometryTiming{};
-  // Written so that what is no number is refused: of a damaged record no window or limit is made.
-  if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, *first) + "is no timing of odometry");
+  auto made = tick_of(log, name);
+  if (!made) return tl::unexpected(made.error());
+  track::FlightTick& flight = *made;
   const auto segments = segments_of(log, name);
   if (!segments) return tl::unexpected(segments.error());
 
-  track::FlightTick flight(vehicle, constants->battery_land, timing);
   Replay result;
   result.segments = segments->size();
   result.state_hash = 0xcbf29ce484222325u;
   const TickInputRecord* input = nullptr;
+  ReplayedAir air;
   for (const RawRecord& record : log.records) {
     if (record.header.kind == RecordKind::tick_input) {
       input = payload<TickInputRecord>(record);
       if (!input) return bad(at(name, record) + "is too short for the inputs of a tick");
     }
+    if (const auto wrong = air.take(record)) return bad(at(name, record) + *wrong);
     if (record.header.kind != RecordKind::tick) continue;
     const auto* logged = payload<TickRecord>(record);
     if (!logged) return bad(at(name, record) + "is too short for a tick");
-    if (!input) continue;  // the daemon could not write them: the number is counted as missing below
+    if (!input) {  // the daemon could not write them: the number is counted as missing below
+      air.skip();
+      continue;
+    }
     const track::AcceptedSegment* segment = nullptr;
     if (input->segment != 0) {
       const auto found = segments->find(input->segment);
@@ -212,16 +277,18 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
       segment = found->second.get();
     }
     TickRecord replayed{};
-    decided(flight, flight.step(decode(*input, segment)), replayed);
+    const track::TickInput in = decode(*input, segment);
+    const track::TickOutput out = flight.step(in);
+    decided(flight, out, replayed);
     input = nullptr;
     result.ticks_missing += logged->tick - (result.ticks + result.ticks_missing);
     ++result.ticks;
     result.setpoints += (replayed.asked & kAskedSetpoint) != 0;
-    if (auto difference = compare(*logged, replayed, result.state_hash)) {
-      ++result.differing;
-      difference->offset = record.offset;
-      if (!result.first) result.first = difference;
-    }
+    auto difference = compare(kDecisions, *logged, replayed, result.state_hash);
+    if (difference) difference->offset = record.offset;
+    const auto of_air = air.step(in, flight, out, logged->tick, result.state_hash);
+    result.differing += difference || of_air;
+    if (!result.first) result.first = difference ? difference : of_air;
   }
   return result;
 }

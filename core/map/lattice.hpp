@@ -17,6 +17,12 @@ inline std::size_t linear(const Index3& size, const Index3& v) noexcept {
              (static_cast<std::size_t>(v.y()) + static_cast<std::size_t>(size.y()) * static_cast<std::size_t>(v.z()));
 }
 
+/// The voxel at a position in such an array. Precondition: within it.
+inline Index3 voxel(const Index3& size, std::size_t linear) noexcept {
+  const auto sx = static_cast<std::size_t>(size.x()), sy = static_cast<std::size_t>(size.y());
+  return {static_cast<int>(linear % sx), static_cast<int>(linear / sx % sy), static_cast<int>(linear / (sx * sy))};
+}
+
 /// Calls visit(v, share) for the eight points v of the integer lattice about q, x fastest; share.prod() is the point's
 /// trilinear weight, and along an axis the weights of both ends add up to 1. Precondition: q within the range of int.
 /// Real-time as visit is: wait-free, no allocation.

@@ -11,10 +11,4 @@ OccupancyGrid::OccupancyGrid(const Vec3& origin_W, double resolution, const Inde
           static_cast<std::size_t>(size.x()) * static_cast<std::size_t>(size.y()) * static_cast<std::size_t>(size.z()),
           fill) {}
 
-Index3 OccupancyGrid::voxel(std::size_t linear) const noexcept {
-  const auto nx = static_cast<std::size_t>(size_.x());
-  const auto ny = static_cast<std::size_t>(size_.y());
-  return {static_cast<int>(linear % nx), static_cast<int>(linear / nx % ny), static_cast<int>(linear / nx / ny)};
-}
-
 }  // namespace backwash::map

@@ -27,7 +27,7 @@ class OccupancyGrid {
   bool inside(const Index3& v) const noexcept { return map::inside(size_, v); }
   /// Position of a voxel in the cell array: x runs fastest. Precondition: inside(v).
   std::size_t linear(const Index3& v) const noexcept { return map::linear(size_, v); }
-  Index3 voxel(std::size_t linear) const noexcept;
+  Index3 voxel(std::size_t linear) const noexcept { return map::voxel(size_, linear); }
 
   /// The cell's content; unknown outside the grid.
   Cell at(const Index3& v) const noexcept { return inside(v) ? cells_[linear(v)] : Cell::unknown; }

@@ -48,8 +48,8 @@ reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& mod
   needed.add(near.low), needed.add(near.high);
   const map::OccupancyGrid part = map::part_of(grid, needed);
   const map::DistanceField distance(part);
-  std::vector<std::size_t> voxels = voxels_for_centre(part, distance, reach.vehicle);
-  std::erase_if(voxels, [&](std::size_t n) { return !read.contains(needed.low + part.voxel(n)); });
+  const std::vector<std::size_t> voxels =
+      voxels_for_centre(part, distance, reach.vehicle, {read.low - needed.low, read.high - needed.low});
   field::DisturbanceField field(part, voxels);
   const field::WholeField whole(part, model, voxels);
   field.fill(whole, 0, whole.block_count());

@@ -2,50 +2,20 @@
 #include "core/plan/safe_space.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 
 namespace backwash::plan {
 
 SafeSpace::SafeSpace(const map::OccupancyGrid& passable)
-    : origin_W_(passable.origin()), resolution_(passable.resolution()), size_(passable.size()), sums_(passable) {
-  number_regions(passable);
-}
+    : origin_W_(passable.origin()),
+      resolution_(passable.resolution()),
+      size_(passable.size()),
+      sums_(passable),
+      components_(passable) {}
 
-// Two passes: provisional numbers from the neighbours before each voxel, joined in a forest, then the trees' numbers.
-void SafeSpace::number_regions(const map::OccupancyGrid& passable) {
-  std::vector<std::uint32_t> tree(passable.cell_count(), kNoRegion);
-  std::vector<std::uint32_t> parent{kNoRegion};
-  const auto root = [&parent](std::uint32_t n) {
-    while (parent[n] != n) n = parent[n] = parent[parent[n]];
-    return n;
-  };
-  const std::array<std::size_t, 3> strides{1, static_cast<std::size_t>(size_.x()),
-                                           static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y())};
-  std::size_t n = 0;
-  for (int k = 0; k < size_.z(); ++k)
-    for (int j = 0; j < size_.y(); ++j)
-      for (int i = 0; i < size_.x(); ++i, ++n) {
-        if (passable.at(n) != map::Cell::free) continue;
-        std::uint32_t number = kNoRegion;
-        const std::array<bool, 3> has{i > 0, j > 0, k > 0};
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const std::uint32_t before = has[axis] ? tree[n - strides[axis]] : kNoRegion;
-          if (before == kNoRegion || before == number) continue;
-          if (number == kNoRegion)
-            number = before;
-          else
-            parent[std::max(root(number), root(before))] = std::min(root(number), root(before));
-        }
-        if (number == kNoRegion) parent.push_back(number = static_cast<std::uint32_t>(parent.size()));
-        tree[n] = number;
-      }
-  std::vector<std::uint16_t> of_tree{kNoRegion};  // a root stands before all of its tree
-  std::uint16_t last = kNoRegion;
-  for (std::uint32_t t = 1; t < parent.size(); ++t)
-    of_tree.push_back(root(t) != t ? of_tree[root(t)] : last == kLastRegion ? last : ++last);
-  region_.resize(tree.size());
-  std::ranges::transform(tree, region_.begin(), [&](std::uint32_t t) { return of_tree[t]; });
+void SafeSpace::update(const map::OccupancyGrid& passable, const map::VoxelBox& changed) {
+  sums_.update(passable, changed.low, changed.high);
+  components_.update(passable, changed);
 }
 
 SafeView::SafeView(const SafeSpace& space, const std::vector<Index3>& also) : space_(&space) {
@@ -91,7 +61,7 @@ bool SafeView::clear(const Motion& motion) const noexcept {
 bool SafeView::may_join(const Index3& a, const Index3& b) const noexcept {
   const std::uint32_t one = space_->region(a), other = space_->region(b);
   // An extra voxel may join regions: say yes.
-  return one == other || !also_.empty() || one == SafeSpace::kNoRegion || other == SafeSpace::kNoRegion;
+  return one == other || !also_.empty() || one == Components::kNone || other == Components::kNone;
 }
 
 namespace {

@@ -7,16 +7,19 @@
 #include "core/map/lattice.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/occupancy_sums.hpp"
+#include "core/plan/components.hpp"
 #include "core/plan/motion_primitive.hpp"
 
 namespace backwash::plan {
 
 /// The voxels that may be passed, with O(1) box queries by a summed-area table and the regions they form. Outside the
-/// grid nothing may be passed. Built once per map; what a single search adds is a SafeView.
+/// grid nothing may be passed. What a single search adds is a SafeView. Copies share what is equal in them.
 class SafeSpace {
  public:
   /// The free voxels of `passable` may be passed. O(voxels).
   explicit SafeSpace(const map::OccupancyGrid& passable);
+  /// Takes over what changed in `passable` within a box inside it (all else as before).
+  void update(const map::OccupancyGrid& passable, const map::VoxelBox& changed);
 
   double resolution() const noexcept { return resolution_; }
   const Vec3& origin() const noexcept { return origin_W_; }
@@ -29,23 +32,19 @@ class SafeSpace {
   bool inside(const Index3& v) const noexcept { return map::inside(size_, v); }
   /// Precondition: inside(v).
   std::size_t linear(const Index3& v) const noexcept { return map::linear(size_, v); }
-  bool passable(const Index3& v) const noexcept { return inside(v) && region_[linear(v)] != kNoRegion; }
+  bool passable(const Index3& v) const noexcept { return inside(v) && components_.free(v); }
   /// Whether all voxels with low ≤ v ≤ high may be passed; true for none. O(1).
   bool passable(const Index3& low, const Index3& high) const noexcept { return sums_.voxels_free(low, high); }
-  /// The region of a voxel: passable voxels that share faces have the same one, those of two numbers are not joined.
-  /// The 65,535th region and all after it share kLastRegion. 0: may not be passed. A motion whose closed swept set is
-  /// passable never leaves its region.
-  static constexpr std::uint16_t kNoRegion = 0, kLastRegion = 0xffff;
-  std::uint32_t region(const Index3& v) const noexcept { return inside(v) ? region_[linear(v)] : kNoRegion; }
+  /// The region of a voxel: passable voxels that share faces have the same one, those of two numbers are not joined
+  /// (Components). 0: may not be passed. A motion whose closed swept set is passable never leaves its region.
+  std::uint32_t region(const Index3& v) const noexcept { return inside(v) ? components_.of(v) : Components::kNone; }
 
  private:
-  void number_regions(const map::OccupancyGrid& passable);
-
   Vec3 origin_W_;
   double resolution_;
   Index3 size_;
   map::OccupancySums sums_;
-  std::vector<std::uint16_t> region_;
+  Components components_;
 };
 
 /// Number of moves to a goal from the voxels that a flood reached.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/field/field_update.hpp"
+#include "core/field/whole_field.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -16,33 +17,59 @@ map::VoxelBox grown(const map::VoxelBox& box, const Index3& by, const Index3& si
   return {(box.low - by).cwiseMax(0), (box.high + by).cwiseMin(size - Index3::Ones())};
 }
 
-/// Stores Σ at the listed voxels.
-void fill_field(field::DisturbanceField& field, const map::OccupancyGrid& grid, const Model& model,
-                std::span<const std::size_t> voxels, const Parallel& parallel) {
-  const field::WholeField whole(grid, model, voxels);
-  parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field.fill(whole, begin, end); });
+/// The grid's columns, in pieces of about 300 × 300: what is needed besides the world itself is that of one piece.
+std::vector<map::VoxelBox> pieces(const Index3& size) {
+  constexpr int kMost = 320;  // voxels
+  const auto parts = [](int n) { return (n + kMost - 1) / kMost; };
+  const int nx = parts(size.x()), ny = parts(size.y());
+  std::vector<map::VoxelBox> result;
+  for (int j = 0; j < ny; ++j)
+    for (int i = 0; i < nx; ++i)
+      result.push_back({{size.x() * i / nx, size.y() * j / ny, 0},
+                        {size.x() * (i + 1) / nx - 1, size.y() * (j + 1) / ny - 1, size.z() - 1}});
+  return result;
 }
 
-/// Stores Σ at the listed voxels of some columns, from what can reach them alone.
-void fill_columns(field::DisturbanceField& field, const map::OccupancyGrid& grid, const Model& model,
-                  const map::VoxelBox& columns, std::span<const std::size_t> voxels, const Parallel& parallel) {
-  const map::VoxelBox around = field::affected_columns(grid, model, columns);
-  const map::OccupancyGrid part = map::part_of(grid, around);
-  std::vector<std::size_t> listed;
-  listed.reserve(voxels.size());
-  for (const std::size_t n : voxels) listed.push_back(part.linear(grid.voxel(n) - around.low));
-  const field::WholeField whole(part, model, listed);
-  parallel(whole.block_count(),
-           [&](std::size_t begin, std::size_t end) { field.fill(whole, part, around.low, begin, end); });
+/// Bounds of Σ, evaluated anew in whole columns from what can reach them alone. `whole`: the map in which that is; the
+/// grid of `bounds` is a part of it, from its voxel `low` on. Columns and listed voxels are those of the part.
+void update_bounds(reach::BoundField& bounds, const map::OccupancyGrid& whole, const Index3& low, const Index3& size,
+                   const Model& model, const map::VoxelBox& columns, std::span<const std::size_t> listed,
+                   const Parallel& parallel) {
+  const map::VoxelBox around = field::affected_columns(whole, model, {low + columns.low, low + columns.high});
+  const map::OccupancyGrid reached = map::part_of(whole, around);
+  const Index3 shift = low - around.low;
+  std::vector<std::size_t> of_reached;
+  of_reached.reserve(listed.size());
+  for (const std::size_t n : listed) of_reached.push_back(reached.linear(map::voxel(size, n) + shift));
+  const field::WholeField sweep(reached, model, of_reached);
+  const field::Extension& air = bounds.extension();
+  const auto fill = [&](const auto& store) {
+    parallel(sweep.block_count(), [&](std::size_t begin, std::size_t end) {
+      sweep.evaluate(begin, end, [&](std::size_t n, const Variance& s) {
+        const Index3 v = reached.voxel(n) - shift;
+        const auto factor = air.by_place() ? static_cast<float>(std::exp(air.at(v).ln_variance)) : 1.f;
+        const auto single = [factor](double of_s) { return factor * static_cast<float>(of_s); };
+        store(map::linear(size, v), Variance{single(s.xx), single(s.xy), 0, single(s.yy), 0, single(s.zz)});
+      });
+    });
+  };
+  bounds.update(columns, listed, fill, parallel);
 }
 
-/// Stores a model's extension at voxels where it may have changed, and multiplies Σ where it was computed anew.
-void extend(field::Extension& air, field::DisturbanceField& field, const map::OccupancyGrid& grid,
-            std::span<const std::size_t> moved, std::span<const std::size_t> fresh, const Parallel& parallel) {
-  if (!air.by_place()) return;
-  parallel(moved.size(),
-           [&](std::size_t begin, std::size_t end) { air.fill(grid, moved.subspan(begin, end - begin)); });
-  field.scale(air, fresh);
+/// Stores a model's extension at the listed voxels.
+void fill_air(field::Extension& air, const map::OccupancyGrid& grid, std::span<const std::size_t> listed,
+              const Parallel& parallel) {
+  parallel(listed.size(),
+           [&](std::size_t begin, std::size_t end) { air.fill(grid, listed.subspan(begin, end - begin)); });
+}
+
+/// Where hovering is safe, at the listed voxels.
+void fill_hover(reach::HoverMap& hover, const reach::Reachability& reach, const map::OccupancyGrid& grid,
+                const map::DistanceField& distance, const map::OccupancySums& sums, const reach::BoundField& bounds,
+                std::span<const std::size_t> listed, std::optional<double> constant_margin, const Parallel& parallel) {
+  parallel(listed.size(), [&](std::size_t begin, std::size_t end) {
+    hover.fill(reach, grid, distance, sums, bounds, listed.subspan(begin, end - begin), constant_margin);
+  });
 }
 
 /// Where the hover map can change: a set reads w̄ over itself, and obstacles up to 1 m (the cap of its clearance) and
@@ -50,8 +77,7 @@ void extend(field::Extension& air, field::DisturbanceField& field, const map::Oc
 map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& bounds, const map::VoxelBox& field,
                                const map::VoxelBox& changed) {
   const auto& grid = world.grid;
-  const Vec3 far = grid.origin() + grid.resolution() * grid.size().cast<double>();
-  const auto after = bounds.max_over(grid.origin(), far), before = world.bounds.max_over(grid.origin(), far);
+  const auto after = bounds.largest(), before = world.bounds.largest();
   const double w = std::max(std::ranges::max(after.w), std::ranges::max(before.w));
   const double h = std::max(w * std::max(world.reach.horizontal.h_inf, world.reach.vertical.h_inf),
                             world.constant_margin.value_or(0.0));
@@ -70,12 +96,15 @@ map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& boun
 }  // namespace
 
 std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                                           const Vehicle& vehicle) {
+                                           const Vehicle& vehicle, const map::VoxelBox& box) {
   const double least = vehicle.body.radius - grid.resolution() * std::sqrt(3.0) / 2;
   std::vector<std::size_t> voxels;
-  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    if (grid.at(n) == map::Cell::free && distance.at(n) >= least) voxels.push_back(n);
-  }
+  for (int k = box.low.z(); k <= box.high.z(); ++k)
+    for (int j = box.low.y(); j <= box.high.y(); ++j) {
+      std::size_t n = grid.linear({box.low.x(), j, k});
+      for (int i = box.low.x(); i <= box.high.x(); ++i, ++n)
+        if (grid.at(n) == map::Cell::free && distance.at(n) >= least) voxels.push_back(n);
+    }
   return voxels;
 }
 
@@ -89,32 +118,45 @@ reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
   return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
 }
 
-void run_serial(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) { work(0, count); }
+namespace {
 
-std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
-                                         reach::Method method, std::optional<double> constant_margin,
-                                         const Parallel& parallel) {
+/// The world of a grid, or of one that is a part of a whole map from its voxel `low` on.
+std::shared_ptr<const World> build(const map::OccupancyGrid* whole, const Index3& low, map::OccupancyGrid grid,
+                                   const Model& model, const Vehicle& vehicle, reach::Method method,
+                                   std::optional<double> constant_margin, const Parallel& parallel) {
   const Model vehicle_model = with_vehicle(model, vehicle);
   reach::Reachability reach = sets_of(vehicle, method);
   map::DistanceField distance(grid);
   map::OccupancySums sums(grid);
+  const auto listed = [&](const map::VoxelBox& box) { return voxels_for_centre(grid, distance, vehicle, box); };
 
-  const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, vehicle);
-  field::DisturbanceField field(grid, voxels);
-  fill_field(field, grid, vehicle_model, voxels, parallel);
   field::Extension air(grid, vehicle_model);
-  extend(air, field, grid, voxels, voxels, parallel);
-
-  reach::BoundField bounds(grid, field, model.bound, std::move(air));
+  if (air.by_place()) fill_air(air, grid, listed(map::all_of(grid.size())), parallel);
+  reach::BoundField bounds(grid, model.bound, std::move(air));
+  for (const map::VoxelBox& piece : pieces(grid.size()))
+    update_bounds(bounds, whole ? *whole : grid, low, grid.size(), vehicle_model, piece, listed(piece), parallel);
   reach::HoverMap hover(grid);
-  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
-    hover.fill(reach, grid, distance, sums, bounds, std::span(voxels).subspan(begin, end - begin), constant_margin);
-  });
+  for (const map::VoxelBox& piece : pieces(grid.size()))
+    fill_hover(hover, reach, grid, distance, sums, bounds, listed(piece), constant_margin, parallel);
   SafeSpace safe(hover.safe_voxels());
   CentreResponse response(vehicle, reach.loop);
-  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field),
-                                             std::move(bounds), std::move(hover), std::move(safe), std::move(reach),
-                                             std::move(response), constant_margin});
+  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(bounds),
+                                             std::move(hover), std::move(safe), std::move(reach), std::move(response),
+                                             constant_margin});
+}
+
+}  // namespace
+
+std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
+                                         reach::Method method, std::optional<double> constant_margin,
+                                         const Parallel& parallel) {
+  return build(nullptr, Index3::Zero(), std::move(grid), model, vehicle, method, constant_margin, parallel);
+}
+
+std::shared_ptr<const World> build_part(const map::OccupancyGrid& grid, const map::VoxelBox& columns,
+                                        const Model& model, const Vehicle& vehicle, const Parallel& parallel) {
+  return build(&grid, columns.low, map::part_of(grid, columns), model, vehicle, reach::Method::tight, std::nullopt,
+               parallel);
 }
 
 World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
@@ -123,57 +165,78 @@ World with_clearance_by(World world, reach::Method method, std::optional<double>
   world.reach = sets_of(vehicle, method);
   world.response = CentreResponse(vehicle, world.reach.loop);
   world.constant_margin = constant_margin;
-  const std::vector<std::size_t> voxels = voxels_for_centre(world.grid, world.distance, vehicle);
   world.hover = reach::HoverMap(world.grid);
-  parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
-    world.hover.fill(world.reach, world.grid, world.distance, world.sums, world.bounds,
-                     std::span(voxels).subspan(begin, end - begin), constant_margin);
-  });
+  for (const map::VoxelBox& piece : pieces(world.grid.size()))
+    fill_hover(world.hover, world.reach, world.grid, world.distance, world.sums, world.bounds,
+               voxels_for_centre(world.grid, world.distance, vehicle, piece), constant_margin, parallel);
   world.safe = SafeSpace(world.hover.safe_voxels());
   return world;
+}
+
+std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
+                                      const Parallel& parallel) {
+  World world = old;
+  if (!world.air.known()) {
+    const map::VoxelBox all = map::all_of(world.grid.size());
+    const auto voxels = voxels_for_centre(world.grid, world.distance, world.reach.vehicle, all);
+    world.air.update(world.grid, with_vehicle(model, world.reach.vehicle), all, voxels, voxels, parallel);
+  }
+  if (world.air.factors == factors) return std::make_shared<const World>(std::move(world));
+  world.air.factors = factors;
+  world.bounds = reach::BoundField(world.grid, world.air.flown(), model.bound, old.bounds.extension());
+  const reach::Method method = world.reach.method;
+  const std::optional<double> margin = world.constant_margin;
+  return std::make_shared<const World>(with_clearance_by(std::move(world), method, margin, parallel));
 }
 
 std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
                                           const Model& model, const Parallel& parallel) {
   if (changed.empty()) return std::make_shared<const World>(old);
-  const Model vehicle_model = with_vehicle(model, old.reach.vehicle);
+  const Vehicle& vehicle = old.reach.vehicle;
+  const Model vehicle_model = with_vehicle(model, vehicle);
   map::DistanceField distance = old.distance;
   distance.update(grid, changed);
   map::OccupancySums sums = old.sums;
   sums.update(grid, changed.low, changed.high);
-  const std::vector<std::size_t> voxels = voxels_for_centre(grid, distance, old.reach.vehicle);
+  const auto listed = [&](const map::VoxelBox& box) { return voxels_for_centre(grid, distance, vehicle, box); };
 
   map::VoxelBox columns = field::affected_columns(grid, vehicle_model, changed);
-  // A wide body's centre gets places, or loses them, beyond the field's range.
-  const int body = static_cast<int>(std::ceil(old.reach.vehicle.body.radius / grid.resolution())) + 1;
-  const map::VoxelBox beside = grown(changed, {body, body, grid.size().z()}, grid.size());
-  columns.add(beside.low), columns.add(beside.high);
-  field::DisturbanceField field(grid, voxels, old.field, columns);
-  fill_columns(field, grid, vehicle_model, columns, field::voxels_within(grid, voxels, columns), parallel);
+  const auto add_beside = [&](double metres) {
+    const int by = static_cast<int>(std::ceil(metres / grid.resolution())) + 1;
+    const map::VoxelBox beside = grown(changed, {by, by, grid.size().z()}, grid.size());
+    columns.add(beside.low), columns.add(beside.high);
+  };
+  add_beside(vehicle.body.radius);  // a wide body's centre gets places, or loses them, beyond the field's range
+  reach::BoundField bounds = old.bounds;
+  const bool by_place = bounds.extension().by_place();
+  if (by_place) {
+    field::Extension air = bounds.extension();
+    add_beside(air.level_range());
+    fill_air(air, grid, listed(columns), parallel);
+    bounds.extend(std::move(air));
+  }
+  const std::vector<std::size_t> inside = listed(columns);
+  AirScale scale = old.air;
+  if (scale.known()) {
+    scale.update(grid, vehicle_model, columns, listed(map::all_of(grid.size())), inside, parallel);
+    const field::DisturbanceField flown = scale.flown();
+    bounds.update(columns, inside, [&](const auto& store) {
+      for (const std::size_t n : inside) store(n, flown.at(grid.voxel(n)));
+    });
+  } else {
+    update_bounds(bounds, grid, Index3::Zero(), grid.size(), vehicle_model, columns, inside, parallel);
+  }
 
-  field::Extension air = old.bounds.extension();
-  const auto sideways = static_cast<int>(std::ceil(air.level_range() / grid.resolution())) + 1;
-  map::VoxelBox moved = grown(changed, {sideways, sideways, grid.size().z()}, grid.size());
-  moved.add(columns.low), moved.add(columns.high);
-  extend(air, field, grid, field::voxels_within(grid, voxels, moved), field::voxels_within(grid, voxels, columns),
-         parallel);
-  const bool everywhere = air.by_place();  // pushes of anywhere widen the largest sets
-
-  reach::BoundField bounds = everywhere ? reach::BoundField(grid, field, model.bound, std::move(air))
-                                        : reach::BoundField(old.bounds, field, columns);
-  const map::VoxelBox hover_box = everywhere ? map::VoxelBox{Index3::Zero(), grid.size() - Index3::Ones()}
-                                             : reached_by_hover(old, bounds, columns, changed);
-  const std::vector<std::size_t> hover_voxels = field::voxels_within(grid, voxels, hover_box);
+  // Pushes of anywhere widen the largest sets.
+  const map::VoxelBox hover_box = by_place ? map::all_of(grid.size()) : reached_by_hover(old, bounds, columns, changed);
   reach::HoverMap hover = old.hover;
   hover.clear(hover_box);
-  parallel(hover_voxels.size(), [&](std::size_t begin, std::size_t end) {
-    hover.fill(old.reach, grid, distance, sums, bounds, std::span(hover_voxels).subspan(begin, end - begin),
-               old.constant_margin);
-  });
-  SafeSpace safe(hover.safe_voxels());
-  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(field),
-                                             std::move(bounds), std::move(hover), std::move(safe), old.reach,
-                                             old.response, old.constant_margin});
+  fill_hover(hover, old.reach, grid, distance, sums, bounds, listed(hover_box), old.constant_margin, parallel);
+  SafeSpace safe = old.safe;
+  safe.update(hover.safe_voxels(), hover_box);
+  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(bounds),
+                                             std::move(hover), std::move(safe), old.reach, old.response,
+                                             old.constant_margin, std::move(scale)});
 }
 
 }  // namespace backwash::plan

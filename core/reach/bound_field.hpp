@@ -1,34 +1,44 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <vector>
+#include <functional>
+#include <span>
+#include <utility>
 
 #include "core/field/disturbance_field.hpp"
 #include "core/field/extension.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/voxel_box.hpp"
-#include "core/reach/bound_code.hpp"
+#include "core/reach/bound_tiles.hpp"
 #include "core/types/disturbance.hpp"
+#include "core/types/parallel.hpp"
 
 namespace backwash::reach {
 
-/// w̄ at every voxel of a stored field, for maxima over sets (docs/model.md section 3, "Over the set, not at its
-/// centre"), and the mean push that an extended model has there: the disturbance at p is push(p, v) ± w̄. Keeps the
-/// maxima over all cubes of 1, 2 and 4 voxels whose lowest voxel is v, for the v where one is not zero: 32 bytes per
-/// entry, 1.03 bytes per voxel of the grid. They are kept in 16 bits and rounded up (bound_code.hpp): what is read is
-/// w̄ to w̄·(1 + kBoundGrowth).
+/// Computes Σ at voxels, with the factor that an extended model has there, and calls store(linear index, Σ) for each of
+/// them once, possibly from several threads.
+using FillVariance = std::function<void(const std::function<void(std::size_t, const Variance&)>& store)>;
+
+/// w̄ at every voxel of a field, for maxima over sets (docs/model.md section 3, "Over the set, not at its centre"), and
+/// the mean push that an extended model has there: the disturbance at p is push(p, v) ± w̄. Σ itself is not kept.
+/// Bounds are kept in 16 bits and rounded up (bound_code.hpp): what is read is w̄ to w̄·(1 + kBoundGrowth). Copies share
+/// what is equal in them (bound_tiles.hpp).
 class BoundField {
  public:
-  /// Unstored voxels count as 0 (the vehicle's centre cannot be there).
-  /// `extension`: filled where the field is. What it does not know of the push is in w̄; its factor of Σ by place is
-  /// expected in `field`.
+  /// w̄ is 0 everywhere: what is not stored counts so (the vehicle's centre cannot be there). `extension`: filled where
+  /// w̄ will be. What it does not know of the push is added to w̄.
+  BoundField(const map::OccupancyGrid& grid, const BoundModel& model, field::Extension extension = {});
+  /// Of a stored field, in which the extension's factor of Σ by place is expected.
   BoundField(const map::OccupancyGrid& grid, const field::DisturbanceField& field, const BoundModel& model,
              field::Extension extension = {});
-  /// The same as BoundField(grid, field, …) from `old`, whose field differed at the voxels of `changed` alone.
-  /// Precondition: of a model whose extension is not by place. O(voxels of the grid) to copy, the rest O(changed).
-  BoundField(const BoundField& old, const field::DisturbanceField& field, const map::VoxelBox& changed);
+  /// The voxels of a box inside the grid anew: w̄ of what `fill` stores at the listed ones (linear indices, inside the
+  /// box), 0 at the others. O(voxels of the tiles met); by an extension by place O(voxels).
+  void update(const map::VoxelBox& changed, std::span<const std::size_t> listed, const FillVariance& fill,
+              const Parallel& parallel = run_serial);
+  /// Another extension of the same model. Wherever it says something else than before, update() must follow.
+  void extend(field::Extension extension) { extension_ = std::move(extension); }
+  /// Largest w̄ of all voxels, m/s². O(voxels / 4096).
+  DisturbanceBound largest() const noexcept;
   const field::Extension& extension() const noexcept { return extension_; }
   /// Mean push on a vehicle that moves with v at p, m/s². Real-time: wait-free, no allocation.
   Vec3 push(const Vec3& p_W, const Vec3& v_W) const noexcept { return extension_.push(p_W, v_W); }
@@ -51,29 +61,15 @@ class BoundField {
   DisturbanceBound at(const Index3& v) const noexcept;
 
  private:
-  static constexpr int kFew = 512;                              // voxels
-  static constexpr int kLevels = 3;                             // cubes of 1 << level voxels
-  static constexpr std::size_t kLargest = 1u << (kLevels - 1);  // edge of the largest, voxels
-  static constexpr std::size_t kRun = 128;                      // voxels whose entries are numbered from one base
-  using Maximum = std::array<BoundCode, kDirections>;
-  struct alignas(32) Entry {
-    std::array<Maximum, kLevels> level{};
-  };
-  bool inside(const Index3& v) const noexcept;
+  static constexpr int kFew = 512;  // voxels
+  bool inside(const Index3& v) const noexcept { return map::inside(tiles_.size(), v); }
   map::VoxelBox meeting(const Vec3& low_W, const Vec3& high_W) const noexcept;
   DisturbanceBound moving(DisturbanceBound w, const Vec3& v_W) const noexcept;
-  static DisturbanceBound decoded(const Maximum& codes) noexcept;
-  std::size_t entry_of(std::size_t n) const noexcept;  // of a voxel in entries_; 0: every cube at it is zero
-  void number_entries(const std::vector<std::uint8_t>& entered);
-  void copy_entries(const BoundField& old) noexcept;
-  void pool(int level, const map::VoxelBox& box) noexcept;
+  bool stored(const Index3& v) const noexcept { return tiles_.at(v).level[0][kZ] != 0; }
 
   Vec3 origin_W_;
   double resolution_;
-  Index3 size_;
-  std::vector<std::uint8_t> rank_;     // per voxel: its entry's number within the run, from 1; 0: none
-  std::vector<std::uint32_t> before_;  // per run: entries of the runs before it
-  std::vector<Entry> entries_;
+  BoundTiles tiles_;
   field::Extension extension_;
   BoundModel model_;
   Vec3 least_push_ = Vec3::Zero(), largest_push_ = Vec3::Zero();  // of the stored voxels

@@ -114,10 +114,9 @@ Figure flight_field_figure(const sim::Flight& flight, const plan::World& world) 
       Vec3 p = grid.center({i, j, 0});
       p.z() = height;
       const Index3 v = grid.index(p);
-      if (grid.free(v) && world.field.has(v)) {
-        const double deviation = std::sqrt(std::max(0.0, world.field.interpolated(p, world.field.at(v)).zz));
-        largest = std::max(largest, deviation);
-        set(raster, v, deviation);
+      if (const double bound = world.bounds.at(v).w[kZ]; bound > 0) {
+        largest = std::max(largest, bound);
+        set(raster, v, bound);
       }
     }
   }
@@ -126,7 +125,7 @@ Figure flight_field_figure(const sim::Flight& flight, const plan::World& world) 
          << path.str() << "EOD\n"
          << kPalette << "set cbrange [0:" << largest << "]\nset tics out nomirror\nset border 3\n"
          << view_from_above(grid, first, last)
-         << "set cblabel 'vertical standard deviation √Σ_{zz}, m/s^2'\nset key outside top center horizontal\n"
+         << "set cblabel 'bound of the vertical disturbance, m/s^2'\nset key outside top center horizontal\n"
          << "plot $field using 1:2:3 with image notitle, " << plot_cells()
          << "$path using 1:2 with lines linewidth 2.5 linecolor '#0b3d91' title 'path flown'\n";
   const double ratio = (last - first).y() / std::max(1.0, static_cast<double>((last - first).x()));

@@ -33,7 +33,7 @@ Figure field_slice_figure(const map::OccupancyGrid& grid, const Slice& slice, co
 Figure map_figure(const sim::Flight& flight, const plan::World& world);
 /// Heights along the route: floor, ceiling, tube, command and flight over the distance flown along the commands.
 Figure height_figure(const sim::Flight& flight, const plan::World& world);
-/// √Σ_zz at flight height with the route.
+/// w̄ along z at flight height with the route.
 Figure flight_field_figure(const sim::Flight& flight, const plan::World& world);
 /// Error on three axes over time between its upper and lower bounds; the paper's bound dashed.
 Figure error_figure(const sim::Flight& flight);

@@ -72,7 +72,7 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
        map_figure(flight, world)},
       {"Height along the route", "Floor and ceiling at the commanded position.", height_figure(flight, world)},
       {"Disturbance at flight height",
-       "Vertical standard deviation of the modelled disturbance; white where the vehicle's "
+       "Bound of the modelled vertical disturbance, mean and κ standard deviations; white where the vehicle's "
        "centre cannot be.",
        flight_field_figure(flight, world)},
       {"Error between its bounds",

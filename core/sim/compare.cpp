@@ -157,7 +157,7 @@ RouteOutcome measure(const Route& route, const plan::World& world, const Vehicle
 }
 
 SceneComparison compare_scene(const std::string& scene, plan::World world, const std::vector<RoutePair>& pairs,
-                              const std::vector<CompareMethod>& methods, const plan::Parallel& parallel) {
+                              const std::vector<CompareMethod>& methods, const Parallel& parallel) {
   const Vehicle vehicle = world.reach.vehicle;
   SceneComparison comparison{scene, vehicle.name, pairs, {}};
   for (const auto& method : methods) {

@@ -89,6 +89,7 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) no
   facts.lifts_itself = in.autopilot.lifts_itself;
   facts.lifted = lifted(in);
   facts.obstacle_ahead = in.surroundings.tube_blocked;
+  facts.air_rougher = in.surroundings.rougher;
   facts.outside_map = in.surroundings.outside;
   facts.map_late = in.surroundings.late;
   facts.map_missing = in.surroundings.missing;

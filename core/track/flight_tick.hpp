@@ -40,6 +40,7 @@ struct Surroundings {
   bool late = false;          ///< a live map is older than it may be
   bool tube_blocked = false;  ///< new occupied voxels reach into Tracker::ahead()
   bool stop_blocked = false;  ///< and into Tracker::next_stop()
+  bool rougher = false;       ///< what is ahead is not clear any more in the air as it was learnt
 };
 
 /// Everything that a tick decides from. Two ticks with equal inputs in equal states decide bit for bit alike.

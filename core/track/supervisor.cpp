@@ -97,6 +97,7 @@ void Supervisor::note_flight(const SupervisorInput& in, Occurring& now) const no
   now[Reason::outside_map] = in.outside_map;                                           // row 9
   now[Reason::map_late] = in.map_late;                                                 // row 13
   now[Reason::obstacle_ahead] = in.obstacle_ahead;                                     // row 14
+  now[Reason::air_rougher] = in.air_rougher;                                           // row 54
   now[Reason::outside_set] = now[Reason::outside_column] = outside_ >= kOutsideTicks;  // row 16
   now[Reason::takeoff_accepted] = in.new_segment && in.takeoff;
   now[Reason::segment_accepted] = in.new_segment && pose_trusted() && !in.frames_apart;

@@ -48,6 +48,7 @@ struct SupervisorInput {
   bool new_segment = false;     ///< the tracker was given a segment
   bool takeoff = false;         ///< that is a take-off
   bool obstacle_ahead = false;  ///< something new reaches into the sets still to be flown
+  bool air_rougher = false;     ///< these are not clear any more in the air as the flight has learnt it
   bool outside_map = false;     ///< the newest pose is outside the map
   bool map_late = false;        ///< a live map is older than 1 s
   bool map_missing = false;     ///< there is no map

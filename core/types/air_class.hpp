@@ -19,6 +19,22 @@ enum class AirClass : std::uint8_t {
 };
 inline constexpr std::size_t kAirClasses = 5;
 
+/// Factors on Σ by class: 1 is as modelled.
+using AirFactors = std::array<double, kAirClasses>;
+inline constexpr AirFactors kModelledAir{1, 1, 1, 1, 1};
+
+/// The factor at a place of this class. What was learnt without a class may be of any, and counts for all.
+constexpr double factor_of(const AirFactors& factors, AirClass air) noexcept {
+  const double known = factors[static_cast<std::size_t>(air)];
+  const double unnamed = factors[static_cast<std::size_t>(AirClass::none)];
+  return known > unnamed ? known : unnamed;
+}
+/// The larger factor of each class.
+constexpr AirFactors larger(AirFactors a, const AirFactors& b) noexcept {
+  for (std::size_t k = 0; k < kAirClasses; ++k) a[k] = a[k] > b[k] ? a[k] : b[k];
+  return a;
+}
+
 constexpr const char* to_string(AirClass air) noexcept {
   constexpr std::array<const char*, kAirClasses> kNames{"free_air", "ground", "wall", "corner", "none"};
   return kNames[static_cast<std::size_t>(air)];

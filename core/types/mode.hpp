@@ -68,6 +68,7 @@ enum class Reason : std::uint8_t {
   outside_column,
   not_armed,
   frames_apart,
+  air_rougher,
 };
 
 /// In what two descriptions of the same motion contradict each other: an axis of the map, or an angle.
@@ -123,10 +124,11 @@ inline constexpr std::array kReasonNames{
     "outside the take-off's column for 3 ticks",
     "autopilot did not arm within 3 s",
     "map and autopilot frames come apart",
+    "air rougher than the flight allows for",
 };
 inline constexpr int kModes = kModeNames.size(), kReasons = kReasonNames.size();
 static_assert(kModes == 1 + static_cast<int>(Mode::lifting));
-static_assert(kReasons == 1 + static_cast<int>(Reason::frames_apart));
+static_assert(kReasons == 1 + static_cast<int>(Reason::air_rougher));
 static_assert(kMismatchNames.size() == 1 + static_cast<std::size_t>(Mismatch::pitch));
 
 /// How the status's task begins when the plan for the last command was refused; why follows.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <toml++/toml.h>
 #include <cstdio>
+#include <tuple>
 
+#include "core/config/config.hpp"
 #include "services/backwash/adapt_flight.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
@@ -33,18 +34,12 @@ constexpr const char* kForms[] = {"karman", "first_order", "second_order"};
 /// What calibration says of the gusts: the interval of τ_w where the model file has one, else τ_w itself.
 adapt::Gusts gusts_of(const Options& options, const Model& model) {
   adapt::Gusts gusts;
-  gusts.tau_low_s = gusts.tau_high_s = model.bound.tau_w;
   gusts.mean_horizontal = model.bound.mean_horizontal, gusts.mean_vertical = model.bound.mean_vertical;
   for (std::size_t k = 0; k < std::size(kForms); ++k)
     if (options.gusts == kForms[k]) gusts.form = static_cast<adapt::GustForm>(k);
-  if (options.model.starts_with("builtin:")) return gusts;
-  const auto file = toml::parse_file(options.model);  // load_model has accepted it
-  const auto* interval = file["confidence"]["bound.tau_w"].as_array();
-  if (!interval || interval->size() != 2) return gusts;
-  const double low = (*interval)[0].value_or(0.0), high = (*interval)[1].value_or(0.0);
-  if (!(low > 0) || !(high >= low))
-    throw Failure(kConfiguration, options.model + ":1: confidence.bound.tau_w must be two rising times above 0");
-  gusts.tau_low_s = low, gusts.tau_high_s = high;
+  const auto interval = config::load_tau_interval(options.model);
+  if (!interval) throw Failure(kConfiguration, interval.error().message);
+  std::tie(gusts.tau_low_s, gusts.tau_high_s) = std::tuple((*interval)[0], (*interval)[1]);
   return gusts;
 }
 

@@ -8,47 +8,15 @@
 #include "core/adapt/disturbance.hpp"
 #include "core/field/disturbance_field.hpp"
 #include "core/log/log_columns.hpp"
-#include "core/log/tick_log.hpp"
+#include "core/log/raw_flight.hpp"
 #include "core/report/recorded_flight.hpp"
 #include "core/study/windows/gates.hpp"
 #include "core/study/windows/texture.hpp"
-#include "core/types/mode.hpp"
 #include "services/backwash/study_flights.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
 namespace {
-
-void put(log::FlightLog& log, const std::string& prefix, const std::string& unit, const double (&x)[3]) {
-  for (std::size_t i = 0; i < 3; ++i) log.columns[prefix + "xyz"[i] + unit].push_back(x[i]);
-}
-
-/// The raw log's ticks as rows: those that commanded a vehicle under way, each new odometry once.
-log::FlightLog flight_of_raw_log(const std::string& path) {
-  const auto raw = log::read_raw_log(path);
-  if (!raw)
-    throw Failure(raw.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, raw.error().message);
-  log::FlightLog flight;
-  const log::TickInputRecord* in = nullptr;
-  std::int64_t last_stamp = 0;
-  for (const auto& record : raw->records) {
-    if (record.header.kind == log::RecordKind::tick_input) in = log::payload<log::TickInputRecord>(record);
-    const auto* tick = record.header.kind == log::RecordKind::tick ? log::payload<log::TickRecord>(record) : nullptr;
-    if (!tick || !in) continue;
-    const auto mode = static_cast<Mode>(tick->mode);
-    if ((mode != Mode::tracking && mode != Mode::hold) || in->odometry_stamp_ns <= last_stamp) continue;
-    last_stamp = in->odometry_stamp_ns;
-    flight.t_s.push_back(1e-9 * static_cast<double>(in->odometry_stamp_ns));
-    put(flight, "", "_m", tick->p), put(flight, "v", "_mps", tick->v);
-    put(flight, "cmd_", "_m", tick->cmd_p), put(flight, "cmd_v", "_mps", tick->cmd_v);
-    put(flight, "cmd_a", "_mps2", tick->cmd_a);
-    for (std::size_t i = 0; i < 4; ++i) flight.columns[std::string("q") + "wxyz"[i]].push_back(in->q[i]);
-  }
-  if (flight.t_s.size() < 2) throw Failure(kBadData, path + ":1: no tick flew a set-point; give a log of a flight");
-  const double first = flight.t_s.front();
-  for (double& t : flight.t_s) t -= first;
-  return flight;
-}
 
 /// Adds the acceleration, by differences of the velocity.
 void differentiate(log::FlightLog& log) {
@@ -61,7 +29,7 @@ void differentiate(log::FlightLog& log) {
 }
 
 log::FlightLog read(const std::string& path, bool& accelerometer) {
-  auto log = path.ends_with(".bwlog") ? flight_of_raw_log(path) : read_flight(path);
+  auto log = read_flight(path);
   for (const std::string prefix : {"", "v", "cmd_"}) {
     const std::string unit = prefix == "v" ? "_mps" : "_m";
     if (!log::has_xyz(log, prefix, unit))
@@ -153,7 +121,7 @@ map::OccupancyGrid floor_below(const std::vector<Vec3>& path) {
 
 /// The map that a raw log says it was flown with; nothing for other logs.
 std::optional<map::OccupancyGrid> own_map(const std::string& path) {
-  if (!path.ends_with(".bwlog")) return std::nullopt;
+  if (!log::is_raw_log(path)) return std::nullopt;
   const auto raw = log::read_raw_log(path);
   auto grid = raw ? report::recorded_map(raw->records) : tl::make_unexpected(raw.error());
   return grid ? std::optional(std::move(*grid)) : std::nullopt;

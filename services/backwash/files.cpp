@@ -12,7 +12,6 @@
 #include "core/config/config.hpp"
 #include "core/config/simulation_terms.hpp"
 #include "core/map/load_map.hpp"
-#include "services/backwash/verb.hpp"
 
 namespace backwash::services {
 
@@ -45,8 +44,9 @@ log::FlightLog read_table(const std::string& path, const std::string& time_colum
   auto table = log::read_csv(path, time_column);
   if (table) return std::move(*table);
   if (table.error().kind == log::LogError::Kind::bad_data) {
-    if (path.ends_with(".bwlog"))
-      throw Failure(kBadData, path + ":1: is no table but a raw log of backwashd; report, replay and adapt read it");
+    if (path.ends_with(".bwlog") || path.ends_with(".mcap"))
+      throw Failure(kBadData,
+                    path + ":1: is no table but a recording of backwashd; make one of it with backwash export --csv");
     if (path.ends_with(".ulg") || path.ends_with(".bin") || path.ends_with(".BIN"))
       throw Failure(kBadData, path + ":1: is no table but an autopilot's log; make one of it with backwash import");
   }
@@ -109,13 +109,17 @@ void write_whole(const std::string& path, bool force, const std::function<bool(c
 
 }  // namespace
 
-void write_file(const std::string& path, const std::string& content, bool force) {
+void write_stream(const std::string& path, bool force, const std::function<void(std::ostream&)>& write) {
   write_whole(path, force, [&](const std::string& to) {
     std::ofstream file(to, std::ios::binary);
-    file << content;
+    write(file);
     file.close();
     return file.good();
   });
+}
+
+void write_file(const std::string& path, const std::string& content, bool force) {
+  write_stream(path, force, [&](std::ostream& file) { file << content; });
 }
 
 void write_log(const std::string& path, const log::FlightLog& log, bool force) {

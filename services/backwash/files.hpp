@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
+#include <iosfwd>
 #include <string>
+#include <tl/expected.hpp>
+#include <utility>
 #include <vector>
 
 #include "core/log/flight_log.hpp"
@@ -11,6 +15,7 @@
 #include "core/types/model.hpp"
 #include "core/types/simulation_term.hpp"
 #include "core/types/vehicle.hpp"
+#include "services/backwash/verb.hpp"
 #include "services/command_line/command_line.hpp"
 
 namespace backwash::services {
@@ -23,6 +28,12 @@ Model read_model(const std::string& path);
 std::vector<SimulationTerm> read_simulation(const std::string& path);
 Vehicle read_vehicle(const std::string& path);
 log::FlightLog read_table(const std::string& path, const std::string& time_column);
+/// What a reader of core/log gives; its error as Failure 66 or 65.
+template <typename T>
+T read_or_fail(tl::expected<T, log::LogError> read) {
+  if (read) return std::move(*read);
+  throw Failure(read.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, read.error().message);
+}
 
 /// Adds `--method`: tight or paper.
 Option add_method(Command& command, reach::Method& target);
@@ -39,6 +50,8 @@ void check_outputs(const std::vector<std::string>& paths, bool force);
 /// Writes a whole file; one that is replaced stays until the new one is complete. Throws Failure 73 (exists, cannot be
 /// created) or 74 (cannot be written).
 void write_file(const std::string& path, const std::string& content, bool force);
+/// The same by what `write` puts onto a stream, which is not held in memory.
+void write_stream(const std::string& path, bool force, const std::function<void(std::ostream&)>& write);
 /// The same of a flight log.
 void write_log(const std::string& path, const log::FlightLog& log, bool force);
 

@@ -28,10 +28,10 @@ int main(int argc, char** argv) {
   try {
     app.version(backwash::kVersion);
     app.require_subcommand();
-    verbs = {fly_verb(app),       plan_verb(app),        reach_verb(app),   field_verb(app),
-             simulate_verb(app),  feasibility_verb(app), compare_verb(app), report_verb(app),
-             calibrate_verb(app), import_verb(app),      replay_verb(app),  study_verb(app),
-             adapt_verb(app),     vehicle_verb(app),     map_verb(app),     campaign_verb(app)};
+    verbs = {fly_verb(app),         plan_verb(app),    reach_verb(app),    field_verb(app),     simulate_verb(app),
+             feasibility_verb(app), compare_verb(app), report_verb(app),   calibrate_verb(app), import_verb(app),
+             replay_verb(app),      export_verb(app),  merge_verb(app),    study_verb(app),     adapt_verb(app),
+             vehicle_verb(app),     map_verb(app),     campaign_verb(app), keys_verb(app)};
     app.each_verb([&](Command& verb) {
       verb.add_flag("--quiet", quiet, "no progress on stderr");
       verb.add_option("--threads", threads, "at most so many; default: one a processor").check(within(1, 1024));

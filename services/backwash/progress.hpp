@@ -17,7 +17,7 @@ void end_progress();
 /// Nothing is shown from now on.
 void be_quiet();
 
-/// plan::Parallel on all processors, its share shown as the progress of what is at work. Throws Interrupted between
+/// Parallel on all processors, its share shown as the progress of what is at work. Throws Interrupted between
 /// two items once Ctrl-C was pressed and finish_what_is_done() was called.
 void run_shown(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work);
 

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "core/log/tick_log.hpp"
+#include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
 
@@ -12,7 +13,7 @@ namespace {
 constexpr int kDiffers = 1;
 
 struct Options {
-  std::string log;
+  std::vector<std::string> logs;
   bool json = false;
 };
 
@@ -40,26 +41,22 @@ Json to_json(const log::Replay& r, bool equal) {
 }
 
 int run(const Options& options) {
-  auto log = log::read_raw_log(options.log);
-  if (!log)
-    throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  auto log = read_or_fail(log::read_raw_logs(options.logs));
   // A kill leaves a last record that is cut short, and perhaps the input of a tick that was not written any more.
-  while (log->cut_at && !log->records.empty() && log->records.back().header.kind != log::RecordKind::tick)
-    log->records.pop_back();
-  const auto replay = log::replay(*log, options.log);
-  if (!replay) throw Failure(kBadData, replay.error().message);
-  const log::Replay& r = *replay;
+  while (log.cut_at && !log.records.empty() && log.records.back().header.kind != log::RecordKind::tick)
+    log.records.pop_back();
+  const log::Replay r = read_or_fail(log::replay(log, options.logs.front()));
   const bool equal = r.differing == 0 && r.ticks_missing == 0;
   if (options.json) {
     Json json = to_json(r, equal);
-    json["cut_at"] = log->cut_at ? Json(*log->cut_at) : Json();
+    json["cut_at"] = log.cut_at ? Json(*log.cut_at) : Json();
     print(json);
     return equal ? kOk : kDiffers;
   }
   std::printf("%" PRIu64 " ticks, %" PRIu64 " set-points, %" PRIu64 " segments replayed; decisions %s\n", r.ticks,
               r.setpoints, r.segments, hex(r.state_hash).c_str());
-  if (log->cut_at)
-    std::printf("the last record is cut short at byte %" PRIu64 ": replayed up to the tick before it\n", *log->cut_at);
+  if (log.cut_at)
+    std::printf("the last record is cut short at byte %" PRIu64 ": replayed up to the tick before it\n", *log.cut_at);
   if (r.ticks_missing > 0) std::printf("%" PRIu64 " ticks are missing from the log\n", r.ticks_missing);
   if (r.first)
     std::printf(
@@ -75,7 +72,7 @@ int run(const Options& options) {
 Verb replay_verb(Command& app) {
   auto options = std::make_shared<Options>();
   auto& command = app.add_subcommand("replay", "Runs a raw log's inputs through the flight pipeline's tick again");
-  command.add_option("--log", options->log, "raw log of backwashd").required();
+  command.add_option("--log", options->logs, "raw log of backwashd, or its parts from the first on").required();
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.footer(
       "Every tick is decided again from its logged inputs (odometry, telemetry, segments, requests, map verdicts) and\n"

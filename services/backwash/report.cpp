@@ -13,15 +13,11 @@ namespace backwash::services {
 namespace {
 
 struct Options {
-  std::string log, truth, vehicle = "builtin:quad-5in", model, because, out;
+  std::vector<std::string> logs;  ///< parts of one; the first names it
+  std::string truth, vehicle = "builtin:quad-5in", model, because, out;
   bool json = false, force = false;
+  const std::string& log() const { return logs.front(); }
 };
-
-template <typename T>
-T take(tl::expected<T, log::LogError> value) {
-  if (value) return std::move(*value);
-  throw Failure(value.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, value.error().message);
-}
 
 /// One take-off and one route, recorded to their end with the truth beside them: what `fly` flies.
 bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
@@ -34,13 +30,13 @@ bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
 int tell(const Options& options, const FlightStory& story, const map::OccupancyGrid* map) {
   if (!options.out.empty()) {
     progress("drawing the report");
-    write_file(options.out, story_page(story, map, options.log), options.force);
+    write_file(options.out, story_page(story, map, options.log()), options.force);
   }
-  options.json ? print(to_json(story, options.log)) : print_text(story, options.log);
+  options.json ? print(to_json(story, options.log())) : print_text(story, options.log());
   if (story.ok()) return kOk;
   std::string line;
   for (const auto& reason : story.wrong) line += (line.empty() ? "" : "; ") + reason;
-  throw Failure(kFlightFailed, options.log + ":1: " + line);
+  throw Failure(kFlightFailed, options.log() + ":1: " + line);
 }
 
 /// A flight such as `fly`'s: its sets are propagated again and must be those that were logged.
@@ -49,11 +45,11 @@ int judge(const Options& options, const std::vector<log::RawRecord>& log, const 
   const std::string model_path = model_of(options.vehicle, options.model);
   const auto model = read_model(model_path);
   progress("building the world");
-  const auto world =
-      plan::build_world(take(report::recorded_map(log)), model, vehicle, reach::Method::tight, std::nullopt, run_shown);
-  const auto flight = take(report::recorded_flight(log, truth, *world));
+  const auto world = plan::build_world(read_or_fail(report::recorded_map(log)), model, vehicle, reach::Method::tight,
+                                       std::nullopt, run_shown);
+  const auto flight = read_or_fail(report::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
-  const report::ReportContext context{options.log, model_path, options.vehicle, kVersion, start, goal, {}, 1};
+  const report::ReportContext context{options.log(), model_path, options.vehicle, kVersion, start, goal, {}, 1};
   return conclude({flight, *world, context, sim::summarise(flight, *world, goal)}, options.out, options.json,
                   options.force);
 }
@@ -61,7 +57,7 @@ int judge(const Options& options, const std::vector<log::RawRecord>& log, const 
 /// The truth of the flight, where it is given.
 std::optional<log::FlightLog> read_truth(const std::string& path) {
   if (path.empty()) return std::nullopt;
-  auto truth = take(log::read_csv(path));
+  auto truth = read_or_fail(log::read_csv(path));
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!truth.has(name)) throw Failure(kBadData, path + ":1: no column '" + name + "'; give backwash-bench's --log");
   if (truth.t_s.size() < 2) throw Failure(kBadData, path + ":1: has fewer than two rows; give the whole log");
@@ -72,7 +68,7 @@ int run(const Options& options) {
   check_output(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   read_model(model_of(options.vehicle, options.model));
-  const auto log = take(log::read_raw_log(options.log));
+  const auto log = read_or_fail(log::read_raw_logs(options.logs));
   const auto truth = read_truth(options.truth);
   const auto map = report::recorded_map(log.records);
   const auto* grid = map ? &*map : nullptr;
@@ -87,7 +83,7 @@ int run(const Options& options) {
 Verb report_verb(Command& app) {
   auto options = std::make_shared<Options>();
   auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
-  command.add_option("--log", options->log, "raw log of backwashd").required();
+  command.add_option("--log", options->logs, "raw log of backwashd, or parts of one in their order").required();
   command.add_option("--truth", options->truth,
                      "log of the truth by backwash-bench, CSV; without it measured positions are judged");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();

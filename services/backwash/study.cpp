@@ -50,6 +50,8 @@ std::vector<study::ExtensionTerm> read_terms(const std::string& path) {
       term.scale.offset_W = {(*offset)[0].value_or(0.0), (*offset)[1].value_or(0.0), 0};
     if (const auto* theta = (*table)["theta"].as_array())
       for (const auto& value : *theta) term.theta.push_back(value.value_or(0.0));
+    term.gain = (*table)["held_out_nats"].value_or(0.0);
+    term.flights = static_cast<std::size_t>(std::max<std::int64_t>(0, (*table)["flights"].value_or(std::int64_t{0})));
     for (const auto& [key, numbers] : {std::pair{"anchor", &term.scale.anchor}, {"beside", &term.beside}})
       if (const auto* list_of = (*table)[key].as_array())
         for (const auto& value : *list_of) numbers->push_back(value.value_or(0.0));
@@ -123,7 +125,7 @@ void refuse_other_numbers(const std::vector<std::string>& logs) {
 std::optional<study::Observations> sound_flights(const Options& options, const Vehicle& vehicle, const Model& model) {
   if (options.reference.empty()) return std::nullopt;
   study::Observer observer(vehicle, model, nullptr);
-  for (const auto& path : options.reference) observer.add(read_flight(path));
+  for (const auto& path : options.reference) observer.add(read_studied(path));
   return observer.finish();
 }
 
@@ -215,14 +217,15 @@ int run(const Options& options) {
   Flights flights = read_flights(options.logs, options.group);
   auto seen = observe(flights, vehicle, model, grid);
   const auto measured = seen;  // nothing that the model holds taken out
-  const auto left = study::apply(read_terms(options.model), seen);
+  auto terms = study::apply(read_terms(options.model), seen);
   const auto sound = sound_flights(options, vehicle, model);
   auto chosen = study_options(options);
+  chosen.search.known = std::move(terms.known);
   if (sound) chosen.sound = study::sound_rotors(*sound);
   const auto result = study::study(seen, chosen);
   const auto names = names_of(flights);
   Json json = to_json(result, seen, vehicle, names);
-  add_left_out(json, left, flights);
+  add_left_out(json, terms.left, flights);
   const auto anytime = look_every_time(options, flights, vehicle, model, grid, chosen.sound);
   if (anytime) json["anytime"] = to_json(*anytime);
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};

@@ -6,9 +6,13 @@
 #include <numeric>
 
 #include "core/log/dataflash.hpp"
+#include "core/log/import_columns.hpp"
+#include "core/log/median.hpp"
+#include "core/log/raw_flight.hpp"
 #include "core/log/same_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "core/study/windows/same_gusts.hpp"
+#include "core/types/formatted.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/verb.hpp"
 
@@ -34,6 +38,16 @@ bool leave_out_twins(Flights& flights, const study::Observations& seen) {
   return !twins.empty();
 }
 
+/// A flight that is below the map's lowest voxel most of the time has its heights downwards, or another map.
+void refuse_below(const Flights& flights, const map::OccupancyGrid& grid) {
+  for (std::size_t k = 0; k < flights.logs.size(); ++k) {
+    const auto& z = flights.logs[k].column("z_m");
+    if (!z.empty() && log::median(z) < grid.origin().z())
+      throw Failure(kBadData, flights.paths[k] + ":1: z_m is below the map in most rows (median " +
+                                  formatted("%.2f", log::median(z)) + " m): heights are upwards, in the map's frame");
+  }
+}
+
 study::Observations look_at(const Flights& flights, const Vehicle& vehicle, const Model& model,
                             const map::OccupancyGrid* grid) {
   const auto order = flights.order();
@@ -55,10 +69,20 @@ bool is_autopilots_log(const std::string& path) {
 }
 
 log::FlightLog read_flight(const std::string& path) {
+  if (log::is_raw_log(path)) return read_or_fail(log::flight_of_raw_log(read_or_fail(log::read_raw_log(path)), path));
   if (!is_autopilots_log(path)) return read_table(path, "t_s");
-  auto log = path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path);
-  if (log) return std::move(*log);
-  throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  return read_or_fail(path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path));
+}
+
+log::FlightLog read_studied(const std::string& path) {
+  auto log = read_flight(path);
+  for (const char* name : {"x_m", "y_m", "z_m"})
+    if (!log.has(name))
+      throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
+  for (const auto& name : log::silent_columns(log)) log.columns.erase(name);
+  if (is_autopilots_log(path)) return log;
+  if (const auto wrong = log::impossible(log); !wrong.empty()) throw Failure(kBadData, path + ":1: " + wrong.front());
+  return log;
 }
 
 Flights read_flights(const std::vector<std::string>& paths, const std::string& group) {
@@ -66,10 +90,7 @@ Flights read_flights(const std::vector<std::string>& paths, const std::string& g
   std::vector<log::FlightMark> marks;
   const auto read = [&](const std::string& path) {
     progress("reading " + path);
-    auto log = read_flight(path);
-    for (const char* name : {"x_m", "y_m", "z_m"})
-      if (!log.has(name))
-        throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
+    auto log = read_studied(path);
     if (!group.empty() && (!log.has(group) || log.column(group).empty()))
       throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
     const log::FlightMark mark(log);
@@ -97,6 +118,7 @@ std::vector<std::size_t> Flights::order() const {
 
 study::Observations observe(Flights& flights, const Vehicle& vehicle, const Model& model,
                             const map::OccupancyGrid* grid) {
+  if (grid) refuse_below(flights, *grid);
   auto seen = look_at(flights, vehicle, model, grid);
   return leave_out_twins(flights, seen) ? look_at(flights, vehicle, model, grid) : seen;
 }

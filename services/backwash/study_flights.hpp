@@ -19,6 +19,10 @@ bool is_autopilots_log(const std::string& path);
 /// A flight log: ULog (.ulg) or DataFlash (.bin) by its name, else CSV. Throws Failure.
 log::FlightLog read_flight(const std::string& path);
 
+/// The same for a study, which needs positions: without the columns of sensors that never spoke. A table that no flight
+/// can be (core/log, impossible()) is refused. Throws Failure.
+log::FlightLog read_studied(const std::string& path);
+
 /// The flights of a study, each once.
 struct Flights {
   std::vector<std::string> paths;

@@ -75,11 +75,9 @@ struct TuningEvidence {
 };
 
 TuningEvidence evidence_of(const std::string& path) {
-  const auto log = log::read_raw_log(path);
-  if (!log)
-    throw Failure(log.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, log.error().message);
+  const auto log = read_or_fail(log::read_raw_log(path));
   TuningEvidence evidence;
-  for (const auto& record : log->records) {
+  for (const auto& record : log.records) {
     log::TickRecord tick;
     if (record.header.kind != log::RecordKind::tick || record.bytes.size() < sizeof tick) continue;
     std::memcpy(&tick, record.bytes.data(), sizeof tick);

@@ -40,11 +40,14 @@ Verb report_verb(Command& app);
 Verb calibrate_verb(Command& app);
 Verb import_verb(Command& app);
 Verb replay_verb(Command& app);
+Verb export_verb(Command& app);
+Verb merge_verb(Command& app);
 Verb study_verb(Command& app);
 Verb adapt_verb(Command& app);
 Verb vehicle_verb(Command& app);
 Verb map_verb(Command& app);
 Verb campaign_verb(Command& app);
+Verb keys_verb(Command& app);
 
 /// So many finite numbers with commas between them; anything else is a usage error that says what they `are`.
 std::vector<double> read_numbers(const std::string& option, const std::string& text, std::size_t count,

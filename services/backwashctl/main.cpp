@@ -17,6 +17,9 @@ int main(int argc, char** argv) {
     const int code = verbs.run();
     return backwash::services::finished(backwash::ctl::interrupted() ? 128 + backwash::ctl::interrupted() : code,
                                         "backwashctl");
+  } catch (const backwash::StartError& e) {
+    std::cerr << "backwashctl: " << e.what() << "\n";
+    return e.code;
   } catch (const backwash::dds::Error& e) {
     std::cerr << "backwashctl: " << e.what() << "; give an --interface and a --domain of this machine\n";
     return backwash::kSystem;

@@ -7,6 +7,9 @@
 #include <random>
 #include <thread>
 
+#include "services/command_line/exit_code.hpp"
+#include "services/security/credentials.hpp"
+
 namespace backwash::ctl {
 namespace {
 
@@ -19,6 +22,14 @@ std::string text(const char* s) { return s ? s : ""; }
 std::uint64_t draw_session() {
   std::random_device random;
   return std::uint64_t{random()} << 32 | random();
+}
+
+/// The folder itself, where its credentials are good or it is none.
+const std::string& judged(const std::string& folder) {
+  if (!folder.empty())
+    if (const auto credentials = security::read_credentials(folder); !credentials)
+      throw StartError(kConfiguration, "--security: " + credentials.error());
+  return folder;
 }
 
 volatile std::sig_atomic_t signal_that_came = 0;
@@ -34,8 +45,7 @@ int interrupted() noexcept { return signal_that_came; }
 Station::Station(const Options& options)
     : options_(options),
       session_(draw_session()),
-      participant_(static_cast<std::uint32_t>(options.domain), options.interface),
-      commands_(dds::make_writer<dds::Command>(participant_, options.name_space)),
+      participant_(static_cast<std::uint32_t>(options.domain), options.interface, {}, judged(options.security)),
       acks_(dds::make_reader<dds::Ack>(participant_, options.name_space)),
       statuses_(dds::make_reader<dds::Status>(participant_, options.name_space)),
       waitset_(participant_) {
@@ -45,10 +55,11 @@ Station::Station(const Options& options)
 
 std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& position, double yaw,
                                              const std::vector<Vec3>& waypoints) {
-  constexpr double kRepeat = 0.5;  // s
-  const auto begun = Clock::now();
-  while (!interrupted() && commands_.matched() == 0 && since(begun) < options_.timeout_s)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  try {
+    if (!commands_) commands_.emplace(dds::make_writer<dds::Command>(participant_, options_.name_space));
+  } catch (const dds::NotPermitted& e) {
+    return Result{backwash_msgs_msg_dds__ACK_REFUSED, e.what()};
+  }
   dds::Command command{};
   command.station = dds::c_string(options_.station);
   command.session = session_;
@@ -61,16 +72,24 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
   for (const Vec3& p : waypoints) points.push_back({p.x(), p.y(), p.z()});
   const auto count = static_cast<std::uint32_t>(points.size());
   command.waypoints = {count, count, points.data(), false};
+  return ask(command);
+}
+
+std::optional<Station::Result> Station::ask(const dds::Command& command) {
+  constexpr double kRepeat = 0.5;  // s
+  const auto begun = Clock::now();
+  while (!interrupted() && commands_->matched() == 0 && since(begun) < options_.timeout_s)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   std::optional<Result> result;
   auto sent = Clock::time_point{};
   while (!interrupted() && !result && since(begun) < options_.timeout_s) {
     if (since(sent) > kRepeat) {
-      commands_.write(command);
+      commands_->write(command);
       sent = Clock::now();
     }
     waitset_.wait(0.05);
     acks_.take([&](const dds::Ack& ack) {
-      const bool ours = std::ranges::equal(ack.writer, commands_.guid());
+      const bool ours = std::ranges::equal(ack.writer, commands_->guid());
       if (ours && ack.session == session_ && ack.sequence_number == sequence_)
         result = Result{ack.result, text(ack.reason)};
     });

@@ -23,13 +23,14 @@ int interrupted() noexcept;
 struct Options {
   int domain = 0;
   std::string interface = "lo", name_space = "backwash", station;
+  std::string security;  ///< folder of credentials of DDS Security; empty: none
   double timeout_s = 5;
 };
 
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its members that own memory are null
-  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says;
+  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says, air;
   std::vector<std::pair<std::string, double>> parameters;   ///< that the autopilot has told
   std::vector<std::pair<std::string, std::string>> advice;  ///< on those that are not good
 
@@ -56,6 +57,7 @@ inline constexpr StatusText kStatusTexts[] = {
     {"refused", &dds::Status::refused, &StatusCopy::refused},
     {"autopilot", &dds::Status::autopilot, &StatusCopy::autopilot},
     {"autopilot_says", &dds::Status::autopilot_says, &StatusCopy::autopilot_says},
+    {"air", &dds::Status::air, &StatusCopy::air},
 };
 
 /// An age or a delay of the status, s; −1 on the wire: nothing was measured for it yet.
@@ -64,6 +66,7 @@ inline std::optional<double> measured(double told) noexcept { return told < 0 ? 
 /// One ground station: sends commands, waits for their acknowledgement and watches the status.
 class Station {
  public:
+  /// Throws StartError 78 for credentials that are not good, dds::Error for an interface that is none.
   explicit Station(const Options& options);
 
   struct Result {
@@ -71,6 +74,7 @@ class Station {
     std::string reason;
   };
   /// Sends a command and repeats it, with the same sequence number, until it is acknowledged; nothing if it never is.
+  /// Refused at once where this station's own permissions do not let it command.
   std::optional<Result> send(std::uint8_t verb, const Vec3& position = Vec3::Zero(), double yaw = 0,
                              const std::vector<Vec3>& waypoints = {});
   /// Ends the session. What is sent next begins a new one.
@@ -88,11 +92,13 @@ class Station {
             const std::function<bool(const StatusCopy&)>& failed);
 
  private:
+  std::optional<Result> ask(const dds::Command& command);
+
   Options options_;
   std::uint64_t session_;
   std::uint32_t sequence_ = 0;
   dds::Participant participant_;
-  dds::Writer<dds::Command> commands_;
+  std::optional<dds::Writer<dds::Command>> commands_;  ///< from the first command on: an observer may have none
   dds::Reader<dds::Ack> acks_;
   dds::Reader<dds::Status> statuses_;
   dds::WaitSet waitset_;

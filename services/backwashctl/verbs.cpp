@@ -59,6 +59,8 @@ Verbs::Verbs(Command& app) {
       .capture_default_str()
       .check(services::name_space());
   app.add_option("--station", options_.station, "this station's name: it holds the session").capture_default_str();
+  app.add_option("--security", options_.security,
+                 "folder of this station's credentials, if the daemon has dds.security");
   app.add_option("--timeout", options_.timeout_s, "s to wait for an acknowledgement")
       .capture_default_str()
       .check(services::positive());
@@ -165,6 +167,13 @@ void Verbs::add_views(Command& app) {
 
 int Verbs::run() { return chosen_(); }
 
+/// Why there may be no answer.
+std::string Verbs::nobody() const {
+  return "no daemon answered in domain " + std::to_string(options_.domain) + " on interface " + options_.interface +
+         ", namespace " + options_.name_space + "; is backwashd running, " +
+         (options_.security.empty() ? "without dds.security?" : "with credentials of the same authority?");
+}
+
 int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& position,
                    const std::function<bool(const StatusCopy&)>& done) {
   Station station(options_);
@@ -176,9 +185,7 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
   };
   const auto answer = station.send(verb, position, yaw_.value_or(0), waypoints_);
   if (interrupted()) return fail("interrupted");
-  if (!answer)
-    return fail("no daemon answered in domain " + std::to_string(options_.domain) + " on interface " +
-                options_.interface + ", namespace " + options_.name_space + "; is backwashd running?");
+  if (!answer) return fail(nobody());
   if (answer->result != backwash_msgs_msg_dds__ACK_ACCEPTED) return fail("refused: " + answer->reason);
   outcome.accepted = true;
   if (!wait_ || !done) return say(outcome, json_);
@@ -212,8 +219,7 @@ int Verbs::status() {
   Station station(options_);
   const auto now = station.status(options_.timeout_s);
   if (!now) {
-    std::cerr << "backwashctl status: no daemon in domain " << options_.domain << " on interface "
-              << options_.interface << ", namespace " << options_.name_space << "; is backwashd running?\n";
+    std::cerr << "backwashctl status: " << nobody() << "\n";
     return kUnavailable;
   }
   if (json_)
@@ -256,8 +262,7 @@ int Verbs::check() {
   const auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
   while (after && !interrupted() && since() < kWatch) after = station.status(1.0);
   if (!after) {
-    std::cerr << "backwashctl check: no daemon in domain " << options_.domain << " on interface "
-              << options_.interface << ", namespace " << options_.name_space << "; is backwashd running?\n";
+    std::cerr << "backwashctl check: " << nobody() << "\n";
     return kUnavailable;
   }
   bool all = true;

@@ -33,6 +33,7 @@ class Verbs {
   Command* waiting(Command* sub, double patience_s);
   int command(const std::string& name, std::uint8_t verb, const Vec3& position,
               const std::function<bool(const StatusCopy&)>& done);
+  std::string nobody() const;
   int go_to();
   int follow();
   int goals();

@@ -117,6 +117,13 @@ struct CommandId {
 
 inline constexpr std::uint64_t kTicksPerSecond = 50;
 
+/// What the flight has learnt of its air, by class.
+struct AirView {
+  AirClass here = AirClass::none;  ///< of the newest place that was flown through
+  AirFactors factors = kModelledAir;
+  std::array<double, kAirClasses> ln_evidence{}, seconds{};  ///< core/adapt/bets.hpp
+};
+
 /// What the control thread shows to the others, once a tick.
 struct ControlView {
   std::int64_t t_ns = 0;
@@ -149,6 +156,7 @@ struct ControlView {
   double untold_delay = 0;                        ///< of the autopilot's line, s
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
+  std::optional<AirView> air;  ///< none: nothing is learnt in flight
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 
@@ -160,11 +168,13 @@ struct ControlRecord {
 
 /// What the control thread has to tell the operator; rarer than ticks, and none is skipped while the ring has room.
 struct ControlEvent {
-  enum class Kind : std::uint8_t { transition, missed_deadline, page_fault } kind = Kind::transition;
+  enum class Kind : std::uint8_t { transition, missed_deadline, page_fault, rougher } kind = Kind::transition;
   std::int64_t t_ns = 0;
   Mode mode = Mode::passive;
   Reason reason = Reason::started;
-  std::uint64_t count = 0;  ///< periods missed, pages faulted
+  std::uint64_t count = 0;             ///< periods missed, pages faulted
+  AirClass air = AirClass::none;       ///< whose factor grew
+  double factor = 1, ln_evidence = 0;  ///< to what, and on what
 };
 
 /// A port that was opened again. The control thread swaps its lost one in, so that closing it is not its work.
@@ -222,16 +232,20 @@ struct Channels {
   sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control
   AtomicTime map_ns;                                       // map worker: reception of the newest data in the snapshot
   std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
+  std::atomic<std::uint64_t> rough_segment{0};             // the same, in the air as the flight has learnt it
+  sync::LatestValue<AirFactors> air, air_kept;             // control → map worker, air file: each time that one grew
   sync::RecordRing<track::Order, 64> orders;               // mission → control
   sync::Handover<PlanJob> jobs;                            // mission → planner
   sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
   sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
-  sync::RecordRing<ControlRecord, 2048> control_log;                       // control → recorder
-  sync::RecordRing<ControlRecord, 256> command_log;                        // DDS reader → recorder
-  sync::RecordRing<ControlEvent, 256> events;                              // control → link watch
-  sync::Handover<FreshPort> ports;                                         // link watch → control
-  std::atomic<std::optional<firmware_bridge::LinkFault>> link_fault;       // control → link watch
+  std::atomic<bool> map_partial{false};  // map worker → planner: the newest world is what is around the vehicle alone
+  sync::LatestValue<Vec3> vehicle_W;     // control → map worker: where the newest good odometry is, in the map
+  sync::RecordRing<ControlRecord, 2048> control_log;                  // control → recorder
+  sync::RecordRing<ControlRecord, 256> command_log;                   // DDS reader → recorder
+  sync::RecordRing<ControlEvent, 256> events;                         // control → link watch
+  sync::Handover<FreshPort> ports;                                    // link watch → control
+  std::atomic<std::optional<firmware_bridge::LinkFault>> link_fault;  // control → link watch
   static_assert(decltype(link_fault)::is_always_lock_free);
   std::atomic<std::uint32_t> port_losses{0};  // control → link watch: times that a good port was lost
   sync::AtomicOptional<mavlink::SigningTime, 0> signing_time;  // control → signing time: of the newest signature

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <utility>
 
+#include "core/log/air_log.hpp"
 #include "core/log/tick_log.hpp"
 
 namespace backwash::daemon {
@@ -38,12 +39,18 @@ firmware_bridge::Signal signal_of(Mode mode) noexcept {
 }  // namespace
 
 ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle,
-                         double battery_land, const MapSettings& map, const OdometryTiming& timing)
+                         double battery_land, const MapSettings& map, const OdometryTiming& timing,
+                         const std::optional<adapt::InFlightConstants>& air)
     : channels_(channels), link_(link), flight_(vehicle, battery_land, timing), lookout_(channels, vehicle, map) {
   link_.tap(&ControlLoop::on_frame, this);
   const auto constants = log::constants(vehicle, battery_land, timing);
   record(log::RecordKind::constants, now_ns(), &constants,
          timing.usual() ? sizeof constants.constants : sizeof constants);
+  if (!air) return;
+  air_.emplace(*air);
+  view_.air.emplace().factors = air_->factors();
+  const auto start = log::constants(*air);
+  record(log::RecordKind::air_constants, now_ns(), &start, sizeof start);
 }
 
 void ControlLoop::record(log::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept {
@@ -202,46 +209,6 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);
 }
 
-void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& out) noexcept {
-  const auto& telemetry = link_.telemetry();
-  const auto& tracker = flight_.tracker();
-  view_.t_ns = in.now_ns;
-  view_.mode = out.supervisor.mode;
-  view_.reason = out.supervisor.reason;
-  view_.armed = in.autopilot.armed;
-  view_.offboard = in.autopilot.offboard;
-  view_.landed = !telemetry.landed_state || telemetry.landed_state->value == firmware_bridge::LandedState::kOnGround;
-  view_.aligned = flight_.alignment().aligned();
-  view_.mismatch = flight_.alignment().mismatch();
-  view_.odometry_age = flight_.odometry_age();
-  view_.odometry_lost_after = flight_.odometry_lost_after();
-  view_.heartbeat_age = in.autopilot.heartbeat_age;
-  view_.clock = link_.clock();
-  view_.untold_delay = link_.untold_delay();
-  view_.pose_age = in.autopilot.pose_age(in.now_ns);
-  if (flight_.odometry()) view_.state = flight_.odometry()->state;
-  view_.command = out.command;
-  view_.epoch = flight_.epoch();
-  view_.segment = tracker.segment();
-  view_.index = tracker.index();
-  view_.finished = tracker.finished();
-  view_.braking = tracker.braking();
-  view_.stop_branch = tracker.stop_branch();
-  view_.closures = tracker.closures();
-  view_.shift = tracker.shift();
-  if (out.refused) view_.refused_segment = in.segment->id;
-  view_.odometry_received += in.odometry.has_value();
-  view_.odometry_rejected += in.odometry && !out.fresh;
-  if (out.inside.judged) ++(out.inside.inside ? view_.inside : view_.outside);
-  view_.missed += static_cast<std::uint64_t>(in.missed_periods);
-  view_.frames_bad = link_.received().bad_crc;
-  if (link_.signing()) view_.frames_refused = link_.signing()->counters().refused();
-  constexpr std::uint8_t kWorstNotice = 4;  // severity: 4 is a warning
-  if (telemetry.text && telemetry.text->value.severity <= kWorstNotice) view_.warning = telemetry.text;
-  view_.residual_m = flight_.alignment().position_residual();
-  view_.residual_rad = flight_.alignment().yaw_residual();
-}
-
 // Transitions, missed deadlines and page faults, each to the operator; the tick itself to the raw log.
 void ControlLoop::report(const track::TickInput& in, const track::TickOutput& out) noexcept {
   const auto tell = [&](ControlEvent::Kind kind, std::uint64_t count) {
@@ -261,6 +228,7 @@ void ControlLoop::report(const track::TickInput& in, const track::TickOutput& ou
   channels_.view_mission.write(view_);
   channels_.view_planner.write(view_);
   channels_.view_status.write(view_);
+  if (out.fresh) channels_.vehicle_W.write(view_.state.p_W);
 }
 
 void ControlLoop::tick(std::int64_t now_ns, int missed, double lateness_us) noexcept {
@@ -287,6 +255,7 @@ void ControlLoop::tick(std::int64_t now_ns, int missed, double lateness_us) noex
   record(log::RecordKind::tick_input, now_ns, &logged, sizeof logged);
   const track::TickOutput out = flight_.step(in);
   send(in, out);
+  learn(in, out);
   publish(in, out);
   report(in, out);
   for (const auto* segment : out.released) channels_.segments.give_back(segment);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "core/adapt/in_flight.hpp"
 #include "core/track/flight_tick.hpp"
 #include "core/track/orders.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
@@ -19,8 +20,10 @@ namespace backwash::daemon {
 /// decided, and records both. The one owner of the link.
 class ControlLoop {
  public:
+  /// `air`: what it learns of the air from; none: it learns nothing.
   ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle, double battery_land,
-              const MapSettings& map = {}, const OdometryTiming& timing = {});
+              const MapSettings& map = {}, const OdometryTiming& timing = {},
+              const std::optional<adapt::InFlightConstants>& air = {});
 
   /// One tick at `now_ns` (CLOCK_MONOTONIC), `missed` whole periods after it was due, `lateness_us` after its own
   /// period began. Real-time: wait-free, no allocation; system calls: non-blocking reads and writes of the port,
@@ -38,6 +41,7 @@ class ControlLoop {
   void poll(std::int64_t now_ns) noexcept;
   track::TickInput gather(std::int64_t now_ns, int missed) noexcept;
   track::AutopilotFacts autopilot(std::int64_t now_ns) const noexcept;
+  void learn(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void send(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void forward_odometry(std::uint8_t resets) noexcept;
   void ask_for_messages(std::int64_t now_ns) noexcept;
@@ -51,6 +55,7 @@ class ControlLoop {
   firmware_bridge::AutopilotLink& link_;
   track::FlightTick flight_;
   Lookout lookout_;
+  std::optional<adapt::InFlight> air_;
   SenderClock sender_clock_;  // of the odometry's
   ParameterReader parameters_;
   bool port_open_ = true;

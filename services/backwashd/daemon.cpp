@@ -5,9 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <ctime>
 #include <new>
 #include <system_error>
 
+#include "core/config/file_hash.hpp"
+#include "services/backwashd/air_file.hpp"
 #include "services/backwashd/control_loop.hpp"
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/gpio_worker.hpp"
@@ -42,6 +45,11 @@ auto made(ExitCode code, Make&& make) {
   }
 }
 
+std::int64_t part_bytes(const config::Daemon& daemon) {
+  constexpr double kMib = 1 << 20;
+  return static_cast<std::int64_t>(daemon.log.max_mib * kMib);
+}
+
 /// A port that is missing or busy may be plugged in, or its simulator started, later: the link watch goes on trying.
 firmware_bridge::Port port_at_start(const decltype(config::Daemon::link)& link) {
   using Kind = firmware_bridge::PortError::Kind;
@@ -65,8 +73,21 @@ std::unique_ptr<SigningTimeFile> sign(const config::Daemon& daemon, firmware_bri
   return time;
 }
 
-// What carries odometry and the stop switch to the control thread comes right below it, before the middleware starts
-// its threads.
+/// What earlier flights have learnt of the air, where a file is configured for it.
+std::unique_ptr<AirFile> air_file(const Settings& s) {
+  if (!s.air || s.daemon.adaptation.file.empty()) return nullptr;
+  const auto files = config::hash_of_files(s.daemon.vehicle, s.daemon.model);
+  if (!files) throw StartError(kNoInput, files.error().message);
+  return std::make_unique<AirFile>(s.daemon.adaptation.file, *files);
+}
+
+std::optional<adapt::InFlightConstants> learns_from(const Settings& s, const AirFile* file) {
+  auto air = s.air;
+  if (air && file) air->start = file->start();
+  return air;
+}
+
+// What carries odometry and the stop switch to the control thread comes right below it, before the middleware starts.
 int reader_priority(const config::Daemon& daemon) {
   const int control = daemon.control.priority;
   return allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0));
@@ -83,6 +104,12 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
   if (!daemon) return wrong(daemon.error());
   if (const auto line = configured_line(daemon->link, daemon->odometry.timing); !line)
     return tl::make_unexpected(StartError(kConfiguration, path + ": " + line.error()));
+  std::optional<security::Credentials> credentials;
+  if (!daemon->dds.security.empty()) {
+    auto read = security::read_credentials(daemon->dds.security);
+    if (!read) return tl::make_unexpected(StartError(kConfiguration, path + ": dds.security: " + read.error()));
+    credentials = std::move(*read);
+  }
   auto vehicle = config::load_vehicle(daemon->vehicle);
   if (!vehicle) return wrong(vehicle.error());
   // What a velocity from poses may be off is in the first set of every tube.
@@ -91,7 +118,21 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
         track::PoseVelocity::error(std::min(OdometryTiming::kUsual, daemon->odometry.timing.rate_least));
   auto model = config::load_model(daemon->model);
   if (!model) return wrong(model.error());
-  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model)};
+  if (!daemon->adaptation.enabled)
+    return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials)};
+  if (!model->extension.empty())
+    return tl::make_unexpected(StartError(
+        kConfiguration, daemon->model + ": is an extended model, whose effects are not in what a flight learns: give " +
+                            "the one before, or adaptation.enabled = false in " + path));
+  const auto tau = config::load_tau_interval(daemon->model);
+  if (!tau) return wrong(tau.error());
+  const adapt::InFlightConstants air{vehicle->controller,
+                                     {.tau_low_s = (*tau)[0],
+                                      .tau_high_s = (*tau)[1],
+                                      .mean_horizontal = model->bound.mean_horizontal,
+                                      .mean_vertical = model->bound.mean_vertical},
+                                     daemon->adaptation.alpha};
+  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials), air};
 }
 
 namespace {
@@ -102,7 +143,10 @@ struct Flight {
       : settings(s),
         manager(m),
         port(port_at_start(s.daemon.link)),  // first: a start that fails there leaves no log behind
-        recorder(made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file); })),
+        factors(air_file(s)),
+        air(learns_from(s, factors.get())),
+        recorder(
+            made(kCannotCreate, [&] { return std::make_unique<Recorder>(s.daemon.log.file, part_bytes(s.daemon)); })),
         log(recorder->path()),
         link(std::move(port), static_cast<std::uint8_t>(s.daemon.link.system), std::chrono::steady_clock::now()),
         signing_time(sign(s.daemon, link)),
@@ -111,7 +155,7 @@ struct Flight {
             [&] { return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels); })),
         maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
         mission(s.vehicle),
-        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map, s.daemon.odometry.timing) {
+        loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map, s.daemon.odometry.timing, air) {
     link.pace(configured_line(s.daemon.link, s.daemon.odometry.timing).value());
     if (!s.daemon.gpio.chip.empty()) gpio.emplace(*channels, s.daemon.gpio);
   }
@@ -120,6 +164,8 @@ struct Flight {
   const ServiceManager& manager;
   std::unique_ptr<Channels> channels = std::make_unique<Channels>();
   firmware_bridge::Port port;
+  std::unique_ptr<AirFile> factors;  ///< null: none are kept
+  std::optional<adapt::InFlightConstants> air;
   std::unique_ptr<Recorder> recorder;
   const std::string log;  ///< file that the recorder began with
   firmware_bridge::AutopilotLink link;
@@ -140,8 +186,11 @@ void start(Flight& f) {
   const auto& daemon = f.settings.daemon;
   f.writer.start("recorder", [&] { f.recorder->run(channels, f.recorded); });
   if (f.signing_time) f.writer.start("signing time", [&] { run_signing_time(*f.signing_time, channels, f.recorded); });
-  f.threads.start("map worker",
-                  [&] { run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map); });
+  if (f.factors) f.writer.start("air file", [&] { run_air_file(*f.factors, channels, f.recorded); });
+  f.threads.start("map worker", [&] {
+    run_map_worker(channels, *f.recorder, f.settings.model, f.settings.vehicle, daemon.map,
+                   f.air ? std::optional(f.air->start) : std::nullopt);
+  });
   f.threads.start("planner", [&] {
     run_planner(
         channels, *f.recorder, [&](const track::AcceptedSegment& segment) { f.maps->send(segment); },
@@ -196,6 +245,17 @@ bool end(Flight& f) {
   return ended && closed;
 }
 
+/// The middleware ends what speaks by a certificate with that certificate, in flight too.
+void tell_of(const security::Credentials& c) {
+  constexpr std::int64_t kSoon_s = 30 * 86400;
+  const std::int64_t left_s = c.ends - std::time(nullptr);
+  if (left_s < kSoon_s)
+    spdlog::warn("DDS Security as {}: its certificate ends in {} days and {} h; a flight then ends with it", c.subject,
+                 left_s / 86400, left_s / 3600 % 24);
+  else
+    spdlog::info("DDS Security as {}", c.subject);
+}
+
 }  // namespace
 
 int run(const Settings& settings) {
@@ -213,6 +273,7 @@ int run(const Settings& settings) {
       spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}, raw log {}", settings.vehicle.name,
                    settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space,
                    flight->log);
+      if (const auto& c = settings.credentials) tell_of(*c);
       bool ready = false;  // the first ticks are on time only if the rest has started
       wait_for_end(signals, flight->failure, [&] {
         if (!ready && (ready = flight->channels->pulse.ticks >= kTicksToBeReady)) manager.ready();

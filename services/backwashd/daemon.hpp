@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 
+#include "core/adapt/in_flight.hpp"
 #include "core/config/daemon_config.hpp"
 #include "services/command_line/exit_code.hpp"
+#include "services/security/credentials.hpp"
 
 namespace backwash::daemon {
 
@@ -14,6 +17,8 @@ struct Settings {
   config::Daemon daemon;
   Vehicle vehicle;
   Model model;
+  std::optional<security::Credentials> credentials;  ///< of DDS Security; absent: everyone may speak
+  std::optional<adapt::InFlightConstants> air{};     ///< none: nothing is learnt of the air
 };
 
 /// Reads the daemon's file and the vehicle and model files that it names. Error: 66 where one of them is missing, 78

@@ -53,7 +53,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
                    spdlog::warn("DDS: {} ({} more left out)", printable(line, 240), left_out);
                  }),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface,
-                   {.priority = priority, .max_sample_bytes = kMaxSampleBytes}),
+                   {.priority = priority, .max_sample_bytes = kMaxSampleBytes}, config.dds.security),
       poses_(participant_, config),
       closures_(dds::make_reader<dds::TransformStamped>(participant_, config.dds.name_space)),
       commands_(dds::make_reader<dds::Command>(participant_, config.dds.name_space)),

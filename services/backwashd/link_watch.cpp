@@ -27,6 +27,10 @@ void tell(const ControlEvent& event, const ServiceManager& manager) {
       return spdlog::warn("control deadline missed: {} periods skipped", event.count);
     case ControlEvent::Kind::page_fault:
       return spdlog::warn("{} page faults in a control tick", event.count);
+    case ControlEvent::Kind::rougher:
+      return spdlog::warn(
+          "air of class {} is rougher: its variance is above {:.2f} times the model's, ln evidence {:.1f}",
+          to_string(event.air), event.factor, event.ln_evidence);
   }
 }
 

@@ -122,9 +122,9 @@ track::Surroundings Lookout::look(const track::FlightTick& flight, std::int64_t 
     }
   }
   // The planner has found that the newest snapshot does not leave the flight clear.
-  if (segment_ != 0 && channels_.blocked_segment.load(std::memory_order_relaxed) == segment_ && !tracker.finished() &&
-      !tracker.braking())
-    result.tube_blocked = true;
+  const bool goes_on = segment_ != 0 && !tracker.finished() && !tracker.braking();
+  if (goes_on && channels_.blocked_segment.load(std::memory_order_relaxed) == segment_) result.tube_blocked = true;
+  result.rougher = goes_on && channels_.rough_segment.load(std::memory_order_relaxed) == segment_;
   return result;
 }
 

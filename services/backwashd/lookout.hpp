@@ -30,6 +30,12 @@ class Lookout {
   /// it.
   track::Surroundings look(const track::FlightTick& flight, std::int64_t now_ns) noexcept;
 
+  /// Σ and class of the air at a place; real-time as look().
+  plan::AirPlace air_at(const Vec3& p_W) const noexcept {
+    if (!world_) return {};
+    return plan::air_at(world_->world->air, world_->world->grid, p_W);
+  }
+
  private:
   bool late(const track::Tracker& tracker, std::int64_t now_ns) const noexcept;
   bool catch_up(const track::Tracker& tracker, track::Surroundings& result) noexcept;

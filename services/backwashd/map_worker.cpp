@@ -11,6 +11,7 @@
 #include <span>
 #include <thread>
 
+#include "core/config/file_hash.hpp"
 #include "core/map/octomap_message.hpp"
 #include "services/backwashd/scan_placement.hpp"
 #include "services/dds/dds.hpp"
@@ -24,19 +25,16 @@ namespace {
 constexpr std::size_t kBytesPerVoxel = 115;
 // Resolutions for which the field is known to hold (tests/field/resolution_and_yaw_test.cpp), m.
 constexpr int kBelowTheRest = 10;  // niceness
+constexpr double kMadeFirst = 5;   // m level from the vehicle to the sides of what is made first
+constexpr int kWorthIt = 4;        // times as many voxels as that has a map of which a part is made first
 constexpr double kFinest = 0.02, kCoarsest = 0.2;
-
-// 64-bit FNV-1a.
-std::uint64_t hash(const std::vector<std::int8_t>& data) {
-  std::uint64_t h = 0xcbf29ce484222325;
-  for (const std::int8_t byte : data) h = (h ^ static_cast<std::uint8_t>(byte)) * 0x100000001b3;
-  return h;
-}
 
 // A rejected map is told apart by its hash: whoever sends 40 MB of anything does not fill the disk with it.
 void record(Recorder& recorder, const MapMessage& message, bool accepted) {
   const log::MapRecord head{message.resolution, message.binary, accepted};
-  const log::RejectedMap rejected{message.data.size(), accepted ? 0 : hash(message.data)};
+  const log::RejectedMap rejected{
+      message.data.size(),
+      accepted ? 0 : config::fnv1a({reinterpret_cast<const char*>(message.data.data()), message.data.size()})};
   const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
   const auto rest = accepted ? std::as_bytes(std::span(message.data)) : bytes_of(rejected);
   std::vector<std::uint8_t> bytes(sizeof head + rest.size());
@@ -65,7 +63,7 @@ map::ScanChange difference(const map::OccupancyGrid& before, const map::Occupanc
 struct Ended {};
 
 /// run_parallel, given up with Ended as soon as the daemon ends: a world may take minutes.
-plan::Parallel until_the_end(const std::atomic<bool>& stop) {
+Parallel until_the_end(const std::atomic<bool>& stop) {
   return [&stop](std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
     run_parallel(count, [&](std::size_t begin, std::size_t end) {
       if (stop) throw Ended{};
@@ -85,13 +83,14 @@ NewVoxels as_new_voxels(const map::OccupancyGrid& before, const map::ScanChange&
 }  // namespace
 
 MapWorker::MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
-                     const MapSettings& settings)
+                     const MapSettings& settings, const std::optional<AirFactors>& air)
     : channels_(channels),
       recorder_(recorder),
       model_(model),
       vehicle_(vehicle),
       settings_(settings),
-      parallel_(until_the_end(channels.stop)) {}
+      parallel_(until_the_end(channels.stop)),
+      air_(air) {}
 
 MapWorker::~MapWorker() {
   while (const auto scan = channels_.scans.pop()) delete *scan;
@@ -147,12 +146,32 @@ void MapWorker::take_map(const MapMessage& message) {
     publish(plan::update_world(*world_, std::move(*grid), change.box, model_, parallel_), message.received_ns);
   } else {
     live_.emplace(*grid);
-    publish(plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_),
-            message.received_ns);
+    if (!world_) publish_near(*grid, message.received_ns);  // what flies in another world is not cut short
+    auto world = plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_);
+    if (air_) world = plan::with_air(*world, *air_, model_, parallel_);
+    publish(std::move(world), message.received_ns);
+    channels_.map_partial = false;
   }
   ++channels_.maps_accepted;
   spdlog::info("map accepted: {} x {} x {} voxels, world {} in {} ms", size.x(), size.y(), size.z(),
                update ? "updated" : "built", (now_ns() - begun) / 1'000'000);
+}
+
+// Σ takes seconds in a building and longer on an office floor. Until then the vehicle may fly in what is around it.
+void MapWorker::publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns) {
+  if (const auto newest = channels_.vehicle_W.read_new()) vehicle_W_ = *newest;
+  if (!vehicle_W_ || air_ || !model_.extension.empty() || !grid.inside(grid.index(*vehicle_W_))) return;
+  const auto begun = now_ns();
+  const int by = static_cast<int>(std::ceil(kMadeFirst / grid.resolution()));
+  const Index3 v = grid.index(*vehicle_W_), last = grid.size() - Index3::Ones();
+  const map::VoxelBox columns{(v - Index3(by, by, v.z())).cwiseMax(0), (v + Index3(by, by, last.z())).cwiseMin(last)};
+  const Index3 extent = columns.high - columns.low + Index3::Ones();
+  if (static_cast<std::size_t>(extent.prod()) * kWorthIt > grid.cell_count()) return;
+  auto near = plan::build_part(grid, columns, model_, vehicle_, parallel_);
+  channels_.map_partial = true;
+  publish(std::move(near), received_ns);
+  spdlog::info("map: {:.0f} m around the vehicle can be flown after {} ms, the rest follows", kMadeFirst,
+               (now_ns() - begun) / 1'000'000);
 }
 
 bool MapWorker::take_scans() {
@@ -185,22 +204,42 @@ bool MapWorker::take_scans() {
   return true;
 }
 
+/// Factors that have grown enough: the world of the newest data, in rougher air.
+bool MapWorker::take_air() {
+  const auto said = channels_.air.read_new();
+  if (!said || !air_) return false;
+  air_ = larger(*air_, *said);
+  if (!world_) return false;
+  bool grew = false;
+  for (std::size_t k = 0; k < kAirClasses; ++k) grew = grew || (*air_)[k] >= (1 + kStep) * world_->air.factors[k];
+  if (!grew) return false;
+  const auto begun = now_ns();
+  publish(plan::with_air(*world_, *air_, model_, parallel_), channels_.map_ns.load().value_or(begun));
+  std::string line = "air";
+  for (std::size_t k = 0; k < kAirClasses; ++k)
+    line += std::string(" ") + to_string(static_cast<AirClass>(k)) + " " + std::to_string((*air_)[k]);
+  recorder_.append(log::RecordKind::world, line);
+  spdlog::info("world made anew in {} ms for rougher {}", (now_ns() - begun) / 1'000'000, line);
+  return true;
+}
+
 bool MapWorker::step() {
   const MapMessage* message = channels_.maps.take();
-  bool scanned = false;
+  bool scanned = false, rougher = false;
   try {
     if (message) take_map(*message);
     scanned = take_scans();
+    rougher = take_air();
   } catch (const Ended&) {  // the old world stays
   }
   if (message) channels_.maps.give_back(message);
   channels_.worlds.collect();
-  return message || scanned;
+  return message || scanned || rougher;
 }
 
 void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
-                    const MapSettings& settings) {
-  MapWorker worker(channels, recorder, model, vehicle, settings);
+                    const MapSettings& settings, const std::optional<AirFactors>& air) {
+  MapWorker worker(channels, recorder, model, vehicle, settings, air);
   bool below = false;
   while (!channels.stop) {
     if (!worker.step()) std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -16,11 +16,17 @@ namespace backwash::daemon {
 /// that has nothing free, another resolution than the one in use, or a snapshot above map.max_mib, is rejected whole
 /// and counted, and the old world stays (docs/faults.md rows 10 to 12); so is one of another writer than the first good
 /// one of its term (row 48). Scans that came meanwhile are taken in
-/// together, and the world is updated where they changed something.
+/// together, and the world is updated where they changed something. Of a first map that is far larger than what is
+/// around the vehicle, that part is made and handed out first. Where the flight has learnt that its air is rougher the
+/// world is made anew with the factors, and handed out like a new map.
 class MapWorker {
  public:
+  /// A world is made anew once a factor is larger by this share than the one it was made with.
+  static constexpr double kStep = 0.05;
+
+  /// `air`: factors to begin with; none: the air is as modelled, and nothing is learnt of it.
   MapWorker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
-            const MapSettings& settings);
+            const MapSettings& settings, const std::optional<AirFactors>& air = {});
   ~MapWorker();
   MapWorker(const MapWorker&) = delete;
   MapWorker& operator=(const MapWorker&) = delete;
@@ -31,7 +37,9 @@ class MapWorker {
  private:
   void take_map(const MapMessage& message);
   bool take_scans();
+  bool take_air();
   void reject(const std::string& why);
+  void publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns);
   void publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns);
 
   Channels& channels_;
@@ -39,14 +47,16 @@ class MapWorker {
   Model model_;
   Vehicle vehicle_;
   MapSettings settings_;
-  plan::Parallel parallel_;
+  Parallel parallel_;
+  std::optional<AirFactors> air_;    // as the control thread last said
   std::optional<MapWriter> writer_;  // of the maps in use
   std::optional<map::LiveMap> live_;
+  std::optional<Vec3> vehicle_W_;  // where the vehicle was last
   std::shared_ptr<const plan::World> world_;
 };
 
 /// Thread body.
 void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, const Vehicle& vehicle,
-                    const MapSettings& settings);
+                    const MapSettings& settings, const std::optional<AirFactors>& air = {});
 
 }  // namespace backwash::daemon

@@ -64,7 +64,10 @@ plan::Replan PlannerWorker::onward(const plan::World& world, const plan::Route& 
 std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
   std::optional<std::string> why;
   for (int attempt = 0; attempt < kPlans; ++attempt) {
+    const bool partial = channels_.map_partial;  // before the newest world is taken
     if (!current()) return kEnded;
+    if (partial && !world_->grid.inside(world_->grid.index(job.position)))
+      return "the map is still being made there; what is around the vehicle can be flown: ask again";
     const auto world = world_;  // a newer one may come while this is planned in
     const std::uint32_t closures = view_.closures;
     const auto options = limits_of(*world, view_.residual_m);

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <utility>
 
 #include "core/track/rebase.hpp"
@@ -60,6 +61,7 @@ void PlannerWorker::pursue() {
   const std::size_t now = view_.index, branch = now + p.lead;
   auto next = onward(*world_, route, now, branch, p.goal_W);
   using Kind = plan::Replan::Kind;
+  if (next.kind == Kind::kept && !braking) air_ = world_->air.factors;
   if (next.kind == Kind::kept || (braking && next.kind != Kind::extended)) return;
   if (next.kind == Kind::unsafe) return block("no way on is clear in the new map: " + metres(next.clearance_m));
   auto commands = std::move(next.route.commands);
@@ -72,19 +74,46 @@ void PlannerWorker::pursue() {
   verify(on, *world_, now);
   if (!(on.segment.clearance > 0)) return braking ? void() : verify_again();
   add_guards(on, *world_, now);
+  // Nowhere to go on in rougher air: stopped as it is verified there, and held.
+  const bool held = next.kind == Kind::stopping && !grown_air().empty() && !on.segment.stops.empty();
+  const AirFactors before = air_;
   const bool taken = offer(std::move(on));
   spdlog::info("{} from command {} on: {}{}", next.kind == Kind::extended ? "extended" : "stopping", branch,
                next.reaches_goal ? "to the goal" : next.message, taken ? "" : " (too late)");
   p.lead = taken ? kLeastLead : std::min(2 * p.lead, kMostLead);
   if (!taken) p.again_ns = 0;
+  if (!taken || !held) return;
+  air_ = before;
+  block("no way on is clear in it");
 }
 
 /// The flight does not go on as it was accepted: the control thread brakes it on its next verified stop.
 void PlannerWorker::block(const std::string& why) {
   if (blocked_ == flying_->segment.id) return;
   blocked_ = flying_->segment.id;
+  const std::string air = grown_air();
+  if (!air.empty()) {
+    channels_.rough_segment.store(blocked_, std::memory_order_relaxed);
+    const std::string line = "the flight is stopped in rougher air: " + why + air;
+    recorder_.append(log::RecordKind::world, line);
+    return spdlog::warn("{}", line);
+  }
   channels_.blocked_segment.store(blocked_, std::memory_order_relaxed);
   spdlog::warn("the flight is stopped: {}", why);
+}
+
+/// The classes whose factors have grown since what flies was last found clear, with factor and evidence; "": none has.
+std::string PlannerWorker::grown_air() const {
+  std::string text;
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    const double now = world_->air.factors[k];
+    if (!(now > air_[k])) continue;
+    char line[96];
+    std::snprintf(line, sizeof line, "; %s %.2f times the model's variance, ln evidence %.1f",
+                  to_string(static_cast<AirClass>(k)), now, view_.air ? view_.air->ln_evidence[k] : 0.0);
+    text += line;
+  }
+  return text;
 }
 
 /// The sets still to be flown, in the newest world: what is in it now, and with the bounds it has now.
@@ -93,6 +122,8 @@ void PlannerWorker::verify_again() {
   verify(again, *world_, view_.index);
   if (!(again.segment.clearance > 0))
     block("the rest of it is not clear in the new map: " + metres(again.segment.clearance));
+  else
+    air_ = world_->air.factors;
 }
 
 /// After a loop closure: the same flight, back to its place in the map from a little ahead of now. One that was told to

@@ -177,6 +177,7 @@ Flying PlannerWorker::continued(std::size_t branch, std::vector<Setpoint> comman
 bool PlannerWorker::offer(Flying next) {
   front_.stamp(next.segment);
   next.segment.seen_ns = seen_ns_;  // every caller verified it in the newest world
+  const AirFactors air = world_->air.factors;
   recorder_.append(log::RecordKind::offer, log::encode(next.segment));
   channels_.segments.offer(std::make_unique<const track::AcceptedSegment>(next.segment));
   for (std::size_t wait = 0; wait < kAnswerPauses && !channels_.stop; ++wait) {
@@ -188,6 +189,7 @@ bool PlannerWorker::offer(Flying next) {
       if (!next.segment.arms) recorder_.append(log::RecordKind::segment, segment_record(next));
       accepted_(next.segment);
       flying_ = std::move(next);
+      air_ = air;
       return true;
     }
     if (fate == PlanFront::Fate::refused) return false;

@@ -67,6 +67,7 @@ class PlannerWorker {
   bool pursues();
   void pursue();
   void block(const std::string& why);
+  std::string grown_air() const;
   void verify_again();
   std::optional<std::string> rectify();
   std::vector<Setpoint> moved_by_closure(std::size_t branch) const;
@@ -88,6 +89,7 @@ class PlannerWorker {
   PlanFront front_;
   std::uint64_t blocked_ = 0;
   std::optional<Flying> flying_;
+  AirFactors air_ = kModelledAir;  // in which that was last found clear
   std::optional<Pursuit> pursuit_;
 };
 

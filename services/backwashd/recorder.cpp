@@ -41,6 +41,19 @@ bool room_for(int fd, std::size_t bytes) {
   return std::uint64_t{disk.f_bavail} * disk.f_frsize >= bytes + std::min(kFloor, whole / kFloorShare);
 }
 
+std::int64_t wall_clock_ns() {
+  using namespace std::chrono;
+  return duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+/// Adds a record to others.
+void put_record(std::vector<std::uint8_t>& to, const log::RecordHeader& header, const std::uint8_t* bytes) {
+  const std::size_t at = to.size();
+  to.resize(at + sizeof header + header.size);
+  std::memcpy(to.data() + at, &header, sizeof header);
+  std::copy_n(bytes, header.size, to.data() + at + sizeof header);
+}
+
 /// The highest N of the files STEM-N.EXTENSION beside `name`; 1 if there is none.
 int highest_number(const fs::path& name) {
   const std::string before = name.stem().string() + "-", after = name.extension().string();
@@ -60,14 +73,15 @@ int highest_number(const fs::path& name) {
 
 }  // namespace
 
-Recorder::Recorder(const std::string& name) : name_(name), path_(name) {
+Recorder::Recorder(const std::string& name, std::int64_t part_bytes)
+    : name_(name), part_bytes_(part_bytes), log_(wall_clock_ns()), path_(name) {
   if (!create())
     throw std::runtime_error(name + ": raw log cannot be created: " + std::strerror(errno) +
                              "; give log.file a writable directory");
 }
 
 Recorder::~Recorder() {
-  const bool nothing = written_ == static_cast<std::int64_t>(std::string_view(log::kRawLogMagic).size());
+  const bool nothing = written_ == begun_;
   if (nothing && file_.get() >= 0 && still_there()) ::unlink(path_.c_str());
 }
 
@@ -86,12 +100,47 @@ bool Recorder::create() {
   file_ = firmware_bridge::FileDescriptor(fd);
   written_ = 0;
   told_lost_ = 0;
-  const std::string_view magic(log::kRawLogMagic);
-  if (fd < 0 || write({magic.begin(), magic.end()})) return fd >= 0;
+  if (fd < 0 || begin()) return fd >= 0;
   const int why = errno;
   ::unlink(path_.c_str());  // a full disk takes a name, and no byte behind it
   errno = why;
   return false;
+}
+
+/// What every file begins with: its first line, which part it is, and what an earlier part holds of the flight's world.
+bool Recorder::begin() {
+  const std::string_view magic(log::kRawLogMagic);
+  if (!write({magic.begin(), magic.end()})) return false;
+  std::vector<std::uint8_t> bytes;
+  const std::int64_t now = now_ns();
+  const log::PartRecord part{log_, wall_clock_ns() - now, part_ + 1, static_cast<std::uint32_t>(kept_.size())};
+  put_record(bytes, {now, log::RecordKind::part, sizeof part}, reinterpret_cast<const std::uint8_t*>(&part));
+  for (const auto& [kind, record] : kept_) bytes.insert(bytes.end(), record.begin(), record.end());
+  if (!write(bytes)) return false;
+  begun_ = written_;
+  ++part_;
+  return true;
+}
+
+void Recorder::keep(const log::RecordHeader& header, const std::uint8_t* bytes) {
+  if (header.kind != log::RecordKind::constants && header.kind != log::RecordKind::map) return;
+  if (log::MapRecord map; header.kind == log::RecordKind::map) {
+    if (header.size < sizeof map) return;
+    std::memcpy(&map, bytes, sizeof map);
+    if (!map.accepted) return;
+  }
+  auto& kept = kept_[header.kind];
+  kept.clear();
+  put_record(kept, header, bytes);
+}
+
+/// The next part, if this one is large enough and its last tick commanded nothing. One that cannot be made is looked
+/// for as one that has vanished.
+void Recorder::leave_part() {
+  if (written_ < part_bytes_ || mode_ != static_cast<std::uint32_t>(Mode::passive)) return;
+  if (::fdatasync(file_.get()) != 0) spdlog::warn("{}: not on the disk yet: {}", path_, std::strerror(errno));
+  const std::string before = path_;
+  if (create()) spdlog::info("{} is full; the log goes on in {}", before, path_);
 }
 
 bool Recorder::still_there() const {
@@ -139,9 +188,8 @@ void Recorder::append(log::RecordKind kind, const std::string& text) {
 }
 
 void Recorder::put(const log::RecordHeader& header, const std::uint8_t* bytes) {
-  const auto* head = reinterpret_cast<const std::uint8_t*>(&header);
-  batch_.insert(batch_.end(), head, head + sizeof header);
-  batch_.insert(batch_.end(), bytes, bytes + header.size);
+  put_record(batch_, header, bytes);
+  keep(header, bytes);
 }
 
 void Recorder::put_control(const ControlRecord& record) {
@@ -191,6 +239,7 @@ void Recorder::write_batch(std::uint64_t lost_in_ring) {
   in_batch_ = 0;
   batch_.clear();
   if (std::exchange(failing_, false)) spdlog::warn("{}: written again after {} records were lost", path_, lost.records);
+  leave_part();
 }
 
 void Recorder::drain(Channels& channels) {

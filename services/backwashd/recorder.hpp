@@ -3,6 +3,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
+#include <map>
 #include <mutex>
 #include <span>
 #include <string>
@@ -20,14 +22,17 @@ namespace backwash::daemon {
 ///
 /// A file that exists is never opened (row 45). `name` itself is taken if nothing has it, otherwise the next number
 /// above those in its directory: flight.bwlog, flight-2.bwlog, flight-3.bwlog … The file is 0640, and no link is
-/// followed. It is on the disk as far as the last change of the mode, and no more than a second back: a power cut costs
-/// that, a kill the 20 ms since the last batch. Of the disk 64 MiB are left to others, or a twentieth of a small one.
+/// followed. One that has grown beyond its size is left once the mode is passive, and the next part begins: a flight
+/// is in one of them. A part begins with what none can be read without: constants and the map. It is on the disk as far
+/// as the last change of the mode, and no more than a second back: a power cut costs that, a kill the 20 ms since the
+/// last batch. Of the disk 64 MiB are left to others, or a twentieth of a small one.
 class Recorder {
  public:
   static constexpr std::size_t kMostPending = 64u << 20;  ///< bytes of other threads' records that wait for the disk
 
-  /// Makes the file. Throws std::runtime_error naming it if that fails.
-  explicit Recorder(const std::string& name);
+  /// Makes the file. `part_bytes`: size beyond which a part is left. Throws std::runtime_error naming the file if it
+  /// cannot be made.
+  explicit Recorder(const std::string& name, std::int64_t part_bytes = std::numeric_limits<std::int64_t>::max());
   /// Removes the file if nothing was recorded: a start that failed leaves none.
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -47,6 +52,9 @@ class Recorder {
 
  private:
   bool create();
+  bool begin();
+  void keep(const log::RecordHeader& header, const std::uint8_t* bytes);
+  void leave_part();
   bool still_there() const;
   bool open_again(std::int64_t now);
   bool write(const std::vector<std::uint8_t>& bytes);
@@ -56,9 +64,14 @@ class Recorder {
   void fail(const char* why);
 
   const std::string name_;
+  const std::int64_t part_bytes_;
+  std::int64_t log_;                                           ///< of PartRecord
+  std::uint32_t part_ = 0;                                     ///< number of the file, from 1
+  std::map<log::RecordKind, std::vector<std::uint8_t>> kept_;  ///< whole records, for the beginning of the next part
   std::string path_;
   firmware_bridge::FileDescriptor file_;
   std::int64_t written_ = 0;  ///< bytes, all of whole records
+  std::int64_t begun_ = 0;    ///< of those the file's beginning
   std::int64_t checked_ns_ = 0;
   bool failing_ = false;
   std::uint32_t mode_ = 0;  ///< of the last tick record

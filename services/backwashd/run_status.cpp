@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The status's thread: what the other threads have said, as one message ten times a second.
 #include <algorithm>
+#include <cstdio>
 #include <thread>
 #include <vector>
 
@@ -40,9 +41,22 @@ Sequence sequence(std::vector<T>& values) {
   return {count, count, values.data(), false};
 }
 
+/// "ground 1.41 (8.2), …": factor, and ln of the evidence so far, of each class that was flown in or has a factor.
+std::string to_string(const AirView& air) {
+  std::string text;
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    if (!(air.seconds[k] > 0) && !(air.factors[k] > 1)) continue;
+    char line[64];
+    std::snprintf(line, sizeof line, "%s%s %.2f (%.1f)", text.empty() ? "" : ", ", to_string(static_cast<AirClass>(k)),
+                  air.factors[k], air.ln_evidence[k]);
+    text += line;
+  }
+  return text.empty() ? "as modelled" : text;
+}
+
 /// Owns what a message only points to, until it is sent.
 struct StatusStrings {
-  std::string state, reason, mismatch, stop_switch, autopilot, warning;
+  std::string state, reason, mismatch, stop_switch, autopilot, warning, air;
   std::vector<firmware_bridge::ParameterFinding> findings;
   std::vector<dds::Parameter> parameters;
   std::vector<dds::Advice> advice;
@@ -56,6 +70,7 @@ StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
                      std::string(name(view.stop_switch)),
                      std::string(name(view.autopilot)),
                      {},
+                     view.air ? to_string(*view.air) : "",
                      {},
                      {},
                      {}};
@@ -104,6 +119,7 @@ void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
   s.odometry_to_wire = timing(view.odometry_to_wire);
   s.autopilot = dds::c_string(text.autopilot);
   s.autopilot_says = dds::c_string(text.warning);
+  s.air = dds::c_string(text.air);
   s.parameters = sequence<decltype(s.parameters)>(text.parameters);
   s.advice = sequence<decltype(s.advice)>(text.advice);
 }

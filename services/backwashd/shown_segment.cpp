@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "core/reach/tube_boxes.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -34,7 +35,7 @@ ShownSegment::ShownSegment(const track::AcceptedSegment& segment, std::string ma
   shapes_.push_back(marker(0, kCube));
   shapes_.back().action = kDeleteAll;
   show_line();
-  show_boxes();
+  show_boxes(segment.tube);
   const auto shapes = static_cast<std::uint32_t>(shapes_.size());
   markers_.markers = {shapes, shapes, shapes_.data(), false};
 }
@@ -63,16 +64,8 @@ void ShownSegment::show_line() {
   shapes_.push_back(m);
 }
 
-void ShownSegment::show_boxes() {
-  const std::size_t each = (steps_.size() + kBoxes - 1) / kBoxes;
-  for (std::size_t from = 0; from < steps_.size(); from += each) {
-    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    for (std::size_t n = from; n < std::min(from + each, steps_.size()); ++n) {
-      const auto& s = steps_[n];
-      const Vec3 c(s.center.x, s.center.y, s.center.z), half(s.half_widths[0], s.half_widths[1], s.half_widths[2]);
-      low = low.cwiseMin(c - half);
-      high = high.cwiseMax(c + half);
-    }
+void ShownSegment::show_boxes(const reach::ReachTube& tube) {
+  for (const auto& [low, high] : reach::tube_boxes(tube, kBoxes)) {
     dds::Marker m = marker(static_cast<std::int32_t>(shapes_.size()), kCube);
     m.pose.position = point((low + high) / 2);
     m.scale = {high.x() - low.x(), high.y() - low.y(), high.z() - low.z()};

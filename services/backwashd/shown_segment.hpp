@@ -30,7 +30,7 @@ class ShownSegment {
  private:
   dds::Marker marker(std::int32_t id, std::int32_t type);
   void show_line();
-  void show_boxes();
+  void show_boxes(const reach::ReachTube& tube);
 
   std::string map_frame_;
   std::vector<dds::TubeStep> steps_;

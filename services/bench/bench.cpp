@@ -159,7 +159,8 @@ class Bench {
         log_(options.log),
         vio_(kVioShare * vehicle.estimation.position, options.seed + 1),
         priority_(allowed_fifo(kPriority)),
-        participant_(static_cast<std::uint32_t>(options.domain), options.interface, {.priority = priority_}),
+        participant_(static_cast<std::uint32_t>(options.domain), options.interface, {.priority = priority_},
+                     options.security),
         noise_(options.seed) {
     // It stands in for hardware: where it may, it runs before everything but the daemon's own real-time threads.
     if (priority_ > 0) set_fifo(priority_);

@@ -25,6 +25,7 @@ struct Options {
   std::uint64_t seed = 1;
   int domain = 0;
   std::string interface = "lo", name_space = "backwash";
+  std::string security;  ///< folder of credentials of DDS Security; empty: none
   double duration_s = 600;
   std::optional<double> stop_odometry_s, stop_heartbeat_s;  ///< s after arming
   std::map<std::string, double> parameters;                 ///< of the autopilot, in place of its own

@@ -14,6 +14,7 @@
 #include "services/command_line/exit_code.hpp"
 #include "services/command_line/words.hpp"
 #include "services/dds/dds.hpp"
+#include "services/security/credentials.hpp"
 #include "version.hpp"
 
 namespace {
@@ -59,6 +60,8 @@ void add_world(Command& app, Given& given) {
   app.add_option("--namespace", given.options.name_space, "the daemon's name space")
       .capture_default_str()
       .check(name_space());
+  app.add_option("--security", given.options.security,
+                 "folder of the VIO's credentials, if the daemon has dds.security");
   app.add_option("--duration", given.options.duration_s, "s").capture_default_str().check(positive());
   app.add_option("--log", given.options.log, "flight log of the truth, CSV");
   app.add_option("--wire", given.options.wire, "what arrived from the daemon, frame by frame, CSV");
@@ -167,6 +170,9 @@ void keep(const char* option, const std::string& path, bool force) {
 
 /// Reads the files that the options name, and runs.
 int run(bench::Options& o, const std::string& timeline) {
+  if (!o.security.empty())
+    if (const auto credentials = security::read_credentials(o.security); !credentials)
+      return failed(kConfiguration, "--security: " + credentials.error());
   const auto grid = map::load_map(o.map);
   if (!grid) return failed(missing(grid.error().kind) ? kNoInput : kBadData, grid.error().message);
   const auto vehicle = config::load_vehicle(o.vehicle);
@@ -210,6 +216,8 @@ int main(int argc, char** argv) {
     return finished(run(given.options, given.timeline), "backwash-bench");
   } catch (const StartError& e) {
     return failed(e.code, e.what());
+  } catch (const dds::NotPermitted& e) {
+    return failed(kConfiguration, e.what());
   } catch (const dds::Error& e) {
     return failed(kSystem, std::string(e.what()) + "; give an --interface and a --domain of this machine");
   } catch (const std::exception& e) {

@@ -7,6 +7,7 @@
 
 source "$(dirname "${BASH_SOURCE[0]}")/configuration.sh"
 bench_pid='' daemon_pid='' more_pids=() work=$(mktemp -d)
+ctl_options=() # of every backwashctl, --security for one
 log=$work/log
 : >"$log"
 # Domains above 200 would use port numbers that the system hands out itself.
@@ -51,14 +52,14 @@ start_daemon() {
 }
 
 # ctl VERB …: one command of the ground station; its failure ends the script.
-ctl() { "$bin/backwashctl" --domain "$domain" "$@" >>"$log" 2>&1 || die "backwashctl $1 failed: $(tail -n 1 "$log")"; }
+ctl() { "$bin/backwashctl" --domain "$domain" "${ctl_options[@]}" "$@" >>"$log" 2>&1 || die "backwashctl $1 failed: $(tail -n 1 "$log")"; }
 
 # Enables control; a daemon that has just started may not have heard its autopilot yet, or, while others start beside it, not
 # for the 1.5 s after which it goes quiet. The vehicle stands disarmed: asking again is safe.
 enable() {
   local answer
   for _ in $(seq 40); do
-    answer=$("$bin/backwashctl" --domain "$domain" enable --wait 2>&1) && return
+    answer=$("$bin/backwashctl" --domain "$domain" "${ctl_options[@]}" enable --wait 2>&1) && return
     echo "$answer" >>"$log"
     grep -Eq 'refused: no |no heartbeat from the autopilot|pose older than' <<<"$answer" || break
     sleep 0.25

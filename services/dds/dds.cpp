@@ -15,6 +15,7 @@
 #include <string_view>
 
 #include "services/dds/packet_filter.hpp"
+#include "services/dds/secured.hpp"
 
 // Takes the C library's place in every program that links this: the middleware receives by it and by nothing else.
 extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
@@ -34,6 +35,8 @@ constexpr int kTakeAtOnce = 64;
 constexpr const char* kReceiveBuffer = "32MiB";
 
 Entity checked(dds_return_t code, const std::string& what) {
+  if (code == DDS_RETCODE_NOT_ALLOWED_BY_SECURITY)
+    throw NotPermitted("DDS: " + what + ": the permissions of its credentials do not allow it");
   if (code < 0) throw Error("DDS: " + what + ": " + dds_strretcode(-code));
   return code;
 }
@@ -65,8 +68,10 @@ std::string configuration(const std::string& interface, const Receiving& receivi
 }
 
 // The middleware shares sockets and threads within a domain object, of which a process has one for each number. Another
-// number, which on the wire is the same domain, gives a participant its own.
-constexpr std::uint32_t kApart = 1000;  // above every domain that has ports
+// number, which on the wire is the same domain, gives a participant its own. It is one that has ports, because DDS
+// Security asks for it and knows no others.
+constexpr std::uint32_t kDomains = 231;
+std::uint32_t apart_from(std::uint32_t domain) { return (domain + kDomains / 2) % kDomains; }
 
 std::string on_the_wire(std::uint32_t domain) {
   return ",<CycloneDDS><Domain Id=\"any\"><Discovery><ExternalDomainId>" + std::to_string(domain) +
@@ -92,15 +97,19 @@ dds_qos_t* make_qos(Delivery delivery) {
 
 }  // namespace
 
-Participant::Participant(std::uint32_t domain, const std::string& interface, const Receiving& receiving) {
+Participant::Participant(std::uint32_t domain, const std::string& interface, const Receiving& receiving,
+                         const std::string& credentials) {
   const char* environment = std::getenv("CYCLONEDDS_URI");
   const std::string where = "domain " + std::to_string(domain) + " on interface " + interface;
-  const std::uint32_t number = domain + (receiving.apart ? kApart : 0);
+  const std::uint32_t number = receiving.apart ? apart_from(domain) : domain;
   const std::string chosen = environment ? environment : configuration(interface, receiving);
   if (receiving.apart || !environment)
     domain_ =
         checked(dds_create_domain(number, (chosen + (receiving.apart ? on_the_wire(domain) : "")).c_str()), where);
-  participant_ = checked(dds_create_participant(number, nullptr, nullptr), "participant in " + where);
+  dds_qos_t* const qos = secured(credentials);
+  const dds_return_t participant = dds_create_participant(number, qos, nullptr);
+  dds_delete_qos(qos);
+  participant_ = checked(participant, "participant in " + where);
 }
 
 Participant::~Participant() {

@@ -24,6 +24,11 @@ struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What this process's own permissions of DDS Security do not let it do.
+struct NotPermitted : Error {
+  using Error::Error;
+};
+
 using Entity = std::int32_t;
 
 constexpr double kLease_s = 2;
@@ -52,8 +57,10 @@ struct Receiving {
 class Participant {
  public:
   /// `interface`: network interface by name; with it, priority and size, ignored if the environment's CYCLONEDDS_URI
-  /// already configures the middleware (whose Domain Id then has to be "any"). Throws Error.
-  Participant(std::uint32_t domain, const std::string& interface, const Receiving& receiving = {});
+  /// already configures the middleware (whose Domain Id then has to be "any"). `credentials`: folder of DDS Security
+  /// that security::read_credentials found good; empty: without. Throws Error.
+  Participant(std::uint32_t domain, const std::string& interface, const Receiving& receiving = {},
+              const std::string& credentials = {});
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;

@@ -13,10 +13,11 @@ using Bytes = std::span<std::uint8_t>;
 
 constexpr std::size_t kHeader = 20, kSubmessageHeader = 4;
 constexpr std::uint8_t kPad = 0x01, kInfoTimestamp = 0x09, kData = 0x15, kDataFragment = 0x16;
-constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x0c;  // flags; payload: data or key
+constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02;                 // flags
+constexpr std::uint8_t kPayload = 0x0c, kDataFlag = 0x04, kFragmentKey = 0x04;  // data or key; in fragments one flag
 constexpr std::uint16_t kPidPad = 0, kPidSentinel = 1, kMustUnderstand = 0x4000;
 constexpr std::uint16_t kTypePids[] = {0x0072, 0x0075};  // of DDS-XTypes: object, information
-constexpr std::uint32_t kParticipantMessage = 0x000200c2, kStatelessMessage = 0x000201c3;
+constexpr std::uint32_t kParticipantMessage = 0x000200c2, kStatelessMessage = 0x000201c3, kTokenMessage = 0xff0202c3;
 
 std::atomic<std::uint64_t> filtered{0};
 
@@ -72,9 +73,13 @@ bool filter_data(Bytes body, std::uint8_t id, std::uint8_t flags) noexcept {
   constexpr std::uint32_t kBuiltin = 0xc0;
   if ((writer & kBuiltin) != kBuiltin && (reader & kBuiltin) != kBuiltin) return true;
   // The type lookup service has the entities 0x000300.. and 0x000301...
-  if (writer >> 9 == 0x000300u >> 1 || reader >> 9 == 0x000300u >> 1 || id == kDataFragment) return false;
-  const bool secured = writer == kStatelessMessage || writer >> 24 == 0xff;
-  return !(flags & kPayload) || secured || filter_builtin(rest, writer);
+  if (writer >> 9 == 0x000300u >> 1 || reader >> 9 == 0x000300u >> 1) return false;
+  // A handshake of DDS Security carries a certificate and permissions: several fragments. It is never a key, which the
+  // middleware would read through a null pointer.
+  const bool handshake = writer == kStatelessMessage || writer == kTokenMessage;
+  if (handshake) return id == kData ? (flags & kPayload) == kDataFlag : (flags & kFragmentKey) == 0;
+  if (writer >> 24 == 0xff) return true;
+  return id == kData && (!(flags & kPayload) || filter_builtin(rest, writer));
 }
 
 }  // namespace

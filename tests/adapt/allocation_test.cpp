@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include "core/adapt/adaptation.hpp"
+#include <cmath>
+
+#include "core/adapt/in_flight.hpp"
 #include "tests/support/allocations.hpp"
 
 namespace backwash::adapt {
@@ -21,6 +23,24 @@ TEST(AdaptRealTime, ATickDoesNotAllocate) {
   EXPECT_GT(told, 0);
   const AirSample sample;
   static_assert(noexcept(adaptation.add(sample))&& noexcept(adaptation.factor(AirClass::wall)));
+}
+
+TEST(AdaptRealTime, ATickInFlightDoesNotAllocate) {
+  InFlightConstants constants;
+  constants.controller = {{10, 12}, {5.5, 6}, 0.02, 0, 0.05};
+  InFlight air(constants);
+  int grown = 0;
+  EXPECT_EQ(test::allocations_during([&] {
+              for (int k = 0; k < 3000; ++k) {
+                AirTick tick{20'000'000LL * k, 0, {}, {}, Vec3::Constant(0.01), AirClass::wall};
+                tick.state.v_W.x() = 0.2 * std::sin(0.2 * k);
+                grown += air.add(tick);
+              }
+            }),
+            0);
+  EXPECT_GT(grown, 0) << "the ticks in which a factor grows are among them";
+  const AirTick tick;
+  static_assert(noexcept(air.add(tick)));
 }
 
 }  // namespace

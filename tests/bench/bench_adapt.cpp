@@ -3,12 +3,18 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <cstring>
 #include <ctime>
 #include <random>
 #include <vector>
 
-#include "core/adapt/adaptation.hpp"
+#include "core/adapt/in_flight.hpp"
+#include "core/config/config.hpp"
+#include "core/log/air_log.hpp"
+#include "core/map/load_map.hpp"
+#include "core/plan/world.hpp"
 
 namespace {
 
@@ -104,16 +110,62 @@ class Ratios : public benchmark::ConsoleReporter {
   double baseline_ = 0;
 };
 
+double now() {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return 1e9 * static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_nsec);
+}
+
+/// The daemon's tick by the monotonic clock: its decision alone, and with what it learns of the air (Σ and class at the
+/// place, the update, its record). By turns, so that both see the same machine.
+void spread_in_the_daemon() {
+  const Vehicle vehicle = config::load_vehicle("builtin:quad-5in").value();
+  const auto world =
+      plan::with_air(*plan::build_world(map::builtin_scene("parallel-walls-2m", 0.1).value(), Model{}, vehicle),
+                     kModelledAir, Model{});
+  InFlightConstants constants;
+  constants.controller = vehicle.controller;
+  InFlight air(constants);
+  track::FlightTick flight(vehicle, 0);
+  std::array<std::vector<double>, 2> ns;
+  std::mt19937_64 rng(1);
+  std::normal_distribution<double> normal;
+  std::array<std::uint8_t, 512> ring{};
+  track::TickInput in;
+  for (int k = 0; k < 120'000; ++k) {
+    in.now_ns += 20'000'000;
+    track::OdometrySample s;
+    s.received_ns = s.stamp_ns = in.now_ns;
+    s.state.p_W = Vec3(0.3 * std::sin(0.002 * k), 0, 1.2);
+    s.state.v_W = 0.002 * Vec3(normal(rng), normal(rng), normal(rng));
+    in.odometry = s;
+    const bool learns = k % 4 >= 2;  // two in a row: half of them after one that learnt too
+    const double before = now();
+    const auto out = flight.step(in);
+    if (learns) {
+      const auto place = plan::air_at(world->air, world->grid, flight.odometry()->state.p_W);
+      log::AirRecord r{};
+      std::copy_n(place.sigma.data(), 3, r.sigma);
+      r.air = static_cast<std::uint32_t>(place.air);
+      benchmark::DoNotOptimize(log::learn(air, flight, out, r));
+      std::memcpy(ring.data(), &r, sizeof r);
+    }
+    ns[learns].push_back(now() - before);
+    benchmark::DoNotOptimize(ring);
+  }
+  for (auto& x : ns) std::ranges::sort(x);
+  const auto at = [&](std::size_t learns, double share) {
+    return ns[learns][static_cast<std::size_t>(share * static_cast<double>(ns[learns].size()))];
+  };
+  std::printf("the daemon's decision, ns: p50 %.0f, p99 %.0f; with what it learns: p50 %.0f, p99 %.0f\n", at(0, 0.5),
+              at(0, 0.99), at(1, 0.5), at(1, 0.99));
+}
+
 /// Single ticks by the monotonic clock, its own cost in them.
 void spread() {
   const auto all = samples();
   Adaptation adaptation{Gusts{}};
   std::vector<double> ns, empty;
-  const auto now = [] {
-    timespec t{};
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return 1e9 * static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_nsec);
-  };
   double t = 0;
   for (int turn = 0; turn < 20; ++turn)
     for (AirSample sample : all) {
@@ -139,5 +191,6 @@ int main(int argc, char** argv) {
   Ratios reporter;
   benchmark::RunSpecifiedBenchmarks(&reporter);
   spread();
+  spread_in_the_daemon();
   return 0;
 }

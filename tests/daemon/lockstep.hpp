@@ -110,6 +110,8 @@ class Lockstep {
   /// daemon knows it.
   void slow_line(double baud, bool thinned);
 
+  std::optional<adapt::InFlightConstants> air;  ///< of the next restart(): it learns of its air
+
   bool vio_on = true;
   int vio_age_steps = 0;                       ///< ms between a sample's reception and the tick that sees it
   std::function<void(OdometrySample&)> spoil;  ///< changes each sample

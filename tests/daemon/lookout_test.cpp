@@ -157,6 +157,21 @@ TEST(Lookout, MissesNoPartOfAVoxelThatIsTurnedAgainstTheSets) {
 }
 
 // What the planner or the tick was told of: the vehicle brakes on a stop that leads away from the flight.
+// Row 54.
+TEST(Lookout, AFlightThatIsNotClearInRougherAirIsToldByItsNumberAloneUntilItBrakes) {
+  LongFlight f;
+  f.channels->rough_segment = 2;
+  EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).rougher);
+  f.channels->rough_segment = 1;
+  const auto seen = f.lookout.look(f.flight, f.in.now_ns);
+  EXPECT_TRUE(seen.rougher);
+  EXPECT_FALSE(seen.tube_blocked);
+  f.in.surroundings.rougher = true;
+  f.tick();
+  ASSERT_TRUE(f.flight.tracker().braking());
+  EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).rougher);
+}
+
 TEST(Lookout, WhileItBrakesTheStopIsWhatIsAheadAndTheBlockedFlightIsNoMore) {
   LongFlight f;
   for (reach::TubeStep& s : f.segment.stops[0].tube) s.center.p_W.z() += 3;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/backwashd/map_worker.hpp"
-
 #include <gtest/gtest.h>
 #include <malloc.h>
 #include <unistd.h>
@@ -8,48 +6,13 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <utility>
+#include <vector>
 
-#include "core/config/config.hpp"
-#include "core/map/load_map.hpp"
-#include "core/map/octomap_message.hpp"
+#include "tests/daemon/map_worker_rig.hpp"
 
 namespace backwash::daemon {
 namespace {
-
-class MapWorkerTest : public testing::Test {
- protected:
-  std::string log_ = std::filesystem::temp_directory_path() / ("backwash_map_worker." + std::to_string(getpid()));
-  std::unique_ptr<Channels> channels_ = std::make_unique<Channels>();
-  Recorder recorder_{log_};
-  MapSettings settings_;
-  MapWorker worker_{*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_};
-  map::OccupancyGrid grid_ = map::builtin_scene("parallel-walls-2m", 0.2).value();
-  const Snapshot* held_ = nullptr;
-
-  ~MapWorkerTest() override {
-    channels_->worlds.control.give_back(held_);
-    channels_->worlds.collect();
-    std::filesystem::remove(log_);
-  }
-  void send(std::vector<std::int8_t> data, double resolution, std::int64_t received_ns = 1) {
-    channels_->maps.offer(
-        std::make_unique<const MapMessage>(MapMessage{std::move(data), resolution, true, "OcTree", received_ns}));
-    EXPECT_TRUE(worker_.step());
-  }
-  void send(const map::OccupancyGrid& grid, std::int64_t received_ns = 1) {
-    send(map::encode_octomap(grid), grid.resolution(), received_ns);
-  }
-  /// The newest world that the control thread was handed, or the one from before.
-  const plan::World* world() {
-    if (const auto* newest = channels_->worlds.control.take())
-      channels_->worlds.control.give_back(std::exchange(held_, newest));
-    return held_ ? held_->world.get() : nullptr;
-  }
-  void scan(const std::vector<Vec3>& points, const Vec3& sensor, std::int64_t received_ns) {
-    channels_->scans.push(new Scan{points, sensor, received_ns});
-    EXPECT_TRUE(worker_.step() || channels_->scans_rejected > 0);
-  }
-};
 
 // Building one takes minutes where the map is large and the processor busy.
 TEST_F(MapWorkerTest, AWorldInTheMakingIsGivenUpWhenTheDaemonEnds) {
@@ -86,6 +49,39 @@ TEST_F(MapWorkerTest, InOneTermMapsAreTakenOfTheFirstWriterWhoseMapWasGood) {
   EXPECT_EQ(send_from(0, 1, good), std::pair(2ul, 2ul));
   EXPECT_EQ(send_from(1, 7, good), std::pair(3ul, 2ul)) << "the first writer is gone: a new term";
   EXPECT_EQ(send_from(1, 1, good), std::pair(3ul, 3ul));
+}
+
+// Row 54.
+TEST_F(MapWorkerTest, GrownFactorsMakeTheWorldAnewAndLaterMapsAndScansKeepThem) {
+  MapWorker worker(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_,
+                   AirFactors{1, 1, 1.5, 1, 1});
+  const auto take = [&](const map::OccupancyGrid& grid, std::int64_t at_ns) {
+    channels_->maps.offer(std::make_unique<const MapMessage>(
+        MapMessage{map::encode_octomap(grid), grid.resolution(), true, "OcTree", at_ns}));
+    EXPECT_TRUE(worker.step());
+    return world();
+  };
+  channels_->air.write({1, 1, 1.5, 1, 1});
+  EXPECT_FALSE(worker.step()) << "there is no world yet";
+  const plan::World* before = take(grid_, 7);
+  ASSERT_TRUE(before && before->air.known());
+  EXPECT_EQ(before->air.factors, (AirFactors{1, 1, 1.5, 1, 1})) << "what earlier flights have learnt";
+  channels_->air.write({1.04, 1, 1.5, 1, 1});
+  EXPECT_FALSE(worker.step()) << "less than a step";
+  EXPECT_EQ(world(), before);
+  channels_->air.write({1.04, 1, 2, 1, 1});
+  EXPECT_TRUE(worker.step());
+  ASSERT_NE(world(), before);
+  EXPECT_EQ(world()->air.factors, (AirFactors{1.04, 1, 2, 1, 1}));
+  EXPECT_EQ(channels_->map_ns.load(), 7) << "the map is no younger for it";
+  const Vec3 p(0, 0.5, 1.2);
+  EXPECT_GT(world()->bounds.at(grid_.index(p)).w[kX], 0);
+  channels_->air.write({1, 1, 1, 1, 1});
+  EXPECT_FALSE(worker.step()) << "no factor shrinks";
+  grid_.set(grid_.index({0, 0, 1}), map::Cell::occupied);
+  EXPECT_EQ(take(grid_, 8)->air.factors, (AirFactors{1.04, 1, 2, 1, 1}));
+  EXPECT_EQ(take(map::builtin_scene("parallel-walls-4m", 0.2).value(), 9)->air.factors, (AirFactors{1.04, 1, 2, 1, 1}))
+      << "a map of another place";
 }
 
 TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {

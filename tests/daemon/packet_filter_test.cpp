@@ -113,6 +113,30 @@ TEST(PacketFilter, ShutsOutTheTypeLookupServiceAndDiscoveryInFragments) {
   }
 }
 
+// A handshake has a certificate and permissions in it; what comes after it is authenticated.
+TEST(PacketFilter, LetsDdsSecurityThroughInFragmentsToo) {
+  constexpr std::uint32_t kHandshake = 0x000201c3, kVolatile = 0xff0202c3, kSecurePublications = 0xff0003c2;
+  for (const std::uint32_t writer : {kHandshake, kVolatile, kSecurePublications}) {
+    std::vector<Packet> good{data(writer, Packet(8, 0xf2)), data(writer, Packet(8, 0xf2), kFragment)};
+    good[1][1] = 0x01;  // of fragments the flag of data in a whole is that of a key
+    EXPECT_EQ(filtered(good), whole(good)) << writer;
+  }
+}
+
+// One packet with a key in place of a handshake's data is a null pointer in libddsc 0.10.2.
+TEST(PacketFilter, ShutsOutAHandshakeThatIsAKeyOrNothing) {
+  for (const std::uint32_t writer : {0x000201c3u, 0xff0202c3u}) {
+    for (const std::uint8_t flags : {0x01, 0x09, 0x0d}) {
+      Packet bad = data(writer, Packet(8, 0xf2));
+      bad[1] = flags;
+      EXPECT_EQ(filtered({bad})[20], kPad) << writer << " " << int{flags};
+    }
+    Packet key = data(writer, Packet(8, 0xf2), kFragment);
+    key[1] = 0x05;
+    EXPECT_EQ(filtered({key})[20], kPad) << writer;
+  }
+}
+
 TEST(PacketFilter, ShutsOutDiscoveryThatIsNotWellFormed) {
   const auto padded = [](Packet bad) {
     const Packet seen = filtered({bad, submessage(kHeartbeat, Packet(28))});

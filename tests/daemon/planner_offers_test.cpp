@@ -240,5 +240,15 @@ TEST(FlyingGuards, EveryStopThatIsOfferedIsClear) {
   for (const plan::Stop& stop : f.segment.stops) EXPECT_GT(plan::tube_clearance(*world, stop.tube), 0) << stop.branch;
 }
 
+TEST_F(PlannerOffers, AGoalWhereTheMapIsStillBeingMadeIsToldApartFromOneOutsideOfIt) {
+  know(room());
+  stand({1, 2, 1});
+  channels_->map_partial = true;
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {7, 2, 1}).find("still being made there"), std::string::npos);
+  EXPECT_EQ(ask(PlanJob::Kind::go_to, {2, 2, 1}), "");
+  channels_->map_partial = false;
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {7, 2, 1}).find("outside the map"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace backwash::daemon::test

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the planner does about a flight under way: in a new world, after a loop closure, when it is to brake.
+#include <fstream>
+
 #include "tests/daemon/planner_rig.hpp"
 
 namespace backwash::daemon::test {
@@ -30,6 +32,20 @@ class PlannerWatch : public PlannerOffers {
     return grid;
   }
   bool blocked() const { return channels_->blocked_segment != 0; }
+  bool rough() const { return channels_->rough_segment != 0; }
+  /// The same map, in air that is rougher by these factors.
+  void learn(const AirFactors& factors) {
+    world_ = plan::with_air(*world_, factors, Model{});
+    channels_->worlds.offer({world_, kSeen_ns + 1});
+    view_.air.emplace().factors = factors;
+    view_.air->ln_evidence.fill(7.25);
+    show();
+  }
+  std::string recorded() {
+    recorder_.drain(*channels_);
+    std::ifstream file(log_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
 };
 
 TEST_F(PlannerWatch, ATakeoffIsBlockedByWhatComesToStandInItsWayAndByNothingElse) {
@@ -68,6 +84,39 @@ TEST_F(PlannerWatch, AFlightWithoutAClearWayOnIsBlocked) {
   planner_.step();
   EXPECT_EQ(channels_->blocked_segment, view_.segment);
   EXPECT_EQ(offers_.size(), 1u);
+}
+
+// Row 54.
+TEST_F(PlannerWatch, AFlightThatIsClearInRougherAirGoesOnAndKeepsItsSets) {
+  fly_past(1.4);
+  const auto sets = offers_[0].tube;
+  learn({1.2, 1.2, 1.2, 1.2, 1});
+  planner_.step();
+  EXPECT_FALSE(blocked());
+  EXPECT_FALSE(rough());
+  EXPECT_EQ(offers_.size(), 1u) << "what was accepted is judged by the sets that it was accepted with";
+}
+
+TEST_F(PlannerWatch, AFlightThatIsNotClearInRougherAirIsStoppedForTheAirAndSaysWhich) {
+  fly_past(2.5);
+  learn({1, 100, 1, 1, 1});
+  planner_.step();
+  EXPECT_FALSE(blocked());
+  EXPECT_EQ(channels_->rough_segment, view_.segment);
+  const std::string log = recorded();
+  EXPECT_NE(log.find("ground 100.00 times the model's variance, ln evidence 7.2"), std::string::npos);
+  EXPECT_EQ(log.find("free_air 1"), std::string::npos) << "a class that is as modelled is not named";
+}
+
+TEST_F(PlannerWatch, AnObstacleInAirThatWasRoughBeforeIsAnObstacle) {
+  fly_past(1.4);
+  learn({1.2, 1.2, 1.2, 1.2, 1});
+  planner_.step();
+  world_ = plan::with_air(*world_of(walled(view_.state.p_W.x() + 0.6, false)), {1.2, 1.2, 1.2, 1.2, 1}, Model{});
+  channels_->worlds.offer({world_, kSeen_ns + 2});
+  planner_.step();
+  EXPECT_FALSE(rough());
+  EXPECT_EQ(channels_->blocked_segment, view_.segment);
 }
 
 TEST_F(PlannerWatch, AFlightThatWasStoppedIsNotExtended) {

@@ -26,14 +26,17 @@ namespace {
 
 class RecorderFault : public RecordedFolder {
  protected:
-  /// Number of records in the file, and what its last `lost` record says.
+  /// Number of records in the file beside the one that says which part it is, and what its last `lost` record says.
   std::pair<std::size_t, std::uint64_t> read() const {
     const auto log = log::read_raw_log(path_).value();
     EXPECT_FALSE(log.cut_at) << "a record was cut";
     std::uint64_t lost = 0;
-    for (const auto& r : log.records)
+    std::size_t parts = 0;
+    for (const auto& r : log.records) {
+      parts += r.header.kind == log::RecordKind::part;
       if (r.header.kind == log::RecordKind::lost) lost = log::payload<log::LostRecord>(r)->records;
-    return {log.records.size(), lost};
+    }
+    return {log.records.size() - parts, lost};
   }
 };
 
@@ -183,7 +186,9 @@ TEST_F(RecorderFault, EachStartMakesANewFileWithTheNextNumberAndTouchesNoOther) 
   EXPECT_EQ(ninth.path(), folder_ + "/flight-9.bwlog");
   EXPECT_EQ(content(path_), "an earlier flight");
   EXPECT_EQ(content(folder_ + "/flight-7.bwlog"), "flight-7.bwlog");
-  EXPECT_EQ(content(folder_ + "/flight-8.bwlog"), log::kRawLogMagic);
+  const auto begun = log::read_raw_log(folder_ + "/flight-8.bwlog").value();
+  ASSERT_EQ(begun.records.size(), 1u);
+  EXPECT_EQ(log::payload<log::PartRecord>(begun.records[0])->part, 1u);
   struct stat status {};
   const mode_t mask = ::umask(0);
   const Recorder open_to_all(path_);
@@ -207,7 +212,7 @@ TEST_F(RecorderFault, AStartThatFailsBeforeAnythingIsRecordedLeavesNoLogAndTouch
     put(1);
     recorder.drain(*channels_);
   }
-  EXPECT_EQ(log::read_raw_log(folder_ + "/flight-3.bwlog").value().records.size(), 1u);
+  EXPECT_EQ(log::read_raw_log(folder_ + "/flight-3.bwlog").value().records.size(), 2u);
   EXPECT_EQ(content(path_), "an earlier flight");
 }
 
@@ -248,7 +253,7 @@ TEST_F(RecorderFault, AFileThatWasReplacedInFlightIsLeftAndTheNextOneMade) {
   recorder.drain(*channels_);
   EXPECT_EQ(content(path_), "of somebody else");
   EXPECT_EQ(recorder.path(), folder_ + "/flight-2.bwlog");
-  EXPECT_EQ(log::read_raw_log(recorder.path()).value().records.size(), 4u);
+  EXPECT_EQ(log::read_raw_log(recorder.path()).value().records.size(), 1 + 4u);
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ def keys_of_code(source: str) -> dict[str, tuple[str, bool]]:
     table = re.search(r"TextKey texts\[\] = \{(.*?)\n  \};", source, re.S)
     for key in re.findall(r'\{"([\w.]+)", &', table[1] if table else ""):
         keys[key] = ("", True)
-    for body in re.findall(r"TextKey frames\[\] = \{(.*?)\};", source, re.S):
+    for body in re.findall(r"TextKey optional\[\] = \{(.*?)\};", source, re.S):
         keys.update({key: ("", False) for key in re.findall(r'\{"([\w.]+)", &', body)})
     for body in re.findall(r"std::string_view(?:> text_keys| k\w+\[\] =) ?\{([^}]*)\}", source):
         keys.update({key: ("", key == "name") for key in re.findall(r'"([\w.]+)"', body)})

@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 53
+ROWS = 54
 
 
 def known_tests(build: str) -> list[str]:

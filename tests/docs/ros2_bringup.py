@@ -81,6 +81,29 @@ def wrong_in_foxglove(layout: dict, interfaces: str, idl: dict) -> list[str]:
     return wrong
 
 
+def wrong_in_recorded(layout: dict, interfaces: str, idl: dict) -> list[str]:
+    """The layout for files of backwash export: by its table of topics, and members of ROS 2's types."""
+    types = {topic: type_.rsplit("/", 1)[1] for topics, type_ in re.findall(r"^\| ((?:`/[\w/]+`(?:, )?)+) \| (\w+/msg/\w+) \|", interfaces, re.M)
+             for topic in re.findall(r"`([^`]+)`", topics)}
+    panels = layout["configById"]
+    wrong = [] if sorted(placed(layout["layout"])) == sorted(panels) else ["foxglove: panels and places of the recorded one differ"]
+    if len(types) < 10:
+        wrong.append(f"foxglove: only {len(types)} topics of a recording are told")
+    shown = [t for panel in panels.values() for t in panel.get("topics", {})] + values(panels, {"value", "topicPath", "topicToRender"})
+    known = idl | {"String": {"data": "string"}, "Vector3Stamped": {"header": "Header_", "vector": "geometry_msgs::msg::dds_::Vector3_"}}
+    for path in shown:
+        topic, *members = path.split(".")
+        type_ = types.get(topic)
+        if not type_:
+            wrong.append(f"foxglove: {path} is no topic of a recording")
+        for member in members if type_ else []:
+            type_ = known.get(type_.rsplit("::", 1)[-1].removesuffix("_"), {}).get(member)
+            if not type_:
+                wrong.append(f"foxglove: {path}: no member {member}")
+                break
+    return wrong
+
+
 def wrong_in_launch(source: str, rviz: str) -> list[str]:
     names = [ast.literal_eval(node.value) for node in ast.parse(source).body
              if isinstance(node, ast.Assign) and node.targets[0].id == "TOPICS"]
@@ -95,7 +118,9 @@ def main() -> int:
     rviz, launch = (package / "rviz/backwash.rviz").read_text(), (package / "launch/backwash.launch.py").read_text()
     foxglove = json.loads((package / "foxglove/backwash.json").read_text())
     idl = members_of((root / "idl/backwash_msgs.idl").read_text())
-    wrong = wrong_in_rviz(rviz, interfaces) + wrong_in_foxglove(foxglove, interfaces, idl) + wrong_in_launch(launch, rviz)
+    recorded = json.loads((package / "foxglove/recorded.json").read_text())
+    every = idl | members_of((root / "idl/ros2.idl").read_text())
+    wrong = wrong_in_recorded(recorded, interfaces, every) + wrong_in_rviz(rviz, interfaces) + wrong_in_foxglove(foxglove, interfaces, idl) + wrong_in_launch(launch, rviz)
     manifest = (package / "package.xml").read_text()
     for module in re.findall(r"^from (\w+)", launch, re.M):
         if f"<exec_depend>{module}</exec_depend>" not in manifest:

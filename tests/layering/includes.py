@@ -27,7 +27,7 @@ MAY = {
     "core/adapt": ["core/types"],
     "core/plan": FLIGHT[:4],
     "core/track": FLIGHT[:5],
-    "core/log": ["core/files", *FLIGHT],
+    "core/log": ["core/files", "core/adapt", *FLIGHT],
     "core/sim": ["core/log", *FLIGHT],
     "core/report": ["core/log", "core/sim", *FLIGHT],
     STUDY + "windows": ["core/types", "core/map", "core/field", "core/log"],
@@ -41,15 +41,16 @@ MAY = {
     "firmware_bridge": ["core/types"],
     "services/parallel": [],
     "services/command_line": [],
-    "services/dds": ["idl"],
+    "services/security": [],
+    "services/dds": ["idl", "services/security"],
     "services/maps": ["core/types", "core/files", "core/map", "core/log"],
     # What flies sees neither the simulation nor what judges flights afterwards.
-    "services/backwashd": ["core/sync", "core/config", "core/log", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel",
-                           "services/command_line"],
-    "services/backwashctl": ["core/types", "core/files", "services/dds", "services/command_line"],
-    "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/dds", "services/parallel",
-                       "services/command_line"],
-    "services/backwash": ["core", "services/maps", "services/parallel", "services/command_line"],
+    "services/backwashd": ["core/sync", "core/config", "core/adapt", "core/log", *FLIGHT, "firmware_bridge", "services/security",
+                           "services/dds", "services/parallel", "services/command_line"],
+    "services/backwashctl": ["core/types", "core/files", "services/security", "services/dds", "services/command_line"],
+    "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/security", "services/dds",
+                       "services/parallel", "services/command_line"],
+    "services/backwash": ["core", "services/security", "services/maps", "services/parallel", "services/command_line"],
     "services/package": ["core/config", *FLIGHT],  # the library's example
 }
 # The worlds with hidden effects share no code with what looks for them. These ask the study, and no world includes them.

@@ -4,7 +4,7 @@
 The field of a box room agrees with this folder's own sum of equations 2-1 to 2-5 within 5 %. A world without an effect is told nothing.
 Nor is one whose attitude loop is of another order than the vehicle file's idealisation, with the mean lateness that the file tells.
 A load of 5 % and more, rotor drag, an uncompensated battery and a wrong attitude_lag are each named alone. The load's size is right within a
-tenth, the lag's within 15 ms.
+tenth, the lag's within 15 ms. With the model that the study wrote of a load of 9.7 %, the same flights are told nothing.
 """
 import json
 import os
@@ -19,7 +19,8 @@ from generate import ROOMS, generate
 from measure import study
 from room import variance
 
-SEED = 1  # of every world: one room
+SEED = 1  # of every world but one: one room
+HEAVY = "payload", 901  # a load whose form's error gains 31 nats
 
 
 def field_demands(program, folder):
@@ -57,11 +58,17 @@ def main():
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     with tempfile.TemporaryDirectory() as out:
-        worlds = [(name, SEED) for name in ("none", "sluggish", "payload", "flapping", "battery", "lag")]
+        worlds = [(name, SEED) for name in ("none", "sluggish", "payload", "flapping", "battery", "lag")] + [HEAVY]
         folders = list(generate(out, worlds))
         failures = field_demands(sys.argv[1], folders[0])
-        for (name, _), folder in zip(worlds, folders):
-            failures += study_demands(name, study(sys.argv[1], folder))
+        for (name, seed), folder in zip(worlds, folders):
+            if (name, seed) != HEAVY:
+                failures += study_demands(name, study(sys.argv[1], folder))
+                continue
+            study(sys.argv[1], folder, options=("--out", os.path.join(folder, "extended.toml")))
+            again = study(sys.argv[1], folder, "extended.toml")
+            if again["verdict"] != "nothing_found":
+                failures.append(f"{name}, with its own model: told {again['verdict']} {[c['set'] for c in again['causes']]}")
     for line in failures:
         print(line)
     sys.exit(bool(failures))

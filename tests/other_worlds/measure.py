@@ -18,11 +18,11 @@ BATCH = 16  # worlds simulated at once
 COLUMNS = ("alone", "beside", "set", "unknown", "nothing", "wrong")
 
 
-def study(program, folder):
-    """The study's JSON of one world."""
-    files = {k: os.path.join(folder, f) for k, f in (("--map", "room.bt"), ("--model", "model.toml"), ("--vehicle", "vehicle.toml"))}
+def study(program, folder, model="model.toml", options=()):
+    """The study's JSON of one world, with a model file of its folder."""
+    files = {k: os.path.join(folder, f) for k, f in (("--map", "room.bt"), ("--model", model), ("--vehicle", "vehicle.toml"))}
     logs = sorted(glob.glob(os.path.join(folder, "flight*.csv")))
-    command = [program, "study", "--quick", "--json"] + [x for pair in files.items() for x in pair] + ["--log"] + logs
+    command = [program, "study", "--quick", "--json", *options] + [x for pair in files.items() for x in pair] + ["--log"] + logs
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 

@@ -76,8 +76,8 @@ TEST(SafeSpace, BoxQueryEqualsCountingVoxels) {
   EXPECT_GT(only_opened, 20);
 }
 
-TEST(SafeSpace, KeepsRegionsApartUpToTheLastNumberAndNeverSplitsOne) {
-  OccupancyGrid grid({0, 0, 0}, 0.1, {60, 60, 40}, Cell::free);  // 72,000 voxels by themselves
+TEST(SafeSpace, KeepsRegionsApartUpToTheLastPartOfATileAndNeverSplitsOne) {
+  OccupancyGrid grid({0, 0, 0}, 0.1, {60, 60, 40}, Cell::free);  // 72,000 voxels by themselves, 2,048 of a tile
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (grid.voxel(n).sum() % 2) grid.set(grid.voxel(n), Cell::occupied);
   grid.set({3, 2, 0}, Cell::free);  // joins its four neighbours and the one above
@@ -86,9 +86,8 @@ TEST(SafeSpace, KeepsRegionsApartUpToTheLastNumberAndNeverSplitsOne) {
   EXPECT_EQ(cells.region({2, 2, 0}), cells.region({4, 2, 0}));
   EXPECT_TRUE(space.may_join({2, 2, 0}, {3, 2, 1}));
   EXPECT_FALSE(space.may_join({2, 2, 0}, {6, 2, 0}));
-  EXPECT_FALSE(space.may_join({0, 0, 0}, {59, 59, 38}));
-  EXPECT_EQ(cells.region({59, 59, 38}), SafeSpace::kLastRegion);
-  EXPECT_TRUE(space.may_join({57, 59, 38}, {59, 59, 38})) << "what is not known is not denied";
+  EXPECT_FALSE(space.may_join({0, 0, 0}, {58, 58, 38}));
+  EXPECT_TRUE(space.may_join({56, 58, 38}, {58, 58, 38})) << "what is not known is not denied";
   EXPECT_FALSE(cells.passable({58, 59, 38}));
 }
 

@@ -16,7 +16,7 @@ namespace {
 Vehicle vehicle_5in() { return config::load_vehicle("builtin:quad-5in").value(); }
 map::OccupancyGrid corridor() { return map::builtin_scene("parallel-walls-2m", 0.2).value(); }
 
-TEST(World, StoresTheFieldExactlyWhereTheVehiclesCentreCanBe) {
+TEST(World, HasBoundsExactlyWhereTheVehiclesCentreCanBe) {
   const Vehicle vehicle = vehicle_5in();
   const auto world = build_world(corridor(), Model{}, vehicle);
   std::size_t stored = 0;
@@ -24,7 +24,7 @@ TEST(World, StoresTheFieldExactlyWhereTheVehiclesCentreCanBe) {
     const Index3 v = world->grid.voxel(n);
     const double least = vehicle.body.radius - 0.2 * std::sqrt(3.0) / 2;
     const bool possible = world->grid.free(v) && world->distance.at(v) >= least;
-    ASSERT_EQ(world->field.has(v), possible);
+    ASSERT_EQ(world->bounds.at(v).w[kZ] > 0, possible);
     stored += possible;
     if (!possible) {
       EXPECT_FALSE(world->hover.safe(v));
@@ -43,9 +43,11 @@ TEST(World, TakesTheFootprintOfTheGroundTermFromTheVehicle) {
   const field::ProximityField exact(world->grid, expected);
   for (std::size_t n = 0; n < world->grid.cell_count(); n += 7) {
     const Index3 v = world->grid.voxel(n);
-    if (!world->field.has(v)) continue;
-    const double zz = exact.at(world->grid.center(v)).sigma().zz;
-    EXPECT_NEAR(world->field.at(v).zz, zz, 1e-6 * zz);
+    const double w = world->bounds.at(v).w[kZ];
+    if (!(w > 0)) continue;
+    const double exactly = bound(exact.at(world->grid.center(v)).sigma(), expected.bound).w[kZ];
+    EXPECT_GE(w, exactly * (1 - 1e-6));
+    EXPECT_LE(w, exactly * (1 + 1e-6 + reach::kBoundGrowth));
   }
 }
 
@@ -137,7 +139,6 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnew) {
       const Index3 v = grid.voxel(n);
       ASSERT_EQ(world->grid.at(n), anew->grid.at(n));
       ASSERT_EQ(world->distance.at(v), anew->distance.at(v));
-      ASSERT_EQ(world->field.has(v), anew->field.has(v)) << "round " << round;
       ASSERT_EQ(world->bounds.at(v).w, anew->bounds.at(v).w) << "round " << round;
       ASSERT_EQ(world->hover.safe(v), anew->hover.safe(v)) << "round " << round;
       differ += before->hover.safe(v) != anew->hover.safe(v);
@@ -178,11 +179,7 @@ TEST(World, OfABuildingUpdatedByRegionIsTheOneBuiltAnew) {
     std::size_t differ = 0;
     for (std::size_t n = 0; n < grid.cell_count(); ++n) {
       const Index3 v = grid.voxel(n);
-      ASSERT_EQ(updated->field.has(v), anew->field.has(v)) << v.transpose();
-      if (anew->field.has(v)) {
-        const Variance is = updated->field.at(v), was = anew->field.at(v);
-        ASSERT_TRUE(is.xx == was.xx && is.xy == was.xy && is.yy == was.yy && is.zz == was.zz) << v.transpose();
-      }
+      ASSERT_EQ(updated->bounds.at(v).w, anew->bounds.at(v).w) << v.transpose();
       ASSERT_EQ(updated->bounds.max_over_voxels(v, v + Index3(1, 3, 2)).w,
                 anew->bounds.max_over_voxels(v, v + Index3(1, 3, 2)).w);
       ASSERT_EQ(updated->hover.safe(v), anew->hover.safe(v)) << v.transpose();
@@ -217,10 +214,37 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnewForAWideVehicleToo) {
   const auto back = update_world(*anew, empty, changed, model);
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const Index3 v = grid.voxel(n);
-    ASSERT_EQ(back->field.has(v), before->field.has(v)) << v.transpose();
     ASSERT_EQ(back->bounds.at(v).w, before->bounds.at(v).w) << v.transpose();
     ASSERT_EQ(back->hover.safe(v), before->hover.safe(v)) << v.transpose();
   }
+}
+
+// What is made first of a large map: its bounds are those of the whole map, and what it calls safe is.
+TEST(World, OfAPartSaysWhatTheWholeOneSaysThere) {
+  const auto grid = map::builtin_scene("apartment", 0.1).value();
+  const auto whole = build_world(grid, Model{}, vehicle_5in());
+  const Index3 last = grid.size() - Index3::Ones();
+  std::size_t safe = 0, elsewhere = 0;
+  for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(1.7, 1.3, 0), Vec3(4, 2.5, 0)}) {
+    Index3 low = grid.index(corner).cwiseMax(0), high = (low + Index3(35, 30, 0)).cwiseMin(last);
+    low.z() = 0, high.z() = last.z();
+    const auto part = build_part(grid, {low, high}, Model{}, vehicle_5in());
+    for (std::size_t n = 0; n < part->grid.cell_count(); ++n) {
+      const Index3 v = part->grid.voxel(n);
+      ASSERT_EQ(part->grid.at(v), grid.at(low + v));
+      if (part->bounds.at(v).w[kZ] > 0) {
+        ASSERT_EQ(part->bounds.at(v).w, whole->bounds.at(low + v).w);
+      }
+      if (part->hover.safe(v)) {
+        ASSERT_TRUE(whole->hover.safe(low + v)) << (low + v).transpose();
+        const Vec3 p_W = part->grid.center(v);
+        ASSERT_LT((p_W - whole->grid.center(low + v)).norm(), 1e-9);
+      }
+      safe += part->hover.safe(v), elsewhere += whole->hover.safe(low + v) && !part->hover.safe(v);
+    }
+  }
+  EXPECT_GT(safe, 2000u);
+  EXPECT_GT(elsewhere, 200u);  // at the part's sides, which count as obstacles
 }
 
 }  // namespace

@@ -189,7 +189,7 @@ TEST(CompareScene, FliesTheSamePairsInTheSameAirWhateverTheOrderAndTheWork) {
   const auto world = world_of("apartment", vehicle_5in());
   const auto pairs = pairs_in(world, 6, 2);
   const std::vector<CompareMethod> twice = {{"tight"}, {"margin", reach::Method::tight, 0.1}, {"again"}};
-  const plan::Parallel backwards = [](std::size_t count, const auto& work) {
+  const Parallel backwards = [](std::size_t count, const auto& work) {
     for (std::size_t end = count; end > 0; --end) work(end - 1, end);
   };
   const auto one = compare_scene("apartment", world, pairs, twice);

@@ -149,7 +149,7 @@ TEST(Study, FindsNoMoreOfACauseThatItsExtendedModelHolds) {
   auto seen = world_with({"ceiling"}, 2);
   const auto before = studied(seen);
   ASSERT_EQ(study_worlds::told(before).substr(0, 7), "ceiling");
-  EXPECT_TRUE(study::apply(terms_of(before), seen).empty());
+  EXPECT_TRUE(study::apply(terms_of(before), seen).left.empty());
   for (const auto& cause : studied(seen).causes) EXPECT_NE(cause.found.form->cause(), "ceiling");
 }
 

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -39,6 +41,19 @@ TEST(StudyMatrix, CountsASetWithTheTruthAsNeitherRightAloneNorWrong) {
   EXPECT_FALSE(o.wrong_name());
   EXPECT_TRUE(told_of("unknown", {}, {"z_m"}).right());
   EXPECT_FALSE(told_of("trim", {{"trim"}}, {"z_m"}).right());
+}
+
+TEST(StudyMatrix, ReferenceFlightsAreOfTheWorldsOwnCraft) {
+  // Worlds of one seed have other rooms in other cells, and after another room the craft is drawn anew.
+  const auto path = std::filesystem::temp_directory_path() / ("study-matrix-craft-" + std::to_string(::getpid()));
+  const auto sound = [&](const char* confound) {
+    return study_worlds::sound_rotors(draw_world({4711, {}, 1, 12, confound}), path);
+  };
+  // A thread remembers the last craft that it flew; a new one remembers none.
+  const auto own = std::async(std::launch::async, [&] { return sound(""); }).get();
+  sound("bob");
+  EXPECT_EQ(sound("").mean, own.mean);
+  std::filesystem::remove_all(path);
 }
 
 TEST(StudyMatrix, WilsonsIntervalSolvesItsDefiningEquation) {

@@ -87,7 +87,7 @@ TEST(Extension, OfASaggingBatteryHoldsOnFlightsWithOtherVoltages) {
     if (further.windows[i].voltage > highest - 0.8)
       for (auto& weight : emptier.weight) weight[i] = 0;
   const double before = mean_square(emptier, kMeanZ);
-  ASSERT_TRUE(study::apply(terms_of(result), emptier).empty());
+  ASSERT_TRUE(study::apply(terms_of(result), emptier).left.empty());
   EXPECT_LT(mean_square(emptier, kMeanZ), 0.5 * before);
 }
 

@@ -17,7 +17,7 @@ namespace {
 using namespace backwash;
 using namespace backwash::study;
 using study_worlds::HiddenStructure;
-using Kind = HiddenStructure::Kind;
+using Hides = HiddenStructure::Kind;
 using Quantity = HiddenStructure::Quantity;
 using Where = HiddenStructure::Where;
 
@@ -54,7 +54,7 @@ StudyResult studied(const Observations& seen) {
 
 TEST(Structures, AGustOfOneFrequencyCommonToAllFlightsIsToldWithItsFrequency) {
   const auto seen =
-      world_with({Kind::tone, Where::up, {Quantity::t, Quantity::t}, {2 * M_PI * 0.07, 0}, {0.8, 0}, 0}, 1);
+      world_with({Hides::tone, Where::up, {Quantity::t, Quantity::t}, {2 * M_PI * 0.07, 0}, {0.8, 0}, 0}, 1);
   EXPECT_GT(seen.explained, 0.15);
   const auto result = studied(seen.observations);
   ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
@@ -64,7 +64,7 @@ TEST(Structures, AGustOfOneFrequencyCommonToAllFlightsIsToldWithItsFrequency) {
 }
 
 TEST(Structures, AThirdHarmonicOfTheHeadingIsTold) {
-  const auto seen = world_with({Kind::heading, Where::up, {Quantity::yaw, Quantity::t}, {3, 0}, {0.4, 0}, 0}, 1);
+  const auto seen = world_with({Hides::heading, Where::up, {Quantity::yaw, Quantity::t}, {3, 0}, {0.4, 0}, 0}, 1);
   EXPECT_GT(seen.explained, 0.15);
   const auto result = studied(seen.observations);
   ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
@@ -74,7 +74,7 @@ TEST(Structures, AThirdHarmonicOfTheHeadingIsTold) {
 
 TEST(Structures, AProductOfTwoPlacesIsToldWithBoth) {
   const auto seen = world_with(
-      {Kind::product, Where::level, {Quantity::x, Quantity::y}, {2 * M_PI / 3, 2 * M_PI / 3}, {0.3, 0.9}, 0.5}, 1);
+      {Hides::product, Where::level, {Quantity::x, Quantity::y}, {2 * M_PI / 3, 2 * M_PI / 3}, {0.3, 0.9}, 0.5}, 1);
   EXPECT_GT(seen.explained, 0.15);
   const auto result = studied(seen.observations);
   ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);

@@ -83,9 +83,12 @@ void observe_each(const HiddenWorld& world, const std::filesystem::path& folder,
 }
 
 study::SoundRotors sound_rotors(const HiddenWorld& world, const std::filesystem::path& folder) {
-  using Key = std::tuple<std::uint64_t, double, double>;  // worlds of one seed mostly have one craft
+  // Worlds of one seed mostly have one craft. An empty room is drawn from fewer numbers, and the craft after it is
+  // another one: with the motors' commands of one and the thrust curve of the other sound rotors look damaged.
+  using Key = std::tuple<std::uint64_t, double, double, double, double>;
   thread_local std::optional<std::pair<Key, study::SoundRotors>> last;
-  const Key craft(world.request.seed, world.craft.rotor_spread, world.craft.max_thrust);
+  const Key craft(world.request.seed, world.craft.rotor_spread, world.craft.max_thrust, world.craft.thr_mdl_fac,
+                  world.craft.mass);
   if (last && last->first == craft) return last->second;
   constexpr int kSound = 6, kOthers = 1000;
   HiddenWorld sound = world;

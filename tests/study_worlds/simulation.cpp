@@ -153,8 +153,10 @@ Proof prove(const ProofRequest& request, const std::filesystem::path& folder) {
   proof.told = told(result);
   auto further = observe(world, fresh, folder);
   auto extended = further;
-  study::apply(study::terms_of(result), extended);
-  proof.told_after = told(study::study(extended, quick(world, folder)));
+  auto after = with_reference(world, folder);  // with what remains, as `backwash study` asks it
+  after.minimum_detectable = false;
+  after.search.known = study::apply(study::terms_of(result), extended).known;
+  proof.told_after = told(study::study(extended, after));
   const auto named = std::find_if(result.causes.begin(), result.causes.end(),
                                   [&](auto& c) { return c.found.form->cause() == request.cause; });
   if (named == result.causes.end()) return proof;

@@ -15,7 +15,8 @@ inline std::vector<ExtensionTerm> terms_of(const StudyResult& result) {
                      f.form->formula,
                      f.scale,
                      {f.theta.data(), f.theta.data() + f.theta.size()},
-                     cause.applied.beside});
+                     cause.applied.beside,
+                     cause.gain.held_out_nats});
   }
   return terms;
 }

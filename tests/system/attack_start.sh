@@ -1,12 +1,31 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# What a start must not do (docs/faults.md rows 38, 45): with an invalid configuration no port is opened, no file is
-# waited for and nothing is made; a start that fails, and one that does not, leaves every earlier log byte for byte.
+# What a start must not do (docs/faults.md rows 29, 38, 45): with an invalid configuration, or with credentials that no
+# peer would take, no port is opened, no file is waited for and nothing is made; a start that fails, and one that does not,
+# leaves every earlier log byte for byte.
 #   attack_start.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 unset CYCLONEDDS_URI
+# Credentials of DDS Security, each with one thing wrong.
+keys() { "$2/services/backwash" keys "${@:3}" >/dev/null; }
+for authority in net others; do
+  keys "$@" init "$work/$authority"
+  for name in good other; do keys "$@" add "$work/$authority" $name --role vehicle; done
+done
+for bad in open keyless unlike foreign forged revoked tampered unfit ended; do cp -r "$work/net/good" "$work/$bad"; done
+chmod 0640 "$work/open/key.pem"
+rm "$work/keyless/key.pem"
+cp "$work/net/other/key.pem" "$work/unlike"
+cp "$work/others/good/identity_ca.cert.pem" "$work/foreign" && rm "$work/foreign/crl.pem"
+cp "$work/others/good/governance.p7s" "$work/forged"
+sed -i 's,rt/backwash/ack,rt/backwash/xyz,' "$work/tampered/permissions.p7s"
+cp "$work/net/other/permissions.p7s" "$work/unfit"
+cp "$work/net/other/"*.pem "$work/net/other/permissions.p7s" "$work/revoked"
+keys "$@" revoke "$work/net" other && cp "$work/net/crl.pem" "$work/revoked"
+keys "$@" add "$work/net" ended --role vehicle --until "$(date -u -d '+2 seconds' +%Y-%m-%dT%H:%M:%SZ)"
+cp "$work/net/ended/"* "$work/ended" && sleep 3
 python3 - "${2:?usage: attack_start.sh SOURCE_DIR BUILD_DIR}/services/backwashd" "$work" <<'PYTHON'
 import fcntl, os, select, signal, struct, subprocess, sys, time
 daemon, work = sys.argv[1:]
@@ -32,7 +51,7 @@ class Port:
 
 def configuration(port, **changed):
     keys = dict(vehicle="builtin:quad-5in", model="builtin:quad-5in", domain="9", interface="lo", namespace="backwash",
-                topic="rt/backwash/odometry", baud="921600", file=log, more="")
+                topic="rt/backwash/odometry", security="", baud="921600", file=log, more="")
     keys.update(changed)
     return """vehicle = "{vehicle}"
 model = "{model}"
@@ -41,6 +60,7 @@ domain = {domain}
 interface = "{interface}"
 namespace = "{namespace}"
 odometry_topic = "{topic}"
+{security}
 [link]
 device = "{device}"
 baud = {baud}
@@ -69,13 +89,13 @@ os.mkfifo(work + "/fifo")
 with open(work + "/large.toml", "wb") as f:
     f.truncate(1 << 40)
 cases = [
-    ("baud", {"baud": "12"}, ":10: key 'link.baud' = 12"),
-    ("unknown key", {"more": "turbo = 1"}, ":16: key 'control.turbo' = 1"),
+    ("baud", {"baud": "12"}, ":11: key 'link.baud' = 12"),
+    ("unknown key", {"more": "turbo = 1"}, ":17: key 'control.turbo' = 1"),
     ("domain", {"domain": "231"}, ":4: key 'dds.domain' = 231"),
     ("XML in the interface", {"interface": r"lo\"/><x y=\""}, ":5: key 'dds.interface'"),
     ("namespace", {"namespace": "back wash"}, ":6: key 'dds.namespace' = "),
     ("topic", {"topic": "rt/9lives"}, ":7: key 'dds.odometry_topic' = "),
-    ("not TOML", {"more": "]["}, ":16: not valid TOML"),
+    ("not TOML", {"more": "]["}, ":17: not valid TOML"),
     ("vehicle huge", {"vehicle": work + "/large.toml"}, "/large.toml: has 1048576 MiB, the cap is 1 MiB"),
 ]
 no_files = [
@@ -84,6 +104,13 @@ no_files = [
     ("model endless", {"model": "/dev/zero"}, "/dev/zero: is a device; needs the path of a TOML file"),
     ("model a directory", {"model": work}, ": is a directory; needs the path of a TOML file"),
 ]
+refused = dict(open="open/key.pem: has mode 0640, needs 0600", keyless="keyless/key.pem: cannot be opened: No such file",
+               unlike="unlike/cert.pem: is of another key", foreign="foreign/cert.pem: ", forged="forged/governance.p7s: is not signed",
+               tampered="tampered/permissions.p7s: is not signed", unfit="unfit/permissions.p7s: grants nothing to CN=good",
+               revoked="revoked/cert.pem: certificate revoked", ended="ended/cert.pem: certificate has expired",
+               absent="absent/key.pem: cannot be opened")
+cases += [("credentials " + folder, {"security": f'security = "{work}/{folder}"'}, f"dds.security: {work}/{words}")
+          for folder, words in refused.items()]
 for name, changed, words in cases + no_files:
     port = Port()
     open(path, "w").write(configuration(port.path, **changed))
@@ -126,10 +153,10 @@ time.sleep(5)
 running.send_signal(signal.SIGTERM)
 assert running.wait(20) == 0 and port.was_opened(), "a port that appeared was not opened"
 
-# A good one: the port is opened, and the log is a new file beside the earlier ones.
+# A good one, with good credentials: the port is opened, and the log is a new file beside the earlier ones.
 before = logs()
 port = Port()
-open(path, "w").write(configuration(port.path))
+open(path, "w").write(configuration(port.path, security=f'security = "{work}/net/good"'))
 running = subprocess.Popen([daemon, "--config", path], stderr=subprocess.PIPE, text=True)
 for line in running.stderr:
     if "raw log" in line:

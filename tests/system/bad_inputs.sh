@@ -165,7 +165,32 @@ refused 65 "has no point" field --map builtin:narrow-gap --model $quad --points 
 refused 64 "is no kind of recording; known are airgarage" import nanobench
 refused 64 "without --out" import --propose ms.csv -o logs
 refused 65 "import" calibrate --log corrupt.ulg --vehicle $quad
-refused 65 "raw log of backwashd; report" study --log corrupt.bwlog --vehicle $quad
+refused 65 "backwash export --csv" study --log corrupt.bwlog --vehicle $quad
+refused 65 "backwash export --csv" calibrate --log corrupt.bwlog --vehicle $quad
+printf 'backwash raw log 3\n' >begun.bwlog
+refused 65 "no tick flew a set-point" study --log begun.bwlog --vehicle $quad
+refused 65 "no tick flew a set-point" export begun.bwlog --csv begun.csv
+refused 64 "give --mcap, --csv or both" export begun.bwlog
+refused 64 "two outputs" export begun.bwlog --mcap both.out --csv ./both.out
+refused 66 "" export none.bwlog --mcap none.mcap
+refused 65 "does not begin as a raw log" export ms.csv --mcap none.mcap
+refused 65 "does not say which part" export begun.bwlog begun.bwlog --mcap none.mcap
+printf '\x89MCAP0\r\n' >begun.mcap
+refused 65 "byte 8: no channel /backwash/raw_log" replay --log begun.mcap
+refused 64 "needs two logs" merge begun.bwlog -o both.mcap
+refused 64 "is no autopilot's log by its name" merge begun.bwlog begun.mcap -o both.mcap
+refused 65 "no answer of the autopilot to TIMESYNC" merge begun.bwlog corrupt.ulg -o both.mcap
+refused 74 "cannot be written to its end" export begun.bwlog --mcap /dev/full --force
+# tables that no flight can be: gravity in the acceleration, heights downwards, an attitude without length
+flown() {
+  awk -v z="$1" -v a="$2" -v q="$3" 'BEGIN { print "t_s,x_m,y_m,z_m,ax_mps2,ay_mps2,az_mps2,qw,qx,qy,qz"
+    for (i = 0; i < 300; ++i) printf "%.2f,2,2,%.4f,0,0,%g,%g,0,0,0\n", i / 50, z + 0.05 * sin(i / 20), a, q }'
+}
+flown 1.2 9.81 1 >gravity.csv && flown -1.2 0 1 >downwards.csv && flown 1.2 0 0 >no_attitude.csv && flown 1.2 0 1 >sound.csv
+refused 65 "gravity.csv:1: az_mps2 has a median of 9.81 m/s²" study --log sound.csv gravity.csv --vehicle $quad
+refused 65 "downwards.csv:1: z_m is below the map" study --log downwards.csv --vehicle $quad --map builtin:apartment
+refused 65 "no_attitude.csv:1: qw, qx, qy and qz have no length of 1" study --log no_attitude.csv --vehicle $quad
+refused 65 "gravity.csv:1: az_mps2" study --log sound.csv --reference gravity.csv --vehicle $quad
 tune=(vehicle tune --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1)
 refused 66 "is a directory; needs the autopilot's parameter file" "${tune[@]}" --parameters .
 refused 66 "is a device; needs the autopilot's parameter file" "${tune[@]}" --parameters /dev/zero

@@ -7,13 +7,14 @@ mapfile -t verbs < <("$backwash" --help | sed -n '/^Subcommands:/,$ s/^  \([a-z]
 [[ ${#verbs[@]} -ge 13 ]] || die "only ${#verbs[@]} verbs in --help"
 verbs=("${verbs[@]/vehicle/vehicle tune}")
 verbs=("${verbs[@]/campaign/campaign plan}")
+verbs=("${verbs[@]/keys/keys init}")
 for verb in "${verbs[@]/#map/map info}" "map convert"; do
   read -ra words <<<"$verb"
   "$backwash" "${words[@]}" --help >help || die "$verb --help fails"
   grep -q "^  backwash $verb " help || die "$verb --help has no example"
   # One that needs no file of the reader's works as it stands. compare's takes minutes.
   sed -n '/^Example:/,$ { /^  /p; }' help >example.sh
-  [[ $verb == compare ]] || grep -qE '[a-z0-9*]+\.(csv|bwlog|toml|bt|ulg|obj|pcd)' example.sh && continue
+  [[ $verb == compare ]] || grep -qE '[a-z0-9*]+\.(csv|bwlog|mcap|toml|bt|ulg|obj|pcd)' example.sh && continue
   mkdir -p examples
   (cd examples && PATH=$(dirname "$backwash"):$PATH bash -e ../example.sh) >/dev/null || die "the example of $verb --help fails"
   examples+=("$verb")

@@ -1,25 +1,41 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # A hostile peer sends damaged copies of its own RTPS packets to daemon, bench and all (docs/faults.md row 47):
-# nobody dies, the daemon's memory stays bounded, and afterwards odometry and commands work as before.
-#   daemon_rtps_fuzz.sh SOURCE_DIR BUILD_DIR PACKETS [SEED]
+# nobody dies, the daemon's memory stays bounded, and afterwards odometry and commands work as before. Secured: they speak
+# by DDS Security, and the hostile peer has first no credentials, then those of another authority.
+#   daemon_rtps_fuzz.sh SOURCE_DIR BUILD_DIR PACKETS [SEED] [open|secured]
 set -euo pipefail
-source_dir=$1 build=$2 packets=$3 seed=${4:-1}
+source_dir=$1 build=$2 packets=$3 seed=${4:-1} mode=${5:-open}
 # The only peers must be ours: what is damaged goes to every port that is open.
-if [[ ${5:-} != inside ]]; then
+if [[ ${6:-} != inside ]]; then
   if ! unshare --net true 2>/dev/null; then
     echo "SKIPPED: needs the right to make a network namespace"
     exit 77
   fi
-  exec unshare --net bash -c 'ip link set lo up && exec "$@"' - "$0" "$source_dir" "$build" "$packets" "$seed" inside
+  exec unshare --net bash -c 'ip link set lo up && exec "$@"' - "$0" "$source_dir" "$build" "$packets" "$seed" "$mode" inside
 fi
 source "$source_dir/services/bench/session.sh"
-status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json"; }
+status() { "$bin/backwashctl" --domain "$domain" "${ctl_options[@]}" status --json >"$work/$1.json"; }
 resident() { awk '/VmRSS/ { print $2 }' "/proc/$daemon_pid/status"; }
-start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --duration 86400
+bench=()
+if [[ $mode == secured ]]; then
+  for keys in "$work/keys" "$work/others"; do "$build/services/backwash" keys init "$keys" >>"$log"; done
+  for role in vehicle vio station; do "$build/services/backwash" keys add "$work/keys" "$role" --role "$role" >>"$log"; done
+  "$build/services/backwash" keys add "$work/others" outsider --role vio --topic rt/backwash/command >>"$log"
+  more_dds="security = \"$work/keys/vehicle\""
+  bench=(--security "$work/keys/vio")
+  ctl_options=(--security "$work/keys/station")
+fi
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --duration 86400 "${bench[@]}"
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 before=$(resident)
-"$build/tests/rtps_fuzz" "$domain" backwash "$packets" "$seed" 2>"$work/fuzz" || { tail -n 3 "$work/fuzz"; die "a peer is gone"; }
+attack() { "$build/tests/rtps_fuzz" "$domain" backwash "$packets" "$seed" "$@" 2>"$work/fuzz" || { tail -n 3 "$work/fuzz"; die "a peer is gone, or met a stranger"; }; }
+if [[ $mode == secured ]]; then
+  attack outside
+  attack outside "$work/others/outsider"
+else
+  attack
+fi
 kill -0 "$daemon_pid" || die "the daemon died"
 kill -0 "$bench_pid" || die "the bench died"
 after=$(resident)

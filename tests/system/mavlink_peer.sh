@@ -6,14 +6,8 @@
 #   mavlink_peer.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
-for tool in node npm; do command -v $tool >/dev/null || { echo "skipped: mavlink_peer needs $tool"; exit 77; }; done
-modules=$build/node_peer
-if [[ ! -d $modules/node_modules/node-mavlink ]]; then
-  mkdir -p "$modules"
-  timeout 120 npm install --no-audit --no-fund --no-save --ignore-scripts --loglevel=error --prefix "$modules" \
-    node-mavlink@2.3.0 mavlink-mappings@1.0.21-20250824-1 >/dev/null 2>&1 ||
-    { rm -rf "$modules"; echo "skipped: mavlink_peer needs the npm registry (node-mavlink)"; exit 77; }
-fi
+source "$source_dir/tests/system/node_peer.sh"
+node_peer "$build" mavlink_peer node_peer node-mavlink@2.3.0 mavlink-mappings@1.0.21-20250824-1
 source "$source_dir/services/bench/session.sh"
 key=000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f other=${key//0/f}
 

@@ -2,8 +2,9 @@
 // A hostile participant, for tests/system/daemon_rtps_fuzz.sh (docs/faults.md row 47): it takes part in the domain as a
 // real peer with types that describe themselves, notes every packet that its own middleware sends, and sends damaged
 // copies of them to where they went. To be run in a network namespace of its own.
-//   rtps_fuzz DOMAIN NAMESPACE PACKETS SEED
-// Prints how many were sent, and how many the receivers' sockets had no room for; 1 if it never met a peer.
+//   rtps_fuzz DOMAIN NAMESPACE PACKETS SEED [outside [CREDENTIALS]]
+// Prints how many were sent, and how many the receivers' sockets had no room for; 1 if it never met a peer. Outside:
+// the peers speak by DDS Security, and it has no credentials or those of another authority; 1 if it does meet one.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -72,8 +73,8 @@ struct Peer {
   dds::Reader<dds::Status> statuses;
   dds::Reader<dds::Tube> tubes;
 
-  Peer(std::uint32_t domain, const std::string& name)
-      : participant(domain, "lo"),
+  Peer(std::uint32_t domain, const std::string& name, const std::string& credentials)
+      : participant(domain, "lo", {}, credentials),
         odometry(dds::make_writer<dds::Odometry>(participant, name)),
         maps(dds::make_writer<dds::Octomap>(participant, name)),
         clouds(dds::make_writer<dds::PointCloud>(participant, name)),
@@ -83,8 +84,8 @@ struct Peer {
         statuses(dds::make_reader<dds::Status>(participant, name)),
         tubes(dds::make_reader<dds::Tube>(participant, name)) {}
 
-  bool met() const {
-    for (int n = 0; n < 1000; ++n, std::this_thread::sleep_for(10ms))
+  bool met(int patience) const {
+    for (int n = 0; n < patience; ++n, std::this_thread::sleep_for(10ms))
       if (odometry.matched() > 0 && maps.matched() > 0 && commands.matched() > 0) return true;
     return false;
   }
@@ -166,7 +167,9 @@ extern "C" ssize_t sendmsg(int socket, const msghdr* message, int flags) {
 }
 
 int main(int argc, char** argv) {
-  if (argc != 5) return 64;
+  if (argc < 5) return 64;
+  const bool outside = argc > 5;
+  const std::string credentials = argc > 6 ? argv[6] : "";
   const auto domain = static_cast<std::uint32_t>(std::atoi(argv[1]));
   const auto packets = static_cast<long>(std::atof(argv[3]));
   constexpr long kPerPeer = 50'000;  // then its identities are spent
@@ -184,9 +187,9 @@ int main(int argc, char** argv) {
         const std::lock_guard guard(lock);
         corpus.clear();
       }
-      peer = std::make_unique<Peer>(domain, argv[2]);
-      if (!peer->met()) {
-        std::fprintf(stderr, "no peer after %ld packets\n", n);
+      peer = std::make_unique<Peer>(domain, argv[2], credentials);
+      if (peer->met(outside ? 200 : 1000) == outside) {
+        std::fprintf(stderr, "%s peer after %ld packets\n", outside ? "met a" : "no", n);
         return 1;
       }
     }

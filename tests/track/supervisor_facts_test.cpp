@@ -61,6 +61,7 @@ TEST(SupervisorFacts, EachEndsTrackingInItsOwnWay) {
       {Mode::hold, Reason::stop_requested, [](auto& in) { in.request = Request::stop; }},
       {Mode::hold, Reason::stop_requested, [](auto& in) { in.request = Request::disable; }},
       {Mode::hold, Reason::obstacle_ahead, [](auto& in) { in.obstacle_ahead = true; }},
+      {Mode::hold, Reason::air_rougher, [](auto& in) { in.air_rougher = true; }},
       {Mode::hold, Reason::outside_map, [](auto& in) { in.outside_map = true; }},
       {Mode::hold, Reason::map_late, [](auto& in) { in.map_late = true; }},
   };
@@ -78,11 +79,12 @@ TEST(SupervisorFacts, WhatSpeaksAgainstThePoseFreezesTheSetPointAndNothingElseDo
     bool freezes;
     Change change;
   } rows[] = {
-      {true, [](auto& in) { in.odometry_jump = true; }},   {true, [](auto& in) { in.odometry_inconsistent = true; }},
-      {true, [](auto& in) { in.odometry_frozen = true; }}, {true, [](auto& in) { in.odometry_disorder = true; }},
-      {true, [](auto& in) { in.odometry_age = 0.081; }},   {true, [](auto& in) { in.frames_agree = false; }},
-      {false, [](auto& in) { in.frames_apart = true; }},   {false, [](auto& in) { in.request = Request::stop; }},
-      {false, [](auto& in) { in.obstacle_ahead = true; }}, {false, [](auto& in) { in.autopilot_reset = true; }},
+      {true, [](auto& in) { in.odometry_jump = true; }},    {true, [](auto& in) { in.odometry_inconsistent = true; }},
+      {true, [](auto& in) { in.odometry_frozen = true; }},  {true, [](auto& in) { in.odometry_disorder = true; }},
+      {true, [](auto& in) { in.odometry_age = 0.081; }},    {true, [](auto& in) { in.frames_agree = false; }},
+      {false, [](auto& in) { in.frames_apart = true; }},    {false, [](auto& in) { in.request = Request::stop; }},
+      {false, [](auto& in) { in.obstacle_ahead = true; }},  {false, [](auto& in) { in.air_rougher = true; }},
+      {false, [](auto& in) { in.autopilot_reset = true; }},
   };
   for (const auto& row : rows) {
     const auto out = after(flying_after_takeoff(), row.change);
@@ -146,6 +148,7 @@ TEST(SupervisorFacts, EachEndsALiftOffInItsOwnWay) {
       {Mode::land, Reason::closure_refused, [](auto& in) { in.closure_refused = true; }},
       {Mode::land, Reason::battery_low, [](auto& in) { in.battery_low = true; }},
       {Mode::land, Reason::obstacle_ahead, [](auto& in) { in.obstacle_ahead = true; }},
+      {Mode::land, Reason::air_rougher, [](auto& in) { in.air_rougher = true; }},
       {Mode::land, Reason::outside_map, [](auto& in) { in.outside_map = true; }},
       {Mode::land, Reason::map_late, [](auto& in) { in.map_late = true; }},
       {Mode::tracking, Reason::lifted_off, [](auto& in) { in.lifted = true; }},

@@ -43,6 +43,26 @@ TEST(FlightTick, EveryHoldButTheOneForAnObstacleEndsWhatWasPlanned) {
   EXPECT_EQ(late.epoch().lapse, before.lapse + 1);
 }
 
+// Row 54: the stop is the verified one, and only a later command flies on.
+TEST(FlightTick, InAirThatIsRougherThanItWasVerifiedInItComesToRestOnTheNextVerifiedStop) {
+  Flight flight;
+  const Epoch before = flight.epoch();
+  const auto* stop = flight.tracker().next_stop();
+  ASSERT_TRUE(stop);
+  const Vec3 end = stop->commands.back().p_W;
+  flight.in.surroundings.rougher = true;
+  flight.step();
+  EXPECT_EQ(flight.out.supervisor.mode, Mode::hold);
+  EXPECT_EQ(flight.out.supervisor.reason, Reason::air_rougher);
+  EXPECT_TRUE(flight.tracker().braking());
+  EXPECT_EQ(flight.epoch().lapse, before.lapse + 1);
+  flight.in.surroundings.rougher = false;
+  for (int n = 0; n < 300; ++n) flight.step();
+  EXPECT_EQ(flight.out.supervisor.mode, Mode::hold);
+  EXPECT_EQ(flight.out.supervisor.reason, Reason::air_rougher);
+  EXPECT_LT((flight.out.command.p_W - end).norm(), 1e-9);
+}
+
 // Row 40: the motors start in the tick that accepts a take-off, and on the ground a stop stops them.
 TEST(FlightTick, ArmsInTheTickThatAcceptsATakeoffAloneAndDisarmsOnTheGroundAloneAfterAStop) {
   for (const bool arms : {true, false}) {

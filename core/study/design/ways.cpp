@@ -60,9 +60,7 @@ class Room {
   static Index3 up() { return {0, 0, 1}; }
 
  private:
-  bool holds(const Index3& v) const {
-    return region_ != plan::SafeSpace::kNoRegion && world_.safe.region(v) == region_;
-  }
+  bool holds(const Index3& v) const { return region_ != plan::Components::kNone && world_.safe.region(v) == region_; }
   const plan::World& world_;
   std::uint32_t region_;
   std::vector<Index3> voxels_;

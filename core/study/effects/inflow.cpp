@@ -12,6 +12,7 @@ Effect inflow() {
                      .possible = {{0, 5, "a climb takes thrust; 5 1/s would be half the weight at 1 m/s"}},
                      .floor = 0.01,
                      .one_sided = true,
+                     .needs = {Source::attitude, Source::thrust},  // a loop that is late looks like it
                      .columns =
                          [](const Windows& ws, const Scale&) {
                            return std::vector{lifting(

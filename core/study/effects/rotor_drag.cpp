@@ -50,6 +50,7 @@ Effect rotor_drag() {
                      .reference = Reference{1, "m/s", [](auto& w) { return w.speed; }},
                      .by_speed = true,
                      .floor = 0.01,
+                     .needs = {Source::attitude, Source::thrust},  // a loop that is late looks like it
                      .columns = against_velocity,
                      .shapes = {{.formula = "push -k v (1 + v/u)/(1 + 1 m/s/u), level: the body's drag beside it",
                                  .parameters = {},

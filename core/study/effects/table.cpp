@@ -62,6 +62,8 @@ std::optional<std::string> why_not_tested(const Form& form, const Observations& 
       return std::nullopt;
   if (!(seen.has(Source::thrust) && seen.has(Source::attitude)) && !seen.has(Source::setpoints))
     return "without thrust and attitude or set-points no push shows, and other effects in hover only";
+  if (!seen.has(Source::acceleration))
+    return seen.missing.at(Source::acceleration) + ": of differentiated motion the gusts are not told from its noise";
   return "no window measures it";
 }
 

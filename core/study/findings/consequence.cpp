@@ -142,7 +142,7 @@ std::pair<Vec3, Vec3> farthest(const std::vector<Vec3>& places, const std::vecto
 }  // namespace
 
 Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
-                        const map::OccupancyGrid* grid, const plan::Parallel& parallel) {
+                        const map::OccupancyGrid* grid, const Parallel& parallel) {
   Consequence c;
   const Added added = held_out(result, seen);
   c.before.inside = inside(seen, model.bound, nullptr);

@@ -35,6 +35,6 @@ struct Consequence {
 /// plan: between the two places farthest apart that are safe in the world before. Two worlds are built: seconds on a
 /// large map.
 Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
-                        const map::OccupancyGrid* grid, const plan::Parallel& parallel = plan::run_serial);
+                        const map::OccupancyGrid* grid, const Parallel& parallel = run_serial);
 
 }  // namespace backwash::study

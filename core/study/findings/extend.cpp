@@ -29,6 +29,7 @@ toml::table table_of(const NamedCause& cause, const Observations& seen) {
   toml::table term{{"cause", f.form->cause()},
                    {"form", f.form->formula},
                    {"held_out_nats", config::rounded(cause.gain.held_out_nats, 8)},
+                   {"flights", static_cast<std::int64_t>(seen.flights)},
                    {"theta", theta},
                    {"effect", effects},
                    {"simulation", simulation}};
@@ -48,23 +49,25 @@ toml::table table_of(const NamedCause& cause, const Observations& seen) {
 
 }  // namespace
 
-std::vector<ExtensionTerm> apply(const std::vector<ExtensionTerm>& terms, Observations& seen) {
-  std::vector<ExtensionTerm> left;
+AppliedTerms apply(const std::vector<ExtensionTerm>& terms, Observations& seen) {
+  AppliedTerms applied;
   for (const ExtensionTerm& term : terms) {
-    const auto known = std::find_if(catalogue().begin(), catalogue().end(), [&](const Form* f) {
+    const auto found = std::find_if(catalogue().begin(), catalogue().end(), [&](const Form* f) {
       return f->cause() == term.cause && f->formula == term.formula && f->parameters.size() == term.theta.size();
     });
     // An offset of zero displaces nothing: a file of before offsets were written as such.
-    const bool no_offset = known != catalogue().end() && (*known)->displaces_map && term.scale.offset_W.isZero();
-    if (known == catalogue().end() || no_offset || why_not_tested(**known, seen)) {
-      left.push_back(term);
+    const bool no_offset = found != catalogue().end() && (*found)->displaces_map && term.scale.offset_W.isZero();
+    if (found == catalogue().end() || no_offset || why_not_tested(**found, seen)) {
+      applied.left.push_back(term);
       continue;
     }
-    const Form& form = **known;
+    const Form& form = **found;
     auto columns = form.columns(moved_by_itself(form, seen.windows, term.scale,
                                                 Eigen::Map<const Eigen::VectorXd>(
                                                     term.theta.data(), static_cast<Eigen::Index>(term.theta.size()))),
                                 term.scale);
+    const double flights = term.flights > 0 ? static_cast<double>(term.flights) : static_cast<double>(seen.flights);
+    applied.known.push_back({columns, term.gain * static_cast<double>(seen.flights) / flights});
     auto coefficients = term.theta;
     for (const auto& column : companions(form, seen)) {
       if (coefficients.size() >= term.theta.size() + term.beside.size()) break;
@@ -75,7 +78,7 @@ std::vector<ExtensionTerm> apply(const std::vector<ExtensionTerm>& terms, Observ
       for (const auto& part : columns[k].parts)
         for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] -= coefficients[k] * part.x[i];
   }
-  return left;
+  return applied;
 }
 
 std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen) {

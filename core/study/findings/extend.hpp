@@ -14,11 +14,17 @@ struct ExtensionTerm {
   Scale scale;
   std::vector<double> theta;        ///< its parameters, in their order
   std::vector<double> beside = {};  ///< of its companions; empty in files of before they were stored
+  double gain = 0;                  ///< held out, nats, in the study that found it
+  std::size_t flights = 0;          ///< of that study; 0 in files of before they were stored
 };
 
-/// Takes the terms out of the observations: the simulation is then the extended model's. A term whose form or columns
-/// are unknown here is returned.
-std::vector<ExtensionTerm> apply(const std::vector<ExtensionTerm>& terms, Observations& seen);
+struct AppliedTerms {
+  std::vector<Known> known;         ///< for the search of what is left
+  std::vector<ExtensionTerm> left;  ///< of which form or columns are unknown here
+};
+
+/// Takes the terms out of the observations: the simulation is then the extended model's.
+AppliedTerms apply(const std::vector<ExtensionTerm>& terms, Observations& seen);
 
 /// What a cause adds to the model for field, reach and plan (core/study/README.md, "Extension"): pushes and factors of
 /// Σ by place and velocity; what depends on things that a plan does not know (battery, time, heading) by its range over

@@ -105,10 +105,11 @@ std::vector<std::pair<std::string, std::string>> untested(const Observations& se
 }
 
 /// Where nothing else was found, a dependence is a structure without a name, at its share of the verdict's level.
-/// Beside an accepted cause it is a hint: with enough flights the error of the cause's form is found as well.
+/// Beside an accepted cause, or one that the model holds, it is a hint: with enough flights the error of the cause's
+/// form is found as well.
 void look_at_what_remains(StudyResult& result, const Evidence& evidence, const std::vector<DesignColumn>& accepted,
                           const CauseSearchOptions& options) {
-  const bool silent = result.causes.empty() && result.unknown.empty();
+  const bool silent = result.causes.empty() && result.unknown.empty() && options.known.empty();
   const double level = silent ? kRules.dependence_share * options.accept_p : kRules.dependence_level.value;
   result.remaining = remaining_dependence(evidence, accepted, options.seed, level);
   if (!silent || result.remaining.empty() || !result.remaining.front().found) return;

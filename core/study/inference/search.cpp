@@ -29,15 +29,20 @@ unsigned disturbs(const std::vector<DesignColumn>& columns) {
   return kinds;
 }
 
-/// Gain that a further cause needs: a share of that of each accepted one whose form's error it might be, a larger one
-/// where it repairs it in the same moments of the thrust's or the commands' delay.
-double needed_gain(const SearchCandidate& candidate, const std::vector<Accepted>& accepted, double threshold) {
+/// Gain that a further cause needs beside one that has `gain`: a share of it where it might be the error of that one's
+/// form, a larger one where it repairs it in the same moments of the thrust's or the commands' delay.
+double needed_beside(const SearchCandidate& candidate, const std::vector<DesignColumn>& columns, double gain) {
+  if (!(disturbs(columns) & disturbs(candidate.columns))) return 0;
+  const bool repairs = dynamic(columns) && dynamic(candidate.columns);
+  return gain * (repairs ? kRules.repair_share : kRules.least_share);
+}
+
+/// Gain that a further cause needs beside the accepted ones and those that the model holds.
+double needed_gain(const SearchCandidate& candidate, const std::vector<Accepted>& accepted,
+                   const std::vector<Known>& known, double threshold) {
   double needed = threshold;
-  for (const auto& a : accepted) {
-    if (!(disturbs(a.columns) & disturbs(candidate.columns))) continue;
-    const double share = dynamic(a.columns) && dynamic(candidate.columns) ? kRules.repair_share : kRules.least_share;
-    needed = std::max(needed, share * a.gain);
-  }
+  for (const auto& a : accepted) needed = std::max(needed, needed_beside(candidate, a.columns, a.gain));
+  for (const auto& k : known) needed = std::max(needed, needed_beside(candidate, k.columns, k.gain));
   return needed;
 }
 
@@ -104,10 +109,11 @@ bool is_known(const SearchCandidate& c, const std::vector<Accepted>& accepted) {
 
 /// The cause that gains most beside what is accepted, more than `led` nats, but is none that a vehicle can have.
 std::optional<Refused> impossible(const std::vector<SearchCandidate>& all, const std::vector<Accepted>& accepted,
-                                  double threshold, double led) {
+                                  const std::vector<Known>& known, double threshold, double led) {
   std::optional<Refused> found;
   for (const auto& c : all) {
-    if (!c.form || is_known(c, accepted) || c.gain <= std::max(led, needed_gain(c, accepted, threshold))) continue;
+    if (!c.form || is_known(c, accepted) || c.gain <= std::max(led, needed_gain(c, accepted, known, threshold)))
+      continue;
     const auto theta = c.normal.fit();
     const auto k = c.beyond_possible(theta);
     if (!k || !c.large_enough(theta) || !excludes_zero(c.normal, c.columns)) continue;
@@ -119,11 +125,11 @@ std::optional<Refused> impossible(const std::vector<SearchCandidate>& all, const
 }
 
 const SearchCandidate* best_of(const std::vector<SearchCandidate>& all, const std::vector<Accepted>& accepted,
-                               double threshold, const Evidence& evidence) {
+                               const std::vector<Known>& known, double threshold, const Evidence& evidence) {
   const SearchCandidate* best = nullptr;
   for (const auto& c : all) {
     if (is_known(c, accepted) || (best && c.gain <= best->gain)) continue;
-    if (c.gain <= needed_gain(c, accepted, threshold) || !c.effect(c.normal.fit())) continue;
+    if (c.gain <= needed_gain(c, accepted, known, threshold) || !c.effect(c.normal.fit())) continue;
     if (c.form && error_of_form(*c.form, c.columns, c.gain, accepted, evidence)) continue;
     if (!c.form || excludes_zero(c.normal, c.columns)) best = &c;
   }
@@ -203,9 +209,10 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
                           options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value));
     if (step.named.empty() && step.structures.empty()) break;
     result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
-    const SearchCandidate* cause = best_of(step.named, result.accepted, step.threshold, evidence);
-    const SearchCandidate* structure = best_of(step.structures, result.accepted, step.structure_threshold, evidence);
-    if (const auto no = impossible(step.named, result.accepted, step.threshold, cause ? cause->gain : 0))
+    const SearchCandidate* cause = best_of(step.named, result.accepted, options.known, step.threshold, evidence);
+    const SearchCandidate* structure =
+        best_of(step.structures, result.accepted, options.known, step.structure_threshold, evidence);
+    if (const auto no = impossible(step.named, result.accepted, options.known, step.threshold, cause ? cause->gain : 0))
       result.refused.push_back(*no);
     if (structure && leads(*structure, cause, result.accepted)) {
       drop_means_of(structure->columns, structure->gain, result.accepted);

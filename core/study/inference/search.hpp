@@ -12,11 +12,18 @@
 
 namespace backwash::study {
 
+/// A cause that the model holds already and that is taken out of the observations.
+struct Known {
+  std::vector<DesignColumn> columns;
+  double gain;  ///< held out, nats, of as many flights as these
+};
+
 struct CauseSearchOptions {
   int flips = static_cast<int>(kRules.flips);  ///< sign draws of the null
   double accept_p = kRules.accept_p;           ///< family-wise, nominal; core/study/confusion.md says what it comes to
   unsigned seed = 1;
   std::size_t most_causes = static_cast<std::size_t>(kRules.most_causes);
+  std::vector<Known> known = {};  ///< what is left may be the error of their forms, as beside an accepted cause
   std::function<void(const std::string&)> progress = [](const std::string&) {};
 };
 

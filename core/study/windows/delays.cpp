@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/study/windows/observation.hpp"
 
@@ -17,6 +18,25 @@ double earlier(const Series& s, std::size_t i, double shift, int axis) {
   return s.a_nominal[k - 1][axis] + share * (s.a_nominal[k][axis] - s.a_nominal[k - 1][axis]);
 }
 
+/// Slope of a value over a sample's neighbours.
+template <typename F>
+auto slope_at(const Series& s, F value) {
+  return [&s, value](std::size_t i) {
+    const std::size_t a = i > 0 ? i - 1 : 0, b = std::min(i + 1, s.size() - 1);
+    return (value(b) - value(a)) / (s.t[b] - s.t[a]);
+  };
+}
+
+/// Values without their mean.
+template <typename F>
+std::vector<double> about_mean(SampleRange w, F value) {
+  std::vector<double> x;
+  for (std::size_t i = w.begin; i < w.end; ++i) x.push_back(value(i));
+  const double mean = std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
+  for (double& v : x) v -= mean;
+  return x;
+}
+
 }  // namespace
 
 /// How late and how steeply thrust and commands act.
@@ -25,11 +45,13 @@ void Observer::put_delays(const Series& s, SampleRange w) {
   if (s.simulated_by_thrust) {
     // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
     // design that shares their noise with the residual would be biased.
-    const auto r = detrended_values(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
-    const auto rate = rates(s, w, nominal(2)), level = detrended_values(w, nominal(2));
+    // Their means alone are taken out: up and down once in 3 to 5 s, half of what was asked for is a window's trend.
+    const auto r = about_mean(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
+    const auto rate = about_mean(w, slope_at(s, nominal(2))), level = about_mean(w, nominal(2));
     // A steeper curve adds a share of what was commanded; a first-order lag takes τ times the rate of what came of it.
-    const auto flown = detrended_values(w, [&](std::size_t i) { return s.thrust_acc[i]; });
-    const auto flown_rate = rates(s, w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); });
+    const auto flown = about_mean(w, [&](std::size_t i) { return s.thrust_acc[i]; });
+    const auto along = [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); };
+    const auto flown_rate = about_mean(w, slope_at(s, along));
     const Moment delay(rate), slope(level);
     ThrustMoments moments{seen_.windows.size() - 1};
     for (std::size_t i = w.begin; i < w.end; ++i) moments.mean[0] += s.a_nominal[i].z() / static_cast<double>(w.size());

@@ -84,7 +84,9 @@ Observer::Observer(const Vehicle& vehicle, MapView& surroundings) : vehicle_(veh
 
 void Observer::add(const log::FlightLog& log) {
   const Series s = series_of(log, vehicle_);
-  for (const auto& [name, column] : log.columns) ever_.insert(name);
+  for (const auto& [name, column] : log.columns)
+    if (!s.strayed || !name.starts_with("cmd_")) ever_.insert(name);
+  strayed_ = strayed_ || s.strayed;
   ++seen_.flights;
   if (static_cast<double>(s.size()) >= kWindowRules.fewest_rows) {
     const auto rotors = rotor_phases(log, s);
@@ -180,7 +182,8 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRan
 
 /// Means; returns the detrended residuals.
 Residual Observer::put_means(const WindowRow& row, const Series& s, SampleRange w) {
-  Residual rest{{}, row.sigma, simulated(s) || !under_way(s, w)};
+  // What differentiation makes of the noise of positions or velocities is no gust, and its share follows Σ.
+  Residual rest{{}, row.sigma, s.has_acceleration && (simulated(s) || !under_way(s, w))};
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };
@@ -248,6 +251,7 @@ Observations Observer::so_far() const {
   Observer copy(vehicle_, surroundings_);
   copy.seen_ = seen_, copy.thrust_stage_ = thrust_stage_, copy.thrust_moments_ = thrust_moments_;
   copy.command_stage_ = command_stage_, copy.tilt_stage_ = tilt_stage_, copy.tails_ = tails_, copy.ever_ = ever_;
+  copy.strayed_ = strayed_;
   return copy.finish();
 }
 
@@ -260,10 +264,13 @@ Observations Observer::finish() {
     for (const char* column : columns)
       if (!ever_.contains(column)) seen_.missing.emplace(source, std::string("no ") + column + " column");
   };
+  need(Source::acceleration, {"ax_mps2", "ay_mps2", "az_mps2"});
   need(Source::battery, {"battery_v"});
   need(Source::temperature, {"temperature_c"});
   need(Source::attitude, {"qw", "qx", "qy", "qz"});
   need(Source::thrust, {"thrust"});
+  if (strayed_ && !ever_.contains("cmd_x_m"))
+    seen_.missing.emplace(Source::setpoints, "the craft flew elsewhere than the set-points lead");
   need(Source::setpoints, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
   need(Source::rpm, {"rpm1", "rpm2", "rpm3", "rpm4"});
   need(Source::motors, {"motor1", "motor2", "motor3", "motor4"});

@@ -58,7 +58,18 @@ enum Channel : std::size_t {
 const char* channel_name(Channel c);
 
 /// What flights must hold for an effect to be tested: a map, or something above said by map or log; columns of the log.
-enum class Source : std::size_t { map, ceiling, battery, temperature, attitude, thrust, setpoints, rpm, motors };
+enum class Source : std::size_t {
+  map,
+  ceiling,
+  battery,
+  temperature,
+  attitude,
+  thrust,
+  setpoints,
+  rpm,
+  motors,
+  acceleration
+};
 
 /// Level offsets of the map at which Σ is looked up: a square of so many points.
 inline constexpr auto kOffsetsAside = static_cast<std::size_t>(kWindowRules.offsets_aside);
@@ -173,6 +184,7 @@ class Observer {
   DelayStage tilt_stage_;
   std::vector<Fourth> tails_;   // of every window
   std::set<std::string> ever_;  // columns that some flight had
+  bool strayed_ = false;        // some flight had set-points that it did not follow
   std::optional<MapView> own_;
   MapView& surroundings_;
 };

@@ -116,6 +116,21 @@ std::array<std::vector<Vec3>, kShifts.size()> answers(const Series& s, const Com
   return out;
 }
 
+/// Whether the craft flew where its set-points are, or where the loop would have led it, in half of the rows at least.
+/// Zeros beside commanded velocities, or positions of another frame, are no set-points that a loop has heard.
+bool follows(const Series& s, const Commands& cmd, const Loop& nominal, const Vehicle& vehicle) {
+  const double sunk = kWindowRules.stray + kWindowRules.sunk * kGravity / vehicle.controller.kp.vertical;
+  std::size_t far = 0;
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    const auto near = [&](const Vec3& p_W) {
+      const Vec3 off = s.p[i] - p_W;
+      return off.head<2>().norm() <= kWindowRules.stray && std::abs(off.z()) <= sunk;
+    };
+    far += near(cmd.p[i]) || near(nominal.p[i]) ? 0u : 1u;
+  }
+  return 2 * far <= s.size();
+}
+
 RowNumbers rising_rows(const std::vector<double>& t) {
   RowNumbers rows;
   for (std::size_t i = 0; i < t.size(); ++i)
@@ -141,6 +156,20 @@ void read_attitude(Series& s, const log::FlightLog& log, const RowNumbers& rows)
     Eigen::Quaterniond q(w[i], x[i], y[i], z[i]);
     s.R_WB.push_back(q.norm() > kWindowRules.no_attitude ? q.normalized().toRotationMatrix() : Mat3(Mat3::Identity()));
   }
+}
+
+/// What the set-points lead to, unless the craft flew elsewhere.
+void read_commands(Series& s, const Commands& cmd, const Vehicle& vehicle) {
+  Loop nominal = loop_of(s, cmd, vehicle, true);
+  s.strayed = !follows(s, cmd, nominal, vehicle);
+  if (s.strayed) return;
+  if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
+  Vehicle lagging = vehicle;
+  lagging.controller.attitude_lag += kWindowRules.more_lag;
+  s.a_lagging = loop_of(s, cmd, lagging, true).a;
+  s.v_dragged = loop_of(s, cmd, vehicle, true, kWindowRules.loop_drag).v;
+  if (s.simulated_by_thrust) s.answer = answers(s, cmd, vehicle);
+  s.p_nominal = std::move(nominal.p), s.v_nominal = std::move(nominal.v), s.a_nominal = std::move(nominal.a);
 }
 
 }  // namespace
@@ -172,17 +201,7 @@ Series series_of(const log::FlightLog& log, const Vehicle& vehicle) {
     for (std::size_t i = 0; i < s.size(); ++i)
       s.a_sim.push_back(s.R_WB[i].col(2) * s.thrust_acc[i] - kGravity * Vec3::UnitZ());
   }
-  if (commanded) {
-    const Commands cmd = commands_of(log, rows);
-    if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
-    Loop nominal = loop_of(s, cmd, vehicle, true);
-    Vehicle lagging = vehicle;
-    lagging.controller.attitude_lag += kWindowRules.more_lag;
-    s.a_lagging = loop_of(s, cmd, lagging, true).a;
-    s.v_dragged = loop_of(s, cmd, vehicle, true, kWindowRules.loop_drag).v;
-    if (s.simulated_by_thrust) s.answer = answers(s, cmd, vehicle);
-    s.p_nominal = std::move(nominal.p), s.v_nominal = std::move(nominal.v), s.a_nominal = std::move(nominal.a);
-  }
+  if (commanded) read_commands(s, commands_of(log, rows), vehicle);
   if (s.a_sim.empty()) s.a_sim.assign(s.size(), Vec3::Zero());
   return s;
 }

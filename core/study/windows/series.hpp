@@ -37,6 +37,7 @@ struct Series {
   std::array<std::vector<Vec3>, kShifts.size()> answer;
   std::vector<std::optional<int>> segment;  ///< hover position; none in transit or without the column
   bool simulated_by_thrust = false, has_velocity = false, has_acceleration = false;
+  bool strayed = false;  ///< there are set-points, and most of the time the craft flew elsewhere: they count as none
   std::size_t size() const { return t.size(); }
 };
 

@@ -90,6 +90,8 @@ struct WindowRules {
   Rule stray{"stray", 0.3, "m",
              "measured: halved, forward_speed is 1.041 in place of 1.030; doubled, nothing changes "
              "(core/study/windows/README.md)"};
+  Rule sunk{"sunk", 0.5, "of g",
+            "derived: the heaviest payload that is possible lets a craft hover so much over k_p below its set-point"};
   Rule one_place{
       "one_place", 0.05, "m",
       "measured: halved and doubled no window, name or size of the recordings changes (core/study/windows/README.md)"};

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/adapt/in_flight.hpp"
+
+#include "core/types/time.hpp"
+
+namespace backwash::adapt {
+namespace {
+
+constexpr double kAnew = 2 * Innovations::kLongestInterval;  // s: a gap to all that follows time
+
+Gusts by_differences(Gusts gusts) {
+  gusts.differences = true;
+  return gusts;
+}
+
+Disturbance disturbance_of(const InFlightConstants& constants) {
+  Vehicle vehicle;
+  vehicle.controller = constants.controller;
+  return Disturbance(vehicle);
+}
+
+}  // namespace
+
+InFlight::InFlight(const InFlightConstants& constants)
+    : disturbance_(disturbance_of(constants)),
+      adaptation_(by_differences(constants.gusts), constants.alpha),
+      factors_(larger(constants.start, kModelledAir)) {}
+
+// Since the tick before, by the stamps; nothing where there is none to compare with.
+std::optional<Vec3> InFlight::acceleration(const AirTick& tick) noexcept {
+  const double dt = last_ && last_->frame == tick.frame ? seconds(tick.stamp_ns - last_->stamp_ns) : 0;
+  const bool follows = dt > 0 && dt <= Disturbance::kGap;
+  t_s_ += follows ? dt : kAnew;
+  const Vec3 a_W = follows ? Vec3((tick.state.v_W - last_->state.v_W) / dt) : Vec3(Vec3::Zero());
+  last_ = tick;
+  return follows ? std::optional(a_W) : std::nullopt;
+}
+
+std::optional<Vec3> InFlight::noise(const Vec3& w_W) noexcept {
+  if (last_w_) squares_ += (w_W - *last_w_).cwiseAbs2(), ++steps_;
+  last_w_ = w_W;
+  return steps_ >= kLeastSteps ? std::optional<Vec3>(squares_ / (2 * steps_)) : std::nullopt;
+}
+
+bool InFlight::add(const AirTick& tick) noexcept {
+  const auto a_W = acceleration(tick);
+  if (!a_W) last_w_.reset();
+  const auto w_W = disturbance_.add({t_s_, tick.state, a_W.value_or(Vec3::Zero()), tick.command});
+  if (!w_W || !w_W->allFinite()) {
+    last_w_.reset();
+    return false;
+  }
+  const auto measured = noise(*w_W);
+  if (!measured || !adaptation_.add({t_s_, *w_W, tick.sigma, tick.air, *measured})) return false;
+  const AirFactors before = factors_;
+  factors_ = larger(factors_, adaptation_.factors());
+  return factors_ != before;
+}
+
+}  // namespace backwash::adapt

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/adapt/adaptation.hpp"
+#include "core/adapt/disturbance.hpp"
+
+namespace backwash::adapt {
+
+/// What the updates of a flight depend on beside its ticks.
+struct InFlightConstants {
+  decltype(Vehicle::controller) controller{};
+  Gusts gusts;                      ///< the noise is measured in flight
+  double alpha = kAlpha;            ///< in (0, 1)
+  AirFactors start = kModelledAir;  ///< what earlier flights have learnt, each ≥ 1
+};
+
+/// What one tick adds: the newest good odometry, the set-point of the tick that took it, and the model at its place.
+struct AirTick {
+  std::int64_t stamp_ns = 0;  ///< of the odometry
+  std::uint64_t frame = 0;    ///< another one: state and set-point are of a frame that moved meanwhile
+  State state;
+  Setpoint command;
+  Vec3 sigma = Vec3::Zero();  ///< modelled variance along x, y, z of W, (m/s²)²; 0: the map has none there
+  AirClass air = AirClass::none;
+};
+
+/// Adaptation in flight: acceleration by differences of the velocity, and its noise as the flight shows it, half the
+/// mean square of the steps of the disturbance so far: three times the noise of a velocity over dt², which covers what
+/// neighbouring groups share. Factors never fall. Of two with equal ticks every number is equal, bit for bit.
+class InFlight {
+ public:
+  static constexpr int kLeastSteps = 50;  ///< of which the noise is measured before anything is bet
+
+  explicit InFlight(const InFlightConstants& constants);
+
+  /// One tick; whether a factor grew. A stamp that does not rise, a gap and a frame that moved let it begin anew; what
+  /// has been learnt stays. Real-time: wait-free, no allocation.
+  bool add(const AirTick& tick) noexcept;
+
+  /// Each ≥ 1 and ≥ what it began with; none has ever fallen.
+  const AirFactors& factors() const noexcept { return factors_; }
+  const Bets& of(AirClass air) const noexcept { return adaptation_.of(air); }
+  std::uint64_t refused() const noexcept { return adaptation_.refused(); }  ///< samples
+
+ private:
+  std::optional<Vec3> acceleration(const AirTick& tick) noexcept;
+  std::optional<Vec3> noise(const Vec3& w_W) noexcept;
+
+  Disturbance disturbance_;
+  Adaptation adaptation_;
+  AirFactors factors_;
+  std::optional<AirTick> last_;
+  double t_s_ = 0;               // rises, whatever the stamps do
+  std::optional<Vec3> last_w_;   // of the tick before
+  Vec3 squares_ = Vec3::Zero();  // of the steps of w
+  int steps_ = 0;
+};
+
+}  // namespace backwash::adapt

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/adapt/in_flight.hpp"
+#include "core/log/raw_log.hpp"
+#include "core/track/flight_tick.hpp"
+
+/// What a flight learns of its air in the raw log: the daemon and a replay decide every update by the same code.
+namespace backwash::log {
+
+AirConstantsRecord constants(const adapt::InFlightConstants& constants) noexcept;
+/// The same again, bit for bit. Nothing: no number, or one out of its range.
+std::optional<adapt::InFlightConstants> decode(const AirConstantsRecord& record) noexcept;
+
+/// Whether a tick adds anything: its odometry is new and good, and set-points are flown, off the ground. Real-time:
+/// wait-free, no allocation.
+bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept;
+
+/// Adds a tick that was flown() to what is learnt, with Σ and class of the record, and writes what was decided into it;
+/// whether a factor grew. Real-time: wait-free, no allocation.
+bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out,
+           AirRecord& record) noexcept;
+
+}  // namespace backwash::log

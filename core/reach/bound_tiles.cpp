@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/bound_tiles.hpp"
+
+#include <algorithm>
+#include <memory>
+
+namespace backwash::reach {
+namespace {
+
+constexpr int kAhead = (1 << (BoundTiles::kLevels - 1)) - 1;  // from a cube's lowest voxel to its last
+
+void raise(BoundCodes& maximum, const BoundCodes& other) noexcept {
+  for (std::size_t d = 0; d < kDirections; ++d) maximum[d] = std::max(maximum[d], other[d]);
+}
+
+bool some(const BoundCodes& codes) noexcept {
+  return std::ranges::any_of(codes, [](BoundCode code) { return code != 0; });
+}
+
+map::VoxelBox grown(const map::VoxelBox& box, int below, int above, const Index3& size) {
+  return map::common({box.low - Index3::Constant(below), box.high + Index3::Constant(above)}, map::all_of(size));
+}
+
+/// Codes over a box, padded to whole vectors.
+struct alignas(16) Padded {
+  std::array<BoundCode, 8> code{};
+};
+
+/// Each of them becomes its maximum with the one `step` further on along each axis in turn.
+void pool_all(std::vector<Padded>& codes, const Index3& extent, int step) noexcept {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index3 on = step * Index3::Unit(axis);
+    const std::size_t ahead = static_cast<std::size_t>(on.x() + extent.x() * (on.y() + extent.y() * on.z()));
+    map::for_each_voxel(map::all_of(extent), [&](const Index3& v) {
+      if (v[axis] + step >= extent[axis]) return;
+      const std::size_t n = map::linear(extent, v);
+      for (std::size_t d = 0; d < 8; ++d) codes[n].code[d] = std::max(codes[n].code[d], codes[n + ahead].code[d]);
+    });
+  }
+}
+
+}  // namespace
+
+struct BoundTiles::Marks {
+  map::VoxelBox box;
+  std::vector<std::uint8_t> mark;
+  std::uint8_t& at(const Index3& v) { return mark[map::linear(box.high - box.low + Index3::Ones(), v - box.low)]; }
+  bool at(const Index3& v) const { return mark[map::linear(box.high - box.low + Index3::Ones(), v - box.low)]; }
+};
+
+BoundTiles::BoundTiles(const Index3& size) : tiles_(size, std::make_shared<const Tile>()) {}
+
+// A voxel has an entry if its largest cube holds one whose w̄ is stored: dilation, axis by axis.
+BoundTiles::Marks BoundTiles::entered(const map::VoxelBox& changed, std::span<const std::size_t> listed) const {
+  Marks marks{grown(changed, kAhead, kAhead, size()), {}};
+  const Index3 extent = marks.box.high - marks.box.low + Index3::Ones();
+  map::for_each_voxel(marks.box,
+                      [&](const Index3& v) { marks.mark.push_back(!changed.contains(v) && some(at(v).level[0])); });
+  for (const std::size_t n : listed) marks.at(map::voxel(size(), n)) = 1;
+  std::size_t stride = 1;
+  for (int axis = 0; axis < 3; stride *= static_cast<std::size_t>(extent[axis++]))
+    map::for_each_voxel(map::all_of(extent), [&](const Index3& v) {
+      std::uint8_t& here = marks.mark[map::linear(extent, v)];
+      for (int step = 1; step <= kAhead && v[axis] + step < extent[axis]; ++step)
+        here |= (&here)[static_cast<std::size_t>(step) * stride];
+    });
+  return marks;
+}
+
+// What is outside the changed box is taken over.
+BoundTiles::Tile BoundTiles::renumbered(std::size_t tile, const map::VoxelBox& changed, const Marks& marks) const {
+  const map::VoxelBox anew = grown(changed, kAhead, 0, size());
+  const Tile& old = tiles_[tile];
+  Tile fresh;
+  const map::VoxelBox box = tiles_.voxels(tile);
+  std::vector<std::size_t> kept;  // where the entry of each voxel was
+  map::for_each_voxel(box, [&](const Index3& v) {
+    const std::size_t n = Grid::within(v);
+    if (!(anew.contains(v) ? marks.at(v) : old.rank[n] != 0)) return;
+    fresh.rank[n] = 1;
+    kept.push_back(changed.contains(v) ? 0 : old.entry_of(n));
+  });
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < kVoxels; ++n) {
+    if (n % kRun == 0) fresh.before[n / kRun] = static_cast<std::uint16_t>(count);
+    if (fresh.rank[n]) fresh.rank[n] = static_cast<std::uint8_t>(++count - fresh.before[n / kRun]);
+  }
+  fresh.entries.reserve(kept.size() + 1);
+  for (const std::size_t e : kept) fresh.entries.push_back(old.entries[e]);
+  return fresh;
+}
+
+void BoundTiles::update(const map::VoxelBox& changed, std::span<const std::size_t> listed, const FillBounds& fill,
+                        const Parallel& parallel) {
+  const map::VoxelBox anew = grown(changed, kAhead, 0, size());
+  const Marks marks = entered(changed, listed);
+  const std::vector<std::size_t> met = tiles_.meeting(anew);
+  std::vector<std::shared_ptr<Tile>> fresh(met.size());
+  std::vector<Tile*> of_tile(tiles_.count(), nullptr);
+  parallel(met.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      fresh[n] = std::make_shared<Tile>(renumbered(met[n], changed, marks)), of_tile[met[n]] = fresh[n].get();
+  });
+  fill([&](std::size_t n, const BoundCodes& codes) {
+    const Index3 v = map::voxel(size(), n);
+    Tile& tile = *of_tile[tiles_.holding(v)];
+    tile.entries[tile.entry_of(Grid::within(v))].level[0] = codes;
+  });
+  const auto nothing = std::make_shared<const Tile>();
+  for (std::size_t n = 0; n < met.size(); ++n)
+    tiles_.replace(met[n], fresh[n]->entries.size() > 1 ? std::shared_ptr<const Tile>(fresh[n]) : nothing);
+  parallel(met.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      if (fresh[n]->entries.size() > 1) pool(*fresh[n], map::common(tiles_.voxels(met[n]), anew));
+  });
+}
+
+// The cube of a level is the union of the eight cubes of the level below at its octants.
+void BoundTiles::pool(Tile& tile, const map::VoxelBox& box) const {
+  const map::VoxelBox read = grown(box, 0, kAhead, size());
+  const Index3 extent = read.high - read.low + Index3::Ones();
+  std::vector<Padded> codes(static_cast<std::size_t>(extent.prod()));
+  std::size_t n = 0;
+  map::for_each_voxel(read, [&](const Index3& v) { std::ranges::copy(at(v).level[0], codes[n++].code.begin()); });
+  for (int level = 1; level < kLevels; ++level) {
+    pool_all(codes, extent, 1 << (level - 1));
+    map::for_each_voxel(box, [&](const Index3& v) {
+      const std::size_t e = tile.entry_of(Grid::within(v));
+      if (e)
+        std::copy_n(codes[map::linear(extent, v - read.low)].code.begin(), kDirections,
+                    tile.entries[e].level[level].begin());
+    });
+  }
+  tile.largest = {};
+  for (const Entry& e : tile.entries) raise(tile.largest, e.level[0]);
+}
+
+BoundCodes BoundTiles::largest() const noexcept {
+  BoundCodes largest{};
+  for (std::size_t n = 0; n < tiles_.count(); ++n) raise(largest, tiles_[n].largest);
+  return largest;
+}
+
+}  // namespace backwash::reach

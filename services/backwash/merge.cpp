@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cinttypes>
+#include <cstdio>
+
+#include "core/log/autopilot_flight.hpp"
+#include "core/log/dataflash.hpp"
+#include "core/log/log_file.hpp"
+#include "core/log/mcap_export.hpp"
+#include "core/log/ulog.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/study_flights.hpp"
+#include "version.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct Options {
+  std::vector<std::string> logs;  ///< parts of ours, then the autopilot's
+  std::string out;
+  bool json = false, force = false;
+};
+
+log::TopicLog topics_of(const std::string& path) {
+  const auto content = read_or_fail(log::read_log_file(path, files::kLargestTable, "an autopilot's log"));
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
+  const bool ulog = path.ends_with(".ulg");
+  auto topics = ulog ? log::decode_ulog(bytes) : log::decode_dataflash(bytes);
+  if (!topics) throw Failure(kBadData, path + ":1: " + topics.error());
+  return ulog ? std::move(*topics) : log::px4_names(*topics);
+}
+
+int run(const Options& options) {
+  if (options.logs.size() < 2) throw Failure(kUsage, "needs two logs: that of backwashd, then the autopilot's");
+  const std::string &ours = options.logs.front(), &theirs = options.logs.back();
+  if (!is_autopilots_log(theirs))
+    throw Failure(kUsage, theirs + " is no autopilot's log by its name; give a .ulg or .bin last");
+  check_output(options.out, options.force);
+  progress("reading the logs");
+  const auto log = read_or_fail(log::read_raw_logs(std::span(options.logs).first(options.logs.size() - 1)));
+  const auto pairs = log::clock_pairs(log);
+  if (pairs.empty())
+    throw Failure(kBadData, ours + ":1: holds no answer of the autopilot to TIMESYNC: the clocks cannot be compared");
+  const auto clock = log::clock_line(pairs);
+  const auto poses = log::autopilot_poses(topics_of(theirs), clock);
+  if (!poses) throw Failure(kBadData, theirs + ":1: " + poses.error());
+  std::map<std::string, std::uint64_t> messages;
+  write_stream(options.out, options.force,
+               [&](std::ostream& file) { messages = log::export_mcap(file, log, kVersion, *poses); });
+  const auto merged = messages[std::string(log::kAutopilotTopic)];
+  if (options.json)
+    print(Json{{"log", ours},
+               {"autopilot", theirs},
+               {"clock",
+                {{"pairs", clock.pairs},
+                 {"rate_ppm", 1e6 * clock.rate},
+                 {"rms_ms", 1e3 * clock.rms_s},
+                 {"largest_ms", 1e3 * clock.largest_s},
+                 {"round_trip_ms", 1e3 * clock.round_trip_s}}},
+               {"messages", messages},
+               {"outside", poses->size() - merged}});
+  else
+    std::printf(
+        "clocks               %zu exchanges, %.1f ppm apart, residual %.3f ms rms, %.3f ms at most (round trip %.1f "
+        "ms)\n"
+        "the autopilot's      %" PRIu64 " poses, %" PRIu64 " outside the time of our log\n",
+        clock.pairs, 1e6 * clock.rate, 1e3 * clock.rms_s, 1e3 * clock.largest_s, 1e3 * clock.round_trip_s, merged,
+        poses->size() - merged);
+  return kOk;
+}
+
+}  // namespace
+
+Verb merge_verb(Command& app) {
+  auto options = std::make_shared<Options>();
+  auto& command = app.add_subcommand("merge", "A raw log and the autopilot's own as one MCAP on one clock");
+  command.add_option("logs", options->logs, "raw log of backwashd (or its parts), then the autopilot's: .ulg or .bin")
+      .required();
+  command.add_option("-o,--out", options->out, "MCAP file to write").required();
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite a file that exists");
+  command.footer("Example:\n  backwash merge flight.bwlog fc.ulg -o both.mcap");
+  return {&command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

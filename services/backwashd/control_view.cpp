@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// After a tick's decision: what it says of the air, and what the other threads are shown.
+#include <algorithm>
+
+#include "core/log/air_log.hpp"
+#include "services/backwashd/control_loop.hpp"
+
+namespace backwash::daemon {
+
+// What this tick says of the air, after its decision: nothing of it is decided by this before a world is made of it.
+void ControlLoop::learn(const track::TickInput& in, const track::TickOutput& out) noexcept {
+  if (!air_ || !log::flown(in, out)) return;
+  const plan::AirPlace place = lookout_.air_at(flight_.odometry()->state.p_W);
+  log::AirRecord r{};
+  r.tick = view_.ticks;
+  std::copy_n(place.sigma.data(), 3, r.sigma);
+  r.air = static_cast<std::uint32_t>(place.air);
+  const bool grew = log::learn(*air_, flight_, out, r);
+  record(log::RecordKind::air, in.now_ns, &r, sizeof r);
+  const auto here = static_cast<std::size_t>(place.air);
+  view_.air->here = place.air;
+  view_.air->ln_evidence[here] = r.ln_evidence;
+  view_.air->seconds[here] = r.seconds;
+  if (!grew) return;
+  view_.air->factors = air_->factors();
+  channels_.air.write(air_->factors());
+  channels_.air_kept.write(air_->factors());
+  channels_.events.push({ControlEvent::Kind::rougher, in.now_ns, view_.mode, view_.reason, 0, place.air,
+                         air_->factors()[here], view_.air->ln_evidence[here]});
+}
+
+void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& out) noexcept {
+  const auto& telemetry = link_.telemetry();
+  const auto& tracker = flight_.tracker();
+  view_.t_ns = in.now_ns;
+  view_.mode = out.supervisor.mode;
+  view_.reason = out.supervisor.reason;
+  view_.armed = in.autopilot.armed;
+  view_.offboard = in.autopilot.offboard;
+  view_.landed = !telemetry.landed_state || telemetry.landed_state->value == firmware_bridge::LandedState::kOnGround;
+  view_.aligned = flight_.alignment().aligned();
+  view_.mismatch = flight_.alignment().mismatch();
+  view_.odometry_age = flight_.odometry_age();
+  view_.odometry_lost_after = flight_.odometry_lost_after();
+  view_.heartbeat_age = in.autopilot.heartbeat_age;
+  view_.clock = link_.clock();
+  view_.untold_delay = link_.untold_delay();
+  view_.pose_age = in.autopilot.pose_age(in.now_ns);
+  if (flight_.odometry()) view_.state = flight_.odometry()->state;
+  view_.command = out.command;
+  view_.epoch = flight_.epoch();
+  view_.segment = tracker.segment();
+  view_.index = tracker.index();
+  view_.finished = tracker.finished();
+  view_.braking = tracker.braking();
+  view_.stop_branch = tracker.stop_branch();
+  view_.closures = tracker.closures();
+  view_.shift = tracker.shift();
+  if (out.refused) view_.refused_segment = in.segment->id;
+  view_.odometry_received += in.odometry.has_value();
+  view_.odometry_rejected += in.odometry && !out.fresh;
+  if (out.inside.judged) ++(out.inside.inside ? view_.inside : view_.outside);
+  view_.missed += static_cast<std::uint64_t>(in.missed_periods);
+  view_.frames_bad = link_.received().bad_crc;
+  if (link_.signing()) view_.frames_refused = link_.signing()->counters().refused();
+  constexpr std::uint8_t kWorstNotice = 4;  // severity: 4 is a warning
+  if (telemetry.text && telemetry.text->value.severity <= kWorstNotice) view_.warning = telemetry.text;
+  view_.residual_m = flight_.alignment().position_residual();
+  view_.residual_rad = flight_.alignment().yaw_residual();
+}
+
+}  // namespace backwash::daemon

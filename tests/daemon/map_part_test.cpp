@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What is made first of a large map.
+#include <atomic>
+#include <optional>
+#include <thread>
+
+#include "tests/daemon/map_worker_rig.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+/// A hall of 30 × 30 × 2.4 m.
+map::OccupancyGrid hall() {
+  map::OccupancyGrid grid(Vec3(-3, 0, 0), 0.2, Index3(150, 150, 12), map::Cell::free);
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const Index3 v = grid.voxel(n), last = grid.size() - Index3::Ones();
+    if ((v.array() == 0).any() || (v.array() == last.array()).any()) grid.set(v, map::Cell::occupied);
+  }
+  return grid;
+}
+
+// Take-off does not wait for the far end of a building.
+TEST_F(MapWorkerTest, OfALargeMapWhatIsAroundTheVehicleIsHandedOutFirst) {
+  const map::OccupancyGrid grid = hall();
+  const Vec3 vehicle_W(4, 20, 0.3);
+  channels_->vehicle_W.write(vehicle_W);
+  std::vector<std::shared_ptr<const plan::World>> handed;
+  std::atomic<bool> end{false};
+  std::thread control([&] {  // takes each world as it comes
+    while (!end) {
+      if (const auto* world = this->world(); world && (handed.empty() || handed.back().get() != world))
+        handed.push_back(held_->world);
+    }
+  });
+  send(grid, 7);
+  end = true;
+  control.join();
+  ASSERT_EQ(world()->grid.size(), grid.size());
+  if (handed.empty() || handed.back().get() != world()) handed.push_back(held_->world);
+  ASSERT_EQ(handed.size(), 2u);
+  const plan::World &near = *handed.front(), &whole = *handed.back();
+  EXPECT_EQ(near.grid.size(), Index3(51, 51, 12));
+  std::size_t safe = 0;
+  for (std::size_t n = 0; n < near.grid.cell_count(); ++n) {
+    const Vec3 p_W = near.grid.center(near.grid.voxel(n));
+    if (!near.hover.safe(near.grid.voxel(n))) continue;
+    ++safe;
+    EXPECT_TRUE(whole.hover.safe(whole.grid.index(p_W)));
+    EXPECT_LT((p_W - vehicle_W).head<2>().cwiseAbs().maxCoeff(), 5.2);
+  }
+  EXPECT_GT(safe, 1000u);
+  EXPECT_EQ(channels_->maps_accepted, 1u);
+  EXPECT_FALSE(channels_->map_partial);
+}
+
+TEST_F(MapWorkerTest, WithoutAPlaceOrInASmallMapTheWholeIsMadeAtOnce) {
+  for (const auto& [vehicle_W, grid] : {std::pair<std::optional<Vec3>, map::OccupancyGrid>{std::nullopt, hall()},
+                                        {Vec3(100, 0, 0), hall()},
+                                        {Vec3(0, 0, 0.5), grid_}}) {  // 6 × 2 m
+    Channels channels;
+    MapWorker worker(channels, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_);
+    if (vehicle_W) channels.vehicle_W.write(*vehicle_W);
+    channels.maps.offer(std::make_unique<const MapMessage>(
+        MapMessage{map::encode_octomap(grid), grid.resolution(), true, "OcTree", 7}));
+    EXPECT_TRUE(worker.step());
+    const Snapshot* only = channels.worlds.control.take();
+    ASSERT_TRUE(only);
+    EXPECT_EQ(only->world->grid.size(), grid.size());
+    EXPECT_FALSE(channels.map_partial);
+    channels.worlds.control.give_back(only);
+    channels.worlds.collect();
+  }
+}
+
+}  // namespace
+}  // namespace backwash::daemon

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a study refuses of a flight log: what no flight can be, and no more.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+
+#include "core/log/import_columns.hpp"
+#include "core/types/geometry.hpp"
+
+namespace backwash::log {
+namespace {
+
+constexpr double kG = 9.81;
+
+/// 20 s at 50 Hz along a curve of three tones, tilted as it accelerates; every column follows from the curve.
+FlightLog flown() {
+  FlightLog log;
+  const double size[] = {1.5, 1.2, 0.5}, omega[] = {0.8, 1.1, 0.9};
+  for (int k = 0; k < 1000; ++k) {
+    const double t = 0.02 * k;
+    log.t_s.push_back(t);
+    Vec3 a;
+    for (int i = 0; i < 3; ++i) {
+      const std::string axis(1, "xyz"[i]);
+      const double s = size[i] * std::sin(omega[i] * t + i), c = size[i] * omega[i] * std::cos(omega[i] * t + i);
+      a[i] = -omega[i] * omega[i] * s;
+      log.columns[axis + "_m"].push_back(2 + s);
+      log.columns["v" + axis + "_mps"].push_back(c);
+      log.columns["a" + axis + "_mps2"].push_back(a[i]);
+    }
+    const auto q = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3(a + kG * Vec3::UnitZ()));
+    log.columns["qw"].push_back(q.w()), log.columns["qx"].push_back(q.x());
+    log.columns["qy"].push_back(q.y()), log.columns["qz"].push_back(q.z());
+    log.columns["thrust"].push_back(0.5 * (a.z() + kG) / kG);
+    for (const char* name : {"rpm1", "rpm2", "rpm3", "rpm4"}) log.columns[name].push_back(9000);
+  }
+  return log;
+}
+
+void scale(FlightLog& log, const std::vector<std::string>& names, double factor) {
+  for (const auto& name : names)
+    for (double& x : log.columns.at(name)) x *= factor;
+}
+
+std::string refusal(const std::function<void(FlightLog&)>& change) {
+  auto log = flown();
+  change(log);
+  const auto wrong = impossible(log);
+  return wrong.empty() ? "" : wrong.front();
+}
+
+const std::vector<std::string> kP{"x_m", "y_m", "z_m"}, kV{"vx_mps", "vy_mps", "vz_mps"},
+    kA{"ax_mps2", "ay_mps2", "az_mps2"}, kQ{"qw", "qx", "qy", "qz"};
+
+TEST(Impossible, SaysNothingOfAFlightAndOfOneWhoseEstimatorIsPoor) {
+  EXPECT_EQ(refusal([](auto&) {}), "");
+  // Half of the velocity, as an estimator told that slipped: an import refuses it, a study does not.
+  auto slipped = flown();
+  scale(slipped, kV, 0.5);
+  EXPECT_FALSE(contradictions(slipped).empty());
+  EXPECT_TRUE(impossible(slipped).empty());
+}
+
+TEST(Impossible, UnitsFramesAndStampsAreToldByTheirColumn) {
+  EXPECT_NE(refusal([](auto& log) { scale(log, kA, 1 / kG); }).find("ax_mps2 is 0.1"), std::string::npos);
+  EXPECT_NE(refusal([](auto& log) { scale(log, kP, 1000); }).find("vx_mps is 0.001 times"), std::string::npos);
+  EXPECT_NE(refusal([](auto& log) { scale(log, {"vy_mps"}, -1); }).find("vy_mps is -1 times"), std::string::npos);
+  EXPECT_NE(refusal([](auto& log) {
+              for (double& a : log.columns.at("az_mps2")) a += kG;
+            }).find("gravity is in it"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& log) { scale(log, {"thrust"}, 100); }).find("thrust goes from"), std::string::npos);
+  EXPECT_NE(refusal([](auto& log) {
+              for (double& t : log.t_s) t *= 1e6;
+            }).find("t_s goes on by 2e+04 a row"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& log) { std::reverse(log.t_s.begin(), log.t_s.end()); }).find("t_s does not rise"),
+            std::string::npos);
+}
+
+TEST(Impossible, NorAreColumnsThatNothingHasMeasured) {
+  EXPECT_NE(refusal([](auto& log) { scale(log, kV, 0); }).find("vx_mps, vy_mps and vz_mps are 0 in every row"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& log) { scale(log, kA, 0); }).find("ax_mps2, ay_mps2 and az_mps2 are 0"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& log) { scale(log, kQ, 0); }).find("no length of 1 in 1000 of 1000 rows"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& log) {
+              for (const auto& name : kQ) log.columns.at(name)[7] = 0;
+            }).find("no length of 1 in 1 of 1000 rows"),
+            std::string::npos);
+}
+
+TEST(Impossible, AnAttitudeInAnotherOrderIsToldWithTheOrderThatFits) {
+  const auto rotated = [](std::size_t by) {
+    return [by](FlightLog& log) {
+      const FlightLog was = log;
+      for (std::size_t k = 0; k < 4; ++k) log.columns[kQ[(k + by) % 4]] = was.column(kQ[k]);
+    };
+  };
+  EXPECT_NE(refusal(rotated(3)).find("x, y, z, w"), std::string::npos) << refusal(rotated(3));
+  EXPECT_NE(refusal(rotated(1)).find("z, w, x, y"), std::string::npos) << refusal(rotated(1));
+}
+
+TEST(SilentColumns, AreThoseOfASensorThatReadsNothingInAnyRow) {
+  auto log = flown();
+  EXPECT_TRUE(silent_columns(log).empty());
+  scale(log, {"rpm2"}, 0);
+  EXPECT_TRUE(silent_columns(log).empty()) << "one rotor's sensor is broken, and that is a finding";
+  scale(log, {"rpm1", "rpm3", "rpm4"}, 0);
+  EXPECT_EQ(silent_columns(log), (std::vector<std::string>{"rpm1", "rpm2", "rpm3", "rpm4"}));
+  scale(log, {"thrust"}, 0);
+  EXPECT_EQ(silent_columns(log).back(), "thrust");
+}
+
+}  // namespace
+}  // namespace backwash::log

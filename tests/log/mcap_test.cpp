@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A raw log within an MCAP file: the same records again, or a word of what is wrong and where. Other people's readers
+// of the same files: tests/system/mcap_peer.sh.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "core/log/mcap_export.hpp"
+#include "core/log/mcap_writer.hpp"
+#include "core/log/raw_flight.hpp"
+#include "core/log/raw_log.hpp"
+
+namespace backwash::log {
+namespace {
+
+class McapFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = testing::TempDir() + "mcap_" + std::to_string(::getpid());
+    put(RecordKind::part, PartRecord{1, 1'000'000'000'000, 1, 0});
+    for (int n = 0; n < 9000; ++n) {
+      t_ns_ += 1'000'000;
+      OdometryRecord odometry{t_ns_, {1.0 * n, 2, 3}, {}, {1, 0, 0, 0}};
+      if (n % 10 == 0) put(RecordKind::odometry, odometry);
+      std::vector<std::uint8_t> frame(random_() % 281);
+      for (auto& byte : frame) byte = static_cast<std::uint8_t>(random_());
+      log_.records.push_back({{t_ns_, RecordKind::frame_in, static_cast<std::uint32_t>(frame.size())}, frame});
+    }
+    std::ostringstream out;
+    export_mcap(out, log_, "test");
+    whole_ = out.str();
+    ASSERT_GT(whole_.size(), std::size_t{2} << 20) << "several chunks";
+  }
+  void TearDown() override { ::unlink(path_.c_str()); }
+
+  template <typename T>
+  void put(RecordKind kind, const T& record) {
+    std::vector<std::uint8_t> bytes(sizeof record);
+    std::memcpy(bytes.data(), &record, sizeof record);
+    log_.records.push_back({{t_ns_, kind, sizeof record}, std::move(bytes)});
+  }
+  tl::expected<RawLog, LogError> read(const std::string& content) const {
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << content;
+    return read_raw_log(path_);
+  }
+  /// Whether the log's first records are those that were written; all of them, if not `less`.
+  void expect_those_written(const RawLog& read, const std::string& content, bool less) const {
+    ASSERT_TRUE(less ? read.records.size() <= log_.records.size() : read.records.size() == log_.records.size());
+    for (std::size_t n = 0; n < read.records.size(); ++n) {
+      const auto &got = read.records[n], &wanted = log_.records[n];
+      ASSERT_TRUE(std::memcmp(&got.header, &wanted.header, sizeof got.header) == 0 && got.bytes == wanted.bytes) << n;
+      ASSERT_EQ(std::memcmp(content.data() + got.offset, &wanted.header, sizeof wanted.header), 0) << "its offset";
+    }
+  }
+
+  std::mt19937 random_{20261125};
+  std::int64_t t_ns_ = 5'000'000'000;
+  std::string path_, whole_;
+  RawLog log_;
+};
+
+TEST_F(McapFile, HoldsTheRawLogByteForByte) {
+  const auto log = read(whole_);
+  ASSERT_TRUE(log) << log.error().message;
+  EXPECT_FALSE(log->cut_at);
+  expect_those_written(*log, whole_, false);
+  EXPECT_TRUE(is_raw_log(path_));
+}
+
+TEST_F(McapFile, CutAnywhereGivesItsFirstRecordsAndSaysWhereItEnds) {
+  std::size_t some = 0;
+  for (int n = 0; n < 200; ++n) {
+    const std::size_t cut = random_() % whole_.size();
+    const std::string content = whole_.substr(0, cut);
+    const auto log = read(content);
+    if (!log) {
+      EXPECT_EQ(log.error().kind, LogError::Kind::bad_data);
+      EXPECT_EQ(log.error().message.find(path_ + ": byte "), 0u) << log.error().message;
+      continue;
+    }
+    // Behind the data an index may be missing: all records are there.
+    if (log->records.size() < log_.records.size()) {
+      ASSERT_TRUE(log->cut_at) << cut;
+      EXPECT_LE(*log->cut_at, cut);
+    }
+    expect_those_written(*log, content, true);
+    some += !log->records.empty();
+  }
+  EXPECT_GT(some, 50u);
+}
+
+TEST_F(McapFile, WithABitTurnedIsReadWholeOrRefusedByItsByteAndNeverOtherwise) {
+  std::size_t refused = 0;
+  for (int n = 0; n < 400; ++n) {
+    // Every other one near an end, where the records are that hold the others.
+    const std::size_t near = random_() % 2000, at = n % 2 == 0   ? random_() % whole_.size()
+                                                    : n % 4 == 1 ? near
+                                                                 : whole_.size() - 1 - near;
+    std::string content = whole_;
+    content[at] = static_cast<char>(content[at] ^ (1 << random_() % 8));
+    const auto log = read(content);
+    if (!log) {
+      EXPECT_EQ(log.error().kind, LogError::Kind::bad_data);
+      EXPECT_EQ(log.error().message.find(path_ + ": byte "), 0u) << log.error().message;
+      ++refused;
+    } else {
+      expect_those_written(*log, content, log->cut_at.has_value());
+    }
+  }
+  EXPECT_GT(refused, 200u);
+}
+
+TEST_F(McapFile, OfOthersIsRefusedByName) {
+  std::ostringstream out;
+  McapWriter writer(out, "test");
+  writer.write(writer.add_channel("/chatter", "std_msgs/msg/String", "string data\n"), {}, {});
+  writer.finish();
+  const auto log = read(out.str());
+  ASSERT_FALSE(log);
+  EXPECT_NE(log.error().message.find("/backwash/raw_log"), std::string::npos) << log.error().message;
+}
+
+TEST_F(McapFile, ThatSomebodyCompressedIsRefusedByName) {
+  // A chunk's times, size and checksum are 28 bytes; the length of its compression's name follows, here 0, then 8
+  // bytes.
+  const std::size_t chunk = whole_.find('\x06', 8 + 9);
+  std::string content = whole_.substr(0, chunk + 9 + 28) + std::string("\x04\0\0\0zstd\0\0\0\0\0\0\0\0", 16);
+  content[chunk + 1] = 28 + 16;
+  std::memset(content.data() + chunk + 2, 0, 7);
+  const auto log = read(content);
+  ASSERT_FALSE(log);
+  EXPECT_NE(log.error().message.find("is compressed"), std::string::npos) << log.error().message;
+}
+
+TEST_F(McapFile, MessagesHaveWallTimeAndTheirLogTimeNeverFalls) {
+  log_.records.push_back({{1'000'000'000, RecordKind::frame_in, 0}, {}});  // of a thread that was drained late
+  std::ostringstream out;
+  export_mcap(out, log_, "test");
+  const std::string content = out.str();
+  // The last chunk's times are told by the statistics: 8 + 2 + 4 · 4 bytes behind their head.
+  const std::size_t statistics = content.rfind(std::string("\x0B\x9C\0\0\0\0\0\0\0", 9));
+  ASSERT_NE(statistics, content.npos);
+  std::uint64_t times[2];
+  std::memcpy(times, content.data() + statistics + 9 + 26, sizeof times);
+  EXPECT_EQ(times[0], 1'005'000'000'000u);
+  EXPECT_EQ(times[1], static_cast<std::uint64_t>(t_ns_ + 1'000'000'000'000));
+}
+
+}  // namespace
+}  // namespace backwash::log

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/plan/air_scale.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/config/config.hpp"
+#include "core/map/load_map.hpp"
+#include "core/plan/world.hpp"
+#include "tests/support/stored_field.hpp"
+
+namespace backwash::plan {
+namespace {
+
+constexpr double kEdge = 0.2;
+const AirFactors kRougher{1, 1.4142, 4, 2, 1};
+
+Vehicle quad() { return config::load_vehicle("builtin:quad-5in").value(); }
+/// A corridor with a box on its floor, so that every class is somewhere.
+map::OccupancyGrid furnished() {
+  map::OccupancyGrid grid = map::builtin_scene("parallel-walls-4m", kEdge).value();
+  const Index3 low = grid.index({-0.3, -0.3, 0.1});
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i) grid.set(low + Index3(i, j, k), map::Cell::occupied);
+  return grid;
+}
+std::shared_ptr<const World> as_modelled() {
+  static const auto world = build_world(furnished(), Model{}, quad());
+  return world;
+}
+std::size_t counted(const World& world, AirClass air) {
+  std::size_t n = 0;
+  for (std::size_t v = 0; v < world.grid.cell_count(); ++v)
+    n += world.air.sigma->has(world.grid.voxel(v)) && world.air.classes[v] == air;
+  return n;
+}
+
+TEST(AirScale, TheClassOfAVoxelIsTheTermThatIsLargestInTheExactModel) {
+  const auto world = with_air(*as_modelled(), kModelledAir, Model{});
+  const field::ProximityField exact(world->grid, with_vehicle(Model{}, quad()));
+  std::size_t compared = 0, close = 0;
+  for (std::size_t n = 0; n < world->grid.cell_count(); n += 3) {
+    const Index3 v = world->grid.voxel(n);
+    if (!world->air.sigma->has(v)) continue;
+    const auto parts = exact.at(world->grid.center(v));
+    const AirClass expected = dominant(parts.base, parts.ground, parts.wall, parts.corner);
+    ++compared;
+    if (world->air.classes[n] == expected) continue;
+    // Rounding may tell two terms apart that are equal to a millionth.
+    const auto trace = [](const Variance& s) { return s.xx + s.yy + s.zz; };
+    std::array<double, 4> traces{trace(parts.base), trace(parts.ground), trace(parts.wall), trace(parts.corner)};
+    EXPECT_NEAR(traces[static_cast<std::size_t>(world->air.classes[n])], traces[static_cast<std::size_t>(expected)],
+                1e-5 * *std::ranges::max_element(traces));
+    ++close;
+  }
+  EXPECT_GT(compared, 200u);
+  EXPECT_LE(close, compared / 100);
+  for (const AirClass air : {AirClass::free_air, AirClass::ground, AirClass::wall})
+    EXPECT_GT(counted(*world, air), 20u) << to_string(air);
+}
+
+TEST(AirScale, ABoundGrowsByTheRootOfItsClasssFactorAndTheSteadyPushDoesNot) {
+  Model model;
+  model.bound.mean_horizontal = 0.05, model.bound.mean_vertical = 0.02;
+  const auto calm = build_world(furnished(), model, quad());
+  const auto rough = with_air(*calm, kRougher, model);
+  const field::DisturbanceField modelled = test::stored_field(*calm, model);
+  std::size_t grown = 0;
+  for (std::size_t n = 0; n < calm->grid.cell_count(); ++n) {
+    const Index3 v = calm->grid.voxel(n);
+    if (!rough->air.sigma->has(v)) continue;
+    const double root = std::sqrt(kRougher[static_cast<std::size_t>(rough->air.classes[n])]);
+    const auto before = bound(rough->air.sigma->at(v), model.bound);
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      const double mean = d == kZ ? 0.02 : 0.05, expected = mean + root * (before.w[d] - mean);
+      EXPECT_GE(rough->bounds.at(v).w[d], expected * (1 - 1e-6));
+      EXPECT_LE(rough->bounds.at(v).w[d], expected * (1 + 1.1 * reach::kBoundGrowth));
+    }
+    grown += root > 1;
+    EXPECT_EQ(rough->air.sigma->at(v).xx, modelled.at(v).xx) << "Σ is the model's";
+    EXPECT_TRUE(calm->hover.safe(v) || !rough->hover.safe(v)) << "rougher air makes no place safe";
+  }
+  EXPECT_GT(grown, 100u);
+}
+
+TEST(AirScale, RougherAirTakesPlacesToHoverAwayAndWidensTheSetsThere) {
+  const auto calm = as_modelled();
+  const auto rough = with_air(*calm, {4, 4, 4, 4, 1}, Model{});
+  std::size_t lost = 0;
+  for (std::size_t n = 0; n < calm->grid.cell_count(); ++n)
+    lost += calm->hover.safe(calm->grid.voxel(n)) && !rough->hover.safe(rough->grid.voxel(n));
+  EXPECT_GT(lost, 10u);
+  // Half widths are linear in w̄: twice, where the air is one all over the set.
+  const Vec3 p(-2, 0, 1.2);
+  const auto before = reach::hover_set(calm->reach, calm->grid, calm->distance, calm->bounds, p);
+  const auto after = reach::hover_set(rough->reach, rough->grid, rough->distance, rough->bounds, p);
+  ASSERT_TRUE(before.safe() && after.bounded);
+  EXPECT_GT(after.half_widths[kX], 1.95 * before.half_widths[kX]);
+}
+
+TEST(AirScale, AirAsModelledChangesNothing) {
+  const auto world = with_air(*as_modelled(), kModelledAir, Model{});
+  for (std::size_t n = 0; n < world->grid.cell_count(); ++n) {
+    const Index3 v = world->grid.voxel(n);
+    EXPECT_EQ(world->bounds.at(v).w, as_modelled()->bounds.at(v).w);
+    EXPECT_EQ(world->hover.safe(v), as_modelled()->hover.safe(v));
+  }
+}
+
+TEST(AirScale, WhatWasLearntWithoutAClassCountsForAll) {
+  const auto all = with_air(*as_modelled(), {4, 4, 4, 4, 1}, Model{});
+  const auto none = with_air(*as_modelled(), {1, 1, 1, 1, 4}, Model{});
+  for (std::size_t n = 0; n < all->grid.cell_count(); ++n)
+    EXPECT_EQ(none->bounds.at(none->grid.voxel(n)).w, all->bounds.at(all->grid.voxel(n)).w);
+}
+
+// A scan in rough air must not bring the model's bounds back.
+TEST(AirScale, AChangedMapKeepsFactorsAndClassesAsIfItHadBeenBuiltWithThem) {
+  const auto old = with_air(*as_modelled(), kRougher, Model{});
+  map::OccupancyGrid grid = old->grid;
+  map::VoxelBox changed;
+  for (const Vec3& p : {Vec3(0.9, 0.9, 0.5), Vec3(1.1, 1.1, 1.1)}) {
+    const Index3 v = grid.index(p);
+    ASSERT_TRUE(grid.free(v));
+    grid.set(v, map::Cell::occupied);
+    changed.add(v);
+  }
+  const auto updated = update_world(*old, grid, changed, Model{});
+  const auto whole = with_air(*build_world(grid, Model{}, quad()), kRougher, Model{});
+  EXPECT_EQ(updated->air.factors, kRougher);
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const Index3 v = grid.voxel(n);
+    ASSERT_EQ(updated->bounds.at(v).w, whole->bounds.at(v).w) << v.transpose();
+    ASSERT_EQ(updated->hover.safe(v), whole->hover.safe(v)) << v.transpose();
+    if (whole->air.sigma->has(v)) {
+      ASSERT_EQ(updated->air.classes[n], whole->air.classes[n]) << v.transpose();
+    }
+  }
+}
+
+TEST(AirScale, APlaceHasTheModelsVarianceAndNoneBeyondTheMap) {
+  const auto world = with_air(*as_modelled(), kRougher, Model{});
+  const Vec3 p = world->grid.center(world->grid.index({-2, 0, 1.2}));
+  const AirPlace here = air_at(world->air, world->grid, p);
+  const Variance expected = test::stored_field(*as_modelled(), Model{}).at(world->grid.index(p));
+  EXPECT_NEAR(here.sigma.x(), expected.xx, 1e-9);
+  EXPECT_NEAR(here.sigma.z(), expected.zz, 1e-9);
+  EXPECT_NE(here.air, AirClass::none);
+  const AirPlace beyond = air_at(world->air, world->grid, {1000, 0, 1});
+  EXPECT_EQ(beyond.sigma, Vec3(0, 0, 0));
+  EXPECT_EQ(beyond.air, AirClass::none);
+  EXPECT_EQ(air_at({}, world->grid, p).air, AirClass::none) << "nobody asked for classes";
+}
+
+}  // namespace
+}  // namespace backwash::plan

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Logs that lack columns, and set-points that the craft did not follow: nothing is told that they cannot show.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "core/study/effects/table.hpp"
+#include "tests/study_worlds/observe.hpp"
+
+namespace lacking {
+namespace {
+
+using namespace backwash::study;
+using study_worlds::Table;
+
+std::filesystem::path folder() {
+  return std::filesystem::temp_directory_path() / ("study-lacking-" + std::to_string(::getpid()));
+}
+
+void drop(Table& table, const std::string& name) {
+  const auto at = std::find(table.names.begin(), table.names.end(), name) - table.names.begin();
+  table.names.erase(table.names.begin() + at);
+  for (auto& row : table.rows) row.erase(row.begin() + at);
+}
+
+void set(Table& table, const std::string& name, double value) {
+  const auto at = std::find(table.names.begin(), table.names.end(), name) - table.names.begin();
+  for (auto& row : table.rows) row[static_cast<std::size_t>(at)] = value;
+}
+
+/// A world without an effect, each of its logs changed.
+template <typename Change>
+Observations changed(Change change) {
+  const auto world = study_worlds::draw_world({88001, {}, 1, 12, ""});
+  auto tables = study_worlds::fly_all(world);
+  for (Table& table : tables) change(table);
+  auto seen = study_worlds::observe(world, tables, folder());
+  std::filesystem::remove_all(folder());
+  return seen;
+}
+
+std::string told(const Observations& seen) {
+  StudyOptions options;
+  options.minimum_detectable = false;
+  return study_worlds::told(study(seen, options));
+}
+
+std::string why_not(const std::string& cause, const Observations& seen) {
+  std::string why;
+  for (const Form* form : catalogue())
+    if (form->cause() == cause) why = why_not_tested(*form, seen).value_or("tested");
+  return why;
+}
+
+TEST(Lacking, SetPointsThatTheCraftDidNotFollowTellNothing) {
+  const auto elsewhere = changed([](Table& table) {
+    for (const char* name : {"cmd_x_m", "cmd_y_m", "cmd_z_m"}) set(table, name, 0);  // velocities are commanded
+  });
+  EXPECT_EQ(told(elsewhere), "nothing");
+  EXPECT_EQ(why_not("command_latency", elsewhere), "the craft flew elsewhere than the set-points lead");
+  EXPECT_EQ(why_not("command_latency", changed([](Table&) {})), "tested");
+}
+
+TEST(Lacking, WithoutAccelerationTheNoiseOfItsDerivativeIsNoGust) {
+  const auto positions = changed([](Table& table) {
+    for (const char* name : {"vx_mps", "vy_mps", "vz_mps", "ax_mps2", "ay_mps2", "az_mps2"}) drop(table, name);
+  });
+  EXPECT_EQ(told(positions), "nothing");
+  for (const Channel c : {kVarX, kVarY, kVarZ, kTail}) EXPECT_FALSE(positions.measured(c)) << channel_name(c);
+  EXPECT_TRUE(positions.measured(kMeanX));
+  EXPECT_EQ(why_not("heavy_tails", positions).substr(0, 17), "no ax_mps2 column");
+}
+
+TEST(Lacking, WithoutThrustALateLoopIsNoDrag) {
+  const auto seen = changed([](Table& table) { drop(table, "thrust"); });
+  EXPECT_EQ(told(seen), "nothing");
+  for (const char* cause : {"rotor_drag", "inflow"}) EXPECT_EQ(why_not(cause, seen), "no thrust column");
+  EXPECT_EQ(why_not("payload", seen), "tested");
+}
+
+}  // namespace
+}  // namespace lacking
