@@ -7,6 +7,11 @@
 #include "core/field/kernels.hpp"
 
 namespace backwash::field {
+namespace {
+
+constexpr std::size_t kRowsAtOnce = 8;  // rows that a kernel takes together
+
+}  // namespace
 
 BlockSweep::BlockSweep(const WholeField& whole)
     : whole_(whole),
@@ -15,11 +20,12 @@ BlockSweep::BlockSweep(const WholeField& whole)
       occupied_(static_cast<std::size_t>(whole.width_) * layers_ * height_),
       targets_(layers_ * kRows),
       elements_(layers_ * height_),
+      eight_(elements_),
+      targeted_(2 * layers_),
       h_part_(64 * layers_ * kRows),
       v_part_(h_part_),
       h_(h_part_),
-      v_(h_part_),
-      lateral_(whole.lateral_) {}
+      v_(h_part_) {}
 
 std::uint64_t BlockSweep::row_of(const std::vector<std::uint64_t>& bits, int x, int y, int z) const noexcept {
   const Index3& size = whole_.grid_->size();
@@ -47,6 +53,10 @@ void BlockSweep::open(const WholeField::Block& block) {
   for (int z = 0; z < static_cast<int>(layers_); ++z)
     for (int row = 0; row < static_cast<int>(kRows); ++row)
       targets_[n++] = row_of(whole_.listed_, block.x, block.y + row, z) & in_block;
+  for (n = 0; n < targeted_.size(); ++n) {
+    targeted_[n] = 0;
+    for (std::size_t row = 0; row < kRowsAtOnce; ++row) targeted_[n] |= targets_[n * kRowsAtOnce + row];
+  }
   std::ranges::fill(h_, 0), std::ranges::fill(v_, 0);
   std::ranges::fill(h_part_, 0), std::ranges::fill(v_part_, 0);
 }
@@ -58,7 +68,13 @@ void BlockSweep::open_plane(int dx) {
     std::uint64_t any = 0;
     for (int row = 0; row < static_cast<int>(height_); ++row)
       any |= rows[row] = row_of(whole_.up_, block_.x + dx, block_.y + row - whole_.radius_, z);
-    if (any) levels_.push_back(z);
+    if (!any) continue;
+    levels_.push_back(z);
+    std::uint64_t* eight = eight_.data() + static_cast<std::size_t>(z) * height_;
+    for (std::size_t row = 0; row + kRowsAtOnce <= height_; ++row) {
+      eight[row] = 0;
+      for (std::size_t n = 0; n < kRowsAtOnce; ++n) eight[row] |= rows[row + n];
+    }
   }
 }
 
@@ -73,9 +89,13 @@ void BlockSweep::sweep_plane(int dx) {
       for (const int level : levels_) {
         const auto z = static_cast<std::size_t>(level - stencil.offsets[n].z());
         if (z >= layers_) continue;
-        add_visible(targets_.data() + z * kRows, elements_.data() + static_cast<std::size_t>(level) * height_ + dy,
-                    here + z * height_, steps, kRows, stencil.terms[n].horizontal, stencil.terms[n].vertical,
-                    h_part_.data() + sum_row(z, 0), v_part_.data() + sum_row(z, 0));
+        const std::size_t at = static_cast<std::size_t>(level) * height_ + dy;
+        for (std::size_t y = 0; y < kRows; y += kRowsAtOnce) {
+          if (!(targeted_[(z * kRows + y) / kRowsAtOnce] & eight_[at + y])) continue;
+          add_visible(targets_.data() + z * kRows + y, elements_.data() + at + y, here + z * height_ + y, steps,
+                      kRowsAtOnce, stencil.terms[n].horizontal, stencil.terms[n].vertical,
+                      h_part_.data() + sum_row(z, y), v_part_.data() + sum_row(z, y));
+        }
       }
     }
 }
@@ -101,19 +121,17 @@ std::uint64_t BlockSweep::column_targets(std::size_t x, std::size_t y, std::size
   return targets;
 }
 
-template <typename Store>
-void BlockSweep::each(const Store& store) {
+template <typename Lateral, typename Store>
+void BlockSweep::each(Lateral& lateral, const Store& store) {
   const auto& base = whole_.model_.base;
-  LateralColumns::Sums sums;
   for (std::size_t z0 = 0; z0 < layers_; z0 += LateralColumns::kLayers) {
-    lateral_.open(block_.x, block_.y, kRows, static_cast<int>(z0));
+    lateral.open(block_.x, block_.y, kRows, static_cast<int>(z0));
     for (std::size_t y = 0; y < kRows; ++y)
       for (std::size_t x = 0; x < static_cast<std::size_t>(block_.width); ++x) {
         std::uint64_t targets = column_targets(x, y, z0);
         if (!targets) continue;
         const int at_x = block_.x + static_cast<int>(x), at_y = block_.y + static_cast<int>(y);
-        sums = {};
-        lateral_.add(at_x, at_y, targets, sums);
+        const LateralColumns::Sums& sums = lateral.sum(at_x, at_y, targets);
         for (; targets; targets &= targets - 1) {
           const auto n = static_cast<std::size_t>(std::countr_zero(targets));
           const std::size_t ground = sum_row(z0 + n, y) + x;
@@ -130,10 +148,16 @@ void WholeField::evaluate(std::size_t begin, std::size_t end,
                           const std::function<void(std::size_t, const Variance&)>& store) const {
   if (begin == end) return;
   BlockSweep sweep(*this);
-  for (std::size_t n = begin; n < end; ++n) {
-    sweep.run(blocks_[n]);
-    sweep.each(store);
-  }
+  const auto sweep_all = [&](auto lateral) {
+    for (std::size_t n = begin; n < end; ++n) {
+      sweep.run(blocks_[n]);
+      sweep.each(lateral, store);
+    }
+  };
+  if (grid_->size().z() <= LateralColumns::kLayers)
+    sweep_all(LateralSweep<std::uint64_t>(lateral_));
+  else
+    sweep_all(LateralSweep<Layers>(lateral_));
 }
 
 }  // namespace backwash::field

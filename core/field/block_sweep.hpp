@@ -16,8 +16,8 @@ class BlockSweep {
 
   void run(const WholeField::Block& block);
   /// Calls store(linear index, Σ) for the block's listed voxels.
-  template <typename Store>
-  void each(const Store& store);
+  template <typename Lateral, typename Store>
+  void each(Lateral& lateral, const Store& store);
 
  private:
   static constexpr std::size_t kRows = WholeField::kRows;
@@ -36,11 +36,12 @@ class BlockSweep {
   std::vector<std::uint64_t> occupied_;  // [dx][z][row of the window]
   std::vector<std::uint64_t> targets_;   // [z][row of the block]
   std::vector<std::uint64_t> elements_;  // [z][row of the window] at the dx in hand
+  std::vector<std::uint64_t> eight_;     // the same in any of eight rows from there on
+  std::vector<std::uint64_t> targeted_;  // [z][half of the rows of the block]: targets in any
   std::vector<int> levels_;              // layers that hold elements there
   std::vector<float> h_part_, v_part_;   // [z][row][64]: sums over one dx: short sums round less
   std::vector<float> h_, v_;             // the same over all
   std::vector<std::int32_t> path_;       // of one offset, where the stencil keeps none
-  LateralSweep lateral_;
   WholeField::Block block_{};
 };
 

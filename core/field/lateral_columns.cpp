@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <tuple>
 #include <utility>
 
+#include "core/field/lateral_kernels.hpp"
+#include "core/field/sight.hpp"
 #include "core/field/surface.hpp"
 
 namespace backwash::field {
@@ -28,11 +31,12 @@ LateralColumns::LateralColumns(const map::OccupancyGrid& grid, const Model& mode
     : grid_(&grid),
       model_(model),
       terms_(model, grid.resolution()),
-      sight_(grid),
       range2_(std::pow(model.wall.l_max / grid.resolution() + 1e-6, 2)),
       radius_(static_cast<int>(model.wall.l_max / grid.resolution() + 0.5 + 1e-6) + 1),
       pitch_(kWindow + 2 * radius_),
       lines_((add_segments(), bundle_normals()), radius_, range2_) {  // of the segments' normals
+  if (model.wall.l_max / grid.resolution() > kCentre) sight_.emplace(grid);
+  add_arrays();
   add_tables();
 }
 
@@ -100,26 +104,69 @@ std::vector<SightLines::Bundle> LateralColumns::bundle_normals() {
   return bundles;
 }
 
-void LateralColumns::add_tables() {
-  constexpr double kSteps = 0x1p40;
-  const double a = grid_->resolution(), a2 = a * a;
-  decay_.push_back(0);
-  step_.assign(kLayers, 0);
-  for (int n = 0; n <= radius_ + 1; ++n) {
-    step_.push_back(std::round(kSteps * std::exp(-model_.wall.k2 * a2 * n * n)) / kSteps);
-    decay_.push_back(decay_.back() + step_.back());
-    const auto gate = terms_.wall_gate(-a * n);
-    wall_low_.push_back(gate.low - a2 * n * n), wall_high_.push_back(gate.high - a2 * n * n);
+/// What the kernels read of the segments; a vector more than there are.
+void LateralColumns::add_arrays() {
+  constexpr std::size_t kLanes = 16;
+  const std::size_t count = segments_.size() + kLanes;
+  x_.assign(count, 0), low_ = high_ = x_;
+  m_x_.assign(count, 0), m_y_ = m_x_;
+  for (std::size_t n = 0; n < segments_.size(); ++n) {
+    const ElementSegment& s = segments_[n];
+    x_[n] = s.x, low_[n] = s.low, high_[n] = s.high;
+    m_x_[n] = static_cast<float>(s.m_x), m_y_[n] = static_cast<float>(s.m_y);
   }
-  step_.resize(step_.size() + kLayers, 0);
+}
+
+void LateralColumns::add_tables() {
+  for (const ColumnOffset& column : lines_.crossings()) places_.push_back(column.y * pitch_ + column.x);
+  const double a = grid_->resolution(), a2 = a * a;
+  for (int n = 0; n <= radius_ + 1; ++n) {
+    step_.push_back(std::exp(-model_.wall.k2 * a2 * n * n));
+    const auto gate = terms_.wall_gate(-a * n);
+    wall_low_.push_back(gate.low <= gate.high ? gate.low - a2 * n * n : std::numeric_limits<double>::infinity());
+  }
+  for (int dy = 0; dy <= radius_; ++dy) {
+    const double beyond = std::max(0.0, dy - 0.5), left = range2_ - beyond * beyond;
+    half_width_.push_back(left < 0 ? -1 : std::min(radius_, static_cast<int>(std::sqrt(left) + 0.5)));
+  }
+  below_.resize(kLayers), above_.resize(kLayers);
+  for (int n = 0; n < kLayers; ++n)
+    for (int part = 0; part < SightLines::kParts; ++part) {
+      const double highest = n * (part + 1.0) / SightLines::kParts + 0.5 + kTouch;
+      const auto up = static_cast<std::size_t>(n), at = static_cast<std::size_t>(part);
+      below_[up][at] = bits(kCentre - floor_to_int(highest), 63),
+      above_[up][at] = bits(0, kCentre + floor_to_int(highest));
+    }
+  corner_l2_ = std::pow((model_.corner.l_max + 1e-9) / a, 2);
   const double phi_max = model_.corner.phi_max;
   cot_phi_max_ = phi_max < std::numbers::pi / 2 ? 1 / std::tan(phi_max) : 0;
-  const auto count = static_cast<std::size_t>(range2_) + 2;
-  least_reach_.assign(count, {-1, -1});
-  std::vector<Reach> at(count + 1);
-  for (std::size_t n = 0; n <= count; ++n) at[n] = reach_of(static_cast<double>(n));
-  for (std::size_t n = 0; n < count; ++n)
-    least_reach_[n] = {std::min(at[n].range, at[n + 1].range), std::min(at[n].wall_range, at[n + 1].wall_range)};
+  const auto count = static_cast<std::size_t>((range2_ + 1) * kCells);
+  for (std::size_t n = 0; n < count; ++n) {
+    const double low = static_cast<double>(n) / kCells, high = static_cast<double>(n + 1) / kCells;
+    // Each bound changes in one sense.
+    reaches_.push_back({exact_reach(low), bounds_of(low) == bounds_of(high)});
+  }
+}
+
+/// Reach before the wall's range and the corner's heights are cut to the others.
+LateralColumns::Reach LateralColumns::bounds_of(double flat2) const noexcept {
+  const double a = grid_->resolution(), d2 = a * a * flat2;
+  const auto root = [](double x) { return x < 0 ? -1.0 : std::sqrt(x); };
+  const double longest = (model_.wall.l_max + 1e-9) / a, highest = root(corner_l2_ - flat2);
+  int wall = -1;
+  while (wall + 1 < static_cast<int>(wall_low_.size()) && wall_low_[static_cast<std::size_t>(wall + 1)] <= d2) ++wall;
+  const double least = model_.corner.phi_max < std::numbers::pi / 2 ? std::sqrt(flat2) * cot_phi_max_ : -1e4;
+  const auto number = [](int n) { return static_cast<std::int16_t>(std::clamp(n, -10000, 10000)); };
+  return {number(floor_to_int(root(longest * longest - flat2))), number(wall),
+          number(std::max(ceil_to_int(least + 0.5 - 1e-6), ceil_to_int(0.5 - highest))),
+          number(floor_to_int(highest + 0.5))};
+}
+
+LateralColumns::Reach LateralColumns::exact_reach(double flat2) const noexcept {
+  Reach reach = bounds_of(flat2);
+  reach.wall_range = std::min(reach.wall_range, reach.range);
+  if (corner_l2_ < flat2 || reach.range < 0) reach.first_up = 0, reach.last_up = -1;
+  return reach;
 }
 
 }  // namespace backwash::field

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/field/proximity_model.hpp"
@@ -33,7 +34,10 @@ class LateralColumns {
   };
 
  private:
+  template <typename Word>
   friend class LateralSweep;
+  friend class LateralSums;
+  friend struct NearSegments;
 
   struct Tensor {
     float xx, xy, yy, zz;
@@ -53,40 +57,50 @@ class LateralColumns {
 
   void add_segments();
   std::vector<SightLines::Bundle> bundle_normals();
+  void add_arrays();
   void add_tables();
 
   const map::OccupancyGrid* grid_;
   Model model_;
   ProximityModel terms_;
-  SightMap sight_;                           ///< for lines beyond the window
-  double range2_;                            ///< (l̄_w/a)² and a little, voxel edges²
-  int radius_;                               ///< of the columns' surroundings, voxels
-  int pitch_;                                ///< columns in a row of a block's window
-  std::vector<ElementSegment> segments_;     ///< row by row, then by x, sector, normal and height
-  std::vector<std::uint32_t> column_first_;  ///< of the segments, per column
+  std::optional<SightMap> sight_;             ///< for lines beyond a word, where there may be such
+  double range2_;                             ///< (l̄_w/a)² and a little, voxel edges²
+  int radius_;                                ///< of the columns' surroundings, voxels
+  int pitch_;                                 ///< columns in a row of a block's window
+  std::vector<ElementSegment> segments_;      ///< row by row, then by x, sector, normal and height
+  std::vector<std::uint32_t> column_first_;   ///< of the segments, per column
+  std::vector<std::int32_t> x_, low_, high_;  ///< of the segments: for find_near()
+  std::vector<float> m_x_, m_y_;
   SightLines lines_;
-  std::vector<double> decay_;  ///< [n]: Σ exp(−k_w2 a² i²) over i < n, in multiples of 2⁻⁴⁰: sums are exact
-  std::vector<double> step_;   ///< [kLayers + n]: exp(−k_w2 a² n²), the same; 0 for n < 0 or beyond the range
-  std::vector<double> wall_low_, wall_high_;  ///< limits of d_c² for the wall term n voxels below, m²
+  std::vector<std::int32_t> places_;  ///< of the lines' crossings, from the column that is looked from, in a window
   struct Reach {
-    int range;       ///< |z_e − z_q| at most, voxels: the gate |r| ≤ l̄_w
-    int wall_range;  ///< z_q − z_e at most for the wall term; −1: no height is within
+    std::int16_t range;              ///< |z_e − z_q| at most, voxels: the gate |r| ≤ l̄_w; −1: never
+    std::int16_t wall_range;         ///< z_q − z_e at most for the wall term; −1: never
+    std::int16_t first_up, last_up;  ///< heights above the floor's voxel at which the corner's factor may not be zero
+    bool operator==(const Reach&) const = default;
   };
-  /// The largest heights that the gates allow at the horizontal distance (d_c/a)² = flat2.
+  /// What the gates leave at the horizontal distance (d_c/a)² = flat2.
   Reach reach_of(double flat2) const noexcept {
-    const double a2 = grid_->resolution() * grid_->resolution(), d2 = a2 * flat2;
-    const auto n = static_cast<std::size_t>(flat2);
-    Reach reach = n < least_reach_.size() ? least_reach_[n] : Reach{-1, -1};
-    while (terms_.in_wall_range(d2 + a2 * (reach.range + 1) * (reach.range + 1))) ++reach.range;
-    const auto in_gate = [&](int up) {
-      const auto at = static_cast<std::size_t>(up);
-      return at < wall_low_.size() && d2 >= wall_low_[at] && d2 <= wall_high_[at];
-    };
-    while (in_gate(reach.wall_range + 1)) ++reach.wall_range;
-    return reach;
+    const auto n = static_cast<std::size_t>(flat2 * kCells);
+    const Cell cell = n < reaches_.size() ? reaches_[n] : Cell{};
+    return cell.same ? cell.reach : exact_reach(flat2);
   }
-  std::vector<Reach> least_reach_;  ///< [n]: what reach_of() is at least, n ≤ (d_c/a)² < n + 1
-  double cot_phi_max_;              ///< 0 if φ̄_c is not less than π/2
+  Reach exact_reach(double flat2) const noexcept;
+  Reach bounds_of(double flat2) const noexcept;
+  static constexpr double kCells = 4;  ///< per voxel edge²
+  struct Cell {
+    Reach reach{};
+    bool same = false;  ///< for all flat2 of the cell
+  };
+  std::vector<Cell> reaches_;
+  std::vector<double> wall_low_;  ///< [n]: least d_c² for the wall term n voxels below, m²
+  std::vector<double> step_;      ///< [n]: exp(−k_w2 a² n²)
+  /// [n]: bits of a word about an element that a line may cross from n layers below and above, by the part that is
+  /// left.
+  std::vector<std::array<std::uint64_t, SightLines::kParts>> below_, above_;
+  std::vector<int> half_width_;  ///< [|dy|]: columns on either side in a row dy away that are near enough
+  double corner_l2_;             ///< (l̄_c/a)² and a little, voxel edges²
+  double cot_phi_max_;           ///< 0 if φ̄_c is not less than π/2
 };
 
 }  // namespace backwash::field

@@ -3,65 +3,91 @@
 
 #include <array>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
+#include "core/field/hiding_runs.hpp"
 #include "core/field/lateral_columns.hpp"
+#include "core/field/lateral_kernels.hpp"
+#include "core/field/lateral_sums.hpp"
 #include "core/field/layers.hpp"
+#include "core/field/near_segments.hpp"
 #include "core/field/sight_lines.hpp"
 
 namespace backwash::field {
 
-/// Evaluates LateralColumns column after column of a block, from a window of its surroundings.
+/// Evaluates LateralColumns column after column of a block, from a window of its surroundings. `Word`: the occupied
+/// layers of a column, std::uint64_t for a map of no more than 64 layers and Layers for any.
+///
+/// Each column of targets takes these steps, each for all segments in range: which are near (kernels), which heights
+/// the gates leave, what is seen for certain, which crossed columns may hide the rest, what they hide (kernels), sums
+/// (kernels).
+template <typename Word>
 class LateralSweep {
  public:
   explicit LateralSweep(const LateralColumns& columns);
   /// Takes the columns x … x + LateralColumns::kWindow − 1, y … y + height − 1 in hand, and the layers first_z …
   /// first_z + LateralColumns::kLayers − 1.
   void open(int x, int y, int height, int first_z);
-  /// Adds the terms in the voxels of column (x, y) of the block that `targets` marks: bit z is layer first_z + z.
-  /// Entries of `sums` outside them hold nothing. Bits do not depend on what was evaluated before.
-  void add(int x, int y, std::uint64_t targets, LateralColumns::Sums& sums);
+  /// Sums of the terms in the voxels of column (x, y) of the block that `targets` marks: bit z is layer first_z + z.
+  /// Other entries hold nothing. Bits do not depend on what was evaluated before.
+  const LateralColumns::Sums& sum(int x, int y, std::uint64_t targets);
 
  private:
   using ElementSegment = LateralColumns::ElementSegment;
-  static constexpr int kBelow = 32;  ///< bit n of a column of the window is layer first_z − kBelow + n
-  /// Free heights, below < z < above.
-  struct FreeStretch {
-    int below, above;
-  };
-  /// A segment as seen from the column in hand; heights count from first_z.
+  static constexpr int kBelow = sizeof(Word) == 8 ? 0 : 32;  ///< bit n of a column is layer first_z − kBelow + n
+  /// A segment in range as seen from the column in hand; heights count from first_z.
   struct View : LateralColumns::Reach {
     const ElementSegment* segment;
-    double d2;                           ///< d_c², m²
-    int first_up, last_up;               ///< heights above the floor's voxel that may have a corner term
-    int from, to;                        ///< elements
-    std::uint64_t targets, with_corner;  ///< with_corner: heights that may have a corner term
-    int low, high;                       ///< first and last target
+    std::uint32_t near;           ///< number in near_
+    std::uint64_t with_corner;    ///< targets that may have a corner term
+    std::uint32_t words;          ///< first of words_, of the columns that its lines cross
+    std::uint16_t crossed, must;  ///< how many, and how many that every line crosses
+    std::uint32_t crossings;      ///< first of them in the table
+    std::uint32_t element, end;   ///< of its elements below
+    std::int16_t from, to;        ///< elements that every target sees; none if from > to
   };
 
-  void add(const ElementSegment& segment, std::uint64_t targets, LateralColumns::Sums& sums);
-  bool meet(const ElementSegment& segment, std::uint64_t targets, View& view) const noexcept;
-  void add_corner(View& view) const noexcept;
-  void look_along(const SightLines::Line& line);
-  bool common_stretch(const View& view, FreeStretch& stretch);
-  static std::uint64_t in_range(const View& view, int z) noexcept;
-  void add_uncertain(const View& view, const FreeStretch& stretch) noexcept;
-  std::uint64_t seen_from(const View& view, int z, std::uint64_t targets) const noexcept;
+  void reserve_views(std::size_t most);
+  void open_view(std::uint32_t near);
+  Word look_along(const SightLines::Line& line);
+  void add_stack(View& view, const Word& all);
+  void add_element(const View& view, int z, const Word& all);
+  std::uint64_t around(const Word& word, int z) const noexcept;
   std::uint64_t looked_at(const View& view, int z, std::uint64_t targets) const noexcept;
+  void find_hiding();
+  void look_between(std::uint32_t element);
+  const std::uint64_t* about(const View& view, int z);
+  void add_walls();
+  void add_corners();
+  std::uint64_t count_stack(const View& view) noexcept;
 
   const LateralColumns& columns_;
-  int first_x_ = 0, first_y_ = 0, first_z_ = 0;          ///< of the window and the layers
-  int x_ = 0, y_ = 0;                                    ///< the column in hand
-  const Layers* home_ = nullptr;                         ///< the same, in the window
-  std::vector<Layers> window_;                           ///< occupied voxels
-  std::vector<const ElementSegment*> near_;              ///< segments of one row that may have a term
-  const SightLines::Line* line_ = nullptr;               ///< to the segment in hand
-  std::vector<Layers> crossed_;                          ///< the columns that it crosses
-  Layers all_ = 0;                                       ///< what is occupied in any of them
-  std::vector<std::pair<ColumnOffset, Layers>> hiding_;  ///< those that are not empty at the heights in question
-  std::size_t hiding_count_ = 0;
-  std::array<double, LateralColumns::kLayers> wall_{}, seen_{};  ///< per layer: Σ exp(−k_w2 a² n²), number of elements
+  int first_x_ = 0, first_y_ = 0, first_z_ = 0;  ///< of the window and the layers
+  int x_ = 0, y_ = 0;                            ///< the column in hand
+  std::uint64_t targets_ = 0;
+  const Word* home_ = nullptr;  ///< the same, in the window
+  std::vector<Word> window_;    ///< occupied voxels
+
+  NearSegments near_;
+  std::size_t view_count_ = 0;
+  std::vector<View> views_;
+  std::vector<double> c_x_, c_y_, range_;  ///< of the views
+  std::vector<LineFromAbove> lines_;
+  const SightLines::Line* line_ = nullptr;  ///< looked along last
+  Word all_ = 0;                            ///< what is occupied in any of the columns there
+  std::vector<Word> words_;                 ///< what is occupied in each
+  std::size_t word_count_ = 0;
+  std::vector<std::uint64_t> about_, inside_;  ///< of one element: words about it, and between its targets and it
+
+  std::size_t element_count_ = 0;
+  std::vector<std::uint32_t> view_of_, open_elements_;
+  std::vector<std::int32_t> z_, wall_range_, reach_;
+  std::vector<std::uint64_t> with_corner_, all_about_, certain_, open_, far_, hidden_, wall_, corner_;
+
+  HidingRuns hiding_;
+  LateralSums totals_;
+  std::array<float, kPadded> count_{}, ones_{};
+  LateralColumns::Sums sums_{};
 };
 
 }  // namespace backwash::field

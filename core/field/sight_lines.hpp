@@ -14,7 +14,6 @@ namespace backwash::field {
 struct ColumnOffset {
   std::int16_t x, y;
 };
-
 /// Lines of sight from one column of voxel centres to the lateral elements of another, seen from above, for a bundle of
 /// normals at once: a box that holds them. Interval arithmetic over the box tells which columns of voxels some line
 /// crosses before its last 2 voxel edges, and which of them every line crosses.
@@ -40,6 +39,11 @@ class SightLines {
   std::span<const ColumnOffset> crossings(const Line& line) const noexcept {
     return std::span(crossings_).subspan(line.first, line.count);
   }
+  /// All of them, of one line after the other.
+  std::span<const ColumnOffset> crossings() const noexcept { return crossings_; }
+  /// Of each: n if the part of the way left there is at most (n + 1)/kParts; and 8 more entries.
+  std::span<const std::uint8_t> left() const noexcept { return left_; }
+  static constexpr int kParts = 16;
 
  private:
   using Limits = std::array<double, 2>;
@@ -51,32 +55,13 @@ class SightLines {
   double end_;               ///< part of the way that is not the last 2 voxel edges, of the longest line
   std::vector<Line> lines_;  ///< per dy, dx and bundle: in the order of the segments of a row
   std::vector<ColumnOffset> crossings_;
-  struct Crossing {
+  std::vector<std::uint8_t> left_;
+  struct Made {
     int lead, side;
+    double in;  ///< least part of the way up to it
     bool must;
   };
-  std::vector<Crossing> made_;  ///< of the line in the making
-};
-
-/// One line of sight from above, from the centre of a column to an element: which heights a crossed column hides.
-/// Heights count from the element's; parts of the way from the column.
-class LineFromAbove {
- public:
-  static constexpr int kCentre = 31;  ///< bit of a word of heights that is the element's own
-
-  /// `c_x`, `c_y`: the element's place; `range`: its height above or below the column's voxels at most. Voxel edges.
-  LineFromAbove(double c_x, double c_y, int range) noexcept;
-  /// Takes a column in hand; false if the line does not cross it.
-  bool cross(const ColumnOffset& column) noexcept;
-  /// Heights from which the voxels low … high of the column in hand hide the element.
-  std::uint64_t hidden(int low, int high) const noexcept;
-
- private:
-  double per_x_, per_y_;       ///< 1/c_x, 1/c_y
-  double flat_, flat2_;        ///< length from above, voxel edges, and its square
-  double end_;                 ///< part of the way that is not the last 2 voxel edges, of the longest line
-  double far_ = 1, near_ = 1;  ///< one over the part that is left where the line enters and leaves the column
-  int gap_ = 0;                ///< heights below this have the column in their last 2 voxel edges
+  std::vector<Made> made_;  ///< of the line in the making
 };
 
 /// Bits low … high of a word; none if low > high or all are outside it.

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <vector>
 
+#include "core/field/lateral_kernels.hpp"
 #include "core/field/sight.hpp"
 
 namespace backwash::field {
@@ -66,6 +68,22 @@ TEST(SightLines, HoldEveryColumnCrossedAndMarkThoseThatEveryLineCrosses) {
   EXPECT_GT(must, may / 2) << "else nothing is known to be hidden";
 }
 
+/// hide() for one line and one column, by itself in the lane `lane` of eight.
+std::uint64_t hidden_by(const Vec3& c, const ColumnOffset& column, int low, int high, std::size_t lane) {
+  std::array<double, 8> x{}, y{}, range{};
+  std::array<LineFromAbove, 8> lines{};
+  x.fill(1), y.fill(1);
+  x[7 - lane] = c.x(), y[7 - lane] = c.y(), range[7 - lane] = kRange;
+  make_lines(x.data(), y.data(), range.data(), 8, lines.data());
+  std::array<std::uint32_t, 8> line{};
+  std::array<std::int32_t, 8> columns_x{}, columns_y{}, lows{}, highs{};
+  std::array<std::uint64_t, 8> hidden{};
+  line[lane] = static_cast<std::uint32_t>(7 - lane);
+  columns_x[lane] = column.x, columns_y[lane] = column.y, lows[lane] = low, highs[lane] = high;
+  hide(lines.data(), {line.data(), columns_x.data(), columns_y.data(), lows.data(), highs.data(), hidden.data()}, 8);
+  return hidden[lane];
+}
+
 TEST(LineFromAbove, HidesTheHeightsThatTheLineOfSightSaysItHides) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -80,12 +98,11 @@ TEST(LineFromAbove, HidesTheHeightsThatTheLineOfSightSaysItHides) {
     const ColumnOffset column{static_cast<std::int16_t>(draw(std::min(dx, 0), std::max(dx, 0))),
                               static_cast<std::int16_t>(draw(std::min(dy, 0), std::max(dy, 0)))};
     const int low = draw(-6, 4), high = low + draw(0, 3);
-    LineFromAbove line(dx + 0.5 * m.x(), dy + 0.5 * m.y(), kRange);
-    const std::uint64_t word = line.cross(column) ? line.hidden(low, high) : 0;
+    const std::uint64_t word = hidden_by(element(dx, dy, 0, m), column, low, high, static_cast<std::size_t>(n % 8));
     for (int y = -kRange; y <= kRange; ++y) {
       // Seen from the height y over the element, at 0: the element is −y layers up, and so are the voxels.
       const bool meets = meets_column(element(dx, dy, -y, m), column, low - y, high - y);
-      ASSERT_EQ(word >> (LineFromAbove::kCentre + y) & 1, meets ? 1U : 0U)
+      ASSERT_EQ(word >> (kCentre + y) & 1, meets ? 1U : 0U)
           << dx << ' ' << dy << ' ' << m.transpose() << ", column " << column.x << ' ' << column.y << ", " << low
           << " … " << high << " from " << y;
       (meets ? hidden : open) += 1;
