@@ -10,9 +10,10 @@
 namespace backwash::field {
 namespace {
 
-constexpr std::size_t kLanes = 16;
-constexpr std::array<std::int32_t, kLanes> kBits{1 << 0, 1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
-                                                 1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+constexpr std::size_t kFloats = 16;
+constexpr std::array<std::int32_t, kFloats> kBitOf{1 << 0,  1 << 1,  1 << 2,  1 << 3, 1 << 4,  1 << 5,
+                                                   1 << 6,  1 << 7,  1 << 8,  1 << 9, 1 << 10, 1 << 11,
+                                                   1 << 12, 1 << 13, 1 << 14, 1 << 15};
 
 /// sums[n] += the number, at the bits n of the word's lowest 16.
 template <std::size_t kPiece>
@@ -22,9 +23,9 @@ template <std::size_t kPiece>
   using Ints = typename vectors::Native<kPiece>::Ints;
   const Ints all = Ints{} + static_cast<std::int32_t>(word & 0xffff), h = reinterpret_cast<Ints>(Floats{} + horizontal),
              v = reinterpret_cast<Ints>(Floats{} + vertical);
-  for (std::size_t n = 0; n < kLanes; n += kPiece / sizeof(float)) {
+  for (std::size_t n = 0; n < kFloats; n += kPiece / sizeof(float)) {
     Ints bits;
-    std::memcpy(&bits, kBits.data() + n, sizeof bits);
+    std::memcpy(&bits, kBitOf.data() + n, sizeof bits);
     const Ints mask = (all & bits) != 0;
     Floats sum;
     std::memcpy(&sum, horizontal_sums + n, sizeof sum);
@@ -58,7 +59,7 @@ struct AddVisible {
       }
       for (std::size_t n = 0; n < kWords; ++n) {
         std::uint64_t word = lanes[n];
-        for (std::size_t at = 64 * (y + n); word; at += kLanes, word >>= kLanes)
+        for (std::size_t at = 64 * (y + n); word; at += kFloats, word >>= kFloats)
           add_at<kPiece>(word, horizontal, vertical, horizontal_sums + at, vertical_sums + at);
       }
     }

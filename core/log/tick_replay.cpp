@@ -100,10 +100,10 @@ template <typename List, typename Record>
 std::optional<Difference> compare(const List& list, const Record& logged, const Record& replayed, std::uint64_t& hash) {
   std::optional<Difference> first;
   const auto number = [&](const char* name, auto a, auto b) {
-    using Bytes = std::array<std::uint8_t, sizeof b>;
-    const auto bytes = std::bit_cast<Bytes>(b);
+    using Bits = std::array<std::uint8_t, sizeof b>;
+    const auto bytes = std::bit_cast<Bits>(b);
     for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
-    if (std::bit_cast<Bytes>(a) != bytes && !first)  // bit for bit
+    if (std::bit_cast<Bits>(a) != bytes && !first)  // bit for bit
       first = Difference{logged.tick, 0, name, static_cast<double>(a), static_cast<double>(b)};
   };
   each_decision(list, [&](const auto& decision) {
