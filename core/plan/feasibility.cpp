@@ -20,7 +20,9 @@ constexpr double kDistanceRounding = 1e-5;  // m, more than any of a distance, s
 /// Clearance of the hover set at a voxel's centre, m.
 double clearance(const World& world, const Index3& v) {
   const Vec3 p_W = world.grid.center(v);
-  return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin).clearance;
+  return reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin,
+                          &world.sums)
+      .clearance;
 }
 
 /// At least the clearance of the hover set at a voxel's centre, without looking for obstacles: the set holds a point no

@@ -49,7 +49,8 @@ std::optional<double> clearance_at_centre(const World& world, std::size_t n, con
                cap = kHoverClearanceCap + taken;
   if (free - kStoredRounding - Vec3(h[kX], h[kY], h[kZ]).norm() >= cap) return std::nullopt;
   const Vec3 p_W = world.grid.center(world.grid.voxel(n));
-  const double found = reach::prism_distance(world.grid, p_W, h, std::min(cap, free + kStoredRounding)) - taken;
+  const double found =
+      reach::prism_distance(world.grid, p_W, h, std::min(cap, free + kStoredRounding), &world.sums) - taken;
   return found < kHoverClearanceCap ? std::optional(found) : std::nullopt;
 }
 
@@ -73,8 +74,8 @@ class Quantiles {
   double at(std::size_t percent, const Parallel& parallel) {
     const std::size_t all = some_.size() + nothing_, larger = all - 1 - all * percent / 100;
     if (all == 0 || larger >= some_.size()) return 0;
-    for (;; look_at_more(parallel)) {
-      if (larger >= values_.size()) continue;
+    for (;; look_at(values_.size() + some_.size() / 64 + 1, parallel)) {
+      if (larger >= values_.size()) look_at(larger + 1, parallel);
       const auto value = values_.begin() + static_cast<std::ptrdiff_t>(larger);
       std::nth_element(values_.begin(), value, values_.end(), std::greater{});
       if (values_.size() == some_.size() || *value >= some_[values_.size()].at_most) return *value;
@@ -82,9 +83,12 @@ class Quantiles {
   }
 
  private:
-  void look_at_more(const Parallel& parallel) {
+  /// So many of them are known. In the order of the map: neighbours read the same memory.
+  void look_at(std::size_t count, const Parallel& parallel) {
     const std::size_t known = values_.size();
-    values_.resize(std::min(some_.size(), known + some_.size() / 64 + 1));
+    values_.resize(std::min(some_.size(), count));
+    const auto at = [this](std::size_t n) { return some_.begin() + static_cast<std::ptrdiff_t>(n); };
+    std::ranges::sort(at(known), at(values_.size()), {}, &GivenUp::voxel);
     parallel(values_.size() - known, [&](std::size_t begin, std::size_t end) {
       for (std::size_t n = known + begin; n < known + end; ++n) values_[n] = exact_(some_[n].voxel);
     });
@@ -134,7 +138,8 @@ SetCost cost_of_set(const World& world, const Parallel& parallel) {
   }
   Quantiles given_up(std::move(some), nothing, [&world](std::size_t n) {
     const Index3 v = world.grid.voxel(n);
-    const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v));
+    const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v),
+                                      std::nullopt, &world.sums);
     return clearance_at_centre(world, n, set_at_centre(world, v)).value() - set.clearance;
   });
   cost.median_m = given_up.at(50, parallel);

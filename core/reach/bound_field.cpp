@@ -53,6 +53,21 @@ void BoundField::update(const map::VoxelBox& changed, std::span<const std::size_
     fill([&](std::size_t n, const Variance& sigma) { store(n, codes(n, sigma)); });
   };
   tiles_.update(changed, listed, bounds, parallel);
+  update_pushes();
+}
+
+void BoundField::restore(std::span<const std::size_t> listed, std::span<const BoundCodes> codes,
+                         const Parallel& parallel) {
+  const FillBounds kept = [&](const auto& store) {
+    parallel(listed.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) store(listed[n], codes[n]);
+    });
+  };
+  tiles_.update(map::all_of(tiles_.size()), listed, kept, parallel);
+  update_pushes();
+}
+
+void BoundField::update_pushes() {
   if (!extension_.by_place()) return;
   least_push_ = largest_push_ = Vec3::Zero();
   map::for_each_voxel(map::all_of(tiles_.size()), [&](const Index3& v) {

@@ -35,6 +35,11 @@ class BoundField {
   /// box), 0 at the others. O(voxels of the tiles met); by an extension by place O(voxels).
   void update(const map::VoxelBox& changed, std::span<const std::size_t> listed, const FillVariance& fill,
               const Parallel& parallel = run_serial);
+  /// What is kept at a voxel inside the grid, and the whole field anew from that: codes[i] belongs to listed[i] (linear
+  /// indices), all others are 0. Cost as that of update() of all, without `fill`.
+  const BoundCodes& codes(const Index3& v) const noexcept { return tiles_.at(v).level[0]; }
+  void restore(std::span<const std::size_t> listed, std::span<const BoundCodes> codes,
+               const Parallel& parallel = run_serial);
   /// Another extension of the same model. Wherever it says something else than before, update() must follow.
   void extend(field::Extension extension) { extension_ = std::move(extension); }
   /// Largest w̄ of all voxels, m/s². O(voxels / 4096).
@@ -65,6 +70,7 @@ class BoundField {
   bool inside(const Index3& v) const noexcept { return map::inside(tiles_.size(), v); }
   map::VoxelBox meeting(const Vec3& low_W, const Vec3& high_W) const noexcept;
   DisturbanceBound moving(DisturbanceBound w, const Vec3& v_W) const noexcept;
+  void update_pushes();
   bool stored(const Index3& v) const noexcept { return tiles_.at(v).level[0][kZ] != 0; }
 
   Vec3 origin_W_;

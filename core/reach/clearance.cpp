@@ -114,10 +114,24 @@ class Scan {
 
   /// Squared distance; the squared limit if nothing is nearer; 0 if enough was found.
   double nearest2() {
-    outwards(2, 0, [&](int k, double gap2_z) {
-      if (layer_free(k)) return;
+    const auto layer = [&](int k, double gap2_z) {
       outwards(1, gap2_z, [&](int j, double gap2_y) { row(j, k, gap2_y, gap2_z); });
-    });
+    };
+    if (!sums_) {
+      outwards(2, 0, layer);
+      return nearest2_;
+    }
+    // Up and down from the middle layer; of the layers with obstacles the nearer one first.
+    const int top = grid_.size().z() - 1, middle = std::clamp(static_cast<int>(center_.z()), 0, top);
+    int up = first_with_obstacle(middle, 1), down = first_with_obstacle(middle - 1, -1);
+    while (nearest2_ > 0 && (up <= top || down >= 0)) {
+      const bool upwards = down < 0 || (up <= top && gap2(2, up) <= gap2(2, down));
+      int& next = upwards ? up : down;
+      layer(next, gap2(2, next));
+      next = first_with_obstacle(upwards ? next + 1 : next - 1, upwards ? 1 : -1);
+      int& other = upwards ? down : up;
+      if (gap2(2, other) >= nearest2_) other = upwards ? -1 : top + 1;
+    }
     return nearest2_;
   }
 
@@ -147,15 +161,27 @@ class Scan {
       layer(down);
     }
   }
-  bool layer_free(int k) const noexcept {
-    if (!sums_) return false;
+  /// The first layer from k on, upwards or downwards, that holds an obstacle within a box around what is nearer than
+  /// the nearest so far; -1 or the number of layers if there is none. By halves.
+  int first_with_obstacle(int k, int step) const noexcept {
+    const int size = grid_.size().z(), none = step > 0 ? size : -1;
     const double reach = std::sqrt(nearest2_);
-    Index3 low(0, 0, k), high(0, 0, k);
-    for (int axis = 0; axis < 2; ++axis) {
-      low[axis] = std::max(0, static_cast<int>(center_[axis] - half_[axis] - reach));
-      high[axis] = std::min(grid_.size()[axis] - 1, static_cast<int>(center_[axis] + half_[axis] + reach));
+    const Vec3 far = half_ + Vec3::Constant(reach);
+    const Index3 low = (center_ - far).cwiseMax(0).cast<int>();
+    const Index3 high = (center_ + far).cwiseMin(grid_.size().cast<double>() - Vec3::Ones()).cast<int>();
+    const auto free = [&](int from, int to) {
+      return sums_->voxels_free({low.x(), low.y(), std::min(from, to)}, {high.x(), high.y(), std::max(from, to)});
+    };
+    int last = step > 0 ? high.z() : low.z();
+    if ((last - k) * step < 0 || free(k, last)) return none;
+    while (k != last) {
+      const int half = k + (last - k) / 2;
+      if (free(k, half))
+        k = half + step;
+      else
+        last = half;
     }
-    return sums_->voxels_free(low, high);
+    return k;
   }
   /// A row of voxels along x. Distance is convex in x: it only grows beyond the prism's bounding box, so that on either
   /// side of it the first obstacle is enough.
@@ -224,8 +250,8 @@ double body_and_estimation(const Vehicle& vehicle) noexcept {
 
 // A voxel is a box, so its distance to the prism is that of its centre to prism ⊕ box, whose supports are the sums.
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
-                      double limit) {
-  return distance(grid, center_W, tight_supports(half_widths), limit);
+                      double limit, const map::OccupancySums* sums) {
+  return distance(grid, center_W, tight_supports(half_widths), limit, sums);
 }
 
 bool prism_clear(const map::OccupancyGrid& grid, const map::OccupancySums& sums, const Vec3& center_W,

@@ -21,12 +21,13 @@ double body_and_estimation(const Vehicle& vehicle) noexcept;
 /// Distance from an octagonal prism to the nearest face of an occupied or unknown voxel, m, 0 if they meet
 /// (docs/model.md section 4, "Clearance", before body and estimation are taken off). The prism is
 /// {center + e : |unit(d)·e| ≤ half_widths[d] for every Direction d}; outside the grid is unknown.
-/// Exact up to `limit`; returns `limit` if nothing is nearer. O((extent/a)³).
+/// Exact up to `limit`; returns `limit` if nothing is nearer. O((extent/a)³); the same, sooner, with the `sums` of
+/// `grid`, by which layers without obstacles are skipped.
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
-                      double limit);
+                      double limit, const map::OccupancySums* sums = nullptr);
 
-/// Whether nothing comes as near to the prism as `least`, m: prism_distance > least. Skips the layers that `sums`,
-/// those of `grid`, show to be free, and ends at the first voxel that is too near.
+/// Whether nothing comes as near to the prism as `least`, m: prism_distance > least. Ends at the first voxel that
+/// is too near.
 bool prism_clear(const map::OccupancyGrid& grid, const map::OccupancySums& sums, const Vec3& center_W,
                  const PerDirection& half_widths, double least);
 

@@ -44,13 +44,13 @@ Vec3 static_shift(const Vehicle& vehicle, const Vec3& push_W) {
 /// Clearance of a set, exact up to the cap. The distance field brackets the answer: the set holds p, so it is no
 /// farther from obstacles than p, and no nearer than p less the set's circumradius.
 double set_clearance(const Vehicle& vehicle, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                     const Vec3& p_W, const PerDirection& half_widths) {
+                     const Vec3& p_W, const PerDirection& half_widths, const map::OccupancySums* sums) {
   const Index3 v = grid.index(p_W);
   const double off_center = (p_W - grid.center(v)).norm() + 1e-6;  // the field is stored in single precision
   const double taken = body_and_estimation(vehicle);
   if (distance.at(v) - off_center - box(half_widths).norm() >= kHoverClearanceCap + taken) return kHoverClearanceCap;
   const double limit = std::min(kHoverClearanceCap + taken, distance.at(v) + off_center);
-  return prism_distance(grid, p_W, half_widths, limit) - taken;
+  return prism_distance(grid, p_W, half_widths, limit, sums) - taken;
 }
 
 /// Boxes of voxels around a point of voxel v.
@@ -189,13 +189,14 @@ HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid,
 }
 
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                   const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin) {
+                   const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin,
+                   const map::OccupancySums* sums) {
   HoverSet set = hover_extent(reach, grid, distance, bounds, p_W, constant_margin);
   if (!set.bounded) return set;
   const Vec3 c_W = set.shift + p_W;
   const double taken = body_and_estimation(reach.vehicle);
   set.clearance = constant_margin ? std::min(kHoverClearanceCap, distance.exact(grid, c_W) - *constant_margin - taken)
-                                  : set_clearance(reach.vehicle, grid, distance, c_W, set.half_widths);
+                                  : set_clearance(reach.vehicle, grid, distance, c_W, set.half_widths, sums);
   return set;
 }
 

@@ -25,9 +25,11 @@ struct HoverSet {
 /// by how much the push differs over the set is in w̄. For method paper h is the support of the
 /// infinite-time ellipsoid instead. Unbounded, with the clearance of touching, when h exceeds the free distance and
 /// where p or c is not in a free voxel. A `constant_margin`, m, replaces the set by a ball of that radius (the baseline
-/// of `--margin`). Cost: some look-ups of max_over and one prism_distance, which the distance field limits.
+/// of `--margin`). Cost: some look-ups of max_over and one prism_distance, which the distance field limits, and the
+/// `sums` of `grid` where they are given.
 HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                   const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin = std::nullopt);
+                   const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin = std::nullopt,
+                   const map::OccupancySums* sums = nullptr);
 
 /// The same set without its clearance, which is the dear part: `clearance` is that of touching.
 HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
@@ -44,6 +46,8 @@ class HoverMap {
   void fill(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
             const map::OccupancySums& sums, const BoundField& bounds, std::span<const std::size_t> voxels,
             std::optional<double> constant_margin = std::nullopt);
+  /// The voxel is safe, as fill() found it before. Precondition: inside the grid.
+  void set_safe(const Index3& v) noexcept { safe_.set(v, map::Cell::free); }
   /// As if the voxels of a box inside the grid had never been computed.
   void clear(const map::VoxelBox& box) noexcept;
   /// False outside the grid and where nothing was computed.

@@ -151,6 +151,8 @@ TEST(PrismDistance, EqualsBruteForceOnRandomGrids) {
       const PerDirection h = random_half_widths(random);
       const double expected = brute_force(grid, p, h, 0.6);
       EXPECT_NEAR(prism_distance(grid, p, h, 0.6), expected, 1e-9);
+      const map::OccupancySums sums(grid);
+      EXPECT_EQ(prism_distance(grid, p, h, 0.6, &sums), prism_distance(grid, p, h, 0.6));
       apart += expected > 0 && expected < 0.6;
     }
   }
@@ -177,6 +179,8 @@ TEST(PrismDistance, ToSolidBlocksEqualsBruteForce) {
     const PerDirection h = random_half_widths(random);
     const double expected = brute_force(grid, p, h, 0.6);
     EXPECT_NEAR(prism_distance(grid, p, h, 0.6), expected, 1e-9);
+    const map::OccupancySums sums(grid);
+    EXPECT_EQ(prism_distance(grid, p, h, 0.6, &sums), prism_distance(grid, p, h, 0.6));
     apart += expected > 0 && expected < 0.6;
   }
   EXPECT_GT(apart, 50);
