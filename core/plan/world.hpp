@@ -3,6 +3,8 @@
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_grid.hpp"
@@ -47,6 +49,15 @@ std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& m
                                          reach::Method method = reach::Method::tight,
                                          std::optional<double> constant_margin = std::nullopt,
                                          const Parallel& parallel = run_serial);
+
+/// What is dear in a world, as bytes to keep between runs: w̄ where the vehicle's centre can be, and where hovering is
+/// safe there. 11 bytes a voxel, of this machine's byte order. Precondition: a world of build_world().
+std::string kept_of(const World& world);
+/// The world that build_world() makes of these arguments, from what kept_of() gave for the same ones. Null where it has
+/// another length than they want; bytes of another world or damaged ones are not noticed: keep a hash beside them.
+std::shared_ptr<const World> restored_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
+                                            reach::Method method, std::optional<double> constant_margin,
+                                            std::string_view kept, const Parallel& parallel = run_serial);
 
 /// The world of a part of a map, to fly in until the whole one is made: the part's box of whole columns is a grid of
 /// its own, outside of which nothing is known, with the bounds that the whole map gives there. Where hovering is safe

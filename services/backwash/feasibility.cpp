@@ -6,6 +6,7 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/backwash/world_cache.hpp"
 
 namespace backwash::services {
 namespace {
@@ -131,8 +132,8 @@ int run(const Options& options) {
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
   auto grid = read_map(options.map);
-  progress("building the world");
-  const auto world = plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_shown);
+  const auto world =
+      world_of({std::move(grid), model, options.model, vehicle, options.vehicle, options.method, options.margin});
   const auto regions = plan::hover_regions(*world);
   std::optional<Way> way;
   if (options.start) {

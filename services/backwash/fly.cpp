@@ -8,6 +8,7 @@
 #include "services/backwash/flight_output.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/backwash/world_cache.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -80,8 +81,7 @@ int run(const Options& options) {
                     options.vehicle);  // names an unstable loop first
   auto grid = read_map(options.map);
   if (const auto known = known_ends(options); options.ends && known) return print_ends(*known);
-  progress("building the world");
-  const auto world = plan::build_world(std::move(grid), model, vehicle, reach::Method::tight, std::nullopt, run_shown);
+  const auto world = world_of({std::move(grid), model, model_path, vehicle, options.vehicle});
   sim::FlightOptions flight_options{.start_W = Vec3::Zero(),
                                     .goal_W = Vec3::Zero(),
                                     .seed = options.seed,

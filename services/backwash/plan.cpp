@@ -5,6 +5,7 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/backwash/world_cache.hpp"
 
 namespace backwash::services {
 namespace {
@@ -57,12 +58,16 @@ int run(const Options& options) {
   Setpoint hover;
   hover.p_W = *options.start;
   const plan::PlanStart start{State{*options.start, Vec3::Zero()}, hover};
-  progress("looking at both ends");
-  auto refused =
-      plan::refused_at_once(grid, model, vehicle, options.method, options.margin, start, *options.goal, limits);
-  if (!refused) progress("building the world");
-  const auto world =
-      refused ? nullptr : plan::build_world(std::move(grid), model, vehicle, options.method, options.margin, run_shown);
+  const CachedWorld cached(
+      {std::move(grid), model, options.model, vehicle, options.vehicle, options.method, options.margin});
+  auto world = cached.kept();
+  std::optional<plan::Plan> refused;
+  if (!world) {
+    progress("looking at both ends");
+    refused = plan::refused_at_once(cached.input().grid, model, vehicle, options.method, options.margin, start,
+                                    *options.goal, limits);
+    if (!refused) world = cached.made();
+  }
   if (world) progress("planning");
   const auto plan = world ? plan::plan(*world, start, *options.goal, limits) : *std::move(refused);
   options.json ? print_json(plan, options.method) : print_text(plan);

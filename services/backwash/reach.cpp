@@ -9,6 +9,7 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/backwash/world_cache.hpp"
 
 namespace backwash::services {
 namespace {
@@ -151,9 +152,8 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
   const Model model = read_model(options.model);
   if (chance && model.bound.kappa == 0)
     throw Failure(kConfiguration, options.model + ":1: --method chance over a map needs bound.kappa above 0");
-  progress("building the world");
   const auto world =
-      plan::build_world(read_map(options.map), model, reach.vehicle, reach.method, std::nullopt, run_shown);
+      world_of({read_map(options.map), model, options.model, reach.vehicle, options.vehicle, reach.method});
   if (chance) {
     return chance_tube_over_field(reach, start, commands[0], commands, world->bounds, model.bound,
                                   *options.probability);

@@ -72,6 +72,52 @@ TEST(World, DoesNotDependOnHowTheWorkIsDivided) {
   EXPECT_GT(safe, 10u);
 }
 
+/// A model with a push and a variance by place.
+Model extended_model() {
+  Model model;
+  model.extension = {{Law::push_to_walls, Vec3(0.5, 0, 0), Vec3(0.1, 0, 0), 0.5},
+                     {Law::ln_variance_under_surface, Vec3(0.7, 0, 0), Vec3(0.3, 0, 0), 0.8},
+                     {Law::push_against_velocity, Vec3(0.3, 0, 0), Vec3(0.05, 0, 0), 0}};
+  return model;
+}
+
+TEST(World, RestoredIsTheOneThatWasBuilt) {
+  const struct {
+    Model model;
+    reach::Method method;
+    std::optional<double> margin;
+  } cases[] = {{Model{}, reach::Method::tight, {}},
+               {Model{}, reach::Method::paper, {}},
+               {Model{}, reach::Method::tight, 0.1},
+               {extended_model(), reach::Method::tight, {}}};
+  for (const auto& [model, method, margin] : cases) {
+    const auto built = build_world(corridor(), model, vehicle_5in(), method, margin);
+    const std::string kept = kept_of(*built);
+    const auto restored = restored_world(corridor(), model, vehicle_5in(), method, margin, kept);
+    ASSERT_TRUE(restored);
+    std::size_t safe = 0;
+    for (std::size_t n = 0; n < built->grid.cell_count(); ++n) {
+      const Index3 v = built->grid.voxel(n);
+      ASSERT_EQ(built->bounds.at(v).w, restored->bounds.at(v).w);
+      ASSERT_EQ(built->hover.safe(v), restored->hover.safe(v));
+      ASSERT_EQ(built->safe.region(v), restored->safe.region(v));
+      ASSERT_EQ(built->distance.at(v), restored->distance.at(v));
+      const Index3 high = v + Index3(3, 5, 2);
+      const Vec3 push(0.1, 0, 0);
+      ASSERT_EQ(built->bounds.max_over_voxels(v, high).w, restored->bounds.max_over_voxels(v, high).w);
+      ASSERT_EQ(built->bounds.max_about_voxels(push, push, v, high).w,
+                restored->bounds.max_about_voxels(push, push, v, high).w);
+      ASSERT_EQ(built->safe.passable(v, high), restored->safe.passable(v, high));
+      safe += restored->hover.safe(v);
+    }
+    EXPECT_GT(safe, 10u);
+    EXPECT_EQ(restored->constant_margin, margin);
+    EXPECT_EQ(restored->reach.loop, built->reach.loop);
+    EXPECT_FALSE(restored_world(corridor(), model, vehicle_5in(), method, margin, kept.substr(1)));
+    EXPECT_FALSE(restored_world(corridor(), model, vehicle_5in(), method, margin, ""));
+  }
+}
+
 TEST(World, UsesThePapersLoopForThePapersMethodOnly) {
   EXPECT_EQ(build_world(corridor(), Model{}, vehicle_5in(), reach::Method::paper)->reach.loop, reach::Loop::continuous);
   EXPECT_EQ(build_world(corridor(), Model{}, vehicle_5in(), reach::Method::tight)->reach.loop, reach::Loop::vehicle);

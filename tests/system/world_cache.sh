@@ -1,0 +1,84 @@
+#!/bin/bash
+# SPDX-License-Identifier: BSD-3-Clause
+# world_cache.sh BACKWASH: a world that was made before is taken from the cache, for equal inputs alone and whole, and says the same.
+set -eu
+backwash=$1
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+export BACKWASH_CACHE=$work/cache
+here=$(cd "$(dirname "$0")" && pwd)
+map=$here/../../../shared/data/maps/geb079.bt
+[[ -e $map ]] || map=/usr/share/doc/liboctomap-dev/examples/data/geb079.bt
+if [[ ! -e $map ]]; then
+  echo "no map geb079.bt here: skipped"
+  exit 77
+fi
+failed=0
+fail() {
+  echo "FAILED: $1"
+  failed=1
+}
+
+
+cp "$here/../../core/config/files/quad-5in.vehicle.toml" "$work/own.toml"
+
+# NAME [ARGUMENT …]: the regions and the way of a vehicle, in $work/NAME.
+ask() {
+  local name=$1
+  shift
+  "$backwash" feasibility --map "$map" --model builtin:quad-5in --vehicle "$work/own.toml" --json "$@" >"$work/$name" 2>"$work/error" ||
+    fail "feasibility ends with $?: $(cat "$work/error")"
+}
+kept() { find "$work/cache" -type f 2>/dev/null | wc -l; }
+
+BACKWASH_CACHE='' ask without
+[[ $(kept) == 0 ]] || fail "something was kept without a folder"
+ask first
+[[ $(kept) == 1 ]] || fail "$(kept) files after the first world"
+[[ $(stat -c %a "$work/cache") == 700 ]] || fail "others may read the folder"
+file=$(find "$work/cache" -type f)
+touch -d '2001-01-01' "$file"
+ask second
+[[ $(stat -c %Y "$file") -gt 1000000000 ]] || fail "the kept world was not used"
+for name in first second; do
+  cmp -s "$work/without" "$work/$name" || fail "$name says something else than a world made anew"
+done
+
+# Another vehicle, margin or method is another world.
+ask margin --margin 0.2
+ask paper --method paper
+sed -i 's/^radius = .*/radius = 0.17/' "$work/own.toml"
+grep -q '^radius = 0.17' "$work/own.toml" || fail "the vehicle file has no radius to change"
+ask wide
+[[ $(kept) == 4 ]] || fail "$(kept) files after four different worlds"
+for name in margin paper wide; do
+  if cmp -s "$work/first" "$work/$name"; then fail "$name says what the first one says"; fi
+done
+
+# Damaged, cut, swapped or unreadable files are worlds made anew.
+cp "$file" "$work/good"
+size=$(stat -c %s "$file")
+sed -i 's/^radius = .*/radius = 0.16/' "$work/own.toml"
+ask anew
+for at in 0 3 20 90 150 200 $((size / 2)) $((size - 1)); do
+  cp "$work/good" "$file"
+  printf '\xa5' | dd of="$file" bs=1 seek="$at" conv=notrunc status=none
+  ask damaged
+  cmp -s "$work/anew" "$work/damaged" || fail "a file damaged at byte $at was believed"
+done
+for length in 0 10 145 200 $((size - 11)); do
+  head -c "$length" "$work/good" >"$file"
+  ask cut
+  cmp -s "$work/anew" "$work/cut" || fail "a file cut at byte $length was believed"
+done
+for other in "$work"/cache/*; do [[ $other == "$file" ]] || cp "$other" "$file"; done
+ask swapped
+cmp -s "$work/anew" "$work/swapped" || fail "the world of another vehicle was believed"
+rm "$file"
+mkdir "$file"
+ask folder
+cmp -s "$work/anew" "$work/folder" || fail "a folder in a world's place changed the answer"
+BACKWASH_CACHE=/proc/none ask nowhere
+BACKWASH_CACHE=/dev/null ask device
+for name in nowhere device; do cmp -s "$work/anew" "$work/$name" || fail "$name: another answer"; done
+exit $failed
