@@ -26,6 +26,7 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
       trajectory_(dds::make_writer<dds::Path>(participant_, config.dds.name_space)),
       markers_(dds::make_writer<dds::MarkerArray>(participant_, config.dds.name_space)),
+      disturbance_(dds::make_writer<dds::Disturbance>(participant_, config.dds.name_space)),
       waitset_(participant_) {
   waitset_.add(maps_);
   waitset_.add(scans_);
@@ -97,6 +98,13 @@ void MapFront::let_writers_go() {
   maps_.renew(waitset_);
 }
 
+/// Where somebody looks.
+void MapFront::show_disturbance() {
+  const auto vehicle_W = placement_.newest_W();
+  if (!world_ || !vehicle_W || disturbance_.matched() == 0 || !shows_.due(*world_->world, *vehicle_W, now_ns())) return;
+  disturbance_.write(ShownField(*world_->world, *vehicle_W, map_frame_).cloud());
+}
+
 void MapFront::run_readers() {
   while (!channels_.stop) {
     waitset_.wait(0.1);
@@ -104,6 +112,7 @@ void MapFront::run_readers() {
     take_scans();
     take_maps();
     let_writers_go();
+    show_disturbance();
     if (const auto writers = foreign_.take_new()) {
       channels_.foreign_writers += writers;
       spdlog::warn("{} writers of maps or scans have another type: they are not listened to", writers);

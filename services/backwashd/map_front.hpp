@@ -9,14 +9,15 @@
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/backwashd/scan_placement.hpp"
+#include "services/backwashd/shown_field.hpp"
 #include "services/dds/topics.hpp"
 #include "services/dds/writers.hpp"
 
 namespace backwash::daemon {
 
-/// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube, trajectory and markers out.
-/// Its participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here, odometry and
-/// commands (DdsFront) do not wait for it (docs/faults.md row 46).
+/// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube, trajectory, markers and the
+/// disturbance out. Its participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here,
+/// odometry and commands (DdsFront) do not wait for it (docs/faults.md row 46).
 ///
 /// Maps are taken from one writer, and scans from one: the first whose sample was good, until it is gone (row 48). Its
 /// successor is listened to in flight too: without it what appears in the way would stay unseen.
@@ -39,6 +40,7 @@ class MapFront {
   void take_maps();
   void take_scans();
   void let_writers_go();
+  void show_disturbance();
 
   Channels& channels_;
   Recorder& recorder_;
@@ -49,6 +51,7 @@ class MapFront {
   BoundWriter map_writer_{"a map"}, scan_writer_{"a scan"};
   std::uint32_t term_ = 0;           // rises when a map's writer is let go of
   const Snapshot* world_ = nullptr;  // the reader's
+  FieldShows shows_;
   dds::Participant participant_;
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;
@@ -56,6 +59,7 @@ class MapFront {
   dds::Writer<dds::Tube> tube_;
   dds::Writer<dds::Path> trajectory_;
   dds::Writer<dds::MarkerArray> markers_;
+  dds::Writer<dds::Disturbance> disturbance_;
   dds::WaitSet waitset_;
 };
 

@@ -27,6 +27,8 @@ class ScanPlacement {
   /// right.
   tl::expected<Scan, std::string> scan(const dds::PointCloud& message, std::int64_t received_ns) const;
 
+  /// Where the newest pose is, m in the map.
+  std::optional<Vec3> newest_W() const { return history_.empty() ? std::nullopt : std::optional(history_.back().p); }
   /// Held now; bounded whatever is added.
   std::size_t poses() const noexcept { return history_.size(); }
 

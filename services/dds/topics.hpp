@@ -17,6 +17,7 @@ using PoseStamped = geometry_msgs_msg_dds__PoseStamped_;
 using PoseWithCovarianceStamped = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
 using TfMessage = tf2_msgs_msg_dds__TFMessage_;
 using PointCloud = sensor_msgs_msg_dds__PointCloud2_;
+struct Disturbance : PointCloud {};  ///< another topic than that of the scans
 using PointField = sensor_msgs_msg_dds__PointField_;
 using TransformStamped = geometry_msgs_msg_dds__TransformStamped_;
 using Octomap = octomap_msgs_msg_dds__Octomap_;
@@ -71,6 +72,12 @@ struct TopicOf<PointCloud> {
   static const dds_topic_descriptor& type() { return sensor_msgs_msg_dds__PointCloud2__desc; }
   static constexpr const char* kName = "points";
   static constexpr Delivery kDelivery = Delivery::scans;
+};
+template <>
+struct TopicOf<Disturbance> {
+  static const dds_topic_descriptor& type() { return sensor_msgs_msg_dds__PointCloud2__desc; }
+  static constexpr const char* kName = "disturbance";
+  static constexpr Delivery kDelivery = Delivery::state;
 };
 template <>
 struct TopicOf<TransformStamped> {

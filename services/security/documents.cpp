@@ -33,7 +33,7 @@ std::vector<std::string> writable(const Grant& grant) {
   };
   switch (grant.role) {
     case Role::vehicle:
-      add({"ack", "status", "tube", "trajectory", "markers"});
+      add({"ack", "status", "tube", "trajectory", "markers", "disturbance"});
       topics.emplace_back("rt/diagnostics");
       break;
     case Role::station:

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What RViz and ROS 2's diagnostic tools see, through Fast DDS with types written by hand, member by member.
-//   fastdds_viewer DOMAIN MARKERS_TOPIC SECONDS
-// Prints the last of both: "diagnostics LEVEL HARDWARE NAME: MESSAGE" and "markers COUNT in FRAME: line of POINTS,
-// boxes up to LARGEST m wide"; 1 if one of them did not come.
+//   fastdds_viewer DOMAIN MARKERS_TOPIC DISTURBANCE_TOPIC SECONDS
+// Prints the last of each: "diagnostics LEVEL HARDWARE NAME: MESSAGE", "markers COUNT in FRAME: line of POINTS, boxes
+// up to LARGEST m wide" and "disturbance COUNT in FRAME from Z to Z: level LEAST to LARGEST, vertical LEAST to
+// LARGEST"; 1 if one of them did not come.
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <string>
 #include <thread>
 
@@ -108,10 +110,46 @@ class MarkersType : public ReadType {
   }
 };
 
+class CloudType : public ReadType {
+ public:
+  CloudType() : ReadType("sensor_msgs::msg::dds_::PointCloud2_", 1 << 22) {}
+  std::string read(Cdr& cdr) override {
+    const std::string frame = header(cdr);
+    const auto height = number<std::uint32_t>(cdr), width = number<std::uint32_t>(cdr);
+    std::string fields;
+    for (auto count = number<std::uint32_t>(cdr); count > 0; --count) {
+      fields += text(cdr);
+      fields += "@" + std::to_string(number<std::uint32_t>(cdr));
+      fields += ":" + std::to_string(number<std::uint8_t>(cdr)) + " ";
+      if (number<std::uint32_t>(cdr) != 1) return "a field of several";
+    }
+    if (fields != "x@0:7 y@4:7 z@8:7 level@12:7 vertical@16:7 ") return "other fields: " + fields;
+    const bool big_endian = number<bool>(cdr);
+    const auto step = number<std::uint32_t>(cdr), row = number<std::uint32_t>(cdr), bytes = number<std::uint32_t>(cdr);
+    if (big_endian || height != 1 || step != 20 || row != width * step || bytes != row) return "other sizes";
+    std::array<float, 5> least, largest;
+    least.fill(1e9F), largest.fill(-1e9F);
+    for (std::uint32_t n = 0; n < width; ++n) {
+      std::array<std::uint8_t, 20> raw;
+      for (auto& byte : raw) byte = number<std::uint8_t>(cdr);
+      std::array<float, 5> point;
+      std::memcpy(point.data(), raw.data(), raw.size());
+      for (std::size_t k = 0; k < 5; ++k)
+        least[k] = std::min(least[k], point[k]), largest[k] = std::max(largest[k], point[k]);
+    }
+    char said[200];
+    std::snprintf(
+        said, sizeof said, "disturbance %u in %s from %.3f to %.3f: level %.3f to %.3f, vertical %.3f to %.3f", width,
+        frame.c_str(), static_cast<double>(least[2]), static_cast<double>(largest[2]), static_cast<double>(least[3]),
+        static_cast<double>(largest[3]), static_cast<double>(least[4]), static_cast<double>(largest[4]));
+    return said;
+  }
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 64;
+  if (argc != 5) return 64;
   const auto domain = static_cast<unsigned>(std::atoi(argv[1]));
   auto* participant = fast::DomainParticipantFactory::get_instance()->create_participant(domain, local_only(domain));
   if (!participant) return 70;
@@ -126,15 +164,16 @@ int main(int argc, char** argv) {
     return subscriber->create_datareader(participant->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT),
                                          qos);
   };
-  fast::DataReader* readers[] = {reader_of(new DiagnosticsType, "rt/diagnostics"), reader_of(new MarkersType, argv[2])};
-  Seen seen[2];
-  for (int n = 0; n < 20 * std::atoi(argv[3]); ++n) {
+  fast::DataReader* readers[] = {reader_of(new DiagnosticsType, "rt/diagnostics"), reader_of(new MarkersType, argv[2]),
+                                 reader_of(new CloudType, argv[3])};
+  Seen seen[3];
+  for (int n = 0; n < 20 * std::atoi(argv[4]); ++n) {
     fast::SampleInfo info;
-    for (int r = 0; r < 2; ++r)
+    for (int r = 0; r < 3; ++r)
       while (readers[r]->take_next_sample(&seen[r], &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   for (const Seen& s : seen) std::printf("%s\n", s.line.c_str());
-  return seen[0].line.empty() || seen[1].line.empty() ? 1 : 0;
+  return std::any_of(seen, seen + 3, [](const Seen& s) { return s.line.empty(); }) ? 1 : 0;
 }

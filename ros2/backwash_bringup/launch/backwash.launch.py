@@ -15,7 +15,7 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-TOPICS = ["odometry", "points", "trajectory", "markers"]  # those of rviz/backwash.rviz
+TOPICS = ["odometry", "points", "trajectory", "markers", "disturbance"]  # those of rviz/backwash.rviz
 
 
 def generate_launch_description():
