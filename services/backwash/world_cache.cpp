@@ -4,6 +4,7 @@
 #include <elf.h>
 #include <link.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -95,8 +96,25 @@ fs::path folder() {
   return home && *home == '/' ? fs::path(home) / ".cache" / "backwash" : fs::path();
 }
 
+/// The file of a key. What is removed is named so, whatever else lies in the folder.
+constexpr std::string_view kSuffix = ".backwash-world";
+fs::path file_of(const fs::path& in, const std::string& key) { return in / (key + std::string(kSuffix)); }
+bool is_kept_world(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.size() == kDigits + kSuffix.size() && name.ends_with(kSuffix) &&
+         name.find_first_not_of("0123456789abcdef") == kDigits;
+}
+
+/// Whether nobody else can put a world there: plans are made of them.
+bool ours_alone(const fs::path& in) {
+  struct stat found;
+  return ::stat(in.c_str(), &found) == 0 && S_ISDIR(found.st_mode) && found.st_uid == ::geteuid() &&
+         (found.st_mode & (S_IWGRP | S_IWOTH)) == 0;
+}
+
 /// A world's bytes if the file holds them whole.
 std::optional<std::string> read(const fs::path& file, const std::string& key) {
+  if (!ours_alone(file.parent_path())) return std::nullopt;
   auto content = files::read_file(file.string(), kMostBytes, "a kept world");
   const std::size_t header = kMagic.size() + 2 * kDigits;
   if (!content || content->size() < header || !content->starts_with(std::string(kMagic) + key)) return std::nullopt;
@@ -118,7 +136,7 @@ void make_room(const fs::path& in, std::uintmax_t bytes) {
   std::vector<Kept> kept;
   std::error_code unknown;
   for (const auto& file : fs::directory_iterator(in, unknown)) {
-    if (!file.is_regular_file(unknown) || file.path().extension() != ".world") continue;
+    if (!file.is_regular_file(unknown) || !is_kept_world(file.path())) continue;
     kept.push_back({file.last_write_time(unknown), file.path(), file.file_size(unknown)});
     bytes += kept.back().bytes;
   }
@@ -136,10 +154,10 @@ void keep(const fs::path& in, const std::string& key, const std::string& bytes) 
     fs::create_directories(in.parent_path(), wrong);
     ::mkdir(in.c_str(), 0700);
   }
-  if (kMostBytes / 2 < bytes.size()) return;
+  if (kMostBytes / 2 < bytes.size() || !ours_alone(in)) return;
   make_room(in, bytes.size());
   try {
-    write_file((in / (key + ".world")).string(), std::string(kMagic) + key + sha256(bytes) + bytes, true);
+    write_file(file_of(in, key).string(), std::string(kMagic) + key + sha256(bytes) + bytes, true);
   } catch (const Failure&) {  // a full or read-only disk: the next call builds again
   }
 }
@@ -151,7 +169,7 @@ CachedWorld::CachedWorld(WorldInput input)
 
 std::shared_ptr<const plan::World> CachedWorld::kept() const {
   if (key_.empty()) return nullptr;
-  const auto bytes = read(fs::path(folder_) / (key_ + ".world"), key_);
+  const auto bytes = read(file_of(folder_, key_), key_);
   return bytes ? plan::restored_world(input_.grid, input_.model, input_.vehicle, input_.method, input_.margin, *bytes,
                                       run_shown)
                : nullptr;

@@ -22,7 +22,8 @@ struct WorldInput {
 /// Worlds that were made before. One that takes longer than half a second is kept in the user's cache, and an equal one
 /// is taken from there: equal in program, processor, map, model file, vehicle file, method and margin, and whole by its
 /// hash. The folder: $BACKWASH_CACHE (empty: none), $XDG_CACHE_HOME/backwash or ~/.cache/backwash; it holds a gibibyte
-/// at most, and the ones unused for longest go. What cannot be read or written there is no error.
+/// at most, and the ones unused for longest go. A folder that others
+/// can write is not used. What cannot be read or written there is no error.
 class CachedWorld {
  public:
   explicit CachedWorld(WorldInput input);

@@ -47,6 +47,7 @@ done
 # Another vehicle, margin or method is another world.
 ask margin --margin 0.2
 ask paper --method paper
+cp "$work/own.toml" "$work/first.toml"
 sed -i 's/^radius = .*/radius = 0.17/' "$work/own.toml"
 grep -q '^radius = 0.17' "$work/own.toml" || fail "the vehicle file has no radius to change"
 ask wide
@@ -58,12 +59,15 @@ done
 # Damaged, cut, swapped or unreadable files are worlds made anew.
 cp "$file" "$work/good"
 size=$(stat -c %s "$file")
-sed -i 's/^radius = .*/radius = 0.16/' "$work/own.toml"
+cp "$work/first.toml" "$work/own.toml"
 ask anew
+cmp -s "$work/first" "$work/anew" || fail "the first vehicle's world has changed"
 for at in 0 3 20 90 150 200 $((size / 2)) $((size - 1)); do
   cp "$work/good" "$file"
   printf '\xa5' | dd of="$file" bs=1 seek="$at" conv=notrunc status=none
+  touch -d '2001-01-01' "$file"
   ask damaged
+  cmp -s "$work/good" "$file" || fail "a file damaged at byte $at was not made anew"
   cmp -s "$work/anew" "$work/damaged" || fail "a file damaged at byte $at was believed"
 done
 for length in 0 10 145 200 $((size - 11)); do
@@ -71,10 +75,26 @@ for length in 0 10 145 200 $((size - 11)); do
   ask cut
   cmp -s "$work/anew" "$work/cut" || fail "a file cut at byte $length was believed"
 done
-for other in "$work"/cache/*; do [[ $other == "$file" ]] || cp "$other" "$file"; done
+for other in "$work"/cache/*.backwash-world; do [[ $other == "$file" ]] || cp "$other" "$file"; done
 ask swapped
 cmp -s "$work/anew" "$work/swapped" || fail "the world of another vehicle was believed"
+# What others could have put there is not read, and what is not ours is not removed.
+chmod 777 "$work/cache"
+touch -d '2001-01-01' "$file"
+ask shared
+[[ $(stat -c %Y "$file") -lt 1000000000 ]] || fail "a world in a folder that others can write was used"
+chmod 700 "$work/cache"
+for n in 0 1; do truncate -s 600M "$work/cache/$(printf '%064d' $n).backwash-world"; done
+truncate -s 600M "$work/cache/gazebo.world"
+touch -d '2000-01-01' "$work/cache/"*000.backwash-world "$work/cache/gazebo.world"
+touch -d '2002-01-01' "$work/cache/"*001.backwash-world
 rm "$file"
+ask full
+[[ -e $file ]] || fail "nothing is kept in a full folder"
+[[ ! -e $work/cache/$(printf '%064d' 0).backwash-world ]] || fail "the folder holds more than a gibibyte"
+[[ -e $work/cache/$(printf '%064d' 1).backwash-world ]] || fail "more was removed than had to be"
+[[ -e $work/cache/gazebo.world ]] || fail "another program's file was removed"
+rm "$work/cache/gazebo.world" "$file"
 mkdir "$file"
 ask folder
 cmp -s "$work/anew" "$work/folder" || fail "a folder in a world's place changed the answer"
