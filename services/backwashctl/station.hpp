@@ -68,8 +68,8 @@ class Station {
  public:
   /// Throws StartError 78 for credentials that are not good, dds::Error for an interface that is none.
   explicit Station(const Options& options);
-  /// Ends the session if it has one. The middleware says only once that a writer is gone, and with DDS Security that may be
-  /// lost: the next process would be refused until the lease of 2 s is over.
+  /// Ends the session if it has one. The middleware says only once that a writer is gone, and with DDS Security that
+  /// may be lost: the next process would be refused until the lease of 2 s is over.
   ~Station();
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
