@@ -53,6 +53,10 @@ Station::Station(const Options& options)
   waitset_.add(statuses_);
 }
 
+Station::~Station() {
+  if (holds_ && !interrupted() && commands_->matched() > 0) release();
+}
+
 std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& position, double yaw,
                                              const std::vector<Vec3>& waypoints) {
   try {
@@ -94,6 +98,7 @@ std::optional<Station::Result> Station::ask(const dds::Command& command) {
         result = Result{ack.result, text(ack.reason)};
     });
   }
+  holds_ = result && result->result != backwash_msgs_msg_dds__ACK_NOT_YOURS;
   return result;
 }
 
@@ -101,6 +106,7 @@ void Station::release() {
   send(backwash_msgs_msg_dds__COMMAND_RELEASE);
   session_ = draw_session();
   sequence_ = 0;
+  holds_ = false;
 }
 
 std::optional<StatusCopy> Station::status(double timeout_s) {

@@ -68,6 +68,11 @@ class Station {
  public:
   /// Throws StartError 78 for credentials that are not good, dds::Error for an interface that is none.
   explicit Station(const Options& options);
+  /// Ends the session if it has one. The middleware says only once that a writer is gone, and with DDS Security that
+  /// may be lost: the next process would be refused until the lease of 2 s is over.
+  ~Station();
+  Station(const Station&) = delete;
+  Station& operator=(const Station&) = delete;
 
   struct Result {
     int result;  ///< ACK_… code
@@ -97,6 +102,7 @@ class Station {
   Options options_;
   std::uint64_t session_;
   std::uint32_t sequence_ = 0;
+  bool holds_ = false;  ///< the session is ours, as far as we were told
   dds::Participant participant_;
   std::optional<dds::Writer<dds::Command>> commands_;  ///< from the first command on: an observer may have none
   dds::Reader<dds::Ack> acks_;

@@ -9,7 +9,8 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 kind=$1 path=$2 build=$3 out=$4
 shift 4
-all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill restart pilot battery rc gcs link reboot)
+all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill restart pilot battery rc gcs link reboot
+  stop_arming stop_takeoff stop_plan stop_replan stop_land stop_goto)
 [[ $# -gt 0 ]] || set -- "${all[@]}"
 if [[ ! -e $path ]]; then
   echo "skipped: tests/autopilots/faults.sh needs the path of a build of $kind"
@@ -49,20 +50,20 @@ case $kind/$fault in
 esac
 fly_real "$kind" "$path" "$build" "$out/$fault"
 
-state() { "$bin/backwashctl" --domain "$domain" status --json 2>>"$log"; }
-read_state() { python3 -c 'import json, sys; s = json.load(sys.stdin); print(s["state"], s["position"][0])'; }
 now() { python3 -c "import time; print(time.monotonic())"; }
 
-# Until the daemon follows its commands no longer.
-left_tracking() {
-  local mode x
-  for _ in $(seq 300); do
-    read -r mode x < <(state | read_state)
-    [[ $mode == tracking ]] || return 0
-    sleep 0.03
-  done
-  return 1
+# look_for EXPRESSION: from now on, in Python, of what the status tells as mode, moving, x, y, z; until it is seen, within 60 s,
+# seen() waits and sets them. One process hears all: to start one a look takes longer than a flight where the machine is busy.
+look_for() {
+  exec 9< <(timeout 60 "$bin/backwashctl" --domain "$domain" "${station[@]}" watch --json 2>>"$log" | python3 -uc 'import json, sys
+for line in sys.stdin:
+    s = json.loads(line)
+    mode, moving, (x, y, z) = s["state"], s["moving"], s["position"]
+    if eval(sys.argv[1]):
+        print(mode, moving, x, y, z)
+        break' "$1")
 }
+seen() { read -r mode moving x y z <&9; }
 
 # CLOCK_MONOTONIC of the first change of mode since $from, which the log tells in local time.
 acted() {
@@ -86,16 +87,11 @@ reboot() {
   must land --wait
 }
 
-at_speed() {
-  local mode x
+at_speed() { # at_speed [X]: on the way to the goal, beyond that x, m; by itself before the door
+  look_for "x > ${1:-4.0}"
   must goto "$goal"
-  # Before the door.
-  for _ in $(seq 100); do
-    read -r mode x < <(state | read_state)
-    python3 -c "import sys; sys.exit(not $x > 4.0)" && break
-    sleep 0.05
-  done
-  [[ $mode == tracking ]] || die "the flight was in $mode before the fault"
+  seen || die "the vehicle did not move"
+  [[ $mode == tracking && $moving == True ]] || die "the flight was in $mode before the fault"
   at=$(now)
   from=$(wc -l <"$log")
 }
@@ -103,6 +99,15 @@ at_speed() {
 inject() {
   case $fault in
     hold | stop | land) must "$fault" --wait ;;
+    stop_land) must stop && must land ;;
+    stop_goto) # stays until a later command
+      must stop --wait
+      sleep 3
+      stays
+      at=$(now)
+      must goto "$goal" --wait
+      must stop
+      ;;
     vio_*) echo "$(sed 's/^vio_//; s/^jump$/jump 1 0.5 0/; s/^turn$/turn 1.57/' <<<"$fault")" >&7 ;;
     sigstop) kill -STOP "$autopilot_pid" && sleep 3 && kill -CONT "$autopilot_pid" ;;
     kill)
@@ -149,12 +154,68 @@ slow() {
       "$path/bin/px4-param" set SIM_BAT_DRAIN 1 >>"$log" 2>&1
       ;;
   esac
-  left_tracking || die "the autopilot did nothing"
+  look_for 'mode != "tracking"'
+  seen || die "the autopilot did nothing"
   at=$(acted)
+}
+
+# stop_while_lifting Z: a take-off that is stopped above that height, m, or with 0 as soon as it is accepted. One that did not
+# arm is asked for again.
+stop_while_lifting() {
+  for _ in $(seq 30); do
+    ctl enable --wait || true
+    from=$(wc -l <"$log")
+    look_for "z > $1 or mode == 'passive'"
+    if ctl takeoff --height 1.2 && seen && [[ $mode != passive ]]; then break; fi
+    sleep 1
+  done
+  must stop
+  at=$(now)
+}
+
+# A goto and a stop that overtake each other, six times. Where the stop came last nothing may be flown.
+stop_while_planning() {
+  local wait last round
+  from=$(wc -l <"$log")
+  for wait in 0 0.005 0.01 0.02 0.03 0.05; do
+    round=$(wc -l <"$log")
+    ctl goto "$goal" &
+    sleep "$wait"
+    must stop
+    wait $! || true
+    last=$(tail -n +"$((round + 1))" "$log" | grep -o 'from .*: \(planning\|stopping\)$' | tail -n 1)
+    echo "a goto, and a stop $wait s later; the daemon heard last: $last" >>"$log"
+    [[ $last == *stopping ]] || must stop
+    at=$(now)
+    sleep 2.5
+    stays
+  done
+}
+
+# The daemon moves nothing for 2 s.
+stays() {
+  look_for "moving or mode not in ('hold', 'tracking')"
+  ! read -t 2 -r <&9 || die "it moved on after a stop"
 }
 
 case $fault in
   reboot) reboot ;;
+  stop_arming) stop_while_lifting 0 ;;
+  stop_takeoff) stop_while_lifting 0.4 ;;
+  stop_plan)
+    take_off
+    stop_while_planning
+    ;;
+  stop_replan) # in the tick in which a cube of 1 m3 was found on the path, or soon after
+    take_off
+    at_speed 3.1
+    look_for 'mode == "hold"'
+    echo "crate 5.0 2.4 1.2 1.0" >&7
+    seen || die "the cube was not seen"
+    from=$(wc -l <"$log")
+    must stop
+    at=$(now)
+    ;;
   battery | gcs)
     take_off
     from=$(wc -l <"$log")

@@ -19,7 +19,9 @@ SAYS = {"hold": "", "stop": "hold: operator asks to stop", "land": "land: operat
         "sigstop": "quiet: no heartbeat|hold: autopilot's pose|quiet: port|hold: map and autopilot|hold: odometry lost", "kill": "passive: started",
         "restart": "land: operator asks to land", "pilot": "passive: autopilot left offboard",
         "battery": "land: battery low|passive: autopilot left offboard", "rc": "passive: autopilot left offboard",
-        "gcs": "passive: autopilot left offboard", "link": "quiet: no heartbeat", "reboot": "tracking: lifted off"}
+        "gcs": "passive: autopilot left offboard", "link": "quiet: no heartbeat", "reboot": "tracking: lifted off", "stop_arming": "land: operator asks to stop|passive: ",
+        "stop_takeoff": "land: operator asks to stop|hold: operator asks to stop", "stop_plan": "hold: operator asks to stop", "stop_replan": "hold: operator asks to stop",
+        "stop_land": "land: operator asks to land", "stop_goto": "hold: operator asks to stop"}
 
 
 def main() -> int:

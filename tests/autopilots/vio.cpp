@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The VIO and the mapper beside a real autopilot in its simulator: the simulator's truth, placed in a map, becomes
 // odometry with noise on DDS; the map is published; the truth is logged and held against the map.
-// Faults come as lines of standard input: stop, go, freeze, jump X Y Z (m), turn YAW (rad).
+// Faults come as lines of standard input: stop, go, freeze, jump X Y Z (m), turn YAW (rad). So does what the map does
+// not have: crate X Y Z EDGE (m), scanned at 10 Hz from then on.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -29,10 +30,10 @@ namespace {
 
 volatile std::sig_atomic_t stopped = 0;
 const std::string kMap = "map";
-constexpr std::int64_t kHalfTruthStep_ns = 5'000'000;
+constexpr std::int64_t kHalfTruthStep_ns = 5'000'000, kScanPeriod_ns = 100'000'000;
 
 struct Options {
-  std::string truth, map, vehicle, log;
+  std::string truth, map, vehicle, log, security;
   std::vector<double> start;  // the vehicle's centre as it stands, m
   double yaw = 0;             // map <- east, north, up
   double noise = 0.001;       // m
@@ -49,6 +50,15 @@ struct Fault {
   std::optional<Truth> frozen;
 };
 
+/// A cube that the map does not have.
+struct Crate {
+  Vec3 center_W;
+  double edge = 0;  // m
+  double distance(const Vec3& p_W) const {
+    return ((p_W - center_W).cwiseAbs().array() - edge / 2).max(0).matrix().norm();
+  }
+};
+
 struct Pose {
   Vec3 p, v;
   Eigen::Quaterniond q;
@@ -63,13 +73,12 @@ class Vio {
         vehicle_(config::load_vehicle(o.vehicle).value()),
         start_(o.start[0], o.start[1], o.start[2]),
         R_(Eigen::AngleAxisd(o.yaw, Vec3::UnitZ())),
-        participant_(static_cast<std::uint32_t>(o.domain), "lo", {.priority = allowed_fifo(60)}),
+        participant_(static_cast<std::uint32_t>(o.domain), "lo", {.priority = allowed_fifo(60)}, o.security),
         odometry_(dds::make_writer<dds::Odometry>(participant_, "backwash")),
         map_(dds::make_writer<dds::Octomap>(participant_, "backwash")),
         log_(o.log),
         truth_(truth_source(o.truth)) {
     log_ << "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,qw,qx,qy,qz\n" << std::setprecision(15);
-    publish_map();
   }
 
   void run() {
@@ -118,6 +127,7 @@ class Vio {
       if (verb == "freeze") fault_.frozen = last_;
       if (verb == "jump") in >> fault_.jump.x() >> fault_.jump.y() >> fault_.jump.z();
       if (verb == "turn") in >> fault_.turn, fault_.pivot = in_map(last_).p;
+      if (Crate c; verb == "crate" && in >> c.center_W.x() >> c.center_W.y() >> c.center_W.z() >> c.edge) crate_ = c;
       std::cout << "fault " << verb << " at " << last_.at_ns << std::endl;
     }
   }
@@ -127,8 +137,13 @@ class Vio {
     const double dt = static_cast<double>(t.at_ns - last_.at_ns) * 1e-9;
     const Vec3 a = samples_ > 0 && dt > 0 ? Vec3(R_ * (t.v_E - last_.v_E) / dt) : Vec3::Zero();
     last_ = t;
-    ++samples_;
+    if (++samples_ == 1) publish_map();  // a mapper knows where it is
     judge(p);
+    if (crate_ && t.at_ns >= scan_ns_) {
+      scan_ns_ = t.at_ns + kScanPeriod_ns;
+      scans_.send(bench::seen_of_crate(crate_->center_W, crate_->edge, p.p), {.p_W = p.p}, p.q,
+                  static_cast<double>(t.at_ns) * 1e-9);
+    }
     log_ << static_cast<double>(t.at_ns) * 1e-9;
     for (const Vec3& v : {p.p, p.v, a}) log_ << ',' << v.x() << ',' << v.y() << ',' << v.z();
     log_ << ',' << p.q.w() << ',' << p.q.x() << ',' << p.q.y() << ',' << p.q.z() << '\n';
@@ -147,7 +162,9 @@ class Vio {
   /// The vehicle's ball against the map; the floor that it stands on is no obstacle below half its radius above.
   void judge(const Pose& p) {
     if (p.p.z() < start_.z() + 0.5 * vehicle_.body.radius) return;
-    const double clearance = distance_.exact(grid_, p.p) - vehicle_.body.radius;
+    double nearest = distance_.exact(grid_, p.p);
+    if (crate_) nearest = std::min(nearest, crate_->distance(p.p));
+    const double clearance = nearest - vehicle_.body.radius;
     if (clearance < closest_) closest_ = clearance, closest_at_ = p.p;
     const bool contact = clearance < 0;
     contacts_ += contact && !touching_;
@@ -184,11 +201,14 @@ class Vio {
   dds::Participant participant_;
   dds::Writer<dds::Odometry> odometry_;
   dds::Writer<dds::Octomap> map_;
+  bench::Scans scans_{participant_, "backwash"};
   std::vector<std::int8_t> map_data_;
   std::ofstream log_;
   std::unique_ptr<TruthSource> truth_;
   std::string heard_;
   Fault fault_;
+  std::optional<Crate> crate_;
+  std::int64_t scan_ns_ = 0;  // of the next scan of it
   Truth last_;
   std::int64_t due_ns_ = 0;  // of the next odometry
   long samples_ = 0, contacts_ = 0;
@@ -217,6 +237,7 @@ int main(int argc, char** argv) {
   app.add_option("--rate", o.rate, "of the odometry, Hz; default: as the truth comes");
   app.add_option("--domain", o.domain).required();
   app.add_option("--log", o.log, "the truth, CSV").required();
+  app.add_option("--security", o.security, "folder of the VIO's credentials, if the daemon has dds.security");
   if (const auto code = app.parse(argc, argv)) return *code;
   std::signal(SIGTERM, [](int) { backwash::autopilots::stopped = 1; });
   std::signal(SIGINT, [](int) { backwash::autopilots::stopped = 1; });
