@@ -42,6 +42,22 @@ void end_waits_on_signals() {
 
 int interrupted() noexcept { return signal_that_came; }
 
+StatusCopy copy_of(const dds::Status& status) {
+  StatusCopy copy;
+  copy.numbers = status;
+  for (const StatusText& t : kStatusTexts) {
+    copy.*t.own = text(status.*t.sent);
+    copy.numbers.*t.sent = nullptr;
+  }
+  for (std::uint32_t n = 0; n < status.parameters._length; ++n)
+    copy.parameters.emplace_back(text(status.parameters._buffer[n].name), status.parameters._buffer[n].value);
+  for (std::uint32_t n = 0; n < status.advice._length; ++n)
+    copy.advice.emplace_back(text(status.advice._buffer[n].name), text(status.advice._buffer[n].text));
+  copy.numbers.parameters = {};
+  copy.numbers.advice = {};
+  return copy;
+}
+
 Station::Station(const Options& options)
     : options_(options),
       session_(draw_session()),
@@ -58,7 +74,8 @@ Station::~Station() {
 }
 
 std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& position, double yaw,
-                                             const std::vector<Vec3>& waypoints) {
+                                             const std::vector<Vec3>& waypoints,
+                                             const std::function<bool()>& given_up) {
   try {
     if (!commands_) commands_.emplace(dds::make_writer<dds::Command>(participant_, options_.name_space));
   } catch (const dds::NotPermitted& e) {
@@ -76,22 +93,23 @@ std::optional<Station::Result> Station::send(std::uint8_t verb, const Vec3& posi
   for (const Vec3& p : waypoints) points.push_back({p.x(), p.y(), p.z()});
   const auto count = static_cast<std::uint32_t>(points.size());
   command.waypoints = {count, count, points.data(), false};
-  return ask(command);
+  return ask(command, given_up);
 }
 
-std::optional<Station::Result> Station::ask(const dds::Command& command) {
+std::optional<Station::Result> Station::ask(const dds::Command& command, const std::function<bool()>& given_up) {
   constexpr double kRepeat = 0.5;  // s
   const auto begun = Clock::now();
-  while (!interrupted() && commands_->matched() == 0 && since(begun) < options_.timeout_s)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  const auto goes_on = [&] { return !interrupted() && !(given_up && given_up()) && since(begun) < options_.timeout_s; };
+  while (goes_on() && commands_->matched() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   std::optional<Result> result;
   auto sent = Clock::time_point{};
-  while (!interrupted() && !result && since(begun) < options_.timeout_s) {
+  while (!result && goes_on()) {
     if (since(sent) > kRepeat) {
       commands_->write(command);
       sent = Clock::now();
     }
     waitset_.wait(0.05);
+    statuses_.take([](const dds::Status&) {});  // or the next wait would return at once
     acks_.take([&](const dds::Ack& ack) {
       const bool ours = std::ranges::equal(ack.writer, commands_->guid());
       if (ours && ack.session == session_ && ack.sequence_number == sequence_)
@@ -102,8 +120,8 @@ std::optional<Station::Result> Station::ask(const dds::Command& command) {
   return result;
 }
 
-void Station::release() {
-  send(backwash_msgs_msg_dds__COMMAND_RELEASE);
+void Station::release(const std::function<bool()>& given_up) {
+  send(backwash_msgs_msg_dds__COMMAND_RELEASE, Vec3::Zero(), 0, {}, given_up);
   session_ = draw_session();
   sequence_ = 0;
   holds_ = false;
@@ -115,19 +133,7 @@ std::optional<StatusCopy> Station::status(double timeout_s) {
   while (!interrupted() && !newest && since(begun) < timeout_s) {
     waitset_.wait(0.05);
     acks_.take([](const dds::Ack&) {});
-    statuses_.take([&](const dds::Status& s) {
-      newest.emplace().numbers = s;
-      for (const StatusText& t : kStatusTexts) {
-        (*newest).*t.own = text(s.*t.sent);
-        newest->numbers.*t.sent = nullptr;
-      }
-      for (std::uint32_t n = 0; n < s.parameters._length; ++n)
-        newest->parameters.emplace_back(text(s.parameters._buffer[n].name), s.parameters._buffer[n].value);
-      for (std::uint32_t n = 0; n < s.advice._length; ++n)
-        newest->advice.emplace_back(text(s.advice._buffer[n].name), text(s.advice._buffer[n].text));
-      newest->numbers.parameters = {};
-      newest->numbers.advice = {};
-    });
+    statuses_.take([&](const dds::Status& s) { newest = copy_of(s); });
   }
   return newest;
 }

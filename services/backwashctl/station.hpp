@@ -39,6 +39,9 @@ struct StatusCopy {
   bool because(Reason why) const noexcept { return reason_named(reason) == why; }
 };
 
+/// All that a message says.
+StatusCopy copy_of(const dds::Status& status);
+
 /// A text of the status: the key that JSON gives it, and where it is in the message and in a copy.
 struct StatusText {
   const char* key;
@@ -80,10 +83,11 @@ class Station {
   };
   /// Sends a command and repeats it, with the same sequence number, until it is acknowledged; nothing if it never is.
   /// Refused at once where this station's own permissions do not let it command.
+  /// `given_up` ends the wait early: asked 20 times a second.
   std::optional<Result> send(std::uint8_t verb, const Vec3& position = Vec3::Zero(), double yaw = 0,
-                             const std::vector<Vec3>& waypoints = {});
+                             const std::vector<Vec3>& waypoints = {}, const std::function<bool()>& given_up = {});
   /// Ends the session. What is sent next begins a new one.
-  void release();
+  void release(const std::function<bool()>& given_up = {});
   /// For further readers of this process.
   const dds::Participant& participant() const noexcept { return participant_; }
   /// Whether this status knows of a later command than ours, whoever gave it.
@@ -97,7 +101,7 @@ class Station {
             const std::function<bool(const StatusCopy&)>& failed);
 
  private:
-  std::optional<Result> ask(const dds::Command& command);
+  std::optional<Result> ask(const dds::Command& command, const std::function<bool()>& given_up);
 
   Options options_;
   std::uint64_t session_;

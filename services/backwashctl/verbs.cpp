@@ -163,6 +163,9 @@ void Verbs::add_views(Command& app) {
   verb(app, "status", "print the daemon's status once", "status --json", [this] { return status(); });
   verb(app, "watch", "print the status until interrupted; with --json an object a line", "watch",
        [this] { return watch(); });
+  auto* page = verb(app, "serve", "show the flight on a page in a browser, with buttons, until interrupted", "serve",
+                    [this] { return serve(options_, page_, json_); });
+  add_options(*page, page_);
 }
 
 int Verbs::run() { return chosen_(); }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "services/backwashctl/goals.hpp"
+#include "services/backwashctl/serve/serve.hpp"
 #include "services/backwashctl/station.hpp"
 #include "services/command_line/command_line.hpp"
 
@@ -15,7 +16,7 @@ namespace backwash::ctl {
 using services::Command;
 
 /// The verbs of backwashctl: enable, disable, takeoff, goto, follow, hold, stop, land, release, goals, status, watch,
-/// check.
+/// check, serve.
 class Verbs {
  public:
   explicit Verbs(Command& app);
@@ -47,6 +48,7 @@ class Verbs {
   std::vector<Vec3> waypoints_;  ///< of the command: of a route with headings pairs
   std::string route_;
   GoalRules goal_rules_;
+  ServeOptions page_;
   std::string goal_topic_ = "/goal_pose", heading_ = "goal";
   double height_ = 0, patience_s_ = 0;
   bool wait_ = false, json_ = false;

@@ -47,7 +47,7 @@ MAY = {
     # What flies sees neither the simulation nor what judges flights afterwards.
     "services/backwashd": ["core/sync", "core/config", "core/adapt", "core/log", *FLIGHT, "firmware_bridge", "services/security",
                            "services/dds", "services/parallel", "services/command_line"],
-    "services/backwashctl": ["core/types", "core/files", "services/security", "services/dds", "services/command_line"],
+    "services/backwashctl": ["core/files", "core/config", *FLIGHT[:5], "services/security", "services/dds", "services/command_line"],
     "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/security", "services/dds",
                        "services/parallel", "services/command_line"],
     "services/backwash": ["core", "services/security", "services/maps", "services/parallel", "services/command_line"],

@@ -1,0 +1,275 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""What `backwashctl serve` answers to requests that no browser would send, and to many of them.
+
+requests.py URL PID alone                       no daemon answers
+requests.py URL PID flight BACKWASHCTL DOMAIN   a vehicle is in the air
+"""
+import json
+import math
+import pathlib
+import random
+import socket
+import subprocess
+import sys
+import time
+import urllib.parse
+
+url = urllib.parse.urlsplit(sys.argv[1])
+token, port, pid = url.fragment, url.port, int(sys.argv[2])
+host = f"127.0.0.1:{port}"
+PAGE, OTHER, NOBODY = "a" * 32, "b" * 32, "c" * 32
+
+
+def connect(timeout: float = 5) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", port), timeout)
+
+
+def raw(data: bytes, timeout: float = 5) -> bytes:
+    """All that comes back until the other side closes."""
+    with connect(timeout) as s:
+        got = b""
+        try:
+            s.sendall(data)
+            while part := s.recv(65536):
+                got += part
+        except (ConnectionResetError, BrokenPipeError):
+            pass
+        return got
+
+
+def ask(method: str, path: str, body: object = None, **headers: str) -> tuple[int, dict, str]:
+    """Status, headers, body. Of a POST everything is right but what `headers` says otherwise ("": left out)."""
+    text = body if isinstance(body, str) else "" if body is None else json.dumps(body)
+    all_ = {"Host": host}
+    if method == "POST":
+        all_ |= {"X-Token": token, "Content-Type": "application/json", "Origin": f"http://{host}", "Content-Length": str(len(text.encode()))}
+    all_ |= {name.replace("_", "-"): value for name, value in headers.items()}
+    head = f"{method} {path} HTTP/1.1\r\n" + "".join(f"{name}: {value}\r\n" for name, value in all_.items() if value) + "\r\n"
+    answer = raw((head + text).encode())
+    top, _, rest = answer.partition(b"\r\n\r\n")
+    lines = top.decode(errors="replace").split("\r\n")
+    assert lines[0].startswith("HTTP/1.1 "), (method, path, headers, answer[:200])
+    return int(lines[0].split()[1]), dict(line.split(": ", 1) for line in lines[1:]), rest.decode()
+
+
+class Page:
+    """A stream of events, as a page holds it."""
+
+    def __init__(self, name: str):
+        self.socket = connect()
+        self.socket.sendall(f"GET /events?page={name} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+        self.text, self.last = b"", {}
+
+    def event(self) -> dict:
+        """The newest, with what earlier ones said last of what comes only when it changes. Two are waited for."""
+        fresh = 0
+        while fresh < 2:
+            part = self.socket.recv(1 << 20)
+            assert part, "the stream ended"
+            *whole, self.text = (self.text + part).split(b"\n\n")
+            for one in whole:
+                self.last |= json.loads(one.partition(b"data: ")[2])
+            fresh += len(whole)
+        return self.last
+
+    def until(self, what: str, holds, seconds: float = 5) -> dict:
+        begun = time.monotonic()
+        while not holds(event := self.event()):
+            assert time.monotonic() - begun < seconds, (what, event["command"], event["session"])
+        return event
+
+    def close(self) -> None:
+        self.socket.close()
+
+
+def command(verb: str, page: str = PAGE, **headers: str) -> int:
+    return ask("POST", "/command", {"page": page, "verb": verb}, **headers)[0]
+
+
+def check_gate() -> None:
+    status, headers, body = ask("GET", "/")
+    assert status == 200 and "<title>backwash</title>" in body and token not in body
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy and "unsafe" not in policy and "frame-ancestors 'none'" in policy, policy
+    assert headers["Referrer-Policy"] == "no-referrer" and headers["X-Content-Type-Options"] == "nosniff"
+    assert not any(name.startswith("Access-Control") for name in headers), headers
+    for path in ("/page.css", "/page.js", "/picture.js", "/icon.svg"):
+        assert ask("GET", path)[0] == 200, path
+    for path in ("/command", "/nothing", "/../etc/passwd", "/page.js/..", "/%2e%2e/%2e%2e/etc/passwd"):
+        assert ask("GET", path)[0] == 404, path
+    # Names that another site may have; ours.
+    for name in ("evil.example", f"evil.example:{port}", "127.0.0.1", "127.0.0.1:1", f"127.0.0.1.evil.example:{port}", f"localhost.:{port}"):
+        assert ask("GET", "/", Host=name)[0] == 403, name
+    assert ask("GET", "/", Host="")[0] == 403
+    assert ask("GET", "/", Host=f"localhost:{port}")[0] == 200
+    assert raw(f"GET / HTTP/1.1\r\nHost: {host}\r\nHost: evil.example\r\n\r\n".encode()).startswith(b"HTTP/1.1 403")
+    for origin in ("null", "http://evil.example", f"https://{host}", f"http://localhost:{port}", f"http://127.0.0.1:{port + 1}"):
+        assert ask("GET", "/", Origin=origin)[0] == 403, origin
+        assert command("stop", Origin=origin) == 403, origin
+    for site in ("cross-site", "same-site"):
+        assert ask("GET", "/events?page=" + PAGE, Sec_Fetch_Site=site)[0] == 403, site
+    for method in ("PUT", "DELETE", "OPTIONS", "PATCH", "HEAD", "TRACE"):
+        assert raw(f"{method} /command HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()).split()[1] == b"405", method
+    for wrong in ("", "0" * 32, token[:-1], token + "0", token.upper() + " x"):
+        assert command("stop", X_Token=wrong) == 401, wrong
+    assert ask("POST", "/preview", {"page": PAGE, "goal": [1, 2, 3]}, X_Token="")[0] == 401
+    assert command("stop", Content_Type="text/plain") == 415 and command("stop", Content_Encoding="gzip") == 415
+    for body in ("", "{", "[]", "7", '{"verb": 8}', '{"verb": "enable"}', '{"verb": "goto"}', '{"verb": "goto", "goal": [1, 2]}', '{"verb": "goto", "goal": [1, 2, "3"]}',
+                 '{"verb": "goto", "goal": [1, 2, 1e999]}', "[" * 4000, '{"verb": "st\u0000op"}'):
+        assert ask("POST", "/command", body)[0] == 400, body[:60]
+    assert ask("POST", "/command", {"page": NOBODY, "verb": "land"})[0] == 409
+    assert ask("POST", "/command", "x" * 5000)[0] == 413
+    for z in ("", "nan", "1e999", "1x", "%00"):
+        assert ask("GET", "/slice?z=" + z)[0] in (400, 404), z
+    for name in ("", "x", "A" * 32, "a" * 33, "../" * 10):
+        assert ask("GET", "/events?page=" + name)[0] == 400, name
+
+
+def check_garbage() -> None:
+    random.seed(1)
+    for n in range(300):
+        data = random.randbytes(random.randrange(1, 400))
+        if n % 2:
+            good = bytearray(f"POST /command HTTP/1.1\r\nHost: {host}\r\nX-Token: {token}\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n{{\"a\": 12}}".encode())
+            for _ in range(random.randrange(1, 9)):
+                good[random.randrange(len(good))] = random.randrange(256)
+            data = bytes(good)
+        with connect() as s:
+            s.sendall(data)
+    # A head without an end, lines without an end, a chunked body without an end: each ends with its budget.
+    for endless in (b"a: b\r\n" * 200_000, b"a" * 2_000_000):
+        begun = time.monotonic()
+        raw(f"GET / HTTP/1.1\r\nHost: {host}\r\n".encode() + endless)
+        assert time.monotonic() - begun < 5
+    head = f"POST /command HTTP/1.1\r\nHost: {host}\r\nX-Token: {token}\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+    assert b" 202 " not in raw(head.encode() + b"800\r\n" + b" " * 2048 + b"\r\n" + b"800\r\n" + (b" " * 2048 + b"\r\n800\r\n") * 100)
+
+
+def memory() -> int:
+    return int(next(line for line in pathlib.Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS")).split()[1])
+
+
+def check_slow(page: Page) -> None:
+    """Who sends a byte now and then is closed after 3 s; of 100 connections the first 48 are kept, and then others come again."""
+    slow = connect(10)
+    slow.sendall(b"GET / HTTP/1.1\r\n")
+    begun = time.monotonic()
+    try:
+        while time.monotonic() - begun < 10:
+            slow.sendall(b"x")
+            slow.settimeout(0.2)
+            try:
+                if not slow.recv(100):
+                    break
+            except TimeoutError:
+                pass
+    except (ConnectionResetError, BrokenPipeError):
+        pass
+    assert 2 < time.monotonic() - begun < 6, time.monotonic() - begun
+    idle = [connect() for _ in range(100)]
+    time.sleep(0.5)
+    page.event()  # what is open goes on
+    closed = 0
+    for s in idle:
+        s.setblocking(False)
+        try:
+            closed += s.recv(100) != b"never"
+        except BlockingIOError:
+            pass
+        except ConnectionResetError:
+            closed += 1
+    assert 100 - closed <= 48, closed
+    begun = time.monotonic()
+    while True:  # a STOP gets through while they still hold what they have
+        try:
+            if command("stop") == 202:
+                break
+        except (AssertionError, OSError):
+            pass
+        assert time.monotonic() - begun < 6
+        time.sleep(0.1)
+    print(f"100 connections: {closed} closed at once, a STOP taken after {time.monotonic() - begun:.1f} s")
+    for s in idle:
+        s.close()
+
+
+def check_streams() -> None:
+    pages = [Page(f"{n:032x}") for n in range(15)]
+    time.sleep(0.5)
+    assert ask("GET", "/events?page=" + "d" * 32)[0] == 409
+    assert ask("GET", "/events?page=" + PAGE)[0] == 409  # it is open
+    # Who reads nothing is dropped, and its place is free again.
+    time.sleep(0.2)
+    for page in pages:
+        page.close()
+
+
+def check_flight(ctl: str, domain: str) -> None:
+    def backwashctl(*line: str) -> subprocess.CompletedProcess:
+        return subprocess.run([ctl, "--domain", domain, *line], capture_output=True, text=True)
+
+    def status() -> dict:
+        return json.loads(backwashctl("status", "--json").stdout)
+
+    page, other = Page(PAGE), Page(OTHER)
+    assert page.event()["session"] == {"mine": False, "holder": "", "left_s": 0} or page.event()["session"]["holder"] == ""
+    # A way is shown before it is flown: from where the vehicle is to the goal, inside its tube; none into a wall.
+    assert ask("POST", "/preview", {"page": PAGE, "goal": [2, 0, 1.2]})[0] == 202
+    way = page.until("a way is planned", lambda e: e.get("preview") and e["preview"]["state"] == "ok", 30)["preview"]
+    assert way["path"][-1] == [2000, 0, 1200] and math.dist(way["path"][0], [1e3 * v for v in status()["setpoint"]]) < 2, way["path"]
+    for p in way["path"]:
+        assert any(all(abs(p[d] - row[d]) <= row[3 + d] + 100 for d in range(3)) for row in way["tube"]), p
+    assert ask("POST", "/preview", {"page": PAGE, "goal": [0, 2.1, 1.2]})[0] == 202
+    assert "goal" in page.until("a wall is refused", lambda e: e.get("preview") and e["preview"]["state"] == "refused", 30)["preview"]["message"]
+    field = json.loads(ask("GET", "/slice?z=1.2")[2])["field"]
+    assert field["most"] >= max(field["values"]) - 0.01 > 0 and min(field["values"]) >= 0, field["most"]
+    assert ask("POST", "/command", {"page": PAGE, "verb": "goto", "goal": [2, 0, 1.2]})[0] == 202
+    page.until("goto is accepted", lambda e: e["command"]["state"] == "accepted" and e["session"]["mine"])
+    other.until("the other page is told", lambda e: "another page" in e["session"]["holder"])
+    for verb in ("hold", "land", "release"):
+        assert command(verb, OTHER) == 409, verb
+    # Another station is told who has the session.
+    told = backwashctl("--station", "rival", "hold")
+    assert told.returncode == 69 and "session held by page@here" in told.stderr, told
+    page.until("it moves", lambda e: e["status"]["moving"])
+    over = page.until("it is judged", lambda e: e["over_bound"])["over_bound"]
+    assert max(map(abs, over)) < 1.5, over
+    # STOP is anybody's, and takes no session: the holder's stays.
+    assert command("stop", OTHER) == 202
+    other.until("stop is accepted", lambda e: e["command"]["verb"] == "stop" and e["command"]["state"] == "accepted")
+    begun = time.monotonic()
+    while (now := status())["moving"] or now["state"] != "hold":
+        assert time.monotonic() - begun < 10, now
+    assert page.event()["session"]["mine"]
+    number, _, sliced = ask("GET", "/slice?z=1.2")
+    sliced = json.loads(sliced)
+    assert number == 200 and sum(sliced["runs"][1::2]) == sliced["size"][0] * sliced["size"][1] and abs(sliced["z"] - 1.2) < 0.11
+    # A page that has gone holds nothing, here and at the daemon.
+    page.close()
+    other.until("the session is free", lambda e: e["session"]["holder"] == "", 4)
+    time.sleep(1)
+    assert backwashctl("--station", "rival", "land").returncode == 0, backwashctl("--station", "rival", "land").stderr
+    print(f"error over bound {[round(r, 2) for r in over]}, stopped at {now['setpoint'][0]:.2f} m")
+
+
+def main() -> None:
+    if sys.argv[3] == "flight":
+        return check_flight(sys.argv[4], sys.argv[5])
+    check_gate()
+    check_garbage()
+    page = Page(PAGE)
+    event = page.event()
+    assert event["status"] is None and event["age_s"] is None and event["command"] is None
+    before = memory()
+    check_streams()
+    check_garbage()
+    check_slow(page)
+    assert memory() - before < 8192, (before, memory())
+    # Nobody answers: a STOP goes on being sent, a HOLD waits its turn.
+    event = page.until("STOP is told of", lambda e: e["command"] and e["command"]["verb"] == "stop")
+    assert event["command"]["state"] == "sent", event["command"]
+    print(f"memory {before} -> {memory()} kB")
+
+
+main()
