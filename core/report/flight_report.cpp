@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/report/flight_report.hpp"
 
+#include "core/report/flight_data.hpp"
+#include "core/report/interactive.hpp"
 #include "core/report/page.hpp"
+#include "core/report/recorded_tables.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::report {
@@ -56,43 +59,81 @@ std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
   return text + "</table>\n</section>\n";
 }
 
-struct Section {
-  const char *title, *text;
-  Figure figure;
-};
-
-}  // namespace
-
-tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
-                                                   const plan::World& world, const ReportContext& context) {
-  const Section sections[] = {
+/// Its figures, each with what it shows as tables.
+std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& world) {
+  return {
       {"From above",
        "Obstacles are those that the tube meets in height, body included. The tube was propagated once, when the "
        "trajectory was accepted.",
-       map_figure(flight, world)},
-      {"Height along the route", "Floor and ceiling at the commanded position.", height_figure(flight, world)},
+       map_figure(flight, world),
+       {},
+       {"path", "tube"}},
+      {"Height along the route",
+       "Floor and ceiling at the commanded position.",
+       height_figure(flight, world),
+       {},
+       {"path", "tube"}},
       {"Disturbance at flight height",
        "Bound of the modelled vertical disturbance, mean and κ standard deviations; white where the vehicle's "
        "centre cannot be.",
-       flight_field_figure(flight, world)},
+       flight_field_figure(flight, world),
+       {},
+       {"field"}},
       {"Error between its bounds",
-       "Measured position minus the predicted centre. The dotted line is the moment at which the "
-       "route was accepted.",
-       error_figure(flight)},
-      {"Clearance", "During take-off only what stands beside the vehicle counts.", clearance_figure(flight, world)},
+       "Measured position minus the predicted centre. The ellipsoids' bound begins at the moment at which the route "
+       "was "
+       "accepted; where it is drawn, a dotted line marks that.",
+       error_figure(flight),
+       error_plots(true),
+       {"error"}},
+      {"Clearance",
+       "During take-off only what stands beside the vehicle counts.",
+       clearance_figure(flight, world),
+       {{"clearance",
+         "clearance",
+         "clearance",
+         "m",
+         {{"clearance_m", "body to the nearest obstacle, true", "flown"},
+          {"set_clearance_m", "left over by the reachable set", "bound"}}}},
+       {"clearance"}},
   };
+}
+
+}  // namespace
+
+std::string parameters_html(const std::string& command,
+                            const std::vector<std::pair<std::string, std::string>>& parameters) {
+  std::string html = "<section><h2>Command and parameters</h2>\n<p>This page was written by</p>\n<pre tabindex=\"0\">" +
+                     escaped(command) + "</pre>\n";
+  for (const auto& [name, text] : parameters)
+    html += "<details><summary>" + escaped(name) + "</summary>\n<pre tabindex=\"0\">" + escaped(text) +
+            "</pre>\n</details>\n";
+  return html + "</section>\n";
+}
+
+tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
+                                                   const plan::World& world, const ReportContext& context,
+                                                   const RecordedBeside* recorded) {
   std::string page = "<h1>One flight, and the sets it was planned with</h1>\n";
   page += "<p class=\"context\">Map " + escaped(context.map) + ", vehicle " + escaped(context.vehicle) + ", model " +
           escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) +
           (context.seed ? "; seed " + std::to_string(*context.seed) : "; recorded");
   if (context.sigma_scale != 1) page += "; judged with sets of \u03a3 \u00d7 " + number(context.sigma_scale, 3, "");
   page += "; backwash " + escaped(context.version) + "</p>\n" + verdict(summary);
+  PageData data = recorded ? recorded->data : PageData{};
+  for (auto& t : flight_tables(flight, world)) data.tables.push_back(std::move(t));
+  data.scene = flight_scene(flight, world);
+  page += (recorded ? recorded->timeline : "") + scene_html(*data.scene);
+  auto sections = sections_of(flight, world);
+  for (const auto& section : sections) data.plots.insert(data.plots.end(), section.plots.begin(), section.plots.end());
+  if (recorded) sections.insert(sections.end(), recorded->sections.begin(), recorded->sections.end());
   for (const auto& section : sections) {
-    if (!section.figure) return tl::make_unexpected(section.figure.error());
-    page += std::string("<section><h2>") + section.title + "</h2>\n<p>" + section.text + "</p>\n" + *section.figure +
-            "</section>\n";
+    if (!section.drawing) return tl::make_unexpected(section.drawing.error());
+    page += to_html(section);
   }
-  return html_page("backwash flight", page + table(flight, summary));
+  const auto moved = interactive(data, javascript_folders());
+  page += table(flight, summary) + parameters_html(context.command, context.parameters) + moved.notes;
+  return html_page("backwash flight", page, moved.scripts);
 }
 
 }  // namespace backwash::report

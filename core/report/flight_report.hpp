@@ -3,8 +3,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "core/report/figures.hpp"
+#include "core/report/page_data.hpp"
 
 namespace backwash::report {
 
@@ -15,11 +19,28 @@ struct ReportContext {
   Vec3 start_W, goal_W;               ///< m
   std::optional<std::uint64_t> seed;  ///< of a simulated flight; a recorded one has none
   double sigma_scale;
+  std::string command;  ///< the line that wrote the page
+  std::vector<std::pair<std::string, std::string>>
+      parameters;  ///< files that the flight was flown with: names, contents
 };
 
+/// What a raw log adds to a flight: HTML of its timeline, sections about the machine, and the data of both. Its times
+/// are the flight's.
+struct RecordedBeside {
+  std::string timeline;
+  std::vector<Section> sections;
+  PageData data;
+};
+
+/// The command and the parameters, each to be unfolded.
+std::string parameters_html(const std::string& command,
+                            const std::vector<std::pair<std::string, std::string>>& parameters);
+
 /// One self-contained HTML page about a flight: verdict, figures, a table of what was measured. Nothing in it refers to
-/// another file or host. Error: a figure that could not be drawn.
+/// another file or host. `recorded`: of a flight by the daemon; null: of a simulated one. Error: a figure that could
+/// not be drawn.
 tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
-                                                   const plan::World& world, const ReportContext& context);
+                                                   const plan::World& world, const ReportContext& context,
+                                                   const RecordedBeside* recorded = nullptr);
 
 }  // namespace backwash::report

@@ -1,25 +1,80 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/report/page.hpp"
 
+#include <string_view>
+
+#include "core/report/page_files.hpp"
+
 namespace backwash::report {
 namespace {
 
-const char* const kStyle = R"(
-:root { color-scheme: light; }
-body { font: 16px/1.5 "DejaVu Sans", system-ui, sans-serif; color: #1d2430; background: #f4f6f8; margin: 0; }
-main { max-width: 1060px; margin: 0 auto; padding: 32px 24px 64px; }
-h1 { font-size: 1.7em; margin: 0 0 4px; } h2 { font-size: 1.15em; margin: 0 0 4px; }
-.context { color: #5a6675; margin: 0 0 20px; font-size: 0.9em; }
-.verdict { padding: 14px 20px; border-radius: 8px; font-weight: 600; margin: 0 0 24px; }
-.passed { background: #e2f3e6; color: #17602c; border: 1px solid #a9d8b6; }
-.failed { background: #fbe6e4; color: #8c1c13; border: 1px solid #e8b2ac; }
-section { background: #fff; border: 1px solid #dfe4ea; border-radius: 8px; padding: 18px 22px; margin: 0 0 20px; }
-section p { color: #4b5766; margin: 0 0 10px; font-size: 0.9em; }
-svg { width: 100%; height: auto; display: block; } svg image { image-rendering: pixelated; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: 6px 10px; border-bottom: 1px solid #e8ecf0; font-weight: normal; }
-th { color: #4b5766; width: 55%; } .wide th { width: auto; } .wide { font-size: 0.78em; } thead th { font-weight: 600; color: #1d2430; }
-)";
+/// Goes through a body tag by tag and adds what every page owes its reader: names, scopes, room to scroll.
+class Framer {
+ public:
+  explicit Framer(std::string_view body) : rest_(body) {}
+
+  std::string framed() {
+    for (auto tag = next(); !tag.empty(); tag = next()) take(tag);
+    return std::move(out_) + std::string(rest_);
+  }
+
+ private:
+  /// Moves what stands before the next tag to the page; the tag, or nothing.
+  std::string_view next() {
+    const auto begin = rest_.find('<'), end = rest_.find('>', begin);
+    if (end == rest_.npos) return {};
+    const auto before = rest_.substr(0, begin), tag = rest_.substr(begin, end + 1 - begin);
+    out_ += before;
+    if (heading_) name_ += before;
+    rest_.remove_prefix(end + 1);
+    return tag;
+  }
+
+  void take(std::string_view tag) {
+    if (tag == "<h2>" || tag == "<h3>") heading_ = true, name_.clear();
+    if (tag == "</h2>" || tag == "</h3>") heading_ = false;
+    if (tag == "<thead>" || tag == "</thead>") head_ = tag == "<thead>";
+    if (tag.starts_with("<table"))
+      open_table(tag);
+    else if (tag == "</table>")
+      out_ += "</table></div>";
+    else if (tag.starts_with("<svg"))
+      take_svg(tag);
+    else if (tag == "<th>")
+      open_head();
+    else
+      out_ += tag;
+  }
+
+  std::string scrolling() const { return "<div class=\"scroll\" role=\"group\" tabindex=\"0\" aria-label=\"" + name_; }
+
+  void open_table(std::string_view tag) {
+    // Two columns break their words and need no room; only what does scroll has to be reached by the keyboard.
+    out_ += tag.find("wide") == tag.npos ? "<div class=\"scroll\">" : scrolling() + ", table\">";
+    out_ += std::string(tag) + "<caption>" + name_ + "</caption>";
+  }
+
+  /// Within the picture nothing is ours.
+  void take_svg(std::string_view tag) {
+    out_ += "<div class=\"drawing\">" + scrolling() + ", figure\"><svg role=\"img\" aria-label=\"" + name_ + '"';
+    out_ += tag.substr(4);
+    const auto end = rest_.find("</svg>");
+    if (end == rest_.npos) return;
+    out_ += rest_.substr(0, end);
+    out_ += "</svg></div></div>";
+    rest_.remove_prefix(end + 6);
+  }
+
+  void open_head() {
+    const bool empty = rest_.starts_with("</th>");
+    if (empty) rest_.remove_prefix(5);
+    out_ += empty ? "<td></td>" : head_ ? "<th scope=\"col\">" : "<th scope=\"row\">";
+  }
+
+  std::string_view rest_;
+  std::string out_, name_;
+  bool heading_ = false, head_ = false;
+};
 
 }  // namespace
 
@@ -40,9 +95,15 @@ std::string escaped(const std::string& text) {
   return safe;
 }
 
-std::string html_page(const std::string& title, const std::string& body) {
-  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>" + escaped(title) +
-         "</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n<main>\n" + body + "</main>\n</body>\n</html>\n";
+std::string html_page(const std::string& title, const std::string& body, const std::string& scripts) {
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+         "content=\"width=device-width, initial-scale=1\">\n<meta http-equiv=\"Content-Security-Policy\" "
+         "content=\"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src "
+         "'unsafe-inline'\">\n<title>" +
+         escaped(title) + "</title>\n<style>" + kStyle +
+         "</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#content\">To the content</a>\n<main id=\"content\" "
+         "tabindex=\"-1\">\n" +
+         Framer(body).framed() + "</main>\n" + scripts + "</body>\n</html>\n";
 }
 
 }  // namespace backwash::report

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "core/report/page.hpp"
 #include "core/study/calibrate/bound_figure.hpp"
 #include "core/study/calibrate/model_text.hpp"
 #include "services/backwash/calibrate_input.hpp"
@@ -118,24 +119,20 @@ void print_text(const Calibration& c, const Options& options) {
 }
 
 std::string report_page(const Calibration& c, const Campaign& campaign, const Options& options) {
-  std::string page =
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>backwash "
-      "calibration</title><style>body{font:"
-      "16px/1.5 \"DejaVu Sans\",sans-serif;max-width:1100px;margin:24px auto;color:#1d2430}svg{width:100%;height:auto}"
-      "</style></head>\n<body>\n<h1>Hover variances under the calibrated bound</h1>\n<p>Red: variance of each 2 s "
-      "window. "
-      "Surface: the bound at quantile " +
-      to_text(options.quantile, 2) + ", one set of constants for all maps. " + std::to_string(campaign.windows) +
-      " windows of " + std::to_string(campaign.logs.size()) + " flights; backwash " + kVersion + ".</p>\n";
+  std::string page = "<h1>Hover variances under the calibrated bound</h1>\n<p class=\"context\">" +
+                     std::to_string(campaign.windows) + " windows of " + std::to_string(campaign.logs.size()) +
+                     " flights; backwash " + kVersion +
+                     "</p>\n<p>Red: variance of each 2 s window. Surface: the bound at quantile " +
+                     to_text(options.quantile, 2) + ", one set of constants for all maps.</p>\n";
   std::vector<FigurePlace> places;
   for (std::size_t i = 0; i < campaign.maps.size(); ++i)
     places.push_back({campaign.map_names[i], &campaign.maps[i], i});
   for (int axis = 0; axis < 3; ++axis) {
     const auto figure = bound_figure(campaign.data, c.model, axis, places);
     if (!figure) throw Failure(kUnavailable, options.report + ":1: " + figure.error().message);
-    page += std::string("<h2>Acceleration along ") + "xyz"[axis] + "</h2>\n" + *figure + "\n";
+    page += std::string("<section><h2>Acceleration along ") + "xyz"[axis] + "</h2>\n" + *figure + "</section>\n";
   }
-  return page + "</body>\n</html>\n";
+  return report::html_page("backwash calibration", page);
 }
 
 /// What cannot be determined, one line for the end of the program.

@@ -80,10 +80,10 @@ void print_text(const sim::Flight& flight, const sim::FlightSummary& s, const re
 }  // namespace
 
 int conclude(const JudgedFlight& judged, const std::string& report, bool json, bool force) {
-  const auto& [flight, world, context, summary] = judged;
+  const auto& [flight, world, context, summary, recorded] = judged;
   if (!report.empty()) {
     progress("drawing the report");
-    const auto page = report::flight_report(flight, summary, world, context);
+    const auto page = report::flight_report(flight, summary, world, context, recorded);
     if (!page) throw Failure(kUnavailable, report + ":1: " + page.error().message);
     write_file(report, *page, force);
   }

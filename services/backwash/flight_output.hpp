@@ -14,6 +14,7 @@ struct JudgedFlight {
   const plan::World& world;
   const report::ReportContext& context;
   sim::FlightSummary summary;
+  const report::RecordedBeside* recorded = nullptr;  ///< of a flight by the daemon
 };
 
 /// Prints the summary (one JSON object or text), after writing the HTML page to `report` unless that is empty. Returns

@@ -15,6 +15,7 @@ namespace backwash::services {
 namespace {
 
 constexpr double kVertical = 0.01;  // m across: what stays within it rises or sinks on one line
+constexpr double kGap = 0.1;        // s without odometry that is worth telling
 // Numbers of idl/backwash_msgs.idl, as the raw log's command records have them.
 constexpr unsigned kEnable = 1, kTakeOff = 3, kGoTo = 4, kRelease = 7, kGoToFacing = 10;
 constexpr std::array kVerbs{
@@ -45,8 +46,7 @@ std::vector<report::RecordedSegment> segments_of(const log::RawLog& log) {
   return segments;
 }
 
-bool airborne(const log::TickInputRecord& record) {
-  const auto facts = log::decode(record, nullptr).autopilot;
+bool airborne(const track::AutopilotFacts& facts) {
   if (!facts.armed) return false;
   return facts.landed ? !*facts.landed : facts.in_air.value_or(false);
 }
@@ -72,25 +72,26 @@ class Teller {
     using enum log::RecordKind;
     const auto kind = record.header.kind;
     const std::string text(record.bytes.begin(), record.bytes.end());
+    if (kind == odometry) take_odometry(record.header.t_ns);
     if (kind == tick_input)
-      if (const auto* input = log::payload<log::TickInputRecord>(record)) in_air_ = airborne(*input);
+      if (const auto* input = log::payload<log::TickInputRecord>(record)) take_input(*input);
     if (kind == tick)
       if (const auto* row = log::payload<log::TickRecord>(record)) take_tick(*row, record.header.t_ns);
     if (kind == command) take_command(text);
     if (kind == ack) take_answer(text);
-    if (kind == failure) failure_ = text, say("the daemon ended itself: " + text);
+    if (kind == failure) failure_ = text, say("fault", "the daemon ended itself: " + text);
     if (kind == lost)
       if (const auto* lost_records = log::payload<log::LostRecord>(record)) {
         story_.records_lost = lost_records->records;
-        say(std::to_string(lost_records->records) + " records were lost by now: the disk did not take them");
+        say("fault", std::to_string(lost_records->records) + " records were lost by now: the disk did not take them");
       }
     if (kind == log::RecordKind::map)
       if (const auto* head = log::payload<log::MapRecord>(record))
-        say(head->accepted ? "a map was accepted" : "a map was refused");
+        say("map", head->accepted ? "a map was accepted" : "a map was refused");
   }
 
   void finish(bool cut, const std::string& because) {
-    close_piece();
+    open_ = false, close_mode();
     story_.time_s = story_.samples.empty() ? std::max(now_s_, 0.0) : last_tick_s_.value();
     if (!last_tick_s_)
       story_.ended = "no control tick was recorded";
@@ -105,7 +106,25 @@ class Teller {
  private:
   std::string mode() const { return kModeNames[std::min<std::size_t>(mode_, kModeNames.size() - 1)]; }
   std::string reason() const { return kReasonNames[std::min<std::size_t>(reason_, kReasonNames.size() - 1)]; }
-  void say(const std::string& text) { story_.events.push_back({now_s_, text}); }
+  void say(const char* kind, const std::string& text) { story_.timeline.events.push_back({now_s_, kind, text}); }
+
+  void take_odometry(std::int64_t t_ns) {
+    const double gap_s = odometry_ns_ ? 1e-9 * static_cast<double>(t_ns - *odometry_ns_) : 0;
+    if (gap_s > kGap) say("vio", "the first odometry after " + to_text(gap_s, 2) + " s");
+    odometry_ns_ = t_ns;
+  }
+
+  void take_input(const log::TickInputRecord& record) {
+    const auto input = log::decode(record, nullptr);
+    in_air_ = airborne(input.autopilot);
+    if (input.odometry && input.odometry->closures != closures_) {
+      closures_ = input.odometry->closures;
+      say("vio", "loop closure " + std::to_string(closures_));
+    }
+    const auto resets = input.autopilot.reset_counter;
+    if (resets && resets_ && *resets != *resets_) say("vio", "the autopilot's estimator was reset");
+    if (resets) resets_ = resets;
+  }
 
   void take_command(const std::string& text) {
     const auto at = text.find(" verb ");
@@ -115,7 +134,7 @@ class Teller {
     if (verb == 0 || verb >= kVerbs.size()) return;
     const bool place = verb == kTakeOff || verb == kGoTo || verb == kGoToFacing;
     const std::string asked = std::string("asked to ") + kVerbs[verb] + (place ? " " + to_text(Vec3(x, y, z)) : "");
-    if (asked != asked_) say(asked);  // a station repeats itself until it is answered
+    if (asked != asked_) say("command", asked);  // a station repeats itself until it is answered
     asked_ = asked;
     ordered_ = verb != kEnable && verb != kRelease;
   }
@@ -129,7 +148,7 @@ class Teller {
     ++story_.refusals;
     const auto why = text.find(": ", at);
     last_refusal_ = why == text.npos ? text : text.substr(why + 2);
-    say("refused: " + last_refusal_);
+    say("command", "refused: " + last_refusal_);
   }
 
   void take_tick(const log::TickRecord& tick, std::int64_t t_ns) {
@@ -139,8 +158,8 @@ class Teller {
     StorySample s{now_s_, vec(tick.p), vec(tick.cmd_p), tick.judged != 0, tick.inside != 0, in_air_, Vec3::Zero(), {}};
     if (truth_) s.p_W = truth_->at(1e-9 * static_cast<double>(t_ns), "x_m", "y_m", "z_m");
     if (s.judged) take_verdict(tick, s);
-    if (in_air_ && !was_in_air_) ++story_.take_offs, say("in the air");
-    if (!in_air_ && was_in_air_) ++story_.landings, say("on the ground");
+    if (in_air_ && !was_in_air_) ++story_.take_offs, say("flight", "in the air");
+    if (!in_air_ && was_in_air_) ++story_.landings, say("flight", "on the ground");
     if (in_air_ && was_in_air_ && !story_.samples.empty())
       story_.length_m += (s.p_W - story_.samples.back().p_W).norm();
     was_in_air_ = in_air_;
@@ -157,15 +176,21 @@ class Teller {
 
   void take_mode(const log::TickRecord& tick) {
     const auto said = static_cast<Reason>(tick.reason);
+    close_mode();
     if (!last_tick_s_ || tick.mode != mode_) {
       const std::string from = !last_tick_s_ ? "" : mode() + " → ";
       mode_ = tick.mode, reason_ = tick.reason;
-      say(from + mode() + ": " + reason());
+      say("mode", from + mode() + ": " + reason());
       story_.holds += static_cast<Mode>(tick.mode) == Mode::hold;
       if (in_air_ && static_cast<Mode>(tick.mode) != Mode::passive) fault_ = as_asked(said) ? "" : reason();
     }
     mode_ = tick.mode, reason_ = tick.reason;
+    story_.timeline.modes.push_back({now_s_, now_s_, mode(), reason()});
     if (!as_asked(said) && static_cast<Mode>(tick.mode) != Mode::tracking) last_fault_ = reason();
+  }
+
+  void close_mode() {  // the newest one lasts until now
+    if (!story_.timeline.modes.empty()) story_.timeline.modes.back().until_s = now_s_;
   }
 
   void take_verdict(const log::TickRecord& tick, StorySample& s) {
@@ -183,7 +208,6 @@ class Teller {
       const auto known = std::ranges::find(segments_, tick.segment, [](auto& known_one) { return known_one.head.id; });
       const bool goes_on = open_ && known != segments_.end() && known->head.continues != 0;
       if (!goes_on) {
-        close_piece();
         story_.pieces.push_back({});
         auto& piece = story_.pieces.back();
         piece.take_off = known != segments_.end() ? vertical(*known) : true;  // a lift-off alone is no segment
@@ -207,8 +231,6 @@ class Teller {
     }
     piece.by_order = !piece.to_its_end && (piece.by_order || ordered_);
   }
-
-  void close_piece() { open_ = false; }
 
   void judge(const std::string& because) {
     auto& wrong = story_.wrong;
@@ -242,7 +264,9 @@ class Teller {
   std::int64_t zero_ns_ = 0;
   double now_s_ = 0;
   std::optional<double> last_tick_s_;
-  std::uint32_t mode_ = 0, reason_ = 0;
+  std::uint32_t mode_ = 0, reason_ = 0, closures_ = 0;
+  std::optional<std::int64_t> odometry_ns_;  ///< of the newest sample
+  std::optional<std::uint8_t> resets_;       ///< as the autopilot counts its estimator's
   bool in_air_ = false, was_in_air_ = false;
   bool open_ = false;     ///< a piece is being flown
   bool ordered_ = false;  ///< an operator has asked for something since the piece began

@@ -10,6 +10,7 @@
 #include "core/log/flight_log.hpp"
 #include "core/log/raw_log.hpp"
 #include "core/map/occupancy_grid.hpp"
+#include "core/report/timeline.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/mode.hpp"
 
@@ -27,11 +28,6 @@ struct StoryPiece {
   bool reached = false;     ///< flown to its end, and the position then within the set around it
 };
 
-struct StoryEvent {
-  double t_s;  ///< since the log's first tick
-  std::string text;
-};
-
 /// A tick with a judged position, or one in the air.
 struct StorySample {
   double t_s;
@@ -45,7 +41,9 @@ struct StorySample {
 /// none.
 struct FlightStory {
   std::vector<StoryPiece> pieces;
-  std::vector<StoryEvent> events;  ///< commands, refusals, changes of the mode, what the daemon could not go on with
+  /// Modes; commands, refusals, changes of the mode, maps, gaps of the VIO, what the daemon could not go on with. Times
+  /// are since the log's first tick.
+  report::Timeline timeline;
   std::vector<StorySample> samples;
   bool by_truth = false;  ///< positions are the truth's; otherwise those that the vehicle measured itself
   std::size_t take_offs = 0, landings = 0, holds = 0, refusals = 0;

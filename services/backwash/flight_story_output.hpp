@@ -13,8 +13,10 @@ namespace backwash::services {
 Json to_json(const FlightStory& story, const std::string& log);
 /// The same for people, on stdout.
 void print_text(const FlightStory& story, const std::string& log);
-/// The same as a self-contained HTML page, why the flight was not good first. `map`: what the path is drawn over; null:
-/// nothing. Throws Failure 69 where gnuplot cannot draw.
-std::string story_page(const FlightStory& story, const map::OccupancyGrid* map, const std::string& log);
+
+/// Why the flight was not good, the gravest first; what a piece was, and how it ended.
+std::string why(const FlightStory& story);
+std::string name_of(const StoryPiece& piece);
+std::string end_of(const StoryPiece& piece);
 
 }  // namespace backwash::services

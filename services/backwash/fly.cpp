@@ -7,6 +7,7 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/flight_output.hpp"
 #include "services/backwash/json.hpp"
+#include "services/backwash/page_parts.hpp"
 #include "services/backwash/verb.hpp"
 #include "services/backwash/world_cache.hpp"
 #include "version.hpp"
@@ -95,8 +96,9 @@ int run(const Options& options) {
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);
   if (!flight) throw Failure(kUnavailable, options.map + ":1: " + flight.error().message);
   if (!options.log.empty()) write_flight(options, *flight);
-  const report::ReportContext context{options.map,  model_path,  options.vehicle, kVersion,
-                                      ends.start_W, ends.goal_W, options.seed,    options.sigma_scale};
+  const report::ReportContext context{
+      options.map, model_path,   options.vehicle,     kVersion,      ends.start_W,
+      ends.goal_W, options.seed, options.sigma_scale, own_command(), parameter_files(options.vehicle, model_path)};
   return conclude({*flight, *world, context, sim::summarise(*flight, *world, ends.goal_W)}, options.report,
                   options.json, options.force);
 }

@@ -2,10 +2,14 @@
 #include <algorithm>
 
 #include "core/report/recorded_flight.hpp"
+#include "core/report/recorded_tables.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/flight_output.hpp"
 #include "services/backwash/flight_story_output.hpp"
 #include "services/backwash/json.hpp"
+#include "services/backwash/log_parts.hpp"
+#include "services/backwash/page_parts.hpp"
+#include "services/backwash/story_page.hpp"
 #include "services/backwash/verb.hpp"
 #include "version.hpp"
 
@@ -27,10 +31,13 @@ bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
 }
 
 /// Any flight, by what the daemon recorded of it.
-int tell(const Options& options, const FlightStory& story, const map::OccupancyGrid* map) {
+int tell(const Options& options, std::span<const log::RawRecord> log, const FlightStory& story,
+         const map::OccupancyGrid* map, double radius) {
   if (!options.out.empty()) {
     progress("drawing the report");
-    write_file(options.out, story_page(story, map, options.log()), options.force);
+    const auto parameters = parameter_files(options.vehicle, model_of(options.vehicle, options.model));
+    const auto page = story_page(story, log, map, {options.log(), radius, parameters});
+    write_file(options.out, page, options.force);
   }
   options.json ? print(to_json(story, options.log())) : print_text(story, options.log());
   if (story.ok()) return kOk;
@@ -40,7 +47,8 @@ int tell(const Options& options, const FlightStory& story, const map::OccupancyG
 }
 
 /// A flight such as `fly`'s: its sets are propagated again and must be those that were logged.
-int judge(const Options& options, const std::vector<log::RawRecord>& log, const log::FlightLog& truth) {
+int judge(const Options& options, const std::vector<log::RawRecord>& log, const log::FlightLog& truth,
+          const FlightStory& story) {
   const auto vehicle = read_vehicle(options.vehicle);
   const std::string model_path = model_of(options.vehicle, options.model);
   const auto model = read_model(model_path);
@@ -49,8 +57,20 @@ int judge(const Options& options, const std::vector<log::RawRecord>& log, const 
                                        std::nullopt, run_shown);
   const auto flight = read_or_fail(report::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
-  const report::ReportContext context{options.log(), model_path, options.vehicle, kVersion, start, goal, {}, 1};
-  return conclude({flight, *world, context, sim::summarise(flight, *world, goal)}, options.out, options.json,
+  report::ReportContext context{options.log(),
+                                model_path,
+                                options.vehicle,
+                                kVersion,
+                                start,
+                                goal,
+                                {},
+                                1,
+                                own_command(),
+                                parameter_files(options.vehicle, model_path)};
+  context.parameters.emplace_back("As the daemon had them", report::recorded_configuration(log));
+  const auto zero_ns = report::first_tick_ns(log, report::first_segment(log));
+  const auto recorded = recorded_beside(log, story, zero_ns.value());
+  return conclude({flight, *world, context, sim::summarise(flight, *world, goal), &recorded}, options.out, options.json,
                   options.force);
 }
 
@@ -68,14 +88,14 @@ int run(const Options& options) {
   check_output(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   read_model(model_of(options.vehicle, options.model));
-  const auto log = read_or_fail(log::read_raw_logs(options.logs));
+  const auto log = read_or_fail(log::read_raw_logs(with_later_parts(options.logs)));
   const auto truth = read_truth(options.truth);
   const auto map = report::recorded_map(log.records);
   const auto* grid = map ? &*map : nullptr;
   progress("reading the log");
   const auto story = flight_story(log, grid, vehicle.body.radius, truth ? &*truth : nullptr, options.because);
-  if (options.because.empty() && as_fly_flies(log, story)) return judge(options, log.records, *truth);
-  return tell(options, story, grid);
+  if (options.because.empty() && as_fly_flies(log, story)) return judge(options, log.records, *truth, story);
+  return tell(options, log.records, story, grid, vehicle.body.radius);
 }
 
 }  // namespace
@@ -83,7 +103,11 @@ int run(const Options& options) {
 Verb report_verb(Command& app) {
   auto options = std::make_shared<Options>();
   auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
-  command.add_option("--log", options->logs, "raw log of backwashd, or parts of one in their order").required();
+  command
+      .add_option(
+          "--log", options->logs,
+          "raw log of backwashd, or parts of one in their order; of one file the later parts beside it are read too")
+      .required();
   command.add_option("--truth", options->truth,
                      "log of the truth by backwash-bench, CSV; without it measured positions are judged");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();

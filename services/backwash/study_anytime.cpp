@@ -97,11 +97,12 @@ void print_text(const AnytimeReport& report) {
 }
 
 std::string html(const AnytimeReport& report) {
-  std::string page = "<h2>Looked at after every flight</h2>\n<p>" + report::escaped(sentence(report) + " " + kMeaning) +
-                     "</p>\n<table><tr><th>flight</th><th>e-value after it</th></tr>\n";
+  std::string page = "<section><h2>Looked at after every flight</h2>\n<p>" +
+                     report::escaped(sentence(report) + " " + kMeaning) +
+                     "</p>\n<table class=\"wide\">\n<thead><tr><th>flight</th><th>e-value after it</th></tr></thead>\n";
   for (std::size_t n = 0; n < report.flights.size(); ++n)
     page += "<tr><td>" + report::escaped(report.flights[n]) + "</td><td>" + e_value(report.log_e[n]) + "</td></tr>\n";
-  return page + "</table>\n";
+  return page + "</table>\n</section>\n";
 }
 
 }  // namespace backwash::services

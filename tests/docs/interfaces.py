@@ -95,7 +95,7 @@ def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> No
     # Every name that the programs write is somewhere in the page; every name in a JSON table is written somewhere.
     named = {part for q in quoted(text) for part in re.findall(r"[A-Za-z_]\w*", q)}
     files = list((root / "services/backwash").glob("*.cpp")) + [root / "services/backwashctl" / name for name in ("status_output.cpp", "verbs.cpp")]
-    not_output = {"flight_spec.cpp", "import.cpp", "main.cpp"}
+    not_output = {"flight_spec.cpp", "import.cpp", "main.cpp", "story_page.cpp"}
     written = set()
     for file in files:
         code = file.read_text()

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/log/raw_log.hpp"
+#include "core/report/page_data.hpp"
+
+namespace backwash::report {
+
+/// When the first tick of a log was, or of a segment in it. Nothing: it holds none.
+std::optional<std::int64_t> first_tick_ns(std::span<const log::RawRecord> log,
+                                          std::optional<std::uint64_t> segment = std::nullopt);
+/// The number of the first segment that a log holds.
+std::optional<std::uint64_t> first_segment(std::span<const log::RawRecord> log);
+
+/// Of each tick with a judged position: error and bound on each axis as they were logged. Times are since `zero_ns`,
+/// here and below.
+DataTable recorded_error(std::span<const log::RawRecord> log, std::int64_t zero_ns);
+/// Error on each axis between its bounds, of a table `error` with error_x_m, bound_x_m and so on; `ellipsoids`: it has
+/// ellipsoid_x_m too.
+std::vector<TimePlot> error_plots(bool ellipsoids);
+/// The sets predicted for the ticks of a log.
+std::vector<Prism> recorded_tube(std::span<const log::RawRecord> log);
+
+/// What a log says of the machine: tick timing, link and odometry rates, battery. Each with its table in `data`, where
+/// the log has any of it.
+std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std::int64_t zero_ns, PageData& data);
+
+/// The files that the daemon was configured with, as the log holds them.
+std::string recorded_configuration(std::span<const log::RawRecord> log);
+
+}  // namespace backwash::report

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/story_page.hpp"
+
+#include <cmath>
+#include <sstream>
+
+#include "core/report/figure_parts.hpp"
+#include "core/report/interactive.hpp"
+#include "core/report/page.hpp"
+#include "core/report/recorded_tables.hpp"
+#include "services/backwash/flight_story_output.hpp"
+#include "services/backwash/page_parts.hpp"
+#include "services/backwash/verb.hpp"
+#include "version.hpp"
+
+namespace backwash::services {
+namespace {
+
+/// What positions and clearances are, and what they are worth.
+std::string basis(const FlightStory& story) {
+  return story.by_truth ? "Positions and clearances are the truth's; samples are what the vehicle measured itself."
+                        : "No truth was given: positions are those that the vehicle measured itself, and clearances "
+                          "hold up to the error of its estimate.";
+}
+
+report::DataTable path_table(const FlightStory& story) {
+  report::DataTable table{"path", {"t_s", "x_m", "y_m", "z_m", "command_x_m", "command_y_m", "command_z_m"}, {}, 0};
+  for (const auto& s : story.samples) {
+    const Vec3 &p = s.p_W, &c = s.command_W;
+    table.rows.push_back({s.t_s, p.x(), p.y(), p.z()});
+    for (const double value : {c.x(), c.y(), c.z()})  // on the ground nothing is commanded
+      table.rows.back().push_back(s.in_air ? value : report::kNoValue);
+  }
+  return report::thinned(std::move(table));
+}
+
+report::DataTable clearance_table(const FlightStory& story) {
+  report::DataTable table{"clearance", {"t_s", "clearance_m"}, {}, 0};
+  for (const auto& s : story.samples) table.rows.push_back({s.t_s, s.clearance_m.value_or(report::kNoValue)});
+  return report::thinned(std::move(table));
+}
+
+report::Figure path_figure(const FlightStory& story, const report::DataTable& path, const map::OccupancyGrid* map) {
+  Vec3 low = story.samples.front().p_W, high = low;
+  for (const auto& s : story.samples) low = low.cwiseMin(s.p_W), high = high.cwiseMax(s.p_W);
+  std::ostringstream data;
+  data << "$flown << EOD\n";
+  for (const auto& row : path.rows)
+    if (!std::isnan(row[4])) data << row[1] << ' ' << row[2] << ' ' << row[4] << ' ' << row[5] << '\n';
+  // A row apart, to which no line leads: a flight that never took off has no other.
+  data << '\n' << low.x() << ' ' << low.y() << ' ' << low.x() << ' ' << low.y() << "\nEOD\n" << report::kAxes;
+  std::string cells;
+  if (map) {
+    const auto inside = [&](const Vec3& p) {
+      return Index3(map->index(p).cwiseMax(Index3::Zero()).cwiseMin(map->size() - Index3::Ones()));
+    };
+    const Index3 first = inside(low - Vec3(1, 1, 0)), last = inside(high + Vec3(1, 1, 0));
+    data << report::cell_blocks(*map, first, last, map->center(last).z(), map->center(last).z())
+         << report::view_from_above(*map, first, last);
+    cells = report::plot_cells();
+  } else {
+    data << "set size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\n";
+  }
+  data << "set key outside top center horizontal\nplot " << cells
+       << "$flown using 3:4 with lines linewidth 1.5 linecolor '#888888' title 'commanded', $flown using 1:2 with "
+          "lines linewidth 2 linecolor '#c8371d' title 'flown'\n";
+  return report::draw(data.str(), report::Format::svg, 1000, 520);
+}
+
+/// The figures of where it was, with their tables.
+std::vector<report::Section> sections_of(const FlightStory& story, std::span<const log::RawRecord> log,
+                                         const map::OccupancyGrid* map, report::PageData& data) {
+  std::vector<report::Section> sections;
+  const auto path = path_table(story), clearance = clearance_table(story);
+  const auto error = report::recorded_error(log, report::first_tick_ns(log).value_or(0));
+  sections.push_back({"From above", basis(story), path_figure(story, path, map), {}, {"path"}});
+  const auto add = [&](const report::DataTable& table, const char* title, const char* text,
+                       std::vector<report::TimePlot> plots) {
+    if (table.rows.size() < 2) return;
+    data.tables.push_back(table);
+    data.plots.insert(data.plots.end(), plots.begin(), plots.end());
+    sections.push_back({title, text, report::plots_figure(table, plots), plots, {table.id}});
+  };
+  add(path, "Height", "Commands are drawn in the air alone.",
+      {{"height", "path", "height", "m", {{"command_z_m", "commanded", "commanded"}, {"z_m", "flown", "flown"}}}});
+  add(error, "Error between its bounds", "Measured position minus the predicted centre, as each tick logged it.",
+      report::error_plots(false));
+  if (story.clearance_m)
+    add(clearance, "Clearance", "On the routes, body to the nearest obstacle.",
+        {{"clearance", "clearance", "clearance", "m", {{"clearance_m", "body to the nearest obstacle", "flown"}}}});
+  return sections;
+}
+
+/// Path, sets and map in three dimensions.
+report::Scene scene_of(const FlightStory& story, std::span<const log::RawRecord> log, const map::OccupancyGrid* map,
+                       double radius) {
+  std::vector<Vec3> path_W;
+  for (const auto& s : story.samples) path_W.push_back(s.p_W);
+  report::Scene scene{"path", report::at_intervals(report::recorded_tube(log)), {}, radius};
+  if (map) scene.faces = report::map_faces(*map, path_W);
+  return scene;
+}
+
+std::string row(const std::string& name, const std::string& value) {
+  return "<tr><th>" + name + "</th><td>" + report::escaped(value) + "</td></tr>\n";
+}
+
+std::string figures_table(const FlightStory& s) {
+  std::string text = "<section><h2>In figures</h2>\n<p>" + basis(s) + "</p>\n<table>\n";
+  text += row("The log ends", s.ended);
+  text += row("Time, way in the air", to_text(s.time_s, 2) + " s, " + to_text(s.length_m, 2) + " m");
+  text += row("Take-offs / landings / holds / refused commands",
+              std::to_string(s.take_offs) + " / " + std::to_string(s.landings) + " / " + std::to_string(s.holds) +
+                  " / " + std::to_string(s.refusals));
+  text += row("Smallest clearance on the routes, body to obstacle",
+              s.clearance_m ? to_text(*s.clearance_m, 3) + " m" : "not judged: no map, or no route");
+  text += row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
+                                                         to_text(s.largest_ratio.y(), 2) + " / " +
+                                                         to_text(s.largest_ratio.z(), 2));
+  text += row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.judged));
+  text += row("Records lost", std::to_string(s.records_lost));
+  return text + "</table>\n</section>\n";
+}
+
+std::string pieces_table(const FlightStory& s) {
+  if (s.pieces.empty()) return "";
+  std::string text = "<section><h2>What was flown</h2>\n<table>\n";
+  for (const auto& p : s.pieces)
+    text += row(to_text(p.from_s, 2) + " to " + to_text(p.until_s, 2) + " s, " + name_of(p),
+                "to " + to_text(p.goal_W) + " m: " + end_of(p) + "; " + std::to_string(p.inside) + " of " +
+                    std::to_string(p.samples) + " samples inside");
+  return text + "</table>\n</section>\n";
+}
+
+}  // namespace
+
+std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log, const map::OccupancyGrid* map,
+                       const StoryContext& context) {
+  std::string page = "<h1>A flight of the daemon, from its raw log</h1>\n<p class=\"context\">" +
+                     report::escaped(context.log) + "; backwash " + report::escaped(kVersion) +
+                     "</p>\n<p class=\"verdict " + (s.ok() ? "passed" : "failed") + "\">" +
+                     report::escaped(s.ok() ? "Every goal reached, nothing touched, every sample inside its set."
+                                            : "Not good: " + why(s) + ".") +
+                     "</p>\n";
+  auto beside = recorded_beside(log, s, report::first_tick_ns(log).value_or(0));
+  page += beside.timeline;
+  std::vector<report::Section> sections;
+  if (!s.samples.empty()) {
+    beside.data.scene = scene_of(s, log, map, context.body_radius);
+    page += report::scene_html(*beside.data.scene);
+    sections = sections_of(s, log, map, beside.data);
+  }
+  sections.insert(sections.end(), beside.sections.begin(), beside.sections.end());
+  for (const auto& section : sections) {
+    if (!section.drawing) throw Failure(kUnavailable, section.drawing.error().message);
+    page += report::to_html(section);
+  }
+  page += figures_table(s) + pieces_table(s);
+  auto parameters = context.parameters;
+  parameters.emplace_back("As the daemon had them", report::recorded_configuration(log));
+  const auto moved = report::interactive(beside.data, report::javascript_folders());
+  page += report::parameters_html(own_command(), parameters) + moved.notes;
+  return report::html_page("backwash flight", page, moved.scripts);
+}
+
+}  // namespace backwash::services
