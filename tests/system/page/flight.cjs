@@ -46,6 +46,7 @@ async function fly(page, goal) {
   for (const [n, id] of ['x', 'y', 'z'].entries()) await page.fill('#' + id, String(goal[n]))
   await page.click('#show')
   await until('the way is shown', async () => (await text(page, 'asked')).includes('m clear of obstacles beyond its sets'), 20000)
+  if (pictures) await page.screenshot({ path: `${pictures}/way.png` })
   await page.click('#fly')
   await until('goto is accepted', async () => (await text(page, 'command')).startsWith('GOTO: accepted'))
 }
