@@ -11,7 +11,7 @@ command -v chromium >/dev/null || { echo "skipped: serve_page needs chromium (De
 node_peer "$build" serve_page page_modules playwright-core@1.65.1
 source "$source_dir/services/bench/session.sh"
 
-start_bench "$build/services" "$log" builtin:apartment 3.0,4.2,1.2 builtin:quad-5in
+start_bench "$build/services" "$log" builtin:thin-wall 2,-3,1.2 builtin:quad-5in
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 enable
 ctl takeoff --height 1.2 --wait
@@ -21,7 +21,7 @@ more_pids+=($serve_pid)
 for _ in $(seq 100); do [[ -s $work/serve.json ]] && break; sleep 0.05; done
 url=$(python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["url"])' "$work/serve.json")
 printf 'x_m,y_m,z_m\n' >"$work/route.csv"
-for _ in 1 2 3 4 5 6; do printf '7.4,3.0,1.2\n3.0,4.2,1.2\n' >>"$work/route.csv"; done
+for _ in 1 2 3 4 5 6; do printf '2,3,1.2\n2,-3,1.2\n' >>"$work/route.csv"; done
 HOME=$work nice -n 5 timeout 200 node "$source_dir/tests/system/page/flight.cjs" "$modules" "$url" "$bin/backwashctl" "$domain" "$daemon_pid" "$serve_pid" "$work/route.csv" "${3:-}" ||
   die "the page is not as it shall be"
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the page says and sends. It listens to /events; what it asks for goes to /command, with the token.
+import { fill, rows, say, showCheck, showError } from '/panels.js'
 import { Picture } from '/picture.js'
 
 const $ = (id) => document.getElementById(id)
-const kLost_s = 0.7 // without news what is shown is no longer now
+const kLost_s = 0.6 // without news what is shown is no longer now
 
 // The token leaves the address bar, and with it the history. Both survive a reload of this tab.
 const draw = () => Array.from(crypto.getRandomValues(new Uint8Array(16)), (b) => b.toString(16).padStart(2, '0')).join('')
@@ -51,76 +52,6 @@ function lost() {
 
 // --- what is shown ---------------------------------------------------------------------------------------------------
 
-function say(id, text) {
-  if ($(id).textContent !== text) $(id).textContent = text
-}
-
-function rows(status) {
-  const us = (t) => `${t.p50.toFixed(0)} / ${t.p99.toFixed(0)} / ${t.max.toFixed(0)} µs`
-  const seconds = (v) => (v === null ? 'none yet' : v < 0 ? 'none' : `${v.toFixed(2)} s`)
-  const all = {
-    'position, m': status.position.map((v) => v.toFixed(2)).join(', '),
-    'set-point, m': status.setpoint.map((v) => v.toFixed(2)).join(', '),
-    armed: status.armed ? 'armed' : 'disarmed',
-    autopilot: `${status.autopilot}, ${status.offboard ? 'follows us' : 'does not follow us'}`,
-    flight: status.landed ? 'on the ground' : status.moving ? 'moving' : 'at rest',
-    'inside its sets': `${status.samples_inside} of ${status.samples_inside + status.samples_outside}`,
-    'age of status': `${event.age_s.toFixed(1)} s`,
-    'age of odometry': seconds(status.odometry_age_s),
-    'age of map': seconds(status.map_age_s),
-    'tick, p50 / p99 / max': us(status.tick_us),
-    'wake-up late': us(status.lateness_us),
-    'odometry to wire': us(status.odometry_to_wire_us),
-    'periods missed': String(status.ticks_missed),
-    'stop switch': status.stop_switch,
-  }
-  if (status.air) all.air = status.air
-  return all
-}
-
-function fill(list, all) {
-  if (list.childElementCount !== 2 * Object.keys(all).length) {
-    list.replaceChildren(...Object.keys(all).flatMap((name) => [document.createElement('dt'), document.createElement('dd')]))
-  }
-  Object.entries(all).forEach(([name, value], n) => {
-    list.children[2 * n].textContent = name
-    list.children[2 * n + 1].textContent = value
-  })
-}
-
-function showError(over) {
-  const names = ['x', 'y', 'z', 'x+y', 'x−y'], box = $('error')
-  if (!box.childElementCount)
-    for (const name of names) {
-      const bar = document.createElement('div')
-      bar.className = 'bar'
-      bar.innerHTML = '<span></span><meter min="0" max="1.2" low="0.8" high="1" optimum="0"></meter><span></span>'
-      bar.firstChild.textContent = name
-      bar.children[1].setAttribute('aria-label', `error over bound along ${name}`)
-      box.append(bar)
-    }
-  names.forEach((name, n) => {
-    const value = over ? Math.abs(over[n]) : 0
-    box.children[n].children[1].value = value
-    box.children[n].lastChild.textContent = over ? value.toFixed(2) : '–'
-    box.children[n].lastChild.className = value > 1 ? 'outside' : ''
-  })
-}
-
-function showCheck(findings) {
-  const items = findings.map(({ name, good, found, advice }) => {
-    const item = document.createElement('li')
-    item.className = good ? 'good' : 'bad'
-    item.append(Object.assign(document.createElement('b'), { textContent: good ? '✓ good' : '✗ FAIL' }), ` ${name}: ${found}`)
-    if (!good) item.append(Object.assign(document.createElement('small'), { textContent: advice }))
-    return item
-  })
-  const bad = findings.filter((f) => !f.good).length
-  say('check-title', !items.length ? 'Preflight' : bad ? `Preflight: ${bad} of ${items.length} fail` : `Preflight: all ${items.length} good`)
-  if (!items.length) items.push(Object.assign(document.createElement('li'), { textContent: 'Two seconds of the status are needed.' }))
-  $('check').replaceChildren(...items)
-}
-
 function showSession(why) {
   const { mine, holder, left_s: left } = event?.session ?? {}
   const may = token && !holder
@@ -163,7 +94,7 @@ function show() {
     document.title = `${status.state} – ${status.vehicle}`
     say('vehicle', status.vehicle)
     say('mode', `${status.state}: ${status.reason}${status.task ? '. ' + status.task : ''}${status.autopilot_says ? '. The autopilot says: ' + status.autopilot_says : ''}`)
-    fill($('state'), rows(status))
+    fill($('state'), rows(status, event.age_s))
     showError(event.over_bound)
     const now = JSON.stringify(event.preflight)
     if (now !== checked) showCheck(event.preflight)

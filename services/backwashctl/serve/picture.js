@@ -51,7 +51,7 @@ export class Picture {
     for (let n = 0; n < runs.length; n += 2)
       for (let end = cell + runs[n + 1]; cell < end; ++cell) {
         const row = ny - 1 - Math.floor(cell / nx), at = 4 * (row * nx + cell % nx)
-        const share = runs[n] === 1 && field ? Math.min(1, Math.max(0, field.values[cell]) / field.most) * 0.75 : 0
+        const share = runs[n] === 1 && field ? Math.min(1, field.values[cell] / 100 / field.most) * 0.75 : 0
         for (let c = 0; c < 3; ++c) pixels.data[at + c] = rgb[runs[n]][c] * (1 - share) + rgb[3][c] * share
         pixels.data[at + 3] = 255
       }

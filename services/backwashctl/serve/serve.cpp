@@ -146,9 +146,14 @@ std::unique_ptr<Surroundings> surroundings_of(const Feed& feed, const ServeOptio
   const bool builtin = options.vehicle.starts_with("builtin:");
   if (options.vehicle.empty() || (options.model.empty() && !builtin))
     throw StartError(kUsage, "serve: --vehicle and --model belong together: give both, or a built-in vehicle");
-  return std::make_unique<Surroundings>(
-      feed, read(config::load_vehicle(options.vehicle)),
-      read(config::load_model(options.model.empty() ? options.vehicle : options.model)));
+  const Vehicle vehicle = read(config::load_vehicle(options.vehicle));
+  const Model model = read(config::load_model(options.model.empty() ? options.vehicle : options.model));
+  try {
+    plan::sets_of(vehicle, reach::Method::tight);
+  } catch (const std::exception& e) {  // a loop that has no sets
+    throw StartError(kConfiguration, "serve: " + options.vehicle + ": " + e.what());
+  }
+  return std::make_unique<Surroundings>(feed, vehicle, model);
 }
 
 }  // namespace

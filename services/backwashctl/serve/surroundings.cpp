@@ -2,6 +2,8 @@
 #include "services/backwashctl/serve/surroundings.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <exception>
 
 #include "core/plan/planner.hpp"
 #include "services/backwashctl/serve/control.hpp"
@@ -55,12 +57,12 @@ nlohmann::json Surroundings::bounds_at(const map::OccupancyGrid& grid, double z)
     world = world_;
   }
   if (!world) return {};
-  constexpr double kStep = 0.01;  // m/s² that are told apart
+  constexpr double kStep = 0.01;  // m/s²
   const int layer = layer_at(grid, z);
-  std::vector<double> values;
+  std::vector<long> values;
   for (int j = 0; j < grid.size().y(); ++j)
     for (int i = 0; i < grid.size().x(); ++i)
-      values.push_back(std::round(world->bounds.at({i, j, layer}).w[kX] / kStep) * kStep);
+      values.push_back(std::lround(world->bounds.at({i, j, layer}).w[kX] / kStep));
   return {{"values", std::move(values)}, {"most", world->bounds.largest().w[kX]}};
 }
 
@@ -70,9 +72,16 @@ void Surroundings::build(const std::shared_ptr<const map::OccupancyGrid>& grid) 
     grid_ = grid;
     world_ = nullptr;
   }
-  auto world = plan::build_world(*grid, model_, vehicle_, reach::Method::tight, std::nullopt, run_interruptible);
+  std::shared_ptr<const plan::World> world;
+  std::string failure;
+  try {
+    world = plan::build_world(*grid, model_, vehicle_, reach::Method::tight, std::nullopt, run_interruptible);
+  } catch (const std::exception& e) {  // a map that is too large for this machine: the page goes on without
+    failure = std::string("the map cannot be computed with here: ") + e.what();
+  }
   const std::lock_guard lock(mutex_);
   world_ = std::move(world);
+  failure_ = std::move(failure);
 }
 
 nlohmann::json Surroundings::planned(const Proposal& proposal) const {
@@ -84,7 +93,7 @@ nlohmann::json Surroundings::planned(const Proposal& proposal) const {
     told["message"] = why;
     return told;
   };
-  if (!world_) return refused("there is no map yet");
+  if (!world_) return refused(failure_.empty() ? "there is no map yet" : failure_);
   if (!seen.status || Clock::now() - seen.status_at > std::chrono::duration<double>(kOld_s))
     return refused("where the vehicle is is not known now");
   const auto& n = seen.status->numbers;

@@ -27,8 +27,8 @@ class Surroundings {
   /// {number, goal, state, message} and, where there is a way, {path, tube, time_s, clearance_m}; null for a page that
   /// proposed nothing, or of which another page proposed since.
   nlohmann::json preview(const std::string& page) const;
-  /// The bound along x at the voxels of the layer at z, {values, most}, m/s², x running fastest, 0 where the vehicle
-  /// cannot be; null until it is computed of this map.
+  /// The bound along x at the voxels of the layer at z: {values, most}, values in 0.01 m/s², x running fastest, 0 where
+  /// the vehicle cannot be; the map's largest in m/s². Null until it is computed of this map.
   nlohmann::json bounds_at(const map::OccupancyGrid& grid, double z) const;
   /// Thread body.
   void run(const std::stop_token& stopped);
@@ -49,6 +49,7 @@ class Surroundings {
   std::condition_variable proposed_;
   std::shared_ptr<const map::OccupancyGrid> grid_;  // that world_ is of
   std::shared_ptr<const plan::World> world_;
+  std::string failure_;  // why there is none
   std::optional<Proposal> proposal_;
   std::string page_;  // whose the preview is
   nlohmann::json preview_;

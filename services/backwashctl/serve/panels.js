@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The page's tables and lists.
+
+const $ = (id) => document.getElementById(id)
+
+export function say(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text
+}
+
+export function rows(status, age_s) {
+  const us = (t) => `${t.p50.toFixed(0)} / ${t.p99.toFixed(0)} / ${t.max.toFixed(0)} µs`
+  const seconds = (v) => (v === null ? 'none yet' : v < 0 ? 'none' : `${v.toFixed(2)} s`)
+  const all = {
+    'position, m': status.position.map((v) => v.toFixed(2)).join(', '),
+    'set-point, m': status.setpoint.map((v) => v.toFixed(2)).join(', '),
+    armed: status.armed ? 'armed' : 'disarmed',
+    autopilot: `${status.autopilot}, ${status.offboard ? 'follows us' : 'does not follow us'}`,
+    flight: status.landed ? 'on the ground' : status.moving ? 'moving' : 'at rest',
+    'inside its sets': `${status.samples_inside} of ${status.samples_inside + status.samples_outside}`,
+    'age of status': `${age_s.toFixed(1)} s`,
+    'age of odometry': seconds(status.odometry_age_s),
+    'age of map': seconds(status.map_age_s),
+    'tick, p50 / p99 / max': us(status.tick_us),
+    'wake-up late': us(status.lateness_us),
+    'odometry to wire': us(status.odometry_to_wire_us),
+    'periods missed': String(status.ticks_missed),
+    'stop switch': status.stop_switch,
+  }
+  if (status.air) all.air = status.air
+  return all
+}
+
+export function fill(list, all) {
+  if (list.childElementCount !== 2 * Object.keys(all).length) {
+    list.replaceChildren(...Object.keys(all).flatMap((name) => [document.createElement('dt'), document.createElement('dd')]))
+  }
+  Object.entries(all).forEach(([name, value], n) => {
+    list.children[2 * n].textContent = name
+    list.children[2 * n + 1].textContent = value
+  })
+}
+
+export function showError(over) {
+  const names = ['x', 'y', 'z', 'x+y', 'x−y'], box = $('error')
+  if (!box.childElementCount)
+    for (const name of names) {
+      const bar = document.createElement('div')
+      bar.className = 'bar'
+      bar.innerHTML = '<span></span><meter min="0" max="1.2" low="0.8" high="1" optimum="0"></meter><span></span>'
+      bar.firstChild.textContent = name
+      bar.children[1].setAttribute('aria-label', `error over bound along ${name}`)
+      box.append(bar)
+    }
+  names.forEach((name, n) => {
+    const value = over ? Math.abs(over[n]) : 0
+    box.children[n].children[1].value = value
+    box.children[n].lastChild.textContent = over ? value.toFixed(2) : '–'
+    box.children[n].lastChild.className = value > 1 ? 'outside' : ''
+  })
+}
+
+export function showCheck(findings) {
+  const items = findings.map(({ name, good, found, advice }) => {
+    const item = document.createElement('li')
+    item.className = good ? 'good' : 'bad'
+    item.append(Object.assign(document.createElement('b'), { textContent: good ? '✓ good' : '✗ FAIL' }), ` ${name}: ${found}`)
+    if (!good) item.append(Object.assign(document.createElement('small'), { textContent: advice }))
+    return item
+  })
+  const bad = findings.filter((f) => !f.good).length
+  say('check-title', !items.length ? 'Preflight' : bad ? `Preflight: ${bad} of ${items.length} fail` : `Preflight: all ${items.length} good`)
+  if (!items.length) items.push(Object.assign(document.createElement('li'), { textContent: 'Two seconds of the status are needed.' }))
+  $('check').replaceChildren(...items)
+}
