@@ -19,7 +19,8 @@ struct ConfigError {
 /// Reads a vehicle file; `builtin:quad-5in` and `builtin:quad-7in` name the two that ship. An unknown, missing or
 /// out-of-range key is an error. `controller` takes either kp/kd or px4 = { MPC_XY_P, MPC_XY_VEL_P_ACC, MPC_Z_P,
 /// MPC_Z_VEL_P_ACC } with k_p = P_pos·P_vel, k_d = P_vel (docs/model.md section 4). Optional keys: latency,
-/// feedback_delay, attitude_lag (default 0); the px4 gains (PX4's defaults).
+/// feedback_delay, attitude_lag, velocity_integrator (default 0; in px4 = { … } MPC_XY_VEL_I_ACC and MPC_Z_VEL_I_ACC);
+/// the other px4 gains (PX4's defaults).
 tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path);
 
 /// Reads a model file; `builtin:quad-5in` and `builtin:quad-7in` ship. `[bound] mean` (default 0), `tau_w` and

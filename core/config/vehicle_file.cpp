@@ -11,6 +11,7 @@ namespace {
 /// PX4's cascaded position control, its parameters' names and defaults.
 struct Px4Gains {
   double xy_p = 0.95, xy_vel_p_acc = 1.8, z_p = 1.0, z_vel_p_acc = 4.0;
+  double xy_vel_i_acc = 0, z_vel_i_acc = 0;  // these only as they are written
 };
 
 constexpr Range kKp{0, 200, true};    // 1/s²
@@ -18,6 +19,7 @@ constexpr Range kKd{0, 100, true};    // 1/s
 constexpr Range kDelay{0, 0.3};       // s
 constexpr Range kRadius{0, 5, true};  // m
 constexpr Range kPx4Gain{0, 20, true};
+constexpr Range kKi{0, 20};  // 1/s²
 
 std::vector<NumberKey> vehicle_keys(Vehicle& v, Px4Gains& px4) {
   using enum NumberKey::Presence;
@@ -34,6 +36,10 @@ std::vector<NumberKey> vehicle_keys(Vehicle& v, Px4Gains& px4) {
       {"controller.px4.MPC_XY_VEL_P_ACC", &px4.xy_vel_p_acc, kPx4Gain, optional},
       {"controller.px4.MPC_Z_P", &px4.z_p, kPx4Gain, optional},
       {"controller.px4.MPC_Z_VEL_P_ACC", &px4.z_vel_p_acc, kPx4Gain, optional},
+      {"controller.px4.MPC_XY_VEL_I_ACC", &px4.xy_vel_i_acc, kKi, optional},
+      {"controller.px4.MPC_Z_VEL_I_ACC", &px4.z_vel_i_acc, kKi, optional},
+      {"controller.velocity_integrator.horizontal", &v.controller.velocity_integrator.horizontal, kKi, with_parent},
+      {"controller.velocity_integrator.vertical", &v.controller.velocity_integrator.vertical, kKi, with_parent},
       {"controller.latency", &v.controller.latency, kDelay, optional},
       {"controller.feedback_delay", &v.controller.feedback_delay, kDelay, optional},
       {"controller.attitude_lag", &v.controller.attitude_lag, {0, 1}, optional},
@@ -47,15 +53,17 @@ std::vector<NumberKey> vehicle_keys(Vehicle& v, Px4Gains& px4) {
   };
 }
 
-/// Whether s²(lag·s + 1) + (kd·s + kp)·e^(−delay·s) has its roots in the left half plane. The open loop's magnitude
-/// falls monotonically, so it has one crossover ω, and by Nyquist the loop is stable iff the phase margin there is
-/// positive: atan(kd ω/kp) > atan(lag ω) + delay·ω.
-bool stable(double kp, double kd, double delay, double lag) {
+/// Whether s²(lag·s + 1) + (kd·s + kp)(1 + ki/(kd·s))·e^(−delay·s) has its zeros in the left half plane. The open
+/// loop's magnitude falls monotonically, so it has one crossover ω, and by Nyquist the loop is stable iff the phase
+/// margin there is positive: atan(kd ω/kp) > atan(lag ω) + delay·ω + atan(ki/(kd ω)).
+bool stable(double kp, double kd, double ki, double delay, double lag) {
   double low = 0, high = 1;
-  const auto loop_gain = [&](double w) { return std::hypot(kp, kd * w) / (w * w * std::hypot(1, lag * w)); };
+  const auto loop_gain = [&](double w) {
+    return std::hypot(kp, kd * w) * std::hypot(1, ki / (kd * w)) / (w * w * std::hypot(1, lag * w));
+  };
   while (loop_gain(high) > 1) high *= 2;
   for (int i = 0; i < 100; ++i) (loop_gain((low + high) / 2) > 1 ? low : high) = (low + high) / 2;
-  return std::atan(kd * high / kp) > std::atan(lag * high) + delay * high;
+  return std::atan(kd * high / kp) > std::atan(lag * high) + delay * high + std::atan(ki / (kd * high));
 }
 
 /// What the ranges of single keys cannot say.
@@ -67,10 +75,16 @@ tl::expected<void, ConfigError> check_together(const StrictTable& file, const Ve
     return tl::unexpected(file.error("propulsion.max_thrust", right.str()));
   }
   const auto& c = v.controller;
-  if (!stable(c.kp.horizontal, c.kd.horizontal, c.feedback_delay, c.attitude_lag) ||
-      !stable(c.kp.vertical, c.kd.vertical, c.feedback_delay, c.attitude_lag))
+  const auto& ki = c.velocity_integrator;
+  if ((ki.horizontal > 0) != (ki.vertical > 0))
+    return tl::unexpected(file.error("controller.velocity_integrator",
+                                     "needs both horizontal and vertical above 0, or neither (an autopilot that holds "
+                                     "height by another integrator: its equal here)"));
+  if (!stable(c.kp.horizontal, c.kd.horizontal, ki.horizontal, c.feedback_delay, c.attitude_lag) ||
+      !stable(c.kp.vertical, c.kd.vertical, ki.vertical, c.feedback_delay, c.attitude_lag))
     return tl::unexpected(
-        file.error("controller", "loop is unstable; needs more kd/kp or less feedback_delay and attitude_lag"));
+        file.error("controller",
+                   "loop is unstable; needs more kd/kp, or less feedback_delay, attitude_lag and velocity_integrator"));
   return {};
 }
 
@@ -94,6 +108,9 @@ tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path) {
   if (has_px4) {
     vehicle.controller.kp = {px4.xy_p * px4.xy_vel_p_acc, px4.z_p * px4.z_vel_p_acc};
     vehicle.controller.kd = {px4.xy_vel_p_acc, px4.z_vel_p_acc};
+    if (file->has("controller.velocity_integrator"))
+      return tl::unexpected(file->error("controller.velocity_integrator", "needs kp and kd; px4 has MPC_XY_VEL_I_ACC"));
+    vehicle.controller.velocity_integrator = {px4.xy_vel_i_acc, px4.z_vel_i_acc};
   }
   if (auto sound = check_together(*file, vehicle); !sound) return tl::unexpected(sound.error());
   return vehicle;

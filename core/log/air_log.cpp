@@ -9,7 +9,8 @@
 namespace backwash::log {
 
 AirConstantsRecord constants(const adapt::InFlightConstants& c) noexcept {
-  const auto& [kp, kd, latency, feedback_delay, attitude_lag] = c.controller;
+  // The velocity's integrator is not in it: what is learnt is the disturbance less what the integrator holds.
+  const auto& [kp, kd, latency, feedback_delay, attitude_lag, integrator] = c.controller;
   AirConstantsRecord r{{kp.horizontal, kp.vertical},
                        {kd.horizontal, kd.vertical},
                        latency,
@@ -26,7 +27,7 @@ AirConstantsRecord constants(const adapt::InFlightConstants& c) noexcept {
 
 std::optional<adapt::InFlightConstants> decode(const AirConstantsRecord& r) noexcept {
   adapt::InFlightConstants c{
-      {{r.kp[0], r.kp[1]}, {r.kd[0], r.kd[1]}, r.latency, r.feedback_delay, r.attitude_lag},
+      {{r.kp[0], r.kp[1]}, {r.kd[0], r.kd[1]}, r.latency, r.feedback_delay, r.attitude_lag, {}},
       {.tau_low_s = r.tau_low, .tau_high_s = r.tau_high, .mean_horizontal = r.mean[0], .mean_vertical = r.mean[1]},
       r.alpha,
       {}};

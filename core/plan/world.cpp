@@ -227,8 +227,9 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
     update_bounds(bounds, grid, Index3::Zero(), grid.size(), vehicle_model, columns, inside, parallel);
   }
 
-  // Pushes of anywhere widen the largest sets.
-  const map::VoxelBox hover_box = by_place ? map::all_of(grid.size()) : reached_by_hover(old, bounds, columns, changed);
+  // Pushes of anywhere widen the largest sets; an integrator may hold what blows anywhere.
+  const bool whole = by_place || reach::has_integrator(vehicle);
+  const map::VoxelBox hover_box = whole ? map::all_of(grid.size()) : reached_by_hover(old, bounds, columns, changed);
   reach::HoverMap hover = old.hover;
   hover.clear(hover_box);
   fill_hover(hover, old.reach, grid, distance, sums, bounds, listed(hover_box), old.constant_margin, parallel);

@@ -11,6 +11,9 @@ struct AxisLoop {
   double kd;              ///< 1/s
   double feedback_delay;  ///< s, ≥ 0
   double attitude_lag;    ///< s, ≥ 0; 0: a = u
+  /// Integral gain of the velocity loop, 1/s², ≥ 0. No equation of the sets holds it: what it does joins the bound
+  /// (integrator.hpp).
+  double velocity_integrator = 0;
 };
 
 /// Exact solution of one axis over a time h with x = (p, v, a) and an input u that is a cubic in time:

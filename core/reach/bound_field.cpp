@@ -70,14 +70,48 @@ void BoundField::restore(std::span<const std::size_t> listed, std::span<const Bo
 void BoundField::update_pushes() {
   if (!extension_.by_place()) return;
   least_push_ = largest_push_ = Vec3::Zero();
+  unknown_level_ = unknown_vertical_ = 0;
   map::for_each_voxel(map::all_of(tiles_.size()), [&](const Index3& v) {
     if (!stored(v)) return;
-    const Vec3 push_W = extension_.at(v).push_W;
-    least_push_ = least_push_.cwiseMin(push_W), largest_push_ = largest_push_.cwiseMax(push_W);
+    const Air air = extension_.at(v);
+    least_push_ = least_push_.cwiseMin(air.push_W), largest_push_ = largest_push_.cwiseMax(air.push_W);
+    unknown_level_ = std::max(unknown_level_, air.level), unknown_vertical_ = std::max(unknown_vertical_, air.vertical);
   });
 }
 
 DisturbanceBound BoundField::largest() const noexcept { return decoded(tiles_.largest()); }
+
+// Laws of velocity are monotone in each component's size, so that their extremes are at ends or at rest.
+FieldExtremes BoundField::extremes(double v_max) const noexcept {
+  Vec3 least = Vec3::Zero(), most = Vec3::Zero();
+  FieldExtremes found;
+  double ln_variance = 0;
+  for (int corner = 0; corner < 27; ++corner) {
+    const Air air = extension_.moving(v_max * Vec3(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1));
+    least = least.cwiseMin(air.push_W), most = most.cwiseMax(air.push_W);
+    found.level = std::max(found.level, air.level), found.vertical = std::max(found.vertical, air.vertical);
+    ln_variance = std::max(ln_variance, air.ln_variance);
+  }
+  found.push_range = most - least + largest_push_ - least_push_;
+  found.level += model_.mean_horizontal + unknown_level_, found.vertical += model_.mean_vertical + unknown_vertical_;
+  found.gusts = largest();
+  for (std::size_t d = 0; d < kDirections; ++d) {
+    const double mean = d == kZ ? model_.mean_vertical : model_.mean_horizontal;
+    found.gusts.w[d] = std::exp(ln_variance / 2) * std::max(0.0, found.gusts.w[d] - mean);
+  }
+  return found;
+}
+
+DisturbanceBound BoundField::max_without_push(const Vec3& v_W, const Vec3& low_W, const Vec3& high_W) const noexcept {
+  const map::VoxelBox box = meeting(low_W, high_W);
+  return max_without_push_over(v_W, box.low, box.high);
+}
+
+DisturbanceBound BoundField::max_without_push_over(const Vec3& v_W, const Index3& low,
+                                                   const Index3& high) const noexcept {
+  const DisturbanceBound found = max_over_voxels(low, high);
+  return extension_.none() || !(found.w[kZ] > 0) ? found : moving(found, v_W);
+}
 
 // Closed voxels: one that only touches the box counts. Compared before the casts, so that any box is in range.
 map::VoxelBox BoundField::meeting(const Vec3& low_W, const Vec3& high_W) const noexcept {

@@ -19,6 +19,13 @@ namespace backwash::reach {
 /// them once, possibly from several threads.
 using FillVariance = std::function<void(const std::function<void(std::size_t, const Variance&)>& store)>;
 
+/// The most that blows anywhere in a field, for what a loop may hold of it (integrator.hpp).
+struct FieldExtremes {
+  Vec3 push_range = Vec3::Zero();  ///< of the known pushes and of none, along each axis, m/s²
+  double level = 0, vertical = 0;  ///< steady push of unknown sign, m/s²
+  DisturbanceBound gusts;          ///< w̄ less its steady part, m/s²
+};
+
 /// w̄ at every voxel of a field, for maxima over sets (docs/model.md section 3, "Over the set, not at its centre"), and
 /// the mean push that an extended model has there: the disturbance at p is push(p, v) ± w̄. Σ itself is not kept.
 /// Bounds are kept in 16 bits and rounded up (bound_code.hpp): what is read is w̄ to w̄·(1 + kBoundGrowth). Copies share
@@ -44,6 +51,9 @@ class BoundField {
   void extend(field::Extension extension) { extension_ = std::move(extension); }
   /// Largest w̄ of all voxels, m/s². O(voxels / 4096).
   DisturbanceBound largest() const noexcept;
+  /// Over all stored voxels and velocities of up to v_max along each axis, m/s. O(voxels / 4096).
+  FieldExtremes extremes(double v_max) const noexcept;
+  const BoundModel& model() const noexcept { return model_; }
   const field::Extension& extension() const noexcept { return extension_; }
   /// Mean push on a vehicle that moves with v at p, m/s². Real-time: wait-free, no allocation.
   Vec3 push(const Vec3& p_W, const Vec3& v_W) const noexcept { return extension_.push(p_W, v_W); }
@@ -53,6 +63,9 @@ class BoundField {
   DisturbanceBound max_about(const Vec3& push_W, const Vec3& v_W, const Vec3& low_W, const Vec3& high_W) const noexcept;
   /// Of that, what the push alone deviates by, m/s².
   PerDirection push_spread(const Vec3& push_W, const Vec3& v_W, const Vec3& low_W, const Vec3& high_W) const noexcept;
+  /// max_about without any push: what is left of w̄ where a loop's integrator takes the pushes.
+  DisturbanceBound max_without_push(const Vec3& v_W, const Vec3& low_W, const Vec3& high_W) const noexcept;
+  DisturbanceBound max_without_push_over(const Vec3& v_W, const Index3& low, const Index3& high) const noexcept;
   /// max_about over the voxels from low to high.
   DisturbanceBound max_about_voxels(const Vec3& push_W, const Vec3& v_W, const Index3& low,
                                     const Index3& high) const noexcept;
@@ -79,6 +92,7 @@ class BoundField {
   field::Extension extension_;
   BoundModel model_;
   Vec3 least_push_ = Vec3::Zero(), largest_push_ = Vec3::Zero();  // of the stored voxels
+  double unknown_level_ = 0, unknown_vertical_ = 0;               // the same, of what is not known of the push, m/s²
 };
 
 }  // namespace backwash::reach

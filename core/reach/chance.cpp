@@ -90,6 +90,10 @@ void check(const Reachability& reach, double probability) {
   if (!(probability > 0) || !(probability < 1))
     throw std::invalid_argument("chance-constrained sets need a probability above 0 and below 1");
   if (reach.method != Method::tight) throw std::invalid_argument("chance-constrained sets have no ellipsoids");
+  if (has_integrator(reach.vehicle))
+    throw std::invalid_argument(
+        "controller.velocity_integrator: chance-constrained sets do not know it; leave it out or ask for the worst "
+        "case");
   if (reach.loop == Loop::sampled)
     throw std::invalid_argument(
         "chance-constrained sets know continuous feedback only; choose the loop vehicle or continuous");

@@ -13,7 +13,8 @@ namespace backwash::reach {
 AxisLoop axis_loop(const Vehicle& vehicle, bool vertical, Loop loop) {
   const auto& c = vehicle.controller;
   AxisLoop axis{vertical ? c.kp.vertical : c.kp.horizontal, vertical ? c.kd.vertical : c.kd.horizontal,
-                c.feedback_delay, c.attitude_lag};
+                c.feedback_delay, c.attitude_lag,
+                vertical ? c.velocity_integrator.vertical : c.velocity_integrator.horizontal};
   if (loop == Loop::continuous) axis.feedback_delay = axis.attitude_lag = 0;
   return axis;
 }

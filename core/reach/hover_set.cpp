@@ -37,6 +37,7 @@ Vec3 box(const PerDirection& half_widths) { return {half_widths[kX], half_widths
 
 /// Where a set hovering at p has its centre, from p: static answer of the loop to the mean push.
 Vec3 static_shift(const Vehicle& vehicle, const Vec3& push_W) {
+  if (has_integrator(vehicle)) return Vec3::Zero();
   const auto& kp = vehicle.controller.kp;
   return push_W.cwiseQuotient(Vec3(kp.horizontal, kp.horizontal, kp.vertical));
 }
@@ -89,12 +90,14 @@ class NearbyVoxels {
 /// centre's voxel, free; `free_distance`: there; `push_W`: that put the centre there.
 template <typename HalfWidths>
 std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, double free_distance, const BoundField& bounds,
-                                        const NearbyVoxels& around, const Index3& v, const Vec3& push_W) {
+                                        const NetDisturbance& net, const NearbyVoxels& around, const Index3& v,
+                                        const Vec3& push_W) {
   const bool extended = !bounds.extension().none();
   auto over = around.meeting(Vec3::Zero());
   DisturbanceBound w_bar{};
   for (;;) {
-    const DisturbanceBound found = extended ? bounds.max_about_voxels(push_W, Vec3::Zero(), over.low, over.high)
+    const DisturbanceBound found = net.held() ? net(bounds.max_without_push_over(Vec3::Zero(), over.low, over.high))
+                                   : extended ? bounds.max_about_voxels(push_W, Vec3::Zero(), over.low, over.high)
                                    : over.low == over.high ? bounds.at(v)
                                                            : bounds.max_over_voxels(over.low, over.high);
     // Holds by itself but for rounding in the ellipsoid's scalar root, which must not make the iteration cycle.
@@ -179,9 +182,10 @@ HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid,
     return supports(hover_ellipsoid(reach.vehicle, channels(w_bar)).diagonal().cwiseSqrt());
   };
   const NearbyVoxels around(grid, v, c_W);
+  const NetDisturbance net(reach, bounds);
   const auto h = reach.method == Method::tight
-                     ? fixed_point(ConstantHalfWidths(reach), distance.at(v), bounds, around, v, push_W)
-                     : fixed_point(paper, distance.at(v), bounds, around, v, push_W);
+                     ? fixed_point(ConstantHalfWidths(reach), distance.at(v), bounds, net, around, v, push_W)
+                     : fixed_point(paper, distance.at(v), bounds, net, around, v, push_W);
   if (!h) return set;
   set.bounded = true;
   set.half_widths = *h;
@@ -234,14 +238,15 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
     });
   }
   const ClearTest test(reach.vehicle, grid, sums);
+  const NetDisturbance net(reach, bounds);
   const auto safe_with = [&](const auto& half_widths) {
     return [&](const Centre& c) {
       const NearbyVoxels around(grid, c.v, c.p_W);
       // A centre off its voxel's is nearer to obstacles by that much at most.
       const double free_distance = distance.at(c.v), off = extended ? (c.p_W - grid.center(c.v)).norm() : 0;
       // A part of the set, and cheap.
-      if (test.blocked(around, free_distance - off, half_widths(bounds.at(c.v)))) return false;
-      const auto h = fixed_point(half_widths, free_distance, bounds, around, c.v, c.push_W);
+      if (test.blocked(around, free_distance - off, half_widths(net(bounds.at(c.v))))) return false;
+      const auto h = fixed_point(half_widths, free_distance, bounds, net, around, c.v, c.push_W);
       return h && test.clear(around, c.p_W, free_distance - off, *h);
     };
   };

@@ -111,11 +111,13 @@ bool covers(const PerDirection& a, const PerDirection& b) {
 // to the next. The set grows by dt²/2 per unit of bound within a step, so one or two rounds settle it; the reach is
 // doubled after that, which ends at the whole field at the latest.
 template <typename Sets>
-DisturbanceBound bound_over_set(const Sets& sets, const State& from, const State& to, const BoundField& bounds) {
+DisturbanceBound bound_over_set(const Sets& sets, const State& from, const State& to, const BoundField& bounds,
+                                const NetDisturbance& net) {
   const Vec3 low = from.p_W.cwiseMin(to.p_W), high = from.p_W.cwiseMax(to.p_W);
   const Vec3 push = bounds.push(from.p_W, from.v_W);
   const auto over = [&](const PerDirection& h) {
     const Vec3 reach(h[kX], h[kY], h[kZ]);
+    if (net.held()) return net(bounds.max_without_push(from.v_W, low - reach, high + reach));
     return bounds.max_about(push, from.v_W, low - reach, high + reach);
   };
   DisturbanceBound w = over(sets.half_widths());
@@ -143,7 +145,13 @@ Reachability::Reachability(const Vehicle& v, Method m, Loop l)
       horizontal(axis_response(axis_loop(v, false, m == Method::paper ? Loop::continuous : l),
                                m == Method::paper ? Loop::continuous : l)),
       vertical(axis_response(axis_loop(v, true, m == Method::paper ? Loop::continuous : l),
-                             m == Method::paper ? Loop::continuous : l)) {}
+                             m == Method::paper ? Loop::continuous : l)),
+      horizontal_integrator(integrator_response(axis_loop(v, false, l))),
+      vertical_integrator(integrator_response(axis_loop(v, true, l))) {
+  if (l == Loop::sampled && has_integrator(v))
+    throw std::invalid_argument(
+        "controller.velocity_integrator: --loop sampled does not know it; choose the loop vehicle or continuous");
+}
 
 ReachTube tube_with_bounds(const Reachability& reach, const State& start, const Setpoint& previous,
                            std::span<const Setpoint> commands, std::span<const DisturbanceBound> bounds,
@@ -161,10 +169,13 @@ ReachTube tube_with_bounds(const Reachability& reach, const State& start, const 
 
 ReachTube tube_over_field(const Reachability& reach, const State& start, const Setpoint& previous,
                           std::span<const Setpoint> commands, const BoundField& bounds) {
-  const auto push_at = [&](std::size_t, const State& s) { return bounds.push(s.p_W, s.v_W); };
+  const NetDisturbance net(reach, bounds);
+  const auto push_at = [&](std::size_t, const State& s) {
+    return net.held() ? Vec3::Zero().eval() : bounds.push(s.p_W, s.v_W);
+  };
   const std::vector<State> centers = centres(reach, start, previous, commands, push_at);
   const auto from_field = [&](std::size_t k, const auto& sets) {
-    return bound_over_set(sets, centers[k], centers[k + 1], bounds);
+    return bound_over_set(sets, centers[k], centers[k + 1], bounds, net);
   };
   return reach.method == Method::paper ? propagate<EllipsoidHalfWidths>(reach, centers, from_field)
                                        : propagate<ExactHalfWidths>(reach, centers, from_field);

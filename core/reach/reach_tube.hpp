@@ -7,6 +7,7 @@
 #include "core/reach/bound_field.hpp"
 #include "core/reach/ellipsoid.hpp"
 #include "core/reach/error_dynamics.hpp"
+#include "core/reach/integrator.hpp"
 #include "core/reach/support.hpp"
 #include "core/types/disturbance.hpp"
 #include "core/types/state.hpp"
@@ -28,13 +29,15 @@ struct TubeStep {
 };
 using ReachTube = std::vector<TubeStep>;
 
-/// Everything about a vehicle's loop that tubes need, computed once.
+/// Everything about a vehicle's loop that tubes need, computed once. Errors: throws std::invalid_argument for
+/// Loop::sampled with an integrator.
 struct Reachability {
   Reachability(const Vehicle& vehicle, Method method = Method::tight, Loop loop = Loop::vehicle);
   Vehicle vehicle;
   Method method;
   Loop loop;
   AxisResponse horizontal, vertical;
+  IntegratorResponse horizontal_integrator, vertical_integrator;
 };
 
 /// Tube along held commands with the bound given for each step (command k and bound k hold during step k; sizes equal):

@@ -29,7 +29,8 @@ void Quadrotor::command(const Setpoint& setpoint) {
   in_transit_.emplace_back(steps_ + steps_in(vehicle_.controller.latency), setpoint);
 }
 
-Vec3 Quadrotor::specific_force(const State& believed) const noexcept {
+Vec3 Quadrotor::specific_force(const State& believed) noexcept {
+  if (!motors_on_ || on_ground_) integrated_.setZero();
   if (!motors_on_) return Vec3::Zero();
   const auto& c = vehicle_.controller;
   const Vec3 kp{c.kp.horizontal, c.kp.horizontal, c.kp.vertical};
@@ -38,11 +39,16 @@ Vec3 Quadrotor::specific_force(const State& believed) const noexcept {
       active_.a_W + kp.cwiseProduct(active_.p_W - believed.p_W) + kd.cwiseProduct(active_.v_W - believed.v_W);
   // Height goes before sideways motion: limit the vertical part, then what is left of thrust and tilt.
   const double max = vehicle_.propulsion.max_thrust / vehicle_.body.mass, min = kMinThrust * max;
-  Vec3 f = u + kGravityUp;
+  Vec3 f = u + integrated_ + kGravityUp;
+  const Vec3 asked = f;
   f.z() = std::clamp(f.z(), min, max);
   const double horizontal = f.head<2>().norm();
   const double allowed = std::min(std::tan(kMaxTilt) * f.z(), std::sqrt(max * max - f.z() * f.z()));
   if (horizontal > allowed) f.head<2>() *= allowed / horizontal;
+  const auto& integrator = c.velocity_integrator;
+  const Vec3 ki{integrator.horizontal, integrator.horizontal, integrator.vertical};
+  // Held at the limits, as autopilots do: what cannot be given is not asked for ever more.
+  if (!on_ground_ && f == asked) integrated_ += kStep * ki.cwiseQuotient(kd).cwiseProduct(u - active_.a_W);
   return f;
 }
 

@@ -17,6 +17,7 @@ namespace backwash::sim {
 /// lag, integrated at 1 kHz. Frames: W z-up; body x forward, y left, z up.
 ///
 ///   u = a_cmd + k_p (p_cmd − p̂) + k_d (v_cmd − v̂)   set-points `latency` old, p̂ and v̂ `feedback_delay` old
+///     + i,   di/dt = k_i/k_d (k_p (p_cmd − p̂) + k_d (v_cmd − v̂)), k_i the velocity integrator, 0 on the ground
 ///   f = saturated(u + g e_z)                         specific force the rotors shall produce
 ///   lag·ȧ = (f − g e_z) − a,   ṗ = v,   v̇ = a + w
 ///
@@ -55,7 +56,7 @@ class Quadrotor {
   double thrust() const noexcept;  ///< normalised collective command u, 0..1, by the vehicle's thrust curve
 
  private:
-  Vec3 specific_force(const State& believed) const noexcept;
+  Vec3 specific_force(const State& believed) noexcept;
   Vec3 given(const Vec3& produced);
 
   Vehicle vehicle_;
@@ -63,7 +64,8 @@ class Quadrotor {
   std::optional<double> z_floor_;
   bool motors_on_ = true, on_ground_ = false;
   Vec3 acceleration_ = Vec3::Zero();
-  Vec3 produced_ = Vec3::Zero();  // acceleration the rotors produce, gravity removed
+  Vec3 integrated_ = Vec3::Zero();  // what the velocity's integrator asks for, m/s²
+  Vec3 produced_ = Vec3::Zero();    // acceleration the rotors produce, gravity removed
   long steps_ = 0;
   Setpoint active_;
   double yaw_ = 0;

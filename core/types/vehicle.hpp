@@ -23,6 +23,8 @@ struct Vehicle {
     double latency = 0;         ///< set-point to controller, s
     double feedback_delay = 0;  ///< measurement to action, s
     double attitude_lag = 0;    ///< first-order lag of the acceleration, s
+    /// Integral gain of the velocity loop, 1/s²: a push is held off, not rested against. 0: none; both or neither.
+    HorizontalVertical velocity_integrator = {};
   } controller;
   struct {
     double position = 0;  ///< VIO and map error, m

@@ -200,8 +200,10 @@ void print_text(const study::NamedCause& cause, const Vehicle& vehicle, const st
   if (!cause.flights.empty()) std::printf("\n");
   if (!cause.applied.refused.empty()) std::printf("  does not join the model: %s\n", cause.applied.refused.c_str());
   if (cause.shift.refuted())
-    std::printf("  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; has the loop an integrator?\n",
-                cause.shift.slope, cause.shift.low, cause.shift.high);
+    std::printf(
+        "  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; if the loop has an integrator,\n"
+        "  set controller.velocity_integrator of the vehicle file\n",
+        cause.shift.slope, cause.shift.low, cause.shift.high);
   for (const auto& e : cause.found.parameters)
     std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
   if (!cause.extrapolated.empty()) std::printf("  extrapolated: %s\n", cause.extrapolated.c_str());

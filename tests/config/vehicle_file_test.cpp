@@ -46,6 +46,43 @@ TEST(LoadVehicle, RefusesAnUnstableLoop) {
   EXPECT_THAT(message(true, replaced(no_lag, delay, "feedback_delay = 0.201 ")), HasSubstr("unstable"));
 }
 
+TEST(LoadVehicle, ReadsTheVelocitysIntegratorAndHasNoneWithoutTheKey) {
+  const std::string text = shipped("quad-5in.vehicle.toml"),
+                    with = "velocity_integrator = { horizontal = 0.4, vertical = 2 }\n";
+  const auto integrator = [](const std::string& content) {
+    const TemporaryFile file(content);
+    const auto v = load_vehicle(file.path);
+    EXPECT_TRUE(v) << v.error().message;
+    return v ? v->controller.velocity_integrator : Vehicle::HorizontalVertical{-1, -1};
+  };
+  EXPECT_EQ(integrator(text).horizontal, 0);
+  EXPECT_EQ(integrator(text).vertical, 0);
+  EXPECT_EQ(integrator(replaced(text, kKp, with + kKp)).horizontal, 0.4);
+  EXPECT_EQ(integrator(replaced(text, kKp, with + kKp)).vertical, 2);
+  const auto px4 = [&](const char* gains) { return replaced(replaced(text, kKd, ""), kKp, gains); };
+  EXPECT_EQ(integrator(px4("px4 = {}\n")).horizontal, 0);
+  EXPECT_EQ(integrator(px4("px4 = { MPC_XY_VEL_I_ACC = 0.4, MPC_Z_VEL_I_ACC = 2 }\n")).vertical, 2);
+  EXPECT_THAT(message(true, px4(("px4 = {}\n" + with).c_str())), HasSubstr("px4 has MPC_XY_VEL_I_ACC"));
+  EXPECT_THAT(message(true, px4("px4 = { MPC_XY_VEL_I_ACC = 0.4 }\n")),
+              HasSubstr("needs both horizontal and vertical"));
+  EXPECT_THAT(message(true, replaced(text, kKp, std::string(kKp) + "velocity_integrator = { horizontal = 0.4 }\n")),
+              HasSubstr("velocity_integrator.vertical"));
+}
+
+TEST(LoadVehicle, RefusesAnIntegratorThatMakesTheLoopUnstable) {
+  // Without lag and delay s³ + kd s² + (kp + ki) s + ki kp/kd is stable iff kd² (kp + ki) > ki kp (Routh). With kp 20
+  // and kd 2 that is ki < 5.
+  const auto file = [&](const char* ki) {
+    std::string text = replaced(shipped("quad-5in.vehicle.toml"), "attitude_lag = 0.05", "attitude_lag = 0.0");
+    text = replaced(text, kKp,
+                    std::string("velocity_integrator = { horizontal = ") + ki +
+                        ", vertical = 1 }\nkp = { horizontal = 20.0, vertical = 12.0 }\n");
+    return replaced(text, kKd, "kd = { horizontal = 2.0, vertical = 6.0 }\n");
+  };
+  EXPECT_EQ(message(true, file("4.99")), "");
+  EXPECT_THAT(message(true, file("5.01")), HasSubstr("unstable"));
+}
+
 TEST(LoadVehicle, RefusesThrustBelowWeight) {
   EXPECT_THAT(message(true, replaced(shipped("quad-5in.vehicle.toml"), "max_thrust = 18.0", "max_thrust = 8.8")),
               HasSubstr("key 'propulsion.max_thrust' = 8.8: needs more than the vehicle's weight"));

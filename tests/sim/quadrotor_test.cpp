@@ -47,6 +47,18 @@ TEST(Quadrotor, SettlesWhereASteadyPushMeetsTheSpring) {
   EXPECT_LT(quad.acceleration().norm(), 1e-6);
 }
 
+TEST(Quadrotor, WithAnIntegratorItRestsOnItsSetPointAfterThePushHasMovedIt) {
+  Vehicle v = five_inch();
+  v.controller.velocity_integrator = {2, 2};
+  Quadrotor quad(v, kStart);
+  const Vec3 push(0.5, -0.3, 0.4);
+  fly(quad, 1, push);
+  EXPECT_GT((quad.state().p_W - kStart.p_W).x(), 0.5 * push.x() / v.controller.kp.horizontal);
+  fly(quad, 60, push);
+  EXPECT_LT((quad.state().p_W - kStart.p_W).norm(), 1e-6);
+  EXPECT_LT(quad.acceleration().norm(), 1e-6);
+}
+
 /// Independent solution of lag·ȧ = u − a, u = −kp (p − r)(t − delay) − kd v(t − delay), r stepping at `latency`:
 /// Runge-Kutta with a tenth of the simulator's step; returns p at every ms.
 std::vector<double> step_response(double kp, double kd, double lag, double latency, double delay, double r) {

@@ -67,6 +67,7 @@ Windows moved_by(const Windows& windows, const std::vector<DesignColumn>& column
       for (const auto& part : columns[k].parts)
         if (part.channel <= kMeanZ)
           push[static_cast<Eigen::Index>(part.channel)] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
+    if (moved[i].held_off) continue;
     const Vec3 by = push.cwiseProduct(moved[i].give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
     const auto move = [&](PlaceAround& place) {
       place.height += by.z(), place.ceiling_gap -= by.z();

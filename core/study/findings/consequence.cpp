@@ -106,16 +106,27 @@ std::vector<reach::HoverSet> sets_at(const plan::World& world, const std::vector
 std::vector<reach::HoverSet> sets_in_the_open(const Model& model, const Vehicle& vehicle) {
   const reach::Reachability reach(vehicle);
   const Air air = field::air_moving(model.extension, Vec3::Zero());
-  const auto sigma =
-      std::exp(air.ln_variance) * Variance::horizontal_vertical(model.base.horizontal, model.base.vertical);
+  const auto base = Variance::horizontal_vertical(model.base.horizontal, model.base.vertical);
+  const auto sigma = std::exp(air.ln_variance) * base;
   reach::HoverSet set;
   const auto w = bound(sigma, model.bound);
   for (std::size_t d = 0; d < kDirections; ++d)
     set.half_widths[d] =
         d == kZ ? reach.vertical.h_inf * (w.w[d] + air.vertical) : reach.horizontal.h_inf * (w.w[d] + air.level);
+  set.bounded = true;
+  if (reach::has_integrator(vehicle)) {  // one voxel of open air
+    const map::OccupancyGrid voxel(Vec3::Zero(), 1, Index3::Ones(), map::Cell::free);
+    reach::BoundField bounds(voxel, model.bound, field::Extension(voxel, model));
+    const std::size_t all[] = {0};
+    bounds.update(map::all_of(voxel.size()), all, [&](const auto& store) { store(0, base); });
+    const auto net = reach::NetDisturbance(
+        reach, bounds)(bounds.max_without_push_over(Vec3::Zero(), Index3::Zero(), Index3::Zero()));
+    for (std::size_t d = 0; d < kDirections; ++d)
+      set.half_widths[d] = (d == kZ ? reach.vertical : reach.horizontal).h_inf * net.w[d];
+    return {set};
+  }
   const auto& kp = vehicle.controller.kp;
   set.shift = air.push_W.cwiseQuotient(Vec3(kp.horizontal, kp.horizontal, kp.vertical));
-  set.bounded = true;
   return {set};
 }
 

@@ -19,7 +19,7 @@ struct ShiftCheck {
 
 /// Of a cause's pushes in the windows of hover, where set-points say where the craft should be. `beside`: coefficients
 /// of the form's companions. Not tested without such windows in 3 flights, or below 2 mm of predicted shift,
-/// nor what a sensor alone tells.
+/// nor what a sensor alone tells, nor of a vehicle file with an integrator: it predicts no shift.
 ShiftCheck check_shift(const Accepted& cause, const std::vector<double>& beside, const Observations& seen);
 
 }  // namespace backwash::study

@@ -153,7 +153,9 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
   if (cause.shift.tested)
     text += row("Hovers off their set-points, of what this push predicts",
                 number(cause.shift.slope) + "  [" + number(cause.shift.low) + ", " + number(cause.shift.high) + "]" +
-                    (cause.shift.refuted() ? ": refuted, plans keep the centre. Has the loop an integrator?" : ""));
+                    (cause.shift.refuted() ? ": refuted, plans keep the centre. If the loop has an integrator, set "
+                                             "controller.velocity_integrator of the vehicle file"
+                                           : ""));
   if (!a.refused.empty()) text += row("Does not join the model", a.refused);
   for (const auto& s : cause.separate_by)
     text += row("Not told from " + spoken(s.rival),

@@ -157,6 +157,7 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRan
   row.p_W = mean_of(p), row.v_W = mean_of(v);
   const auto& kp = vehicle_.controller.kp;
   row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
+  row.held_off = vehicle_.controller.velocity_integrator.horizontal > 0;
   if (as_told) row.slowed = (row.v_W - mean_of(s.v_dragged)) / kWindowRules.loop_drag;
   for (int axis = 0; axis < 3; ++axis)
     for (const double x : detrended_values(w, [&](std::size_t i) { return v[i][axis]; }))

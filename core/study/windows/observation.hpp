@@ -95,6 +95,7 @@ struct WindowRow {
   PlaceAround around;             ///< of p_W
   std::vector<PlaceAround> path;  ///< of points along the window; empty where it is one place
   Vec3 give = Vec3::Zero();     ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  bool held_off = false;        ///< an integrator holds a steady push off: it moves the craft for some seconds only
   Vec3 slowed = Vec3::Zero();   ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer; 0 where measured
   Vec3 varied2 = Vec3::Zero();  ///< (m/s)², variance of the velocity along the window, its trend taken out
   Vec3 off_W = Vec3::Zero();    ///< measured place less p_W, m; 0 where p_W is measured

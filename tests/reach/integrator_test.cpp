@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What an integrator of the velocity loop holds: its kernel, the bound on the disturbance less what is held, and sets
+// under it, against an integration of the loop that shares nothing with them.
+#include "core/reach/integrator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "core/reach/chance.hpp"
+#include "core/reach/hover_set.hpp"
+#include "core/reach/reach_tube.hpp"
+
+namespace backwash::reach {
+namespace {
+
+constexpr double kEuler = 5e-4;  // s
+
+/// PX4's default level gains, with a delay and a lag.
+constexpr AxisLoop kAxis{0.95 * 1.8, 1.8, 0.04, 0.1, 0.4};
+
+/// Oracle: one axis by Euler's method in steps of 0.5 ms, u = a_cmd + k_p e + k_d ė + i, i̇ = (k_i/k_d)(k_p e + k_d ė)
+/// with what was measured `feedback_delay` ago.
+class Loop1 {
+ public:
+  explicit Loop1(const AxisLoop& axis)
+      : axis_(axis), past_(static_cast<std::size_t>(std::lround(axis.feedback_delay / kEuler)) + 1) {}
+  void step(double w, double p_cmd = 0, double v_cmd = 0, double a_cmd = 0) {
+    past_[at_] = {p, v};
+    at_ = (at_ + 1) % past_.size();
+    const double off = axis_.kp * (p_cmd - past_[at_][0]) + axis_.kd * (v_cmd - past_[at_][1]);
+    const double wanted = a_cmd + off + held;
+    held += kEuler * axis_.velocity_integrator / axis_.kd * off;
+    a += kEuler * (wanted - a) / axis_.attitude_lag;
+    p += kEuler * (v + kEuler / 2 * (a + w)), v += kEuler * (a + w);
+  }
+  double p = 0, v = 0, a = 0, held = 0;
+
+ private:
+  AxisLoop axis_;
+  std::vector<std::array<double, 2>> past_;
+  std::size_t at_ = 0;
+};
+
+Vehicle vehicle_of(double integrator) {
+  Vehicle vehicle;
+  vehicle.controller.kp = {kAxis.kp, 4};
+  vehicle.controller.kd = {kAxis.kd, 4};
+  vehicle.controller.feedback_delay = kAxis.feedback_delay, vehicle.controller.attitude_lag = kAxis.attitude_lag;
+  vehicle.controller.velocity_integrator = {integrator, 5 * integrator};
+  vehicle.body.radius = 0.1;
+  vehicle.limits = {.v_max = 1, .a_max = 1};
+  return vehicle;
+}
+
+/// Free air, 8 m wide, with gusts of a deviation, m/s², a constant push and a steady one of unknown sign.
+struct OpenAir {
+  explicit OpenAir(const Vec3& push = Vec3::Zero(), double mean = 0, double gusts = 0.1)
+      : grid(Vec3::Constant(-4), 0.5, Index3::Constant(16), map::Cell::free),
+        distance(grid),
+        bounds(grid, {3, mean, mean, 0.15}, extension(push)) {
+    std::vector<std::size_t> all(grid.cell_count());
+    for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
+    bounds.update(map::all_of(grid.size()), all, [&](const auto& store) {
+      for (const std::size_t n : all) store(n, Variance::horizontal_vertical(gusts * gusts, gusts * gusts));
+    });
+  }
+  static field::Extension extension(const Vec3& push) {
+    Model model;
+    if (!push.isZero()) model.extension = {{Law::push, push, Vec3::Zero(), 0}};
+    return {map::OccupancyGrid(Vec3::Constant(-4), 0.5, Index3::Constant(16), map::Cell::free), model};
+  }
+  map::OccupancyGrid grid;
+  map::DistanceField distance;
+  BoundField bounds;
+};
+
+AxisLoop with_gain(double integrator) {
+  AxisLoop axis = kAxis;
+  axis.velocity_integrator = integrator;
+  return axis;
+}
+
+TEST(Integrator, HoldsOffASteadyPushAsItsKernelSays) {
+  for (const double gain : {0.4, 2.0}) {
+    const IntegratorResponse response = integrator_response(with_gain(gain));
+    Loop1 loop(with_gain(gain));
+    double cumulated = 0, largest = 0;
+    std::size_t bin = 0;
+    for (double t = 0; t < 40; t += kEuler) {
+      loop.step(1);
+      largest = std::max(largest, -loop.held);
+      if (t + kEuler < 0.02 * static_cast<double>(bin + 1) || bin >= response.kernel.size()) continue;
+      cumulated += response.kernel[bin] - 2 * response.opposite[bin], ++bin;
+      ASSERT_NEAR(cumulated, -loop.held, 0.02) << t;
+    }
+    EXPECT_LT(std::hypot(loop.held + 1, loop.p), 2e-3);
+    EXPECT_LE(largest, 1.01 + response.opposed());
+    EXPECT_GT(largest, gain > 1 ? 1.02 : 0.99);  // the stronger overshoots: something is opposed
+  }
+}
+
+TEST(Integrator, IsNoneWithoutItsGain) {
+  AxisLoop axis = kAxis;
+  axis.velocity_integrator = 0;
+  EXPECT_TRUE(integrator_response(axis).kernel.empty());
+  const OpenAir air;
+  const NetDisturbance net(Reachability(vehicle_of(0)), air.bounds);
+  EXPECT_FALSE(net.held());
+  EXPECT_EQ(net(air.bounds.largest()).w, air.bounds.largest().w);
+}
+
+TEST(Integrator, RefusesWhatNeverSettlesAndWhatDoesNotKnowIt) {
+  AxisLoop axis = kAxis;
+  axis.velocity_integrator = 8;
+  EXPECT_THROW(integrator_response(axis), std::invalid_argument);
+  axis.velocity_integrator = 1e-3;
+  EXPECT_THROW(integrator_response(axis), std::invalid_argument);
+  EXPECT_THROW(Reachability(vehicle_of(0.4), Method::tight, Loop::sampled), std::invalid_argument);
+  const OpenAir air;
+  const Reachability reach(vehicle_of(0.4));
+  const std::vector<Setpoint> commands(5);
+  EXPECT_THROW(chance_tube_over_field(reach, {}, {}, commands, air.bounds, air.bounds.model(), 1e-3),
+               std::invalid_argument);
+}
+
+TEST(Integrator, ManoeuvresChargeItByNoMoreThanSaidAndSomeByThat) {
+  const IntegratorResponse response = integrator_response(kAxis);
+  std::mt19937 random(7);
+  double largest = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    Loop1 loop(kAxis);
+    double p = 0, v = 0, a = 1, left = 0, most = 0;
+    const double mean_length = std::exponential_distribution(0.3)(random) + 0.3;
+    for (double t = 0; t < 60; t += kEuler, left -= kEuler) {
+      if (left <= 0) a = -a, left = std::exponential_distribution(1 / mean_length)(random);
+      loop.step(0, p, v, a);
+      p += kEuler * v + kEuler * kEuler / 2 * a, v += kEuler * a;
+      most = std::max(most, std::abs(loop.held));
+    }
+    largest = std::max(largest, most);
+    ASSERT_LE(most, response.manoeuvre);
+  }
+  EXPECT_GT(largest, 0.5 * response.manoeuvre);
+  EXPECT_NEAR(integrator_response({kAxis.kp, kAxis.kd, 0, 0, 0.4}).manoeuvre, 0, 1e-6);  // without delay and lag
+}
+
+TEST(Integrator, ErrorsAtTheStartChargeItByAsMuchAsSaid) {
+  const IntegratorResponse response = integrator_response(kAxis);
+  for (const bool of_position : {true, false}) {
+    Loop1 loop(kAxis);
+    (of_position ? loop.p : loop.v) = 1;
+    for (double t = 0; t < kAxis.feedback_delay; t += kEuler) {  // what was measured before the start
+      const double p = loop.p, v = loop.v;
+      loop.step(0);
+      loop.p = p, loop.v = v, loop.a = loop.held = 0;
+    }
+    double most = 0;
+    for (double t = 0; t < 20; t += kEuler) loop.step(0), most = std::max(most, std::abs(loop.held));
+    EXPECT_NEAR(of_position ? response.from_position : response.from_velocity, 1.01 * most, 0.03 * most) << of_position;
+  }
+}
+
+/// Pushes that change their side now and then, between least and most.
+struct Switching {
+  double least, most, push = 0, left = 0;
+  double next(std::mt19937& random, double mean_length) {
+    if ((left -= kEuler) <= 0) {
+      push = std::bernoulli_distribution(0.5)(random) ? most : least;
+      left = std::exponential_distribution(1 / mean_length)(random);
+    }
+    return push;
+  }
+};
+
+TEST(Integrator, SteadyPushesLessWhatIsHeldStayWithinTheirBound) {
+  // A known push of 0 … 0.3 m/s² and one of unknown sign up to 0.1 m/s²; the gusts' part is taken off.
+  const OpenAir air(Vec3(0.3, 0, 0), 0.1);
+  for (const double gain : {0.4, 2.0}) {
+    Vehicle vehicle = vehicle_of(gain);
+    vehicle.limits.a_max = 0;
+    const NetDisturbance net(Reachability(vehicle), air.bounds);
+    DisturbanceBound none;
+    none.w.fill(0.1);
+    const OpenAir calm(Vec3(0.3, 0, 0), 0.1, 0);
+    const double bound = NetDisturbance(Reachability(vehicle), calm.bounds)(none).w[kX];
+    std::mt19937 random(11);
+    double largest = 0;
+    for (int trial = 0; trial < 60; ++trial) {
+      Loop1 loop(with_gain(gain));
+      Switching known{0, 0.3}, unknown{-0.1, 0.1};
+      const double mean_length = trial % 3 == 0 ? 1 : trial % 3 == 1 ? 5 : 30;
+      for (double t = 0; t < 120; t += kEuler) {
+        const double w = known.next(random, mean_length) + unknown.next(random, mean_length);
+        loop.step(w);
+        largest = std::max(largest, std::abs(w + loop.held));
+        ASSERT_LE(std::abs(w + loop.held), bound);
+      }
+    }
+    EXPECT_GT(largest, 0.8 * bound) << gain;
+    EXPECT_GT(net(none).w[kX], bound);  // gusts are held, too
+  }
+}
+
+TEST(Integrator, GustsLessWhatIsHeldHaveNoMoreThanTheSaidDeviation) {
+  // Rough air of deviation 0.3 for 10 s, then calm air of 0.1: what is held of the rough one is still there.
+  constexpr double kRough = 0.3, kCalm = 0.1, kTau = 0.15;
+  constexpr int kMotions = 1500;
+  const OpenAir air(Vec3::Zero(), 0, kRough);
+  Vehicle vehicle = vehicle_of(0.4);
+  vehicle.limits.a_max = 0;
+  const NetDisturbance net(Reachability(vehicle), air.bounds);
+  DisturbanceBound calm, rough;
+  calm.w.fill(3 * kCalm), rough.w.fill(3 * kRough);
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const double keep = std::exp(-kEuler / kTau);
+  double in_rough = 0, in_calm = 0;
+  for (int motion = 0; motion < kMotions; ++motion) {
+    Loop1 loop(kAxis);
+    double xi = normal(random), w = 0;
+    const auto blow = [&](double seconds, double deviation) {
+      for (double t = 0; t < seconds; t += kEuler) {
+        w = deviation * xi;
+        loop.step(w);
+        xi = keep * xi + std::sqrt(1 - keep * keep) * normal(random);
+      }
+      return std::pow(w + loop.held, 2) / kMotions;
+    };
+    in_rough += blow(10, kRough), in_calm += blow(0.5, kCalm);
+  }
+  const double error = 3 / std::sqrt(2.0 * kMotions);  // of a deviation, three standard errors
+  EXPECT_LE(std::sqrt(in_rough), net(rough).w[kX] / 3 * (1 + error));
+  EXPECT_LE(std::sqrt(in_calm), net(calm).w[kX] / 3 * (1 + error));
+  EXPECT_GT(std::sqrt(in_calm), 1.05 * kCalm);  // the memory is there
+  EXPECT_LT(net(rough).w[kX], 1.2 * 3 * kRough);
+}
+
+TEST(Integrator, AHoverRestsOnItsSetPointAndItsSetHoldsThePush) {
+  const Vec3 push(0.3, 0, 0);
+  const OpenAir pushed(push), still;
+  const auto set_of = [](double integrator, const OpenAir& air) {
+    return hover_extent(Reachability(vehicle_of(integrator)), air.grid, air.distance, air.bounds,
+                        Vec3(0.25, 0.25, 0.25));
+  };
+  EXPECT_NEAR(set_of(0, pushed).shift.x(), 0.3 / kAxis.kp, 1e-9);
+  const HoverSet held = set_of(0.4, pushed);
+  ASSERT_TRUE(held.bounded);
+  EXPECT_EQ(held.shift, Vec3::Zero());
+  // The push may set in: the set grows by what it moves the craft before it is held.
+  Loop1 loop(kAxis);
+  double farthest = 0;
+  for (double t = 0; t < 20; t += kEuler) loop.step(push.x()), farthest = std::max(farthest, loop.p);
+  EXPECT_GE(held.half_widths[kX] - set_of(0.4, still).half_widths[kX], farthest);
+  EXPECT_GT(farthest, std::abs(loop.p) + 0.1);
+}
+
+TEST(Integrator, FlightsStayInTheirTubeWhileThePushComesAndGoes) {
+  const OpenAir air(Vec3(0.3, 0, 0), 0.05);
+  const Vehicle vehicle = vehicle_of(0.4);
+  const Reachability reach(vehicle);
+  std::vector<Setpoint> commands;  // 2 m in 4 s and back to rest, within 1 m/s²
+  for (int k = 0; k < 400; ++k) {
+    const double t = std::min(0.02 * k, 4.0), s = t / 4, rate = 1.0 / 4;
+    Setpoint c;
+    c.p_W.x() = -1 + 2 * s * s * s * (10 - 15 * s + 6 * s * s);
+    c.v_W.x() = 2 * rate * 30 * s * s * (1 - s) * (1 - s);
+    c.a_W.x() = 2 * rate * rate * 60 * s * (1 - s) * (1 - 2 * s);
+    commands.push_back(c);
+  }
+  State start;
+  start.p_W.x() = -1;
+  const ReachTube tube = tube_over_field(reach, start, commands.front(), commands, air.bounds);
+  std::mt19937 random(3);
+  double nearest = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Loop1 loop(kAxis);
+    loop.p = -1;
+    Switching known{0, 0.3}, unknown{-0.05, 0.05}, gust{-0.3, 0.3};
+    // The charge of the start: of hovering in some push.
+    for (double t = 0; t < 30; t += kEuler) loop.step(known.next(random, 8) + unknown.next(random, 8), -1);
+    loop.p = -1, loop.v = 0;
+    for (std::size_t k = 0; k < commands.size(); ++k) {
+      const Setpoint& c = commands[k];
+      for (double t = 0; t < 0.02 - kEuler / 2; t += kEuler)
+        loop.step(known.next(random, 4) + unknown.next(random, 4) + gust.next(random, 0.15), c.p_W.x(), c.v_W.x(),
+                  c.a_W.x());
+      const double share = std::abs(loop.p - tube[k + 1].center.p_W.x()) / tube[k + 1].half_widths[kX];
+      nearest = std::max(nearest, share);
+      ASSERT_LE(share, 1) << k;
+    }
+  }
+  EXPECT_GT(nearest, 0.4);
+}
+
+}  // namespace
+}  // namespace backwash::reach
