@@ -33,55 +33,69 @@ std::string json_number(double value) {
   return text;
 }
 
-std::string field(const char* name, const std::string& json, bool last = false) {
-  return "\"" + std::string(name) + "\":" + json + (last ? "" : ",");
+std::string object(std::initializer_list<std::pair<const char*, std::string>> fields) {
+  std::string text;
+  for (const auto& [name, json] : fields) {
+    text += text.empty() ? "{\"" : ",\"";
+    text += name;
+    text += "\":";
+    text += json;
+  }
+  text += '}';
+  return text;
+}
+
+std::string array(const std::vector<std::string>& entries) {
+  return list(entries, [](const std::string& json) { return json; });
 }
 
 std::string to_json(const DataTable& t) {
-  return "{" + field("id", script_quoted(t.id)) + field("before", std::to_string(t.before)) +
-         field("columns", list(t.columns, script_quoted)) +
-         field("rows", list(t.rows, [](const auto& row) { return list(row, json_number); }), true) + "}";
+  return object({{"id", script_quoted(t.id)},
+                 {"before", std::to_string(t.before)},
+                 {"columns", list(t.columns, script_quoted)},
+                 {"rows", list(t.rows, [](const auto& row) { return list(row, json_number); })}});
 }
 
 std::string to_json(const TimePlot& p) {
   const auto curve = [](const Curve& c) {
-    return "{" + field("column", script_quoted(c.column)) + field("name", script_quoted(c.name)) +
-           field("mirrored", c.mirrored ? "true" : "false") + field("kind", script_quoted(c.kind), true) + "}";
+    return object({{"column", script_quoted(c.column)},
+                   {"name", script_quoted(c.name)},
+                   {"mirrored", c.mirrored ? "true" : "false"},
+                   {"kind", script_quoted(c.kind)}});
   };
-  return "{" + field("id", script_quoted(p.id)) + field("table", script_quoted(p.table)) +
-         field("name", script_quoted(p.name)) + field("unit", script_quoted(p.unit)) +
-         field("curves", list(p.curves, curve), true) + "}";
+  return object({{"id", script_quoted(p.id)},
+                 {"table", script_quoted(p.table)},
+                 {"name", script_quoted(p.name)},
+                 {"unit", script_quoted(p.unit)},
+                 {"curves", list(p.curves, curve)}});
 }
 
 std::string to_json(const ModeSpan& m) {
-  return "[" + json_number(m.from_s) + "," + json_number(m.until_s) + "," + script_quoted(m.mode) + "," +
-         script_quoted(m.reason) + "]";
+  return array({json_number(m.from_s), json_number(m.until_s), script_quoted(m.mode), script_quoted(m.reason)});
 }
 
-std::string json_point(const Vec3& p) {
-  return "[" + json_number(p.x()) + "," + json_number(p.y()) + "," + json_number(p.z()) + "]";
-}
+std::string json_point(const Vec3& p) { return array({json_number(p.x()), json_number(p.y()), json_number(p.z())}); }
 
 std::string to_json(const Scene& s) {
   const auto prism = [](const Prism& p) {
-    const auto corner = [](const Vec3& c) { return json_number(c.x()) + "," + json_number(c.y()); };
-    return "[" + json_point(p.center_W) + "," + json_number(p.half_widths[kZ]) + "," +
-           list(octagon(p.half_widths), corner) + "]";
-  };
-  const auto face = [](const MapFaces::Face& f) {
-    std::string text = std::to_string(f.side);
-    for (const int n : {f.plane, f.low[0], f.low[1], f.high[0], f.high[1]}) {
-      text += ',';
-      text += std::to_string(n);
-    }
-    return text;
+    std::vector<std::string> corners;
+    for (const Vec3& c : octagon(p.half_widths))
+      for (const double value : {c.x(), c.y()}) corners.push_back(json_number(value));
+    return array({json_point(p.center_W), json_number(p.half_widths[kZ]), array(corners)});
   };
   std::string map = "null";
-  if (s.faces)
-    map = "{" + field("origin", json_point(s.faces->origin_W)) + field("side", json_number(s.faces->side_m)) +
-          field("faces", list(s.faces->faces, face), true) + "}";
-  return "{" + field("path", script_quoted(s.path)) + field("radius", json_number(s.body_radius_m)) +
-         field("tube", list(s.tube, prism)) + field("map", map, true) + "}";
+  if (s.faces) {
+    std::vector<int> faces;
+    for (const auto& f : s.faces->faces)
+      for (const int n : {f.side, f.plane, f.low[0], f.low[1], f.high[0], f.high[1]}) faces.push_back(n);
+    map = object({{"origin", json_point(s.faces->origin_W)},
+                  {"side", json_number(s.faces->side_m)},
+                  {"faces", list(faces, [](int n) { return std::to_string(n); })}});
+  }
+  return object({{"path", script_quoted(s.path)},
+                 {"radius", json_number(s.body_radius_m)},
+                 {"tube", list(s.tube, prism)},
+                 {"map", map}});
 }
 
 /// Rows of a group that hold an extreme of a column, its first and its last.
@@ -177,8 +191,10 @@ std::string script_quoted(const std::string& text) {
 
 std::string to_json(const PageData& data) {
   const auto any = [](const auto& thing) { return to_json(thing); };
-  return "{" + field("tables", list(data.tables, any)) + field("plots", list(data.plots, any)) +
-         field("modes", list(data.modes, any)) + field("scene", data.scene ? to_json(*data.scene) : "null", true) + "}";
+  return object({{"tables", list(data.tables, any)},
+                 {"plots", list(data.plots, any)},
+                 {"modes", list(data.modes, any)},
+                 {"scene", data.scene ? to_json(*data.scene) : "null"}});
 }
 
 std::string scene_html(const Scene& scene) {

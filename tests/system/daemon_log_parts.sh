@@ -29,13 +29,15 @@ code=0
 "$bin/backwash" replay --log "$(part 2)" --json >"$work/second.json" 2>"$work/second" || code=$?
 [[ $code == 65 ]] && grep -q 'begins with part 2 of its log' "$work/second" || die "part 2 alone was replayed, exit $code"
 "$bin/backwash" report --log "$(part 2)" --json --quiet >"$work/flight.json" || die "part 2 is no good flight"
+"$bin/backwash" report --log "$(part 1)" --json --quiet >"$work/all.json" || die "part 1 and those beside it are no good flight"
 "$bin/backwash" export "${parts[@]}" --mcap "$work/whole.mcap" --quiet >/dev/null
 "$bin/backwash" replay --log "$work/whole.mcap" --json | cmp - "$work/whole.json" || die "the parts as one MCAP are another log"
 PYTHONPATH=$source_dir/tests/system python3 - "$work" "${parts[@]}" <<'PYTHON'
 import json, sys
 import raw_log
 work, *parts = sys.argv[1:]
-whole, flight = (json.load(open(f"{work}/{name}.json")) for name in ("whole", "flight"))
+whole, flight, all_parts = (json.load(open(f"{work}/{name}.json")) for name in ("whole", "flight", "all"))
+assert all_parts["take_offs"] == 1 and all_parts["time_s"] > flight["time_s"] and all_parts["samples"] == flight["samples"], all_parts
 ticks = [[t for t in raw_log.ticks(path)] for path in parts]
 print("ticks by part", [len(part) for part in ticks], "replayed", whole["ticks"])
 assert whole["equal"] and whole["ticks"] == sum(map(len, ticks)) and whole["ticks_missing"] == 0, whole

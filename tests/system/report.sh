@@ -7,7 +7,7 @@
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 command -v gnuplot >/dev/null && drawn=yes || drawn=no
 PYTHONPATH=$here python3 - "$backwash" "$drawn" <<'PYTHON'
-import json, random, subprocess, sys
+import json, os, random, subprocess, sys
 from raw_log_maker import *
 
 backwash, drawn = sys.argv[1], sys.argv[2] == "yes"
@@ -127,6 +127,26 @@ assert story["reason"] == "the battery fell out" and not story["ok"]
 if drawn:
     page = open("page.html").read()
     assert "Not good: the battery fell out" in page and page.count("<svg") >= 3 and "asked to go to" in page
+
+# A log in parts: of the first alone the later ones beside it are read, but not a file of another log.
+def part(number, log_id=77):
+    log = RawLog()
+    log.record(17, struct.pack("<qqII", log_id, 0, number, 0))
+    log.wait()
+    return log
+
+
+log = part(3)
+log.t = 10**10
+log.fly((0, 0, 1))
+log.fly((2, 0, 1))
+log.land()
+for name, made in (("flight-2", part(2, 5)), ("flight-3", part(2)), ("flight-4", log), ("flight-5", part(5))):
+    made.write(f"{name}.bwlog", None)
+story, _ = told(part(1), 0)
+assert story["take_offs"] == story["landings"] == 1 and story["log"] == "flight.bwlog" and story["time_s"] > 9, story
+os.remove("flight-3.bwlog")
+assert told(part(1), 1)[0]["take_offs"] == 0, "a part that is missing ends the log"
 
 # Killed at any byte: all whole records before it are told, and nothing is a defect or bad data.
 log, chance = good_flight(), random.Random(20261123)

@@ -76,7 +76,10 @@ function orbit(view, camera, home, change) {
     camera.lookAt(...eye.at);
     change();
   };
-  const look = (to) => { Object.assign(eye, home, {at: home.at.slice()}, to); place(); };
+  const look = (to) => {
+    Object.assign(eye, home, {at: home.at.slice(), far: home.far * Math.max(1, 1.3 / camera.aspect)}, to);
+    place();
+  };
   const turn = (x, y) => { eye.turn -= x; eye.tilt -= y; place(); };
   const zoom = (factor) => { eye.far *= factor; place(); };
   const shift = (x, y) => { // shares of the view
