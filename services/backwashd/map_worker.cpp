@@ -26,7 +26,8 @@ constexpr std::size_t kBytesPerVoxel = 115;
 // Resolutions for which the field is known to hold (tests/field/resolution_and_yaw_test.cpp), m.
 constexpr int kBelowTheRest = 10;  // niceness
 constexpr double kMadeFirst = 5;   // m level from the vehicle to the sides of what is made first
-constexpr int kWorthIt = 4;        // times as many voxels as that has a map of which a part is made first
+constexpr std::int64_t kVehicleWithin_ns = 2'000'000'000;  // for so long the place of the vehicle is waited for
+constexpr int kWorthIt = 4;  // times as many voxels as that has a map of which a part is made first
 constexpr double kFinest = 0.02, kCoarsest = 0.2;
 
 // A rejected map is told apart by its hash: whoever sends 40 MB of anything does not fill the disk with it.
@@ -157,13 +158,27 @@ void MapWorker::take_map(const MapMessage& message) {
                update ? "updated" : "built", (now_ns() - begun) / 1'000'000);
 }
 
+// The map and the first pose come in any order, and the whole takes longer than to wait for the other.
+void MapWorker::await_vehicle() {
+  const auto until = now_ns() + kVehicleWithin_ns;
+  do {
+    if (const auto newest = channels_.vehicle_W.read_new()) vehicle_W_ = *newest;
+    if (vehicle_W_ || channels_.stop) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  } while (now_ns() < until);
+}
+
 // Σ takes seconds in a building and longer on an office floor. Until then the vehicle may fly in what is around it.
 void MapWorker::publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns) {
-  if (const auto newest = channels_.vehicle_W.read_new()) vehicle_W_ = *newest;
-  if (!vehicle_W_ || air_ || !model_.extension.empty() || !grid.inside(grid.index(*vehicle_W_))) return;
-  const auto begun = now_ns();
+  if (air_ || !model_.extension.empty()) return;
   const int by = static_cast<int>(std::ceil(kMadeFirst / grid.resolution()));
-  const Index3 v = grid.index(*vehicle_W_), last = grid.size() - Index3::Ones();
+  const Index3 last = grid.size() - Index3::Ones();
+  const Index3 corner = last.cwiseMin(Index3(by, by, last.z())) + Index3::Ones();  // the least that it can be
+  if (static_cast<std::size_t>(corner.prod()) * kWorthIt > grid.cell_count()) return;
+  await_vehicle();
+  if (!vehicle_W_ || !grid.inside(grid.index(*vehicle_W_))) return;
+  const auto begun = now_ns();
+  const Index3 v = grid.index(*vehicle_W_);
   const map::VoxelBox columns{(v - Index3(by, by, v.z())).cwiseMax(0), (v + Index3(by, by, last.z())).cwiseMin(last)};
   const Index3 extent = columns.high - columns.low + Index3::Ones();
   if (static_cast<std::size_t>(extent.prod()) * kWorthIt > grid.cell_count()) return;

@@ -17,8 +17,8 @@ namespace backwash::daemon {
 /// and counted, and the old world stays (docs/faults.md rows 10 to 12); so is one of another writer than the first good
 /// one of its term (row 48). Scans that came meanwhile are taken in
 /// together, and the world is updated where they changed something. Of a first map that is far larger than what is
-/// around the vehicle, that part is made and handed out first. Where the flight has learnt that its air is rougher the
-/// world is made anew with the factors, and handed out like a new map.
+/// around the vehicle, that part is made and handed out first; its place is waited for, up to 2 s. Where the flight has
+/// learnt that its air is rougher the world is made anew with the factors, and handed out like a new map.
 class MapWorker {
  public:
   /// A world is made anew once a factor is larger by this share than the one it was made with.
@@ -39,6 +39,7 @@ class MapWorker {
   bool take_scans();
   bool take_air();
   void reject(const std::string& why);
+  void await_vehicle();
   void publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns);
   void publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What is made first of a large map.
 #include <atomic>
+#include <chrono>
 #include <optional>
 #include <thread>
 
@@ -51,6 +52,22 @@ TEST_F(MapWorkerTest, OfALargeMapWhatIsAroundTheVehicleIsHandedOutFirst) {
   EXPECT_GT(safe, 1000u);
   EXPECT_EQ(channels_->maps_accepted, 1u);
   EXPECT_FALSE(channels_->map_partial);
+}
+
+// The two come in any order, by other senders.
+TEST_F(MapWorkerTest, ALargeMapThatComesBeforeTheFirstPoseHasItsNearPartToo) {
+  std::atomic<bool> partial{false}, end{false};
+  std::thread control([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    channels_->vehicle_W.write(Vec3(4, 20, 0.3));
+    while (!end) partial = partial || channels_->map_partial;
+  });
+  send(hall(), 7);
+  end = true;
+  control.join();
+  EXPECT_TRUE(partial);
+  EXPECT_FALSE(channels_->map_partial);
+  EXPECT_EQ(world()->grid.size(), hall().size());
 }
 
 TEST_F(MapWorkerTest, WithoutAPlaceOrInASmallMapTheWholeIsMadeAtOnce) {
