@@ -13,6 +13,7 @@
 
 #include "core/config/file_hash.hpp"
 #include "core/map/octomap_message.hpp"
+#include "core/reach/integrator.hpp"
 #include "services/backwashd/scan_placement.hpp"
 #include "services/dds/dds.hpp"
 #include "services/parallel/parallel.hpp"
@@ -170,7 +171,7 @@ void MapWorker::await_vehicle() {
 
 // Σ takes seconds in a building and longer on an office floor. Until then the vehicle may fly in what is around it.
 void MapWorker::publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns) {
-  if (air_ || !model_.extension.empty()) return;
+  if (air_ || !model_.extension.empty() || reach::has_integrator(vehicle_)) return;
   const int by = static_cast<int>(std::ceil(kMadeFirst / grid.resolution()));
   const Index3 last = grid.size() - Index3::Ones();
   const Index3 corner = last.cwiseMin(Index3(by, by, last.z())) + Index3::Ones();  // the least that it can be

@@ -70,12 +70,22 @@ TEST_F(MapWorkerTest, ALargeMapThatComesBeforeTheFirstPoseHasItsNearPartToo) {
   EXPECT_EQ(world()->grid.size(), hall().size());
 }
 
-TEST_F(MapWorkerTest, WithoutAPlaceOrInASmallMapTheWholeIsMadeAtOnce) {
-  for (const auto& [vehicle_W, grid] : {std::pair<std::optional<Vec3>, map::OccupancyGrid>{std::nullopt, hall()},
-                                        {Vec3(100, 0, 0), hall()},
-                                        {Vec3(0, 0, 0.5), grid_}}) {  // 6 × 2 m
+TEST_F(MapWorkerTest, WithoutAPlaceInASmallMapOrForAnIntegratorTheWholeIsMadeAtOnce) {
+  const Vehicle plain = config::load_vehicle("builtin:quad-5in").value();
+  Vehicle integrator = plain;
+  integrator.controller.velocity_integrator = {0.4, 0.4};
+  const Vec3 inside(4, 20, 0.3);
+  const struct {
+    std::optional<Vec3> vehicle_W;
+    map::OccupancyGrid grid;
+    Vehicle vehicle;
+  } cases[] = {{std::nullopt, hall(), plain},
+               {Vec3(100, 0, 0), hall(), plain},
+               {Vec3(0, 0, 0.5), grid_, plain},  // 6 × 2 m
+               {inside, hall(), integrator}};    // its sets read the whole field's extremes
+  for (const auto& [vehicle_W, grid, vehicle] : cases) {
     Channels channels;
-    MapWorker worker(channels, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_);
+    MapWorker worker(channels, recorder_, Model{}, vehicle, settings_);
     if (vehicle_W) channels.vehicle_W.write(*vehicle_W);
     channels.maps.offer(std::make_unique<const MapMessage>(
         MapMessage{map::encode_octomap(grid), grid.resolution(), true, "OcTree", 7}));
