@@ -48,7 +48,8 @@ Vec3 Quadrotor::specific_force(const State& believed) noexcept {
   const auto& integrator = c.velocity_integrator;
   const Vec3 ki{integrator.horizontal, integrator.horizontal, integrator.vertical};
   // Held at the limits, as autopilots do: what cannot be given is not asked for ever more.
-  if (!on_ground_ && f == asked) integrated_ += kStep * ki.cwiseQuotient(kd).cwiseProduct(u - active_.a_W);
+  if (ki != Vec3::Zero() && !on_ground_ && f == asked)
+    integrated_ += kStep * ki.cwiseQuotient(kd).cwiseProduct(u - active_.a_W);
   return f;
 }
 

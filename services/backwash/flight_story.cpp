@@ -132,8 +132,9 @@ class Teller {
     double x = 0, y = 0, z = 0;
     if (at == text.npos || std::sscanf(text.c_str() + at, " verb %u (%lf, %lf, %lf)", &verb, &x, &y, &z) != 4) return;
     if (verb == 0 || verb >= kVerbs.size()) return;
-    const bool place = verb == kTakeOff || verb == kGoTo || verb == kGoToFacing;
-    const std::string asked = std::string("asked to ") + kVerbs[verb] + (place ? " " + to_text(Vec3(x, y, z)) : "");
+    std::string asked = std::string("asked to ") + kVerbs[verb];
+    if (verb == kGoTo || verb == kGoToFacing) asked += " " + to_text(Vec3(x, y, z));
+    if (verb == kTakeOff && z != 0) asked += " to " + to_text(z, 2) + " m";
     if (asked != asked_) say("command", asked);  // a station repeats itself until it is answered
     asked_ = asked;
     ordered_ = verb != kEnable && verb != kRelease;

@@ -7,7 +7,9 @@ node_peer() {
   modules=$build/$3
   shift 3
   for tool in node npm; do command -v $tool >/dev/null || { echo "skipped: $test needs $tool"; exit 77; }; done
-  [[ -d $modules/node_modules/${1%@*} ]] && return
+  local package missing=()
+  for package in "$@"; do [[ -d $modules/node_modules/${package%@*} ]] || missing+=("$package"); done
+  [[ ${#missing[@]} -eq 0 ]] && return
   mkdir -p "$modules"
   timeout 120 npm install --no-audit --no-fund --no-save --ignore-scripts --loglevel=error --prefix "$modules" "$@" >/dev/null 2>&1 ||
     { rm -rf "$modules"; echo "skipped: $test needs the npm registry ($*)"; exit 77; }

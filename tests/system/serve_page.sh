@@ -8,7 +8,7 @@ set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/tests/system/node_peer.sh"
 command -v chromium >/dev/null || { echo "skipped: serve_page needs chromium (Debian's package of that name)"; exit 77; }
-node_peer "$build" serve_page page_modules playwright-core@1.65.1
+node_peer "$build" serve_page serve_modules playwright-core@1.65.1
 source "$source_dir/services/bench/session.sh"
 
 start_bench "$build/services" "$log" builtin:thin-wall 2,-3,1.2 builtin:quad-5in
