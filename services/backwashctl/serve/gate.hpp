@@ -19,6 +19,7 @@ Reply refusal(int status, const std::string& why);
 struct Head {
   std::string method, host, origin, fetch_site, content_type, content_encoding, token;
   std::size_t hosts = 0;  ///< how many Host headers
+  bool parts = false;     ///< asks for parts of the answer
 };
 
 /// Why a request is refused, or nothing. Whoever asks must have called us `localhost` or by a numeric IPv4 address,

@@ -159,10 +159,15 @@ class Server : public httplib::Server {
 
 Head head_of(const httplib::Request& request) {
   const auto header = [&](const char* name) { return request.get_header_value(name); };
-  return {request.method,         header("Host"),
-          header("Origin"),       header("Sec-Fetch-Site"),
-          header("Content-Type"), header("Content-Encoding"),
-          header("X-Token"),      request.get_header_value_count("Host")};
+  return {request.method,
+          header("Host"),
+          header("Origin"),
+          header("Sec-Fetch-Site"),
+          header("Content-Type"),
+          header("Content-Encoding"),
+          header("X-Token"),
+          request.get_header_value_count("Host"),
+          request.has_header("Range")};
 }
 
 Asked asked_of(const httplib::Request& request) {

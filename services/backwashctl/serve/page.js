@@ -5,6 +5,7 @@ import { Picture } from '/picture.js'
 
 const $ = (id) => document.getElementById(id)
 const kLost_s = 0.6 // without news what is shown is no longer now
+const kDrift = 1e-4 // two machines' clocks run apart by no more than that
 
 // The token leaves the address bar, and with it the history. Both survive a reload of this tab.
 const draw = () => Array.from(crypto.getRandomValues(new Uint8Array(16)), (b) => b.toString(16).padStart(2, '0')).join('')
@@ -19,16 +20,21 @@ sessionStorage.setItem('page', page)
 const picture = new Picture($('picture'))
 const shown = { live: false, status: null, flown: null, preview: null, goal: null }
 let event = null, heard = -Infinity, begun = performance.now(), failed = ''
+let behind_s = 0, least_s = Infinity // by how much more than the fastest event of this stream the newest one was under way
 
 // --- what comes in ---------------------------------------------------------------------------------------------------
 
 let stream = null, refusals = 0
 function listen() {
   stream = new EventSource('/events?page=' + page)
+  least_s = Infinity
   stream.onmessage = (message) => {
     refusals = 0
     event = JSON.parse(message.data)
-    heard = performance.now()
+    const now = performance.now(), way_s = now / 1e3 - event.now_s
+    least_s = Math.min(least_s + Math.max(0, now - heard) * kDrift / 1e3, way_s)
+    behind_s = way_s - least_s
+    heard = now
     if ('flown' in event) shown.flown = event.flown
     if (event.preview) offer(event.preview)
   }
@@ -46,7 +52,8 @@ function lost() {
   if (!event) return silent > kLost_s ? 'No connection to backwashctl.' : ''
   if (silent > kLost_s) return `NO DATA for ${silent.toFixed(1)} s: backwashctl does not answer. Nothing below is now.`
   if (event.age_s === null) return 'NO DATA: the daemon has said nothing yet.'
-  const age = event.age_s + silent
+  if (behind_s > kLost_s) return `NO DATA of now: it arrives ${behind_s.toFixed(1)} s late, the connection is too slow. Nothing below is now.`
+  const age = event.age_s + silent + behind_s
   return age > kLost_s ? `NO DATA for ${age.toFixed(1)} s: the daemon is silent. Nothing below is now.` : ''
 }
 

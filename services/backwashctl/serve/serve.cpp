@@ -46,6 +46,7 @@ class PageEvents {
     Json event = control_.told(page_);
     event["status"] = seen.status ? json_of(*seen.status) : Json();
     event["age_s"] = seen.status ? Json(std::chrono::duration<double>(Clock::now() - seen.status_at).count()) : Json();
+    event["now_s"] = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
     event["over_bound"] = over_bound(seen);
     event["map"] = {{"number", seen.map_number}, {"refused", seen.map_refused}};
     event["preflight"] = Json::array();

@@ -22,6 +22,14 @@ async function until(what, holds, ms = 10000) {
 const asked = [], said = []
 async function open(browser, where, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1000, height: 700 }, ...options })
+  await context.addInitScript(() => { // events can be made to come late, each by as much
+    const Plain = window.EventSource
+    window.EventSource = class extends Plain {
+      set onmessage(hear) {
+        super.onmessage = (message) => (window.late ? setTimeout(hear, window.late, message) : hear(message))
+      }
+    }
+  })
   const page = await context.newPage()
   page.on('request', (request) => asked.push({ url: request.url(), referer: request.headers().referer ?? '' }))
   page.on('console', (line) => line.type() === 'error' && said.push(line.text()))
@@ -171,6 +179,12 @@ async function main() {
   await blank
   await lives(pilot)
   const cut = await dies(Number(serve), pilot, 'backwashctl does not answer')
+  await lives(pilot)
+  // News that a slow line has kept for two seconds comes at its full rate, and is not now.
+  await pilot.evaluate(() => (window.late = 2000))
+  await until('late news is said to be late', async () => (await text(pilot, 'lost')).includes('late, the connection is too slow'))
+  assert.ok(await pilot.evaluate(() => document.body.classList.contains('stale')))
+  await pilot.evaluate(() => (window.late = 0))
   await lives(pilot)
   console.log(`said after ${silent} ms that the daemon, after ${cut} ms that the page's server is silent`)
 
