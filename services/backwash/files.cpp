@@ -7,10 +7,12 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <set>
 
 #include "core/config/config.hpp"
 #include "core/config/simulation_terms.hpp"
+#include "core/files/read_file.hpp"
 #include "core/map/load_map.hpp"
 
 namespace backwash::services {
@@ -34,11 +36,36 @@ T read_configuration(tl::expected<T, config::ConfigError> value) {
 
 }  // namespace
 
-Model read_model(const std::string& path) { return read_configuration(config::load_model(path)); }
+namespace {
+
+/// What a configuration says: a built-in one belongs to the program. Empty: it cannot be read.
+std::string content_of(const std::string& path) {
+  if (path.starts_with("builtin:")) return path;
+  return files::read_file(path, files::kLargestConfiguration, "the path of a TOML file").value_or("");
+}
+
+std::map<std::string, std::string> contents;  // of configurations that were read, by path; empty: it changed meanwhile
+
+template <typename Load>
+auto read_and_remember(const std::string& path, const Load& load) {
+  const std::string before = content_of(path);
+  auto value = read_configuration(load(path));
+  contents[path] = before == content_of(path) ? before : "";
+  return value;
+}
+
+}  // namespace
+
+std::string content_when_read(const std::string& path) {
+  const auto found = contents.find(path);
+  return found == contents.end() ? "" : found->second;
+}
+
+Model read_model(const std::string& path) { return read_and_remember(path, config::load_model); }
 std::vector<SimulationTerm> read_simulation(const std::string& path) {
   return read_configuration(config::load_simulation(path));
 }
-Vehicle read_vehicle(const std::string& path) { return read_configuration(config::load_vehicle(path)); }
+Vehicle read_vehicle(const std::string& path) { return read_and_remember(path, config::load_vehicle); }
 
 log::FlightLog read_table(const std::string& path, const std::string& time_column) {
   auto table = log::read_csv(path, time_column);

@@ -27,6 +27,9 @@ Model read_model(const std::string& path);
 /// What an extended model adds to the simulation; nothing for others.
 std::vector<SimulationTerm> read_simulation(const std::string& path);
 Vehicle read_vehicle(const std::string& path);
+/// What a model or vehicle file held when it was read, the name of a built-in one; empty if it changed meanwhile, or
+/// was not read.
+std::string content_when_read(const std::string& path);
 log::FlightLog read_table(const std::string& path, const std::string& time_column);
 /// What a reader of core/log gives; its error as Failure 66 or 65.
 template <typename T>

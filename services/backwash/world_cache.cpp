@@ -62,12 +62,6 @@ struct VectorBytes {
   }
 };
 
-/// What a configuration says: a built-in one belongs to the program.
-std::string content_of(const std::string& path) {
-  if (path.starts_with("builtin:")) return path;
-  return files::read_file(path, files::kLargestConfiguration, "the path of a TOML file").value_or("");
-}
-
 template <class T>
 std::string bytes_of(const T* values, std::size_t count) {
   return {reinterpret_cast<const char*>(values), count * sizeof(T)};
@@ -75,8 +69,8 @@ std::string bytes_of(const T* values, std::size_t count) {
 
 /// The hash of all that decides on a world; empty where that is not known.
 std::string key_of(const WorldInput& input) {
-  const std::string program = build_id(), model = content_of(input.model_path),
-                    vehicle = content_of(input.vehicle_path);
+  const std::string program = build_id(), model = content_when_read(input.model_path),
+                    vehicle = content_when_read(input.vehicle_path);
   if (program.empty() || model.empty() || vehicle.empty()) return "";
   const auto& grid = input.grid;
   const double numbers[] = {grid.origin().x(), grid.origin().y(), grid.origin().z(), grid.resolution(),
@@ -97,12 +91,13 @@ fs::path folder() {
 }
 
 /// The file of a key. What is removed is named so, whatever else lies in the folder.
-constexpr std::string_view kSuffix = ".backwash-world";
+constexpr std::string_view kSuffix = ".backwash-world", kUnfinished = ".backwash-world.part-";
 fs::path file_of(const fs::path& in, const std::string& key) { return in / (key + std::string(kSuffix)); }
 bool is_kept_world(const fs::path& file) {
   const std::string name = file.filename().string();
-  return name.size() == kDigits + kSuffix.size() && name.ends_with(kSuffix) &&
-         name.find_first_not_of("0123456789abcdef") == kDigits;
+  const std::string_view rest = std::string_view(name).substr(std::min(kDigits, name.size()));
+  return name.find_first_not_of("0123456789abcdef") == kDigits &&
+         (rest == kSuffix || rest.starts_with(kUnfinished));  // of a call that was killed
 }
 
 /// Whether nobody else can put a world there: plans are made of them.

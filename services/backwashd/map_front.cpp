@@ -100,7 +100,9 @@ void MapFront::let_writers_go() {
 
 /// Where somebody looks.
 void MapFront::show_disturbance() {
+  constexpr double kFarthest = 1e6;  // m: indices of voxels beyond it are no numbers
   const auto vehicle_W = placement_.newest_W();
+  if (vehicle_W && !(vehicle_W->cwiseAbs().maxCoeff() < kFarthest)) return;
   if (!world_ || !vehicle_W || disturbance_.matched() == 0 || !shows_.due(*world_->world, *vehicle_W, now_ns())) return;
   disturbance_.write(ShownField(*world_->world, *vehicle_W, map_frame_).cloud());
 }

@@ -84,6 +84,8 @@ touch -d '2001-01-01' "$file"
 ask shared
 [[ $(stat -c %Y "$file") -lt 1000000000 ]] || fail "a world in a folder that others can write was used"
 chmod 700 "$work/cache"
+truncate -s 600M "$work/cache/$(printf '%064d' 2).backwash-world.part-7"
+touch -d '1999-01-01' "$work/cache/"*.part-7
 for n in 0 1; do truncate -s 600M "$work/cache/$(printf '%064d' $n).backwash-world"; done
 truncate -s 600M "$work/cache/gazebo.world"
 touch -d '2000-01-01' "$work/cache/"*000.backwash-world "$work/cache/gazebo.world"
@@ -93,6 +95,7 @@ ask full
 [[ -e $file ]] || fail "nothing is kept in a full folder"
 [[ ! -e $work/cache/$(printf '%064d' 0).backwash-world ]] || fail "the folder holds more than a gibibyte"
 [[ -e $work/cache/$(printf '%064d' 1).backwash-world ]] || fail "more was removed than had to be"
+[[ ! -e $work/cache/$(printf '%064d' 2).backwash-world.part-7 ]] || fail "what a killed call left stays for ever"
 [[ -e $work/cache/gazebo.world ]] || fail "another program's file was removed"
 rm "$work/cache/gazebo.world" "$file"
 mkdir "$file"

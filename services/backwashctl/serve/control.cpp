@@ -65,6 +65,9 @@ Reply Control::command(const nlohmann::json& said, const std::string& remote) {
   const auto now = Clock::now();
   const bool stops = name == "stop", others = held_by_another(page, now);
   if (gone(page, now) && !stops) return refusal(409, "page must be one that listens to /events");
+  // A page repeats what was not delivered: what was asked for before a STOP must not come after it.
+  if (flies && !(said.contains("stops") && said["stops"] == stops_))
+    return refusal(409, "a STOP has come since this was asked for; ask again");
   if (others && !stops) return refusal(409, "read-only: the session is held by another page, of " + holder_->remote);
   if (wish_ && wish_->verb->urgency > verb->urgency)
     return refusal(409, std::string(wish_->verb->name) + " is sent first");
@@ -72,6 +75,7 @@ Reply Control::command(const nlohmann::json& said, const std::string& remote) {
   if (!others && (!stops || (holder_ && holder_->page == page)))
     holder_ = Holder{page, remote, now + seconds(kLease_s)};
   wish_ = Wish{verb, goal.value_or(Vec3::Zero()), ++numbers_, now};
+  stops_ += stops;
   say(*wish_, "sent", "");
   wished_.notify_all();
   return {202, nlohmann::json{{"number", numbers_}}.dump()};
@@ -91,9 +95,12 @@ nlohmann::json Control::told(const std::string& page) const {
   const auto now = Clock::now();
   const bool others = held_by_another(page, now), mine = holder_ && holder_->page == page && now < holder_->until;
   const double left = others || mine ? duration<double>(holder_->until - now).count() : 0;
-  return {
-      {"session", {{"mine", mine}, {"holder", others ? "another page, of " + holder_->remote : ""}, {"left_s", left}}},
-      {"command", command_}};
+  return {{"session",
+           {{"mine", mine},
+            {"holder", others ? "another page, of " + holder_->remote : ""},
+            {"left_s", left},
+            {"stops", stops_}}},
+          {"command", command_}};
 }
 
 bool Control::cut_off(int urgency) const {

@@ -35,7 +35,8 @@ class Control {
   bool enter(const std::string& page);
   void leave(const std::string& page);
 
-  /// Takes a command of a page: {page, verb, goal}. What becomes of it is in told().
+  /// Takes a command of a page: {page, verb, goal, stops}. A goal is refused if a STOP has come since the page was told
+  /// of that many. What becomes of it is in told().
   Reply command(const nlohmann::json& said, const std::string& remote);
   /// {session, command} as a page is told.
   nlohmann::json told(const std::string& page) const;
@@ -74,10 +75,10 @@ class Control {
   std::condition_variable wished_;
   std::map<std::string, std::optional<Clock::time_point>> pages_;  // when each left, of those that are not here
   std::optional<Holder> holder_;
-  std::optional<Wish> wish_;  // the next one
-  std::uint64_t numbers_ = 0;
-  Clock::time_point ours_until_{};  // the daemon may hold its session for us until then
-  nlohmann::json command_;          // the newest, and what became of it
+  std::optional<Wish> wish_;               // the next one
+  std::uint64_t numbers_ = 0, stops_ = 0;  // of commands, and of STOPs among them
+  Clock::time_point ours_until_{};         // the daemon may hold its session for us until then
+  nlohmann::json command_;                 // the newest, and what became of it
 };
 
 }  // namespace backwash::ctl

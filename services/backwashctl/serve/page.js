@@ -141,13 +141,13 @@ async function follow() {
 // What cannot be delivered is tried again until something else is asked for; a STOP goes on for as long as it takes.
 let attempt = 0
 async function command(verb, goal) {
-  const mine = ++attempt
+  const mine = ++attempt, stops = event?.session?.stops // as the person who asks for it sees it
   failed = ''
   for (let n = 1; mine === attempt; ++n) {
     try {
       const answer = await fetch('/command', {
         method: 'POST', headers: { 'Content-Type': 'application/json', 'X-Token': token },
-        body: JSON.stringify({ page, verb, goal }), signal: AbortSignal.timeout(1500),
+        body: JSON.stringify({ page, verb, goal, stops }), signal: AbortSignal.timeout(1500),
       })
       if (mine !== attempt) return
       failed = answer.ok ? '' : `${verb.toUpperCase()}: REFUSED: ${(await answer.json().catch(() => ({}))).error ?? answer.status}`

@@ -215,7 +215,12 @@ def check_flight(ctl: str, domain: str) -> None:
         return json.loads(backwashctl("status", "--json").stdout)
 
     page, other = Page(PAGE), Page(OTHER)
-    assert page.event()["session"] == {"mine": False, "holder": "", "left_s": 0} or page.event()["session"]["holder"] == ""
+    assert page.event()["session"]["holder"] == ""
+    stops = page.event()["session"]["stops"]
+
+    def go(stops: object) -> int:
+        return ask("POST", "/command", {"page": PAGE, "verb": "goto", "goal": [2, 0, 1.2], "stops": stops})[0]
+
     # A way is shown before it is flown: from where the vehicle is to the goal, inside its tube; none into a wall.
     assert ask("POST", "/preview", {"page": PAGE, "goal": [2, 0, 1.2]})[0] == 202
     way = page.until("a way is planned", lambda e: e.get("preview") and e["preview"]["state"] == "ok", 30)["preview"]
@@ -226,7 +231,9 @@ def check_flight(ctl: str, domain: str) -> None:
     assert "goal" in page.until("a wall is refused", lambda e: e.get("preview") and e["preview"]["state"] == "refused", 30)["preview"]["message"]
     field = json.loads(ask("GET", "/slice?z=1.2")[2])["field"]
     assert field["most"] >= max(field["values"]) / 100 - 0.01 > 0 and min(field["values"]) >= 0, field["most"]
-    assert ask("POST", "/command", {"page": PAGE, "verb": "goto", "goal": [2, 0, 1.2]})[0] == 202
+    assert ask("POST", "/command", {"page": PAGE, "verb": "goto", "goal": [2, 0, 1.2]})[0] == 409  # of no number of STOPs
+    assert [go(wrong) for wrong in (stops + 1, None, str(stops), -1)] == [409] * 4
+    assert go(stops) == 202
     page.until("goto is accepted", lambda e: e["command"]["state"] == "accepted" and e["session"]["mine"])
     other.until("the other page is told", lambda e: "another page" in e["session"]["holder"])
     for verb in ("hold", "land", "release"):
@@ -240,6 +247,8 @@ def check_flight(ctl: str, domain: str) -> None:
     # STOP is anybody's, and takes no session: the holder's stays.
     assert command("stop", OTHER) == 202
     other.until("stop is accepted", lambda e: e["command"]["verb"] == "stop" and e["command"]["state"] == "accepted")
+    # What was asked for before it, and comes late, is not flown.
+    assert go(stops) == 409 and page.until("the STOP is counted", lambda e: e["session"]["stops"] == stops + 1)
     begun = time.monotonic()
     while (now := status())["moving"] or now["state"] != "hold":
         assert time.monotonic() - begun < 10, now
