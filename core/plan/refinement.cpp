@@ -10,13 +10,14 @@ namespace backwash::plan {
 
 namespace {
 
-constexpr double kOptimiseShare = 0.97;        ///< of the limits: re-timing has little left to do
-constexpr double kFirstMargin = 0.02;          ///< m beyond the tube, in the collision cost of the first round
-constexpr double kMoreMargin = 0.02;           ///< m, after each round that fails verification
-constexpr std::size_t kFailures = 4;           ///< of verification, per pace
-constexpr double kWorthwhile = 0.005;          ///< share of the cost that a round of polishing must gain
-constexpr std::size_t kHoldCommands = 50;      ///< verified hover at the goal: one second
-constexpr double kPaces[] = {1.0, 0.7, 0.45};  ///< share of the searched path's speed
+constexpr double kOptimiseShare = 0.97;              ///< of the limits: re-timing has little left to do
+constexpr double kFirstMargin = 0.02;                ///< m beyond the tube, in the collision cost of the first round
+constexpr double kMoreMargin = 0.02;                 ///< m, after each round that fails verification
+constexpr std::size_t kFailures = 4;                 ///< of verification, per pace
+constexpr double kWorthwhile = 0.005;                ///< share of the cost that a round of polishing must gain
+constexpr std::size_t kHoldCommands = 50;            ///< verified hover at the goal: one second
+constexpr double kQuickenings[] = {1.0, 0.5, 0.25};  ///< share of what the limits leave
+constexpr double kPaces[] = {1.0, 0.7, 0.45};        ///< share of the searched path's speed
 
 /// Time between control points: 0.6 m of flight at full speed. Half of it costs 0.7 times more and smooths no better.
 double knot_span(double v_max) { return std::clamp(0.6 / v_max, 0.15, 0.6); }
@@ -29,8 +30,8 @@ BSpline fit_path(const std::vector<Motion>& motions, const PlanStart& start, con
   return fit(samples.positions, samples.step / pace, start.command.v_W, start.command.a_W, Vec3::Zero(), Vec3::Zero());
 }
 
-/// By what the knot span must grow for the control points of velocity and acceleration to keep the limits; at most 1 if
-/// they do. What the start fixes (its velocity and acceleration) is kept and not judged.
+/// By what the knot span may change for the control points of velocity and acceleration to keep the limits: above 1 it
+/// must grow. What the start fixes (its velocity and acceleration) is kept and not judged.
 double stretch_needed(const BSpline& spline, const MotionLimits& limits) {
   const auto velocity = spline.velocity_points(), acceleration = spline.acceleration_points();
   double stretch = 0;
@@ -41,13 +42,19 @@ double stretch_needed(const BSpline& spline, const MotionLimits& limits) {
   return stretch;
 }
 
+/// The same curve with another knot span; its start keeps velocity and acceleration.
+BSpline with_knot_span(BSpline spline, const PlanStart& start, double knot_span) {
+  spline.knot_span = knot_span;
+  std::ranges::copy(end_control_points(start.command.p_W, start.command.v_W, start.command.a_W, knot_span),
+                    spline.control_points.begin());
+  return spline;
+}
+
 BSpline retimed(BSpline spline, const PlanStart& start, const MotionLimits& limits) {
   for (int i = 0; i < 30; ++i) {
     const double stretch = stretch_needed(spline, limits);
     if (stretch <= 1) break;
-    spline.knot_span *= 1.0001 * std::min(stretch, 1.5);
-    std::ranges::copy(end_control_points(start.command.p_W, start.command.v_W, start.command.a_W, spline.knot_span),
-                      spline.control_points.begin());
+    spline = with_knot_span(std::move(spline), start, 1.0001 * std::min(stretch, 1.5) * spline.knot_span);
   }
   return spline;
 }
@@ -73,8 +80,15 @@ class Refiner {
         limits_{Vec3::Constant(options.v_max), start.command.a_W.cwiseAbs().cwiseMax(options.a_max),
                 start.command.v_W} {}
 
-  /// Rounds from one spline.
+  /// Rounds from one spline, and what they keep as fast as it may be.
   void run(BSpline spline) {
+    polish(std::move(spline));
+    if (options_.polish > 0 && result_.found) quicken();
+  }
+  const Refinement& result() const noexcept { return result_; }
+
+ private:
+  void polish(BSpline spline) {
     reach::ReachTube tube = fly(spline).tube;
     std::size_t polish = options_.polish;
     double margin = kFirstMargin;
@@ -100,9 +114,23 @@ class Refiner {
       if (result_.found && polish == 0) return;
     }
   }
-  const Refinement& result() const noexcept { return result_; }
 
- private:
+  /// Less time for the same curve, up to the limits: the most of it that is verified. From a motion another pace is
+  /// another curve, taken if it costs no more.
+  void quicken() {
+    const BSpline polished = result_.found->trajectory;
+    const double most = 1 - stretch_needed(polished, limits_);
+    for (const double share : kQuickenings) {
+      if (share * most < kWorthwhile || Clock::now() > deadline_) return;
+      const double knot_span = (1 - share * most) * polished.knot_span;
+      Refined candidate = fly(retimed(with_knot_span(polished, start_, knot_span), start_, limits_));
+      if (jerk2_at_equal_time(candidate.trajectory) > (1 + 1e-9) * jerk2_at_equal_time(polished)) return;
+      if (!verified(candidate)) continue;
+      result_.found = std::move(candidate);
+      return;
+    }
+  }
+
   Refined fly(const BSpline& spline) const {
     Refined flight{spline, spline.commands(), {}, 0};
     const Setpoint hold = flight.commands.back();

@@ -193,7 +193,7 @@ TEST(Plan, PolishingNeverCostsMoreThanTheFirstVerifiedTrajectory) {
       return p.metrics.jerk2 * std::pow(p.metrics.time_s, 5);
     };
     const double a = cost(0), b = cost(400);
-    EXPECT_LE(b, a) << goal.transpose();
+    EXPECT_LE(b, a * (1 + 1e-9)) << goal.transpose();  // another pace rounds otherwise
     first += a, polished += b;
   }
   EXPECT_LT(polished, first);

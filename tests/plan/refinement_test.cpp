@@ -49,20 +49,59 @@ TEST(Refinement, PolishingReturnsNothingThatCostsMoreThanWhatWasFoundWithoutIt) 
   for (const Vec3& v : {Vec3(0, 0, 0), Vec3(0.8, 0.3, 0), Vec3(-0.5, 0.5, 0)})
     for (const Vec3& goal : {Vec3(2, 0, 1.2), Vec3(1, 1.2, 1.6)}) {
       const auto planned = [&](std::size_t polish) {
-        return plan(open_world(), moving({-1.5, 0, 1.2}, v), goal, {.v_max = 1.5, .a_max = 1.5, .polish = polish});
+        return plan(open_world(), moving({-1.5, 0, 1.2}, v), goal,
+                    {.v_max = 1.5, .a_max = 1.5, .evaluations = 4, .polish = polish});  // so few leave work undone
       };
       const Plan rough = planned(0);
       if (rough.status != PlanStatus::ok) continue;
       for (const std::size_t polish : {1U, 2U, 3U, 5U, 8U, 20U}) {
         const Plan polished = planned(polish);
         ASSERT_EQ(polished.status, PlanStatus::ok);
-        EXPECT_LE(cost(polished.trajectory), cost(rough.trajectory)) << goal.transpose() << " polished " << polish;
+        EXPECT_LE(cost(polished.trajectory), cost(rough.trajectory) * (1 + 1e-9))  // another pace rounds otherwise
+            << goal.transpose() << " polished " << polish;
         ++flown;
-        better += cost(polished.trajectory) < cost(rough.trajectory);
+        better += cost(polished.trajectory) < (1 - 1e-6) * cost(rough.trajectory);
       }
     }
   EXPECT_GT(flown, 20);
   EXPECT_GT(better, 0);
+}
+
+// The searched pace is that of a cubic: what polishing smooths need not take as long.
+TEST(Refinement, PolishedTrajectoriesFromRestTakeAsLittleTimeAsTheLimitsAndTheirTubeAllow) {
+  const double v_max = 1.5, a_max = 1.5;
+  int at_limit = 0, quicker = 0;
+  for (const Vec3& goal : {Vec3(2, 0, 1.2), Vec3(1, 1.2, 1.6), Vec3(-0.5, 0.3, 1.2), Vec3(-1.2, -0.8, 1.0)}) {
+    const auto planned = [&](std::size_t polish) {
+      return plan(open_world(), moving({-1.5, 0, 1.2}, Vec3::Zero()), goal,
+                  {.v_max = v_max, .a_max = a_max, .polish = polish});
+    };
+    const Plan rough = planned(0), polished = planned(400);
+    ASSERT_EQ(polished.status, PlanStatus::ok);
+    EXPECT_GT(nearest_approach(open_world(), polished.tube).clearance, 0);
+    double used = 0;
+    for (double t = 0; t <= polished.trajectory.duration(); t += 0.005) {
+      const double v = polished.trajectory.derivative(t, 1).cwiseAbs().maxCoeff() / v_max;
+      const double a = polished.trajectory.derivative(t, 2).cwiseAbs().maxCoeff() / a_max;
+      used = std::max({used, v, a});
+    }
+    EXPECT_LE(used, 1 + 1e-6);
+    at_limit += used > 0.97;
+    quicker += polished.trajectory.duration() < 0.95 * rough.trajectory.duration();
+  }
+  EXPECT_EQ(at_limit, 4);
+  EXPECT_GE(quicker, 2);
+}
+
+// Of 900 pairs in three scenes the one whose tube touches, by 0.7 mm, at the pace that the limits alone would let it
+// have.
+TEST(Refinement, WhatIsMadeQuickerIsStillClear) {
+  const auto world =
+      build_world(map::builtin_scene("apartment", 0.1).value(), config::load_model("builtin:quad-5in").value(),
+                  config::load_vehicle("builtin:quad-5in").value());
+  const Plan p = plan(*world, moving({7.75, 3.15, 0.45}, Vec3::Zero()), {8.05, 3.95, 1.85}, {.v_max = 1.5, .a_max = 2});
+  ASSERT_EQ(p.status, PlanStatus::ok) << p.message;
+  EXPECT_GT(tube_clearance(*world, p.tube), 0);
 }
 
 TEST(Refinement, EndsAtItsDeadlineAndSaysSo) {
