@@ -3,6 +3,8 @@
 // planner_watch.cpp what happens in flight.
 #include "services/backwashd/planner_worker.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <cstdio>
 #include <thread>
 #include <utility>
@@ -15,6 +17,7 @@ namespace {
 
 constexpr int kAttempts = 25;               // offers of one segment, each from a fresh state
 constexpr std::size_t kBrakeAfter = 15;     // commands (0.3 s) that a stop on request leaves untouched
+constexpr std::size_t kLaterStops = 20;     // of the flight that are tried where braking at once is not clear
 constexpr double kLeastLift = 0.3;          // m: what an autopilot can tell from standing
 constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a segment or not
 
@@ -134,8 +137,34 @@ std::optional<std::string> PlannerWorker::brake() {
   Flying next = continued(branch, std::move(commands));
   next.held = true;
   verify(next, *world_, view_.index);
-  if (!(next.segment.clearance > 0)) return not_clear("braking here", next.segment.clearance);
+  const double here = next.segment.clearance;
+  if (!(here > 0)) return brake_later() ? std::nullopt : std::optional(not_clear("braking here", here));
   return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
+}
+
+/// Where rest here is not clear, as in a doorway: by the first of the flight's own stops that still is, else at its
+/// end.
+bool PlannerWorker::brake_later() {
+  std::size_t tries = 0;
+  for (const plan::Stop& stop : flying_->segment.stops) {
+    refresh();
+    if (stop.branch < view_.index + kBrakeAfter) continue;
+    if (++tries > kLaterStops) break;
+    Flying next = continued(stop.branch, flown_commands(*flying_, true, stop.branch));
+    next.held = true;
+    verify(next, *world_, view_.index);
+    if (!(next.segment.clearance > 0)) continue;
+    add_guards(next, *world_, view_.index);
+    const double after = kControlPeriod * static_cast<double>(stop.branch - view_.index);
+    if (!offer(std::move(next))) return false;
+    spdlog::info("braking here is not clear: the flight comes to rest {:.1f} s later", after);
+    return true;
+  }
+  Flying whole = *flying_;
+  verify(whole, *world_, view_.index);
+  flying_->held = whole.segment.clearance > 0;
+  if (flying_->held) spdlog::info("no rest before its end is clear: the flight comes to rest there");
+  return flying_->held;
 }
 
 /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may

@@ -56,6 +56,7 @@ class PlannerWorker {
   std::optional<std::string> go_to(const PlanJob& job);
   std::optional<std::string> explore(const PlanJob& job);
   std::optional<std::string> brake();
+  bool brake_later();
   std::optional<std::string> fly(std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
                                  std::optional<double> z_safe, std::uint32_t closures, bool lifts = false);
   std::vector<Setpoint> rise(const Vec3& from, const Vec3& to) const;

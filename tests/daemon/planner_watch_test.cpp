@@ -2,6 +2,7 @@
 // What the planner does about a flight under way: in a new world, after a loop closure, when it is to brake.
 #include <fstream>
 
+#include "core/plan/stop.hpp"
 #include "tests/daemon/planner_rig.hpp"
 
 namespace backwash::daemon::test {
@@ -174,6 +175,36 @@ TEST_F(PlannerWatch, AfterALoopClosureAFlightThatWasToldToHoldStaysWhereItIs) {
         EXPECT_LT((offers_.back().commands[k].p_W - flown[k].p_W - Vec3(0, 0.1 * closures, 0)).norm(), 1e-9) << k;
     }
   }
+}
+
+// A narrow gap, passed 8 cm beside its middle: a set that rests there grows into its side, one that passes does not.
+TEST_F(PlannerWatch, AHoldInANarrowGapIsARestBehindIt) {
+  constexpr double kGap = 3.0;  // m, along x
+  OccupancyGrid grid = room();
+  fill(grid, {29, 0, 1}, {30, 15, 19}), fill(grid, {29, 24, 1}, {30, 39, 19});
+  know(grid);
+  stand({1.05, 2.13, 1.05});
+  ASSERT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.13, 1.05}), "");
+  const track::AcceptedSegment flown = offers_.at(0);
+  view_.index = 70;
+  view_.command = flown.commands[view_.index];
+  view_.state = flown.tube[view_.index].center;
+  view_.finished = false;
+  show();
+  const auto at_once = plan::stop_along(flown.commands, view_.index + 15, world_->reach.vehicle.limits.a_max);
+  ASSERT_LE(plan::tube_clearance(*world_, reach::tube_over_field(world_->reach, {flown.commands[0].p_W, Vec3::Zero()},
+                                                                 flown.commands[0], at_once, world_->bounds)),
+            0);
+
+  EXPECT_EQ(ask(PlanJob::Kind::brake, Vec3::Zero()), "");
+  ASSERT_EQ(offers_.size(), 2u);
+  const auto& held = offers_[1];
+  EXPECT_EQ(held.continues, flown.id);
+  EXPECT_GT(held.clearance, 0);
+  EXPECT_GT(held.commands.back().p_W.x(), kGap);
+  EXPECT_LT(held.commands.back().p_W.x(), 5.0) << "it does not fly on to its goal";
+  EXPECT_TRUE(held.commands.back().v_W.isZero());
+  EXPECT_FALSE(held.stops.empty()) << "on the way there it can still be stopped";
 }
 
 TEST_F(PlannerWatch, BrakingThatWouldTouchIsNotOffered) {
