@@ -43,6 +43,8 @@ if [[ ! -e $sysroot/.whole ]]; then
     from=$(find "$sysroot/usr/lib" -path "*/$library/lib$library.so.3" | head -n 1)
     [[ -z $from ]] || ln -sf "$from" "$(dirname "$(dirname "$from")")/lib$library.so.3"
   done
+  # Some CMake packages (assimp, draco, Fast DDS) name libraries by absolute paths.
+  find "$sysroot/usr/lib" -path '*/cmake/*.cmake' -exec sed -i -E "s#([\":;])(/usr/lib/[^/\";:>]+/lib)#\1$sysroot\2#g" {} +
   touch "$sysroot/.whole"
 fi
 
