@@ -27,24 +27,47 @@ const Control::Verb Control::kVerbs[] = {{"stop", backwash_msgs_msg_dds__COMMAND
                                          {"goto", backwash_msgs_msg_dds__COMMAND_GOTO, 0},
                                          {"release", backwash_msgs_msg_dds__COMMAND_RELEASE, 0}};
 
-bool Control::enter(const std::string& page) {
+/// Pages that have been gone for long.
+void Control::forget(Clock::time_point now) {
+  std::erase_if(pages_,
+                [&](const auto& entry) { return entry.second.left && now - *entry.second.left > seconds(kGone_s); });
+}
+
+bool Control::full(bool admitted) const {
+  const auto alike = [&](const auto& entry) { return entry.second.admitted == admitted; };
+  return std::ranges::count_if(pages_, alike) >= static_cast<std::ptrdiff_t>(kPages);
+}
+
+std::optional<bool> Control::enter(const std::string& page) {
+  const std::lock_guard lock(mutex_);
+  forget(Clock::now());
+  const auto known = pages_.find(page);
+  if (known != pages_.end() ? !known->second.left : full(false)) return std::nullopt;
+  pages_[page].left.reset();
+  return pages_[page].admitted;
+}
+
+bool Control::admit(const std::string& page) {
   const std::lock_guard lock(mutex_);
   const auto now = Clock::now();
-  std::erase_if(pages_, [&](const auto& entry) { return entry.second && now - *entry.second > seconds(kGone_s); });
+  forget(now);
   const auto known = pages_.find(page);
-  if (known != pages_.end() ? !known->second : pages_.size() >= kPages) return false;
-  pages_[page] = std::nullopt;
+  if ((known == pages_.end() || !known->second.admitted) && full(true)) return false;
+  if (known == pages_.end())
+    pages_[page] = {true, now};
+  else
+    known->second.admitted = true;
   return true;
 }
 
 void Control::leave(const std::string& page) {
   const std::lock_guard lock(mutex_);
-  pages_[page] = Clock::now();
+  pages_[page].left = Clock::now();
 }
 
 bool Control::gone(const std::string& page, Clock::time_point now) const {
   const auto known = pages_.find(page);
-  return known == pages_.end() || (known->second && now - *known->second > seconds(kGone_s));
+  return known == pages_.end() || (known->second.left && now - *known->second.left > seconds(kGone_s));
 }
 
 bool Control::held_by_another(const std::string& page, Clock::time_point now) const {

@@ -27,13 +27,16 @@ std::optional<Vec3> point_of(const nlohmann::json& said);
 class Control {
  public:
   static constexpr double kLease_s = 10, kGone_s = 2;
-  static constexpr std::size_t kPages = 16;
+  static constexpr std::size_t kPages = 16;  ///< of those with the token, and as many without
 
   explicit Control(Station& station) : station_(station) {}
 
-  /// A page, by the name that it drew for itself, listens. False: there is one of that name, or there are too many.
-  bool enter(const std::string& page);
+  /// A page, by the name that it drew for itself, listens. Nothing: there is one of that name, or there are too many.
+  /// Else whether it was admitted.
+  std::optional<bool> enter(const std::string& page);
   void leave(const std::string& page);
+  /// A page that has the token is about to listen: pages without it cannot take its place. False: too many are.
+  bool admit(const std::string& page);
 
   /// Takes a command of a page: {page, verb, goal, stops}. A goal is refused if a STOP has come since the page was told
   /// of that many. What becomes of it is in told().
@@ -63,6 +66,12 @@ class Control {
     std::string page, remote;
     Clock::time_point until;
   };
+  struct Listener {
+    bool admitted = false;
+    std::optional<Clock::time_point> left;  // when, of one that is not here
+  };
+  void forget(Clock::time_point now);
+  bool full(bool admitted) const;
   bool gone(const std::string& page, Clock::time_point now) const;
   bool held_by_another(const std::string& page, Clock::time_point now) const;
   void let_go();
@@ -73,7 +82,7 @@ class Control {
   Station& station_;
   mutable std::mutex mutex_;
   std::condition_variable wished_;
-  std::map<std::string, std::optional<Clock::time_point>> pages_;  // when each left, of those that are not here
+  std::map<std::string, Listener> pages_;
   std::optional<Holder> holder_;
   std::optional<Wish> wish_;               // the next one
   std::uint64_t numbers_ = 0, stops_ = 0;  // of commands, and of STOPs among them

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <mutex>
 #include <thread>
 
 #include "services/command_line/exit_code.hpp"
@@ -103,15 +104,44 @@ class Connection : public httplib::Stream {
   char buffer_[4096];
 };
 
-/// Whether the connection that this thread was handed is one too many.
-thread_local bool too_many = false;
+/// The open connections whose client has not shown the token, by age. Each is taken out before its socket is closed.
+class Strangers {
+ public:
+  std::uint64_t add(int socket) {
+    const std::lock_guard lock(mutex_);
+    sockets_[++last_] = socket;
+    return last_;
+  }
+  void remove(std::uint64_t number) {
+    const std::lock_guard lock(mutex_);
+    sockets_.erase(number);
+  }
+  /// Ends the oldest; false: there is none. Its thread sees that at once, or in a stream within 0.1 s.
+  bool end_oldest() {
+    const std::lock_guard lock(mutex_);
+    if (sockets_.empty()) return false;
+    shutdown(sockets_.begin()->second, SHUT_RDWR);
+    sockets_.erase(sockets_.begin());
+    return true;
+  }
 
-/// A thread for each connection that is allowed, and none that waits.
+ private:
+  std::mutex mutex_;
+  std::map<std::uint64_t, int> sockets_;
+  std::uint64_t last_ = 0;
+};
+
+/// Of the connection that this thread was handed: whether it is one too many, and what keeps it.
+thread_local bool too_many = false;
+thread_local std::function<void()> keep;
+
+/// A thread for each connection that is allowed or leaves, and none that waits.
 class Workers : public httplib::ThreadPool {
  public:
-  explicit Workers(std::atomic<std::size_t>& open) : ThreadPool(kConnections), open_(open) {}
+  Workers(std::atomic<std::size_t>& open, Strangers& strangers)
+      : ThreadPool(kConnections + kLeaving), open_(open), strangers_(strangers) {}
   void enqueue(std::function<void()> job) override {
-    if (open_ < kConnections) {
+    if (open_ < kConnections || (open_ < kConnections + kLeaving && strangers_.end_oldest())) {
       ++open_;
       return ThreadPool::enqueue(std::move(job));
     }
@@ -122,12 +152,13 @@ class Workers : public httplib::ThreadPool {
 
  private:
   std::atomic<std::size_t>& open_;
+  Strangers& strangers_;
 };
 
 class Server : public httplib::Server {
  public:
   Server() {
-    new_task_queue = [this] { return new Workers(open_); };
+    new_task_queue = [this] { return new Workers(open_, strangers_); };
   }
   void end() {
     ends_ = true;
@@ -146,13 +177,17 @@ class Server : public httplib::Server {
     const int on = 1;
     setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     Connection connection(socket, ends_);
+    const std::uint64_t number = strangers_.add(socket);
+    keep = [this, number] { strangers_.remove(number); };
     bool closed = false;
     const bool good = process_request(connection, true, closed, nullptr);
+    strangers_.remove(number);
     connection.close();
     --open_;
     return good;
   }
 
+  Strangers strangers_;
   std::atomic<std::size_t> open_{0};
   std::atomic<bool> ends_{false};
 };
@@ -219,6 +254,8 @@ void add_site(httplib::Server& server, const Site& site) {
 
 }  // namespace
 
+void keep_connection() { keep(); }
+
 void serve_http(const Door& door, const Site& site, const std::function<void(int port)>& listening,
                 const std::function<bool()>& stopped) {
   Server server;
@@ -234,6 +271,7 @@ void serve_http(const Door& door, const Site& site, const std::function<void(int
   server.set_pre_routing_handler([&](const httplib::Request& request, httplib::Response& response) {
     const auto reply = refused(head_of(request), port, door.token);
     if (reply) answer(*reply, response);
+    if (!reply && request.method == "POST") keep();
     return reply ? httplib::Server::HandlerResponse::Handled : httplib::Server::HandlerResponse::Unhandled;
   });
   server.set_exception_handler(

@@ -35,9 +35,13 @@ struct Door {
 };
 
 /// Each connection is one request of at most kRequestBytes within kRequest_s, or a stream; at most kConnections at a
-/// time, a further one is closed. A client that takes no bytes for kWrite_s is dropped.
-constexpr std::size_t kRequestBytes = 16 << 10, kBodyBytes = 4 << 10, kConnections = 48;
+/// time. For a further one the oldest that has not shown the token is closed; where all have, or kLeaving are still
+/// closing, it gets 503. A client that takes no bytes for kWrite_s is dropped.
+constexpr std::size_t kRequestBytes = 16 << 10, kBodyBytes = 4 << 10, kConnections = 48, kLeaving = 16;
 constexpr double kRequest_s = 3, kWrite_s = 1;
+
+/// Called while a request is answered: its connection is not closed for a further one's sake.
+void keep_connection();
 
 /// Calls `listening` with the port, then serves until `stopped`. Throws StartError 71 where it cannot listen.
 void serve_http(const Door& door, const Site& site, const std::function<void(int port)>& listening,

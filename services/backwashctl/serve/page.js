@@ -25,7 +25,12 @@ let behind_s = 0, least_s = Infinity // by how much more than the fastest event 
 // --- what comes in ---------------------------------------------------------------------------------------------------
 
 let stream = null, refusals = 0
-function listen() {
+const post = (path, body) => fetch(path, {
+  method: 'POST', headers: { 'Content-Type': 'application/json', 'X-Token': token }, body: JSON.stringify(body), signal: AbortSignal.timeout(1500),
+})
+
+async function listen() {
+  if (token) await post('/enter', { page }).catch(() => null) // pages without the token cannot take this one's place
   stream = new EventSource('/events?page=' + page)
   least_s = Infinity
   stream.onmessage = (message) => {
@@ -145,10 +150,7 @@ async function command(verb, goal) {
   failed = ''
   for (let n = 1; mine === attempt; ++n) {
     try {
-      const answer = await fetch('/command', {
-        method: 'POST', headers: { 'Content-Type': 'application/json', 'X-Token': token },
-        body: JSON.stringify({ page, verb, goal, stops }), signal: AbortSignal.timeout(1500),
-      })
+      const answer = await post('/command', { page, verb, goal, stops })
       if (mine !== attempt) return
       failed = answer.ok ? '' : `${verb.toUpperCase()}: REFUSED: ${(await answer.json().catch(() => ({}))).error ?? answer.status}`
       if (answer.ok || answer.status !== 503) return show()
@@ -170,7 +172,7 @@ function propose(goal) {
   const question = `Fly to ${goal.map((v) => v.toFixed(2)).join(', ')} m? The daemon plans, and refuses what is not clear.`
   say('asked', event?.plans ? question + ' Planning here …' : question + ' Started without --vehicle, backwashctl shows no way before it is flown.')
   if (event?.plans && token)
-    fetch('/preview', { method: 'POST', headers: { 'Content-Type': 'application/json', 'X-Token': token }, body: JSON.stringify({ page, goal }) }).catch(() => null)
+    post('/preview', { page, goal }).catch(() => null)
 }
 
 // What backwashctl planned to the goal that is asked about. The daemon plans anew.

@@ -116,10 +116,19 @@ Site site_of(const Feed& feed, Control& control, Surroundings* surroundings) {
   site.posts["/command"] = [&control](const Asked& asked) {
     return control.command(Json::parse(asked.body, nullptr, false), asked.remote);
   };
+  site.posts["/enter"] = [&control](const Asked& asked) {
+    const Json said = Json::parse(asked.body, nullptr, false);
+    const std::string page = said.is_object() && said.contains("page") && said["page"].is_string() ? said["page"] : "";
+    if (!is_name(page)) return refusal(400, "page must be 32 hexadecimal digits");
+    if (!control.admit(page)) return refusal(409, "too many pages have the token");
+    return Reply{202, "{}"};
+  };
   site.streams["/events"] = [&feed, &control, surroundings](const Asked& asked) -> std::variant<Reply, NextEvents> {
     const std::string page = parameter(asked, "page");
     if (!is_name(page)) return refusal(400, "page must be 32 hexadecimal digits");
-    if (!control.enter(page)) return refusal(409, "this page is open already, or too many are");
+    const auto entered = control.enter(page);
+    if (!entered) return refusal(409, "this page is open already, or too many are");
+    if (*entered) keep_connection();
     const auto events = std::make_shared<PageEvents>(feed, control, surroundings, page);
     return [events] { return events->next(); };
   };
