@@ -9,7 +9,10 @@ namespace backwash::adapt {
 /// samples every number is equal, bit for bit. Made before the flight: the constructor takes 10 ms.
 class Adaptation {
  public:
-  explicit Adaptation(const Gusts& gusts, double alpha = kAlpha) : innovations_(gusts) { bets_.fill(Bets(alpha)); }
+  explicit Adaptation(const Gusts& gusts, double alpha = kAlpha) : innovations_(gusts), none_(alpha) { reset(); }
+
+  /// Nothing is known any more. Real-time: wait-free, no allocation.
+  void reset() noexcept { bets_.fill(none_); }
 
   /// One tick; whether a class's factor or limit may have changed. Real-time: wait-free, no allocation.
   bool add(const AirSample& sample) noexcept {
@@ -32,6 +35,7 @@ class Adaptation {
 
  private:
   Innovations innovations_;
+  Bets none_;  // of a class that was not flown in
   std::array<Bets, kAirClasses> bets_;
 };
 

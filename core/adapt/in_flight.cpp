@@ -51,9 +51,27 @@ bool InFlight::add(const AirTick& tick) noexcept {
     return false;
   }
   const auto measured = noise(*w_W);
-  if (!measured || !adaptation_.add({t_s_, *w_W, tick.sigma, tick.air, *measured})) return false;
+  return measured && adaptation_.add({t_s_, *w_W, tick.sigma, tick.air, *measured}) && !frozen_ && follow();
+}
+
+bool InFlight::follow() noexcept {
   const AirFactors before = factors_;
   factors_ = larger(factors_, adaptation_.factors());
+  return factors_ != before;
+}
+
+void InFlight::forget() noexcept {
+  adaptation_.reset();
+  factors_ = kModelledAir;
+  last_.reset(), last_w_.reset();
+  squares_.setZero(), steps_ = 0;
+}
+
+bool InFlight::carry_out(AirOrder order) noexcept {
+  const AirFactors before = factors_;
+  if (order == AirOrder::reset) forget();
+  if (order == AirOrder::freeze) frozen_ = true;
+  if (order == AirOrder::thaw) frozen_ = false, follow();
   return factors_ != before;
 }
 

@@ -24,9 +24,18 @@ struct AirTick {
   AirClass air = AirClass::none;
 };
 
+/// What an operator asks of what a flight learns.
+enum class AirOrder : std::uint32_t {
+  reset,   ///< as modelled, as if nothing had been flown: the one thing that lets a factor fall
+  freeze,  ///< the factors stay as they are; evidence goes on being counted
+  thaw     ///< they follow the evidence again, at once that of meanwhile
+};
+inline constexpr std::uint32_t kAirOrders = 3;
+
 /// Adaptation in flight: acceleration by differences of the velocity, and its noise as the flight shows it, half the
 /// mean square of the steps of the disturbance so far: three times the noise of a velocity over dt², which covers what
-/// neighbouring groups share. Factors never fall. Of two with equal ticks every number is equal, bit for bit.
+/// neighbouring groups share. Factors never fall, but by an order. Of two with equal ticks and orders every number is
+/// equal, bit for bit.
 class InFlight {
  public:
   static constexpr int kLeastSteps = 50;  ///< of which the noise is measured before anything is bet
@@ -37,7 +46,12 @@ class InFlight {
   /// has been learnt stays. Real-time: wait-free, no allocation.
   bool add(const AirTick& tick) noexcept;
 
-  /// Each ≥ 1 and ≥ what it began with; none has ever fallen.
+  /// Does what is asked; whether a factor changed. Whoever asks sees to it that nothing flies on sets that shrink.
+  /// Real-time: wait-free, no allocation.
+  bool carry_out(AirOrder order) noexcept;
+  bool frozen() const noexcept { return frozen_; }
+
+  /// Each ≥ 1, and ≥ what it began with until a reset; none falls otherwise.
   const AirFactors& factors() const noexcept { return factors_; }
   const Bets& of(AirClass air) const noexcept { return adaptation_.of(air); }
   std::uint64_t refused() const noexcept { return adaptation_.refused(); }  ///< samples
@@ -45,10 +59,13 @@ class InFlight {
  private:
   std::optional<Vec3> acceleration(const AirTick& tick) noexcept;
   std::optional<Vec3> noise(const Vec3& w_W) noexcept;
+  bool follow() noexcept;
+  void forget() noexcept;
 
   Disturbance disturbance_;
   Adaptation adaptation_;
   AirFactors factors_;
+  bool frozen_ = false;
   std::optional<AirTick> last_;
   double t_s_ = 0;               // rises, whatever the stamps do
   std::optional<Vec3> last_w_;   // of the tick before

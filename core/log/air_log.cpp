@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "core/log/tick_decisions.hpp"
+#include "core/log/replayed_air.hpp"
 
 namespace backwash::log {
 
@@ -55,6 +56,71 @@ bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::T
                              place});
   each_decision(kAirDecisions, [&](const auto& decision) { decision.write(Learnt{air, place}, r); });
   return grew;
+}
+
+double evidence(const AirRecord& r, double alpha) noexcept {
+  const double rougher = r.ln_evidence / std::log(static_cast<double>(kAirClasses) / alpha);
+  const double became = 1 + r.ln_changed / std::log(adapt::kRunLength);
+  return std::max({0.0, rougher, became});
+}
+
+bool carry_out(adapt::InFlight& air, const track::TickInput& in, AirOrderRecord& r) noexcept {
+  const auto order = static_cast<adapt::AirOrder>(r.order);
+  const bool done = order != adapt::AirOrder::reset || !in.autopilot.armed;
+  const bool changed = done && air.carry_out(order);
+  each_decision(kAirOrderDecisions, [&](const auto& decision) { decision.write(Ordered{air, done}, r); });
+  return changed;
+}
+
+std::optional<std::string> ReplayedAir::take(const RawRecord& record) {
+  if (record.header.kind == RecordKind::air_constants) {
+    const auto* start = payload<AirConstantsRecord>(record);
+    const auto constants = start ? decode(*start) : std::nullopt;
+    if (!constants) return "is no start of what is learnt of the air";
+    air_.emplace(*constants);
+  } else if (record.header.kind == RecordKind::air) {
+    next_ = payload<AirRecord>(record), offset_ = record.offset;
+    if (!next_) return "is too short for the air of a tick";
+    if (!air_) return "learns of the air, and no record before it says from what";
+  } else if (record.header.kind == RecordKind::air_order) {
+    const auto* order = payload<AirOrderRecord>(record);
+    if (!order || order->order >= adapt::kAirOrders) return "is no order about the air";
+    if (!air_) return "is an order about the air, and no record before it says that anything is learnt";
+    orders_.push_back({order, record.offset});
+  }
+  return std::nullopt;
+}
+
+void ReplayedAir::skip() noexcept {
+  next_ = nullptr;
+  for (const Order& order : std::exchange(orders_, {}))
+    if (order.logged->done != 0) air_->carry_out(static_cast<adapt::AirOrder>(order.logged->order));
+}
+
+std::optional<Difference> ReplayedAir::step(const track::TickInput& in, const track::FlightTick& flight,
+                                            const track::TickOutput& out, std::uint64_t tick, std::uint64_t& hash) {
+  auto first = carry_out_orders(in, hash);
+  const AirRecord* logged = std::exchange(next_, nullptr);
+  if (const bool adds = air_ && flown(in, out); adds != (logged != nullptr))
+    return first ? first : Difference{tick, offset_, "air", adds ? 0.0 : 1.0, adds ? 1.0 : 0.0};
+  if (!logged) return first;
+  AirRecord again = *logged;
+  learn(*air_, flight, out, again);
+  auto difference = compare(kAirDecisions, *logged, again, hash);
+  if (difference) difference->offset = offset_;
+  return first ? first : difference;
+}
+
+std::optional<Difference> ReplayedAir::carry_out_orders(const track::TickInput& in, std::uint64_t& hash) {
+  std::optional<Difference> first;
+  for (const Order& order : std::exchange(orders_, {})) {
+    AirOrderRecord again = *order.logged;
+    carry_out(*air_, in, again);
+    auto difference = compare(kAirOrderDecisions, *order.logged, again, hash);
+    if (difference) difference->offset = order.offset;
+    if (!first) first = difference;
+  }
+  return first;
 }
 
 }  // namespace backwash::log

@@ -21,4 +21,13 @@ bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept;
 bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out,
            AirRecord& record) noexcept;
 
+/// That a class is rougher than modelled: of the martingale and of the detector (docs/model.md 7-6, 7-7) the larger
+/// one, each over what it takes. 0 is none, 1 is enough.
+double evidence(const AirRecord& record, double alpha) noexcept;
+
+/// Does what the record's order asks in this tick, unless it lets sets shrink that may be flown: a reset of an armed
+/// vehicle. Writes what was decided into the record; whether a factor changed. Precondition: its order is one.
+/// Real-time: wait-free, no allocation.
+bool carry_out(adapt::InFlight& air, const track::TickInput& in, AirOrderRecord& record) noexcept;
+
 }  // namespace backwash::log

@@ -39,8 +39,9 @@ enum class RecordKind : std::uint32_t {
   part = 17,        ///< PartRecord: the first of each file
   air_constants = 18,  ///< AirConstantsRecord: the daemon learns in flight (core/log/air_log.hpp)
   air = 19,            ///< AirRecord: what the tick whose record follows added to what was learnt
+  air_order = 20,      ///< AirOrderRecord: what an operator asked of that, before the same tick's air
 };
-inline constexpr auto kLastKind = RecordKind::air;
+inline constexpr auto kLastKind = RecordKind::air_order;
 
 struct RecordHeader {
   std::int64_t t_ns;  ///< CLOCK_MONOTONIC when the daemon saw it
@@ -113,12 +114,18 @@ struct AirConstantsRecord {
 };
 struct AirRecord {
   std::uint64_t tick;
-  double sigma[3];             ///< of the model at the place, (m/s²)²
-  std::uint32_t air, padding;  ///< AirClass of the place
+  double sigma[3];            ///< of the model at the place, (m/s²)²
+  std::uint32_t air, frozen;  ///< AirClass of the place; whether the factors stay as they are
   double factors[kAirClasses];
   double ln_evidence, ln_changed, seconds;  ///< of that class (core/adapt/bets.hpp)
 };
 static_assert(sizeof(AirRecord) == 104);
+struct AirOrderRecord {
+  std::uint64_t tick;
+  std::uint32_t order, done;    ///< adapt::AirOrder; not done: it came too late
+  double factors[kAirClasses];  ///< after it
+};
+static_assert(sizeof(AirOrderRecord) == 56);
 
 struct LostRecord {
   std::uint64_t records;  ///< lost since the start of the log

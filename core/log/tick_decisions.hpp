@@ -24,6 +24,12 @@ struct Learnt {
   const adapt::Bets& here() const noexcept { return air.of(place); }
 };
 
+/// What became of an order about it.
+struct Ordered {
+  const adapt::InFlight& air;
+  bool done;
+};
+
 /// One decided member of a record: its name, and where it comes from. An array takes a container of its length.
 template <typename Record, typename Member, typename Source>
 struct Decision {
@@ -93,6 +99,11 @@ inline constexpr auto kAirDecisions = std::tuple{
     Decision{"ln_evidence", &AirRecord::ln_evidence, [](const Learnt& l) { return l.here().ln_evidence(); }},
     Decision{"ln_changed", &AirRecord::ln_changed, [](const Learnt& l) { return l.here().ln_changed(); }},
     Decision{"seconds", &AirRecord::seconds, [](const Learnt& l) { return l.here().seconds(); }},
+    Decision{"frozen", &AirRecord::frozen, [](const Learnt& l) { return l.air.frozen(); }},
+};
+inline constexpr auto kAirOrderDecisions = std::tuple{
+    Decision{"done", &AirOrderRecord::done, [](const Ordered& o) { return o.done; }},
+    Decision{"factors", &AirOrderRecord::factors, [](const Ordered& o) { return o.air.factors(); }},
 };
 
 /// Calls each(decision) for all of a list.

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cstring>
 #include <utility>
 
-#include "core/log/tick_decisions.hpp"
+#include "core/log/replayed_air.hpp"
 
 namespace backwash::log {
 namespace {
@@ -95,27 +93,6 @@ class Cursor {
   std::span<const std::uint8_t> left_;
 };
 
-/// Compares what a list has of a tick, and mixes what was replayed into the hash.
-template <typename List, typename Record>
-std::optional<Difference> compare(const List& list, const Record& logged, const Record& replayed, std::uint64_t& hash) {
-  std::optional<Difference> first;
-  const auto number = [&](const char* name, auto a, auto b) {
-    using Bits = std::array<std::uint8_t, sizeof b>;
-    const auto bytes = std::bit_cast<Bits>(b);
-    for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
-    if (std::bit_cast<Bits>(a) != bytes && !first)  // bit for bit
-      first = Difference{logged.tick, 0, name, static_cast<double>(a), static_cast<double>(b)};
-  };
-  each_decision(list, [&](const auto& decision) {
-    const auto &a = logged.*decision.member, &b = replayed.*decision.member;
-    if constexpr (std::is_array_v<std::remove_cvref_t<decltype(a)>>)
-      for (std::size_t i = 0; i < std::size(a); ++i) number(decision.name, a[i], b[i]);
-    else
-      number(decision.name, a, b);
-  });
-  return first;
-}
-
 using Segments = std::map<std::uint64_t, std::unique_ptr<track::AcceptedSegment>>;
 
 std::string at(const std::string& name, const RawRecord& record) {
@@ -162,44 +139,6 @@ tl::expected<track::FlightTick, LogError> tick_of(const RawLog& log, const std::
   if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, **first) + "is no timing of odometry");
   return track::FlightTick(vehicle, constants->battery_land, timing);
 }
-
-/// The air's part of a replay: what is learnt, and the record that the next tick is compared with.
-class ReplayedAir {
- public:
-  /// Takes a record of the air. Says what is wrong with it.
-  std::optional<std::string> take(const RawRecord& record) {
-    if (record.header.kind == RecordKind::air_constants) {
-      const auto* start = payload<AirConstantsRecord>(record);
-      const auto constants = start ? decode(*start) : std::nullopt;
-      if (!constants) return "is no start of what is learnt of the air";
-      air_.emplace(*constants);
-    } else if (record.header.kind == RecordKind::air) {
-      next_ = payload<AirRecord>(record), offset_ = record.offset;
-      if (!next_) return "is too short for the air of a tick";
-      if (!air_) return "learns of the air, and no record before it says from what";
-    }
-    return std::nullopt;
-  }
-  /// The air of a tick that the log has no input of is not replayed either.
-  void skip() { next_ = nullptr; }
-  std::optional<Difference> step(const track::TickInput& in, const track::FlightTick& flight,
-                                 const track::TickOutput& out, std::uint64_t tick, std::uint64_t& hash) {
-    const AirRecord* logged = std::exchange(next_, nullptr);
-    if (const bool adds = air_ && flown(in, out); adds != (logged != nullptr))
-      return Difference{tick, offset_, "air", adds ? 0.0 : 1.0, adds ? 1.0 : 0.0};
-    if (!logged) return std::nullopt;
-    AirRecord again = *logged;
-    learn(*air_, flight, out, again);
-    auto difference = compare(kAirDecisions, *logged, again, hash);
-    if (difference) difference->offset = offset_;
-    return difference;
-  }
-
- private:
-  std::optional<adapt::InFlight> air_;
-  const AirRecord* next_ = nullptr;
-  std::uint64_t offset_ = 0;
-};
 
 }  // namespace
 

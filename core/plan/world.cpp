@@ -63,6 +63,16 @@ void fill_air(field::Extension& air, const map::OccupancyGrid& grid, std::span<c
            [&](std::size_t begin, std::size_t end) { air.fill(grid, listed.subspan(begin, end - begin)); });
 }
 
+/// Σ of a field at the listed voxels.
+auto variances(field::DisturbanceField field, const map::OccupancyGrid& grid, const std::vector<std::size_t>& listed,
+               const Parallel& parallel) {
+  return [field = std::move(field), &grid, &listed, &parallel](const auto& store) {
+    parallel(listed.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) store(listed[k], field.at(grid.voxel(listed[k])));
+    });
+  };
+}
+
 /// Where hovering is safe, at the listed voxels.
 void fill_hover(reach::HoverMap& hover, const reach::Reachability& reach, const map::OccupancyGrid& grid,
                 const map::DistanceField& distance, const map::OccupancySums& sums, const reach::BoundField& bounds,
@@ -183,10 +193,19 @@ std::shared_ptr<const World> with_air(const World& old, const AirFactors& factor
   }
   if (world.air.factors == factors) return std::make_shared<const World>(std::move(world));
   world.air.factors = factors;
-  world.bounds = reach::BoundField(world.grid, world.air.flown(), model.bound, old.bounds.extension());
-  const reach::Method method = world.reach.method;
-  const std::optional<double> margin = world.constant_margin;
-  return std::make_shared<const World>(with_clearance_by(std::move(world), method, margin, parallel));
+  const Vehicle& vehicle = world.reach.vehicle;
+  auto listed = voxels_for_centre(world.grid, world.distance, vehicle, map::all_of(world.grid.size()));
+  world.bounds = reach::BoundField(world.grid, model.bound, old.bounds.extension());
+  world.bounds.update(map::all_of(world.grid.size()), listed,
+                      variances(world.air.flown(), world.grid, listed, parallel), parallel);
+  // Sets grow with the air: where hovering is not safe it is not in a rougher one.
+  if (larger(factors, old.air.factors) == factors)
+    std::erase_if(listed, [&](std::size_t n) { return !old.hover.safe(old.grid.voxel(n)); });
+  world.hover = reach::HoverMap(world.grid);
+  fill_hover(world.hover, world.reach, world.grid, world.distance, world.sums, world.bounds, listed,
+             world.constant_margin, parallel);
+  world.safe = SafeSpace(world.hover.safe_voxels());
+  return std::make_shared<const World>(std::move(world));
 }
 
 std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,

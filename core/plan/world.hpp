@@ -72,9 +72,9 @@ std::shared_ptr<const World> build_part(const map::OccupancyGrid& grid, const ma
 World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
                         const Parallel& parallel = run_serial);
 
-/// The same surroundings in air that is rougher by these factors, each at least what it is in `old`: bounds and
-/// hover map are made anew. Σ and the classes are found where `old` has none, and kept from then on. `old` must have
-/// been built with this model. What update_world() makes of it keeps both.
+/// The same surroundings in air that is rougher by these factors: bounds and hover map are made anew. Cheaper where no
+/// factor is below that of `old`. Σ and the classes are found where `old` has none, and kept from then on. `old` must
+/// have been built with this model. What update_world() makes of it keeps both.
 std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
                                       const Parallel& parallel = run_serial);
 

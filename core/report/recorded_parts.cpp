@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/types/text.hpp"
+
 namespace backwash::report {
 
 std::optional<RecordedSegment> recorded_segment(const log::RawRecord& record) {
@@ -21,6 +23,27 @@ std::optional<RecordedSegment> recorded_segment(const log::RawRecord& record) {
       s.commands.push_back(c);
   }
   return s;
+}
+
+std::vector<std::string> AirNews::take(const log::RawRecord& record) {
+  using enum log::RecordKind;
+  std::vector<std::string> news;
+  const auto kind = record.header.kind;
+  if (const auto* start = kind == air_constants ? log::payload<log::AirConstantsRecord>(record) : nullptr)
+    std::copy_n(start->start, kAirClasses, factors_.begin());
+  if (const auto* order = kind == air_order ? log::payload<log::AirOrderRecord>(record) : nullptr)
+    std::copy_n(order->factors, kAirClasses, factors_.begin());
+  if (const auto* row = kind == air ? log::payload<log::AirRecord>(record) : nullptr)
+    for (std::size_t k = 0; k < kAirClasses; ++k) {
+      if (row->factors[k] > factors_[k])
+        news.push_back(std::string("air of class ") + to_string(static_cast<AirClass>(k)) + " is rougher: above " +
+                       to_text(row->factors[k], 2) + " times the model's variance, ln evidence " +
+                       to_text(row->ln_evidence, 1));
+      factors_[k] = row->factors[k];
+    }
+  const std::string text(record.bytes.begin(), record.bytes.end());
+  if (kind == world && text.starts_with("the flight is stopped in rougher air")) news.push_back(text);
+  return news;
 }
 
 Vec3 TruthRows::at(double t, const char* x, const char* y, const char* z) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/log/flight_log.hpp"
@@ -19,6 +20,16 @@ struct RecordedSegment {
 
 /// Nothing: the record is of another kind, or too short for the head.
 std::optional<RecordedSegment> recorded_segment(const log::RawRecord& record);
+
+/// What a log tells of its air, record by record.
+class AirNews {
+ public:
+  /// Factors that grew, and a flight that was stopped for them: a line each.
+  std::vector<std::string> take(const log::RawRecord& record);
+
+ private:
+  AirFactors factors_ = kModelledAir;
+};
 
 /// The bench's log of the truth by time.
 class TruthRows {

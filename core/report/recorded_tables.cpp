@@ -5,8 +5,13 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <sstream>
 
+#include "core/log/air_log.hpp"
 #include "core/log/tick_log.hpp"
+#include "core/report/figure_parts.hpp"
+#include "core/report/plot.hpp"
+#include "core/report/recorded_flight.hpp"
 
 namespace backwash::report {
 namespace {
@@ -70,6 +75,65 @@ DataTable battery_table(std::span<const log::RawRecord> log, std::int64_t zero_n
   return thinned(std::move(table));
 }
 
+/// Alpha of the log's start; nothing: it learns of no air.
+std::optional<double> alpha_of(std::span<const log::RawRecord> log) {
+  std::optional<double> alpha;
+  each<log::AirConstantsRecord>(log, RecordKind::air_constants, [&](const auto&, const auto& c) { alpha = c.alpha; });
+  return alpha;
+}
+
+std::string column(const char* what, std::size_t k) {
+  return std::string(what) + "_" + to_string(static_cast<AirClass>(k));
+}
+
+/// A plot of one of its quantities, a curve for each class.
+TimePlot air_plot(const DataTable& table, const char* what, const char* name, const char* unit) {
+  constexpr std::array kKinds{"flown", "commanded", "paper", "bound"};
+  TimePlot plot{std::string("air-") + what, table.id, name, unit, {}};
+  for (std::size_t k = 0; k < kAirClasses; ++k)
+    if (std::ranges::find(table.columns, column(what, k)) != table.columns.end())
+      plot.curves.push_back({column(what, k), std::string(to_string(static_cast<AirClass>(k))),
+                             kKinds[plot.curves.size() % kKinds.size()]});
+  return plot;
+}
+
+/// The way from above; each place in the colour of the factor that its class has at the end.
+Figure rough_places(const DataTable& table, const map::OccupancyGrid& grid) {
+  Vec3 low = Vec3::Constant(1e9), high = -low;
+  std::ostringstream script;
+  script << "$way << EOD\n";
+  for (const auto& row : table.rows) {
+    const Vec3 p(row[1], row[2], row[3]);
+    low = low.cwiseMin(p), high = high.cwiseMax(p);
+    const auto at = std::ranges::find(table.columns, column("factor", static_cast<std::size_t>(row[4])));
+    script << p.x() << ' ' << p.y() << ' ' << table.rows.back()[static_cast<std::size_t>(at - table.columns.begin())]
+           << '\n';
+  }
+  const auto inside = [&](const Vec3& p) {
+    return Index3(grid.index(p).cwiseMax(Index3::Zero()).cwiseMin(grid.size() - Index3::Ones()));
+  };
+  const Index3 first = inside(low - Vec3(1, 1, 0)), last = inside(high + Vec3(1, 1, 0));
+  script << "EOD\n"
+         << kAxes << cell_blocks(grid, first, last, grid.center(first).z(), grid.center(last).z())
+         << view_from_above(grid, first, last)
+         << "set palette defined (0 '#2f77ba', 0.3 '#e6a23c', 1 '#b3263c')\nset cbrange [1:2 < *]\nset cblabel "
+            "'factor on the variance'\nset key off\nplot "
+         << plot_cells() << "$way using 1:2:3 with points pointtype 7 pointsize 0.5 palette notitle\n";
+  return draw(script.str(), Format::svg, 1000, 520);
+}
+
+void add_places(std::vector<Section>& sections, std::span<const log::RawRecord> log, const DataTable& table) {
+  const auto grid = recorded_map(log);
+  if (!grid || table.rows.empty()) return;
+  sections.push_back(
+      {"Where the air was rough",
+       "The way flown, from above, as far as it was learnt from. Its colour is the factor that the class "
+       "of the place has at the end; blue is as modelled.",
+       rough_places(table, *grid),
+       {},
+       {table.id}});
+}
+
 /// Adds the section if the table has rows.
 void add(std::vector<Section>& sections, PageData& data, DataTable table, const char* title, const char* text,
          std::vector<TimePlot> plots) {
@@ -124,6 +188,35 @@ std::vector<TimePlot> error_plots(bool ellipsoids) {
   return plots;
 }
 
+DataTable recorded_air(std::span<const log::RawRecord> log, std::int64_t zero_ns) {
+  DataTable table{"air", {"t_s", "x_m", "y_m", "z_m", "class"}, {}, 0};
+  const auto alpha = alpha_of(log);
+  if (!alpha) return table;
+  std::array<bool, kAirClasses> flown{};
+  each<log::AirRecord>(log, RecordKind::air, [&](const auto&, const log::AirRecord& air) {
+    flown[std::min<std::size_t>(air.air, 4)] = true;
+  });
+  for (const char* what : {"factor", "evidence"})
+    for (std::size_t k = 0; k < kAirClasses; ++k)
+      if (flown[k]) table.columns.push_back(column(what, k));
+  std::array<double, kAirClasses> evidences;
+  evidences.fill(kNoValue);
+  const log::AirRecord* air = nullptr;
+  for (const auto& record : log) {
+    if (record.header.kind == RecordKind::air) air = log::payload<log::AirRecord>(record);
+    const auto* tick = record.header.kind == RecordKind::tick ? log::payload<log::TickRecord>(record) : nullptr;
+    if (!tick || !air || air->tick != tick->tick) continue;
+    const std::size_t here = std::min<std::size_t>(air->air, kAirClasses - 1);
+    evidences[here] = log::evidence(*air, *alpha);
+    table.rows.push_back({seconds_since(record, zero_ns), tick->p[0], tick->p[1], tick->p[2], double(here)});
+    for (std::size_t k = 0; k < kAirClasses; ++k)
+      if (flown[k]) table.rows.back().push_back(air->factors[k]);
+    for (std::size_t k = 0; k < kAirClasses; ++k)
+      if (flown[k]) table.rows.back().push_back(evidences[k]);
+  }
+  return thinned(std::move(table));
+}
+
 std::vector<Prism> recorded_tube(std::span<const log::RawRecord> log) {
   std::vector<Prism> tube;
   each<log::TickRecord>(log, RecordKind::tick, [&](const auto&, const log::TickRecord& tick) {
@@ -137,6 +230,13 @@ std::vector<Prism> recorded_tube(std::span<const log::RawRecord> log) {
 
 std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std::int64_t zero_ns, PageData& data) {
   std::vector<Section> sections;
+  const DataTable air = recorded_air(log, zero_ns);
+  add(sections, data, air, "Air",
+      "What was learnt of it, by class: the factor on the model's variance that the sets were grown by, and the "
+      "evidence "
+      "that it is above 1, as a share of what it takes.",
+      {air_plot(air, "factor", "factor", "× variance"), air_plot(air, "evidence", "evidence", "share")});
+  add_places(sections, log, air);
   add(sections, data, tick_table(log, zero_ns), "Tick timing",
       "As each tick logged it: of the tick before it how long it computed and how late it began; and from a sample's "
       "reception to the set-point that first used it.",

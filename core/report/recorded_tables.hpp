@@ -26,9 +26,13 @@ std::vector<TimePlot> error_plots(bool ellipsoids);
 /// The sets predicted for the ticks of a log.
 std::vector<Prism> recorded_tube(std::span<const log::RawRecord> log);
 
-/// What a log says of the machine: tick timing, link and odometry rates, battery. Each with its table in `data`, where
-/// the log has any of it.
+/// What a log says of the air, where the flight learnt of it, and of the machine: tick timing, link and odometry rates,
+/// battery. Each with its table in `data`, where the log has any of it.
 std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std::int64_t zero_ns, PageData& data);
+
+/// Of each tick that learnt of its air: place, class, and of each class that was flown in so far its factor and its
+/// evidence. Of the two that may raise a factor the larger one counts, each over what it takes: 1 is "rougher".
+DataTable recorded_air(std::span<const log::RawRecord> log, std::int64_t zero_ns);
 
 /// The files that the daemon was configured with, as the log holds them.
 std::string recorded_configuration(std::span<const log::RawRecord> log);

@@ -14,6 +14,7 @@ struct Lane {
   const char *name, *kinds;
 };
 constexpr std::array<Lane, 3> kLanes{{{"commands", "command"}, {"map, scans", "map"}, {"VIO, faults", "vio fault"}}};
+constexpr Lane kAir{"air", "air"};
 
 /// Where a time lies between the two ends, as CSS wants it.
 std::string share(double t, double from, double until) {
@@ -29,7 +30,10 @@ std::string lanes(const Timeline& timeline, double from, double until, double ze
     spoken += (spoken.empty() ? "" : ", ") + m.mode + " from " + to_text(m.from_s - zero_s, 1) + " s";
   }
   html += "</div>\n";
-  for (const auto& lane : kLanes) {
+  std::vector<Lane> all(kLanes.begin(), kLanes.end());
+  const auto of_air = [](const TimelineEvent& e) { return e.kind == std::string(kAir.kinds); };
+  if (std::ranges::any_of(timeline.events, of_air)) all.push_back(kAir);
+  for (const auto& lane : all) {
     html += "<div class=\"lane\"><span class=\"name\">" + std::string(lane.name) + "</span>";
     for (const auto& e : timeline.events)
       if (std::string(lane.kinds).find(e.kind) != std::string::npos)

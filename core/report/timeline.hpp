@@ -10,7 +10,7 @@ namespace backwash::report {
 
 struct TimelineEvent {
   double t_s;
-  const char* kind;  ///< command, mode, flight, map, vio, fault
+  const char* kind;  ///< command, mode, flight, map, vio, fault, air
   std::string text;
 };
 

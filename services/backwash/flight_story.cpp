@@ -10,17 +10,13 @@
 #include "core/map/distance_field.hpp"
 #include "core/report/recorded_parts.hpp"
 #include "core/types/text.hpp"
+#include "services/backwash/asked.hpp"
 
 namespace backwash::services {
 namespace {
 
 constexpr double kVertical = 0.01;  // m across: what stays within it rises or sinks on one line
 constexpr double kGap = 0.1;        // s without odometry that is worth telling
-// Numbers of idl/backwash_msgs.idl, as the raw log's command records have them.
-constexpr unsigned kEnable = 1, kTakeOff = 3, kGoTo = 4, kRelease = 7, kGoToFacing = 10;
-constexpr std::array kVerbs{
-    "",     "enable", "disable",          "take off",       "go to", "hold", "land", "end the session",
-    "stop", "follow", "go to, then turn", "follow, turning"};
 
 Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 
@@ -77,6 +73,7 @@ class Teller {
       if (const auto* input = log::payload<log::TickInputRecord>(record)) take_input(*input);
     if (kind == tick)
       if (const auto* row = log::payload<log::TickRecord>(record)) take_tick(*row, record.header.t_ns);
+    for (const auto& news : air_.take(record)) say("air", news);
     if (kind == command) take_command(text);
     if (kind == ack) take_answer(text);
     if (kind == failure) failure_ = text, say("fault", "the daemon ended itself: " + text);
@@ -127,17 +124,11 @@ class Teller {
   }
 
   void take_command(const std::string& text) {
-    const auto at = text.find(" verb ");
-    unsigned verb = 0;
-    double x = 0, y = 0, z = 0;
-    if (at == text.npos || std::sscanf(text.c_str() + at, " verb %u (%lf, %lf, %lf)", &verb, &x, &y, &z) != 4) return;
-    if (verb == 0 || verb >= kVerbs.size()) return;
-    std::string asked = std::string("asked to ") + kVerbs[verb];
-    if (verb == kGoTo || verb == kGoToFacing) asked += " " + to_text(Vec3(x, y, z));
-    if (verb == kTakeOff && z != 0) asked += " to " + to_text(z, 2) + " m";
-    if (asked != asked_) say("command", asked);  // a station repeats itself until it is answered
-    asked_ = asked;
-    ordered_ = verb != kEnable && verb != kRelease;
+    const auto asked = asked_for(text);
+    if (!asked) return;
+    if (asked->what != asked_) say("command", asked->what);  // a station repeats itself until it is answered
+    asked_ = asked->what;
+    if (!asked->beside) ordered_ = asked->ends;
   }
 
   void take_answer(const std::string& text) {
@@ -273,6 +264,7 @@ class Teller {
   bool ordered_ = false;  ///< an operator has asked for something since the piece began
   std::uint64_t segment_ = 0;
   std::size_t commands_ = 0;  ///< of the segment
+  report::AirNews air_;
   std::string asked_, last_refusal_, failure_;
   std::string fault_;       ///< why the last change of the mode in the air was none that was asked for
   std::string last_fault_;  ///< the newest of them at all

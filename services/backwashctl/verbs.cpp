@@ -70,6 +70,7 @@ Verbs::Verbs(Command& app) {
   add_goals(app);
   add_ends(app);
   add_views(app);
+  add_adaptation(app);
 }
 
 Command* Verbs::verb(Command& app, const std::string& name, const std::string& what, const std::string& example,

@@ -16,7 +16,7 @@ namespace backwash::ctl {
 using services::Command;
 
 /// The verbs of backwashctl: enable, disable, takeoff, goto, follow, hold, stop, land, release, goals, status, watch,
-/// check, serve.
+/// check, serve, adaptation.
 class Verbs {
  public:
   explicit Verbs(Command& app);
@@ -29,6 +29,7 @@ class Verbs {
   void add_goals(Command& app);
   void add_ends(Command& app);
   void add_views(Command& app);
+  void add_adaptation(Command& app);
   Command* verb(Command& app, const std::string& name, const std::string& what, const std::string& example,
                 std::function<int()> run);
   Command* waiting(Command* sub, double patience_s);
@@ -41,6 +42,7 @@ class Verbs {
   int status();
   int check();
   int watch();
+  int adaptation();
 
   Options options_;
   std::vector<double> goal_;
@@ -49,7 +51,7 @@ class Verbs {
   std::string route_;
   GoalRules goal_rules_;
   ServeOptions page_;
-  std::string goal_topic_ = "/goal_pose", heading_ = "goal";
+  std::string goal_topic_ = "/goal_pose", heading_ = "goal", air_order_ = "show";
   double height_ = 0, patience_s_ = 0;
   bool wait_ = false, json_ = false;
   std::function<int()> chosen_;

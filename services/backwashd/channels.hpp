@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/adapt/in_flight.hpp"
 #include "core/log/raw_log.hpp"
 #include "core/plan/world.hpp"
 #include "core/sync/atomic_optional.hpp"
@@ -117,8 +118,15 @@ struct CommandId {
 
 inline constexpr std::uint64_t kTicksPerSecond = 50;
 
+/// Factors of the air for the map worker. They fall only with a rising number of resets.
+struct HandedAir {
+  AirFactors factors = kModelledAir;
+  std::uint64_t resets = 0;
+};
+
 /// What the flight has learnt of its air, by class.
 struct AirView {
+  bool frozen = false;             ///< the factors stay as they are
   AirClass here = AirClass::none;  ///< of the newest place that was flown through
   AirFactors factors = kModelledAir;
   std::array<double, kAirClasses> ln_evidence{}, seconds{};  ///< core/adapt/bets.hpp
@@ -168,7 +176,7 @@ struct ControlRecord {
 
 /// What the control thread has to tell the operator; rarer than ticks, and none is skipped while the ring has room.
 struct ControlEvent {
-  enum class Kind : std::uint8_t { transition, missed_deadline, page_fault, rougher } kind = Kind::transition;
+  enum class Kind : std::uint8_t { transition, missed_deadline, page_fault, rougher, air_kept } kind = Kind::transition;
   std::int64_t t_ns = 0;
   Mode mode = Mode::passive;
   Reason reason = Reason::started;
@@ -233,7 +241,9 @@ struct Channels {
   AtomicTime map_ns;                                       // map worker: reception of the newest data in the snapshot
   std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
   std::atomic<std::uint64_t> rough_segment{0};             // the same, in the air as the flight has learnt it
-  sync::LatestValue<AirFactors> air, air_kept;             // control → map worker, air file: each time that one grew
+  sync::LatestValue<HandedAir> air;                        // control → map worker: each time that a factor changed
+  sync::LatestValue<AirFactors> air_kept;                  // control → air file: the same
+  sync::RecordRing<adapt::AirOrder, 16> air_orders;        // mission → control
   sync::RecordRing<track::Order, 64> orders;               // mission → control
   sync::Handover<PlanJob> jobs;                            // mission → planner
   sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission

@@ -42,6 +42,8 @@ class ControlLoop {
   track::TickInput gather(std::int64_t now_ns, int missed) noexcept;
   track::AutopilotFacts autopilot(std::int64_t now_ns) const noexcept;
   void learn(const track::TickInput& in, const track::TickOutput& out) noexcept;
+  void carry_out(adapt::AirOrder order, const track::TickInput& in) noexcept;
+  void hand_over_air() noexcept;
   void send(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void forward_odometry(std::uint8_t resets) noexcept;
   void ask_for_messages(std::int64_t now_ns) noexcept;
@@ -56,6 +58,7 @@ class ControlLoop {
   track::FlightTick flight_;
   Lookout lookout_;
   std::optional<adapt::InFlight> air_;
+  std::uint64_t air_resets_ = 0;
   SenderClock sender_clock_;  // of the odometry's
   ParameterReader parameters_;
   bool port_open_ = true;

@@ -9,7 +9,9 @@ namespace backwash::daemon {
 
 // What this tick says of the air, after its decision: nothing of it is decided by this before a world is made of it.
 void ControlLoop::learn(const track::TickInput& in, const track::TickOutput& out) noexcept {
-  if (!air_ || !log::flown(in, out)) return;
+  if (!air_) return;
+  while (const auto order = channels_.air_orders.pop()) carry_out(*order, in);
+  if (!log::flown(in, out)) return;
   const plan::AirPlace place = lookout_.air_at(flight_.odometry()->state.p_W);
   log::AirRecord r{};
   r.tick = view_.ticks;
@@ -22,11 +24,27 @@ void ControlLoop::learn(const track::TickInput& in, const track::TickOutput& out
   view_.air->ln_evidence[here] = r.ln_evidence;
   view_.air->seconds[here] = r.seconds;
   if (!grew) return;
-  view_.air->factors = air_->factors();
-  channels_.air.write(air_->factors());
-  channels_.air_kept.write(air_->factors());
+  hand_over_air();
   channels_.events.push({ControlEvent::Kind::rougher, in.now_ns, view_.mode, view_.reason, 0, place.air,
                          air_->factors()[here], view_.air->ln_evidence[here]});
+}
+
+void ControlLoop::hand_over_air() noexcept {
+  view_.air->factors = air_->factors();
+  channels_.air.write({air_->factors(), air_resets_});
+  channels_.air_kept.write(air_->factors());
+}
+
+// What an operator asks of it; the mission has judged it by what it was shown, which may be a moment old.
+void ControlLoop::carry_out(adapt::AirOrder order, const track::TickInput& in) noexcept {
+  log::AirOrderRecord r{};
+  r.tick = view_.ticks, r.order = static_cast<std::uint32_t>(order);
+  const bool changed = log::carry_out(*air_, in, r);
+  record(log::RecordKind::air_order, in.now_ns, &r, sizeof r);
+  if (r.done == 0) channels_.events.push({ControlEvent::Kind::air_kept, in.now_ns, view_.mode, view_.reason, 0});
+  if (order == adapt::AirOrder::reset && r.done != 0) ++air_resets_, view_.air.emplace();
+  view_.air->frozen = air_->frozen();
+  if (changed) hand_over_air();
 }
 
 void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& out) noexcept {

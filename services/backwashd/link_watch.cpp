@@ -31,6 +31,8 @@ void tell(const ControlEvent& event, const ServiceManager& manager) {
       return spdlog::warn(
           "air of class {} is rougher: its variance is above {:.2f} times the model's, ln evidence {:.1f}",
           to_string(event.air), event.factor, event.ln_evidence);
+    case ControlEvent::Kind::air_kept:
+      return spdlog::warn("the factors of the air were not reset: the vehicle was armed meanwhile");
   }
 }
 

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <span>
 #include <thread>
+#include <utility>
 
 #include "core/config/file_hash.hpp"
 #include "core/map/octomap_message.hpp"
@@ -220,13 +221,14 @@ bool MapWorker::take_scans() {
   return true;
 }
 
-/// Factors that have grown enough: the world of the newest data, in rougher air.
+/// Factors that have grown enough, or that were reset: the world of the newest data, in that air.
 bool MapWorker::take_air() {
   const auto said = channels_.air.read_new();
   if (!said || !air_) return false;
-  air_ = larger(*air_, *said);
+  const bool reset = std::exchange(air_resets_, said->resets) != said->resets;
+  air_ = reset ? said->factors : larger(*air_, said->factors);
   if (!world_) return false;
-  bool grew = false;
+  bool grew = reset && *air_ != world_->air.factors;
   for (std::size_t k = 0; k < kAirClasses; ++k) grew = grew || (*air_)[k] >= (1 + kStep) * world_->air.factors[k];
   if (!grew) return false;
   const auto begun = now_ns();
@@ -235,7 +237,7 @@ bool MapWorker::take_air() {
   for (std::size_t k = 0; k < kAirClasses; ++k)
     line += std::string(" ") + to_string(static_cast<AirClass>(k)) + " " + std::to_string((*air_)[k]);
   recorder_.append(log::RecordKind::world, line);
-  spdlog::info("world made anew in {} ms for rougher {}", (now_ns() - begun) / 1'000'000, line);
+  spdlog::info("world made anew in {} ms for {} {}", (now_ns() - begun) / 1'000'000, reset ? "reset" : "rougher", line);
   return true;
 }
 

@@ -18,7 +18,8 @@ namespace backwash::daemon {
 /// one of its term (row 48). Scans that came meanwhile are taken in
 /// together, and the world is updated where they changed something. Of a first map that is far larger than what is
 /// around the vehicle, that part is made and handed out first; its place is waited for, up to 2 s. Where the flight has
-/// learnt that its air is rougher the world is made anew with the factors, and handed out like a new map.
+/// learnt that its air is rougher the world is made anew with the factors, and handed out like a new map; so it is
+/// after a reset of them.
 class MapWorker {
  public:
   /// A world is made anew once a factor is larger by this share than the one it was made with.
@@ -49,7 +50,8 @@ class MapWorker {
   Vehicle vehicle_;
   MapSettings settings_;
   Parallel parallel_;
-  std::optional<AirFactors> air_;    // as the control thread last said
+  std::optional<AirFactors> air_;  // as the control thread last said
+  std::uint64_t air_resets_ = 0;
   std::optional<MapWriter> writer_;  // of the maps in use
   std::optional<map::LiveMap> live_;
   std::optional<Vec3> vehicle_W_;  // where the vehicle was last

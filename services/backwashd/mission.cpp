@@ -114,7 +114,8 @@ Decision Mission::handle(const CommandMessage& command, double now_s) {
   lease_->until_s = now_s + kLease;
   lease_->last = *decision.answer;
   const bool releases = command.verb == backwash_msgs_msg_dds__COMMAND_RELEASE;
-  if (!releases && decision.answer->result == kAccepted) accepted_ = {command.session, command.sequence};
+  if (!releases && !decision.air && decision.answer->result == kAccepted)
+    accepted_ = {command.session, command.sequence};
   if (releases) end_lease();
   return decision;
 }
@@ -142,6 +143,12 @@ Decision Mission::decide(const CommandMessage& command) {
       return land();
     case backwash_msgs_msg_dds__COMMAND_RELEASE:
       return only(kAccepted, "session released");
+    case backwash_msgs_msg_dds__COMMAND_AIR_RESET:
+      return ask_of_air(adapt::AirOrder::reset);
+    case backwash_msgs_msg_dds__COMMAND_AIR_FREEZE:
+      return ask_of_air(adapt::AirOrder::freeze);
+    case backwash_msgs_msg_dds__COMMAND_AIR_THAW:
+      return ask_of_air(adapt::AirOrder::thaw);
     default:
       return only(kInvalid, "unknown command " + std::to_string(command.verb));
   }
@@ -236,6 +243,18 @@ Decision Mission::stop(const CommandMessage& command) {
   if (mode == Mode::land) decision.answer = {kRefused, "landing: the autopilot lands, and ends that by itself"};
   if (idle && !pending) decision.answer = {kRefused, "not enabled"};
   if (decision.answer->result == kAccepted) accepted_ = {command.session, command.sequence};
+  return decision;
+}
+
+/// Neither freezing nor thawing makes a set smaller, so both are taken in flight; a reset does.
+Decision Mission::ask_of_air(adapt::AirOrder order) const {
+  if (!view_.air) return refused("nothing is learnt of the air: adaptation.enabled is false");
+  const bool resets = order == adapt::AirOrder::reset;
+  if (resets && (view_.armed || track::commanding(view_.mode)))
+    return refused(std::string("a reset makes sets smaller: not while ") +
+                   (view_.armed ? "the vehicle is armed: land first" : "enabled: disable first"));
+  Decision decision = only(kAccepted, resets ? "resetting" : order == adapt::AirOrder::freeze ? "freezing" : "thawing");
+  decision.air = order;
   return decision;
 }
 

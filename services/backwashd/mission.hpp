@@ -25,6 +25,7 @@ struct Decision {
   std::optional<Answer> answer;
   std::optional<track::Order> order;
   std::optional<PlanJob> job;
+  std::optional<adapt::AirOrder> air{};
 };
 
 /// What the other threads have said since the last call.
@@ -62,7 +63,7 @@ class Mission {
   const ControlView& view() const noexcept { return view_; }
   /// What became of the last task: "", "planning", "waypoints to go: N" of a route's more than one, or "refused: why".
   const std::string& task() const noexcept { return task_; }
-  /// The newest command that was accepted; releases are none.
+  /// The newest command that was accepted; releases and orders about the air are none.
   const CommandId& accepted() const noexcept { return accepted_; }
   /// "", or why the vehicle could not take off where it is; judged once a second.
   const std::string& place() const noexcept { return place_; }
@@ -83,6 +84,7 @@ class Mission {
   Decision hold();
   Decision land();
   Decision stop(const CommandMessage& command);
+  Decision ask_of_air(adapt::AirOrder order) const;
   Decision start(PlanJob::Kind kind, const Goal& goal = {});
   Decision order(track::Request request, std::string answer);
   std::optional<PlanJob> continue_route(double now_s);

@@ -23,6 +23,7 @@ void show(sync::LatestValue<std::array<char, 192>>& where, const std::string& te
 /// The order first: a plan that is made after it belongs to it. False: the control thread takes no orders.
 bool carry_out(Channels& channels, const Decision& decision) {
   if (decision.order && !channels.orders.push(*decision.order)) return false;
+  if (decision.air && !channels.air_orders.push(*decision.air)) return false;
   if (decision.job) channels.jobs.offer(std::make_unique<const PlanJob>(*decision.job));
   return true;
 }

@@ -9,6 +9,7 @@
 #include "services/backwashd/shown_diagnostics.hpp"
 #include "services/backwashd/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
+#include "services/dds/air_text.hpp"
 #include "services/dds/packet_filter.hpp"
 
 namespace backwash::daemon {
@@ -41,17 +42,12 @@ Sequence sequence(std::vector<T>& values) {
   return {count, count, values.data(), false};
 }
 
-/// "ground 1.41 (8.2), …": factor, and ln of the evidence so far, of each class that was flown in or has a factor.
 std::string to_string(const AirView& air) {
-  std::string text;
-  for (std::size_t k = 0; k < kAirClasses; ++k) {
-    if (!(air.seconds[k] > 0) && !(air.factors[k] > 1)) continue;
-    char line[64];
-    std::snprintf(line, sizeof line, "%s%s %.2f (%.1f)", text.empty() ? "" : ", ", to_string(static_cast<AirClass>(k)),
-                  air.factors[k], air.ln_evidence[k]);
-    text += line;
-  }
-  return text.empty() ? "as modelled" : text;
+  dds::AirSaid said{air.frozen, {}};
+  for (std::size_t k = 0; k < kAirClasses; ++k)
+    if (air.seconds[k] > 0 || air.factors[k] > 1)
+      said.classes.push_back({to_string(static_cast<AirClass>(k)), air.factors[k], air.ln_evidence[k], air.seconds[k]});
+  return to_text(said);
 }
 
 /// Owns what a message only points to, until it is sent.

@@ -212,5 +212,40 @@ TEST(InFlight, ALargerAlphaIsReachedByLessEvidence) {
   EXPECT_GE(later, 5);
 }
 
+TEST(InFlight, FrozenFactorsStayAndThawedOnesAreThoseOfAFlightThatWasNeverFrozen) {
+  GustyFlight free(8), frozen(8);
+  free.factor = frozen.factor = 4;
+  EXPECT_FALSE(frozen.learnt.carry_out(AirOrder::freeze));
+  free.fly(30), frozen.fly(30);
+  ASSERT_GT(free.wall(), 1);
+  EXPECT_EQ(frozen.learnt.factors(), kModelledAir);
+  EXPECT_EQ(frozen.learnt.of(AirClass::wall).ln_evidence(), free.learnt.of(AirClass::wall).ln_evidence());
+  EXPECT_TRUE(frozen.learnt.carry_out(AirOrder::thaw));
+  EXPECT_EQ(frozen.learnt.factors(), free.learnt.factors());
+  EXPECT_FALSE(frozen.learnt.carry_out(AirOrder::thaw)) << "nothing is new";
+}
+
+// What is flown after it is learnt as by a flight that begins there; stored factors count no more either.
+TEST(InFlight, AfterAResetNothingOfBeforeCounts) {
+  InFlightConstants c = constants();
+  c.start = {1, 1, 1.5, 1, 1};
+  GustyFlight flight(9, c);
+  flight.factor = 4;
+  flight.fly(20.01);
+  ASSERT_GT(flight.wall(), 1.5);
+  EXPECT_TRUE(flight.learnt.carry_out(AirOrder::reset));
+  EXPECT_EQ(flight.learnt.factors(), kModelledAir);
+  EXPECT_EQ(flight.learnt.of(AirClass::wall).seconds(), 0);
+  EXPECT_EQ(flight.learnt.of(AirClass::wall).ln_evidence(), 0);
+  InFlight anew(constants());
+  flight.spoil = [&](AirTick& tick) { anew.add(tick); };
+  flight.fly(20);
+  EXPECT_GT(flight.wall(), 1) << "it learns again";
+  EXPECT_EQ(flight.learnt.factors(), anew.factors());
+  const Bets &now = flight.learnt.of(AirClass::wall), &other = anew.of(AirClass::wall);
+  EXPECT_NEAR(now.ln_evidence(), other.ln_evidence(), 0.1 * other.ln_evidence()) << "groups may begin a sample later";
+  EXPECT_NEAR(now.seconds(), other.seconds(), 0.1);
+}
+
 }  // namespace
 }  // namespace backwash::adapt

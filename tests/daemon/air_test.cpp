@@ -7,6 +7,7 @@
 
 #include "core/log/air_log.hpp"
 #include "core/log/tick_log.hpp"
+#include "services/dds/air_text.hpp"
 #include "tests/daemon/air_rig.hpp"
 
 namespace backwash::daemon::test {
@@ -43,10 +44,11 @@ LearningRig* LearnsInFlight::rig_ = nullptr;
 TEST_F(LearnsInFlight, RougherAirIsHandedOverShownAndTold) {
   ASSERT_TRUE(rig_->view().air);
   EXPECT_GT(rig_->largest_factor(), 1.1);
-  const auto handed = rig_->channels->air.read_new(), kept = rig_->channels->air_kept.read_new();
+  const auto handed = rig_->channels->air.read_new();
+  const auto kept = rig_->channels->air_kept.read_new();
   ASSERT_TRUE(handed && kept);
-  EXPECT_EQ(*handed, rig_->view().air->factors);
-  EXPECT_EQ(*kept, *handed);
+  EXPECT_EQ(handed->factors, rig_->view().air->factors);
+  EXPECT_EQ(*kept, handed->factors);
   double told = 0;
   while (const auto event = rig_->channels->events.pop())
     if (event->kind == ControlEvent::Kind::rougher) {
@@ -169,6 +171,116 @@ TEST(LearnsInFlightOfTheBench, OdometryThatMissesTicksIsReplayedToo) {
   EXPECT_EQ(log::replay(saved(rig), "log")->differing, 0u);
   const auto records = of_kind(rig, RecordKind::air);
   EXPECT_GT(records.size(), 80u);
+}
+
+std::vector<log::AirOrderRecord> orders_of(const Lockstep& rig) {
+  std::vector<log::AirOrderRecord> orders;
+  for (const auto& record : of_kind(rig, RecordKind::air_order))
+    orders.push_back(*log::payload<log::AirOrderRecord>(record));
+  return orders;
+}
+
+/// Frozen before take-off, in air in which factors grow within the flight; then as the test has it.
+struct OrdersAboutTheAir : testing::Test {
+  OrdersAboutTheAir() {
+    ask(adapt::AirOrder::freeze);
+    rig.take_off();
+    rig.start_route(2);
+    rig.ticks(600);
+  }
+  void ask(adapt::AirOrder order) {
+    rig.channels->air_orders.push(order);
+    rig.tick();
+  }
+  LearningRig rig{8};
+};
+
+TEST_F(OrdersAboutTheAir, FrozenFactorsStayWhileEvidenceIsCountedAndThawedOnesFollowItAtOnce) {
+  EXPECT_TRUE(rig.view().air->frozen);
+  EXPECT_EQ(rig.largest_factor(), 1);
+  EXPECT_FALSE(rig.channels->air.read_new());
+  EXPECT_GT(*std::ranges::max_element(rig.view().air->ln_evidence), 1);
+  ask(adapt::AirOrder::thaw);
+  EXPECT_FALSE(rig.view().air->frozen);
+  EXPECT_GT(rig.largest_factor(), 1.1) << "what was learnt meanwhile";
+  const auto handed = rig.channels->air.read_new();
+  ASSERT_TRUE(handed);
+  EXPECT_EQ(handed->factors, rig.view().air->factors);
+  EXPECT_EQ(rig.channels->air_kept.read_new(), handed->factors);
+}
+
+TEST_F(OrdersAboutTheAir, AResetOfAnArmedVehicleIsNotDoneAndTold) {
+  ask(adapt::AirOrder::thaw);
+  const AirFactors before = rig.view().air->factors;
+  ask(adapt::AirOrder::reset);
+  EXPECT_EQ(rig.view().air->factors, before);
+  EXPECT_EQ(orders_of(rig).back().done, 0u);
+  int told = 0;
+  while (const auto event = rig.channels->events.pop()) told += event->kind == ControlEvent::Kind::air_kept;
+  EXPECT_EQ(told, 1);
+}
+
+TEST_F(OrdersAboutTheAir, AResetOfADisarmedOneForgetsFactorsAndEvidenceAndIsHandedOverAsOne) {
+  ask(adapt::AirOrder::thaw);
+  ASSERT_GT(rig.largest_factor(), 1);
+  rig.in_hand().disarm();
+  rig.ticks(100);
+  ask(adapt::AirOrder::reset);
+  EXPECT_EQ(rig.view().air->factors, kModelledAir);
+  EXPECT_EQ(*std::ranges::max_element(rig.view().air->ln_evidence), 0);
+  EXPECT_EQ(*std::ranges::max_element(rig.view().air->seconds), 0);
+  const auto handed = rig.channels->air.read_new();
+  ASSERT_TRUE(handed);
+  EXPECT_EQ(handed->factors, kModelledAir);
+  EXPECT_EQ(handed->resets, 1u);
+  EXPECT_EQ(rig.channels->air_kept.read_new(), kModelledAir) << "a restart begins with it";
+}
+
+TEST_F(OrdersAboutTheAir, AReplayDecidesThemAgainAndNamesOneThatTheLogTellsOtherwise) {
+  ask(adapt::AirOrder::thaw);
+  rig.ticks(50);
+  ask(adapt::AirOrder::reset);
+  rig.in_hand().disarm();
+  rig.ticks(100);
+  ask(adapt::AirOrder::reset);
+  const auto orders = orders_of(rig);
+  ASSERT_EQ(orders.size(), 4u);
+  EXPECT_EQ(orders[2].done, 0u);
+  EXPECT_EQ(orders[3].done, 1u);
+  const auto log = saved(rig);
+  const auto replayed = log::replay(log, "log");
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_EQ(replayed->differing, 0u) << replayed->first->field << " of tick " << replayed->first->tick;
+  const auto first = [&](std::size_t n, const auto& change) {
+    auto told = log;
+    for (auto& record : told.records)
+      if (record.header.kind == RecordKind::air_order && n-- == 0)
+        change(*reinterpret_cast<log::AirOrderRecord*>(record.bytes.data()));
+    const auto again = log::replay(told, "log");
+    return again && again->first ? again->first->field : again ? "" : again.error().message;
+  };
+  EXPECT_EQ(first(2, [](auto& r) { r.done = 1; }), "done");
+  EXPECT_EQ(first(3, [](auto& r) { r.factors[1] = 1.5; }), "factors");
+  EXPECT_EQ(first(0, [](auto& r) { r.order = 2; }), "frozen") << "thawed instead: the next tick differs";
+  EXPECT_NE(first(1, [](auto& r) { r.order = 3; }).find("is no order about the air"), std::string::npos);
+}
+
+TEST(AirText, SaysWhatItIsToldToTheDigitsThatItHas) {
+  const dds::AirSaid air{true, {{"ground", 1.4142, 8.24, 33.6}, {"none", 1, 0, 2}}};
+  EXPECT_EQ(dds::to_text(air), "frozen: ground 1.41 (8.2, 34 s), none 1.00 (0.0, 2 s)");
+  const auto said = dds::air_said(dds::to_text(air));
+  ASSERT_TRUE(said && said->classes.size() == 2);
+  EXPECT_TRUE(said->frozen);
+  EXPECT_EQ(said->classes[0].name, "ground");
+  EXPECT_EQ(said->classes[0].factor, 1.41);
+  EXPECT_EQ(said->classes[0].ln_evidence, 8.2);
+  EXPECT_EQ(said->classes[0].seconds, 34);
+  EXPECT_EQ(dds::to_text(*said), dds::to_text(air));
+  EXPECT_EQ(dds::to_text({}), "as modelled");
+  ASSERT_TRUE(dds::air_said("as modelled"));
+  EXPECT_TRUE(dds::air_said("as modelled")->classes.empty());
+  for (const char* other : {"", "frozen: ", "ground 1.41 (8.2)", "ground 1.41 (8.2, 34 s) and more", "anything"})
+    EXPECT_FALSE(dds::air_said(other)) << other;
 }
 
 }  // namespace

@@ -61,27 +61,50 @@ TEST_F(MapWorkerTest, GrownFactorsMakeTheWorldAnewAndLaterMapsAndScansKeepThem) 
     EXPECT_TRUE(worker.step());
     return world();
   };
-  channels_->air.write({1, 1, 1.5, 1, 1});
+  channels_->air.write({{1, 1, 1.5, 1, 1}, 0});
   EXPECT_FALSE(worker.step()) << "there is no world yet";
   const plan::World* before = take(grid_, 7);
   ASSERT_TRUE(before && before->air.known());
   EXPECT_EQ(before->air.factors, (AirFactors{1, 1, 1.5, 1, 1})) << "what earlier flights have learnt";
-  channels_->air.write({1.04, 1, 1.5, 1, 1});
+  channels_->air.write({{1.04, 1, 1.5, 1, 1}, 0});
   EXPECT_FALSE(worker.step()) << "less than a step";
   EXPECT_EQ(world(), before);
-  channels_->air.write({1.04, 1, 2, 1, 1});
+  channels_->air.write({{1.04, 1, 2, 1, 1}, 0});
   EXPECT_TRUE(worker.step());
   ASSERT_NE(world(), before);
   EXPECT_EQ(world()->air.factors, (AirFactors{1.04, 1, 2, 1, 1}));
   EXPECT_EQ(channels_->map_ns.load(), 7) << "the map is no younger for it";
   const Vec3 p(0, 0.5, 1.2);
   EXPECT_GT(world()->bounds.at(grid_.index(p)).w[kX], 0);
-  channels_->air.write({1, 1, 1, 1, 1});
+  channels_->air.write({{1, 1, 1, 1, 1}, 0});
   EXPECT_FALSE(worker.step()) << "no factor shrinks";
   grid_.set(grid_.index({0, 0, 1}), map::Cell::occupied);
   EXPECT_EQ(take(grid_, 8)->air.factors, (AirFactors{1.04, 1, 2, 1, 1}));
   EXPECT_EQ(take(map::builtin_scene("parallel-walls-4m", 0.2).value(), 9)->air.factors, (AirFactors{1.04, 1, 2, 1, 1}))
       << "a map of another place";
+}
+
+TEST_F(MapWorkerTest, AResetMakesTheWorldAnewAsModelledAndFactorsGrowFromThere) {
+  MapWorker worker(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_,
+                   AirFactors{1, 1, 2, 1, 1});
+  channels_->maps.offer(std::make_unique<const MapMessage>(
+      MapMessage{map::encode_octomap(grid_), grid_.resolution(), true, "OcTree", 7}));
+  EXPECT_TRUE(worker.step());
+  const auto bounds = [&] { return world()->bounds.at(grid_.index({0, 0.5, 1.2})).w; };
+  const auto rough = bounds();
+  channels_->air.write({kModelledAir, 1});
+  EXPECT_TRUE(worker.step());
+  EXPECT_EQ(world()->air.factors, kModelledAir);
+  EXPECT_LT(bounds()[kX], rough[kX]);
+  const auto modelled = plan::build_world(grid_, Model{}, config::load_vehicle("builtin:quad-5in").value());
+  EXPECT_NEAR(bounds()[kX], modelled->bounds.at(grid_.index({0, 0.5, 1.2})).w[kX], 1e-3 * rough[kX]);
+  channels_->air.write({kModelledAir, 2});
+  EXPECT_FALSE(worker.step()) << "there is nothing to make anew";
+  channels_->air.write({{1, 1, 1.5, 1, 1}, 2});
+  EXPECT_TRUE(worker.step());
+  channels_->air.write({{1, 1, 1.2, 1, 1}, 2});
+  EXPECT_FALSE(worker.step()) << "no factor shrinks without a reset";
+  EXPECT_EQ(world()->air.factors, (AirFactors{1, 1, 1.5, 1, 1}));
 }
 
 TEST_F(MapWorkerTest, AGoodMapBecomesAWorldForEveryThread) {

@@ -193,5 +193,50 @@ TEST_F(MissionRefusals, AWayThatWasBlockedIsTriedAgainFromRestOnly) {
   EXPECT_TRUE(look().job);
 }
 
+TEST_F(MissionRefusals, OrdersAboutTheAirWhereNothingIsLearntOfIt) {
+  for (const auto verb : {kAirReset, kAirFreeze, kAirThaw}) {
+    const Decision d = give(gcs_.next(verb));
+    expect_nothing(d, kRefused, "adaptation.enabled is false");
+    EXPECT_FALSE(d.air);
+  }
+}
+
+TEST_F(MissionRefusals, AResetOfTheAirThatWouldShrinkSetsThatMayBeFlown) {
+  view_.air.emplace();
+  const auto reset = [&](Mode mode, bool armed) {
+    view_.mode = mode, view_.armed = armed;
+    look();
+    return give(gcs_.next(kAirReset));
+  };
+  for (const Mode mode : {Mode::passive, Mode::quiet, Mode::enabling, Mode::tracking, Mode::hold, Mode::land}) {
+    const Decision d = reset(mode, true);
+    expect_nothing(d, kRefused, "the vehicle is armed: land first");
+    EXPECT_FALSE(d.air);
+  }
+  for (const Mode mode : {Mode::enabling, Mode::tracking, Mode::lifting, Mode::hold}) {
+    const Decision d = reset(mode, false);
+    expect_nothing(d, kRefused, "enabled: disable first");
+    EXPECT_FALSE(d.air);
+  }
+  for (const Mode mode : {Mode::passive, Mode::quiet}) EXPECT_EQ(reset(mode, false).air, adapt::AirOrder::reset);
+}
+
+TEST_F(MissionRefusals, OrdersAboutTheAirOfAnotherStationOrARepeat) {
+  view_.air.emplace();
+  look();
+  const Decision first = give(gcs_.next(kAirFreeze));
+  EXPECT_EQ(result(first), kAccepted);
+  EXPECT_EQ(first.air, adapt::AirOrder::freeze);
+  EXPECT_FALSE(first.order || first.job) << "what flies goes on";
+  EXPECT_EQ(mission_.accepted().sequence, 0u) << "whoever waits for a flight waits on";
+  const Decision again = give(gcs_.at(gcs_.sequence, kAirFreeze));
+  EXPECT_EQ(result(again), kAccepted);
+  EXPECT_FALSE(again.air) << "answered again, not done again";
+  const Decision others = give(other_.next(kAirThaw));
+  expect_nothing(others, kNotYours, "session held");
+  EXPECT_FALSE(others.air);
+  EXPECT_EQ(give(gcs_.next(kAirThaw)).air, adapt::AirOrder::thaw);
+}
+
 }  // namespace
 }  // namespace backwash::daemon::test

@@ -22,7 +22,10 @@ inline constexpr std::uint8_t kEnable = backwash_msgs_msg_dds__COMMAND_ENABLE,
                               kFollowFacing = backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING,
                               kHold = backwash_msgs_msg_dds__COMMAND_HOLD, kStop = backwash_msgs_msg_dds__COMMAND_STOP,
                               kLand = backwash_msgs_msg_dds__COMMAND_LAND,
-                              kRelease = backwash_msgs_msg_dds__COMMAND_RELEASE;
+                              kRelease = backwash_msgs_msg_dds__COMMAND_RELEASE,
+                              kAirReset = backwash_msgs_msg_dds__COMMAND_AIR_RESET,
+                              kAirFreeze = backwash_msgs_msg_dds__COMMAND_AIR_FREEZE,
+                              kAirThaw = backwash_msgs_msg_dds__COMMAND_AIR_THAW;
 
 /// A process of a ground station.
 struct Station {

@@ -155,5 +155,24 @@ TEST(AirScale, APlaceHasTheModelsVarianceAndNoneBeyondTheMap) {
   EXPECT_EQ(air_at({}, world->grid, p).air, AirClass::none) << "nobody asked for classes";
 }
 
+// What is taken over from the world before must not show: its places to hover, while factors grow, and no more after a
+// reset.
+TEST(AirScale, TheWorldDependsOnTheFactorsAndNotOnThoseBefore) {
+  const auto at_once = with_air(*as_modelled(), {4, 4, 4, 4, 1}, Model{});
+  const auto half_way = with_air(*as_modelled(), {2, 1, 4, 1, 1}, Model{});
+  const auto equal = [](const World& a, const World& b) {
+    std::size_t differ = 0;
+    for (std::size_t n = 0; n < a.grid.cell_count(); ++n) {
+      const Index3 v = a.grid.voxel(n);
+      differ += a.bounds.at(v).w != b.bounds.at(v).w || a.hover.safe(v) != b.hover.safe(v);
+    }
+    return differ == 0;
+  };
+  EXPECT_FALSE(equal(*half_way, *at_once));
+  EXPECT_TRUE(equal(*with_air(*half_way, {4, 4, 4, 4, 1}, Model{}), *at_once)) << "grown in two steps";
+  EXPECT_TRUE(equal(*with_air(*at_once, {2, 1, 4, 1, 1}, Model{}), *half_way)) << "some fell";
+  EXPECT_TRUE(equal(*with_air(*at_once, kModelledAir, Model{}), *as_modelled())) << "a reset";
+}
+
 }  // namespace
 }  // namespace backwash::plan

@@ -4,7 +4,9 @@ import struct
 
 MODES = {"passive": 0, "enabling": 1, "tracking": 2, "hold": 3, "land": 4, "quiet": 5, "lifting": 6}
 STARTED, SEGMENT_ACCEPTED, ODOMETRY_LOST, LANDED, LAND_REQUESTED, STOP_REQUESTED = 0, 4, 6, 16, 18, 35
-MAP, COMMAND, ACK, TICK, SEGMENT, TICK_INPUT, LOST, FAILURE = 3, 4, 5, 8, 9, 11, 13, 16
+MAP, COMMAND, ACK, TICK, SEGMENT, TICK_INPUT, LOST, WORLD, FAILURE = 3, 4, 5, 8, 9, 11, 13, 15, 16
+AIR_CONSTANTS, AIR = 18, 19
+CLASSES = ["free_air", "ground", "wall", "corner", "none"]
 ARMED, LANDED_KNOWN, ON_GROUND = 1 << 4, 1 << 14, 1 << 15
 GO_TO, LAND, STOP = 4, 6, 8
 
@@ -15,6 +17,7 @@ class RawLog:
     def __init__(self):
         self.bytes, self.t, self.number, self.segments, self.sequence = b"backwash raw log 3\n", 10**9, 0, 0, 0
         self.at, self.in_air = (0.0, 0.0, 0.0), False
+        self.learnt = None  # of the air: class, factors, ln of the evidence and of the detector's
 
     def record(self, kind, body):
         self.bytes += struct.pack("<qII", self.t, kind, len(body)) + body
@@ -25,6 +28,9 @@ class RawLog:
         self.at = (center[0] + error, center[1], center[2])
         judged = self.in_air and segment > 0 if judged is None else judged
         flags = (ARMED if self.in_air else 0) | LANDED_KNOWN | (0 if self.in_air else ON_GROUND)
+        if self.learnt and self.in_air:
+            where, factors, evidence, changed = self.learnt
+            self.record(AIR, struct.pack("<Q3d2I8d", self.number, *[0.03] * 3, CLASSES.index(where), 0, *factors, evidence, changed, 1))
         self.record(TICK_INPUT, struct.pack("<5q2Q29d2i2IIf", *[self.t] * 5, 0, 0, *[0.0] * 29, 0, 0, flags, 0, 0, 0.0))
         self.record(TICK, struct.pack("<3Q6I5fI34d2I", self.number, segment, index, MODES[mode], reason, 0, judged,
                                       abs(error) <= 0.1, 0, 0, 0, 0, 0, 0, 0, *self.at, 0, 0, 0, *center, *[0.0] * 7,
@@ -61,6 +67,9 @@ class RawLog:
     def wait(self, ticks=5):
         for _ in range(ticks):
             self.tick("passive", STARTED)
+
+    def learns(self, start=(1.0,) * 5, alpha=0.01):
+        self.record(AIR_CONSTANTS, struct.pack("<17d", *[1.0] * 11, alpha, *start))
 
     def free_cube(self):
         """A map that knows one thing: the cube from (-1.6, -1.6, -1.6) to the origin is free."""

@@ -7,7 +7,7 @@
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 command -v gnuplot >/dev/null && drawn=yes || drawn=no
 PYTHONPATH=$here python3 - "$backwash" "$drawn" <<'PYTHON'
-import json, os, random, subprocess, sys
+import json, math, os, random, re, subprocess, sys
 from raw_log_maker import *
 
 backwash, drawn = sys.argv[1], sys.argv[2] == "yes"
@@ -147,6 +147,35 @@ story, _ = told(part(1), 0)
 assert story["take_offs"] == story["landings"] == 1 and story["log"] == "flight.bwlog" and story["time_s"] > 9, story
 os.remove("flight-3.bwlog")
 assert told(part(1), 1)[0]["take_offs"] == 0, "a part that is missing ends the log"
+
+# What it learnt of its air: a factor that grew, not one that earlier flights had learnt; evidence as a share of what it takes.
+log = RawLog()
+log.free_cube()
+log.learns(start=(1, 1, 1.5, 1, 1))
+log.at = (-0.8, -0.8, -1.2)
+log.wait()
+log.learnt = ("ground", (1, 1, 1.5, 1, 1), math.log(5 / 0.01) / 2, math.log(1e-9))
+log.fly((-0.8, -0.8, -0.8))
+log.learnt = ("wall", (1, 1, 2.0, 1, 1), 0.0, 0.0)
+log.fly((-0.8, -0.3, -0.8))
+log.record(WORLD, b"the flight is stopped in rougher air: the rest of it is not clear; wall 2.00 times")
+log.record(WORLD, b"snapshot 3 ms after its newest data")
+log.land()
+story, _ = told(log, None, *(["--out", "air.html"] if drawn else []))
+events = [(round(e["t"], 2), e["what"]) for e in story["events"] if e["kind"] == "air"]
+assert events == [(1.1, "air of class wall is rougher: above 2.00 times the model's variance, ln evidence 0.0"),
+                  (2.1, "the flight is stopped in rougher air: the rest of it is not clear; wall 2.00 times")], events
+assert not any(e["kind"] == "air" for e in told(good_flight(), 0, *(["--out", "calm.html"] if drawn else []))[0]["events"])
+if drawn:
+    page, calm = open("air.html").read(), open("calm.html").read()
+    for part in ("<h2>Air</h2>", "<h2>Where the air was rough</h2>", 'class="name">air<'):
+        assert part in page and part not in calm, part
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
+    columns, rows = next((table["columns"], table["rows"]) for table in data["tables"] if table["id"] == "air")
+    assert columns == ["t_s", "x_m", "y_m", "z_m", "class", "factor_ground", "factor_wall", "evidence_ground", "evidence_wall"], columns
+    first, last = (dict(zip(columns, row)) for row in (rows[0], rows[-1]))
+    assert (first["factor_wall"], first["class"], first["evidence_wall"]) == (1.5, 1, None) and abs(first["evidence_ground"] - 0.5) < 1e-6, first
+    assert (last["factor_wall"], last["class"], last["evidence_wall"]) == (2.0, 2, 1), last
 
 # Killed at any byte: all whole records before it are told, and nothing is a defect or bad data.
 log, chance = good_flight(), random.Random(20261123)
