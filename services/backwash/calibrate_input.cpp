@@ -56,50 +56,60 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
             for (const auto& log : logs) files.logs.push_back({log, map});
           },
           "flight logs, CSV")
-      .trigger_on_parse()
-      .required();
+      .trigger_on_parse();
 }
 
-Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>& vehicle, const Model& gates,
-                       std::uint64_t seed) {
+Campaign empty_campaign(const CampaignFiles& files) {
   Campaign campaign{};
-  const bool mapless = files.maps.empty();
   for (const auto& name : files.maps) campaign.maps.push_back(read_map(name)), campaign.map_names.push_back(name);
-  if (mapless) campaign.maps.push_back(flat_floor());
+  if (files.maps.empty()) campaign.maps.push_back(flat_floor());
+  return campaign;
+}
+
+void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>& maps,
+               const std::optional<Vehicle>& vehicle, const Model& gates,
+               const std::function<void(CalibratedLog&&)>& take) {
+  const bool mapless = files.maps.empty();
   study::WindowOptions options;
   options.tau_w = gates.bound.tau_w;
   if (mapless) options = mapless_windows(gates);
-  std::vector<HeightRow> rows;
-  std::optional<study::Signal> signal;
   for (const auto& file : files.logs) {
-    const std::size_t place = place_of(files, file), number = campaign.data.place.size();
+    const std::size_t place = place_of(files, file);
     const auto log = read_table(file.path, "t_s");
     auto flight = study::flight_windows(log, vehicle, options, file.path);
     if (!flight) throw Failure(kBadData, flight.error().message);
-    if (signal && *signal != flight->signal)
-      throw Failure(kBadData, file.path + ":1: has " + (flight->signal == study::Signal::commanded ? "" : "no ") +
+    CalibratedLog one{file.path, place, flight->signal, flight->gated, flight->not_tested, flight->windows.size(),
+                      {},        {}};
+    if (mapless) {
+      one.map.reset(), one.heights = height_rows(*flight, log, 0);
+      for (auto& w : flight->windows) w.p_W = {0, 0, std::max(0.02, w.p_W.z() - value_of(log, "surface_z_m", 0))};
+    }
+    one.hovers = hovers_of(*flight, 0, maps[place], gates);
+    take(std::move(one));
+  }
+}
+
+void add_logs(Campaign& campaign, std::vector<CalibratedLog> logs, std::uint64_t seed) {
+  std::vector<HeightRow> rows;
+  for (auto& log : logs) {
+    const std::size_t number = campaign.data.place.size();
+    const bool commanded = log.signal == study::Signal::commanded;
+    if (log.signal != logs.front().signal)
+      throw Failure(kBadData, log.path + ":1: has " + (commanded ? "" : "no ") +
                                   "set-points, unlike the logs before it; calibrate them apart");
-    signal = flight->signal;
-    for (std::size_t g = 0; g < study::kHoverGates; ++g) campaign.gated[g] += flight->gated[g];
-    for (const auto& what : flight->not_tested) {
+    for (std::size_t g = 0; g < study::kHoverGates; ++g) campaign.gated[g] += log.gated[g];
+    for (const auto& what : log.not_tested) {
       if (std::find(campaign.not_tested.begin(), campaign.not_tested.end(), what) == campaign.not_tested.end())
         campaign.not_tested.push_back(what);
     }
-    if (mapless) {
-      const auto more = height_rows(*flight, log, number);
-      rows.insert(rows.end(), more.begin(), more.end());
-    }
-    for (auto& w : flight->windows) {
-      if (mapless) w.p_W = {0, 0, std::max(0.02, w.p_W.z() - value_of(log, "surface_z_m", 0))};
-    }
-    campaign.windows += flight->windows.size();
-    auto hovers = hovers_of(*flight, number, campaign.maps[place], gates);
-    std::move(hovers.begin(), hovers.end(), std::back_inserter(campaign.data.hovers));
-    campaign.data.place.push_back(place), campaign.logs.push_back(file.path);
+    for (auto& row : log.heights) row.flight = number, rows.push_back(row);
+    for (auto& hover : log.hovers) hover.flight = number, campaign.data.hovers.push_back(std::move(hover));
+    campaign.windows += log.windows;
+    campaign.data.place.push_back(log.map.value_or(0)), campaign.logs.push_back(log.path);
   }
-  campaign.signal = study::to_string(*signal), campaign.pushes = signal == study::Signal::commanded;
+  campaign.signal = study::to_string(logs.front().signal);
+  campaign.pushes = logs.front().signal == study::Signal::commanded;
   if (const auto effects = height_effects(rows, seed)) campaign.height = effects->all;
-  return campaign;
 }
 
 std::optional<HeightEffects> read_height_effects(const std::vector<std::string>& logs, const Model& gates,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +25,18 @@ struct CampaignFiles {
 /// --map and --log, both as often as wanted.
 void add_campaign_options(Command& command, CampaignFiles& files);
 
+/// What a calibration keeps of one log; its flight is numbered 0.
+struct CalibratedLog {
+  std::string path;
+  std::optional<std::size_t> map;  ///< its place; none: without a map
+  study::Signal signal = study::Signal::raw;
+  std::array<std::size_t, study::kHoverGates> gated{};
+  std::vector<std::string> not_tested;
+  std::size_t windows = 0;
+  std::vector<study::calibrate::Hover> hovers;
+  std::vector<study::calibrate::HeightRow> heights;  ///< without a map
+};
+
 /// Flight logs, cut into windows.
 struct Campaign {
   study::calibrate::Data data;
@@ -36,10 +50,16 @@ struct Campaign {
   std::optional<study::calibrate::HeightEffect> height;  ///< without a map: what the logs say of height and ceiling
 };
 
-/// Reads all of it. Without a map the floor is flat, at the log's `surface_z_m` or z = 0, and passes count as hovers:
-/// the height effect holds the speed fixed. Throws Failure with the file that is at fault.
-Campaign read_campaign(const CampaignFiles& files, const std::optional<Vehicle>& vehicle, const Model& gates,
-                       std::uint64_t seed);
+/// The maps by place: those of `files`, or a flat floor.
+Campaign empty_campaign(const CampaignFiles& files);
+/// Reads each log and gives what it is worth to `take`. Without a map the floor is flat, at the log's `surface_z_m` or
+/// z = 0, and passes count as hovers: the height effect holds the speed fixed. Throws Failure with the file that is at
+/// fault.
+void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>& maps,
+               const std::optional<Vehicle>& vehicle, const Model& gates,
+               const std::function<void(CalibratedLog&&)>& take);
+/// Puts logs together in their order. Throws Failure 65 where only some have set-points.
+void add_logs(Campaign& campaign, std::vector<CalibratedLog> logs, std::uint64_t seed);
 
 /// What logs flown without a map say of height and ceiling, as read_campaign does; nothing from fewer than 10 windows.
 std::optional<study::calibrate::HeightEffects> read_height_effects(const std::vector<std::string>& logs,

@@ -10,11 +10,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <utility>
 
-#include "core/files/read_file.hpp"
 #include "services/backwash/campaign_shard.hpp"
 #include "services/backwash/child.hpp"
 #include "services/backwash/files.hpp"
+#include "services/backwash/sha256.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -56,8 +57,19 @@ Survey good_survey(
 }
 
 void write_same(const std::string& path, const std::string& content, bool force) {
-  const auto there = files::read_file(path, content.size(), "");
-  if (!there || *there != content) write_file(path, content, force);
+  std::error_code none;
+  const bool same = std::filesystem::is_regular_file(path, none) && sha256_of_file(path) == sha256(content);
+  if (!same) write_file(path, content, force);
+}
+
+/// One text of all: each part is let go when it is in.
+std::string joined(std::vector<std::string> parts) {
+  std::size_t size = 0;
+  for (const auto& part : parts) size += part.size();
+  std::string all;
+  all.reserve(size);
+  for (auto& part : parts) all += std::exchange(part, std::string());
+  return all;
 }
 
 /// Throws Failure, as run_missing does, or says what other processes do.
@@ -157,12 +169,10 @@ std::size_t merge_shards(const std::string& folder, const CampaignPlan& plan, bo
   missing.insert(missing.end(), found.running.begin(), found.running.end());
   std::ranges::sort(missing);
   if (!missing.empty())
-    throw Failure(kBadData, folder + ": shards " + ranges(missing) + " of 0-" + std::to_string(parts.size() - 1) +
+    throw Failure(kBadData, folder + ": shards " + ranges(missing) + " of 0-" + std::to_string(plan.shards.size() - 1) +
                                 " are missing; run them first");
-  std::string all;
-  for (const auto& part : parts) all += part;
   const std::string rows = std::filesystem::absolute(folder + "/rows.jsonl").string();
-  write_same(rows, all, force);
+  write_same(rows, joined(std::move(parts)), force);
   if (plan.last.empty()) return count;
   check_last(plan);
   auto command = plan.last;

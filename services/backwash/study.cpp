@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <toml++/toml.h>
 #include <algorithm>
-#include <numeric>
 #include <optional>
-#include <sstream>
 
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
@@ -15,7 +12,9 @@
 #include "services/backwash/study_design.hpp"
 #include "services/backwash/study_flights.hpp"
 #include "services/backwash/study_output.hpp"
+#include "services/backwash/study_rows.hpp"
 #include "services/backwash/study_simulation.hpp"
+#include "services/backwash/study_terms.hpp"
 #include "services/backwash/verb.hpp"
 #include "version.hpp"
 
@@ -25,74 +24,27 @@ namespace {
 struct Options {
   std::string map, model = "builtin:quad-5in", vehicle, report, out;
   std::vector<std::string> logs, reference;
-  std::string group;
+  std::string group, from;
   unsigned seed = 1;
   std::vector<std::string> fleet;
   DesignOptions design;
-  bool json = false, force = false, quick = false, rules = false, residuals = false, anytime = false;
+  bool json = false, force = false, quick = false, rules = false, residuals = false, anytime = false, rows = false;
 };
 
-/// The study's own terms of a model file that it has extended before; none in others.
-std::vector<study::ExtensionTerm> read_terms(const std::string& path) {
-  std::vector<study::ExtensionTerm> terms;
-  if (path.starts_with("builtin:")) return terms;
-  const auto file = toml::parse_file(path);  // load_model has accepted it
-  const auto* list = file.at_path("extension.term").as_array();
-  if (!list) return terms;
-  for (const auto& entry : *list) {
-    const auto* table = entry.as_table();
-    if (!table) continue;
-    study::ExtensionTerm term{(*table)["cause"].value_or(std::string()),
-                              (*table)["form"].value_or(std::string()),
-                              {(*table)["scale"].value_or(0.0)},
-                              {}};
-    if (const auto* offset = (*table)["offset_m"].as_array(); offset && offset->size() == 2)
-      term.scale.offset_W = {(*offset)[0].value_or(0.0), (*offset)[1].value_or(0.0), 0};
-    if (const auto* theta = (*table)["theta"].as_array())
-      for (const auto& value : *theta) term.theta.push_back(value.value_or(0.0));
-    term.gain = (*table)["held_out_nats"].value_or(0.0);
-    term.flights = static_cast<std::size_t>(std::max<std::int64_t>(0, (*table)["flights"].value_or(std::int64_t{0})));
-    for (const auto& [key, numbers] : {std::pair{"anchor", &term.scale.anchor}, {"beside", &term.beside}})
-      if (const auto* list_of = (*table)[key].as_array())
-        for (const auto& value : *list_of) numbers->push_back(value.value_or(0.0));
-    terms.push_back(std::move(term));
-  }
-  return terms;
-}
-
-/// The [[extension.term]] tables of a model file as they stand there; empty if it has none.
-std::string earlier_terms(const std::string& path) {
-  if (path.starts_with("builtin:")) return "";
-  const auto file = toml::parse_file(path);  // load_model has accepted it
-  const auto* list = file.at_path("extension.term").as_array();
-  if (!list) return "";
-  std::ostringstream text;
-  text << toml::toml_formatter{toml::table{{"extension", toml::table{{"term", *list}}}}};
-  return text.str();
-}
-
 /// The evidence after every flight, in the order of the logs, what the model holds taken out.
-std::optional<AnytimeReport> look_every_time(const Options& options, const Flights& flights, const Vehicle& vehicle,
-                                             const Model& model, const map::OccupancyGrid* grid,
+std::optional<AnytimeReport> look_every_time(const Options& options, const Flights& flights, const LookedWith& with,
                                              const std::optional<study::SoundRotors>& sound) {
   if (!options.anytime) return std::nullopt;
   const auto terms = read_terms(options.model);
-  study::Observer observer(vehicle, model, grid);
+  study::Observer observer(with.vehicle, with.surroundings);
   study::Anytime anytime(sound);
-  for (const auto& log : flights.logs) {
-    observer.add(log);
+  for (const auto& one : flights.observed) {
+    observer.add(one);
     auto seen = observer.so_far();
     study::apply(terms, seen);
     anytime.look(seen);
   }
   return anytime_report(flights.paths, anytime, options.fleet);
-}
-
-/// The logs' names in the order in which the flights are observed.
-std::vector<std::string> names_of(const Flights& flights) {
-  std::vector<std::string> names;
-  for (const std::size_t k : flights.order()) names.push_back(flights.paths[k]);
-  return names;
 }
 
 /// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
@@ -147,11 +99,28 @@ std::optional<study::RotorVerdict> against_reference(const Options& options,
 std::optional<study::calibrate::HeightEffects> height_effects(const Options& options, const Model& model,
                                                               const study::Observations& seen) {
   if (!options.map.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
+  if (!options.from.empty())
+    throw Failure(kUsage, options.from + ":1: logs with a ceiling column need a --map, or --log in place of --from");
   return read_height_effects(options.logs, model, options.seed);
 }
 
+/// What one log at a time is asked for, and what needs more than is kept of each.
+void check_rows(const Options& options) {
+  const auto not_with = [](bool given, const std::string& option, const std::string& why) {
+    if (given) throw Failure(kUsage, option + " " + why);
+  };
+  const std::string alone = "studies nothing: give it with --vehicle, --map, --model, --group and --log alone";
+  not_with(options.rows && (options.json || options.anytime || options.residuals || !options.reference.empty() ||
+                            !(options.out + options.report + options.from + options.design.points).empty()),
+           "--rows", alone);
+  not_with(!options.from.empty() && !options.logs.empty(), "--from", "takes the place of --log: give one of them");
+  not_with(!options.from.empty() && options.residuals, "--residuals", "needs the logs: give --log in place of --from");
+}
+
 void check(const Options& options) {
-  if (options.vehicle.empty() || options.logs.empty()) throw Failure(kUsage, "study needs --vehicle and --log");
+  if (options.vehicle.empty() || (options.logs.empty() && options.from.empty()))
+    throw Failure(kUsage, "study needs --vehicle, and --log or --from");
+  check_rows(options);
   if (options.residuals && (options.map.empty() || options.report.empty()))
     throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
   if (options.anytime && !options.group.empty())
@@ -162,8 +131,9 @@ void check(const Options& options) {
   check_outputs({options.report, options.out, options.design.points}, options.force);
 }
 
-study::StudyOptions study_options(const Options& options) {
+study::StudyOptions study_options(const Options& options, const std::optional<study::Observations>& sound) {
   study::StudyOptions chosen;
+  if (sound) chosen.sound = study::sound_rotors(*sound);
   chosen.search.seed = options.seed;
   chosen.search.progress = [](const std::string& line) { progress(line); };
   chosen.minimum_detectable = !options.quick;
@@ -206,6 +176,32 @@ void add_left_out(Json& json, const std::vector<study::ExtensionTerm>& terms, co
   for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
 }
 
+Flights read_flights(const Options& options, const LookedWith& with) {
+  std::vector<StudiedFlight> studied;
+  std::vector<log::FlightLog> logs;
+  if (options.from.empty()) {
+    for (const auto& path : options.logs)
+      studied.push_back(look_at(path, options.group, with, options.residuals ? &logs : nullptr));
+  } else {
+    progress("reading " + options.from);
+    studied = read_study_rows(options.from, {options.vehicle, options.model, options.map, options.group});
+  }
+  progress("looking for flights that come twice");
+  auto flights = each_once(std::move(studied), !options.group.empty(), std::move(logs));
+  if (!options.reference.empty()) refuse_other_numbers(flights.paths);
+  return flights;
+}
+
+int print_rows(const Options& options, const LookedWith& with) {
+  for (const auto& path : options.logs) {
+    const auto row = study_row(look_at(path, options.group, with, nullptr),
+                               {options.vehicle, options.model, options.map, options.group});
+    end_progress();
+    std::fputs(row.c_str(), stdout);
+  }
+  return kOk;
+}
+
 int run(const Options& options) {
   if (options.rules) return print_rules(options.json), kOk;
   check(options);
@@ -214,19 +210,21 @@ int run(const Options& options) {
   model.ground.r0 = vehicle.body.diagonal_radius;
   const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
   const map::OccupancyGrid* grid = room ? &*room : nullptr;
-  Flights flights = read_flights(options.logs, options.group);
-  auto seen = observe(flights, vehicle, model, grid);
-  const auto measured = seen;  // nothing that the model holds taken out
-  auto terms = study::apply(read_terms(options.model), seen);
+  study::MapView surroundings(grid, model);
+  const LookedWith with{vehicle, model, grid, surroundings};
+  if (options.rows) return print_rows(options, with);
+  Flights flights = read_flights(options, with);
   const auto sound = sound_flights(options, vehicle, model);
-  auto chosen = study_options(options);
+  auto chosen = study_options(options, sound);
+  const auto anytime = look_every_time(options, flights, with, chosen.sound);
+  auto seen = observations(flights, with);
+  const auto measured = options.residuals ? seen : study::Observations{};  // nothing that the model holds taken out
+  auto terms = study::apply(read_terms(options.model), seen);
   chosen.search.known = std::move(terms.known);
-  if (sound) chosen.sound = study::sound_rotors(*sound);
   const auto result = study::study(seen, chosen);
-  const auto names = names_of(flights);
+  const auto names = flights.names();
   Json json = to_json(result, seen, vehicle, names);
   add_left_out(json, terms.left, flights);
-  const auto anytime = look_every_time(options, flights, vehicle, model, grid, chosen.sound);
   if (anytime) json["anytime"] = to_json(*anytime);
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
   const auto height = height_effects(options, model, seen);
@@ -265,6 +263,9 @@ Verb study_verb(Command& app) {
   command.add_option("--model", options->model, "model file or builtin:NAME").capture_default_str();
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
   command.add_option("--log", options->logs, "flight logs, one flight each: CSV, PX4 (.ulg) or ArduPilot (.bin)");
+  command.add_flag("--rows", options->rows,
+                   "prints what a study keeps of each log as a line of JSON, and nothing else");
+  command.add_option("--from", options->from, "such lines, in order, in place of logs").type_name("FILE");
   command.add_option(
       "--reference", options->reference,
       "flights of the same vehicle known to be sound, 4 or more: the --log flights' motor shares are judged against "

@@ -2,14 +2,13 @@
 #include "services/backwash/study_flights.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <numeric>
+#include <utility>
 
 #include "core/log/dataflash.hpp"
 #include "core/log/import_columns.hpp"
 #include "core/log/median.hpp"
 #include "core/log/raw_flight.hpp"
-#include "core/log/same_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "core/study/windows/same_gusts.hpp"
 #include "core/types/formatted.hpp"
@@ -19,47 +18,25 @@
 namespace backwash::services {
 namespace {
 
-/// Leaves out the later of two flights with the same gusts; whether there was one.
-bool leave_out_twins(Flights& flights, const study::Observations& seen) {
-  const auto order = flights.order();
-  const auto same = study::same_gusts(seen);
-  std::vector<std::size_t> twins;
-  for (std::size_t f = 0; f < same.size(); ++f) {
-    if (same[f] == f) continue;
-    twins.push_back(order[f]);
-    flights.twice.emplace_back(flights.paths[order[f]], flights.paths[order[same[f]]]);
-  }
-  std::ranges::sort(twins, std::greater());
-  for (const std::size_t k : twins) {
-    const auto at = static_cast<std::ptrdiff_t>(k);
-    flights.paths.erase(flights.paths.begin() + at), flights.logs.erase(flights.logs.begin() + at);
-    if (!flights.group.empty()) flights.group.erase(flights.group.begin() + at);
-  }
-  return !twins.empty();
-}
-
 /// A flight that is below the map's lowest voxel most of the time has its heights downwards, or another map.
-void refuse_below(const Flights& flights, const map::OccupancyGrid& grid) {
-  for (std::size_t k = 0; k < flights.logs.size(); ++k) {
-    const auto& z = flights.logs[k].column("z_m");
-    if (!z.empty() && log::median(z) < grid.origin().z())
-      throw Failure(kBadData, flights.paths[k] + ":1: z_m is below the map in most rows (median " +
-                                  formatted("%.2f", log::median(z)) + " m): heights are upwards, in the map's frame");
-  }
+void refuse_below(const std::string& path, const log::FlightLog& log, const map::OccupancyGrid& grid) {
+  const auto& z = log.column("z_m");
+  if (!z.empty() && log::median(z) < grid.origin().z())
+    throw Failure(kBadData, path + ":1: z_m is below the map in most rows (median " +
+                                formatted("%.2f", log::median(z)) + " m): heights are upwards, in the map's frame");
 }
 
-study::Observations look_at(const Flights& flights, const Vehicle& vehicle, const Model& model,
-                            const map::OccupancyGrid* grid) {
-  const auto order = flights.order();
-  study::Observer observer(vehicle, model, grid);
-  for (const std::size_t k : order) observer.add(flights.logs[k]);
-  auto seen = observer.finish();
-  if (flights.group.empty()) return seen;
-  std::vector<double> by_flight;
-  by_flight.reserve(order.size());
-  for (const std::size_t k : order) by_flight.push_back(flights.group[k]);
-  seen.group(by_flight);
-  return seen;
+/// Leaves out each flight that is another one again, both by their numbers.
+void leave_out(Flights& flights, const std::vector<std::pair<std::size_t, std::size_t>>& twins) {
+  std::vector<char> left(flights.paths.size(), 0);
+  for (const auto& [twin, known] : twins)
+    flights.twice.emplace_back(flights.paths[twin], flights.paths[known]), left[twin] = 1;
+  const auto keep = [&](auto& list) {
+    std::size_t k = 0;
+    std::erase_if(list, [&](auto&) { return left[k++] != 0; });
+  };
+  if (twins.empty()) return;
+  keep(flights.paths), keep(flights.observed), keep(flights.group), keep(flights.logs);
 }
 
 }  // namespace
@@ -85,42 +62,70 @@ log::FlightLog read_studied(const std::string& path) {
   return log;
 }
 
-Flights read_flights(const std::vector<std::string>& paths, const std::string& group) {
+StudiedFlight look_at(const std::string& path, const std::string& group, const LookedWith& with,
+                      std::vector<log::FlightLog>* keep) {
+  progress("reading " + path);
+  auto log = read_studied(path);
+  if (!group.empty() && (!log.has(group) || log.column(group).empty()))
+    throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
+  if (with.grid) refuse_below(path, log, *with.grid);
+  study::Observer observer(with.vehicle, with.surroundings);
+  observer.add(log);
+  StudiedFlight flight{path, group.empty() ? 0 : log.column(group).front(), log::FlightMark(log), observer.take()};
+  if (keep) keep->push_back(std::move(log));
+  return flight;
+}
+
+Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<log::FlightLog> logs) {
   Flights flights;
   std::vector<log::FlightMark> marks;
-  const auto read = [&](const std::string& path) {
-    progress("reading " + path);
-    auto log = read_studied(path);
-    if (!group.empty() && (!log.has(group) || log.column(group).empty()))
-      throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
-    const log::FlightMark mark(log);
-    const auto known = std::ranges::find_if(marks, [&](auto& m) { return m.shared(mark) >= log::kSameFlight; });
-    if (known != marks.end()) {
-      flights.twice.emplace_back(path, flights.paths[static_cast<std::size_t>(known - marks.begin())]);
-      return;
-    }
-    marks.push_back(mark);
-    if (!group.empty()) flights.group.push_back(log.column(group).front());
-    flights.paths.push_back(path);
-    flights.logs.push_back(std::move(log));
+  for (auto& flight : studied) {
+    flights.paths.push_back(std::move(flight.path)), flights.observed.push_back(std::move(flight.observed));
+    if (grouped) flights.group.push_back(flight.group);
+    marks.push_back(std::move(flight.mark));
+  }
+  flights.logs = std::move(logs);
+  const auto twins_of = [](const std::vector<std::size_t>& same, const std::vector<std::size_t>& order) {
+    std::vector<std::pair<std::size_t, std::size_t>> twins;
+    for (std::size_t f = 0; f < same.size(); ++f)
+      if (same[f] != f) twins.emplace_back(order[f], order[same[f]]);
+    return twins;
   };
-  for (const auto& path : paths) read(path);
+  std::vector<std::size_t> as_given(marks.size());
+  std::iota(as_given.begin(), as_given.end(), std::size_t{0});
+  leave_out(flights, twins_of(log::same_flights(marks), as_given));
+  const auto order = flights.order();
+  std::vector<study::Gusts> gusts;
+  for (const std::size_t k : order) gusts.push_back(study::gusts_of(flights.observed[k].seen, 0));
+  leave_out(flights, twins_of(study::same_gusts(gusts), order));
   return flights;
 }
 
 std::vector<std::size_t> Flights::order() const {
-  std::vector<std::size_t> order(logs.size());
+  std::vector<std::size_t> order(paths.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (!group.empty())
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return group[a] < group[b]; });
   return order;
 }
 
-study::Observations observe(Flights& flights, const Vehicle& vehicle, const Model& model,
-                            const map::OccupancyGrid* grid) {
-  if (grid) refuse_below(flights, *grid);
-  auto seen = look_at(flights, vehicle, model, grid);
-  return leave_out_twins(flights, seen) ? look_at(flights, vehicle, model, grid) : seen;
+std::vector<std::string> Flights::names() const {
+  std::vector<std::string> names;
+  for (const std::size_t k : order()) names.push_back(paths[k]);
+  return names;
+}
+
+study::Observations observations(Flights& flights, const LookedWith& with) {
+  const auto order = flights.order();
+  study::Observer observer(with.vehicle, with.surroundings);
+  for (const std::size_t k : order) observer.add(std::exchange(flights.observed[k], {}));
+  auto seen = observer.finish();
+  if (flights.group.empty()) return seen;
+  std::vector<double> by_flight;
+  by_flight.reserve(order.size());
+  for (const std::size_t k : order) by_flight.push_back(flights.group[k]);
+  seen.group(by_flight);
+  return seen;
 }
 
 }  // namespace backwash::services

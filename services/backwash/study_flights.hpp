@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/log/flight_log.hpp"
+#include "core/log/same_flight.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/study/windows/observation.hpp"
 #include "core/types/model.hpp"
@@ -23,20 +24,42 @@ log::FlightLog read_flight(const std::string& path);
 /// can be (core/log, impossible()) is refused. Throws Failure.
 log::FlightLog read_studied(const std::string& path);
 
+/// What flights are looked at with. Nothing here outlives the study.
+struct LookedWith {
+  const Vehicle& vehicle;
+  const Model& model;
+  const map::OccupancyGrid* grid;  ///< may be null
+  study::MapView& surroundings;    ///< of the two
+};
+
+/// What a study keeps of one log.
+struct StudiedFlight {
+  std::string path;
+  double group = 0;  ///< value of the column that flights are grouped by in the first row
+  log::FlightMark mark;
+  study::Observed observed;
+};
+/// Reads a log and looks at it. `group`: a column, or empty. `keep`: takes the log. Throws Failure.
+StudiedFlight look_at(const std::string& path, const std::string& group, const LookedWith& with,
+                      std::vector<log::FlightLog>* keep);
+
 /// The flights of a study, each once.
 struct Flights {
   std::vector<std::string> paths;
-  std::vector<log::FlightLog> logs;
-  std::vector<double> group;  ///< value of the column that they are grouped by in each one's first row; empty: none
+  std::vector<study::Observed> observed;
+  std::vector<double> group;                               ///< empty: none
+  std::vector<log::FlightLog> logs;                        ///< where they are kept
   std::vector<std::pair<std::string, std::string>> twice;  ///< left out, and which flight it is again
   /// Numbers of the flights, those of one group behind each other.
   std::vector<std::size_t> order() const;
+  /// Their logs in this order.
+  std::vector<std::string> names() const;
 };
 
-/// Reads them and leaves out those that hold another one's positions. `group`: a column, or empty. Throws Failure.
-Flights read_flights(const std::vector<std::string>& paths, const std::string& group);
-/// Leaves out those with another one's gusts, too, and makes windows of the others. `grid` may be null.
-study::Observations observe(Flights& flights, const Vehicle& vehicle, const Model& model,
-                            const map::OccupancyGrid* grid);
+/// Leaves out flights that hold another one's positions, then those with another one's gusts. `logs`: of each, or
+/// empty.
+Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<log::FlightLog> logs);
+/// All of them as one: takes what was observed out of `flights`.
+study::Observations observations(Flights& flights, const LookedWith& with);
 
 }  // namespace backwash::services

@@ -53,10 +53,10 @@ void Observer::put_delays(const Series& s, SampleRange w) {
     const auto along = [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); };
     const auto flown_rate = about_mean(w, slope_at(s, along));
     const Moment delay(rate), slope(level);
-    ThrustMoments moments{seen_.windows.size() - 1};
+    Observed::ThrustMoments moments{all_.seen.windows.size() - 1};
     for (std::size_t i = w.begin; i < w.end; ++i) moments.mean[0] += s.a_nominal[i].z() / static_cast<double>(w.size());
     moments.mean[1] = (s.a_nominal[w.end - 1].z() - s.a_nominal[w.begin].z()) / (s.t[w.end - 1] - s.t[w.begin]);
-    WindowRow& row = seen_.windows.back();
+    WindowRow& row = all_.seen.windows.back();
     const bool late = delay.excited(kWindowRules.excited_rate), steep = slope.excited(kWindowRules.excited_level);
     if (late) {
       moments.delay = {delay.with(level), delay.with(rate)};
@@ -69,8 +69,8 @@ void Observer::put_delays(const Series& s, SampleRange w) {
       put(kThrustSlope, slope.with(r), 1);
     }
     if (late || steep) {
-      thrust_stage_.add({level, rate}, {flown, flown_rate});
-      thrust_moments_.push_back(moments);
+      moments.stage.add({level, rate}, {flown, flown_rate});
+      all_.thrust.push_back(moments);
     }
   }
   put_command_delay(s, w, 0, 2);
@@ -104,7 +104,7 @@ void Observer::put_tilt_delay(const Series& s, SampleRange w) {
   design[kOwn] = 0.5 * (design[kOwn - 1] + design[kOwn + 1]);
   for (double& g : design) g /= std::sqrt(square);
   put(kTiltDelay, y / std::sqrt(square), 1);
-  tilt_stage_.add(seen_.windows.size() - 1, y / std::sqrt(square), design);
+  all_.tilt.add(all_.seen.windows.size() - 1, y / std::sqrt(square), design);
 }
 
 /// Of axes `from` … `to` − 1, along the nominal rate of each.
@@ -128,25 +128,27 @@ void Observer::put_command_delay(const Series& s, SampleRange w, int from, int t
   for (double& d : design) d /= std::sqrt(square);
   const std::size_t channel = from == 0 ? kCommandDelayH : kCommandDelayZ;
   put(channel, y / std::sqrt(square), 1);
-  seen_.windows.back().lag_gain[channel - kCommandDelayH] = lagging / kWindowRules.more_lag / std::sqrt(square);
-  command_stage_[channel - kCommandDelayH].add(seen_.windows.size() - 1, y / std::sqrt(square), design);
+  all_.seen.windows.back().lag_gain[channel - kCommandDelayH] = lagging / kWindowRules.more_lag / std::sqrt(square);
+  all_.command[channel - kCommandDelayH].add(all_.seen.windows.size() - 1, y / std::sqrt(square), design);
 }
 
 void Observer::settle_commands() {
-  for (std::size_t k = 0; k < command_stage_.size(); ++k)
-    for (const auto& [window, design] : command_stage_[k].designs()) seen_.windows[window].command_gain[k] = design;
-  for (const auto& [window, design] : tilt_stage_.designs()) seen_.windows[window].tilt_gain = design;
+  for (std::size_t k = 0; k < all_.command.size(); ++k)
+    for (const auto& [window, design] : all_.command[k].designs()) all_.seen.windows[window].command_gain[k] = design;
+  for (const auto& [window, design] : all_.tilt.designs()) all_.seen.windows[window].tilt_gain = design;
 }
 
 /// Designs of (delay, slope): the moments with −ȧ and T/m − g as they follow z.
 void Observer::follow_thrust() {
-  const Eigen::Matrix2d follows = thrust_stage_.coefficients();
+  FirstStage whole;
+  for (const auto& moments : all_.thrust) whole.add(moments.stage);
+  const Eigen::Matrix2d follows = whole.coefficients();
   const auto design = [&](const std::array<double, 2>& moment) {
     const Eigen::RowVector2d flown = Eigen::RowVector2d(moment[0], moment[1]) * follows;
     return std::array<double, 2>{-flown[1], flown[0]};
   };
-  for (const auto& [window, delay, slope, mean] : thrust_moments_) {
-    WindowRow& row = seen_.windows[window];
+  for (const auto& [window, delay, slope, mean, own] : all_.thrust) {
+    WindowRow& row = all_.seen.windows[window];
     row.delay_gain = design(delay), row.slope_gain = design(slope), row.mean_gain = design(mean);
   }
 }

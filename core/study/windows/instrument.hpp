@@ -69,6 +69,7 @@ struct Moment {
 struct FirstStage {
   Eigen::Matrix2d instruments = Eigen::Matrix2d::Zero(), followed = Eigen::Matrix2d::Zero();
   void add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust);
+  void add(const FirstStage& other) { instruments += other.instruments, followed += other.followed; }
   /// Columns: T/m − g and ȧ as combinations of z = (level, rate); the nominal itself where nothing was excited.
   Eigen::Matrix2d coefficients() const;
 };
@@ -79,16 +80,21 @@ struct FirstStage {
 class DelayStage {
  public:
   using PerSecond = std::array<double, kShifts.size()>;  ///< design at each shift; at 0 its limit
-  void add(std::size_t window, double y, const PerSecond& design) { seen_.push_back({window, y, design}); }
-  /// Window and design at the fixed point.
-  std::vector<std::pair<std::size_t, double>> designs() const;
-
- private:
   struct Seen {
     std::size_t window;
     double y;
     PerSecond design;
   };
+  void add(std::size_t window, double y, const PerSecond& design) { seen_.push_back({window, y, design}); }
+  /// What another one was given, its windows counted from `first`.
+  void add(const DelayStage& other, std::size_t first) {
+    for (const auto& w : other.seen_) seen_.push_back({first + w.window, w.y, w.design});
+  }
+  const std::vector<Seen>& seen() const noexcept { return seen_; }
+  /// Window and design at the fixed point.
+  std::vector<std::pair<std::size_t, double>> designs() const;
+
+ private:
   std::vector<Seen> seen_;
 };
 

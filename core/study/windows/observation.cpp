@@ -75,19 +75,19 @@ bool Observations::measured(Channel c) const {
 
 Observer::Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid)
     : vehicle_(vehicle), own_(std::in_place, grid, model), surroundings_(*own_) {
-  seen_.first.push_back(0);
+  all_.seen.first.push_back(0);
 }
 
 Observer::Observer(const Vehicle& vehicle, MapView& surroundings) : vehicle_(vehicle), surroundings_(surroundings) {
-  seen_.first.push_back(0);
+  all_.seen.first.push_back(0);
 }
 
 void Observer::add(const log::FlightLog& log) {
   const Series s = series_of(log, vehicle_);
   for (const auto& [name, column] : log.columns)
-    if (!s.strayed || !name.starts_with("cmd_")) ever_.insert(name);
-  strayed_ = strayed_ || s.strayed;
-  ++seen_.flights;
+    if (!s.strayed || !name.starts_with("cmd_")) all_.ever.insert(name);
+  all_.strayed = all_.strayed || s.strayed;
+  ++all_.seen.flights;
   if (static_cast<double>(s.size()) >= kWindowRules.fewest_rows) {
     const auto rotors = rotor_phases(log, s);
     std::vector<SampleRange> good;
@@ -98,13 +98,13 @@ void Observer::add(const log::FlightLog& log) {
       if (!why) why = unfit(s, log, w, options);
       if (!why) why = misplaced(s, w);
       if (why)
-        ++seen_.gated_out[*why];
+        ++all_.seen.gated_out[*why];
       else
         good.push_back(w);
     }
     add_windows(log, s, rotors, good);
   }
-  seen_.first.push_back(seen_.windows.size());
+  all_.seen.first.push_back(all_.seen.windows.size());
 }
 
 std::optional<Gate> Observer::misplaced(const Series& s, SampleRange w) const {
@@ -116,7 +116,7 @@ std::optional<Gate> Observer::misplaced(const Series& s, SampleRange w) const {
 }
 
 void Observer::smooth_voltage() {
-  const auto windows = std::span(seen_.windows).subspan(seen_.first.back());
+  const auto windows = std::span(all_.seen.windows).subspan(all_.seen.first.back());
   std::vector<double> t, volts;
   for (const auto& w : windows) t.push_back(w.t), volts.push_back(w.voltage);
   const auto course = slow_course(t, volts);
@@ -126,15 +126,15 @@ void Observer::smooth_voltage() {
 void Observer::put_tails() {
   std::vector<Fourth> whole;
   std::vector<std::size_t> of;
-  for (std::size_t i = 0; i < tails_.size(); ++i)
-    if (tails_[i].at_once > 0) whole.push_back(tails_[i]), of.push_back(i);
+  for (std::size_t i = 0; i < all_.tails.size(); ++i)
+    if (all_.tails[i].at_once > 0) whole.push_back(all_.tails[i]), of.push_back(i);
   const auto y = tails(whole);
-  for (std::size_t i = 0; i < y.size(); ++i) seen_.y[kTail][of[i]] = y[i], seen_.weight[kTail][of[i]] = 1;
+  for (std::size_t i = 0; i < y.size(); ++i) all_.seen.y[kTail][of[i]] = y[i], all_.seen.weight[kTail][of[i]] = 1;
 }
 
 void Observer::put(std::size_t channel, double y, double weight) {
   if (!std::isfinite(y) || !(weight > 0)) return;
-  seen_.y[channel].back() = y, seen_.weight[channel].back() = weight;
+  all_.seen.y[channel].back() = y, all_.seen.weight[channel].back() = weight;
 }
 
 WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRange w) {
@@ -202,9 +202,9 @@ Residual Observer::put_means(const WindowRow& row, const Series& s, SampleRange 
 /// ln variances of the last windows, the accelerometer's noise taken out, and what their tails are made of.
 void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_hz) {
   const Texture texture = texture_of(residuals, rate_hz);
-  const std::size_t first = seen_.windows.size() - residuals.size();
+  const std::size_t first = all_.seen.windows.size() - residuals.size();
   for (std::size_t i = 0; i < residuals.size(); ++i) {
-    WindowRow& row = seen_.windows[first + i];
+    WindowRow& row = all_.seen.windows[first + i];
     for (std::size_t a = 0; a < 3; ++a) {
       const auto axis = static_cast<Eigen::Index>(a);
       const auto [variance, samples] = spread(residuals[i].x[a]);
@@ -212,10 +212,10 @@ void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_h
       if (!residuals[i].comparable || !(variance > 0) || !(samples > 2)) continue;
       const double gusts = std::max(variance - texture.white[axis], kWindowRules.least_gusts * variance);
       const double own = ln_variance(samples) * std::pow(variance / gusts, 2);
-      seen_.y[kVarX + a][first + i] = std::log(gusts / row.sigma[axis]) - ln_bias(samples);
-      seen_.weight[kVarX + a][first + i] = 1 / (own + kWindowRules.scatter2);
+      all_.seen.y[kVarX + a][first + i] = std::log(gusts / row.sigma[axis]) - ln_bias(samples);
+      all_.seen.weight[kVarX + a][first + i] = 1 / (own + kWindowRules.scatter2);
     }
-    tails_.push_back(residuals[i].comparable ? fourth_moments(residuals[i], texture) : Fourth{});
+    all_.tails.push_back(residuals[i].comparable ? fourth_moments(residuals[i], texture) : Fourth{});
   }
 }
 
@@ -223,10 +223,10 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
                            const std::vector<SampleRange>& good) {
   std::vector<Residual> residuals;
   for (const SampleRange w : good) {
-    for (std::size_t c = 0; c < kChannels; ++c) seen_.y[c].push_back(0), seen_.weight[c].push_back(0);
-    seen_.windows.push_back(placed(log, s, w));
-    WindowRow& row = seen_.windows.back();
-    row.flight = seen_.flights - 1;
+    for (std::size_t c = 0; c < kChannels; ++c) all_.seen.y[c].push_back(0), all_.seen.weight[c].push_back(0);
+    all_.seen.windows.push_back(placed(log, s, w));
+    WindowRow& row = all_.seen.windows.back();
+    row.flight = all_.seen.flights - 1;
     residuals.push_back(put_means(row, s, w));
     if (!s.a_nominal.empty()) put_delays(s, w);
     for (const auto& [channel, value, weight] :
@@ -237,7 +237,7 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
       if (line) line->floor2 = std::max(0.0, line->floor2 - row.sigma.z() * gusts_at(line->folded, dt));
   }
   const double period = s.t.back() / static_cast<double>(s.size() - 1);
-  seen_.row_period = std::max(seen_.row_period, period);
+  all_.seen.row_period = std::max(all_.seen.row_period, period);
   put_spreads(residuals, 1 / period);
   smooth_voltage();
 }
@@ -248,36 +248,29 @@ void Observations::group(const std::vector<double>& by_flight) {
     if (f + 1 == by_flight.size() || by_flight[f + 1] != by_flight[f]) units.first.push_back(first[f + 1]);
 }
 
-Observations Observer::so_far() const {
-  Observer copy(vehicle_, surroundings_);
-  copy.seen_ = seen_, copy.thrust_stage_ = thrust_stage_, copy.thrust_moments_ = thrust_moments_;
-  copy.command_stage_ = command_stage_, copy.tilt_stage_ = tilt_stage_, copy.tails_ = tails_, copy.ever_ = ever_;
-  copy.strayed_ = strayed_;
-  return copy.finish();
-}
-
 Observations Observer::finish() {
-  seen_.units.first = seen_.first;
+  all_.seen.units.first = all_.seen.first;
   follow_thrust();
   settle_commands();
   put_tails();
   const auto need = [&](Source source, std::initializer_list<const char*> columns) {
     for (const char* column : columns)
-      if (!ever_.contains(column)) seen_.missing.emplace(source, std::string("no ") + column + " column");
+      if (!all_.ever.contains(column)) all_.seen.missing.emplace(source, std::string("no ") + column + " column");
   };
   need(Source::acceleration, {"ax_mps2", "ay_mps2", "az_mps2"});
   need(Source::battery, {"battery_v"});
   need(Source::temperature, {"temperature_c"});
   need(Source::attitude, {"qw", "qx", "qy", "qz"});
   need(Source::thrust, {"thrust"});
-  if (strayed_ && !ever_.contains("cmd_x_m"))
-    seen_.missing.emplace(Source::setpoints, "the craft flew elsewhere than the set-points lead");
+  if (all_.strayed && !all_.ever.contains("cmd_x_m"))
+    all_.seen.missing.emplace(Source::setpoints, "the craft flew elsewhere than the set-points lead");
   need(Source::setpoints, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
   need(Source::rpm, {"rpm1", "rpm2", "rpm3", "rpm4"});
   need(Source::motors, {"motor1", "motor2", "motor3", "motor4"});
-  if (!surroundings_.has_map() && !ever_.contains("ceiling")) seen_.missing.emplace(Source::ceiling, "no map given");
-  if (!surroundings_.has_map()) seen_.missing.emplace(Source::map, "no map given");
-  return std::move(seen_);
+  if (!surroundings_.has_map() && !all_.ever.contains("ceiling"))
+    all_.seen.missing.emplace(Source::ceiling, "no map given");
+  if (!surroundings_.has_map()) all_.seen.missing.emplace(Source::map, "no map given");
+  return std::move(all_.seen);
 }
 
 }  // namespace backwash::study

@@ -141,6 +141,25 @@ struct Observations {
   void group(const std::vector<double>& by_flight);
 };
 
+/// What an Observer keeps of flights until it is asked: of one flight, all that a study needs of its log. Nothing of
+/// one flight depends on another's, so flights may be looked at anywhere and put together in their order.
+struct Observed {
+  /// Σ z (level, rate)/√Σz² of a window, z the instrument of the delay and that of the slope; their means; its part of
+  /// the first stage.
+  struct ThrustMoments {
+    std::size_t window;
+    std::array<double, 2> delay{}, slope{}, mean{};  // mean: not an instrument's, of the window
+    FirstStage stage{};
+  };
+  Observations seen;
+  std::vector<ThrustMoments> thrust;
+  std::array<DelayStage, 2> command;  ///< level, vertical
+  DelayStage tilt;
+  std::vector<Fourth> tails;   ///< of every window
+  std::set<std::string> ever;  ///< columns that some flight had
+  bool strayed = false;        ///< some flight had set-points that it did not follow
+};
+
 /// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
 /// known but the floor at z = 0, and Σ = Σ_0. Real-time status: offline.
 class Observer {
@@ -150,6 +169,10 @@ class Observer {
   Observer(const Vehicle& vehicle, MapView& surroundings);
   Observer(const Observer&) = delete;
   void add(const log::FlightLog& log);
+  /// Flights that another Observer of the same vehicle, model and map looked at, behind these.
+  void add(Observed flights);
+  /// Of the flights so far; none are left here.
+  Observed take();
   Observations finish();
   /// As finish() would tell it now; more flights may be added.
   Observations so_far() const;
@@ -173,19 +196,7 @@ class Observer {
   void put_tails();
 
   const Vehicle vehicle_;
-  Observations seen_;
-  FirstStage thrust_stage_;
-  /// Σ z (level, rate)/√Σz² of a window, z the instrument of the delay and that of the slope; their means.
-  struct ThrustMoments {
-    std::size_t window;
-    std::array<double, 2> delay{}, slope{}, mean{};  // mean: not an instrument's, of the window
-  };
-  std::vector<ThrustMoments> thrust_moments_;
-  std::array<DelayStage, 2> command_stage_;  // level, vertical
-  DelayStage tilt_stage_;
-  std::vector<Fourth> tails_;   // of every window
-  std::set<std::string> ever_;  // columns that some flight had
-  bool strayed_ = false;        // some flight had set-points that it did not follow
+  Observed all_;
   std::optional<MapView> own_;
   MapView& surroundings_;
 };

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/observed.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <iterator>
+#include <utility>
+
+namespace backwash::study {
+namespace {
+
+/// Appends what it is given; whoever is packed and whoever is unpacked is visited by the same functions.
+struct Packer {
+  std::string bytes;
+  static constexpr bool good = true;
+  void refuse() {}
+  void raw(void* value, std::size_t size) { bytes.append(static_cast<const char*>(value), size); }
+  std::size_t count(std::size_t n) {
+    raw(&n, sizeof n);
+    return n;
+  }
+};
+
+/// Reads it back in the same order; `good` until the bytes do not suffice.
+struct Unpacker {
+  std::string_view bytes;
+  bool good = true;
+  void refuse() { good = false; }
+  void raw(void* value, std::size_t size) {
+    good = good && size <= bytes.size();
+    if (!good) return;
+    std::memcpy(value, bytes.data(), size);
+    bytes.remove_prefix(size);
+  }
+  /// How many follow, each of a byte or more: a count from damaged bytes asks for no memory.
+  std::size_t count(std::size_t) {
+    std::size_t n = 0;
+    raw(&n, sizeof n);
+    good = good && n <= bytes.size();
+    return good ? n : 0;
+  }
+};
+
+template <typename A>
+struct Visitor {
+  A& archive;
+
+  template <typename... T>
+  void operator()(T&... values) {
+    (visit(values), ...);
+  }
+
+ private:
+  void visit(double& value) { archive.raw(&value, sizeof value); }
+  void visit(int& value) { archive.raw(&value, sizeof value); }
+  void visit(std::size_t& value) { archive.raw(&value, sizeof value); }
+  void visit(bool& value) {
+    auto byte = static_cast<std::uint8_t>(value);
+    archive.raw(&byte, 1);
+    value = byte != 0;
+  }
+  void visit(Gate& gate) {
+    auto number = static_cast<std::size_t>(gate);
+    visit(number);
+    if (number > static_cast<std::size_t>(Gate::outside)) number = 0, archive.refuse();
+    gate = static_cast<Gate>(number);
+  }
+  template <int rows, int columns>
+  void visit(Eigen::Matrix<double, rows, columns>& value) {
+    archive.raw(value.data(), sizeof(double) * static_cast<std::size_t>(value.size()));
+  }
+  template <typename T, std::size_t n>
+  void visit(std::array<T, n>& all) {
+    for (auto& each : all) visit(each);
+  }
+  template <typename T>
+  void visit(std::vector<T>& all) {
+    const std::size_t n = archive.count(all.size());
+    for (std::size_t k = 0; k < n && archive.good; ++k) {
+      if (k == all.size()) all.resize(k + 1);
+      visit(all[k]);
+    }
+  }
+  void visit(std::string& text) {
+    text.resize(archive.count(text.size()));
+    archive.raw(text.data(), text.size());
+  }
+  template <typename T>
+  void visit(std::optional<T>& value) {
+    bool there = value.has_value();
+    visit(there);
+    if (there) visit(value ? *value : value.emplace());
+  }
+  template <typename S, typename T>
+  void visit(std::pair<S, T>& both) {
+    (*this)(both.first, both.second);
+  }
+  /// A set or a map, as a list in its order.
+  template <typename T, typename Container>
+  void visit_as(Container& all) {
+    std::vector<T> list(all.begin(), all.end());
+    visit(list);
+    all = Container(list.begin(), list.end());
+  }
+  void visit(PlaceAround& a) { (*this)(a.height, a.ceiling_gap, a.walls, a.whole_walls); }
+  void visit(RotorLine& l) { (*this)(l.excess, l.amplitude2, l.floor2, l.folded); }
+  void visit(Fourth& f) { (*this)(f.at_once, f.apart); }
+  void visit(FirstStage& s) { (*this)(s.instruments, s.followed); }
+  void visit(Observed::ThrustMoments& m) { (*this)(m.window, m.delay, m.slope, m.mean, m.stage); }
+  void visit(DelayStage::Seen& s) { (*this)(s.window, s.y, s.design); }
+  void visit(DelayStage& stage) {
+    auto seen = stage.seen();
+    visit(seen);
+    stage = {};
+    for (const auto& s : seen) stage.add(s.window, s.y, s.design);
+  }
+  /// The names are counted by the compiler: a field that is new in WindowRow has to be named here, too.
+  void visit(WindowRow& row) {
+    auto& [flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, yaw, thrust_acc, voltage, temperature,
+           around, path, give, held_off, slowed, varied2, off_W, sigma, ln_sigma_moved, delay_gain, slope_gain,
+           mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance, lines] = row;
+    (*this)(flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, yaw, thrust_acc, voltage);
+    (*this)(temperature, around, path, give, held_off, slowed, varied2, off_W, sigma, ln_sigma_moved, delay_gain);
+    (*this)(slope_gain, mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance);
+    visit(lines);
+  }
+  void visit(Observations& seen) {
+    auto& [flights, windows, first, units, row_period, y, weight, gated_out, missing] = seen;
+    (*this)(flights, windows, first, row_period, y, weight);
+    visit_as<std::pair<Gate, std::size_t>>(gated_out);
+    static_cast<void>(units), static_cast<void>(missing);  // made when all flights are together
+  }
+
+ public:
+  void visit(Observed& all) {
+    auto& [seen, thrust, command, tilt, tails, ever, strayed] = all;
+    (*this)(seen, thrust, command, tilt, tails, strayed);
+    visit_as<std::string>(ever);
+  }
+};
+
+bool sound(const WindowRow& row) { return row.path.empty() || row.path.size() == kPoints; }
+
+/// Whether every number is within what it counts, so that nothing beyond it is read.
+bool sound(const Observed& all) {
+  const Observations& seen = all.seen;
+  const std::size_t n = seen.windows.size();
+  const auto within = [n](const auto& list) {
+    return std::ranges::all_of(list, [n](auto& w) { return w.window < n; });
+  };
+  const auto measured = [n](const auto& channels) {
+    return std::ranges::all_of(channels, [n](auto& c) { return c.size() == n; });
+  };
+  return seen.first.size() == seen.flights + 1 && seen.first.front() == 0 && seen.first.back() == n &&
+         std::ranges::is_sorted(seen.first) && measured(seen.y) && measured(seen.weight) && all.tails.size() == n &&
+         std::ranges::all_of(seen.windows, [&](auto& row) { return sound(row) && row.flight < seen.flights; }) &&
+         within(all.thrust) && within(all.command[0].seen()) && within(all.command[1].seen()) &&
+         within(all.tilt.seen());
+}
+
+}  // namespace
+
+std::string packed(Observed flights) {
+  Packer packer;
+  Visitor<Packer>{packer}.visit(flights);
+  return std::move(packer.bytes);
+}
+
+std::optional<Observed> unpacked(std::string_view bytes) {
+  Unpacker unpacker{bytes};
+  Observed flights;
+  Visitor<Unpacker>{unpacker}.visit(flights);
+  if (!unpacker.good || !unpacker.bytes.empty() || !sound(flights)) return std::nullopt;
+  return flights;
+}
+
+Observations Observer::so_far() const {
+  Observer copy(vehicle_, surroundings_);
+  copy.all_ = all_;
+  return copy.finish();
+}
+
+Observed Observer::take() {
+  Observed taken = std::exchange(all_, {});
+  all_.seen.first.push_back(0);
+  return taken;
+}
+
+void Observer::add(Observed flights) {
+  Observations &seen = all_.seen, &more = flights.seen;
+  const std::size_t windows = seen.windows.size();
+  for (auto& row : more.windows) row.flight += seen.flights;
+  std::ranges::move(more.windows, std::back_inserter(seen.windows));
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    seen.y[c].insert(seen.y[c].end(), more.y[c].begin(), more.y[c].end());
+    seen.weight[c].insert(seen.weight[c].end(), more.weight[c].begin(), more.weight[c].end());
+  }
+  seen.flights += more.flights;
+  for (std::size_t f = 1; f < more.first.size(); ++f) seen.first.push_back(windows + more.first[f]);
+  seen.row_period = std::max(seen.row_period, more.row_period);
+  for (const auto& [gate, count] : more.gated_out) seen.gated_out[gate] += count;
+  for (auto& moments : flights.thrust) moments.window += windows, all_.thrust.push_back(moments);
+  for (std::size_t k = 0; k < all_.command.size(); ++k) all_.command[k].add(flights.command[k], windows);
+  all_.tilt.add(flights.tilt, windows);
+  all_.tails.insert(all_.tails.end(), flights.tails.begin(), flights.tails.end());
+  all_.ever.merge(flights.ever);
+  all_.strayed = all_.strayed || flights.strayed;
+}
+
+}  // namespace backwash::study
