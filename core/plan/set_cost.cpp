@@ -6,6 +6,7 @@
 
 #include "core/plan/feasibility.hpp"
 #include "core/reach/clearance.hpp"
+#include "core/reach/integrator.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -34,9 +35,9 @@ struct GivenUp {
   std::size_t voxel;
 };
 
-/// Half widths of the set with Σ at a voxel's centre, m.
-PerDirection set_at_centre(const World& world, const Index3& v) {
-  PerDirection h = world.bounds.at(v).w;
+/// Half widths of the set with Σ at a voxel's centre, m; `net`: with what an integrator holds.
+PerDirection set_at_centre(const World& world, const reach::NetDisturbance& net, const Index3& v) {
+  PerDirection h = net(net.held() ? world.bounds.max_without_push_over(Vec3::Zero(), v, v) : world.bounds.at(v)).w;
   for (std::size_t d = 0; d < kDirections; ++d)
     h[d] *= d == kZ ? world.reach.vertical.h_inf : world.reach.horizontal.h_inf;
   return h;
@@ -105,12 +106,12 @@ struct CostOfLayer {
   std::vector<GivenUp> some;
 };
 
-void add_cost(const World& world, std::size_t n, CostOfLayer& cost) {
+void add_cost(const World& world, const reach::NetDisturbance& net, std::size_t n, CostOfLayer& cost) {
   const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(n);
   if (world.grid.at(n) != map::Cell::free || free <= taken) return;
   const Index3 v = world.grid.voxel(n);
   const Vec3 p_W = world.grid.center(v);
-  const PerDirection h = set_at_centre(world, v);
+  const PerDirection h = set_at_centre(world, net, v);
   const bool safe = world.hover.safe(v),
              plain = world.bounds.extension().none();  // plain: the set holds that at its centre
   if (!(safe && plain) && !reach::prism_clear(world.grid, world.sums, p_W, h, taken)) return;
@@ -128,7 +129,10 @@ void add_cost(const World& world, std::size_t n, CostOfLayer& cost) {
 }  // namespace
 
 SetCost cost_of_set(const World& world, const Parallel& parallel) {
-  const auto layers = by_layers(world, parallel, CostOfLayer{}, add_cost);
+  const reach::NetDisturbance net(world.reach, world.bounds);
+  const auto layers =
+      by_layers(world, parallel, CostOfLayer{},
+                [&net](const World& w, std::size_t n, CostOfLayer& cost) { add_cost(w, net, n, cost); });
   SetCost cost;
   std::vector<GivenUp> some;
   std::size_t nothing = 0;
@@ -136,11 +140,11 @@ SetCost cost_of_set(const World& world, const Parallel& parallel) {
     cost.safe_at_centre += layer.safe, cost.lost += layer.lost, nothing += layer.nothing;
     some.insert(some.end(), layer.some.begin(), layer.some.end());
   }
-  Quantiles given_up(std::move(some), nothing, [&world](std::size_t n) {
+  Quantiles given_up(std::move(some), nothing, [&world, &net](std::size_t n) {
     const Index3 v = world.grid.voxel(n);
     const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v),
                                       std::nullopt, &world.sums);
-    return clearance_at_centre(world, n, set_at_centre(world, v)).value() - set.clearance;
+    return clearance_at_centre(world, n, set_at_centre(world, net, v)).value() - set.clearance;
   });
   cost.median_m = given_up.at(50, parallel);
   cost.quantile95_m = given_up.at(95, parallel);

@@ -15,7 +15,8 @@ constexpr double kLongestStep = 1e-3;   // s
 constexpr double kLongestCharge = 600;  // s: a loop that has not settled after this is refused
 constexpr double kSettled = 1e-5;       // share of the largest motion
 constexpr double kLeastMotion = 1e-3;   // m/s²: a loop without delay and lag follows a command with none at all
-constexpr double kHeldMargin = 1.01;    // covers the trapezoid rule and what comes after kSettled
+constexpr double kHalfHold = kControlPeriod / 2;  // s: so late is a held place on the mean, a held acceleration not
+constexpr double kHeldMargin = 1.01;              // covers the trapezoid rule and what comes after kSettled
 
 /// What an axis starts with, of size 1: an impulse of the disturbance; one of the commanded acceleration, of which
 /// velocity and place are the integrals; an error that the delayed feedback has seen all the time before.
@@ -24,9 +25,11 @@ enum class Start { disturbance, command, position, velocity };
 /// One axis with its integrator, moved on in steps that the feedback delay is a multiple of.
 class ChargedAxis {
  public:
-  ChargedAxis(const AxisLoop& axis, Start start)
+  /// `late`: by how much the place and the velocity that are commanded follow the acceleration, s.
+  ChargedAxis(const AxisLoop& axis, Start start, double late = 0)
       : axis_(axis),
         commanded_(start == Start::command),
+        late_(late),
         delay_(static_cast<std::size_t>(std::ceil(axis.feedback_delay / kLongestStep))) {
     h_ = delay_ > 0 ? axis.feedback_delay / static_cast<double>(delay_) : kLongestStep;
     move_ = axis_step(axis, delay_ == 0, h_);
@@ -38,7 +41,8 @@ class ChargedAxis {
     fed_back_[0] = feedback();
   }
   void step() {
-    const double command = commanded_ ? axis_.kp * t_ + axis_.kd : 0, command_rate = commanded_ ? axis_.kp : 0;
+    const bool heard = commanded_ && t_ >= late_ - h_ / 2;
+    const double command = heard ? axis_.kp * (t_ - late_) + axis_.kd : 0, command_rate = heard ? axis_.kp : 0;
     const std::size_t n = fed_back_.size(), oldest = (newest_ + 1) % n, next = (newest_ + 2) % n;
     const double late = delay_ > 0 ? fed_back_[oldest] : 0, late_after = delay_ > 0 ? fed_back_[next] : 0;
     const double seen = command + (delay_ > 0 ? late : feedback());
@@ -55,7 +59,7 @@ class ChargedAxis {
   double held() const { return held_; }
   /// How far it is from rest, m/s². What is commanded is met by what was measured: late, the craft is ahead of it.
   double motion() const {
-    const double p = x_[0] - (commanded_ ? t_ + axis_.feedback_delay : 0), v = x_[1] - (commanded_ ? 1 : 0);
+    const double p = x_[0] - (commanded_ ? t_ + axis_.feedback_delay - late_ : 0), v = x_[1] - (commanded_ ? 1 : 0);
     return axis_.kp * std::abs(p) + axis_.kd * std::abs(v) + std::abs(held_);
   }
 
@@ -64,6 +68,7 @@ class ChargedAxis {
 
   AxisLoop axis_;
   bool commanded_;
+  double late_;
   std::size_t delay_, newest_ = 0;  // steps
   double h_ = 0, t_ = 0, held_ = 0;
   AxisStep move_;
@@ -103,8 +108,12 @@ IntegratorResponse integrator_response(const AxisLoop& axis) {
     response.kernel[bin] += kHeldMargin * h * std::abs(held);
     response.opposite[bin] += kHeldMargin * h * std::max(0.0, held);  // c = −held
   });
-  run_until_settled(ChargedAxis(counted, Start::command), axis,
-                    [&](double held, double, double h) { response.manoeuvre += kHeldMargin * h * std::abs(held); });
+  for (const double late : {0.0, kHalfHold}) {
+    double sum = 0;
+    run_until_settled(ChargedAxis(counted, Start::command, late), axis,
+                      [&](double held, double, double h) { sum += kHeldMargin * h * std::abs(held); });
+    response.manoeuvre = std::max(response.manoeuvre, sum);
+  }
   const auto peak_after = [&](Start start) {
     double peak = 0;
     run_until_settled(ChargedAxis(counted, start), axis,
@@ -136,12 +145,15 @@ std::pair<double, double> held_of_gusts(const IntegratorResponse& response, doub
 }  // namespace
 
 NetDisturbance::NetDisturbance(const Reachability& reach, const BoundField& bounds)
+    : NetDisturbance(reach,
+                     has_integrator(reach.vehicle) ? bounds.extremes(reach.vehicle.limits.v_max) : FieldExtremes(),
+                     bounds.model()) {}
+
+NetDisturbance::NetDisturbance(const Reachability& reach, const FieldExtremes& most, const BoundModel& model)
     : held_(has_integrator(reach.vehicle)) {
   if (!held_) return;
   const auto& limits = reach.vehicle.limits;
   const auto& first = reach.vehicle.initial_error;
-  const FieldExtremes most = bounds.extremes(limits.v_max);
-  const BoundModel& model = bounds.model();
   for (std::size_t d = 0; d < kDirections; ++d) {
     const IntegratorResponse& response = d == kZ ? reach.vertical_integrator : reach.horizontal_integrator;
     const auto [variance, covariance] = held_of_gusts(response, std::max(model.tau_w, kControlPeriod));

@@ -10,6 +10,7 @@
 namespace backwash::reach {
 
 class BoundField;
+struct FieldExtremes;
 struct Reachability;
 
 /// What the integrator of one axis' velocity loop holds: i = −c ∗ w under a disturbance w, ∫ c = 1, so that a steady
@@ -17,7 +18,7 @@ struct Reachability;
 struct IntegratorResponse {
   std::vector<double> kernel;    ///< ∫ |c| of each 20 ms of age
   std::vector<double> opposite;  ///< … of what of c is below 0, held the other way
-  double manoeuvre = 0;          ///< most that is held under commands of 1 m/s² at most, without a disturbance
+  double manoeuvre = 0;  ///< most that is held under commands of 1 m/s² at most, streamed or held for 20 ms, in calm
   double from_position = 0, from_velocity = 0;  ///< … after an error of 1 m, 1/s², and of 1 m/s, 1/s
   double opposed() const;                       ///< sum of `opposite`
 };
@@ -32,6 +33,8 @@ class NetDisturbance {
  public:
   /// O(kernel). The field's extremes are of vehicles within limits.v_max along each axis.
   NetDisturbance(const Reachability& reach, const BoundField& bounds);
+  /// Of a field of which only the extremes are known.
+  NetDisturbance(const Reachability& reach, const FieldExtremes& most, const BoundModel& model);
   /// False without an integrator: nothing is changed.
   bool held() const noexcept { return held_; }
   /// Bound on it where the air's own is w̄, without the known pushes: these are in what is added. Real-time: wait-free,

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <limits>
 
+#include "core/reach/integrator.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::sim {
@@ -39,7 +40,8 @@ reach::ReachTube scaled_tube(const plan::World& world, const reach::ReachTube& t
       b.w[d] = mean + std::sqrt(sigma_scale) * (b.w[d] - mean);
     }
     scaled.push_back(b);
-    pushes.push_back(world.bounds.push(tube[k].center.p_W, tube[k].center.v_W));
+    const bool held_off = reach::has_integrator(world.reach.vehicle);  // then the centre keeps to the set-points
+    pushes.push_back(held_off ? Vec3::Zero().eval() : world.bounds.push(tube[k].center.p_W, tube[k].center.v_W));
   }
   return reach::tube_with_bounds(world.reach, tube.front().center, previous, commands, scaled, pushes);
 }

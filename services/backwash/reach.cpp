@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "core/reach/bound_field.hpp"
 #include "core/reach/chance.hpp"
+#include "core/reach/integrator.hpp"
 #include "core/reach/reach_tube.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -135,6 +138,10 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
   const auto commands = read_commands(options.track, track);
   const State start{commands[0].p_W, commands[0].v_W};
   const bool chance = options.kind == Kind::chance;
+  if (chance && reach::has_integrator(reach.vehicle))
+    throw Failure(kConfiguration, options.vehicle +
+                                      ":1: controller.velocity_integrator: --method chance does not know it; leave "
+                                      "it out or ask for --method tight");
   if (has_variances(options.track, track)) {
     if (!options.map.empty()) throw Failure(kUsage, "the track has sigma columns; give either those or --map");
     const BoundModel model = options.model.empty() ? BoundModel{} : read_model(options.model).bound;
@@ -143,7 +150,18 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
       return chance_tube_with_variances(reach, start, commands[0], commands, sigma, model, *options.probability);
     std::vector<DisturbanceBound> bounds;
     bounds.reserve(sigma.size());
-    for (const Variance& s : sigma) bounds.push_back(bound(s, model));
+    reach::FieldExtremes most;
+    most.level = model.mean_horizontal, most.vertical = model.mean_vertical;
+    for (const Variance& s : sigma) {
+      bounds.push_back(bound(s, model));
+      for (std::size_t d = 0; d < kDirections; ++d) {
+        const double mean = d == kZ ? model.mean_vertical : model.mean_horizontal;
+        most.gusts.w[d] = std::max(most.gusts.w[d], bounds.back().w[d] - mean);
+      }
+    }
+    // A loop with an integrator holds what blew before: of a track, its own largest.
+    const reach::NetDisturbance net(reach, most, model);
+    for (DisturbanceBound& b : bounds) b = net(b);
     return {tube_with_bounds(reach, start, commands[0], commands, bounds), {}};
   }
   if (options.map.empty() || options.model.empty()) {

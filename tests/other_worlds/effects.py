@@ -30,6 +30,19 @@ NEUTRAL = dict(
     stuck=0.0, stuck_rotor=0.0,  # share of one tachometer's readings that are lost, in bursts
     plume=0.0, plume_heading=0.0,  # m/s^2 on the axis of a level jet beside the room's middle; its heading
     tether=0.0,  # weight of a cord per metre of height, over the vehicle's
+    surge=0.0, surge_rate=0.1,  # m/s^2 along x, Hz: the same at the same time of all flights
+    thirds=0.0,  # m/s^2 along x, times cos(3 yaw)
+    saddle=0.0,  # m/s^2 along y, 1 m beside the room's middle and 1 m above it: a product of x and z
+    cushion=0.0,  # m/s^2 at the floor, falling as exp(-(z/0.4 m)^2)
+    onset=0.0,  # m/s^2 along x, from half a minute after the start on
+    full_rpm=24000.0,  # of a rotor at its full thrust
+    file_mass=1.0,  # of the vehicle file, over the true one
+    weight=0.0, weighted=0.0,  # mass over the vehicle's, under one rotor; which
+    uneven=0.007,  # spread of the four rotors' thrust coefficients
+    misread=1.0, misreader=0.0, misread_flights=0.0, misread_since=0.0,  # factor on one tachometer; which; bits of the flights; s
+    blind=0.0,  # columns that the log lacks: 1 voltage, 2 rpm
+    coarse=0.0,  # 1: accelerations in steps of 0.05 m/s^2, places of 5 mm; 5 % of the rows are lost, also in bursts
+    bobbing=0.0,  # 1: every flight goes up and down about one height
 )
 
 
@@ -44,6 +57,15 @@ def level(rng, size):
 
 def pair(names, xy):
     return dict(zip(names, xy))
+
+
+def tachometer(rng, since):
+    flights = rng.permutation(12)[:rng.integers(4, 7)]
+    return dict(misread=0.54, misreader=rng.integers(4), misread_flights=float(sum(1 << int(f) for f in flights)), misread_since=since)
+
+
+def both(first, second):
+    return lambda rng: dict(EFFECTS[first][0](rng), **EFFECTS[second][0](rng))
 
 
 def drift(rng):
@@ -86,6 +108,32 @@ EFFECTS = {
     "plume": (lambda rng: dict(plume=rng.uniform(0.6, 1.0), plume_heading=rng.uniform(-np.pi, np.pi)), "unknown_structure", (),
               "a level jet of 0.6 to 1 m/s^2, 0.5 m wide"),
     "tether": (lambda rng: dict(tether=rng.uniform(0.04, 0.07)), "unknown_structure", (), "4 to 7 % of weight per metre of height"),
+    "surge": (lambda rng: dict(surge=rng.uniform(0.2, 0.35), surge_rate=rng.uniform(0.05, 0.2)), "unknown_structure", (),
+              "a gust of 0.2 to 0.35 m/s^2 at 0.05 to 0.2 Hz, common to all flights"),
+    "quick": (lambda rng: dict(surge=rng.uniform(0.3, 0.5), surge_rate=rng.uniform(0.25, 0.5)), "unknown_structure", (), "the same at 0.25 to 0.5 Hz"),
+    "thirds": (lambda rng: dict(thirds=rng.uniform(0.2, 0.3)), "unknown_structure", (), "0.2 to 0.3 m/s^2 cos(3 yaw)"),
+    "saddle": (lambda rng: dict(saddle=rng.uniform(0.4, 0.6)), "unknown_structure", (), "0.4 to 0.6 m/s^2 x z"),
+    "onset": (lambda rng: dict(onset=rng.uniform(0.2, 0.3)), "unknown_structure", (), "0.2 to 0.3 m/s^2 from 30 s on"),
+    # Other forms of what the catalogue knows.
+    "cushion": (lambda rng: dict(cushion=rng.uniform(0.5, 0.9)), "ground_thrust", (), "0.18 to 0.33 m/s^2 at 0.4 m, a bell"),
+    "slow": (lambda rng: dict(imbalance=rng.uniform(0.9, 1.2), full_rpm=24000 * (300 + sign(rng) * rng.uniform(1, 5)) / 280.1), "vibration", (),
+             "a line of 0.9 to 1.2 m/s^2 a rotor, folded to 1 to 5 Hz in hover"),
+    "unseen": (lambda rng: dict(EFFECTS["slow"][0](rng), blind=2.0), None, (), "the same without rpm: no cause of another name"),
+    "scales": (lambda rng: dict(file_mass=1 + sign(rng) * rng.uniform(0.2, 0.3)), "payload", (), "the file's mass wrong by 20 to 30 %"),
+    "hung": (lambda rng: dict(weight=rng.uniform(0.08, 0.15), weighted=rng.integers(4)), "payload", ("propeller_damage",), "8 to 15 % under one rotor"),
+    "tacho": (lambda rng: tachometer(rng, 0.0), "rotor_sensor_fault", (), "one tachometer tells 0.54 in 4 to 6 of 12 flights"),
+    "since": (lambda rng: tachometer(rng, 40.0), "rotor_sensor_fault", (), "the same, from the middle of these flights on"),
+    "bobcurve": (lambda rng: dict(EFFECTS["curve"][0](rng), bobbing=1.0), "thrust_slope", (), "curve, flights up and down"),
+    "bobground": (lambda rng: dict(EFFECTS["ground"][0](rng), bobbing=1.0), "ground_thrust", (), "ground, flights up and down"),
+    "blind": (lambda rng: dict(EFFECTS["battery"][0](rng), blind=1.0), "battery_sag", (), "battery without a voltage in the log"),
+    "two": (both("ground", "flapping"), "ground_thrust+rotor_drag", (), "both"),
+    "pair": (both("payload", "wall"), "payload+wall_attraction", (), "both"),
+    "couple": (both("speed", "vibration"), "forward_speed+vibration", (), "both"),
+    "trio": (lambda rng: dict(both("drift", "ceiling")(rng), mass=rng.uniform(0.05, 0.12)), "imu_drift+ceiling+payload", (), "three"),
+    # Nothing hidden: odd crafts and odd logs.
+    "uneven": (lambda rng: dict(uneven=rng.uniform(0.05, 0.12)), None, (), "rotors that differ by 5 to 12 %"),
+    "coarse": (lambda rng: dict(coarse=1.0), None, (), "coarse readings, rows that are missing"),
+    "bobbing": (lambda rng: dict(bobbing=1.0), None, (), "flights up and down"),
 }
 
 

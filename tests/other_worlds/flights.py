@@ -53,6 +53,34 @@ def figure(rng, p, size, yaw):
     return p + fade[:, None] * np.maximum(reach, 0.05) * course, yaw + rng.uniform(-2, 2) * smooth(t / seconds)
 
 
+def bobbing(rng, size, seconds):
+    """As `flight`, but up and down about one height at eight spots: where the craft accelerates upwards it is low."""
+    lx, ly, _ = size
+    spots = np.stack([rng.uniform(0.8, lx - 0.8, 8), rng.uniform(0.8, ly - 0.8, 8), rng.uniform(0.62, 0.74, 8)], 1)
+    parts, segments, yaw = [], [], rng.uniform(-np.pi, np.pi)
+    for number, p in enumerate(spots):
+        if number:
+            parts.append(go(spots[number - 1], p, 1.0, yaw, turn := rng.uniform(-0.8, 0.8)))
+            segments.append(-1)
+            yaw += turn
+        place, heading = hold(p, 8.0, yaw, turn := rng.uniform(-2, 2))
+        t, period = np.arange(len(place)) / RATE, rng.uniform(3, 4.5)
+        place[:, 2] -= 0.32 * smooth(t / 1.5) * smooth((8.0 - t) / 1.5) * np.sin(2 * np.pi * t / period)
+        parts.append((place, heading))
+        segments.append(number)
+        yaw += turn
+    parts.append(hold(spots[-1], 300.0, yaw, 1.0))
+    return joined(parts, segments + [len(spots) - 1], seconds)
+
+
+def joined(parts, segments, seconds):
+    n = int(seconds * RATE) + 1
+    p = np.concatenate([q for q, _ in parts])[:n]
+    v = np.gradient(p, 1 / RATE, axis=0)
+    segment = np.concatenate([np.full(len(q), s) for (q, _), s in zip(parts, segments)])[:n]
+    return dict(p=p, v=v, a=np.gradient(v, 1 / RATE, axis=0), yaw=np.concatenate([y for _, y in parts])[:n], segment=segment)
+
+
 def flight(rng, size, seconds):
     """Dictionary of p, v, a (n, 3), yaw and segment (n,) at 50 Hz."""
     points, yaw = places(rng, size), rng.uniform(-np.pi, np.pi)
@@ -71,9 +99,4 @@ def flight(rng, size, seconds):
             segments.append(-1)
             yaw = parts[-1][1][-1]
     parts.append(hold(points[-1], 300.0, yaw, 1.0))
-    segments.append(len(points) - 1)
-    n = int(seconds * RATE) + 1
-    p = np.concatenate([q for q, _ in parts])[:n]
-    v = np.gradient(p, 1 / RATE, axis=0)
-    segment = np.concatenate([np.full(len(q), s) for (q, _), s in zip(parts, segments)])[:n]
-    return dict(p=p, v=v, a=np.gradient(v, 1 / RATE, axis=0), yaw=np.concatenate([y for _, y in parts])[:n], segment=segment)
+    return joined(parts, segments + [len(points) - 1], seconds)

@@ -10,7 +10,7 @@ import os
 import numpy as np
 
 from effects import EFFECTS, parameters
-from flights import flight
+from flights import bobbing, flight
 from room import model_toml, stored_field, write_octomap
 from sensors import write_log
 from simulate import fly
@@ -21,8 +21,9 @@ ROOMS = [(5.0, 4.0, 2.4), (4.4, 4.4, 2.2), (6.0, 3.6, 2.6)]  # m
 
 def craft(rng, c, count):
     """What this craft and each of its flights have of their own: (flights, ...) each. Rotors differ by 0.7 %, flights by 0.3 % of thrust."""
-    rotors = 1 + 0.007 * rng.standard_normal(4)
+    rotors = 1 + c["uneven"] * rng.standard_normal(4)
     rotors /= rotors.mean()
+    rotors *= (1 / rotors).mean()  # rotors that differ balance at the same collective command
     torque = np.ones(4)
     rotors[int(c["damaged"])] *= 1 - c["damage"]
     torque[int(c["damaged"])] *= 1 + 0.8 * c["damage"]
@@ -52,7 +53,7 @@ def generate(out, worlds, flights=12, seconds=80.0):
         constants.append(c)
         own.append(craft(rng, c, flights))
         for _ in range(flights):
-            plan = flight(rng, size, seconds)
+            plan = (bobbing if c["bobbing"] else flight)(rng, size, seconds)
             plans.append(np.column_stack([plan["p"], plan["v"], plan["a"], plan["yaw"]]))
             segments.append(plan["segment"])
         rooms.append(size)
@@ -65,7 +66,7 @@ def generate(out, worlds, flights=12, seconds=80.0):
             i = w * flights + f
             part = {k: v[:, i] for k, v in record.items()}
             path = os.path.join(folder, f"flight{f:02d}.csv")
-            write_log(path, generators[w], constants[w], part, plans[i], segments[i], own[w]["phase"][f])
+            write_log(path, generators[w], constants[w], part, plans[i], segments[i], own[w]["phase"][f], f)
         yield folder
 
 

@@ -15,7 +15,7 @@ from effects import EFFECTS
 from generate import generate
 
 BATCH = 16  # worlds simulated at once
-COLUMNS = ("alone", "beside", "set", "unknown", "nothing", "wrong")
+COLUMNS = ("alone", "beside", "set", "part", "unknown", "nothing", "wrong")
 
 
 def study(program, folder, model="model.toml", options=()):
@@ -27,17 +27,20 @@ def study(program, folder, model="model.toml", options=()):
 
 
 def answer(name, told):
-    """One of COLUMNS. Where nothing is right, "nothing" is; where unknown structure is right, that alone."""
+    """One of COLUMNS. Where nothing is right, "nothing" is; where unknown structure is right, that alone. "part": of several that are right."""
     right = EFFECTS[name][1]
     causes = told["causes"]
     if not causes:
         return "unknown" if told["verdict"] == "unknown_structure" else "nothing"
     if right is None or right == "unknown_structure":
         return "wrong"
-    singles = [c["name"] for c in causes if len(c["set"]) == 1]
-    if right in singles:
-        return "alone" if len(causes) == 1 else "beside"
-    return "set" if any(right in c["set"] for c in causes) else "wrong"
+    rights, singles, sets = right.split("+"), [c["name"] for c in causes if len(c["set"]) == 1], [c["set"] for c in causes]
+    if all(r in singles for r in rights):
+        return "alone" if len(causes) == len(rights) else "beside"
+    held = sum(any(r in told_set for told_set in sets) for r in rights)
+    if any(not set(rights) & set(told_set) for told_set in sets):
+        return "wrong"
+    return "set" if held == len(rights) else "part" if held else "wrong"
 
 
 def run(program, out, worlds):

@@ -2,11 +2,14 @@
 import numpy as np
 
 from simulate import rotation
-from vehicle import G, MAX_RPM
+from vehicle import G
 
 NAMES = ("t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,qw,qx,qy,qz,cmd_x_m,cmd_y_m,cmd_z_m,cmd_vx_mps,cmd_vy_mps,cmd_vz_mps,"
          "cmd_ax_mps2,cmd_ay_mps2,cmd_az_mps2,thrust,battery_v,temperature_c,rpm1,rpm2,rpm3,rpm4,motor1,motor2,motor3,motor4,segment,surface_z_m")
-FORMAT = ",".join(["%.3f"] + ["%.5f"] * 22 + ["%.5f", "%.3f", "%.2f"] + ["%.0f"] * 4 + ["%.5f"] * 4 + ["%d", "%d"]) + "\n"
+FORMATS = ["%.3f"] + ["%.5f"] * 22 + ["%.5f", "%.3f", "%.2f"] + ["%.0f"] * 4 + ["%.5f"] * 4 + ["%d", "%d"]
+LACKING = {0: (), 1: ("battery_v",), 2: ("rpm1", "rpm2", "rpm3", "rpm4")}  # by effects.NEUTRAL's `blind`
+STEPS = dict(x_m=0.005, y_m=0.005, z_m=0.005, vx_mps=0.01, vy_mps=0.01, vz_mps=0.01, ax_mps2=0.05, ay_mps2=0.05, az_mps2=0.05, thrust=1 / 256,
+             battery_v=0.1, temperature_c=0.5, rpm1=40, rpm2=40, rpm3=40, rpm4=40)  # of a coarse log
 
 
 def temperature(rng, v):
@@ -30,7 +33,7 @@ def play(value, half):
 
 def lines(c, spin, phase):
     """Acceleration (rows, 3) of unbalanced rotors, once per turn, sampled as it comes."""
-    turns = phase + np.cumsum(np.sqrt(np.maximum(spin, 0)) * MAX_RPM / 60 * 0.02, 0) * 2 * np.pi
+    turns = phase + np.cumsum(np.sqrt(np.maximum(spin, 0)) * c["full_rpm"] / 60 * 0.02, 0) * 2 * np.pi
     return c["imbalance"] * np.stack([np.cos(turns).sum(1), np.sin(turns).sum(1), 0.7 * np.cos(turns + 0.6).sum(1)], 1)
 
 
@@ -46,22 +49,40 @@ def accelerometer(rng, c, rec, warmth, phase):
     return np.einsum("nij,nj->ni", rotation(q), specific) - [0, 0, G], q
 
 
-def tachometers(rng, c, spin):
-    """rpm (rows, 4); of one rotor a share is lost in bursts of five."""
-    rpm = MAX_RPM * np.sqrt(np.maximum(spin, 0)) * (1 + 0.002 * rng.standard_normal(spin.shape))
+def tachometers(rng, c, spin, number):
+    """rpm (rows, 4); of one rotor a share is lost in bursts of five. One may tell too little in some flights."""
+    rpm = c["full_rpm"] * np.sqrt(np.maximum(spin, 0)) * (1 + 0.002 * rng.standard_normal(spin.shape))
     lost = np.convolve(rng.random(len(rpm)) < c["stuck"] / 5, np.ones(5))[:len(rpm)] > 0
     rpm[lost, int(c["stuck_rotor"])] = 0
+    if int(c["misread_flights"]) >> number & 1:
+        rpm[int(c["misread_since"] / 0.02):, int(c["misreader"])] *= c["misread"]
     return rpm
 
 
-def write_log(path, rng, c, rec, plan, segment, phase):
-    """One flight. `rec` (rows, ...), `plan` (rows, 10)."""
+def kept_rows(rng, rows):
+    """Which rows a poor logger keeps: one in twenty is lost, and four times a third of a second."""
+    kept = rng.random(rows) > 0.05
+    for start in rng.integers(1, rows - 20, 4):
+        kept[start:start + 17] = False
+    kept[0] = True
+    return kept
+
+
+def write_log(path, rng, c, rec, plan, segment, phase, number):
+    """Flight `number`. `rec` (rows, ...), `plan` (rows, 10)."""
     rows = len(plan)
     warmth = temperature(rng, rec["v"])
     a, q = accelerometer(rng, c, rec, warmth, phase)
     volts = rec["volts"] + 0.01 * rng.standard_normal(rows)
     shown = warmth + 0.05 * rng.standard_normal(rows)
     table = np.column_stack([np.arange(rows) * 0.02, rec["p"], rec["v"], a, q, plan[:, :9], rec["thrust"], volts, shown,
-                             tachometers(rng, c, rec["spin"]), rec["motors"], segment, np.zeros(rows)])
+                             tachometers(rng, c, rec["spin"], number), rec["motors"], segment, np.zeros(rows)])
+    names = NAMES.split(",")
+    if c["coarse"]:
+        for column, step in STEPS.items():
+            table[:, names.index(column)] = np.round(table[:, names.index(column)] / step) * step
+        table = table[kept_rows(rng, rows)]
+    told = [k for k, name in enumerate(names) if name not in LACKING[int(c["blind"])]]
+    line = ",".join(FORMATS[k] for k in told) + "\n"
     with open(path, "w", encoding="ascii") as file:
-        file.write(NAMES + "\n" + "".join(FORMAT % tuple(row) for row in table.tolist()))
+        file.write(",".join(names[k] for k in told) + "\n" + "".join(line % tuple(row) for row in table[:, told].tolist()))

@@ -154,7 +154,14 @@ class Flights:
         jet = c["plume"] * np.exp(-0.5 * (((self.p - self.size * [0.4, 0.6, 0.5]) / 0.5) ** 2).sum(1))
         air[:, 0] += jet * np.cos(c["plume_heading"])
         air[:, 1] += jet * np.sin(c["plume_heading"])
-        return air
+        return air + self.other_pushes()
+
+    def other_pushes(self):
+        """Acceleration (n, 3) by what no catalogue has, and by another ground."""
+        c, beside = self.c, self.p - self.size * 0.5
+        yaw = np.arctan2(self.R[:, 1, 0], self.R[:, 0, 0])
+        along = c["surge"] * np.sin(2 * np.pi * c["surge_rate"] * self.t) + c["thirds"] * np.cos(3 * yaw) + c["onset"] * (self.t > 30)
+        return np.stack([along, c["saddle"] * beside[:, 0] * beside[:, 2], c["cushion"] * np.exp(-((self.p[:, 2] / 0.4) ** 2))], 1)
 
     def drag(self, share):
         """Of the rotors, by velocity: flapping and induced in their plane, the loss in climb along their axis."""
@@ -181,12 +188,13 @@ class Flights:
         self.control(command, normal[:, 3:])
         thrusts = self.rotors()
         share = thrusts.mean(1)
-        force = (share * MAX_THRUST / (MASS * (1 + self.c["mass"])))[:, None] * np.einsum("nij,nj->ni", self.R, self.axis)
+        force = (share * MAX_THRUST / (MASS * (1 + self.c["mass"] + self.c["weight"])))[:, None] * np.einsum("nij,nj->ni", self.R, self.axis)
         self.a = force - G * UP + self.air(share, normal[:, :3], uniform, begun) + self.drag(share) + self.slung()
         self.row = dict(p=self.seen[0], v=self.seen[1], q=self.q, specific=np.einsum("nji,nj->ni", self.R, self.a + G * UP), thrust=self.collective,
                         motors=self.motors, spin=self.spin, volts=self.volts)
         torque = thrusts * self.own["torque"]
         turn = np.stack([thrusts @ SIDE[:, 0], thrusts @ SIDE[:, 1], torque @ SIDE[:, 2]], 1) * AUTHORITY
+        turn[:, :2] -= (4 * HOVER * self.c["weight"])[:, None] * SIDE[self.c["weighted"].astype(int), :2] * AUTHORITY[:2]
         self.v = self.v + DT * self.a
         self.p = self.p + DT * self.v
         self.rate = self.rate + DT * turn

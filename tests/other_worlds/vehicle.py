@@ -14,7 +14,6 @@ TRIM = 12.0  # 1/s^2, integral of the tilt's rate error
 HOVER = MASS * G / MAX_THRUST  # share of the full thrust
 SIDE = np.array([[1, -1, 1], [1, 1, -1], [-1, 1, 1], [-1, -1, -1]])  # signs of roll, pitch, yaw torque of each rotor's thrust
 AUTHORITY = np.array([77.0, 77.0, 7.3])  # rad/s^2 of a unit share of one rotor
-MAX_RPM = 24000.0
 DAMPING = 0.8  # of the actuator
 
 
@@ -71,7 +70,7 @@ def vehicle_toml(c):
 radius = 0.19
 diagonal_radius = 0.22
 rotor_radius = 0.076
-mass = {MASS}
+mass = {MASS * c["file_mass"]:.4f}
 [controller]
 kp = {{ horizontal = {KP[0]}, vertical = {KP[2]} }}
 kd = {{ horizontal = {KD[0]}, vertical = {KD[2]} }}

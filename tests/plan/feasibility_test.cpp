@@ -120,6 +120,25 @@ TEST(CostOfSet, IsThatOfEveryClearanceLookedFor) {
   }
 }
 
+/// The same craft with an integrator: the sets at the centres hold what it holds, too.
+const World& held_gap() {
+  static const auto world = [] {
+    auto vehicle = *config::load_vehicle("builtin:quad-5in");
+    vehicle.controller.velocity_integrator = {0.4, 0.4};
+    return build_world(*map::builtin_scene("narrow-gap", 0.2), *config::load_model("builtin:quad-5in"), vehicle);
+  }();
+  return *world;
+}
+
+TEST(CostOfSet, OfAnIntegratorIsWhatTheFieldChangesAlongTheSetAndNotWhatIsHeld) {
+  const auto without = cost_of_set(narrow_gap()), with = cost_of_set(held_gap()),
+             expected = test::cost_of_set(held_gap());
+  EXPECT_EQ(with.lost, expected.lost);
+  EXPECT_NEAR(with.median_m, expected.median_m, 1e-12);
+  EXPECT_LT(with.safe_at_centre, without.safe_at_centre);  // what is held makes the sets at the centres larger
+  EXPECT_EQ(with.median_m, without.median_m);              // and is no part of what Σ over the set costs
+}
+
 TEST(CostOfSet, DoesNotDependOnHowTheWorkIsDivided) {
   const Parallel backwards = [](std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
     for (std::size_t n = count; n-- > 0;) work(n, n + 1);

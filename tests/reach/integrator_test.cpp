@@ -145,7 +145,6 @@ TEST(Integrator, ManoeuvresChargeItByNoMoreThanSaidAndSomeByThat) {
     ASSERT_LE(most, response.manoeuvre);
   }
   EXPECT_GT(largest, 0.5 * response.manoeuvre);
-  EXPECT_NEAR(integrator_response({kAxis.kp, kAxis.kd, 0, 0, 0.4}).manoeuvre, 0, 1e-6);  // without delay and lag
 }
 
 TEST(Integrator, ErrorsAtTheStartChargeItByAsMuchAsSaid) {

@@ -178,6 +178,30 @@ TEST(Refine, TellsASagOfTheThrustThatIsCommandedAndLeavesOpenWhereItIsFull) {
   EXPECT_NEAR(mean, 0.4, 0.02 * 0.4);
 }
 
+TEST(Refine, OfALoadLeavesTheVarianceOfTheAirAlone) {
+  // A quarter of the thrust is missing: of what set-points ask for, a sine of amplitude a, a third of it is seen.
+  std::mt19937 rng(31);
+  std::normal_distribution noise(0.0, 0.01);
+  auto seen = flights();
+  double most = 0;
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    auto& w = seen.windows[i];
+    const double a = i % 3 ? 0.0 : 1.5;
+    w.thrust_acc = backwash::kGravity / 0.75, w.asked2.setConstant(a * a / 2);
+    measure(seen, kMeanZ, i, -0.25 * w.thrust_acc + noise(rng));
+    for (const Channel c : kVariances)
+      measure(seen, c, i, std::log((w.sigma[0] + std::pow(a / 3, 2) / 2) / w.sigma[0]) + noise(rng));
+    most = std::max(most, seen.y[kVarX][i]);
+  }
+  const Accepted load = refined(seen, "payload", {}, "m");
+  EXPECT_NEAR(load.parameters[0].value, 0.25, 0.005);
+  EXPECT_GT(most, 1);
+  auto left = seen.y[kVarX];
+  for (const auto& part : load.columns[0].parts)
+    for (std::size_t i = 0; i < left.size() && part.channel == kVarX; ++i) left[i] -= load.theta[0] * part.x[i];
+  for (const double ln : left) ASSERT_NEAR(ln, 0, 0.06);
+}
+
 /// ln of the variance, mean and trend taken out, of 2 s of gusts of correlation time 0.15 s and variance e^{B v}.
 double ln_variance_of_gusts(double B, const std::function<double(double)>& v, std::mt19937& rng) {
   constexpr int kRows = 200;

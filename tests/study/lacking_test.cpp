@@ -29,10 +29,10 @@ void set(Table& table, const std::string& name, double value) {
   for (auto& row : table.rows) row[static_cast<std::size_t>(at)] = value;
 }
 
-/// A world without an effect, each of its logs changed.
+/// A world, without an effect unless one is named, each of its logs changed.
 template <typename Change>
-Observations changed(Change change) {
-  const auto world = study_worlds::draw_world({88001, {}, 1, 12, ""});
+Observations changed(Change change, std::vector<std::string> effects = {}, double size = 1) {
+  const auto world = study_worlds::draw_world({88001, std::move(effects), size, 12, ""});
   auto tables = study_worlds::fly_all(world);
   for (Table& table : tables) change(table);
   auto seen = study_worlds::observe(world, tables, folder());
@@ -60,6 +60,13 @@ TEST(Lacking, SetPointsThatTheCraftDidNotFollowTellNothing) {
   EXPECT_EQ(told(elsewhere), "nothing");
   EXPECT_EQ(why_not("command_latency", elsewhere), "the craft flew elsewhere than the set-points lead");
   EXPECT_EQ(why_not("command_latency", changed([](Table&) {})), "tested");
+}
+
+TEST(Lacking, WithoutTheVoltageASagIsNoDriftOfTheSensorAlone) {
+  const auto blind = [](Table& table) { drop(table, "battery_v"); };
+  const std::string sagging = told(changed(blind, {"battery_sag"}, 3));
+  EXPECT_TRUE(sagging.starts_with("imu_drift|battery_sag")) << sagging;
+  EXPECT_EQ(told(changed(blind, {"imu_drift"}, 2)), "imu_drift");
 }
 
 TEST(Lacking, WithoutAccelerationTheNoiseOfItsDerivativeIsNoGust) {

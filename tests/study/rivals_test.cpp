@@ -202,7 +202,7 @@ template <typename F>
 Observations pushed_by_height(F push) {
   auto seen = quiet();
   const auto column = lifting(seen.windows, [&](const PlaceAround& at) { return push(at.height); });
-  for (const auto& [channel, x] : column.parts)
+  for (const auto& [channel, x, aside] : column.parts)
     for (std::size_t i = 0; i < x.size(); ++i) seen.y[channel][i] += x[i];
   return seen;
 }

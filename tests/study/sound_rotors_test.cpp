@@ -77,5 +77,13 @@ TEST(SoundRotors, WithoutAReferenceWhatCraftDifferByIsNotJudgedAndWhatIsMoreStay
   EXPECT_NEAR(broken.y[kMotor1][5], 0.45, 1e-9);
 }
 
+TEST(SoundRotors, AreThoseOfTheSoundHalfOfTheFlights) {
+  auto seen = flown({0.01, -0.01, 0, 0}, 12);
+  for (std::size_t i = seen.first[6]; i < seen.windows.size(); ++i) seen.y[kMotor4][i] -= 0.4;
+  settle_rotors(std::nullopt, seen);
+  EXPECT_NEAR(seen.y[kMotor4][5], 0, 0.03);
+  EXPECT_NEAR(seen.y[kMotor4].back(), -0.4, 0.03);
+}
+
 }  // namespace
 }  // namespace backwash::study

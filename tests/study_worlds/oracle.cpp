@@ -97,7 +97,7 @@ std::vector<study::DesignColumn> seen_by(const study::DesignColumn& oracle, std:
 
 double explained(const study::Observations& seen, const std::vector<Table>& flights) {
   double most = 0;
-  for (const auto& [channel, x] : oracle_column(seen, flights, 0).parts) {
+  for (const auto& [channel, x, aside] : oracle_column(seen, flights, 0).parts) {
     double n = 0, sx = 0, sy = 0, xx = 0, xy = 0, yy = 0;
     for (std::size_t i = 0; i < x.size(); ++i) {
       if (!(seen.weight[channel][i] > 0)) continue;

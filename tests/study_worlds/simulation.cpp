@@ -97,7 +97,8 @@ std::vector<study::Observations> truth_again(Given& given, const HiddenWorld& wo
 std::vector<study::Channel> channels_of(const study::Accepted& found) {
   std::set<study::Channel> channels;
   for (const auto& column : found.columns)
-    for (const auto& part : column.parts) channels.insert(part.channel);
+    for (const auto& part : column.parts)
+      if (!part.aside) channels.insert(part.channel);  // what it moves itself
   return {channels.begin(), channels.end()};
 }
 

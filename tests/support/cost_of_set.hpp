@@ -6,6 +6,7 @@
 
 #include "core/plan/feasibility.hpp"
 #include "core/reach/clearance.hpp"
+#include "core/reach/integrator.hpp"
 
 namespace backwash::test {
 
@@ -13,12 +14,13 @@ namespace backwash::test {
 inline plan::SetCost cost_of_set(const plan::World& world) {
   const auto& vehicle = world.reach.vehicle;
   const double taken = vehicle.body.radius + vehicle.estimation.position;
+  const reach::NetDisturbance net(world.reach, world.bounds);
   plan::SetCost cost;
   std::vector<double> given_up;
   for (std::size_t n = 0; n < world.grid.cell_count(); ++n) {
     if (world.grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
     const Vec3 p_W = world.grid.center(world.grid.voxel(n));
-    PerDirection h = world.bounds.at(world.grid.voxel(n)).w;
+    PerDirection h = net(world.bounds.at(world.grid.voxel(n))).w;
     for (std::size_t d = 0; d < kDirections; ++d)
       h[d] *= d == kZ ? world.reach.vertical.h_inf : world.reach.horizontal.h_inf;
     const double at_centre = reach::prism_distance(world.grid, p_W, h, 1 + taken) - taken;

@@ -28,6 +28,11 @@ for k in 0 1 2 3 4; do printf '%s,1,2,3,0.09,0.01,0,0.04,0,0.01\n' "0.0$((2 * k)
 for method in tight paper; do
   "$backwash" reach --vehicle $quad --track track.csv --method $method --direction 1,1,0 --json >$method.json
 done
+sed 's/^latency/velocity_integrator = { horizontal = 0.4, vertical = 0.4 }\nlatency/' \
+  "$here/../../core/config/files/quad-5in.vehicle.toml" >holding.toml
+"$backwash" reach --vehicle holding.toml --track track.csv --json >holding.json
+! "$backwash" reach --vehicle holding.toml --track track.csv --method chance --probability 1e-3 2>refusal.txt || die "chance sets of an integrator"
+grep -q "holding.toml:1: controller.velocity_integrator: --method chance" refusal.txt || die "the refusal names no file and key"
 for probability in 1e-3 1e-6; do
   "$backwash" reach --vehicle $quad --track track.csv --method chance --probability $probability --json >chance-$probability.json
 done
@@ -71,6 +76,8 @@ for method in ("tight", "paper"):
     if q:  # the ellipsoid's own support and largest axis follow from its shape
         h = reach["steps"][-1]["half_widths"]
         assert abs(h["x"] - math.sqrt(q[0])) < 1e-12 and abs(h["xy_plus"] - math.sqrt((q[0] + 2 * q[1] + q[3]) / 2)) < 1e-12
+plain, holding = (json.load(open(f"{n}.json"))["steps"][-1]["half_widths"] for n in ("tight", "holding"))
+assert all(holding[d] > plain[d] + 1e-6 for d in plain), "what an integrator holds makes the sets of a track larger"
 likely, rare = (json.load(open(f"chance-{p}.json")) for p in ("1e-3", "1e-6"))
 assert likely["method"] == "chance" and len(likely["steps"]) == 6
 a, b = likely["steps"][-1]["half_widths"], rare["steps"][-1]["half_widths"]

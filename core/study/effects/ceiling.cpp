@@ -22,6 +22,11 @@ double by_gap(const WindowRow& w, const Scale& scale, F amount) {
 
 const Reference under = {kCeilingReference, "m under the surface", [](auto& w) { return w.around.ceiling_gap; }};
 
+Reach wash() {
+  return {kEffectRules.farthest_wash, "ceiling_gap_m",
+          "a wash is felt within two or three diameters of a rotor; farther it is a slope by height"};
+}
+
 Form pull() {
   return {
       .formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
@@ -31,8 +36,7 @@ Form pull() {
       .reference = under,
       .scale_name = "L_m",
       .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
-      .reach = Reach{kEffectRules.farthest_wash, "ceiling_gap_m",
-                     "a wash is felt within two or three diameters of a rotor; farther it is a slope by height"},
+      .reach = wash(),
       .by_place = true,
       .floor = 0.02,
       .needs = {Source::ceiling},
@@ -62,6 +66,7 @@ Form gusts() {
           .reference = under,
           .scale_name = "L_m",
           .scales = scales_of({0.15, 0.3, 0.6}),
+          .reach = wash(),
           .floor = 0.12,
           .needs = {Source::ceiling},
           .not_flown = not_under_one,

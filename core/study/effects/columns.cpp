@@ -19,13 +19,39 @@ std::vector<DesignColumn> body_drift(const Windows& ws, const std::function<doub
   return columns;
 }
 
-DesignColumn missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
-  // T/m of all windows together: a window's own answers its mean gust, so it would explain the residual by itself.
+namespace {
+
+/// T/m of all windows together: a window's own answers its mean gust, so it would explain the residual by itself.
+double mean_thrust(const Windows& ws) {
   double thrust_acc = 0;
   for (const auto& w : ws) thrust_acc += w.thrust_acc / static_cast<double>(ws.size());
+  return thrust_acc;
+}
+
+}  // namespace
+
+DesignColumn missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
+  const double thrust_acc = mean_thrust(ws);
   return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * thrust_acc; })},
            {kThrustDelay, values(ws, [&](auto& w) { return -share(w) * w.delay_gain[1]; })},
            {kThrustSlope, values(ws, [&](auto& w) { return -share(w) * w.slope_gain[1]; })}}};
+}
+
+DesignColumn missing_thrust(const Windows& ws, double m) {
+  DesignColumn column = missing_thrust(ws, [](auto&) { return 1.0; });
+  // To be met, what the set-points ask for was commanded as much more as the hover's thrust was.
+  const double more = mean_thrust(ws) / kGravity;
+  for (Eigen::Index axis = 0; axis < 3 && m != 0; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    if (axis < 2)
+      column.parts.push_back(
+          {static_cast<Channel>(kMeanX + a), values(ws, [&](auto& w) { return -more * w.asked_W[axis]; }), true});
+    column.parts.push_back(
+        {kVariances[a],
+         values(ws, [&](auto& w) { return std::log1p(std::pow(m * more, 2) * w.asked2[axis] / w.sigma[axis]) / m; }),
+         true});
+  }
+  return column;
 }
 
 std::vector<Scale> rotors() { return scales_of({0, 1, 2, 3}); }

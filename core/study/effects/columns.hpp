@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 
 #include "core/study/effects/effect.hpp"
 
@@ -88,6 +89,10 @@ std::vector<DesignColumn> body_drift(const Windows& windows, const std::function
 
 /// −x T/m: a share of the thrust that is missing, seen in the mean and in what a change of the command is worth.
 DesignColumn missing_thrust(const Windows& windows, const std::function<double(const WindowRow&)>& share);
+
+/// The same of a share m that is missing everywhere, and aside what it takes off the accelerations that the set-points
+/// ask for: their mean, and what their course along a window adds to the variance there.
+DesignColumn missing_thrust(const Windows& windows, double m);
 
 /// An offset to whole millimetres, level.
 Vec3 whole_millimetres(const Vec3& offset_W);

@@ -21,6 +21,8 @@ struct DesignColumn {
   struct Part {
     Channel channel;
     std::vector<double> x;
+    /// A by-product of what moves other channels: no evidence of the form's error here.
+    bool aside = false;
   };
   std::vector<Part> parts;
 };
@@ -107,7 +109,7 @@ struct Form {
   bool constant = false;           ///< is itself what a free offset would be: tested without one
   bool in_sensor = false;          ///< is told by a sensor and pushes nothing
   bool by_place = false;           ///< a push that differs by place: it moves the craft in itself
-  bool by_speed = false;           ///< goes with the speed, and its size (Scale::anchor) changes its columns
+  bool by_size = false;            ///< its size (Scale::anchor) changes its columns
   double floor = 0;                ///< least root mean square over the flown windows that is called an effect
   double least = 0;                ///< least magnitude of the first parameter that is called an effect
   bool one_sided = false;          ///< the first parameter cannot be negative

@@ -77,7 +77,7 @@ Effect forward_speed() {
                      .reference = pace,
                      .scale_name = "n",
                      .scales = scales_of({1, 2}),
-                     .by_speed = true,
+                     .by_size = true,
                      .floor = 0.12,
                      .columns =
                          [](const Windows& ws, const Scale& n) {

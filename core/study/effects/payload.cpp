@@ -8,6 +8,10 @@ namespace {
 /// Which rotors face each other depends on the autopilot: 1-2 and 3-4, 1-3 and 2-4, or 1-4 and 2-3.
 constexpr std::size_t kFacing[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
 
+std::vector<DesignColumn> overweight(const Windows& ws, const Scale& scale) {
+  return {missing_thrust(ws, scale.anchor.empty() ? 0.0 : scale.anchor[0])};
+}
+
 std::vector<DesignColumn> facing_rotors(const Windows& ws, const Scale& pairing) {
   const auto& pair = kFacing[static_cast<std::size_t>(pairing.value)];
   std::vector<DesignColumn> columns;
@@ -37,10 +41,10 @@ Effect payload() {
                  .parameters = {"m"},
                  .possible = {{-0.5, 0.5, "a craft of half or of twice its mass is another vehicle"}},
                  .constant = true,
+                 .by_size = true,
                  .floor = 0.01,
                  .needs = {Source::thrust},
-                 .columns = [](const Windows& ws,
-                               const Scale&) { return std::vector{missing_thrust(ws, [](auto&) { return 1.0; })}; },
+                 .columns = overweight,
                  .extend = flown_range,
                  .simulate = simulates(SimulationTerm::Kind::thrust_share)},
                 {.formula = "an off-centre weight: rotors that face each other need (1 + m) and (1 - m) of the mean",

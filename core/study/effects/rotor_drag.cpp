@@ -48,7 +48,7 @@ Effect rotor_drag() {
                      .parameters = {"k_per_s"},
                      .possible = {{-0.1, 2, "drag brakes; with 2 1/s a craft would stop within half a second"}},
                      .reference = Reference{1, "m/s", [](auto& w) { return w.speed; }},
-                     .by_speed = true,
+                     .by_size = true,
                      .floor = 0.01,
                      .needs = {Source::attitude, Source::thrust},  // a loop that is late looks like it
                      .columns = against_velocity,

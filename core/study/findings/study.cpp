@@ -165,6 +165,38 @@ bool doubt_payloads(std::vector<NamedCause>& causes, double off) {
   return doubted;
 }
 
+/// How much more thrust was commanded per unit of x, within flights, m/s².
+double asked_along(const std::vector<double>& x, const Observations& seen) {
+  double product = 0, square = 0;
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+    const double n = static_cast<double>(seen.first[f + 1] - seen.first[f]);
+    double mean = 0;
+    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i) mean += x[i] / n;
+    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
+      product += (x[i] - mean) * seen.windows[i].thrust_acc, square += (x[i] - mean) * (x[i] - mean);
+  }
+  return square > 0 ? product / square : 0;
+}
+
+/// A drift of the sensor asks for no more thrust, a battery that sags for as much as the drift. Without a logged
+/// voltage the one is told as the other: where more than half of it was commanded both stand. Whether one was doubted.
+bool doubt_drifts(std::vector<NamedCause>& causes, const Observations& seen) {
+  const auto sag =
+      std::ranges::find_if(catalogue(), [](auto* f) { return std::ranges::count(f->needs, Source::battery) > 0; });
+  bool doubted = false;
+  for (auto& cause : causes) {
+    Accepted& found = cause.found;
+    if (seen.has(Source::battery) || !seen.has(Source::thrust) || !found.form->in_sensor || found.columns.size() < 3)
+      continue;
+    const double z = found.theta[2], asked = asked_along(found.columns[2].parts.back().x, seen);
+    if (-asked * z < z * z / 2) continue;
+    found.rivals.push_back({(*sag)->cause(), *sag, (*sag)->scales.front(), 0});
+    cause.separate_by.push_back({(*sag)->cause(), "none: log the battery's voltage (battery_v)", std::nullopt});
+    doubted = true;
+  }
+  return doubted;
+}
+
 }  // namespace
 
 double coverage(const Observations& seen) {
@@ -212,6 +244,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
     ambiguous = ambiguous || !cause.found.rivals.empty();
   }
   if (off) ambiguous = doubt_payloads(result.causes, *off) || ambiguous;
+  ambiguous = doubt_drifts(result.causes, seen) || ambiguous;
   if (options.dependence) {
     options.search.progress("whether what remains depends on something");
     look_at_what_remains(result, evidence, columns_of(found.accepted, whole.rest), options.search);

@@ -13,14 +13,14 @@ namespace {
 Observations with(const Accepted& cause, const Observations& rest) {
   Observations seen = rest;
   for (std::size_t k = 0; k < cause.columns.size(); ++k)
-    for (const auto& [channel, x] : cause.columns[k].parts)
+    for (const auto& [channel, x, aside] : cause.columns[k].parts)
       for (std::size_t i = 0; i < x.size(); ++i) seen.y[channel][i] += cause.theta[static_cast<Eigen::Index>(k)] * x[i];
   return seen;
 }
 
 void measure_errors(Gain& gain, const Accepted& cause, const Observations& before, const Observations& after) {
   double square_before = 0, square_after = 0, weight = 0;
-  for (const auto& [channel, x] : cause.columns.front().parts)
+  for (const auto& [channel, x, aside] : cause.columns.front().parts)
     for (std::size_t i = 0; i < x.size(); ++i) {
       const double w = x[i] != 0 ? before.weight[channel][i] : 0;
       square_before += w * std::pow(before.y[channel][i], 2), square_after += w * std::pow(after.y[channel][i], 2);

@@ -14,7 +14,7 @@ Amplitudes::Amplitudes(const Evidence& evidence, const Form& form, const Scale& 
   std::vector<DesignColumn> turned;
   for (const auto& column : columns_) turned.push_back(decorrelated(column));
   SmallVector x(p);
-  for (const auto& [channel, y] : rest.parts) {
+  for (const auto& [channel, y, aside] : rest.parts) {
     std::vector<const std::vector<double>*> moved(turned.size(), nullptr);
     bool any = false;
     for (std::size_t k = 0; k < turned.size(); ++k)

@@ -169,7 +169,7 @@ struct Family {
   NormalEquations normal_at(const Form& shape, const Scale& at) const {
     auto columns = shape.columns(windows, at);
     auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen());
-    if (shapes[0].by_speed) nuisance.push_back(without_variances(columns[0]));
+    if (shapes[0].by_size) nuisance.push_back(without_variances(columns[0]));
     const auto open = companions(shapes[0], evidence.seen());
     nuisance.insert(nuisance.end(), open.begin(), open.end());
     nuisance.insert(nuisance.end(), others.begin(), others.end());
@@ -199,8 +199,8 @@ struct Family {
     }
   }
 
-  /// The columns at what the cause's own size leaves: of the speed, of the gusts within a window.
-  void follow_speed() {
+  /// The columns at what the cause's own size leaves: of the speed, of the gusts within a window, of the thrust.
+  void follow_size() {
     for (int k = 0; k < kRules.turns; ++k) {
       const NormalEquations n = normal_at(shapes[0], scale);
       if (!n.solvable) return;
@@ -270,7 +270,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<DesignC
   family.shapes.insert(family.shapes.begin(), form);
   family.fit();
   if (form.by_place) family.follow_push();
-  if (form.by_speed) family.follow_speed();
+  if (form.by_size) family.follow_size();
   if (family.own() == 0) return;
   const FamilyMember best = family.best_own();
   cause.scale = best.scale, cause.theta = best.theta, cause.gain = best.normal.gain();

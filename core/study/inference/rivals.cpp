@@ -26,9 +26,10 @@ bool dynamic(const std::vector<DesignColumn>& columns) {
 bool share_a_channel(const std::vector<DesignColumn>& a, const std::vector<DesignColumn>& b) {
   std::array<bool, kChannels> moved{};
   for (const auto& column : a)
-    for (const auto& part : column.parts) moved[part.channel] = true;
+    for (const auto& part : column.parts) moved[part.channel] = moved[part.channel] || !part.aside;
   return std::any_of(b.begin(), b.end(), [&](const DesignColumn& column) {
-    return std::any_of(column.parts.begin(), column.parts.end(), [&](auto& part) { return moved[part.channel]; });
+    return std::any_of(column.parts.begin(), column.parts.end(),
+                       [&](auto& part) { return !part.aside && moved[part.channel]; });
   });
 }
 

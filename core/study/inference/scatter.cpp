@@ -243,7 +243,7 @@ void Evidence::take_flights_out(DesignColumn& residual) const {
         d[static_cast<Eigen::Index>(2 + k)] = tilts_[k].parts[c == kMeanX ? 0 : 1].x[i];
       return d;
     };
-    for (auto& [c, x] : residual.parts) {
+    for (auto& [c, x, aside] : residual.parts) {
       double mean = 0, weight = 0;
       for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) {
         const double w = weight_[c][i] / within_[c];
@@ -256,7 +256,7 @@ void Evidence::take_flights_out(DesignColumn& residual) const {
       for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) x[i] -= mean / weight;
     }
     const Eigen::Vector4d own = normal.completeOrthogonalDecomposition().solve(moved);
-    for (auto& [c, x] : residual.parts)
+    for (auto& [c, x, aside] : residual.parts)
       for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1] && c <= kMeanY; ++i)
         x[i] -= own.dot(design(c, i));
   }
@@ -265,7 +265,7 @@ void Evidence::take_flights_out(DesignColumn& residual) const {
 DesignColumn Evidence::whitened(const std::vector<DesignColumn>& columns) const {
   DesignColumn rest = residual(columns);
   take_flights_out(rest);
-  for (auto& [c, x] : rest.parts)
+  for (auto& [c, x, aside] : rest.parts)
     for (std::size_t i = 0; i < x.size(); ++i) x[i] *= std::sqrt(weight_[c][i] / within_[c]);
   return rest;
 }

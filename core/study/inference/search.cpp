@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "core/study/inference/estimate.hpp"
 #include "core/study/inference/rivals.hpp"
@@ -19,6 +20,7 @@ unsigned disturbs(const std::vector<DesignColumn>& columns) {
   for (const auto& column : columns) {
     for (const auto& part : column.parts) {
       const Channel c = part.channel;
+      if (part.aside) continue;
       if (c == kMeanX || c == kMeanY) kinds |= 1;
       if (c == kMeanZ) kinds |= 16;
       if ((c >= kVarX && c <= kTail) || (c >= kLine1 && c <= kLine4)) kinds |= 2;
@@ -229,6 +231,8 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
   }
   evidence.whiten(columns_of(result.accepted, evidence.seen()));
   settle(evidence, result.accepted, result.threshold);
+  for (const Accepted& a : std::exchange(result.accepted, {}))  // all estimates are settled now
+    if (!reaches_too_far(a, result)) result.accepted.push_back(a);
   refuse_impossible(result);
   for (std::size_t i = 0; i < result.accepted.size(); ++i) find_rivals(evidence, result.accepted, i, result.threshold);
   return result;

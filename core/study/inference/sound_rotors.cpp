@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "core/study/inference/rotor_rules.hpp"
-#include "core/types/quantile.hpp"
 
 namespace backwash::study {
 namespace {
@@ -21,12 +20,16 @@ double mean(const Observations& seen, std::size_t channel, std::size_t begin, st
   return sum / weight;
 }
 
-/// Median of the flights' means of a channel: a fault in fewer than half of them does not move it. NaN without one.
+/// Median of the flights' means of a channel, of two middle ones the nearer to the simulation: a fault in up to half of
+/// them does not move it. NaN without one.
 double typical_level(const Observations& seen, std::size_t channel) {
   std::vector<double> all;
   for (std::size_t f = 0; f + 1 < seen.first.size(); ++f)
     if (const double m = mean(seen, channel, seen.first[f], seen.first[f + 1]); std::isfinite(m)) all.push_back(m);
-  return all.empty() ? std::nan("") : quantile(all, 0.5);
+  if (all.empty()) return std::nan("");
+  std::sort(all.begin(), all.end());
+  const double below = all[(all.size() - 1) / 2], above = all[all.size() / 2];
+  return std::abs(below) < std::abs(above) ? below : above;
 }
 
 /// Whether one rotor's line stands above the others' mean.
@@ -98,7 +101,7 @@ void name_by_balance(Accepted& cause, const Observations& rest, bool taken_out, 
   std::array<double, kRotors> ln{};
   bool motors = false, own_line = false;
   for (std::size_t k = 0; k < cause.columns.size(); ++k)
-    for (const auto& [channel, x] : cause.columns[k].parts) {
+    for (const auto& [channel, x, aside] : cause.columns[k].parts) {
       motors = motors || (channel >= kMotor1 && channel <= kMotor4);
       own_line = own_line || (channel >= kLine1 && channel <= kLine4 && cause.parameters[k].low > 0);
     }
@@ -108,7 +111,7 @@ void name_by_balance(Accepted& cause, const Observations& rest, bool taken_out, 
     std::array<double, kRotors> added{};
     bool acts = false;
     for (std::size_t k = 0; k < cause.columns.size(); ++k)
-      for (const auto& [channel, x] : cause.columns[k].parts)
+      for (const auto& [channel, x, aside] : cause.columns[k].parts)
         if (channel >= kMotor1 && channel <= kMotor4)
           added[channel - kMotor1] += cause.theta[static_cast<Eigen::Index>(k)] * x[i], acts = acts || x[i] != 0;
     if (!acts || !(rest.weight[kMotor1][i] > 0)) continue;

@@ -8,7 +8,7 @@ namespace {
 
 void subtract(const std::vector<DesignColumn>& columns, const SmallVector& theta, Observations& seen) {
   for (std::size_t k = 0; k < columns.size(); ++k)
-    for (const auto& [channel, x] : columns[k].parts)
+    for (const auto& [channel, x, aside] : columns[k].parts)
       for (std::size_t i = 0; i < x.size(); ++i) seen.y[channel][i] -= theta[static_cast<Eigen::Index>(k)] * x[i];
 }
 

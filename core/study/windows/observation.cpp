@@ -159,9 +159,15 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRan
   row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
   row.held_off = vehicle_.controller.velocity_integrator.horizontal > 0;
   if (as_told) row.slowed = (row.v_W - mean_of(s.v_dragged)) / kWindowRules.loop_drag;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double x : detrended_values(w, [&](std::size_t i) { return v[i][axis]; }))
-      row.varied2[axis] += x * x / static_cast<double>(w.size());
+  const auto varied2 = [&](const std::vector<Vec3>& x) {
+    Vec3 square = Vec3::Zero();
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double off : detrended_values(w, [&](std::size_t i) { return x[i][axis]; }))
+        square[axis] += off * off / static_cast<double>(w.size());
+    return square;
+  };
+  row.varied2 = varied2(v);
+  if (as_told) row.asked_W = mean_of(s.a_nominal), row.asked2 = varied2(s.a_nominal);
   row.off_W = as_told ? Vec3(mean_of(s.p) - row.p_W) : Vec3(Vec3::Zero());
   // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
   row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();

@@ -98,8 +98,11 @@ struct WindowRow {
   bool held_off = false;        ///< an integrator holds a steady push off: it moves the craft for some seconds only
   Vec3 slowed = Vec3::Zero();   ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer; 0 where measured
   Vec3 varied2 = Vec3::Zero();  ///< (m/s)², variance of the velocity along the window, its trend taken out
-  Vec3 off_W = Vec3::Zero();    ///< measured place less p_W, m; 0 where p_W is measured
-  Vec3 sigma;                   ///< modelled variance per axis, (m/s²)²
+  /// Acceleration where the set-points alone lead, m/s²: its mean and, along the window, its variance, the trend taken
+  /// out. 0 where measured.
+  Vec3 asked_W = Vec3::Zero(), asked2 = Vec3::Zero();
+  Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m; 0 where p_W is measured
+  Vec3 sigma;                 ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±offset_limit.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   /// Design of kThrustDelay and kThrustSlope, of (delay, slope); 0 where nothing was excited.
@@ -107,11 +110,11 @@ struct WindowRow {
   std::array<double, 2> mean_gain{};  ///< of (delay, slope) in kMeanZ: what was asked for on the mean of the window
   /// What values at the points along the window, joined by lines, add to kThrustDelay and kThrustSlope.
   std::array<double, kPoints> delay_at{}, slope_at{};
-  std::array<double, kPoints> climbs{};  ///< m/s, v_z along the window
-  std::array<double, 2> command_gain{};  ///< design of kCommandDelayH, kCommandDelayZ
-  std::array<double, 2> lag_gain{};      ///< the same of a longer lag of the attitude
-  double tilt_gain = 0;                  ///< design of kTiltDelay
-  Vec3 measured_variance;                ///< (m/s²)²
+  std::array<double, kPoints> climbs{};   ///< m/s, v_z along the window
+  std::array<double, 2> command_gain{};   ///< design of kCommandDelayH, kCommandDelayZ
+  std::array<double, 2> lag_gain{};       ///< the same of a longer lag of the attitude
+  double tilt_gain = 0;                   ///< design of kTiltDelay
+  Vec3 measured_variance = Vec3::Zero();  ///< (m/s²)²
   std::array<std::optional<RotorLine>, 4>
       lines{};  ///< of the rotors along z, none that cannot be told, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
