@@ -132,17 +132,25 @@ TEST(Structures, TheNullsMaximaAreThoseOfEveryCandidateInEveryDraw) {
   const auto seen = quiet();
   const Evidence evidence(seen);
   const auto draws = sign_draws(seen.units.size(), 40, 3);
-  for (const auto& all : {named_candidates(evidence, {}), structure_candidates(evidence, {})}) {
-    ASSERT_GT(all.size(), 50u);
-    std::vector<double> expected;
-    for (const auto& signs : draws) {
-      double most = 0;
-      for (const auto& c : all)
-        if (const double gain = c.normal.gain(signs); gain > most && c.effect(c.normal.fit(signs))) most = gain;
-      expected.push_back(most);
-    }
+  for (const auto each : {each_named, each_structure_candidate}) {
+    std::vector<double> expected(draws.size(), 0);
+    NullMaxima maxima(draws);
+    std::size_t count = 0;
+    each(evidence, {}, [&](SearchCandidate&& c) {
+      for (std::size_t d = 0; d < draws.size(); ++d)
+        if (const double gain = c.normal.gain(draws[d]); gain > expected[d] && c.effect(c.normal.fit(draws[d])))
+          expected[d] = gain;
+      maxima.add(c);
+      ++count;
+      if (count % 20 != 1) return;
+      const auto again = filled(outline(c), evidence, {});
+      EXPECT_EQ(again.gain, c.gain) << c.name;
+      ASSERT_EQ(again.columns.size(), c.columns.size());
+      EXPECT_EQ(again.columns.front().parts.front().x, c.columns.front().parts.front().x);
+    });
+    ASSERT_GT(count, 50u);
     std::sort(expected.begin(), expected.end());
-    EXPECT_EQ(null_maxima(all, draws), expected);
+    EXPECT_EQ(maxima.sorted(), expected);
   }
 }
 

@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
 #include <random>
 
+#include "core/study/inference/rules.hpp"
 #include "core/study/windows/distributions.hpp"
 
 namespace backwash::study {
@@ -99,6 +101,58 @@ TEST(TwoLevels, NeighboursThatAreAlikeInflateTheErrorOfAMean) {
 TEST(TwoLevels, StudentsTailIsThatOfTheDensity) {
   for (const double t : {0.0, 0.7, 3.0, 40.0})
     EXPECT_NEAR(student_tail(t, 1), 0.5 - std::atan(t) / std::numbers::pi, 1e-12) << t;
+}
+
+/// p of a division by its definition.
+double p_of(const std::vector<double>& values, const std::vector<bool>& high, double tried, double lost) {
+  double count[2] = {}, mean[2] = {}, square = 0;
+  for (std::size_t f = 0; f < values.size(); ++f) count[high[f]] += 1, mean[high[f]] += values[f];
+  if (count[0] == 0 || count[1] == 0) return 1;
+  for (const int k : {0, 1}) mean[k] /= count[k];
+  for (std::size_t f = 0; f < values.size(); ++f) square += std::pow(values[f] - mean[high[f]], 2);
+  const double n = static_cast<double>(values.size());
+  const double t = std::abs(mean[1] - mean[0]) / std::sqrt(square / (n - 2) * (1 / count[0] + 1 / count[1]));
+  return std::min(1.0, 3 * tried * 2 * student_tail(t, n - lost));
+}
+
+/// Least p of all divisions, each tried.
+double least_p(const std::vector<double>& values) {
+  const std::size_t n = values.size();
+  const double flights = static_cast<double>(n);
+  double least = 1;
+  const auto offer = [&](auto high, double tried, double lost) {
+    std::vector<bool> sides(n);
+    for (std::size_t f = 0; f < n; ++f) sides[f] = high(f);
+    least = std::min(least, p_of(values, sides, tried, lost));
+  };
+  for (std::size_t a = 2; a + 2 <= n; ++a) offer([=](std::size_t f) { return f >= a; }, flights - 1, 2);
+  for (std::size_t a = 1; a + 1 < n; ++a)
+    for (std::size_t b = a + 2; b < n; ++b)
+      offer([=](std::size_t f) { return f >= a && f < b; }, (flights - 1) * (flights - 2) / 2, 2);
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t k = 2; k + 2 <= n; ++k)
+    offer([&](std::size_t f) { return values[f] >= sorted[k]; }, std::exp2(flights - 1), 2 + kRules.level_scatter);
+  return least;
+}
+
+TEST(TwoLevels, TheDivisionIsTheClearestOfAllThatAreTried) {
+  std::mt19937 rng(11);
+  std::normal_distribution<double> normal;
+  int below = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const int flights = 6 + trial % 20;
+    const double step = 2 * (trial % 5), offset = trial % 3 == 0 ? 1000 : 0;
+    std::vector<double> values;
+    for (int f = 0; f < flights; ++f)
+      values.push_back(offset + normal(rng) + (f >= flights / 3 && f < flights / 3 + 1 + trial % 7 ? step : 0));
+    if (trial % 4 == 1)
+      for (double& x : values) x = std::round(x);  // many are the same
+    const double expected = least_p(values), found = two_levels(values, 0)->p;
+    below += expected < 1 ? 1 : 0;
+    EXPECT_NEAR(found, expected, 1e-6 * expected) << "trial " << trial;
+  }
+  EXPECT_GT(below, 100);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ namespace backwash::study {
 namespace {
 
 using std::numbers::pi;
+using Take = std::function<void(Structure&&)>;
 
 constexpr int kFew = static_cast<int>(kEffectRules.few_cosines), kMany = static_cast<int>(kEffectRules.many_cosines);
 constexpr int kTurns = static_cast<int>(kEffectRules.angle_turns);
@@ -42,19 +43,19 @@ std::vector<double> product(const std::vector<double>& a, const std::vector<doub
 
 Functions turn(int k, const std::vector<double>& angle) { return {cosine(k, angle), sine(k, angle)}; }
 
-void add_rank(std::vector<Structure>& all, const Regressor& along, const std::vector<double>& q) {
+void add_rank(const Take& take, const Regressor& along, const std::vector<double>& q) {
   Structure few{along.name, std::to_string(kFew) + " cosines", {}, {}};
   for (int k = 1; k <= kFew; ++k) few.functions.push_back(cosine(pi * k, q));
   Structure many = few;
   many.shape = std::to_string(kMany) + " cosines";
   for (int k = kFew + 1; k <= kMany; ++k) many.functions.push_back(cosine(pi * k, q));
-  all.push_back(std::move(few)), all.push_back(std::move(many));
+  take(std::move(few)), take(std::move(many));
 }
 
-void add_turns(std::vector<Structure>& all, const Regressor& along, const std::vector<double>& angle) {
+void add_turns(const Take& take, const Regressor& along, const std::vector<double>& angle) {
   Structure both{along.name, "turns 1 and 2", {}, turn(1, angle)};
   for (auto& x : turn(2, angle)) both.functions.push_back(std::move(x));
-  all.push_back(std::move(both));
+  take(std::move(both));
   for (int k = 1; k <= kTurns; ++k) {
     Structure one{along.name, "turn " + std::to_string(k), {}, turn(k, angle)};
     // The others in the order of their number.
@@ -62,19 +63,18 @@ void add_turns(std::vector<Structure>& all, const Regressor& along, const std::v
       const int other = n < k ? n : n + 1;
       return other <= kTurns ? turn(other, angle) : Functions{};
     };
-    all.push_back(std::move(one));
+    take(std::move(one));
   }
 }
 
-void add_products(std::vector<Structure>& all, const std::vector<std::string>& names,
-                  const std::vector<Functions>& bases) {
+void add_products(const Take& take, const std::vector<std::string>& names, const std::vector<Functions>& bases) {
   for (std::size_t a = 0; a < bases.size(); ++a)
     for (std::size_t b = a + 1; b < bases.size(); ++b) {
       Structure pair{names[a] + ", " + names[b], "products", {}, bases[a]};
       for (const auto& y : bases[b]) pair.functions.push_back(y);
       for (const auto& x : bases[a])
         for (const auto& y : bases[b]) pair.functions.push_back(product(x, y));
-      all.push_back(std::move(pair));
+      take(std::move(pair));
     }
 }
 
@@ -91,7 +91,7 @@ Functions tone(double hz, const Moments& windows) {
   return both;
 }
 
-void add_tones(std::vector<Structure>& all, const Windows& windows) {
+void add_tones(const Take& take, const Windows& windows) {
   const auto moments = std::make_shared<Moments>();
   double longest = 0;
   for (const auto& w : windows) {
@@ -103,30 +103,27 @@ void add_tones(std::vector<Structure>& all, const Windows& windows) {
     if (hz > kHighest) break;
     char shape[32];
     std::snprintf(shape, sizeof shape, "%.4f Hz", hz);
-    all.push_back({"t_s", shape, hz, tone(hz, *moments), [moments, hz](int n) {
-                     return (n + 1) * hz <= kHighest ? tone((n + 1) * hz, *moments) : Functions{};
-                   }});
+    take({"t_s", shape, hz, tone(hz, *moments),
+          [moments, hz](int n) { return (n + 1) * hz <= kHighest ? tone((n + 1) * hz, *moments) : Functions{}; }});
   }
 }
 
 }  // namespace
 
-std::vector<Structure> structures(const Observations& seen) {
-  std::vector<Structure> all;
+void each_structure(const Observations& seen, const std::function<void(Structure&&)>& take) {
   std::vector<std::string> names;
   std::vector<Functions> bases;
   for (const auto& along : regressors(seen)) {
     const auto u = ranks(along, seen.windows);
     if (along.circular)
-      add_turns(all, along, u);
+      add_turns(take, along, u);
     else
-      add_rank(all, along, u);
+      add_rank(take, along, u);
     names.push_back(along.name);
     bases.push_back(along.circular ? turn(1, u) : Functions{cosine(pi, u), cosine(2 * pi, u)});
   }
-  add_products(all, names, bases);
-  add_tones(all, seen.windows);
-  return all;
+  add_products(take, names, bases);
+  add_tones(take, seen.windows);
 }
 
 std::vector<DesignColumn> columns_in(const std::vector<Channel>& group, const Functions& functions) {

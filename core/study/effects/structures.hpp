@@ -24,10 +24,11 @@ struct Structure {
   std::function<Functions(int n)> further = [](int) { return Functions{}; };
 };
 
-/// Everything that is tried: cos(π k q), k = 1 … 4 and 1 … 8, of each regressor's rank q in [0, 1]; of an angle one and
-/// two turns, and each turn alone; products of the first two of any two regressors; tones of which the step is half of
-/// 1/(longest flight), from 1.5/(longest flight) to a quarter of a hertz, where a window of 2 s still shows 0.64 of it.
-std::vector<Structure> structures(const Observations& seen);
+/// Gives everything that is tried to `take`, one after another, for all of them are a thousand columns: cos(π k q), k =
+/// 1 … 4 and 1 … 8, of each regressor's rank q in [0, 1]; of an angle one and two turns, and each turn alone; products
+/// of the first two of any two regressors; tones of which the step is half of 1/(longest flight), from 1.5/(longest
+/// flight) to a quarter of a hertz, where a window of 2 s still shows 0.64 of it.
+void each_structure(const Observations& seen, const std::function<void(Structure&&)>& take);
 
 /// Functions as columns of one group of channels: level means each for themselves (a push may point anywhere in the
 /// plane), ln variance along all axes as one.

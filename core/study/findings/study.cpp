@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/study/findings/where_it_acts.hpp"
 #include "core/study/findings/words.hpp"
@@ -223,7 +224,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   Observations settled = seen;
   const auto off = settle_rotors(options.sound, settled);
   if (off) leave_unjudged(result, *off);
-  const WholeSearch whole = search_all(settled, options.search);
+  const WholeSearch whole = search_all(std::move(settled), options.search);
   const CauseSearchResult& found = whole.found;
   result.threshold = found.threshold;
   result.unknown = found.unknown, result.refused = found.refused;
@@ -266,12 +267,12 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
   constexpr int kFlips = static_cast<int>(kRules.power_flips);
   const auto draws = sign_draws(evidence.seen().units.size(), kFlips, options.seed + 1);
   std::map<std::string, std::map<std::string, double>> least;
-  for (const auto& c : named_candidates(evidence, {})) {
-    if (least.contains(c.name) && !least[c.name].contains(c.form->parameters[0])) continue;
+  each_named(evidence, {}, [&](SearchCandidate&& c) {
+    if (least.contains(c.name) && !least[c.name].contains(c.form->parameters[0])) return;
+    NormalEquations injected = c.normal;
     const auto power = [&](double size) {
       int found = 0;
       for (const auto& signs : draws) {
-        NormalEquations injected = c.normal;
         for (std::size_t f = 0; f < injected.b.size(); ++f)
           injected.b[f] = signs[f] * c.normal.b[f] + size * c.normal.A[f].col(0);
         if (injected.gain() >= threshold && c.effect(injected.fit())) ++found;
@@ -279,7 +280,7 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
       return static_cast<double>(found) / kFlips;
     };
     double low = kRules.power_low, high = kRules.power_high;  // ln of the parameter
-    if (power(std::exp(high)) < kRules.power) continue;
+    if (power(std::exp(high)) < kRules.power) return;
     for (int i = 0; i < kRules.power_halvings; ++i) {
       const double middle = (low + high) / 2;
       (power(std::exp(middle)) >= kRules.power ? high : low) = middle;
@@ -288,7 +289,7 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
     const double size = std::exp(high);
     const auto [at, fresh] = entry.emplace(c.form->parameters[0], size);
     if (!fresh) at->second = std::min(at->second, size);
-  }
+  });
   return least;
 }
 

@@ -37,8 +37,11 @@ class Amplitudes {
   Scale scale_;
   const Units* units_;
   std::vector<DesignColumn> columns_;
-  std::vector<SmallMatrix> A_;
-  std::vector<SmallVector> b_;
+  /// Of one window.
+  SmallMatrix A(std::size_t window) const;
+  SmallVector b(std::size_t window) const { return b_.col(static_cast<Eigen::Index>(window)); }
+
+  Eigen::MatrixXd A_, b_;  // a window a column: a SmallMatrix has room for many parameters, and windows are many
   SmallMatrix size_;
 };
 

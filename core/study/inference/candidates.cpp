@@ -2,6 +2,7 @@
 #include "core/study/inference/candidates.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -15,7 +16,7 @@ bool fitted(SearchCandidate& c, const Evidence& evidence, const std::vector<Desi
   if (c.columns.size() > static_cast<std::size_t>(kMostColumns)) return false;
   c.normal = evidence.normal(c.columns, nuisance);
   if (!c.normal.solvable) return false;
-  c.gain = c.normal.gain();
+  c.gain = c.normal.gain(), c.fit = c.normal.fit();
   c.size = evidence.size(c.columns);
   return true;
 }
@@ -27,26 +28,19 @@ std::vector<DesignColumn> beside(const std::vector<DesignColumn>& columns, const
   return nuisance;
 }
 
-/// Σ b of every draw may gain no more than all flights fitted together: ½ bᵀ(ΣA)⁻¹b, never less than the held-out
-/// gain. Of most candidates that is already less than the largest gain so far.
-class Bound {
- public:
-  explicit Bound(const NormalEquations& normal) : b_(normal.total.rows(), static_cast<Eigen::Index>(normal.b.size())) {
-    for (Eigen::Index f = 0; f < b_.cols(); ++f) b_.col(f) = normal.b[static_cast<std::size_t>(f)];
-    SmallMatrix total = normal.total;
-    total.diagonal() *= 1 - kRules.ridge;
-    whole_.compute(total);
-    b_ = whole_.matrixL().solve(b_).eval();
-  }
-  double most(const Eigen::VectorXd& signs) const {
-    if (whole_.info() != Eigen::Success) return INFINITY;
-    return 0.5 * (1 + kRules.bound_error) * (b_ * signs).squaredNorm();
-  }
+/// A form's candidate at a scale; whether it can be fitted.
+bool fit_form(SearchCandidate& c, const Evidence& evidence, const std::vector<DesignColumn>& accepted) {
+  const Observations& seen = evidence.seen();
+  c.columns = c.form->columns(seen.windows, c.scale);
+  return fitted(c, evidence, nuisance_of(*c.form, c.columns, accepted, seen));
+}
 
- private:
-  Eigen::MatrixXd b_;  // L⁻¹ b_f
-  Eigen::LLT<SmallMatrix> whole_;
-};
+/// Whether parameters near these may be an effect, as far as rounding goes.
+bool may_be_effect(const SearchCandidate& c, const SmallVector& theta) {
+  const SmallVector wide = (1 + kRules.bound_error) * theta;
+  const bool of_any_sign = c.form && c.form->one_sided && std::abs(wide[0]) <= kRules.bound_error * wide.norm();
+  return of_any_sign || c.large_enough(wide);
+}
 
 }  // namespace
 
@@ -73,31 +67,54 @@ std::vector<DesignColumn> nuisance_of(const Form& form, const std::vector<Design
   return form.constant ? accepted : beside(columns, accepted, seen);
 }
 
-std::vector<SearchCandidate> named_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted) {
-  std::vector<SearchCandidate> all;
-  const Observations& seen = evidence.seen();
+void each_named(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
+                const std::function<void(SearchCandidate&&)>& take) {
+  std::size_t number = 0;
   for (const Form* form : catalogue()) {
-    if (why_not_tested(*form, seen)) continue;
+    if (why_not_tested(*form, evidence.seen())) continue;
     for (const Scale& scale : form->scales) {
-      SearchCandidate c{form, form->cause(), scale, form->columns(seen.windows, scale), {}, 0, {}};
-      if (fitted(c, evidence, nuisance_of(*form, c.columns, accepted, seen))) all.push_back(std::move(c));
+      SearchCandidate c;
+      c.form = form, c.name = form->cause(), c.scale = scale, c.number = number++;
+      if (fit_form(c, evidence, accepted)) take(std::move(c));
     }
   }
-  return all;
 }
 
-std::vector<SearchCandidate> structure_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted) {
-  std::vector<SearchCandidate> all;
+void each_structure_candidate(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
+                              const std::function<void(SearchCandidate&&)>& take) {
   const Observations& seen = evidence.seen();
-  for (const auto& structure : structures(seen))
+  std::size_t number = 0;
+  each_structure(seen, [&](Structure&& structure) {
     for (const auto& [name, channels] : channel_groups()) {
       SearchCandidate c;
-      c.name = structure.along, c.columns = columns_in(channels, structure.functions);
+      c.name = structure.along, c.columns = columns_in(channels, structure.functions), c.number = number++;
       if (!fitted(c, evidence, beside(c.columns, accepted, seen))) continue;
       c.structure = {structure.along, structure.shape, structure.hz, {}, structure.further};
-      all.push_back(std::move(c));
+      take(std::move(c));
     }
-  return all;
+  });
+}
+
+SearchCandidate outline(SearchCandidate whole) {
+  whole.columns = {}, whole.normal = {};
+  return whole;
+}
+
+SearchCandidate filled(const SearchCandidate& outline, const Evidence& evidence,
+                       const std::vector<DesignColumn>& accepted) {
+  SearchCandidate whole = outline;
+  if (whole.form) {
+    fit_form(whole, evidence, accepted);
+    return whole;
+  }
+  const std::size_t groups = channel_groups().size();
+  std::size_t number = 0;
+  each_structure(evidence.seen(), [&](Structure&& structure) {
+    if (number++ == outline.number / groups)
+      whole.columns = columns_in(channel_groups()[outline.number % groups].second, structure.functions);
+  });
+  fitted(whole, evidence, beside(whole.columns, accepted, evidence.seen()));
+  return whole;
 }
 
 SearchCandidate with_harmonics(SearchCandidate found, const Evidence& evidence,
@@ -129,18 +146,54 @@ std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigne
   return draws;
 }
 
-std::vector<double> null_maxima(std::span<const SearchCandidate> all, const std::vector<std::vector<int>>& draws) {
-  std::vector<double> maxima(draws.size(), 0);
-  for (const auto& candidate : all) {
-    const Bound bound(candidate.normal);
-    for (std::size_t d = 0; d < draws.size(); ++d) {
-      const Eigen::VectorXd signs =
-          Eigen::Map<const Eigen::VectorXi>(draws[d].data(), static_cast<Eigen::Index>(draws[d].size())).cast<double>();
-      if (bound.most(signs) <= maxima[d]) continue;
-      const double gain = candidate.normal.gain(draws[d]);
-      if (gain > maxima[d] && candidate.effect(candidate.normal.fit(draws[d]))) maxima[d] = gain;
-    }
+NullMaxima::NullMaxima(const std::vector<std::vector<int>>& draws) : draws_(draws), maxima_(draws.size(), 0) {
+  const std::size_t flights = draws.empty() ? 0 : draws.front().size();
+  for (std::size_t f = 0; f < flights; f += 8) {
+    signs_.emplace_back(draws.size(), std::uint8_t{0});
+    for (std::size_t d = 0; d < draws.size(); ++d)
+      for (std::size_t k = 0; k < 8 && f + k < flights; ++k)
+        if (draws[d][f + k] > 0) signs_.back()[d] |= static_cast<std::uint8_t>(1u << k);
   }
+}
+
+Eigen::MatrixXd NullMaxima::sums(const NormalEquations& normal) const {
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(normal.total.rows(), static_cast<Eigen::Index>(draws_.size()));
+  std::array<double, 256> of_signs;
+  for (std::size_t g = 0; g < signs_.size(); ++g)
+    for (Eigen::Index row = 0; row < sums.rows(); ++row) {
+      of_signs[0] = 0;
+      for (std::size_t k = 0, end = 1; k < 8; ++k, end *= 2) {
+        const std::size_t f = 8 * g + k;
+        const double b = f < normal.b.size() ? normal.b[f][row] : 0;
+        for (std::size_t s = 0; s < end; ++s) of_signs[end + s] = of_signs[s] + b, of_signs[s] -= b;
+      }
+      for (std::size_t d = 0; d < draws_.size(); ++d) sums(row, static_cast<Eigen::Index>(d)) += of_signs[signs_[g][d]];
+    }
+  return sums;
+}
+
+/// Σ s b of a draw may gain no more than all flights fitted together: ½ bᵀ(ΣA)⁻¹b, never less than the held-out gain.
+/// For most draws that is already less than the largest gain so far, or their fit is too small to be an effect.
+void NullMaxima::add(const SearchCandidate& candidate) {
+  const auto& normal = candidate.normal;
+  SmallMatrix total = normal.total;
+  total.diagonal() *= 1 - kRules.ridge;
+  const Eigen::LLT<SmallMatrix> bounded(total);
+  const Eigen::LDLT<SmallMatrix> whole(normal.total);
+  const Eigen::MatrixXd all = sums(normal);
+  for (std::size_t d = 0; d < draws_.size(); ++d) {
+    const SmallVector sum = all.col(static_cast<Eigen::Index>(d));
+    if (bounded.info() == Eigen::Success &&
+        0.5 * (1 + kRules.bound_error) * SmallVector(bounded.matrixL().solve(sum)).squaredNorm() <= maxima_[d])
+      continue;
+    if (!may_be_effect(candidate, whole.solve(sum))) continue;
+    const double gain = normal.gain(draws_[d]);
+    if (gain > maxima_[d] && candidate.effect(normal.fit(draws_[d]))) maxima_[d] = gain;
+  }
+}
+
+std::vector<double> NullMaxima::sorted() const {
+  auto maxima = maxima_;
   std::sort(maxima.begin(), maxima.end());
   return maxima;
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -18,9 +19,11 @@ struct SearchCandidate {
   Scale scale;
   std::vector<DesignColumn> columns;
   NormalEquations normal;
-  double gain = 0;        ///< held out, nats
-  SmallMatrix size;       ///< θᵀ size θ: mean square of what the columns add
-  Structure structure{};  ///< of a structure, its functions left out: they are the columns
+  double gain = 0;         ///< held out, nats
+  SmallMatrix size;        ///< θᵀ size θ: mean square of what the columns add
+  Structure structure{};   ///< of a structure, its functions left out: they are the columns
+  SmallVector fit{};       ///< (ΣA)⁻¹ Σ b
+  std::size_t number = 0;  ///< among all that are tried
 
   /// Whether parameters are an effect at all: at least the stated floor, of the right sign, and possible.
   bool effect(const SmallVector& theta) const { return large_enough(theta) && !beyond_possible(theta); }
@@ -33,18 +36,39 @@ struct SearchCandidate {
 std::vector<DesignColumn> nuisance_of(const Form& form, const std::vector<DesignColumn>& columns,
                                       const std::vector<DesignColumn>& accepted, const Observations& seen);
 
-/// Every form of the catalogue that can be tested, at every scale, with the accepted columns as nuisance.
-std::vector<SearchCandidate> named_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted);
-/// Every structure in every group of channels.
-std::vector<SearchCandidate> structure_candidates(const Evidence& evidence, const std::vector<DesignColumn>& accepted);
+/// Gives every form of the catalogue that can be tested, at every scale, with the accepted columns as nuisance, to
+/// `take`: one after another, for the columns and normal equations of all flights are large.
+void each_named(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
+                const std::function<void(SearchCandidate&&)>& take);
+/// The same of every structure in every group of channels.
+void each_structure_candidate(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
+                              const std::function<void(SearchCandidate&&)>& take);
+/// Without its columns and normal equations.
+SearchCandidate outline(SearchCandidate whole);
+/// With them again.
+SearchCandidate filled(const SearchCandidate& outline, const Evidence& evidence,
+                       const std::vector<DesignColumn>& accepted);
 /// A structure's candidate with its further harmonics, as long as each adds kRules.harmonic_nats to the held-out gain.
 SearchCandidate with_harmonics(SearchCandidate found, const Evidence& evidence,
                                const std::vector<DesignColumn>& accepted);
 
 /// `flips` rows of ±1 per flight.
 std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigned seed);
-/// For each draw the largest gain of a candidate that would count as an effect, sorted; 0 where none gains.
-std::vector<double> null_maxima(std::span<const SearchCandidate> all, const std::vector<std::vector<int>>& draws);
+/// For each draw of signs the largest gain of a candidate that would count as an effect; 0 where none gains.
+class NullMaxima {
+ public:
+  explicit NullMaxima(const std::vector<std::vector<int>>& draws);
+  void add(const SearchCandidate& candidate);
+  std::vector<double> sorted() const;
+
+ private:
+  /// Σ s_f b_f of each draw, a column each: of eight flights the sums of all signs are tabled once.
+  Eigen::MatrixXd sums(const NormalEquations& normal) const;
+
+  const std::vector<std::vector<int>>& draws_;
+  std::vector<std::vector<std::uint8_t>> signs_;  // of eight flights and each draw: a bit a flight
+  std::vector<double> maxima_;
+};
 /// Share of the null that is at least as large, the data counted.
 double p_value(const std::vector<double>& sorted_null, double gain);
 

@@ -30,18 +30,51 @@ double median_distance(const MatrixXd& points) {
   return quantile(std::move(distances), 0.5);
 }
 
-/// ΦᵀΨ of one flight with Ψ turned round, a column for each turn; the first is as flown.
-MatrixXd turned_products(const MatrixXd& phi, const MatrixXd& psi) {
-  const Index n = phi.rows(), turns = std::min(n, kMostTurns);
-  MatrixXd products(phi.cols() * psi.cols(), turns);
-  for (Index j = 0; j < turns; ++j) {
-    const Index s = j * n / turns;
-    const MatrixXd product =
-        phi.topRows(n - s).transpose() * psi.bottomRows(n - s) + phi.bottomRows(s).transpose() * psi.topRows(s);
-    products.col(j) = product.reshaped();
+/// ΦᵀΨ of each flight with its Ψ turned round. They are made once where they are few, else when they are asked for: of
+/// ten thousand flights they are gigabytes.
+class TurnedProducts {
+ public:
+  TurnedProducts(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first)
+      : phi_(phi), psi_(psi) {
+    Index all = 0;
+    for (std::size_t f = 0; f + 1 < first.size(); ++f) {
+      const auto count = static_cast<Index>(first[f + 1] - first[f]);
+      if (count == 0) continue;
+      flights_.push_back({static_cast<Index>(first[f]), count, std::min(count, kMostTurns)});
+      all += flights_.back().turns * phi.cols() * psi.cols();
+    }
+    if (all > kMostKept) return;
+    for (std::size_t f = 0; f < flights_.size(); ++f) {
+      kept_.emplace_back(phi.cols() * psi.cols(), flights_[f].turns);
+      for (Index j = 0; j < flights_[f].turns; ++j) kept_.back().col(j) = made(f, j).reshaped();
+    }
   }
-  return products;
-}
+  std::size_t flights() const { return flights_.size(); }
+  Index turns(std::size_t flight) const { return flights_[flight].turns; }
+  /// Adds a flight's product; turn 0 is as flown.
+  void add(std::size_t flight, Index turn, Eigen::VectorXd& sum) const {
+    if (kept_.empty())
+      sum += made(flight, turn).reshaped();
+    else
+      sum += kept_[flight].col(turn);
+  }
+
+ private:
+  struct Flight {
+    Index begin, count, turns;
+  };
+  MatrixXd made(std::size_t flight, Index turn) const {
+    const auto [begin, n, turns] = flights_[flight];
+    const auto phi = phi_.middleRows(begin, n), psi = psi_.middleRows(begin, n);
+    const Index s = turn * n / turns;
+    return phi.topRows(n - s).transpose() * psi.bottomRows(n - s) + phi.bottomRows(s).transpose() * psi.topRows(s);
+  }
+  static constexpr Index kMostKept = Index{1} << 24;  // numbers: 128 MiB
+
+  const MatrixXd &phi_, &psi_;
+  std::vector<Flight> flights_;
+  std::vector<MatrixXd> kept_;
+};
 
 /// GroupRows of the windows that measure every channel of a group, and where each flight begins among them.
 struct GroupRows {
@@ -137,21 +170,17 @@ MatrixXd centred(MatrixXd phi, const std::vector<std::size_t>& first) {
 
 Independence turn_test(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first, int shifts,
                        int enough, unsigned seed) {
-  std::vector<MatrixXd> products;
-  for (std::size_t f = 0; f + 1 < first.size(); ++f) {
-    const auto begin = static_cast<Index>(first[f]), count = static_cast<Index>(first[f + 1] - first[f]);
-    if (count > 0) products.push_back(turned_products(phi.middleRows(begin, count), psi.middleRows(begin, count)));
-  }
+  const TurnedProducts products(phi, psi, first);
   const double n2 = std::pow(static_cast<double>(phi.rows()), 2);
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(phi.cols() * psi.cols());
-  for (const auto& p : products) sum += p.col(0);
+  for (std::size_t f = 0; f < products.flights(); ++f) products.add(f, 0, sum);
   const double hsic = sum.squaredNorm() / n2;
   std::mt19937_64 rng(seed);
   int above = 1, draw = 0;
   for (; draw < shifts && above <= enough; ++draw) {
     sum.setZero();
-    for (const auto& p : products)
-      sum += p.col(static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(p.cols())));
+    for (std::size_t f = 0; f < products.flights(); ++f)
+      products.add(f, static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(products.turns(f))), sum);
     above += sum.squaredNorm() / n2 >= hsic * (1 - kRules.same) ? 1 : 0;
   }
   return {hsic, above / (1.0 + draw)};

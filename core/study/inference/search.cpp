@@ -80,21 +80,32 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
     refine(evidence, accepted[i], columns_of(accepted, evidence.seen(), i));
 }
 
-/// What one step tries: the catalogue and the structures, each with the null of its own maxima and its share of the
-/// level.
+/// What one step tries: the catalogue and the structures, outlined, each with the null of its own maxima and its share
+/// of the level.
 struct SearchStep {
   std::vector<SearchCandidate> named, structures;
   std::vector<double> null_named, null_structures;
   double threshold, structure_threshold;  // nats
 
   SearchStep(const Evidence& evidence, const std::vector<DesignColumn>& accepted,
-             const std::vector<std::vector<int>>& draws, double level)
-      : named(named_candidates(evidence, accepted)),
-        structures(structure_candidates(evidence, accepted)),
-        null_named(null_maxima(named, draws)),
-        null_structures(null_maxima(structures, draws)),
-        threshold(least_gain(null_named, named_share() * level)),
-        structure_threshold(least_gain(null_structures, kRules.structure_share * level)) {}
+             const std::vector<std::vector<int>>& draws, double level) {
+    NullMaxima of_named(draws), of_structures(draws);
+    each_named(evidence, accepted, [&](SearchCandidate&& c) {
+      of_named.add(c);
+      named.push_back(outline(std::move(c)));
+    });
+    each_structure_candidate(evidence, accepted, [&](SearchCandidate&& c) {
+      of_structures.add(c);
+      structures.push_back(outline(std::move(c)));
+    });
+    null_named = of_named.sorted(), null_structures = of_structures.sorted();
+    threshold = least_gain(null_named, named_share() * level);
+    structure_threshold = least_gain(null_structures, kRules.structure_share * level);
+    // The largest gain first, in the order of trial where they are the same: who takes the first that will do fills in
+    // no other.
+    for (auto* all : {&named, &structures})
+      std::stable_sort(all->begin(), all->end(), [](auto& a, auto& b) { return a.gain > b.gain; });
+  }
 
   static double named_share() { return 1 - kRules.structure_share - kRules.dependence_share; }
   /// Gain above which p_value is at most `level`: so many of the null may be larger.
@@ -109,33 +120,43 @@ bool is_known(const SearchCandidate& c, const std::vector<Accepted>& accepted) {
                      [&](auto& a) { return c.form && a.form->effect == c.form->effect; });
 }
 
+/// What a step's candidates are judged beside.
+struct Beside {
+  const Evidence& evidence;
+  const std::vector<Accepted>& accepted;
+  const std::vector<DesignColumn>& columns;  ///< of the accepted
+  const std::vector<Known>& known;
+};
+
 /// The cause that gains most beside what is accepted, more than `led` nats, but is none that a vehicle can have.
-std::optional<Refused> impossible(const std::vector<SearchCandidate>& all, const std::vector<Accepted>& accepted,
-                                  const std::vector<Known>& known, double threshold, double led) {
-  std::optional<Refused> found;
+std::optional<Refused> impossible(const std::vector<SearchCandidate>& all, const Beside& beside, double threshold,
+                                  double led) {
   for (const auto& c : all) {
-    if (!c.form || is_known(c, accepted) || c.gain <= std::max(led, needed_gain(c, accepted, known, threshold)))
+    if (c.gain <= std::max(led, threshold)) return std::nullopt;
+    if (!c.form || is_known(c, beside.accepted)) continue;
+    const auto k = c.beyond_possible(c.fit);
+    if (!k || !c.large_enough(c.fit)) continue;
+    const auto whole = filled(c, beside.evidence, beside.columns);
+    if (c.gain <= needed_gain(whole, beside.accepted, beside.known, threshold) ||
+        !excludes_zero(whole.normal, whole.columns))
       continue;
-    const auto theta = c.normal.fit();
-    const auto k = c.beyond_possible(theta);
-    if (!k || !c.large_enough(theta) || !excludes_zero(c.normal, c.columns)) continue;
-    led = c.gain;
-    found = {c.name, c.form->formula, c.form->parameters[*k], theta[static_cast<Eigen::Index>(*k)],
-             c.form->possible[*k]};
+    return Refused{c.name, c.form->formula, c.form->parameters[*k], c.fit[static_cast<Eigen::Index>(*k)],
+                   c.form->possible[*k]};
   }
-  return found;
+  return std::nullopt;
 }
 
-const SearchCandidate* best_of(const std::vector<SearchCandidate>& all, const std::vector<Accepted>& accepted,
-                               const std::vector<Known>& known, double threshold, const Evidence& evidence) {
-  const SearchCandidate* best = nullptr;
+std::optional<SearchCandidate> best_of(const std::vector<SearchCandidate>& all, const Beside& beside,
+                                       double threshold) {
   for (const auto& c : all) {
-    if (is_known(c, accepted) || (best && c.gain <= best->gain)) continue;
-    if (c.gain <= needed_gain(c, accepted, known, threshold) || !c.effect(c.normal.fit())) continue;
-    if (c.form && error_of_form(*c.form, c.columns, c.gain, accepted, evidence)) continue;
-    if (!c.form || excludes_zero(c.normal, c.columns)) best = &c;
+    if (c.gain <= threshold) return std::nullopt;
+    if (is_known(c, beside.accepted) || !c.effect(c.fit)) continue;
+    auto whole = filled(c, beside.evidence, beside.columns);
+    if (c.gain <= needed_gain(whole, beside.accepted, beside.known, threshold)) continue;
+    if (c.form && error_of_form(*c.form, whole.columns, c.gain, beside.accepted, beside.evidence)) continue;
+    if (!c.form || excludes_zero(whole.normal, whole.columns)) return whole;
   }
-  return best;
+  return std::nullopt;
 }
 
 UnknownStructure told(const SearchCandidate& structure, double p) {
@@ -146,7 +167,8 @@ UnknownStructure told(const SearchCandidate& structure, double p) {
 }
 
 /// Whether a structure says more than any cause does, and more than the error of an accepted one could.
-bool leads(const SearchCandidate& structure, const SearchCandidate* cause, const std::vector<Accepted>& accepted) {
+bool leads(const SearchCandidate& structure, const std::optional<SearchCandidate>& cause,
+           const std::vector<Accepted>& accepted) {
   if (structure.gain < needed_structure(structure, accepted)) return false;
   return !cause ||
          structure.gain - cause->gain > std::max(kRules.structure_lead.value, kRules.structure_margin * cause->gain);
@@ -211,10 +233,10 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
                           options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value));
     if (step.named.empty() && step.structures.empty()) break;
     result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
-    const SearchCandidate* cause = best_of(step.named, result.accepted, options.known, step.threshold, evidence);
-    const SearchCandidate* structure =
-        best_of(step.structures, result.accepted, options.known, step.structure_threshold, evidence);
-    if (const auto no = impossible(step.named, result.accepted, options.known, step.threshold, cause ? cause->gain : 0))
+    const Beside beside{evidence, result.accepted, accepted, options.known};
+    const auto cause = best_of(step.named, beside, step.threshold);
+    const auto structure = best_of(step.structures, beside, step.structure_threshold);
+    if (const auto no = impossible(step.named, beside, step.threshold, cause ? cause->gain : 0))
       result.refused.push_back(*no);
     if (structure && leads(*structure, cause, result.accepted)) {
       drop_means_of(structure->columns, structure->gain, result.accepted);

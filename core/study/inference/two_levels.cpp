@@ -25,28 +25,50 @@ class Divisions {
  public:
   Divisions(const std::vector<double>& values, double least_spread) : values_(values), least_(least_spread) {}
 
-  /// `tried`: how many of this kind there are; `lost`: degrees of freedom.
+  /// Divisions of another kind. `tried`: how many there are; `lost`: degrees of freedom.
+  void begin(double tried, double lost) { tried_ = tried, lost_ = lost, clearest_ = -1; }
+
+  /// `off`: sum of the `count` values that are called high, all values taken about their mean. Of one kind, t rises
+  /// with off²/(count (n − count)): what is less clear by that than an earlier one has no less p, and most are.
   template <typename High>
-  void offer(High high, double tried, double lost) {
+  void offer(double off, std::size_t count, High high) {
+    const double n = static_cast<double>(values_.size()), k = static_cast<double>(count);
+    if (count == values_.size()) return look(high);  // all of one value
+    const double clear = off * off / (k * (n - k));
+    if (clear <= clearest_ * (1 - kRules.bound_error)) return;
+    clearest_ = std::max(clearest_, clear);
+    look(high);
+  }
+
+  const std::optional<TwoLevels>& best() const { return best_; }
+
+ private:
+  template <typename High>
+  void look(High high) {
     Side sides[2];
     for (std::size_t f = 0; f < values_.size(); ++f) sides[high(f) ? 1 : 0].add(values_[f]);
     const double n = static_cast<double>(values_.size()),
                  between = sides[1].sum / sides[1].n - sides[0].sum / sides[0].n;
     const double spread = std::max(least_, std::sqrt(std::max(0.0, sides[0].scatter() + sides[1].scatter()) / (n - 2)));
     const double t = std::abs(between) / (spread * std::sqrt(1 / sides[0].n + 1 / sides[1].n));
-    const double p = std::min(1.0, kRules.division_kinds * tried * 2 * student_tail(t, n - lost));
+    const double p = std::min(1.0, kRules.division_kinds * tried_ * 2 * student_tail(t, n - lost_));
     if (best_ && p >= best_->p) return;
     best_ = TwoLevels{{}, p, spread};
     for (std::size_t f = 0; f < values_.size(); ++f) best_->high.push_back(high(f) == (between > 0));
   }
 
-  const std::optional<TwoLevels>& best() const { return best_; }
-
- private:
   const std::vector<double>& values_;
-  double least_;
+  double least_, tried_ = 0, lost_ = 0, clearest_ = -1;
   std::optional<TwoLevels> best_;
 };
+
+/// Sums of the first 0, 1, … values about their mean.
+std::vector<double> sums_off_mean(const std::vector<double>& values) {
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  std::vector<double> sums{0};
+  for (const double x : values) sums.push_back(sums.back() + (x - mean));
+  return sums;
+}
 
 }  // namespace
 
@@ -54,17 +76,25 @@ std::optional<TwoLevels> two_levels(const std::vector<double>& values, double le
   const std::size_t n = values.size();
   if (static_cast<double>(n) < kRules.fewest_divided) return std::nullopt;
   const double flights = static_cast<double>(n);
+  const auto sum = sums_off_mean(values);
   Divisions divisions(values, least_spread);
+  divisions.begin(flights - 1, 2);
   for (std::size_t a = kFewestASide; a + kFewestASide <= n; ++a)
-    divisions.offer([a](std::size_t f) { return f >= a; }, flights - 1, 2);
+    divisions.offer(sum[n] - sum[a], n - a, [a](std::size_t f) { return f >= a; });
+  divisions.begin((flights - 1) * (flights - 2) / 2, 2);
   for (std::size_t a = 1; a + 1 < n; ++a)
     for (std::size_t b = a + kFewestASide; b < n; ++b)
-      divisions.offer([a, b](std::size_t f) { return f >= a && f < b; }, (flights - 1) * (flights - 2) / 2, 2);
+      divisions.offer(sum[b] - sum[a], b - a, [a, b](std::size_t f) { return f >= a && f < b; });
   std::vector<double> sorted = values;
   std::sort(sorted.begin(), sorted.end());
-  for (std::size_t k = kFewestASide; k + kFewestASide <= n; ++k)
-    divisions.offer([&](std::size_t f) { return values[f] >= sorted[k]; }, std::exp2(flights - 1),
-                    2 + kRules.level_scatter);
+  const auto sorted_sum = sums_off_mean(sorted);
+  divisions.begin(std::exp2(flights - 1), 2 + kRules.level_scatter);
+  for (std::size_t k = kFewestASide; k + kFewestASide <= n; ++k) {
+    const auto first =
+        static_cast<std::size_t>(std::lower_bound(sorted.begin(), sorted.end(), sorted[k]) - sorted.begin());
+    divisions.offer(sorted_sum[n] - sorted_sum[first], n - first,
+                    [&](std::size_t f) { return values[f] >= sorted[k]; });
+  }
   return divisions.best();
 }
 

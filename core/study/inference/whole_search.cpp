@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/inference/whole_search.hpp"
 
+#include <utility>
+
 #include "core/study/inference/rivals.hpp"
 
 namespace backwash::study {
@@ -28,8 +30,8 @@ void take_out(const InSomeFlights& cause, const std::vector<Accepted>& accepted,
 
 }  // namespace
 
-WholeSearch search_all(const Observations& seen, const CauseSearchOptions& options) {
-  WholeSearch all{{}, {}, seen};
+WholeSearch search_all(Observations seen, const CauseSearchOptions& options) {
+  WholeSearch all{{}, {}, std::move(seen)};
   for (;;) {
     Evidence evidence(all.rest);
     all.found = search(evidence, options);

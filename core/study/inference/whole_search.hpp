@@ -16,6 +16,6 @@ struct WholeSearch {
 
 /// Searches all flights, then flight by flight. Each cause that acts in some flights is taken out of those flights,
 /// with what it leaves open, and everything is searched anew, up to most_parts times. Real-time status: offline.
-WholeSearch search_all(const Observations& seen, const CauseSearchOptions& options);
+WholeSearch search_all(Observations seen, const CauseSearchOptions& options);
 
 }  // namespace backwash::study
