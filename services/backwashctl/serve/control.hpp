@@ -31,7 +31,7 @@ class Control {
 
   explicit Control(Station& station) : station_(station) {}
 
-  /// A page, by the name that it drew for itself, listens. False: there is one of that name, or there are too many.
+  /// A page with the token, by the name that it drew for itself, listens. False: there is one of that name, or there are too many.
   bool enter(const std::string& page);
   void leave(const std::string& page);
 

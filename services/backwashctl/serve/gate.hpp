@@ -27,6 +27,9 @@ struct Head {
 /// browser must say that it asks for our own page. What changes something needs the token, as JSON.
 std::optional<Reply> refused(const Head& head, int port, const std::string& token);
 
+/// Whether it is the token, in a time that does not tell how much of it was right.
+bool is_token(const std::string& said, const std::string& token);
+
 /// 128 random bits in hexadecimal.
 std::string draw_token();
 

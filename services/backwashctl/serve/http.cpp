@@ -9,6 +9,7 @@
 #include <chrono>
 #include <thread>
 
+#include "services/backwashctl/serve/connections.hpp"
 #include "services/command_line/exit_code.hpp"
 
 namespace backwash::ctl {
@@ -54,8 +55,8 @@ class Connection : public httplib::Stream {
   void get_local_ip_and_port(std::string& ip, int& port) const override { name(&getsockname, ip, port); }
   socket_t socket() const override { return socket_; }
 
-  /// Closes it so that the answer arrives: what was sent and not read would take it back.
-  void close() {
+  /// Before it is closed, so that the answer arrives: what was sent and not read would take it back.
+  void finish() {
     shutdown(socket_, SHUT_WR);
     const auto until = in(0.2);
     std::size_t left = std::size_t{64} << 10;
@@ -64,7 +65,6 @@ class Connection : public httplib::Stream {
       if (count <= 0) break;
       left -= std::min(left, static_cast<std::size_t>(count));
     }
-    ::close(socket_);
   }
 
  private:
@@ -105,23 +105,22 @@ class Connection : public httplib::Stream {
 
 /// Whether the connection that this thread was handed is one too many.
 thread_local bool too_many = false;
+/// Where the connection of this thread stands among the others.
+thread_local Connections::Place own_place;
 
-/// A thread for each connection that is allowed, and none that waits.
+/// A thread for each connection that is allowed. What waits for one waits for a connection that was shut.
 class Workers : public httplib::ThreadPool {
  public:
-  explicit Workers(std::atomic<std::size_t>& open) : ThreadPool(kConnections), open_(open) {}
+  explicit Workers(Connections& open) : ThreadPool(kConnections), open_(open) {}
   void enqueue(std::function<void()> job) override {
-    if (open_ < kConnections) {
-      ++open_;
-      return ThreadPool::enqueue(std::move(job));
-    }
+    if (open_.room()) return ThreadPool::enqueue(std::move(job));
     too_many = true;
     job();
     too_many = false;
   }
 
  private:
-  std::atomic<std::size_t>& open_;
+  Connections& open_;
 };
 
 class Server : public httplib::Server {
@@ -129,6 +128,8 @@ class Server : public httplib::Server {
   Server() {
     new_task_queue = [this] { return new Workers(open_); };
   }
+  /// The connection of this thread came with the token.
+  void prove() { open_.prove(own_place); }
   void end() {
     ends_ = true;
     stop();
@@ -146,14 +147,20 @@ class Server : public httplib::Server {
     const int on = 1;
     setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     Connection connection(socket, ends_);
+    std::string remote;
+    int port = 0;
+    connection.get_remote_ip_and_port(remote, port);
+    own_place = open_.enter(socket, remote);
     bool closed = false;
     const bool good = process_request(connection, true, closed, nullptr);
-    connection.close();
-    --open_;
+    connection.finish();
+    open_.leave(own_place);
+    ::close(socket);
+    open_.gone();
     return good;
   }
 
-  std::atomic<std::size_t> open_{0};
+  Connections open_{kConnections};
   std::atomic<bool> ends_{false};
 };
 
@@ -170,8 +177,13 @@ Head head_of(const httplib::Request& request) {
           request.has_header("Range")};
 }
 
-Asked asked_of(const httplib::Request& request) {
-  return {{request.params.begin(), request.params.end()}, request.body, request.remote_addr};
+/// Whether it came with the token: a browser's stream of events can say it in no header.
+bool proven(const httplib::Request& request, const std::string& token) {
+  return request.method == "POST" || is_token(request.get_param_value("token"), token);
+}
+
+Asked asked_of(const httplib::Request& request, bool commands = false) {
+  return {{request.params.begin(), request.params.end()}, request.body, request.remote_addr, commands};
 }
 
 void answer(const Reply& reply, httplib::Response& response) {
@@ -201,7 +213,7 @@ void open_stream(const std::variant<Reply, NextEvents>& opened, httplib::Respons
       });
 }
 
-void add_site(httplib::Server& server, const Site& site) {
+void add_site(httplib::Server& server, const Site& site, const std::string& token) {
   for (const auto& [path, file] : site.files)
     server.Get(path, [&file = file](const auto&, auto& response) { answer(file, response); });
   for (const auto& [path, read] : site.reads)
@@ -212,8 +224,8 @@ void add_site(httplib::Server& server, const Site& site) {
       answer(post(asked_of(request)), response);
     });
   for (const auto& [path, stream] : site.streams)
-    server.Get(path, [&stream = stream](const auto& request, auto& response) {
-      open_stream(stream(asked_of(request)), response);
+    server.Get(path, [&stream = stream, &token](const auto& request, auto& response) {
+      open_stream(stream(asked_of(request, proven(request, token))), response);
     });
 }
 
@@ -229,11 +241,12 @@ void serve_http(const Door& door, const Site& site, const std::function<void(int
     const int on = 1;
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   });
-  add_site(server, site);
+  add_site(server, site, door.token);
   int port = door.port;
   server.set_pre_routing_handler([&](const httplib::Request& request, httplib::Response& response) {
     const auto reply = refused(head_of(request), port, door.token);
     if (reply) answer(*reply, response);
+    if (!reply && proven(request, door.token)) server.prove();
     return reply ? httplib::Server::HandlerResponse::Handled : httplib::Server::HandlerResponse::Unhandled;
   });
   server.set_exception_handler(

@@ -14,6 +14,7 @@ namespace backwash::ctl {
 struct Asked {
   std::map<std::string, std::string> parameters;  ///< after the ?
   std::string body, remote;                       ///< remote: numeric address
+  bool commands = false;                          ///< it came with the token
 };
 
 /// Server-sent events of one stream: what is to be sent next, waited for at most 0.1 s; empty: nothing yet. Copies
@@ -35,7 +36,7 @@ struct Door {
 };
 
 /// Each connection is one request of at most kRequestBytes within kRequest_s, or a stream; at most kConnections at a
-/// time, a further one is closed. A client that takes no bytes for kWrite_s is dropped.
+/// time, for a further one another is closed (Connections). A client that takes no bytes for kWrite_s is dropped.
 constexpr std::size_t kRequestBytes = 16 << 10, kBodyBytes = 4 << 10, kConnections = 48;
 constexpr double kRequest_s = 3, kWrite_s = 1;
 

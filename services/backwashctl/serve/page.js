@@ -26,7 +26,7 @@ let behind_s = 0, least_s = Infinity // by how much more than the fastest event 
 
 let stream = null, refusals = 0
 function listen() {
-  stream = new EventSource('/events?page=' + page)
+  stream = new EventSource('/events?page=' + page + (token && '&token=' + encodeURIComponent(token)))
   least_s = Infinity
   stream.onmessage = (message) => {
     refusals = 0

@@ -32,10 +32,12 @@ std::string parameter(const Asked& asked, const std::string& name) {
 /// What a page is told 10 times a second. It gets the long parts again when they change.
 class PageEvents {
  public:
-  /// `surroundings`: null without a vehicle.
-  PageEvents(const Feed& feed, Control& control, const Surroundings* surroundings, std::string page)
-      : feed_(feed), control_(control), surroundings_(surroundings), page_(std::move(page)) {}
-  ~PageEvents() { control_.leave(page_); }
+  /// `surroundings`: null without a vehicle. `commands`: the page has entered, and leaves at the end.
+  PageEvents(const Feed& feed, Control& control, const Surroundings* surroundings, std::string page, bool commands)
+      : feed_(feed), control_(control), surroundings_(surroundings), page_(std::move(page)), commands_(commands) {}
+  ~PageEvents() {
+    if (commands_) control_.leave(page_);
+  }
   PageEvents(const PageEvents&) = delete;
   PageEvents& operator=(const PageEvents&) = delete;
 
@@ -73,6 +75,7 @@ class PageEvents {
   Control& control_;
   const Surroundings* surroundings_;
   std::string page_;
+  bool commands_;
   Json preview_;
   std::uint64_t path_number_ = 0;
   bool begun_ = false;
@@ -119,8 +122,9 @@ Site site_of(const Feed& feed, Control& control, Surroundings* surroundings) {
   site.streams["/events"] = [&feed, &control, surroundings](const Asked& asked) -> std::variant<Reply, NextEvents> {
     const std::string page = parameter(asked, "page");
     if (!is_name(page)) return refusal(400, "page must be 32 hexadecimal digits");
-    if (!control.enter(page)) return refusal(409, "this page is open already, or too many are");
-    const auto events = std::make_shared<PageEvents>(feed, control, surroundings, page);
+    // Who has no token cannot command, and takes no name from those who can.
+    if (asked.commands && !control.enter(page)) return refusal(409, "this page is open already, or too many are");
+    const auto events = std::make_shared<PageEvents>(feed, control, surroundings, page, asked.commands);
     return [events] { return events->next(); };
   };
   return site;
