@@ -12,9 +12,10 @@ import random
 import socket
 import subprocess
 import sys
-import threading
 import time
 import urllib.parse
+
+from crowd import Renewed
 
 url = urllib.parse.urlsplit(sys.argv[1])
 token, port, pid = url.fragment, url.port, int(sys.argv[2])
@@ -153,37 +154,6 @@ def memory() -> int:
     return int(next(line for line in pathlib.Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS")).split()[1])
 
 
-class Renewed:
-    """So many connections that say nothing; each that is closed comes again, for ever."""
-
-    def __init__(self, count: int):
-        self.over = threading.Event()
-        self.threads = [threading.Thread(target=self.hold) for _ in range(count)]
-
-    def hold(self) -> None:
-        while not self.over.is_set():
-            try:
-                with connect(0.3) as s:
-                    while not self.over.is_set():
-                        try:
-                            if not s.recv(100):
-                                break
-                        except TimeoutError:
-                            pass
-            except OSError:
-                pass
-
-    def __enter__(self) -> None:
-        for thread in self.threads:
-            thread.start()
-        time.sleep(0.5)
-
-    def __exit__(self, *_: object) -> None:
-        self.over.set()
-        for thread in self.threads:
-            thread.join()
-
-
 def check_slow(page: Page) -> None:
     """Who sends a byte now and then is closed after 3 s; of 100 connections without the token the newest are kept, and one with it
     gets in at once: a STOP, while 48 others are renewed for ever. A page with the token is not closed for them."""
@@ -215,7 +185,7 @@ def check_slow(page: Page) -> None:
         except ConnectionResetError:
             closed += 1
     assert 100 - closed <= 48, closed
-    with Renewed(48):
+    with Renewed(port, 48):
         took = []
         for _ in range(10):
             begun = time.monotonic()
