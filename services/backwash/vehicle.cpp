@@ -11,6 +11,7 @@
 #include "core/plan/gain_sweep.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
+#include "services/backwash/vehicle_file.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -172,7 +173,7 @@ int run(const Options& options) {
 
 Verb vehicle_verb(Command& app) {
   auto options = std::make_shared<Options>();
-  auto& group = app.add_subcommand("vehicle", "What a vehicle's gains make of its sets");
+  auto& group = app.add_subcommand("vehicle", "Vehicle files: begun, checked, and which gains a way needs");
   group.require_subcommand();
   auto& command = group.add_subcommand("tune", "The smallest gains with which a way is passable");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
@@ -189,7 +190,11 @@ Verb vehicle_verb(Command& app) {
       "follows:\nmeasure controller.attitude_lag and feedback_delay first.\nExample:\n"
       "  backwash vehicle tune --map builtin:apartment --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
       "    --start 3,4.2,1.2 --goal 7.4,3,1.2");
-  return {&group, [options] { return run(*options); }};
+  const Verb printed = vehicle_print_verb(group), checked = vehicle_check_verb(group);
+  return {&group, [options, printed, checked] {
+            if (printed.command->parsed()) return printed.run();
+            return checked.command->parsed() ? checked.run() : run(*options);
+          }};
 }
 
 }  // namespace backwash::services

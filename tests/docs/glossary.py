@@ -17,7 +17,7 @@ import subprocess
 import sys
 
 # What any reader of such documents knows, and what other people's programs call their modes.
-EVERYDAY = set("AMD CPU CSV EPYC HTML ICRA JSON LED README CONTRIBUTING SECURITY ROS SI TCP TOML UDP USB POSCTL STABILIZE".split())
+EVERYDAY = set("AMD CPU CSV EPYC HTML ICRA JSON LED README CONTRIBUTING SECURITY ROS SI TCP TOML UDP USB POSCTL STABILIZE BRAKE GUIDED LOITER RTL UART VSLAM".split())
 ABBREVIATION = re.compile(r"(?<![\w./-])([A-Z]{2,})s?(?![\w/-])")
 SPOKEN = {"κ": "kappa", "Σ": "sigma", "τ_w": "tau", "w̄": "w bar"}
 

@@ -12,6 +12,7 @@ import json
 import pathlib
 import re
 import sys
+from xml.etree import ElementTree
 
 
 def topics_of(interfaces: str) -> dict[str, tuple[bool, bool]]:
@@ -24,6 +25,9 @@ def members_of(idl: str) -> dict[str, dict[str, str]]:
     bare = re.sub(r"//[^\n]*", "", idl)
     structs = re.findall(r"struct (\w+)_ \{(.*?)\};", bare, re.S)
     return {name: {m[1]: m[0] for m in re.findall(r"(\S+)\s+(\w+)\s*;", body)} for name, body in structs}
+
+
+NUMBERS = {"double", "float", "long", "short"}
 
 
 def wrong_in_rviz(text: str, interfaces: str) -> list[str]:
@@ -81,16 +85,43 @@ def wrong_in_foxglove(layout: dict, interfaces: str, idl: dict) -> list[str]:
     return wrong
 
 
+# What ROS 2 has and the IDL does not say.
+OF_ROS2 = {"String": {"data": "string"}, "Vector3Stamped": {"header": "Header_", "vector": "geometry_msgs::msg::dds_::Vector3_"}}
+
+
+def types_of_recording(interfaces: str) -> dict[str, str]:
+    return {topic: type_.rsplit("/", 1)[1] for topics, type_ in re.findall(r"^\| ((?:`/[\w/]+`(?:, )?)+) \| (\w+/msg/\w+) \|", interfaces, re.M)
+            for topic in re.findall(r"`([^`]+)`", topics)}
+
+
+def wrong_in_plotjuggler(name: str, text: str, types: dict[str, str], idl: dict) -> list[str]:
+    """Each curve is TOPIC/member/…/number, with a topic that there is and members of its message; each plot has a curve."""
+    root, known, wrong = ElementTree.fromstring(text), idl | OF_ROS2, []
+    plots, curves = root.findall(".//plot"), [curve.get("name") for curve in root.iter("curve")]
+    if len(plots) < 5 or not all(plot.findall("curve") for plot in plots):
+        wrong.append(f"plotjuggler/{name}: {len(plots)} plots, and one of them may be empty")
+    for splitter in root.iter("DockSplitter"):
+        if not int(splitter.get("count")) == len(splitter) == len(splitter.get("sizes").split(";")):
+            wrong.append(f"plotjuggler/{name}: a splitter counts other plots than it has")
+    for curve in curves:
+        topic = next((t for t in types if curve.startswith(t + "/")), None)
+        type_ = types.get(topic)
+        for member in curve[len(topic) + 1:].split("/") if topic else []:
+            type_ = known.get((type_ or "").rsplit("::", 1)[-1].removesuffix("_"), {}).get(member)
+        if type_ not in NUMBERS:
+            wrong.append(f"plotjuggler/{name}: {curve} is no number of a message that there is")
+    return wrong
+
+
 def wrong_in_recorded(layout: dict, interfaces: str, idl: dict) -> list[str]:
     """The layout for files of backwash export: by its table of topics, and members of ROS 2's types."""
-    types = {topic: type_.rsplit("/", 1)[1] for topics, type_ in re.findall(r"^\| ((?:`/[\w/]+`(?:, )?)+) \| (\w+/msg/\w+) \|", interfaces, re.M)
-             for topic in re.findall(r"`([^`]+)`", topics)}
+    types = types_of_recording(interfaces)
     panels = layout["configById"]
     wrong = [] if sorted(placed(layout["layout"])) == sorted(panels) else ["foxglove: panels and places of the recorded one differ"]
     if len(types) < 10:
         wrong.append(f"foxglove: only {len(types)} topics of a recording are told")
     shown = [t for panel in panels.values() for t in panel.get("topics", {})] + values(panels, {"value", "topicPath", "topicToRender"})
-    known = idl | {"String": {"data": "string"}, "Vector3Stamped": {"header": "Header_", "vector": "geometry_msgs::msg::dds_::Vector3_"}}
+    known = idl | OF_ROS2
     for path in shown:
         topic, *members = path.split(".")
         type_ = types.get(topic)
@@ -121,6 +152,8 @@ def main() -> int:
     recorded = json.loads((package / "foxglove/recorded.json").read_text())
     every = idl | members_of((root / "idl/ros2.idl").read_text())
     wrong = wrong_in_recorded(recorded, interfaces, every) + wrong_in_rviz(rviz, interfaces) + wrong_in_foxglove(foxglove, interfaces, idl) + wrong_in_launch(launch, rviz)
+    for name, types in (("recorded.xml", types_of_recording(interfaces)), ("backwash.xml", {"/backwash/status": "Status"})):
+        wrong += wrong_in_plotjuggler(name, (package / "plotjuggler" / name).read_text(), types, every)
     manifest = (package / "package.xml").read_text()
     for module in re.findall(r"^from (\w+)", launch, re.M):
         if f"<exec_depend>{module}</exec_depend>" not in manifest:

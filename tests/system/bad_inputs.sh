@@ -11,7 +11,7 @@ refused() {
   shift 2
   timeout 20 "$backwash" "$@" >stdout 2>stderr
   local got=$? below=
-  [[ ${1:-} != vehicle ]] || below=" tune"
+  [[ ${1:-} != vehicle ]] || below=" $2"
   line=$(cat stderr)
   if [[ $got != "$code" || $(wc -l <stderr) != 1 || $line != "backwash${1:+ }${1:-}$below:"* || $line != *"$words"* ]]; then
     echo "backwash $*"
@@ -191,6 +191,11 @@ refused 65 "gravity.csv:1: az_mps2 has a median of 9.81 m/s²" study --log sound
 refused 65 "downwards.csv:1: z_m is below the map" study --log downwards.csv --vehicle $quad --map builtin:apartment
 refused 65 "no_attitude.csv:1: qw, qx, qy and qz have no length of 1" study --log no_attitude.csv --vehicle $quad
 refused 65 "gravity.csv:1: az_mps2" study --log sound.csv --reference gravity.csv --vehicle $quad
+refused 66 "quad-5in: no built-in vehicle; give builtin:quad-5in or" vehicle print quad-5in
+refused 66 "builtin:quad-5in: no built-in daemon" vehicle print builtin:quad-5in --kind daemon
+refused 64 "'modle' is not one of vehicle, model, daemon" vehicle print $quad --kind modle
+sed 's/^attitude_lag = 0.05/attitude_lag = 0.9/' "$here/../../core/config/files/quad-5in.vehicle.toml" >lag.toml
+refused 78 "lag.toml:10: key 'controller' = {…}: loop is unstable" vehicle check --vehicle lag.toml
 tune=(vehicle tune --map builtin:narrow-gap --model $quad --vehicle $quad --start 1,0,1 --goal 5,0,1)
 refused 66 "is a directory; needs the autopilot's parameter file" "${tune[@]}" --parameters .
 refused 66 "is a device; needs the autopilot's parameter file" "${tune[@]}" --parameters /dev/zero

@@ -35,8 +35,9 @@ for answer in adapt study; do
 done
 grep -q '"equal": *true' flight.mcap.replay
 
-PYTHONPATH=$source_dir/tests/system python3 - "$before" <<'PYTHON'
+PYTHONPATH=$source_dir/tests/system python3 - "$before" "$source_dir/ros2/backwash_bringup/plotjuggler/recorded.xml" <<'PYTHON'
 import csv, hashlib, json, struct, sys, time
+from xml.etree import ElementTree
 import raw_log
 
 before = int(sys.argv[1])
@@ -51,6 +52,9 @@ assert counts == {topic: n for topic, n in told["messages"].items() if n > 0}
 # Byte for byte the raw log, but for its first line.
 assert peer["raw"] == hashlib.sha256(open("flight.bwlog", "rb").read()[len(raw_log.MAGIC):]).hexdigest()
 assert counts["/backwash/raw_log"] == len(records)
+# PlotJuggler's layout finds every topic that it plots (its members: ros2_bringup).
+curves = [curve.get("name") for curve in ElementTree.parse(sys.argv[2]).iter("curve")]
+assert len(curves) >= 10 and all(any(curve.startswith(topic + "/") for topic, n in counts.items() if n) for curve in curves), curves
 
 # Wall time, by the flight's own: one difference for all of them.
 whole = odometry[0][0] - said["/backwash/odometry"][0]["t"]

@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""docs/guide.md says what the programs say: each message of its table is a text of the source, and every refusal of the mission
+is there; its table of reasons has each of core/types/mode.hpp once; its table of the vehicle file names each key of
+docs/interfaces.md; and what stands in its fenced blocks is what tests/system/guide.sh runs (commands()).
+
+guide.py SOURCE_DIR [BUILD_DIR]
+"""
+import pathlib
+import re
+import sys
+
+from page import expect, quoted, rows, sections, wrong
+
+MISSION = ("services/backwashd/mission.cpp", "services/backwashd/mission_route.cpp")
+LITERAL = r'"((?:[^"\\\n]|\\.)*)"'
+
+
+def commands(text: str) -> str:
+    """The fenced blocks of the page in their order: one script."""
+    return "\n".join(re.findall(r"^```\n(.*?)^```$", text, re.M | re.S))
+
+
+def literals(code: str) -> list[str]:
+    """String literals, adjacent ones as one."""
+    return ["".join(re.findall(LITERAL, run[0])) for run in re.finditer(rf"(?:{LITERAL}\s*)+", code)]
+
+
+def main() -> int:
+    root = pathlib.Path(sys.argv[1])
+    page = (root / "docs/guide.md").read_text()
+    part = sections(page)
+    texts = {text for folder in ("core", "services", "firmware_bridge") for source in (root / folder).rglob("*.cpp")
+             for text in literals(source.read_text())}
+    told = [quoted(row[0]) for row in rows(part["Troubleshooting by message"])[1:]]
+    if len(told) < 20 or not all(len(cell) == 1 for cell in told):
+        wrong.append("the table of messages has not one message in each row")
+    messages = {cell[0] for cell in told if cell}
+    for message in sorted(messages):
+        for piece in filter(None, message.split("…")):
+            if not any(piece in text for text in texts):
+                wrong.append(f"no program says '{piece}'")
+    refusals = {text for source in MISSION for text in re.findall(rf"refused\((?:std::string\()?{LITERAL}", (root / source).read_text())}
+    if len(refusals) < 15:
+        wrong.append(f"only {len(refusals)} refusals of the mission were found")
+    wrong.extend(f"the mission's '{text}' is not in the table" for text in sorted(refusals)
+                 if not any(message.partition("…")[0] == text for message in messages))
+    modes = (root / "core/types/mode.hpp").read_text()
+    reasons = set(re.findall(LITERAL, re.search(r"kReasonNames\{(.*?)\};", modes, re.S)[1]))
+    listed = [row[0] for row in rows(part["In flight: what it did, and what to do"])[1:]]
+    expect("reasons", set(listed), reasons)
+    wrong.extend(f"reason '{r}' stands twice" for r in set(listed) if listed.count(r) > 1)
+    keys = {k for row in rows(sections((root / "docs/interfaces.md").read_text())["Vehicle file"])[1:] for k in quoted(row[0])}
+    named = {k for row in rows(part["Your vehicle"])[1:] for k in quoted(row[0])}
+    for key in sorted(keys - {"name"}):  # .horizontal and .vertical are one subject, and the autopilot's own gains are those of kp and kd
+        stem = re.sub(r"\.(horizontal|vertical)$", "", key)
+        if stem not in named and not stem.startswith("controller.px4"):
+            wrong.append(f"the guide does not say what a wrong {stem} does")
+    if commands(page).count("\n") < 30:
+        wrong.append("the guide has hardly any commands")
+    for line in dict.fromkeys(wrong):
+        print(f"docs/guide.md: {line}")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
