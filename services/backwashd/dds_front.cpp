@@ -61,7 +61,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       acks_(dds::make_writer<dds::Ack>(participant_, config.dds.name_space)),
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
       diagnostics_(participant_, diagnostic_msgs_msg_dds__DiagnosticArray__desc, dds::kDiagnostics,
-                   dds::Delivery::state),  // the newest alone: a reader that takes nothing holds up no thread
+                   config.dds),  // the newest alone: a reader that takes nothing holds up no thread
       statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {
   waitset_.add(poses_.reader());

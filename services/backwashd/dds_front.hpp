@@ -19,6 +19,7 @@
 #include "services/backwashd/pose_source.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
+#include "services/backwashd/shown_writer.hpp"
 #include "services/dds/topics.hpp"
 #include "services/dds/writers.hpp"
 
@@ -72,7 +73,7 @@ class DdsFront {
   dds::ForeignWriters foreign_;
   dds::Writer<dds::Ack> acks_;
   dds::Writer<dds::Status> status_;
-  dds::Writer<dds::DiagnosticArray> diagnostics_;
+  ShownWriter<dds::DiagnosticArray> diagnostics_;
   dds::OtherWriters statuses_;
   dds::WaitSet waitset_;
 };

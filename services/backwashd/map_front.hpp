@@ -10,6 +10,7 @@
 #include "services/backwashd/refusals.hpp"
 #include "services/backwashd/scan_placement.hpp"
 #include "services/backwashd/shown_field.hpp"
+#include "services/backwashd/shown_writer.hpp"
 #include "services/dds/topics.hpp"
 #include "services/dds/writers.hpp"
 
@@ -56,10 +57,10 @@ class MapFront {
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;
   dds::ForeignWriters foreign_;
-  dds::Writer<dds::Tube> tube_;
-  dds::Writer<dds::Path> trajectory_;
-  dds::Writer<dds::MarkerArray> markers_;
-  dds::Writer<dds::Disturbance> disturbance_;
+  ShownWriter<dds::Tube> tube_;
+  ShownWriter<dds::Path> trajectory_;
+  ShownWriter<dds::MarkerArray> markers_;
+  ShownWriter<dds::Disturbance> disturbance_;
   dds::WaitSet waitset_;
 };
 
