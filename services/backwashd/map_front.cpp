@@ -23,10 +23,10 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
       scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
       foreign_(participant_, {&maps_, &scans_}),
-      tube_(dds::make_writer<dds::Tube>(participant_, config.dds.name_space)),
-      trajectory_(dds::make_writer<dds::Path>(participant_, config.dds.name_space)),
-      markers_(dds::make_writer<dds::MarkerArray>(participant_, config.dds.name_space)),
-      disturbance_(dds::make_writer<dds::Disturbance>(participant_, config.dds.name_space)),
+      tube_(participant_, config.dds.name_space),
+      trajectory_(participant_, config.dds.name_space),
+      markers_(participant_, config.dds.name_space),
+      disturbance_(participant_, config.dds.name_space),
       waitset_(participant_) {
   waitset_.add(maps_);
   waitset_.add(scans_);

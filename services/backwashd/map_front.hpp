@@ -10,6 +10,7 @@
 #include "services/backwashd/refusals.hpp"
 #include "services/backwashd/scan_placement.hpp"
 #include "services/backwashd/shown_field.hpp"
+#include "services/backwashd/shown_topic.hpp"
 #include "services/dds/topics.hpp"
 #include "services/dds/writers.hpp"
 
@@ -56,10 +57,10 @@ class MapFront {
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;
   dds::ForeignWriters foreign_;
-  dds::Writer<dds::Tube> tube_;
-  dds::Writer<dds::Path> trajectory_;
-  dds::Writer<dds::MarkerArray> markers_;
-  dds::Writer<dds::Disturbance> disturbance_;
+  ShownTopic<dds::Tube> tube_;
+  ShownTopic<dds::Path> trajectory_;
+  ShownTopic<dds::MarkerArray> markers_;
+  ShownTopic<dds::Disturbance> disturbance_;
   dds::WaitSet waitset_;
 };
 
