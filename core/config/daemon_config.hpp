@@ -14,15 +14,19 @@
 
 namespace backwash::config {
 
+/// Transforms that the daemon sends: none; frames.odometry in frames.map; the body in one of these too.
+enum class Transforms { none, map, vehicle };
+
 /// The daemon's one configuration file (an example with comments: files/backwashd.daemon.toml).
 struct Daemon {
   std::string vehicle, model;  ///< files, or builtin:NAME
   struct {
     int domain = 0;
-    std::string interface;       ///< network interface by name
-    std::string name_space;      ///< topics are rt/NAMESPACE/…: several vehicles share a domain
-    std::string odometry_topic;  ///< whole name on the wire, for any VIO
-    std::string security;        ///< folder of credentials of DDS Security; empty: everyone may speak
+    std::string interface;             ///< network interface by name
+    std::string name_space;            ///< topics are rt/NAMESPACE/…: several vehicles share a domain
+    std::string odometry_topic;        ///< whole name on the wire, for any VIO
+    Transforms tf = Transforms::none;  ///< what is sent on rt/tf
+    std::string security;              ///< folder of credentials of DDS Security; empty: everyone may speak
   } dds;
   struct {
     std::string map = "map";         ///< of maps, clouds, odometry and what the daemon sends

@@ -166,13 +166,20 @@ tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d
   return read_custom(file, twist, message, d.odometry);
 }
 
-tl::expected<void, ConfigError> check_frames(const StrictTable& file, const Daemon& d) {
+/// `sent`: dds.tf. Who takes poses and closures from rt/tf would hear itself there.
+tl::expected<void, ConfigError> read_frames(const StrictTable& file, const std::string& sent, Daemon& d) {
   if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
     return tl::unexpected(file.error("frames", "needs three different names"));
   // Of odometry a child frame says nothing of what is placed: VINS-Fusion's is its world.
   const std::string& child = d.odometry.child;
   if (d.odometry.message == PoseMessage::tf && (child == d.frames.map || child == d.frames.odometry))
     return tl::unexpected(file.error(kChild, "needs the vehicle's frame, none of the map or of the odometry"));
+  if (sent == "none") return {};
+  if (sent != "map" && sent != "vehicle")
+    return tl::unexpected(file.error("dds.tf", "needs \"none\", \"map\" or \"vehicle\""));
+  if (d.odometry.message == PoseMessage::tf)
+    return tl::unexpected(file.error("dds.tf", "needs \"none\": with odometry.message = \"tf\" others send them"));
+  d.dds.tf = sent == "map" ? Transforms::map : Transforms::vehicle;
   return {};
 }
 
@@ -266,11 +273,10 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
       {"link.device", &d.link.device},
       {"log.file", &d.log.file},
   };
-  const TextKey optional[] = {{"dds.security", &d.dds.security},
-                              {"frames.map", &d.frames.map},
-                              {"frames.odometry", &d.frames.odometry},
-                              {"frames.body", &d.frames.body},
-                              {kAdaptation[1], &d.adaptation.file}};
+  std::string tf = "none";
+  const TextKey optional[] = {{"dds.security", &d.dds.security}, {"dds.tf", &tf},
+                              {"frames.map", &d.frames.map},     {"frames.odometry", &d.frames.odometry},
+                              {"frames.body", &d.frames.body},   {kAdaptation[1], &d.adaptation.file}};
   std::vector<std::string_view> others{kLive, kAdaptation[0], kAdaptation[1], kProtocol, kSigningKeyFile};
   others.insert(others.end(), std::begin(kOdometry), std::end(kOdometry));
   others.insert(others.end(), std::begin(kGpio), std::end(kGpio));
@@ -283,7 +289,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (auto read = read_odometry(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
-  if (auto good = check_frames(*file, d); !good) return tl::unexpected(good.error());
+  if (auto good = read_frames(*file, tf, d); !good) return tl::unexpected(good.error());
   if (auto read = read_flags(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = convert(*file, converted, d); !good) return tl::unexpected(good.error());
   return d;

@@ -122,7 +122,7 @@ Command& add_convert(Command& group, const std::shared_ptr<Options>& options) {
   auto& command = group.add_subcommand("convert", "A mesh, a point cloud or a map of others as a map to fly in");
   command
       .add_option("file", options->map.file,
-                  "OctoMap (.bt, .ot), builtin:NAME, .ply, .pcd, .csv, .obj, .gltf, .glb, .stl")
+                  "OctoMap (.bt, .ot), builtin:NAME, .ply, .pcd, .csv, .mcap, .obj, .gltf, .glb, .stl")
       .required();
   command.add_option("-o,--out", options->out, "binary OctoMap file, .bt").required();
   command.add_option("--resolution", options->map.resolution, "edge of a voxel, m; default an OctoMap's own, else 0.1")
@@ -142,6 +142,7 @@ Command& add_convert(Command& group, const std::shared_ptr<Options>& options) {
       .add_text("--sensor", points_to(options->map.sensors, "--sensor"),
                 "a cloud: where it was seen from; the rays to its points are free, m")
       .type_name("X,Y,Z");
+  command.add_option("--topic", options->map.topic, "a recording: its clouds, where it holds those of several topics");
   command.add_option("--points-least", options->map.points_least, "a cloud: points that make a voxel occupied")
       .check(within(1, 65535))
       .capture_default_str();

@@ -104,7 +104,9 @@ void add_mesh(const maps::Geometry& geometry, MadeMap& made) {
 }
 
 MadeMap from_geometry(const MapOptions& options) {
-  auto read = maps::read_geometry(options.file);
+  if (!options.topic.empty() && !options.file.ends_with(".mcap"))
+    throw Failure(kUsage, "--topic is of recordings; " + options.file + " is none");
+  auto read = maps::read_geometry(options.file, options.topic);
   if (!read)
     throw Failure(read.error().kind == map::MapError::Kind::not_found ? kNoInput : kBadData, read.error().message);
   maps::Geometry& geometry = *read;

@@ -12,6 +12,7 @@ namespace backwash::services {
 /// Where a file's content goes, and with what voxels, as the options say it.
 struct MapOptions {
   std::string file, up;
+  std::string topic;                        ///< of a recording's clouds; empty: it has one
   std::optional<double> resolution, scale;  ///< m; m per unit of the file
   map::Placement place;                     ///< its rotation is the one about W's axes, after `up`
   std::optional<std::pair<Vec3, Vec3>> crop;

@@ -41,7 +41,7 @@ auto made(ExitCode code, Make&& make) {
   try {
     return make();
   } catch (const std::exception& e) {
-    throw StartError(code, e.what());
+    throw StartError(dynamic_cast<const dds::NotPermitted*>(&e) ? kConfiguration : code, e.what());
   }
 }
 

@@ -62,8 +62,11 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
       diagnostics_(participant_, diagnostic_msgs_msg_dds__DiagnosticArray__desc, dds::kDiagnostics,
                    config.dds),  // the newest alone: a reader that takes nothing holds up no thread
+      transforms_(config),
       statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {
+  if (config.dds.tf != config::Transforms::none)
+    tf_.emplace(participant_, tf2_msgs_msg_dds__TFMessage__desc, dds::kTf, config.dds, dds::Delivery::sent_tf);
   waitset_.add(poses_.reader());
   waitset_.add(closures_);
   waitset_.add(commands_);
@@ -94,6 +97,7 @@ void DdsFront::take_odometry(const dds::Odometry& m, const dds::Guid& writer) {
   if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
   channels_.odometry.write(*sample);
   channels_.poses.push(*sample);
+  transforms_.add(*sample);
 }
 
 void DdsFront::take_poses() {
@@ -113,6 +117,7 @@ void DdsFront::take_closure(const dds::TransformStamped& m, const dds::Guid& wri
   if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
   channels_.loop_closures = localization_.closures();
   channels_.map_from_odom.write(*localization_.map_from_odom());
+  transforms_.close(*localization_.map_from_odom());
 }
 
 // What the next writer said was refused while this one was not known to be gone; it is said once.

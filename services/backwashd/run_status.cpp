@@ -166,6 +166,7 @@ void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
     s.session = accepted.session;
     s.sequence_number = accepted.sequence;
     status_.write(s);
+    if (const auto& shown = transforms_.message(now_ns()); tf_ && shown.transforms._length > 0) tf_->write(shown);
     if (rounds++ % kDiagnosticsEvery == 0) diagnostics_.write(ShownDiagnostics(s, name_space_).message());
   }
 }

@@ -12,16 +12,16 @@ namespace backwash::daemon {
 /// Says in the daemon's log which topic its credentials do not allow, and which command makes others.
 void warn_not_permitted(const std::string& topic, const decltype(config::Daemon::dds)& config);
 
-/// Writer of what people look at and nothing flies by, of Delivery::state. Credentials may be older than its topic:
+/// Writer of what people look at and nothing flies by. Credentials may be older than its topic:
 /// then that is said once, at the start, and nothing is written (docs/faults.md row 29). Answers and status are not of
 /// this kind: without them no start.
 template <typename T>
 class ShownWriter {
  public:
   ShownWriter(const dds::Participant& participant, const dds_topic_descriptor& type, const std::string& topic,
-              const decltype(config::Daemon::dds)& config) {
+              const decltype(config::Daemon::dds)& config, dds::Delivery delivery = dds::Delivery::state) {
     try {
-      writer_.emplace(participant, type, topic, dds::Delivery::state);
+      writer_.emplace(participant, type, topic, delivery);
     } catch (const dds::NotPermitted&) {
       warn_not_permitted(topic, config);
     }

@@ -36,7 +36,8 @@ constexpr const char* kReceiveBuffer = "32MiB";
 
 Entity checked(dds_return_t code, const std::string& what) {
   if (code == DDS_RETCODE_NOT_ALLOWED_BY_SECURITY)
-    throw NotPermitted("DDS: " + what + ": the permissions of its credentials do not allow it");
+    throw NotPermitted("DDS: " + what +
+                       ": the permissions of its credentials do not allow it; backwash keys add makes others");
   if (code < 0) throw Error("DDS: " + what + ": " + dds_strretcode(-code));
   return code;
 }
@@ -90,6 +91,7 @@ dds_qos_t* make_qos(Delivery delivery) {
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST,
                    delivery == Delivery::reliable || delivery == Delivery::tf ? 64
                    : delivery == Delivery::scans                              ? 8
+                   : delivery == Delivery::sent_tf                            ? 100
                                                                               : 1);
   dds_qset_durability(qos, delivery == Delivery::state ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   return qos;

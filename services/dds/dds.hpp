@@ -36,6 +36,7 @@ constexpr double kLease_s = 2;
 /// Delivery of a topic.
 enum class Delivery {
   latest,    ///< best effort, keep last 1: odometry, status
+  sent_tf,   ///< reliable, keep last 100: transforms, as ROS 2's broadcasters send them
   tf,        ///< best effort, keep last 64: transforms of all, ours among them
   scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data
   reliable,  ///< reliable, keep last 64, a writer's liveliness has a lease of kLease_s: commands and acknowledgements

@@ -125,6 +125,8 @@ struct TopicOf<MarkerArray> {
 
 /// ROS 2's one topic of diagnostics: of all robots of a domain, outside every name space.
 constexpr const char* kDiagnostics = "rt/diagnostics";
+/// ROS 2's one topic of transforms: of all robots of a domain, who differ in their frames.
+constexpr const char* kTf = "rt/tf";
 
 template <typename T>
 Reader<T> make_reader(const Participant& participant, const std::string& name_space) {

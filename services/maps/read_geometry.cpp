@@ -29,8 +29,6 @@ constexpr struct {
     {".e57", "an E57 cloud", "pdal translate A.e57 A.ply (pdal.io)"},
     {".fbx", "an FBX scene", "assimp export A.fbx A.glb (package assimp-utils)"},
     {".dae", "a Collada scene", "assimp export A.dae A.glb (package assimp-utils)"},
-    {".mcap", "a recording",
-     "play it to octomap_server, and: ros2 run octomap_server octomap_saver_node --ros-args -p octomap_path:=A.bt"},
 };
 
 std::string ending_of(const std::string& path) {
@@ -99,8 +97,12 @@ tl::expected<std::string, map::MapError> content_of(const std::string& path, con
       map::MapError{large ? Kind::too_large : Kind::not_found, path + ": " + content.error().message});
 }
 
-Read read_geometry(const std::string& path) {
+Read read_geometry(const std::string& path, const std::string& topic) {
   const auto ending = ending_of(path);
+  if (ending == ".mcap") {
+    auto geometry = read_recording(path, topic);
+    return geometry ? checked(std::move(*geometry), path) : geometry;
+  }
   for (const auto& reader : kReaders) {
     if (ending != reader.ending) continue;
     auto geometry = reader.read(path);
@@ -114,9 +116,9 @@ Read read_geometry(const std::string& path) {
       return tl::make_unexpected(
           map::MapError{Kind::unknown_name,
                         message + other.what + " is not read; make one that is: " + converter(other.command, path)});
-  return tl::make_unexpected(
-      map::MapError{Kind::unknown_name, message + "ends in " + (ending.empty() ? "nothing" : ending) +
-                                            "; known are .bt, .ot, .ply, .pcd, .csv, .obj, .gltf, .glb and .stl"});
+  return tl::make_unexpected(map::MapError{
+      Kind::unknown_name, message + "ends in " + (ending.empty() ? "nothing" : ending) +
+                              "; known are .bt, .ot, .ply, .pcd, .csv, .mcap, .obj, .gltf, .glb and .stl"});
 }
 
 }  // namespace backwash::maps

@@ -34,7 +34,7 @@ std::vector<std::string> writable(const Grant& grant) {
   switch (grant.role) {
     case Role::vehicle:
       add({"ack", "status", "tube", "trajectory", "markers", "disturbance"});
-      topics.emplace_back("rt/diagnostics");
+      topics.insert(topics.end(), {"rt/diagnostics", "rt/tf"});
       break;
     case Role::station:
       add({"command"});

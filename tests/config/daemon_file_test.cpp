@@ -175,17 +175,17 @@ TEST(DaemonFile, NamesTheLineAndKeyOfWhatIsWrong) {
     std::string key;
   } cases[] = {{"domain = 0", "domain = 231", 7, "dds.domain"},
                {"domain = 0", "domain = 1.5", 7, "dds.domain"},
-               {"baud = 921600", "baud = \"fast\"", 15, "link.baud"},
-               {"\"/dev/ttyAMA0\"", "\"udp:there:14580\"", 14, "link.device"},
-               {"baud = 921600", "bauds = 921600", 15, "link.bauds"},
-               {"device = \"/dev/ttyAMA0\"", "device = \"\"", 14, "link.device"},
-               {"\nfile = ", "\npath = ", 26, "log.path"},
-               {"cpu = -1", "cpu = 0.5", 22, "control.cpu"},
-               {"battery_land = 0.15", "battery_land = 15", 23, "control.battery_land"},
-               {"[control]", "[controls]", 20, "controls"},
-               {"live = false", "live = 0", 45, "map.live"},
-               {"max_mib = 512", "max_mib = 0", 48, "map.max_mib"},
-               {"body = \"base_link\"", "body = \"map\"", 29, "frames"}};
+               {"baud = 921600", "baud = \"fast\"", 16, "link.baud"},
+               {"\"/dev/ttyAMA0\"", "\"udp:there:14580\"", 15, "link.device"},
+               {"baud = 921600", "bauds = 921600", 16, "link.bauds"},
+               {"device = \"/dev/ttyAMA0\"", "device = \"\"", 15, "link.device"},
+               {"\nfile = ", "\npath = ", 27, "log.path"},
+               {"cpu = -1", "cpu = 0.5", 23, "control.cpu"},
+               {"battery_land = 0.15", "battery_land = 15", 24, "control.battery_land"},
+               {"[control]", "[controls]", 21, "controls"},
+               {"live = false", "live = 0", 46, "map.live"},
+               {"max_mib = 512", "max_mib = 0", 49, "map.max_mib"},
+               {"body = \"base_link\"", "body = \"map\"", 30, "frames"}};
   for (const auto& c : cases)
     EXPECT_THAT(error_after(c.right, c.wrong), HasSubstr(".toml:" + std::to_string(c.line) + ": key '" + c.key + "'"));
 }
@@ -241,7 +241,7 @@ TEST(DaemonFile, TakesASigningKeyRawOrInHex) {
 
 TEST(DaemonFile, RefusesASigningKeyThatOthersMayReadOrThatIsNone) {
   using enum std::filesystem::perms;
-  const std::string good(64, 'a'), at = ".toml:18: key 'link.signing_key_file' = ";
+  const std::string good(64, 'a'), at = ".toml:19: key 'link.signing_key_file' = ";
   const auto refused = [&](const std::string& said, const std::string& why) {
     return said.find(at) != said.npos && said.find(why) != said.npos && said.find(good) == said.npos;
   };
@@ -265,7 +265,7 @@ TEST(DaemonFile, ThePlainProtocolNeedsASerialPort) {
   EXPECT_EQ(error_after(was, "protocol = \"plain\""), "no error");
   EXPECT_EQ(error_after(was, "protocol = \"mavlink\""), "no error");
   const auto unknown = error_after(was, "protocol = \"modbus\""), key = std::string("key 'link.protocol' = 'modbus'");
-  EXPECT_NE(unknown.find(".toml:17: " + key), unknown.npos) << unknown;
+  EXPECT_NE(unknown.find(".toml:18: " + key), unknown.npos) << unknown;
   EXPECT_THAT(error_after("device = \"/dev/ttyAMA0\"", "device = \"tcp:1.2.3.4:5\"\nprotocol = \"plain\""),
               HasSubstr("needs a serial port"));
 }
@@ -293,7 +293,7 @@ TEST(DaemonFile, RefusesNamesThatRos2OrTheKernelWouldNotTake) {
 TEST(DaemonFile, RefusesTextThatWouldSteerATerminalOrCutAPath) {
   for (const char* bad : {"/dev/tty\\u0000x", "/dev/\\u001b[2J"})
     EXPECT_THAT(error_after("/dev/ttyAMA0", bad),
-                testing::AllOf(HasSubstr(".toml:14: key 'link.device'"), testing::Not(HasSubstr("\x1b"))));
+                testing::AllOf(HasSubstr(".toml:15: key 'link.device'"), testing::Not(HasSubstr("\x1b"))));
 }
 
 }  // namespace

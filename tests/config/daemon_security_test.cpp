@@ -21,7 +21,7 @@ TEST(DaemonFile, CredentialsMayBeLeftOutOrHaveAFolder) {
   for (const std::string bad : {"\"\"", "true", "7", "\"/etc\\u001b[2J\""}) {
     const auto refused = with_lines("security = " + bad + "\n");
     ASSERT_FALSE(refused) << bad;
-    EXPECT_THAT(refused.error().message, testing::HasSubstr(".toml:13: key 'dds.security' = ")) << bad;
+    EXPECT_THAT(refused.error().message, testing::HasSubstr(".toml:14: key 'dds.security' = ")) << bad;
   }
 }
 

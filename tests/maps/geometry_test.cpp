@@ -140,7 +140,7 @@ TEST_F(Geometries, TakePointsAndTheirSensorsFromATable) {
 TEST_F(Geometries, TellHowToConvertWhatIsNotRead) {
   refused("room.las", "LASF", "pdal translate " + folder_ + "room.las " + folder_ + "room.ply");
   refused("room.E57", "ASTM-E57", "pdal translate ");
-  refused("room.mcap", "", "octomap_saver_node");
+  refused("room.mcap", "", "room.mcap: does not begin as an MCAP file");
   refused("room.dwg", "", "ends in .dwg; known are .bt");
   refused("room", "", "ends in nothing");
 }

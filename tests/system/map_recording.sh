@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# `backwash map convert` of recordings that libraries of others wrote: the map is, bit for bit, that of the same points placed by matrices
+# (tests/maps/peer). What cannot be placed is refused by name. Skipped without node, npm or the registry.
+#   map_recording.sh SOURCE_DIR BUILD_DIR
+set -euo pipefail
+source_dir=$1 build=$2
+source "$source_dir/tests/system/node_peer.sh"
+node_peer "$build" map_recording mcap_modules @mcap/core@2.2.2 @foxglove/rosmsg2-serialization@3.1.0 @foxglove/rosmsg-msgs-common@3.2.3
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+cd "$out"
+die() { echo "$*"; exit 1; }
+convert() { "$build/services/backwash" map convert "$@" --force; }
+written() { node "$source_dir/tests/maps/peer/write_clouds.cjs" "$modules" "$1.mcap" "$1"; }
+refused() { # refused KIND TEXT [OPTION …]
+  local kind=$1 text=$2 code=0
+  shift 2
+  written "$kind"
+  convert "$kind.mcap" -o no.bt "$@" >said 2>&1 || code=$?
+  [[ $code == 65 && ! -e no.bt && $(wc -l <said) == 1 ]] && grep -qF -- "$text" said || die "$kind: $code $(<said)"
+}
+same() { cmp "$1.bt" "$1-csv.bt" || die "$1: another map than of the same points placed by matrices"; }
+
+for kind in tf odometry placed; do
+  written $kind
+  convert $kind.mcap -o $kind.bt --json >$kind.json
+  convert $kind.csv -o $kind-csv.bt --json >$kind-csv.json
+  same $kind
+  python3 - $kind.json $kind-csv.json $kind <<'PYTHON'
+import json, sys
+a, b = (json.load(open(f)) for f in sys.argv[1:3])
+print(f"{sys.argv[3]}: {a['points']} points, {a['free_voxels']} free and {a['occupied_voxels']} occupied voxels")
+assert a["points"] == b["points"] == 10 * 599 and a["points_not_finite"] == 10, a
+assert a["free_voxels"] > 5000 and a["freed_voxels"] == b["freed_voxels"], a
+frame = "camera_init" if sys.argv[3] == "placed" else "map"
+notes = " ".join(a["notes"])
+assert f"10 clouds of /points in frame '{frame}'" in notes and "1 of 11 clouds have no pose at their time" in notes, notes
+PYTHON
+done
+refused second 'holds clouds of /depth/points and /points; choose one by --topic'
+convert second.mcap --topic /points -o second.bt >said
+convert second.csv -o second-csv.bt >/dev/null
+same second
+refused second "holds no sensor_msgs/msg/PointCloud2 on /scan" --topic /scan
+refused parents "frame 'base_link' is placed in 'odom' and in 'world'; record one of them"
+refused lz4 "its chunks are compressed by 'lz4', which is not read; write them without: mcap decompress FILE -o OTHER.mcap"
+refused ros1 "is of ROS 1"
+refused corner "/points: a point_step of 16 bytes does not hold x, y and z"
+
+# Nobody says where they were seen from: as they stand, with nothing free.
+written still
+convert still.mcap -o still.bt --free-from 0,0,0 >said 2>&1 || die "still: $(<said)"
+grep -q "nothing says where they were seen from" said || die "still: $(<said)"
+# Cut short: what is whole is used, and that is told; a bit that is not the writer's is no map.
+head -c 60000 tf.mcap >cut.mcap
+convert cut.mcap -o cut.bt >said
+grep -q 'it was cut short at byte [0-9]*: what is before is used' said || die "cut: $(<said)"
+python3 -c 'b = bytearray(open("tf.mcap", "rb").read()); b[30000] ^= 1; open("bad.mcap", "wb").write(b)'
+code=0
+convert bad.mcap -o no.bt >said 2>&1 || code=$?
+[[ $code == 65 ]] && grep -q 'the file is damaged' said || die "damaged: $code $(<said)"
