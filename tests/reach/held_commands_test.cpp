@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What held set-points charge the integrator of a loop that has neither delay nor lag: its own integration is the oracle.
+// What held set-points charge the integrator of a loop that has neither delay nor lag: its own integration is the
+// oracle.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -59,7 +59,8 @@ Observed looked_at() {
     for (const auto& [axis, size, w] : {std::tuple('x', 0.05, 1.0), {'y', 0.04, 1.3}, {'z', 0.05, 0.9}}) {
       log.columns[std::string{axis, '_', 'm'}].push_back(1.5 + size * std::sin(w * t));
       log.columns[std::string{'v', axis, '_', 'm', 'p', 's'}].push_back(size * w * std::cos(w * t));
-      log.columns[std::string{'a', axis, '_', 'm', 'p', 's', '2'}].push_back(-size * w * w * std::sin(w * t) + 0.1 * std::sin(9 * t));
+      log.columns[std::string{'a', axis, '_', 'm', 'p', 's', '2'}].push_back(-size * w * w * std::sin(w * t) +
+                                                                             0.1 * std::sin(9 * t));
     }
   }
   MapView open(nullptr, Model{});
