@@ -142,6 +142,12 @@ TEST(Structures, TheNullsMaximaAreThoseOfEveryCandidateInEveryDraw) {
           expected[d] = gain;
       maxima.add(c);
       ++count;
+      // Between the floors of means (0.03) and of ln variances (0.2) of a structure; the outline has no columns to ask.
+      const SmallVector between = c.fit * (0.1 / std::sqrt(c.fit.dot(c.size * c.fit)));
+      EXPECT_EQ(outline(c).effect(between), c.effect(between)) << c.name;
+      if (!c.form) {
+        EXPECT_EQ(c.effect(between), c.columns.front().parts.front().channel != kVarX);
+      }
       if (count % 20 != 1) return;
       const auto again = filled(outline(c), evidence, {});
       EXPECT_EQ(again.gain, c.gain) << c.name;

@@ -187,9 +187,9 @@ bool doubt_drifts(std::vector<NamedCause>& causes, const Observations& seen) {
   bool doubted = false;
   for (auto& cause : causes) {
     Accepted& found = cause.found;
-    if (seen.has(Source::battery) || !seen.has(Source::thrust) || !found.form->in_sensor || found.columns.size() < 3)
+    if (seen.has(Source::battery) || !seen.has(Source::thrust) || !found.form->in_sensor || found.columns.size() <= kZ)
       continue;
-    const double z = found.theta[2], asked = asked_along(found.columns[2].parts.back().x, seen);
+    const double z = found.theta[kZ], asked = asked_along(found.columns[kZ].parts.back().x, seen);
     if (-asked * z < z * z / 2) continue;
     found.rivals.push_back({(*sag)->cause(), *sag, (*sag)->scales.front(), 0});
     cause.separate_by.push_back({(*sag)->cause(), "none: log the battery's voltage (battery_v)", std::nullopt});

@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
 namespace {
+
+constexpr std::size_t kTogether = std::numeric_limits<std::uint8_t>::digits;  // flights whose signs are one number
 
 /// Fits a candidate's columns; whether every flight can be left out.
 bool fitted(SearchCandidate& c, const Evidence& evidence, const std::vector<DesignColumn>& nuisance) {
@@ -45,10 +48,7 @@ bool may_be_effect(const SearchCandidate& c, const SmallVector& theta) {
 }  // namespace
 
 bool SearchCandidate::large_enough(const SmallVector& theta) const {
-  const auto floor_of_structure = [&] {
-    return columns.front().parts.front().channel == kVarX ? kRules.structure_floor_ln : kRules.structure_floor_mean;
-  };
-  if (!form) return theta.dot(size * theta) >= std::pow(floor_of_structure().value, 2);
+  if (!form) return theta.dot(size * theta) >= floor * floor;
   if (std::abs(theta[0]) < form->least || (form->one_sided && theta[0] < 0)) return false;
   const double square =
       form->integer_scale && form->one_sided ? theta[0] * theta[0] * size(0, 0) : theta.dot(size * theta);
@@ -88,6 +88,7 @@ void each_structure_candidate(const Evidence& evidence, const std::vector<Design
     for (const auto& [name, channels] : channel_groups()) {
       SearchCandidate c;
       c.name = structure.along, c.columns = columns_in(channels, structure.functions), c.number = number++;
+      c.floor = channels.front() == kVarX ? kRules.structure_floor_ln : kRules.structure_floor_mean;
       if (!fitted(c, evidence, beside(c.columns, accepted, seen))) continue;
       c.structure = {structure.along, structure.shape, structure.hz, {}, structure.further};
       take(std::move(c));
@@ -148,22 +149,22 @@ std::vector<std::vector<int>> sign_draws(std::size_t flights, int flips, unsigne
 
 NullMaxima::NullMaxima(const std::vector<std::vector<int>>& draws) : draws_(draws), maxima_(draws.size(), 0) {
   const std::size_t flights = draws.empty() ? 0 : draws.front().size();
-  for (std::size_t f = 0; f < flights; f += 8) {
+  for (std::size_t f = 0; f < flights; f += kTogether) {
     signs_.emplace_back(draws.size(), std::uint8_t{0});
     for (std::size_t d = 0; d < draws.size(); ++d)
-      for (std::size_t k = 0; k < 8 && f + k < flights; ++k)
+      for (std::size_t k = 0; k < kTogether && f + k < flights; ++k)
         if (draws[d][f + k] > 0) signs_.back()[d] |= static_cast<std::uint8_t>(1u << k);
   }
 }
 
 Eigen::MatrixXd NullMaxima::sums(const NormalEquations& normal) const {
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(normal.total.rows(), static_cast<Eigen::Index>(draws_.size()));
-  std::array<double, 256> of_signs;
+  std::array<double, 1 << kTogether> of_signs;
   for (std::size_t g = 0; g < signs_.size(); ++g)
     for (Eigen::Index row = 0; row < sums.rows(); ++row) {
       of_signs[0] = 0;
-      for (std::size_t k = 0, end = 1; k < 8; ++k, end *= 2) {
-        const std::size_t f = 8 * g + k;
+      for (std::size_t k = 0, end = 1; k < kTogether; ++k, end *= 2) {
+        const std::size_t f = kTogether * g + k;
         const double b = f < normal.b.size() ? normal.b[f][row] : 0;
         for (std::size_t s = 0; s < end; ++s) of_signs[end + s] = of_signs[s] + b, of_signs[s] -= b;
       }

@@ -22,6 +22,7 @@ struct SearchCandidate {
   double gain = 0;         ///< held out, nats
   SmallMatrix size;        ///< θᵀ size θ: mean square of what the columns add
   Structure structure{};   ///< of a structure, its functions left out: they are the columns
+  double floor = 0;        ///< of a structure: the least root mean square that is an effect
   SmallVector fit{};       ///< (ΣA)⁻¹ Σ b
   std::size_t number = 0;  ///< among all that are tried
 
