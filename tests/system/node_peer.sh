@@ -11,6 +11,6 @@ node_peer() {
   for package in "$@"; do [[ -d $modules/node_modules/${package%@*} ]] || missing+=("$package"); done
   [[ ${#missing[@]} -eq 0 ]] && return
   mkdir -p "$modules"
-  timeout 120 npm install --no-audit --no-fund --no-save --ignore-scripts --loglevel=error --prefix "$modules" "$@" >/dev/null 2>&1 ||
+  timeout 120 npm install --fetch-retries=1 --fetch-retry-maxtimeout=5000 --prefer-offline --no-audit --no-fund --no-save --ignore-scripts --loglevel=error --prefix "$modules" "$@" >/dev/null 2>&1 ||
     { rm -rf "$modules"; echo "skipped: $test needs the npm registry ($*)"; exit 77; }
 }
