@@ -52,7 +52,13 @@ start_daemon() {
 }
 
 # ctl VERB …: one command of the ground station; its failure ends the script.
-ctl() { "$bin/backwashctl" --domain "$domain" "${ctl_options[@]}" "$@" >>"$log" 2>&1 || die "backwashctl $1 failed: $(tail -n 1 "$log")"; }
+# Its own last words are the reason: the daemon writes to the log, too.
+ctl() {
+  local answer code=0
+  answer=$("$bin/backwashctl" --domain "$domain" "${ctl_options[@]}" "$@" 2>&1) || code=$?
+  echo "$answer" >>"$log"
+  [[ $code == 0 ]] || die "backwashctl $1 failed: $(tail -n 1 <<<"$answer")"
+}
 
 # Enables control; a daemon that has just started may not have heard its autopilot yet, or, while others start beside it, not
 # for the 1.5 s after which it goes quiet. The vehicle stands disarmed: asking again is safe.
