@@ -142,6 +142,37 @@ TEST(Dependence, AWorldWithAStructureOutsideTheCatalogueShowsIt) {
   EXPECT_TRUE(all.front().found) << all.front().regressor << " " << all.front().p_holm;
 }
 
+/// Hovers whose vertical push follows x in every other flight, from flight `from` on.
+Observations pushed_in_every_other(std::size_t flights, std::size_t from) {
+  constexpr std::size_t kOfFlight = 4;
+  std::mt19937_64 rng(5);
+  std::normal_distribution draw;
+  Observations seen;
+  seen.flights = flights, seen.windows.resize(flights * kOfFlight, WindowRow{});
+  for (auto& y : seen.y) y.assign(seen.windows.size(), 0);
+  for (auto& weight : seen.weight) weight.assign(seen.windows.size(), 0);
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    auto& w = seen.windows[i];
+    w.flight = i / kOfFlight, w.sigma.setConstant(0.04), w.R_WB.setZero(), w.p_W = backwash::Vec3(draw(rng), 0, 1);
+    if (i % kOfFlight == 0) seen.first.push_back(i);
+    seen.y[kMeanZ][i] = draw(rng) + (w.flight % 2 == from ? w.p_W.x() : 0), seen.weight[kMeanZ][i] = 1;
+  }
+  seen.first.push_back(seen.windows.size()), seen.units.first = seen.first;
+  seen.missing = {{Source::attitude, "not flown"}, {Source::map, "none"}};
+  return seen;
+}
+
+TEST(Dependence, OfMoreThanAThousandFlightsIsAskedOfAThousandAtMostEvenlySpread) {
+  constexpr std::size_t kMany = 1500;  // every second is asked
+  const auto found = [](std::size_t from) {
+    const auto seen = pushed_in_every_other(kMany, from);
+    const auto all = remaining_dependence(Evidence(seen), {}, 1);
+    return !all.empty() && all.front().found;
+  };
+  EXPECT_TRUE(found(0));
+  EXPECT_FALSE(found(1));
+}
+
 TEST(Dependence, AWorldWithoutAnEffectShowsNone) {
   const auto all = remaining({}, 1);
   ASSERT_GE(all.size(), 20u);

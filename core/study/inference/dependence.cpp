@@ -76,7 +76,7 @@ class TurnedProducts {
   std::vector<MatrixXd> kept_;
 };
 
-/// GroupRows of the windows that measure every channel of a group, and where each flight begins among them.
+/// Windows that measure every channel of a group, and where each flight begins among them.
 struct GroupRows {
   std::vector<std::size_t> window, first;
 };
@@ -84,7 +84,10 @@ struct GroupRows {
 GroupRows rows_of(const Evidence& evidence, const std::vector<Channel>& group) {
   GroupRows rows;
   const auto& windows = evidence.seen().windows;
+  const auto flights = static_cast<double>(evidence.seen().first.size() - 1);
+  const auto every = static_cast<std::size_t>(std::ceil(flights / kRules.dependence_flights));
   for (std::size_t i = 0; i < windows.size(); ++i) {
+    if (windows[i].flight % every != 0) continue;
     if (!std::all_of(group.begin(), group.end(), [&](Channel c) { return evidence.measured(c, i); })) continue;
     if (rows.window.empty() || windows[rows.window.back()].flight != windows[i].flight)
       rows.first.push_back(rows.window.size());

@@ -95,6 +95,8 @@ struct Rules {
                     "derived: a p that so many draws tell is known to 1/√50, a seventh of itself"};
   Rule most_turns{"most_turns", 64, "turns a flight", "chosen: of 12 flights, 64^12 draws differ"};
   Rule median_of{"median_of", 400, "windows", "chosen: of which the kernel's width is the median distance"};
+  Rule dependence_flights{"dependence_flights", 1000, "flights",
+                          "chosen: evenly spread over those given; a thousand show a correlation of a few hundredths"};
   Rule most_features{"most_features", 100, "features", "chosen: rank of a kernel; 30 suffice for a smooth one"};
   Rule kernel_error{"kernel_error", 1e-5, "1", "chosen: of each entry of a kernel whose diagonal is 1"};
   Rule constant_regressor{"constant_regressor", 1e-3, "1", "chosen: sum of squares within flights"};
