@@ -19,8 +19,8 @@ T little(const std::uint8_t* p) noexcept {
 /// Appends a number, little-endian.
 template <typename T>
 void put_little(std::vector<std::uint8_t>& bytes, T value) {
-  const auto* first = reinterpret_cast<const std::uint8_t*>(&value);
-  bytes.insert(bytes.end(), first, first + sizeof value);
+  bytes.resize(bytes.size() + sizeof value);
+  std::memcpy(bytes.data() + bytes.size() - sizeof value, &value, sizeof value);
 }
 
 /// The number at p of a type by its letter, as ULog's reader and DataFlash name them: b, h, i, q are integers of 1, 2,

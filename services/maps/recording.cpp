@@ -6,15 +6,19 @@
 #include <set>
 #include <utility>
 
+#include "core/log/mcap_reader.hpp"
+#include "core/log/mcap_walk.hpp"
+#include "core/log/octets.hpp"
 #include "services/maps/content.hpp"
 #include "services/maps/frame_tree.hpp"
 #include "services/maps/geometry.hpp"
-#include "services/maps/mcap.hpp"
-#include "services/maps/octets.hpp"
 #include "services/maps/scalars.hpp"
+#include "services/maps/unpack.hpp"
 
 namespace backwash::maps {
 namespace {
+
+using log::Octets;
 
 struct Header {
   std::int64_t stamp_ns;
@@ -79,15 +83,15 @@ class Recording {
   explicit Recording(std::string topic) : topic_(std::move(topic)) {}
 
   /// What is wrong with a message, or nothing.
-  std::string take(const Recorded& m) {
+  std::string take(const log::McapChannel& m, std::string_view data) {
     const bool cloud = m.type == "sensor_msgs/msg/PointCloud2", odometry = m.type == "nav_msgs/msg/Odometry";
     if (m.encoding == "ros1")
       return "is of ROS 1; convert the bag for ROS 2 first: rosbags-convert --src FILE.bag --dst FOLDER";
     if (!cloud && !odometry && m.type != "tf2_msgs/msg/TFMessage") return "";
     constexpr std::size_t kHead = 4;  // its representation
-    if (m.encoding != "cdr" || m.data.size() < kHead || m.data[0] != 0 || (m.data[1] & ~1) != 0)
+    if (m.encoding != "cdr" || data.size() < kHead || data[0] != 0 || (data[1] & ~1) != 0)
       return "needs messages of ROS 2 as they are on the wire, in plain CDR";
-    Octets cdr(m.data.substr(kHead), true, m.data[1] == 0);
+    Octets cdr(data.substr(kHead), true, data[1] == 0);
     const auto wrong = cloud ? take_cloud(m.topic, cdr) : odometry ? take_odometry(cdr) : take_transforms(m.topic, cdr);
     return cdr.good || !wrong.empty() ? wrong : "a message that ends before its members";
   }
@@ -258,13 +262,20 @@ class Recording {
 Read read_recording(const std::string& path, const std::string& topic) {
   const auto content = content_of(path, "an MCAP file");
   if (!content) return tl::make_unexpected(content.error());
+  if (!log::is_mcap({reinterpret_cast<const std::uint8_t*>(content->data()), content->size()}))
+    return corrupt(path, ": does not begin as an MCAP file");
   Recording recording(topic);
-  std::string cut;
-  const auto wrong = each_message(
-      *content, [&](const Recorded& m) { return recording.take(m); }, cut);
-  if (!wrong.empty()) return corrupt(path, wrong);
+  log::McapListener listener;
+  listener.message = [&](const log::McapChannel& channel, std::string_view data, std::uint64_t) {
+    const auto why = recording.take(channel, data);
+    return why.empty() ? why : channel.topic + ": " + why;
+  };
+  listener.unpack = unpacked;
+  const auto end = log::walk_mcap(*content, listener);
+  const auto at = "byte " + std::to_string(end.at) + ": ";
+  if (!end.wrong.empty()) return corrupt(path, ": " + at + end.wrong);
   auto geometry = recording.placed(path);
-  if (geometry && !cut.empty()) geometry->notes.push_back(cut);
+  if (geometry && !end.whole) geometry->notes.push_back("it was cut short at " + at + "what is before is used");
   return geometry;
 }
 

@@ -38,13 +38,36 @@ notes = " ".join(a["notes"])
 assert f"10 clouds of /points in frame '{frame}'" in notes and "1 of 11 clouds have no pose at their time" in notes, notes
 PYTHON
 done
+for kind in zstd lz4; do
+  command -v $kind >/dev/null || { echo "$kind is not installed: compressed recordings are not tried" >&2; continue; }
+  written $kind
+  [[ $(stat -c %s $kind.mcap) -lt $(stat -c %s tf.mcap) ]] || die "$kind: not smaller"
+  convert $kind.mcap -o $kind.bt >said
+  cmp $kind.bt tf.bt || die "$kind: another map than of the same recording without compression"
+  # What does not unpack is damaged, wherever a bit turns.
+  python3 - $kind.mcap <<'PYTHON'
+import random, sys
+whole = open(sys.argv[1], "rb").read()
+random.seed(7)
+for n in range(12):
+    b = bytearray(whole)
+    b[random.randrange(3000, len(b) // 2)] ^= 1 << random.randrange(8)
+    open(f"bad-{n}.mcap", "wb").write(b)
+PYTHON
+  for n in {0..11}; do
+    code=0
+    convert bad-$n.mcap -o no.bt >said 2>&1 || code=$?
+    [[ $code == 65 && ! -e no.bt ]] || { [[ $code == 0 ]] && cmp no.bt tf.bt; } || die "$kind, bit $n: $code $(<said)"
+    rm -f no.bt
+  done
+done
 refused second 'holds clouds of /depth/points and /points; choose one by --topic'
 convert second.mcap --topic /points -o second.bt >said
 convert second.csv -o second-csv.bt >/dev/null
 same second
 refused second "holds no sensor_msgs/msg/PointCloud2 on /scan" --topic /scan
 refused parents "frame 'base_link' is placed in 'odom' and in 'world'; record one of them"
-refused lz4 "its chunks are compressed by 'lz4', which is not read; write them without: mcap decompress FILE -o OTHER.mcap"
+refused bzip2 "a chunk is compressed by 'bzip2'; lz4 and zstd are read; write it without: mcap decompress FILE -o OTHER.mcap"
 refused ros1 "is of ROS 1"
 refused corner "/points: a point_step of 16 bytes does not hold x, y and z"
 

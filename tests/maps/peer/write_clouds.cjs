@@ -3,9 +3,10 @@
 // alone), and beside it the same points placed by matrices as a CSV: what a reader should make of it.
 //   node write_clouds.cjs MODULES OUT KIND
 // KIND: tf: all by transforms, the lidar upside down on the body. odometry: the body by Odometry. placed: Odometry, and clouds in its own
-// frame, in doubles. second: tf, and clouds on another topic. still: no pose. parents: a body with two of them. lz4, ros1, corner: chunks
-// that say so, messages that do, fields that lie beyond their point.
+// frame, in doubles. second: tf, and clouds on another topic. still: no pose. parents: a body with two of them. zstd, lz4: tf, its chunks
+// compressed by the program of that name. bzip2, ros1, corner: chunks that say so, messages that do, fields that lie beyond their point.
 const fs = require('node:fs')
+const { execFileSync } = require('node:child_process')
 const [modules, out, kind] = process.argv.slice(2)
 const load = (name) => require(require.resolve(name, { paths: [modules] }))
 const { McapWriter } = load('@mcap/core')
@@ -54,7 +55,8 @@ async function main() {
   let size = 0n
   const writable = { write: async (b) => { parts.push(Buffer.from(b)); size += BigInt(b.length) }, position: () => size }
   const options = { writable, chunkSize: 20000 }
-  if (kind === 'lz4') options.compressChunk = (bytes) => ({ compression: 'lz4', compressedData: bytes })
+  if (kind === 'bzip2') options.compressChunk = (bytes) => ({ compression: kind, compressedData: bytes })
+  if (kind === 'lz4' || kind === 'zstd') options.compressChunk = (input) => ({ compression: kind, compressedData: execFileSync(kind, ['-c', '-q'], { input }) })
   const writer = new McapWriter(options)
   await writer.start({ profile: 'ros2', library: 'test' })
   const channels = new Map()

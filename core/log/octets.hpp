@@ -6,7 +6,7 @@
 #include <cstring>
 #include <string_view>
 
-namespace backwash::maps {
+namespace backwash::log {
 
 /// Takes a record or a message apart, from its first byte to its last. `good` is false once something was asked for
 /// that is not there; what it gives from then on is zero or empty.
@@ -49,4 +49,4 @@ class Octets {
   bool aligned_, swapped_;
 };
 
-}  // namespace backwash::maps
+}  // namespace backwash::log
