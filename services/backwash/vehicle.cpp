@@ -26,9 +26,17 @@ struct Options {
 /// How a firmware names its gains: k_d is the velocity gain, k_p the product of the two.
 struct GainNames {
   const char *xy_position, *xy_velocity, *z_position, *z_velocity;
+  const char *xy_integral, *z_integral;  ///< z: null where no parameter is it
 };
-constexpr GainNames kPx4{"MPC_XY_P", "MPC_XY_VEL_P_ACC", "MPC_Z_P", "MPC_Z_VEL_P_ACC"};
-constexpr GainNames kArduPilot{"PSC_POSXY_P", "PSC_VELXY_P", "PSC_POSZ_P", "PSC_VELZ_P"};
+constexpr GainNames kPx4{"MPC_XY_P",        "MPC_XY_VEL_P_ACC", "MPC_Z_P",
+                         "MPC_Z_VEL_P_ACC", "MPC_XY_VEL_I_ACC", "MPC_Z_VEL_I_ACC"};
+constexpr GainNames kArduPilot{"PSC_POSXY_P", "PSC_VELXY_P", "PSC_POSZ_P", "PSC_VELZ_P", "PSC_VELXY_I", nullptr};
+
+/// Whose gains are tuned, and which of the firmware's could not be taken.
+struct Firmware {
+  GainNames names = kPx4;
+  std::string left_out;
+};
 
 /// NAME and number of each line of a parameter file: ArduPilot's (NAME,1 or NAME 1), PX4's (NAME=1), or a ground
 /// station's with NAME and value in the third and fourth column.
@@ -49,8 +57,27 @@ std::map<std::string, double> read_parameters(const std::string& path) {
   return values;
 }
 
-/// The gains that fly, in place of the vehicle file's; the firmware that they are of.
-GainNames take_gains(const std::string& path, Vehicle& vehicle) {
+/// Integral gains that fly, both of them or neither: along z the file's where no parameter is it. What is left out.
+std::string take_integrals(const std::map<std::string, double>& values, const GainNames& names, Vehicle& vehicle) {
+  auto& own = vehicle.controller.velocity_integrator;
+  const auto gain = [&](const char* name, double without) {
+    const auto found = name ? values.find(name) : values.end();
+    return found == values.end() ? without : found->second;
+  };
+  const Vehicle::HorizontalVertical flown{gain(names.xy_integral, own.horizontal),
+                                          gain(names.z_integral, own.vertical)};
+  if ((flown.horizontal > 0) == (flown.vertical > 0)) {
+    own = flown;
+    return "";
+  }
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", flown.horizontal);
+  return std::string(names.xy_integral) + " " + text + " is left out: along z controller.velocity_integrator is " +
+         (flown.vertical > 0 ? "not 0" : "0") + ", and both integrate or neither does";
+}
+
+/// The gains that fly, in place of the vehicle file's.
+Firmware take_gains(const std::string& path, Vehicle& vehicle) {
   const auto values = read_parameters(path);
   for (const GainNames& names : {kPx4, kArduPilot}) {
     if (!values.contains(names.xy_velocity)) continue;
@@ -64,7 +91,7 @@ GainNames take_gains(const std::string& path, Vehicle& vehicle) {
     vehicle.controller.kd = {gain(names.xy_velocity), gain(names.z_velocity)};
     vehicle.controller.kp = {gain(names.xy_position) * gain(names.xy_velocity),
                              gain(names.z_position) * gain(names.z_velocity)};
-    return names;
+    return {names, take_integrals(values, names, vehicle)};
   }
   throw Failure(kBadData,
                 path + ":1: has neither MPC_XY_VEL_P_ACC nor PSC_VELXY_P; save all parameters of the autopilot");
@@ -110,7 +137,14 @@ Json to_json(const plan::GainStep& s) {
   return json;
 }
 
-void print_text(const plan::GainSweep& sweep, const GainNames& names, const std::optional<TuningEvidence>& evidence) {
+void print_text(const plan::GainSweep& sweep, const Firmware& firmware, const Vehicle& vehicle,
+                const std::optional<TuningEvidence>& evidence) {
+  const auto& [names, left_out] = firmware;
+  const auto& integral = vehicle.controller.velocity_integrator;
+  if (integral.horizontal > 0)
+    std::printf("integral gains of the velocity, which stay: %g along x and y, %g along z\n", integral.horizontal,
+                integral.vertical);
+  if (!left_out.empty()) std::printf("%s\n", left_out.c_str());
   if (evidence)
     std::printf(
         "the log: %zu of %zu samples inside the sets of the gains it was flown with%s\n", evidence->inside,
@@ -145,8 +179,8 @@ void print_text(const plan::GainSweep& sweep, const GainNames& names, const std:
 int run(const Options& options) {
   auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
-  GainNames names = kPx4;
-  if (!options.parameters.empty()) names = take_gains(options.parameters, vehicle);
+  Firmware firmware;
+  if (!options.parameters.empty()) firmware = take_gains(options.parameters, vehicle);
   std::optional<TuningEvidence> evidence;
   if (!options.log.empty()) evidence = evidence_of(options.log);
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
@@ -160,11 +194,14 @@ int run(const Options& options) {
     Json steps = Json::array();
     for (const auto& s : sweep.steps) steps.push_back(to_json(s));
     Json json = {{"steps", std::move(steps)}, {"smallest", sweep.smallest ? to_json(*sweep.smallest) : Json()}};
+    const auto& integral = vehicle.controller.velocity_integrator;
+    json["velocity_integrator"] = {{"horizontal", integral.horizontal}, {"vertical", integral.vertical}};
+    json["left_out"] = firmware.left_out.empty() ? Json() : Json(firmware.left_out);
     json["log"] = nullptr;
     if (evidence) json["log"] = {{"judged", evidence->judged}, {"inside", evidence->inside}};
     print(json);
   } else {
-    print_text(sweep, names, evidence);
+    print_text(sweep, firmware, vehicle, evidence);
   }
   return sweep.smallest ? kOk : kUnavailable;
 }

@@ -33,6 +33,24 @@ sed 's/^latency/velocity_integrator = { horizontal = 0.4, vertical = 0.4 }\nlate
 "$backwash" reach --vehicle holding.toml --track track.csv --json >holding.json
 ! "$backwash" reach --vehicle holding.toml --track track.csv --method chance --probability 1e-3 2>refusal.txt || die "chance sets of an integrator"
 grep -q "holding.toml:1: controller.velocity_integrator: --method chance" refusal.txt || die "the refusal names no file and key"
+# The autopilot's integral gains are taken with its others: the same sets as of a vehicle file that says them.
+tuned() { "$backwash" vehicle tune --map builtin:narrow-gap --model $quad --start 1,0,1 --goal 5,0,1 --json "$@"; }
+gains='MPC_XY_P = 1.2, MPC_XY_VEL_P_ACC = 2.5, MPC_Z_P = 1.2, MPC_Z_VEL_P_ACC = 3, MPC_XY_VEL_I_ACC = 0.4, MPC_Z_VEL_I_ACC = 0.5'
+sed "s/^kp = .*/px4 = { $gains }/; /^kd = /d" "$here/../../core/config/files/quad-5in.vehicle.toml" >px4.toml
+tr ',' '\n' <<<"$gains" | sed 's/^ *//; s/ = /=/' >px4.params
+printf 'PSC_POSXY_P,1.2\nPSC_VELXY_P,2.5\nPSC_POSZ_P,1.2\nPSC_VELZ_P,3\nPSC_VELXY_I,1\n' >copter.params
+tuned --vehicle px4.toml >of_file.json || [[ $? == 69 ]] || die "tune"
+tuned --vehicle $quad --parameters px4.params >of_parameters.json || [[ $? == 69 ]] || die "tune with parameters"
+tuned --vehicle $quad --parameters copter.params >of_copter.json || [[ $? == 69 ]] || die "tune with ArduPilot's"
+cmp -s of_file.json of_parameters.json || die "other sets of the parameters' gains than of the file's"
+python3 - <<'PYTHON'
+import json
+px4, copter = (json.load(open(f"of_{name}.json")) for name in ("parameters", "copter"))
+assert px4["velocity_integrator"] == {"horizontal": 0.4, "vertical": 0.5} and px4["left_out"] is None, px4["velocity_integrator"]
+assert copter["velocity_integrator"] == {"horizontal": 0, "vertical": 0} and "PSC_VELXY_I 1 is left out" in copter["left_out"]
+widths = lambda j: [s["tightest"]["half_widths_m"] for s in j["steps"] if s["stable"] and s["tightest"] and s["tightest"]["bounded"]]
+assert widths(px4) and widths(copter) and widths(px4) != widths(copter)
+PYTHON
 for probability in 1e-3 1e-6; do
   "$backwash" reach --vehicle $quad --track track.csv --method chance --probability $probability --json >chance-$probability.json
 done
