@@ -12,10 +12,8 @@ file=${4:-study-$seed}
 "$matrix" --null-size --worlds "$worlds" --seed "$seed" --jobs "$(nproc)" >"$file-null.md"
 if [[ ! -f $file-campaign/manifest.json ]]; then
   {
-    printf 'kind = "program"\n[program]\nname = "cell"\nseed = %s\ncount = %s\n' "$seed" "$worlds"
-    printf 'command = ["%s", "--rows", "--worlds", "1", "--seed", "{seed}", "--cell", "{cell}"]\neach = [\n' "$matrix"
-    "$matrix" --names | sed 's/.*/  "&",/'
-    printf ']\n'
+    printf 'kind = "program"\nseconds = 50\n[program]\nname = "world"\nseed = %s\ncount = %s\n' "$seed" "$worlds"
+    printf 'command = ["%s", "--rows", "--worlds", "1", "--seed", "{seed}"]\n' "$matrix"
   } >"$file.toml"
   "$backwash" campaign plan "$file.toml" -o "$file-campaign"
 fi

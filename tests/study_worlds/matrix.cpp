@@ -23,7 +23,7 @@ struct Options {
   std::vector<double> sizes = {1};
   std::vector<std::string> cells, from;
   std::string out, markdown;
-  bool gate = false, null_size = false, rows = false, names = false;
+  bool gate = false, null_size = false, rows = false;
 };
 
 /// The one size, or log-uniform between the two by the world's seed.
@@ -73,10 +73,6 @@ std::vector<WorldOutcome> read(const std::vector<std::string>& files) {
 }
 
 int report(const Options& options) {
-  if (options.names) {
-    for (const auto& cell : cells()) std::printf("%s\n", cell.name.c_str());
-    return 0;
-  }
   if (options.rows) return run(options), 0;
   const auto outcomes = options.from.empty() ? run(options) : read(options.from);
   const auto summary = summarise(outcomes);
@@ -104,11 +100,10 @@ int main(int argc, char** argv) {
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");
   app.add_option("--markdown", options.markdown, "writes the tables there too");
   app.add_flag("--rows", options.rows, "prints the worlds as lines of JSON, times as 0, and nothing else");
-  app.add_flag("--names", options.names, "prints the names of all cells, and nothing else");
   app.add_flag("--gate", options.gate, "exit 1 when a gate is missed");
   app.add_flag("--null-size", options.null_size, "instead: how often each channel rejects regressors without effect");
   if (const auto code = app.parse(argc, argv)) return *code;
-  if (options.from.empty() && !options.rows && !options.names)
+  if (options.from.empty() && !options.rows)
     std::printf("seed %llu, %d worlds a cell, %d flights\n\n", static_cast<unsigned long long>(options.seed),
                 options.worlds, options.flights);
   if (!options.null_size) return report(options);

@@ -177,7 +177,8 @@ std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Wo
   for (const auto& g : gates(cells))
     page += "| " + g.name + " | " + g.figure + " | " + (g.held ? "yes" : "**no**") + " |\n";
   std::vector<double> search, world;
-  for (const auto& o : outcomes) search.push_back(o.study_s), world.push_back(o.world_s);
+  for (const auto& o : outcomes)
+    if (o.study_s > 0) search.push_back(o.study_s), world.push_back(o.world_s);  // rows of a campaign have no times
   if (search.empty()) return page;
   std::sort(search.begin(), search.end()), std::sort(world.begin(), world.end());
   return page + text("\nCPU a study, median and slowest: %.2f s and %.2f s; flying and observing its world %.2f s.\n",
