@@ -2,6 +2,7 @@
 #include "core/log/local_cubic.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 
 namespace backwash::log {
 namespace {
@@ -33,6 +34,20 @@ std::vector<std::optional<LocalMotion>> local_cubics(const std::vector<double>& 
     while (last < t.size() && t[last] <= t[i] + kHalfWidth + 1e-9) ++last;
     const bool both_sides = t[i] - t[first] > 0.5 * kHalfWidth && t[last - 1] - t[i] > 0.5 * kHalfWidth;
     if (last - first >= kLeastRows && both_sides) motion[i] = cubic(t, p, first, last, t[i]);
+  }
+  return motion;
+}
+
+std::vector<std::optional<LocalMotion>> local_cubics_but_for_holds(const std::vector<double>& t,
+                                                                   const std::vector<Vec3>& p) {
+  auto motion = local_cubics(t, p);
+  for (std::size_t first = 0, next = 0; first < t.size(); first = next) {
+    for (next = first + 1; next < t.size() && p[next] == p[first];) ++next;
+    const double end = t[std::min(next, t.size() - 1)];  // until something else was said
+    if (end - t[first] <= 2 * kHalfWidth) continue;
+    const auto from = std::lower_bound(t.begin(), t.end(), t[first] - kHalfWidth);
+    const auto to = std::upper_bound(t.begin(), t.end(), end + kHalfWidth);
+    std::fill(motion.begin() + (from - t.begin()), motion.begin() + (to - t.begin()), std::nullopt);
   }
   return motion;
 }

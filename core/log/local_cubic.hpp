@@ -18,4 +18,9 @@ struct LocalMotion {
 /// are that near, or less than 0.06 s of them on one side: a gap, or an end. `t`: s, rising.
 std::vector<std::optional<LocalMotion>> local_cubics(const std::vector<double>& t, const std::vector<Vec3>& p);
 
+/// The same, and nothing within 0.12 s of places that were held for longer than 0.24 s: an estimate that froze goes on
+/// by a leap, which is no motion. Positions that are logged at 5 Hz or more are not held so long.
+std::vector<std::optional<LocalMotion>> local_cubics_but_for_holds(const std::vector<double>& t,
+                                                                   const std::vector<Vec3>& p);
+
 }  // namespace backwash::log

@@ -146,7 +146,7 @@ Both where_known(const std::vector<std::optional<LocalMotion>>& motion, const Ve
 
 std::vector<std::string> contradictions(const FlightLog& log, const Bounds& bounds) {
   std::vector<std::string> wrong;
-  const auto motion = local_cubics(log.t_s, rows_of(log, kP));
+  const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
   if (has_all(log, kV)) {
     const auto v = where_known(motion, rows_of(log, kV), false);
     pair_up({"velocity", "the derivative", kV, kP, kLeastSpeed, bounds.velocity, bounds.strangers}, v.said, v.derived,
@@ -207,7 +207,7 @@ bool silent(const FlightLog& log, std::span<const char* const> names) {
 
 /// Velocities or accelerations that are 0 while the positions move.
 void zeros(const FlightLog& log, std::vector<std::string>& wrong) {
-  const auto motion = local_cubics(log.t_s, rows_of(log, kP));
+  const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
   for (const bool second : {false, true}) {
     const Names& names = second ? kA : kV;
     if (!silent(log, names)) continue;

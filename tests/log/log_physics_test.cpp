@@ -63,6 +63,26 @@ TEST(Impossible, SaysNothingOfAFlightAndOfOneWhoseEstimatorIsPoor) {
   EXPECT_TRUE(impossible(slipped).empty());
 }
 
+TEST(Impossible, AnEstimateThatFrozeAndLeaptIsNoContradictionAndHidesNone) {
+  // Along a line that is a little off x. All places are held while x turns round, and y goes on 1.2 m off.
+  const auto frozen = [](FlightLog& log) {
+    for (std::size_t k = 0; k < log.t_s.size(); ++k) {
+      log.columns["y_m"][k] = 0.1 * log.column("x_m")[k] + (k >= 541 ? 1.2 : 0);
+      log.columns["vy_mps"][k] = 0.1 * log.column("vx_mps")[k];
+    }
+    for (std::size_t k = 442; k < 541; ++k)
+      for (const auto& name : kP) log.columns[name][k] = log.column(name)[441];
+    for (const auto& names : {kA, kQ})
+      for (const auto& name : names) log.columns.erase(name);
+  };
+  EXPECT_EQ(refusal(frozen), "");
+  EXPECT_NE(refusal([&](FlightLog& log) {
+              frozen(log);
+              scale(log, {"vz_mps"}, -1);
+            }).find("vz_mps is -1 times"),
+            std::string::npos);
+}
+
 TEST(Impossible, UnitsFramesAndStampsAreToldByTheirColumn) {
   EXPECT_NE(refusal([](auto& log) { scale(log, kA, 1 / kG); }).find("ax_mps2 is 0.1"), std::string::npos);
   EXPECT_NE(refusal([](auto& log) { scale(log, kP, 1000); }).find("vx_mps is 0.001 times"), std::string::npos);
