@@ -20,6 +20,7 @@ constexpr double kLeastSpeed = 0.05;         // m/s, rms: less says nothing of v
 constexpr double kLeastAcceleration = 0.25;  // m/s², rms
 constexpr double kSettled = 0.06;            // s on each side: what measured accelerations are averaged over
 constexpr double kFollows = 0.7;             // correlation from which an axis follows another
+constexpr double kClearly = 0.05;            // by which one correlation is more than another
 constexpr double kStranger = 0.3;            // below it two that moved have nothing to do with each other
 /// Slopes that are right, and whether what has nothing to do with its derivative is wrong.
 struct Bounds {
@@ -68,27 +69,33 @@ struct Pairing {
   int axes = 3;
 };
 
-/// How an axis of `said` goes with each axis of `shown` (means taken off both): slope and correlation with the one that
-/// it goes with best.
+/// How an axis goes with another one, means taken off both: slope and correlation.
 struct Match {
-  int axis;
+  int axis;  // the other
   double slope, correlation;
 };
-Match best_match(const Vectors& said, const Vectors& shown, int axis, int axes) {
-  Match best{axis, 0, 0};
+Match match_of(const Vectors& said, int axis, const Vectors& shown, int other) {
   const auto n = static_cast<double>(said.size());
-  Vec3 mean_said = Vec3::Zero(), mean_shown = Vec3::Zero();
-  for (std::size_t i = 0; i < said.size(); ++i) mean_said += said[i] / n, mean_shown += shown[i] / n;
+  double mean_said = 0, mean_shown = 0, ss = 0, dd = 0, sd = 0;
+  for (std::size_t i = 0; i < said.size(); ++i) mean_said += said[i][axis] / n, mean_shown += shown[i][other] / n;
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    const double s = said[i][axis] - mean_said, d = shown[i][other] - mean_shown;
+    ss += s * s, dd += d * d, sd += s * d;
+  }
+  return {other, dd > 0 ? sd / dd : 0, ss > 0 && dd > 0 ? sd / std::sqrt(ss * dd) : 0};
+}
+
+/// With the axis of `shown` that an axis of `said` goes with best: itself, unless another one does clearly better, and
+/// better than because it goes with what is said along that one. On a way between two axes a leap of the estimate along
+/// one of them would make it a stranger to its own.
+Match best_match(const Vectors& said, const Vectors& shown, int axis, int axes) {
+  Match best = match_of(said, axis, shown, axis);
   for (int other = 0; other < axes; ++other) {
-    double ss = 0, dd = 0, sd = 0;
-    for (std::size_t i = 0; i < said.size(); ++i) {
-      const double s = said[i][axis] - mean_said[axis], d = shown[i][other] - mean_shown[other];
-      ss += s * s, dd += d * d, sd += s * d;
-    }
-    const double r = ss > 0 && dd > 0 ? sd / std::sqrt(ss * dd) : 0;
-    // The axis itself, unless another one goes with it clearly better.
-    if (std::abs(r) > std::abs(best.correlation) + (other == axis ? -0.05 : 0.05) || (other == 0))
-      best = {other, dd > 0 ? sd / dd : 0, r};
+    if (other == axis) continue;
+    const Match match = match_of(said, axis, shown, other);
+    const double led =
+        std::abs(match_of(said, axis, said, other).correlation * match_of(said, other, shown, other).correlation);
+    if (std::abs(match.correlation) > std::max(std::abs(best.correlation), led) + kClearly) best = match;
   }
   return best;
 }

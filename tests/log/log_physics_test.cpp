@@ -83,6 +83,28 @@ TEST(Impossible, AnEstimateThatFrozeAndLeaptIsNoContradictionAndHidesNone) {
             std::string::npos);
 }
 
+TEST(Impossible, ALeapOnAWayBetweenTwoAxesIsNoContradictionButExchangedAxesAre) {
+  const auto between = [](FlightLog& log) {
+    for (std::size_t k = 0; k < log.t_s.size(); ++k) {
+      const double slow = 0.5 * std::sin(0.5 * log.t_s[k]);
+      log.columns["y_m"][k] = 0.3 * log.column("x_m")[k] + slow,
+      log.columns["vy_mps"][k] = 0.3 * log.column("vx_mps")[k] + 0.25 * std::cos(0.5 * log.t_s[k]);
+    }
+    for (const auto& names : {kA, kQ})
+      for (const auto& name : names) log.columns.erase(name);
+  };
+  EXPECT_EQ(refusal([&](FlightLog& log) {
+              between(log);
+              for (std::size_t k = 500; k < log.t_s.size(); ++k) log.columns["y_m"][k] += 0.5;
+            }),
+            "");
+  EXPECT_NE(refusal([&](FlightLog& log) {
+              between(log);
+              std::swap(log.columns.at("vx_mps"), log.columns.at("vy_mps"));
+            }).find("vx_mps is 1 times the derivative of y_m"),
+            std::string::npos);
+}
+
 TEST(Impossible, UnitsFramesAndStampsAreToldByTheirColumn) {
   EXPECT_NE(refusal([](auto& log) { scale(log, kA, 1 / kG); }).find("ax_mps2 is 0.1"), std::string::npos);
   EXPECT_NE(refusal([](auto& log) { scale(log, kP, 1000); }).find("vx_mps is 0.001 times"), std::string::npos);
