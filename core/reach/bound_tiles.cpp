@@ -2,6 +2,7 @@
 #include "core/reach/bound_tiles.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 
 namespace backwash::reach {
@@ -21,21 +22,25 @@ map::VoxelBox grown(const map::VoxelBox& box, int below, int above, const Index3
   return map::common({box.low - Index3::Constant(below), box.high + Index3::Constant(above)}, map::all_of(size));
 }
 
-/// Codes over a box, padded to whole vectors.
-struct alignas(16) Padded {
-  std::array<BoundCode, 8> code{};
+/// Codes padded to a whole vector: compilers take maxima of an array one by one.
+struct Padded {
+  using Codes [[gnu::vector_size(16)]] = BoundCode;
+  static_assert(sizeof(BoundCodes) <= sizeof(Codes));
+  Codes codes{};
 };
 
-/// Each of them becomes its maximum with the one `step` further on along each axis in turn.
-void pool_all(std::vector<Padded>& codes, const Index3& extent, int step) noexcept {
+/// Each cell of a box becomes what `join` makes of it and the one `step` further on, along each axis in turn.
+template <class Cell, class Join>
+void join_ahead(std::vector<Cell>& cells, const Index3& extent, int step, const Join& join) {
+  std::size_t stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const Index3 on = step * Index3::Unit(axis);
-    const std::size_t ahead = static_cast<std::size_t>(on.x() + extent.x() * (on.y() + extent.y() * on.z()));
-    map::for_each_voxel(map::all_of(extent), [&](const Index3& v) {
-      if (v[axis] + step >= extent[axis]) return;
-      const std::size_t n = map::linear(extent, v);
-      for (std::size_t d = 0; d < 8; ++d) codes[n].code[d] = std::max(codes[n].code[d], codes[n + ahead].code[d]);
-    });
+    const std::size_t block = stride * static_cast<std::size_t>(extent[axis]);
+    const std::size_t ahead = stride * static_cast<std::size_t>(step), count = block > ahead ? block - ahead : 0;
+    for (std::size_t first = 0; first < cells.size(); first += block) {
+      Cell* const here = cells.data() + first;
+      for (std::size_t n = 0; n < count; ++n) here[n] = join(here[n], here[n + ahead]);
+    }
+    stride = block;
   }
 }
 
@@ -48,22 +53,32 @@ struct BoundTiles::Marks {
   bool at(const Index3& v) const { return mark[map::linear(box.high - box.low + Index3::Ones(), v - box.low)]; }
 };
 
+/// Visits the entries of the voxels of a box, x fastest, row by row.
+template <class Visit>
+void BoundTiles::for_each_entry(const map::VoxelBox& box, const Visit& visit) const {
+  for (int k = box.low.z(); k <= box.high.z(); ++k)
+    for (int j = box.low.y(); j <= box.high.y(); ++j) {
+      const auto* const tiles = tiles_.row(j, k);
+      const std::size_t row = Grid::within({0, j, k});
+      for (int i = box.low.x(); i <= box.high.x(); ++i)
+        visit(tiles[i >> kShift]->at(row | static_cast<std::size_t>(i & (Grid::kEdge - 1))));
+    }
+}
+
 BoundTiles::BoundTiles(const Index3& size) : tiles_(size, std::make_shared<const Tile>()) {}
 
 // A voxel has an entry if its largest cube holds one whose w̄ is stored: dilation, axis by axis.
 BoundTiles::Marks BoundTiles::entered(const map::VoxelBox& changed, std::span<const std::size_t> listed) const {
   Marks marks{grown(changed, kAhead, kAhead, size()), {}};
   const Index3 extent = marks.box.high - marks.box.low + Index3::Ones();
-  map::for_each_voxel(marks.box,
-                      [&](const Index3& v) { marks.mark.push_back(!changed.contains(v) && some(at(v).level[0])); });
+  marks.mark.reserve(static_cast<std::size_t>(extent.prod()));
+  for_each_entry(marks.box, [&](const Entry& entry) { marks.mark.push_back(some(entry.level[0])); });
+  for (int k = changed.low.z(); k <= changed.high.z(); ++k)
+    for (int j = changed.low.y(); j <= changed.high.y(); ++j)
+      std::fill_n(&marks.at({changed.low.x(), j, k}), changed.high.x() - changed.low.x() + 1, std::uint8_t{0});
   for (const std::size_t n : listed) marks.at(map::voxel(size(), n)) = 1;
-  std::size_t stride = 1;
-  for (int axis = 0; axis < 3; stride *= static_cast<std::size_t>(extent[axis++]))
-    map::for_each_voxel(map::all_of(extent), [&](const Index3& v) {
-      std::uint8_t& here = marks.mark[map::linear(extent, v)];
-      for (int step = 1; step <= kAhead && v[axis] + step < extent[axis]; ++step)
-        here |= (&here)[static_cast<std::size_t>(step) * stride];
-    });
+  for (int step = 1; step <= kAhead; step *= 2)
+    join_ahead(marks.mark, extent, step, [](auto a, auto b) { return static_cast<std::uint8_t>(a | b); });
   return marks;
 }
 
@@ -121,14 +136,15 @@ void BoundTiles::pool(Tile& tile, const map::VoxelBox& box) const {
   const Index3 extent = read.high - read.low + Index3::Ones();
   std::vector<Padded> codes(static_cast<std::size_t>(extent.prod()));
   std::size_t n = 0;
-  map::for_each_voxel(read, [&](const Index3& v) { std::ranges::copy(at(v).level[0], codes[n++].code.begin()); });
-  for (int level = 1; level < kLevels; ++level) {
-    pool_all(codes, extent, 1 << (level - 1));
+  for_each_entry(read,
+                 [&](const Entry& entry) { std::memcpy(&codes[n++].codes, &entry.level[0], sizeof(BoundCodes)); });
+  for (std::size_t level = 1; level < kLevels; ++level) {
+    join_ahead(codes, extent, 1 << (level - 1),
+               [](const Padded& a, const Padded& b) { return Padded{a.codes > b.codes ? a.codes : b.codes}; });
     map::for_each_voxel(box, [&](const Index3& v) {
       const std::size_t e = tile.entry_of(Grid::within(v));
       if (e)
-        std::copy_n(codes[map::linear(extent, v - read.low)].code.begin(), kDirections,
-                    tile.entries[e].level[level].begin());
+        std::memcpy(&tile.entries[e].level[level], &codes[map::linear(extent, v - read.low)].codes, sizeof(BoundCodes));
     });
   }
   tile.largest = {};

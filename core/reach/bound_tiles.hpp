@@ -72,6 +72,8 @@ class BoundTiles {
     const Entry& at(std::size_t n) const noexcept { return entries[entry_of(n)]; }
   };
   using Grid = map::Tiles<Tile, kShift>;
+  template <class Visit>
+  void for_each_entry(const map::VoxelBox& box, const Visit& visit) const;
   struct Marks;  // which voxels of a box have an entry
   Marks entered(const map::VoxelBox& changed, std::span<const std::size_t> listed) const;
   Tile renumbered(std::size_t tile, const map::VoxelBox& changed, const Marks& marks) const;
