@@ -203,9 +203,9 @@ void DdsFront::run_readers() {
     take_poses();
     look_for_other_daemons();
     take_commands();
-    if (const auto writers = foreign_.take_new()) {
-      channels_.foreign_writers += writers;
-      spdlog::warn("{} writers on our topics have another type: they are not listened to", writers);
+    if (const auto news = foreign_.take_new(); news.count > 0) {
+      channels_.foreign_writers += news.count - 1;
+      refusals_.add(channels_.foreign_writers, [&] { return printable(news.first, 240) + ": it is not listened to"; });
     }
   }
 }

@@ -115,9 +115,9 @@ void MapFront::run_readers() {
     take_maps();
     let_writers_go();
     show_disturbance();
-    if (const auto writers = foreign_.take_new()) {
-      channels_.foreign_writers += writers;
-      spdlog::warn("{} writers of maps or scans have another type: they are not listened to", writers);
+    if (const auto news = foreign_.take_new(); news.count > 0) {
+      channels_.foreign_writers += news.count - 1;
+      refusals_.add(channels_.foreign_writers, [&] { return printable(news.first, 240) + ": it is not listened to"; });
     }
   }
 }

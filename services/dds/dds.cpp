@@ -14,7 +14,9 @@
 #include <span>
 #include <string_view>
 
+#include "services/dds/loopback.hpp"
 #include "services/dds/packet_filter.hpp"
+#include "services/dds/quality.hpp"
 #include "services/dds/secured.hpp"
 
 // Takes the C library's place in every program that links this: the middleware receives by it and by nothing else.
@@ -23,7 +25,8 @@ extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
   if (received <= 0 || message->msg_iovlen != 1 || (flags & MSG_PEEK)) return received;
   const std::span datagram(static_cast<std::uint8_t*>(message->msg_iov[0].iov_base),
                            std::min(static_cast<std::size_t>(received), message->msg_iov[0].iov_len));
-  return static_cast<ssize_t>(backwash::dds::filter_packet(datagram));
+  const std::size_t heard = backwash::dds::heard_of(*message, datagram);
+  return static_cast<ssize_t>(backwash::dds::filter_packet(datagram.first(heard)));
 }
 
 namespace backwash::dds {
@@ -53,11 +56,12 @@ std::string threads(int priority) {
 }
 
 std::string configuration(const std::string& interface, const Receiving& receiving) {
-  // The loopback interface has no multicast: participants find each other by asking the first thirty ports in turn.
-  // Elsewhere multicast is for discovery alone: data sent to a group would reach the sockets of every participant.
+  // The loopback interface is not marked as one with multicast, but has it: what others with their own settings listen
+  // to. Those without it are found by asking the first thirty ports in turn. Multicast is for discovery alone: data
+  // sent to a group would reach the sockets of every participant.
   const bool loopback = interface == "lo";
   return "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"" + interface +
-         "\"/></Interfaces><AllowMulticast>" + (loopback ? "false" : "spdp") + "</AllowMulticast></General>" +
+         (loopback ? "\" multicast=\"true" : "") + "\"/></Interfaces><AllowMulticast>spdp</AllowMulticast></General>" +
          (loopback ? "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>30"
                      "</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>"
                    : "") +
@@ -84,19 +88,6 @@ Entity make_topic(Entity participant, const dds_topic_descriptor& type, const st
   return checked(dds_create_topic(participant, &type, name.c_str(), nullptr, nullptr), "topic " + name);
 }
 
-dds_qos_t* make_qos(Delivery delivery) {
-  dds_qos_t* qos = dds_create_qos();
-  const bool best_effort = delivery == Delivery::latest || delivery == Delivery::scans || delivery == Delivery::tf;
-  dds_qset_reliability(qos, best_effort ? DDS_RELIABILITY_BEST_EFFORT : DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
-  dds_qset_history(qos, DDS_HISTORY_KEEP_LAST,
-                   delivery == Delivery::reliable || delivery == Delivery::tf ? 64
-                   : delivery == Delivery::scans                              ? 8
-                   : delivery == Delivery::sent_tf                            ? 100
-                                                                              : 1);
-  dds_qset_durability(qos, delivery == Delivery::state ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-  return qos;
-}
-
 }  // namespace
 
 Participant::Participant(std::uint32_t domain, const std::string& interface, const Receiving& receiving,
@@ -105,6 +96,7 @@ Participant::Participant(std::uint32_t domain, const std::string& interface, con
   const std::string where = "domain " + std::to_string(domain) + " on interface " + interface;
   const std::uint32_t number = receiving.apart ? apart_from(domain) : domain;
   const std::string chosen = environment ? environment : configuration(interface, receiving);
+  if (!environment && interface == "lo") loopback_alone();
   if (receiving.apart || !environment)
     domain_ =
         checked(dds_create_domain(number, (chosen + (receiving.apart ? on_the_wire(domain) : "")).c_str()), where);
@@ -140,7 +132,7 @@ ReaderBase::ReaderBase(const Participant& participant, const dds_topic_descripto
                        Delivery delivery)
     : topic_(topic), type_(type.m_typename) {
   const Entity handle = make_topic(participant.handle(), type, topic);
-  dds_qos_t* qos = make_qos(delivery);
+  dds_qos_t* qos = quality(delivery, Role::reader, type_);
   const dds_return_t reader = dds_create_reader(participant.handle(), handle, qos, nullptr);
   dds_delete_qos(qos);
   reader_ = checked(reader, "reader of " + topic);
@@ -211,10 +203,7 @@ std::size_t ReaderBase::take(const std::function<void(const void*, const Guid&)>
 WriterBase::WriterBase(const Participant& participant, const dds_topic_descriptor& type, const std::string& topic,
                        Delivery delivery) {
   const Entity handle = make_topic(participant.handle(), type, topic);
-  dds_qos_t* qos = make_qos(delivery);
-  // Of readers nothing of the kind is asked: a writer without a lease is as welcome.
-  if (delivery == Delivery::reliable)
-    dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC, static_cast<dds_duration_t>(kLease_s * 1e9));
+  dds_qos_t* qos = quality(delivery, Role::writer, type.m_typename);
   const dds_return_t writer = dds_create_writer(participant.handle(), handle, qos, nullptr);
   dds_delete_qos(qos);
   writer_ = checked(writer, "writer of " + topic);

@@ -35,7 +35,8 @@ constexpr double kLease_s = 2;
 
 /// Delivery of a topic.
 enum class Delivery {
-  latest,    ///< best effort, keep last 1: odometry, status
+  latest,    ///< best effort, keep last 1: odometry
+  status,    ///< sent reliably, keep last 1: whoever reads is matched, and holds up nobody; read best effort
   sent_tf,   ///< reliable, keep last 100: transforms, as ROS 2's broadcasters send them
   tf,        ///< best effort, keep last 64: transforms of all, ours among them
   scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data

@@ -101,7 +101,7 @@ template <>
 struct TopicOf<Status> {
   static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Status__desc; }
   static constexpr const char* kName = "status";
-  static constexpr Delivery kDelivery = Delivery::latest;
+  static constexpr Delivery kDelivery = Delivery::status;
 };
 template <>
 struct TopicOf<Tube> {

@@ -25,20 +25,45 @@ void take(Entity publications, Each&& each) {
   }
 }
 
+bool is_reliable(const dds_qos_t* qos) {
+  dds_reliability_kind_t kind = DDS_RELIABILITY_BEST_EFFORT;
+  dds_qget_reliability(qos, &kind, nullptr);
+  return kind == DDS_RELIABILITY_RELIABLE;
+}
+
+bool is_kept(const dds_qos_t* qos) {
+  dds_durability_kind_t kind = DDS_DURABILITY_VOLATILE;
+  dds_qget_durability(qos, &kind);
+  return kind != DDS_DURABILITY_VOLATILE;
+}
+
 }  // namespace
 
 ForeignWriters::ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers)
     : publications_(participant.publications()) {
-  for (const auto* reader : readers) types_[reader->topic()] = reader->type();
+  for (const auto* reader : readers) {
+    dds_qos_t* qos = dds_create_qos();
+    dds_get_qos(reader->handle(), qos);
+    wanted_[reader->topic()] = {reader->type(), is_reliable(qos), is_kept(qos)};
+    dds_delete_qos(qos);
+  }
 }
 
-std::size_t ForeignWriters::take_new() {
-  const std::size_t before = seen_.size();
+ForeignWriters::News ForeignWriters::take_new() {
+  News news;
   take(publications_, [&](const Guid& guid, const dds_builtintopic_endpoint_t* writer) {
-    const auto ours = writer ? types_.find(writer->topic_name) : types_.end();
-    if (ours != types_.end() && ours->second != writer->type_name && seen_.size() < kMost) seen_.insert(guid);
+    const auto ours = writer ? wanted_.find(writer->topic_name) : wanted_.end();
+    if (ours == wanted_.end() || seen_.size() >= kMost) return;
+    const Wanted& wanted = ours->second;
+    const std::string why = wanted.type != writer->type_name
+                                ? "has the type " + std::string(writer->type_name) + ", expected " + wanted.type
+                            : wanted.reliable && !is_reliable(writer->qos) ? "is best effort, expected reliable"
+                            : wanted.kept && !is_kept(writer->qos)         ? "is volatile, expected transient local"
+                                                                           : "";
+    if (why.empty() || !seen_.insert(guid).second) return;
+    if (news.count++ == 0) news.first = "writer " + text(guid) + " of " + ours->first + " " + why;
   });
-  return seen_.size() - before;
+  return news;
 }
 
 OtherWriters::OtherWriters(const Participant& participant, std::string topic, const Guid& ours)

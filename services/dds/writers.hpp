@@ -13,18 +13,26 @@
 /// Who else writes: what the middleware knows of the writers of other participants.
 namespace backwash::dds {
 
-/// Counts the writers of other participants that use the topic of one of these readers with another type: the
-/// middleware does not connect them and tells nobody (docs/faults.md row 27).
+/// Counts the writers of other participants that use the topic of one of these readers with another type, or offer less
+/// than it asks: the middleware does not connect them and tells nobody (docs/faults.md row 27).
 class ForeignWriters {
  public:
+  struct News {
+    std::size_t count = 0;
+    std::string first;  ///< of them: topic, writer, what it offers and what was expected; text of others in it
+  };
   ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);
-  /// How many came since the last call; after kMost of them no more are counted. Call from one thread.
-  std::size_t take_new();
+  /// Who came since the last call; after kMost of them no more are counted. Call from one thread.
+  News take_new();
 
  private:
+  struct Wanted {
+    std::string type;
+    bool reliable, kept;
+  };
   static constexpr std::size_t kMost = 1000;  // their identities are kept
   Entity publications_;
-  std::map<std::string, std::string> types_;  // by topic
+  std::map<std::string, Wanted> wanted_;  // by topic
   std::set<Guid> seen_;
 };
 

@@ -3,8 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <memory>
 #include <random>
 #include <vector>
+
+#include "services/dds/loopback.hpp"
 
 namespace backwash::dds {
 namespace {
@@ -187,6 +192,53 @@ TEST(PacketFilter, LeavesOtherProtocolsAlone) {
   const Packet before = other;
   EXPECT_EQ(filter_packet(other), 5u);
   EXPECT_EQ(other, before);
+}
+
+/// A locator as discovery says it: of UDP over IPv4 unless its kind is another.
+Packet locator(const std::array<std::uint8_t, 4>& address, bool little, std::uint32_t kind = 1) {
+  Packet p = number(kind, 4, little);
+  p += number(7411, 4, little);
+  p += Packet(12);
+  p += Packet(address.begin(), address.end());
+  return p;
+}
+
+constexpr bool ours(std::uint32_t address) { return address == 0x0a630001; }  // 10.99.0.1
+
+TEST(Loopback, TakesThePlaceOfThisMachinesAddressesAndOfNoOther) {
+  constexpr std::uint32_t kParticipants = 0x000100c2;
+  for (const bool little : {true, false}) {
+    const auto said = [&](const std::array<std::uint8_t, 4>& a) {
+      Parameters all{{0x05, kTopic}};
+      for (const std::uint16_t id : {0x2f, 0x31, 0x32, 0x4032}) all.push_back({id, locator(a, little)});
+      return data(kParticipants, list(all, little));
+    };
+    Packet p = whole({said({10, 99, 0, 1}), said({10, 99, 0, 2}), said({127, 0, 0, 1})});
+    EXPECT_EQ(by_loopback(p, ours), 4u);
+    EXPECT_EQ(p, whole({said({127, 0, 0, 1}), said({10, 99, 0, 2}), said({127, 0, 0, 1})}));
+  }
+}
+
+TEST(Loopback, LeavesGroupsOtherKindsSamplesAndWhatIsCutOffAsTheyAre) {
+  const Packet mine = locator({10, 99, 0, 1}, true);
+  Packet cut = data(kPublications, list({{0x2f, mine}}));
+  cut.resize(cut.size() - 12);
+  for (const Packet& m :
+       {data(kPublications, list({{0x30, mine}, {0x33, mine}, {0x2f, locator({10, 99, 0, 1}, true, 2)}})),
+        data(kUser, list({{0x2f, mine}})), data(kPublications, list({{0x2f, mine}}), kFragment), cut}) {
+    Packet p = whole({m});
+    EXPECT_EQ(by_loopback(p, ours), 0u);
+    EXPECT_EQ(p, whole({m}));
+  }
+}
+
+TEST(Loopback, ReadsNothingBeyondADatagramOfAnyLength) {
+  const Packet good = whole({data(kPublications, list({{0x2f, locator({10, 99, 0, 1}, true)}, {0x05, kTopic}}))});
+  for (std::size_t length = 0; length <= good.size(); ++length) {
+    const std::unique_ptr<std::uint8_t[]> exact(new std::uint8_t[length]);
+    std::copy_n(good.begin(), length, exact.get());
+    by_loopback({exact.get(), length}, ours);
+  }
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ import re
 import sys
 
 # As rosidl maps them (design.ros2.org, "IDL interface definition").
-TYPES = {"octet": "uint8", "boolean": "bool", "float": "float32", "double": "float64", "long": "int32",
+TYPES = {"uint8": "uint8", "boolean": "bool", "float": "float32", "double": "float64", "long": "int32",
          "unsigned long": "uint32", "unsigned long long": "uint64", "string": "string"}
 
 

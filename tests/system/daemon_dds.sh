@@ -46,7 +46,11 @@ expect second 's["state"] == "passive" and abs(s["position"][0] - 1) < 0.1 and s
 
 probe() { "$build/tests/dds_probe" "$domain" "${2:-backwash}" "$1" || die "dds_probe $1 failed"; }
 probe foreign
-expect backwash 's["foreign_writers"] == 1 and s["state"] == "tracking"'
+expect backwash 's["foreign_writers"] == 3 and s["state"] == "tracking"'
+for why in 'odometry has the type backwash_msgs::msg::dds_::Command_, expected nav_msgs::msg::dds_::Odometry_' \
+  'loop_closure is best effort, expected reliable' 'map is volatile, expected transient local'; do
+  grep -q "refused: writer [0-9a-f:]* of rt/backwash/$why: it is not listened to" "$log" || die "not refused as that: $why"
+done
 probe frame
 expect backwash 's["odometry_refused"] > 0 and s["odometry_rejected"] == 0 and s["state"] == "tracking"'
 # The middleware's own buffer (1 MB) loses each of these on a busy machine; ours is what the kernel gives, counted twice by it.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a confused or hostile participant sends, for the scripts beside it (docs/faults.md rows 2, 3, 12, 26, 27, 46,
-// 48).
+// What a confused or hostile participant sends, for the scripts beside it (docs/faults.md rows 2, 3, 12, 26 to 48).
 //   dds_probe DOMAIN NAMESPACE foreign|frame|second|oversized|lying|corrupt|closure|closures|elsewhere
 //   dds_probe DOMAIN NAMESPACE flood [SECONDS]
 //   dds_probe DOMAIN NAMESPACE roomy [SECONDS]  a good map, once; its writer stays for so long
@@ -30,18 +29,24 @@ void until_matched(const Writer& writer) {
   for (int n = 0; n < 500 && writer.matched() == 0; ++n) std::this_thread::sleep_for(10ms);
 }
 
-// A command where odometry is expected.
+// A command where odometry is expected; a map and a closure that are not kept for who comes later, or not repeated.
 int foreign(const dds::Participant& participant, const std::string& name_space) {
   dds::Writer<dds::Command> writer(participant, dds::TopicOf<dds::Command>::type(), dds::topic(name_space, "odometry"),
                                    dds::Delivery::latest);
-  for (int n = 0; n < 20; ++n) {
+  const auto lesser = [&]<typename T>(T, const char* name, dds::Delivery delivery) {
+    return dds::Writer<T>(participant, dds::TopicOf<T>::type(), dds::topic(name_space, name), delivery);
+  };
+  const auto map = lesser(dds::Octomap{}, "map", dds::Delivery::reliable);
+  for (int n = 0; n < 30; ++n) {
     dds::Command command{};
     char station[] = "nobody";
     command.station = station;
     writer.write(command);
     std::this_thread::sleep_for(50ms);
   }
-  return writer.matched() == 0 ? 0 : 1;
+  const auto closure = lesser(dds::TransformStamped{}, "loop_closure", dds::Delivery::latest);  // one warning a second
+  std::this_thread::sleep_for(300ms);
+  return writer.matched() + map.matched() + closure.matched() == 0 ? 0 : 1;
 }
 
 // The pose at `x` of this frame, again and again.

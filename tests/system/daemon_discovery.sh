@@ -1,0 +1,102 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# With the shipped configuration (dds.interface = "lo") Fast DDS and Cyclone DDS as they come see the topics: where there is
+# nothing but loopback, and beside a network whose address they speak by. Each quality that ROS 2's readers ask is matched
+# and served, one that is stopped holds up nobody, and each topic says its type's hash. What comes from beyond that network is
+# not heard, not even under the name of the vehicle's own odometry. In a network of its own: skipped without the right.
+#   daemon_discovery.sh SOURCE_DIR BUILD_DIR [inside]
+set -euo pipefail
+source_dir=$1 build=$2
+if [[ ${3:-} != inside ]]; then
+  unshare --net true 2>/dev/null || { echo "no network of its own here" >&2; exit 77; }
+  [[ -x $build/tests/fastdds_reader ]] || { echo "no Fast DDS here" >&2; exit 77; }
+  exec unshare --net bash -c 'ip link set lo up && exec "$@"' - "$0" "$source_dir" "$build" inside
+fi
+source "$source_dir/services/bench/session.sh"
+unset CYCLONEDDS_URI FASTRTPS_DEFAULT_PROFILES_FILE
+start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
+start_daemon builtin:quad-5in "$work/flight.bwlog"
+
+topic() { echo "rt/backwash/$1 $2"; }
+asked=()
+for qos in sensor default; do
+  asked+=($(topic status backwash_msgs::msg::dds_::Status_) $qos $(topic ack backwash_msgs::msg::dds_::Ack_) $qos)
+done
+for qos in sensor default latched; do
+  asked+=(rt/diagnostics diagnostic_msgs::msg::dds_::DiagnosticArray_ $qos)
+  asked+=($(topic tube backwash_msgs::msg::dds_::ReachTube_) $qos $(topic trajectory nav_msgs::msg::dds_::Path_) $qos)
+  asked+=($(topic markers visualization_msgs::msg::dds_::MarkerArray_) $qos)
+  asked+=($(topic disturbance sensor_msgs::msg::dds_::PointCloud2_) $qos)
+done
+# seen WHERE: by both as they come, all that was asked. The status comes 10 times a second.
+seen() {
+  local reader
+  for reader in fastdds cyclone; do
+    "$build/tests/${reader}_reader" "$domain" 8 "${asked[@]}" >"$work/seen" 2>>"$log" || die "no $reader reader"
+    python3 - "$work/seen" "$source_dir" "$1, $reader" <<'PYTHON' || die "$1, $reader: $(<"$work/seen")"
+import pathlib, re, sys
+sys.dont_write_bytecode = True
+sys.path.insert(0, sys.argv[2] + "/idl")
+import type_hashes as t
+types = t.types_of(pathlib.Path(sys.argv[2], "idl/ros2.idl").read_text())
+types |= t.types_of(pathlib.Path(sys.argv[2], "idl/backwash_msgs.idl").read_text())
+of = {"status": "backwash_msgs/msg/Status", "ack": "backwash_msgs/msg/Ack", "tube": "backwash_msgs/msg/ReachTube",
+      "trajectory": "nav_msgs/msg/Path", "markers": "visualization_msgs/msg/MarkerArray",
+      "disturbance": "sensor_msgs/msg/PointCloud2", "diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+lines = [re.fullmatch(r"rt/(?:backwash/)?(\w+) (\w+): matched (\d+), (\d+) samples, user data (.*)", l.rstrip()) for l in open(sys.argv[1])]
+assert len(lines) == 19 and all(lines), lines
+for topic, qos, matched, samples, said in (l.groups() for l in lines):
+    assert matched == "1", (topic, qos, matched)
+    assert said == f"typehash=RIHS01_{t.hash_of(of[topic], types)};", (topic, said)
+    least, most = {"status": (40, 90), "diagnostics": (4, 10)}.get(topic, (0, 1))
+    assert least <= int(samples) <= most, (topic, qos, samples)
+print(f"{sys.argv[3]}: {len(lines)} readers matched, {len({l[1] for l in lines})} topics with their types' hashes")
+PYTHON
+  done
+}
+status() { "$bin/backwashctl" --domain "$domain" status --json | python3 -c 'import json, sys; print(json.load(sys.stdin)[sys.argv[1]])' "$1"; }
+
+seen "loopback alone"
+
+# Beside a network: eth to a machine beyond it.
+unshare --net sleep 600 &
+beyond=$!
+more_pids+=("$beyond")
+for _ in $(seq 50); do [[ $(readlink /proc/$beyond/ns/net) != "$(readlink /proc/self/ns/net)" ]] && break; sleep 0.1; done
+ip link add eth type veth peer name far netns "$beyond"
+ip address add 10.99.0.1/24 dev eth
+ip link set eth up
+there() { nsenter --target "$beyond" --net "$@"; }
+there ip address add 10.99.0.2/24 dev far
+there ip link set far up
+there ip link set lo up
+seen "beside a network"
+
+# A reader that is stopped, and asks for every sample: the others get theirs.
+"$build/tests/fastdds_reader" "$domain" 60 $(topic status backwash_msgs::msg::dds_::Status_) default >/dev/null 2>&1 &
+stopped=$!
+more_pids+=("$stopped")
+sleep 2
+kill -STOP "$stopped"
+seen "beside a stopped reader"
+kill -KILL "$stopped"
+wait "$stopped" 2>/dev/null || true
+
+# As the vehicle's odometry, from beyond the network; the same from this machine is heard.
+writer=$(sed -n 's/.*odometry is taken from writer //p' "$log" | tail -n 1)
+spoof=(python3 "$source_dir/tests/system/spoofed_packets.py" "$domain" "$writer" odometry 10.99.0.1)
+[[ $(status odometry_refused) == 0 ]] || die "odometry was refused before"
+there "${spoof[@]}"
+[[ $(status odometry_refused) == 0 ]] || die "what another machine sent was heard"
+there "$build/tests/fastdds_reader" "$domain" 4 $(topic status backwash_msgs::msg::dds_::Status_) sensor >"$work/far" 2>>"$log"
+grep -q 'matched 0, 0 samples' "$work/far" || die "another machine reads the status: $(<"$work/far")"
+"${spoof[@]}"
+sleep 1
+(($(status odometry_refused) > 0)) || die "spoofed odometry of this machine was not heard: it proves nothing above"
+spoofed=$(status odometry_refused)
+# What Fast DDS sends as it comes is heard, too: here it is the second writer of odometry, and refused as that.
+FASTDDS_AS_IT_COMES=1 "$build/tests/fastdds_peer" "$domain" rt/backwash/odometry rt/backwash/status -2 0 0.16 4 odometry >"$work/peer" 2>>"$log" ||
+  die "the peer read no status"
+(($(status odometry_refused) > spoofed + 100)) || die "of the peer's 400 samples $(($(status odometry_refused) - spoofed)) were heard"
+[[ $(status refused) == *"is in use"* ]] || die "the peer was refused as another: $(status refused)"
+echo "10.99.0.2 was not heard; $spoofed spoofed samples of this machine were, and $(($(status odometry_refused) - spoofed)) of Fast DDS as it comes"
