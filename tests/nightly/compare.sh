@@ -7,7 +7,7 @@ set -euo pipefail
 backwash=$(realpath "${1:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}")
 out=${2:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}
 seed=${3:-1}
-flights=92
+flights=200
 mkdir -p "$out"
 scenes=(builtin)
 geb079=/usr/share/doc/liboctomap-dev/examples/data/geb079.bt
