@@ -11,7 +11,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct AdaptOptions {
   std::vector<std::string> logs;
   std::string map, model = "builtin:quad-5in", vehicle, gusts = "any";
   bool json = false;
@@ -32,7 +32,7 @@ struct Learned {
 constexpr const char* kForms[] = {"karman", "first_order", "second_order"};
 
 /// What calibration says of the gusts: the interval of τ_w where the model file has one, else τ_w itself.
-adapt::Gusts gusts_of(const Options& options, const Model& model) {
+adapt::Gusts gusts_of(const AdaptOptions& options, const Model& model) {
   adapt::Gusts gusts;
   gusts.mean_horizontal = model.bound.mean_horizontal, gusts.mean_vertical = model.bound.mean_vertical;
   for (std::size_t k = 0; k < std::size(kForms); ++k)
@@ -110,7 +110,7 @@ void print_text(const Learned& learned, const std::string& path) {
   }
 }
 
-int run(const Options& options) {
+int run(const AdaptOptions& options) {
   if (options.vehicle.empty() || options.logs.empty()) throw Failure(kUsage, "adapt needs logs and --vehicle");
   const auto vehicle = read_vehicle(options.vehicle);
   auto model = read_model(options.model);
@@ -135,7 +135,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb adapt_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<AdaptOptions>();
   auto& command = app.add_subcommand(
       "adapt", "How much rougher than modelled a flight's air was, by class, as it would be known in flight");
   command.add_option("logs", options->logs, "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog)");

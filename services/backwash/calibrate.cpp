@@ -18,7 +18,7 @@ namespace {
 
 using namespace study::calibrate;
 
-struct Options {
+struct CalibrateOptions {
   CampaignFiles files;
   std::string vehicle, base_model = "builtin:quad-5in", out, report, from;
   double quantile = 0.9;
@@ -67,7 +67,7 @@ Json to_json(const std::vector<Refusal>& refused) {
   return all;
 }
 
-Json to_json(const Campaign& campaign, const Options& options) {
+Json to_json(const Campaign& campaign, const CalibrateOptions& options) {
   Json gated, signals = Json::array();
   for (std::size_t g = 0; g < study::kHoverGates; ++g)
     gated[study::to_string(static_cast<study::Gate>(g))] = campaign.gated[g];
@@ -103,7 +103,7 @@ void add(Json& json, const Calibration& c, const Campaign& campaign) {
   json["fitted"] = to_json(c.on_fitted, campaign.logs);
 }
 
-void print_text(const Calibration& c, const Options& options) {
+void print_text(const Calibration& c, const CalibrateOptions& options) {
   std::printf("%-26s %10s   95 %% interval\n", "constant", "value");
   for (std::size_t p = 0; p < kParameters; ++p) {
     if (c.determined[p])
@@ -119,7 +119,7 @@ void print_text(const Calibration& c, const Options& options) {
   if (!options.out.empty()) std::printf("model written to %s\n", options.out.c_str());
 }
 
-std::string report_page(const Calibration& c, const Campaign& campaign, const Options& options) {
+std::string report_page(const Calibration& c, const Campaign& campaign, const CalibrateOptions& options) {
   std::string page = "<h1>Hover variances under the calibrated bound</h1>\n<p class=\"context\">" +
                      std::to_string(campaign.windows) + " windows of " + std::to_string(campaign.logs.size()) +
                      " flights; backwash " + kVersion +
@@ -145,7 +145,7 @@ std::string refusal_line(const std::vector<Refusal>& refused) {
 }
 
 /// The base model against the logs, nothing fitted.
-int judge(const Campaign& campaign, const Model& model, const Options& options, Json json) {
+int judge(const Campaign& campaign, const Model& model, const CalibrateOptions& options, Json json) {
   const auto judged = assess(campaign.data, ln_bounds(campaign.data, parameters_of(model)), options.quantile);
   if (options.json) {
     json["judged"] = to_json(judged, campaign.logs);
@@ -158,7 +158,7 @@ int judge(const Campaign& campaign, const Model& model, const Options& options, 
   return kOk;
 }
 
-void check(const Options& options) {
+void check(const CalibrateOptions& options) {
   if (options.files.logs.empty() == options.from.empty())
     throw Failure(kUsage, "calibrate needs --log or, in its place, --from");
   if (options.rows &&
@@ -170,7 +170,7 @@ void check(const Options& options) {
 }
 
 /// Of logs, or of what was kept of them.
-Campaign campaign_of(const Options& options, const std::optional<Vehicle>& vehicle, const Model& gates) {
+Campaign campaign_of(const CalibrateOptions& options, const std::optional<Vehicle>& vehicle, const Model& gates) {
   Campaign campaign = empty_campaign(options.files);
   const CalibrateRowsOf made{options.vehicle, options.base_model, options.files.maps};
   std::vector<CalibratedLog> logs;
@@ -184,7 +184,7 @@ Campaign campaign_of(const Options& options, const std::optional<Vehicle>& vehic
   return campaign;
 }
 
-int run(const Options& options) {
+int run(const CalibrateOptions& options) {
   check(options);
   std::optional<Vehicle> vehicle;
   if (!options.vehicle.empty()) vehicle = read_vehicle(options.vehicle);
@@ -226,7 +226,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb calibrate_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   auto& command =
       app.add_subcommand("calibrate", "Model file from hover flights: a bound at a quantile, with intervals");
   add_campaign_options(command, options->files);

@@ -14,7 +14,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct CampaignOptions {
   std::string spec, folder;
   std::optional<std::uint64_t> shard;
   std::uint64_t jobs = 0;
@@ -34,7 +34,7 @@ double longest_shard_s(const CampaignPlan& plan) {
   return longest;
 }
 
-int plan(const Options& options) {
+int plan(const CampaignOptions& options) {
   const auto made = read_campaign_spec(options.spec);
   std::error_code wrong;
   std::filesystem::create_directories(options.folder, wrong);
@@ -62,7 +62,7 @@ int plan(const Options& options) {
   return kOk;
 }
 
-int run(const Options& options) {
+int run(const CampaignOptions& options) {
   const auto planned = read_plan(options.folder);
   if (options.shard.has_value() == (options.jobs > 0))
     throw Failure(kUsage, "give the number of one shard, or --jobs for all that are missing");
@@ -74,7 +74,7 @@ int run(const Options& options) {
   return kOk;
 }
 
-int status(const Options& options) {
+int status(const CampaignOptions& options) {
   const auto planned = read_plan(options.folder);
   const auto found = survey(options.folder, planned);
   if (options.json) {
@@ -101,7 +101,7 @@ int status(const Options& options) {
   return kOk;
 }
 
-int merge(const Options& options) {
+int merge(const CampaignOptions& options) {
   const auto planned = read_plan(options.folder);
   progress("merging");
   const auto rows = merge_shards(options.folder, planned, options.force);
@@ -114,19 +114,19 @@ int merge(const Options& options) {
   return kOk;
 }
 
-int hand_over(Options options) {
+int hand_over(CampaignOptions options) {
   if (options.slurm == options.parallel) throw Failure(kUsage, "give one of --slurm and --parallel");
   options.how.to = options.slurm ? Submission::To::slurm : Submission::To::parallel;
   submit(options.folder, read_plan(options.folder), options.how);
   return kOk;
 }
 
-Command& add_folder(Command& command, Options& options) {
+Command& add_folder(Command& command, CampaignOptions& options) {
   command.add_option("folder", options.folder, "of the campaign, made by plan").required();
   return command;
 }
 
-Command& add_submit(Command& group, Options& options) {
+Command& add_submit(Command& group, CampaignOptions& options) {
   auto& command =
       add_folder(group.add_subcommand("submit", "Gives the missing shards to Slurm or GNU parallel"), options);
   command.add_flag("--slurm", options.slurm, "one array over them, and a merge after it");
@@ -147,7 +147,7 @@ Command& add_submit(Command& group, Options& options) {
 Verb campaign_verb(Command& app) {
   auto& group = app.add_subcommand("campaign", "Work that outgrows one process: planned, done in shards, merged");
   group.require_subcommand();
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CampaignOptions>();
   auto& planning = group.add_subcommand("plan", "A manifest of everything to be done, with the hash of every input");
   planning.add_option("spec", options->spec, "specification, TOML").required();
   planning.add_option("-o,--out", options->folder, "folder of the campaign").required();

@@ -17,7 +17,7 @@ constexpr std::size_t kGapFlights = 10;
 constexpr double kMostFlights = 100'000;  // of a scene and vehicle: weeks
 const char* const kGapScene = "builtin:narrow-gap";
 
-struct Options {
+struct CompareOptions {
   std::vector<std::string> scenes{"builtin"}, vehicles{"builtin:quad-5in", "builtin:quad-7in"}, models;
   std::size_t flights = 10;
   std::uint64_t seed = 1;
@@ -33,10 +33,10 @@ std::uint64_t seed_for(std::uint64_t seed, const std::string& scene, const std::
   return hash + seed;
 }
 
-std::size_t first_pair(const Options& options) { return options.pairs ? options.pairs->first : 0; }
+std::size_t first_pair(const CompareOptions& options) { return options.pairs ? options.pairs->first : 0; }
 
 /// Flies one scene with the vehicle of that number. Throws Interrupted after Ctrl-C, and then nothing of it is kept.
-void fly_scene(report::Comparison& c, const Options& options, const std::string& map, std::size_t n,
+void fly_scene(report::Comparison& c, const CompareOptions& options, const std::string& map, std::size_t n,
                const std::string& model) {
   const std::string scene = map.starts_with("builtin:") ? map : std::filesystem::path(map).filename().string();
   const auto vehicle = read_vehicle(options.vehicles[n]);
@@ -57,7 +57,7 @@ void fly_scene(report::Comparison& c, const Options& options, const std::string&
   if (gap) c.gaps.push_back(*std::move(gap));
 }
 
-report::Comparison nothing_yet(const Options& options) {
+report::Comparison nothing_yet(const CompareOptions& options) {
   report::Comparison c{sim::compare_methods(), {}, {}, {}, {}, options.seed, options.flights, kVersion};
   c.timed = !options.untimed && options.from.empty();
   return c;
@@ -68,7 +68,7 @@ void judge(report::Comparison& c) {
   c.demands = sim::demands(c.table, c.methods);
 }
 
-report::Comparison compare(const Options& options, const std::vector<std::string>& maps,
+report::Comparison compare(const CompareOptions& options, const std::vector<std::string>& maps,
                            const std::vector<std::string>& models) {
   auto c = nothing_yet(options);
   finish_what_is_done();
@@ -84,14 +84,14 @@ report::Comparison compare(const Options& options, const std::vector<std::string
 }
 
 /// The comparison that rows of parts of it add up to.
-report::Comparison from_rows(const Options& options) {
+report::Comparison from_rows(const CompareOptions& options) {
   auto c = nothing_yet(options);
   add_rows(c, options.from);
   judge(c);
   return c;
 }
 
-void check(const Options& options) {
+void check(const CompareOptions& options) {
   if (options.rows && !(options.report.empty() && options.out.empty() && options.from.empty() && !options.json))
     throw Failure(kUsage, "--rows prints rows and nothing else; give it without --json, --from, --out and --report");
   if (!options.pairs) return;
@@ -100,7 +100,7 @@ void check(const Options& options) {
     throw Failure(kUsage, "--pairs must be FIRST:END with FIRST below END and END up to --flights");
 }
 
-report::Comparison compare(const Options& options) {
+report::Comparison compare(const CompareOptions& options) {
   const auto models = models_of(options.vehicles, options.models);
   const auto maps = maps_of(options.scenes);
   for (const auto& map : maps) read_map(map);  // all inputs are looked at before hours are spent on the first
@@ -112,7 +112,7 @@ report::Comparison compare(const Options& options) {
   return compare(options, maps, models);
 }
 
-int run(const Options& options) {
+int run(const CompareOptions& options) {
   check(options);
   check_outputs({options.report, options.out}, options.force);
   const auto comparison = options.from.empty() ? compare(options) : from_rows(options);
@@ -128,7 +128,7 @@ int run(const Options& options) {
     if (!page) throw Failure(kUnavailable, options.report + ":1: " + page.error().message);
     write_file(options.report, *page, options.force);
   }
-  options.json ? print(to_json(comparison)) : print_text(comparison);
+  options.json ? print(services::to_json(comparison)) : services::print_text(comparison);
   if (interrupted())
     throw Failure(kInterrupted, "interrupted after " + std::to_string(comparison.scenes.size()) + " of " +
                                     std::to_string(maps_of(options.scenes).size() * options.vehicles.size()) +
@@ -139,7 +139,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb compare_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareOptions>();
   auto& command =
       app.add_subcommand("compare", "The paper's Table I: sets against constant margins, flown in closed loop");
   command

@@ -32,7 +32,7 @@ Json row_of(const sim::RouteOutcome& o) {
               {"samples", o.samples},
               {"contact_samples", o.contacts},
               {"samples_outside", o.outside},
-              {"largest_ratio", to_json(o.largest_ratio)}});
+              {"largest_ratio", services::to_json(o.largest_ratio)}});
   return row;
 }
 
@@ -60,7 +60,7 @@ Json gap_row(const sim::GapCampaign& gap) {
   for (const auto& s : gap.shown) shown.push_back({s.error, s.half_widths});
   return {{"gap", gap.vehicle},       {"flights", gap.flights},
           {"samples", gap.samples},   {"samples_outside", gap.outside},
-          {"contacts", gap.contacts}, {"largest_ratio", to_json(gap.largest_ratio)},
+          {"contacts", gap.contacts}, {"largest_ratio", services::to_json(gap.largest_ratio)},
           {"shown", std::move(shown)}};
 }
 
@@ -113,8 +113,8 @@ std::string to_rows(const report::Comparison& c, std::size_t first) {
                         {"vehicle", scene.vehicle},
                         {"pair", first + n},
                         {"seed", scene.pairs[n].seed},
-                        {"start", to_json(scene.pairs[n].start_W)},
-                        {"goal", to_json(scene.pairs[n].goal_W)},
+                        {"start", services::to_json(scene.pairs[n].start_W)},
+                        {"goal", services::to_json(scene.pairs[n].goal_W)},
                         {"outcomes", std::move(outcomes)}};
       text += row.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     }

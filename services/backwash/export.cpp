@@ -11,13 +11,13 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct ExportOptions {
   std::vector<std::string> logs;
   std::string mcap, csv;
   bool json = false, force = false;
 };
 
-int run(const Options& options) {
+int run(const ExportOptions& options) {
   if (options.mcap.empty() && options.csv.empty())
     throw Failure(kUsage, "nothing to write; give --mcap, --csv or both");
   check_outputs({options.mcap, options.csv}, options.force);
@@ -48,7 +48,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb export_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportOptions>();
   auto& command =
       app.add_subcommand("export", "A raw log as MCAP, which Foxglove and rosbag2 open, or as a flight log");
   command.add_option("logs", options->logs, "raw log of backwashd, or parts of one in their order").required();

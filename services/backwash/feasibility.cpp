@@ -11,7 +11,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct FeasibilityOptions {
   std::string map, model, vehicle;
   reach::Method method = reach::Method::tight;
   std::optional<Vec3> start, goal;
@@ -126,7 +126,7 @@ void print_text(const plan::World& world, const plan::Regions& regions, const st
               b.passable ? (to_text(b.clearance_m, 3) + " m to spare").c_str() : "too tight for body and hover set");
 }
 
-int run(const Options& options) {
+int run(const FeasibilityOptions& options) {
   if (options.start.has_value() != options.goal.has_value())
     throw Failure(kUsage, "give both --start and --goal, or neither");
   const auto vehicle = read_vehicle(options.vehicle);
@@ -151,7 +151,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb feasibility_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FeasibilityOptions>();
   auto& command = app.add_subcommand("feasibility", "Where a vehicle can hover safely, and where a way is too tight");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
   command.add_option("--model", options->model, "model file or builtin:NAME").required();

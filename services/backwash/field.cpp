@@ -11,7 +11,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct FieldOptions {
   std::string map, model, vehicle, points, slice, out;
   std::optional<Vec3> at;
   bool interpolated = false, json = false, force = false;
@@ -66,7 +66,7 @@ std::vector<Vec3> slice_points(const map::OccupancyGrid& grid, const report::Sli
 }
 
 /// What is wrong with a slice that cuts no free voxel.
-std::string empty_slice(const Options& options, const map::OccupancyGrid& grid, const report::Slice& slice) {
+std::string empty_slice(const FieldOptions& options, const map::OccupancyGrid& grid, const report::Slice& slice) {
   const double low = grid.origin()[slice.axis];
   const double high = low + grid.resolution() * grid.size()[slice.axis];
   return options.map + ":1: no free voxel in the slice " + options.slice + "; the map spans " + "xyz"[slice.axis] +
@@ -147,13 +147,14 @@ void check_free(const map::OccupancyGrid& grid, const Vec3& p_W, const std::stri
 void print_json(const std::vector<Value>& values, bool extended) {
   Json points = Json::array();
   for (const auto& value : values) {
-    Json entry = {{"p", to_json(value.p_W)}, {"sigma", value.sigma ? to_json(*value.sigma) : Json()}};
+    Json entry = {{"p", services::to_json(value.p_W)},
+                  {"sigma", value.sigma ? services::to_json(*value.sigma) : Json()}};
     if (value.parts) {
-      entry["ground"] = to_json(value.parts->ground);
-      entry["corner"] = to_json(value.parts->corner);
-      entry["wall"] = to_json(value.parts->wall);
-      entry["base"] = to_json(value.parts->base);
-      if (extended) entry["push"] = to_json(value.push_W);
+      entry["ground"] = services::to_json(value.parts->ground);
+      entry["corner"] = services::to_json(value.parts->corner);
+      entry["wall"] = services::to_json(value.parts->wall);
+      entry["base"] = services::to_json(value.parts->base);
+      if (extended) entry["push"] = services::to_json(value.push_W);
     }
     points.push_back(std::move(entry));
   }
@@ -175,7 +176,7 @@ void print_table(const std::vector<Value>& values) {
   }
 }
 
-void write_picture(const Options& options, const map::OccupancyGrid& grid, const report::Slice& slice,
+void write_picture(const FieldOptions& options, const map::OccupancyGrid& grid, const report::Slice& slice,
                    const std::vector<Value>& values) {
   std::vector<report::FieldSample> samples;
   for (const auto& value : values) {
@@ -187,7 +188,7 @@ void write_picture(const Options& options, const map::OccupancyGrid& grid, const
   write_file(options.out, *picture, options.force);
 }
 
-int run(const Options& options) {
+int run(const FieldOptions& options) {
   if (options.points.empty() + options.slice.empty() + !options.at != 2) {
     throw Failure(kUsage, "give exactly one of --points, --slice and --at");
   }
@@ -218,7 +219,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb field_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FieldOptions>();
   auto& command = app.add_subcommand("field", "Variance of the disturbance at points or in a slice of a map");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
   command.add_option("--model", options->model, "model file or builtin:NAME").required();

@@ -15,7 +15,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct FlyOptions {
   std::string map = "builtin:apartment", vehicle = "builtin:quad-5in", model, report, log;
   std::optional<Vec3> start, goal;
   std::uint64_t seed = 1;
@@ -34,7 +34,7 @@ const DefaultFlight kDefaultFlights[] = {
 };
 
 /// Start and goal that need no search: those given, or the map's own.
-std::optional<plan::HoverPair> known_ends(const Options& options) {
+std::optional<plan::HoverPair> known_ends(const FlyOptions& options) {
   if (options.start) return plan::HoverPair{*options.start, *options.goal};
   for (const auto& known : kDefaultFlights) {
     if (options.map == known.map || std::filesystem::path(options.map).filename() == known.map)
@@ -43,7 +43,7 @@ std::optional<plan::HoverPair> known_ends(const Options& options) {
   return std::nullopt;
 }
 
-plan::HoverPair choose_ends(const Options& options, const plan::World& world, sim::FlightOptions flight) {
+plan::HoverPair choose_ends(const FlyOptions& options, const plan::World& world, sim::FlightOptions flight) {
   if (const auto known = known_ends(options)) return *known;
   const auto pair = plan::farthest_pair(world, plan::hover_regions(world), [&](const Vec3& start_W) {
     flight.start_W = start_W;
@@ -59,7 +59,7 @@ plan::HoverPair choose_ends(const Options& options, const plan::World& world, si
   return *pair;
 }
 
-void write_flight(const Options& options, const sim::Flight& flight) {
+void write_flight(const FlyOptions& options, const sim::Flight& flight) {
   auto samples = flight.take_off.samples;
   // The route's first sample is the take-off's last tick again.
   samples.insert(samples.end(), flight.route.samples.begin() + 1, flight.route.samples.end());
@@ -71,7 +71,7 @@ int print_ends(const plan::HoverPair& ends) {
   return kOk;
 }
 
-int run(const Options& options) {
+int run(const FlyOptions& options) {
   if (options.start.has_value() != options.goal.has_value())
     throw Failure(kUsage, "give both --start and --goal, or neither");
   check_outputs({options.report, options.log}, options.force);
@@ -106,7 +106,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb fly_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FlyOptions>();
   auto& command =
       app.add_subcommand("fly", "One closed-loop flight in simulated airflow, judged against its reachable sets");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME").capture_default_str();

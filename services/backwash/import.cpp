@@ -34,7 +34,7 @@ constexpr struct {
     {"ulog", log::read_ulog},
 };
 
-struct Options {
+struct ImportOptions {
   std::string kind, folder, map_columns, labels;
   std::vector<std::string> files;  ///< after `kind`, which is the first of them with a column map
   bool propose = false, json = false, force = false;
@@ -50,7 +50,7 @@ Importer importer(const std::string& kind) {
 }
 
 /// The importer that the options name, and the recordings.
-std::pair<Importer, std::vector<std::string>> importer_of(const Options& options) {
+std::pair<Importer, std::vector<std::string>> importer_of(const ImportOptions& options) {
   if (options.map_columns.empty()) {
     auto import = importer(options.kind);
     if (options.files.empty()) throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
@@ -69,7 +69,7 @@ std::pair<Importer, std::vector<std::string>> importer_of(const Options& options
   throw Failure(error.kind == log::LogError::Kind::not_found ? kNoInput : kBadData, error.message);
 }
 
-int propose(const Options& options) {
+int propose(const ImportOptions& options) {
   if (!options.files.empty()) throw Failure(kUsage, "--propose looks at one table; give one");
   if (!options.folder.empty() || !options.labels.empty())
     throw Failure(kUsage, "--propose prints and writes nothing; give it without --out and --labels");
@@ -93,7 +93,7 @@ std::string target(const std::string& folder, const std::string& file) {
   return (std::filesystem::path(folder) / log::recording_name(file)).string() + ".csv";
 }
 
-log::Labels labels_of(const Options& options) {
+log::Labels labels_of(const ImportOptions& options) {
   if (options.labels.empty()) return {};
   auto labels = log::read_labels(options.labels);
   if (!labels) fail(labels.error());
@@ -109,7 +109,7 @@ void add_labels(log::FlightLog& log, const log::Labels& labels, const std::strin
   if (const auto added = log::add_labels(log, of->second, labels_file); !added) fail(added.error());
 }
 
-int run(const Options& options) {
+int run(const ImportOptions& options) {
   if (options.propose) return propose(options);
   const auto [read, files] = importer_of(options);
   if (options.folder.empty()) throw Failure(kUsage, "--out is required: the folder for the flight logs");
@@ -159,7 +159,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb import_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportOptions>();
   auto& command = app.add_subcommand("import", "Recordings of others as flight logs");
   command.add_option("kind", options->kind, "airgarage, ardupilot (.bin), crazypad or ulog; left out with a column map")
       .required();

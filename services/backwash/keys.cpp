@@ -24,7 +24,7 @@ constexpr const char* kAuthority = "authority";  // its key and certificate, in 
 constexpr std::int64_t kDay_s = 86400, kYear_s = 365 * kDay_s;
 constexpr const char* kDate = "%Y-%m-%dT%H:%M:%SZ";
 
-struct Options {
+struct KeysOptions {
   std::string folder, name;
   security::Protection protection = security::Protection::encrypt;
   security::Grant grant;
@@ -32,7 +32,7 @@ struct Options {
   bool force = false;
 };
 
-std::string path(const Options& o, const std::string& folder, const char* file) {
+std::string path(const KeysOptions& o, const std::string& folder, const char* file) {
   return o.folder + "/" + (folder.empty() ? "" : folder + "/") + file;
 }
 
@@ -61,7 +61,7 @@ std::int64_t time_of(const std::string& text) {
 }
 
 /// From a day ago, for computers whose clocks differ, to the end that is asked for.
-security::Validity validity(const Options& o, std::int64_t usual) {
+security::Validity validity(const KeysOptions& o, std::int64_t usual) {
   const std::int64_t now = std::time(nullptr), until = o.until.value_or(usual);
   if (until <= now) throw Failure(kUsage, "--until " + date_of(until) + " has passed; it is " + date_of(now));
   return {now - kDay_s, until};
@@ -76,7 +76,7 @@ void check_name(const std::string& name) {
     throw Failure(kUsage, "'" + name + "' is no name; it takes up to 64 letters, digits, . _ and -, not 'authority'");
 }
 
-security::Authority authority_of(const Options& o) {
+security::Authority authority_of(const KeysOptions& o) {
   const std::string key = path(o, kAuthority, security::kKey);
   auto authority = security::Authority::of({read(key), read(path(o, kAuthority, security::kCertificate))});
   if (!authority) throw Failure(kBadData, key + ":1: is not the key of cert.pem beside it; restore both");
@@ -90,7 +90,7 @@ void make_folder(const std::string& folder) {
   if (wrong) throw Failure(kCannotCreate, folder + ":1: cannot be made: " + wrong.message());
 }
 
-int init(const Options& o) {
+int init(const KeysOptions& o) {
   const std::int64_t now = std::time(nullptr);
   const auto pair = security::Authority::make("backwash", validity(o, now + 10 * kYear_s));
   const auto authority = security::Authority::of(pair).value();
@@ -106,7 +106,7 @@ int init(const Options& o) {
   return kOk;
 }
 
-int add(const Options& o) {
+int add(const KeysOptions& o) {
   check_name(o.name);
   const auto authority = authority_of(o);
   const std::int64_t now = std::time(nullptr);
@@ -132,7 +132,7 @@ int add(const Options& o) {
 }
 
 /// Folders of holders, by name.
-std::vector<std::string> holders(const Options& o) {
+std::vector<std::string> holders(const KeysOptions& o) {
   std::vector<std::string> names;
   std::error_code wrong;
   for (const auto& entry : fs::directory_iterator(o.folder, wrong)) {
@@ -143,7 +143,7 @@ std::vector<std::string> holders(const Options& o) {
   return names;
 }
 
-int revoke(const Options& o) {
+int revoke(const KeysOptions& o) {
   check_name(o.name);
   const std::string certificate = read(path(o, o.name, security::kCertificate));
   const std::string list = path(o, "", security::kRevoked);
@@ -155,7 +155,7 @@ int revoke(const Options& o) {
   return kOk;
 }
 
-int list(const Options& o) {
+int list(const KeysOptions& o) {
   const std::string revoked = read(path(o, "", security::kRevoked));
   for (const auto& name : holders(o)) {
     const auto holder = security::issued(read(path(o, name, security::kCertificate)), revoked);
@@ -168,13 +168,13 @@ int list(const Options& o) {
   return kOk;
 }
 
-Command& add_way(Command& group, const std::shared_ptr<Options>& o, const char* name, const char* what) {
+Command& add_way(Command& group, const std::shared_ptr<KeysOptions>& o, const char* name, const char* what) {
   auto& command = group.add_subcommand(name, what);
   command.add_option("folder", o->folder, "of the authority and of all that it signed").required();
   return command;
 }
 
-void add_making(Command& command, const std::shared_ptr<Options>& o, const char* until) {
+void add_making(Command& command, const std::shared_ptr<KeysOptions>& o, const char* until) {
   command
       .add_text(
           "--until", [o](const std::string& text) { o->until = time_of(text); }, until)
@@ -182,7 +182,7 @@ void add_making(Command& command, const std::shared_ptr<Options>& o, const char*
   command.add_flag("--force", o->force, "replace a key that is there");
 }
 
-Command& add_adding(Command& group, const std::shared_ptr<Options>& o) {
+Command& add_adding(Command& group, const std::shared_ptr<KeysOptions>& o) {
   auto& command = add_way(group, o, "add", "A key, a certificate and permissions for one process");
   command.add_option("name", o->name, "of the holder: the folder to make").required();
   std::vector<std::pair<std::string, security::Role>> roles;
@@ -209,7 +209,7 @@ Command& add_adding(Command& group, const std::shared_ptr<Options>& o) {
 Verb keys_verb(Command& app) {
   auto& group = app.add_subcommand("keys", "Who may speak: keys and permissions of DDS Security");
   group.require_subcommand();
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<KeysOptions>();
   auto& init_command = add_way(group, o, "init", "An authority in a new folder");
   add_choice(init_command, "--protect", o->protection,
              std::vector<std::pair<std::string, security::Protection>>{{"encrypt", security::Protection::encrypt},
@@ -222,7 +222,7 @@ Verb keys_verb(Command& app) {
   auto& revoke_command = add_way(group, o, "revoke", "Whom nobody listens to any more");
   revoke_command.add_option("name", o->name, "of the holder").required();
   auto& list_command = add_way(group, o, "list", "Holders, roles, ends");
-  const std::vector<std::pair<Command*, int (*)(const Options&)>> ways = {
+  const std::vector<std::pair<Command*, int (*)(const KeysOptions&)>> ways = {
       {&init_command, init}, {&add_command, add}, {&revoke_command, revoke}, {&list_command, list}};
   return {&group, [o, ways] {
             for (const auto& [command, run] : ways)

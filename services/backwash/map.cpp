@@ -13,7 +13,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct MapVerbOptions {
   MapOptions map;
   std::string out;
   std::vector<Vec3> seeds;
@@ -21,7 +21,7 @@ struct Options {
 };
 
 /// Floods from the seeds; throws Failure 69 for one that is outside or occupied.
-map::Flood flood(const Options& options, map::OccupancyGrid& grid) {
+map::Flood flood(const MapVerbOptions& options, map::OccupancyGrid& grid) {
   std::vector<Index3> seeds;
   for (const Vec3& seed : options.seeds) {
     const Index3 v = grid.index(seed);
@@ -44,12 +44,12 @@ void note_edges(const map::Flood& flood, MadeMap& made) {
                            to_text(made.grid.center(*edge)) + ": a hole, or an open side");
 }
 
-void print_json(const Options& options, const MadeMap& made, const map::Flood& flood) {
+void print_json(const MapVerbOptions& options, const MadeMap& made, const map::Flood& flood) {
   const auto count = count_cells(made.grid);
   Json edges = Json::array();
   for (std::size_t side = 0; side < 6; ++side)
     if (const auto& edge = flood.edge[side])
-      edges.push_back({{"side", kSides[side]}, {"p", to_json(made.grid.center(*edge))}});
+      edges.push_back({{"side", kSides[side]}, {"p", services::to_json(made.grid.center(*edge))}});
   Json json = {{"out", options.out},
                {"kind", made.kind},
                {"points", made.points},
@@ -62,7 +62,7 @@ void print_json(const Options& options, const MadeMap& made, const map::Flood& f
   print(json);
 }
 
-void print_text(const Options& options, const MadeMap& made) {
+void print_text(const MapVerbOptions& options, const MadeMap& made) {
   if (made.kind == "mesh") std::printf("%zu triangles", made.triangles);
   if (made.kind == "cloud") std::printf("%zu points", made.points);
   std::printf("%s%s\n", made.kind == "octomap" ? "a map, written to " : " written to ", options.out.c_str());
@@ -70,7 +70,7 @@ void print_text(const Options& options, const MadeMap& made) {
   for (const auto& note : made.notes) std::printf("note: %s\n", note.c_str());
 }
 
-int run(const Options& options) {
+int run(const MapVerbOptions& options) {
   if (!options.out.ends_with(".bt"))
     throw Failure(kUsage, "--out " + options.out + " is a binary OctoMap file; name it .bt");
   check_output(options.out, options.force);
@@ -118,7 +118,7 @@ void add_placement(Command& command, MapOptions& map) {
   command.add_text("--crop", crop, "box that the map covers, m; default what the file covers").type_name("LOW,HIGH");
 }
 
-Command& add_convert(Command& group, const std::shared_ptr<Options>& options) {
+Command& add_convert(Command& group, const std::shared_ptr<MapVerbOptions>& options) {
   auto& command = group.add_subcommand("convert", "A mesh, a point cloud or a map of others as a map to fly in");
   command
       .add_option("file", options->map.file,
@@ -159,7 +159,7 @@ Command& add_convert(Command& group, const std::shared_ptr<Options>& options) {
 Verb map_verb(Command& app) {
   auto& group = app.add_subcommand("map", "Maps of others: made, mended and looked at");
   group.require_subcommand();
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MapVerbOptions>();
   auto& convert = add_convert(group, options);
   const Verb info = map_info_verb(group);
   return {&group, [options, &convert, info] { return convert.parsed() ? run(*options) : info.run(); }};

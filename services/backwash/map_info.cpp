@@ -12,7 +12,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct MapInfoOptions {
   std::string map, vehicle, model, out;
   std::optional<double> height;
   bool json = false, force = false;
@@ -31,7 +31,7 @@ double middle_height(const map::OccupancyGrid& grid) {
   return grid.center({0, 0, layer}).z();
 }
 
-void write_picture(const Options& options, const map::OccupancyGrid& grid) {
+void write_picture(const MapInfoOptions& options, const map::OccupancyGrid& grid) {
   const double z = options.height.value_or(middle_height(grid));
   const Vec3& low = grid.origin();
   const Vec3 high = low + grid.resolution() * grid.size().cast<double>();
@@ -46,7 +46,7 @@ void write_picture(const Options& options, const map::OccupancyGrid& grid) {
 }
 
 /// Where the vehicle may hover in this map; empty: nowhere.
-plan::Regions regions_of(const Options& options, const map::OccupancyGrid& grid) {
+plan::Regions regions_of(const MapInfoOptions& options, const map::OccupancyGrid& grid) {
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(model_of(options.vehicle, options.model));
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
@@ -62,10 +62,11 @@ Json flyable_json(const plan::Regions& regions) {
   json["largest"] = nullptr;
   if (!regions.regions.empty()) {
     const auto& largest = regions.regions.front();
-    json["largest"] = {{"volume_m3", largest.volume_m3},
-                       {"low", to_json(largest.low_W)},
-                       {"high", to_json(largest.high_W)},
-                       {"widest", {{"p", to_json(largest.widest_W)}, {"clearance_m", largest.widest_clearance_m}}}};
+    json["largest"] = {
+        {"volume_m3", largest.volume_m3},
+        {"low", services::to_json(largest.low_W)},
+        {"high", services::to_json(largest.high_W)},
+        {"widest", {{"p", services::to_json(largest.widest_W)}, {"clearance_m", largest.widest_clearance_m}}}};
   }
   return json;
 }
@@ -82,7 +83,7 @@ void print_flyable(const plan::Regions& regions) {
               largest.widest_clearance_m);
 }
 
-int run(const Options& options) {
+int run(const MapInfoOptions& options) {
   if (!options.out.empty() && !options.out.ends_with(".svg") && !options.out.ends_with(".png"))
     throw Failure(kUsage, "--out " + options.out + " is no picture that can be drawn; name it .svg or .png");
   if (options.height && options.out.empty()) throw Failure(kUsage, "--height is of the picture --out; give one");
@@ -150,7 +151,7 @@ void print_extent(const map::OccupancyGrid& grid, const CellCount& count) {
 }
 
 Verb map_info_verb(Command& group) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MapInfoOptions>();
   auto& command = group.add_subcommand("info", "Size, what is known, and whether a vehicle can fly in a map");
   command.add_option("map", options->map, "OctoMap file or builtin:NAME").required();
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME: whether it can fly there");

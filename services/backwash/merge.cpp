@@ -15,7 +15,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct MergeOptions {
   std::vector<std::string> logs;  ///< parts of ours, then the autopilot's
   std::string out;
   bool json = false, force = false;
@@ -30,7 +30,7 @@ log::TopicLog topics_of(const std::string& path) {
   return ulog ? std::move(*topics) : log::px4_names(*topics);
 }
 
-int run(const Options& options) {
+int run(const MergeOptions& options) {
   if (options.logs.size() < 2) throw Failure(kUsage, "needs two logs: that of backwashd, then the autopilot's");
   const std::string &ours = options.logs.front(), &theirs = options.logs.back();
   if (!is_autopilots_log(theirs))
@@ -72,7 +72,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb merge_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MergeOptions>();
   auto& command = app.add_subcommand("merge", "A raw log and the autopilot's own as one MCAP on one clock");
   command.add_option("logs", options->logs, "raw log of backwashd (or its parts), then the autopilot's: .ulg or .bin")
       .required();

@@ -10,7 +10,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct PlanOptions {
   std::string map, model, vehicle;
   reach::Method method = reach::Method::tight;
   std::optional<Vec3> start, goal;
@@ -23,16 +23,16 @@ void print_json(const plan::Plan& plan, reach::Method method) {
   for (std::size_t k = 0; k < plan.commands.size(); ++k) {
     const auto& c = plan.commands[k];
     trajectory.push_back({{"t", static_cast<double>(k) * kControlPeriod},
-                          {"p", to_json(c.p_W)},
-                          {"v", to_json(c.v_W)},
-                          {"a", to_json(c.a_W)},
+                          {"p", services::to_json(c.p_W)},
+                          {"v", services::to_json(c.v_W)},
+                          {"a", services::to_json(c.a_W)},
                           {"yaw", c.yaw}});
   }
   print(Json{{"status", plan::to_string(plan.status)},
              {"message", plan.message},
-             {"metrics", to_json(plan.metrics)},
+             {"metrics", services::to_json(plan.metrics)},
              {"trajectory", std::move(trajectory)},
-             {"tube", to_json(plan.tube, method)}});
+             {"tube", services::to_json(plan.tube, method)}});
 }
 
 void print_text(const plan::Plan& plan) {
@@ -47,7 +47,7 @@ void print_text(const plan::Plan& plan) {
               m.search_ms, m.expanded, m.optimise_ms, m.evaluations, m.verify_ms);
 }
 
-int run(const Options& options) {
+int run(const PlanOptions& options) {
   const auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
   read_reachability(vehicle, options.method, reach::Loop::vehicle,
@@ -78,7 +78,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb plan_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlanOptions>();
   auto& command = app.add_subcommand("plan", "Trajectory whose clearance is its reachable set");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
   command.add_option("--model", options->model, "model file or builtin:NAME").required();

@@ -23,7 +23,7 @@ const std::vector<std::pair<std::string, Kind>> kKinds = {
 const std::vector<std::pair<std::string, reach::Loop>> kLoops = {
     {"vehicle", reach::Loop::vehicle}, {"continuous", reach::Loop::continuous}, {"sampled", reach::Loop::sampled}};
 
-struct Options {
+struct ReachOptions {
   std::string vehicle, track, map, model;
   Kind kind = Kind::tight;
   std::optional<reach::Loop> loop;
@@ -104,7 +104,7 @@ const std::string& name_of(Kind kind) {
   return std::ranges::find(kKinds, kind, &std::pair<std::string, Kind>::second)->first;
 }
 
-reach::Loop read_loop(const Options& options) {
+reach::Loop read_loop(const ReachOptions& options) {
   if (options.kind == Kind::paper) {
     if (options.loop && options.loop != reach::Loop::continuous) {
       throw Failure(kUsage, "--method paper knows only --loop continuous; the second-order loop of the paper");
@@ -118,7 +118,7 @@ reach::Loop read_loop(const Options& options) {
   return options.loop.value_or(reach::Loop::vehicle);
 }
 
-void check_probability(const Options& options) {
+void check_probability(const ReachOptions& options) {
   if (options.kind != Kind::chance) {
     if (options.probability)
       throw Failure(kUsage, "--probability belongs to --method chance; the others bound the worst case");
@@ -132,7 +132,7 @@ void check_probability(const Options& options) {
 }
 
 /// A tube, and the levels of its seconds where the method is chance.
-reach::ChanceTube tube(const Options& options, const reach::Reachability& reach) {
+reach::ChanceTube tube(const ReachOptions& options, const reach::Reachability& reach) {
   const auto track = read_table(options.track, "t_s");
   check_times(options.track, track);
   const auto commands = read_commands(options.track, track);
@@ -179,7 +179,7 @@ reach::ChanceTube tube(const Options& options, const reach::Reachability& reach)
   return {tube_over_field(reach, start, commands[0], commands, world->bounds), {}};
 }
 
-void print_table(const reach::ReachTube& tube, const Options& options) {
+void print_table(const reach::ReachTube& tube, const ReachOptions& options) {
   if (options.probability) {
     std::printf("left with at most %g per second of flight, for Gaussian disturbances: no worst case\n",
                 *options.probability);
@@ -196,7 +196,7 @@ void print_table(const reach::ReachTube& tube, const Options& options) {
   }
 }
 
-int run(Options options) {
+int run(ReachOptions options) {
   if (options.direction) {
     if (options.direction->norm() == 0) throw Failure(kUsage, "--direction: 0,0,0 has no direction; give another");
     options.direction->normalize();
@@ -213,9 +213,9 @@ int run(Options options) {
   if (options.probability) {
     json["probability"] = *options.probability;
     json["levels"] = Json::array();
-    for (const PerDirection& level : levels) json["levels"].push_back(to_json(level));
+    for (const PerDirection& level : levels) json["levels"].push_back(services::to_json(level));
   }
-  json["steps"] = to_json(steps, options.method(), options.direction);
+  json["steps"] = services::to_json(steps, options.method(), options.direction);
   print(json);
   return kOk;
 }
@@ -223,7 +223,7 @@ int run(Options options) {
 }  // namespace
 
 Verb reach_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReachOptions>();
   auto& command = app.add_subcommand("reach", "Reachable sets of the position error along a track of commands");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").required();
   command.add_option("--track", options->track, "CSV: t_s, cmd_x_m … cmd_az_mps2, and sigma_xx … sigma_zz or --map")

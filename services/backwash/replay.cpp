@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kDiffers = 1;
 
-struct Options {
+struct ReplayOptions {
   std::vector<std::string> logs;
   bool json = false;
 };
@@ -40,7 +40,7 @@ Json to_json(const log::Replay& r, bool equal) {
   return json;
 }
 
-int run(const Options& options) {
+int run(const ReplayOptions& options) {
   auto log = read_or_fail(log::read_raw_logs(options.logs));
   // A kill leaves a last record that is cut short, and perhaps the input of a tick that was not written any more.
   while (log.cut_at && !log.records.empty() && log.records.back().header.kind != log::RecordKind::tick)
@@ -70,7 +70,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb replay_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   auto& command = app.add_subcommand("replay", "Runs a raw log's inputs through the flight pipeline's tick again");
   command.add_option("--log", options->logs, "raw log of backwashd, or its parts from the first on").required();
   command.add_flag("--json", options->json, "one JSON object on stdout");

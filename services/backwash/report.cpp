@@ -16,7 +16,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct ReportOptions {
   std::vector<std::string> logs;  ///< parts of one; the first names it
   std::string truth, vehicle = "builtin:quad-5in", model, because, out;
   bool json = false, force = false;
@@ -31,7 +31,7 @@ bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
 }
 
 /// Any flight, by what the daemon recorded of it.
-int tell(const Options& options, std::span<const log::RawRecord> log, const FlightStory& story,
+int tell(const ReportOptions& options, std::span<const log::RawRecord> log, const FlightStory& story,
          const map::OccupancyGrid* map, double radius) {
   if (!options.out.empty()) {
     progress("drawing the report");
@@ -47,7 +47,7 @@ int tell(const Options& options, std::span<const log::RawRecord> log, const Flig
 }
 
 /// A flight such as `fly`'s: its sets are propagated again and must be those that were logged.
-int judge(const Options& options, const std::vector<log::RawRecord>& log, const log::FlightLog& truth,
+int judge(const ReportOptions& options, const std::vector<log::RawRecord>& log, const log::FlightLog& truth,
           const FlightStory& story) {
   const auto vehicle = read_vehicle(options.vehicle);
   const std::string model_path = model_of(options.vehicle, options.model);
@@ -84,7 +84,7 @@ std::optional<log::FlightLog> read_truth(const std::string& path) {
   return truth;
 }
 
-int run(const Options& options) {
+int run(const ReportOptions& options) {
   check_output(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   read_model(model_of(options.vehicle, options.model));
@@ -101,7 +101,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb report_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReportOptions>();
   auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
   command
       .add_option(

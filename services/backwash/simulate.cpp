@@ -14,7 +14,7 @@ namespace {
 /// Whose laws the gusts follow.
 enum class Air { truth, model };
 
-struct Options {
+struct SimulateOptions {
   std::string map, model, vehicle, flight, setpoints, out;
   Air air = Air::truth;
   std::optional<std::uint64_t> seed;
@@ -22,7 +22,7 @@ struct Options {
 };
 
 /// A straight line that the vehicle cannot fly is an error of the specification.
-void check_line(const Options& options, const map::OccupancyGrid& grid, const map::DistanceField& distance,
+void check_line(const SimulateOptions& options, const map::OccupancyGrid& grid, const map::DistanceField& distance,
                 const Vehicle& vehicle, const Vec3& from, const Vec3& to) {
   const double length = (to - from).norm();
   const int steps = std::max(1, static_cast<int>(std::ceil(length / (0.5 * grid.resolution()))));
@@ -36,7 +36,7 @@ void check_line(const Options& options, const map::OccupancyGrid& grid, const ma
 }
 
 /// What `--flight` asks for, rest to rest on straight lines.
-log::FlightLog fly_specified(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle,
+log::FlightLog fly_specified(const SimulateOptions& options, const map::OccupancyGrid& grid, const Vehicle& vehicle,
                              const sim::HoverFlight& spec, const sim::Simulation& simulation) {
   const map::DistanceField distance(grid);
   Vec3 at = spec.start_W;
@@ -49,7 +49,7 @@ log::FlightLog fly_specified(const Options& options, const map::OccupancyGrid& g
 }
 
 /// The set-points of `--setpoints` again.
-log::FlightLog fly_again(const Options& options, const map::OccupancyGrid& grid, const Vehicle& vehicle,
+log::FlightLog fly_again(const SimulateOptions& options, const map::OccupancyGrid& grid, const Vehicle& vehicle,
                          std::uint64_t seed, const sim::Simulation& simulation) {
   const auto from = read_table(options.setpoints, "t_s");
   const auto flight = sim::logged_flight(from, vehicle, options.setpoints);
@@ -58,13 +58,13 @@ log::FlightLog fly_again(const Options& options, const map::OccupancyGrid& grid,
   return sim::to_log(sim::fly_setpoints(grid, vehicle, *flight, seed, simulation), *flight, from);
 }
 
-void check(const Options& options) {
+void check(const SimulateOptions& options) {
   if (options.flight.empty() == options.setpoints.empty()) throw Failure(kUsage, "give either --flight or --setpoints");
   if (options.air == Air::model && options.model.empty()) throw Failure(kUsage, "--air model needs --model");
   check_output(options.out, options.force);
 }
 
-int run(const Options& options) {
+int run(const SimulateOptions& options) {
   check(options);
   const auto vehicle = read_vehicle(options.vehicle);
   Model model;
@@ -95,7 +95,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb simulate_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimulateOptions>();
   auto& command = app.add_subcommand(
       "simulate", "Flight log of a simulated flight: between hover points, or the set-points of a log again");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();

@@ -21,7 +21,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct StudyOptions {
   std::string map, model = "builtin:quad-5in", vehicle, report, out;
   std::vector<std::string> logs, reference;
   std::string group, from;
@@ -32,8 +32,8 @@ struct Options {
 };
 
 /// The evidence after every flight, in the order of the logs, what the model holds taken out.
-std::optional<AnytimeReport> look_every_time(const Options& options, const Flights& flights, const LookedWith& with,
-                                             const std::optional<study::SoundRotors>& sound) {
+std::optional<AnytimeReport> look_every_time(const StudyOptions& options, const Flights& flights,
+                                             const LookedWith& with, const std::optional<study::SoundRotors>& sound) {
   if (!options.anytime) return std::nullopt;
   const auto terms = read_terms(options.model);
   study::Observer observer(with.vehicle, with.surroundings);
@@ -48,7 +48,7 @@ std::optional<AnytimeReport> look_every_time(const Options& options, const Fligh
 }
 
 /// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
-std::string residuals(const Options& options, const Flights& flights, const Vehicle& vehicle, const Model& model,
+std::string residuals(const StudyOptions& options, const Flights& flights, const Vehicle& vehicle, const Model& model,
                       const map::OccupancyGrid& grid, const study::Observations& measured,
                       const std::vector<SimulationTerm>& found) {
   FlownAgain again{{}, {}, vehicle, model, grid, options.seed};
@@ -74,7 +74,8 @@ void refuse_other_numbers(const std::vector<std::string>& logs) {
 }
 
 /// Flights known to be sound; nothing without such.
-std::optional<study::Observations> sound_flights(const Options& options, const Vehicle& vehicle, const Model& model) {
+std::optional<study::Observations> sound_flights(const StudyOptions& options, const Vehicle& vehicle,
+                                                 const Model& model) {
   if (options.reference.empty()) return std::nullopt;
   study::Observer observer(vehicle, model, nullptr);
   for (const auto& path : options.reference) observer.add(read_studied(path));
@@ -82,7 +83,7 @@ std::optional<study::Observations> sound_flights(const Options& options, const V
 }
 
 /// Motor shares of the flights against those of the reference flights; nothing without such.
-std::optional<study::RotorVerdict> against_reference(const Options& options,
+std::optional<study::RotorVerdict> against_reference(const StudyOptions& options,
                                                      const std::optional<study::Observations>& sound,
                                                      const study::Observations& seen) {
   if (!sound) return std::nullopt;
@@ -96,7 +97,7 @@ std::optional<study::RotorVerdict> against_reference(const Options& options,
 
 /// Ratios of the vertical variance by height and plate, day and speed held fixed, of recordings that say what they
 /// stood on and under (`backwash import airgarage`).
-std::optional<study::calibrate::HeightEffects> height_effects(const Options& options, const Model& model,
+std::optional<study::calibrate::HeightEffects> height_effects(const StudyOptions& options, const Model& model,
                                                               const study::Observations& seen) {
   if (!options.map.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
   if (!options.from.empty())
@@ -105,7 +106,7 @@ std::optional<study::calibrate::HeightEffects> height_effects(const Options& opt
 }
 
 /// What one log at a time is asked for, and what needs more than is kept of each.
-void check_rows(const Options& options) {
+void check_rows(const StudyOptions& options) {
   const auto not_with = [](bool given, const std::string& option, const std::string& why) {
     if (given) throw Failure(kUsage, option + " " + why);
   };
@@ -117,7 +118,7 @@ void check_rows(const Options& options) {
   not_with(!options.from.empty() && options.residuals, "--residuals", "needs the logs: give --log in place of --from");
 }
 
-void check(const Options& options) {
+void check(const StudyOptions& options) {
   if (options.vehicle.empty() || (options.logs.empty() && options.from.empty()))
     throw Failure(kUsage, "study needs --vehicle, and --log or --from");
   check_rows(options);
@@ -131,7 +132,7 @@ void check(const Options& options) {
   check_outputs({options.report, options.out, options.design.points}, options.force);
 }
 
-study::StudyOptions study_options(const Options& options, const std::optional<study::Observations>& sound) {
+study::StudyOptions study_options(const StudyOptions& options, const std::optional<study::Observations>& sound) {
   study::StudyOptions chosen;
   if (sound) chosen.sound = study::sound_rotors(*sound);
   chosen.search.seed = options.seed;
@@ -140,7 +141,7 @@ study::StudyOptions study_options(const Options& options, const std::optional<st
   return chosen;
 }
 
-void write_page(const Options& options, const study::StudyResult& result, const study::Observations& seen,
+void write_page(const StudyOptions& options, const study::StudyResult& result, const study::Observations& seen,
                 const study::PageContext& context) {
   progress("drawing");
   const auto page = study::study_page(result, seen, context);
@@ -148,7 +149,7 @@ void write_page(const Options& options, const study::StudyResult& result, const 
   write_file(options.report, *page, options.force);
 }
 
-void write_model(const Options& options, const Model& model, const study::StudyResult& result,
+void write_model(const StudyOptions& options, const Model& model, const study::StudyResult& result,
                  const study::Observations& seen) {
   const auto text =
       study::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model));
@@ -176,7 +177,7 @@ void add_left_out(Json& json, const std::vector<study::ExtensionTerm>& terms, co
   for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
 }
 
-Flights read_flights(const Options& options, const LookedWith& with) {
+Flights read_flights(const StudyOptions& options, const LookedWith& with) {
   std::vector<StudiedFlight> studied;
   std::vector<log::FlightLog> logs;
   if (options.from.empty()) {
@@ -192,7 +193,7 @@ Flights read_flights(const Options& options, const LookedWith& with) {
   return flights;
 }
 
-int print_rows(const Options& options, const LookedWith& with) {
+int print_rows(const StudyOptions& options, const LookedWith& with) {
   for (const auto& path : options.logs) {
     const auto row = study_row(look_at(path, options.group, with, nullptr),
                                {options.vehicle, options.model, options.map, options.group});
@@ -202,7 +203,7 @@ int print_rows(const Options& options, const LookedWith& with) {
   return kOk;
 }
 
-int run(const Options& options) {
+int run(const StudyOptions& options) {
   if (options.rules) return print_rules(options.json), kOk;
   check(options);
   const auto vehicle = read_vehicle(options.vehicle);
@@ -223,18 +224,18 @@ int run(const Options& options) {
   chosen.search.known = std::move(terms.known);
   const auto result = study::study(seen, chosen);
   const auto names = flights.names();
-  Json json = to_json(result, seen, vehicle, names);
+  Json json = services::to_json(result, seen, vehicle, names);
   add_left_out(json, terms.left, flights);
-  if (anytime) json["anytime"] = to_json(*anytime);
+  if (anytime) json["anytime"] = services::to_json(*anytime);
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
   const auto height = height_effects(options, model, seen);
-  if (height) json["height_effect"] = to_json(*height);
+  if (height) json["height_effect"] = services::to_json(*height);
   const auto rotors = against_reference(options, sound, seen);
-  if (rotors) json["rotors_against_reference"] = to_json(*rotors);
+  if (rotors) json["rotors_against_reference"] = services::to_json(*rotors);
   const auto consequence = what_it_costs(result, seen, model, vehicle, grid);
-  if (consequence) json["consequence"] = to_json(*consequence);
+  if (consequence) json["consequence"] = services::to_json(*consequence);
   const auto design = designed(options.design, seen, result, model, vehicle, grid, options.force);
-  if (design) json["design"] = to_json(*design, options.design);
+  if (design) json["design"] = services::to_json(*design, options.design);
   if (!options.out.empty()) {
     write_model(options, model, result, seen);
     json["extended_model"] = options.out;
@@ -248,7 +249,7 @@ int run(const Options& options) {
         options, result, seen,
         {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle, names});
   }
-  options.json ? print(json) : print_text(result, seen, vehicle, names, consequence, rotors, height);
+  options.json ? print(json) : services::print_text(result, seen, vehicle, names, consequence, rotors, height);
   if (!options.json) print_beside(flights, anytime, design, options.design);
   return kOk;
 }
@@ -256,7 +257,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb study_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StudyOptions>();
   auto& command = app.add_subcommand("study", "What the simulation gets wrong, by name, with the gain");
   command.add_option("--map", options->map,
                      "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");

@@ -13,8 +13,8 @@
 namespace backwash::services {
 namespace {
 
-constexpr double kLevel = 0.05;   // that the sentence speaks of
-constexpr std::size_t kTold = 3;  // causes
+constexpr double kLevel = 0.05;         // that the sentence speaks of
+constexpr std::size_t kCausesTold = 3;  // causes
 
 /// "4.1", "2.3e+07": three digits of e^x, whatever x.
 std::string e_value(double log_e) {
@@ -71,7 +71,7 @@ AnytimeReport anytime_report(const std::vector<std::string>& flights, const stud
   for (const auto& [name, log_e] : anytime.causes())
     report.leading.emplace_back(name, std::exp(log_e - report.log_e.back()));
   std::ranges::stable_sort(report.leading, std::greater(), [](auto& c) { return c.second; });
-  report.leading.resize(std::min(report.leading.size(), kTold));
+  report.leading.resize(std::min(report.leading.size(), kCausesTold));
   for (const auto& path : fleet) report.fleet_log_e += read_log_e(path);
   return report;
 }

@@ -14,7 +14,7 @@
 namespace backwash::services {
 namespace {
 
-constexpr std::size_t kTold = 3;  // flights, in the text
+constexpr std::size_t kFlightsTold = 3;  // flights, in the text
 
 double seconds(const study::NextFlight& flight) { return kControlPeriod * static_cast<double>(flight.commands.size()); }
 
@@ -37,7 +37,7 @@ std::string outcome_of(const study::NextFlight& f) {
 }
 
 std::span<const study::NextFlight> told_flights(const study::Design& design) {
-  return std::span(design.flights).first(std::min(kTold, design.flights.size()));
+  return std::span(design.flights).first(std::min(kFlightsTold, design.flights.size()));
 }
 
 }  // namespace

@@ -17,7 +17,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct VehicleOptions {
   std::string map, model, vehicle, parameters, log;
   std::optional<Vec3> start, goal;
   bool json = false;
@@ -176,7 +176,7 @@ void print_text(const plan::GainSweep& sweep, const Firmware& firmware, const Ve
               names.xy_velocity, g[1], names.z_position, g[2], names.z_velocity, g[3]);
 }
 
-int run(const Options& options) {
+int run(const VehicleOptions& options) {
   auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
   Firmware firmware;
@@ -209,7 +209,7 @@ int run(const Options& options) {
 }  // namespace
 
 Verb vehicle_verb(Command& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<VehicleOptions>();
   auto& group = app.add_subcommand("vehicle", "Vehicle files: begun, checked, and which gains a way needs");
   group.require_subcommand();
   auto& command = group.add_subcommand("tune", "The smallest gains with which a way is passable");

@@ -14,7 +14,7 @@
 namespace backwash::services {
 namespace {
 
-struct Options {
+struct VehicleFileOptions {
   std::string name, kind = "vehicle", vehicle;
   bool json = false;
 };
@@ -22,7 +22,7 @@ struct Options {
 constexpr double kLittleThrust = 1.5;  // over the weight: below, hardly any is left to hold a gust off and climb
 constexpr double kLittleDamping = 0.5;
 
-int print_file(const Options& options) {
+int print_file(const VehicleFileOptions& options) {
   constexpr std::string_view kPrefix = "builtin:";
   const auto found = std::ranges::find(
       config::builtin_files(),
@@ -43,7 +43,7 @@ double hover_command(const Vehicle& v) {
 
 double damping(double kp, double kd) { return kd / (2 * std::sqrt(kp)); }
 
-int check_file(const Options& options) {
+int check_file(const VehicleFileOptions& options) {
   const auto v = read_vehicle(options.vehicle);
   const auto reach = read_reachability(v, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
   const double thrust = v.propulsion.max_thrust / (v.body.mass * kGravity);
@@ -87,7 +87,7 @@ int check_file(const Options& options) {
 }  // namespace
 
 Verb vehicle_print_verb(Command& group) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<VehicleFileOptions>();
   auto& command = group.add_subcommand("print", "A file that ships, to begin your own with");
   command.add_option("name", options->name, "builtin:quad-5in, builtin:quad-7in; builtin:backwashd with --kind daemon")
       .required();
@@ -99,7 +99,7 @@ Verb vehicle_print_verb(Command& group) {
 }
 
 Verb vehicle_check_verb(Command& group) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<VehicleFileOptions>();
   auto& command = group.add_subcommand("check", "Whether a vehicle file is good, and what follows from it");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").required();
   command.add_flag("--json", options->json, "one JSON object on stdout");

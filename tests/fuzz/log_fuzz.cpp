@@ -153,7 +153,7 @@ TEST(Fuzz, ADamagedFlightIsPutTogetherOrRefused) {
 }
 
 TEST(Fuzz, ADamagedULogIsReadOrRefusedByItsByte) {
-  const std::string path = std::string(BACKWASH_SHARED_DATA) + "/ulog/sample_log_small.ulg";
+  const std::string path = BACKWASH_SHARED_DATA "/ulog/sample_log_small.ulg";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
   Mutator mutator("ULog", 0.5);
   Bytes whole = read(path);
