@@ -153,6 +153,7 @@ void MapFront::run_readers() {
     take_maps();
     take_parts();
     let_writers_go();
+    if (const auto line = partial_.look(dds::partial_sample(), now_ns())) refusals_.add(late_, [&] { return *line; });
     show_disturbance();
     if (const auto news = foreign_.take_new(); news.count > 0) {
       channels_.foreign_writers += news.count - 1;

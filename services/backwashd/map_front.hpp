@@ -9,6 +9,7 @@
 #include "services/backwashd/bound_writer.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/map_parts.hpp"
+#include "services/backwashd/partial_watch.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/backwashd/scan_placement.hpp"
@@ -55,7 +56,8 @@ class MapFront {
   ScanPlacement placement_;
   Refusals refusals_;
   MapParts assembly_;
-  std::atomic<std::uint64_t> maps_lost_{0};
+  PartialWatch partial_;
+  std::atomic<std::uint64_t> maps_lost_{0}, late_{0};
   BoundWriter map_writer_{"a map"}, scan_writer_{"a scan"};
   std::uint32_t term_ = 0;           // rises when a map's writer is let go of
   const Snapshot* world_ = nullptr;  // the reader's
