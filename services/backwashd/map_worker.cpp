@@ -146,8 +146,10 @@ void MapWorker::take_map(const MapMessage& message) {
   }
   record(recorder_, message, wrong.empty());
   if (!wrong.empty()) return reject(message, wrong);
-  writer_ = message.from;
-  channels_.map_writer.write(*writer_);
+  if (!message.transfer) {  // a mapper stays; who sends a map in parts is done with it
+    writer_ = message.from;
+    channels_.map_writer.write(*writer_);
+  }
   tell(message, "");
 
   const Index3 size = grid->size();
