@@ -24,17 +24,16 @@ std::uint64_t draw_session() {
   return std::uint64_t{random()} << 32 | random();
 }
 
-/// The folder itself, where its credentials are good or it is none.
+volatile std::sig_atomic_t signal_that_came = 0;
+
+}  // namespace
+
 const std::string& judged(const std::string& folder) {
   if (!folder.empty())
     if (const auto credentials = security::read_credentials(folder); !credentials)
       throw StartError(kConfiguration, "--security: " + credentials.error());
   return folder;
 }
-
-volatile std::sig_atomic_t signal_that_came = 0;
-
-}  // namespace
 
 void end_waits_on_signals() {
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int which) { signal_that_came = which; });

@@ -27,6 +27,9 @@ struct Options {
   double timeout_s = 5;
 };
 
+/// The folder itself, where its credentials are good or it is none. Throws StartError 78.
+const std::string& judged(const std::string& folder);
+
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its members that own memory are null

@@ -71,6 +71,7 @@ Verbs::Verbs(Command& app) {
   add_ends(app);
   add_views(app);
   add_adaptation(app);
+  add_map(app);
 }
 
 Command* Verbs::verb(Command& app, const std::string& name, const std::string& what, const std::string& example,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "services/backwashctl/goals.hpp"
+#include "services/backwashctl/map.hpp"
 #include "services/backwashctl/serve/serve.hpp"
 #include "services/backwashctl/station.hpp"
 #include "services/command_line/command_line.hpp"
@@ -16,7 +17,7 @@ namespace backwash::ctl {
 using services::Command;
 
 /// The verbs of backwashctl: enable, disable, takeoff, goto, follow, hold, stop, land, release, goals, status, watch,
-/// check, serve, adaptation.
+/// check, serve, adaptation, map.
 class Verbs {
  public:
   explicit Verbs(Command& app);
@@ -30,6 +31,7 @@ class Verbs {
   void add_ends(Command& app);
   void add_views(Command& app);
   void add_adaptation(Command& app);
+  void add_map(Command& app);
   Command* verb(Command& app, const std::string& name, const std::string& what, const std::string& example,
                 std::function<int()> run);
   Command* waiting(Command* sub, double patience_s);
@@ -43,6 +45,7 @@ class Verbs {
   int check();
   int watch();
   int adaptation();
+  int map();
 
   Options options_;
   std::vector<double> goal_;
@@ -51,6 +54,7 @@ class Verbs {
   std::string route_;
   GoalRules goal_rules_;
   ServeOptions page_;
+  MapOptions map_;
   std::string goal_topic_ = "/goal_pose", heading_ = "goal", air_order_ = "show";
   double height_ = 0, patience_s_ = 0;
   bool wait_ = false, json_ = false;

@@ -55,6 +55,7 @@ struct MapMessage {
   std::string id;
   std::int64_t received_ns = 0;
   MapWriter from{};
+  std::optional<std::uint64_t> transfer{};  ///< that it came in parts by; none: it came whole
 };
 
 /// One range scan in the map.
@@ -93,6 +94,13 @@ struct Worlds {
 
 /// One line for the operator.
 using Line = std::array<char, 192>;
+
+/// What became of a map that came in parts.
+struct MapVerdict {
+  std::uint64_t transfer = 0;
+  bool accepted = false;
+  Line why{};  ///< it was not
+};
 
 /// One command as received, or the news that a writer of commands is gone. Of the station's name only printable
 /// characters are left, and as many as fit.
@@ -234,6 +242,7 @@ struct Channels {
   sync::LatestValue<Line> refused, refused_map;            // DDS reader, map reader → status: the newest, and why
   sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
   sync::Handover<MapMessage> maps;                         // map reader → map worker
+  sync::LatestValue<MapVerdict> map_verdict;               // map worker → map reader: of the last that came in parts
   sync::LatestValue<MapWriter> map_writer;                 // map worker → map reader: of the first good map of a term
   sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
   Worlds worlds;                                           // map worker → each

@@ -30,8 +30,8 @@ namespace {
 using namespace std::chrono_literals;
 
 // Whatever is at work, the process is gone 2 s after it was asked to end: the threads have until kToEnd after that, the
-// raw log until kToRecord, the last lines kToSay more.
-constexpr auto kToEnd = 700ms, kToRecord = 1500ms;
+// raw log until kToRecord, the middleware until kToTakeDown, the last lines kToSay more.
+constexpr auto kToEnd = 700ms, kToRecord = 1500ms, kToTakeDown = 1600ms;
 constexpr double kToSay = 0.3;  // s
 constexpr std::uint64_t kTicksToBeReady = kTicksPerSecond / 2;
 
@@ -92,50 +92,6 @@ int reader_priority(const config::Daemon& daemon) {
   const int control = daemon.control.priority;
   return allowed_fifo(std::max(control - 10, control > 0 ? 1 : 0));
 }
-
-}  // namespace
-
-tl::expected<Settings, StartError> load_settings(const std::string& path) {
-  const auto wrong = [](const config::ConfigError& e) {
-    const bool missing = e.kind == config::ConfigError::Kind::not_found;
-    return tl::make_unexpected(StartError(missing ? kNoInput : kConfiguration, e.message));
-  };
-  auto daemon = config::load_daemon(path);
-  if (!daemon) return wrong(daemon.error());
-  if (const auto line = configured_line(daemon->link, daemon->odometry.timing); !line)
-    return tl::make_unexpected(StartError(kConfiguration, path + ": " + line.error()));
-  std::optional<security::Credentials> credentials;
-  if (!daemon->dds.security.empty()) {
-    auto read = security::read_credentials(daemon->dds.security);
-    if (!read) return tl::make_unexpected(StartError(kConfiguration, path + ": dds.security: " + read.error()));
-    credentials = std::move(*read);
-  }
-  auto vehicle = config::load_vehicle(daemon->vehicle);
-  if (!vehicle) return wrong(vehicle.error());
-  // What a velocity from poses may be off is in the first set of every tube.
-  if (daemon->odometry.twist == config::Twist::none)
-    vehicle->initial_error.velocity +=
-        track::PoseVelocity::error(std::min(OdometryTiming::kUsual, daemon->odometry.timing.rate_least));
-  auto model = config::load_model(daemon->model);
-  if (!model) return wrong(model.error());
-  if (!daemon->adaptation.enabled)
-    return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials)};
-  if (!model->extension.empty())
-    return tl::make_unexpected(StartError(
-        kConfiguration, daemon->model + ": is an extended model, whose effects are not in what a flight learns: give " +
-                            "the one before, or adaptation.enabled = false in " + path));
-  const auto tau = config::load_tau_interval(daemon->model);
-  if (!tau) return wrong(tau.error());
-  const adapt::InFlightConstants air{vehicle->controller,
-                                     {.tau_low_s = (*tau)[0],
-                                      .tau_high_s = (*tau)[1],
-                                      .mean_horizontal = model->bound.mean_horizontal,
-                                      .mean_vertical = model->bound.mean_vertical},
-                                     daemon->adaptation.alpha};
-  return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials), air};
-}
-
-namespace {
 
 /// Everything that runs. What others use comes first.
 struct Flight {
@@ -218,8 +174,7 @@ void start(Flight& f) {
 /// Waits for the threads and closes the log, with why the flight ended if nobody asked for it. False: a thread is still
 /// at work. It may be left: the control thread sends nothing more after its next tick, the log is closed by a thread of
 /// its own, and the rest (maps, plans, answers) is memory of this process alone.
-bool end(Flight& f) {
-  const auto asked = std::chrono::steady_clock::now();
+bool end(Flight& f, std::chrono::steady_clock::time_point asked) {
   f.channels->stop = true;
   f.manager.stopping();
   let_all_run();
@@ -243,6 +198,15 @@ bool end(Flight& f) {
   else
     spdlog::info("stopped{}", ended ? "" : ", with a thread still at work");
   return ended && closed;
+}
+
+/// Takes down what ran, of which all is recorded and told. False: the middleware is still at it. libddsc 0.10.2 waits
+/// for its own threads without end where an interface that it spoke on has vanished; what it would still do is memory
+/// of this process, and the farewell to others, who notice by its lease.
+bool take_down(std::unique_ptr<Flight> flight, std::chrono::steady_clock::time_point latest) {
+  if (done_by(latest, [held = flight.release()] { const std::unique_ptr<Flight> gone(held); })) return true;
+  spdlog::warn("the middleware does not end, as when a network interface has vanished: it is left behind");
+  return false;
 }
 
 /// The middleware ends what speaks by a certificate with that certificate, in flight too.
@@ -281,9 +245,11 @@ int run(const Settings& settings) {
     } catch (const std::system_error& e) {
       flight->failure.note("start", e.what(), kSystem);
     }
-    const bool ended = end(*flight);
+    const auto asked = std::chrono::steady_clock::now();
+    const bool ended = end(*flight, asked);
     code = flight->failure.code();
-    if (!ended) {  // what hangs still uses the flight
+    // What hangs still uses the flight: it is left to the process's end.
+    if (!(ended ? take_down(std::move(flight), asked + kToTakeDown) : (flight.release(), false))) {
       sink->close(kToSay);
       ::_exit(code);
     }

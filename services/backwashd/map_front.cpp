@@ -18,17 +18,23 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       sensor_range_(config.map.sensor_range),
       placement_(config),
       refusals_(channels.refused_map),
+      assembly_(kMaxMapBytes, config.frames.map),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, {.apart = true},
                    config.dds.security),
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
       scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
-      foreign_(participant_, {&maps_, &scans_}),
+      parts_(dds::make_reader<dds::MapPart>(participant_, config.dds.name_space)),
+      foreign_(participant_, {&maps_, &parts_, &scans_}),
+      receipts_(participant_, dds::TopicOf<dds::MapReceipt>::type(),
+                dds::topic(config.dds.name_space, dds::TopicOf<dds::MapReceipt>::kName), config.dds,
+                dds::Delivery::parts),
       tube_(participant_, config.dds),
       trajectory_(participant_, config.dds),
       markers_(participant_, config.dds),
       disturbance_(participant_, config.dds),
       waitset_(participant_) {
   waitset_.add(maps_);
+  waitset_.add(parts_);
   waitset_.add(scans_);
 }
 
@@ -90,9 +96,41 @@ void MapFront::take_maps() {
   });
 }
 
+// With a pause of its own: it is said beside the refusals of whoever sends meanwhile.
+void MapFront::tell_lost(const std::optional<std::string>& line) {
+  if (!line) return;
+  ++channels_.maps_rejected;
+  refusals_.add(maps_lost_, [&] { return *line; });
+}
+
+void MapFront::take_parts() {
+  if (const auto verdict = channels_.map_verdict.read_new()) assembly_.judge(*verdict);
+  parts_.take([&](const dds::MapPart& part, const dds::Guid& by) {
+    const dds::Guid writer = dds::participant_of(by);  // who has a writer for each of what may overtake one another
+    const auto refuse = [&](const std::string& why) { refusals_.add(channels_.maps_rejected, [&] { return why; }); };
+    if (!map_writer_.hears(writer)) {
+      assembly_.refuse(part, writer, map_writer_.refusal(writer), now_ns());
+      return refuse(map_writer_.refusal(writer));
+    }
+    const auto taken = assembly_.take(part, writer, now_ns());
+    if (!taken) return refuse(taken.error());
+    if (*taken == MapParts::Taken::begins) spdlog::info("{} begins to arrive", assembly_.what());
+    if (*taken != MapParts::Taken::whole) return;
+    spdlog::info("{} is whole after {:.1f} s", assembly_.what(), assembly_.age_s(now_ns()));
+    MapMessage message = assembly_.message();
+    message.from.term = term_;
+    channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+  });
+  tell_lost(assembly_.stalled(now_ns()));
+  if (const auto receipt = assembly_.receipt(now_ns())) receipts_.write(*receipt);
+}
+
 void MapFront::let_writers_go() {
   scan_writer_.let_go(scans_.departed(), true, now_ns());
-  if (!map_writer_.let_go(maps_.departed(), true, now_ns())) return;
+  auto departed = maps_.departed();
+  for (const dds::Guid& writer : parts_.departed()) departed.push_back(dds::participant_of(writer));
+  tell_lost(assembly_.let_go(departed));
+  if (!map_writer_.let_go(departed, true, now_ns())) return;
   ++term_;
   // What the next writer said was refused while this one was not known to be gone; a map may be said once.
   maps_.renew(waitset_);
@@ -113,7 +151,9 @@ void MapFront::run_readers() {
     take_poses();
     take_scans();
     take_maps();
+    take_parts();
     let_writers_go();
+    if (const auto line = partial_.look(dds::partial_sample(), now_ns())) refusals_.add(late_, [&] { return *line; });
     show_disturbance();
     if (const auto news = foreign_.take_new(); news.count > 0) {
       channels_.foreign_writers += news.count - 1;

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
+#include <optional>
 #include <string>
 
 #include "core/config/daemon_config.hpp"
 #include "services/backwashd/bound_writer.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/backwashd/map_parts.hpp"
+#include "services/backwashd/partial_watch.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
 #include "services/backwashd/scan_placement.hpp"
@@ -39,6 +43,8 @@ class MapFront {
  private:
   void take_poses();
   void take_maps();
+  void take_parts();
+  void tell_lost(const std::optional<std::string>& line);
   void take_scans();
   void let_writers_go();
   void show_disturbance();
@@ -49,6 +55,9 @@ class MapFront {
   double sensor_range_;
   ScanPlacement placement_;
   Refusals refusals_;
+  MapParts assembly_;
+  PartialWatch partial_;
+  std::atomic<std::uint64_t> maps_lost_{0}, late_{0};
   BoundWriter map_writer_{"a map"}, scan_writer_{"a scan"};
   std::uint32_t term_ = 0;           // rises when a map's writer is let go of
   const Snapshot* world_ = nullptr;  // the reader's
@@ -56,7 +65,9 @@ class MapFront {
   dds::Participant participant_;
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;
+  dds::Reader<dds::MapPart> parts_;
   dds::ForeignWriters foreign_;
+  ShownWriter<dds::MapReceipt> receipts_;
   ShownWriter<dds::Tube> tube_;
   ShownWriter<dds::Path> trajectory_;
   ShownWriter<dds::MarkerArray> markers_;

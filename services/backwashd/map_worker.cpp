@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <span>
 #include <thread>
@@ -99,8 +100,16 @@ MapWorker::~MapWorker() {
   while (const auto scan = channels_.scans.pop()) delete *scan;
 }
 
-void MapWorker::reject(const std::string& why) {
+void MapWorker::tell(const MapMessage& message, const std::string& why) {
+  if (!message.transfer) return;
+  MapVerdict verdict{*message.transfer, why.empty(), {}};
+  std::snprintf(verdict.why.data(), verdict.why.size(), "%s", why.c_str());
+  channels_.map_verdict.write(verdict);
+}
+
+void MapWorker::reject(const MapMessage& message, const std::string& why) {
   ++channels_.maps_rejected;
+  tell(message, why);
   spdlog::warn("map rejected: {}", why);
 }
 
@@ -116,8 +125,8 @@ void MapWorker::take_map(const MapMessage& message) {
   const auto begun = now_ns();
   // It was sent before the reader knew whose maps are used.
   if (writer_ && writer_->term == message.from.term && writer_->writer != message.from.writer)
-    return reject("it is of writer " + dds::text(message.from.writer) + ", that of " + dds::text(writer_->writer) +
-                  " is in use");
+    return reject(message, "it is of writer " + dds::text(message.from.writer) + ", that of " +
+                               dds::text(writer_->writer) + " is in use");
   const double cap = settings_.max_mib * (1 << 20);
   auto grid = map::decode_octomap(message.data, message.resolution, message.binary, message.id,
                                   static_cast<std::size_t>(cap / kBytesPerVoxel));
@@ -136,9 +145,12 @@ void MapWorker::take_map(const MapMessage& message) {
     wrong = "it has no free voxel";
   }
   record(recorder_, message, wrong.empty());
-  if (!wrong.empty()) return reject(wrong);
-  writer_ = message.from;
-  channels_.map_writer.write(*writer_);
+  if (!wrong.empty()) return reject(message, wrong);
+  if (!message.transfer) {  // a mapper stays; who sends a map in parts is done with it
+    writer_ = message.from;
+    channels_.map_writer.write(*writer_);
+  }
+  tell(message, "");
 
   const Index3 size = grid->size();
   const bool update = world_ && same_place(world_->grid, *grid);

@@ -39,7 +39,9 @@ class MapWorker {
   void take_map(const MapMessage& message);
   bool take_scans();
   bool take_air();
-  void reject(const std::string& why);
+  void reject(const MapMessage& message, const std::string& why);
+  /// The map reader, of a map that came in parts; `why` it was not accepted, or empty.
+  void tell(const MapMessage& message, const std::string& why);
   void await_vehicle();
   void publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns);
   void publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns);

@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <future>
 #include <system_error>
 #include <utility>
 
@@ -88,6 +89,16 @@ bool Threads::join(std::chrono::steady_clock::time_point latest) {
   for (std::thread& thread : threads_)
     if (thread.joinable()) thread.join();
   return true;
+}
+
+bool done_by(std::chrono::steady_clock::time_point latest, std::function<void()> work) {
+  std::promise<void> promise;
+  const auto done = promise.get_future();
+  std::thread([work = std::move(work), promise = std::move(promise)]() mutable {
+    work();
+    promise.set_value();
+  }).detach();
+  return done.wait_until(latest) == std::future_status::ready;
 }
 
 sigset_t shield_process() {

@@ -55,6 +55,9 @@ class Threads {
   std::vector<std::thread> threads_;
 };
 
+/// Does `work` in a thread of its own. False: it was not done by `latest`, and goes on until the process ends.
+bool done_by(std::chrono::steady_clock::time_point latest, std::function<void()> work);
+
 /// At start, before any file is opened and any thread started:
 /// - a standard descriptor that is closed is opened on /dev/null, so that no port or log ever gets its number;
 /// - SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN and SIGTSTP are ignored: a pipe, a limit or a terminal never ends or stops a

@@ -9,11 +9,13 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <span>
 #include <string_view>
 
+#include "services/dds/fragments.hpp"
 #include "services/dds/loopback.hpp"
 #include "services/dds/packet_filter.hpp"
 #include "services/dds/quality.hpp"
@@ -26,6 +28,8 @@ extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
   const std::span datagram(static_cast<std::uint8_t*>(message->msg_iov[0].iov_base),
                            std::min(static_cast<std::size_t>(received), message->msg_iov[0].iov_len));
   const std::size_t heard = backwash::dds::heard_of(*message, datagram);
+  const auto now = std::chrono::steady_clock::now();
+  backwash::dds::note_fragments(datagram.first(heard), std::chrono::nanoseconds(now.time_since_epoch()).count());
   return static_cast<ssize_t>(backwash::dds::filter_packet(datagram.first(heard)));
 }
 

@@ -40,6 +40,7 @@ enum class Delivery {
   sent_tf,   ///< reliable, keep last 100: transforms, as ROS 2's broadcasters send them
   tf,        ///< best effort, keep last 64: transforms of all, ours among them
   scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data
+  parts,     ///< best effort, keep last 64: parts of maps and their receipts, which say themselves what is missing
   reliable,  ///< reliable, keep last 64, a writer's liveliness has a lease of kLease_s: commands and acknowledgements
   state,     ///< reliable, transient local, keep last 1: late joiners get the newest: map, trajectory, tube
 };
@@ -76,6 +77,12 @@ class Participant {
 
 /// Identity of one writer: its process draws it anew at each start.
 using Guid = std::array<std::uint8_t, 16>;
+
+/// Who all writers of one participant are: its own identity, which no writer has.
+inline Guid participant_of(Guid writer) noexcept {
+  writer[12] = writer[13] = writer[14] = writer[15] = 0;
+  return writer;
+}
 
 /// As the tools of DDS print it: 8 hexadecimal digits four times.
 std::string text(const Guid& guid);

@@ -12,13 +12,14 @@ namespace {
 
 bool best_effort(Delivery delivery, Role role) {
   return delivery == Delivery::latest || delivery == Delivery::scans || delivery == Delivery::tf ||
-         (delivery == Delivery::status && role == Role::reader);
+         delivery == Delivery::parts || (delivery == Delivery::status && role == Role::reader);
 }
 
 int depth(Delivery delivery) {
   switch (delivery) {
     case Delivery::reliable:
     case Delivery::tf:
+    case Delivery::parts:
       return 64;
     case Delivery::sent_tf:
       return 100;

@@ -32,6 +32,8 @@ using Status = backwash_msgs_msg_dds__Status_;
 using Parameter = backwash_msgs_msg_dds__Parameter_;
 using Advice = backwash_msgs_msg_dds__Advice_;
 using Timing = backwash_msgs_msg_dds__Timing_;
+using MapPart = backwash_msgs_msg_dds__MapPart_;
+using MapReceipt = backwash_msgs_msg_dds__MapReceipt_;
 using Tube = backwash_msgs_msg_dds__ReachTube_;
 using TubeStep = backwash_msgs_msg_dds__ReachStep_;
 
@@ -102,6 +104,18 @@ struct TopicOf<Status> {
   static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Status__desc; }
   static constexpr const char* kName = "status";
   static constexpr Delivery kDelivery = Delivery::status;
+};
+template <>
+struct TopicOf<MapPart> {
+  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__MapPart__desc; }
+  static constexpr const char* kName = "map_part";
+  static constexpr Delivery kDelivery = Delivery::parts;
+};
+template <>
+struct TopicOf<MapReceipt> {
+  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__MapReceipt__desc; }
+  static constexpr const char* kName = "map_receipt";
+  static constexpr Delivery kDelivery = Delivery::parts;
 };
 template <>
 struct TopicOf<Tube> {

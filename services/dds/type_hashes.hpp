@@ -51,6 +51,8 @@ inline constexpr TypeHash kTypeHashes[] = {
     {"backwash_msgs::msg::dds_::Status_", "RIHS01_fbacb3292a04c8dce16506acc7d98738977766c8df83dc8ea22377065046811d"},
     {"backwash_msgs::msg::dds_::ReachStep_", "RIHS01_eb1cf8bae007f124aced5c5d7111a2856f049f00ff8db1583041a39701ef0aa2"},
     {"backwash_msgs::msg::dds_::ReachTube_", "RIHS01_205e5a736e8e66742da3743c25961c8bcef8edc4bc08b1c7f503e3f980520ebd"},
+    {"backwash_msgs::msg::dds_::MapPart_", "RIHS01_f721a090fccf137d5acd86d8d436fb0eeb0aaab7c3f33afd575a5e0e4dcbfb68"},
+    {"backwash_msgs::msg::dds_::MapReceipt_", "RIHS01_c155532ee7aeadde8c7ed792ea535d6c6296d9d5519cf0f7f2650eaa9bc2137f"},
 };
 // clang-format on
 

@@ -33,14 +33,14 @@ std::vector<std::string> writable(const Grant& grant) {
   };
   switch (grant.role) {
     case Role::vehicle:
-      add({"ack", "status", "tube", "trajectory", "markers", "disturbance"});
+      add({"ack", "status", "tube", "trajectory", "markers", "disturbance", "map_receipt"});
       topics.insert(topics.end(), {"rt/diagnostics", "rt/tf"});
       break;
     case Role::station:
-      add({"command"});
+      add({"command", "map_part"});
       break;
     case Role::vio:
-      add({"odometry", "loop_closure", "map", "points"});
+      add({"odometry", "loop_closure", "map", "points", "map_part"});
       break;
     case Role::observer:
       break;

@@ -51,6 +51,32 @@ TEST_F(MapWorkerTest, InOneTermMapsAreTakenOfTheFirstWriterWhoseMapWasGood) {
   EXPECT_EQ(send_from(1, 1, good), std::pair(3ul, 3ul));
 }
 
+TEST_F(MapWorkerTest, AMapInPartsBindsNobodyAndItsVerdictIsTold) {
+  const auto send_from = [&](std::uint8_t writer, std::optional<std::uint64_t> transfer,
+                             std::vector<std::int8_t> data) {
+    auto message = MapMessage{std::move(data), grid_.resolution(), true, "OcTree", 1};
+    message.from = {0, {writer}};
+    message.transfer = transfer;
+    channels_->maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+    EXPECT_TRUE(worker_.step());
+    return channels_->map_verdict.read_new();
+  };
+  const auto good = map::encode_octomap(grid_);
+  for (const std::uint8_t writer : {1, 2}) {
+    const auto verdict = send_from(writer, 10 + writer, good);
+    ASSERT_TRUE(verdict);
+    EXPECT_EQ(verdict->transfer, 10u + writer);
+    EXPECT_TRUE(verdict->accepted) << verdict->why.data();
+  }
+  EXPECT_FALSE(channels_->map_writer.read_new());
+  EXPECT_FALSE(send_from(3, std::nullopt, good)) << "a mapper, which is told by nobody";
+  ASSERT_TRUE(channels_->map_writer.read_new());
+  const auto verdict = send_from(1, 20, good);
+  ASSERT_TRUE(verdict);
+  EXPECT_FALSE(verdict->accepted);
+  EXPECT_NE(std::string(verdict->why.data()).find("is in use"), std::string::npos);
+}
+
 // Row 54.
 TEST_F(MapWorkerTest, GrownFactorsMakeTheWorldAnewAndLaterMapsAndScansKeepThem) {
   MapWorker worker(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_,

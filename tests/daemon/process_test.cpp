@@ -93,6 +93,18 @@ TEST(Ending, EveryThreadIsGivenOrdinaryPriorityWhereAllowed) {
   EXPECT_EQ(code, 5);
 }
 
+TEST(Process, WorkThatHangsIsWaitedForNoLongerThanAsked) {
+  const int code = in_a_process([] {
+    const auto begun = std::chrono::steady_clock::now();
+    if (!done_by(after(10s), [] {})) return 1;
+    if (std::chrono::steady_clock::now() - begun > 5s) return 2;
+    ::alarm(20);
+    if (done_by(after(50ms), [] { ::pause(); })) return 3;
+    ::_exit(7);
+  });
+  EXPECT_EQ(code, 7);
+}
+
 TEST(ThreadFault, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
   const int code = in_a_process([] {
     std::atomic<bool> stop{false};

@@ -167,7 +167,8 @@ def check_tables(root: pathlib.Path, text: str) -> None:
 # --- DDS and MAVLink -------------------------------------------------------------------------------------------------
 
 DELIVERY = {"latest": "best effort, keep last 1", "scans": "best effort, keep last 8", "status": "reliable, keep last 1",
-            "reliable": "reliable, keep last 64", "state": "reliable, transient local, keep last 1"}
+            "parts": "best effort, keep last 64", "reliable": "reliable, keep last 64",
+            "state": "reliable, transient local, keep last 1"}
 
 
 def check_dds(root: pathlib.Path, sections_of: dict[str, str]) -> None:

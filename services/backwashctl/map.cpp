@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashctl/map.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "core/config/file_hash.hpp"
+#include "core/map/load_map.hpp"
+#include "core/map/octomap_message.hpp"
+#include "services/backwashctl/verbs.hpp"
+#include "services/command_line/exit_code.hpp"
+
+namespace backwash::ctl {
+namespace {
+
+constexpr double kBitsPerByte = 8, kTold_s = 5;
+// In turn: a best-effort reader leaves out what one writer's later sample has overtaken, and 50 ms of jitter make every
+// fourth part such a one. At 1 Mbit/s a writer's parts are 170 ms apart.
+constexpr int kWriters = 16;
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+map::OccupancyGrid load(const std::string& file) {
+  auto grid = map::load_map(file);
+  if (grid) return std::move(*grid);
+  using Kind = map::MapError::Kind;
+  const bool missing = grid.error().kind == Kind::not_found || grid.error().kind == Kind::unknown_name;
+  throw StartError(missing ? kNoInput : kBadData, grid.error().message);
+}
+
+/// The parts of one map and the receipts of it.
+class Transfer {
+ public:
+  Transfer(const Options& options, const MapOptions& map, const map::OccupancyGrid& grid)
+      : map_(map),
+        data_(map::encode_octomap(grid)),
+        participant_(static_cast<std::uint32_t>(options.domain), options.interface, {}, judged(options.security)),
+        receipts_(dds::make_reader<dds::MapReceipt>(participant_, options.name_space)),
+        waitset_(participant_) {
+    waitset_.add(receipts_);
+    for (int n = 0; n < kWriters; ++n)
+      parts_.push_back(dds::make_writer<dds::MapPart>(participant_, options.name_space));
+    std::random_device random;
+    part_.transfer = std::uint64_t{random()} << 32 | random();
+    part_.frame_id = dds::c_string(map_.frame);
+    part_.id = dds::c_string(id_);
+    part_.binary = true;
+    part_.resolution = grid.resolution();
+    part_.hash = config::fnv1a({reinterpret_cast<const char*>(data_.data()), data_.size()});
+    part_.size = static_cast<std::uint32_t>(data_.size());
+  }
+
+  std::size_t bytes() const noexcept { return data_.size(); }
+  /// Whether a daemon listens within `timeout_s`.
+  bool heard(double timeout_s) {
+    const std::int64_t begun = now_ns();
+    while (!interrupted() && seconds(now_ns() - begun) < timeout_s) {
+      if (parts_.front().matched() > 0) return true;
+      waitset_.wait(0.02);
+    }
+    return false;
+  }
+  /// Sends what is due and takes what was answered.
+  void step(dds::MapSending& sending) {
+    while (const auto number = sending.next(now_ns())) write(*number);
+    waitset_.wait(0.002);
+    receipts_.take([&](const dds::MapReceipt& receipt) {
+      if (receipt.transfer != part_.transfer) return;
+      sending.hear(receipt, now_ns());
+      state_ = receipt.state;
+      reason_ = receipt.reason ? receipt.reason : "";
+    });
+  }
+  bool accepted() const noexcept { return state_ == backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED; }
+  bool refused() const noexcept { return state_ == backwash_msgs_msg_dds__MAPRECEIPT_REFUSED; }
+  const std::string& reason() const noexcept { return reason_; }
+
+ private:
+  void write(std::uint32_t number) {
+    const std::size_t begin = number * dds::kPartBytes;
+    const auto size = static_cast<std::uint32_t>(std::min(dds::kPartBytes, data_.size() - begin));
+    part_.number = number;
+    part_.sent = static_cast<std::uint64_t>(now_ns());
+    part_.data = {size, size, reinterpret_cast<std::uint8_t*>(data_.data() + begin), false};
+    parts_[++turn_ % kWriters].write(part_);
+  }
+
+  MapOptions map_;
+  std::string id_ = "OcTree", reason_;
+  std::vector<std::int8_t> data_;
+  dds::MapPart part_{};
+  std::uint8_t state_ = backwash_msgs_msg_dds__MAPRECEIPT_ARRIVING;
+  dds::Participant participant_;
+  std::vector<dds::Writer<dds::MapPart>> parts_;
+  std::size_t turn_ = 0;
+  dds::Reader<dds::MapReceipt> receipts_;
+  dds::WaitSet waitset_;
+};
+
+void tell(const dds::MapSending& sending, std::size_t bytes, double took_s) {
+  const double share = static_cast<double>(sending.held()) / sending.count();
+  std::fprintf(stderr, "%.1f of %.1f MiB acknowledged after %.0f s, sending at %.0f kbit/s\n",
+               share * static_cast<double>(bytes) / (1 << 20), static_cast<double>(bytes) / (1 << 20), took_s,
+               sending.rate() * kBitsPerByte * 1e-3);
+}
+
+}  // namespace
+
+std::string given_up(const dds::MapSending& sending, std::size_t bytes, double took_s, double silent_s) {
+  char line[512];
+  const double mib = static_cast<double>(bytes) / (1 << 20);
+  const std::uint32_t held = sending.held(), count = sending.count();
+  const int size = std::snprintf(
+      line, sizeof line,
+      "not arrived: a map of %.1f MiB in %u parts; %llu were sent in %.0f s, %u are acknowledged (%.0f %%, the first "
+      "missing is %u), none in the last %.0f s. ",
+      mib, count, static_cast<unsigned long long>(sending.sent()), took_s, held, 100.0 * held / count,
+      sending.first_missing(), silent_s);
+  const char* advice =
+      held == count ? "The daemon has it all and says nothing of it: see its log"
+      : held == 0
+          ? "Nothing came back: see that the daemon's dds.interface is on this line, or give a larger --patience"
+          : "Give a larger --patience, a --rate below what the line carries, or a smaller map: backwash map "
+            "convert has --crop and --resolution";
+  return std::string(line, static_cast<std::size_t>(std::max(size, 0))) + advice;
+}
+
+Outcome send_map(const Options& options, const MapOptions& map, bool quiet) {
+  Outcome outcome{"map", false, std::nullopt, ""};
+  Transfer transfer(options, map, load(map.file));
+  if (transfer.bytes() == 0) throw StartError(kBadData, map.file + ": nothing is known in it");
+  if (!transfer.heard(options.timeout_s)) {
+    outcome.why = interrupted() ? "interrupted" : "no daemon listens to parts of maps; is backwashd running?";
+    return outcome;
+  }
+  const std::int64_t begun = now_ns();
+  dds::MapSending sending(transfer.bytes(), std::max(dds::MapSending::kLeast, map.rate_kbit_s * 1e3 / kBitsPerByte),
+                          begun);
+  double told_s = 0;
+  while (!transfer.accepted() && !transfer.refused() && !interrupted()) {
+    transfer.step(sending);
+    const double took_s = seconds(now_ns() - begun), silent_s = seconds(now_ns() - sending.progress_ns());
+    if (silent_s > map.patience_s) {
+      outcome.why = given_up(sending, transfer.bytes(), took_s, silent_s);
+      return outcome;
+    }
+    if (quiet || took_s - told_s < kTold_s) continue;
+    told_s = took_s;
+    tell(sending, transfer.bytes(), took_s);
+  }
+  if (transfer.accepted()) {
+    outcome.accepted = outcome.done.emplace(true);
+    if (!quiet)
+      std::printf("a map of %.1f MiB is in use after %.1f s; %llu parts were sent, %u needed\n",
+                  static_cast<double>(transfer.bytes()) / (1 << 20), seconds(now_ns() - begun),
+                  static_cast<unsigned long long>(sending.sent()), sending.count());
+  } else {
+    outcome.why = transfer.refused() ? "refused: " + transfer.reason()
+                                     : "interrupted; " + given_up(sending, transfer.bytes(), seconds(now_ns() - begun),
+                                                                  seconds(now_ns() - sending.progress_ns()));
+  }
+  return outcome;
+}
+
+void Verbs::add_map(Command& app) {
+  auto* sub = verb(app, "map", "send a map and wait until the daemon has it in use; on a bad line too",
+                   "map floor.bt --patience 60", [this] { return map(); });
+  sub->add_option("file", map_.file, "OctoMap, or builtin:NAME").required();
+  sub->add_option("--frame", map_.frame, "that the map is in: the daemon's frames.map").capture_default_str();
+  sub->add_option("--rate", map_.rate_kbit_s, "kbit/s that the line carries; slower lines are noticed")
+      .capture_default_str()
+      .check(services::within(64, 1e6));
+  sub->add_option("--patience", map_.patience_s, "s without a newly acknowledged part until it is given up")
+      .capture_default_str()
+      .check(services::positive());
+}
+
+int Verbs::map() {
+  try {
+    return say(send_map(options_, map_, json_), json_);
+  } catch (const dds::NotPermitted& e) {
+    return say({"map", false, std::nullopt, std::string("refused: ") + e.what()}, json_);
+  }
+}
+
+}  // namespace backwash::ctl

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwashd/map_parts.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/daemon/map_in_parts.hpp"
+
+namespace backwash::daemon {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(MapParts, APartThatIsNoneOfItsMapIsRefused) {
+  Map map(3000);
+  MapParts parts(1u << 20, "map");
+  const auto refused = [&](auto&& change) {
+    dds::MapPart part = map.of(1, 1);
+    change(part);
+    const auto taken = parts.take(part, kOne, kSecond);
+    return taken ? "taken" : taken.error();
+  };
+  EXPECT_THAT(refused([](auto& p) { p.size = (1u << 20) + 1; }), HasSubstr("at most 1048576"));
+  EXPECT_THAT(refused([](auto& p) { p.size = 0; }), HasSubstr("at least 1"));
+  EXPECT_THAT(refused([](auto& p) { p.number = 3, p.data._length = 3000 - 2 * dds::kPartBytes; }), HasSubstr("part 3"));
+  EXPECT_THAT(refused([](auto& p) { p.data._length = 1151; }), HasSubstr("has 1151"));
+  const std::string odom = "odom";
+  EXPECT_THAT(refused([&](auto& p) { p.frame_id = dds::c_string(odom); }), HasSubstr("'map'"));
+  map.part.transfer = 8;
+  ASSERT_TRUE(parts.take(map.of(0, 1), kOne, kSecond));
+  EXPECT_THAT(refused([](auto& p) { ++p.hash; }), HasSubstr("differs from the others"));
+}
+
+TEST(MapParts, OneMapArrivesAtATimeUntilItsSenderIsSilent) {
+  Map map(3000), next(3000);
+  next.part.transfer = 8;
+  MapParts parts(1u << 20, "map");
+  ASSERT_TRUE(parts.take(map.of(0, 1), kOne, 0));
+  EXPECT_FALSE(parts.take(next.of(0, 1), kOther, MapParts::kYield_ns - 1));
+  EXPECT_FALSE(parts.stalled(MapParts::kYield_ns));
+  EXPECT_TRUE(parts.take(next.of(0, 1), kOther, MapParts::kYield_ns));
+  const auto line = parts.stalled(MapParts::kYield_ns);
+  ASSERT_TRUE(line);
+  EXPECT_THAT(*line, HasSubstr("1 of 3 parts came in 0 s, and another began in its place"));
+  EXPECT_FALSE(parts.stalled(MapParts::kYield_ns));
+}
+
+TEST(MapParts, AWriterThatBeginsAMapWithEachPartTakesMemoryOnceASecond) {
+  Map map(3000);
+  MapParts parts(1u << 20, "map");
+  int begun = 0;
+  for (std::int64_t now = 0; now < 3 * kSecond; now += 10 * kMs, ++map.part.transfer)
+    if (const auto taken = parts.take(map.of(0, now), kOne, now)) begun += *taken == MapParts::Taken::begins;
+  EXPECT_EQ(begun, 3);
+}
+
+TEST(MapParts, TheOperatorIsToldOnceOfAMapThatDoesNotGoOn) {
+  Map map(3000);
+  MapParts parts(1u << 20, "map");
+  ASSERT_TRUE(parts.take(map.of(1, 1), kOne, 0));
+  EXPECT_FALSE(parts.stalled(MapParts::kSilent_ns - 1));
+  const auto line = parts.stalled(MapParts::kSilent_ns);
+  ASSERT_TRUE(line);
+  EXPECT_THAT(*line, HasSubstr("1 of 3 parts came"));
+  EXPECT_FALSE(parts.stalled(MapParts::kSilent_ns + 1));
+  // It may go on, and is told of again.
+  ASSERT_TRUE(parts.take(map.of(0, 2), kOne, 15 * kSecond));
+  EXPECT_TRUE(parts.stalled(26 * kSecond));
+  EXPECT_FALSE(parts.stalled(90 * kSecond));
+  EXPECT_EQ(*parts.take(map.of(0, 3), kOne, 91 * kSecond), MapParts::Taken::begins);  // what came was let go
+}
+
+TEST(MapParts, AMapWhoseSenderIsGoneMakesRoomAtOnceAndIsTold) {
+  Map map(3000), next(3000);
+  next.part.transfer = 8;
+  MapParts parts(1u << 20, "map");
+  ASSERT_TRUE(parts.take(map.of(1, 1), kOne, 0));
+  EXPECT_FALSE(parts.let_go(std::vector{kOther}));
+  const auto line = parts.let_go(std::vector{kOther, kOne});
+  ASSERT_TRUE(line);
+  EXPECT_THAT(*line, HasSubstr("1 of 3 parts came in 0 s, and its sender is gone"));
+  EXPECT_FALSE(parts.let_go(std::vector{kOne}));
+  EXPECT_EQ(*parts.take(next.of(0, 1), kOther, 1), MapParts::Taken::begins);
+}
+
+TEST(MapParts, AMapThatArrivesDamagedIsRefusedInItsReceipts) {
+  Map map(3000);
+  ++map.data[5];
+  MapParts parts(1u << 20, "map");
+  ASSERT_TRUE(parts.take(map.of(0, 1), kOne, 0));
+  ASSERT_TRUE(parts.take(map.of(1, 2), kOne, 0));
+  EXPECT_FALSE(parts.take(map.of(2, 3), kOne, 0));
+  const auto receipt = parts.receipt(kSecond);
+  ASSERT_TRUE(receipt);
+  EXPECT_EQ(receipt->state, backwash_msgs_msg_dds__MAPRECEIPT_REFUSED);
+  EXPECT_THAT(receipt->reason, HasSubstr("differs from what was sent"));
+}
+
+TEST(MapParts, TheVerdictOfTheMapWorkerGoesIntoTheReceipts) {
+  for (const bool good : {true, false}) {
+    Map map(1000);
+    MapParts parts(1u << 20, "map");
+    ASSERT_EQ(*parts.take(map.of(0, 1), kOne, 0), MapParts::Taken::whole);
+    EXPECT_EQ(parts.receipt(kSecond)->state, backwash_msgs_msg_dds__MAPRECEIPT_WHOLE);
+    EXPECT_FALSE(parts.receipt(2 * kSecond));  // nothing new
+    MapVerdict verdict{7, good, {}};
+    std::snprintf(verdict.why.data(), verdict.why.size(), "%s", good ? "" : "it has no free voxel");
+    parts.judge({6, !good, {}});  // of another map
+    EXPECT_FALSE(parts.receipt(2 * kSecond));
+    parts.judge(verdict);
+    const auto receipt = parts.receipt(3 * kSecond);
+    ASSERT_TRUE(receipt);
+    EXPECT_EQ(receipt->state,
+              good ? backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED : backwash_msgs_msg_dds__MAPRECEIPT_REFUSED);
+    EXPECT_STREQ(receipt->reason, good ? "" : "it has no free voxel");
+  }
+}
+
+}  // namespace
+}  // namespace backwash::daemon
