@@ -131,7 +131,9 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
                                       .tau_high_s = (*tau)[1],
                                       .mean_horizontal = model->bound.mean_horizontal,
                                       .mean_vertical = model->bound.mean_vertical},
-                                     daemon->adaptation.alpha};
+                                     daemon->adaptation.alpha,
+                                     kModelledAir,
+                                     daemon->adaptation.calmest};
   return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials), air};
 }
 
