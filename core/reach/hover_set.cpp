@@ -111,6 +111,13 @@ std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, double fr
   }
 }
 
+/// Centre of a set, its voxel, and what pushes there.
+struct Centre {
+  Index3 v;
+  Vec3 p_W, push_W;
+  double distance;  // of the voxel's centre to obstacles, m
+};
+
 /// Whether sets around voxel centres are clear of obstacles by body and estimation. Box queries bracket the answer and
 /// decide most; no rounding can make them wrong, since boxes within the fat set are a little smaller than that.
 class ClearTest {
@@ -219,11 +226,6 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
                     std::optional<double> constant_margin) {
   const double taken = body_and_estimation(reach.vehicle);
   const bool extended = !bounds.extension().none();
-  struct Centre {  // of a set
-    Index3 v;
-    Vec3 p_W, push_W;
-    double distance;  // of the voxel's centre
-  };
   const auto fill_where = [&](const auto& safe) {
     for (const std::size_t n : voxels) {
       const double here = distance.at(n);
@@ -249,14 +251,13 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
   }
   const ClearTest test(reach.vehicle, grid, sums);
   const NetDisturbance net(reach, bounds);
-  std::optional<BlockExtents> extents;
-  if (reach.method == Method::tight && !extended && !net.held())
-    extents.emplace(reach, bounds, grid.size(), grid.resolution());
+  const bool by_blocks = reach.method == Method::tight && !extended && !net.held();
+  BlockExtents extents(reach, bounds, grid.size(), grid.resolution());
   const auto safe_with = [&](const auto& half_widths) {
     return [&](const Centre& c) {
       // A centre off its voxel's is nearer to obstacles by that much at most.
       const double free_distance = c.distance, off = extended ? (c.p_W - grid.center(c.v)).norm() : 0;
-      const Vec3* const most = extents ? &extents->at(c.v) : nullptr;
+      const Vec3* const most = by_blocks ? &extents.at(c.v) : nullptr;
       if (most && test.far(free_distance, *most)) return true;
       const NearbyVoxels around(grid, c.v, c.p_W);
       if (most && test.surely_clear(around, free_distance, *most)) return true;
