@@ -6,7 +6,7 @@
 namespace backwash::adapt {
 
 /// What a flight learns of its air, class by class (docs/model.md section 7). Starts with nothing; of two with equal
-/// samples every number is equal, bit for bit. Made before the flight: the constructor takes 25 ms.
+/// samples every number is equal, bit for bit. Made before the flight: the constructor takes 30 ms.
 class Adaptation {
  public:
   explicit Adaptation(const Gusts& gusts, double alpha = kAlpha)
