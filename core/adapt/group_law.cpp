@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kLongerTau = 8;  // of tau_low: beyond it every form's innovations are smaller than at tau_low
 constexpr int kTaus = 4;          // of them, in equal ratios
+constexpr int kMany = 24;         // samples in a long mean: more change it by less than a hundredth
 
 /// Variance of a group's mean and its covariance with that of the group before, per unit of the gusts' variance.
 struct GroupMoments {
@@ -61,16 +62,21 @@ double correlation(GustForm form, double lag_s, double tau_s) {
   return std::pow(2, 2.0 / 3) / std::tgamma(1.0 / 3) * std::cbrt(x) * std::cyl_bessel_k(1.0 / 3, x);
 }
 
-GroupLaw::GroupLaw(double tau_low_s, double tau_high_s, std::optional<GustForm> form)
-    : group_s_((form == GustForm::second_order ? kBlock : kGroup) * tau_low_s), block_s_(kBlock * tau_low_s) {
+GroupLaw::GroupLaw(double tau_low_s, double tau_high_s, std::optional<GustForm> form, MeansOf means)
+    : group_s_((means == MeansOf::pairs          ? kPaired
+                : form == GustForm::second_order ? kBlock
+                                                 : kGroup) *
+               tau_low_s),
+      block_s_(kBlock * tau_low_s) {
   const GustForm assumed = form.value_or(GustForm::first_order);
   const auto forms = form ? std::span<const GustForm>(&assumed, 1) : std::span<const GustForm>(kGustForms);
   for (int n = 0; n < kSamples; ++n)
     for (int k = 0; k < kLengths; ++k) {
       const double seconds = group_s_ * std::exp(kLnShortest + (kLnLongest - kLnShortest) * k / (kLengths - 1));
-      const auto m = moments(assumed, n + 1, seconds, tau_low_s);
-      const double rho = m.before / m.own;
-      const Kind kind{n + 1, seconds, rho};
+      const int samples = means == MeansOf::pairs && n + 1 == kSamples ? kMany : n + 1;
+      const auto m = moments(assumed, samples, seconds, tau_low_s);
+      const double rho = means == MeansOf::pairs ? 1 : m.before / m.own;
+      const Kind kind{samples, seconds, rho};
       table_[static_cast<std::size_t>(n)][static_cast<std::size_t>(k)] = {
           rho, range(kind, forms, tau_low_s, kLongerTau * tau_low_s).second,
           range(kind, forms, tau_low_s, tau_high_s).first};

@@ -14,6 +14,12 @@ inline constexpr std::array kGustForms{GustForm::karman, GustForm::first_order, 
 /// ρ(lag), 1: of a form with the correlation time tau_s > 0. Not real-time.
 double correlation(GustForm form, double lag_s, double tau_s);
 
+/// What two means in a row are compared for.
+enum class MeansOf {
+  groups,  ///< short ones, each less what the one before foretells: what is new in the gusts, soon
+  pairs    ///< long ones, each less its neighbour: their variance is that of any form of gusts, steady push cancels
+};
+
 /// What means over short groups of samples say of a group from the one before it (docs/model.md 7-3): tables by count
 /// and duration, made once.
 class GroupLaw {
@@ -24,13 +30,15 @@ class GroupLaw {
   /// The means that are bet on are so long, in correlation times: a burst is in one of them or two. So are groups of
   /// gusts that are told to be of second order: shorter ones would leave something of each innovation in the next.
   static constexpr double kBlock = 0.7;
+  /// Each mean of a pair is so long, in correlation times: longer than gusts are told apart, or velocities are noisy.
+  static constexpr double kPaired = 4;
   /// tau_low, tau_high: the calibrated interval of τ, s; 0 < tau_low ≤ tau_high. `form`: the likeliest one as
   /// calibrated; without it whichever is worst. 10 ms of a processor.
-  GroupLaw(double tau_low_s, double tau_high_s, std::optional<GustForm> form = {});
+  GroupLaw(double tau_low_s, double tau_high_s, std::optional<GustForm> form = {}, MeansOf means = MeansOf::groups);
 
   /// Of ȳ_k − ρ ȳ_{k−1}, per unit of the gusts' variance.
   struct Innovation {
-    double rho;    ///< of the form at tau_low; not knowing it, of the first-order one
+    double rho;    ///< of the form at tau_low; not knowing it, of the first-order one; of pairs 1
     double most;   ///< largest variance with τ ≥ tau_low
     double least;  ///< smallest with τ in the interval
   };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/adapt/in_flight.hpp"
 
+#include <algorithm>
+
 #include "core/types/time.hpp"
 
 namespace backwash::adapt {
@@ -24,7 +26,9 @@ Disturbance disturbance_of(const InFlightConstants& constants) {
 InFlight::InFlight(const InFlightConstants& constants)
     : disturbance_(disturbance_of(constants)),
       adaptation_(by_differences(constants.gusts), constants.alpha),
-      factors_(larger(constants.start, kModelledAir)) {}
+      calmest_(constants.calmest),
+      grown_(larger(constants.start, kModelledAir)),
+      factors_(grown_) {}
 
 // Since the tick before, by the stamps; nothing where there is none to compare with.
 std::optional<Vec3> InFlight::acceleration(const AirTick& tick) noexcept {
@@ -51,18 +55,53 @@ bool InFlight::add(const AirTick& tick) noexcept {
     return false;
   }
   const auto measured = noise(*w_W);
-  return measured && adaptation_.add({t_s_, *w_W, tick.sigma, tick.air, *measured}) && !frozen_ && follow();
+  if (!measured) return false;
+  const AirFactors before = factors_;
+  if (adaptation_.add({t_s_, *w_W, tick.sigma, tick.air, *measured})) {
+    return_from_calm();
+    if (!frozen_) grow();
+  }
+  if (tick.rests && !frozen_) settle();
+  return factors_ != before;
 }
 
-bool InFlight::follow() noexcept {
-  const AirFactors before = factors_;
-  factors_ = larger(factors_, adaptation_.factors());
-  return factors_ != before;
+void InFlight::grow() noexcept {
+  grown_ = larger(grown_, adaptation_.factors());
+  combine();
+}
+
+// Also of frozen factors: what was shrunk was right in calmer air alone.
+void InFlight::return_from_calm() noexcept {
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    const auto air = static_cast<AirClass>(k);
+    if (!(calm_[k] < 1) || !(adaptation_.of(air).rose() || adaptation_.of(air).above())) continue;
+    calm_[k] = 1;
+    adaptation_.forget_calmer(air);
+  }
+  combine();
+}
+
+// What no class is known of may be anywhere.
+void InFlight::settle() noexcept {
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    const auto air = static_cast<AirClass>(k);
+    const auto below = adaptation_.of(air).below();
+    if (air == AirClass::none || !below || grown_[k] > 1) continue;
+    const double factor = std::max(calmest_, *below);
+    if (!(factor < calm_[k])) continue;
+    calm_[k] = factor;
+    adaptation_.watch(air, factor);
+  }
+  combine();
+}
+
+void InFlight::combine() noexcept {
+  for (std::size_t k = 0; k < kAirClasses; ++k) factors_[k] = grown_[k] > 1 ? grown_[k] : calm_[k];
 }
 
 void InFlight::forget() noexcept {
   adaptation_.reset();
-  factors_ = kModelledAir;
+  factors_ = grown_ = calm_ = kModelledAir;
   last_.reset(), last_w_.reset();
   squares_.setZero(), steps_ = 0;
 }
@@ -71,7 +110,7 @@ bool InFlight::carry_out(AirOrder order) noexcept {
   const AirFactors before = factors_;
   if (order == AirOrder::reset) forget();
   if (order == AirOrder::freeze) frozen_ = true;
-  if (order == AirOrder::thaw) frozen_ = false, follow();
+  if (order == AirOrder::thaw) frozen_ = false, grow();
   return factors_ != before;
 }
 

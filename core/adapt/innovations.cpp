@@ -38,6 +38,10 @@ std::optional<Innovation> Innovations::ended() noexcept {
   const Group now = group_;
   before_ = now, group_ = {};
   if (!before || now.mixed) return std::nullopt;
+  if (means_ == MeansOf::pairs) {
+    if (before->mixed || before->air != now.air) return std::nullopt;
+    before_.reset();
+  }
   const auto [rho, most, least] = law_.at(now.samples, now.seconds);
   const Vec3 push(gusts_.mean_horizontal, gusts_.mean_horizontal, gusts_.mean_vertical);
   const Vec3 e = now.y - rho * before->y;

@@ -38,12 +38,14 @@ struct Innovation {
 };
 
 /// Samples into innovations (docs/model.md 7-2, 7-3): y = w/σ, means ȳ over groups of 0.4 τ, each less what the one
-/// before foretells. Samples come at any rate; dt is what it was.
+/// before foretells. Or pairs of means of 4 τ, no sample in two of them (7-8). Samples come at any rate; dt is what it
+/// was.
 class Innovations {
  public:
   static constexpr double kGap = 3;                ///< of the last interval: after a longer one nothing is foretold
   static constexpr double kLongestInterval = 0.5;  ///< s, the same at once
-  explicit Innovations(const Gusts& gusts) : gusts_(gusts), law_(gusts.tau_low_s, gusts.tau_high_s, gusts.form) {}
+  explicit Innovations(const Gusts& gusts, MeansOf means = MeansOf::groups)
+      : gusts_(gusts), means_(means), law_(gusts.tau_low_s, gusts.tau_high_s, gusts.form, means) {}
 
   /// The next sample; an innovation where it ends a group. None after a gap, in a group of two classes, or for a
   /// sample that is refused: one that is not finite, without Σ, or not later than the one before. Real-time:
@@ -63,6 +65,7 @@ class Innovations {
   std::optional<Innovation> ended() noexcept;
 
   Gusts gusts_;
+  MeansOf means_;
   GroupLaw law_;
   std::optional<double> last_t_;
   double interval_ = 0;

@@ -68,7 +68,9 @@ struct Daemon {
   struct Adaptation {
     bool enabled = false;  ///< sets grow in flight where the air is shown to be rougher than modelled
     double alpha = 0.01;   ///< probability of a flight in which that is said wrongly (docs/model.md section 7)
-    std::string file;      ///< where the factors are kept over restarts; empty: they are not
+    double calmest =
+        1;             ///< down to it sets shrink at rest in air shown to be calmer: the calibrated lower end; 1: none
+    std::string file;  ///< where the factors are kept over restarts; empty: they are not
   } adaptation;
   struct {
     std::string file;       ///< raw log; a start that finds it makes the next of NAME-2, NAME-3 …

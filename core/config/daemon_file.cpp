@@ -233,6 +233,7 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {kRateLeast, &d.odometry.timing.rate_least, {9, 500}, kOptional},
       {"odometry.latency", &d.odometry.timing.latency, {0, 0.2}, kOptional},
       {"adaptation.alpha", &d.adaptation.alpha, {1e-6, 0.1}, kOptional},
+      {"adaptation.calmest", &d.adaptation.calmest, {0.1, 1}, kOptional},
       {"control.cpu", &c.cpu, {-1, 1023}},
       {"control.battery_land", &d.control.battery_land, {0, 1}},
   };

@@ -157,8 +157,10 @@ bool DisturbanceField::has(const Index3& v) const noexcept {
   return map::inside(size_, v) && has(map::linear(size_, v));
 }
 
-Variance DisturbanceField::at(const Index3& v) const noexcept {
-  const Stored& s = sigma_[slot(map::linear(size_, v))];
+Variance DisturbanceField::at(const Index3& v) const noexcept { return at(map::linear(size_, v)); }
+
+Variance DisturbanceField::at(std::size_t n) const noexcept {
+  const Stored& s = sigma_[slot(n)];
   return {s[0], s[1], 0, s[2], 0, s[3]};
 }
 

@@ -74,6 +74,8 @@ class DisturbanceField {
   bool has(const Index3& v) const noexcept;
   /// Σ at a voxel centre. Precondition: has(v). Real-time: wait-free, no allocation.
   Variance at(const Index3& v) const noexcept;
+  /// The same by the voxel's linear index.
+  Variance at(std::size_t n) const noexcept;
   /// Trilinear interpolation, weights of the stored voxels renormalised; `fallback` where none of the eight is stored.
   /// Real-time: wait-free, no allocation.
   Variance interpolated(const Vec3& p_W, const Variance& fallback) const noexcept;

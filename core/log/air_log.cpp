@@ -8,8 +8,13 @@
 #include "core/log/replayed_air.hpp"
 
 namespace backwash::log {
+namespace {
 
-AirConstantsRecord constants(const adapt::InFlightConstants& c) noexcept {
+constexpr double kAtRest = 0.2;  // m/s; what hovering in gusts moves with
+
+}  // namespace
+
+CalmAirConstantsRecord constants(const adapt::InFlightConstants& c) noexcept {
   // The velocity's integrator is not in it: what is learnt is the disturbance less what the integrator holds.
   const auto& [kp, kd, latency, feedback_delay, attitude_lag, integrator] = c.controller;
   AirConstantsRecord r{{kp.horizontal, kp.vertical},
@@ -23,19 +28,25 @@ AirConstantsRecord constants(const adapt::InFlightConstants& c) noexcept {
                        c.alpha,
                        {}};
   std::ranges::copy(c.start, r.start);
-  return r;
+  return {r, c.calmest};
 }
 
-std::optional<adapt::InFlightConstants> decode(const AirConstantsRecord& r) noexcept {
+std::optional<adapt::InFlightConstants> decode(const RawRecord& record) noexcept {
+  const auto* plain = payload<AirConstantsRecord>(record);
+  const auto* calm = payload<CalmAirConstantsRecord>(record);
+  if (!plain) return std::nullopt;
+  const AirConstantsRecord& r = *plain;
   adapt::InFlightConstants c{
       {{r.kp[0], r.kp[1]}, {r.kd[0], r.kd[1]}, r.latency, r.feedback_delay, r.attitude_lag, {}},
       {.tau_low_s = r.tau_low, .tau_high_s = r.tau_high, .mean_horizontal = r.mean[0], .mean_vertical = r.mean[1]},
       r.alpha,
-      {}};
+      {},
+      calm ? calm->calmest : 1};
   std::ranges::copy(r.start, c.start.begin());
   // Written so that what is no number is refused: of a damaged record no table is made.
   const bool sound = r.tau_low > 0 && r.tau_high >= r.tau_low && std::isfinite(r.tau_high) && r.alpha > 0 &&
-                     r.alpha < 1 && std::ranges::all_of(c.start, [](double f) { return f >= 1 && std::isfinite(f); });
+                     r.alpha < 1 && c.calmest > 0 && c.calmest <= 1 &&
+                     std::ranges::all_of(c.start, [](double f) { return f >= 1 && std::isfinite(f); });
   return sound ? std::optional(c) : std::nullopt;
 }
 
@@ -48,14 +59,17 @@ bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept {
 bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out, AirRecord& r) noexcept {
   const track::OdometrySample& s = *flight.odometry();
   const auto place = static_cast<AirClass>(std::min<std::uint32_t>(r.air, kAirClasses - 1));
-  const bool grew = air.add({s.stamp_ns,
-                             std::uint64_t{s.closures} << 8 | out.odometry_resets,
-                             s.state,
-                             out.command,
-                             {r.sigma[0], r.sigma[1], r.sigma[2]},
-                             place});
+  // The last command is at rest, and everything up to it was found clear.
+  const bool rests = flight.tracker().segment() != 0 && flight.tracker().finished() && s.state.v_W.norm() < kAtRest;
+  const bool changed = air.add({s.stamp_ns,
+                                std::uint64_t{s.closures} << 8 | out.odometry_resets,
+                                s.state,
+                                out.command,
+                                {r.sigma[0], r.sigma[1], r.sigma[2]},
+                                place,
+                                rests});
   each_decision(kAirDecisions, [&](const auto& decision) { decision.write(Learnt{air, place}, r); });
-  return grew;
+  return changed;
 }
 
 double evidence(const AirRecord& r, double alpha) noexcept {
@@ -74,8 +88,7 @@ bool carry_out(adapt::InFlight& air, const track::TickInput& in, AirOrderRecord&
 
 std::optional<std::string> ReplayedAir::take(const RawRecord& record) {
   if (record.header.kind == RecordKind::air_constants) {
-    const auto* start = payload<AirConstantsRecord>(record);
-    const auto constants = start ? decode(*start) : std::nullopt;
+    const auto constants = decode(record);
     if (!constants) return "is no start of what is learnt of the air";
     air_.emplace(*constants);
   } else if (record.header.kind == RecordKind::air) {

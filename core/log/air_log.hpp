@@ -8,16 +8,17 @@
 /// What a flight learns of its air in the raw log: the daemon and a replay decide every update by the same code.
 namespace backwash::log {
 
-AirConstantsRecord constants(const adapt::InFlightConstants& constants) noexcept;
-/// The same again, bit for bit. Nothing: no number, or one out of its range.
-std::optional<adapt::InFlightConstants> decode(const AirConstantsRecord& record) noexcept;
+CalmAirConstantsRecord constants(const adapt::InFlightConstants& constants) noexcept;
+/// The same again, bit for bit; what is not in an AirConstantsRecord alone is as it was before there was more. Nothing:
+/// no number, or one out of its range.
+std::optional<adapt::InFlightConstants> decode(const RawRecord& record) noexcept;
 
 /// Whether a tick adds anything: its odometry is new and good, and set-points are flown, off the ground. Real-time:
 /// wait-free, no allocation.
 bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept;
 
 /// Adds a tick that was flown() to what is learnt, with Σ and class of the record, and writes what was decided into it;
-/// whether a factor grew. Real-time: wait-free, no allocation.
+/// whether a factor changed. Real-time: wait-free, no allocation.
 bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out,
            AirRecord& record) noexcept;
 

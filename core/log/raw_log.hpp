@@ -112,6 +112,11 @@ struct AirConstantsRecord {
   double tau_low, tau_high, mean[2], alpha;
   double start[kAirClasses];
 };
+/// The same where sets may shrink; without it none does.
+struct CalmAirConstantsRecord {
+  AirConstantsRecord constants;
+  double calmest;
+};
 struct AirRecord {
   std::uint64_t tick;
   double sigma[3];            ///< of the model at the place, (m/s²)²

@@ -58,6 +58,14 @@ field::DisturbanceField AirScale::flown() const {
   return rougher;
 }
 
+// In single precision, as the field is scaled.
+Variance AirScale::flown_at(std::size_t n) const noexcept {
+  const Variance s = sigma->at(n);
+  const auto factor = static_cast<float>(factor_of(factors, classes[n]));
+  const auto scaled = [factor](double of_s) { return static_cast<double>(factor * static_cast<float>(of_s)); };
+  return {scaled(s.xx), scaled(s.xy), 0, scaled(s.yy), 0, scaled(s.zz)};
+}
+
 AirPlace air_at(const AirScale& scale, const map::OccupancyGrid& grid, const Vec3& p_W) noexcept {
   if (!scale.known()) return {};
   const Variance s = scale.sigma->interpolated(p_W, {});

@@ -28,6 +28,8 @@ struct AirScale {
               std::span<const std::size_t> voxels, std::span<const std::size_t> inside, const Parallel& parallel);
   /// Σ times the factor of each voxel's class: what the sets are made of. Precondition: known.
   field::DisturbanceField flown() const;
+  /// That at one voxel with a Σ, by its linear index.
+  Variance flown_at(std::size_t n) const noexcept;
 };
 
 /// Σ along x, y, z of W and the class at a place; zeros and none where the map has none.

@@ -63,14 +63,12 @@ void fill_air(field::Extension& air, const map::OccupancyGrid& grid, std::span<c
            [&](std::size_t begin, std::size_t end) { air.fill(grid, listed.subspan(begin, end - begin)); });
 }
 
-/// Σ of a field at the listed voxels.
-auto variances(field::DisturbanceField field, const map::OccupancyGrid& grid, const std::vector<std::size_t>& listed,
-               const Parallel& parallel) {
-  return [field = std::move(field), &grid, &listed, &parallel](const auto& store) {
-    parallel(listed.size(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) store(listed[k], field.at(grid.voxel(listed[k])));
-    });
-  };
+/// The free voxels, linear, in rising order.
+std::vector<std::size_t> voxels_where(const map::OccupancyGrid& free) {
+  std::vector<std::size_t> voxels;
+  for (std::size_t n = 0; n < free.cell_count(); ++n)
+    if (free.at(n) == map::Cell::free) voxels.push_back(n);
+  return voxels;
 }
 
 /// Where hovering is safe, at the listed voxels.
@@ -193,14 +191,18 @@ std::shared_ptr<const World> with_air(const World& old, const AirFactors& factor
   }
   if (world.air.factors == factors) return std::make_shared<const World>(std::move(world));
   world.air.factors = factors;
-  const Vehicle& vehicle = world.reach.vehicle;
-  auto listed = voxels_for_centre(world.grid, world.distance, vehicle, map::all_of(world.grid.size()));
-  world.bounds = reach::BoundField(world.grid, model.bound, old.bounds.extension());
-  world.bounds.update(map::all_of(world.grid.size()), listed,
-                      variances(world.air.flown(), world.grid, listed, parallel), parallel);
+  world.bounds.revalue(
+      [&](std::size_t n) -> std::optional<Variance> {
+        const AirClass air = world.air.classes[n];
+        if (factor_of(factors, air) == factor_of(old.air.factors, air)) return std::nullopt;
+        return world.air.flown_at(n);
+      },
+      parallel);
   // Sets grow with the air: where hovering is not safe it is not in a rougher one.
-  if (larger(factors, old.air.factors) == factors)
-    std::erase_if(listed, [&](std::size_t n) { return !old.hover.safe(old.grid.voxel(n)); });
+  const auto listed =
+      larger(factors, old.air.factors) == factors
+          ? voxels_where(old.hover.safe_voxels())
+          : voxels_for_centre(world.grid, world.distance, world.reach.vehicle, map::all_of(world.grid.size()));
   world.hover = reach::HoverMap(world.grid);
   fill_hover(world.hover, world.reach, world.grid, world.distance, world.sums, world.bounds, listed,
              world.constant_margin, parallel);

@@ -37,20 +37,21 @@ BoundField::BoundField(const map::OccupancyGrid& grid, const field::DisturbanceF
   });
 }
 
+BoundCodes BoundField::coded(std::size_t n, const Variance& sigma) const noexcept {
+  DisturbanceBound w = bound(sigma, model_);
+  if (extension_.by_place()) {
+    const Air air = extension_.at(map::voxel(tiles_.size(), n));
+    for (std::size_t d = 0; d < kDirections; ++d) w.w[d] += d == kZ ? air.vertical : air.level;
+  }
+  BoundCodes result;
+  std::ranges::transform(w.w, result.begin(), code_of);
+  return result;
+}
+
 void BoundField::update(const map::VoxelBox& changed, std::span<const std::size_t> listed, const FillVariance& fill,
                         const Parallel& parallel) {
-  const auto codes = [&](std::size_t n, const Variance& sigma) {
-    DisturbanceBound w = bound(sigma, model_);
-    if (extension_.by_place()) {
-      const Air air = extension_.at(map::voxel(tiles_.size(), n));
-      for (std::size_t d = 0; d < kDirections; ++d) w.w[d] += d == kZ ? air.vertical : air.level;
-    }
-    BoundCodes result;
-    std::ranges::transform(w.w, result.begin(), code_of);
-    return result;
-  };
   const FillBounds bounds = [&](const auto& store) {
-    fill([&](std::size_t n, const Variance& sigma) { store(n, codes(n, sigma)); });
+    fill([&](std::size_t n, const Variance& sigma) { store(n, coded(n, sigma)); });
   };
   tiles_.update(changed, listed, bounds, parallel);
   update_pushes();

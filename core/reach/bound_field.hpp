@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -42,6 +43,18 @@ class BoundField {
   /// box), 0 at the others. O(voxels of the tiles met); by an extension by place O(voxels).
   void update(const map::VoxelBox& changed, std::span<const std::size_t> listed, const FillVariance& fill,
               const Parallel& parallel = run_serial);
+  /// The same with another Σ at the voxels where w̄ is stored, by linear index; nothing: w̄ stays there. As update() of
+  /// all of them, and cheaper: O(voxels) where much changes, and what does not change stays shared.
+  template <class Sigma>
+  void revalue(const Sigma& sigma, const Parallel& parallel = run_serial) {
+    tiles_.recode(
+        [&](std::size_t n, const BoundCodes& old) {
+          const std::optional<Variance> other = sigma(n);
+          return other ? coded(n, *other) : old;
+        },
+        parallel);
+    update_pushes();
+  }
   /// What is kept at a voxel inside the grid, and the whole field anew from that: codes[i] belongs to listed[i] (linear
   /// indices), all others are 0. Cost as that of update() of all, without `fill`.
   const BoundCodes& codes(const Index3& v) const noexcept { return tiles_.at(v).level[0]; }
@@ -83,6 +96,7 @@ class BoundField {
   bool inside(const Index3& v) const noexcept { return map::inside(tiles_.size(), v); }
   map::VoxelBox meeting(const Vec3& low_W, const Vec3& high_W) const noexcept;
   DisturbanceBound moving(DisturbanceBound w, const Vec3& v_W) const noexcept;
+  BoundCodes coded(std::size_t n, const Variance& sigma) const noexcept;
   void update_pushes();
   bool stored(const Index3& v) const noexcept { return tiles_.at(v).level[0][kZ] != 0; }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
+#include <utility>
 
 namespace backwash::reach {
 namespace {
@@ -12,10 +13,6 @@ constexpr int kAhead = (1 << (BoundTiles::kLevels - 1)) - 1;  // from a cube's l
 
 void raise(BoundCodes& maximum, const BoundCodes& other) noexcept {
   for (std::size_t d = 0; d < kDirections; ++d) maximum[d] = std::max(maximum[d], other[d]);
-}
-
-bool some(const BoundCodes& codes) noexcept {
-  return std::ranges::any_of(codes, [](BoundCode code) { return code != 0; });
 }
 
 map::VoxelBox grown(const map::VoxelBox& box, int below, int above, const Index3& size) {
@@ -127,6 +124,39 @@ void BoundTiles::update(const map::VoxelBox& changed, std::span<const std::size_
   parallel(met.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n)
       if (fresh[n]->entries.size() > 1) pool(*fresh[n], map::common(tiles_.voxels(met[n]), anew));
+  });
+}
+
+// Those that a tile's cubes reach, in rising order, itself first.
+std::vector<std::size_t> BoundTiles::reached(std::size_t tile) const {
+  return tiles_.meeting(grown(tiles_.voxels(tile), 0, kAhead, size()));
+}
+
+// A tile that is no other's; its codes are those of before, or fresh.
+BoundTiles::Tile& BoundTiles::own(std::size_t tile, const Fresh& fresh) {
+  const auto own = fresh[tile] ? fresh[tile] : std::make_shared<Tile>(tiles_[tile]);
+  tiles_.replace(tile, own);
+  return *own;
+}
+
+// Pools a tile again if one of those that it reaches is fresh. False, and nothing is done, if one of them has a number
+// from `end` on: another thread may be writing it.
+bool BoundTiles::pool_before(std::size_t end, std::size_t tile, const Fresh& fresh) {
+  if (tiles_[tile].entries.size() <= 1) return true;
+  const std::vector<std::size_t> all = reached(tile);
+  if (all.back() >= end) return false;
+  if (std::ranges::any_of(all, [&](std::size_t n) { return fresh[n] != nullptr; }))
+    pool(own(tile, fresh), tiles_.voxels(tile));
+  return true;
+}
+
+void BoundTiles::pool_rest(const std::vector<std::uint8_t>& pooled, const Fresh& fresh, const Parallel& parallel) {
+  std::vector<std::pair<std::size_t, Tile*>> rest;
+  for (std::size_t tile = 0; tile < pooled.size(); ++tile)
+    if (!pooled[tile] && std::ranges::any_of(reached(tile), [&](std::size_t n) { return fresh[n] != nullptr; }))
+      rest.emplace_back(tile, &own(tile, fresh));
+  parallel(rest.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) pool(*rest[n].second, tiles_.voxels(rest[n].first));
   });
 }
 

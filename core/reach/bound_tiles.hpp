@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,10 @@ namespace backwash::reach {
 
 /// Codes of w̄ in the five directions.
 using BoundCodes = std::array<BoundCode, kDirections>;
+
+inline bool some(const BoundCodes& codes) noexcept {
+  return std::ranges::any_of(codes, [](BoundCode code) { return code != 0; });
+}
 
 /// Computes w̄ at voxels and calls store(linear index, codes) for each of them once, possibly from several threads.
 using FillBounds = std::function<void(const std::function<void(std::size_t, const BoundCodes&)>& store)>;
@@ -35,6 +40,22 @@ class BoundTiles {
   /// indices), and zero at its others. Tiles are made by `parallel`. O(voxels of the tiles that meet the box).
   void update(const map::VoxelBox& changed, std::span<const std::size_t> listed, const FillBounds& fill,
               const Parallel& parallel);
+  /// Other codes at the voxels where some are not zero: anew(linear index, codes so far), possibly from several
+  /// threads. As update() of all with these. Tiles in reach of no other code stay shared. O(voxels of the others).
+  template <class Anew>
+  void recode(const Anew& anew, const Parallel& parallel) {
+    Fresh fresh(tiles_.count());
+    std::vector<std::uint8_t> pooled(tiles_.count());
+    // From the last one on: cubes reach ahead, and what was just written is still near.
+    parallel(tiles_.count(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = end; n-- > begin;) {
+        fresh[n] = recoded(n, anew);
+        if (fresh[n]) tiles_.replace(n, fresh[n]);
+        pooled[n] = pool_before(end, n, fresh);
+      }
+    });
+    pool_rest(pooled, fresh, parallel);
+  }
 
   struct alignas(32) Entry {
     std::array<BoundCodes, kLevels> level{};
@@ -77,9 +98,38 @@ class BoundTiles {
   struct Marks;  // which voxels of a box have an entry
   Marks entered(const map::VoxelBox& changed, std::span<const std::size_t> listed) const;
   Tile renumbered(std::size_t tile, const map::VoxelBox& changed, const Marks& marks) const;
+  using Fresh = std::vector<std::shared_ptr<Tile>>;  // null: a tile stays
+  template <class Anew>
+  std::shared_ptr<Tile> recoded(std::size_t tile, const Anew& anew) const;
+  std::vector<std::size_t> reached(std::size_t tile) const;
+  Tile& own(std::size_t tile, const Fresh& fresh);
+  bool pool_before(std::size_t end, std::size_t tile, const Fresh& fresh);
+  void pool_rest(const std::vector<std::uint8_t>& pooled, const Fresh& fresh, const Parallel& parallel);
   void pool(Tile& tile, const map::VoxelBox& box) const;
 
   Grid tiles_;
 };
+
+// Null: no code of the tile differs.
+template <class Anew>
+std::shared_ptr<BoundTiles::Tile> BoundTiles::recoded(std::size_t tile, const Anew& anew) const {
+  if (tiles_[tile].entries.size() <= 1) return nullptr;
+  auto fresh = std::make_shared<Tile>(tiles_[tile]);
+  const map::VoxelBox box = tiles_.voxels(tile);
+  bool changed = false;
+  for (int k = box.low.z(); k <= box.high.z(); ++k)
+    for (int j = box.low.y(); j <= box.high.y(); ++j) {
+      const std::size_t row = Grid::within({0, j, k}), n = map::linear(size(), {box.low.x(), j, k});
+      for (int i = box.low.x(); i <= box.high.x(); ++i) {
+        const std::size_t e = fresh->entry_of(row | static_cast<std::size_t>(i & (Grid::kEdge - 1)));
+        BoundCodes& codes = fresh->entries[e].level[0];
+        if (e == 0 || !some(codes)) continue;
+        const BoundCodes other = anew(n + static_cast<std::size_t>(i - box.low.x()), codes);
+        changed = changed || other != codes;
+        codes = other;
+      }
+    }
+  return changed ? fresh : nullptr;
+}
 
 }  // namespace backwash::reach

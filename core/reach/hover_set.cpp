@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/reach/block_extents.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
 
@@ -110,6 +111,13 @@ std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, double fr
   }
 }
 
+/// Centre of a set, its voxel, and what pushes there.
+struct Centre {
+  Index3 v;
+  Vec3 p_W, push_W;
+  double distance;  // of the voxel's centre to obstacles, m
+};
+
 /// Whether sets around voxel centres are clear of obstacles by body and estimation. Box queries bracket the answer and
 /// decide most; no rounding can make them wrong, since boxes within the fat set are a little smaller than that.
 class ClearTest {
@@ -119,15 +127,24 @@ class ClearTest {
 
   /// True only where a set that holds this one is not clear. `free_distance`: of the set's centre.
   bool blocked(const NearbyVoxels& around, double free_distance, const PerDirection& half_widths) const noexcept {
-    if (far(free_distance, half_widths)) return false;
+    if (far(free_distance, box(half_widths))) return false;
     const Octagon o(half_widths);
     const double t = taken_ * (1 - 1e-9);
     return !box_free(around, o.middle + Vec3(0, 0, t)) || !box_free(around, o.along_x + Vec3(t, 0, 0)) ||
            !box_free(around, o.along_y + Vec3(0, t, 0));
   }
+  /// Whether sets that reach no farther along x, y and z end their iteration, and are clear by the centre's distance.
+  bool far(double free_distance, const Vec3& half) const noexcept {
+    return free_distance - half.norm() - 1e-6 > taken_;  // the field is stored in single precision
+  }
+  /// The same by boxes. True only where all of them are.
+  bool surely_clear(const NearbyVoxels& around, double free_distance, const Vec3& most) const noexcept {
+    return most.maxCoeff() <= free_distance && box_free(around, most + Vec3::Constant(taken_));
+  }
   /// Exact. `p_W`: the set's centre.
   bool clear(const NearbyVoxels& around, const Vec3& p_W, double free_distance, const PerDirection& half_widths) const {
-    if (far(free_distance, half_widths) || box_free(around, box(half_widths) + Vec3::Constant(taken_))) return true;
+    if (far(free_distance, box(half_widths)) || box_free(around, box(half_widths) + Vec3::Constant(taken_)))
+      return true;
     if (blocked(around, free_distance, half_widths)) return false;
     const Octagon o(half_widths);
     const double t = taken_ * (1 - 1e-9) / std::sqrt(2.0);
@@ -149,9 +166,6 @@ class ClearTest {
     }
     Vec3 along_x, along_y, middle;
   };
-  bool far(double free_distance, const PerDirection& half_widths) const noexcept {
-    return free_distance - box(half_widths).norm() - 1e-6 > taken_;  // the field is stored in single precision
-  }
   bool box_free(const NearbyVoxels& around, const Vec3& half) const noexcept {
     const auto voxels = around.meeting(half);
     return sums_.voxels_free(voxels.low, voxels.high);
@@ -212,20 +226,18 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
                     std::optional<double> constant_margin) {
   const double taken = body_and_estimation(reach.vehicle);
   const bool extended = !bounds.extension().none();
-  struct Centre {  // of a set
-    Index3 v;
-    Vec3 p_W, push_W;
-  };
   const auto fill_where = [&](const auto& safe) {
     for (const std::size_t n : voxels) {
-      if (distance.at(n) <= taken) continue;  // not even a point fits
+      const double here = distance.at(n);
+      if (here <= taken) continue;  // not even a point fits
       const Index3 v = grid.voxel(n);
-      Centre c{v, grid.center(v), Vec3::Zero()};
+      Centre c{v, grid.center(v), Vec3::Zero(), here};
       if (extended) {
         c.push_W = bounds.push(c.p_W, Vec3::Zero());
         c.p_W += static_shift(reach.vehicle, c.push_W);
         c.v = grid.index(c.p_W);
-        if (!grid.free(c.v) || distance.at(c.v) <= 0) continue;
+        c.distance = distance.at(c.v);
+        if (!grid.free(c.v) || c.distance <= 0) continue;
       }
       if (safe(c)) safe_.set(v, map::Cell::free);
     }
@@ -233,17 +245,22 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
   if (constant_margin) {
     // Stored distances are exact at centres, in single precision.
     return fill_where([&](const Centre& c) {
-      const double free_distance = extended ? distance.exact(grid, c.p_W) : distance.at(c.v);
+      const double free_distance = extended ? distance.exact(grid, c.p_W) : c.distance;
       return free_distance - 1e-6 > *constant_margin + taken;
     });
   }
   const ClearTest test(reach.vehicle, grid, sums);
   const NetDisturbance net(reach, bounds);
+  const bool by_blocks = reach.method == Method::tight && !extended && !net.held();
+  BlockExtents extents(reach, bounds, grid.size(), grid.resolution());
   const auto safe_with = [&](const auto& half_widths) {
     return [&](const Centre& c) {
-      const NearbyVoxels around(grid, c.v, c.p_W);
       // A centre off its voxel's is nearer to obstacles by that much at most.
-      const double free_distance = distance.at(c.v), off = extended ? (c.p_W - grid.center(c.v)).norm() : 0;
+      const double free_distance = c.distance, off = extended ? (c.p_W - grid.center(c.v)).norm() : 0;
+      const Vec3* const most = by_blocks ? &extents.at(c.v) : nullptr;
+      if (most && test.far(free_distance, *most)) return true;
+      const NearbyVoxels around(grid, c.v, c.p_W);
+      if (most && test.surely_clear(around, free_distance, *most)) return true;
       // A part of the set, and cheap.
       if (test.blocked(around, free_distance - off, half_widths(net(bounds.at(c.v))))) return false;
       const auto h = fixed_point(half_widths, free_distance, bounds, net, around, c.v, c.push_W);

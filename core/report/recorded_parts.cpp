@@ -35,10 +35,14 @@ std::vector<std::string> AirNews::take(const log::RawRecord& record) {
     std::copy_n(order->factors, kAirClasses, factors_.begin());
   if (const auto* row = kind == air ? log::payload<log::AirRecord>(record) : nullptr)
     for (std::size_t k = 0; k < kAirClasses; ++k) {
-      if (row->factors[k] > factors_[k])
-        news.push_back(std::string("air of class ") + to_string(static_cast<AirClass>(k)) + " is rougher: above " +
-                       to_text(row->factors[k], 2) + " times the model's variance, ln evidence " +
-                       to_text(row->ln_evidence, 1));
+      const std::string of = std::string("air of class ") + to_string(static_cast<AirClass>(k));
+      if (row->factors[k] < factors_[k])
+        news.push_back(of + " is calmer: below " + to_text(row->factors[k], 2) + " times the model's variance");
+      else if (row->factors[k] > factors_[k] && row->factors[k] <= 1)
+        news.push_back(of + " is no longer as calm as shown: its sets are the model's again");
+      else if (row->factors[k] > factors_[k])
+        news.push_back(of + " is rougher: above " + to_text(row->factors[k], 2) +
+                       " times the model's variance, ln evidence " + to_text(row->ln_evidence, 1));
       factors_[k] = row->factors[k];
     }
   const std::string text(record.bytes.begin(), record.bytes.end());

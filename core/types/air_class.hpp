@@ -19,15 +19,15 @@ enum class AirClass : std::uint8_t {
 };
 inline constexpr std::size_t kAirClasses = 5;
 
-/// Factors on Σ by class: 1 is as modelled.
+/// Factors on Σ by class: 1 is as modelled, less is calmer.
 using AirFactors = std::array<double, kAirClasses>;
 inline constexpr AirFactors kModelledAir{1, 1, 1, 1, 1};
 
-/// The factor at a place of this class. What was learnt without a class may be of any, and counts for all.
+/// The factor at a place of this class. Rougher air that was learnt without a class may be of any, and counts for all.
 constexpr double factor_of(const AirFactors& factors, AirClass air) noexcept {
   const double known = factors[static_cast<std::size_t>(air)];
   const double unnamed = factors[static_cast<std::size_t>(AirClass::none)];
-  return known > unnamed ? known : unnamed;
+  return unnamed > 1 && unnamed > known ? unnamed : known;
 }
 /// The larger factor of each class.
 constexpr AirFactors larger(AirFactors a, const AirFactors& b) noexcept {

@@ -51,13 +51,22 @@ struct BoundModel {
 /// w̄_n = mean_n + κ √(nᵀΣn) in the five directions (docs/model.md section 3): the one conversion from variance to
 /// bound. Negative variances from rounding count as 0. Real-time: wait-free, no allocation.
 inline DisturbanceBound bound(const Variance& sigma, const BoundModel& model) noexcept {
+  // Along an axis the other products are zeros, unless one of them is no number.
+  const bool finite = std::isfinite(sigma.xx + sigma.xy + sigma.xz + sigma.yy + sigma.yz + sigma.zz);
+  const auto along = [&](Direction d) { return sigma.along(unit(d)); };
+  PerDirection variances;
+  variances[kX] = finite ? sigma.xx : along(kX), variances[kY] = finite ? sigma.yy : along(kY);
+  variances[kZ] = finite ? sigma.zz : along(kZ);
+  variances[kXyPlus] = along(kXyPlus), variances[kXyMinus] = along(kXyMinus);
+  const auto root = [](double variance) { return std::sqrt(variance > 0 ? variance : 0.0); };
+  // Roots are dear, and Σ is often the same along both axes and both diagonals.
+  PerDirection roots;
+  roots[kX] = root(variances[kX]), roots[kXyPlus] = root(variances[kXyPlus]), roots[kZ] = root(variances[kZ]);
+  roots[kY] = variances[kY] == variances[kX] ? roots[kX] : root(variances[kY]);
+  roots[kXyMinus] = variances[kXyMinus] == variances[kXyPlus] ? roots[kXyPlus] : root(variances[kXyMinus]);
   DisturbanceBound b;
-  for (std::size_t d = 0; d < kDirections; ++d) {
-    const auto direction = static_cast<Direction>(d);
-    const double variance = sigma.along(unit(direction));
-    const double mean = direction == kZ ? model.mean_vertical : model.mean_horizontal;
-    b.w[d] = mean + model.kappa * std::sqrt(variance > 0 ? variance : 0.0);
-  }
+  for (std::size_t d = 0; d < kDirections; ++d)
+    b.w[d] = (d == kZ ? model.mean_vertical : model.mean_horizontal) + model.kappa * roots[d];
   return b;
 }
 

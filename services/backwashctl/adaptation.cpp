@@ -26,7 +26,8 @@ void print(const std::optional<dds::AirSaid>& air) {
   if (air->frozen) std::printf("frozen: the factors stay as they are until thawed\n");
   if (air->classes.empty()) std::printf("as modelled; nothing was flown yet\n");
   for (const auto& [name, factor, ln_evidence, seconds] : air->classes)
-    std::printf("%-9s factor %.2f, ln evidence %.1f, %.0f s of flight\n", name.c_str(), factor, ln_evidence, seconds);
+    std::printf("%-9s factor %.2f%s, ln evidence %.1f, %.0f s of flight\n", name.c_str(), factor,
+                factor < 1 ? " (calmer)" : "", ln_evidence, seconds);
 }
 
 }  // namespace

@@ -126,10 +126,10 @@ struct CommandId {
 
 inline constexpr std::uint64_t kTicksPerSecond = 50;
 
-/// Factors of the air for the map worker. They fall only with a rising number of resets.
+/// Factors of the air for the map worker. One falls only with a rising number of falls: resets, and calmer air at rest.
 struct HandedAir {
   AirFactors factors = kModelledAir;
-  std::uint64_t resets = 0;
+  std::uint64_t falls = 0;
 };
 
 /// What the flight has learnt of its air, by class.
@@ -184,12 +184,19 @@ struct ControlRecord {
 
 /// What the control thread has to tell the operator; rarer than ticks, and none is skipped while the ring has room.
 struct ControlEvent {
-  enum class Kind : std::uint8_t { transition, missed_deadline, page_fault, rougher, air_kept } kind = Kind::transition;
+  enum class Kind : std::uint8_t {
+    transition,
+    missed_deadline,
+    page_fault,
+    rougher,
+    calmer,
+    air_kept
+  } kind = Kind::transition;
   std::int64_t t_ns = 0;
   Mode mode = Mode::passive;
   Reason reason = Reason::started;
   std::uint64_t count = 0;             ///< periods missed, pages faulted
-  AirClass air = AirClass::none;       ///< whose factor grew
+  AirClass air = AirClass::none;       ///< whose factor changed
   double factor = 1, ln_evidence = 0;  ///< to what, and on what
 };
 

@@ -50,7 +50,7 @@ ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& lin
   air_.emplace(*air);
   view_.air.emplace().factors = air_->factors();
   const auto start = log::constants(*air);
-  record(log::RecordKind::air_constants, now_ns(), &start, sizeof start);
+  record(log::RecordKind::air_constants, now_ns(), &start, air->calmest < 1 ? sizeof start : sizeof start.constants);
 }
 
 void ControlLoop::record(log::RecordKind kind, std::int64_t t_ns, const void* bytes, std::size_t size) noexcept {

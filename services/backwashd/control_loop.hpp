@@ -44,6 +44,7 @@ class ControlLoop {
   void learn(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void carry_out(adapt::AirOrder order, const track::TickInput& in) noexcept;
   void hand_over_air() noexcept;
+  void tell_of_air(const AirFactors& before, const track::TickInput& in) noexcept;
   void send(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void forward_odometry(std::uint8_t resets) noexcept;
   void ask_for_messages(std::int64_t now_ns) noexcept;
@@ -58,7 +59,7 @@ class ControlLoop {
   track::FlightTick flight_;
   Lookout lookout_;
   std::optional<adapt::InFlight> air_;
-  std::uint64_t air_resets_ = 0;
+  std::uint64_t air_falls_ = 0;
   SenderClock sender_clock_;  // of the odometry's
   ParameterReader parameters_;
   bool port_open_ = true;

@@ -17,22 +17,34 @@ void ControlLoop::learn(const track::TickInput& in, const track::TickOutput& out
   r.tick = view_.ticks;
   std::copy_n(place.sigma.data(), 3, r.sigma);
   r.air = static_cast<std::uint32_t>(place.air);
-  const bool grew = log::learn(*air_, flight_, out, r);
+  const AirFactors before = air_->factors();
+  const bool changed = log::learn(*air_, flight_, out, r);
   record(log::RecordKind::air, in.now_ns, &r, sizeof r);
   const auto here = static_cast<std::size_t>(place.air);
   view_.air->here = place.air;
   view_.air->ln_evidence[here] = r.ln_evidence;
   view_.air->seconds[here] = r.seconds;
-  if (!grew) return;
-  hand_over_air();
-  channels_.events.push({ControlEvent::Kind::rougher, in.now_ns, view_.mode, view_.reason, 0, place.air,
-                         air_->factors()[here], view_.air->ln_evidence[here]});
+  if (changed) tell_of_air(before, in);
 }
 
+// A restart knows nothing of calmer air: where it begins is not where that was shown.
 void ControlLoop::hand_over_air() noexcept {
   view_.air->factors = air_->factors();
-  channels_.air.write({air_->factors(), air_resets_});
-  channels_.air_kept.write(air_->factors());
+  channels_.air.write({air_->factors(), air_falls_});
+  channels_.air_kept.write(larger(air_->factors(), kModelledAir));
+}
+
+void ControlLoop::tell_of_air(const AirFactors& before, const track::TickInput& in) noexcept {
+  const AirFactors& now = air_->factors();
+  bool fell = false;
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    if (now[k] == before[k]) continue;
+    fell = fell || now[k] < before[k];
+    channels_.events.push({now[k] < before[k] ? ControlEvent::Kind::calmer : ControlEvent::Kind::rougher, in.now_ns,
+                           view_.mode, view_.reason, 0, static_cast<AirClass>(k), now[k], view_.air->ln_evidence[k]});
+  }
+  air_falls_ += fell;
+  hand_over_air();
 }
 
 // What an operator asks of it; the mission has judged it by what it was shown, which may be a moment old.
@@ -42,7 +54,7 @@ void ControlLoop::carry_out(adapt::AirOrder order, const track::TickInput& in) n
   const bool changed = log::carry_out(*air_, in, r);
   record(log::RecordKind::air_order, in.now_ns, &r, sizeof r);
   if (r.done == 0) channels_.events.push({ControlEvent::Kind::air_kept, in.now_ns, view_.mode, view_.reason, 0});
-  if (order == adapt::AirOrder::reset && r.done != 0) ++air_resets_, view_.air.emplace();
+  if (order == adapt::AirOrder::reset && r.done != 0) ++air_falls_, view_.air.emplace();
   view_.air->frozen = air_->frozen();
   if (changed) hand_over_air();
 }

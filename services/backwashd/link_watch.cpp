@@ -27,7 +27,13 @@ void tell(const ControlEvent& event, const ServiceManager& manager) {
       return spdlog::warn("control deadline missed: {} periods skipped", event.count);
     case ControlEvent::Kind::page_fault:
       return spdlog::warn("{} page faults in a control tick", event.count);
+    case ControlEvent::Kind::calmer:
+      return spdlog::info("air of class {} is calmer: its variance is below {:.2f} times the model's; sets shrink",
+                          to_string(event.air), event.factor);
     case ControlEvent::Kind::rougher:
+      if (!(event.factor > 1))
+        return spdlog::info("air of class {} is no longer as calm as shown: its sets are the model's again",
+                            to_string(event.air));
       return spdlog::warn(
           "air of class {} is rougher: its variance is above {:.2f} times the model's, ln evidence {:.1f}",
           to_string(event.air), event.factor, event.ln_evidence);

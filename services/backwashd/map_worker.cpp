@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -233,23 +234,24 @@ bool MapWorker::take_scans() {
   return true;
 }
 
-/// Factors that have grown enough, or that were reset: the world of the newest data, in that air.
+/// Factors that have grown enough, or one that fell: the world of the newest data, in that air.
 bool MapWorker::take_air() {
   const auto said = channels_.air.read_new();
   if (!said || !air_) return false;
-  const bool reset = std::exchange(air_resets_, said->resets) != said->resets;
-  air_ = reset ? said->factors : larger(*air_, said->factors);
+  const bool fell = std::exchange(air_falls_, said->falls) != said->falls;
+  air_ = fell ? said->factors : larger(*air_, said->factors);
   if (!world_) return false;
-  bool grew = reset && *air_ != world_->air.factors;
+  bool grew = fell && *air_ != world_->air.factors;
   for (std::size_t k = 0; k < kAirClasses; ++k) grew = grew || (*air_)[k] >= (1 + kStep) * world_->air.factors[k];
   if (!grew) return false;
   const auto begun = now_ns();
   publish(plan::with_air(*world_, *air_, model_, parallel_), channels_.map_ns.load().value_or(begun));
+  const char* const what = !fell ? "rougher" : *std::ranges::min_element(*air_) < 1 ? "calmer" : "reset";
   std::string line = "air";
   for (std::size_t k = 0; k < kAirClasses; ++k)
     line += std::string(" ") + to_string(static_cast<AirClass>(k)) + " " + std::to_string((*air_)[k]);
   recorder_.append(log::RecordKind::world, line);
-  spdlog::info("world made anew in {} ms for {} {}", (now_ns() - begun) / 1'000'000, reset ? "reset" : "rougher", line);
+  spdlog::info("world made anew in {} ms for {} {}", (now_ns() - begun) / 1'000'000, what, line);
   return true;
 }
 

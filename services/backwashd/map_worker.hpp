@@ -53,7 +53,7 @@ class MapWorker {
   MapSettings settings_;
   Parallel parallel_;
   std::optional<AirFactors> air_;  // as the control thread last said
-  std::uint64_t air_resets_ = 0;
+  std::uint64_t air_falls_ = 0;
   std::optional<MapWriter> writer_;  // of the maps in use
   std::optional<map::LiveMap> live_;
   std::optional<Vec3> vehicle_W_;  // where the vehicle was last

@@ -31,7 +31,8 @@ std::vector<AirSample> samples() {
   return all;
 }
 
-/// As the equations are written: every bet's logarithm in every innovation, every mean of exponentials.
+/// As the equations are written: every bet's logarithm in every innovation, every mean of exponentials. Bets that it is
+/// calmer, one in twelve correlation times, are left out.
 class LogEachBet {
  public:
   double add(const Innovation& i) {
@@ -47,19 +48,11 @@ class LogEachBet {
       }
       told += sum;
     }
-    for (std::size_t k = 0; k < Bets::kCalmer.size(); ++k) {
-      double x = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        x += std::min(kMostSquare, i.square[axis] / (Bets::kCalmer[k] * i.least)) / 3;
-      for (std::size_t j = 0; j < Bets::kCalmStakes.size(); ++j)
-        told += std::exp(calm_[k][j] += std::log1p(Bets::kCalmStakes[j] / 15.05 * (0.95 - x)));
-    }
     return told;
   }
 
  private:
   std::array<std::array<double, 3>, Bets::kRougher.size()> ln_{}, since_{};
-  std::array<std::array<double, 3>, Bets::kCalmer.size()> calm_{};
 };
 
 constexpr const char* kBaseline = "log_each_bet";

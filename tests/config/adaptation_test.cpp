@@ -44,7 +44,12 @@ TEST(AdaptationTable, NothingIsLearntOfTheAirUnlessItIsAskedFor) {
   EXPECT_TRUE(on->adaptation.enabled);
   EXPECT_EQ(on->adaptation.alpha, 0.05);
   EXPECT_EQ(on->adaptation.file, "/tmp/air");
+  EXPECT_EQ(plain.adaptation.calmest, 1) << "no set shrinks";
+  EXPECT_EQ(with("enabled = true\ncalmest = 0.4")->adaptation.calmest, 0.4);
   for (const auto& [lines, named] : {std::pair{"enabled = 1", "adaptation.enabled"},
+                                     {"calmest = 0.05", "adaptation.calmest"},
+                                     {"calmest = 1.5", "adaptation.calmest"},
+                                     {"calmest = nan", "adaptation.calmest"},
                                      {"alpha = 0.2", "adaptation.alpha"},
                                      {"alpha = 0", "adaptation.alpha"},
                                      {"alpha = nan", "adaptation.alpha"},

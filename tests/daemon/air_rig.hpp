@@ -6,9 +6,10 @@
 namespace backwash::daemon::test {
 
 /// As the daemon takes it from the files that ship.
-inline adapt::InFlightConstants learning() {
+inline adapt::InFlightConstants learning(double calmest = 1) {
   const Model model;
   adapt::InFlightConstants air;
+  air.calmest = calmest;
   air.controller = vehicle_5in().controller;
   air.gusts.tau_low_s = air.gusts.tau_high_s = model.bound.tau_w;
   air.gusts.mean_horizontal = model.bound.mean_horizontal, air.gusts.mean_vertical = model.bound.mean_vertical;

@@ -232,7 +232,7 @@ TEST_F(OrdersAboutTheAir, AResetOfADisarmedOneForgetsFactorsAndEvidenceAndIsHand
   const auto handed = rig.channels->air.read_new();
   ASSERT_TRUE(handed);
   EXPECT_EQ(handed->factors, kModelledAir);
-  EXPECT_EQ(handed->resets, 1u);
+  EXPECT_EQ(handed->falls, 1u);
   EXPECT_EQ(rig.channels->air_kept.read_new(), kModelledAir) << "a restart begins with it";
 }
 

@@ -45,6 +45,8 @@ Learned fly(const Trial& trial) {
     const bool acts = t >= trial.since_s && (at_wall || !trial.walls_only);
     const Vec3 w = std::sqrt(acts ? trial.factor : 1) * sigma.cwiseSqrt().cwiseProduct(gust) +
                    trial.push * Vec3::UnitX() + trial.noise * Vec3(air.normal(), air.normal(), air.normal());
+    while (learned.calmer_at.size() < trial.at_s.size() && t >= trial.at_s[learned.calmer_at.size()])
+      learned.calmer_at.push_back(adaptation.of(acting).below().value_or(2));
     if (acts) exposed += t - last;
     last = t;
     adaptation.add({t, w, sigma, at_wall ? AirClass::wall : AirClass::free_air});
@@ -52,6 +54,7 @@ Learned fly(const Trial& trial) {
       if (adaptation.of(static_cast<AirClass>(c)).above()) learned.alarm_s = t;
     if (!learned.exposed_s && t >= trial.since_s && adaptation.of(acting).above()) learned.exposed_s = exposed;
   }
+  learned.calmer_at.resize(trial.at_s.size(), adaptation.of(acting).below().value_or(2));
   learned.factor = adaptation.factor(acting), learned.calmer = adaptation.of(acting).below();
   return learned;
 }

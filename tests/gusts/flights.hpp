@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "core/adapt/adaptation.hpp"
 #include "tests/gusts/gust_air.hpp"
@@ -24,6 +25,7 @@ struct Trial {
   double since_s = 0;       ///< from then on
   bool walls_only = false;  ///< 4 s of every 10 are near a wall, and the factor acts only there
   std::uint64_t seed = 1;
+  std::vector<double> at_s{};  ///< rising
 };
 
 /// What it learned.
@@ -32,6 +34,7 @@ struct Learned {
   std::optional<double> exposed_s;  ///< in the class that the factor acts in: time in it from then on until that, s
   double factor = 1;                ///< of that class, at the end
   std::optional<double> calmer;     ///< the same
+  std::vector<double> calmer_at;    ///< the same at the times of Trial::at_s; 2: nothing was told by then
 };
 Learned fly(const Trial& trial);
 

@@ -139,29 +139,43 @@ bool power_gate(bool told, std::size_t flights, std::uint64_t seed, int jobs) {
   return held;
 }
 
-/// Calmer air: how far down it is told to be (docs/model.md 7-9), and how often below what it is.
-bool calm_gate(bool told, std::size_t flights, double seconds, std::uint64_t seed, int jobs) {
-  constexpr double kCalm = 0.4;
-  std::size_t all = 0, wrong_all = 0;
-  std::printf("\nx%g for %.0f s, told calmer\n%-26s%-14s%8s%8s%12s%8s\n", kCalm, seconds, "air", "form", "flights",
-              "told", "below p50", "wrong");
-  for (const Air& air : kAirs)
-    for (const Form form : kForms) {
-      std::vector<Trial> trials;
-      for (std::size_t k = 0; k < flights; ++k) {
-        trials.push_back(trial_of(air, form, told, seed, k));
-        trials.back().factor = kCalm, trials.back().seconds = seconds;
+/// Calmer air (docs/model.md 7-9): how far down it is told to be by when, and in how many flights not above what it is.
+bool calm_gate(bool told, std::size_t flights, std::uint64_t seed, int jobs) {
+  const std::vector<double> at{120, 300, 600, 1200};
+  std::size_t all = 0, wrong_all = 0, all_null = 0, wrong_null = 0;
+  std::printf(
+      "\ntold calmer: flights, and median of what it is told to be below (2: nothing), after s\n%-8s%-26s%-14s%8s",
+      "truly", "air", "form", "flights");
+  for (const double t : at) std::printf("%12.0f", t);
+  std::printf("%8s\n", "wrong");
+  for (const double truly : {1.0, 0.5, 0.4, 0.2, 0.1})
+    for (const Air& air : kAirs)
+      for (const Form form : kForms) {
+        std::vector<Trial> trials;
+        for (std::size_t k = 0; k < flights; ++k) {
+          trials.push_back(trial_of(air, form, told, seed, k));
+          trials.back().factor = truly, trials.back().seconds = at.back(), trials.back().at_s = at;
+        }
+        seed += flights;
+        const auto learned = fly_all(trials, jobs);
+        std::printf("%-8g%-26s%-14s%8zu", truly, air.name.c_str(), kFormNames[static_cast<std::size_t>(form)], flights);
+        for (std::size_t n = 0; n < at.size(); ++n) {
+          std::vector<double> below;
+          for (const auto& l : learned) below.push_back(l.calmer_at[n]);
+          std::ranges::sort(below);
+          std::printf("%5td %6.2f", std::ranges::count_if(below, [](double b) { return b <= 1; }),
+                      below[below.size() / 2]);
+        }
+        const auto wrong = static_cast<std::size_t>(
+            std::ranges::count_if(learned, [&](const Learned& l) { return l.calmer.value_or(2) <= truly; }));
+        std::printf("%8zu\n", wrong);
+        std::fflush(stdout);
+        all += flights, wrong_all += wrong;
+        if (truly == 1) all_null += flights, wrong_null += wrong;
       }
-      std::vector<double> below;
-      for (const auto& learned : fly_all(trials, jobs)) below.push_back(learned.calmer.value_or(INFINITY));
-      std::ranges::sort(below);
-      const auto said = std::ranges::count_if(below, [](double b) { return std::isfinite(b); });
-      const auto wrong = static_cast<std::size_t>(std::ranges::count_if(below, [](double b) { return b < kCalm; }));
-      std::printf("%-26s%-14s%8zu%8td%12.2f%8zu\n", air.name.c_str(), kFormNames[static_cast<std::size_t>(form)],
-                  flights, said, below[below.size() / 2], wrong);
-      all += flights, wrong_all += wrong;
-    }
   const double share = static_cast<double>(wrong_all) / static_cast<double>(all);
+  std::printf("as modelled, of %.0f s: %zu of %zu told calmer, upper 95 %% limit %.4f\n", at.back(), wrong_null,
+              all_null, upper(wrong_null, all_null));
   std::printf("all: %zu of %zu wrong, upper 95 %% limit %.4f; asked: at most %.4f: %s\n", wrong_all, all,
               upper(wrong_all, all), kMostAlarms, share <= kMostAlarms ? "held" : "MISSED");
   return share <= kMostAlarms;
@@ -171,7 +185,7 @@ bool calm_gate(bool told, std::size_t flights, double seconds, std::uint64_t see
 
 int main(int argc, char** argv) {
   backwash::services::Command app{"How often calm air is called rougher, and how soon rough air is", "adapt_gate"};
-  std::size_t flights = 10000, changed = 100;
+  std::size_t flights = 10000, changed = 100, calmer = 0;
   double seconds = 120;
   std::uint64_t seed = 20261123;
   int jobs = 2;
@@ -180,6 +194,7 @@ int main(int argc, char** argv) {
   app.add_flag("--form-told", told, "the form of the gusts is known");
   app.add_option("--flights", flights, "without a change").capture_default_str();
   app.add_option("--changed", changed, "flights of each cell with one").capture_default_str();
+  app.add_option("--calmer", calmer, "nothing but so many flights of 1200 s of each cell in calmer air");
   app.add_option("--seconds", seconds, "of a flight without a change").capture_default_str();
   app.add_option("--seed", seed, "of the first flight").capture_default_str();
   app.add_option("--jobs", jobs, "threads").capture_default_str();
@@ -187,8 +202,8 @@ int main(int argc, char** argv) {
   if (const auto code = app.parse(argc, argv)) return *code;
   if (row) return print_row(told, seconds, seed, *row), 0;
   std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
+  if (calmer > 0) return calm_gate(told, calmer, seed, jobs) ? 0 : 1;
   const bool null = null_gate(told, flights, seconds, seed, jobs);
   const bool power = power_gate(told, changed, seed + 1000000, jobs);
-  const bool calm = calm_gate(told, changed, seconds, seed + 2000000, jobs);
-  return null && power && calm ? 0 : 1;
+  return null && power ? 0 : 1;
 }

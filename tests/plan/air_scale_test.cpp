@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/world.hpp"
+#include "core/reach/clearance.hpp"
 #include "tests/support/stored_field.hpp"
 
 namespace backwash::plan {
@@ -172,6 +174,54 @@ TEST(AirScale, TheWorldDependsOnTheFactorsAndNotOnThoseBefore) {
   EXPECT_TRUE(equal(*with_air(*half_way, {4, 4, 4, 4, 1}, Model{}), *at_once)) << "grown in two steps";
   EXPECT_TRUE(equal(*with_air(*at_once, {2, 1, 4, 1, 1}, Model{}), *half_way)) << "some fell";
   EXPECT_TRUE(equal(*with_air(*at_once, kModelledAir, Model{}), *as_modelled())) << "a reset";
+}
+
+/// Everything of a world in this air by the long way: Σ scaled as a field, w̄ of all places, each hover set by itself.
+void expect_made_anew(const World& world, const World& modelled, const AirFactors& factors) {
+  AirScale scale = modelled.air;
+  scale.factors = factors;
+  EXPECT_EQ(world.air.factors, factors);
+  EXPECT_EQ(world.air.classes, modelled.air.classes);
+  const reach::BoundField bounds(modelled.grid, scale.flown(), Model{}.bound);
+  EXPECT_EQ(world.bounds.largest().w, bounds.largest().w);
+  map::OccupancyGrid safe(modelled.grid.origin(), modelled.grid.resolution(), modelled.grid.size(), map::Cell::unknown);
+  for (std::size_t n = 0; n < modelled.grid.cell_count(); ++n) {
+    const Index3 v = modelled.grid.voxel(n);
+    ASSERT_EQ(world.bounds.codes(v), bounds.codes(v)) << v.transpose();
+    for (const int edge : {2, 3, 4, 6, 9}) {
+      const Index3 high = v + Index3::Constant(edge - 1);
+      ASSERT_EQ(world.bounds.max_over_voxels(v, high).w, bounds.max_over_voxels(v, high).w) << v.transpose();
+    }
+    const bool may =
+        scale.sigma->has(v) && modelled.distance.at(v) > reach::body_and_estimation(modelled.reach.vehicle);
+    const bool is =
+        may &&
+        reach::hover_set(modelled.reach, modelled.grid, modelled.distance, bounds, modelled.grid.center(v)).safe();
+    ASSERT_EQ(world.hover.safe(v), is) << v.transpose();
+    if (is) safe.set(v, map::Cell::free);
+  }
+  const SafeSpace space(safe);
+  for (std::size_t n = 0; n < safe.cell_count(); ++n)
+    ASSERT_EQ(world.safe.region(safe.voxel(n)), space.region(safe.voxel(n)));
+}
+
+// Only what a factor scales is made anew: bit for bit what all of it made anew is, whatever changed before and however
+// the work is shared.
+TEST(AirScale, AChangeOfFactorsGivesBitForBitWhatAllMadeAnewGives) {
+  const auto in_pieces = [](std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
+    for (std::size_t n = 0; n < count; n += 7) work(n, std::min(n + 7, count));
+  };
+  const auto modelled = with_air(*as_modelled(), kModelledAir, Model{});
+  auto world = modelled;
+  const AirFactors steps[] = {{1, 1.1892, 1, 1, 1},
+                              {1, 1.1892, 2.3784, 1, 1},
+                              {3.3636, 1.4142, 2.3784, 8, 1},
+                              {1, 1, 1, 1, 2.8284},
+                              {8, 8, 8, 8, 8}};
+  for (const AirFactors& factors : steps) {
+    world = with_air(*world, factors, Model{}, factors[0] > 1 ? Parallel(in_pieces) : Parallel(run_serial));
+    expect_made_anew(*world, *modelled, factors);
+  }
 }
 
 }  // namespace

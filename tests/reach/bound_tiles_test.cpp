@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <random>
 #include <vector>
 
@@ -70,6 +71,45 @@ TEST(BoundTiles, HoldTheMaximaOfAllCubesWhateverChangedAndCopiesStayAsTheyWere) 
       if (round % 4 == 3) expect_same(old, before);
     }
   }
+}
+
+/// Ranges of a few at a time, in an order that is not the rising one: what a range does must not depend on others.
+void run_in_pieces(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
+  constexpr std::size_t kPiece = 3;
+  for (std::size_t first = 0; first < 2; ++first)
+    for (std::size_t n = first * kPiece; n < count; n += 2 * kPiece) work(n, std::min(n + kPiece, count));
+}
+
+TEST(BoundTiles, OtherCodesAreThoseOfAnUpdateOfAllAndWhatNoneReachesStaysShared) {
+  std::mt19937 random(5);
+  const Index3 size(70, 37, 21);
+  for (const Parallel& parallel : {Parallel(run_serial), Parallel(run_in_pieces)})
+    for (const bool everywhere : {true, false}) {
+      BoundTiles tiles(size);
+      Plain plain{size, std::vector<BoundCodes>(static_cast<std::size_t>(size.prod()))};
+      change(tiles, plain, map::all_of(size), random);
+      const BoundTiles old = tiles;
+      const Plain before = plain;
+      // Where codes have an odd sum, or in one corner of one tile: its lowest, which cubes of seven others reach.
+      const map::VoxelBox corner{{48, 16, 16}, {48, 16, 16}};
+      const auto anew = [&](std::size_t n, const BoundCodes& codes) {
+        EXPECT_EQ(codes, before.codes[n]);
+        if (everywhere ? (codes[0] + codes[1]) % 2 == 0 : !corner.contains(map::voxel(size, n))) return codes;
+        BoundCodes other = codes;
+        for (BoundCode& code : other) code = static_cast<BoundCode>(std::max(1, everywhere ? code / 2 : 65535));
+        return other;
+      };
+      for (std::size_t n = 0; n < plain.codes.size(); ++n)
+        if (plain.codes[n] != BoundCodes{}) plain.codes[n] = anew(n, plain.codes[n]);
+      tiles.recode(anew, parallel);
+      expect_same(tiles, plain);
+      expect_same(old, before);
+      const auto shared = [&](const Index3& v) { return &tiles.at(v) == &old.at(v); };
+      if (!everywhere) {
+        EXPECT_TRUE(shared({5, 5, 5}));
+        EXPECT_TRUE(shared({65, 30, 20}));
+      }
+    }
 }
 
 }  // namespace

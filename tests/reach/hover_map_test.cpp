@@ -11,6 +11,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/world.hpp"
+#include "core/reach/block_extents.hpp"
 
 namespace backwash::reach {
 namespace {
@@ -65,6 +66,29 @@ map::OccupancyGrid random_room(unsigned seed) {
           if (const Index3 v = low + Index3(i, j, k); grid.inside(v)) grid.set(v, cell);
   }
   return grid;
+}
+
+TEST(BlockExtents, NoSetOfAVoxelReachesFartherAndFewReachMuchLess) {
+  Vehicle vehicle = config::load_vehicle("builtin:quad-5in").value();
+  for (const double gain : {1.0, 0.2}) {  // of wide sets, which reach over several blocks
+    vehicle.controller.kp.horizontal *= gain;
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      const auto w = plan::build_world(random_room(seed), Model{}, vehicle);
+      BlockExtents extents(w->reach, w->bounds, w->grid.size(), w->grid.resolution());
+      int bounded = 0, tight = 0;
+      for (std::size_t n = 0; n < w->grid.cell_count(); ++n) {
+        const Index3 v = w->grid.voxel(n);
+        if (!w->grid.free(v)) continue;
+        const HoverSet set = hover_extent(w->reach, w->grid, w->distance, w->bounds, w->grid.center(v));
+        if (!set.bounded) continue;
+        const Vec3 own(set.half_widths[kX], set.half_widths[kY], set.half_widths[kZ]), most = extents.at(v);
+        ASSERT_TRUE((own.array() <= most.array()).all()) << v.transpose();
+        ++bounded, tight += (most.array() <= 1.5 * own.array()).all();
+      }
+      EXPECT_GT(bounded, 500);
+      EXPECT_GT(tight, bounded / 3);
+    }
+  }
 }
 
 TEST(HoverMap, SaysOfEveryVoxelOfRandomRoomsWhatTheExactSetSays) {

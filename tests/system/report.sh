@@ -165,6 +165,19 @@ story, _ = told(log, None, *(["--out", "air.html"] if drawn else []))
 events = [(round(e["t"], 2), e["what"]) for e in story["events"] if e["kind"] == "air"]
 assert events == [(1.1, "air of class wall is rougher: above 2.00 times the model's variance, ln evidence 0.0"),
                   (2.1, "the flight is stopped in rougher air: the rest of it is not clear; wall 2.00 times")], events
+shrunk = RawLog()
+shrunk.free_cube()
+shrunk.learns()
+shrunk.at = (-0.8, -0.8, -1.2)
+shrunk.wait()
+shrunk.learnt = ("ground", (1, 0.5946, 1, 1, 1), 0.0, math.log(1e-9))
+shrunk.fly((-0.8, -0.8, -0.8))
+shrunk.learnt = ("ground", (1, 1, 1, 1, 1), 0.0, math.log(1e-9))
+shrunk.fly((-0.8, -0.3, -0.8))
+shrunk.land()
+told_of_air = [e["what"] for e in told(shrunk, None)[0]["events"] if e["kind"] == "air"]
+assert told_of_air == ["air of class ground is calmer: below 0.59 times the model's variance",
+                       "air of class ground is no longer as calm as shown: its sets are the model's again"], told_of_air
 assert not any(e["kind"] == "air" for e in told(good_flight(), 0, *(["--out", "calm.html"] if drawn else []))[0]["events"])
 if drawn:
     page, calm = open("air.html").read(), open("calm.html").read()
