@@ -11,6 +11,7 @@
 
 #include "core/files/read_file.hpp"
 #include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
 #include "services/backwash/private_file.hpp"
 #include "services/backwash/verb.hpp"
 #include "services/security/authority.hpp"
@@ -29,7 +30,7 @@ struct KeysOptions {
   security::Protection protection = security::Protection::encrypt;
   security::Grant grant;
   std::optional<std::int64_t> until;
-  bool force = false;
+  bool force = false, json = false;
 };
 
 std::string path(const KeysOptions& o, const std::string& folder, const char* file) {
@@ -157,14 +158,23 @@ int revoke(const KeysOptions& o) {
 
 int list(const KeysOptions& o) {
   const std::string revoked = read(path(o, "", security::kRevoked));
+  Json holders_json = Json::array();
   for (const auto& name : holders(o)) {
     const auto holder = security::issued(read(path(o, name, security::kCertificate)), revoked);
     if (!holder) throw Failure(kBadData, path(o, name, security::kCertificate) + ":1: is no certificate in PEM");
-    std::printf("%-20s %-10s until %s%s\n", name.c_str(), holder->role.c_str(), date_of(holder->ends).c_str(),
-                holder->revoked                      ? " revoked"
-                : holder->ends <= std::time(nullptr) ? " expired"
-                                                     : "");
+    const bool expired = holder->ends <= std::time(nullptr);
+    holders_json.push_back({{"name", name},
+                            {"role", holder->role},
+                            {"ends", date_of(holder->ends)},
+                            {"revoked", holder->revoked},
+                            {"expired", expired}});
+    if (!o.json)
+      std::printf("%-20s %-10s until %s%s\n", name.c_str(), holder->role.c_str(), date_of(holder->ends).c_str(),
+                  holder->revoked ? " revoked"
+                  : expired       ? " expired"
+                                  : "");
   }
+  if (o.json) print(Json{{"holders", holders_json}});
   return kOk;
 }
 
@@ -222,6 +232,7 @@ Verb keys_verb(Command& app) {
   auto& revoke_command = add_way(group, o, "revoke", "Whom nobody listens to any more");
   revoke_command.add_option("name", o->name, "of the holder").required();
   auto& list_command = add_way(group, o, "list", "Holders, roles, ends");
+  list_command.add_flag("--json", o->json, "one JSON object on stdout");
   const std::vector<std::pair<Command*, int (*)(const KeysOptions&)>> ways = {
       {&init_command, init}, {&add_command, add}, {&revoke_command, revoke}, {&list_command, list}};
   return {&group, [o, ways] {

@@ -58,6 +58,8 @@ int main(int argc, char** argv) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     writer->get_publication_matched_status(matched);
   }
+  // The reader matches a little later; what is written before that is acknowledged as history, and not delivered.
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
   Pose pose;
   pose.frame = argv[3];
   if (std::string(argv[4]) != "none") {

@@ -66,6 +66,14 @@ for list in net/crl.pem net/drone/crl.pem; do
 done
 "$backwash" keys list net >listed
 grep -Eq '^pilot +station +until 20.* revoked$' listed && grep -Eq '^drone +vehicle +until 20[0-9TZ:-]*$' listed && [[ $(wc -l <listed) == 4 ]] || die "list: $(<listed)"
+"$backwash" keys list net --json >listed.json
+python3 - listed listed.json <<'EOF' || die "list --json says something else than list"
+import json, sys
+said = [tuple(line.split()) for line in open(sys.argv[1])]
+holders = json.load(open(sys.argv[2]))["holders"]
+state = lambda h: ("revoked",) * h["revoked"] or ("expired",) * h["expired"]
+sys.exit(said != [(h["name"], h["role"], "until", h["ends"]) + state(h) for h in holders])
+EOF
 "$backwash" keys init signed --protect sign >/dev/null
 grep -q '<rtps_protection_kind>SIGN_WITH_ORIGIN_AUTHENTICATION<' signed/governance.p7s && grep -q '<rtps_protection_kind>ENCRYPT_WITH_ORIGIN_AUTHENTICATION<' net/governance.p7s || die "--protect was not kept"
 echo "four holders, two of them revoked; openssl agrees with every one"
