@@ -63,7 +63,7 @@ class InFlight {
   std::optional<Vec3> acceleration(const AirTick& tick) noexcept;
   std::optional<Vec3> noise(const Vec3& w_W) noexcept;
   void grow() noexcept;
-  void return_from_calm() noexcept;
+  void judge_calm() noexcept;
   void settle() noexcept;
   void combine() noexcept;
   void forget() noexcept;
@@ -72,6 +72,7 @@ class InFlight {
   Adaptation adaptation_;
   double calmest_;
   AirFactors grown_, calm_ = kModelledAir;  // ≥ 1 and never falling; ≤ 1
+  AirFactors shown_ = kModelledAir;         // ≤ calm_, and watched: what calm_ becomes at rest
   AirFactors factors_;
   bool frozen_ = false;
   std::optional<AirTick> last_;
