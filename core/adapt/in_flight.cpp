@@ -107,6 +107,16 @@ void InFlight::forget() noexcept {
   squares_.setZero(), steps_ = 0;
 }
 
+bool InFlight::end() noexcept {
+  if (!last_) return false;
+  last_.reset(), last_w_.reset();
+  const AirFactors before = factors_;
+  calm_ = shown_ = kModelledAir;
+  for (std::size_t k = 0; k < kAirClasses; ++k) adaptation_.forget_calmer(static_cast<AirClass>(k));
+  combine();
+  return factors_ != before;
+}
+
 bool InFlight::carry_out(AirOrder order) noexcept {
   const AirFactors before = factors_;
   if (order == AirOrder::reset) forget();

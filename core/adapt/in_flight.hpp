@@ -53,6 +53,9 @@ class InFlight {
   /// Real-time: wait-free, no allocation.
   bool carry_out(AirOrder order) noexcept;
   bool frozen() const noexcept { return frozen_; }
+  /// The flight has ended: the next one begins with no calmer air than the model's, and shows it anew; whether a factor
+  /// changed. Nothing happens without a tick since the last one ended. Real-time: wait-free, no allocation.
+  bool end() noexcept;
 
   /// ≥ calmest; ≥ what it began with until a reset.
   const AirFactors& factors() const noexcept { return factors_; }

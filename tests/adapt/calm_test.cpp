@@ -172,6 +172,15 @@ TEST(CalmInFlight, FrozenFactorsFallNoFartherAndReturnAllTheSame) {
   EXPECT_EQ(flight.fly(60).wall(), 1);
 }
 
+TEST(CalmInFlight, TheNextFlightBeginsWithTheModelAndShowsAMinuteOfItsOwn) {
+  GustyFlight flight = shrunk(6);
+  EXPECT_TRUE(flight.learnt.end());
+  EXPECT_FALSE(flight.learnt.end());
+  EXPECT_EQ(flight.learnt.factors(), kModelledAir);
+  EXPECT_EQ(flight.fly(58).wall(), 1);
+  EXPECT_LT(flight.fly(30).wall(), 1);
+}
+
 TEST(CalmInFlight, AResetBeginsWithTheModel) {
   GustyFlight flight = shrunk(6);
   EXPECT_TRUE(flight.learnt.carry_out(AirOrder::reset));
