@@ -58,7 +58,7 @@ bool InFlight::add(const AirTick& tick) noexcept {
   if (!measured) return false;
   const AirFactors before = factors_;
   if (adaptation_.add({t_s_, *w_W, tick.sigma, tick.air, *measured})) {
-    return_from_calm();
+    judge_calm();
     if (!frozen_) grow();
   }
   if (tick.rests && !frozen_) settle();
@@ -70,28 +70,29 @@ void InFlight::grow() noexcept {
   combine();
 }
 
-// Also of frozen factors: what was shrunk was right in calmer air alone.
-void InFlight::return_from_calm() noexcept {
+// What is shown is watched from then on, long before a rest may shrink sets by it: air that was calm once need not be
+// so at the next rest. Sets of frozen factors return too: what was shrunk was right in calmer air alone.
+void InFlight::judge_calm() noexcept {
   for (std::size_t k = 0; k < kAirClasses; ++k) {
     const auto air = static_cast<AirClass>(k);
-    if (!(calm_[k] < 1) || !(adaptation_.of(air).rose() || adaptation_.of(air).above())) continue;
-    calm_[k] = 1;
-    adaptation_.forget_calmer(air);
+    const Bets& bets = adaptation_.of(air);
+    if (bets.rose() || bets.above()) {
+      calm_[k] = shown_[k] = 1;
+      adaptation_.forget_calmer(air);
+      continue;
+    }
+    const double factor = std::max(calmest_, bets.below().value_or(1));
+    if (!(factor < shown_[k])) continue;
+    shown_[k] = factor;
+    adaptation_.watch(air, factor);
   }
   combine();
 }
 
 // What no class is known of may be anywhere.
 void InFlight::settle() noexcept {
-  for (std::size_t k = 0; k < kAirClasses; ++k) {
-    const auto air = static_cast<AirClass>(k);
-    const auto below = adaptation_.of(air).below();
-    if (air == AirClass::none || !below || grown_[k] > 1) continue;
-    const double factor = std::max(calmest_, *below);
-    if (!(factor < calm_[k])) continue;
-    calm_[k] = factor;
-    adaptation_.watch(air, factor);
-  }
+  for (std::size_t k = 0; k < kAirClasses; ++k)
+    if (static_cast<AirClass>(k) != AirClass::none && !(grown_[k] > 1)) calm_[k] = shown_[k];
   combine();
 }
 
@@ -101,9 +102,19 @@ void InFlight::combine() noexcept {
 
 void InFlight::forget() noexcept {
   adaptation_.reset();
-  factors_ = grown_ = calm_ = kModelledAir;
+  factors_ = grown_ = calm_ = shown_ = kModelledAir;
   last_.reset(), last_w_.reset();
   squares_.setZero(), steps_ = 0;
+}
+
+bool InFlight::end() noexcept {
+  if (!last_) return false;
+  last_.reset(), last_w_.reset();
+  const AirFactors before = factors_;
+  calm_ = shown_ = kModelledAir;
+  for (std::size_t k = 0; k < kAirClasses; ++k) adaptation_.forget_calmer(static_cast<AirClass>(k));
+  combine();
+  return factors_ != before;
 }
 
 bool InFlight::carry_out(AirOrder order) noexcept {

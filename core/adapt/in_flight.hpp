@@ -53,6 +53,9 @@ class InFlight {
   /// Real-time: wait-free, no allocation.
   bool carry_out(AirOrder order) noexcept;
   bool frozen() const noexcept { return frozen_; }
+  /// The flight has ended: the next one begins with no calmer air than the model's, and shows it anew; whether a factor
+  /// changed. Nothing happens without a tick since the last one ended. Real-time: wait-free, no allocation.
+  bool end() noexcept;
 
   /// ≥ calmest; ≥ what it began with until a reset.
   const AirFactors& factors() const noexcept { return factors_; }
@@ -63,7 +66,7 @@ class InFlight {
   std::optional<Vec3> acceleration(const AirTick& tick) noexcept;
   std::optional<Vec3> noise(const Vec3& w_W) noexcept;
   void grow() noexcept;
-  void return_from_calm() noexcept;
+  void judge_calm() noexcept;
   void settle() noexcept;
   void combine() noexcept;
   void forget() noexcept;
@@ -72,6 +75,7 @@ class InFlight {
   Adaptation adaptation_;
   double calmest_;
   AirFactors grown_, calm_ = kModelledAir;  // ≥ 1 and never falling; ≤ 1
+  AirFactors shown_ = kModelledAir;         // ≤ calm_, and watched: what calm_ becomes at rest
   AirFactors factors_;
   bool frozen_ = false;
   std::optional<AirTick> last_;

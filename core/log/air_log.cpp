@@ -56,6 +56,8 @@ bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept {
          !in.autopilot.landed.value_or(false);
 }
 
+bool ended(adapt::InFlight& air, const track::TickInput& in) noexcept { return !in.autopilot.armed && air.end(); }
+
 bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out, AirRecord& r) noexcept {
   const track::OdometrySample& s = *flight.odometry();
   const auto place = static_cast<AirClass>(std::min<std::uint32_t>(r.air, kAirClasses - 1));
@@ -113,6 +115,7 @@ void ReplayedAir::skip() noexcept {
 std::optional<Difference> ReplayedAir::step(const track::TickInput& in, const track::FlightTick& flight,
                                             const track::TickOutput& out, std::uint64_t tick, std::uint64_t& hash) {
   auto first = carry_out_orders(in, hash);
+  if (air_) ended(*air_, in);
   const AirRecord* logged = std::exchange(next_, nullptr);
   if (const bool adds = air_ && flown(in, out); adds != (logged != nullptr))
     return first ? first : Difference{tick, offset_, "air", adds ? 0.0 : 1.0, adds ? 1.0 : 0.0};

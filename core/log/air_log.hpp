@@ -17,6 +17,10 @@ std::optional<adapt::InFlightConstants> decode(const RawRecord& record) noexcept
 /// wait-free, no allocation.
 bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept;
 
+/// What is known to be calm ends with the flight, when the vehicle is disarmed; whether a factor changed. Real-time:
+/// wait-free, no allocation.
+bool ended(adapt::InFlight& air, const track::TickInput& in) noexcept;
+
 /// Adds a tick that was flown() to what is learnt, with Σ and class of the record, and writes what was decided into it;
 /// whether a factor changed. Real-time: wait-free, no allocation.
 bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out,

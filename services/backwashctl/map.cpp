@@ -81,6 +81,8 @@ class Transfer {
     });
   }
   bool accepted() const noexcept { return state_ == backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED; }
+  /// The daemon has it all and is at it, which takes as long as its worlds do.
+  bool whole() const noexcept { return state_ == backwash_msgs_msg_dds__MAPRECEIPT_WHOLE; }
   bool refused() const noexcept { return state_ == backwash_msgs_msg_dds__MAPRECEIPT_REFUSED; }
   const std::string& reason() const noexcept { return reason_; }
 
@@ -148,7 +150,8 @@ Outcome send_map(const Options& options, const MapOptions& map, bool quiet) {
   double told_s = 0;
   while (!transfer.accepted() && !transfer.refused() && !interrupted()) {
     transfer.step(sending);
-    const double took_s = seconds(now_ns() - begun), silent_s = seconds(now_ns() - sending.progress_ns());
+    const std::int64_t news_ns = transfer.whole() ? sending.heard_ns() : sending.progress_ns();
+    const double took_s = seconds(now_ns() - begun), silent_s = seconds(now_ns() - news_ns);
     if (silent_s > map.patience_s) {
       outcome.why = given_up(sending, transfer.bytes(), took_s, silent_s);
       return outcome;

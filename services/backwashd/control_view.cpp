@@ -11,13 +11,14 @@ namespace backwash::daemon {
 void ControlLoop::learn(const track::TickInput& in, const track::TickOutput& out) noexcept {
   if (!air_) return;
   while (const auto order = channels_.air_orders.pop()) carry_out(*order, in);
+  const AirFactors before = air_->factors();
+  if (log::ended(*air_, in)) tell_of_air(before, in);
   if (!log::flown(in, out)) return;
   const plan::AirPlace place = lookout_.air_at(flight_.odometry()->state.p_W);
   log::AirRecord r{};
   r.tick = view_.ticks;
   std::copy_n(place.sigma.data(), 3, r.sigma);
   r.air = static_cast<std::uint32_t>(place.air);
-  const AirFactors before = air_->factors();
   const bool changed = log::learn(*air_, flight_, out, r);
   record(log::RecordKind::air, in.now_ns, &r, sizeof r);
   const auto here = static_cast<std::size_t>(place.air);

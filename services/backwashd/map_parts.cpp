@@ -176,10 +176,11 @@ std::optional<std::string> MapParts::stalled(std::int64_t now_ns) {
 }
 
 std::optional<std::string> MapParts::let_go(std::span<const WriterId> departed) {
-  if (!arriving() || std::ranges::find(departed, writer_) == departed.end()) return std::nullopt;
+  if (!(arriving() || judged()) || std::ranges::find(departed, writer_) == departed.end()) return std::nullopt;
   const std::string line = came() + ", and its sender is gone";
+  const bool whole = judged();
   forget();
-  if (std::exchange(said_, true)) return std::nullopt;
+  if (whole || std::exchange(said_, true)) return std::nullopt;
   return line;
 }
 

@@ -52,7 +52,9 @@ class MapParts {
   std::optional<std::string> wrong(const dds::MapPart& part) const;
   bool is_of_this(const dds::MapPart& part) const noexcept;
   bool arriving() const noexcept { return transfer_ && state_ == backwash_msgs_msg_dds__MAPRECEIPT_ARRIVING; }
-  bool alive(std::int64_t now_ns) const noexcept { return arriving() && now_ns - heard_ns_ < kYield_ns; }
+  bool judged() const noexcept { return transfer_ && state_ == backwash_msgs_msg_dds__MAPRECEIPT_WHOLE; }  ///< soon
+  /// Its sender is still there: no other's may begin, or nobody would tell it what became of its map.
+  bool alive(std::int64_t now_ns) const noexcept { return (arriving() || judged()) && now_ns - heard_ns_ < kYield_ns; }
   void end(std::uint8_t state, std::string reason);
   void forget();
   std::string came() const;

@@ -151,7 +151,6 @@ void MapWorker::take_map(const MapMessage& message) {
     writer_ = message.from;
     channels_.map_writer.write(*writer_);
   }
-  tell(message, "");
 
   const Index3 size = grid->size();
   const bool update = world_ && same_place(world_->grid, *grid);
@@ -169,6 +168,7 @@ void MapWorker::take_map(const MapMessage& message) {
     channels_.map_partial = false;
   }
   ++channels_.maps_accepted;
+  tell(message, "");  // not before: its sender goes on as soon as it is in use
   spdlog::info("map accepted: {} x {} x {} voxels, world {} in {} ms", size.x(), size.y(), size.z(),
                update ? "updated" : "built", (now_ns() - begun) / 1'000'000);
 }
@@ -242,7 +242,10 @@ bool MapWorker::take_air() {
   air_ = fell ? said->factors : larger(*air_, said->factors);
   if (!world_) return false;
   bool grew = fell && *air_ != world_->air.factors;
-  for (std::size_t k = 0; k < kAirClasses; ++k) grew = grew || (*air_)[k] >= (1 + kStep) * world_->air.factors[k];
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    const double made = world_->air.factors[k];  // below the model's no step is too small
+    grew = grew || (*air_)[k] >= (1 + kStep) * made || (made < 1 && (*air_)[k] > made);
+  }
   if (!grew) return false;
   const auto begun = now_ns();
   publish(plan::with_air(*world_, *air_, model_, parallel_), channels_.map_ns.load().value_or(begun));

@@ -63,6 +63,7 @@ void PlannerWorker::pursue() {
   using Kind = plan::Replan::Kind;
   if (next.kind == Kind::kept && !braking) air_ = world_->air.factors;
   if (next.kind == Kind::kept || (braking && next.kind != Kind::extended)) return;
+  if (next.kind == Kind::extended && too_calm()) return;  // the next world is not far
   if (next.kind == Kind::unsafe) return block("no way on is clear in the new map: " + metres(next.clearance_m));
   auto commands = std::move(next.route.commands);
   if (next.reaches_goal && p.yaw) {

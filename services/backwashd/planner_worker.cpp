@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <thread>
 #include <utility>
@@ -65,6 +66,14 @@ bool PlannerWorker::current() {
     refresh();
   }
   return front_.standing(view_) == PlanFront::Standing::current;
+}
+
+/// Whether the newest world has sets below the model's that the flight does not allow any more: the map worker makes
+/// one anew at once, or after a map that it was at, which may take minutes.
+bool PlannerWorker::too_calm() const {
+  const AirFactors known = view_.air ? view_.air->factors : kModelledAir;
+  return !std::ranges::equal(world_->air.factors, known,
+                             [](double made, double now) { return made >= std::min(1.0, now); });
 }
 
 /// Why the job could not be done; nothing when it is flying.
@@ -176,6 +185,8 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
   // A lift-off begins on the ground, where nothing moves however old the pose is.
   if (!lifts) commands.insert(commands.begin(), lead_, at_rest(commands.front()));
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    for (std::size_t wait = 0; current() && too_calm() && wait < kAnswerPauses && !channels_.stop; ++wait) pause_();
+    if (too_calm()) return "the air is rougher than the sets allow for, which are being made anew: ask again";
     if (!current()) return kEnded;
     if (view_.mode != Mode::tracking && view_.mode != Mode::hold) return "control was lost meanwhile";
     if (view_.closures != closures) return "a loop closure moved the map meanwhile";

@@ -75,6 +75,7 @@ class PlannerWorker {
 
   void refresh();
   bool current();
+  bool too_calm() const;
   Flying continued(std::size_t branch, std::vector<Setpoint> commands);
   bool offer(Flying next);
 

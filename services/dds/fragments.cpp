@@ -36,6 +36,8 @@ void note(std::span<const std::uint8_t> prefix, std::span<const std::uint8_t> bo
   const std::uint32_t first = number(body.subspan(20, 4), little), several = number(body.subspan(24, 2), little);
   const std::uint32_t each = number(body.subspan(26, 2), little), size = number(body.subspan(28, 4), little);
   if (size < kLargeSample || each == 0 || first == 0) return;
+  // No more than the body has bytes for: who says more costs the receiving thread no more time than it sent.
+  if (several > (body.size() - kFragmentHead) / each + 1) return;
   const std::uint32_t count = size / each + (size % each != 0);
   if (count > kMost || first > count) return;
   Guid writer{};

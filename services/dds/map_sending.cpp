@@ -69,10 +69,18 @@ void MapSending::hold(std::uint32_t number, std::int64_t now_ns) {
   progress_ns_ = now_ns;
 }
 
+// Whoever puts the parts together has begun anew: a daemon that restarted, or that heard nothing for too long.
+void MapSending::begin_anew(const MapReceipt& receipt) {
+  for (Part& part : parts_) part.held = false;
+  held_ = steered_held_ = first_missing_ = 0;
+  fresh_ = std::min(fresh_, receipt.first_missing + 8 * receipt.beyond._length);
+}
+
 void MapSending::hear(const MapReceipt& receipt, std::int64_t now_ns) {
   const auto newest_ns = static_cast<std::int64_t>(receipt.newest);
   const auto waited_ns = static_cast<std::int64_t>(receipt.waited);
   if (receipt.first_missing > fresh_ || newest_ns < 0 || newest_ns > now_ns || waited_ns < 0) return;
+  if (newest_ns > newest_ns_ && receipt.first_missing < first_missing_) begin_anew(receipt);  // it never falls else
   for (std::uint32_t n = first_missing_; n < receipt.first_missing; ++n) hold(n, now_ns);
   for (std::uint32_t n = 0; n < 8 * receipt.beyond._length && receipt.first_missing + n < fresh_; ++n)
     if (receipt.beyond._buffer[n / 8] >> (n % 8) & 1) hold(receipt.first_missing + n, now_ns);

@@ -45,6 +45,8 @@ class MapSending {
   double rate() const noexcept { return rate_; }         ///< byte/s on the line
   /// When a part was last told of that was not before; the start before the first.
   std::int64_t progress_ns() const noexcept { return progress_ns_; }
+  /// When a receipt came last.
+  std::int64_t heard_ns() const noexcept { return heard_ns_; }
 
   static constexpr double kLeast = 8e3;  ///< byte/s
 
@@ -54,6 +56,7 @@ class MapSending {
     bool held = false;
   };
   void hold(std::uint32_t number, std::int64_t now_ns);
+  void begin_anew(const MapReceipt& receipt);
   bool is_lost(const Part& part, std::int64_t now_ns) const noexcept;
   void steer(std::int64_t now_ns);
 

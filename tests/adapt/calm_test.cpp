@@ -132,6 +132,33 @@ TEST(CalmInFlight, WhatWasShownBeforeItWasRougherCountsNoMore) {
   EXPECT_EQ(flight.rises, changes);
 }
 
+TEST(CalmInFlight, AirThatWasCalmBeforeTheLastWayShrinksNothingAfterIt) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    GustyFlight flight(seed, may_shrink());
+    flight.factor = 0.1;
+    EXPECT_TRUE(flight.fly(100).learnt.of(AirClass::wall).below());
+    flight.factor = 1;
+    flight.fly(45);
+    rest(flight);
+    EXPECT_EQ(flight.fly(0.5).rises, 0) << seed;
+  }
+}
+
+TEST(CalmInFlight, AirThatWasShownToBeRougherThanTheModelShrinksNothing) {
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 40 && found < 2; ++seed) {
+    GustyFlight flight(seed, may_shrink());
+    flight.factor = 1.5;
+    while (!flight.learnt.of(AirClass::wall).above() && flight.t < 400) flight.fly(0.02);
+    if (flight.learnt.of(AirClass::wall).above() != 1) continue;  // of less than the next of the grid
+    ++found;
+    flight.factor = 0.1;
+    rest(flight);
+    EXPECT_EQ(flight.fly(150).rises, 0) << seed;
+  }
+  EXPECT_EQ(found, 2);
+}
+
 TEST(CalmInFlight, FrozenFactorsFallNoFartherAndReturnAllTheSame) {
   GustyFlight frozen(5, may_shrink());
   frozen.learnt.carry_out(AirOrder::freeze);
@@ -143,6 +170,15 @@ TEST(CalmInFlight, FrozenFactorsFallNoFartherAndReturnAllTheSame) {
   move(flight);
   flight.factor = 2;
   EXPECT_EQ(flight.fly(60).wall(), 1);
+}
+
+TEST(CalmInFlight, TheNextFlightBeginsWithTheModelAndShowsAMinuteOfItsOwn) {
+  GustyFlight flight = shrunk(6);
+  EXPECT_TRUE(flight.learnt.end());
+  EXPECT_FALSE(flight.learnt.end());
+  EXPECT_EQ(flight.learnt.factors(), kModelledAir);
+  EXPECT_EQ(flight.fly(58).wall(), 1);
+  EXPECT_LT(flight.fly(30).wall(), 1);
 }
 
 TEST(CalmInFlight, AResetBeginsWithTheModel) {

@@ -89,6 +89,22 @@ TEST_F(CalmAir, ShrinksNothingBeforeTheLastCommandOfASegment) {
   EXPECT_NE(rig.view().air->factors, kModelledAir) << "at rest it is done at once";
 }
 
+TEST_F(CalmAir, EndsWithTheFlightAndIsShownAnewInTheNext) {
+  LearningRig rig(0.05, 1, learning(kCalmest));
+  rig.take_off();
+  rig.start_route(2);
+  rig.ticks(static_cast<int>(shrank_tick_));
+  ASSERT_NE(rig.view().air->factors, kModelledAir);
+  const std::uint64_t falls = rig.channels->air.read_new().value().falls;
+  rig.in_hand().disarm();
+  rig.ticks(50);
+  EXPECT_EQ(rig.view().air->factors, kModelledAir);
+  const auto handed = rig.channels->air.read_new();
+  ASSERT_TRUE(handed);
+  EXPECT_EQ(handed->factors, kModelledAir);
+  EXPECT_EQ(handed->falls, falls);
+}
+
 TEST_F(CalmAir, ShrinksNothingUnlessItIsConfigured) {
   LearningRig rig(0.05);
   rig.take_off();

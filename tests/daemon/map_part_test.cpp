@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is made first of a large map.
+// What is made first of a large map, and when a map is said to be in use.
 #include <atomic>
 #include <chrono>
 #include <optional>
@@ -97,6 +97,35 @@ TEST_F(MapWorkerTest, WithoutAPlaceInASmallMapOrForAnIntegratorTheWholeIsMadeAtO
     channels.worlds.control.give_back(only);
     channels.worlds.collect();
   }
+}
+
+TEST_F(MapWorkerTest, AMapInPartsIsNotSaidToBeInUseBeforeItIs) {
+  auto message = MapMessage{map::encode_octomap(grid_), grid_.resolution(), true, "OcTree", 1};
+  message.transfer = 7;
+  channels_->stop = true;  // its world is never made
+  channels_->maps.offer(std::make_unique<const MapMessage>(message));
+  EXPECT_TRUE(worker_.step());
+  ASSERT_EQ(world(), nullptr);
+  EXPECT_FALSE(channels_->map_verdict.read_new());
+  channels_->stop = false;
+  channels_->maps.offer(std::make_unique<const MapMessage>(message));
+  EXPECT_TRUE(worker_.step());
+  ASSERT_NE(world(), nullptr);
+  EXPECT_TRUE(channels_->map_verdict.read_new().value().accepted);
+}
+
+TEST_F(MapWorkerTest, SetsOfCalmerAirAreTheModelsAgainHoweverSmallTheStep) {
+  MapWorker worker(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings_,
+                   kModelledAir);
+  channels_->maps.offer(std::make_unique<const MapMessage>(
+      MapMessage{map::encode_octomap(grid_), grid_.resolution(), true, "OcTree", 7}));
+  EXPECT_TRUE(worker.step());
+  channels_->air.write({{0.97, 1, 1, 1, 1}, 1});
+  EXPECT_TRUE(worker.step());
+  EXPECT_EQ(world()->air.factors[0], 0.97);
+  channels_->air.write({kModelledAir, 1});
+  EXPECT_TRUE(worker.step());
+  EXPECT_EQ(world()->air.factors, kModelledAir);
 }
 
 }  // namespace

@@ -45,6 +45,22 @@ TEST(MapParts, OneMapArrivesAtATimeUntilItsSenderIsSilent) {
   EXPECT_FALSE(parts.stalled(MapParts::kYield_ns));
 }
 
+TEST(MapParts, AWholeMapIsNotDisplacedBeforeItsSenderKnowsWhatBecameOfIt) {
+  Map map(1000), next(3000);
+  next.part.transfer = 8;
+  MapParts parts(1u << 20, "map");
+  ASSERT_EQ(*parts.take(map.of(0, 1), kOne, 0), MapParts::Taken::whole);
+  EXPECT_FALSE(parts.take(next.of(0, 1), kOther, kSecond));
+  ASSERT_EQ(*parts.take(map.of(0, 2), kOne, 2 * kSecond), MapParts::Taken::here) << "it asks";
+  EXPECT_FALSE(parts.take(next.of(0, 2), kOther, 3 * kSecond));
+  parts.judge({7, true, {}});
+  const auto receipt = parts.receipt(4 * kSecond);
+  ASSERT_TRUE(receipt);
+  EXPECT_EQ(receipt->transfer, 7u);
+  EXPECT_EQ(receipt->state, backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED);
+  EXPECT_EQ(*parts.take(next.of(0, 3), kOther, 4 * kSecond), MapParts::Taken::begins);
+}
+
 TEST(MapParts, AWriterThatBeginsAMapWithEachPartTakesMemoryOnceASecond) {
   Map map(3000);
   MapParts parts(1u << 20, "map");

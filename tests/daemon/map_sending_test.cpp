@@ -175,6 +175,25 @@ TEST(MapParts, ReceiptsThatNoDaemonCanHaveMeantChangeNothing) {
   }
 }
 
+// It restarted, or heard nothing for a minute.
+TEST(MapParts, WhatADaemonNoLongerHasIsSentAgain) {
+  Map map(5 * dds::kPartBytes);
+  dds::MapSending sending(map.data.size(), 1e6, 0);
+  std::int64_t now = 0;
+  const auto whole_at = [&](MapParts& parts, std::int64_t until) {
+    for (; now < until; now += kMs) {
+      while (const auto number = sending.next(now))
+        if (parts.take(map.of(*number, now), kOne, now) == MapParts::Taken::whole) return true;
+      if (const auto receipt = parts.receipt(now)) sending.hear(*receipt, now);
+    }
+    return false;
+  };
+  MapParts before(1u << 20, "map"), after(1u << 20, "map");
+  ASSERT_FALSE(whole_at(before, 105 * kMs));
+  ASSERT_GT(sending.held(), 1u);
+  EXPECT_TRUE(whole_at(after, 20 * kSecond));
+}
+
 TEST(MapParts, OnceAllIsHereTheSenderAsksForTheVerdictUntilItComes) {
   dds::MapSending sending(2 * dds::kPartBytes, 1e6, 0);
   ASSERT_TRUE(sending.next(kMs) && sending.next(100 * kMs));

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <vector>
 
 namespace backwash::daemon {
@@ -19,6 +20,7 @@ struct Fragment {
   std::uint32_t size = kSize;
   std::uint8_t writer = 7, sample = 1;
   bool little = true;
+  std::optional<std::size_t> bytes{};  ///< of data behind the head; none: as many as it says
 };
 
 /// A datagram of RTPS with an INFO_TS and this DATA_FRAG.
@@ -33,8 +35,9 @@ std::vector<std::uint8_t> datagram(const Fragment& f) {
   put(8, 2);
   bytes.insert(bytes.end(), 8, 0);
   bytes.insert(bytes.end(), {0x16, std::uint8_t{f.little}});
-  put(32 + 8, 2);
-  bytes.insert(bytes.end(), 8, 0);  // flags, reader
+  const std::size_t data = f.bytes.value_or(std::size_t{f.several} * kEach), length = 32 + data;
+  put(length < 65536 ? length : 0, 2);  // 0: to the end
+  bytes.insert(bytes.end(), 8, 0);      // flags, reader
   bytes.insert(bytes.end(), {0, 0, 1, 2});
   put(0, 4);
   put(f.sample, 4);
@@ -42,7 +45,7 @@ std::vector<std::uint8_t> datagram(const Fragment& f) {
   put(f.several, 2);
   put(kEach, 2);
   put(f.size, 4);
-  bytes.insert(bytes.end(), 8, 0);
+  bytes.resize(bytes.size() + data);
   return bytes;
 }
 
@@ -76,6 +79,16 @@ TEST(PartialSample, IsNoneOfBytesThatSayNonsense) {
   cut[0] = 'X';
   dds::note_fragments(cut, 0);
   EXPECT_FALSE(dds::partial_sample());
+}
+
+// Looking at a datagram must cost no more than receiving it.
+TEST(PartialSample, HasNoMoreFragmentsThanADatagramHasBytesFor) {
+  note({.first = 1, .sample = 30});
+  note({.first = 2, .several = 1000, .sample = 30, .bytes = 2 * kEach});
+  EXPECT_EQ(dds::partial_sample().value().came, 1u);
+  note({.first = 2, .several = 3, .sample = 30, .bytes = 2 * kEach + 1});
+  EXPECT_EQ(dds::partial_sample().value().came, 4u);
+  note({.first = 1, .several = static_cast<std::uint16_t>(kCount), .sample = 30});
 }
 
 TEST(PartialSample, ThatIsLongOnItsWayIsToldAfterTenSecondsAndOnceAMinute) {

@@ -109,6 +109,23 @@ TEST_F(PlannerWatch, AFlightThatIsNotClearInRougherAirIsStoppedForTheAirAndSaysW
   EXPECT_EQ(log.find("free_air 1"), std::string::npos) << "a class that is as modelled is not named";
 }
 
+// The map worker may be at another map for minutes.
+TEST_F(PlannerWatch, NothingNewIsFlownBySetsOfCalmerAirThanIsKnownYet) {
+  know(room());
+  stand({1.05, 2.05, 1.05});
+  learn({0.3, 0.3, 0.3, 0.3, 1});
+  view_.air->factors[1] = 1;
+  show();
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}).find("being made anew"), std::string::npos);
+  EXPECT_TRUE(offers_.empty());
+  int pauses = 0;
+  meanwhile_ = [&] {
+    if (++pauses == 5) learn({0.3, 1, 0.3, 0.3, 1});
+  };
+  EXPECT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "") << "the world comes";
+  EXPECT_EQ(offers_.size(), 1u);
+}
+
 TEST_F(PlannerWatch, AnObstacleInAirThatWasRoughBeforeIsAnObstacle) {
   fly_past(1.4);
   learn({1.2, 1.2, 1.2, 1.2, 1});
