@@ -61,7 +61,7 @@ void PlannerWorker::pursue() {
   const std::size_t now = view_.index, branch = now + p.lead;
   auto next = onward(*world_, route, now, branch, p.goal_W);
   using Kind = plan::Replan::Kind;
-  if (next.kind == Kind::kept && !braking) air_ = world_->air.factors;
+  if (next.kind == Kind::kept && !braking) keep();
   if (next.kind == Kind::kept || (braking && next.kind != Kind::extended)) return;
   if (next.kind == Kind::extended && too_calm()) return;  // the next world is not far
   if (next.kind == Kind::unsafe) return block("no way on is clear in the new map: " + metres(next.clearance_m));
@@ -124,7 +124,25 @@ void PlannerWorker::verify_again() {
   if (!(again.segment.clearance > 0))
     block("the rest of it is not clear in the new map: " + metres(again.segment.clearance));
   else
-    air_ = world_->air.factors;
+    keep();
+}
+
+/// What flies is clear in the newest world. Where its stops were verified in calmer air than there is, it is offered
+/// once more as it is, with the stops that are clear now: a STOP must not brake on sets that the air does not allow.
+void PlannerWorker::keep() {
+  const AirFactors before = std::exchange(air_, world_->air.factors);
+  Flying next = *flying_;
+  next.segment.continues = flying_->segment.id;
+  next.segment.branch = view_.index + kRectifyAfter;
+  if (allowed(before, air_) || next.segment.arms || next.segment.branch >= next.segment.commands.size() ||
+      front_.standing(view_) == PlanFront::Standing::ended)
+    return;
+  verify(next, *world_, view_.index);
+  add_guards(next, *world_, view_.index);
+  spdlog::info("the air is not as calm as the stops of this flight allow for: they are verified anew");
+  if (offer(std::move(next))) return;
+  air_ = before;  // looked at again
+  new_world_ = true;
 }
 
 /// After a loop closure: the same flight, back to its place in the map from a little ahead of now. One that was told to

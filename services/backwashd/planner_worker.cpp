@@ -68,12 +68,15 @@ bool PlannerWorker::current() {
   return front_.standing(view_) == PlanFront::Standing::current;
 }
 
+/// Whether sets made with these factors are no smaller than the air now allows, or than the model's.
+bool PlannerWorker::allowed(const AirFactors& made, const AirFactors& now) {
+  return std::ranges::equal(made, now, [](double with, double least) { return with >= std::min(1.0, least); });
+}
+
 /// Whether the newest world has sets below the model's that the flight does not allow any more: the map worker makes
 /// one anew at once, or after a map that it was at, which may take minutes.
 bool PlannerWorker::too_calm() const {
-  const AirFactors known = view_.air ? view_.air->factors : kModelledAir;
-  return !std::ranges::equal(world_->air.factors, known,
-                             [](double made, double now) { return made >= std::min(1.0, now); });
+  return !allowed(world_->air.factors, view_.air ? view_.air->factors : kModelledAir);
 }
 
 /// Why the job could not be done; nothing when it is flying.

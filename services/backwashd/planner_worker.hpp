@@ -70,11 +70,13 @@ class PlannerWorker {
   void block(const std::string& why);
   std::string grown_air() const;
   void verify_again();
+  void keep();
   std::optional<std::string> rectify();
   std::vector<Setpoint> moved_by_closure(std::size_t branch) const;
 
   void refresh();
   bool current();
+  static bool allowed(const AirFactors& made, const AirFactors& now);
   bool too_calm() const;
   Flying continued(std::size_t branch, std::vector<Setpoint> commands);
   bool offer(Flying next);

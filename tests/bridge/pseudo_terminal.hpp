@@ -34,8 +34,14 @@ class PseudoTerminal {
     if (master_ >= 0) ::close(master_);
     master_ = -1;
   }
+  /// A full buffer is waited for, for at most a second: the kernel hands its bytes over in its own time.
   void write(std::span<const std::uint8_t> bytes) {
-    ASSERT_EQ(::write(master_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+    for (int i = 0; i < 1000 && !bytes.empty(); ++i) {
+      const ssize_t n = ::write(master_, bytes.data(), bytes.size());
+      if (n > 0) bytes = bytes.subspan(static_cast<std::size_t>(n));
+      if (!bytes.empty()) ::usleep(1000);
+    }
+    ASSERT_TRUE(bytes.empty());
   }
   /// All that has arrived.
   Bytes read() {

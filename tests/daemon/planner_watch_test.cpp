@@ -11,9 +11,10 @@ namespace {
 class PlannerWatch : public PlannerOffers {
  protected:
   /// Flies along the room and has come past x, at speed.
-  void fly_past(double x) {
+  void fly_past(double x, const AirFactors& air = kModelledAir) {
     know(room());
     stand({1.05, 2.05, 1.05});
+    if (air != kModelledAir) learn(air);
     ASSERT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "");
     const auto& commands = offers_.at(0).commands;
     while (view_.index < commands.size() && commands[view_.index].p_W.x() < x) ++view_.index;
@@ -107,6 +108,33 @@ TEST_F(PlannerWatch, AFlightThatIsNotClearInRougherAirIsStoppedForTheAirAndSaysW
   const std::string log = recorded();
   EXPECT_NE(log.find("ground 100.00 times the model's variance, ln evidence 7.2"), std::string::npos);
   EXPECT_EQ(log.find("free_air 1"), std::string::npos) << "a class that is as modelled is not named";
+}
+
+TEST_F(PlannerWatch, AFlightThatBeganInCalmerAirGetsStopsOfTheAirThatThereIs) {
+  fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
+  learn(kModelledAir);
+  planner_.step();
+  ASSERT_EQ(offers_.size(), 2u);
+  const auto &before = offers_[0], &after = offers_[1];
+  EXPECT_EQ(after.continues, before.id);
+  ASSERT_EQ(after.commands.size(), before.commands.size());
+  for (std::size_t k = 0; k < after.commands.size(); ++k) ASSERT_EQ(after.commands[k].p_W, before.commands[k].p_W);
+  ASSERT_FALSE(after.stops.empty());
+  for (const plan::Stop& stop : after.stops) EXPECT_GT(plan::tube_clearance(*world_, stop.tube), 0) << stop.branch;
+  EXPECT_GT(after.stops.back().tube.back().half_widths[0], 1.5 * before.stops.back().tube.back().half_widths[0]);
+  planner_.step();
+  EXPECT_EQ(offers_.size(), 2u) << "once";
+}
+
+TEST_F(PlannerWatch, StopsOfCalmerAirAreLookedAtUntilTheyAreRenewed) {
+  fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
+  learn(kModelledAir);
+  answer_ = [](const auto&) {};  // it was past the branch
+  planner_.step();
+  ASSERT_EQ(offers_.size(), 2u);
+  answer_ = [this](const auto& s) { view_.segment = s.id; };
+  planner_.step();
+  EXPECT_EQ(offers_.size(), 3u);
 }
 
 // The map worker may be at another map for minutes.
