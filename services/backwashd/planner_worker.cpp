@@ -73,7 +73,7 @@ bool PlannerWorker::allowed(const AirFactors& made, const AirFactors& now) {
   return std::ranges::equal(made, now, [](double with, double least) { return with >= std::min(1.0, least); });
 }
 
-/// Whether the newest world has sets below the model's that the flight does not allow any more: the map worker makes
+/// Whether the newest world has sets below the model's that the air does not allow any more: the map worker makes
 /// one anew at once, or after a map that it was at, which may take minutes.
 bool PlannerWorker::too_calm() const {
   return !allowed(world_->air.factors, view_.air ? view_.air->factors : kModelledAir);
