@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <tl/expected.hpp>
 
 /// The one way in which the programs read a file.
@@ -24,6 +26,12 @@ struct FileError {
 /// read.
 tl::expected<std::string, FileError> read_file(const std::string& path, std::size_t most_bytes,
                                                const std::string& wanted);
+
+/// The lines of such a file one after the other, without their ends, while no more than a line and a mebibyte is held.
+/// What `take` throws comes through. Errors as read_file's; a line may have been taken before the file cannot be read
+/// on.
+tl::expected<void, FileError> each_line(const std::string& path, std::size_t most_bytes, const std::string& wanted,
+                                        const std::function<void(std::string_view)>& take);
 
 /// What gzip made this content of; content that gzip did not make, as it is. Error: damaged, cut short, or larger than
 /// `most_bytes` unpacked, of which no more than that is ever held.

@@ -51,16 +51,12 @@ std::string sealed(const Json& row) {
 
 void read_sealed(const std::string& path, const std::string& verb, const Json& made,
                  const std::function<void(const Json&)>& take) {
-  const auto text = files::read_file(path, kLargestRows, "a file of what " + verb + " printed");
-  if (!text) throw Failure(kNoInput, path + ":1: " + text.error().message);
   std::size_t number = 0;
-  for (std::size_t at = 0; at < text->size();) {
-    const std::size_t end = std::min(text->find('\n', at), text->size());
-    const auto line = std::string_view(*text).substr(at, end - at);
+  const auto each = [&](std::string_view line) {
     const auto refuse = [&](const std::string& what) {
       throw Failure(kBadData, path + ":" + std::to_string(number) + ": " + what + "; make it again with " + verb);
     };
-    ++number, at = end + 1;
+    ++number;
     const auto row = Json::parse(unsealed(line), nullptr, false);
     const auto wrong = wrong_with(line, row, made);
     if (wrong == "no row") refuse("is no line of it, or is cut short");
@@ -74,7 +70,9 @@ void read_sealed(const std::string& path, const std::string& verb, const Json& m
     } catch (const Json::exception&) {
       refuse("is no line of it");
     }
-  }
+  };
+  const auto read = files::each_line(path, kLargestRows, "a file of what " + verb + " printed", each);
+  if (!read) throw Failure(kNoInput, path + ":1: " + read.error().message);
   if (number == 0) throw Failure(kBadData, path + ":1: is empty; fill it with " + verb);
 }
 

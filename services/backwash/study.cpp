@@ -290,7 +290,7 @@ Verb study_verb(Command& app) {
   command.footer(
       "Example:\n  backwash study --map room.bt --model builtin:quad-5in --vehicle builtin:quad-5in --log flight*.csv "
       "--report study.html --out extended.toml");
-  return {&command, [options] { return run(*options); }};
+  return {&command, [options] { return keep_pages(), run(*options); }};
 }
 
 }  // namespace backwash::services

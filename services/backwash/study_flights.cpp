@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwash/study_flights.hpp"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <numeric>
 #include <utility>
@@ -97,7 +99,7 @@ Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<
   const auto order = flights.order();
   std::vector<study::Gusts> gusts;
   for (const std::size_t k : order) gusts.push_back(study::gusts_of(flights.observed[k].seen, 0));
-  leave_out(flights, twins_of(study::same_gusts(gusts), order));
+  leave_out(flights, twins_of(study::same_gusts(std::move(gusts)), order));
   return flights;
 }
 
@@ -115,10 +117,16 @@ std::vector<std::string> Flights::names() const {
   return names;
 }
 
+void keep_pages() { ::mallopt(M_MMAP_THRESHOLD, 1 << 30), ::mallopt(M_TRIM_THRESHOLD, 1 << 30); }
+
 study::Observations observations(Flights& flights, const LookedWith& with) {
   const auto order = flights.order();
   study::Observer observer(with.vehicle, with.surroundings);
+  std::size_t windows = 0;
+  for (const std::size_t k : order) windows += flights.observed[k].seen.windows.size();
+  observer.expect(windows);
   for (const std::size_t k : order) observer.add(std::exchange(flights.observed[k], {}));
+  ::malloc_trim(0);  // what ten thousand flights held in small pieces: 0.6 GiB that nothing else fits into
   auto seen = observer.finish();
   if (flights.group.empty()) return seen;
   std::vector<double> by_flight;

@@ -56,6 +56,10 @@ struct Flights {
   std::vector<std::string> names() const;
 };
 
+/// To be called first. Columns of thousands of flights come and go thousands of times: the kernel need not clear their
+/// pages each time.
+void keep_pages();
+
 /// Leaves out flights that hold another one's positions, then those with another one's gusts. `logs`: of each, or
 /// empty.
 Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<log::FlightLog> logs);

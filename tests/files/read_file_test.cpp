@@ -7,6 +7,8 @@
 
 #include <filesystem>
 #include <fstream>
+#include <string_view>
+#include <vector>
 
 namespace backwash::files {
 namespace {
@@ -58,6 +60,27 @@ TEST_F(ReadFile, RefusesWhatIsLargerThanItsKindBeforeReadingIt) {
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().kind, Kind::too_large);
   EXPECT_EQ(read.error().message, "has 1048576 MiB, the cap is 8192 MiB; needs a raw log");
+}
+
+TEST_F(ReadFile, GivesEachLineOnceWhateverItsLengthAndHoldsNoOther) {
+  const std::string path = folder_ + "/lines", longest(std::size_t{5} << 19, 'x');  // 2.5 MiB: read in three
+  const std::vector<std::string> lines{"a", "", longest, std::string((1u << 20) - 1, 'y'), "b\r", "last"};
+  for (const bool ended : {true, false}) {
+    std::string text;
+    for (const auto& line : lines) text += line + "\n";
+    if (!ended) text.pop_back();
+    std::ofstream(path, std::ios::binary) << text;
+    std::vector<std::string> told;
+    ASSERT_TRUE(each_line(path, text.size(), "x", [&](std::string_view line) { told.emplace_back(line); }));
+    EXPECT_TRUE(told == lines) << told.size();
+  }
+  std::ofstream(path, std::ios::binary).flush();
+  ASSERT_TRUE(each_line(path, 0, "x", [](std::string_view) { FAIL() << "of an empty file"; }));
+  const auto none = [](std::string_view) { FAIL() << "of no file"; };
+  EXPECT_EQ(each_line(folder_, 9, "rows", none).error().message, "is a directory; needs rows");
+  EXPECT_EQ(each_line(folder_ + "/absent", 9, "rows", none).error().kind, Kind::not_found);
+  std::ofstream(path) << "0123456789";
+  EXPECT_EQ(each_line(path, 9, "rows", none).error().kind, Kind::too_large);
 }
 
 }  // namespace

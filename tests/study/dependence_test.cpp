@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <random>
+#include <tuple>
 
 #include "core/study/inference/dependence.hpp"
 #include "tests/study_worlds/observe.hpp"
@@ -66,6 +68,49 @@ TEST(Dependence, StatisticIsTheSumOverPairsTriplesAndQuadruples) {
   const double expected = pairs / 64 + quadruples / 4096 - 2 * triples / 512;
   EXPECT_GT(expected, 0.01);
   EXPECT_NEAR(independence(x, y, {0, static_cast<std::size_t>(n)}, 1, 1).hsic, expected, 3e-5);
+}
+
+/// The test as it is defined: draw by draw, each flight's psi turned in full.
+Independence one_by_one(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first, int shifts,
+                        int enough, unsigned seed) {
+  const double n2 = static_cast<double>(phi.rows() * phi.rows()), hsic = (phi.transpose() * psi).squaredNorm() / n2;
+  std::mt19937_64 rng(seed);
+  int above = 1, draw = 0;
+  for (; draw < shifts && above <= enough; ++draw) {
+    MatrixXd turned = psi;
+    for (std::size_t f = 0; f + 1 < first.size(); ++f) {
+      const std::size_t count = first[f + 1] - first[f], turns = std::min<std::size_t>(count, 64);
+      if (count == 0) continue;
+      const std::size_t by = (rng() >> 11) % turns * count / turns;
+      for (std::size_t i = 0; i < count; ++i)
+        turned.row(static_cast<Eigen::Index>(first[f] + i)) =
+            psi.row(static_cast<Eigen::Index>(first[f] + (i + by) % count));
+    }
+    above += (phi.transpose() * turned).squaredNorm() / n2 >= hsic * (1 - 1e-9) ? 1 : 0;
+  }
+  return {hsic, above / (1.0 + draw)};
+}
+
+TEST(Dependence, DrawsInHundredsAreTheDrawsOneByOne) {
+  const auto ragged = [](std::size_t flights) {
+    std::vector<std::size_t> first{0};
+    for (std::size_t f = 0; f < flights; ++f)
+      first.push_back(first.back() + f * 37 % 90);  // 0 windows, and more than 64
+    return first;
+  };
+  // The products of 300 flights are more than are kept: they are made again for each hundred.
+  for (const auto& [flights, rank, shifts, enough] :
+       {std::tuple{std::size_t{12}, 5, 700, 700}, {std::size_t{12}, 5, 700, 9}, {std::size_t{300}, 38, 70, 70}}) {
+    const auto first = ragged(flights);
+    const auto n = static_cast<Eigen::Index>(first.back());
+    std::srand(7);
+    const MatrixXd phi = centred(MatrixXd::Random(n, rank), first), psi = MatrixXd::Random(n, rank);
+    const auto told = turn_test(phi, psi, first, shifts, enough, 5),
+               expected = one_by_one(phi, psi, first, shifts, enough, 5);
+    EXPECT_NEAR(told.hsic, expected.hsic, 1e-12 * expected.hsic) << flights;
+    EXPECT_DOUBLE_EQ(told.p, expected.p) << flights << " " << enough;
+    EXPECT_GT(told.p, 0.01) << "no draw was as large: the seed shows nothing";
+  }
 }
 
 TEST(Dependence, HolmMultipliesByTheTestsThatAreLeft) {

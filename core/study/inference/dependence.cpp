@@ -19,6 +19,7 @@ using Eigen::MatrixXd;
 constexpr auto kMedianOf = static_cast<Index>(kRules.median_of),
                kMostFeatures = static_cast<Index>(kRules.most_features),
                kMostTurns = static_cast<Index>(kRules.most_turns);
+constexpr int kFewestDraws = 32, kMostDraws = 256;  // at a time: their sums fit a processor's cache
 
 double median_distance(const MatrixXd& points) {
   const Index step = 1 + (points.rows() - 1) / kMedianOf;
@@ -30,8 +31,8 @@ double median_distance(const MatrixXd& points) {
   return quantile(std::move(distances), 0.5);
 }
 
-/// ΦᵀΨ of each flight with its Ψ turned round. They are made once where they are few, else when they are asked for: of
-/// ten thousand flights they are gigabytes.
+/// ΦᵀΨ of each flight with its Ψ turned round, a column a turn; turn 0 is as flown. They are made once where they are
+/// few, else when they are asked for: of ten thousand flights they are gigabytes.
 class TurnedProducts {
  public:
   TurnedProducts(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first)
@@ -44,36 +45,38 @@ class TurnedProducts {
       all += flights_.back().turns * phi.cols() * psi.cols();
     }
     if (all > kMostKept) return;
-    for (std::size_t f = 0; f < flights_.size(); ++f) {
-      kept_.emplace_back(phi.cols() * psi.cols(), flights_[f].turns);
-      for (Index j = 0; j < flights_[f].turns; ++j) kept_.back().col(j) = made(f, j).reshaped();
-    }
+    for (const Flight& own : flights_) kept_.push_back(made(own));
   }
   std::size_t flights() const { return flights_.size(); }
   Index turns(std::size_t flight) const { return flights_[flight].turns; }
-  /// Adds a flight's product; turn 0 is as flown.
-  void add(std::size_t flight, Index turn, Eigen::VectorXd& sum) const {
-    if (kept_.empty())
-      sum += made(flight, turn).reshaped();
-    else
-      sum += kept_[flight].col(turn);
+  /// Valid until the next call.
+  const MatrixXd& of(std::size_t flight) {
+    if (!kept_.empty()) return kept_[flight];
+    return asked_ = made(flights_[flight]);
   }
 
  private:
   struct Flight {
     Index begin, count, turns;
   };
-  MatrixXd made(std::size_t flight, Index turn) const {
-    const auto [begin, n, turns] = flights_[flight];
+  MatrixXd made(const Flight& own) const {
+    const auto [begin, n, turns] = own;
     const auto phi = phi_.middleRows(begin, n), psi = psi_.middleRows(begin, n);
-    const Index s = turn * n / turns;
-    return phi.topRows(n - s).transpose() * psi.bottomRows(n - s) + phi.bottomRows(s).transpose() * psi.topRows(s);
+    MatrixXd all(phi.cols() * psi.cols(), turns);
+    for (Index j = 0; j < turns; ++j) {
+      const Index s = j * n / turns;
+      const MatrixXd one =
+          phi.topRows(n - s).transpose() * psi.bottomRows(n - s) + phi.bottomRows(s).transpose() * psi.topRows(s);
+      all.col(j) = one.reshaped();
+    }
+    return all;
   }
   static constexpr Index kMostKept = Index{1} << 24;  // numbers: 128 MiB
 
   const MatrixXd &phi_, &psi_;
   std::vector<Flight> flights_;
   std::vector<MatrixXd> kept_;
+  MatrixXd asked_;
 };
 
 /// Windows that measure every channel of a group, and where each flight begins among them.
@@ -173,18 +176,34 @@ MatrixXd centred(MatrixXd phi, const std::vector<std::size_t>& first) {
 
 Independence turn_test(const MatrixXd& phi, const MatrixXd& psi, const std::vector<std::size_t>& first, int shifts,
                        int enough, unsigned seed) {
-  const TurnedProducts products(phi, psi, first);
+  TurnedProducts products(phi, psi, first);
   const double n2 = std::pow(static_cast<double>(phi.rows()), 2);
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(phi.cols() * psi.cols());
-  for (std::size_t f = 0; f < products.flights(); ++f) products.add(f, 0, sum);
-  const double hsic = sum.squaredNorm() / n2;
   std::mt19937_64 rng(seed);
+  // Draws are summed some hundred at a time, flight by flight: a flight's products are read, or made, once for all of
+  // them.
+  MatrixXd sums;
+  std::vector<Index> turn;
+  const auto sum = [&](Index draws) {
+    sums.setZero(phi.cols() * psi.cols(), draws);
+    for (std::size_t f = 0; f < products.flights(); ++f) {
+      const MatrixXd& own = products.of(f);
+      for (Index d = 0; d < draws; ++d)
+        sums.col(d) += own.col(turn[static_cast<std::size_t>(d) * products.flights() + f]);
+    }
+  };
+  turn.assign(products.flights(), 0);
+  sum(1);
+  const double hsic = sums.squaredNorm() / n2;
   int above = 1, draw = 0;
-  for (; draw < shifts && above <= enough; ++draw) {
-    sum.setZero();
-    for (std::size_t f = 0; f < products.flights(); ++f)
-      products.add(f, static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(products.turns(f))), sum);
-    above += sum.squaredNorm() / n2 >= hsic * (1 - kRules.same) ? 1 : 0;
+  for (int most = kFewestDraws; draw < shifts && above <= enough; most = std::min(2 * most, kMostDraws)) {
+    const int now = std::min(most, shifts - draw);
+    turn.clear();
+    for (int d = 0; d < now; ++d)
+      for (std::size_t f = 0; f < products.flights(); ++f)
+        turn.push_back(static_cast<Index>((rng() >> 11) % static_cast<std::uint64_t>(products.turns(f))));
+    sum(now);
+    for (int d = 0; d < now && above <= enough; ++d, ++draw)
+      above += sums.col(d).squaredNorm() / n2 >= hsic * (1 - kRules.same) ? 1 : 0;
   }
   return {hsic, above / (1.0 + draw)};
 }

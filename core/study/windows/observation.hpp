@@ -172,6 +172,8 @@ class Observer {
   Observer(const Vehicle& vehicle, MapView& surroundings);
   Observer(const Observer&) = delete;
   void add(const log::FlightLog& log);
+  /// Room for so many windows more: without it the vectors grow by doubling, and hold twice what is seen.
+  void expect(std::size_t windows);
   /// Flights that another Observer of the same vehicle, model and map looked at, behind these.
   void add(Observed flights);
   /// Of the flights so far; none are left here.

@@ -189,6 +189,12 @@ Observed Observer::take() {
   return taken;
 }
 
+void Observer::expect(std::size_t windows) {
+  const std::size_t all = all_.seen.windows.size() + windows;
+  all_.seen.windows.reserve(all);
+  for (std::size_t c = 0; c < kChannels; ++c) all_.seen.y[c].reserve(all), all_.seen.weight[c].reserve(all);
+}
+
 void Observer::add(Observed flights) {
   Observations &seen = all_.seen, &more = flights.seen;
   const std::size_t windows = seen.windows.size();

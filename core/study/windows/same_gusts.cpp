@@ -9,38 +9,43 @@
 namespace backwash::study {
 namespace {
 
-using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
+/// Sums of one axis over the windows that two flights share, of values less their flight's own mean: what is squared is
+/// no larger than what it is to tell.
+struct Shared {
+  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+};
 
-/// Windows of two flights at the same time since take-off.
-void pair_windows(const Gusts& a, const Gusts& b, Pairs& pairs) {
-  pairs.clear();
+/// Correlation of two flights' ln variances over their windows at the same time since take-off, each axis about its own
+/// mean; 0 where too few can be compared.
+double likeness(const Gusts& a, const Gusts& b) {
+  std::array<Shared, 3> axes{};
   for (std::size_t i = 0, j = 0; i < a.t.size(); ++i) {
     while (j < b.t.size() && b.t[j] < a.t[i] - a.near[i]) ++j;
-    if (j == b.t.size()) return;
-    if (b.t[j] <= a.t[i] + a.near[i]) pairs.emplace_back(i, j);
+    if (j == b.t.size()) break;
+    if (b.t[j] > a.t[i] + a.near[i]) continue;
+    for (std::size_t c = 0; c < axes.size(); ++c) {
+      if (!(a.weight[c][i] > 0 && b.weight[c][j] > 0)) continue;
+      const double x = a.y[c][i], y = b.y[c][j];
+      Shared& s = axes[c];
+      s.n += 1, s.x += x, s.y += y, s.xx += x * x, s.yy += y * y, s.xy += x * y;
+    }
   }
+  double n = 0, xx = 0, yy = 0, xy = 0;
+  for (const Shared& s : axes) {
+    if (s.n == 0) continue;
+    n += s.n, xx += s.xx - s.x * s.x / s.n, yy += s.yy - s.y * s.y / s.n, xy += s.xy - s.x * s.y / s.n;
+  }
+  return n >= kWindowRules.same_windows && xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0;
 }
 
-/// Correlation of two flights' ln variances, each axis about its own mean; 0 where too few can be compared.
-double likeness(const Gusts& a, const Gusts& b, const Pairs& pairs) {
-  double xx = 0, yy = 0, xy = 0;
-  std::size_t count = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    double mean_x = 0, mean_y = 0;
-    std::size_t own = 0;
-    const auto measured = [&](auto& at) { return a.weight[c][at.first] > 0 && b.weight[c][at.second] > 0; };
-    for (const auto& at : pairs)
-      if (measured(at)) mean_x += a.y[c][at.first], mean_y += b.y[c][at.second], ++own;
-    const double n = static_cast<double>(own);
-    for (const auto& at : pairs) {
-      if (!measured(at)) continue;
-      const double x = a.y[c][at.first], y = b.y[c][at.second];
-      xx += std::pow(x - mean_x / n, 2), yy += std::pow(y - mean_y / n, 2);
-      xy += (x - mean_x / n) * (y - mean_y / n);
-    }
-    count += own;
+/// Less the mean of what was measured, per axis.
+void centre(Gusts& gusts) {
+  for (std::size_t c = 0; c < gusts.y.size(); ++c) {
+    double sum = 0, n = 0;
+    for (std::size_t i = 0; i < gusts.t.size(); ++i)
+      if (gusts.weight[c][i] > 0) sum += gusts.y[c][i], n += 1;
+    for (double& y : gusts.y[c]) y -= n > 0 ? sum / n : 0;
   }
-  return static_cast<double>(count) >= kWindowRules.same_windows && xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0;
 }
 
 }  // namespace
@@ -55,15 +60,13 @@ Gusts gusts_of(const Observations& seen, std::size_t flight) {
   return gusts;
 }
 
-std::vector<std::size_t> same_gusts(const std::vector<Gusts>& flights) {
+std::vector<std::size_t> same_gusts(std::vector<Gusts> flights) {
+  for (Gusts& own : flights) centre(own);
   std::vector<std::size_t> same(flights.size());
-  Pairs pairs;
   for (std::size_t f = 0; f < same.size(); ++f) {
     same[f] = f;
     for (std::size_t g = 0; g < f && same[f] == f; ++g) {
-      if (same[g] != g) continue;
-      pair_windows(flights[f], flights[g], pairs);
-      if (likeness(flights[f], flights[g], pairs) >= kWindowRules.same_gusts) same[f] = g;
+      if (same[g] == g && likeness(flights[f], flights[g]) >= kWindowRules.same_gusts) same[f] = g;
     }
   }
   return same;
@@ -72,7 +75,7 @@ std::vector<std::size_t> same_gusts(const std::vector<Gusts>& flights) {
 std::vector<std::size_t> same_gusts(const Observations& seen) {
   std::vector<Gusts> flights;
   for (std::size_t f = 0; f < seen.flights; ++f) flights.push_back(gusts_of(seen, f));
-  return same_gusts(flights);
+  return same_gusts(std::move(flights));
 }
 
 }  // namespace backwash::study
