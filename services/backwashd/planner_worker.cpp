@@ -174,9 +174,10 @@ bool PlannerWorker::brake_later() {
   }
   Flying whole = *flying_;
   verify(whole, *world_, view_.index);
-  flying_->held = whole.segment.clearance > 0;
-  if (flying_->held) spdlog::info("no rest before its end is clear: the flight comes to rest there");
-  return flying_->held;
+  const bool clear = whole.segment.clearance > 0;
+  flying_->held = flying_->held || clear;  // told once: a second order that cannot be followed does not take it back
+  if (clear) spdlog::info("no rest before its end is clear: the flight comes to rest there");
+  return clear;
 }
 
 /// Offers the commands with a tube from the newest state until the control thread accepts: by then the vehicle may
