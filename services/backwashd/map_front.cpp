@@ -36,6 +36,7 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
   waitset_.add(maps_);
   waitset_.add(parts_);
   waitset_.add(scans_);
+  if (!config.dds.security.empty()) silent_.emplace();
 }
 
 void MapFront::take_poses() {
@@ -74,6 +75,7 @@ void MapFront::take_maps() {
   if (const auto good = channels_.map_writer.read_new(); good && good->term == term_ && map_writer_.bind(good->writer))
     spdlog::info("maps are taken from writer {}", dds::text(good->writer));
   maps_.take([&](const dds::Octomap& m, const dds::Guid& writer) {
+    if (silent_) silent_->heard(writer);
     if (!map_writer_.hears(writer))
       return refusals_.add(channels_.maps_rejected, [&] { return map_writer_.refusal(writer); });
     const std::string frame = m.header.frame_id ? m.header.frame_id : "";
@@ -136,6 +138,13 @@ void MapFront::let_writers_go() {
   maps_.renew(waitset_);
 }
 
+void MapFront::watch_what_does_not_come() {
+  auto lines = partial_.look(dds::partial_samples(), now_ns());
+  if (silent_)
+    for (std::string& line : silent_->look(maps_.known(), now_ns())) lines.push_back(std::move(line));
+  for (const std::string& line : lines) refusals_.add(late_, [&] { return line; });
+}
+
 /// Where somebody looks.
 void MapFront::show_disturbance() {
   constexpr double kFarthest = 1e6;  // m: indices of voxels beyond it are no numbers
@@ -153,7 +162,7 @@ void MapFront::run_readers() {
     take_maps();
     take_parts();
     let_writers_go();
-    if (const auto line = partial_.look(dds::partial_sample(), now_ns())) refusals_.add(late_, [&] { return *line; });
+    watch_what_does_not_come();
     show_disturbance();
     if (const auto news = foreign_.take_new(); news.count > 0) {
       channels_.foreign_writers += news.count - 1;
