@@ -11,6 +11,25 @@
 
 namespace backwash::daemon {
 
+namespace {
+
+std::optional<WindowFront> window_front(const config::Daemon& config, const dds::Participant& participant,
+                                        Channels& channels, Recorder& recorder) {
+  if (!config.map.window.declared()) return std::nullopt;
+  return std::optional<WindowFront>(std::in_place, config, participant, channels, recorder);
+}
+
+std::vector<const dds::detail::ReaderBase*> read_of(const dds::Reader<dds::Octomap>& maps,
+                                                    const dds::Reader<dds::MapPart>& parts,
+                                                    const dds::Reader<dds::PointCloud>& scans,
+                                                    const std::optional<WindowFront>& window) {
+  std::vector<const dds::detail::ReaderBase*> all{&maps, &parts, &scans};
+  if (window) window->add_to(all);
+  return all;
+}
+
+}  // namespace
+
 MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
     : channels_(channels),
       recorder_(recorder),
@@ -24,7 +43,8 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
       scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
       parts_(dds::make_reader<dds::MapPart>(participant_, config.dds.name_space)),
-      foreign_(participant_, {&maps_, &parts_, &scans_}),
+      window_(window_front(config, participant_, channels, recorder)),
+      foreign_(participant_, read_of(maps_, parts_, scans_, window_)),
       receipts_(participant_, dds::TopicOf<dds::MapReceipt>::type(),
                 dds::topic(config.dds.name_space, dds::TopicOf<dds::MapReceipt>::kName), config.dds,
                 dds::Delivery::parts),
@@ -37,6 +57,7 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
   waitset_.add(parts_);
   waitset_.add(scans_);
   if (!config.dds.security.empty()) silent_.emplace();
+  if (window_) window_->add_to(waitset_);
 }
 
 void MapFront::take_poses() {
@@ -159,6 +180,7 @@ void MapFront::run_readers() {
     waitset_.wait(0.1);
     take_poses();
     take_scans();
+    if (window_) window_->take(world_ ? &world_->world->grid : nullptr, placement_.newest_W(), refusals_);
     take_maps();
     take_parts();
     let_writers_go();

@@ -16,6 +16,7 @@
 #include "services/backwashd/shown_field.hpp"
 #include "services/backwashd/shown_writer.hpp"
 #include "services/backwashd/silent_writers.hpp"
+#include "services/backwashd/window_front.hpp"
 #include "services/dds/topics.hpp"
 #include "services/dds/writers.hpp"
 
@@ -69,6 +70,7 @@ class MapFront {
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;
   dds::Reader<dds::MapPart> parts_;
+  std::optional<WindowFront> window_;  // where a mapper's is declared
   dds::ForeignWriters foreign_;
   ShownWriter<dds::MapReceipt> receipts_;
   ShownWriter<dds::Tube> tube_;
