@@ -176,6 +176,10 @@ TEST_F(MapWindowTest, WithoutAWholeMapTheWorldIsWhatTheWindowHasSaidAndMovesWith
   vehicle({0.3, 0, 1});
   say(false, 3, [](const Vec3&) { return false; });
   EXPECT_EQ(world(), first) << "the window is within that world";
+  const Vec3 found(0.5, 0.1, 1.1);
+  channels_->scans.push(new Scan{{found}, {-0.3, 0.1, 1.1}, 3});
+  step();
+  ASSERT_EQ(at(found), Cell::occupied);
   vehicle({0.9, 0, 1});
   say(false, 4, corridor_wall);
   say(true, 4, air);
@@ -184,6 +188,7 @@ TEST_F(MapWindowTest, WithoutAWholeMapTheWorldIsWhatTheWindowHasSaidAndMovesWith
   EXPECT_EQ(at({1.7, 0.1, 1}), Cell::free);
   EXPECT_EQ(at({1.7, 0.9, 1}), Cell::occupied);
   EXPECT_EQ(at({-0.1, 0.1, 1}), Cell::free) << "taken along";
+  EXPECT_EQ(at(found), Cell::occupied) << "what a scan has found, too";
   EXPECT_EQ(at({0.1, 0.9, 1}), Cell::occupied);
   expect_as_built();
   EXPECT_EQ(channels_->map_ns.load(), 4);

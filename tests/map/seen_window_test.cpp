@@ -67,8 +67,8 @@ TEST(SeenWindow, AgreesWithATableOfVoxelsWhateverIsSaid) {
   for (std::int64_t stamp = 0; stamp < 400; ++stamp) {
     std::vector<Index3> voxels;
     for (int n = 0; n < 40; ++n)
-      voxels.emplace_back(static_cast<int>(random() % 60) - 30, static_cast<int>(random() % 40) - 20,
-                          static_cast<int>(random() % 20) - 10);
+      voxels.emplace_back(static_cast<int>(random() % 12) - 6, static_cast<int>(random() % 8) - 4,
+                          static_cast<int>(random() % 4) - 2);
     std::size_t changed = 0;
     const bool occupied = random() % 2;
     const std::int64_t at = stamp - static_cast<std::int64_t>(random() % 3);

@@ -136,8 +136,9 @@ if case == "obstacle":
     assert clear > 0.16, "it touched the cube"
     assert any(t.mode == "tracking" and t.t > hold.t for t in ticks), "it did not go on"
 elif case in ("alone", "pieces"):
-    worlds = re.findall(r"world of the window made around the vehicle: (\d+) x (\d+) x (\d+) voxels", said)
-    print(f"{len(worlds)} worlds of {' x '.join(worlds[0])} voxels, one after the other")
+    made = re.findall(r"world of the window made around the vehicle: (\d+) x (\d+) x (\d+) voxels in (\d+) ms", said)
+    worlds = [m[:3] for m in made]
+    print(f"{len(worlds)} worlds of {' x '.join(worlds[0])} voxels, one after the other, in {', '.join(m[3] for m in made)} ms")
     assert len(worlds) >= 3 and set(worlds) == {("60", "60", "60")}, worlds
     assert status["maps_accepted"] == (case == "pieces"), status
     if case == "pieces":
