@@ -8,6 +8,7 @@
 #include "core/config/config.hpp"
 #include "core/config/key_file.hpp"
 #include "core/config/link_device.hpp"
+#include "core/config/map_window.hpp"
 #include "core/config/odometry_profile.hpp"
 #include "core/types/odometry_timing.hpp"
 #include "core/types/state.hpp"
@@ -45,7 +46,8 @@ struct Daemon {
     bool live = false;           ///< a mapper is declared: a late map is a fault (docs/faults.md row 13)
     double closing_speed = 0.2;  ///< by which the age of a live map shrinks the trusted clearance, m/s
     double sensor_range = 8;     ///< points farther away only free the way up to there, m
-    double max_mib = 512;        ///< largest snapshot made of a map, MiB
+    double max_mib = kMaxMib;    ///< largest snapshot made of a map, MiB
+    MapWindow window;            ///< of a mapper that says what is around the vehicle
   } map;
   struct {
     std::string device;   ///< as written: for messages

@@ -4,12 +4,14 @@
 #include <tuple>
 
 #include "core/config/daemon_config.hpp"
+#include "core/config/ros_name.hpp"
 #include "core/config/strict_table.hpp"
 
 namespace backwash::config {
 namespace {
 
 constexpr std::string_view kLive = "map.live";
+constexpr std::string_view kWindow[] = {"map.window.occupied", "map.window.free"};
 constexpr std::string_view kProtocol = "link.protocol";
 constexpr std::string_view kShare = "link.share";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
@@ -20,33 +22,9 @@ constexpr std::string_view kRateLeast = "odometry.rate_least";
 constexpr std::string_view kAdaptation[] = {"adaptation.enabled", "adaptation.file"};
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
-bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
-bool digit(char c) { return c >= '0' && c <= '9'; }
-
-/// ROS 2's rules for names: tokens of letters, digits and underscores, none that begins with a digit or holds two
-/// underscores in a row, between single slashes.
-bool ros_name(std::string_view name, std::size_t longest) {
-  if (name.empty() || name.size() > longest || name.find("__") != name.npos) return false;
-  for (std::size_t at = 0; at <= name.size();) {
-    const std::string_view token = name.substr(at, name.find('/', at) - at);
-    if (token.empty() || digit(token[0])) return false;
-    if (!std::ranges::all_of(token, [](char c) { return letter(c) || digit(c); })) return false;
-    at += token.size() + 1;
-  }
-  return true;
-}
-
-/// As Linux allows (15 characters), and nothing that means something in the middleware's XML.
-bool interface_name(std::string_view name) {
-  constexpr std::string_view kMarks = ".:-@";
-  return name.size() <= 15 &&
-         std::ranges::all_of(name, [&](char c) { return letter(c) || digit(c) || kMarks.find(c) != kMarks.npos; });
-}
-
 /// What is wrong with the names that go to the middleware, if anything.
 tl::expected<void, ConfigError> check_names(const StrictTable& file, const Daemon& d) {
-  // 255 is what DDS takes for a topic; rt/NAMESPACE/loop_closure has to fit.
-  constexpr std::size_t kTopic = 255, kNamespace = kTopic - 16;
+  constexpr std::size_t kTopic = kLongestTopic, kNamespace = kTopic - 16;  // rt/NAMESPACE/loop_closure has to fit
   const std::string rule =
       " characters: tokens of letters, digits and single '_' that begin with no digit, between '/'";
   if (!interface_name(d.dds.interface))
@@ -194,6 +172,17 @@ tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {
   return read_protocol(file, d);
 }
 
+/// A window is declared by its table.
+tl::expected<void, ConfigError> read_window(const StrictTable& file, Daemon& d) {
+  if (!file.has("map.window")) return {};
+  const TextKey occupied[] = {{kWindow[0], &d.map.window.occupied}}, free[] = {{kWindow[1], &d.map.window.free}};
+  if (auto read = read_texts(file, occupied, true); !read) return read;
+  if (auto read = read_texts(file, free, false); !read) return read;
+  if (const auto wrong = wrong_window(d.map.window, d.map.max_mib))
+    return tl::unexpected(file.error(wrong->first, wrong->second));
+  return {};
+}
+
 tl::expected<void, ConfigError> read_flags(const StrictTable& file, Daemon& d) {
   const std::pair<std::string_view, bool*> flags[] = {{kLive, &d.map.live}, {kAdaptation[0], &d.adaptation.enabled}};
   for (const auto& [key, target] : flags) {
@@ -213,7 +202,7 @@ struct Converted {
 /// Every number of the file; no keys but theirs and `others`.
 tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<const std::string_view> others,
                                              Daemon& d, Converted& c) {
-  constexpr auto kOptional = NumberKey::Presence::optional;
+  constexpr auto kOptional = NumberKey::Presence::optional, kWithTable = NumberKey::Presence::with_parent;
   const NumberKey numbers[] = {
       {"dds.domain", &c.domain, {0, 230}},
       {"link.baud", &c.baud, {9600, 4'000'000}},
@@ -223,6 +212,11 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {"map.closing_speed", &d.map.closing_speed, {0, 5}, kOptional},
       {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, kOptional},
       {"map.max_mib", &d.map.max_mib, {1, 65536}, kOptional},
+      {"map.window.size_x", &d.map.window.size.x(), {1, 200}, kWithTable},
+      {"map.window.size_y", &d.map.window.size.y(), {1, 200}, kWithTable},
+      {"map.window.size_z", &d.map.window.size.z(), {1, 200}, kWithTable},
+      {"map.window.resolution", &d.map.window.resolution, {0.02, 0.2}, kWithTable},
+      {"map.window.keep_voxels", &d.map.window.keep_voxels, {4096, 1e10}, kOptional},
       {"log.max_mib", &d.log.max_mib, {1, 4096}, kOptional},
       {"odometry.sensor_x", &d.odometry.sensor_B.x(), {-5, 5}, kOptional},
       {"odometry.sensor_y", &d.odometry.sensor_B.y(), {-5, 5}, kOptional},
@@ -281,6 +275,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   std::vector<std::string_view> others{kLive, kAdaptation[0], kAdaptation[1], kProtocol, kSigningKeyFile};
   others.insert(others.end(), std::begin(kOdometry), std::end(kOdometry));
   others.insert(others.end(), std::begin(kGpio), std::end(kGpio));
+  others.insert(others.end(), std::begin(kWindow), std::end(kWindow));
   for (const auto& [key, target] : texts) others.push_back(key);
   for (const auto& [key, target] : optional) others.push_back(key);
   if (auto read = read_numbers(*file, others, d, converted); !read) return tl::unexpected(read.error());
@@ -291,6 +286,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (auto good = read_link(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_frames(*file, tf, d); !good) return tl::unexpected(good.error());
+  if (auto read = read_window(*file, d); !read) return tl::unexpected(read.error());
   if (auto read = read_flags(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = convert(*file, converted, d); !good) return tl::unexpected(good.error());
   return d;

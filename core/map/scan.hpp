@@ -27,6 +27,11 @@ class LiveMap {
   explicit LiveMap(OccupancyGrid grid);
 
   const OccupancyGrid& grid() const noexcept { return grid_; }
+  /// Another than a scan says what a voxel holds. Precondition: it is inside the grid.
+  void set(const Index3& v, Cell c) noexcept {
+    grid_.set(v, c);
+    misses_[grid_.linear(v)] = 0;
+  }
   /// Casts a ray from the sensor to each point (m in W); the last voxel of a ray is not passed. Points farther than
   /// `max_range` (m) only free the way up to there. Precondition: the sensor is inside the grid and max_range < 1 km.
   /// O(points · range/a).

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <random>
 #include <utility>
 #include <vector>
 
 #include "core/config/file_hash.hpp"
+#include "core/config/map_window.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap_message.hpp"
 #include "services/backwashctl/verbs.hpp"
@@ -136,9 +138,25 @@ std::string given_up(const dds::MapSending& sending, std::size_t bytes, double t
   return std::string(line, static_cast<std::size_t>(std::max(size, 0))) + advice;
 }
 
+std::optional<std::string> needs_more(const map::OccupancyGrid& grid) {
+  constexpr double kMib = 1 << 20;
+  const double needed =
+      std::ceil(static_cast<double>(grid.cell_count()) * static_cast<double>(config::kWorldBytesPerVoxel) / kMib);
+  if (needed <= config::kMaxMib) return std::nullopt;
+  char line[320];
+  std::snprintf(
+      line, sizeof line,
+      "a map of %d x %d x %d voxels: the daemon takes it with map.max_mib = %.0f or more (%.0f where it is not "
+      "set), or by parts with a [map.window]; otherwise it refuses it once all is there",
+      grid.size().x(), grid.size().y(), grid.size().z(), needed, config::kMaxMib);
+  return line;
+}
+
 Outcome send_map(const Options& options, const MapOptions& map, bool quiet) {
   Outcome outcome{"map", false, std::nullopt, ""};
-  Transfer transfer(options, map, load(map.file));
+  const map::OccupancyGrid grid = load(map.file);
+  if (const auto line = needs_more(grid)) std::fprintf(stderr, "backwashctl map: %s\n", line->c_str());
+  Transfer transfer(options, map, grid);
   if (transfer.bytes() == 0) throw StartError(kBadData, map.file + ": nothing is known in it");
   if (!transfer.heard(options.timeout_s)) {
     outcome.why = interrupted() ? "interrupted" : "no daemon listens to parts of maps; is backwashd running?";

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/map/occupancy_grid.hpp"
 #include "services/backwashctl/answer.hpp"
 #include "services/backwashctl/station.hpp"
 #include "services/dds/map_sending.hpp"
@@ -22,6 +23,9 @@ struct MapOptions {
 /// What a transfer that was given up has come to, and what to set: one line, for people.
 /// `silent_s`: since a part was last acknowledged.
 std::string given_up(const dds::MapSending& sending, std::size_t bytes, double took_s, double silent_s);
+
+/// What the daemon needs for a map beyond its default memory: one line; nothing: the default is enough.
+std::optional<std::string> needs_more(const map::OccupancyGrid& grid);
 
 /// Sends a map in parts (docs/interfaces.md, "Maps in parts") and waits until the daemon has it in use. Accepted: it
 /// has; done: the same. Throws StartError 66 for a file that is missing and 65 for one that is no map.

@@ -24,6 +24,7 @@
 #include "firmware_bridge/autopilot_link.hpp"
 #include "firmware_bridge/gpio/stop_switch.hpp"
 #include "firmware_bridge/parameters.hpp"
+#include "services/backwashd/map_news.hpp"
 #include "services/backwashd/timing.hpp"
 
 /// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is
@@ -37,42 +38,6 @@ inline std::int64_t now_ns() noexcept {
 }
 
 using track::OdometrySample;
-
-/// Who wrote a sample on the network: the DDS GUID of its writer. No two writers that live at one time share one.
-using WriterId = std::array<std::uint8_t, 16>;
-
-/// Whose map it is. In one term maps are taken of one writer alone: the first whose map was good.
-struct MapWriter {
-  std::uint32_t term = 0;
-  WriterId writer{};
-};
-
-/// One octomap_msgs/Octomap as received.
-struct MapMessage {
-  std::vector<std::int8_t> data;
-  double resolution = 0;
-  bool binary = true;
-  std::string id;
-  std::int64_t received_ns = 0;
-  MapWriter from{};
-  std::optional<std::uint64_t> transfer{};  ///< that it came in parts by; none: it came whole
-};
-
-/// One range scan in the map.
-struct Scan {
-  std::vector<Vec3> points_W;  ///< m
-  Vec3 sensor_W = Vec3::Zero();
-  std::int64_t received_ns = 0;
-};
-
-/// Cubes of the map's lattice that a scan found occupied and the newest snapshot does not.
-struct NewVoxels {
-  static constexpr std::size_t kMost = 256;
-  std::int64_t received_ns = 0;
-  double edge = 0;  ///< m
-  std::size_t count = 0;
-  std::array<std::array<double, 3>, kMost> centers{};  ///< m
-};
 
 /// The surroundings as they were seen.
 struct Snapshot {
@@ -252,6 +217,7 @@ struct Channels {
   sync::LatestValue<MapVerdict> map_verdict;               // map worker → map reader: of the last that came in parts
   sync::LatestValue<MapWriter> map_writer;                 // map worker → map reader: of the first good map of a term
   sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
+  sync::RecordRing<WindowCloud*, 16> windows;              // map reader → map worker, which frees them
   Worlds worlds;                                           // map worker → each
   sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control
   AtomicTime map_ns;                                       // map worker: reception of the newest data in the snapshot

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashd/cloud.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace backwash::daemon {
 namespace {
@@ -49,7 +52,7 @@ std::optional<Coordinates> find_three(const dds::PointCloud& m, const std::strin
 
 }  // namespace
 
-tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& m) {
+tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& m, std::size_t most_points) {
   const auto wrong = [](const std::string& what) { return tl::unexpected<std::string>("point cloud: " + what); };
   if (m.fields._length > kMaxCloudFields || m.point_step > kMaxPointBytes)
     return wrong(std::to_string(m.fields._length) + " fields in points of " + std::to_string(m.point_step) +
@@ -58,8 +61,7 @@ tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& m) {
   const auto xyz = find_three(m, "");
   if (!xyz) return wrong("fields x, y, z of type float32 or float64 within a point are needed");
   const std::uint64_t count = std::uint64_t{m.width} * m.height;
-  if (count > kMaxCloudPoints)
-    return wrong(std::to_string(count) + " points, at most " + std::to_string(kMaxCloudPoints));
+  if (count > most_points) return wrong(std::to_string(count) + " points, at most " + std::to_string(most_points));
   const std::uint64_t row = std::uint64_t{m.width} * m.point_step;
   if (m.row_step < row || std::uint64_t{m.row_step} * m.height > m.data._length)
     return wrong("its sizes do not agree: " + std::to_string(m.width) + " x " + std::to_string(m.height) +
@@ -78,7 +80,22 @@ tl::expected<Cloud, std::string> decode_cloud(const dds::PointCloud& m) {
     for (std::uint32_t i = 0; i < m.width; ++i, point += m.point_step)
       if (const Vec3 p = xyz->read(point); p.allFinite()) cloud.points.push_back(p);
   }
+  cloud.left_out = count - cloud.points.size();
   return cloud;
+}
+
+std::optional<std::pair<double, double>> range_of(const dds::PointCloud& m, const std::string& field) {
+  const auto found = find(m, field);
+  if (!found || m.width == 0 || m.height == 0) return std::nullopt;
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  std::pair range{kFar, -kFar};
+  for (std::uint32_t j = 0; j < m.height; ++j)
+    for (std::uint32_t i = 0; i < m.width; ++i) {
+      const double value = found->read(m.data._buffer + std::size_t{j} * m.row_step + std::size_t{i} * m.point_step);
+      if (std::isnan(value)) return std::pair{value, value};
+      range = {std::min(range.first, value), std::max(range.second, value)};
+    }
+  return range;
 }
 
 }  // namespace backwash::daemon

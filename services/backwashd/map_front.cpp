@@ -11,6 +11,25 @@
 
 namespace backwash::daemon {
 
+namespace {
+
+std::optional<WindowFront> window_front(const config::Daemon& config, const dds::Participant& participant,
+                                        Channels& channels, Recorder& recorder) {
+  if (!config.map.window.declared()) return std::nullopt;
+  return std::optional<WindowFront>(std::in_place, config, participant, channels, recorder);
+}
+
+std::vector<const dds::detail::ReaderBase*> read_of(const dds::Reader<dds::Octomap>& maps,
+                                                    const dds::Reader<dds::MapPart>& parts,
+                                                    const dds::Reader<dds::PointCloud>& scans,
+                                                    const std::optional<WindowFront>& window) {
+  std::vector<const dds::detail::ReaderBase*> all{&maps, &parts, &scans};
+  if (window) window->add_to(all);
+  return all;
+}
+
+}  // namespace
+
 MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
     : channels_(channels),
       recorder_(recorder),
@@ -24,7 +43,8 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
       scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
       parts_(dds::make_reader<dds::MapPart>(participant_, config.dds.name_space)),
-      foreign_(participant_, {&maps_, &parts_, &scans_}),
+      window_(window_front(config, participant_, channels, recorder)),
+      foreign_(participant_, read_of(maps_, parts_, scans_, window_)),
       receipts_(participant_, dds::TopicOf<dds::MapReceipt>::type(),
                 dds::topic(config.dds.name_space, dds::TopicOf<dds::MapReceipt>::kName), config.dds,
                 dds::Delivery::parts),
@@ -36,6 +56,8 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
   waitset_.add(maps_);
   waitset_.add(parts_);
   waitset_.add(scans_);
+  if (!config.dds.security.empty()) silent_.emplace();
+  if (window_) window_->add_to(waitset_);
 }
 
 void MapFront::take_poses() {
@@ -74,6 +96,7 @@ void MapFront::take_maps() {
   if (const auto good = channels_.map_writer.read_new(); good && good->term == term_ && map_writer_.bind(good->writer))
     spdlog::info("maps are taken from writer {}", dds::text(good->writer));
   maps_.take([&](const dds::Octomap& m, const dds::Guid& writer) {
+    if (silent_) silent_->heard(writer);
     if (!map_writer_.hears(writer))
       return refusals_.add(channels_.maps_rejected, [&] { return map_writer_.refusal(writer); });
     const std::string frame = m.header.frame_id ? m.header.frame_id : "";
@@ -136,6 +159,13 @@ void MapFront::let_writers_go() {
   maps_.renew(waitset_);
 }
 
+void MapFront::watch_what_does_not_come() {
+  auto lines = partial_.look(dds::partial_samples(), now_ns());
+  if (silent_)
+    for (std::string& line : silent_->look(maps_.known(), now_ns())) lines.push_back(std::move(line));
+  for (const std::string& line : lines) refusals_.add(late_, [&] { return line; });
+}
+
 /// Where somebody looks.
 void MapFront::show_disturbance() {
   constexpr double kFarthest = 1e6;  // m: indices of voxels beyond it are no numbers
@@ -150,10 +180,11 @@ void MapFront::run_readers() {
     waitset_.wait(0.1);
     take_poses();
     take_scans();
+    if (window_) window_->take(world_ ? &world_->world->grid : nullptr, placement_.newest_W(), refusals_);
     take_maps();
     take_parts();
     let_writers_go();
-    if (const auto line = partial_.look(dds::partial_sample(), now_ns())) refusals_.add(late_, [&] { return *line; });
+    watch_what_does_not_come();
     show_disturbance();
     if (const auto news = foreign_.take_new(); news.count > 0) {
       channels_.foreign_writers += news.count - 1;

@@ -15,6 +15,8 @@
 #include "services/backwashd/scan_placement.hpp"
 #include "services/backwashd/shown_field.hpp"
 #include "services/backwashd/shown_writer.hpp"
+#include "services/backwashd/silent_writers.hpp"
+#include "services/backwashd/window_front.hpp"
 #include "services/dds/topics.hpp"
 #include "services/dds/writers.hpp"
 
@@ -47,6 +49,7 @@ class MapFront {
   void tell_lost(const std::optional<std::string>& line);
   void take_scans();
   void let_writers_go();
+  void watch_what_does_not_come();
   void show_disturbance();
 
   Channels& channels_;
@@ -57,6 +60,7 @@ class MapFront {
   Refusals refusals_;
   MapParts assembly_;
   PartialWatch partial_;
+  std::optional<SilentWriters> silent_;  // where fragments may be encrypted
   std::atomic<std::uint64_t> maps_lost_{0}, late_{0};
   BoundWriter map_writer_{"a map"}, scan_writer_{"a scan"};
   std::uint32_t term_ = 0;           // rises when a map's writer is let go of
@@ -66,6 +70,7 @@ class MapFront {
   dds::Reader<dds::Octomap> maps_;
   dds::Reader<dds::PointCloud> scans_;
   dds::Reader<dds::MapPart> parts_;
+  std::optional<WindowFront> window_;  // where a mapper's is declared
   dds::ForeignWriters foreign_;
   ShownWriter<dds::MapReceipt> receipts_;
   ShownWriter<dds::Tube> tube_;

@@ -87,15 +87,18 @@ tl::expected<MapParts::Taken, std::string> MapParts::take(const dds::MapPart& pa
   if (!is_of_this(part)) return tl::make_unexpected("a part that differs from the others of " + what());
   if (part.sent >= newest_) newest_ns_ = now_ns;
   newest_ = std::max<std::uint64_t>(newest_, part.sent);
-  heard_ns_ = now_ns;
   owes_ = true;
-  if (state_ != backwash_msgs_msg_dds__MAPRECEIPT_ARRIVING) return Taken::here;
+  if (state_ != backwash_msgs_msg_dds__MAPRECEIPT_ARRIVING) {
+    heard_ns_ = now_ns;  // it asks what became of its map, and is told soon
+    return Taken::here;
+  }
   if (here_.empty()) {  // of the first part, and of one after the rest was let go
     data_.resize(size_);
     here_.resize(dds::parts_of(size_));
   }
-  said_ = false;
   if (here_[part.number]) return Taken::here;
+  said_ = false;
+  heard_ns_ = now_ns;
   here_[part.number] = true;
   std::copy_n(reinterpret_cast<const std::int8_t*>(part.data._buffer), part.data._length,
               data_.begin() + static_cast<std::ptrdiff_t>(part.number * dds::kPartBytes));

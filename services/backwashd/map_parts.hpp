@@ -17,10 +17,11 @@ namespace backwash::daemon {
 /// is here. It holds no more than the map's own size and a bit for each part. Pure: it has no clock of its own.
 class MapParts {
  public:
-  static constexpr std::int64_t kReceipt_ns = 100'000'000;    ///< between two receipts
-  static constexpr std::int64_t kSilent_ns = 10'000'000'000;  ///< without a part: the operator is told
-  static constexpr std::int64_t kYield_ns = 2'000'000'000;    ///< without a part: the map of another writer may begin
-  static constexpr std::int64_t kForget_ns = 60'000'000'000;  ///< without a part: what came of the map is let go
+  static constexpr std::int64_t kReceipt_ns = 100'000'000;  ///< between two receipts
+  // A part that is here already is none of these: who repeats it holds no place by it.
+  static constexpr std::int64_t kSilent_ns = 10'000'000'000;  ///< without a new part: the operator is told
+  static constexpr std::int64_t kYield_ns = 2'000'000'000;    ///< without a new part: the map of another may begin
+  static constexpr std::int64_t kForget_ns = 60'000'000'000;  ///< without a new part: what came of the map is let go
 
   static constexpr std::int64_t kOneIn_ns = 1'000'000'000;  ///< between two maps of one writer: each takes memory
 

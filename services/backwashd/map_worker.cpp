@@ -17,16 +17,14 @@
 #include "core/config/file_hash.hpp"
 #include "core/map/octomap_message.hpp"
 #include "core/reach/integrator.hpp"
-#include "services/backwashd/scan_placement.hpp"
+#include "services/backwashd/map_change.hpp"
 #include "services/dds/dds.hpp"
 #include "services/parallel/parallel.hpp"
 
 namespace backwash::daemon {
 namespace {
 
-// Of a snapshot and of the live grid behind it, at most: grid 1, misses and marks 2, distance 4, Σ 24, bounds 4 + 64,
-// hover map 16.
-constexpr std::size_t kBytesPerVoxel = 115;
+using config::kWorldBytesPerVoxel;
 // Resolutions for which the field is known to hold (tests/field/resolution_and_yaw_test.cpp), m.
 constexpr int kBelowTheRest = 10;  // niceness
 constexpr double kMadeFirst = 5;   // m level from the vehicle to the sides of what is made first
@@ -48,24 +46,14 @@ void record(Recorder& recorder, const MapMessage& message, bool accepted) {
   recorder.append(log::RecordKind::map, bytes);
 }
 
-bool same_place(const map::OccupancyGrid& a, const map::OccupancyGrid& b) {
-  return a.size() == b.size() && a.resolution() == b.resolution() &&
-         (a.origin() - b.origin()).cwiseAbs().maxCoeff() < 1e-6 * a.resolution();
-}
-
-/// What differs between two grids of the same place.
-map::ScanChange difference(const map::OccupancyGrid& before, const map::OccupancyGrid& after) {
-  map::ScanChange change;
-  for (std::size_t n = 0; n < after.cell_count(); ++n) {
-    if (before.at(n) == after.at(n)) continue;
-    change.box.add(after.voxel(n));
-    if (after.at(n) == map::Cell::occupied) change.occupied.push_back(after.voxel(n));
-  }
-  return change;
-}
-
 /// The daemon ends while a world is in the making.
 struct Ended {};
+
+/// A map that has no room, and what would make it.
+std::string too_large(const MapSettings& settings) {
+  return std::string("too large: its snapshot would need more than ") +
+         std::to_string(static_cast<long>(settings.max_mib)) + " MiB (map.max_mib)";
+}
 
 /// run_parallel, given up with Ended as soon as the daemon ends: a world may take minutes.
 Parallel until_the_end(const std::atomic<bool>& stop) {
@@ -75,14 +63,6 @@ Parallel until_the_end(const std::atomic<bool>& stop) {
       work(begin, end);
     });
   };
-}
-
-/// As if a scan had found the newly occupied voxels of a whole map.
-NewVoxels as_new_voxels(const map::OccupancyGrid& before, const map::ScanChange& change, std::int64_t received_ns) {
-  Scan scan;
-  scan.received_ns = received_ns;
-  for (const Index3& v : change.occupied) scan.points_W.push_back(before.center(v));
-  return new_voxels(before, scan, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace
@@ -95,10 +75,13 @@ MapWorker::MapWorker(Channels& channels, Recorder& recorder, const Model& model,
       vehicle_(vehicle),
       settings_(settings),
       parallel_(until_the_end(channels.stop)),
-      air_(air) {}
+      air_(air) {
+  if (settings_.window.declared()) window_.emplace(settings_);
+}
 
 MapWorker::~MapWorker() {
   while (const auto scan = channels_.scans.pop()) delete *scan;
+  while (const auto cloud = channels_.windows.pop()) delete *cloud;
 }
 
 void MapWorker::tell(const MapMessage& message, const std::string& why) {
@@ -122,39 +105,54 @@ void MapWorker::publish(std::shared_ptr<const plan::World> world, std::int64_t r
   recorder_.append(log::RecordKind::world, "snapshot " + std::to_string(age) + " ms after its newest data");
 }
 
+/// Why a map is refused; empty: it is not.
+std::string MapWorker::wrong(const MapMessage& message,
+                             const tl::expected<map::OccupancyGrid, map::MapError>& grid) const {
+  if (!grid && grid.error().kind == map::MapError::Kind::too_large) return too_large(settings_);
+  if (!grid) return grid.error().message;
+  const auto is = [&](double wanted) { return std::abs(wanted - message.resolution) <= 1e-9; };
+  const std::string seen = "resolution " + std::to_string(message.resolution) + " m, ";
+  if (!(message.resolution >= kFinest * (1 - 1e-9) && message.resolution <= kCoarsest * (1 + 1e-9)))
+    return seen + "expected 0.02 to 0.2 m";
+  if (window_ && !is(settings_.window.resolution))
+    return seen + "expected " + std::to_string(settings_.window.resolution) + " m (map.window.resolution)";
+  if (world_ && !is(world_->grid.resolution()))
+    return seen + "the map in use has " + std::to_string(world_->grid.resolution()) +
+           " m; restart the daemon to change it";
+  if (std::ranges::find(grid->cells(), map::Cell::free) == grid->cells().end()) return "it has no free voxel";
+  return "";
+}
+
 void MapWorker::take_map(const MapMessage& message) {
-  const auto begun = now_ns();
   // It was sent before the reader knew whose maps are used.
   if (writer_ && writer_->term == message.from.term && writer_->writer != message.from.writer)
     return reject(message, "it is of writer " + dds::text(message.from.writer) + ", that of " +
                                dds::text(writer_->writer) + " is in use");
-  const double cap = settings_.max_mib * (1 << 20);
+  const auto cap = static_cast<std::size_t>(settings_.max_mib * (1 << 20)) / kWorldBytesPerVoxel;
   auto grid = map::decode_octomap(message.data, message.resolution, message.binary, message.id,
-                                  static_cast<std::size_t>(cap / kBytesPerVoxel));
-  std::string wrong;
-  if (!grid && grid.error().kind == map::MapError::Kind::too_large) {
-    wrong = "too large: its snapshot would need more than " + std::to_string(static_cast<long>(settings_.max_mib)) +
-            " MiB (map.max_mib)";
-  } else if (!grid) {
-    wrong = grid.error().message;
-  } else if (!(message.resolution >= kFinest * (1 - 1e-9) && message.resolution <= kCoarsest * (1 + 1e-9))) {
-    wrong = "resolution " + std::to_string(message.resolution) + " m, expected 0.02 to 0.2 m";
-  } else if (world_ && std::abs(world_->grid.resolution() - message.resolution) > 1e-9) {
-    wrong = "resolution " + std::to_string(message.resolution) + " m, the map in use has " +
-            std::to_string(world_->grid.resolution()) + " m; restart the daemon to change it";
-  } else if (std::ranges::find(grid->cells(), map::Cell::free) == grid->cells().end()) {
-    wrong = "it has no free voxel";
-  }
-  record(recorder_, message, wrong.empty());
-  if (!wrong.empty()) return reject(message, wrong);
+                                  window_ ? window_->most_voxels() : cap);
+  const std::string why = wrong(message, grid);
+  record(recorder_, message, why.empty());
+  if (!why.empty()) return reject(message, why);
   if (!message.transfer) {  // a mapper stays; who sends a map in parts is done with it
     writer_ = message.from;
     channels_.map_writer.write(*writer_);
   }
+  use(message, std::move(*grid));
+  ++channels_.maps_accepted;
+  tell(message, "");  // not before: its sender goes on as soon as it is in use
+}
 
-  const Index3 size = grid->size();
-  const bool update = world_ && same_place(world_->grid, *grid);
-  if (update) {
+void MapWorker::use(const MapMessage& message, map::OccupancyGrid whole) {
+  const auto begun = now_ns();
+  const Index3 size = whole.size();
+  auto grid = window_ ? window_->whole(std::move(whole)) : std::optional(std::move(whole));
+  const bool update = grid && world_ && same_place(world_->grid, *grid);
+  if (!grid) {
+    await_vehicle();
+    if (!move_world(nullptr, message.received_ns))
+      spdlog::info("map kept: its world is made around the vehicle, once there is odometry");
+  } else if (update) {
     const auto change = difference(world_->grid, *grid);
     if (!change.occupied.empty()) channels_.map_voxels.push(as_new_voxels(world_->grid, change, message.received_ns));
     live_.emplace(*grid);
@@ -162,15 +160,16 @@ void MapWorker::take_map(const MapMessage& message) {
   } else {
     live_.emplace(*grid);
     if (!world_) publish_near(*grid, message.received_ns);  // what flies in another world is not cut short
-    auto world = plan::build_world(std::move(*grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_);
-    if (air_) world = plan::with_air(*world, *air_, model_, parallel_);
-    publish(std::move(world), message.received_ns);
+    publish(made(std::move(*grid)), message.received_ns);
     channels_.map_partial = false;
   }
-  ++channels_.maps_accepted;
-  tell(message, "");  // not before: its sender goes on as soon as it is in use
   spdlog::info("map accepted: {} x {} x {} voxels, world {} in {} ms", size.x(), size.y(), size.z(),
                update ? "updated" : "built", (now_ns() - begun) / 1'000'000);
+}
+
+std::shared_ptr<const plan::World> MapWorker::made(map::OccupancyGrid grid) const {
+  auto world = plan::build_world(std::move(grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_);
+  return air_ ? plan::with_air(*world, *air_, model_, parallel_) : world;
 }
 
 // The map and the first pose come in any order, and the whole takes longer than to wait for the other.
@@ -264,6 +263,7 @@ bool MapWorker::step() {
   try {
     if (message) take_map(*message);
     scanned = take_scans();
+    scanned = take_windows() || scanned;
     rougher = take_air();
   } catch (const Ended&) {  // the old world stays
   }
@@ -281,7 +281,7 @@ void run_map_worker(Channels& channels, Recorder& recorder, const Model& model, 
     // From the first world on below everything else in the process, and below the kernel's workers that carry the
     // serial line; inherited by the threads that build worlds. Before it nothing flies, and beside busy processors a
     // thread so low waits for minutes.
-    if (!below && channels.maps_accepted > 0)
+    if (!below && channels.map_ns.load())
       below = setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kBelowTheRest) == 0;
   }
 }

@@ -3,12 +3,14 @@
 
 #include <optional>
 
+#include "core/map/load_map.hpp"
 #include "core/map/scan.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/lookout.hpp"
 #include "services/backwashd/recorder.hpp"
+#include "services/backwashd/window_keeper.hpp"
 
 namespace backwash::daemon {
 
@@ -19,7 +21,8 @@ namespace backwash::daemon {
 /// together, and the world is updated where they changed something. Of a first map that is far larger than what is
 /// around the vehicle, that part is made and handed out first; its place is waited for, up to 2 s. Where the flight has
 /// learnt that its air is rougher the world is made anew with the factors, and handed out like a new map; so it is
-/// after a reset of them.
+/// after a reset of them. Where a mapper's window is declared, the world is made of it and of the last whole map
+/// (WindowKeeper), and updated as by a scan (docs/faults.md row 55).
 class MapWorker {
  public:
   /// A world is made anew once a factor is larger by this share than the one it was made with.
@@ -37,13 +40,19 @@ class MapWorker {
 
  private:
   void take_map(const MapMessage& message);
+  std::string wrong(const MapMessage& message, const tl::expected<map::OccupancyGrid, map::MapError>& grid) const;
+  void use(const MapMessage& message, map::OccupancyGrid grid);
   bool take_scans();
+  bool take_windows();
+  bool move_world(const map::OccupancyGrid* live, std::int64_t seen_ns);
+  void tell_let_go(const WindowKeeper::Changes& changes);
   bool take_air();
   void reject(const MapMessage& message, const std::string& why);
   /// The map reader, of a map that came in parts; `why` it was not accepted, or empty.
   void tell(const MapMessage& message, const std::string& why);
   void await_vehicle();
   void publish_near(const map::OccupancyGrid& grid, std::int64_t received_ns);
+  std::shared_ptr<const plan::World> made(map::OccupancyGrid grid) const;
   void publish(std::shared_ptr<const plan::World> world, std::int64_t received_ns);
 
   Channels& channels_;
@@ -56,7 +65,8 @@ class MapWorker {
   std::uint64_t air_falls_ = 0;
   std::optional<MapWriter> writer_;  // of the maps in use
   std::optional<map::LiveMap> live_;
-  std::optional<Vec3> vehicle_W_;  // where the vehicle was last
+  std::optional<WindowKeeper> window_;  // of a mapper's, where one is declared
+  std::optional<Vec3> vehicle_W_;       // where the vehicle was last
   std::shared_ptr<const plan::World> world_;
 };
 

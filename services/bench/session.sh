@@ -37,14 +37,14 @@ start_bench() {
   die "the bench did not start"
 }
 
-# start_daemon VEHICLE RAW_LOG [ODOMETRY_TOPIC]: returns once it has built its world from the map.
+# start_daemon VEHICLE RAW_LOG [ODOMETRY_TOPIC]: returns once it has built its world from the map, or from a mapper's window.
 start_daemon() {
   local from=$(wc -l <"$log")
   write_configuration "$@"
   "${BACKWASHD:-$bin/backwashd}" --config "$work/backwashd.toml" >>"$log" 2>&1 &
   daemon_pid=$!
   for _ in $(seq 1200); do
-    tail -n +"$((from + 1))" "$log" | grep -q 'map accepted' && return
+    tail -n +"$((from + 1))" "$log" | grep -Eq 'map accepted|world of the window made' && return
     kill -0 "$daemon_pid" 2>/dev/null || die "the daemon stopped"
     sleep 0.1
   done

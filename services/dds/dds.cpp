@@ -176,6 +176,12 @@ std::vector<Guid> ReaderBase::departed() {
   return gone;
 }
 
+std::vector<Guid> ReaderBase::known() const {
+  std::vector<Guid> all;
+  for (const auto& [publication, writer] : writers_) all.push_back(writer);
+  return all;
+}
+
 void ReaderBase::renew(WaitSet& waitset) {
   dds_qos_t* qos = dds_create_qos();
   dds_get_qos(reader_, qos);

@@ -102,6 +102,8 @@ class ReaderBase {
   /// they have one (kLease_s), else for that of their process (10 s). Cheap while none comes or goes. Call from the
   /// thread that takes. Of several whose liveliness ends at once one is told now, the others after the longer lease.
   std::vector<Guid> departed();
+  /// Writers that are matched, as of the last departed(), and those of samples since. Call from the thread that takes.
+  std::vector<Guid> known() const;
   /// Is replaced by one that begins anew, in the wait set too: of a topic of Delivery::state it gets from each writer
   /// what that said last, even if it was taken already. Call from the thread that takes.
   void renew(WaitSet& waitset);

@@ -2,6 +2,7 @@
 #include "services/dds/fragments.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <mutex>
 
@@ -13,10 +14,15 @@ constexpr std::size_t kHead = 20, kSubmessageHead = 4, kPrefixAt = 8, kPrefix = 
 constexpr std::uint8_t kDataFrag = 0x16, kLittleEndian = 1;
 constexpr std::uint32_t kMost = 1u << 16;  // fragments of a sample: 64 MiB in the smallest that the standard allows
 
-struct Kept {
-  std::mutex mutex;
+struct One {
   Partial sample;
   std::bitset<kMost> here;
+  bool whole() const noexcept { return sample.came == sample.count; }  // of none, too
+};
+
+struct Kept {
+  std::mutex mutex;
+  std::array<One, kPartialSamples> all;
 };
 
 Kept& kept() noexcept {
@@ -28,6 +34,23 @@ std::uint32_t number(std::span<const std::uint8_t> bytes, bool little) noexcept 
   std::uint32_t value = 0;
   for (std::size_t n = 0; n < bytes.size(); ++n) value = value << 8 | bytes[little ? bytes.size() - 1 - n : n];
   return value;
+}
+
+/// Where the fragments of this sample are kept: in the place of its writer's last one, of one that is whole, or of the
+/// one that has not gone on for longest. Null: a later sample of its writer is there.
+One* place(Kept& kept, const Partial& sample) noexcept {
+  const auto same = std::ranges::find_if(kept.all, [&](const One& o) { return o.sample.writer == sample.writer; });
+  if (same != kept.all.end() && same->sample.count > 0) {
+    const Partial& known = same->sample;
+    if (known.number == sample.number && known.size == sample.size && known.count == sample.count) return &*same;
+    if (known.number > sample.number) return nullptr;
+    *same = {sample, {}};
+    return &*same;
+  }
+  One& oldest =
+      *std::ranges::min_element(kept.all, {}, [](const One& o) { return o.whole() ? INT64_MIN : o.sample.newest_ns; });
+  oldest = {sample, {}};
+  return &oldest;
 }
 
 /// `body`: of a DATA_FRAG, from the byte behind its head on; at least kFragmentHead.
@@ -48,15 +71,13 @@ void note(std::span<const std::uint8_t> prefix, std::span<const std::uint8_t> bo
   Kept& k = kept();
   const std::unique_lock lock(k.mutex, std::try_to_lock);
   if (!lock) return;
-  if (k.sample.writer != writer || k.sample.number != sample || k.sample.size != size || k.sample.count != count) {
-    k.sample = {writer, sample, size, 0, count, now_ns, now_ns};
-    k.here.reset();
-  }
+  One* const one = place(k, {writer, sample, size, 0, count, now_ns, now_ns});
+  if (!one) return;
   for (std::uint32_t n = first - 1; n < std::min(count, first - 1 + several); ++n) {
-    if (k.here[n]) continue;
-    k.here[n] = true;
-    ++k.sample.came;
-    k.sample.newest_ns = now_ns;
+    if (one->here[n]) continue;
+    one->here[n] = true;
+    ++one->sample.came;
+    one->sample.newest_ns = now_ns;
   }
 }
 
@@ -76,11 +97,13 @@ void note_fragments(std::span<const std::uint8_t> datagram, std::int64_t now_ns)
   }
 }
 
-std::optional<Partial> partial_sample() {
+std::vector<Partial> partial_samples() {
   Kept& k = kept();
   const std::lock_guard lock(k.mutex);
-  if (k.sample.count == 0 || k.sample.came == k.sample.count) return std::nullopt;
-  return k.sample;
+  std::vector<Partial> partial;
+  for (const One& one : k.all)
+    if (!one.whole()) partial.push_back(one.sample);
+  return partial;
 }
 
 }  // namespace backwash::dds

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
+#include <vector>
 
 #include "services/dds/dds.hpp"
 
@@ -21,12 +21,14 @@ struct Partial {
 
 constexpr std::size_t kLargeSample = 1u << 20;  ///< smaller ones are not looked at
 
-/// Notes the fragments of large samples in a datagram of RTPS. The newest such sample of the newest writer is kept;
-/// what is encrypted cannot be seen. Takes nothing for granted in the bytes. Real-time: no allocation, never waits;
-/// beside another caller it may note nothing.
+constexpr std::size_t kPartialSamples = 4;  ///< that are kept at a time, each of another writer
+
+/// Notes the fragments of large samples in a datagram of RTPS. The newest such sample of each of the newest writers is
+/// kept; what is encrypted cannot be seen. Takes nothing for granted in the bytes. Real-time: no allocation, never
+/// waits; beside another caller it may note nothing.
 void note_fragments(std::span<const std::uint8_t> datagram, std::int64_t now_ns) noexcept;
 
-/// The sample that note_fragments() keeps, unless all of it has come.
-std::optional<Partial> partial_sample();
+/// The samples that note_fragments() keeps and of which not all has come.
+std::vector<Partial> partial_samples();
 
 }  // namespace backwash::dds

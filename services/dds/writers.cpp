@@ -39,7 +39,7 @@ bool is_kept(const dds_qos_t* qos) {
 
 }  // namespace
 
-ForeignWriters::ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers)
+ForeignWriters::ForeignWriters(const Participant& participant, const std::vector<const detail::ReaderBase*>& readers)
     : publications_(participant.publications()) {
   for (const auto* reader : readers) {
     dds_qos_t* qos = dds_create_qos();

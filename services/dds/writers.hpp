@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <initializer_list>
 #include <map>
 #include <optional>
 #include <set>
@@ -21,7 +20,7 @@ class ForeignWriters {
     std::size_t count = 0;
     std::string first;  ///< of them: topic, writer, what it offers and what was expected; text of others in it
   };
-  ForeignWriters(const Participant& participant, std::initializer_list<const detail::ReaderBase*> readers);
+  ForeignWriters(const Participant& participant, const std::vector<const detail::ReaderBase*>& readers);
   /// Who came since the last call; after kMost of them no more are counted. Call from one thread.
   News take_new();
 

@@ -45,6 +45,28 @@ TEST(MapParts, OneMapArrivesAtATimeUntilItsSenderIsSilent) {
   EXPECT_FALSE(parts.stalled(MapParts::kYield_ns));
 }
 
+TEST(MapParts, WhoOnlyRepeatsAPartHoldsItsPlaceNoLonger) {
+  Map map(3000), next(3000);
+  next.part.transfer = 8;
+  MapParts parts(1u << 20, "map");
+  ASSERT_TRUE(parts.take(map.of(0, 1), kOne, 0));
+  std::int64_t now = 0;
+  for (; now < MapParts::kYield_ns; now += 10 * kMs) ASSERT_TRUE(parts.take(map.of(0, now), kOne, now));
+  EXPECT_EQ(*parts.take(next.of(0, 1), kOther, now), MapParts::Taken::begins);
+  // The operator is told of it, and what came is let go.
+  MapParts alone(1u << 20, "map");
+  ASSERT_TRUE(alone.take(map.of(0, 1), kOne, 0));
+  std::vector<std::int64_t> told;
+  for (now = 0; now < 65 * kSecond; now += 100 * kMs) {
+    if (now <= MapParts::kForget_ns) {
+      ASSERT_TRUE(alone.take(map.of(0, now), kOne, now));
+    }
+    if (alone.stalled(now)) told.push_back(now / kSecond);
+  }
+  EXPECT_EQ(told, std::vector<std::int64_t>{10});
+  EXPECT_EQ(*alone.take(map.of(1, now), kOne, now), MapParts::Taken::begins);
+}
+
 TEST(MapParts, AWholeMapIsNotDisplacedBeforeItsSenderKnowsWhatBecameOfIt) {
   Map map(1000), next(3000);
   next.part.transfer = 8;

@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 54
+ROWS = 55
 
 
 def known_tests(build: str) -> list[str]:

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <functional>
+
+#include "tests/daemon/map_worker_rig.hpp"
+
+// docs/interfaces.md, "A window that moves": what the map worker makes of it.
+namespace backwash::daemon {
+namespace {
+
+using map::Cell;
+
+MapSettings with_window(std::size_t keep_parts, double max_mib = 512) {
+  MapSettings settings;
+  settings.max_mib = max_mib;
+  settings.window = {
+      "rt/occ", "rt/free", {2, 2, 2}, 0.2, static_cast<double>(keep_parts * map::SeenWindow::kPartVoxels)};
+  return settings;
+}
+
+class MapWindowTest : public MapWorkerTest {
+ protected:
+  void begin(const MapSettings& settings) {
+    settings_ = settings;
+    worker_now_.emplace(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings);
+  }
+  bool step() { return worker_now_->step(); }
+  void whole(const map::OccupancyGrid& grid, std::int64_t at_ns = 1) {
+    channels_->maps.offer(std::make_unique<const MapMessage>(
+        MapMessage{map::encode_octomap(grid), grid.resolution(), true, "OcTree", at_ns}));
+    step();
+  }
+  void vehicle(const Vec3& p) {
+    vehicle_ = p;
+    channels_->vehicle_W.write(p);
+  }
+  /// A cloud of those voxels of the window around the vehicle for which `listed` holds, by their centres.
+  void say(bool free, std::int64_t at_ns, const std::function<bool(const Vec3&)>& listed) {
+    auto cloud = std::make_unique<WindowCloud>();
+    const Index3 size = settings_.window.voxels();
+    cloud->free = free;
+    cloud->window.low = (vehicle_ / 0.2 - size.cast<double>() / 2).array().round().cast<int>();
+    cloud->window.high = cloud->window.low + size - Index3::Ones();
+    cloud->stamp_ns = cloud->received_ns = at_ns;
+    map::for_each_voxel(cloud->window, [&](const Index3& v) {
+      if (listed(0.2 * (v.cast<double>() + Vec3::Constant(0.5)))) cloud->voxels.push_back(v);
+    });
+    ASSERT_TRUE(channels_->windows.push(cloud.release()));
+    step();
+  }
+  Cell at(const Vec3& p) { return world()->grid.at(world()->grid.index(p)); }
+  void expect_as_built() {
+    const auto built = plan::build_world(world()->grid, Model{}, config::load_vehicle("builtin:quad-5in").value());
+    EXPECT_TRUE(std::ranges::equal(built->grid.cells(), world()->grid.cells()));
+    EXPECT_TRUE(std::ranges::equal(built->hover.safe_voxels().cells(), world()->hover.safe_voxels().cells()));
+  }
+  std::size_t bytes() const { return mallinfo2().uordblks + mallinfo2().hblkhd; }
+
+  std::optional<MapWorker> worker_now_;
+  Vec3 vehicle_ = Vec3::Zero();
+};
+
+const Vec3 kSeenAt(0.5, 0.1, 1.1), kWallAt(0.5, 1.1, 1.1);
+
+bool same_voxel(const Vec3& p, const Vec3& q) { return (p - q).cwiseAbs().maxCoeff() < 0.05; }
+
+TEST_F(MapWindowTest, ItsVoxelsChangeTheWorldAsAScanDoesAndAgreeWithAWorldBuiltOfThem) {
+  begin(with_window(100));
+  whole(grid_);
+  vehicle({0, 0.5, 1.1});
+  ASSERT_EQ(at(kSeenAt), Cell::free);
+  ASSERT_EQ(at(kWallAt), Cell::occupied);
+  say(false, 5, [](const Vec3& p) { return same_voxel(p, kSeenAt); });
+  EXPECT_EQ(at(kSeenAt), Cell::occupied);
+  EXPECT_EQ(channels_->map_ns.load(), 5);
+  const auto handed = channels_->map_voxels.pop();
+  ASSERT_TRUE(handed) << "to the control thread, as of another map";
+  EXPECT_EQ(handed->count, 1u);
+  expect_as_built();
+  // Not listed any more is not free; a cloud of free voxels says so.
+  say(false, 6, [](const Vec3&) { return false; });
+  EXPECT_EQ(at(kSeenAt), Cell::occupied);
+  say(true, 7, [](const Vec3& p) { return same_voxel(p, kSeenAt) || same_voxel(p, kWallAt); });
+  EXPECT_EQ(at(kSeenAt), Cell::free);
+  EXPECT_EQ(at(kWallAt), Cell::free);
+  EXPECT_EQ(channels_->map_ns.load(), 6) << "free voxels make no map younger";
+  expect_as_built();
+}
+
+TEST_F(MapWindowTest, WhatItHasLeftStaysAsItWasSaidUntilItIsLetGoAndThenAsTheWholeMapHasIt) {
+  begin(with_window(0));
+  whole(grid_);
+  const Vec3 far(-2.5, 0.1, 1.1), freed(-2.5, 1.1, 1.1);
+  ASSERT_EQ(at(freed), Cell::occupied);
+  vehicle({-2.3, 0.5, 1.1});
+  say(false, 5, [&](const Vec3& p) { return same_voxel(p, far); });
+  say(true, 6, [&](const Vec3& p) { return same_voxel(p, freed); });
+  ASSERT_EQ(at(far), Cell::occupied);
+  ASSERT_EQ(at(freed), Cell::free);
+  // It moves by a metre: the part is still met. Then to the other end.
+  vehicle({-1.3, 0.5, 1.1});
+  say(false, 7, [](const Vec3&) { return false; });
+  EXPECT_EQ(at(far), Cell::occupied);
+  vehicle({2.3, 0.5, 1.1});
+  say(false, 8, [](const Vec3&) { return false; });
+  EXPECT_EQ(at(far), Cell::free) << "the whole map's";
+  EXPECT_EQ(at(freed), Cell::occupied) << "the whole map's";
+  expect_as_built();
+  EXPECT_EQ(channels_->map_voxels.pop()->count, 1u) << "the obstacle, when it was seen";
+  ASSERT_TRUE(channels_->map_voxels.pop()) << "what the whole map calls occupied is new to a flight through it";
+}
+
+TEST_F(MapWindowTest, WhatItHasLeftIsKeptWhileThereIsRoom) {
+  begin(with_window(100));
+  whole(grid_);
+  const Vec3 far(-2.5, 0.1, 1.1);
+  vehicle({-2.3, 0.5, 1.1});
+  say(false, 5, [&](const Vec3& p) { return same_voxel(p, far); });
+  vehicle({2.3, 0.5, 1.1});
+  say(false, 8, [](const Vec3&) { return false; });
+  EXPECT_EQ(at(far), Cell::occupied);
+}
+
+TEST_F(MapWindowTest, WhatAScanHasFoundMeanwhileIsNotLetGoWithThePart) {
+  begin(with_window(0));
+  whole(grid_);
+  const Vec3 far(-2.5, 0.1, 1.1);
+  vehicle({-2.3, 0.5, 1.1});
+  say(true, 5, [&](const Vec3& p) { return same_voxel(p, far); });
+  channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6});
+  step();
+  ASSERT_EQ(at(far), Cell::occupied);
+  vehicle({2.3, 0.5, 1.1});
+  say(false, 8, [](const Vec3&) { return false; });
+  EXPECT_EQ(at(far), Cell::occupied);
+}
+
+TEST_F(MapWindowTest, ANewerWholeMapTakesBackWhatWasCalledFreeAndNoObstacle) {
+  begin(with_window(100));
+  whole(grid_);
+  vehicle({0, 0.5, 1.1});
+  say(false, 5, [](const Vec3& p) { return same_voxel(p, kSeenAt); });
+  say(true, 6, [](const Vec3& p) { return same_voxel(p, kWallAt); });
+  ASSERT_EQ(at(kWallAt), Cell::free);
+  whole(grid_, 9);
+  EXPECT_EQ(at(kWallAt), Cell::occupied);
+  EXPECT_EQ(at(kSeenAt), Cell::occupied);
+  EXPECT_EQ(channels_->map_ns.load(), 9);
+  say(true, 10, [](const Vec3& p) { return same_voxel(p, kWallAt) || same_voxel(p, kSeenAt); });
+  EXPECT_EQ(at(kWallAt), Cell::free) << "and can be said again";
+  expect_as_built();
+}
+
+TEST_F(MapWindowTest, AMapOfAnotherResolutionThanTheWindowsIsRefusedByTheKey) {
+  begin(with_window(100));
+  whole(map::builtin_scene("parallel-walls-2m", 0.1).value());
+  EXPECT_EQ(channels_->maps_rejected, 1u);
+  EXPECT_EQ(world(), nullptr);
+}
+
+TEST_F(MapWindowTest, WithoutAWholeMapTheWorldIsWhatTheWindowHasSaidAndMovesWithTheVehicle) {
+  begin(with_window(100));
+  const auto corridor_wall = [](const Vec3& p) { return std::abs(p.y()) > 0.8; };
+  const auto air = [&](const Vec3& p) { return !corridor_wall(p); };
+  vehicle({0, 0, 1});
+  say(true, 1, air);
+  EXPECT_EQ(world(), nullptr) << "before anything could be occupied";
+  say(false, 2, corridor_wall);
+  ASSERT_NE(world(), nullptr);
+  EXPECT_EQ(world()->grid.size(), Index3(15, 15, 15)) << "1.5 times the window";
+  EXPECT_EQ(at({0, 0, 1}), Cell::free);
+  EXPECT_EQ(at({1.3, 0, 1}), Cell::unknown);
+  const plan::World* first = world();
+  vehicle({0.3, 0, 1});
+  say(false, 3, [](const Vec3&) { return false; });
+  EXPECT_EQ(world(), first) << "the window is within that world";
+  const Vec3 found(0.5, 0.1, 1.1);
+  channels_->scans.push(new Scan{{found}, {-0.3, 0.1, 1.1}, 3});
+  step();
+  ASSERT_EQ(at(found), Cell::occupied);
+  vehicle({0.9, 0, 1});
+  say(false, 4, corridor_wall);
+  say(true, 4, air);
+  ASSERT_NE(world(), first);
+  EXPECT_LT(std::abs(world()->grid.center({7, 7, 7}).x() - 0.9), 0.2);
+  EXPECT_EQ(at({1.7, 0.1, 1}), Cell::free);
+  EXPECT_EQ(at({1.7, 0.9, 1}), Cell::occupied);
+  EXPECT_EQ(at({-0.1, 0.1, 1}), Cell::free) << "taken along";
+  EXPECT_EQ(at(found), Cell::occupied) << "what a scan has found, too";
+  EXPECT_EQ(at({0.1, 0.9, 1}), Cell::occupied);
+  expect_as_built();
+  EXPECT_EQ(channels_->map_ns.load(), 4);
+}
+
+// Its world would need more than map.max_mib; a byte a voxel does not.
+TEST_F(MapWindowTest, AWholeMapWithoutRoomForItsWorldIsFlownInByPartsAndReloaded) {
+  const double world_mib = 15 * 15 * 15 * 115.0 / (1 << 20);
+  const double whole_mib = static_cast<double>(grid_.cell_count()) / (1 << 20);
+  begin(with_window(0, world_mib + whole_mib + 0.01));
+  ASSERT_LT(world_mib + whole_mib + 0.01, 115 * whole_mib);
+  vehicle({-2.3, 0.1, 1.1});
+  whole(grid_);
+  EXPECT_EQ(channels_->maps_accepted, 1u);
+  ASSERT_NE(world(), nullptr);
+  EXPECT_EQ(world()->grid.size(), Index3(15, 15, 15));
+  const auto as_whole = [&] {
+    map::for_each_voxel(map::all_of(world()->grid.size()), [&](const Index3& v) {
+      const Vec3 p = world()->grid.center(v);
+      EXPECT_EQ(world()->grid.at(v), grid_.at(grid_.index(p)));
+    });
+  };
+  as_whole();
+  const Vec3 far(-2.5, 0.1, 1.1);
+  say(false, 5, [&](const Vec3& p) { return same_voxel(p, far); });
+  EXPECT_EQ(at(far), Cell::occupied);
+  for (const double x : {-1.2, 0.0, 1.2, 2.3}) {
+    vehicle({x, 0.1, 1.1});
+    say(false, 6, [](const Vec3&) { return false; });
+  }
+  EXPECT_GT(world()->grid.origin().x(), 0);
+  as_whole();
+  for (const double x : {1.2, 0.0, -1.2, -2.3}) {
+    vehicle({x, 0.1, 1.1});
+    say(false, 7, [](const Vec3&) { return false; });
+  }
+  EXPECT_EQ(at(far), Cell::free) << "let go, and reloaded";
+  as_whole();
+}
+
+TEST_F(MapWindowTest, AWholeMapBeyondEvenThatIsRefused) {
+  begin(with_window(0, 15 * 15 * 15 * 115.0 / (1 << 20) + static_cast<double>(grid_.cell_count()) / (1 << 20) - 0.001));
+  vehicle({0, 0.1, 1.1});
+  whole(grid_);
+  EXPECT_EQ(channels_->maps_rejected, 1u);
+}
+
+TEST_F(MapWindowTest, CloudsWithoutAWorldTakeNoMoreThanTheOnesThatAreKept) {
+  begin(with_window(2));
+  std::size_t most = 0;
+  const std::size_t before = bytes();
+  for (int n = 0; n <= 400; ++n) {
+    vehicle({1.0 * n, 0, 1});
+    say(false, n + 1, [](const Vec3&) { return true; });  // and none of free ones
+    most = std::max(most, bytes() - std::min(before, bytes()));
+  }
+  EXPECT_EQ(world(), nullptr);
+  EXPECT_LT(most, (2 + map::SeenWindow::parts_of(settings_.window.voxels())) * map::SeenWindow::kPartBytes +
+                      512 * static_cast<std::size_t>(settings_.window.voxels().prod()));
+}
+
+// The formula of docs/interfaces.md: the window's worlds and what is kept, however far it flies.
+TEST_F(MapWindowTest, AKilometreOfCorridorTakesNoMoreThanTheStatedBytes) {
+  constexpr std::size_t kKeep = 30;
+  begin(with_window(kKeep));
+  const auto wall = [](const Vec3& p) { return std::abs(p.y()) > 0.8; };
+  const auto world_voxels = static_cast<std::size_t>(settings_.window.world().prod());
+  const auto window_voxels = static_cast<std::size_t>(settings_.window.voxels().prod());
+  const std::size_t stated =
+      (kKeep + map::SeenWindow::parts_of(settings_.window.voxels())) * map::SeenWindow::kPartBytes +
+      2 * config::kWorldBytesPerVoxel * world_voxels + 512 * window_voxels;
+  std::size_t most = 0, worlds = 0, before = 0;
+  const plan::World* last = nullptr;
+  for (int n = 0; n <= 2000; ++n) {  // 0.5 m a step
+    vehicle({0.5 * n, 0, 1});
+    say(false, n + 1, wall);
+    say(true, n + 1, [&](const Vec3& p) { return !wall(p); });
+    ASSERT_EQ(at({0.5 * n, 0, 1}), Cell::free);
+    worlds += world() != std::exchange(last, world());
+    channels_->worlds.collect();
+    if (n == 0) before = bytes();
+    most = std::max(most, bytes());
+  }
+  // What there is after the first step is one world of the two.
+  const std::size_t grown = most - std::min(most, before) + config::kWorldBytesPerVoxel * world_voxels;
+  RecordProperty("bytes_over_stated", std::to_string(static_cast<double>(grown) / static_cast<double>(stated)));
+  EXPECT_LT(grown, stated);
+  EXPECT_GT(worlds, 900u) << "it has moved";
+}
+
+}  // namespace
+}  // namespace backwash::daemon
