@@ -4,6 +4,7 @@
 #include <limits>
 #include <sstream>
 
+#include "core/report/field_box.hpp"
 #include "core/report/figure_parts.hpp"
 #include "core/report/figures.hpp"
 
@@ -11,8 +12,13 @@ namespace backwash::report {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-const char* const kPalette =
-    "set palette defined (0 '#f7fbff', 0.15 '#d6e6f4', 0.35 '#8fc3dd', 0.55 '#f6c667', 0.78 '#e8703a', 1 '#8b1a1a')\n";
+
+std::string palette() {
+  std::ostringstream text;
+  for (const auto& stop : kFieldPalette)
+    text << (text.str().empty() ? "set palette defined (" : ", ") << stop.share << " '" << stop.colour << '\'';
+  return text.str() + ")\n";
+}
 
 /// A regular raster of numbers over two axes of a map; NaN where there is nothing to show.
 struct Raster {
@@ -75,7 +81,7 @@ Figure field_slice_figure(const map::OccupancyGrid& grid, const Slice& slice, co
   }
   const double span_h = blank.size[blank.horizontal], span_v = blank.size[blank.vertical];
   const bool beside = span_v >= span_h;  // tall maps beside each other, wide ones below each other
-  script << kPalette << "set cbrange [0:" << largest << "]\nset size ratio -1\nset tics out nomirror\n"
+  script << palette() << "set cbrange [0:" << largest << "]\nset size ratio -1\nset tics out nomirror\n"
          << "set cblabel 'standard deviation, m/s^2'\nset border 3\nset object 1 rectangle from graph 0,0 to graph 1,1 "
             "behind fillcolor '#b9b9b9' fillstyle solid noborder\n"
          << "set xlabel '" << names[blank.horizontal] << ", m'\nset ylabel '" << names[blank.vertical] << ", m'\n"
@@ -94,36 +100,27 @@ Figure field_slice_figure(const map::OccupancyGrid& grid, const Slice& slice, co
   return draw(script.str(), format, width, height);
 }
 
-Figure flight_field_figure(const sim::Flight& flight, const plan::World& world) {
+Figure flight_field_figure(std::span<const Vec3> path_W, const plan::World& world) {
   const auto& grid = world.grid;
-  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  const FieldView view = field_view(grid, path_W);
+  const Index3 &first = view.low, &last = view.high;
   std::ostringstream path;
-  double height = 0;
-  for (const auto& sample : flight.route.samples) {
-    low = low.cwiseMin(sample.truth.p_W), high = high.cwiseMax(sample.truth.p_W);
-    height += sample.truth.p_W.z() / static_cast<double>(flight.route.samples.size());
-    path << sample.truth.p_W.x() << ' ' << sample.truth.p_W.y() << '\n';
-  }
-  const Vec3 around(2, 2, 0);
-  const Index3 first = grid.index(low - around).cwiseMax(0),
-               last = grid.index(high + around).cwiseMin(grid.size() - Index3::Ones());
+  for (const Vec3& p : path_W) path << p.x() << ' ' << p.y() << '\n';
   Raster raster = empty_raster(2, first, last - first + Index3::Ones());
   double largest = 0;
-  for (int j = first.y(); j <= last.y(); ++j) {
+  for (int j = first.y(); j <= last.y(); ++j)
     for (int i = first.x(); i <= last.x(); ++i) {
-      Vec3 p = grid.center({i, j, 0});
-      p.z() = height;
-      const Index3 v = grid.index(p);
+      const Index3 v(i, j, view.layer);
       if (const double bound = world.bounds.at(v).w[kZ]; bound > 0) {
         largest = std::max(largest, bound);
         set(raster, v, bound);
       }
     }
-  }
   std::ostringstream script;
-  script << block("field", raster, grid) << cell_blocks(grid, first, last, height, height) << "$path << EOD\n"
+  script << block("field", raster, grid) << cell_blocks(grid, first, last, view.height_m, view.height_m)
+         << "$path << EOD\n"
          << path.str() << "EOD\n"
-         << kPalette << "set cbrange [0:" << largest << "]\nset tics out nomirror\nset border 3\n"
+         << palette() << "set cbrange [0:" << largest << "]\nset tics out nomirror\nset border 3\n"
          << view_from_above(grid, first, last)
          << "set cblabel 'bound of the vertical disturbance, m/s^2'\nset key outside top center horizontal\n"
          << "plot $field using 1:2:3 with image notitle, " << plot_cells()

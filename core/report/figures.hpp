@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
@@ -33,8 +34,8 @@ Figure field_slice_figure(const map::OccupancyGrid& grid, const Slice& slice, co
 Figure map_figure(const sim::Flight& flight, const plan::World& world);
 /// Heights along the route: floor, ceiling, tube, command and flight over the distance flown along the commands.
 Figure height_figure(const sim::Flight& flight, const plan::World& world);
-/// w̄ along z at flight height with the route.
-Figure flight_field_figure(const sim::Flight& flight, const plan::World& world);
+/// w̄ along z at the mean height of a path (field_box.hpp), with the path. Precondition: it holds a point.
+Figure flight_field_figure(std::span<const Vec3> path_W, const plan::World& world);
 /// Error on three axes over time between its upper and lower bounds; the paper's bound dashed.
 Figure error_figure(const sim::Flight& flight);
 /// Clearance over time: true, and of the reachable set.

@@ -69,34 +69,16 @@ DataTable clearance_table(const sim::Flight& flight, const plan::World& world) {
   return thinned(std::move(table));
 }
 
-/// The box of voxels around the route at the mean height of its flight, two metres more on each side.
-DataTable field_table(const sim::Flight& flight, const plan::World& world) {
-  DataTable table{"field", {"x_m", "y_m", "z_m", "vertical_bound_mps2"}, {}, 0};
-  const auto& grid = world.grid;
-  const auto& samples = flight.route.samples;
-  Vec3 low = samples.front().truth.p_W, high = low;
-  double height = 0;
-  for (const auto& s : samples) {
-    low = low.cwiseMin(s.truth.p_W), high = high.cwiseMax(s.truth.p_W);
-    height += s.truth.p_W.z() / static_cast<double>(samples.size());
-  }
-  const Vec3 around(2, 2, 0);
-  const Index3 first = grid.index(low - around).cwiseMax(0),
-               last = grid.index(high + around).cwiseMin(grid.size() - Index3::Ones());
-  for (int i = first.x(); i <= last.x(); ++i)
-    for (int j = first.y(); j <= last.y(); ++j) {
-      const Index3 v(i, j, grid.index({0, 0, height}).z());
-      const Vec3 p = grid.center(v);
-      if (const double bound = world.bounds.at(v).w[kZ]; bound > 0) table.rows.push_back({p.x(), p.y(), p.z(), bound});
-    }
-  return table;
-}
-
 }  // namespace
 
 std::vector<DataTable> flight_tables(const sim::Flight& flight, const plan::World& world) {
-  return {path_table(flight), tube_table(flight), field_table(flight, world), error_table(flight),
-          clearance_table(flight, world)};
+  return {path_table(flight), tube_table(flight), error_table(flight), clearance_table(flight, world)};
+}
+
+std::vector<Vec3> route_of(const sim::Flight& flight) {
+  std::vector<Vec3> path_W;
+  for (const auto& s : flight.route.samples) path_W.push_back(s.truth.p_W);
+  return path_W;
 }
 
 Scene flight_scene(const sim::Flight& flight, const plan::World& world) {

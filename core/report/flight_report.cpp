@@ -73,12 +73,7 @@ std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& w
        height_figure(flight, world),
        {},
        {"path", "tube"}},
-      {"Disturbance at flight height",
-       "Bound of the modelled vertical disturbance, mean and κ standard deviations; white where the vehicle's "
-       "centre cannot be.",
-       flight_field_figure(flight, world),
-       {},
-       {"field"}},
+      field_section(route_of(flight), world),
       {"Error between its bounds",
        "Measured position minus the predicted centre. The ellipsoids' bound begins at the moment at which the route "
        "was "
@@ -100,6 +95,15 @@ std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& w
 }
 
 }  // namespace
+
+Section field_section(std::span<const Vec3> path_W, const plan::World& world) {
+  return {"Disturbance at flight height",
+          "Bound of the modelled vertical disturbance, mean and κ standard deviations; white where the vehicle's "
+          "centre cannot be. The scene shows it at other heights.",
+          flight_field_figure(path_W, world),
+          {},
+          {"field"}};
+}
 
 std::string parameters_html(const std::string& command,
                             const std::vector<std::pair<std::string, std::string>>& parameters) {
@@ -123,6 +127,7 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
   PageData data = recorded ? recorded->data : PageData{};
   for (auto& t : flight_tables(flight, world)) data.tables.push_back(std::move(t));
   data.scene = flight_scene(flight, world);
+  data.field = field_box(world, field_view(world.grid, route_of(flight)));
   page += (recorded ? recorded->timeline : "") + scene_html(*data.scene);
   auto sections = sections_of(flight, world);
   for (const auto& section : sections) data.plots.insert(data.plots.end(), section.plots.begin(), section.plots.end());

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +32,9 @@ struct RecordedBeside {
   std::vector<Section> sections;
   PageData data;
 };
+
+/// The field at the mean height of a path that holds a point; its table is the page's own (PageData::field).
+Section field_section(std::span<const Vec3> path_W, const plan::World& world);
 
 /// The command and the parameters, each to be unfolded.
 std::string parameters_html(const std::string& command,

@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "core/files/base64.hpp"
 #include "core/report/figure_parts.hpp"
 #include "core/report/page.hpp"
 #include "core/types/text.hpp"
@@ -74,7 +75,10 @@ std::string to_json(const ModeSpan& m) {
   return array({json_number(m.from_s), json_number(m.until_s), script_quoted(m.mode), script_quoted(m.reason)});
 }
 
-std::string json_point(const Vec3& p) { return array({json_number(p.x()), json_number(p.y()), json_number(p.z())}); }
+template <class Three>
+std::string json_point(const Three& p) {
+  return array({json_number(p.x()), json_number(p.y()), json_number(p.z())});
+}
 
 std::string to_json(const Scene& s) {
   const auto prism = [](const Prism& p) {
@@ -96,6 +100,21 @@ std::string to_json(const Scene& s) {
                  {"radius", json_number(s.body_radius_m)},
                  {"tube", list(s.tube, prism)},
                  {"map", map}});
+}
+
+/// Codes as two bytes each, the lower one first.
+std::string to_json(const FieldBox& box) {
+  std::string bytes;
+  for (const reach::BoundCode code : box.codes)
+    bytes += static_cast<char>(code & 0xff), bytes += static_cast<char>(code >> 8);
+  const auto stop = [](const PaletteStop& s) { return array({json_number(s.share), script_quoted(s.colour)}); };
+  return object({{"first", json_point(box.first_W)},
+                 {"side", json_number(box.side_m)},
+                 {"stride", json_point(box.stride)},
+                 {"count", json_point(box.count)},
+                 {"level", std::to_string(box.level)},
+                 {"palette", list(kFieldPalette, stop)},
+                 {"codes", script_quoted(files::base64(bytes))}});
 }
 
 /// Rows of a group that hold an extreme of a column, its first and its last.
@@ -194,7 +213,8 @@ std::string to_json(const PageData& data) {
   return object({{"tables", list(data.tables, any)},
                  {"plots", list(data.plots, any)},
                  {"modes", list(data.modes, any)},
-                 {"scene", data.scene ? to_json(*data.scene) : "null"}});
+                 {"scene", data.scene ? to_json(*data.scene) : "null"},
+                 {"field", data.field ? to_json(*data.field) : "null"}});
 }
 
 std::string scene_html(const Scene& scene) {

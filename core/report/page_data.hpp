@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/report/field_box.hpp"
 #include "core/report/figures.hpp"
 #include "core/report/map_faces.hpp"
 
@@ -76,6 +77,7 @@ struct PageData {
   std::vector<TimePlot> plots;
   std::vector<ModeSpan> modes;
   std::optional<Scene> scene;
+  std::optional<FieldBox> field;  ///< the page makes the table "field" of its layer
 };
 
 /// Text as a string of JSON that may stand inside a script element whatever it holds: nothing in it ends one, and it is

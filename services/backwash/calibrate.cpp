@@ -3,10 +3,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "core/report/page.hpp"
-#include "core/study/calibrate/bound_figure.hpp"
 #include "core/study/calibrate/model_text.hpp"
 #include "services/backwash/calibrate_input.hpp"
+#include "services/backwash/calibrate_page.hpp"
 #include "services/backwash/calibrate_rows.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
@@ -119,23 +118,6 @@ void print_text(const Calibration& c, const CalibrateOptions& options) {
   if (!options.out.empty()) std::printf("model written to %s\n", options.out.c_str());
 }
 
-std::string report_page(const Calibration& c, const Campaign& campaign, const CalibrateOptions& options) {
-  std::string page = "<h1>Hover variances under the calibrated bound</h1>\n<p class=\"context\">" +
-                     std::to_string(campaign.windows) + " windows of " + std::to_string(campaign.logs.size()) +
-                     " flights; backwash " + kVersion +
-                     "</p>\n<p>Red: variance of each 2 s window. Surface: the bound at quantile " +
-                     to_text(options.quantile, 2) + ", one set of constants for all maps.</p>\n";
-  std::vector<FigurePlace> places;
-  for (std::size_t i = 0; i < campaign.maps.size(); ++i)
-    places.push_back({campaign.map_names[i], &campaign.maps[i], i});
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto figure = bound_figure(campaign.data, c.model, axis, places);
-    if (!figure) throw Failure(kUnavailable, options.report + ":1: " + figure.error().message);
-    page += std::string("<section><h2>Acceleration along ") + "xyz"[axis] + "</h2>\n" + *figure + "</section>\n";
-  }
-  return report::html_page("backwash calibration", page);
-}
-
 /// What cannot be determined, one line for the end of the program.
 std::string refusal_line(const std::vector<Refusal>& refused) {
   std::string line;
@@ -211,7 +193,10 @@ int run(const CalibrateOptions& options) {
                               campaign.logs, campaign.signal,    campaign.windows,   campaign.gated,
                               options.seed,  options.bootstraps, options.quantile};
   if (!options.out.empty()) write_file(options.out, model_text(calibration, provenance), options.force);
-  if (!options.report.empty()) write_file(options.report, report_page(calibration, campaign, options), options.force);
+  if (!options.report.empty())
+    write_file(options.report,
+               calibrate_page(calibration, campaign, refused, {options.quantile, options.vehicle, options.base_model}),
+               options.force);
   if (options.json) {
     add(json, calibration, campaign);
     if (!options.out.empty()) json["model"] = options.out;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "services/backwash/files.hpp"
+#include "services/backwash/study_flights.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -55,7 +56,7 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
             const auto map = files.maps.empty() ? std::nullopt : std::optional(files.maps.size() - 1);
             for (const auto& log : logs) files.logs.push_back({log, map});
           },
-          "flight logs, CSV")
+          "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog, .mcap)")
       .trigger_on_parse();
 }
 
@@ -75,7 +76,7 @@ void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>
   if (mapless) options = mapless_windows(gates);
   for (const auto& file : files.logs) {
     const std::size_t place = place_of(files, file);
-    const auto log = read_table(file.path, "t_s");
+    const auto log = read_flight(file.path);
     auto flight = study::flight_windows(log, vehicle, options, file.path);
     if (!flight) throw Failure(kBadData, flight.error().message);
     CalibratedLog one{file.path, place, flight->signal, flight->gated, flight->not_tested, flight->windows.size(),
@@ -116,7 +117,7 @@ std::optional<HeightEffects> read_height_effects(const std::vector<std::string>&
                                                  std::uint64_t seed) {
   std::vector<HeightRow> rows;
   for (std::size_t k = 0; k < logs.size(); ++k) {
-    const auto log = read_table(logs[k], "t_s");
+    const auto log = read_flight(logs[k]);
     const auto flight = study::flight_windows(log, std::nullopt, mapless_windows(gates), logs[k]);
     if (!flight) throw Failure(kBadData, flight.error().message);
     const auto more = height_rows(*flight, log, k);

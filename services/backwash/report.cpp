@@ -11,6 +11,7 @@
 #include "services/backwash/page_parts.hpp"
 #include "services/backwash/story_page.hpp"
 #include "services/backwash/verb.hpp"
+#include "services/backwash/world_cache.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -32,11 +33,15 @@ bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
 
 /// Any flight, by what the daemon recorded of it.
 int tell(const ReportOptions& options, std::span<const log::RawRecord> log, const FlightStory& story,
-         const map::OccupancyGrid* map, double radius) {
+         const map::OccupancyGrid* map, const Vehicle& vehicle) {
   if (!options.out.empty()) {
+    const std::string model_path = model_of(options.vehicle, options.model);
+    const auto model = read_model(model_path);
+    const auto world = map ? world_of({*map, model, model_path, vehicle, options.vehicle}) : nullptr;
     progress("drawing the report");
-    const auto parameters = parameter_files(options.vehicle, model_of(options.vehicle, options.model));
-    const auto page = story_page(story, log, map, {options.log(), radius, parameters});
+    const auto page =
+        story_page(story, log, map,
+                   {options.log(), vehicle.body.radius, parameter_files(options.vehicle, model_path), world.get()});
     write_file(options.out, page, options.force);
   }
   options.json ? print(to_json(story, options.log())) : print_text(story, options.log());
@@ -52,9 +57,7 @@ int judge(const ReportOptions& options, const std::vector<log::RawRecord>& log, 
   const auto vehicle = read_vehicle(options.vehicle);
   const std::string model_path = model_of(options.vehicle, options.model);
   const auto model = read_model(model_path);
-  progress("building the world");
-  const auto world = plan::build_world(read_or_fail(report::recorded_map(log)), model, vehicle, reach::Method::tight,
-                                       std::nullopt, run_shown);
+  const auto world = world_of({read_or_fail(report::recorded_map(log)), model, model_path, vehicle, options.vehicle});
   const auto flight = read_or_fail(report::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
   report::ReportContext context{options.log(),
@@ -95,7 +98,7 @@ int run(const ReportOptions& options) {
   progress("reading the log");
   const auto story = flight_story(log, grid, vehicle.body.radius, truth ? &*truth : nullptr, options.because);
   if (options.because.empty() && as_fly_flies(log, story)) return judge(options, log.records, *truth, story);
-  return tell(options, log.records, story, grid, vehicle.body.radius);
+  return tell(options, log.records, story, grid, vehicle);
 }
 
 }  // namespace

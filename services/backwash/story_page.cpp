@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/report/figure_parts.hpp"
+#include "core/report/flight_report.hpp"
 #include "core/report/interactive.hpp"
 #include "core/report/page.hpp"
 #include "core/report/recorded_tables.hpp"
@@ -67,13 +68,27 @@ report::Figure path_figure(const FlightStory& story, const report::DataTable& pa
   return report::draw(data.str(), report::Format::svg, 1000, 520);
 }
 
+/// Where it was in the air; of a flight that never was, where it stood.
+std::vector<Vec3> way_of(const FlightStory& story) {
+  std::vector<Vec3> way_W;
+  for (const auto& s : story.samples)
+    if (s.in_air) way_W.push_back(s.p_W);
+  if (way_W.empty()) way_W.push_back(story.samples.front().p_W);
+  return way_W;
+}
+
 /// The figures of where it was, with their tables.
 std::vector<report::Section> sections_of(const FlightStory& story, std::span<const log::RawRecord> log,
-                                         const map::OccupancyGrid* map, report::PageData& data) {
+                                         const map::OccupancyGrid* map, const plan::World* world,
+                                         report::PageData& data) {
   std::vector<report::Section> sections;
   const auto path = path_table(story), clearance = clearance_table(story);
   const auto error = report::recorded_error(log, report::first_tick_ns(log).value_or(0));
   sections.push_back({"From above", basis(story), path_figure(story, path, map), {}, {"path"}});
+  if (world) {
+    sections.push_back(report::field_section(way_of(story), *world));
+    data.field = report::field_box(*world, report::field_view(world->grid, way_of(story)));
+  }
   const auto add = [&](const report::DataTable& table, const char* title, const char* text,
                        std::vector<report::TimePlot> plots) {
     if (table.rows.size() < 2) return;
@@ -148,7 +163,7 @@ std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log
   if (!s.samples.empty()) {
     beside.data.scene = scene_of(s, log, map, context.body_radius);
     page += report::scene_html(*beside.data.scene);
-    sections = sections_of(s, log, map, beside.data);
+    sections = sections_of(s, log, map, context.world, beside.data);
   }
   sections.insert(sections.end(), beside.sections.begin(), beside.sections.end());
   for (const auto& section : sections) {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/plan/world.hpp"
 #include "services/backwash/flight_story.hpp"
 
 namespace backwash::services {
@@ -15,6 +16,7 @@ struct StoryContext {
   std::string log;     ///< as given
   double body_radius;  ///< m
   std::vector<std::pair<std::string, std::string>> parameters;
+  const plan::World* world = nullptr;  ///< of the map, for the field; null: none is shown
 };
 /// The same as a self-contained HTML page, why the flight was not good first. `map`: what the path is drawn over; null:
 /// nothing. Throws Failure 69 where gnuplot cannot draw.

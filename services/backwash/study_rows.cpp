@@ -4,8 +4,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "core/files/base64.hpp"
 #include "core/study/windows/observed.hpp"
-#include "services/backwash/base64.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/sealed_row.hpp"
 #include "services/backwash/sha256.hpp"
@@ -28,8 +28,8 @@ std::string bytes_of(const std::vector<std::size_t>& numbers) {
 }
 
 StudiedFlight flight_of(const Json& row) {
-  const auto positions = from_base64(row.at("positions").get_ref<const std::string&>());
-  const auto windows = from_base64(row.at("windows").get_ref<const std::string&>());
+  const auto positions = files::from_base64(row.at("positions").get_ref<const std::string&>());
+  const auto windows = files::from_base64(row.at("windows").get_ref<const std::string&>());
   auto observed = windows ? study::unpacked(*windows) : std::nullopt;
   if (!positions || positions->size() % sizeof(std::size_t) != 0 || !observed || observed->seen.flights != 1)
     throw std::out_of_range("windows");
@@ -44,8 +44,8 @@ std::string study_row(const StudiedFlight& flight, const RowsOf& of) {
   Json row{{"log", flight.path}, {"log_sha256", sha256_of_file(flight.path)}};
   row["made"] = made_with(of);
   row["group"] = flight.group;
-  row["positions"] = base64(bytes_of(flight.mark.positions()));
-  row["windows"] = base64(study::packed(flight.observed));
+  row["positions"] = files::base64(bytes_of(flight.mark.positions()));
+  row["windows"] = files::base64(study::packed(flight.observed));
   return sealed(row);
 }
 

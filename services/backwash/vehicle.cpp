@@ -12,6 +12,7 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/vehicle_file.hpp"
+#include "services/backwash/vehicle_fit.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -210,7 +211,8 @@ int run(const VehicleOptions& options) {
 
 Verb vehicle_verb(Command& app) {
   auto options = std::make_shared<VehicleOptions>();
-  auto& group = app.add_subcommand("vehicle", "Vehicle files: begun, checked, and which gains a way needs");
+  auto& group =
+      app.add_subcommand("vehicle", "Vehicle files: begun, checked, proposed from logs, and which gains a way needs");
   group.require_subcommand();
   auto& command = group.add_subcommand("tune", "The smallest gains with which a way is passable");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME").required();
@@ -227,9 +229,10 @@ Verb vehicle_verb(Command& app) {
       "follows:\nmeasure controller.attitude_lag and feedback_delay first.\nExample:\n"
       "  backwash vehicle tune --map builtin:apartment --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
       "    --start 3,4.2,1.2 --goal 7.4,3,1.2");
-  const Verb printed = vehicle_print_verb(group), checked = vehicle_check_verb(group);
-  return {&group, [options, printed, checked] {
+  const Verb printed = vehicle_print_verb(group), checked = vehicle_check_verb(group), fit = vehicle_fit_verb(group);
+  return {&group, [options, printed, checked, fit] {
             if (printed.command->parsed()) return printed.run();
+            if (fit.command->parsed()) return fit.run();
             return checked.command->parsed() ? checked.run() : run(*options);
           }};
 }

@@ -35,7 +35,8 @@ std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after
   const double rejected = rate(before.numbers.odometry_rejected + before.numbers.odometry_refused,
                                n.odometry_rejected + n.odometry_refused);
   add("odometry good", rejected == 0, number("%.1f rejected a second", rejected),
-      "see the daemon's warnings: frames, covariance, stamps or jumps are wrong");
+      after.refused.empty() ? "see the daemon's warnings: covariance, stamps or jumps are wrong"
+                            : "refused: " + after.refused);
   const double lost_after = OdometryTiming::kHoldAfter + std::max(0.0, longer_gap);
   add("odometry age", n.odometry_age < lost_after, number("%.3f s", n.odometry_age),
       number("the VIO or the network is late: %.3f s without odometry is HOLD", lost_after));

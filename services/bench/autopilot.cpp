@@ -16,8 +16,9 @@ constexpr std::uint8_t kQuadrotor = 2, kPx4 = 12, kArmedFlag = 128, kCustomFlag 
 constexpr std::uint32_t kManual = 1u << 16, kOffboard = 6u << 16, kAutoLand = 4u << 16 | 6u << 24;
 constexpr std::uint16_t kSetMode = 176, kArm = 400, kLand = 21, kMessageInterval = 511;
 constexpr std::uint8_t kAccepted = 0, kTemporarilyRejected = 1, kUnsupported = 3;
-constexpr double kHistory = 1.0;   // s
-constexpr long kReportEvery = 20;  // steps, position and attitude
+constexpr double kHistory = 1.0;                    // s
+constexpr long kReportEvery = 20;                   // steps, position and attitude
+constexpr double kLeastCharge = 0.3, kDrain = 900;  // share; s
 
 Eigen::Matrix3d yaw_matrix(double yaw) { return Eigen::AngleAxisd(yaw, Vec3::UnitZ()).toRotationMatrix(); }
 
@@ -199,7 +200,7 @@ void Autopilot::telemetry(double, std::vector<std::uint8_t>& out) {
   for (const auto& value : values_) send(value, out);
   values_.clear();
   if (mute) return out.clear();
-  if (battery && steps_ % 1000 == 500) send_battery(out);
+  if (steps_ % 1000 == 500) send_battery(out);
   if (steps_ % 1000 == 0 || heartbeat_due_) {
     heartbeat_due_ = false;
     const std::uint32_t custom = mode_ == Mode::offboard ? kOffboard : mode_ == Mode::land ? kAutoLand : kManual;
@@ -241,9 +242,16 @@ void Autopilot::send_position(std::vector<std::uint8_t>& out) {
   send(mavlink::LocalPositionNed{static_cast<std::uint32_t>(steps_), p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, out);
 }
 
+double Autopilot::charge() const noexcept {
+  return kLeastCharge + (1 - kLeastCharge) * std::exp(-1e-3 * static_cast<double>(armed_steps_) / kDrain);
+}
+
 void Autopilot::send_battery(std::vector<std::uint8_t>& out) {
-  mavlink::BatteryStatus status{.battery_remaining = static_cast<std::int8_t>(std::lround(100 * battery.value_or(1)))};
+  const double share = battery.value_or(charge());
+  mavlink::BatteryStatus status{.current_battery = -1,
+                                .battery_remaining = static_cast<std::int8_t>(std::lround(100 * share))};
   status.voltages.fill(65535);
+  std::fill_n(status.voltages.begin(), 4, static_cast<std::uint16_t>(std::lround(3500 + 650 * share)));
   send(status, out);
 }
 
@@ -252,6 +260,7 @@ void Autopilot::step(double t, std::vector<std::uint8_t>& out) {
   history_.push_back({t, truth(), attitude()});
   while (history_.front().t < t - kHistory) history_.pop_front();
   telemetry(t, out);
+  armed_steps_ += armed_ ? 1 : 0;
   ++steps_;
 }
 

@@ -69,13 +69,17 @@ class Autopilot {
                                            {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3},
                                            {"MPC_XY_VEL_MAX", 12}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 3},
                                            {"MPC_TILTMAX_AIR", 45}};
-  /// Remaining share, sent once a second as BATTERY_STATUS while set.
+  /// Remaining share that BATTERY_STATUS says, once a second; not set: that of a battery which flying drains
+  /// (charge()).
   std::optional<double> battery;
   /// Writes a row for each frame of the companion computer: time, id, sequence, type mask, position; of a command
   /// its number and parameters 1, 2 and 7. False: the file cannot be made.
   bool log_wire(const std::string& path);
 
  protected:
+  /// Of what is armed for some time: a tenth goes in the first 2.3 min, then ever less, and 0.3 stays. So a flight ends
+  /// by its battery only where `battery` says so.
+  double charge() const noexcept;
   // What a profile of a real firmware (firmware.hpp) does in its own way.
   virtual void on(const mavlink::SetPositionTargetLocalNed& m, double t);
   virtual void on(const mavlink::Odometry& m, double t);
@@ -115,6 +119,7 @@ class Autopilot {
   sim::Quadrotor vehicle_;
   sim::AirflowTruth air_;
   LocalFrame frame_;
+  long armed_steps_ = 0;
   bool armed_ = false, landed_ = true, local_position_ = false, heartbeat_due_ = false;
   std::optional<double> last_setpoint_;  // s, when it came
   double landed_since_ = 0;

@@ -18,7 +18,7 @@ namespace {
 using namespace backwash;
 using namespace backwash::study;
 
-const std::filesystem::path& folder() {
+const std::filesystem::path& world_folder() {
   static const struct Folder {
     std::filesystem::path path =
         std::filesystem::temp_directory_path() / ("study-simulation-test-" + std::to_string(::getpid()));
@@ -40,8 +40,8 @@ struct Halves {
 Halves halves(const std::string& cause, double size, std::uint64_t seed = 4711) {
   const auto world = study_worlds::draw_world({seed, {cause}, size, 24, ""});
   const auto flights = study_worlds::fly_all(world);
-  return {study_worlds::observe(world, {flights.begin(), flights.begin() + 12}, folder()),
-          study_worlds::observe(world, {flights.begin() + 12, flights.end()}, folder())};
+  return {study_worlds::observe(world, {flights.begin(), flights.begin() + 12}, world_folder()),
+          study_worlds::observe(world, {flights.begin() + 12, flights.end()}, world_folder())};
 }
 
 const NamedCause* named(const StudyResult& result, const std::string& cause) {
@@ -63,7 +63,8 @@ TEST(Simulation, EveryFormSaysWhatItAddsToIt) {
 
 TEST(Simulation, ComesNearerToFurtherFlightsByWhatTheStudyFound) {
   for (const char* cause : {"payload", "command_latency"}) {
-    const auto proof = study_worlds::prove({.cause = cause, .seed = 4711, .held_out = 3, .replicas = 2}, folder());
+    const auto proof =
+        study_worlds::prove({.cause = cause, .seed = 4711, .held_out = 3, .replicas = 2}, world_folder());
     ASSERT_TRUE(proof.simulated) << cause << ": " << proof.told << proof.refused;
     EXPECT_LT(proof.after, proof.before) << cause;
     EXPECT_GT(proof.share, 0.6) << cause << ": " << proof.before << " to " << proof.after;

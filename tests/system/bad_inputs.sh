@@ -164,7 +164,7 @@ printf 'x_m,y_m,z_m\n' >none.csv
 refused 65 "has no point" field --map builtin:narrow-gap --model $quad --points none.csv
 refused 64 "is no kind of recording; known are airgarage" import nanobench
 refused 64 "without --out" import --propose ms.csv -o logs
-refused 65 "import" calibrate --log corrupt.ulg --vehicle $quad
+refused 65 "no ULog magic; give a .ulg file" calibrate --log corrupt.ulg --vehicle $quad
 refused 65 "backwash export --csv" study --log corrupt.bwlog --vehicle $quad
 refused 65 "backwash export --csv" calibrate --log corrupt.bwlog --vehicle $quad
 printf 'backwash raw log 3\n' >begun.bwlog

@@ -24,9 +24,42 @@ status=0
   >refused.json 2>stderr || status=$?
 [[ $status == 65 && ! -e none.toml && $(wc -l <stderr) == 1 ]] || die "refusal: exit $status, $(cat stderr)"
 grep -q 'wall refused: no wall closer.*to determine it, hover' stderr || die "the refusal's line: $(cat stderr)"
+"$backwash" calibrate --map builtin:parallel-walls-4m --log poor1.csv poor2.csv poor1.csv --vehicle $quad --keep-base --bootstraps 20 --report kept.html >log 2>stderr ||
+  die "--keep-base: $(cat stderr)"
+# Logs without a map: a page of a flat floor.
+"$backwash" calibrate --log poor1.csv poor2.csv two1.csv --vehicle $quad --keep-base --bootstraps 20 --report flat.html >log 2>stderr || die "without a map: $(cat stderr)"
+
+# Three flights to a vehicle file, and what refuses them.
+sed 's|horizontal = 10.0, vertical = 12.0|horizontal = 7.0, vertical = 9.0|; s|attitude_lag = 0.05|attitude_lag = 0.07|' <("$backwash" vehicle print $quad) >other.toml
+printf 'start = [0, 0, 1]\n[grid]\nlow = [-1.5, -1.2, 0.5]\nhigh = [1.5, 1.2, 1.7]\ncount = [2, 2, 2]\njitter = 0.1\ndwell = 4.0\n' >around.toml
+printf 'start = [0, 0, 1]\n[grid]\nlow = [0, 0, 1]\nhigh = [0, 0, 1]\ncount = [1, 1, 1]\njitter = 0\ndwell = 40.0\n' >hover.toml
+for flight in around:1 around:2 around:3 hover:4; do
+  "$backwash" simulate --map builtin:parallel-walls-4m --vehicle other.toml --model $quad --flight ${flight%:*}.toml --seed ${flight#*:} --out $flight.csv >log
+done
+"$backwash" vehicle fit around:?.csv --vehicle $quad --out proposed.toml --json >keys.json 2>stderr || die "vehicle fit: $(cat stderr)"
+sed "s|^kp = .*|$(grep '^kp' proposed.toml)|; s|^kd = .*|$(grep '^kd' proposed.toml)|; s|^latency = .*|$(grep '^latency' proposed.toml)|; s|^attitude_lag = .*|$(grep '^attitude_lag' proposed.toml)|" other.toml >again.toml
+"$backwash" vehicle check --vehicle again.toml >log || die "what is proposed is no vehicle file"
+status=0
+"$backwash" vehicle fit around:1.csv around:2.csv hover:4.csv --vehicle $quad --out none.toml >log 2>stderr || status=$?
+[[ $status == 65 && ! -e none.toml ]] && grep -q 'hover:4.csv does not excite controller.latency: fly' stderr && ! grep -q 'around:..csv does not excite' stderr ||
+  die "hover: exit $status, $(cat stderr)"
+status=0
+"$backwash" vehicle fit around:1.csv around:2.csv --vehicle $quad >log 2>stderr || status=$?
+[[ $status == 64 ]] && grep -q 'three logs' stderr || die "two logs: exit $status, $(cat stderr)"
+python3 - <<'PYTHON'
+import json
+told = json.load(open("keys.json"))
+assert told["level_by"] == "attitude" and told["vertical_by"] == "thrust" and not told["unexcited"] and len(told["logs"]) == 3
+right = {"controller.kp.horizontal": 7, "controller.kp.vertical": 9, "controller.kd.horizontal": 5.5, "controller.kd.vertical": 6, "controller.latency": 0.02, "controller.attitude_lag": 0.07}
+assert set(told["keys"]) == set(right)
+for key, value in right.items():
+    low, high = told["keys"][key]["ci90"]
+    assert low <= value <= high and abs(told["keys"][key]["value"] - value) < 0.1 * value + 0.015 * (value < 0.1), (key, told["keys"][key])
+assert told["keys"]["controller.kp.horizontal"]["ci90"][1] < 9 < 10 == told["keys"]["controller.kp.horizontal"]["file"]
+PYTHON
 
 python3 - <<'PYTHON'
-import json, re
+import html, json, re
 fit, refused = json.load(open("fit.json")), json.load(open("refused.json"))
 assert fit["flights"] == 4 and fit["windows"] == 96 and fit["signal"].startswith("acceleration beyond")
 for name, value in fit["parameters"].items():
@@ -35,5 +68,22 @@ assert len(fit["parameters"]) == 14 and len(fit["held_out"]["flights"]) == 4
 names = {r["what"] for r in refused["refused"]}
 assert "ground" in names and "wall" in names and "parameters" not in refused
 page = open("page.html").read()
+# The page says what the JSON says: coverage by bin and by flight, each constant with its interval.
+told = re.sub(r"<[^>]+>", " ", re.sub(r"</t[hd]>", "|", page.split("<svg")[0]))
+for which in ("by_wall_distance", "by_height"):
+    assert len(fit["held_out"][which]) >= 4
+    for b in fit["held_out"][which]:
+        shares = " ".join(rf"{b['coverage'][a]:.2f}\s*\|\s*" for a in "xyz") if b["windows"] else r"–\s*\|\s*" * 3
+        high = f"to {b['high_m']:.2f}" if b["high_m"] is not None else "and more"
+        assert re.search(rf"{b['low_m']:.2f} {high}\s*\|\s*{b['windows']}\s*\|\s*" + shares.replace(" ", ""), told), (which, b)
+for f in fit["held_out"]["flights"]:
+    assert re.search(rf"{f['log']}\s*\|\s*{f['windows']}\s*\|\s*{f['coverage']['x']:.2f}", told), f
+for name, value in fit["parameters"].items():
+    assert re.search(re.escape(name) + r"\s*\|\s*" + re.escape(f"{value['value']:.4g}") + r"\s*\|\s*" + re.escape(f"{value['ci95'][0]:.4g} … {value['ci95'][1]:.4g}"), told), (name, value)
+assert f"{fit['held_out']['coverage']['x']:.2f} of the windows lay below the bound along x" in told and "Not determined" not in told
+kept = open("kept.html").read()
+assert "Not determined" in kept and all(html.escape(r["flight"]) in kept for r in refused["refused"])
+flat = open("flat.html").read()
+assert "a flat floor" in flat
 assert page.count("<svg") == 3 and not re.search(r'(src|href)\s*=\s*["\']?(https?:|//|file:)', page)
 PYTHON

@@ -8,7 +8,7 @@ mapfile -t verbs < <("$backwash" --help | sed -n '/^Subcommands:/,$ s/^  \([a-z]
 verbs=("${verbs[@]/vehicle/vehicle tune}")
 verbs=("${verbs[@]/campaign/campaign plan}")
 verbs=("${verbs[@]/keys/keys init}")
-for verb in "${verbs[@]/#map/map info}" "map convert" "vehicle print" "vehicle check"; do
+for verb in "${verbs[@]/#map/map info}" "map convert" "vehicle print" "vehicle check" "vehicle fit"; do
   read -ra words <<<"$verb"
   "$backwash" "${words[@]}" --help >help || die "$verb --help fails"
   grep -q "^  backwash $verb " help || die "$verb --help has no example"

@@ -20,6 +20,7 @@ modules=$(realpath "$modules")
 "$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 >/dev/null || { cat "$out/flight.log"; exit 1; }
 cd "$out"
 "$backwash" fly --map builtin:apartment --report simulated.html --quiet >/dev/null
+"$backwash" report --log flight.bwlog --out told.html --quiet >/dev/null # by what was logged alone
 # One that failed, one that never took off, in words that would do something if they were not only shown.
 PYTHONPATH=$source_dir/tests/system python3 - "$backwash" <<'PYTHON'
 import subprocess, sys
@@ -50,14 +51,15 @@ look flight.html . 360,900,1600 5 10.5
 look simulated.html . 360,1600 5
 look failed.html . 360,1600 1
 look ground.html . 360,1600
+look told.html . 360 5
 XDG_DATA_DIRS=/nonexistent "$backwash" fly --map builtin:apartment --report bare.html --quiet >/dev/null
 look bare.html . 900
 
-PYTHONPATH=$source_dir/tests/system python3 - <<'PYTHON'
-import csv, io, json, struct
+PYTHONPATH=$source_dir/tests/system python3 - "$backwash" <<'PYTHON'
+import csv, io, json, random, re, struct, subprocess, sys, tomllib
 import raw_log
 
-pages = {name: json.load(open(f"{name}.json")) for name in ("flight", "simulated", "failed", "ground", "bare")}
+pages = {name: json.load(open(f"{name}.json")) for name in ("flight", "simulated", "failed", "ground", "told", "bare")}
 for name, page in pages.items():
     assert 20_000 < page["bytes"] <= 5 << 20, (name, page["bytes"])
     for look in page["looks"]:
@@ -76,6 +78,32 @@ for name in ("flight", "simulated", "failed"):
     first, turned, dragged = worked["scene"]
     assert min(s["kinds"] for s in worked["scene"]) > 20 and max(s["most"] for s in worked["scene"]) < 0.98, worked["scene"]
     assert len({s["hash"] for s in worked["scene"]}) == 3, "the scene does not turn"
+# The plane in the scene: off at first, the flat slice's own numbers at its height, and elsewhere those of `backwash field`: κ √Σ_zz.
+model = tomllib.loads(subprocess.run([sys.argv[1], "vehicle", "print", "builtin:quad-5in", "--kind", "model"], capture_output=True, text=True, check=True).stdout)
+kappa, mean = model["bound"]["kappa"], model["bound"]["mean"]["vertical"]
+table = lambda text: [{k: float(v or "nan") for k, v in row.items()} for row in csv.DictReader(io.StringIO(text))]
+for name in ("flight", "simulated", "told"):
+    plane = pages[name]["worked"]["plane"]
+    assert plane["off"]["hidden"] == 5 and plane["again"]["hash"] == plane["off"]["hash"], "it is not off where it shall be"
+    assert all(kind["hidden"] == 0 and kind["told"] == kind["spoken"] for kind in plane["kinds"]), name
+    assert len({kind["hash"] for kind in plane["kinds"]} | {plane["off"]["hash"]}) == 10, f"{name}: the plane does not move"
+    assert plane["kinds"][0]["csv"] == pages[name]["worked"]["files"]["field.csv"], f"{name}: the plane at flight height is another slice"
+    for kind in plane["kinds"]:
+        cells = table(kind["csv"])
+        axis = "xyz"[int(kind["kind"])]
+        assert len(cells) > 300 and {f"{axis} = {cell[axis + '_m']:.2f} m" for cell in cells} == {kind["told"]}, (name, kind["told"])
+    some = random.Random(1).sample([cell for kind in plane["kinds"] for cell in table(kind["csv"])], 60)
+    with open("points.csv", "w") as file:
+        file.write("x_m,y_m,z_m\n" + "".join(f"{c['x_m']},{c['y_m']},{c['z_m']}\n" for c in some))
+    asked = json.loads(subprocess.run([sys.argv[1], "field", "--map", "builtin:apartment", "--model", "builtin:quad-5in", "--vehicle", "builtin:quad-5in", "--points", "points.csv",
+                                       "--json"], capture_output=True, text=True, check=True).stdout)["points"]
+    for cell, point in zip(some, asked, strict=True):
+        bound = kappa * point["sigma"][5] ** 0.5 + mean
+        assert bound * (1 - 1e-6) <= cell["vertical_bound_mps2"] <= bound * (1 + 6e-4), (name, cell, bound)
+    place = min(table(pages[name]["worked"]["files"]["path.csv"]), key=lambda row: abs(row["t_s"] - 5))
+    here = float(re.search(r"([0-9.]+) m/s²", plane["here"])[1])
+    near = [c["vertical_bound_mps2"] for c in table(plane["kinds"][0]["csv"]) if all(abs(c[a] - place[a]) < 0.051 for a in ("x_m", "y_m"))]
+    assert abs(place["z_m"] - table(plane["kinds"][0]["csv"])[0]["z_m"]) > 0.06 or any(abs(here - bound) < 6e-3 for bound in near), (plane["here"], place, near)
 bare = pages["bare"]["worked"]
 assert bare["scene"] == [None] and bare["shown"]["screen"] == bare["shown"]["all"] and "error.csv" in bare["files"]
 assert "install Debian's libjs-dygraphs and libjs-three" in open("bare.html").read()

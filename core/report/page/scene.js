@@ -131,7 +131,7 @@ function homeOf(points) {
     along: high[0] - low[0] > high[1] - low[1] ? -Math.PI / 2 : 0};
 }
 
-function sceneControls(holder, eye, home, planes, change) {
+function sceneControls(holder, eye, home, planes, change, plane) {
   const keys = make("div", {class: "keys"});
   const button = (name, act) => keys.append(Object.assign(make("button", {type: "button"}, name), {onclick: act}));
   button("Whole path", () => eye.look({}));
@@ -152,7 +152,7 @@ function sceneControls(holder, eye, home, planes, change) {
       keys.append(label, told);
     }
   }
-  holder.append(keys, make("p", {id: "scene-keys"}, "Drag or arrow keys turn it, two fingers, wheel or + and − zoom, Shift moves it, Home shows the whole path. " +
+  holder.append(keys, ...(plane ? [plane.box] : []), make("p", {id: "scene-keys"}, "Drag or arrow keys turn it, two fingers, wheel or + and − zoom, Shift moves it, Home shows the whole path. " +
     "The ball is the body at the cursor's time."));
 }
 
@@ -198,12 +198,26 @@ function makeScene() {
     change();
   };
   const eye = orbit(view, camera, home, change);
-  sceneControls(holder, eye, home, planes, change);
+  let shown = null;
+  const showPlane = (plane) => {
+    if (shown) scene.remove(shown), shown.material.map.dispose(), shown.material.dispose(), shown.geometry.dispose();
+    shown = plane && planeMesh(plane.axis, plane.n);
+    if (shown) scene.add(shown);
+    change();
+  };
+  const plane = field && planeKeys(showPlane);
+  sceneControls(holder, eye, home, planes, change, plane);
   const table = tableOf(data.scene.path), at = ["x_m", "y_m", "z_m"].map((name) => columnOf(table, name));
-  const put = (t) => { body.position.set(...at.map((a) => table.rows[nearest(table.rows, t)][a])); change(); };
+  const put = (t) => {
+    const place = at.map((a) => table.rows[nearest(table.rows, t)][a]);
+    body.position.set(...place);
+    if (plane) plane.tellBody(place);
+    change();
+  };
   cursor.shown.push(put);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    scene = new THREE.Scene(), body = fillScene(scene, planes);
+    scene = new THREE.Scene(), body = fillScene(scene, planes), shown = null;
+    if (plane) showPlane(plane.now());
     put(cursor.t);
   });
   addEventListener("resize", fit);

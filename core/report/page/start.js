@@ -3,18 +3,20 @@ function csvOf(table) {
   return [table.columns.join(","), ...table.rows.map((row) => row.map((value) => value === null ? "" : String(value)).join(","))].join("\n") + "\n";
 }
 
+function giveFile(name, text) {
+  const link = make("a", {download: name, href: URL.createObjectURL(new Blob([text], {type: "text/csv"}))});
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
 function makeFiles() {
   document.querySelectorAll("[data-tables]").forEach((place) => place.dataset.tables.split(" ").filter(tableOf).forEach((id) => {
     const table = tableOf(id), rows = table.rows.length;
     const button = make("button", {type: "button", "data-table": id}, `${id}.csv: ` +
-      (table.before ? `${rows} of ${table.before} rows, each peak kept` : `${rows} rows`));
-    button.onclick = () => {
-      const link = make("a", {download: id + ".csv", href: URL.createObjectURL(new Blob([csvOf(table)], {type: "text/csv"}))});
-      document.body.append(link);
-      link.click();
-      link.remove();
-      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-    };
+      (table.before ? `${rows} of ${table.before} rows, each peak kept` : `${rows} rows${table.thin > 1 ? `, one voxel of ${table.thin} along x and y` : ""}`));
+    button.onclick = () => giveFile(id + ".csv", csvOf(table));
     place.append(button);
   }));
 }

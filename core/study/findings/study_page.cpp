@@ -237,6 +237,7 @@ std::string limits_sections(const StudyResult& result, const Observations& seen)
     for (const auto& [parameter, size] : sizes)
       page += row(std::string(cause).append(", ").append(parameter), number(size));
   page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
+  if (seen.gated_out.empty()) page += row("Nothing", "every window was good");
   for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
   page += "</table>\n</section>\n";
   return page;

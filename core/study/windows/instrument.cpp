@@ -13,7 +13,7 @@ std::vector<double> slow(const Series& s, SampleRange w, const std::vector<doubl
   for (std::size_t i = 0; i < z.size(); ++i) {
     double sum = 0, weights = 0;
     for (std::size_t k = 0; k < z.size(); ++k) {
-      const double away = (s.t[w.begin + k] - s.t[w.begin + i]) / width, weight = std::exp(-0.5 * away * away);
+      const double weight = bell(s, w.begin + i, w.begin + k, width);
       sum += weight * z[k], weights += weight;
     }
     out[i] = sum / weights;

@@ -31,6 +31,11 @@ std::vector<double> rates(const Series& s, SampleRange w, F value) {
   return detrended(x);
 }
 
+/// Weight of a sample in the bell about another one, not normalised.
+inline double bell(const Series& s, std::size_t about, std::size_t at, double width) {
+  const double away = (s.t[at] - s.t[about]) / width;
+  return std::exp(-0.5 * away * away);
+}
 /// z weighted by a bell of standard deviation `width` in s over the window's own rows, detrended: what is slow in it.
 std::vector<double> slow(const Series& s, SampleRange w, const std::vector<double>& z, double width);
 

@@ -5,21 +5,13 @@
 #include <cmath>
 
 #include "core/log/log_columns.hpp"
+#include "core/study/windows/loop.hpp"
 #include "core/study/windows/window_rules.hpp"
 
 namespace backwash::study {
 namespace {
 
 using RowNumbers = std::vector<std::size_t>;
-
-std::vector<Vec3> vectors(const log::FlightLog& log, const RowNumbers& rows, const char* prefix, const char* unit) {
-  std::vector<Vec3> out;
-  out.reserve(rows.size());
-  const std::string name(prefix);
-  const auto &x = log.column(name + "x" + unit), &y = log.column(name + "y" + unit), &z = log.column(name + "z" + unit);
-  for (const auto i : rows) out.emplace_back(x[i], y[i], z[i]);
-  return out;
-}
 
 /// Slope of the parabola through a sample and its neighbours `reach` rows away.
 std::vector<Vec3> derivative(const std::vector<double>& t, const std::vector<Vec3>& x, std::size_t reach) {
@@ -31,94 +23,9 @@ std::vector<Vec3> derivative(const std::vector<double>& t, const std::vector<Vec
   return d;
 }
 
-/// The set-points of a flight: absent velocities and accelerations are zero (docs/interfaces.md).
-struct Commands {
-  std::vector<Vec3> p, v, a;
-};
-
-Commands commands_of(const log::FlightLog& log, const RowNumbers& rows) {
-  const auto or_rest = [&](const char* prefix, const char* unit) {
-    return has_xyz(log, prefix, unit) ? vectors(log, rows, prefix, unit) : std::vector<Vec3>(rows.size(), Vec3::Zero());
-  };
-  return {vectors(log, rows, "cmd_", "_m"), or_rest("cmd_v", "_mps"), or_rest("cmd_a", "_mps2")};
-}
-
-struct Loop {
-  std::vector<Vec3> p, v, a;
-};
-
-/// The controller's loop at each row: fed with the logged state, or (`closed`) with its own.
-Loop loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed, double drag = 0) {
-  const auto& c = vehicle.controller;
-  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
-  Loop out;
-  Vec3 p = cmd.p.front(), v = Vec3::Zero(), produced = Vec3::Zero();
-  std::size_t heard = 0, felt = 0;
-  // A command acts from some time in the period before its row on (held) or all along it (streamed): a quarter between.
-  const double period = s.t.back() / static_cast<double>(s.size() - 1),
-               age = c.latency + kWindowRules.command_age * period;
-  const auto at_time = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
-    if (heard + 1 >= s.size() || s.t[heard + 1] - s.t[heard] > kWindowRules.held) return x[heard];
-    const double share = std::clamp((t - s.t[heard]) / (s.t[heard + 1] - s.t[heard]), 0.0, 1.0);
-    return x[heard] + share * (x[heard + 1] - x[heard]);
-  };
-  for (std::size_t i = 0; i < s.size(); ++i) {
-    const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
-    const bool gap = dt > kWindowRules.restart;
-    if (gap) p = s.p[i], v = s.v[i];  // start again where the vehicle is
-    const int steps = gap ? 1 : std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
-    for (int k = 0; k < steps; ++k) {
-      const double h = gap ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
-      while (heard + 1 < s.size() && s.t[heard + 1] <= now - age + kWindowRules.stamp_error) ++heard;
-      while (felt + 1 < s.size() && s.t[felt + 1] <= now - c.feedback_delay + kWindowRules.stamp_error) ++felt;
-      const Vec3 at = closed ? p : s.p[felt], moving = closed ? v : s.v[felt];
-      const double sent = now - age;
-      const Vec3 wanted = at_time(cmd.a, sent) + kp.cwiseProduct(at_time(cmd.p, sent) - at) +
-                          kd.cwiseProduct(at_time(cmd.v, sent) - moving);
-      const double rate = c.attitude_lag > 0 ? 1 - std::exp(-h / c.attitude_lag) : 1;
-      produced += rate * (wanted - produced);
-      v += h * (produced - drag * Vec3(v.x(), v.y(), 0));
-      p += h * v;
-    }
-    out.p.push_back(p), out.v.push_back(v), out.a.push_back(produced);
-  }
-  return out;
-}
-
-/// The loop's answer to the logged state, joined between rows as the controller saw it, at each lag of kShifts.
-std::array<std::vector<Vec3>, kShifts.size()> answers(const Series& s, const Commands& cmd, const Vehicle& vehicle) {
-  const auto& c = vehicle.controller;
-  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
-  std::array<std::vector<Vec3>, kShifts.size()> out;
-  std::array<Vec3, kShifts.size()> r;
-  r.fill(Vec3::Zero());
-  std::size_t at = 0;
-  const auto between = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
-    while (at > 0 && s.t[at] > t) --at;
-    while (at + 2 < s.size() && s.t[at + 1] <= t) ++at;
-    const double share = std::clamp((t - s.t[at]) / (s.t[at + 1] - s.t[at]), 0.0, 1.0);
-    return x[at] + share * (x[at + 1] - x[at]);
-  };
-  for (std::size_t i = 0; i < s.size(); ++i) {
-    const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
-    const int steps =
-        dt > kWindowRules.restart ? 1 : std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
-    for (int k = 0; k < steps; ++k) {
-      const double now = s.t[i] - dt + (k + 0.5) * dt / steps, sent = now - c.latency, felt = now - c.feedback_delay;
-      const Vec3 wanted = between(cmd.a, sent) + kp.cwiseProduct(between(cmd.p, sent) - between(s.p, felt)) +
-                          kd.cwiseProduct(between(cmd.v, sent) - between(s.v, felt));
-      for (std::size_t n = 0; n < kShifts.size(); ++n)
-        r[n] += (1 - std::exp(-dt / steps / std::max<double>(kWindowRules.least_lag, c.attitude_lag + kShifts[n]))) *
-                (wanted - r[n]);
-    }
-    for (std::size_t n = 0; n < kShifts.size(); ++n) out[n].push_back(r[n]);
-  }
-  return out;
-}
-
 /// Whether the craft flew where its set-points are, or where the loop would have led it, in half of the rows at least.
 /// Zeros beside commanded velocities, or positions of another frame, are no set-points that a loop has heard.
-bool follows(const Series& s, const Commands& cmd, const Loop& nominal, const Vehicle& vehicle) {
+bool follows(const Series& s, const Commands& cmd, const LoopMotion& nominal, const Vehicle& vehicle) {
   const double sunk = kWindowRules.stray + kWindowRules.sunk * kGravity / vehicle.controller.kp.vertical;
   std::size_t far = 0;
   for (std::size_t i = 0; i < s.size(); ++i) {
@@ -160,7 +67,7 @@ void read_attitude(Series& s, const log::FlightLog& log, const RowNumbers& rows)
 
 /// What the set-points lead to, unless the craft flew elsewhere.
 void read_commands(Series& s, const Commands& cmd, const Vehicle& vehicle) {
-  Loop nominal = loop_of(s, cmd, vehicle, true);
+  LoopMotion nominal = loop_of(s, cmd, vehicle, true);
   s.strayed = !follows(s, cmd, nominal, vehicle);
   if (s.strayed) return;
   if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
@@ -168,7 +75,12 @@ void read_commands(Series& s, const Commands& cmd, const Vehicle& vehicle) {
   lagging.controller.attitude_lag += kWindowRules.more_lag;
   s.a_lagging = loop_of(s, cmd, lagging, true).a;
   s.v_dragged = loop_of(s, cmd, vehicle, true, kWindowRules.loop_drag).v;
-  if (s.simulated_by_thrust) s.answer = answers(s, cmd, vehicle);
+  if (s.simulated_by_thrust) {
+    std::array<double, kShifts.size()> lags;
+    for (std::size_t n = 0; n < lags.size(); ++n) lags[n] = vehicle.controller.attitude_lag + kShifts[n];
+    auto found = answers(s, cmd, vehicle, lags);
+    std::ranges::move(found, s.answer.begin());
+  }
   s.p_nominal = std::move(nominal.p), s.v_nominal = std::move(nominal.v), s.a_nominal = std::move(nominal.a);
 }
 

@@ -10,6 +10,7 @@ const axe = fs.readFileSync(path.resolve(modules, "node_modules/axe-core/axe.min
 async function look(browser, width, scheme, script) {
   const context = await browser.newContext({viewport: {width, height: 900}, colorScheme: scheme, offline: true, javaScriptEnabled: script,
     acceptDownloads: true, bypassCSP: true}); // axe is put in by the test; the page's own policy is looked at below
+  context.setDefaultTimeout(120000); // software drawing on a machine that others use
   const tab = await context.newPage(), complaints = [], asked = [];
   tab.on("console", (message) => ["error", "warning"].includes(message.type()) && complaints.push(message.text()));
   tab.on("pageerror", (error) => complaints.push(String(error)));
@@ -23,12 +24,42 @@ async function measured(browser, width, scheme) {
   const {context, tab, complaints, asked} = await look(browser, width, scheme, true);
   const said = await tab.evaluate(() => ({scroll: document.documentElement.scrollWidth, width: innerWidth, ground: getComputedStyle(document.body).backgroundColor,
     plots: document.querySelectorAll(".drawn > .plot canvas").length, drawings: document.querySelectorAll("svg").length}));
+  const plane = await tab.$("#plane-which");
+  if (plane) await plane.selectOption("2"); // what it shows and tells is looked at too
+  await tab.waitForTimeout(plane ? 200 : 0);
+  said.scroll = await tab.evaluate(() => document.documentElement.scrollWidth);
   await tab.evaluate(axe);
   const found = await tab.evaluate(() => axe.run(document, {resultTypes: ["violations"]}));
   const grave = found.violations.filter((v) => ["serious", "critical"].includes(v.impact));
   await tab.screenshot({path: path.join(out, `${path.basename(page, ".html")}-${width}-${scheme}.png`)});
   await context.close();
   return {viewport: width, scheme, ...said, complaints, asked, rules: found.violations.length, grave: grave.map((v) => [v.id, v.nodes.slice(0, 3).map((n) => n.html.slice(0, 200))])};
+}
+
+// The plane of the field: off, then as each kind at its first place and one moved by a key; what is told and given of each.
+async function planes(tab, colours, slider) {
+  const given = async (name) => {
+    const [download] = await Promise.all([tab.waitForEvent("download"), tab.click(name)]);
+    return fs.readFileSync(await download.path(), "utf8");
+  };
+  const hidden = () => tab.$$eval(".plane [id]:not(select), .plane .scale, .plane output", (all) => all.filter((e) => getComputedStyle(e).display === "none").length);
+  await slider.evaluate((element, to) => { element.value = to; element.dispatchEvent(new Event("input")); }, times[0]);
+  await tab.waitForTimeout(200);
+  const said = {off: {hidden: await hidden(), ...await colours()}, kinds: []};
+  for (const kind of ["2", "0", "1"]) {
+    await tab.selectOption("#plane-which", kind);
+    for (const key of [null, "ArrowRight", "ArrowRight"]) {
+      if (key) await tab.focus("#plane-where"), await tab.keyboard.press(key);
+      await tab.waitForTimeout(200);
+      said.kinds.push({kind, hidden: await hidden(), told: await tab.textContent(".plane output"), spoken: await tab.getAttribute("#plane-where", "aria-valuetext"),
+        csv: await given("#plane-file"), ...await colours()});
+    }
+  }
+  said.here = await tab.textContent("#plane-here");
+  await tab.selectOption("#plane-which", "");
+  await tab.waitForTimeout(200);
+  said.again = await colours();
+  return said;
 }
 
 async function worked(browser) {
@@ -78,6 +109,7 @@ async function worked(browser) {
     await tab.waitForTimeout(200);
     said.scene.push(await colours());
   }
+  if (await tab.$("#plane-which")) said.plane = await planes(tab, colours, slider);
   const shown = () => tab.$$eval(".drawing", (all) => all.filter((e) => getComputedStyle(e).display !== "none").length);
   said.shown = {screen: await shown()};
   await tab.emulateMedia({media: "print"});

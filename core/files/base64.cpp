@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/backwash/base64.hpp"
+#include "core/files/base64.hpp"
 
 #include <array>
 #include <cstdint>
 
-namespace backwash::services {
+namespace backwash::files {
 namespace {
 
 constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -50,4 +50,4 @@ std::optional<std::string> from_base64(std::string_view text) {
   return bytes;
 }
 
-}  // namespace backwash::services
+}  // namespace backwash::files
