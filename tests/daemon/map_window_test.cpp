@@ -1,74 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
-#include <malloc.h>
 
-#include <functional>
-
-#include "tests/daemon/map_worker_rig.hpp"
+#include "tests/daemon/map_window_rig.hpp"
 
 // docs/interfaces.md, "A window that moves": what the map worker makes of it.
 namespace backwash::daemon {
 namespace {
 
 using map::Cell;
-
-MapSettings with_window(std::size_t keep_parts, double max_mib = 512) {
-  MapSettings settings;
-  settings.max_mib = max_mib;
-  settings.window = {
-      "rt/occ", "rt/free", {2, 2, 2}, 0.2, static_cast<double>(keep_parts * map::SeenWindow::kPartVoxels)};
-  return settings;
-}
-
-class MapWindowTest : public MapWorkerTest {
- protected:
-  void begin(const MapSettings& settings) {
-    settings_ = settings;
-    worker_now_.emplace(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings);
-  }
-  bool step() { return worker_now_->step(); }
-  void whole(const map::OccupancyGrid& grid, std::int64_t at_ns = 1) {
-    channels_->maps.offer(std::make_unique<const MapMessage>(
-        MapMessage{map::encode_octomap(grid), grid.resolution(), true, "OcTree", at_ns}));
-    step();
-  }
-  void vehicle(const Vec3& p) {
-    vehicle_ = p;
-    channels_->vehicle_W.write(p);
-  }
-  /// A cloud of those voxels of the window around the vehicle for which `listed` holds, by their centres.
-  void say(bool free, std::int64_t at_ns, const std::function<bool(const Vec3&)>& listed, bool first = false) {
-    auto cloud = std::make_unique<WindowCloud>();
-    const Index3 size = settings_.window.voxels();
-    cloud->free = free;
-    cloud->first = first;
-    cloud->window.low = (vehicle_ / 0.2 - size.cast<double>() / 2).array().round().cast<int>();
-    cloud->window.high = cloud->window.low + size - Index3::Ones();
-    cloud->stamp_ns = cloud->received_ns = at_ns;
-    map::for_each_voxel(cloud->window, [&](const Index3& v) {
-      if (listed(0.2 * (v.cast<double>() + Vec3::Constant(0.5)))) cloud->voxels.push_back(v);
-    });
-    ASSERT_TRUE(channels_->windows.push(cloud.release()));
-    if (!waits_) step();
-  }
-  /// A scan that looks along x through kSeenAt.
-  void look_through(std::int64_t at_ns) { channels_->scans.push(new Scan{{{1.9, 0.1, 1.1}}, {-0.5, 0.1, 1.1}, at_ns}); }
-  Cell at(const Vec3& p) { return world()->grid.at(world()->grid.index(p)); }
-  void expect_as_built() {
-    const auto built = plan::build_world(world()->grid, Model{}, config::load_vehicle("builtin:quad-5in").value());
-    EXPECT_TRUE(std::ranges::equal(built->grid.cells(), world()->grid.cells()));
-    EXPECT_TRUE(std::ranges::equal(built->hover.safe_voxels().cells(), world()->hover.safe_voxels().cells()));
-  }
-  std::size_t bytes() const { return mallinfo2().uordblks + mallinfo2().hblkhd; }
-
-  std::optional<MapWorker> worker_now_;
-  Vec3 vehicle_ = Vec3::Zero();
-  bool waits_ = false;  // the worker is busy meanwhile
-};
-
-const Vec3 kSeenAt(0.5, 0.1, 1.1), kWallAt(0.5, 1.1, 1.1);
-
-bool same_voxel(const Vec3& p, const Vec3& q) { return (p - q).cwiseAbs().maxCoeff() < 0.05; }
 
 TEST_F(MapWindowTest, ItsVoxelsChangeTheWorldAsAScanDoesAndAgreeWithAWorldBuiltOfThem) {
   begin(with_window(100));
@@ -127,127 +66,7 @@ TEST_F(MapWindowTest, WhatItHasLeftIsKeptWhileThereIsRoom) {
   EXPECT_EQ(at(far), Cell::occupied);
 }
 
-TEST_F(MapWindowTest, WhatAScanHasFoundMeanwhileIsNotLetGoWithThePart) {
-  begin(with_window(0));
-  whole(grid_);
-  const Vec3 far(-2.5, 0.1, 1.1);
-  vehicle({-2.3, 0.5, 1.1});
-  say(true, 5, [&](const Vec3& p) { return same_voxel(p, far); });
-  channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6});
-  step();
-  ASSERT_EQ(at(far), Cell::occupied);
-  vehicle({2.3, 0.5, 1.1});
-  say(false, 8, [](const Vec3&) { return false; });
-  EXPECT_EQ(at(far), Cell::occupied);
-}
-
-TEST_F(MapWindowTest, WhatAScanHasFoundTooIsNotLetGoAsTheWindowsAlone) {
-  for (const bool scan_first : {false, true}) {
-    begin(with_window(0));
-    whole(grid_);
-    const Vec3 far(-2.5, 0.1, 1.1);
-    vehicle({-2.3, 0.5, 1.1});
-    const auto scanned = [&] {
-      channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6});
-      step();
-    };
-    if (scan_first) scanned();
-    say(false, 5, [&](const Vec3& p) { return same_voxel(p, far); });
-    if (!scan_first) scanned();
-    vehicle({2.3, 0.5, 1.1});
-    say(false, 8, [](const Vec3&) { return false; });
-    EXPECT_EQ(at(far), Cell::occupied) << scan_first;
-  }
-}
-
-TEST_F(MapWindowTest, WhatScansHaveFreedIsOccupiedAgainOnceTheWindowListsItAgain) {
-  begin(with_window(100));
-  whole(grid_);
-  vehicle({0, 0.5, 1.1});
-  const auto seen = [](const Vec3& p) { return same_voxel(p, kSeenAt); };
-  say(false, 5, seen);
-  for (int n = 0; n < 5; ++n) look_through(6 + n);
-  step();
-  ASSERT_EQ(at(kSeenAt), Cell::free) << "five scans look through it";
-  say(false, 12, seen);
-  EXPECT_EQ(at(kSeenAt), Cell::occupied);
-  expect_as_built();
-  for (int n = 0; n < 4; ++n) look_through(13 + n);
-  say(false, 17, seen);
-  look_through(18);
-  step();
-  EXPECT_EQ(at(kSeenAt), Cell::occupied) << "scans count from the cloud on";
-}
-
 // While a world is made scans and clouds wait together. The last word counts, and the age is that of the newest.
-TEST_F(MapWindowTest, ScansAndCloudsThatWaitedAreTakenInTheOrderInWhichTheyCame) {
-  begin(with_window(100));
-  whole(grid_);
-  vehicle({0, 0.5, 1.1});
-  const auto seen = [](const Vec3& p) { return same_voxel(p, kSeenAt); };
-  waits_ = true;
-  say(true, 5, seen);
-  channels_->scans.push(new Scan{{kSeenAt}, {-0.5, 0.1, 1.1}, 6});
-  step();
-  EXPECT_EQ(at(kSeenAt), Cell::occupied) << "the scan is newer than the cloud of free voxels";
-  EXPECT_EQ(channels_->map_ns.load(), 6);
-  for (int n = 0; n < 5; ++n) look_through(7 + n);
-  say(false, 12, seen);
-  step();
-  EXPECT_EQ(at(kSeenAt), Cell::occupied) << "the cloud is newer than the scans";
-  EXPECT_EQ(channels_->map_ns.load(), 12);
-  say(false, 13, [](const Vec3&) { return false; });
-  channels_->scans.push(new Scan{{{0.9, 0.1, 1.1}}, {-0.5, 0.1, 1.1}, 14});
-  step();
-  EXPECT_EQ(channels_->map_ns.load(), 14) << "an older cloud makes no scan older";
-  expect_as_built();
-}
-
-TEST_F(MapWindowTest, AMapperThatBeganAnewFreesByItsOwnStamps) {
-  begin(with_window(100));
-  whole(grid_);
-  vehicle({0, 0.5, 1.1});
-  const auto seen = [](const Vec3& p) { return same_voxel(p, kSeenAt); };
-  say(false, 1000, seen);
-  say(
-      false, 3, [](const Vec3&) { return false; }, true);
-  say(true, 4, seen);
-  EXPECT_EQ(at(kSeenAt), Cell::free);
-}
-
-TEST_F(MapWindowTest, WhatAScanHasFoundTooIsTakenAlongAsSuch) {
-  begin(with_window(0));
-  vehicle({0, 0, 1});
-  const Vec3 found(-0.5, 0.1, 1.1);
-  say(true, 1, [](const Vec3&) { return true; });
-  say(false, 2, [&](const Vec3& p) { return same_voxel(p, found); });
-  channels_->scans.push(new Scan{{found}, {0.3, 0.1, 1.1}, 3});
-  step();
-  vehicle({0.9, 0, 1});  // the world moves, and the part is let go of in it
-  say(false, 4, [](const Vec3&) { return false; });
-  const Vec3 moved = world()->grid.origin();
-  ASSERT_EQ(at(found), Cell::occupied);
-  vehicle({1.0, 0, 1});
-  say(false, 5, [](const Vec3&) { return false; });
-  EXPECT_EQ(world()->grid.origin(), moved);
-  EXPECT_EQ(at(found), Cell::occupied);
-}
-
-TEST_F(MapWindowTest, AMapThatWaitsForOdometryIsNotMixedWithTheWorldBeforeIt) {
-  begin(with_window(0, (15 * 15 * 15 * 115.0 + static_cast<double>(grid_.cell_count())) / (1 << 20) + 0.01));
-  map::OccupancyGrid before({-1, -1, 0}, 0.2, {10, 10, 10}, Cell::occupied);
-  before.set({0, 0, 0}, Cell::free);
-  whole(before);
-  ASSERT_EQ(world()->grid.size(), before.size());
-  whole(grid_, 2);
-  vehicle({0, 0.1, 1.1});
-  say(false, 3, [](const Vec3&) { return false; });
-  ASSERT_EQ(world()->grid.size(), Index3(15, 15, 15));
-  map::for_each_voxel(map::all_of(world()->grid.size()), [&](const Index3& v) {
-    ASSERT_EQ(world()->grid.at(v), grid_.at(grid_.index(world()->grid.center(v))));
-  });
-}
-
 TEST_F(MapWindowTest, ANewerWholeMapTakesBackWhatWasCalledFreeAndNoObstacle) {
   begin(with_window(100));
   whole(grid_);
