@@ -40,6 +40,12 @@ void LiveMap::pass(const Vec3& from, const Vec3& to) {
   }
 }
 
+void LiveMap::take_along(const LiveMap& other, const Index3& low) noexcept {
+  for_each_voxel(all_of(grid_.size()), [&](const Index3& v) {
+    if (grid_.occupied(v) && other.found(low + v)) misses_[grid_.linear(v)] = kFound;
+  });
+}
+
 ScanChange LiveMap::insert(std::span<const Vec3> points_W, const Vec3& sensor_W, double max_range) {
   ScanChange change;
   const double a = grid_.resolution();
@@ -57,8 +63,8 @@ ScanChange LiveMap::insert(std::span<const Vec3> points_W, const Vec3& sensor_W,
     Cell now = before;
     if (seen_[n] == Seen::hit) {
       now = Cell::occupied;
-      misses_[n] = 0;
-    } else if (before != Cell::occupied || ++misses_[n] >= kMissesToFree) {
+      misses_[n] = kFound;
+    } else if (before != Cell::occupied || (++misses_[n] & ~kFound) >= kMissesToFree) {
       now = Cell::free;
       misses_[n] = 0;
     }

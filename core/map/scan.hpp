@@ -27,11 +27,17 @@ class LiveMap {
   explicit LiveMap(OccupancyGrid grid);
 
   const OccupancyGrid& grid() const noexcept { return grid_; }
-  /// Another than a scan says what a voxel holds. Precondition: it is inside the grid.
+  /// Another than a scan says what a voxel holds; scans begin anew to free it. Precondition: it is inside the grid.
   void set(const Index3& v, Cell c) noexcept {
     grid_.set(v, c);
-    misses_[grid_.linear(v)] = 0;
+    std::uint8_t& misses = misses_[grid_.linear(v)];
+    misses = c == Cell::occupied && (misses & kFound) != 0 ? kFound : std::uint8_t{0};
   }
+  /// Whether the voxel is occupied and a scan has found it so.
+  bool found(const Index3& v) const noexcept { return grid_.inside(v) && (misses_[grid_.linear(v)] & kFound) != 0; }
+  /// Takes along what scans have found in another grid of the lattice, where it is occupied in this one: `low` is the
+  /// voxel of that grid at this one's first.
+  void take_along(const LiveMap& other, const Index3& low) noexcept;
   /// Casts a ray from the sensor to each point (m in W); the last voxel of a ray is not passed. Points farther than
   /// `max_range` (m) only free the way up to there. Precondition: the sensor is inside the grid and max_range < 1 km.
   /// O(points · range/a).
@@ -39,11 +45,12 @@ class LiveMap {
 
  private:
   enum class Seen : std::uint8_t { nothing, passed, hit };
+  static constexpr std::uint8_t kFound = 0x80;  // of misses_
   void see(const Index3& v, Seen what);
   void pass(const Vec3& from, const Vec3& to);  // in voxels from the origin
 
   OccupancyGrid grid_;
-  std::vector<std::uint8_t> misses_;  // per voxel: scans in a row that passed it while it was occupied
+  std::vector<std::uint8_t> misses_;  // per voxel: scans in a row that passed it while it was occupied; and kFound
   std::vector<Seen> seen_;            // by the scan under way
   std::vector<std::size_t> touched_;  // the voxels of seen_ that are not nothing
 };

@@ -2,6 +2,7 @@
 #include "core/map/seen_window.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace backwash::map {
 namespace {
@@ -56,20 +57,35 @@ std::vector<Index3> SeenWindow::say(std::span<const Index3> voxels, Cell cell) {
 }
 
 std::vector<Index3> SeenWindow::occupied(std::span<const Index3> voxels, std::int64_t stamp_ns) {
-  if (stamp_ns >= newest_ns_) {
-    newest_ns_ = stamp_ns;
-    newest_.assign(voxels.begin(), voxels.end());
-    std::ranges::sort(newest_, before);
+  std::vector<Index3> sorted(voxels.begin(), voxels.end());
+  std::ranges::sort(sorted, before);
+  const auto [same, fresh] = recent_.try_emplace(stamp_ns);
+  if (!fresh && same->second != sorted) forgotten_ns_ = std::max(forgotten_ns_, stamp_ns);
+  same->second = std::move(sorted);
+  if (recent_.size() > kRecent) {
+    forgotten_ns_ = std::max(forgotten_ns_, recent_.begin()->first);
+    recent_.erase(recent_.begin());
   }
   return say(voxels, Cell::occupied);
 }
 
 std::vector<Index3> SeenWindow::freed(std::span<const Index3> voxels, std::int64_t stamp_ns) {
-  if (stamp_ns > newest_ns_ || newest_.empty()) return say(voxels, Cell::free);
+  const auto since = recent_.lower_bound(stamp_ns);
+  const bool forgotten = stamp_ns <= forgotten_ns_;
+  if (!forgotten && since == recent_.end()) return say(voxels, Cell::free);
+  const auto listed = [&](const Index3& v) {
+    return std::any_of(since, recent_.end(),
+                       [&](const auto& r) { return std::ranges::binary_search(r.second, v, before); });
+  };
   std::vector<Index3> left;
   for (const Index3& v : voxels)
-    if (!std::ranges::binary_search(newest_, v, before)) left.push_back(v);
+    if (!listed(v) && !(forgotten && at(v) == Cell::occupied)) left.push_back(v);
   return say(left, Cell::free);
+}
+
+void SeenWindow::restart() noexcept {
+  recent_.clear();
+  forgotten_ns_ = INT64_MIN;
 }
 
 Cell SeenWindow::at(const Index3& v) const noexcept {

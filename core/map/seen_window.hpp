@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <unordered_map>
@@ -21,6 +22,7 @@ namespace backwash::map {
 class SeenWindow {
  public:
   static constexpr int kShift = 4, kEdge = 1 << kShift;
+  static constexpr std::size_t kRecent = 4;
   static constexpr std::size_t kPartVoxels = std::size_t{kEdge} * kEdge * kEdge;
   /// Of one part at most, with what the table and the allocator take for it.
   static constexpr std::size_t kPartBytes = kPartVoxels + 112;
@@ -33,8 +35,12 @@ class SeenWindow {
   /// These are occupied since the stamp; what the cloud does not list stays as it was said. Returns the voxels of which
   /// that was not known.
   std::vector<Index3> occupied(std::span<const Index3> voxels, std::int64_t stamp_ns);
-  /// These are free since the stamp, but for those that the newest occupied cloud holds at this stamp or later.
+  /// These are free since the stamp, but for those that an occupied cloud lists at this stamp or later. Of the newest
+  /// kRecent stamps that is known voxel by voxel; at an older one, and where two clouds share a stamp, nothing that is
+  /// occupied is freed.
   std::vector<Index3> freed(std::span<const Index3> voxels, std::int64_t stamp_ns);
+  /// Another mapper speaks: its stamps count from anew. What was said stays.
+  void restart() noexcept;
   /// What was said; unknown: nothing.
   Cell at(const Index3& v) const noexcept;
 
@@ -57,8 +63,8 @@ class SeenWindow {
 
   std::size_t most_;
   std::unordered_map<Key, std::unique_ptr<Part>> parts_;
-  std::vector<Index3> newest_;  // occupied voxels of the newest cloud, in order
-  std::int64_t newest_ns_ = INT64_MIN;
+  std::map<std::int64_t, std::vector<Index3>> recent_;  // occupied voxels of the newest clouds, in order, by stamp
+  std::int64_t forgotten_ns_ = INT64_MIN;               // the newest stamp of which not all is in recent_
 };
 
 }  // namespace backwash::map

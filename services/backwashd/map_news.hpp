@@ -55,6 +55,7 @@ struct WindowCloud {
   std::vector<Index3> voxels;  ///< of the lattice that has a corner at the origin of W, within the window
   map::VoxelBox window;        ///< of that lattice, around the vehicle
   std::int64_t stamp_ns = 0, received_ns = 0;
+  bool first = false;  ///< of its writer: stamps of those before it say nothing of it
 };
 
 }  // namespace backwash::daemon

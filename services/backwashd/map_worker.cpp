@@ -150,8 +150,10 @@ void MapWorker::use(const MapMessage& message, map::OccupancyGrid whole) {
   const bool update = grid && world_ && same_place(world_->grid, *grid);
   if (!grid) {
     await_vehicle();
-    if (!move_world(nullptr, message.received_ns))
+    if (!move_world(true, message.received_ns)) {
+      live_.reset();  // the world before it has no part in that of this map
       spdlog::info("map kept: its world is made around the vehicle, once there is odometry");
+    }
   } else if (update) {
     const auto change = difference(world_->grid, *grid);
     if (!change.occupied.empty()) channels_.map_voxels.push(as_new_voxels(world_->grid, change, message.received_ns));
@@ -203,33 +205,17 @@ void MapWorker::publish_near(const map::OccupancyGrid& grid, std::int64_t receiv
                (now_ns() - begun) / 1'000'000);
 }
 
-bool MapWorker::take_scans() {
-  const auto begun = now_ns();
-  map::VoxelBox box;
-  std::optional<std::int64_t> received_ns;
-  while (const auto next = channels_.scans.pop()) {
-    const std::unique_ptr<Scan> scan(*next);
-    if (!live_ || !live_->grid().inside(live_->grid().index(scan->sensor_W))) {
-      ++channels_.scans_rejected;  // no map yet, or the sensor is outside of it
-      continue;
-    }
-    const auto change = live_->insert(scan->points_W, scan->sensor_W, settings_.sensor_range);
-    if (!change.box.empty()) {
-      box.add(change.box.low);
-      box.add(change.box.high);
-    }
-    received_ns = scan->received_ns;
-    ++channels_.scans_accepted;
+bool MapWorker::take_scan(const Scan& scan, map::VoxelBox& box) {
+  if (!live_ || !live_->grid().inside(live_->grid().index(scan.sensor_W))) {
+    ++channels_.scans_rejected;  // no map yet, or the sensor is outside of it
+    return false;
   }
-  if (!received_ns) return false;
-  if (box.empty()) {
-    channels_.map_ns.store(*received_ns);  // the snapshot says what the scan says
-    return true;
+  const auto change = live_->insert(scan.points_W, scan.sensor_W, settings_.sensor_range);
+  if (!change.box.empty()) {
+    box.add(change.box.low);
+    box.add(change.box.high);
   }
-  publish(plan::update_world(*world_, live_->grid(), box, model_, parallel_), *received_ns);
-  const Index3 extent = box.high - box.low + Index3::Ones();
-  spdlog::debug("map updated in {} x {} x {} voxels in {} ms", extent.x(), extent.y(), extent.z(),
-                (now_ns() - begun) / 1'000'000);
+  ++channels_.scans_accepted;
   return true;
 }
 
@@ -262,8 +248,7 @@ bool MapWorker::step() {
   bool scanned = false, rougher = false;
   try {
     if (message) take_map(*message);
-    scanned = take_scans();
-    scanned = take_windows() || scanned;
+    scanned = take_news();
     rougher = take_air();
   } catch (const Ended&) {  // the old world stays
   }

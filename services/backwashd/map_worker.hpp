@@ -42,9 +42,12 @@ class MapWorker {
   void take_map(const MapMessage& message);
   std::string wrong(const MapMessage& message, const tl::expected<map::OccupancyGrid, map::MapError>& grid) const;
   void use(const MapMessage& message, map::OccupancyGrid grid);
-  bool take_scans();
-  bool take_windows();
-  bool move_world(const map::OccupancyGrid* live, std::int64_t seen_ns);
+  bool take_news();
+  /// Takes it into the live grid, with the box of what changed. False: it is refused.
+  bool take_scan(const Scan& scan, map::VoxelBox& box);
+  /// The same; the control thread is told of new occupied voxels. What is far is let go, with a box of its own.
+  void take_cloud(const WindowCloud& cloud, map::VoxelBox& said, map::VoxelBox& gone);
+  bool move_world(bool anew, std::int64_t seen_ns);
   void tell_let_go(const WindowKeeper::Changes& changes);
   bool take_air();
   void reject(const MapMessage& message, const std::string& why);

@@ -130,6 +130,7 @@ tl::expected<WindowCloud, std::string> WindowClouds::judge(bool free, const dds:
     if (3 * beyond > cloud->points.size())
       beyond_ = (free ? told_.free : told_.occupied) + ": " + what + ": they are left out";
   }
+  result.first = newest_ns_[free] == INT64_MIN;
   newest_ns_[free] = stamp_ns;
   return result;
 }

@@ -47,17 +47,7 @@ std::optional<map::OccupancyGrid> WindowKeeper::whole(map::OccupancyGrid map) {
   whole_ = std::move(map);
   fixed_ = whole_->cell_count() <= most_fixed_;
   if (!fixed_) return std::nullopt;
-  auto grid = composed(low_of(*whole_), whole_->size(), nullptr);
-  changed_.clear();  // it holds them
-  return grid;
-}
-
-void WindowKeeper::take(const WindowCloud& cloud) {
-  window_ = cloud.window;
-  (cloud.free ? free_came_ : occupied_came_) = true;
-  const auto changed =
-      cloud.free ? seen_.freed(cloud.voxels, cloud.stamp_ns) : seen_.occupied(cloud.voxels, cloud.stamp_ns);
-  changed_.insert(changed_.end(), changed.begin(), changed.end());
+  return composed(low_of(*whole_), whole_->size(), nullptr);
 }
 
 std::optional<map::OccupancyGrid> WindowKeeper::moved(const Vec3& vehicle_W, const map::OccupancyGrid* live) const {
@@ -75,21 +65,29 @@ std::optional<map::OccupancyGrid> WindowKeeper::moved(const Vec3& vehicle_W, con
   return composed(low(size), size, live);
 }
 
-WindowKeeper::Changes WindowKeeper::changes(map::LiveMap* live) {
+WindowKeeper::Changes WindowKeeper::take(const WindowCloud& cloud, map::LiveMap* live) {
   Changes result;
   const Index3 low = live ? low_of(live->grid()) : Index3::Zero();
   const auto set = [&](const Index3& at, map::Cell now, map::ScanChange& change) {
     const Index3 v = at - low;
-    if (!live || !live->grid().inside(v) || live->grid().at(v) == now) return;
+    if (!live || !live->grid().inside(v)) return;
+    const bool known = live->grid().at(v) == now;
     live->set(v, now);
-    note(change, v, now);
+    if (!known) note(change, v, now);
   };
-  for (const Index3& at : changed_) set(at, seen_.at(at), result.said);
-  changed_.clear();
-  for (const auto& [at, said] : seen_.evict(window_)) {
+  (cloud.free ? free_came_ : occupied_came_) = true;
+  if (cloud.free) {
+    for (const Index3& at : seen_.freed(cloud.voxels, cloud.stamp_ns)) set(at, map::Cell::free, result.said);
+  } else {
+    if (cloud.first) seen_.restart();
+    seen_.occupied(cloud.voxels, cloud.stamp_ns);
+    for (const Index3& at : cloud.voxels) set(at, map::Cell::occupied, result.said);
+  }
+  for (const auto& [at, said] : seen_.evict(cloud.window)) {
     ++result.let_go;
     result.let_go_blocks += said == map::Cell::occupied;
-    if (live && live->grid().at(Index3(at - low)) == said) set(at, of_whole(at), result.gone);
+    const Index3 v = at - low;
+    if (live && live->grid().at(v) == said && !live->found(v)) set(at, of_whole(at), result.gone);
   }
   return result;
 }

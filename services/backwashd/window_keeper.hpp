@@ -28,8 +28,6 @@ class WindowKeeper {
   /// Takes a whole map, and says what its world holds. What the window called free before it is not any more. Nothing:
   /// its world does not fit; the next is that of moved().
   std::optional<map::OccupancyGrid> whole(map::OccupancyGrid map);
-  /// Takes a cloud; what it changes comes with the next changes().
-  void take(const WindowCloud& cloud);
   /// The grid of a world around the vehicle: where there is none yet and both clouds have come, or a whole map; or
   /// where the window has reached the edge of that one. `live`: the grid in use, whose content is taken along where
   /// both are; null: there is none, or a new whole map speaks.
@@ -40,10 +38,10 @@ class WindowKeeper {
     std::size_t let_go = 0;         ///< voxels that had been said something of
     std::size_t let_go_blocks = 0;  ///< of them the occupied ones
   };
-  /// Takes into the live grid, null if there is none yet, what the clouds have said since the last call, and lets go of
-  /// what is too much: where the grid still holds what the window had said, it holds what the whole map says again.
-  /// What is outside it is left out.
-  Changes changes(map::LiveMap* live);
+  /// Takes a cloud, and into the live grid, null if there is none yet, what it says that was not known; what is
+  /// occupied is so again where scans had freed it. Lets go of what is too much: where the grid still holds what the
+  /// window had said, and no scan has found it, it holds what the whole map says again. What is outside it is left out.
+  Changes take(const WindowCloud& cloud, map::LiveMap* live);
 
   /// Parts of what the window has said that are held now.
   std::size_t parts() const noexcept { return seen_.parts(); }
@@ -57,8 +55,6 @@ class WindowKeeper {
   map::SeenWindow seen_;
   std::optional<map::OccupancyGrid> whole_;
   bool fixed_ = false, occupied_came_ = false, free_came_ = false;
-  map::VoxelBox window_;         // the newest
-  std::vector<Index3> changed_;  // of the lattice, since changes()
 };
 
 }  // namespace backwash::daemon

@@ -1,70 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
-#include <malloc.h>
 
-#include <functional>
-
-#include "tests/daemon/map_worker_rig.hpp"
+#include "tests/daemon/map_window_rig.hpp"
 
 // docs/interfaces.md, "A window that moves": what the map worker makes of it.
 namespace backwash::daemon {
 namespace {
 
 using map::Cell;
-
-MapSettings with_window(std::size_t keep_parts, double max_mib = 512) {
-  MapSettings settings;
-  settings.max_mib = max_mib;
-  settings.window = {
-      "rt/occ", "rt/free", {2, 2, 2}, 0.2, static_cast<double>(keep_parts * map::SeenWindow::kPartVoxels)};
-  return settings;
-}
-
-class MapWindowTest : public MapWorkerTest {
- protected:
-  void begin(const MapSettings& settings) {
-    settings_ = settings;
-    worker_now_.emplace(*channels_, recorder_, Model{}, config::load_vehicle("builtin:quad-5in").value(), settings);
-  }
-  bool step() { return worker_now_->step(); }
-  void whole(const map::OccupancyGrid& grid, std::int64_t at_ns = 1) {
-    channels_->maps.offer(std::make_unique<const MapMessage>(
-        MapMessage{map::encode_octomap(grid), grid.resolution(), true, "OcTree", at_ns}));
-    step();
-  }
-  void vehicle(const Vec3& p) {
-    vehicle_ = p;
-    channels_->vehicle_W.write(p);
-  }
-  /// A cloud of those voxels of the window around the vehicle for which `listed` holds, by their centres.
-  void say(bool free, std::int64_t at_ns, const std::function<bool(const Vec3&)>& listed) {
-    auto cloud = std::make_unique<WindowCloud>();
-    const Index3 size = settings_.window.voxels();
-    cloud->free = free;
-    cloud->window.low = (vehicle_ / 0.2 - size.cast<double>() / 2).array().round().cast<int>();
-    cloud->window.high = cloud->window.low + size - Index3::Ones();
-    cloud->stamp_ns = cloud->received_ns = at_ns;
-    map::for_each_voxel(cloud->window, [&](const Index3& v) {
-      if (listed(0.2 * (v.cast<double>() + Vec3::Constant(0.5)))) cloud->voxels.push_back(v);
-    });
-    ASSERT_TRUE(channels_->windows.push(cloud.release()));
-    step();
-  }
-  Cell at(const Vec3& p) { return world()->grid.at(world()->grid.index(p)); }
-  void expect_as_built() {
-    const auto built = plan::build_world(world()->grid, Model{}, config::load_vehicle("builtin:quad-5in").value());
-    EXPECT_TRUE(std::ranges::equal(built->grid.cells(), world()->grid.cells()));
-    EXPECT_TRUE(std::ranges::equal(built->hover.safe_voxels().cells(), world()->hover.safe_voxels().cells()));
-  }
-  std::size_t bytes() const { return mallinfo2().uordblks + mallinfo2().hblkhd; }
-
-  std::optional<MapWorker> worker_now_;
-  Vec3 vehicle_ = Vec3::Zero();
-};
-
-const Vec3 kSeenAt(0.5, 0.1, 1.1), kWallAt(0.5, 1.1, 1.1);
-
-bool same_voxel(const Vec3& p, const Vec3& q) { return (p - q).cwiseAbs().maxCoeff() < 0.05; }
 
 TEST_F(MapWindowTest, ItsVoxelsChangeTheWorldAsAScanDoesAndAgreeWithAWorldBuiltOfThem) {
   begin(with_window(100));
@@ -123,20 +66,7 @@ TEST_F(MapWindowTest, WhatItHasLeftIsKeptWhileThereIsRoom) {
   EXPECT_EQ(at(far), Cell::occupied);
 }
 
-TEST_F(MapWindowTest, WhatAScanHasFoundMeanwhileIsNotLetGoWithThePart) {
-  begin(with_window(0));
-  whole(grid_);
-  const Vec3 far(-2.5, 0.1, 1.1);
-  vehicle({-2.3, 0.5, 1.1});
-  say(true, 5, [&](const Vec3& p) { return same_voxel(p, far); });
-  channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6});
-  step();
-  ASSERT_EQ(at(far), Cell::occupied);
-  vehicle({2.3, 0.5, 1.1});
-  say(false, 8, [](const Vec3&) { return false; });
-  EXPECT_EQ(at(far), Cell::occupied);
-}
-
+// While a world is made scans and clouds wait together. The last word counts, and the age is that of the newest.
 TEST_F(MapWindowTest, ANewerWholeMapTakesBackWhatWasCalledFreeAndNoObstacle) {
   begin(with_window(100));
   whole(grid_);
@@ -183,7 +113,7 @@ TEST_F(MapWindowTest, WithoutAWholeMapTheWorldIsWhatTheWindowHasSaidAndMovesWith
   vehicle({0.9, 0, 1});
   say(false, 4, corridor_wall);
   say(true, 4, air);
-  ASSERT_NE(world(), first);
+  ASSERT_GT(world()->grid.origin().x(), -1.2);
   EXPECT_LT(std::abs(world()->grid.center({7, 7, 7}).x() - 0.9), 0.2);
   EXPECT_EQ(at({1.7, 0.1, 1}), Cell::free);
   EXPECT_EQ(at({1.7, 0.9, 1}), Cell::occupied);

@@ -167,7 +167,10 @@ TEST(WindowClouds, AnOlderCloudOfItsKindIsRefusedUntilItsWriterIsGone) {
   EXPECT_THAT(judged.refused(older), HasSubstr("header.stamp 1 s before the one before it"));
   EXPECT_EQ(judged.refused(newer), "taken") << "the same stamp again";
   judged.clouds.forget(false);
-  EXPECT_EQ(judged.refused(older), "taken");
+  const auto first = judged.clouds.judge(false, older.message(), kMapper, kVehicleAt, 3);
+  ASSERT_TRUE(first) << first.error();
+  EXPECT_TRUE(first->first) << "of another mapper: stamps before it say nothing of it";
+  EXPECT_FALSE(judged.clouds.judge(false, older.message(), kMapper, kVehicleAt, 3)->first);
 }
 
 TEST(WindowClouds, ACloudThatIsNoneOrTooLargeOrBeforeTheFirstOdometryIsRefused) {

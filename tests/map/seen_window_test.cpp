@@ -6,6 +6,7 @@
 
 #include <map>
 #include <random>
+#include <set>
 #include <tuple>
 
 namespace backwash::map {
@@ -44,6 +45,46 @@ TEST(SeenWindow, OccupiedWinsAtOneStampInEitherOrderAndOverAnOlderCloudOfFreeVox
     }
 }
 
+// Clouds of two topics come in any order: a late one of free voxels is older than the obstacle, if not than the newest.
+TEST(SeenWindow, AFreeCloudFreesNothingThatAnyOccupiedCloudListsAtItsStampOrLater) {
+  const Index3 other(0, 0, 0);
+  SeenWindow seen(kPlenty);
+  seen.occupied(std::vector{kV}, 50);
+  seen.occupied(std::vector{other}, 60);
+  for (const std::int64_t stamp : {40, 50}) {
+    EXPECT_TRUE(seen.freed(std::vector{kV}, stamp).empty());
+    EXPECT_EQ(seen.at(kV), Cell::occupied) << stamp;
+  }
+  EXPECT_EQ(seen.freed(std::vector{kV}, 55).size(), 1u) << "later than the newest that lists it";
+  // However many clouds came since.
+  seen.occupied(std::vector{kV}, 70);
+  for (int n = 0; n < 20; ++n) seen.occupied(std::vector{other}, 80 + n);
+  seen.freed(std::vector{kV}, 65);
+  EXPECT_EQ(seen.at(kV), Cell::occupied);
+  EXPECT_EQ(seen.freed(std::vector{kV}, 99).size(), 1u);
+}
+
+TEST(SeenWindow, OfTwoOccupiedCloudsOfOneStampNeitherIsFreedAtIt) {
+  SeenWindow seen(kPlenty);
+  seen.occupied(std::vector{kV}, 5);
+  seen.occupied(std::vector{Index3(0, 0, 0)}, 5);
+  seen.freed(std::vector{kV}, 5);
+  EXPECT_EQ(seen.at(kV), Cell::occupied);
+  EXPECT_EQ(seen.freed(std::vector{kV}, 6).size(), 1u);
+}
+
+TEST(SeenWindow, StampsOfAnotherMapperCountFromAnewAndWhatWasSaidStays) {
+  const Index3 other(0, 0, 0);
+  SeenWindow seen(kPlenty);
+  seen.occupied(std::vector{other}, 1000);
+  seen.restart();
+  seen.occupied(std::vector{kV}, 2);
+  EXPECT_TRUE(seen.freed(std::vector{kV}, 2).empty());
+  EXPECT_EQ(seen.at(kV), Cell::occupied);
+  EXPECT_EQ(seen.at(other), Cell::occupied);
+  EXPECT_EQ(seen.freed(std::vector{kV, other}, 3).size(), 2u);
+}
+
 TEST(SeenWindow, AWholeMapTakesFreeBackAndLeavesWhatIsOccupied) {
   SeenWindow seen(kPlenty);
   const Index3 other(100, 100, 100);
@@ -61,8 +102,9 @@ TEST(SeenWindow, AgreesWithATableOfVoxelsWhateverIsSaid) {
   std::mt19937_64 random(1);
   SeenWindow seen(kPlenty);
   std::map<std::tuple<int, int, int>, Cell> table;
-  std::vector<Index3> newest;
-  std::int64_t newest_ns = -1;
+  std::map<std::tuple<int, int, int>, std::int64_t> listed;  // the newest stamp at which it was occupied
+  std::set<std::int64_t> stamps;
+  std::int64_t shared = -9;  // the newest stamp of two clouds
   const auto of = [](const Index3& v) { return std::tuple(v.x(), v.y(), v.z()); };
   for (std::int64_t stamp = 0; stamp < 400; ++stamp) {
     std::vector<Index3> voxels;
@@ -72,10 +114,12 @@ TEST(SeenWindow, AgreesWithATableOfVoxelsWhateverIsSaid) {
     std::size_t changed = 0;
     const bool occupied = random() % 2;
     const std::int64_t at = stamp - static_cast<std::int64_t>(random() % 3);
-    if (occupied && at >= newest_ns) newest = voxels, newest_ns = at;
+    if (occupied && !stamps.insert(at).second) shared = std::max(shared, at);
     for (const Index3& v : voxels) {
-      const bool held = !occupied && at <= newest_ns && std::ranges::find(newest, v) != newest.end();
+      std::int64_t& since = listed.try_emplace(of(v), -9).first->second;
+      if (occupied) since = std::max(since, at);
       Cell& cell = table.try_emplace(of(v), Cell::unknown).first->second;
+      const bool held = !occupied && (at <= since || (at <= shared && cell == Cell::occupied));
       const Cell now = occupied ? Cell::occupied : held ? cell : Cell::free;
       changed += now != std::exchange(cell, now);
     }
@@ -111,8 +155,9 @@ TEST(SeenWindow, LetsGoOfTheFarthestPartsBeyondTheStatedNumberAndOfNoneThatTheWi
 TEST(SeenWindow, HoldsNoMoreThanTheStatedBytesOverAKilometreOfCorridor) {
   constexpr std::size_t kKept = 40;
   const Index3 size(60, 40, 25);
-  const std::size_t stated =
-      (kKept + SeenWindow::parts_of(size)) * SeenWindow::kPartBytes + 12 * static_cast<std::size_t>(size.prod());
+  constexpr std::size_t kWalls = 2 * 60 * 25;  // voxels that a cloud lists as occupied
+  const std::size_t stated = (kKept + SeenWindow::parts_of(size)) * SeenWindow::kPartBytes +
+                             12 * (static_cast<std::size_t>(size.prod()) + (SeenWindow::kRecent - 1) * kWalls);
   SeenWindow seen(kKept);
   std::size_t most_parts = 0, most_bytes = 0;
   const std::size_t before = mallinfo2().uordblks + mallinfo2().hblkhd;
