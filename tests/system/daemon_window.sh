@@ -30,7 +30,7 @@ size_y = $y
 size_z = $z
 resolution = 0.1
 keep_voxels = $keep"
-mapper() { "$build/tests/window_mapper" "$domain" backwash builtin:parallel-walls-4m "$size" "$@" >>"$log" 2>&1; }
+mapper() { exec "$build/tests/window_mapper" "$domain" backwash builtin:parallel-walls-4m "$size" "$@" >>"$log" 2>&1; }
 # at GOAL: waits until the vehicle rests there.
 at() {
   for _ in $(seq 240); do
@@ -53,7 +53,7 @@ if [[ $case == refused ]]; then
   expect() { # expect FAULT PATTERN…: each is in the log
     local fault=$1 pattern
     shift
-    mapper "$fault"
+    (mapper "$fault")
     for pattern in "$@"; do grep -Eq "refused: $pattern" "$log" || die "of $fault nothing said: $pattern"; done
   }
   writer='of writer [0-9a-f]{8}:[0-9a-f:]+'
@@ -76,7 +76,7 @@ if [[ $case == pieces ]]; then
     "$bin/backwashctl" --domain "$domain" map "$work/large.bt" >"$work/sent" 2>&1 || echo "failed" >>"$work/sent"
   } &
 else
-  mapper "${cubes[@]}" &
+  mapper "${cubes[@]}" & # exec: who ends this one ends the mapper, not a shell around it
 fi
 more_pids+=($!)
 start_daemon builtin:quad-5in "$work/flight.bwlog"
