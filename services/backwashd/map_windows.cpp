@@ -66,7 +66,8 @@ bool MapWorker::take_news() {
     while (const auto next = channels_.windows.pop()) clouds.emplace_back(*next);
     while (const auto next = channels_.scans.pop()) scans.emplace_back(*next), more = true;
   }
-  if (scans.empty() && clouds.empty()) return false;
+  // Without news the vehicle may have come to the edge of its world all the same.
+  if (scans.empty() && clouds.empty()) return window_ && move_world(false, channels_.map_ns.load().value_or(0));
   map::VoxelBox said, gone;
   std::optional<std::int64_t> newest_ns;
   const auto newer = [&](std::int64_t ns) { newest_ns = std::max(newest_ns.value_or(ns), ns); };
