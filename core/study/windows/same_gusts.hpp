@@ -18,7 +18,7 @@ Gusts gusts_of(const Observations& seen, std::size_t flight);
 /// Of each flight the first one before it with the same gusts, or its own number. Gusts are chance: what the variances
 /// of two flights' windows share beside the model is small however alike they were flown, and all but 1 where one is
 /// the other under other stamps, other units or a little noise. Windows are compared by their time since take-off
-/// (kWindowRules.same_gusts and what follows it), each with each: 0.1 µs a pair of flights of 15 windows.
+/// (kWindowRules.same_gusts and what follows it), each with each: 0.15 µs a pair of flights of 15 windows.
 std::vector<std::size_t> same_gusts(std::vector<Gusts> flights);
 std::vector<std::size_t> same_gusts(const Observations& seen);
 
