@@ -198,7 +198,9 @@ class Teller {
   void take_piece(const log::TickRecord& tick, const StorySample& s) {
     if (!open_ || tick.segment != segment_) {
       const auto known = std::ranges::find(segments_, tick.segment, [](auto& known_one) { return known_one.head.id; });
-      const bool goes_on = open_ && known != segments_.end() && known->head.continues != 0;
+      // A lift-off alone has no commands of its own: the rise that follows is the same take-off.
+      const bool goes_on =
+          open_ && known != segments_.end() && (known->head.continues != 0 || (commands_ == 0 && vertical(*known)));
       if (!goes_on) {
         story_.pieces.push_back({});
         auto& piece = story_.pieces.back();

@@ -72,7 +72,7 @@ int run(const ReplayOptions& options) {
 Verb replay_verb(Command& app) {
   auto options = std::make_shared<ReplayOptions>();
   auto& command = app.add_subcommand("replay", "Runs a raw log's inputs through the flight pipeline's tick again");
-  command.add_option("--log", options->logs, "raw log of backwashd, or its parts from the first on").required();
+  command.add_option("logs,--log", options->logs, "raw log of backwashd, or its parts from the first on").required();
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.footer(
       "Every tick is decided again from its logged inputs (odometry, telemetry, segments, requests, map verdicts) and\n"

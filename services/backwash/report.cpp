@@ -108,7 +108,7 @@ Verb report_verb(Command& app) {
   auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
   command
       .add_option(
-          "--log", options->logs,
+          "logs,--log", options->logs,
           "raw log of backwashd, or parts of one in their order; of one file the later parts beside it are read too")
       .required();
   command.add_option("--truth", options->truth,

@@ -263,7 +263,8 @@ Verb study_verb(Command& app) {
                      "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
   command.add_option("--model", options->model, "model file or builtin:NAME").capture_default_str();
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
-  command.add_option("--log", options->logs, "flight logs, one flight each: CSV, PX4 (.ulg) or ArduPilot (.bin)");
+  command.add_option("logs,--log", options->logs,
+                     "flight logs, one flight each: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog, .mcap)");
   command.add_flag("--rows", options->rows,
                    "prints what a study keeps of each log as a line of JSON, and nothing else");
   command.add_option("--from", options->from, "such lines, in order, in place of logs").type_name("FILE");

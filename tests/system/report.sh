@@ -46,7 +46,7 @@ assert [p["kind"] for p in story["pieces"]] == ["take-off", "route", "route"] * 
 assert all(p["end"] == "reached" and p["samples"] == p["samples_inside"] > 0 for p in story["pieces"]), story["pieces"]
 assert abs(story["length_m"] - 2 * (1 + 2 + 1)) < 0.2 and story["min_clearance_m"] is None
 assert abs(story["time_s"] - 0.02 * (log.number - 1)) < 1e-9 and story["ended"].startswith("on the ground")
-text = subprocess.run([backwash, "report", "--log", "flight.bwlog"], capture_output=True, text=True, check=True).stdout
+text = subprocess.run([backwash, "report", "flight.bwlog"], capture_output=True, text=True, check=True).stdout
 assert "judged by measured positions" in text and "4 " not in text.split("\n")[0]
 
 # With the truth beside it clearances and goals are the truth's.
@@ -65,6 +65,18 @@ assert story["refusals"] == 1 and not story["goal_reached"] and story["pieces"] 
 
 # Nothing but the first line, as after a start that was killed.
 assert told(RawLog(), 1)[0]["ended"] == "no control tick was recorded"
+
+# A lift-off has no commands of its own: with the rise after it, it is one take-off.
+log = RawLog()
+log.in_air = True
+log.tick("lifting", STARTED, 1000, judged=True)
+for _ in range(50):
+    log.tick("lifting", STARTED, 1000, judged=False)
+log.fly((0, 0, 1))
+log.fly((2, 0, 1))
+log.land()
+story, _ = told(log, 0)
+assert [(p["kind"], p["samples"]) for p in story["pieces"]] == [("take-off", 51), ("route", 50)], story["pieces"]
 
 # An order ends a route: that is no miss. A fault does not.
 log = RawLog()
