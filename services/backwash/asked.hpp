@@ -14,6 +14,7 @@ struct Asked {
   std::string what;
   bool ends = false;  ///< it ends what is flown; otherwise, or where `beside`, that goes on
   bool beside = false;
+  bool session = false;  ///< it gives the session back, as each call of backwashctl does: nothing of the flight changes
 };
 
 /// Nothing: the text is no command that is known. Verbs are those of idl/backwash_msgs.idl.
@@ -43,7 +44,7 @@ inline std::optional<Asked> asked_for(const std::string& text) {
   std::string what = std::string("asked to ") + kVerbs[verb];
   if (verb == kGoTo || verb == kGoToFacing) what += " " + to_text(p);
   if (verb == kTakeOff && p.z() != 0) what += " to " + to_text(p.z(), 2) + " m";
-  return Asked{what, verb != kEnable && verb != kRelease, verb >= kOfAir};
+  return Asked{what, verb != kEnable && verb != kRelease, verb >= kOfAir, verb == kRelease};
 }
 
 }  // namespace backwash::services

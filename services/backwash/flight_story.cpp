@@ -126,6 +126,7 @@ class Teller {
   void take_command(const std::string& text) {
     const auto asked = asked_for(text);
     if (!asked) return;
+    if (asked->session) return;
     if (asked->what != asked_) say("command", asked->what);  // a station repeats itself until it is answered
     asked_ = asked->what;
     if (!asked->beside) ordered_ = asked->ends;

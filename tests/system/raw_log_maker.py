@@ -8,7 +8,7 @@ MAP, COMMAND, ACK, TICK, SEGMENT, TICK_INPUT, LOST, WORLD, FAILURE = 3, 4, 5, 8,
 AIR_CONSTANTS, AIR = 18, 19
 CLASSES = ["free_air", "ground", "wall", "corner", "none"]
 ARMED, LANDED_KNOWN, ON_GROUND = 1 << 4, 1 << 14, 1 << 15
-GO_TO, LAND, STOP = 4, 6, 8
+GO_TO, LAND, RELEASE, STOP = 4, 6, 7, 8
 
 
 class RawLog:
