@@ -55,8 +55,7 @@ class Teller {
       : story_(story), segments_(segments_of(log)), map_(map), radius_(radius) {
     if (truth) truth_.emplace(*truth);
     if (map_) distance_.emplace(*map_);
-    const auto first =
-        std::ranges::find(log.records, log::RecordKind::tick, [](const log::RawRecord& r) { return r.header.kind; });
+    const auto first = std::ranges::find(log.records, log::RecordKind::tick, [](auto& r) { return r.header.kind; });
     if (first != log.records.end())
       zero_ns_ = first->header.t_ns;
     else if (!log.records.empty())
@@ -170,6 +169,7 @@ class Teller {
   void take_mode(const log::TickRecord& tick) {
     const auto said = static_cast<Reason>(tick.reason);
     close_mode();
+    if (open_ && ordered_) end_by_order(story_.pieces.back());
     if (!last_tick_s_ || tick.mode != mode_) {
       const std::string from = !last_tick_s_ ? "" : mode() + " → ";
       mode_ = tick.mode, reason_ = tick.reason;
@@ -179,12 +179,17 @@ class Teller {
     }
     mode_ = tick.mode, reason_ = tick.reason;
     story_.timeline.modes.push_back({now_s_, now_s_, mode(), reason()});
-    if (!as_asked(said) && static_cast<Mode>(tick.mode) != Mode::tracking) last_fault_ = reason();
+    if (as_asked(said) || static_cast<Mode>(tick.mode) == Mode::tracking) return;
+    last_fault_ = reason();
+    if (open_ && story_.pieces.back().fault.empty()) story_.pieces.back().fault = reason();
   }
 
   void close_mode() {  // the newest one lasts until now
     if (!story_.timeline.modes.empty()) story_.timeline.modes.back().until_s = now_s_;
   }
+
+  // What a fault has ended no order ends.
+  static void end_by_order(StoryPiece& piece) { piece.by_order |= !piece.to_its_end && piece.fault.empty(); }
 
   void take_verdict(const log::TickRecord& tick, StorySample& s) {
     ++story_.judged, story_.inside += s.inside;
@@ -224,7 +229,9 @@ class Teller {
     } else if (!piece.to_its_end) {
       piece.goal_error_m = (s.p_W - piece.goal_W).norm();
     }
-    piece.by_order = !piece.to_its_end && (piece.by_order || ordered_);
+    if (m == Mode::tracking) piece.fault.clear();
+    if (ordered_) end_by_order(piece);
+    piece.by_order &= !piece.to_its_end;
   }
 
   void judge(const std::string& because) {
@@ -232,10 +239,8 @@ class Teller {
     if (!because.empty()) wrong.push_back(because);
     if (!failure_.empty()) wrong.push_back("the daemon ended itself: " + failure_);
     if (story_.take_offs == 0) {
-      const std::string why = !last_refusal_.empty() ? "refused: " + last_refusal_
-                              : !last_fault_.empty() ? last_fault_
-                                                     : "nothing asked it to";
-      wrong.push_back("the vehicle never took off: " + why);
+      const std::string fault = last_fault_.empty() ? "nothing asked it to" : last_fault_;
+      wrong.push_back("the vehicle never took off: " + (last_refusal_.empty() ? fault : "refused: " + last_refusal_));
     }
     if (in_air_) wrong.push_back("the log ends " + story_.ended);
     if (story_.touched())
@@ -246,7 +251,7 @@ class Teller {
     for (const auto& piece : story_.pieces)
       if (!piece.take_off && !piece.reached && !piece.by_order)
         wrong.push_back("the goal " + to_text(piece.goal_W) + " was missed by " + to_text(piece.goal_error_m, 2) +
-                        " m" + (last_fault_.empty() ? "" : ": " + last_fault_));
+                        " m" + (piece.fault.empty() ? "" : ": " + piece.fault));
     if (!fault_.empty()) wrong.push_back("the flight did not end as it was asked to: " + fault_);
   }
 

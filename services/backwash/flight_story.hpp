@@ -26,6 +26,7 @@ struct StoryPiece {
   bool by_order = false;    ///< an operator ended it before
   double goal_error_m = 0;  ///< of the position at its last tick
   bool reached = false;     ///< flown to its end, and the position then within the set around it
+  std::string fault;        ///< why it was left: the first reason that nobody asked for; empty without one
 };
 
 /// A tick with a judged position, or one in the air.

@@ -3,7 +3,7 @@
 import struct
 
 MODES = {"passive": 0, "enabling": 1, "tracking": 2, "hold": 3, "land": 4, "quiet": 5, "lifting": 6}
-STARTED, SEGMENT_ACCEPTED, ODOMETRY_LOST, LANDED, LAND_REQUESTED, STOP_REQUESTED = 0, 4, 6, 16, 18, 35
+STARTED, SEGMENT_ACCEPTED, ODOMETRY_LOST, LANDED, LAND_REQUESTED, STOP_REQUESTED, AIR_ROUGHER = 0, 4, 6, 16, 18, 35, 46
 MAP, COMMAND, ACK, TICK, SEGMENT, TICK_INPUT, LOST, WORLD, FAILURE = 3, 4, 5, 8, 9, 11, 13, 15, 16
 AIR_CONSTANTS, AIR = 18, 19
 CLASSES = ["free_air", "ground", "wall", "corner", "none"]

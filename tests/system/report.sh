@@ -103,6 +103,20 @@ log.wait()
 story, _ = told(log, 1)
 assert "missed by 2.40 m: odometry lost" in story["reason"] and story["holds"] == 1, story["reason"]
 
+# Of two goals that were missed, each for its own reason. A third was left since an operator asked to land.
+log = RawLog()
+log.fly((0, 0, 1))
+for goal, fault in (((4, 0, 1), ODOMETRY_LOST), ((2, 0, 1), AIR_ROUGHER)):
+    log.command(GO_TO, goal)
+    log.fly(goal, ticks=100, until=40)
+    for k in range(20):
+        log.tick("hold", fault, log.segments, 40)
+log.fly((0, 0, 1), ticks=100, until=40)
+log.land()
+story, _ = told(log, 1)
+assert [p["end"] for p in story["pieces"]][3] == "ended by an order", story["pieces"]
+assert [r.split(": ")[1] for r in story["reason"].split("; ")] == ["odometry lost", "air rougher than the flight allows for"], story["reason"]
+
 # Samples outside, and their number.
 log = RawLog()
 log.fly((0, 0, 1))
