@@ -88,6 +88,7 @@ class Teller {
 
   void finish(bool cut, const std::string& because) {
     open_ = false, close_mode();
+    std::ranges::stable_sort(story_.timeline.events, {}, &report::TimelineEvent::t_s);  // of several threads
     story_.time_s = story_.samples.empty() ? std::max(now_s_, 0.0) : last_tick_s_.value();
     if (!last_tick_s_)
       story_.ended = "no control tick was recorded";
@@ -289,8 +290,7 @@ bool FlightStory::goal_reached() const noexcept {
 FlightStory flight_story(const log::RawLog& log, const map::OccupancyGrid* map, double radius,
                          const log::FlightLog* truth, const std::string& because) {
   FlightStory story;
-  story.by_truth = truth != nullptr;
-  story.cut_at = log.cut_at;
+  story.by_truth = truth != nullptr, story.cut_at = log.cut_at;
   Teller teller(story, log, map, radius, truth);
   for (const auto& record : log.records) teller.take(record);
   teller.finish(log.cut_at.has_value(), because);

@@ -64,6 +64,19 @@ story, said = told(log, 1)
 assert story["reason"] == "the vehicle never took off: refused: no map was received" and story["reason"] in said
 assert story["refusals"] == 1 and not story["goal_reached"] and story["pieces"] == []
 
+# Threads write their records when they come to it: the story is in the order of time.
+log = RawLog()
+log.wait()
+log.t -= 30_000_000
+log.command(GO_TO, (1, 1, 1), result=1, reason="no map was received")
+log.t += 30_000_000
+log.wait(1)
+log.tick("enabling", STARTED)
+log.t -= 50_000_000
+log.record(FAILURE, b"late")
+story, _ = told(log, 1)
+assert [e["t"] for e in story["events"]] == sorted(e["t"] for e in story["events"]), story["events"]
+
 # Nothing but the first line, as after a start that was killed.
 assert told(RawLog(), 1)[0]["ended"] == "no control tick was recorded"
 
