@@ -23,10 +23,11 @@ class Handover {
     collect();
   }
 
-  /// Offers an object in place of any that was not yet taken, and frees what the reader gave back. Not real-time.
-  void offer(std::unique_ptr<const T> object) {
+  /// Offers an object in place of any that was not yet taken, which is returned, and frees what the reader gave back.
+  /// Not real-time.
+  std::unique_ptr<const T> offer(std::unique_ptr<const T> object) {
     collect();
-    delete offered_.exchange(object.release(), std::memory_order_acq_rel);
+    return std::unique_ptr<const T>(offered_.exchange(object.release(), std::memory_order_acq_rel));
   }
   /// Frees what the reader gave back. Writer's thread only; not real-time.
   void collect() {

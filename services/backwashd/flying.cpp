@@ -9,8 +9,7 @@
 namespace backwash::daemon {
 namespace {
 
-constexpr std::size_t kStopEvery = 10;  // commands (0.2 s) between verified stops
-constexpr double kHoldAfter = 2.0;      // s of hover at the end, so that the last set is the hover set's
+constexpr double kHoldAfter = 2.0;  // s of hover at the end, so that the last set is the hover set's
 
 }  // namespace
 
@@ -29,6 +28,7 @@ void verify(Flying& flying, const plan::World& world, std::size_t now) {
   auto& s = flying.segment;
   s.tube = reach::tube_over_field(world.reach, flying.start, flying.previous, s.commands, world.bounds);
   s.clearance = clearance_from(flying, world, s.tube, now);
+  flying.air = world.air.factors;
 }
 
 void add_guards(Flying& flying, const plan::World& world, std::size_t now) {
@@ -39,6 +39,14 @@ void add_guards(Flying& flying, const plan::World& world, std::size_t now) {
   flying.segment.stops =
       plan::verified_stops(world, flying.start, flying.previous, flying.segment.commands, now, kStopEvery,
                            [&](const reach::ReachTube& tube) { return clearance_from(flying, world, tube, now); });
+}
+
+void add_own_stop(Flying& flying, std::size_t branch) {
+  auto& s = flying.segment;
+  const auto own = static_cast<std::ptrdiff_t>(branch);
+  std::erase_if(s.stops, [&](const plan::Stop& stop) { return stop.branch == branch; });
+  s.stops.insert(std::ranges::lower_bound(s.stops, branch, {}, &plan::Stop::branch),
+                 {branch, {s.commands.begin() + own, s.commands.end()}, {s.tube.begin() + own, s.tube.end()}});
 }
 
 std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch) {

@@ -16,9 +16,12 @@ struct Flying {
   State start;        ///< estimated when its first command was given
   Setpoint previous;  ///< command active before that
   plan::PlanMetrics metrics;
-  std::optional<double> z_safe;  ///< of a take-off: below it only what is beside counts, m
-  bool held = false;             ///< told to hold: a loop closure moves the map alone, not the vehicle
+  std::optional<double> z_safe;   ///< of a take-off: below it only what is beside counts, m
+  bool held = false;              ///< told to hold: a loop closure moves the map alone, not the vehicle
+  AirFactors air = kModelledAir;  ///< of the world that it and its stops were verified in
 };
+
+constexpr std::size_t kStopEvery = 10;  ///< commands (0.2 s) between verified stops
 
 /// Lets the last command be held at rest for as long as the last set takes to become the hover set's.
 void append_hold(std::vector<Setpoint>& commands);
@@ -36,6 +39,10 @@ void add_guards(Flying& flying, const plan::World& world, std::size_t now = 0);
 
 /// The commands as they are flown: those of the segment, or, braking, of its stop that leaves at `stop_branch`.
 std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch);
+
+/// Makes the flight's own way from command `branch` on, which comes to rest, one of its stops: where no other is clear
+/// it still has one.
+void add_own_stop(Flying& flying, std::size_t branch);
 
 /// The segment as the raw log's record (log::SegmentRecord, then the commands).
 std::vector<std::uint8_t> segment_record(const Flying& flying);

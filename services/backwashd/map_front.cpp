@@ -91,6 +91,12 @@ void MapFront::take_scans() {
   });
 }
 
+/// Who sent one that is not looked at any more waits for no verdict.
+void MapFront::offer(MapMessage message) {
+  const auto before = channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+  assembly_.displaced(before.get());
+}
+
 void MapFront::take_maps() {
   // The map worker judges what is in a map.
   if (const auto good = channels_.map_writer.read_new(); good && good->term == term_ && map_writer_.bind(good->writer))
@@ -115,7 +121,7 @@ void MapFront::take_maps() {
     message.binary = m.binary;
     message.id = printable(m.id ? m.id : "");
     message.received_ns = now_ns();
-    channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+    offer(std::move(message));
   });
 }
 
@@ -142,7 +148,7 @@ void MapFront::take_parts() {
     spdlog::info("{} is whole after {:.1f} s", assembly_.what(), assembly_.age_s(now_ns()));
     MapMessage message = assembly_.message();
     message.from.term = term_;
-    channels_.maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+    offer(std::move(message));
   });
   tell_lost(assembly_.stalled(now_ns()));
   if (const auto receipt = assembly_.receipt(now_ns())) receipts_.write(*receipt);

@@ -44,6 +44,7 @@ class MapFront {
 
  private:
   void take_poses();
+  void offer(MapMessage message);
   void take_maps();
   void take_parts();
   void tell_lost(const std::optional<std::string>& line);

@@ -130,6 +130,11 @@ void MapParts::judge(const MapVerdict& verdict) {
       verdict.why.data());
 }
 
+void MapParts::displaced(const MapMessage* message) {
+  if (!message || !message->transfer || message->transfer != transfer_) return;
+  end(backwash_msgs_msg_dds__MAPRECEIPT_REFUSED, "a newer map came before this one was looked at");
+}
+
 std::optional<dds::MapReceipt> MapParts::receipt(std::int64_t now_ns) {
   if (!owes_ || now_ns - told_ns_ < kReceipt_ns) return std::nullopt;
   owes_ = false;

@@ -37,6 +37,9 @@ class MapParts {
   MapMessage message();
   /// Takes what the map worker made of it.
   void judge(const MapVerdict& verdict);
+  /// Another map took the place of this one before the map worker looked at it: if it came in parts, that is what
+  /// became of it. Null: none did.
+  void displaced(const MapMessage* message);
 
   /// A receipt that is due; what it points to lives until the next call.
   std::optional<dds::MapReceipt> receipt(std::int64_t now_ns);

@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
+#include <optional>
+#include <string>
 #include <utility>
 
+#include "core/plan/stop.hpp"
 #include "core/track/rebase.hpp"
 #include "services/backwashd/planner_worker.hpp"
 
@@ -13,6 +17,9 @@ namespace backwash::daemon {
 namespace {
 
 constexpr std::size_t kRectifyAfter = 15;       // commands (0.3 s) that a rectified segment leaves untouched
+constexpr std::size_t kStopAfter = 5;           // commands (0.1 s) before a stop that is chosen for the air
+constexpr std::size_t kStopsTried = 20;         // of them, one every 0.2 s
+constexpr double kBetter = 0.02;                // m that a later stop that is not clear has to be clearer by
 constexpr std::size_t kRunsOut = 300;           // commands: 3 s of motion and as much of hold
 constexpr std::int64_t kLook_ns = 500'000'000;  // between looks at a flight that runs out, without a new world
 
@@ -63,7 +70,8 @@ void PlannerWorker::pursue() {
   using Kind = plan::Replan::Kind;
   if (next.kind == Kind::kept && !braking) keep();
   if (next.kind == Kind::kept || (braking && next.kind != Kind::extended)) return;
-  if (next.kind == Kind::extended && too_calm()) return;  // the next world is not far
+  // The next world may be minutes away: until then what flies has to be clear in this one.
+  if (next.kind == Kind::extended && too_calm()) return braking ? void() : verify_again();
   if (next.kind == Kind::unsafe) return block("no way on is clear in the new map: " + metres(next.clearance_m));
   auto commands = std::move(next.route.commands);
   if (next.reaches_goal && p.yaw) {
@@ -91,16 +99,52 @@ void PlannerWorker::pursue() {
 /// The flight does not go on as it was accepted: the control thread brakes it on its next verified stop.
 void PlannerWorker::block(const std::string& why) {
   if (blocked_ == flying_->segment.id) return;
+  const std::string air = grown_air(), stop = air.empty() ? "" : choose_stop();
   blocked_ = flying_->segment.id;
-  const std::string air = grown_air();
   if (!air.empty()) {
     channels_.rough_segment.store(blocked_, std::memory_order_relaxed);
-    const std::string line = "the flight is stopped in rougher air: " + why + air;
+    const std::string line = "the flight is stopped in rougher air: " + why + air + stop;
     recorder_.append(log::RecordKind::world, line);
     return spdlog::warn("{}", line);
   }
   channels_.blocked_segment.store(blocked_, std::memory_order_relaxed);
   spdlog::warn("the flight is stopped: {}", why);
+}
+
+/// Before a flight is stopped for its air: where its stops were verified in calmer air than the newest world's, it is
+/// offered once more, to rest by the first stop that is clear in it; if none is, by the first that no later one
+/// betters. What is to be said of it; "": its stops are of that air.
+std::string PlannerWorker::choose_stop() {
+  if (std::ranges::equal(flying_->air, world_->air.factors, std::greater_equal{})) return "";
+  const bool offers = !flying_->segment.arms && front_.standing(view_) != PlanFront::Standing::ended;
+  for (const std::size_t lead : {kStopAfter, kRectifyAfter}) {  // the second where the first came too late
+    if (!offers || view_.segment != flying_->segment.id || view_.braking) break;
+    auto best = rest_from(view_.index + lead);
+    if (!best) break;  // it rests before that
+    const double clearance = best->segment.clearance;
+    if (!offer(std::move(*best))) continue;
+    return clearance > 0 ? "; it rests by a stop that is clear in it"
+                         : "; no stop is clear in it, the one flown lacks " + metres(-clearance);
+  }
+  return "; its stops are those of calmer air";
+}
+
+/// The flight, to rest by a stop that leaves it at `branch` or later, as choose_stop() says. Nothing: it ends before.
+std::optional<Flying> PlannerWorker::rest_from(std::size_t branch) {
+  std::optional<Flying> best;
+  for (std::size_t n = 0; n < kStopsTried && !(best && best->segment.clearance > 0); ++n, branch += kStopEvery) {
+    auto commands = plan::stop_along(flying_->segment.commands, branch, 2 * world_->reach.vehicle.limits.a_max);
+    if (commands.empty()) break;
+    Flying next = continued(branch, std::move(commands));
+    verify(next, *world_, view_.index);
+    const double clearance = next.segment.clearance;
+    if (!best || clearance > 0 || clearance > best->segment.clearance + kBetter) best = std::move(next);
+  }
+  if (!best) return best;
+  best->held = true;
+  add_guards(*best, *world_, view_.index);
+  add_own_stop(*best, best->segment.branch);
+  return best;
 }
 
 /// The classes whose factors have grown since what flies was last found clear, with factor and evidence; "": none has.

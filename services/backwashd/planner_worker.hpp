@@ -68,6 +68,8 @@ class PlannerWorker {
   bool pursues();
   void pursue();
   void block(const std::string& why);
+  std::string choose_stop();
+  std::optional<Flying> rest_from(std::size_t branch);
   std::string grown_air() const;
   void verify_again();
   void keep();

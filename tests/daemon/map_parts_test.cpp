@@ -83,6 +83,37 @@ TEST(MapParts, AWholeMapIsNotDisplacedBeforeItsSenderKnowsWhatBecameOfIt) {
   EXPECT_EQ(*parts.take(next.of(0, 3), kOther, 4 * kSecond), MapParts::Taken::begins);
 }
 
+// The map worker is never given it, and says nothing of it: its sender would wait for as long as it is answered.
+TEST(MapParts, AMapThatANewerOneReplacedBeforeItWasLookedAtIsRefusedInItsReceipts) {
+  Map map(1000);
+  MapParts parts(1u << 20, "map");
+  sync::Handover<MapMessage> maps;
+  const auto offer = [&](MapMessage message) {
+    const auto before = maps.offer(std::make_unique<const MapMessage>(std::move(message)));
+    parts.displaced(before.get());
+  };
+  offer({});
+  ASSERT_EQ(*parts.take(map.of(0, 1), kOne, 0), MapParts::Taken::whole);
+  offer(parts.message());
+  EXPECT_EQ(parts.receipt(kSecond)->state, backwash_msgs_msg_dds__MAPRECEIPT_WHOLE);
+  MapMessage other;
+  other.transfer = 6;
+  parts.displaced(&other);
+  EXPECT_FALSE(parts.receipt(2 * kSecond)) << "of another transfer";
+  offer({});
+  const auto receipt = parts.receipt(2 * kSecond);
+  ASSERT_TRUE(receipt);
+  EXPECT_EQ(receipt->state, backwash_msgs_msg_dds__MAPRECEIPT_REFUSED);
+  EXPECT_THAT(receipt->reason, HasSubstr("a newer map came"));
+  // One that the worker has taken is judged by it.
+  ASSERT_EQ(*parts.take((map.part.transfer = 8, map.of(0, 1)), kOne, 3 * kSecond), MapParts::Taken::whole);
+  offer(parts.message());
+  const MapMessage* taken = maps.take();
+  offer({});
+  EXPECT_EQ(parts.receipt(4 * kSecond)->state, backwash_msgs_msg_dds__MAPRECEIPT_WHOLE);
+  maps.give_back(taken);
+}
+
 TEST(MapParts, AWriterThatBeginsAMapWithEachPartTakesMemoryOnceASecond) {
   Map map(3000);
   MapParts parts(1u << 20, "map");

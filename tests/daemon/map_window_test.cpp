@@ -159,6 +159,27 @@ TEST_F(MapWindowTest, AWholeMapWithoutRoomForItsWorldIsFlownInByPartsAndReloaded
   as_whole();
 }
 
+// No mapper speaks, or it has died.
+TEST_F(MapWindowTest, TheWorldMovesAlongWithoutCloudsAndScans) {
+  begin(with_window(0, 15 * 15 * 15 * 115.0 / (1 << 20) + static_cast<double>(grid_.cell_count()) / (1 << 20) + 0.01));
+  vehicle({-2.3, 0.1, 1.1});
+  whole(grid_, 7);
+  ASSERT_NE(world(), nullptr);
+  const plan::World* first = world();
+  EXPECT_FALSE(step()) << "nothing is new";
+  EXPECT_EQ(world(), first);
+  for (const double x : {-1.2, 0.0, 1.2, 2.3}) {
+    vehicle({x, 0.1, 1.1});
+    EXPECT_TRUE(step()) << x;
+    EXPECT_EQ(at({x, 0.1, 1.1}), Cell::free) << x;
+  }
+  EXPECT_GT(world()->grid.origin().x(), 0);
+  map::for_each_voxel(map::all_of(world()->grid.size()), [&](const Index3& v) {
+    EXPECT_EQ(world()->grid.at(v), grid_.at(grid_.index(world()->grid.center(v))));
+  });
+  EXPECT_EQ(channels_->map_ns.load(), 7) << "a world that moves is no younger";
+}
+
 TEST_F(MapWindowTest, AWholeMapBeyondEvenThatIsRefused) {
   begin(with_window(0, 15 * 15 * 15 * 115.0 / (1 << 20) + static_cast<double>(grid_.cell_count()) / (1 << 20) - 0.001));
   vehicle({0, 0.1, 1.1});

@@ -1,54 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the planner does about a flight under way: in a new world, after a loop closure, when it is to brake.
-#include <fstream>
-
+// What the planner does about a flight under way: in a new world, after a loop closure, when it is to brake. In rougher
+// air: planner_air_test.cpp.
 #include "core/plan/stop.hpp"
-#include "tests/daemon/planner_rig.hpp"
+#include "tests/daemon/planner_watch_rig.hpp"
 
 namespace backwash::daemon::test {
 namespace {
-
-class PlannerWatch : public PlannerOffers {
- protected:
-  /// Flies along the room and has come past x, at speed.
-  void fly_past(double x, const AirFactors& air = kModelledAir) {
-    know(room());
-    stand({1.05, 2.05, 1.05});
-    if (air != kModelledAir) learn(air);
-    ASSERT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "");
-    const auto& commands = offers_.at(0).commands;
-    while (view_.index < commands.size() && commands[view_.index].p_W.x() < x) ++view_.index;
-    ASSERT_GT(commands.at(view_.index).v_W.x(), 0.5);
-    view_.command = commands[view_.index];
-    view_.state = offers_[0].tube[view_.index].center;
-    view_.finished = false;
-    show();
-    EXPECT_FALSE(planner_.step());
-    EXPECT_EQ(offers_.size(), 1u) << "as long as nothing is new the flight goes on as it is";
-  }
-  /// The room with a wall across it at x, and a gap in it beside the straight way.
-  static OccupancyGrid walled(double x, bool gap) {
-    OccupancyGrid grid = room();
-    const int i = static_cast<int>(x / 0.1);
-    fill(grid, {i, gap ? 15 : 0, 1}, {i, 39, 19});
-    return grid;
-  }
-  bool blocked() const { return channels_->blocked_segment != 0; }
-  bool rough() const { return channels_->rough_segment != 0; }
-  /// The same map, in air that is rougher by these factors.
-  void learn(const AirFactors& factors) {
-    world_ = plan::with_air(*world_, factors, Model{});
-    channels_->worlds.offer({world_, kSeen_ns + 1});
-    view_.air.emplace().factors = factors;
-    view_.air->ln_evidence.fill(7.25);
-    show();
-  }
-  std::string recorded() {
-    recorder_.drain(*channels_);
-    std::ifstream file(log_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-};
 
 TEST_F(PlannerWatch, ATakeoffIsBlockedByWhatComesToStandInItsWayAndByNothingElse) {
   know(room());
@@ -86,83 +43,6 @@ TEST_F(PlannerWatch, AFlightWithoutAClearWayOnIsBlocked) {
   planner_.step();
   EXPECT_EQ(channels_->blocked_segment, view_.segment);
   EXPECT_EQ(offers_.size(), 1u);
-}
-
-// Row 54.
-TEST_F(PlannerWatch, AFlightThatIsClearInRougherAirGoesOnAndKeepsItsSets) {
-  fly_past(1.4);
-  const auto sets = offers_[0].tube;
-  learn({1.2, 1.2, 1.2, 1.2, 1});
-  planner_.step();
-  EXPECT_FALSE(blocked());
-  EXPECT_FALSE(rough());
-  EXPECT_EQ(offers_.size(), 1u) << "what was accepted is judged by the sets that it was accepted with";
-}
-
-TEST_F(PlannerWatch, AFlightThatIsNotClearInRougherAirIsStoppedForTheAirAndSaysWhich) {
-  fly_past(2.5);
-  learn({1, 100, 1, 1, 1});
-  planner_.step();
-  EXPECT_FALSE(blocked());
-  EXPECT_EQ(channels_->rough_segment, view_.segment);
-  const std::string log = recorded();
-  EXPECT_NE(log.find("ground 100.00 times the model's variance, ln evidence 7.2"), std::string::npos);
-  EXPECT_EQ(log.find("free_air 1"), std::string::npos) << "a class that is as modelled is not named";
-}
-
-TEST_F(PlannerWatch, AFlightThatBeganInCalmerAirGetsStopsOfTheAirThatThereIs) {
-  fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
-  learn(kModelledAir);
-  planner_.step();
-  ASSERT_EQ(offers_.size(), 2u);
-  const auto &before = offers_[0], &after = offers_[1];
-  EXPECT_EQ(after.continues, before.id);
-  ASSERT_EQ(after.commands.size(), before.commands.size());
-  for (std::size_t k = 0; k < after.commands.size(); ++k) ASSERT_EQ(after.commands[k].p_W, before.commands[k].p_W);
-  ASSERT_FALSE(after.stops.empty());
-  for (const plan::Stop& stop : after.stops) EXPECT_GT(plan::tube_clearance(*world_, stop.tube), 0) << stop.branch;
-  EXPECT_GT(after.stops.back().tube.back().half_widths[0], 1.5 * before.stops.back().tube.back().half_widths[0]);
-  planner_.step();
-  EXPECT_EQ(offers_.size(), 2u) << "once";
-}
-
-TEST_F(PlannerWatch, StopsOfCalmerAirAreLookedAtUntilTheyAreRenewed) {
-  fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
-  learn(kModelledAir);
-  answer_ = [](const auto&) {};  // it was past the branch
-  planner_.step();
-  ASSERT_EQ(offers_.size(), 2u);
-  answer_ = [this](const auto& s) { view_.segment = s.id; };
-  planner_.step();
-  EXPECT_EQ(offers_.size(), 3u);
-}
-
-// The map worker may be at another map for minutes.
-TEST_F(PlannerWatch, NothingNewIsFlownBySetsOfCalmerAirThanIsKnownYet) {
-  know(room());
-  stand({1.05, 2.05, 1.05});
-  learn({0.3, 0.3, 0.3, 0.3, 1});
-  view_.air->factors[1] = 1;
-  show();
-  EXPECT_NE(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}).find("being made anew"), std::string::npos);
-  EXPECT_TRUE(offers_.empty());
-  int pauses = 0;
-  meanwhile_ = [&] {
-    if (++pauses == 5) learn({0.3, 1, 0.3, 0.3, 1});
-  };
-  EXPECT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "") << "the world comes";
-  EXPECT_EQ(offers_.size(), 1u);
-}
-
-TEST_F(PlannerWatch, AnObstacleInAirThatWasRoughBeforeIsAnObstacle) {
-  fly_past(1.4);
-  learn({1.2, 1.2, 1.2, 1.2, 1});
-  planner_.step();
-  world_ = plan::with_air(*world_of(walled(view_.state.p_W.x() + 0.6, false)), {1.2, 1.2, 1.2, 1.2, 1}, Model{});
-  channels_->worlds.offer({world_, kSeen_ns + 2});
-  planner_.step();
-  EXPECT_FALSE(rough());
-  EXPECT_EQ(channels_->blocked_segment, view_.segment);
 }
 
 TEST_F(PlannerWatch, AFlightThatWasStoppedIsNotExtended) {
