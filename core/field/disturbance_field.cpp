@@ -12,8 +12,8 @@
 namespace backwash::field {
 namespace {
 
-std::vector<Element> elements_of(const map::OccupancyGrid& grid, Element::Kind kind) {
-  std::vector<Element> elements = surface_elements(grid);
+std::vector<Element> elements_of(const map::OccupancyGrid& grid, Element::Kind kind, bool unknown_floor = false) {
+  std::vector<Element> elements = surface_elements(grid, unknown_floor);
   std::erase_if(elements, [kind](const Element& e) { return e.kind != kind; });
   return elements;
 }
@@ -66,7 +66,7 @@ ProximityField::ProximityField(const map::OccupancyGrid& grid, const Model& mode
       model_(model),
       terms_(model, grid.resolution()),
       sight_(grid),
-      up_(grid, elements_of(grid, Element::Kind::up)),
+      up_(grid, elements_of(grid, Element::Kind::up, model.unknown_floor)),
       lateral_(grid, elements_of(grid, Element::Kind::lateral)) {}
 
 Breakdown ProximityField::at(const Vec3& p_W) const {

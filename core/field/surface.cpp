@@ -63,15 +63,16 @@ void add_lateral_elements(const OccupancyGrid& grid, const Index3& v, std::vecto
 
 }  // namespace
 
-std::vector<Element> surface_elements(const OccupancyGrid& grid) {
+std::vector<Element> surface_elements(const OccupancyGrid& grid, bool unknown_floor) {
   std::vector<Element> elements;
   const double a = grid.resolution();
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    if (grid.at(n) != Cell::occupied) continue;
+    const bool occupied = grid.at(n) == Cell::occupied;
+    if (!occupied && !(unknown_floor && grid.at(n) == Cell::unknown)) continue;
     const Index3 v = grid.voxel(n);
     if (grid.free(v + Index3(0, 0, 1)))
       elements.push_back({Element::Kind::up, grid.center(v) + Vec3(0, 0, 0.5 * a), Vec3::UnitZ(), a * a, std::nullopt});
-    add_lateral_elements(grid, v, elements);
+    if (occupied) add_lateral_elements(grid, v, elements);
   }
   return elements;
 }

@@ -20,7 +20,8 @@ struct Element {
 
 /// All elements of a map, in a fixed order (by voxel, then up before lateral, then +x, −x, +y, −y).
 /// docs/model.md section 1: up element of every occupied voxel whose top neighbour is free; lateral elements with the
-/// normal m = g/|g| from the voxel's surroundings, or one per exposed face where m does not exist.
-std::vector<Element> surface_elements(const map::OccupancyGrid& grid);
+/// normal m = g/|g| from the voxel's surroundings, or one per exposed face where m does not exist. `unknown_floor`: an
+/// up element of every unknown voxel under a free one, too (Model::unknown_floor).
+std::vector<Element> surface_elements(const map::OccupancyGrid& grid, bool unknown_floor = false);
 
 }  // namespace backwash::field

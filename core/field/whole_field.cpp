@@ -36,8 +36,9 @@ void WholeField::add_rows(std::span<const std::size_t> voxels) {
   const auto nx = static_cast<std::size_t>(size.x()), layer = nx * static_cast<std::size_t>(size.y());
   for (std::size_t row = 0, n = 0; row < rows; ++row)
     for (std::size_t x = 0; x < nx; ++x, ++n) {
-      if (grid_->at(n) != map::Cell::occupied) continue;
-      set(occupied_, row, x);
+      const bool occupied = grid_->at(n) == map::Cell::occupied;
+      if (!occupied && !(model_.unknown_floor && grid_->at(n) == map::Cell::unknown)) continue;
+      if (occupied) set(occupied_, row, x);
       if (n + layer < grid_->cell_count() && grid_->at(n + layer) == map::Cell::free) set(up_, row, x);
     }
   for (const std::size_t n : voxels) set(listed_, n / nx, n % nx);

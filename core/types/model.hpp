@@ -44,6 +44,9 @@ struct Model {
   } wall;
   BoundModel bound;
   std::vector<ModelEffect> extension;
+  /// Where a free voxel stands on an unknown one a floor may be, and shakes the vehicle as one does. For maps that show
+  /// what is near alone; no key of the file.
+  bool unknown_floor = false;
 };
 
 }  // namespace backwash

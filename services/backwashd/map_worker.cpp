@@ -76,6 +76,7 @@ MapWorker::MapWorker(Channels& channels, Recorder& recorder, const Model& model,
       settings_(settings),
       parallel_(until_the_end(channels.stop)),
       air_(air) {
+  model_.unknown_floor = settings_.window.declared();
   if (settings_.window.declared()) window_.emplace(settings_);
 }
 

@@ -173,6 +173,15 @@ TEST_F(WindowFlight, BackWhereTheWindowWasLetGoNothingOfBeforeIsTrustedAndACrate
   EXPECT_EQ(at(behind), map::Cell::free) << "said again";
 }
 
+// A window 2 m high at 1.2 m has not shown the floor: where it ends is taken for one, and the sets hold.
+TEST_F(WindowFlight, AFloorThatNobodyHasShownIsTakenForOneAndNoSampleLeavesItsSet) {
+  begin(2, 2, 2);
+  ASSERT_EQ(at({-2, 0, 0.05}), map::Cell::unknown);
+  for (double x = -1.6; x < 1.1; x += 0.4) ASSERT_EQ(go({x, 0, 1.2}), "") << x;
+  expect_at({0.8, 0, 1.2});
+  EXPECT_EQ(held_, 0);
+}
+
 // It dies in flight: the flight ends in what was said, and goes no further.
 TEST_F(WindowFlight, WithoutItsMapperAFlightEndsInWhatIsKnownAndNoneBeginsBeyond) {
   begin(2, 2, 3);

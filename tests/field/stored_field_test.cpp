@@ -98,6 +98,39 @@ void expect_exact_at_samples(const OccupancyGrid& grid, std::size_t samples) {
   }
 }
 
+// A window that never showed the floor: where it ends below is taken for one. Everything else is as before.
+TEST(StoredField, TakesWhatIsUnknownBelowForAFloorWhereItIsToldTo) {
+  Model model;
+  model.unknown_floor = true;
+  OccupancyGrid grid(Vec3::Zero(), 0.1, Index3(24, 22, 20), Cell::unknown), floored = grid;
+  for (OccupancyGrid* g : {&grid, &floored})
+    scene::paint(*g, Cell::free, [](const Vec3& x) { return (x.array() > 0.3).all() && x.z() < 1.7; });
+  scene::paint(floored, Cell::occupied, [](const Vec3& x) { return x.z() < 0.3; });
+  const auto voxels = free_voxels(grid);
+  const WholeField whole(grid, model, voxels);
+  const ProximityField exact(grid, model), with_floor(floored, Model{}), without(grid, Model{});
+  double more = 0;
+  whole.evaluate(0, whole.block_count(), [&](std::size_t n, const Variance& sigma) {
+    const Vec3 p = grid.center(grid.voxel(n));
+    const Mat3 expected = oracle::matrix(with_floor.at(p).sigma());
+    EXPECT_LE(difference(oracle::matrix(sigma), expected), 1e-6) << p.transpose();
+    EXPECT_LE(difference(oracle::matrix(exact.at(p).sigma()), expected), 1e-12) << p.transpose();
+    more = std::max(more, sigma.zz / without.at(p).sigma().zz);
+  });
+  EXPECT_GT(more, 10);
+  for (unsigned seed = 40; seed < 44; ++seed) {
+    const OccupancyGrid random = scene::random_map(seed, 0.12);
+    const auto listed = free_voxels(random);
+    const WholeField all(random, model, listed);
+    const ProximityField one(random, model);
+    all.evaluate(0, all.block_count(), [&](std::size_t n, const Variance& sigma) {
+      if (n % 7 != seed % 7) return;
+      const Vec3 p = random.center(random.voxel(n));
+      EXPECT_LE(difference(oracle::matrix(sigma), oracle::matrix(one.at(p).sigma())), 1e-6) << seed;
+    });
+  }
+}
+
 TEST(StoredField, EqualsTheExactFieldInEveryBuiltInScene) {
   auto names = map::builtin_scene_names();
   std::erase_if(names, [](const std::string& name) { return name.starts_with("forest"); });
