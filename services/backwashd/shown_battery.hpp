@@ -9,8 +9,8 @@
 
 namespace backwash::daemon {
 
-/// The autopilot's battery as ROS 2 says it (sensor_msgs/BatteryState): NaN, or its UNKNOWN, for what the autopilot does
-/// not say. The message points into it.
+/// The autopilot's battery as ROS 2 says it (sensor_msgs/BatteryState): NaN, or its UNKNOWN, for what the autopilot
+/// does not say. The message points into it.
 class ShownBattery {
  public:
   ShownBattery() = default;
