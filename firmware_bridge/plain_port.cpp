@@ -203,7 +203,8 @@ void PlainPort::tell(const plain_state_t& s, std::span<std::uint8_t>& into) noex
   if (s.ground_known) tell(mavlink::ExtendedSysState{0, s.on_ground ? kOnGround : kInAir}, into);
   const bool percent_known = s.battery_percent <= 100;
   if (percent_known || s.battery_millivolts > 0) {
-    mavlink::BatteryStatus b{.battery_remaining = static_cast<std::int8_t>(percent_known ? s.battery_percent : -1)};
+    mavlink::BatteryStatus b{.current_battery = -1,
+                             .battery_remaining = static_cast<std::int8_t>(percent_known ? s.battery_percent : -1)};
     b.voltages.fill(65535);
     if (s.battery_millivolts > 0) b.voltages[0] = s.battery_millivolts;
     tell(b, into);

@@ -45,6 +45,11 @@ std::array<char, 16> parameter_id(std::string_view name) noexcept {
   return id;
 }
 
+/// Of MAVLink's 10 mA; −1: not known.
+std::optional<double> amperes(std::int16_t current) noexcept {
+  return current == -1 ? std::nullopt : std::optional(current / 100.0);
+}
+
 std::optional<double> share(std::int8_t percent) noexcept {
   if (percent < 0 || percent > 100) return std::nullopt;
   return percent / 100.0;
@@ -112,7 +117,7 @@ void Telemetry::take(const mavlink::Odometry& m, Time now) noexcept {
 void Telemetry::take(const mavlink::BatteryStatus& m, Time now) noexcept {
   if (m.id != 0) return;
   battery_status_seen_ = true;
-  Battery b{std::nullopt, share(m.battery_remaining)};
+  Battery b{std::nullopt, share(m.battery_remaining), amperes(m.current_battery)};
   double millivolts = 0;
   for (const auto cell : m.voltages) millivolts += cell == kNoCell ? 0 : cell;
   for (const auto cell : m.voltages_ext) millivolts += cell == kNoCell ? 0 : cell;
@@ -122,7 +127,7 @@ void Telemetry::take(const mavlink::BatteryStatus& m, Time now) noexcept {
 
 void Telemetry::take(const mavlink::SysStatus& m, Time now) noexcept {
   if (battery_status_seen_) return;
-  Battery b{std::nullopt, share(m.battery_remaining)};
+  Battery b{std::nullopt, share(m.battery_remaining), amperes(m.current_battery)};
   if (m.voltage_battery != kNoVoltage && m.voltage_battery != 0) b.voltage = m.voltage_battery / 1000.0;
   if (b.voltage || b.remaining) battery = {b, now};
 }

@@ -47,6 +47,7 @@ struct VehicleAttitude {
 struct Battery {
   std::optional<double> voltage;    ///< V
   std::optional<double> remaining;  ///< 0…1
+  std::optional<double> current;    ///< A out of it, below 0 while it is charged
 };
 
 /// From EXTENDED_SYS_STATE.

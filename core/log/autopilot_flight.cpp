@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
+#include "core/log/median.hpp"
+#include "core/log/tick_log.hpp"
 #include "core/log/turned_attitude.hpp"
 
 namespace backwash::log {
@@ -48,6 +51,20 @@ tl::expected<std::vector<AutopilotPose>, std::string> autopilot_poses(const Topi
                       {turn.w(), turn.x(), turn.y(), turn.z()}}});
   }
   return poses;
+}
+
+std::optional<double> distance_from_link(const RawLog& log, std::span<const AutopilotPose> poses) {
+  constexpr std::int64_t kNear_ns = 50'000'000;
+  std::vector<double> distances;
+  for (const RawRecord& record : log.records) {
+    const auto* row = record.header.kind == RecordKind::tick_input ? payload<TickInputRecord>(record) : nullptr;
+    const auto told = row ? decode(*row, nullptr).autopilot.pose : std::nullopt;
+    if (!told) continue;
+    const auto after = std::ranges::lower_bound(poses, told->at_ns, {}, &AutopilotPose::t_ns);
+    if (after == poses.end() || after->t_ns - told->at_ns > kNear_ns) continue;
+    distances.push_back((after->moving.state.p_W - told->state.p_W).norm());
+  }
+  return distances.empty() ? std::nullopt : std::optional(median(std::move(distances)));
 }
 
 }  // namespace backwash::log

@@ -25,6 +25,7 @@ enum Channel : std::size_t {
   kSetpoint,
   kTrajectory,
   kMarkers,
+  kScene,
   kError,
   kMode,
   kReason,
@@ -43,6 +44,7 @@ constexpr std::array<ChannelName, kAutopilot + 1> kChannels{
      {"/backwash/setpoint", "geometry_msgs", "PoseStamped"},
      {"/backwash/trajectory", "nav_msgs", "Path"},
      {"/backwash/markers", "visualization_msgs", "MarkerArray"},
+     {"/backwash/scene", "foxglove_msgs", "SceneUpdate"},
      {"/backwash/error_over_bound", "geometry_msgs", "Vector3Stamped"},
      {"/backwash/mode", "std_msgs", "String"},
      {"/backwash/reason", "std_msgs", "String"},
@@ -168,6 +170,7 @@ class Exporter {
     if (!flown) return;
     say(kTrajectory, ros::path(now_ns_, (*flown)->commands));
     say(kMarkers, ros::markers(now_ns_, (*flown)->commands, (*flown)->tube));
+    say(kScene, ros::scene(now_ns_, (*flown)->commands, (*flown)->tube));
   }
 
   void take_map(const RawRecord& record) {

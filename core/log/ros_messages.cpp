@@ -76,6 +76,18 @@ Bytes markers_of(std::int64_t stamp_ns, std::span<const Marker> markers) {
   return cdr.bytes();
 }
 
+using Color = std::array<float, 4>;  // red, green, blue, opacity
+
+/// Of a plan that is shown: width of its line, m, the most boxes of its tube, and their colours.
+constexpr double kLineWidth = 0.02;
+constexpr std::size_t kMostBoxes = 100;
+constexpr Color kLineColor{0.1F, 0.4F, 0.9F, 1}, kTubeColor{0.9F, 0.6F, 0.1F, 0.25F};
+
+/// foxglove_msgs/Color.
+void put(CdrWriter& cdr, const Color& color) {
+  for (const float part : color) cdr.number(static_cast<double>(part));
+}
+
 /// Of two velocities in W that of the body's axes.
 Vec3 in_body(const std::array<double, 4>& q, const Vec3& v_W) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).conjugate() * v_W;
@@ -131,20 +143,47 @@ Bytes path(std::int64_t stamp_ns, std::span<const Setpoint> commands) {
 }
 
 Bytes markers(std::int64_t stamp_ns, std::span<const Setpoint> commands, const reach::ReachTube& tube) {
-  constexpr double kWide = 0.02;  // m
-  constexpr std::size_t kBoxes = 100;
   std::vector<Marker> all(2);
   all[0].delete_all = true;
   Marker& line = all[1];
-  line.type = Marker::kLineStrip, line.id = 1, line.scale.x() = kWide, line.color = {0.1F, 0.4F, 0.9F, 1};
+  line.type = Marker::kLineStrip, line.id = 1, line.scale.x() = kLineWidth, line.color = kLineColor;
   for (const Setpoint& c : commands) line.points_W.push_back(c.p_W);
-  for (const auto& [low, high] : reach::tube_boxes(tube, kBoxes)) {
+  for (const auto& [low, high] : reach::tube_boxes(tube, kMostBoxes)) {
     Marker box;
     box.id = static_cast<std::int32_t>(all.size());
-    box.center_W = (low + high) / 2, box.scale = high - low, box.color = {0.9F, 0.6F, 0.1F, 0.25F};
+    box.center_W = (low + high) / 2, box.scale = high - low, box.color = kTubeColor;
     all.push_back(std::move(box));
   }
   return markers_of(stamp_ns, all);
+}
+
+Bytes scene(std::int64_t stamp_ns, std::span<const Setpoint> commands, const reach::ReachTube& tube) {
+  constexpr std::uint8_t kLineStrip = 0, kNo = 0;
+  const auto boxes = reach::tube_boxes(tube, kMostBoxes);
+  CdrWriter cdr;
+  cdr.count(0);  // deletions
+  cdr.count(1);
+  put_header(cdr, stamp_ns, kMapFrame);
+  cdr.text("plan");
+  cdr.number(std::int32_t{0}), cdr.number(std::uint32_t{0});  // lifetime: until it is replaced
+  cdr.number(kNo);                                            // not locked to its frame
+  cdr.count(0), cdr.count(0);                                 // metadata, arrows
+  cdr.count(boxes.size());
+  for (const auto& [low, high] : boxes) {
+    put_pose(cdr, (low + high) / 2, {1, 0, 0, 0});
+    put(cdr, high - low), put(cdr, kTubeColor);
+  }
+  cdr.count(0), cdr.count(0);  // spheres, cylinders
+  cdr.count(1);
+  cdr.number(kLineStrip);
+  put_pose(cdr, Vec3::Zero(), {1, 0, 0, 0});
+  cdr.number(kLineWidth), cdr.number(kNo);  // in m, not in pixels
+  cdr.count(commands.size());
+  for (const Setpoint& c : commands) put(cdr, c.p_W);
+  put(cdr, kLineColor);
+  cdr.count(0), cdr.count(0);                // colours of points, indices
+  cdr.count(0), cdr.count(0), cdr.count(0);  // triangles, texts, models
+  return cdr.bytes();
 }
 
 Bytes voxels(std::int64_t stamp_ns, const map::OccupancyGrid& grid) {

@@ -43,6 +43,9 @@ Bytes path(std::int64_t stamp_ns, std::span<const Setpoint> commands);
 /// visualization_msgs/MarkerArray, as the daemon's topic `markers`: what was shown before is deleted, the commands are
 /// a line, the tube boxes.
 Bytes markers(std::int64_t stamp_ns, std::span<const Setpoint> commands, const reach::ReachTube& tube);
+/// foxglove_msgs/SceneUpdate of the same: one entity `plan`, which takes the place of the one before it, of the
+/// commands as a line and the tube as cubes.
+Bytes scene(std::int64_t stamp_ns, std::span<const Setpoint> commands, const reach::ReachTube& tube);
 /// visualization_msgs/MarkerArray of a map: the occupied voxels that have a face to one that is not.
 Bytes voxels(std::int64_t stamp_ns, const map::OccupancyGrid& grid);
 /// geometry_msgs/Vector3Stamped in the map's frame.

@@ -30,6 +30,19 @@ log::TopicLog topics_of(const std::string& path) {
   return ulog ? std::move(*topics) : log::px4_names(*topics);
 }
 
+/// The distance of its poses from what was told, where they are those of this flight: the clocks count from each start
+/// of the autopilot, and by them alone any of its logs fits somewhere.
+double of_this_flight(const std::string& ours, const std::string& theirs, std::optional<double> distance) {
+  constexpr double kFar = 1;  // m; of one flight 20 ms of the link at 3 m/s are 0.06
+  if (!distance)
+    throw Failure(kBadData, theirs + ":1: none of its poses is of the time of " + ours + ": is it of another start?");
+  if (*distance < kFar) return *distance;
+  char far[32];
+  std::snprintf(far, sizeof far, "%.1f", *distance);
+  throw Failure(kBadData, theirs + ":1: its poses are " + far + " m (median) from those that the autopilot told in " +
+                              ours + " at the same times: give the log of this flight");
+}
+
 int run(const MergeOptions& options) {
   if (options.logs.size() < 2) throw Failure(kUsage, "needs two logs: that of backwashd, then the autopilot's");
   const std::string &ours = options.logs.front(), &theirs = options.logs.back();
@@ -44,6 +57,7 @@ int run(const MergeOptions& options) {
   const auto clock = log::clock_line(pairs);
   const auto poses = log::autopilot_poses(topics_of(theirs), clock);
   if (!poses) throw Failure(kBadData, theirs + ":1: " + poses.error());
+  const double distance = of_this_flight(ours, theirs, log::distance_from_link(log, *poses));
   std::map<std::string, std::uint64_t> messages;
   write_stream(options.out, options.force,
                [&](std::ostream& file) { messages = log::export_mcap(file, log, kVersion, *poses); });
@@ -57,15 +71,18 @@ int run(const MergeOptions& options) {
                  {"rms_ms", 1e3 * clock.rms_s},
                  {"largest_ms", 1e3 * clock.largest_s},
                  {"round_trip_ms", 1e3 * clock.round_trip_s}}},
+               {"distance_m", distance},
                {"messages", messages},
                {"outside", poses->size() - merged}});
   else
     std::printf(
         "clocks               %zu exchanges, %.1f ppm apart, residual %.3f ms rms, %.3f ms at most (round trip %.1f "
         "ms)\n"
-        "the autopilot's      %" PRIu64 " poses, %" PRIu64 " outside the time of our log\n",
+        "the autopilot's      %" PRIu64 " poses, %" PRIu64
+        " outside the time of our log, %.3f m from what it told us "
+        "(median)\n",
         clock.pairs, 1e6 * clock.rate, 1e3 * clock.rms_s, 1e3 * clock.largest_s, 1e3 * clock.round_trip_s, merged,
-        poses->size() - merged);
+        poses->size() - merged, distance);
   return kOk;
 }
 

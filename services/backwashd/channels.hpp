@@ -137,7 +137,8 @@ struct ControlView {
   double untold_delay = 0;                        ///< of the autopilot's line, s
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
-  std::optional<AirView> air;  ///< none: nothing is learnt in flight
+  firmware_bridge::Latest<firmware_bridge::Battery> battery;  ///< the autopilot's
+  std::optional<AirView> air;                                 ///< none: nothing is learnt in flight
   TimingHistogram tick, lateness, odometry_to_wire;
 };
 

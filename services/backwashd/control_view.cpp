@@ -96,6 +96,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   if (link_.signing()) view_.frames_refused = link_.signing()->counters().refused();
   constexpr std::uint8_t kWorstNotice = 4;  // severity: 4 is a warning
   if (telemetry.text && telemetry.text->value.severity <= kWorstNotice) view_.warning = telemetry.text;
+  view_.battery = telemetry.battery;
   view_.residual_m = flight_.alignment().position_residual();
   view_.residual_rad = flight_.alignment().yaw_residual();
 }

@@ -62,6 +62,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       status_(dds::make_writer<dds::Status>(participant_, config.dds.name_space)),
       diagnostics_(participant_, diagnostic_msgs_msg_dds__DiagnosticArray__desc, dds::kDiagnostics,
                    config.dds),  // the newest alone: a reader that takes nothing holds up no thread
+      battery_(participant_, config.dds),
       transforms_(config),
       statuses_(participant_, topic_of<dds::Status>(config), status_.guid()),
       waitset_(participant_) {

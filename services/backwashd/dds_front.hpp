@@ -19,6 +19,7 @@
 #include "services/backwashd/pose_source.hpp"
 #include "services/backwashd/recorder.hpp"
 #include "services/backwashd/refusals.hpp"
+#include "services/backwashd/shown_battery.hpp"
 #include "services/backwashd/shown_transforms.hpp"
 #include "services/backwashd/shown_writer.hpp"
 #include "services/dds/topics.hpp"
@@ -37,7 +38,7 @@ class DdsFront {
   /// Thread body. Odometry is taken from one writer, and loop closures from one: the first whose sample was good, until
   /// it is gone and nothing is commanded any more; those of others are refused by identity (docs/faults.md row 48).
   void run_readers();
-  /// Thread body: status and transforms out at 10 Hz, diagnostics at 1 Hz.
+  /// Thread body: status and transforms out at 10 Hz, diagnostics and battery at 1 Hz.
   void run_status(const Vehicle& vehicle, const Recorder& recorder);
   /// Called by the mission thread.
   void send(const CommandMessage& command, const Answer& answer);
@@ -75,6 +76,8 @@ class DdsFront {
   dds::Writer<dds::Ack> acks_;
   dds::Writer<dds::Status> status_;
   ShownWriter<dds::DiagnosticArray> diagnostics_;
+  ShownWriter<dds::BatteryState> battery_;
+  ShownBattery shown_battery_;
   ShownTransforms transforms_;
   std::optional<ShownWriter<dds::TfMessage>> tf_;  // where dds.tf asks for it
   dds::OtherWriters statuses_;

@@ -167,6 +167,8 @@ void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
     s.sequence_number = accepted.sequence;
     status_.write(s);
     if (const auto& shown = transforms_.message(now_ns()); tf_ && shown.transforms._length > 0) tf_->write(shown);
+    const auto now = firmware_bridge::Time::clock::now();
+    if (const auto* shown = shown_battery_.next(view.battery, now, dds::nanoseconds(s.stamp))) battery_.write(*shown);
     if (rounds++ % kDiagnosticsEvery == 0) diagnostics_.write(ShownDiagnostics(s, name_space_).message());
   }
 }

@@ -26,6 +26,7 @@ using MarkerArray = visualization_msgs_msg_dds__MarkerArray_;
 using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
 using DiagnosticStatus = diagnostic_msgs_msg_dds__DiagnosticStatus_;
 using DiagnosticArray = diagnostic_msgs_msg_dds__DiagnosticArray_;
+using BatteryState = sensor_msgs_msg_dds__BatteryState_;
 using Command = backwash_msgs_msg_dds__Command_;
 using Ack = backwash_msgs_msg_dds__Ack_;
 using Status = backwash_msgs_msg_dds__Status_;
@@ -134,6 +135,12 @@ template <>
 struct TopicOf<MarkerArray> {
   static const dds_topic_descriptor& type() { return visualization_msgs_msg_dds__MarkerArray__desc; }
   static constexpr const char* kName = "markers";
+  static constexpr Delivery kDelivery = Delivery::state;
+};
+template <>
+struct TopicOf<BatteryState> {
+  static const dds_topic_descriptor& type() { return sensor_msgs_msg_dds__BatteryState__desc; }
+  static constexpr const char* kName = "battery";
   static constexpr Delivery kDelivery = Delivery::state;
 };
 

@@ -34,6 +34,7 @@ inline constexpr TypeHash kTypeHashes[] = {
     {"nav_msgs::msg::dds_::Path_", "RIHS01_1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b"},
     {"sensor_msgs::msg::dds_::PointField_", "RIHS01_5c6a4750728c2bcfbbf7037225b20b02d4429634732146b742dee1726637ef01"},
     {"sensor_msgs::msg::dds_::PointCloud2_", "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"},
+    {"sensor_msgs::msg::dds_::BatteryState_", "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741"},
     {"sensor_msgs::msg::dds_::CompressedImage_", "RIHS01_15640771531571185e2efc8a100baf923961a4d15d5569652e6cb6691e8e371a"},
     {"octomap_msgs::msg::dds_::Octomap_", "RIHS01_9891a19a05b70ec20aa8f45db3f8300b9ab80afff32c61c549d25087da9625b0"},
     {"visualization_msgs::msg::dds_::UVCoordinate_", "RIHS01_f27f7ed21fe360c6066944f856b801a0c0d1e94e815b6886444b42d90b196a26"},

@@ -16,8 +16,9 @@ namespace backwash::security {
 enum class Protection { encrypt, sign };
 
 enum class Role {
-  vehicle,   ///< answers, status, tube, trajectory, markers, disturbance; the diagnostics and transforms of ROS 2
-  station,   ///< commands
+  vehicle,  ///< answers, status, battery, tube, trajectory, markers, disturbance; the diagnostics and transforms of ROS
+            ///< 2
+  station,  ///< commands
   observer,  ///< nothing
   vio,       ///< odometry, loop closures, maps, points
 };

@@ -33,7 +33,7 @@ std::vector<std::string> writable(const Grant& grant) {
   };
   switch (grant.role) {
     case Role::vehicle:
-      add({"ack", "status", "tube", "trajectory", "markers", "disturbance", "map_receipt"});
+      add({"ack", "status", "tube", "trajectory", "markers", "disturbance", "map_receipt", "battery"});
       topics.insert(topics.end(), {"rt/diagnostics", "rt/tf"});
       break;
     case Role::station:

@@ -51,6 +51,7 @@ TEST_F(PlainLinkTest, AControllersStateIsTelemetry) {
   EXPECT_EQ(t.reset_counter->value, 3);
   EXPECT_NEAR(*t.battery->value.voltage, 15.6, 1e-9);
   EXPECT_NEAR(*t.battery->value.remaining, 0.87, 1e-9);
+  EXPECT_FALSE(t.battery->value.current);
   auto s = flying();
   s.sequence = 2;
   s.failsafe = s.on_ground = true;

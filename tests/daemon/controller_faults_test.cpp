@@ -94,6 +94,8 @@ TEST(LowBatteryFault, ALowBatteryAsksToLandOnce) {
   rig.autopilot->battery = 0.5;
   rig.ticks(60);
   EXPECT_EQ(rig.mode(), Mode::tracking);
+  ASSERT_TRUE(rig.view().battery);
+  EXPECT_DOUBLE_EQ(rig.view().battery->value.remaining.value(), 0.5);
   rig.autopilot->battery = 0.14;
   ASSERT_GT(rig.ticks_until(Mode::land, 51), 0);
   EXPECT_EQ(rig.reason(), Reason::battery_low);

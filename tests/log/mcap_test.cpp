@@ -142,7 +142,7 @@ TEST_F(McapFile, MessagesHaveWallTimeAndTheirLogTimeNeverFalls) {
   export_mcap(out, log_, "test");
   const std::string content = out.str();
   // The last chunk's times are told by the statistics: 8 + 2 + 4 · 4 bytes behind their head.
-  const std::size_t statistics = content.rfind(std::string("\x0B\x9C\0\0\0\0\0\0\0", 9));
+  const std::size_t statistics = content.rfind(std::string("\x0B\xA6\0\0\0\0\0\0\0", 9));
   ASSERT_NE(statistics, content.npos);
   std::uint64_t times[2];
   std::memcpy(times, content.data() + statistics + 9 + 26, sizeof times);

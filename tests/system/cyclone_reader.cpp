@@ -25,6 +25,7 @@ const dds_topic_descriptor_t* const kTypes[] = {&backwash_msgs_msg_dds__Status__
                                                 &nav_msgs_msg_dds__Odometry__desc,
                                                 &nav_msgs_msg_dds__Path__desc,
                                                 &octomap_msgs_msg_dds__Octomap__desc,
+                                                &sensor_msgs_msg_dds__BatteryState__desc,
                                                 &sensor_msgs_msg_dds__PointCloud2__desc,
                                                 &tf2_msgs_msg_dds__TFMessage__desc,
                                                 &visualization_msgs_msg_dds__MarkerArray__desc,

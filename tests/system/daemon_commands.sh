@@ -51,10 +51,11 @@ sleep 0.5
 status
 # What RViz and the tools of diagnostics are shown, as another middleware reads it.
 if [[ -x $build/tests/fastdds_viewer ]]; then
-  "$build/tests/fastdds_viewer" "$domain" backwash 4 >"$work/seen" || die "markers, disturbance, path or diagnostics did not come: $(cat "$work/seen")"
+  "$build/tests/fastdds_viewer" "$domain" backwash 4 >"$work/seen" || die "markers, disturbance, path, battery or diagnostics did not come: $(cat "$work/seen")"
   cat "$work/seen"
   grep -q '^diagnostics [01] backwash backwashd: quad-5in: tracking: ' "$work/seen" || die "other diagnostics"
   grep -Eq '^markers [0-9]{2,3} in map: line of [0-9]{2,4}, boxes up to 0\.[1-9][0-9]* m wide$' "$work/seen" || die "other markers"
+  grep -Eq '^battery present 1[456]\.[0-9]{2} V, 0\.[3-9][0-9], 5 not known, kinds 0 ""$' "$work/seen" || die "another battery"
   # The last leg, from 1.5,-0.8,1.4: 2.64 m as the crow flies.
   grep -Eq '^path [0-9]{2,4} in map to -1\.00 -?0\.00 1\.20, (2\.[6-9]|3\.)[0-9]* m, 0\.[01][0-9]* m at a time$' "$work/seen" || die "another path"
   # The layer of 1.2 m: one height, and of a room's air no bound of nothing or of many times free air's.

@@ -26,6 +26,7 @@ for qos in sensor default latched; do
   asked+=(rt/diagnostics diagnostic_msgs::msg::dds_::DiagnosticArray_ $qos)
   asked+=($(topic tube backwash_msgs::msg::dds_::ReachTube_) $qos $(topic trajectory nav_msgs::msg::dds_::Path_) $qos)
   asked+=($(topic markers visualization_msgs::msg::dds_::MarkerArray_) $qos)
+  asked+=($(topic battery sensor_msgs::msg::dds_::BatteryState_) $qos)
   asked+=($(topic disturbance sensor_msgs::msg::dds_::PointCloud2_) $qos)
 done
 # seen WHERE: by both as they come, all that was asked. The status comes 10 times a second.
@@ -42,13 +43,13 @@ types = t.types_of(pathlib.Path(sys.argv[2], "idl/ros2.idl").read_text())
 types |= t.types_of(pathlib.Path(sys.argv[2], "idl/backwash_msgs.idl").read_text())
 of = {"status": "backwash_msgs/msg/Status", "ack": "backwash_msgs/msg/Ack", "tube": "backwash_msgs/msg/ReachTube",
       "trajectory": "nav_msgs/msg/Path", "markers": "visualization_msgs/msg/MarkerArray",
-      "disturbance": "sensor_msgs/msg/PointCloud2", "diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+      "disturbance": "sensor_msgs/msg/PointCloud2", "battery": "sensor_msgs/msg/BatteryState", "diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
 lines = [re.fullmatch(r"rt/(?:backwash/)?(\w+) (\w+): matched (\d+), (\d+) samples, user data (.*)", l.rstrip()) for l in open(sys.argv[1])]
-assert len(lines) == 19 and all(lines), lines
+assert len(lines) == 22 and all(lines), lines
 for topic, qos, matched, samples, said in (l.groups() for l in lines):
     assert matched == "1", (topic, qos, matched)
     assert said == f"typehash=RIHS01_{t.hash_of(of[topic], types)};", (topic, said)
-    least, most = {"status": (40, 90), "diagnostics": (4, 10)}.get(topic, (0, 1))
+    least, most = {"status": (40, 90), "diagnostics": (4, 10), "battery": (4, 10)}.get(topic, (0, 1))
     assert least <= int(samples) <= most, (topic, qos, samples)
 print(f"{sys.argv[3]}: {len(lines)} readers matched, {len({l[1] for l in lines})} topics with their types' hashes")
 PYTHON

@@ -32,10 +32,10 @@ said=$(timeout 30 "$bin/backwashd" --config "$work/backwashd.toml" 2>&1) || code
 
 granted ack status tube trajectory
 start_daemon builtin:quad-5in "$work/old.bwlog"
-for topic in rt/backwash/markers rt/backwash/disturbance rt/backwash/map_receipt rt/diagnostics; do
+for topic in rt/backwash/markers rt/backwash/disturbance rt/backwash/map_receipt rt/backwash/battery rt/diagnostics; do
   (($(grep -c "do not allow $topic, which is not sent" "$log") == 1)) || die "of $topic it is not said once that it is not allowed"
 done
-(($(grep -c 'which is not sent' "$log") == 4)) || die 'a topic that is allowed is said not to be'
+(($(grep -c 'which is not sent' "$log") == 5)) || die 'a topic that is allowed is said not to be'
 enable
 ctl takeoff --height 1.2 --wait
 ctl goto 0,0,1.2 --wait
@@ -49,4 +49,4 @@ install_credentials
 lines=$(wc -l <"$log")
 start_daemon builtin:quad-5in "$work/new.bwlog"
 ! tail -n +"$((lines + 1))" "$log" | grep -q 'which is not sent' || die 'the new credentials allow no more than the old ones'
-echo 'three topics left out and named, flown without them; none is left out with the credentials of the command that was said'
+echo 'five topics left out and named, flown without them; none is left out with the credentials of the command that was said'

@@ -147,6 +147,27 @@ class CloudType : public ReadType {
   }
 };
 
+class BatteryType : public ReadType {
+ public:
+  BatteryType() : ReadType("sensor_msgs::msg::dds_::BatteryState_", 4096) {}
+  std::string read(Cdr& cdr) override {
+    header(cdr);
+    std::array<float, 7> values{};  // voltage, temperature, current, charge, two capacities, percentage
+    for (float& v : values) v = number<float>(cdr);
+    const int kinds = number<std::uint8_t>(cdr) + number<std::uint8_t>(cdr) + number<std::uint8_t>(cdr);
+    const bool present = number<bool>(cdr);
+    skip<float>(cdr, number<std::uint32_t>(cdr));  // cells
+    skip<float>(cdr, number<std::uint32_t>(cdr));
+    const std::string texts = text(cdr) + text(cdr);
+    const auto unknown = std::count_if(values.begin(), values.end(), [](float v) { return std::isnan(v); });
+    char said[160];
+    std::snprintf(said, sizeof said, "battery %s %.2f V, %.2f, %d not known, kinds %d \"%s\"",
+                  present ? "present" : "absent", static_cast<double>(values[0]), static_cast<double>(values[6]),
+                  static_cast<int>(unknown), kinds, texts.c_str());
+    return said;
+  }
+};
+
 class PathType : public ReadType {
  public:
   PathType() : ReadType("nav_msgs::msg::dds_::Path_", 1 << 20) {}
@@ -190,15 +211,16 @@ int main(int argc, char** argv) {
   };
   fast::DataReader* readers[] = {
       reader_of(new DiagnosticsType, "rt/diagnostics"), reader_of(new MarkersType, name_space + "markers"),
-      reader_of(new CloudType, name_space + "disturbance"), reader_of(new PathType, name_space + "trajectory")};
-  Seen seen[4];
+      reader_of(new CloudType, name_space + "disturbance"), reader_of(new PathType, name_space + "trajectory"),
+      reader_of(new BatteryType, name_space + "battery")};
+  Seen seen[5];
   for (int n = 0; n < 20 * std::atoi(argv[3]); ++n) {
     fast::SampleInfo info;
-    for (int r = 0; r < 4; ++r)
+    for (int r = 0; r < 5; ++r)
       while (readers[r]->take_next_sample(&seen[r], &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   for (const Seen& s : seen) std::printf("%s\n", s.line.c_str());
-  return std::any_of(seen, seen + 4, [](const Seen& s) { return s.line.empty(); }) ? 1 : 0;
+  return std::any_of(seen, seen + 5, [](const Seen& s) { return s.line.empty(); }) ? 1 : 0;
 }

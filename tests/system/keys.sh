@@ -29,7 +29,7 @@ for who in drone eyes pilot guest; do
 done
 [[ $(openssl x509 -in net/eyes/cert.pem -noout -enddate) == "notAfter=Jun  1 00:00:00 2030 GMT" ]] || die "--until was not kept"
 may() { sed -n '/<publish>/,/<\/publish>/p' "$1.permissions" | grep -o '<topic>[^<]*' | sed 's/<topic>//' | xargs; }
-[[ $(may drone) == "rt/fleet/one/ack rt/fleet/one/status rt/fleet/one/tube rt/fleet/one/trajectory rt/fleet/one/markers rt/fleet/one/disturbance rt/fleet/one/map_receipt rt/diagnostics rt/tf" ]] || die "drone may write $(may drone)"
+[[ $(may drone) == "rt/fleet/one/ack rt/fleet/one/status rt/fleet/one/tube rt/fleet/one/trajectory rt/fleet/one/markers rt/fleet/one/disturbance rt/fleet/one/map_receipt rt/fleet/one/battery rt/diagnostics rt/tf" ]] || die "drone may write $(may drone)"
 [[ $(may eyes) == "rt/backwash/odometry rt/backwash/loop_closure rt/backwash/map rt/backwash/points rt/backwash/map_part rt/vins/odometry rt/tf" ]] || die "eyes may write $(may eyes)"
 [[ $(may pilot) == "rt/backwash/command rt/backwash/map_part" && -z $(may guest) ]] || die "pilot may write $(may pilot), guest $(may guest)"
 [[ $(find net -type f -name key.pem -not -perm 0600 -o -type d -not -perm 0700) == "" ]] || die "others may read what is secret: $(ls -lR net)"

@@ -8,7 +8,7 @@ set -euo pipefail
 source_dir=$1 build=$2
 source "$source_dir/tests/system/node_peer.sh"
 node_peer "$build" mcap_peer mcap_modules @mcap/core@2.2.2 @foxglove/rosmsg@5.0.5 @foxglove/rosmsg2-serialization@3.1.0 \
-  @foxglove/rosmsg-msgs-common@3.2.3 @foxglove/crc@0.0.3
+  @foxglove/rosmsg-msgs-common@3.2.3 @foxglove/crc@0.0.3 @foxglove/schemas@2.1.0
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 backwash=$build/services/backwash
@@ -94,6 +94,11 @@ assert any("verb" in row["text"] for row in said["/backwash/events"])
 # Each trajectory once, when it begins, and the tube around it: every command lies in one of its boxes.
 flown = [tick[1] for n, (t, tick) in enumerate(ticks) if tick[1] and (n == 0 or ticks[n - 1][1][1] != tick[1])]
 assert counts["/backwash/trajectory"] == counts["/backwash/markers"] == len(flown) >= 2, flown
+# The scene of Foxglove's own schema shows what the markers do.
+for scene, shown in zip(said["/backwash/scene"], said["/backwash/markers"], strict=True):
+    cubes = [{"p": s["p"], "scale": s["scale"]} for s in shown["shapes"] if s["type"] == 1 and s["action"] == 0]
+    assert (scene["entities"], scene["id"], scene["frame_id"]) == (1, "plan", "map") and scene["cubes"] == cubes and len(cubes) > 1
+    assert scene["lines"] == [s["points"] for s in shown["shapes"] if s["type"] == 4] and len(scene["lines"][0]) > 10
 for line, shown in zip(said["/backwash/trajectory"], said["/backwash/markers"]):
     clear, strip, *boxes = shown["shapes"]
     assert clear["action"] == 3 and strip["type"] == 4 and strip["points"] == line["p"] and 1 < len(boxes) <= 100
@@ -108,6 +113,13 @@ PYTHON
 PYTHONPATH=$source_dir/tests/system python3 -c 'import ulog_maker; ulog_maker.write("fc.ulg", "flight.bwlog")'
 "$backwash" merge flight.mcap fc.ulg -o both.mcap --json --quiet >merge.json
 node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" both.mcap >both.json
+# Of another flight: at another time, or elsewhere at that time.
+for other in "later_ms=600000:none of its poses is of the time of flight.mcap" "north_m=3:its poses are 3.0 m (median) from those"; do
+  PYTHONPATH=$source_dir/tests/system python3 -c "import ulog_maker; ulog_maker.write('other.ulg', 'flight.bwlog', ${other%%:*})"
+  code=0
+  "$backwash" merge flight.mcap other.ulg -o none.mcap --quiet 2>refused || code=$?
+  [[ $code == 65 && ! -e none.mcap ]] && grep -qF "${other#*:}" refused || { echo "merged with another flight's: $code $(<refused)"; exit 1; }
+done
 "$backwash" replay --log both.mcap --json | cmp - flight.bwlog.replay
 PYTHONPATH=$source_dir/tests/system python3 - <<'PYTHON'
 import bisect, json, math, statistics
@@ -115,7 +127,8 @@ import raw_log, ulog_maker
 
 alone, both, told = (json.load(open(name)) for name in ("peer.json", "both.json", "merge.json"))
 clock = told["clock"]
-print("merge", clock, "outside", told["outside"])
+print("merge", clock, "outside", told["outside"], "from the link", told["distance_m"], "m")
+assert 0 <= told["distance_m"] < 0.05
 assert both["raw"] == alone["raw"] and both["counts"] | {"/tf": 0} == alone["counts"] | {"/tf": 0, "/autopilot/odometry": both["counts"]["/autopilot/odometry"]}
 heard = list(ulog_maker.said("flight.bwlog", ulog_maker.LOCAL_POSITION))
 poses, odometry = both["said"]["/autopilot/odometry"], both["said"]["/backwash/odometry"]

@@ -17,7 +17,8 @@ def said(path, message):
             yield t, struct.unpack_from(layout, body[10:10 + body[1]] + bytes(64))
 
 
-def write(path, raw):
+def write(path, raw, later_ms=0, north_m=0):
+    """`later_ms`, `north_m`: what another flight has otherwise."""
     def message(kind, content):
         return struct.pack("<Hc", len(content), kind) + content
 
@@ -29,4 +30,4 @@ def write(path, raw):
         for number, (_, name, _, _, _) in enumerate(TOPICS):
             file.write(message(b"A", struct.pack("<BH", 0, number) + name.encode()))
         for ms, number, layout, values in rows:
-            file.write(message(b"D", struct.pack("<H", number) + struct.pack(layout, 1000 * ms, *values)))
+            file.write(message(b"D", struct.pack("<H", number) + struct.pack(layout, 1000 * (ms + later_ms), values[0] + north_m * (number == 0), *values[1:])))

@@ -2,6 +2,7 @@
 #include "services/backwashctl/serve/feed.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/map/octomap_message.hpp"
@@ -18,11 +19,13 @@ constexpr std::chrono::seconds kWatch{2};
 
 Feed::Feed(const dds::Participant& participant, const std::string& name_space)
     : statuses_(dds::make_reader<dds::Status>(participant, name_space)),
+      batteries_(dds::make_reader<dds::BatteryState>(participant, name_space)),
       trajectories_(dds::make_reader<dds::Path>(participant, name_space)),
       tubes_(dds::make_reader<dds::Tube>(participant, name_space)),
       maps_(dds::make_reader<dds::Octomap>(participant, name_space)),
       waitset_(participant) {
   waitset_.add(statuses_);
+  waitset_.add(batteries_);
   waitset_.add(trajectories_);
   waitset_.add(tubes_);
   waitset_.add(maps_);
@@ -36,6 +39,7 @@ Seen Feed::seen() const {
 void Feed::step() {
   waitset_.wait(0.05);
   take_status();
+  take_battery();
   take_path();
   take_map();
 }
@@ -58,6 +62,14 @@ void Feed::take_status() {
   seen_.status = std::move(newest);
   seen_.status_at = now;
   seen_.preflight = std::move(findings);
+}
+
+void Feed::take_battery() {
+  const auto said = [](float value) { return std::isfinite(value) ? std::optional<double>(value) : std::nullopt; };
+  batteries_.take([&](const dds::BatteryState& b) {
+    const std::lock_guard lock(mutex_);
+    seen_.battery = {dds::nanoseconds(b.header.stamp), said(b.percentage), said(b.voltage)};
+  });
 }
 
 void Feed::take_path() {

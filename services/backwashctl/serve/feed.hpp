@@ -19,10 +19,17 @@ namespace backwash::ctl {
 
 using Clock = std::chrono::steady_clock;
 
+/// What the autopilot says of its battery; what it does not say is absent.
+struct BatterySeen {
+  std::int64_t stamp_ns = 0;  ///< when the daemon was told, by its wall clock
+  std::optional<double> share, voltage;
+};
+
 /// The newest of all that the vehicle's topics say.
 struct Seen {
   std::optional<StatusCopy> status;
   Clock::time_point status_at{};
+  std::optional<BatterySeen> battery;
   std::vector<Finding> preflight;  ///< over the last seconds; empty until two seconds were seen
   std::shared_ptr<const ShownPath> path;
   std::shared_ptr<const map::OccupancyGrid> grid;
@@ -30,7 +37,7 @@ struct Seen {
   std::uint64_t path_number = 0, map_number = 0;  ///< rise with each new one
 };
 
-/// Listens to status, trajectory, tube and map, on readers of its own.
+/// Listens to status, battery, trajectory, tube and map, on readers of its own.
 class Feed {
  public:
   Feed(const dds::Participant& participant, const std::string& name_space);
@@ -41,10 +48,12 @@ class Feed {
 
  private:
   void take_status();
+  void take_battery();
   void take_path();
   void take_map();
 
   dds::Reader<dds::Status> statuses_;
+  dds::Reader<dds::BatteryState> batteries_;
   dds::Reader<dds::Path> trajectories_;
   dds::Reader<dds::Tube> tubes_;
   dds::Reader<dds::Octomap> maps_;

@@ -106,7 +106,7 @@ function show() {
     document.title = `${status.state} – ${status.vehicle}`
     say('vehicle', status.vehicle)
     say('mode', `${status.state}: ${status.reason}${status.task ? '. ' + status.task : ''}${status.autopilot_says ? '. The autopilot says: ' + status.autopilot_says : ''}`)
-    fill($('state'), rows(status, event.age_s))
+    fill($('state'), rows(event))
     showError(event.over_bound)
     const now = JSON.stringify(event.preflight)
     if (now !== checked) showCheck(event.preflight)

@@ -7,7 +7,16 @@ export function say(id, text) {
   if ($(id).textContent !== text) $(id).textContent = text
 }
 
-export function rows(status, age_s) {
+// What the autopilot says of its battery, and how old that is.
+function power(battery) {
+  if (!battery) return ['not said', 'none']
+  const share = battery.share === null ? 'share not said' : `${(100 * battery.share).toFixed(0)} %`
+  const voltage = battery.voltage_v === null ? 'voltage not said' : `${battery.voltage_v.toFixed(2)} V`
+  return [`${share}, ${voltage}`, `${battery.age_s.toFixed(1)} s`]
+}
+
+export function rows({ status, age_s, battery }) {
+  const [said, said_age] = power(battery)
   const us = (t) => `${t.p50.toFixed(0)} / ${t.p99.toFixed(0)} / ${t.max.toFixed(0)} µs`
   const seconds = (v) => (v === null ? 'none yet' : v < 0 ? 'none' : `${v.toFixed(2)} s`)
   const all = {
@@ -16,6 +25,8 @@ export function rows(status, age_s) {
     armed: status.armed ? 'armed' : 'disarmed',
     autopilot: `${status.autopilot}, ${status.offboard ? 'follows us' : 'does not follow us'}`,
     flight: status.landed ? 'on the ground' : status.moving ? 'moving' : 'at rest',
+    battery: said,
+    'age of battery': said_age,
     'inside its sets': `${status.samples_inside} of ${status.samples_inside + status.samples_outside}`,
     'age of status': `${age_s.toFixed(1)} s`,
     'age of odometry': seconds(status.odometry_age_s),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwashctl/serve/serve.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -47,6 +48,7 @@ class PageEvents {
     event["status"] = seen.status ? json_of(*seen.status) : Json();
     event["age_s"] = seen.status ? Json(std::chrono::duration<double>(Clock::now() - seen.status_at).count()) : Json();
     event["now_s"] = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+    event["battery"] = battery(seen);
     event["over_bound"] = over_bound(seen);
     event["map"] = {{"number", seen.map_number}, {"refused", seen.map_refused}};
     event["preflight"] = Json::array();
@@ -62,6 +64,17 @@ class PageEvents {
   }
 
  private:
+  /// Its age is counted by the daemon's own clock up to the newest status, and from there by ours.
+  static Json battery(const Seen& seen) {
+    if (!seen.status || !seen.battery) return {};
+    const auto& [stamp_ns, share, voltage] = *seen.battery;
+    const double before_s = 1e-9 * static_cast<double>(dds::nanoseconds(seen.status->numbers.stamp) - stamp_ns);
+    const double since_s = std::chrono::duration<double>(Clock::now() - seen.status_at).count();
+    return {{"share", share ? Json(*share) : Json()},
+            {"voltage_v", voltage ? Json(*voltage) : Json()},
+            {"age_s", std::max(before_s, 0.0) + since_s}};
+  }
+
   static Json over_bound(const Seen& seen) {
     if (!seen.status || !seen.path) return {};
     const auto &p = seen.status->numbers.position, &c = seen.status->numbers.setpoint;

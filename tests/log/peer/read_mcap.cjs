@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reads an MCAP file by libraries that are not ours (@mcap/core, @foxglove/rosmsg and rosmsg2-serialization: MIT, for tests
-// alone): from its beginning to its end, then by its indexes. Every checksum is held against the bytes, every schema against ROS 2's own,
+// Reads an MCAP file by libraries that are not ours (@mcap/core, @foxglove/rosmsg, rosmsg2-serialization and schemas: MIT, for tests
+// alone): from its beginning to its end, then by its indexes. Every checksum is held against the bytes, every schema against ROS 2's own or Foxglove's,
 // and every message is decoded and encoded again. Says what it found as one line of JSON; exit 1 and why at the first defect.
 //   node read_mcap.cjs MODULES FILE
 const assert = require('node:assert'), crypto = require('node:crypto'), fs = require('node:fs')
@@ -11,17 +11,25 @@ const { parse } = load('@foxglove/rosmsg')
 const { MessageReader, MessageWriter } = load('@foxglove/rosmsg2-serialization')
 const { ros2humble } = load('@foxglove/rosmsg-msgs-common')
 const { crc32 } = load('@foxglove/crc')
+const { foxgloveMessageSchemas, generateRosMsgMergedSchema } = load('@foxglove/schemas/internal')
 
 const bytes = fs.readFileSync(path)
 const members = (all) => all.definitions.filter((d) => !d.isConstant).map((d) => [d.name, d.type, !!d.isArray, d.arrayLength ?? 0, d.defaultValue ?? null])
 
-/// The definitions in a schema, each as ROS 2 has it.
+/// A type as those who made it publish it.
+function published(name) {
+  if (!name.startsWith('foxglove_msgs/')) return ros2humble[name]
+  const text = generateRosMsgMergedSchema(foxgloveMessageSchemas[name.split('/')[1]], { rosVersion: 2 })
+  return parse(text, { ros2: true }).find((one) => !one.name)
+}
+
+/// The definitions in a schema, each as it is published.
 function definitions(schema) {
   assert.equal(schema.encoding, 'ros2msg')
   const all = parse(new TextDecoder().decode(schema.data), { ros2: true })
   for (const one of all) {
     const name = one.name ?? schema.name.replace('/msg/', '/')
-    assert.deepEqual(members(one), members(ros2humble[name]), name)
+    assert.deepEqual(members(one), members(published(name)), name)
   }
   return all
 }
@@ -116,6 +124,10 @@ function shown(topic, m) {
   if (topic.endsWith('/trajectory')) return { p: m.poses.map((pose) => xyz(pose.pose.position)) }
   if (topic.endsWith('/markers') || topic.endsWith('/voxels'))
     return { shapes: m.markers.map((s) => ({ type: s.type, action: s.action, p: xyz(s.pose.position), scale: xyz(s.scale), points: s.points.map(xyz) })) }
+  if (topic.endsWith('/scene')) {
+    const { id, frame_id, cubes, lines } = m.entities[0]
+    return { entities: m.entities.length, id, frame_id, cubes: cubes.map((c) => ({ p: xyz(c.pose.position), scale: xyz(c.size) })), lines: lines.map((l) => l.points.map(xyz)) }
+  }
   if (topic.endsWith('/error_over_bound')) return { v: xyz(m.vector) }
   return { text: m.data ?? m.msg }
 }

@@ -102,6 +102,9 @@ async function main() {
   await fly(pilot, [2, 3, 1.2])
   await until('the page sees the vehicle move', async () => (await place(pilot))[1] > before[1] + 0.3)
   done('the vehicle moved')
+  const power = (await row(pilot, 'battery')).match(/^(\d+) %, (\d+\.\d\d) V$/)
+  assert.ok(power && Number(power[1]) <= 100 && Number(power[2]) > 14 && Number(power[2]) < 16.7, await row(pilot, 'battery'))
+  assert.match(await row(pilot, 'age of battery'), /^[01]\.\d s$/)
   // Hold, on the way.
   await command(pilot, 'hold')
   const watcher = await open(browser, url), stranger = await open(browser, address)

@@ -210,6 +210,11 @@ def check_flight(ctl: str, domain: str) -> None:
     told = backwashctl("--station", "rival", "hold")
     assert told.returncode == 69 and "session held by page@here" in told.stderr, told
     page.until("it moves", lambda e: e["status"]["moving"])
+    # The battery that the bench's controller says once a second: four cells of 3.5 to 4.15 V by their share.
+    power = page.until("the battery is told", lambda e: e["battery"])["battery"]
+    assert 0.3 < power["share"] <= 1 and abs(power["voltage_v"] - 4 * (3.5 + 0.65 * power["share"])) < 0.02, power
+    ages = [page.event()["battery"]["age_s"] for _ in range(10)]
+    assert max(ages) < 2.5 and min(ages) >= 0, ages
     over = page.until("it is judged", lambda e: e["over_bound"])["over_bound"]
     assert max(map(abs, over)) < 1.5, over
     # STOP is anybody's, and takes no session: the holder's stays.
@@ -239,7 +244,7 @@ def main() -> None:
     check_garbage()
     page = Page(PAGE)
     event = page.event()
-    assert event["status"] is None and event["age_s"] is None and event["command"] is None
+    assert event["status"] is None and event["battery"] is None and event["age_s"] is None and event["command"] is None
     before = memory()
     check_streams()
     check_garbage()
