@@ -10,6 +10,8 @@
 #include "core/study/inference/evidence.hpp"
 #include "core/study/windows/gates.hpp"
 #include "core/study/windows/instrument.hpp"
+#include "core/study/windows/observation.hpp"
+#include "core/study/windows/rotor_channels.hpp"
 #include "core/study/windows/signals.hpp"
 #include "core/study/windows/texture.hpp"
 #include "tests/study_worlds/observe.hpp"
@@ -101,6 +103,31 @@ double tail_of(const std::vector<Residual>& windows) {
   return mean;
 }
 
+// Rotors of one rate have one line: each window's is the value of one of them, in turn. 2 Hz apart each has its own.
+TEST(RotorValues, OneLineOfSeveralRotorsCountsOnce) {
+  for (const double apart : {0.0, 2.0}) {
+    std::mt19937_64 rng(7);
+    std::normal_distribution draw;
+    backwash::log::FlightLog log;
+    Series s;
+    std::vector<double> residual;
+    for (std::size_t i = 0; i < 100; ++i) {
+      s.t.push_back(static_cast<double>(i) / kRate), s.row.push_back(i), residual.push_back(draw(rng));
+      for (std::size_t r = 0; r < 4; ++r)
+        log.columns["rpm" + std::to_string(r + 1)].push_back(60 * (190 + apart * static_cast<double>(r)));
+    }
+    const auto phases = rotor_phases(log, s);
+    for (std::size_t turn = 0; turn < 8; ++turn) {
+      std::array<std::optional<RotorLine>, 4> lines;
+      std::vector<std::size_t> told;
+      for (const auto& value : rotor_values(log, s, phases, backwash::Vehicle{}, residual, 0, 100, turn, lines))
+        if (value.channel >= kLine1 && value.channel < kLine1 + 4) told.push_back(value.channel - kLine1);
+      EXPECT_EQ(told, apart > 0 ? std::vector<std::size_t>({0, 1, 2, 3}) : std::vector<std::size_t>({turn % 4}));
+      for (const auto& line : lines) EXPECT_TRUE(line);
+    }
+  }
+}
+
 TEST(Texture, WhitePartIsTheNoiseOnGustsAndNothingOnSmoothSignals) {
   const Texture noisy = texture_of(made(200, false, 0.06, 1), kRate);
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(noisy.white[axis], 0.0036, 0.0008);
@@ -123,6 +150,27 @@ TEST(Tails, AreZeroForGaussianGustsAndTheBurstsKurtosisInShortNoisyWindows) {
   const double truth = std::log((0.2 * 81 + 0.8) / std::pow(0.2 * 9 + 0.8, 2));
   EXPECT_NEAR(tail_of(made(1500, false, 0.05, 3)), 0, 0.05);
   EXPECT_NEAR(tail_of(made(1500, true, 0.05, 4)), truth, 0.08);
+}
+
+// A line takes 18 % of the variance of a 2.5 s stretch with it, and a third of one of 1.3 s: passes are shorter than
+// hovers.
+TEST(Spread, SaysTheVarianceThatWasMadeHoweverShortTheStretch) {
+  std::mt19937_64 rng(20261126);
+  std::normal_distribution draw;
+  for (const double tau : {0.1, 0.15, 0.25})
+    for (const std::size_t n : {50U, 64U, 100U, 125U}) {
+      const double phi = std::exp(-1 / (kRate * tau));
+      double sum = 0;
+      constexpr int kStretches = 6000;
+      for (int w = 0; w < kStretches; ++w) {
+        std::vector<double> x{draw(rng)};
+        while (x.size() < n) x.push_back(phi * x.back() + std::sqrt(1 - phi * phi) * draw(rng));
+        sum += spread(detrended(x)).variance / kStretches;
+      }
+      EXPECT_NEAR(sum / left_by_a_line(n, 1 / kRate, tau), 1, 0.03) << n << " rows, " << tau << " s";
+      EXPECT_LT(left_by_a_line(n, 1 / kRate, tau), left_by_a_line(2 * n, 1 / kRate, tau));
+    }
+  EXPECT_NEAR(left_by_a_line(100, 1 / kRate, 1e-6), 1, 1e-3) << "white noise";
 }
 
 TEST(SlowCourse, KeepsADischargeAndDropsWhatAlternates) {

@@ -218,7 +218,9 @@ void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_h
       if (!residuals[i].comparable || !(variance > 0) || !(samples > 2)) continue;
       const double gusts = std::max(variance - texture.white[axis], kWindowRules.least_gusts * variance);
       const double own = ln_variance(samples) * std::pow(variance / gusts, 2);
-      all_.seen.y[kVarX + a][first + i] = std::log(gusts / row.sigma[axis]) - ln_bias(samples);
+      const std::size_t n = residuals[i].x[a].size();
+      const double left = left_by_a_line(n, row.duration / static_cast<double>(n - 1), kWindowRules.tau_w);
+      all_.seen.y[kVarX + a][first + i] = std::log(gusts / (left * row.sigma[axis])) - ln_bias(samples);
       all_.seen.weight[kVarX + a][first + i] = 1 / (own + kWindowRules.scatter2);
     }
     all_.tails.push_back(residuals[i].comparable ? fourth_moments(residuals[i], texture) : Fourth{});
@@ -236,7 +238,7 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
     residuals.push_back(put_means(row, s, w));
     if (!s.a_nominal.empty()) put_delays(s, w);
     for (const auto& [channel, value, weight] :
-         rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end, row.lines))
+         rotor_values(log, s, rotors, vehicle_, residuals.back().x[2], w.begin, w.end, residuals.size(), row.lines))
       put(channel, value, weight);
     const double dt = row.duration / static_cast<double>(w.size() - 1);
     for (auto& line : row.lines)

@@ -16,6 +16,25 @@ namespace {
 
 std::string name_of(const char* kind, std::size_t rotor) { return kind + std::to_string(rotor + 1); }
 
+using Rates = std::array<std::optional<double>, 4>;  // Hz
+
+Rates rates_of(const RotorPhases& phases, const Series& s, std::size_t begin, std::size_t end) {
+  Rates rates;
+  for (std::size_t rotor = 0; rotor < rates.size(); ++rotor)
+    if (const auto& phase = phases[rotor]; !phase.empty())
+      rates[rotor] = (phase[end - 1] - phase[begin]) / (2 * std::numbers::pi * (s.t[end - 1] - s.t[begin]));
+  return rates;
+}
+
+/// Whether a rotor's line is its value in this window, and not that of another one whose line it is, too.
+bool speaks(const Rates& rates, std::size_t rotor, std::size_t turn) {
+  constexpr double kApart = kWindowRules.line_alike / kWindowRules.line_block;
+  std::vector<std::size_t> alike;
+  for (std::size_t other = 0; other < rates.size(); ++other)
+    if (rates[other] && std::abs(*rates[other] - *rates[rotor]) < kApart) alike.push_back(other);
+  return alike.empty() || alike[turn % alike.size()] == rotor;  // none: no rate is a number
+}
+
 }  // namespace
 
 RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
@@ -36,11 +55,13 @@ RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
 
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::array<std::optional<RotorLine>, 4>& lines) {
+                                     std::size_t end, std::size_t turn,
+                                     std::array<std::optional<RotorLine>, 4>& lines) {
   std::vector<RotorValue> values;
   std::array<double, 4> share{}, ratio{};
   bool motors = true, rpms = true;
   const std::span<const double> t(s.t.data() + begin, end - begin);
+  const Rates rates = rates_of(phases, s, begin, end);
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
     const bool has_motor = log.has(name_of("motor", rotor)), has_rpm = log.has(name_of("rpm", rotor));
     motors = motors && has_motor, rpms = rpms && has_rpm;
@@ -65,7 +86,7 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
       ratio[rotor] = 2 * std::log(std::max(middle, kWindowRules.least_rpm.value));
       const std::span<const double> phase(phases[rotor].data() + begin, end - begin);
       lines[rotor] = rotor_line(residual, t, phase);
-      if (lines[rotor]) values.push_back({kLine1 + rotor, lines[rotor]->excess, 1});
+      if (lines[rotor] && speaks(rates, rotor, turn)) values.push_back({kLine1 + rotor, lines[rotor]->excess, 1});
     }
   }
   const auto put_contrast = [&](std::size_t channel, const std::array<double, 4>& x) {

@@ -21,9 +21,10 @@ struct RotorValue {
   double value, weight;
 };
 /// Lines, motor shares, rpm against command and dropouts of the rows [begin, end). `residual`: detrended vertical
-/// residual of those rows, m/s². `lines`: each rotor's, where the log tells its rate.
+/// residual of those rows, m/s². `lines`: each rotor's, where the log tells its rate. Rotors of one rate have one line,
+/// which must not count several times: it is the value of one of them, of each in `turn` (the window's number).
 std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
                                      const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::array<std::optional<RotorLine>, 4>& lines);
+                                     std::size_t end, std::size_t turn, std::array<std::optional<RotorLine>, 4>& lines);
 
 }  // namespace backwash::study

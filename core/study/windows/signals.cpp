@@ -52,6 +52,21 @@ Spread spread(std::span<const double> x) {
   return {square / (n - 2), samples};
 }
 
+double left_by_a_line(std::size_t n, double dt, double tau) {
+  const double count = static_cast<double>(n), middle = (count - 1) / 2, rho = std::exp(-dt / tau);
+  // Of a function of time with the mean square 1 the process has Σ f_a f_b ρ^|a−b|/n².
+  const auto taken = [&](const auto& f) {
+    double square = 0, sum = 0, before = 0;  // Σ_{b<a} ρ^{a−b} f_b
+    for (std::size_t a = 0; a < n; ++a) {
+      const double here = f(static_cast<double>(a) - middle);
+      sum += here * here + 2 * here * before, square += here * here;
+      before = rho * (before + here);
+    }
+    return sum / (square * count);
+  };
+  return count * (1 - taken([](double) { return 1.0; }) - taken([](double s) { return s; })) / (count - 2);
+}
+
 double ln_bias(double n) { return digamma(n / 2) - std::log(n / 2); }
 double ln_variance(double n) { return trigamma(n / 2); }
 

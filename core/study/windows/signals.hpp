@@ -21,6 +21,10 @@ struct Spread {
 };
 Spread spread(std::span<const double> detrended);
 
+/// What spread() tells of n samples, `dt` s apart, of a first-order process of the variance 1 and the correlation time
+/// `tau`, s: a line takes slow parts with it, and of a short stretch more.
+double left_by_a_line(std::size_t n, double dt, double tau);
+
 /// E[ln(χ²_n/n)] = ψ(n/2) − ln(n/2), and its variance ψ'(n/2): what the logarithm of a variance estimate of n samples
 /// adds to the logarithm of the variance.
 double ln_bias(double n);

@@ -149,6 +149,7 @@ struct WindowRules {
       "derived: neighbours on each side, 1 Hz apart: the mean of 8 exponential powers is known to 1/√8, a third"};
   Rule line_nearest{"line_nearest", 1.5, "Hz", "derived: what a line spreads over in line_block ends at 1 Hz"};
   Rule line_block{"line_block", 1, "s", "chosen: over more the phase that rpm readings give drifts"};
+  Rule line_alike{"line_alike", 0.5, "1/line_block", "derived: lines so far apart share 0.4 of their noise"};
   Rule least_folded{"least_folded", 0.75, "Hz",
                     "derived: below, a block of 1 s holds no whole turn, and the line is as slow as a gust"};
   Rule from_half_rate{"from_half_rate", 1, "Hz", "derived: nearer to half the rate a line's neighbours are missing"};
