@@ -255,6 +255,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
                                              : StudyVerdict::nothing_found;
   if (options.minimum_detectable) {
     options.search.progress("smallest effects that these flights would show");
+    result.smallest_looked_for = true;
     result.minimum_detectable =
         minimum_detectable(evidence, options.search, std::max(found.threshold, kRules.least_threshold.value));
   }

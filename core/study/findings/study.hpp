@@ -58,7 +58,8 @@ struct StudyResult {
   std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
   /// Per cause and parameter: least size found with 80 % power.
   std::map<std::string, std::map<std::string, double>> minimum_detectable;
-  double threshold = 0;  ///< nats
+  bool smallest_looked_for = false;  ///< whether that was computed
+  double threshold = 0;              ///< nats
   /// Every pair tested, found ones first. Where nothing was accepted, those found make the verdict
   /// unknown_structure; else they are hints. Empty with too few flights.
   std::vector<Dependence> remaining;

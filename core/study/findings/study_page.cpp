@@ -232,7 +232,10 @@ std::string limits_sections(const StudyResult& result, const Observations& seen)
   page +=
       "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
       "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
-  if (result.minimum_detectable.empty()) page += row("Not computed, or none would show", "");
+  if (!result.smallest_looked_for)
+    page += row("Not looked for", "the study was asked without them (--quick), or has too few flights");
+  else if (result.minimum_detectable.empty())
+    page += row("None", "no effect of the catalogue shows in these flights at a size that it may have");
   for (const auto& [cause, sizes] : result.minimum_detectable)
     for (const auto& [parameter, size] : sizes)
       page += row(std::string(cause).append(", ").append(parameter), number(size));
