@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "core/log/median.hpp"
@@ -55,16 +56,24 @@ tl::expected<std::vector<AutopilotPose>, std::string> autopilot_poses(const Topi
 
 std::optional<double> distance_from_link(const RawLog& log, std::span<const AutopilotPose> poses) {
   constexpr std::int64_t kNear_ns = 50'000'000;
-  std::vector<double> distances;
+  constexpr double kAway = 1;  // m: on its pad every flight is at one place, and a log may hold minutes of that
+  std::vector<double> all, away;
+  std::optional<Vec3> first_W;
   for (const RawRecord& record : log.records) {
     const auto* row = record.header.kind == RecordKind::tick_input ? payload<TickInputRecord>(record) : nullptr;
     const auto told = row ? decode(*row, nullptr).autopilot.pose : std::nullopt;
     if (!told) continue;
     const auto after = std::ranges::lower_bound(poses, told->at_ns, {}, &AutopilotPose::t_ns);
     if (after == poses.end() || after->t_ns - told->at_ns > kNear_ns) continue;
-    distances.push_back((after->moving.state.p_W - told->state.p_W).norm());
+    const Vec3& here_W = told->state.p_W;
+    const double distance = (after->moving.state.p_W - here_W).norm();
+    if (!std::isfinite(distance)) continue;  // before the estimator has a position
+    if (!first_W) first_W = here_W;
+    all.push_back(distance);
+    if ((here_W - *first_W).norm() > kAway) away.push_back(distance);
   }
-  return distances.empty() ? std::nullopt : std::optional(median(std::move(distances)));
+  if (all.empty()) return std::nullopt;
+  return median(std::move(away.empty() ? all : away));
 }
 
 }  // namespace backwash::log

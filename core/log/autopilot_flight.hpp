@@ -25,8 +25,8 @@ struct AutopilotPose {
 tl::expected<std::vector<AutopilotPose>, std::string> autopilot_poses(const TopicLog& topics, const ClockLine& clock);
 
 /// How far the poses of an autopilot's log are from those that it told us over the link at the same times: the median,
-/// m; none where no time has both. Of one flight that is what the link's delay makes of its speed. `poses`: rising in
-/// time.
+/// m; none where no time has both. Of one flight that is what the link's delay makes of its speed. Where the vehicle
+/// went more than 1 m away from where it was first, of those times alone. `poses`: rising in time.
 std::optional<double> distance_from_link(const RawLog& log, std::span<const AutopilotPose> poses);
 
 }  // namespace backwash::log

@@ -125,8 +125,7 @@ class Teller {
 
   void take_command(const std::string& text) {
     const auto asked = asked_for(text);
-    if (!asked) return;
-    if (asked->session) return;
+    if (!asked || asked->session) return;
     if (asked->what != asked_) say("command", asked->what);  // a station repeats itself until it is answered
     asked_ = asked->what;
     if (!asked->beside) ordered_ = asked->ends;
@@ -155,7 +154,7 @@ class Teller {
     if (!in_air_ && was_in_air_) ++story_.landings, say("flight", "on the ground");
     if (in_air_ && was_in_air_ && !story_.samples.empty())
       story_.length_m += (s.p_W - story_.samples.back().p_W).norm();
-    was_in_air_ = in_air_;
+    was_in_air_ = in_air_, flown_ &= in_air_;
     if (flying) take_piece(tick, s);
     const auto m = static_cast<Mode>(tick.mode);
     // On its way up and down a vehicle comes as near to the floor as it will.
@@ -205,21 +204,21 @@ class Teller {
   void take_piece(const log::TickRecord& tick, const StorySample& s) {
     if (!open_ || tick.segment != segment_) {
       const auto known = std::ranges::find(segments_, tick.segment, [](auto& known_one) { return known_one.head.id; });
-      // A lift-off alone has no commands of its own: the rise that follows is the same take-off.
+      // A lift-off alone is no segment: the rise that follows is the same take-off.
       const bool goes_on =
           open_ && known != segments_.end() && (known->head.continues != 0 || (commands_ == 0 && vertical(*known)));
       if (!goes_on) {
+        if (open_ && ordered_) end_by_order(story_.pieces.back());
         story_.pieces.push_back({});
         auto& piece = story_.pieces.back();
-        piece.take_off = known != segments_.end() ? vertical(*known) : true;  // a lift-off alone is no segment
-        piece.from_s = now_s_;
+        piece.take_off = known == segments_.end() || (vertical(*known) && !flown_), piece.from_s = now_s_;
       }
       open_ = true, ordered_ = false, segment_ = tick.segment;
       commands_ = known != segments_.end() ? known->commands.size() : 0;
       story_.pieces.back().goal_W = commands_ > 0 ? known->commands.back().p_W : s.command_W;
     }
     auto& piece = story_.pieces.back();
-    piece.until_s = now_s_;
+    piece.until_s = now_s_, flown_ |= in_air_;
     piece.samples += s.judged, piece.inside += s.judged && s.inside;
     const auto m = static_cast<Mode>(tick.mode);
     if (m == Mode::tracking && commands_ > 0 && tick.index + 1 >= commands_) {
@@ -266,10 +265,10 @@ class Teller {
   double now_s_ = 0;
   std::optional<double> last_tick_s_;
   std::uint32_t mode_ = 0, reason_ = 0, closures_ = 0;
-  std::optional<std::int64_t> odometry_ns_;  ///< of the newest sample
-  std::optional<std::uint8_t> resets_;       ///< as the autopilot counts its estimator's
-  bool in_air_ = false, was_in_air_ = false;
-  bool open_ = false;     ///< a piece is being flown
+  std::optional<std::int64_t> odometry_ns_;                   ///< of the newest sample
+  std::optional<std::uint8_t> resets_;                        ///< as the autopilot counts its estimator's
+  bool in_air_ = false, was_in_air_ = false, flown_ = false;  ///< `flown_`: a piece was, since it left the ground
+  bool open_ = false;                                         ///< a piece is being flown
   bool ordered_ = false;  ///< an operator has asked for something since the piece began
   std::uint64_t segment_ = 0;
   std::size_t commands_ = 0;  ///< of the segment

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "core/log/tick_log.hpp"
@@ -49,6 +51,30 @@ TEST(AutopilotFlight, OfAnotherTimeHasNoDistance) {
   EXPECT_FALSE(distance_from_link(log, logged(6'000'000'000, 200, Vec3::Zero())));
   EXPECT_FALSE(distance_from_link(log, logged(0, 40, Vec3::Zero())));
   EXPECT_FALSE(distance_from_link(log, {}));
+}
+
+// Both logs hold a minute on the pad; in the air they have nothing in common.
+TEST(AutopilotFlight, OfAnotherFlightFromTheSamePadIsFarInTheAir) {
+  RawLog log = told(0, 3000);
+  for (RawRecord& record : log.records) {
+    TickInputRecord row;
+    std::memcpy(&row, record.bytes.data(), sizeof row);
+    auto in = decode(row, nullptr);
+    if (in.autopilot.pose) in.autopilot.pose->state.p_W.x() = std::max(0.0, 1e-9 * static_cast<double>(in.now_ns) - 50);
+    row = encode(in);
+    std::memcpy(record.bytes.data(), &row, sizeof row);
+  }
+  auto still = logged(0, 3000, Vec3::Zero());
+  for (auto& pose : still) pose.moving.state.p_W = {0, 1, 2};
+  EXPECT_GT(distance_from_link(log, still).value(), 3);
+}
+
+TEST(AutopilotFlight, APoseThatIsNoNumberIsNoDistance) {
+  auto poses = logged(1'000'000'000, 200, Vec3::Zero());
+  for (std::size_t n = 0; n < 150; ++n) poses[n].moving.state.p_W.x() = std::nan("");
+  EXPECT_NEAR(distance_from_link(told(1'000'000'000, 200), poses).value(), 0, 1e-9);
+  for (auto& pose : poses) pose.moving.state.p_W.x() = std::nan("");
+  EXPECT_FALSE(distance_from_link(told(1'000'000'000, 200), poses));
 }
 
 }  // namespace

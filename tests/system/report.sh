@@ -116,6 +116,30 @@ log.wait()
 story, _ = told(log, 1)
 assert "missed by 2.40 m: odometry lost" in story["reason"] and story["holds"] == 1, story["reason"]
 
+# An order that is flown at the next tick ends the route before it, too.
+log = RawLog()
+log.fly((0, 0, 1))
+log.fly((4, 0, 1), ticks=100, until=40)
+log.command(GO_TO, (1, 3, 1))
+log.fly((1, 3, 1))
+log.land()
+story, _ = told(log, 0)
+assert [p["end"] for p in story["pieces"]] == ["reached", "ended by an order", "reached"], story["pieces"]
+
+# A goal above one in the air is no take-off, and can be missed. After a landing the rise is one again.
+log = RawLog()
+log.fly((0, 0, 1))
+log.fly((0, 0, 2))
+log.fly((0, 0, 3), ticks=100, until=40)
+for k in range(20):
+    log.tick("hold", ODOMETRY_LOST, log.segments, 40)
+log.land()
+log.fly((0, 0, 1))
+log.land()
+story, _ = told(log, 1)
+assert [p["kind"] for p in story["pieces"]] == ["take-off", "route", "route", "take-off"], story["pieces"]
+assert "(0.00, 0.00, 3.00) was missed by 0.60 m: odometry lost" in story["reason"], story["reason"]
+
 # Of two goals that were missed, each for its own reason. A third was left since an operator asked to land.
 log = RawLog()
 log.fly((0, 0, 1))

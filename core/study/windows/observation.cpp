@@ -23,10 +23,10 @@ T mean(SampleRange w, T sum, F value) {
   return sum;
 }
 
-/// Power of gusts of variance 1 and correlation e^{−|t|/τ_w} at a share of the sampling rate, over that of white
+/// Power of gusts of variance 1 and correlation e^{−|t|/τ} at a share of the sampling rate, over that of white
 /// noise of variance 1.
-double gusts_at(double folded, double dt) {
-  const double a = std::exp(-dt / kWindowRules.tau_w);
+double gusts_at(double folded, double dt, double tau) {
+  const double a = std::exp(-dt / tau);
   return (1 - a * a) / (1 + a * a - 2 * a * std::cos(2 * std::numbers::pi * folded));
 }
 
@@ -219,7 +219,7 @@ void Observer::put_spreads(const std::vector<Residual>& residuals, double rate_h
       const double gusts = std::max(variance - texture.white[axis], kWindowRules.least_gusts * variance);
       const double own = ln_variance(samples) * std::pow(variance / gusts, 2);
       const std::size_t n = residuals[i].x[a].size();
-      const double left = left_by_a_line(n, row.duration / static_cast<double>(n - 1), kWindowRules.tau_w);
+      const double left = left_by_a_line(n, row.duration / static_cast<double>(n - 1), surroundings_.tau_w());
       all_.seen.y[kVarX + a][first + i] = std::log(gusts / (left * row.sigma[axis])) - ln_bias(samples);
       all_.seen.weight[kVarX + a][first + i] = 1 / (own + kWindowRules.scatter2);
     }
@@ -242,7 +242,8 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
       put(channel, value, weight);
     const double dt = row.duration / static_cast<double>(w.size() - 1);
     for (auto& line : row.lines)
-      if (line) line->floor2 = std::max(0.0, line->floor2 - row.sigma.z() * gusts_at(line->folded, dt));
+      if (line)
+        line->floor2 = std::max(0.0, line->floor2 - row.sigma.z() * gusts_at(line->folded, dt, surroundings_.tau_w()));
   }
   const double period = s.t.back() / static_cast<double>(s.size() - 1);
   all_.seen.row_period = std::max(all_.seen.row_period, period);

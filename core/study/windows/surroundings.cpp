@@ -11,7 +11,7 @@
 namespace backwash::study {
 
 MapView::MapView(const map::OccupancyGrid* grid, const Model& model)
-    : grid_(grid), base_(model.base.horizontal, model.base.horizontal, model.base.vertical) {
+    : grid_(grid), base_(model.base.horizontal, model.base.horizontal, model.base.vertical), tau_w_(model.bound.tau_w) {
   if (!grid_) return;
   field_.emplace(*grid_, model);
   low_ = grid_->origin();

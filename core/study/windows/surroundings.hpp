@@ -28,6 +28,8 @@ class MapView {
   bool near(const Vec3& p_W) const;
   bool inside_solid(const Vec3& p_W) const { return grid_ && grid_->occupied(grid_->index(p_W)); }
   bool has_map() const noexcept { return grid_ != nullptr; }
+  /// Correlation time of the model's gusts, s.
+  double tau_w() const noexcept { return tau_w_; }
 
  private:
   bool whole(const Vec3& p_W, const Around& around, const std::pair<double, Vec3>& wall) const;
@@ -35,6 +37,7 @@ class MapView {
 
   const map::OccupancyGrid* grid_;
   Vec3 base_;
+  double tau_w_;
   std::optional<field::ProximityField> field_;
   Vec3 low_;
   Index3 size_;
