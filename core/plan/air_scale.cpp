@@ -21,7 +21,8 @@ Model walls_alone(Model model) {
 /// Σ of a model at the listed voxels of some columns, from what can reach them alone.
 void fill_columns(field::DisturbanceField& field, const map::OccupancyGrid& grid, const Model& model,
                   const map::VoxelBox& columns, std::span<const std::size_t> listed, const Parallel& parallel) {
-  const map::VoxelBox around = field::affected_columns(grid, model, columns);
+  map::VoxelBox around = field::affected_columns(grid, model, columns);
+  if (model.unknown_floor) around.low.z() = -1;  // what is below the map is unknown, too
   const map::OccupancyGrid part = map::part_of(grid, around);
   std::vector<std::size_t> of_part;
   of_part.reserve(listed.size());

@@ -35,7 +35,8 @@ std::vector<map::VoxelBox> pieces(const Index3& size) {
 void update_bounds(reach::BoundField& bounds, const map::OccupancyGrid& whole, const Index3& low, const Index3& size,
                    const Model& model, const map::VoxelBox& columns, std::span<const std::size_t> listed,
                    const Parallel& parallel) {
-  const map::VoxelBox around = field::affected_columns(whole, model, {low + columns.low, low + columns.high});
+  map::VoxelBox around = field::affected_columns(whole, model, {low + columns.low, low + columns.high});
+  if (model.unknown_floor) around.low.z() = -1;  // what is below the map is unknown, too
   const map::OccupancyGrid reached = map::part_of(whole, around);
   const Index3 shift = low - around.low;
   std::vector<std::size_t> of_reached;

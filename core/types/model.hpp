@@ -45,7 +45,7 @@ struct Model {
   BoundModel bound;
   std::vector<ModelEffect> extension;
   /// Where a free voxel stands on an unknown one a floor may be, and shakes the vehicle as one does. For maps that show
-  /// what is near alone; no key of the file.
+  /// what is near alone; no key of the file. In a world what is below the map's lowest layer is unknown as well.
   bool unknown_floor = false;
 };
 

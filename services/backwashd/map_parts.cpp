@@ -66,9 +66,12 @@ void MapParts::end(std::uint8_t state, std::string reason) {
 
 void MapParts::refuse(const dds::MapPart& part, const WriterId& writer, const std::string& why, std::int64_t now_ns) {
   if (alive(now_ns) && writer_ != writer) return;  // what arrives meanwhile goes on
+  const bool known = transfer_ == part.transfer && writer_ == writer;
   if (transfer_ != part.transfer) begin(part, writer, now_ns);
   newest_ = std::max<std::uint64_t>(newest_, part.sent);
   newest_ns_ = now_ns;
+  owes_ = true;
+  if (known && !arriving()) return;  // the map worker has it, or it has its verdict
   end(backwash_msgs_msg_dds__MAPRECEIPT_REFUSED, why);
 }
 

@@ -31,7 +31,7 @@ class MapParts {
   /// What a part did. Error: why it was refused; that of the whole map goes into its receipts too.
   enum class Taken { begins, here, whole };
   tl::expected<Taken, std::string> take(const dds::MapPart& part, const WriterId& writer, std::int64_t now_ns);
-  /// Refuses the map that this part belongs to, and says so in its receipts.
+  /// Refuses the map that this part belongs to, and says so in its receipts. One that is whole keeps its verdict.
   void refuse(const dds::MapPart& part, const WriterId& writer, const std::string& why, std::int64_t now_ns);
   /// The map, once after Taken::whole. `from.term` is the caller's.
   MapMessage message();

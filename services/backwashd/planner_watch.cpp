@@ -118,7 +118,8 @@ std::string PlannerWorker::choose_stop() {
   if (std::ranges::equal(flying_->air, world_->air.factors, std::greater_equal{})) return "";
   const bool offers = !flying_->segment.arms && front_.standing(view_) != PlanFront::Standing::ended;
   for (const std::size_t lead : {kStopAfter, kRectifyAfter}) {  // the second where the first came too late
-    if (!offers || view_.segment != flying_->segment.id || view_.braking) break;
+    const bool same_frame = view_.closures == flying_->segment.closures;
+    if (!offers || !same_frame || view_.segment != flying_->segment.id || view_.braking) break;
     auto best = rest_from(view_.index + lead);
     if (!best) break;  // it rests before that
     const double clearance = best->segment.clearance;

@@ -207,10 +207,11 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
   return "the vehicle is not still enough to start: its state left the first set each time";
 }
 
-/// A segment that shares its start and its first commands with what flies.
+/// A segment that shares its start and its first commands with what flies, and so its map frame: where a loop closure
+/// came since, the control thread refuses it.
 Flying PlannerWorker::continued(std::size_t branch, std::vector<Setpoint> commands) {
   append_hold(commands);
-  Flying next{{0, flying_->segment.id, branch, std::move(commands), {}, {}, view_.closures},
+  Flying next{{0, flying_->segment.id, branch, std::move(commands), {}, {}, flying_->segment.closures},
               flying_->start,
               flying_->previous,
               flying_->metrics,

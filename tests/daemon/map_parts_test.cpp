@@ -114,6 +114,23 @@ TEST(MapParts, AMapThatANewerOneReplacedBeforeItWasLookedAtIsRefusedInItsReceipt
   maps.give_back(taken);
 }
 
+// Its sender asks again when maps are taken from another writer by then, or sends a part that is none.
+TEST(MapParts, AMapThatIsWholeHasTheVerdictOfTheMapWorkerAlone) {
+  for (const bool judged : {true, false}) {
+    Map map(1000);
+    MapParts parts(1u << 20, "map");
+    ASSERT_EQ(*parts.take(map.of(0, 1), kOne, 0), MapParts::Taken::whole);
+    if (judged) parts.judge({7, true, {}});
+    parts.refuse(map.of(0, 2), kOne, "maps are taken from another writer", kMs);
+    EXPECT_FALSE(parts.take(map.of(1, 3), kOne, 2 * kMs)) << "there is no such part";
+    if (!judged) {
+      EXPECT_EQ(parts.receipt(kSecond)->state, backwash_msgs_msg_dds__MAPRECEIPT_WHOLE);
+      parts.judge({7, true, {}});
+    }
+    EXPECT_EQ(parts.receipt(2 * kSecond)->state, backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED);
+  }
+}
+
 TEST(MapParts, AWriterThatBeginsAMapWithEachPartTakesMemoryOnceASecond) {
   Map map(3000);
   MapParts parts(1u << 20, "map");

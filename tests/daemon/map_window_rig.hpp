@@ -52,9 +52,15 @@ class MapWindowTest : public MapWorkerTest {
   void look_through(std::int64_t at_ns) { channels_->scans.push(new Scan{{{1.9, 0.1, 1.1}}, {-0.5, 0.1, 1.1}, at_ns}); }
   map::Cell at(const Vec3& p) { return world()->grid.at(world()->grid.index(p)); }
   void expect_as_built() {
-    const auto built = plan::build_world(world()->grid, Model{}, config::load_vehicle("builtin:quad-5in").value());
+    Model model;
+    model.unknown_floor = true;
+    const auto built = plan::build_world(world()->grid, model, config::load_vehicle("builtin:quad-5in").value());
     EXPECT_TRUE(std::ranges::equal(built->grid.cells(), world()->grid.cells()));
     EXPECT_TRUE(std::ranges::equal(built->hover.safe_voxels().cells(), world()->hover.safe_voxels().cells()));
+    std::size_t differ = 0;
+    for (std::size_t n = 0; n < built->grid.cell_count(); ++n)
+      differ += built->bounds.at(built->grid.voxel(n)).w != world()->bounds.at(built->grid.voxel(n)).w;
+    EXPECT_EQ(differ, 0u);
   }
   std::size_t bytes() const { return mallinfo2().uordblks + mallinfo2().hblkhd; }
 

@@ -201,5 +201,28 @@ TEST_F(PlannerWatch, AnObstacleInAirThatWasRoughBeforeIsAnObstacle) {
   EXPECT_EQ(channels_->blocked_segment, view_.segment);
 }
 
+// A stop that is chosen for the air is a way in the frame that the flight was planned in: after a loop closure it would
+// move the vehicle by that at once.
+TEST_F(CalmGap, NoStopIsOfferedInTheFrameOfBeforeALoopClosure) {
+  for (const bool between : {false, true}) {  // the two offers, or before both, where the way back is not clear
+    SCOPED_TRACE(between);
+    offers_.clear();
+    view_ = {};
+    channels_->rough_segment = 0;
+    come_to(1.7);
+    view_.shift.t = {0, 0.1, 0};
+    if (between)
+      answer_ = [this](const auto& s) { view_.closures = 1, view_.refused_segment = s.id; };
+    else
+      view_.closures = 1;
+    learn(kModelledAir);
+    planner_.step();
+    EXPECT_EQ(channels_->rough_segment, view_.segment) << "it is stopped all the same";
+    EXPECT_EQ(offers_.size(), between ? 2u : 1u);
+    for (const auto& s : offers_) EXPECT_EQ(s.closures, 0u);
+    answer_ = [this](const auto& s) { view_.segment = s.id; };
+  }
+}
+
 }  // namespace
 }  // namespace backwash::daemon::test
