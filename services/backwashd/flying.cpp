@@ -49,6 +49,14 @@ void add_own_stop(Flying& flying, std::size_t branch) {
                  {branch, {s.commands.begin() + own, s.commands.end()}, {s.tube.begin() + own, s.tube.end()}});
 }
 
+void add_own_stops(Flying& flying, std::size_t branch) {
+  const auto& s = flying.segment;
+  for (; branch < s.commands.size() && !s.commands[branch].v_W.isZero(); branch += kStopEvery) {
+    const auto next = std::ranges::lower_bound(s.stops, branch, {}, &plan::Stop::branch);
+    if (next == s.stops.end() || next->branch >= branch + kStopEvery) add_own_stop(flying, branch);
+  }
+}
+
 std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch) {
   const auto& s = flying.segment;
   const auto stop = std::ranges::find(s.stops, stop_branch, &plan::Stop::branch);

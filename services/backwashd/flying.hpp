@@ -43,6 +43,9 @@ std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::si
 /// Makes the flight's own way from command `branch` on, which comes to rest, one of its stops: where no other is clear
 /// it still has one.
 void add_own_stop(Flying& flying, std::size_t branch);
+/// The same every 0.2 s from there until it rests, wherever no other stop leaves it: whoever asks for a stop while it
+/// slows down already finds one.
+void add_own_stops(Flying& flying, std::size_t branch);
 
 /// The segment as the raw log's record (log::SegmentRecord, then the commands).
 std::vector<std::uint8_t> segment_record(const Flying& flying);

@@ -151,6 +151,8 @@ std::optional<std::string> PlannerWorker::brake() {
   verify(next, *world_, view_.index);
   const double here = next.segment.clearance;
   if (!(here > 0)) return brake_later() ? std::nullopt : std::optional(not_clear("braking here", here));
+  add_guards(next, *world_, view_.index);
+  add_own_stops(next, branch);
   return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
 }
 
@@ -167,6 +169,7 @@ bool PlannerWorker::brake_later() {
     verify(next, *world_, view_.index);
     if (!(next.segment.clearance > 0)) continue;
     add_guards(next, *world_, view_.index);
+    add_own_stops(next, stop.branch);
     const double after = kControlPeriod * static_cast<double>(stop.branch - view_.index);
     if (!offer(std::move(next))) return false;
     spdlog::info("braking here is not clear: the flight comes to rest {:.1f} s later", after);

@@ -129,7 +129,28 @@ TEST_F(PlannerWatch, AHoldInANarrowGapIsARestBehindIt) {
   EXPECT_GT(held.commands.back().p_W.x(), kGap);
   EXPECT_LT(held.commands.back().p_W.x(), 5.0) << "it does not fly on to its goal";
   EXPECT_TRUE(held.commands.back().v_W.isZero());
-  EXPECT_FALSE(held.stops.empty()) << "on the way there it can still be stopped";
+  ASSERT_FALSE(held.stops.empty());
+  EXPECT_LT(held.stops.front().branch, held.branch) << "on the way there it can still be stopped";
+}
+
+// A STOP after a HOLD: what slows down already has a stop ahead until it rests, and each comes to rest in the clear.
+TEST_F(PlannerWatch, AFlightThatSlowsDownForAHoldHasAStopAheadUntilItRests) {
+  fly_past(1.8);
+  ASSERT_EQ(ask(PlanJob::Kind::brake, Vec3::Zero()), "");
+  ASSERT_EQ(offers_.size(), 2u);
+  const auto& held = offers_[1];
+  std::size_t moving = 0;
+  for (std::size_t k = view_.index; k + 10 < held.commands.size() && !held.commands[k + 10].v_W.isZero();
+       ++k, ++moving) {
+    const auto stop = std::ranges::find_if(held.stops, [&](const auto& s) { return s.branch >= k; });
+    ASSERT_NE(stop, held.stops.end()) << k;
+    EXPECT_LE(stop->branch, k + 10) << k;
+    EXPECT_TRUE(stop->commands.back().v_W.isZero());
+    EXPECT_LE(stop->commands.back().p_W.x(), held.commands.back().p_W.x() + 1e-9) << "no later than the hold";
+    EXPECT_GT(plan::tube_clearance(*world_, stop->tube), 0);
+    EXPECT_EQ(stop->tube.size(), stop->commands.size() + 1);
+  }
+  EXPECT_GT(moving, 30u);
 }
 
 TEST_F(PlannerWatch, BrakingThatWouldTouchIsNotOffered) {
