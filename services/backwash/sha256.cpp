@@ -15,7 +15,7 @@
 namespace backwash::services {
 namespace {
 
-/// OpenSSL's: where the processor has instructions for it, a fifth of the time of plain code.
+/// OpenSSL's, which takes the processor's own instructions where it has them.
 class Hash {
  public:
   Hash() : context_(EVP_MD_CTX_new(), EVP_MD_CTX_free) {

@@ -153,6 +153,41 @@ TEST_F(PlannerWatch, AFlightThatSlowsDownForAHoldHasAStopAheadUntilItRests) {
   EXPECT_GT(moving, 30u);
 }
 
+// Past the gap at speed: a hold rests behind it, the harder stops rest in it and are not clear. Its own way is the
+// stop.
+TEST_F(PlannerWatch, WhereNoHarderStopIsClearAHoldsOwnWayIsTheStop) {
+  OccupancyGrid grid = room();
+  fill(grid, {29, 0, 1}, {30, 15, 19}), fill(grid, {29, 24, 1}, {30, 39, 19});
+  know(grid);
+  stand({1.05, 2.13, 1.05});
+  ASSERT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.13, 1.05}), "");
+  const track::AcceptedSegment flown = offers_.at(0);
+  const auto clear = [&](std::size_t branch, double a_max) {
+    auto commands = plan::stop_along(flown.commands, branch, a_max);
+    append_hold(commands);
+    return plan::tube_clearance(*world_, reach::tube_over_field(world_->reach, {flown.commands[0].p_W, Vec3::Zero()},
+                                                                flown.commands[0], commands, world_->bounds)) > 0;
+  };
+  const double a_max = world_->reach.vehicle.limits.a_max;
+  std::size_t tried = 0;
+  for (std::size_t now = 60; now < 140; ++now) {
+    if (!clear(now + 15, a_max) || clear(now + 10, 2 * a_max) || clear(now + 20, 2 * a_max)) continue;
+    ++tried;
+    offers_.resize(1);
+    view_.segment = flown.id, view_.index = now;
+    view_.command = flown.commands[now], view_.state = flown.tube[now].center, view_.finished = false;
+    show();
+    ASSERT_EQ(ask(PlanJob::Kind::brake, Vec3::Zero()), "");
+    ASSERT_EQ(offers_.size(), 2u);
+    const auto stop = std::ranges::find_if(offers_[1].stops, [&](const auto& x) { return x.branch >= now + 15; });
+    ASSERT_NE(stop, offers_[1].stops.end());
+    EXPECT_EQ(stop->branch, now + 15);
+    EXPECT_EQ(stop->commands.back().p_W, offers_[1].commands.back().p_W);
+    break;
+  }
+  EXPECT_EQ(tried, 1u);
+}
+
 TEST_F(PlannerWatch, BrakingThatWouldTouchIsNotOffered) {
   fly_past(2.5);
   know(walled(view_.state.p_W.x() + 0.6, false));
