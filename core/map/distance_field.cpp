@@ -36,16 +36,15 @@ DistanceField::DistanceField(const OccupancyGrid& grid)
     : origin_W_(grid.origin()),
       resolution_(grid.resolution()),
       half_voxel_(0.5 * grid.resolution()),
-      size_(grid.size()),
-      squared_(grid.cell_count()) {
-  transform_distances(grid, {Index3::Zero(), size_ - Index3::Ones()}, squared_);
+      squared_(grid.size()) {
+  transform_distances(grid, all_of(grid.size()), squared_);
 }
 
 void DistanceField::update(const OccupancyGrid& grid, const VoxelBox& changed) {
   if (changed.empty()) return;
-  const Index3 around = Index3::Constant(most_steps(size_));
+  const Index3 around = Index3::Constant(most_steps(grid.size()));
   const Index3 low = (changed.low - around).cwiseMax(0),
-               high = (changed.high + around).cwiseMin(size_ - Index3::Ones());
+               high = (changed.high + around).cwiseMin(grid.size() - Index3::Ones());
   // Half voxels between a voxel's centre and the box along an axis.
   const auto gap2 = [&](int axis, int i) {
     const int gap = std::max({0, 2 * (changed.low[axis] - i) - 1, 2 * (i - changed.high[axis]) - 1});
@@ -55,20 +54,20 @@ void DistanceField::update(const OccupancyGrid& grid, const VoxelBox& changed) {
   for (int k = low.z(); k <= high.z(); ++k)
     for (int j = low.y(); j <= high.y(); ++j) {
       const int beside = gap2(2, k) + gap2(1, j);
-      const std::uint16_t* const row = &squared_[linear(size_, {0, j, k})];
+      const std::uint16_t* const row = squared_.row(j, k);
       const auto reached = [&](int i) { return beside + gap2(0, i) <= row[i]; };
       int first = low.x(), last = high.x();
       while (first <= last && !reached(first)) ++first;
       while (first < last && !reached(last)) --last;
       if (first <= last) affected.add({first, j, k}), affected.add({last, j, k});
     }
+  if (affected.empty()) return;
+  squared_.own(affected);
   transform_distances(grid, affected, squared_);
 }
 
-double DistanceField::at(const Index3& v) const noexcept { return inside(size_, v) ? at(linear(size_, v)) : 0.0; }
-
 bool DistanceField::covers(const Vec3& q) const noexcept {
-  return (q.array() >= 0.0).all() && (q.array() < size_.cast<double>().array()).all();  // false for NaN
+  return (q.array() >= 0.0).all() && (q.array() < squared_.size().cast<double>().array()).all();  // false for NaN
 }
 
 double DistanceField::interpolated(const Vec3& p_W) const noexcept {
@@ -97,11 +96,11 @@ double DistanceField::exact(const OccupancyGrid& grid, const Vec3& p_W) const no
 
   // The distance is 1-Lipschitz, so at() bounds the search; the surplus covers the rounding of the stored float.
   const double reach = at(v) / resolution_ + (q - v.cast<double>() - Vec3::Constant(0.5)).norm();
-  double best = std::min({q.minCoeff(), (size_.cast<double>() - q).minCoeff(), reach * (1 + 1e-6)});
+  double best = std::min({q.minCoeff(), (grid.size().cast<double>() - q).minCoeff(), reach * (1 + 1e-6)});
   best *= best;
   const double radius = std::sqrt(best);
   const Index3 low = (q.array() - radius).floor().cast<int>().max(0);
-  const Index3 high = (q.array() + radius).floor().cast<int>().min(size_.array() - 1);
+  const Index3 high = (q.array() + radius).floor().cast<int>().min(grid.size().array() - 1);
   for (int k = low.z(); k <= high.z(); ++k) {
     const double dz = gap(q.z(), k);
     for (int j = low.y(); j <= high.y(); ++j) {

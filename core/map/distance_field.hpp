@@ -3,16 +3,16 @@
 
 #include <cmath>
 #include <cstdint>
-#include <vector>
 
 #include "core/map/occupancy_grid.hpp"
-#include "core/map/voxel_box.hpp"
+#include "core/map/shared_rows.hpp"
 
 namespace backwash::map {
 
 /// Distance from points to the nearest face of an occupied or unknown voxel ("obstacle" below; outside the grid is
 /// unknown and therefore an obstacle), docs/model.md section 4. Stored at voxel centres, 0 inside obstacles, as squares
 /// in half voxels: exact up to 127.999 voxels, and that where it is farther, so that no distance is said to be larger.
+/// Copies share what is equal in them.
 class DistanceField {
  public:
   /// Exact separable transform: the distance from each voxel centre to the nearest obstacle *box* (not centre), m.
@@ -22,12 +22,8 @@ class DistanceField {
   /// voxels no farther from the box than from their nearest obstacle are looked at again.
   void update(const OccupancyGrid& grid, const VoxelBox& changed);
 
-  /// At a voxel's centre, m; 0 outside the grid.
-  double at(const Index3& v) const noexcept;
-  /// The same by the voxel's position in the cell array; precondition: inside the grid.
-  double at(std::size_t linear) const noexcept {
-    return static_cast<double>(static_cast<float>(half_voxel_ * std::sqrt(static_cast<double>(squared_[linear]))));
-  }
+  /// At a voxel's centre, m; 0 outside the grid. Real-time: wait-free, no allocation.
+  double at(const Index3& v) const noexcept { return inside(squared_.size(), v) ? metres(squared_[v]) : 0.0; }
   /// Trilinear interpolation between voxel centres, m; 0 outside the grid. Off exact() by at most √3/2·a, and too large
   /// near faces (a/4 on a flat one, 0.56a on a convex corner): for gradients and search; exact() for what must hold.
   /// Real-time: wait-free, no allocation.
@@ -41,11 +37,13 @@ class DistanceField {
 
  private:
   bool covers(const Vec3& q) const noexcept;  // q in voxels from the origin
+  double metres(std::uint16_t squared) const noexcept {
+    return static_cast<double>(static_cast<float>(half_voxel_ * std::sqrt(static_cast<double>(squared))));
+  }
 
   Vec3 origin_W_;
   double resolution_, half_voxel_;
-  Index3 size_;
-  std::vector<std::uint16_t> squared_;
+  SharedRows<std::uint16_t> squared_;
 };
 
 }  // namespace backwash::map

@@ -77,7 +77,7 @@ class Transform {
     std::fill_n(line_.rbegin(), pad_, end_.x() == grid.size().x() ? 0 : kFar);
   }
 
-  void run(std::span<std::uint16_t> squared) {
+  void run(SharedRows<std::uint16_t>& squared) {
     const std::size_t layer = width_ * rows_, layers = static_cast<std::size_t>(end_.z() - low_.z());
     std::vector<std::uint8_t> above(layer * (layers + 1), end_.z() == grid_.size().z() ? 0 : kMostSteps + 1);
     for (int k = end_.z(); k-- > low_.z();) step(k, &above[layer * at(2, k + 1)], &above[layer * at(2, k)]);
@@ -91,7 +91,7 @@ class Transform {
       for (int j = box_.low.y(); j <= box_.high.y(); ++j) {
         along_y(j);
         along_x();
-        store(&out_[pad_ + at(0, box_.low.x())], &squared[grid_.linear({box_.low.x(), j, k})],
+        store(&out_[pad_ + at(0, box_.low.x())], squared.own_row(j, k) + box_.low.x(),
               static_cast<std::size_t>(box_.high.x() - box_.low.x() + 1));
       }
     }
@@ -159,7 +159,7 @@ class Transform {
 
 int most_steps(const Index3& size) noexcept { return std::min(kMostSteps, (size.minCoeff() + 1) / 2); }
 
-void transform_distances(const OccupancyGrid& grid, const VoxelBox& box, std::span<std::uint16_t> squared) {
+void transform_distances(const OccupancyGrid& grid, const VoxelBox& box, SharedRows<std::uint16_t>& squared) {
   Transform(grid, box).run(squared);
 }
 

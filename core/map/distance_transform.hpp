@@ -2,9 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 
-#include "core/map/voxel_box.hpp"
+#include "core/map/shared_rows.hpp"
 
 namespace backwash::map {
 
@@ -16,8 +15,8 @@ inline constexpr std::uint32_t kFarthestSquared = 0xffff;
 int most_steps(const Index3& size) noexcept;
 
 /// For each voxel of a box inside the grid: squared distance from its centre to the nearest obstacle box (anything that
-/// is not free, or outside), half voxels, into `squared` at its linear index. Exact integers, so that the bits do not
-/// depend on the box. O(voxels of the box grown by most_steps), times the distance.
-void transform_distances(const OccupancyGrid& grid, const VoxelBox& box, std::span<std::uint16_t> squared);
+/// is not free, or outside), half voxels, into `squared`. Exact integers, so that the bits do not depend on the box.
+/// Precondition: `squared` owns the box's rows. O(voxels of the box grown by most_steps), times the distance.
+void transform_distances(const OccupancyGrid& grid, const VoxelBox& box, SharedRows<std::uint16_t>& squared);
 
 }  // namespace backwash::map

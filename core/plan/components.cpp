@@ -40,9 +40,19 @@ Components::Components(const map::OccupancyGrid& free)
 
 void Components::update(const map::OccupancyGrid& free, const map::VoxelBox& changed) {
   const auto none = std::make_shared<const Tile>();
-  for (const std::size_t tile : tiles_.meeting(changed)) {
-    const Tile fresh = numbered(free, tiles_.voxels(tile));
-    tiles_.replace(tile, fresh.parts ? std::make_shared<const Tile>(fresh) : none);
+  const auto tiles = tiles_.meeting(changed);
+  for (const std::size_t tile : tiles) {
+    Tile fresh = numbered(free, tiles_.voxels(tile));
+    tiles_.replace(tile, fresh.parts ? std::make_shared<const Tile>(std::move(fresh)) : none);
+  }
+  // What a tile joins depends on the tiles above it, too: those below the changed ones are looked at again.
+  map::VoxelBox touching = changed;
+  if (!tiles.empty()) touching.low = tiles_.voxels(tiles.front()).low - Index3::Ones();
+  for (const std::size_t tile : tiles_.meeting(touching)) {
+    if (!tiles_[tile].parts) continue;
+    Tile joined = tiles_[tile];
+    joined.joints = joints_of(tile);
+    tiles_.replace(tile, std::make_shared<const Tile>(std::move(joined)));
   }
   join();
 }
@@ -75,6 +85,28 @@ Components::Tile Components::numbered(const map::OccupancyGrid& free, const map:
 }
 
 // Parts that touch across the faces of two tiles are one region.
+std::vector<Components::Joint> Components::joints_of(std::size_t tile) const {
+  const Tile& here = tiles_[tile];
+  const map::VoxelBox voxels = tiles_.voxels(tile);
+  std::vector<Joint> joints;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (voxels.high[axis] + 1 == tiles_.size()[axis]) continue;
+    map::VoxelBox face = voxels;
+    face.low[axis] = voxels.high[axis];
+    const Tile& beyond = tiles_.of(face.low + Index3::Unit(axis));
+    const std::size_t first = joints.size();
+    map::for_each_voxel(face, [&](const Index3& v) {
+      const Joint joint{static_cast<std::uint8_t>(axis), here.part[Grid::within(v)],
+                        beyond.part[Grid::within(v + Index3::Unit(axis))]};
+      if (!joint.part || !joint.beyond) return;
+      for (std::size_t n = joints.size(); n > first; --n)  // most faces join one pair
+        if (joints[n - 1].part == joint.part && joints[n - 1].beyond == joint.beyond) return;
+      joints.push_back(joint);
+    });
+  }
+  return joints;
+}
+
 void Components::join() {
   std::uint32_t count = 0;
   for (std::size_t tile = 0; tile < tiles_.count(); ++tile) {
@@ -82,24 +114,12 @@ void Components::join() {
     count += tiles_[tile].parts + 1u;
   }
   Forest forest(count);
-  for (std::size_t tile = 0; tile < tiles_.count(); ++tile) {
-    const Tile& here = tiles_[tile];
-    const map::VoxelBox voxels = tiles_.voxels(tile);
-    for (int axis = 0; axis < 3 && here.parts; ++axis) {
-      if (voxels.high[axis] + 1 == tiles_.size()[axis]) continue;
-      map::VoxelBox face = voxels;
-      face.low[axis] = voxels.high[axis];
-      const std::size_t next = tiles_.holding(face.low + Index3::Unit(axis));
-      const Tile& beyond = tiles_[next];
-      std::uint32_t last_here = 0, last_beyond = 0;  // most faces join one pair
-      map::for_each_voxel(face, [&](const Index3& v) {
-        const std::uint32_t a = here.part[Grid::within(v)], b = beyond.part[Grid::within(v + Index3::Unit(axis))];
-        if (!a || !b || (a == last_here && b == last_beyond)) return;
-        forest.join(first_[tile] + a, first_[next] + b);
-        last_here = a, last_beyond = b;
-      });
-    }
-  }
+  const auto& counts = tiles_.counts();
+  const std::array<std::size_t, 3> next = {1, static_cast<std::size_t>(counts.x()),
+                                           static_cast<std::size_t>(counts.x()) * static_cast<std::size_t>(counts.y())};
+  for (std::size_t tile = 0; tile < tiles_.count(); ++tile)
+    for (const Joint& joint : tiles_[tile].joints)
+      forest.join(first_[tile] + joint.part, first_[tile + next[joint.axis]] + joint.beyond);
   component_.assign(count, kNone);
   std::uint32_t last = kNone;
   for (std::size_t tile = 0; tile < tiles_.count(); ++tile)

@@ -16,7 +16,7 @@ class Components {
   static constexpr std::uint32_t kNone = 0;
   /// O(voxels).
   explicit Components(const map::OccupancyGrid& free);
-  /// Takes over what changed in `free` within a box inside it. O(voxels of the tiles met + tiles · 3 · 256).
+  /// Takes over what changed in `free` within a box inside it. O(voxels of the tiles met + joints of all tiles).
   void update(const map::OccupancyGrid& free, const map::VoxelBox& changed);
 
   /// The region of a voxel inside the grid, from 1; kNone: it is not free. Free voxels that share faces have the same
@@ -31,12 +31,17 @@ class Components {
 
  private:
   static constexpr int kShift = 4;
+  struct Joint {
+    std::uint8_t axis, part, beyond;  // a part of the tile, and one of the tile above along the axis that it touches
+  };
   struct Tile {
     std::array<std::uint8_t, std::size_t{1} << 3 * kShift> part{};  // 0: not free
     std::uint8_t parts = 0;
+    std::vector<Joint> joints{};
   };
   using Grid = map::Tiles<Tile, kShift>;
   static Tile numbered(const map::OccupancyGrid& free, const map::VoxelBox& voxels);
+  std::vector<Joint> joints_of(std::size_t tile) const;
   void join();
 
   Grid tiles_;

@@ -46,10 +46,11 @@ PerDirection set_at_centre(const World& world, const reach::NetDisturbance& net,
 /// Clearance of the set with Σ at a voxel's centre, m, if it is below the cap. The prism holds its centre, so it is no
 /// farther from obstacles, and no nearer than its circumradius makes it.
 std::optional<double> clearance_at_centre(const World& world, std::size_t n, const PerDirection& h) {
-  const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(n),
+  const Index3 v = world.grid.voxel(n);
+  const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(v),
                cap = kHoverClearanceCap + taken;
   if (free - kStoredRounding - Vec3(h[kX], h[kY], h[kZ]).norm() >= cap) return std::nullopt;
-  const Vec3 p_W = world.grid.center(world.grid.voxel(n));
+  const Vec3 p_W = world.grid.center(v);
   const double found =
       reach::prism_distance(world.grid, p_W, h, std::min(cap, free + kStoredRounding), &world.sums) - taken;
   return found < kHoverClearanceCap ? std::optional(found) : std::nullopt;
@@ -107,9 +108,9 @@ struct CostOfLayer {
 };
 
 void add_cost(const World& world, const reach::NetDisturbance& net, std::size_t n, CostOfLayer& cost) {
-  const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(n);
-  if (world.grid.at(n) != map::Cell::free || free <= taken) return;
   const Index3 v = world.grid.voxel(n);
+  const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(v);
+  if (world.grid.at(n) != map::Cell::free || free <= taken) return;
   const Vec3 p_W = world.grid.center(v);
   const PerDirection h = set_at_centre(world, net, v);
   const bool safe = world.hover.safe(v),
@@ -161,16 +162,16 @@ bool safe_by_sets(const World& world, const reach::HoverSet& set, const Index3& 
 }
 
 void add_comparison(const World& world, std::size_t n, std::vector<AgainstMargin>& result) {
-  const double taken = body_and_estimation(world.reach.vehicle);
-  if (world.grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) return;
   const Index3 v = world.grid.voxel(n);
+  const double taken = body_and_estimation(world.reach.vehicle), free = world.distance.at(v);
+  if (world.grid.at(n) != map::Cell::free || free <= taken) return;
   const auto set = reach::hover_extent(world.reach, world.grid, world.distance, world.bounds, world.grid.center(v));
   const bool set_safe = safe_by_sets(world, set, v);
   const auto& h = set.half_widths;
   const double nearest = std::ranges::min(h), corner = Vec3(h[kX], h[kY], h[kZ]).norm();  // at least the farthest
   for (auto& against : result) {
     ++against.voxels;
-    const bool ball_safe = world.distance.at(n) > taken + against.margin_m;
+    const bool ball_safe = free > taken + against.margin_m;
     against.only_ball_safe += ball_safe && !set_safe;
     against.only_set_safe += set_safe && !ball_safe;
     if (!set.bounded) {

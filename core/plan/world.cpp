@@ -112,7 +112,7 @@ std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const
     for (int j = box.low.y(); j <= box.high.y(); ++j) {
       std::size_t n = grid.linear({box.low.x(), j, k});
       for (int i = box.low.x(); i <= box.high.x(); ++i, ++n)
-        if (grid.at(n) == map::Cell::free && distance.at(n) >= least) voxels.push_back(n);
+        if (grid.at(n) == map::Cell::free && distance.at({i, j, k}) >= least) voxels.push_back(n);
     }
   return voxels;
 }

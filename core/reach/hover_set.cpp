@@ -228,9 +228,9 @@ void HoverMap::fill(const Reachability& reach, const map::OccupancyGrid& grid, c
   const bool extended = !bounds.extension().none();
   const auto fill_where = [&](const auto& safe) {
     for (const std::size_t n : voxels) {
-      const double here = distance.at(n);
-      if (here <= taken) continue;  // not even a point fits
       const Index3 v = grid.voxel(n);
+      const double here = distance.at(v);
+      if (here <= taken) continue;  // not even a point fits
       Centre c{v, grid.center(v), Vec3::Zero(), here};
       if (extended) {
         c.push_W = bounds.push(c.p_W, Vec3::Zero());

@@ -84,7 +84,8 @@ void change_of_one_cubic_metre(benchmark::State& state) {
       const DistanceField anew(grid);
       whole_s += seconds_since(anew_begun);
       for (std::size_t n = 0; n < grid.cell_count(); ++n)
-        if (field.at(n) != anew.at(n)) return state.SkipWithError("the update differs from a field made anew");
+        if (field.at(grid.voxel(n)) != anew.at(grid.voxel(n)))
+          return state.SkipWithError("the update differs from a field made anew");
     }
   state.counters["library_ms"] = 1e3 * library_s;
   state.counters["update_ms"] = 1e3 * updates_s / static_cast<double>(updates);

@@ -87,11 +87,12 @@ TEST(DistanceField, MeasuresToTheSidesOfAnEmptyGrid) {
   }
 }
 
-void expect_equal(const DistanceField& a, const DistanceField& b, std::size_t cells) {
-  for (std::size_t n = 0; n < cells; ++n) ASSERT_EQ(a.at(n), b.at(n)) << "voxel " << n;
+void expect_equal(const DistanceField& a, const DistanceField& b, const OccupancyGrid& grid) {
+  for (std::size_t n = 0; n < grid.cell_count(); ++n)
+    ASSERT_EQ(a.at(grid.voxel(n)), b.at(grid.voxel(n))) << "voxel " << n;
 }
 
-TEST(DistanceField, FollowsChangesBitForBit) {
+TEST(DistanceField, FollowsChangesBitForBitAndLeavesSnapshotsAsTheyWere) {
   std::mt19937_64 random(6);
   for (const Index3& size : {Index3(40, 35, 30), Index3(90, 20, 40), Index3(9, 80, 33), Index3(70, 65, 4)}) {
     OccupancyGrid grid({-1, 2, -3}, 0.1, size, Cell::free);
@@ -99,6 +100,8 @@ TEST(DistanceField, FollowsChangesBitForBit) {
     DistanceField field(grid);
     for (int round = 0; round < 40; ++round) {
       const Index3 low = grid.voxel(random() % grid.cell_count());
+      const DistanceField snapshot = field;
+      const OccupancyGrid before = grid;
       VoxelBox changed;
       for (int n = 0; n < 60; ++n) {
         const Index3 v = (low + Index3(n % 5, n / 5 % 4, n / 20)).cwiseMin(size - Index3::Ones());
@@ -106,10 +109,11 @@ TEST(DistanceField, FollowsChangesBitForBit) {
         changed.add(v);
       }
       field.update(grid, changed);
-      expect_equal(field, DistanceField(grid), grid.cell_count());
+      expect_equal(field, DistanceField(grid), grid);
+      if (round % 8 == 0) expect_equal(snapshot, DistanceField(before), before);
     }
     field.update(grid, VoxelBox{});
-    expect_equal(field, DistanceField(grid), grid.cell_count());
+    expect_equal(field, DistanceField(grid), grid);
   }
 }
 

@@ -75,12 +75,15 @@ TEST(Components, FollowWhatJoinsAndPartsThemAndLeaveCopiesAsTheyWere) {
   std::mt19937 random(2);
   OccupancyGrid grid = maze(random, {45, 40, 36});
   Components components(grid);
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < 120; ++round) {
     const OccupancyGrid before = grid;
     const Components old = components;
     map::VoxelBox changed;
+    const int apart = round % 2 ? 45 : 3;  // a change far and wide, or in a tile or two
+    const Index3 low = grid.voxel(random() % grid.cell_count());
+    const auto draw = [&] { return static_cast<int>(random() % static_cast<unsigned>(apart)); };
     for (int n = 0; n < 4; ++n) {
-      const Index3 v = grid.voxel(random() % grid.cell_count());
+      const Index3 v = (low + Index3(draw(), draw(), draw())).cwiseMin(grid.size() - Index3::Ones());
       grid.set(v, grid.free(v) ? Cell::occupied : Cell::free);
       changed.add(v);
     }

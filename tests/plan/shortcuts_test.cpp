@@ -134,7 +134,7 @@ OccupancyGrid forest() {
   OccupancyGrid grid = map::builtin_scene("forest-1", 0.1).value();
   const map::DistanceField distance(grid);
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
-    if (grid.at(n) == Cell::free && distance.at(n) < 0.25) grid.set(grid.voxel(n), Cell::unknown);
+    if (grid.at(n) == Cell::free && distance.at(grid.voxel(n)) < 0.25) grid.set(grid.voxel(n), Cell::unknown);
   return grid;
 }
 

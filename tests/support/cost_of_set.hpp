@@ -18,7 +18,7 @@ inline plan::SetCost cost_of_set(const plan::World& world) {
   plan::SetCost cost;
   std::vector<double> given_up;
   for (std::size_t n = 0; n < world.grid.cell_count(); ++n) {
-    if (world.grid.at(n) != map::Cell::free || world.distance.at(n) <= taken) continue;
+    if (world.grid.at(n) != map::Cell::free || world.distance.at(world.grid.voxel(n)) <= taken) continue;
     const Vec3 p_W = world.grid.center(world.grid.voxel(n));
     PerDirection h = net(world.bounds.at(world.grid.voxel(n))).w;
     for (std::size_t d = 0; d < kDirections; ++d)

@@ -23,7 +23,7 @@ class Room {
       if (!holds(v)) continue;
       voxels_.push_back(v);
       const double way = (world.grid.center(v) - start_W).norm();
-      const double room = world.distance.at(n) - kDesignRules.design_nearer * way;  // the nearest of the roomiest
+      const double room = world.distance.at(v) - kDesignRules.design_nearer * way;  // the nearest of the roomiest
       if (room > most) most = room, open_ = v;
     }
   }
