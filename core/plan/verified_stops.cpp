@@ -12,15 +12,18 @@ std::vector<Stop> verified_stops(const World& world, const State& start, const S
   std::size_t moving = commands.size();
   while (moving > 0 && commands[moving - 1].v_W.isZero()) --moving;
   std::vector<Stop> stops;
-  for (std::size_t branch = from; branch < moving; branch += every) {
+  const auto verify_stop = [&](std::size_t branch) {
     // stop_along() uses half of the limit it is given.
     auto stopped = stop_along(commands, branch, 2 * world.reach.vehicle.limits.a_max);
     stopped.insert(stopped.end(), static_cast<std::size_t>(kRest / kControlPeriod), Setpoint(stopped.back()));
     const auto tube = reach::tube_over_field(world.reach, start, previous, stopped, world.bounds);
-    if (!(clearance(tube) > 0)) continue;
+    if (!(clearance(tube) > 0)) return;
     const auto own = static_cast<std::ptrdiff_t>(branch);
     stops.push_back({branch, {stopped.begin() + own, stopped.end()}, {tube.begin() + own, tube.end()}});
-  }
+  };
+  for (std::size_t branch = from; branch < moving; branch += every) verify_stop(branch);
+  // What is told to stop after the last of them comes to rest by itself, sooner than a stop would.
+  if (!stops.empty() && stops.back().branch + every >= moving && moving < commands.size()) verify_stop(moving);
   return stops;
 }
 

@@ -55,6 +55,10 @@ void add_own_stops(Flying& flying, std::size_t branch) {
     const auto next = std::ranges::lower_bound(s.stops, branch, {}, &plan::Stop::branch);
     if (next == s.stops.end() || next->branch >= branch + kStopEvery) add_own_stop(flying, branch);
   }
+  // Until it rests, also after the last of them.
+  std::size_t rest = s.commands.size();
+  while (rest > 0 && s.commands[rest - 1].v_W.isZero()) --rest;
+  if (rest < s.commands.size()) add_own_stop(flying, rest);
 }
 
 std::vector<Setpoint> flown_commands(const Flying& flying, bool braking, std::size_t stop_branch) {

@@ -10,7 +10,8 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 kind=$1 path=$2 build=$3 out=$4
 shift 4
 all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill restart pilot battery rc gcs link reboot
-  stop_arming stop_takeoff stop_plan stop_replan stop_land stop_goto)
+  stop_arming stop_takeoff stop_plan stop_replan stop_land stop_goto
+  hold_stop_0.2 hold_stop_0.45 hold_stop_1.0 stop_hold hold_hold door_hold_stop door_hold_goto gap_hold_stop gap_hold_goto vio_gap_stop)
 [[ $# -gt 0 ]] || set -- "${all[@]}"
 if [[ ! -e $path ]]; then
   echo "skipped: tests/autopilots/faults.sh needs the path of a build of $kind"
@@ -48,7 +49,15 @@ case $kind/$fault in
   px4/gcs) STATION="udp 18570" ;;
   px4/rc | px4/pilot) STATION="udp 18570 sticks" ;;
 esac
-fly_real "$kind" "$path" "$build" "$out/$fault"
+goal=
+case $fault in # a gap of 1.0 m, for a body of 0.29 m: 0.2 m to either side, of which a set at rest takes most
+  gap_*)
+    MAP=${MAP:-builtin:narrow-gap} START=${START:-1.05,0.15,0.32} goal=5.05,0.15,1.2 VEHICLE=$out/$fault/wide.vehicle.toml
+    mkdir -p "$out/$fault"
+    sed 's/^radius = [0-9.]*/radius = 0.29/; s/^diagonal_radius = [0-9.]*/diagonal_radius = 0.36/' "$root/tests/autopilots/$kind.vehicle.toml" >"$VEHICLE"
+    ;;
+esac
+fly_real "$kind" "$path" "$build" "$out/$fault" ${goal:+"$goal"}
 
 now() { python3 -c "import time; print(time.monotonic())"; }
 
@@ -93,11 +102,35 @@ at_speed() { # at_speed [X]: on the way to the goal, beyond that x, m; by itself
   seen || die "the vehicle did not move"
   [[ $mode == tracking && $moving == True ]] || die "the flight was in $mode before the fault"
   at=$(now)
+  since=$at
   from=$(wc -l <"$log")
+}
+
+# soon_after SECONDS FIRST SECOND: two commands, so long after one another as their processes start.
+soon_after() {
+  ctl "$2" &
+  sleep "$1"
+  must "$3"
+  wait $! || die "backwashctl $2 failed"
+  at=$(now)
 }
 
 inject() {
   case $fault in
+    hold_stop_* | *_hold_stop) soon_after "$(case $fault in hold_*) echo "${fault##*_}" ;; *) echo 0.45 ;; esac)" hold stop ;;
+    stop_hold) soon_after 0.45 stop hold ;;
+    hold_hold) soon_after 0.45 hold hold ;;
+    *_hold_goto) # flown on from where the hold came to rest
+      must hold --wait
+      sleep 2
+      must goto "$goal" --wait
+      at=$(now)
+      ;;
+    vio_gap_stop) # longer than a pose may be away, shorter than what lands: the set-point is frozen, and a stop comes
+      echo stop >&7
+      sleep 0.15
+      echo go >&7 && ctl stop || true
+      ;;
     hold | stop | land) must "$fault" --wait ;;
     stop_land) must stop && must land ;;
     stop_goto) # stays until a later command
@@ -221,6 +254,16 @@ case $fault in
     from=$(wc -l <"$log")
     slow
     ;;
+  door_*) # rest is in the door, 5.8 to 6.0 m
+    take_off
+    at_speed "${DOOR_AT:-4.1}"
+    inject
+    ;;
+  gap_*) # braking at once would end in it, 2.9 to 3.2 m
+    take_off
+    at_speed "${GAP_AT:-1.5}"
+    inject
+    ;;
   *)
     take_off
     at_speed
@@ -230,6 +273,8 @@ esac
 sleep 15
 kill -TERM "$daemon_pid" "$vio_pid" 2>/dev/null || true
 wait "$daemon_pid" "$vio_pid" 2>/dev/null || true
-said=$(tail -n +"$((from + 1))" "$log" | sed -n 's/.*\[info\] \(\(passive\|hold\|land\|quiet\|tracking\): .*\)/\1/p' | paste -sd ';')
+said=$(tail -n +"$((from + 1))" "$log" |
+  sed -n 's/.*\[info\] \(\(passive\|hold\|land\|quiet\|tracking\|braking here is not clear\|no rest before its end is clear\): .*\)/\1/p' | paste -sd ';')
+raw=$(sed -n 's/.* raw log //p' "$log" | tail -n 1)
 python3 "$root/tests/autopilots/run_out.py" "$kind" "$fault" "$out/$kind.truth.csv" "$at" \
-  "$(sed -n 's/.* contacts \([0-9]*\),.*/\1/p' "$out/$kind.vio.log" | tail -n 1)" "$said"
+  "$(sed -n 's/.* contacts \([0-9]*\),.*/\1/p' "$out/$kind.vio.log" | tail -n 1)" "$said" "$raw" "${since:-$at}"

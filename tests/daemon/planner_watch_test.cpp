@@ -140,8 +140,7 @@ TEST_F(PlannerWatch, AFlightThatSlowsDownForAHoldHasAStopAheadUntilItRests) {
   ASSERT_EQ(offers_.size(), 2u);
   const auto& held = offers_[1];
   std::size_t moving = 0;
-  for (std::size_t k = view_.index; k + 10 < held.commands.size() && !held.commands[k + 10].v_W.isZero();
-       ++k, ++moving) {
+  for (std::size_t k = view_.index; !held.commands.at(k).v_W.isZero(); ++k, ++moving) {
     const auto stop = std::ranges::find_if(held.stops, [&](const auto& s) { return s.branch >= k; });
     ASSERT_NE(stop, held.stops.end()) << k;
     EXPECT_LE(stop->branch, k + 10) << k;
@@ -186,6 +185,17 @@ TEST_F(PlannerWatch, WhereNoHarderStopIsClearAHoldsOwnWayIsTheStop) {
     break;
   }
   EXPECT_EQ(tried, 1u);
+}
+
+// A STOP in the last 0.2 s of a flight.
+TEST_F(PlannerWatch, AFlightHasAStopAheadUntilItRests) {
+  fly_past(1.8);
+  const auto& flown = offers_.at(0);
+  for (std::size_t k = view_.index; !flown.commands.at(k).v_W.isZero(); ++k) {
+    const auto stop = std::ranges::find_if(flown.stops, [&](const auto& s) { return s.branch >= k; });
+    ASSERT_NE(stop, flown.stops.end()) << k << " of " << flown.commands.size();
+    EXPECT_GT(plan::tube_clearance(*world_, stop->tube), 0);
+  }
 }
 
 TEST_F(PlannerWatch, BrakingThatWouldTouchIsNotOffered) {

@@ -39,7 +39,7 @@ DaemonRig::Threads::Threads(DaemonRig& rig, daemon::Channels& channels)
       planner(
           channels, recorder, [&rig](const auto&) { ++rig.plans_; }, [&rig] { rig.advance(); }) {}
 
-DaemonRig::DaemonRig(const std::vector<Event>& events, daemon::test::Medium medium)
+DaemonRig::DaemonRig(const std::vector<Event>& events, daemon::test::Medium medium, MakeAutopilot* make)
     : events_(events),
       lock_({0.7, Vec3(5, -3, 0.2)}, medium, world()),
       watch_(vehicle_5in().limits.v_max),
@@ -48,9 +48,28 @@ DaemonRig::DaemonRig(const std::vector<Event>& events, daemon::test::Medium medi
     with_maps_ = with_maps_ || (e.kind >= Kind::map_same && e.kind <= Kind::scan_box);
     with_switch_ = with_switch_ || e.kind == Kind::switch_pressed || e.kind == Kind::switch_broken;
   }
+  if (make) fly(*make);
   lock_.reader = [this](const auto& sample) { return read(sample); };
   lock_.noise = [this](auto& bytes) { spoil_bytes(bytes); };
   start();
+}
+
+// With the parameters that the daemon asks for.
+void DaemonRig::fly(MakeAutopilot& make) {
+  const Vehicle vehicle = vehicle_5in();
+  const Vec3 ground(-2, 0, vehicle.body.radius);
+  constexpr double kUptime = 60;  // s: its gyros have settled
+  lock_.autopilot = make({.grid = lock_.world().grid,
+                          .vehicle = vehicle,
+                          .ground_W = ground,
+                          .frame = lock_.local_frame,
+                          .uptime = kUptime});
+  std::map<std::string, double> asked{{"GUID_TIMEOUT", 0.3}, {"WPNAV_ACCEL_Z", 250}, {"PSC_JERK_XY", 20},
+                                      {"PSC_JERK_Z", 20},    {"COM_OF_LOSS_T", 0.3}, {"COM_OBL_RC_ACT", 4}};
+  for (const auto kind : {firmware_bridge::Autopilot::kArduPilot, firmware_bridge::Autopilot::kPx4})
+    asked.merge(bench::gain_parameters(kind, vehicle));
+  for (auto& [name, value] : lock_.autopilot->parameters)
+    if (const auto set = asked.find(name); set != asked.end()) value = set->second;
 }
 
 DaemonRig::~DaemonRig() {
@@ -101,7 +120,11 @@ void DaemonRig::advance() {
   ++spent_[static_cast<std::size_t>(view.mode)];
   Seen seen{tick_, view.mode, view.armed, view.offboard, wire.silent() ? 0 : wire.bytes};
   seen.setpoints = static_cast<int>(wire.setpoints.size());
-  if (seen.setpoints > 0) seen.setpoint = {wire.setpoints.back().x, wire.setpoints.back().y, wire.setpoints.back().z};
+  if (seen.setpoints > 0) {
+    const auto& sent = wire.setpoints.back();
+    seen.setpoint = {sent.x, sent.y, sent.z};
+    seen.velocity = {sent.vx, sent.vy, sent.vz};
+  }
   for (const auto& c : wire.commands) {
     const bool arming = c.command == daemon::test::kCommandArm;
     seen.arms = seen.arms || (arming && c.param1 == 1);

@@ -11,6 +11,7 @@
 #include "services/backwashd/mission.hpp"
 #include "services/backwashd/planner_worker.hpp"
 #include "services/backwashd/scan_placement.hpp"
+#include "services/bench/firmware.hpp"
 #include "tests/daemon/lockstep.hpp"
 #include "tests/fuzz/sequence/event.hpp"
 #include "tests/fuzz/sequence/watch.hpp"
@@ -23,12 +24,16 @@ struct Violation {
   std::string what;
 };
 
+/// An emulated real firmware.
+using MakeAutopilot = std::unique_ptr<bench::Autopilot>(const bench::Site& site);
+
 /// The daemon without its threads and sockets: control loop and link in lockstep, mission, planner, map worker and
 /// localization in one thread, and what a Watch sees of them. While the planner waits ticks pass, while it computes
 /// none do; `late_segment` is a plan that took its time.
 class DaemonRig {
  public:
-  DaemonRig(const std::vector<Event>& events, daemon::test::Medium medium);
+  /// Flown by the rig's own autopilot, or as `make` has it: make_arducopter() or make_px4().
+  DaemonRig(const std::vector<Event>& events, daemon::test::Medium medium, MakeAutopilot* make = nullptr);
   ~DaemonRig();
 
   /// Runs the events for so many ticks, or until something is violated.
@@ -37,6 +42,10 @@ class DaemonRig {
   std::optional<std::string> replayed();
   int ticks() const { return tick_; }
   int plans() const { return plans_; }
+  /// From now on nothing but an operator disturbs the flight: each step of the set-point is judged, too.
+  void operated_only() { watch_.operated_only(daemon::test::vehicle_5in().limits.a_max); }
+  /// Ticks in which the vehicle was outside its set.
+  std::uint64_t outside() const { return lock_.view().outside; }
   /// Ticks spent in each mode.
   const std::array<long, kModes>& spent() const { return spent_; }
 
@@ -52,6 +61,7 @@ class DaemonRig {
     daemon::PlannerWorker planner;
     std::shared_ptr<const plan::World> known;  // newest that the DDS reader has
   };
+  void fly(MakeAutopilot& make);
   void start();
   void advance();
   void apply(const Event& event);

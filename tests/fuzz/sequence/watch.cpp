@@ -9,13 +9,15 @@
 namespace backwash::fuzz {
 namespace {
 
-constexpr int kRequests = 16 + 2;   // ticks until the control thread has taken every request that can wait
-constexpr int kBraking = 100;       // ticks that a verified stop takes at most, with the way to its branch
-constexpr int kRest = 25;           // ticks without motion: the way is over
-constexpr int kDisarming = 170;     // ticks for which a stop on the ground asks to disarm
-constexpr int kNewFrame = 3;        // ticks in which a reset of the autopilot's frame shows
-constexpr double kStill = 2e-5;     // m in a tick: single precision some metres from the origin
-constexpr double kRounding = 1e-3;  // m in a tick; v_max is per axis
+constexpr int kRequests = 16 + 2;        // ticks until the control thread has taken every request that can wait
+constexpr int kBraking = 100;            // ticks that a verified stop takes at most, with the way to its branch
+constexpr int kRest = 25;                // ticks without motion: the way is over
+constexpr int kDisarming = 170;          // ticks for which a stop on the ground asks to disarm
+constexpr int kNewFrame = 3;             // ticks in which a reset of the autopilot's frame shows
+constexpr double kStill = 2e-5;          // m in a tick: single precision some metres from the origin
+constexpr double kRounding = 1e-3;       // m in a tick; v_max is per axis
+constexpr double kDecelerations = 1.75;  // of a_max, in all three axes
+constexpr double kOffWay = 3e-3;         // m in a tick
 
 std::string line(const char* format, auto... values) {
   char text[200];
@@ -69,7 +71,9 @@ void Watch::stop_given(int tick) {
 
 void Watch::restarted() {
   const int moved = frame_moved_;
+  const auto a_max = a_max_;
   *this = Watch(v_max_);
+  a_max_ = a_max;
   frame_moved_ = moved;
 }
 
@@ -142,6 +146,19 @@ std::optional<std::string> Watch::motion(const Seen& now) {
   return std::nullopt;
 }
 
+// A stop within a hold asks for both their decelerations, along both axes of a flight.
+std::optional<std::string> Watch::smoothness(const Seen& now) const {
+  if (!a_max_) return std::nullopt;
+  const bool flies = now.mode == Mode::tracking || now.mode == Mode::hold;
+  if (!flies || now.setpoints == 0 || last_.setpoints == 0 || (now.accepted && !now.armed)) return std::nullopt;
+  const double change = (now.velocity - last_.velocity).norm();
+  if (!(change <= kDecelerations * *a_max_ * kControlPeriod))
+    return line("the set-point's velocity changes by %.3f m/s", change);
+  const double off = (now.setpoint - last_.setpoint - kControlPeriod / 2 * (now.velocity + last_.velocity)).norm();
+  if (!(off <= kOffWay)) return line("a set-point %.4f m off its way", off);
+  return std::nullopt;
+}
+
 std::optional<std::string> Watch::check(const Seen& now) {
   if (!started_) last_ = now, started_ = true;
   hear_pilot(now);
@@ -149,6 +166,7 @@ std::optional<std::string> Watch::check(const Seen& now) {
   if (!broken) broken = silence(now);
   if (!broken) broken = arming(now);
   if (!broken) broken = motion(now);
+  if (!broken) broken = smoothness(now);
   last_ = now;
   return broken;
 }

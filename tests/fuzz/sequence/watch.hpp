@@ -17,6 +17,7 @@ struct Seen {
   std::size_t bytes = 0;                 ///< sent; 0 if it was odometry alone, a sensor and no command
   int setpoints = 0, commands = 0;       ///< sent; commands without those to disarm
   Vec3 setpoint = Vec3::Zero();          ///< the last one, in the autopilot's local frame, m
+  Vec3 velocity = Vec3::Zero();          ///< of that set-point, m/s
   bool arms = false, disarms = false;    ///< the vehicle was told to
   bool switched_off = false;             ///< the stop switch does not let the vehicle be flown
   bool accepted = false;                 ///< a new segment was accepted
@@ -35,6 +36,9 @@ class Watch {
   void stop_given(int tick);
   /// The autopilot's estimator was reset or leapt, or a message of it said so: for three ticks a leap is not judged.
   void frame_moved(int tick) { frame_moved_ = tick; }
+  /// From now on nothing but an operator disturbs the flight: the set-point goes on where its velocity leads, which an
+  /// acceleration that `a_max`, m/s², allows may change.
+  void operated_only(double a_max) { a_max_ = a_max; }
   /// The daemon was started anew.
   void restarted();
   /// The first promise that this tick broke.
@@ -45,10 +49,12 @@ class Watch {
   std::optional<std::string> silence(const Seen& now) const;
   std::optional<std::string> arming(const Seen& now);
   std::optional<std::string> motion(const Seen& now);
+  std::optional<std::string> smoothness(const Seen& now) const;
   void hear_pilot(const Seen& now);
   std::optional<std::string> hear_switch(const Seen& now);
 
   double v_max_;
+  std::optional<double> a_max_;
   Seen last_;
   bool started_ = false;
   Licence licence_ = Licence::none;
