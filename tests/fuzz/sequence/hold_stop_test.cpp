@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // HOLD and STOP at random times, one soon after another, in flights that nothing else disturbs, by each emulated real
 // autopilot. How many ticks it was outside its sets is told, not judged: both profiles leave them now and then with the
-// rig's vehicle, by a millimetre and on the way to a goal.
+// vehicle of the rig.
 //   BACKWASH_FUZZ_HOLDS   sequences of each autopilot (4)
 //   BACKWASH_FUZZ_SEED    of the first one (1)
 #include <gtest/gtest.h>
