@@ -19,7 +19,7 @@ constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", 
 constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2],
                            kMessage = kOdometry[3];
 constexpr std::string_view kRateLeast = "odometry.rate_least";
-constexpr std::string_view kAdaptation[] = {"adaptation.enabled", "adaptation.file", "adaptation.calmest"};
+constexpr std::string_view kAdaptation[] = {"adaptation.enabled", "adaptation.file"};
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
 /// What is wrong with the names that go to the middleware, if anything.
@@ -194,7 +194,7 @@ tl::expected<void, ConfigError> read_flags(const StrictTable& file, Daemon& d) {
   // Over a floor that is assumed alone the air is calmer than modelled: that says nothing of one that is there.
   if (d.adaptation.enabled && d.adaptation.calmest < 1 && d.map.window.declared())
     return tl::unexpected(
-        file.error(kAdaptation[2], "needs 1 with map.window, which takes what it has not seen for a floor"));
+        file.error("adaptation.calmest", "needs 1 with map.window, which takes what it has not seen for a floor"));
   return {};
 }
 
@@ -231,7 +231,7 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {kRateLeast, &d.odometry.timing.rate_least, {9, 500}, kOptional},
       {"odometry.latency", &d.odometry.timing.latency, {0, 0.2}, kOptional},
       {"adaptation.alpha", &d.adaptation.alpha, {1e-6, 0.1}, kOptional},
-      {kAdaptation[2], &d.adaptation.calmest, {0.1, 1}, kOptional},
+      {"adaptation.calmest", &d.adaptation.calmest, {0.1, 1}, kOptional},
       {"control.cpu", &c.cpu, {-1, 1023}},
       {"control.battery_land", &d.control.battery_land, {0, 1}},
   };
