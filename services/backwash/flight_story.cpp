@@ -79,6 +79,7 @@ class Teller {
         story_.records_lost = lost_records->records;
         say("fault", std::to_string(lost_records->records) + " records were lost by now: the disk did not take them");
       }
+    if (kind == world && text.starts_with("window: ") && text.ends_with("nothing beyond")) say("map", text);
     if (kind == log::RecordKind::map)
       if (const auto* head = log::payload<log::MapRecord>(record))
         say("map", head->accepted ? "a map was accepted" : "a map was refused");
