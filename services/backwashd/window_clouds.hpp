@@ -34,6 +34,7 @@ class WindowClouds {
 
  private:
   std::optional<std::string> wrong(bool free, const dds::PointCloud& message, const Cloud& cloud) const;
+  std::optional<std::string> wrong_stamp(bool free, std::int64_t stamp_ns, std::int64_t late_ns) const;
   std::optional<std::string> off_lattice(std::span<const Vec3> points, const std::vector<Index3>& voxels) const;
   std::string window_text(const Vec3& vehicle_W) const;
 
