@@ -191,6 +191,10 @@ tl::expected<void, ConfigError> read_flags(const StrictTable& file, Daemon& d) {
     if (!flag) return tl::unexpected(flag.error());
     *target = *flag;
   }
+  // Over a floor that is assumed alone the air is calmer than modelled: that says nothing of one that is there.
+  if (d.adaptation.enabled && d.adaptation.calmest < 1 && d.map.window.declared())
+    return tl::unexpected(
+        file.error("adaptation.calmest", "needs 1 with map.window, which takes what it has not seen for a floor"));
   return {};
 }
 

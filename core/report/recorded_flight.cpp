@@ -129,17 +129,23 @@ tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawR
 }  // namespace
 
 tl::expected<map::OccupancyGrid, log::LogError> recorded_map(std::span<const log::RawRecord> log) {
-  for (auto record = log.rbegin(); record != log.rend(); ++record) {
-    if (record->header.kind != log::RecordKind::map) continue;
-    const auto* head = log::payload<log::MapRecord>(*record);
-    if (!head || !head->accepted) continue;
-    const std::span data(reinterpret_cast<const std::int8_t*>(record->bytes.data()) + sizeof *head,
-                         record->bytes.size() - sizeof *head);
-    auto grid = map::decode_octomap(data, head->resolution, head->binary, "OcTree");
-    if (!grid) return bad(grid.error().message);
-    return std::move(*grid);
-  }
+  for (auto record = log.rbegin(); record != log.rend(); ++record)
+    if (accepted_map(*record)) return recorded_map(*record);
   return bad("no map was accepted");
+}
+
+bool accepted_map(const log::RawRecord& record) noexcept {
+  const auto* head = record.header.kind == log::RecordKind::map ? log::payload<log::MapRecord>(record) : nullptr;
+  return head && head->accepted;
+}
+
+tl::expected<map::OccupancyGrid, log::LogError> recorded_map(const log::RawRecord& accepted) {
+  const auto& head = *log::payload<log::MapRecord>(accepted);
+  const std::span data(reinterpret_cast<const std::int8_t*>(accepted.bytes.data()) + sizeof head,
+                       accepted.bytes.size() - sizeof head);
+  auto grid = map::decode_octomap(data, head.resolution, head.binary, "OcTree");
+  if (!grid) return bad(grid.error().message);
+  return std::move(*grid);
 }
 
 tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::RawRecord> log,

@@ -12,6 +12,10 @@ namespace backwash::report {
 
 /// The map that the daemon flew with: the last one it accepted. Error: bad_data if there is none or it cannot be read.
 tl::expected<map::OccupancyGrid, log::LogError> recorded_map(std::span<const log::RawRecord> log);
+/// Whether this record holds a map that the daemon accepted.
+bool accepted_map(const log::RawRecord& record) noexcept;
+/// The map of such a record. Errors: bad_data.
+tl::expected<map::OccupancyGrid, log::LogError> recorded_map(const log::RawRecord& accepted);
 
 /// A flight of the daemon (take-off, then one route), put together from its raw log and the bench's log of the truth
 /// (columns of backwash-bench --log; same monotonic clock). The tubes are propagated again from the logged states and

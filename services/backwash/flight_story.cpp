@@ -7,7 +7,6 @@
 #include <cstdio>
 
 #include "core/log/tick_log.hpp"
-#include "core/map/distance_field.hpp"
 #include "core/report/recorded_parts.hpp"
 #include "core/types/text.hpp"
 #include "services/backwash/asked.hpp"
@@ -42,6 +41,12 @@ std::vector<report::RecordedSegment> segments_of(const log::RawLog& log) {
   return segments;
 }
 
+std::int64_t first_tick(const log::RawLog& log) {
+  const auto first = std::ranges::find(log.records, log::RecordKind::tick, [](auto& r) { return r.header.kind; });
+  if (first != log.records.end()) return first->header.t_ns;
+  return log.records.empty() ? 0 : log.records.front().header.t_ns;
+}
+
 bool airborne(const track::AutopilotFacts& facts) {
   if (!facts.armed) return false;
   return facts.landed ? !*facts.landed : facts.in_air.value_or(false);
@@ -50,16 +55,9 @@ bool airborne(const track::AutopilotFacts& facts) {
 /// Goes through the records in their order.
 class Teller {
  public:
-  Teller(FlightStory& story, const log::RawLog& log, const map::OccupancyGrid* map, double radius,
-         const log::FlightLog* truth)
-      : story_(story), segments_(segments_of(log)), map_(map), radius_(radius) {
+  Teller(FlightStory& story, const log::RawLog& log, double radius, const log::FlightLog* truth)
+      : story_(story), segments_(segments_of(log)), zero_ns_(first_tick(log)), maps_(log, zero_ns_, radius) {
     if (truth) truth_.emplace(*truth);
-    if (map_) distance_.emplace(*map_);
-    const auto first = std::ranges::find(log.records, log::RecordKind::tick, [](auto& r) { return r.header.kind; });
-    if (first != log.records.end())
-      zero_ns_ = first->header.t_ns;
-    else if (!log.records.empty())
-      zero_ns_ = log.records.front().header.t_ns;
   }
 
   void take(const log::RawRecord& record) {
@@ -81,13 +79,14 @@ class Teller {
         story_.records_lost = lost_records->records;
         say("fault", std::to_string(lost_records->records) + " records were lost by now: the disk did not take them");
       }
+    if (kind == world && text.starts_with("window: ") && text.ends_with("nothing beyond")) say("map", text);
     if (kind == log::RecordKind::map)
       if (const auto* head = log::payload<log::MapRecord>(record))
         say("map", head->accepted ? "a map was accepted" : "a map was refused");
   }
 
   void finish(bool cut, const std::string& because) {
-    open_ = false, close_mode();
+    open_ = false, close_mode(), story_.maps = maps_.maps();
     std::ranges::stable_sort(story_.timeline.events, {}, &report::TimelineEvent::t_s);  // of several threads
     story_.time_s = story_.samples.empty() ? std::max(now_s_, 0.0) : last_tick_s_.value();
     if (!last_tick_s_)
@@ -158,10 +157,10 @@ class Teller {
     if (flying) take_piece(tick, s);
     const auto m = static_cast<Mode>(tick.mode);
     // On its way up and down a vehicle comes as near to the floor as it will.
-    if (distance_ && in_air_ && !story_.pieces.empty() && !story_.pieces.back().take_off && open_ &&
+    if (in_air_ && !story_.pieces.empty() && !story_.pieces.back().take_off && open_ &&
         (m == Mode::tracking || m == Mode::hold)) {
-      s.clearance_m = distance_->exact(*map_, s.p_W) - radius_;
-      story_.clearance_m = std::min(story_.clearance_m.value_or(*s.clearance_m), *s.clearance_m);
+      s.clearance_m = maps_.clearance(t_ns, s.p_W);
+      if (s.clearance_m) story_.clearance_m = std::min(story_.clearance_m.value_or(*s.clearance_m), *s.clearance_m);
     }
     story_.samples.push_back(s);
   }
@@ -244,7 +243,8 @@ class Teller {
     }
     if (in_air_) wrong.push_back("the log ends " + story_.ended);
     if (story_.touched())
-      wrong.push_back("an obstacle was touched (clearance " + to_text(*story_.clearance_m, 3) + " m)");
+      wrong.push_back("an obstacle was touched (clearance " + to_text(*story_.clearance_m, 3) + " m)" +
+                      unless_freed(story_.maps));
     if (story_.inside != story_.judged)
       wrong.push_back(std::to_string(story_.judged - story_.inside) + " of " + std::to_string(story_.judged) +
                       " samples lay outside the set predicted for them; all must lie inside");
@@ -257,11 +257,9 @@ class Teller {
 
   FlightStory& story_;
   const std::vector<report::RecordedSegment> segments_;
-  const map::OccupancyGrid* map_;
-  std::optional<map::DistanceField> distance_;
-  double radius_;
+  std::int64_t zero_ns_;
+  MapJudge maps_;
   std::optional<report::TruthRows> truth_;
-  std::int64_t zero_ns_ = 0;
   double now_s_ = 0;
   std::optional<double> last_tick_s_;
   std::uint32_t mode_ = 0, reason_ = 0, closures_ = 0;
@@ -286,11 +284,11 @@ bool FlightStory::goal_reached() const noexcept {
          std::ranges::all_of(pieces, [&](const StoryPiece& p) { return p.take_off || p.reached || p.by_order; });
 }
 
-FlightStory flight_story(const log::RawLog& log, const map::OccupancyGrid* map, double radius,
-                         const log::FlightLog* truth, const std::string& because) {
+FlightStory flight_story(const log::RawLog& log, double radius, const log::FlightLog* truth,
+                         const std::string& because) {
   FlightStory story;
   story.by_truth = truth != nullptr, story.cut_at = log.cut_at;
-  Teller teller(story, log, map, radius, truth);
+  Teller teller(story, log, radius, truth);
   for (const auto& record : log.records) teller.take(record);
   teller.finish(log.cut_at.has_value(), because);
   return story;

@@ -9,10 +9,10 @@
 
 #include "core/log/flight_log.hpp"
 #include "core/log/raw_log.hpp"
-#include "core/map/occupancy_grid.hpp"
 #include "core/report/timeline.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/mode.hpp"
+#include "services/backwash/judged_maps.hpp"
 
 namespace backwash::services {
 
@@ -50,7 +50,8 @@ struct FlightStory {
   std::size_t take_offs = 0, landings = 0, holds = 0, refusals = 0;
   std::size_t judged = 0, inside = 0;
   double time_s = 0, length_m = 0;    ///< of the log; of the way in the air
-  std::optional<double> clearance_m;  ///< least; none without a map or a route
+  std::optional<double> clearance_m;  ///< least where it was judged; none without a map or a route
+  JudgedMaps maps;                    ///< what that was judged by, and where it was not
   Vec3 largest_ratio = Vec3::Zero();  ///< largest |e|/h per axis
   std::string ended;                  ///< how the log ends, in words
   std::uint64_t records_lost = 0;
@@ -62,11 +63,12 @@ struct FlightStory {
   bool touched() const noexcept { return clearance_m && *clearance_m <= 0; }
 };
 
-/// Reads the story out of a raw log. `map`: what clearances are measured to, null: none are. `radius`: of the body, m.
-/// `truth`: the bench's log of the same flight, columns t_s, x_m, y_m, z_m on the same monotonic clock; null: the
-/// positions are those that the vehicle measured, and clearances hold up to the error of its estimate. The sets are
-/// those that the daemon logged; nothing is propagated again. `because`: what ended the flight, as others saw it.
-FlightStory flight_story(const log::RawLog& log, const map::OccupancyGrid* map, double radius,
-                         const log::FlightLog* truth = nullptr, const std::string& because = "");
+/// Reads the story out of a raw log. `radius`: of the body, m, for clearances to the maps that the log holds
+/// (MapJudge). `truth`: the bench's log of the same flight, columns t_s, x_m, y_m, z_m on the same monotonic clock;
+/// null: the positions are those that the vehicle measured, and clearances hold up to the error of its estimate. The
+/// sets are those that the daemon logged; nothing is propagated again. `because`: what ended the flight, as others saw
+/// it.
+FlightStory flight_story(const log::RawLog& log, double radius, const log::FlightLog* truth = nullptr,
+                         const std::string& because = "");
 
 }  // namespace backwash::services

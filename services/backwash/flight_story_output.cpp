@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwash/flight_story_output.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "core/types/text.hpp"
@@ -9,6 +10,20 @@ namespace backwash::services {
 namespace {
 
 const char* judged_by(const FlightStory& story) { return story.by_truth ? "truth" : "measured"; }
+
+constexpr std::size_t kMostLines = 10;  // a mapper may send a map each second
+
+/// Nothing of a flight that one map judged whole.
+void print_maps(const JudgedMaps& m) {
+  const std::size_t count = m.stretches.size();
+  for (std::size_t n = 0; n < std::min(count, kMostLines) && (count > 1 || m.not_judged > 0); ++n) {
+    const auto& stretch = m.stretches[n];
+    std::printf("%-20s %.2f to %.2f s, %s\n", n == 0 ? "clearances" : "", stretch.from_s, stretch.until_s,
+                by_of(stretch).c_str());
+  }
+  if (count > kMostLines) std::printf("%-20s and %zu more: --json has all\n", "", count - kMostLines);
+  if (m.window_clouds > 0) std::printf("window               %s\n", window_of(m).c_str());
+}
 
 }  // namespace
 
@@ -26,6 +41,17 @@ std::string end_of(const StoryPiece& piece) {
                         : "not flown to its end, " + to_text(piece.goal_error_m, 2) + " m from it";
 }
 
+std::string by_of(const JudgedStretch& stretch) {
+  if (!stretch.clearance_m) return "not judged: " + stretch.why;
+  return "by map " + std::to_string(stretch.map) + ", " + to_text(*stretch.clearance_m, 3) + " m at least";
+}
+
+std::string window_of(const JudgedMaps& m) {
+  if (m.window_clouds == 0) return "";
+  return std::to_string(m.window_clouds) + " clouds; let go far from it were " + std::to_string(m.let_go) +
+         " voxels, " + std::to_string(m.let_go_occupied) + " of them occupied";
+}
+
 Json to_json(const FlightStory& s, const std::string& log) {
   Json pieces = Json::array(), events = Json::array();
   for (const auto& p : s.pieces)
@@ -38,6 +64,15 @@ Json to_json(const FlightStory& s, const std::string& log) {
                       {"samples", p.samples},
                       {"samples_inside", p.inside}});
   for (const auto& e : s.timeline.events) events.push_back({{"t", e.t_s}, {"kind", e.kind}, {"what", e.text}});
+  Json stretches = Json::array();
+  for (const auto& j : s.maps.stretches)
+    stretches.push_back({{"from_s", j.from_s},
+                         {"until_s", j.until_s},
+                         {"ticks", j.ticks},
+                         {"map", j.map > 0 ? Json(j.map) : Json()},
+                         {"min_clearance_m", j.clearance_m ? Json(*j.clearance_m) : Json()},
+                         {"why_not", j.why}});
+  const JudgedMaps& m = s.maps;
   const Vec3& r = s.largest_ratio;
   return {{"ok", s.ok()},
           {"reason", why(s)},
@@ -58,6 +93,12 @@ Json to_json(const FlightStory& s, const std::string& log) {
           {"samples_inside", s.inside},
           {"records_lost", s.records_lost},
           {"cut_at", s.cut_at ? Json(*s.cut_at) : Json()},
+          {"maps_accepted_s", m.accepted_s},
+          {"clearances", std::move(stretches)},
+          {"ticks_judged", m.judged},
+          {"ticks_not_judged", m.not_judged},
+          {"scans", m.scans},
+          {"window", {{"clouds", m.window_clouds}, {"let_go", m.let_go}, {"let_go_occupied", m.let_go_occupied}}},
           {"pieces", std::move(pieces)},
           {"events", std::move(events)}};
 }
@@ -72,8 +113,10 @@ void print_text(const FlightStory& s, const std::string& log) {
   std::printf("path, time           %.2f m, %.2f s; take-offs %zu, landings %zu, holds %zu, refusals %zu\n", s.length_m,
               s.time_s, s.take_offs, s.landings, s.holds, s.refusals);
   if (s.clearance_m)
-    std::printf("clearance            %.3f m at least on the routes, body to obstacle%s\n", *s.clearance_m,
+    std::printf("clearance            %.3f m at least on %s, body to obstacle%s\n", *s.clearance_m,
+                s.maps.not_judged > 0 ? "what was judged of the routes" : "the routes",
                 s.by_truth ? "" : ", by the vehicle's own estimate");
+  print_maps(s.maps);
   std::printf("largest error/bound  x %.2f, y %.2f, z %.2f\n", s.largest_ratio.x(), s.largest_ratio.y(),
               s.largest_ratio.z());
   std::printf("inside the set       %zu of %zu samples\n", s.inside, s.judged);

@@ -18,5 +18,8 @@ void print_text(const FlightStory& story, const std::string& log);
 std::string why(const FlightStory& story);
 std::string name_of(const StoryPiece& piece);
 std::string end_of(const StoryPiece& piece);
+/// By what a stretch was judged, or why it was not; what came of a mapper's window, empty without one.
+std::string by_of(const JudgedStretch& stretch);
+std::string window_of(const JudgedMaps& maps);
 
 }  // namespace backwash::services

@@ -28,7 +28,8 @@ struct ReportOptions {
 bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
   const auto segments = std::ranges::count_if(
       log.records, [](const log::RawRecord& r) { return r.header.kind == log::RecordKind::segment; });
-  return story.by_truth && segments == 2 && story.pieces.size() >= 2;
+  // What a window showed is not in the log: the world of its sets cannot be made again.
+  return story.by_truth && segments == 2 && story.pieces.size() >= 2 && story.maps.window_clouds == 0;
 }
 
 /// Any flight, by what the daemon recorded of it.
@@ -96,7 +97,7 @@ int run(const ReportOptions& options) {
   const auto map = report::recorded_map(log.records);
   const auto* grid = map ? &*map : nullptr;
   progress("reading the log");
-  const auto story = flight_story(log, grid, vehicle.body.radius, truth ? &*truth : nullptr, options.because);
+  const auto story = flight_story(log, vehicle.body.radius, truth ? &*truth : nullptr, options.because);
   if (options.because.empty() && as_fly_flies(log, story)) return judge(options, log.records, *truth, story);
   return tell(options, log.records, story, grid, vehicle);
 }

@@ -19,9 +19,28 @@ namespace {
 
 /// What positions and clearances are, and what they are worth.
 std::string basis(const FlightStory& story) {
-  return story.by_truth ? "Positions and clearances are the truth's; samples are what the vehicle measured itself."
-                        : "No truth was given: positions are those that the vehicle measured itself, and clearances "
-                          "hold up to the error of its estimate.";
+  std::string text = story.by_truth
+                         ? "Positions and clearances are the truth's; samples are what the vehicle measured itself."
+                         : "No truth was given: positions are those that the vehicle measured itself, and clearances "
+                           "hold up to the error of its estimate.";
+  const JudgedMaps& m = story.maps;
+  if (m.window_clouds > 0)
+    text +=
+        " What the mapper's window showed is not in the log: obstacles and the field are those of the last whole "
+        "map alone" +
+        std::string(m.accepted_s.empty() ? ", and there was none." : ".");
+  else if (m.accepted_s.size() > 1)
+    text += " Obstacles and the field are drawn of the last of " + std::to_string(m.accepted_s.size()) + " maps.";
+  return text;
+}
+
+/// What is said of obstacles where all is good.
+std::string untouched(const JudgedMaps& m) {
+  if (m.judged + m.not_judged == 0) return "no clearance to judge";
+  if (m.not_judged == 0) return "nothing touched";
+  if (m.judged == 0) return "clearances could not be judged";
+  return "nothing touched where that could be judged, in " + std::to_string(m.judged) + " of " +
+         std::to_string(m.judged + m.not_judged) + " ticks";
 }
 
 report::DataTable path_table(const FlightStory& story) {
@@ -129,6 +148,7 @@ std::string figures_table(const FlightStory& s) {
                   " / " + std::to_string(s.refusals));
   text += row("Smallest clearance on the routes, body to obstacle",
               s.clearance_m ? to_text(*s.clearance_m, 3) + " m" : "not judged: no map, or no route");
+  if (s.maps.window_clouds > 0) text += row("Mapper's window", window_of(s.maps));
   text += row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
                                                          to_text(s.largest_ratio.y(), 2) + " / " +
                                                          to_text(s.largest_ratio.z(), 2));
@@ -147,16 +167,28 @@ std::string pieces_table(const FlightStory& s) {
   return text + "</table>\n</section>\n";
 }
 
+/// Which map judged which part of the way. Nothing where one judged all.
+std::string maps_table(const JudgedMaps& m) {
+  if (m.stretches.empty() || (m.stretches.size() == 1 && m.not_judged == 0)) return "";
+  std::string text =
+      "<section><h2>What clearances were judged by</h2>\n<p>Each place by the whole map that was the "
+      "newest then, of " +
+      std::to_string(m.accepted_s.size()) + ".</p>\n<table>\n";
+  for (const auto& stretch : m.stretches)
+    text += row(to_text(stretch.from_s, 2) + " to " + to_text(stretch.until_s, 2) + " s", by_of(stretch));
+  return text + "</table>\n</section>\n";
+}
+
 }  // namespace
 
 std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log, const map::OccupancyGrid* map,
                        const StoryContext& context) {
-  std::string page = "<h1>A flight of the daemon, from its raw log</h1>\n<p class=\"context\">" +
-                     report::escaped(context.log) + "; backwash " + report::escaped(kVersion) +
-                     "</p>\n<p class=\"verdict " + (s.ok() ? "passed" : "failed") + "\">" +
-                     report::escaped(s.ok() ? "Every goal reached, nothing touched, every sample inside its set."
-                                            : "Not good: " + why(s) + ".") +
-                     "</p>\n";
+  std::string page =
+      "<h1>A flight of the daemon, from its raw log</h1>\n<p class=\"context\">" + report::escaped(context.log) +
+      "; backwash " + report::escaped(kVersion) + "</p>\n<p class=\"verdict " + (s.ok() ? "passed" : "failed") + "\">" +
+      report::escaped(s.ok() ? "Every goal reached, " + untouched(s.maps) + ", every sample inside its set."
+                             : "Not good: " + why(s) + ".") +
+      "</p>\n";
   auto beside = recorded_beside(log, s, report::first_tick_ns(log).value_or(0));
   page += beside.timeline;
   std::vector<report::Section> sections;
@@ -170,7 +202,7 @@ std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log
     if (!section.drawing) throw Failure(kUnavailable, section.drawing.error().message);
     page += report::to_html(section);
   }
-  page += figures_table(s) + pieces_table(s);
+  page += figures_table(s) + pieces_table(s) + maps_table(s.maps);
   auto parameters = context.parameters;
   parameters.emplace_back("As the daemon had them", report::recorded_configuration(log));
   const auto moved = report::interactive(beside.data, report::javascript_folders());

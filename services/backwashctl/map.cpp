@@ -75,13 +75,21 @@ class Transfer {
   void step(dds::MapSending& sending) {
     while (const auto number = sending.next(now_ns())) write(*number);
     waitset_.wait(0.002);
-    receipts_.take([&](const dds::MapReceipt& receipt) {
-      if (receipt.transfer != part_.transfer) return;
+    receipts_.departed();  // so that known() is of now
+    const auto writers = receipts_.known();
+    receipts_.take([&](const dds::MapReceipt& receipt, const dds::Guid& writer) {
+      if (receipt.transfer != part_.transfer || several_) return;
+      several_ = (writer_ && *writer_ != writer) ||
+                 (receipt.state == backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED && writers.size() > 1);
+      writer_ = writer;
+      if (several_) return;
       sending.hear(receipt, now_ns());
       state_ = receipt.state;
       reason_ = receipt.reason ? receipt.reason : "";
     });
   }
+  /// Whether not one alone answers as the daemon: what is said of the map may be another's word.
+  bool several() const noexcept { return several_; }
   bool accepted() const noexcept { return state_ == backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED; }
   /// The daemon has it all and is at it, which takes as long as its worlds do.
   bool whole() const noexcept { return state_ == backwash_msgs_msg_dds__MAPRECEIPT_WHOLE; }
@@ -107,6 +115,8 @@ class Transfer {
   std::vector<dds::Writer<dds::MapPart>> parts_;
   std::size_t turn_ = 0;
   dds::Reader<dds::MapReceipt> receipts_;
+  std::optional<dds::Guid> writer_;  // of receipts
+  bool several_ = false;
   dds::WaitSet waitset_;
 };
 
@@ -168,6 +178,13 @@ Outcome send_map(const Options& options, const MapOptions& map, bool quiet) {
   double told_s = 0;
   while (!transfer.accepted() && !transfer.refused() && !interrupted()) {
     transfer.step(sending);
+    if (transfer.several()) {
+      outcome.why =
+          "not known: more than one process writes map_receipt in this namespace, and one of them may be no "
+          "daemon, or one that ended less than 10 s ago; see whose map is in use by backwashctl status, and end the "
+          "other";
+      return outcome;
+    }
     const std::int64_t news_ns = transfer.whole() ? sending.heard_ns() : sending.progress_ns();
     const double took_s = seconds(now_ns() - begun), silent_s = seconds(now_ns() - news_ns);
     if (silent_s > map.patience_s) {

@@ -24,7 +24,9 @@ class BoundWriter {
   bool hears(const dds::Guid& writer) const noexcept { return !writer_ || *writer_ == writer; }
   std::string refusal(const dds::Guid& writer) const {
     return what_ + " of writer " + dds::text(writer) + ": that of " + dds::text(*writer_) +
-           (gone_ns_ ? ", which is gone, was flown with: disable first" : " is in use");
+           (!gone_ns_ ? " is in use"
+            : stays_  ? ", which is gone, was flown with: disable first"
+                      : ", which is gone, is let go in a moment");
   }
   /// A sample of this writer was good. True if nobody was listened to before. Precondition: hears(writer).
   bool bind(const dds::Guid& writer) noexcept { return !std::exchange(writer_, writer); }
@@ -33,6 +35,7 @@ class BoundWriter {
   bool let_go(std::span<const dds::Guid> departed, bool replaceable, std::int64_t now_ns) noexcept {
     constexpr std::int64_t kForget_ns = 500'000'000;
     if (writer_ && !gone_ns_ && std::ranges::find(departed, *writer_) != departed.end()) gone_ns_ = now_ns;
+    stays_ = !replaceable;
     if (!gone_ns_ || !replaceable || now_ns - *gone_ns_ < kForget_ns) return false;
     writer_.reset();
     gone_ns_.reset();
@@ -43,6 +46,7 @@ class BoundWriter {
   std::string what_;
   std::optional<dds::Guid> writer_;
   std::optional<std::int64_t> gone_ns_;  // since when it is gone
+  bool stays_ = false;                   // nobody may take its place now
 };
 
 }  // namespace backwash::daemon

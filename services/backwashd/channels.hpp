@@ -232,6 +232,7 @@ struct Channels {
   sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
   sync::Handover<track::AcceptedSegment> segments;         // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
+  std::atomic<bool> world_moves{false};  // map worker → planner: the newest world goes along with a mapper's window
   std::atomic<bool> map_partial{false};  // map worker → planner: the newest world is what is around the vehicle alone
   sync::LatestValue<Vec3> vehicle_W;     // control → map worker: where the newest good odometry is, in the map
   sync::RecordRing<ControlRecord, 2048> control_log;                  // control → recorder

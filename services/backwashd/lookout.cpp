@@ -54,11 +54,14 @@ class Runs {
 
 }  // namespace
 
-// Its age shrinks what a live map is trusted for: something may have come nearer meanwhile.
-bool Lookout::late(const track::Tracker& tracker, std::int64_t now_ns) const noexcept {
+// Its age shrinks what a live map is trusted for: something may have come nearer meanwhile. The floor that a vehicle is
+// lifted off does not, and is what it is nearest to.
+bool Lookout::late(const track::FlightTick& flight, std::int64_t now_ns) const noexcept {
+  const auto& tracker = flight.tracker();
   if (!map_.live || tracker.finished()) return false;
   const std::optional<double> age = channels_.map_age(now_ns);
-  return !age || *age > kLate || map_.closing_speed * *age > tracker.clearance();
+  const bool lifted = flight.mode() == Mode::lifting;
+  return !age || *age > kLate || (!lifted && map_.closing_speed * *age > tracker.clearance());
 }
 
 void Lookout::hold_against(const NewVoxels& voxels, const track::Tracker& tracker,
@@ -106,7 +109,7 @@ track::Surroundings Lookout::look(const track::FlightTick& flight, std::int64_t 
     // Compared before anything is made an integer.
     result.outside = !((off.array() >= 0).all() && (off.array() < grid.size().cast<double>().array()).all());
   }
-  result.late = late(tracker, now_ns);
+  result.late = late(flight, now_ns);
 
   // Voxels of before a loop closure are where the map was then.
   if (std::exchange(closures_, tracker.closures()) != tracker.closures()) recorded_ = unchecked_ = 0;

@@ -37,7 +37,7 @@ class Lookout {
   }
 
  private:
-  bool late(const track::Tracker& tracker, std::int64_t now_ns) const noexcept;
+  bool late(const track::FlightTick& flight, std::int64_t now_ns) const noexcept;
   bool catch_up(const track::Tracker& tracker, track::Surroundings& result) noexcept;
   void hold_against(const NewVoxels& voxels, const track::Tracker& tracker, track::Surroundings& result) const noexcept;
 

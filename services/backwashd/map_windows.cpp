@@ -35,6 +35,7 @@ bool MapWorker::move_world(bool anew, std::int64_t seen_ns) {
     live.take_along(*live_,
                     ((grid->origin() - live_->grid().origin()) / grid->resolution()).array().round().cast<int>());
   live_.emplace(std::move(live));
+  channels_.world_moves = true;
   publish(made(std::move(*grid)), seen_ns);
   spdlog::info("world of the window made around the vehicle: {} x {} x {} voxels in {} ms", size.x(), size.y(),
                size.z(), (now_ns() - begun) / 1'000'000);

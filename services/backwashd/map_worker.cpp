@@ -149,6 +149,7 @@ void MapWorker::use(const MapMessage& message, map::OccupancyGrid whole) {
   const Index3 size = whole.size();
   auto grid = window_ ? window_->whole(std::move(whole)) : std::optional(std::move(whole));
   const bool update = grid && world_ && same_place(world_->grid, *grid);
+  if (grid) channels_.world_moves = false;
   if (!grid) {
     await_vehicle();
     if (!move_world(true, message.received_ns)) {

@@ -215,7 +215,10 @@ Decision Mission::fly(std::deque<Goal> route) {
   if (view_.landed) return refused("on the ground: take off first");
   if (!view_.finished) return refused("flying: hold first");
   Decision decision = start(PlanJob::Kind::go_to, route.front());
-  if (decision.job) route_ = std::move(route);
+  if (decision.job) {
+    route_ = std::move(route);
+    if (view_.mode == Mode::hold) held_ = view_.epoch.lapse;
+  }
   return decision;
 }
 

@@ -103,7 +103,8 @@ class Mission {
   track::Request last_request_ = track::Request::none;  // of the newest order
   std::optional<std::uint64_t> job_;                    // under way
   std::uint64_t last_job_ = 0;
-  std::deque<Goal> route_;  // still to be reached; the first is the one flown to
+  std::deque<Goal> route_;             // still to be reached; the first is the one flown to
+  std::optional<std::uint64_t> held_;  // lapse of the hold that it was told in, which has not ended yet
   double judge_at_s_ = 0;
   double retry_at_s_ = 0;  // from rest on the way
   std::string task_, place_;

@@ -41,8 +41,10 @@ std::optional<PlanJob> Mission::continue_route(double now_s) {
   constexpr double kAtGoal = 0.01, kRest = 0.1;  // m, m/s
   const bool tracking = view_.mode == Mode::tracking;
   const bool obstacle = view_.mode == Mode::hold && view_.reason == Reason::obstacle_ahead;
-  // Any other mode, and any other hold, is an operator's to end.
-  if (!tracking && !obstacle) {
+  // Any other mode, and any other hold, is an operator's to end: by a route, too, whose flight has yet to be accepted.
+  if (tracking) held_ = std::nullopt;
+  const bool ending = view_.mode == Mode::hold && held_ == view_.epoch.lapse;
+  if (!tracking && !obstacle && !ending) {
     route_.clear();
     if (task_.starts_with(kToGo)) task_.clear();
   }

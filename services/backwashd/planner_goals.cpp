@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/types/text.hpp"
 #include "services/backwashd/planner_worker.hpp"
 
 namespace backwash::daemon {
@@ -68,6 +69,12 @@ std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
     if (!current()) return kEnded;
     if (partial && !world_->grid.inside(world_->grid.index(job.position)))
       return "the map is still being made there; what is around the vehicle can be flown: ask again";
+    if (channels_.world_moves && !world_->grid.inside(world_->grid.index(job.position))) {
+      const auto& grid = world_->grid;
+      const Vec3 high = grid.origin() + grid.resolution() * grid.size().cast<double>();
+      return "goal " + to_text(job.position) + " is outside the world of the window, " + to_text(grid.origin()) +
+             " to " + to_text(high) + ": use waypoints in it";
+    }
     const auto world = world_;  // a newer one may come while this is planned in
     const std::uint32_t closures = view_.closures;
     const auto options = limits_of(*world, view_.residual_m);

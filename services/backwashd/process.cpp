@@ -94,10 +94,14 @@ bool Threads::join(std::chrono::steady_clock::time_point latest) {
 bool done_by(std::chrono::steady_clock::time_point latest, std::function<void()> work) {
   std::promise<void> promise;
   const auto done = promise.get_future();
-  std::thread([work = std::move(work), promise = std::move(promise)]() mutable {
-    work();
-    promise.set_value();
-  }).detach();
+  try {
+    std::thread([work = std::move(work), promise = std::move(promise)]() mutable {
+      work();
+      promise.set_value();
+    }).detach();
+  } catch (const std::system_error&) {
+    return false;  // no thread is to be had: left undone, as what hangs is
+  }
   return done.wait_until(latest) == std::future_status::ready;
 }
 

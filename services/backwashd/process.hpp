@@ -55,7 +55,8 @@ class Threads {
   std::vector<std::thread> threads_;
 };
 
-/// Does `work` in a thread of its own. False: it was not done by `latest`, and goes on until the process ends.
+/// Does `work` in a thread of its own. False: it was not done by `latest`, and goes on until the process ends; or no
+/// thread was to be had, and it is left undone.
 bool done_by(std::chrono::steady_clock::time_point latest, std::function<void()> work);
 
 /// At start, before any file is opened and any thread started:

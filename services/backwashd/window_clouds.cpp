@@ -12,9 +12,10 @@
 namespace backwash::daemon {
 namespace {
 
-constexpr double kOffCentre = 0.1;       // of a voxel's edge: what float32 rounds off at 10 km is a tenth of it
-constexpr std::size_t kTold = 16;        // points that tell a lattice
-constexpr std::size_t kCompared = 4096;  // points whose distance apart is looked at
+constexpr double kOffCentre = 0.1;  // of a voxel's edge: what float32 rounds off at 10 km is a tenth of it
+constexpr std::int64_t kClocks_ns = 1'000'000'000;  // that a free cloud's clock may be ahead
+constexpr std::size_t kTold = 16;                   // points that tell a lattice
+constexpr std::size_t kCompared = 4096;             // points whose distance apart is looked at
 
 std::string number(double value, const char* unit = " m") {
   char text[48];
@@ -86,6 +87,17 @@ std::optional<std::string> WindowClouds::wrong(bool free, const dds::PointCloud&
   return std::nullopt;
 }
 
+std::optional<std::string> WindowClouds::wrong_stamp(bool free, std::int64_t stamp_ns, std::int64_t late_ns) const {
+  if (stamp_ns < newest_ns_[free])
+    return "header.stamp " + number(seconds(newest_ns_[free] - stamp_ns), " s") +
+           " before the one before it, wanted rising stamps";
+  // Else what it frees would count as later than what is seen to be occupied, however old it is.
+  if (free && occupied_late_ns_ && *occupied_late_ns_ - late_ns > kClocks_ns)
+    return "header.stamp: its clock is " + number(seconds(*occupied_late_ns_ - late_ns), " s") + " ahead of that of " +
+           told_.occupied + ", wanted one clock";
+  return std::nullopt;
+}
+
 tl::expected<WindowCloud, std::string> WindowClouds::judge(bool free, const dds::PointCloud& m, const dds::Guid& writer,
                                                            const std::optional<Vec3>& vehicle_W,
                                                            std::int64_t received_ns) {
@@ -96,9 +108,8 @@ tl::expected<WindowCloud, std::string> WindowClouds::judge(bool free, const dds:
   const std::string frame = printable(m.header.frame_id ? m.header.frame_id : "");
   if (frame != frame_) return refused("header.frame_id '" + frame + "', wanted '" + frame_ + "' (frames.map)");
   const std::int64_t stamp_ns = dds::nanoseconds(m.header.stamp);
-  if (stamp_ns < newest_ns_[free])
-    return refused("header.stamp " + number(seconds(newest_ns_[free] - stamp_ns), " s") +
-                   " before the one before it, wanted rising stamps");
+  const std::int64_t late_ns = received_ns - stamp_ns;
+  if (const auto why = wrong_stamp(free, stamp_ns, late_ns)) return refused(*why);
   if (!vehicle_W) return refused("it came before the first odometry, which says where the window is");
   const Index3 size = told_.voxels();
   const auto most = 2 * static_cast<std::size_t>(size.cast<double>().prod());
@@ -132,6 +143,7 @@ tl::expected<WindowCloud, std::string> WindowClouds::judge(bool free, const dds:
   }
   result.first = newest_ns_[free] == INT64_MIN;
   newest_ns_[free] = stamp_ns;
+  if (!free) occupied_late_ns_ = std::min(occupied_late_ns_.value_or(late_ns), late_ns);
   return result;
 }
 

@@ -20,22 +20,28 @@ class WindowClouds {
   explicit WindowClouds(const config::Daemon& config) : told_(config.map.window), frame_(config.frames.map) {}
 
   /// The cloud in voxels of the lattice, those within the window around the vehicle. A cloud older than one of its kind
-  /// before is refused; so is all that looks like something else than voxels of the stated size.
+  /// before is refused, and a free one whose clock is ahead of that of the occupied ones; so is all that looks like
+  /// something else than voxels of the stated size.
   tl::expected<WindowCloud, std::string> judge(bool free, const dds::PointCloud& message, const dds::Guid& writer,
                                                const std::optional<Vec3>& vehicle_W, std::int64_t received_ns);
   /// One line of a good cloud of which a third or more lay outside the window, or nothing: of the last that was judged.
   const std::optional<std::string>& beyond() const noexcept { return beyond_; }
   /// The writer of this kind is gone: another one's stamps count from anew.
-  void forget(bool free) noexcept { newest_ns_[free] = INT64_MIN; }
+  void forget(bool free) noexcept {
+    newest_ns_[free] = INT64_MIN;
+    if (!free) occupied_late_ns_.reset();
+  }
 
  private:
   std::optional<std::string> wrong(bool free, const dds::PointCloud& message, const Cloud& cloud) const;
+  std::optional<std::string> wrong_stamp(bool free, std::int64_t stamp_ns, std::int64_t late_ns) const;
   std::optional<std::string> off_lattice(std::span<const Vec3> points, const std::vector<Index3>& voxels) const;
   std::string window_text(const Vec3& vehicle_W) const;
 
   config::MapWindow told_;
   std::string frame_;
   std::array<std::int64_t, 2> newest_ns_{INT64_MIN, INT64_MIN};  // stamps, of occupied and of free
+  std::optional<std::int64_t> occupied_late_ns_;  // least from stamp to reception of the clouds of occupied voxels
   std::optional<std::string> beyond_;
 };
 

@@ -18,6 +18,7 @@ WindowFront::WindowFront(const config::Daemon& config, const dds::Participant& p
                       {participant, dds::TopicOf<dds::PointCloud>::type(), topic, dds::Delivery::scans},
                       BoundWriter(topic),
                       std::make_unique<std::atomic<std::uint64_t>>(0),
+                      std::make_unique<std::atomic<std::uint64_t>>(0),
                       std::make_unique<std::atomic<std::uint64_t>>(0)});
   }
 }
@@ -57,7 +58,13 @@ void WindowFront::take(Kind& kind, const map::OccupancyGrid* known, const std::o
     else
       refuse([&] { return kind.reader.topic() + ": the map worker has 16 clouds waiting"; });
   });
-  if (kind.writer.let_go(kind.reader.departed(), true, now_ns())) clouds_.forget(kind.free);
+  const auto bound = kind.writer.writer();
+  if (!kind.writer.let_go(kind.reader.departed(), true, now_ns())) return;
+  clouds_.forget(kind.free);
+  const std::string line = kind.reader.topic() + " of writer " + dds::text(*bound) +
+                           " is gone: what it has shown is flown in, and nothing beyond";
+  refusals.add(*kind.gone, [&] { return line; });
+  recorder_.append(log::RecordKind::world, "window: " + line);
 }
 
 void WindowFront::take(const map::OccupancyGrid* known, const std::optional<Vec3>& vehicle_W, Refusals& refusals) {

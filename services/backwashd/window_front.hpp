@@ -29,7 +29,7 @@ class WindowFront {
     bool free;
     dds::Reader<dds::PointCloud> reader;
     BoundWriter writer;
-    std::unique_ptr<std::atomic<std::uint64_t>> rejected, beyond;  // said apart from each other
+    std::unique_ptr<std::atomic<std::uint64_t>> rejected, beyond, gone;  // said apart from each other
   };
   void take(Kind& kind, const map::OccupancyGrid* known, const std::optional<Vec3>& vehicle_W, Refusals& refusals);
 

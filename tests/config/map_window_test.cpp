@@ -23,17 +23,24 @@ size_z = 4
 resolution = 0.1
 )";
 
-/// The shipped example with a table [map.window] of these lines.
-tl::expected<Daemon, ConfigError> load(const std::string& lines, const std::string& before = "") {
+std::string file_text() {
+  std::ifstream in(std::string(BACKWASH_SOURCE_DIR) + "/core/config/files/backwashd.daemon.toml");
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+tl::expected<Daemon, ConfigError> load_text(const std::string& text) {
   const auto path = std::filesystem::temp_directory_path() / ("backwash_map_window." + std::to_string(getpid()));
-  const std::string shipped = std::string(BACKWASH_SOURCE_DIR) + "/core/config/files/backwashd.daemon.toml";
-  std::ifstream in(shipped);
-  std::string text{std::istreambuf_iterator<char>(in), {}};
-  if (!before.empty()) text.replace(text.find("max_mib = 512"), 13, before);
-  std::ofstream(path) << text << "\n[map.window]\n" << lines;
+  std::ofstream(path) << text;
   auto daemon = load_daemon(path.string());
   std::filesystem::remove(path);
   return daemon;
+}
+
+/// The shipped example with a table [map.window] of these lines.
+tl::expected<Daemon, ConfigError> load(const std::string& lines, const std::string& before = "") {
+  std::string text = file_text();
+  if (!before.empty()) text.replace(text.find("max_mib = 512"), 13, before);
+  return load_text(text + "\n[map.window]\n" + lines);
 }
 
 std::string refused(std::string lines, const std::string& what = "", const std::string& by = "") {
@@ -86,6 +93,26 @@ TEST(MapWindow, OneWhoseWorldDoesNotFitIsRefusedWithTheMemoryThatItNeeds) {
   EXPECT_FALSE(load(larger, "max_mib = 592"));
   EXPECT_THAT(refused(std::string(kGood) + "keep_voxels = 335420\n"), HasSubstr("335421 or more"));
   EXPECT_EQ(refused(std::string(kGood) + "keep_voxels = 335421\n"), "taken");
+}
+
+// Over a floor that is taken for granted alone the air is calmer than modelled, and over one that is there it is not:
+// both are of one class of air, so what the one shows may shrink no set above the other.
+TEST(MapWindow, SetsShrinkByCalmerAirWithoutAWindowAlone) {
+  const std::string text = file_text();
+  const auto with = [&](const std::string& lines, bool window) {
+    std::string changed = text;
+    changed.replace(changed.find("enabled = false"), 15, lines);
+    return load_text(changed + (window ? "\n[map.window]\n" + std::string(kGood) : ""));
+  };
+  const auto both = with("enabled = true\ncalmest = 0.3", true);
+  ASSERT_FALSE(both);
+  EXPECT_THAT(both.error().message, HasSubstr("key 'adaptation.calmest'"));
+  EXPECT_THAT(both.error().message, HasSubstr("0.3"));
+  EXPECT_THAT(both.error().message, HasSubstr("needs 1 with map.window"));
+  EXPECT_TRUE(with("enabled = true\ncalmest = 0.3", false));
+  EXPECT_TRUE(with("enabled = true\ncalmest = 1", true));
+  EXPECT_TRUE(with("enabled = true", true)) << "sets that only grow are right over any floor";
+  EXPECT_TRUE(with("enabled = false\ncalmest = 0.3", true)) << "nothing is learnt";
 }
 
 }  // namespace

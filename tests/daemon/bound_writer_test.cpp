@@ -28,6 +28,18 @@ TEST_F(BoundWriterTest, HearsTheFirstWhoseSampleWasGoodAndNamesBothToTheOthers) 
             "a map of writer " + dds::text(kSecondWriter) + ": that of " + dds::text(kFirst) + " is in use");
 }
 
+// Nobody has to disable for the successor of a mapper, which is heard in flight.
+TEST_F(BoundWriterTest, OneThatIsGoneIsToBeDisabledForOnlyWhereItStays) {
+  const auto said = [&](bool replaceable) {
+    let_go({kFirst}, replaceable, 10);
+    const std::string line = bound_.refusal(kSecondWriter);
+    return line.substr(line.find(dds::text(kFirst)) + dds::text(kFirst).size());
+  };
+  bound_.bind(kFirst);
+  EXPECT_EQ(said(false), ", which is gone, was flown with: disable first");
+  EXPECT_EQ(said(true), ", which is gone, is let go in a moment");
+}
+
 TEST_F(BoundWriterTest, OneThatIsGoneMayBeReplacedHalfASecondLater) {
   bound_.bind(kFirst);
   EXPECT_FALSE(let_go({kSecondWriter}, true, 10)) << "another one went";

@@ -94,7 +94,7 @@ void Lockstep::restart(bool with_map) {
   channels.reset(new (memory) Channels);
   link_ = std::make_unique<firmware_bridge::AutopilotLink>(line_->open(), std::uint8_t{1},
                                                            firmware_bridge::Time(std::chrono::nanoseconds(now_ns_)));
-  loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand, MapSettings{}, timing_, air);
+  loop_ = std::make_unique<ControlLoop>(*channels, *link_, vehicle_, kBatteryLand, map_settings, timing_, air);
   if (with_map) channels->worlds.offer({world_, now_ns_});
   log.clear();
 }

@@ -111,6 +111,7 @@ class Lockstep {
   void slow_line(double baud, bool thinned);
 
   std::optional<adapt::InFlightConstants> air;  ///< of the next restart(): it learns of its air
+  MapSettings map_settings;                     ///< of the next restart()
 
   bool vio_on = true;
   int vio_age_steps = 0;                       ///< ms between a sample's reception and the tick that sees it

@@ -3,7 +3,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
+#include <thread>
+
+#include "services/backwashd/map_front.hpp"
 #include "tests/daemon/map_in_parts.hpp"
 
 namespace backwash::daemon {
@@ -200,6 +205,46 @@ TEST(MapParts, TheVerdictOfTheMapWorkerGoesIntoTheReceipts) {
               good ? backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED : backwash_msgs_msg_dds__MAPRECEIPT_REFUSED);
     EXPECT_STREQ(receipt->reason, good ? "" : "it has no free voxel");
   }
+}
+
+// The reader's thread of the daemon itself, with nobody who looks at maps: a whole map takes the place of one in parts.
+TEST(MapFront, TellsTheSenderOfPartsThatANewerWholeMapTookItsPlace) {
+  config::Daemon config;
+  config.dds.domain = 1 + ::getpid() % 200;
+  config.dds.interface = "lo";
+  config.dds.name_space = "backwash";
+  const std::string log = testing::TempDir() + "map_front." + std::to_string(::getpid());
+  Channels channels;
+  Recorder recorder(log);
+  MapFront front(config, channels, recorder);
+  std::jthread reader([&] { front.run_readers(); });
+  const dds::Participant sender(static_cast<std::uint32_t>(config.dds.domain), "lo");
+  auto parts = dds::make_writer<dds::MapPart>(sender, "backwash");
+  auto wholes = dds::make_writer<dds::Octomap>(sender, "backwash");
+  auto receipts = dds::make_reader<dds::MapReceipt>(sender, "backwash");
+  Map map(1000);
+  std::optional<std::uint8_t> state;
+  std::string why;
+  const auto until = [&](std::uint8_t wanted, const auto& again) {
+    for (int n = 0; n < 200 && state != wanted; ++n) {
+      again();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      receipts.take([&](const dds::MapReceipt& receipt) {
+        state = receipt.state;
+        why = receipt.reason;
+      });
+    }
+    return state == wanted;
+  };
+  EXPECT_TRUE(until(backwash_msgs_msg_dds__MAPRECEIPT_WHOLE, [&] { parts.write(map.of(0, 1)); }));
+  dds::Octomap whole{};
+  whole.header.frame_id = dds::c_string(map.frame);
+  whole.id = dds::c_string(map.id);
+  EXPECT_TRUE(until(backwash_msgs_msg_dds__MAPRECEIPT_REFUSED, [&] { wholes.write(whole); }));
+  EXPECT_THAT(why, HasSubstr("a newer map came before this one was looked at"));
+  channels.stop = true;
+  reader.join();
+  std::filesystem::remove(log);
 }
 
 }  // namespace

@@ -201,6 +201,20 @@ TEST_F(MapWindowTest, CloudsWithoutAWorldTakeNoMoreThanTheOnesThatAreKept) {
                       512 * static_cast<std::size_t>(settings_.window.voxels().prod()));
 }
 
+// By which a goal outside of it is told apart from one outside of a map.
+TEST_F(MapWindowTest, AWorldThatGoesAlongIsToldUntilAWholeMapHasItsPlace) {
+  begin(with_window(100));
+  vehicle({0, 0, 1});
+  EXPECT_FALSE(channels_->world_moves);
+  say(false, 1, [](const Vec3&) { return false; });
+  say(true, 2, [](const Vec3&) { return true; });
+  ASSERT_TRUE(world());
+  EXPECT_TRUE(channels_->world_moves);
+  whole(grid_, 3);
+  EXPECT_EQ(world()->grid.size(), grid_.size());
+  EXPECT_FALSE(channels_->world_moves);
+}
+
 // The formula of docs/interfaces.md: the window's worlds and what is kept, however far it flies.
 TEST_F(MapWindowTest, AKilometreOfCorridorTakesNoMoreThanTheStatedBytes) {
   constexpr std::size_t kKeep = 30;

@@ -93,6 +93,51 @@ TEST_F(MissionTest, ARouteThatAHoldEndsTellsOfNoWaypointsToGo) {
   EXPECT_EQ(mission_.task(), "");
 }
 
+// An operator ends a hold by a route. Its first way is being planned while the hold lasts, and a moment longer.
+TEST_F(MissionTest, ARouteThatEndsAHoldIsFlownToItsLastPlace) {
+  view_.mode = Mode::hold;
+  view_.reason = Reason::map_late;
+  view_.epoch.lapse = 3;
+  look();
+  const Decision planned = give(turned_route(gcs_));
+  ASSERT_TRUE(planned.job) << planned.answer->reason;
+  look();
+  const PlanOutcome flies{planned.job->id, true, {}};
+  EXPECT_FALSE(look({&flies, 1}).job);
+  EXPECT_EQ(mission_.task(), "waypoints to go: 3") << "held still";
+  view_.mode = Mode::tracking;
+  view_.reason = Reason::segment_accepted;
+  view_.finished = false;
+  look();
+  view_.finished = true;
+  view_.command.p_W = planned.job->position;
+  const Decision next = look();
+  ASSERT_TRUE(next.job) << "on to the second place";
+  EXPECT_EQ(next.job->position, Vec3(1, 0, 1.2));
+}
+
+TEST_F(MissionTest, ARouteThatEndsAHoldIsEndedByTheNextOne) {
+  view_.mode = Mode::hold;
+  view_.reason = Reason::map_late;
+  view_.epoch.lapse = 3;
+  look();
+  const Decision planned = give(turned_route(gcs_));
+  ASSERT_TRUE(planned.job);
+  const PlanOutcome flies{planned.job->id, true, {}};
+  look({&flies, 1});
+  view_.epoch.lapse = 4;
+  look();
+  EXPECT_EQ(mission_.task(), "") << "held for something else before it began";
+  const Decision again = give(turned_route(gcs_));
+  ASSERT_TRUE(again.job);
+  const PlanOutcome then{again.job->id, true, {}};
+  view_.mode = Mode::tracking;
+  look({&then, 1});
+  view_.mode = Mode::hold;
+  look();
+  EXPECT_EQ(mission_.task(), "") << "a hold after its flight began";
+}
+
 TEST_F(MissionTest, ARouteOfHalfPairsOrOfWhatIsNoNumberIsInvalid) {
   CommandMessage odd = turned_route(gcs_);
   odd.waypoints = 5;

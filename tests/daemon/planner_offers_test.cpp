@@ -247,6 +247,11 @@ TEST_F(PlannerOffers, AGoalWhereTheMapIsStillBeingMadeIsToldApartFromOneOutsideO
   EXPECT_NE(ask(PlanJob::Kind::go_to, {7, 2, 1}).find("still being made there"), std::string::npos);
   EXPECT_EQ(ask(PlanJob::Kind::go_to, {2, 2, 1}), "");
   channels_->map_partial = false;
+  channels_->world_moves = true;
+  const std::string beyond = ask(PlanJob::Kind::go_to, {90, 2, 1});
+  EXPECT_NE(beyond.find("goal (90.00, 2.00, 1.00) is outside the world of the window, "), std::string::npos) << beyond;
+  EXPECT_TRUE(beyond.ends_with(": use waypoints in it")) << beyond;
+  channels_->world_moves = false;
   EXPECT_NE(ask(PlanJob::Kind::go_to, {7, 2, 1}).find("outside the map"), std::string::npos);
 }
 

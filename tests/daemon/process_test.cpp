@@ -105,6 +105,19 @@ TEST(Process, WorkThatHangsIsWaitedForNoLongerThanAsked) {
   EXPECT_EQ(code, 7);
 }
 
+// At the end of a flight in which memory has run out nothing may throw: all is said and stored by then.
+TEST(Process, WorkThatGetsNoThreadIsLeftUndone) {
+  const int code = in_a_process([] {
+    pthread_attr_t attr;
+    pthread_attr_init(&attr);
+    pthread_attr_setstacksize(&attr, std::size_t{1} << 30);  // or one that an earlier thread has left would do
+    const rlimit none{1 << 20, 1 << 20};                     // less than there is already
+    if (pthread_setattr_default_np(&attr) != 0 || ::setrlimit(RLIMIT_AS, &none) != 0) return 1;
+    return done_by(after(10s), [] {}) ? 2 : 7;
+  });
+  EXPECT_EQ(code, 7);
+}
+
 TEST(ThreadFault, AThreadThatHangsIsWaitedForNoLongerThanAsked) {
   const int code = in_a_process([] {
     std::atomic<bool> stop{false};

@@ -134,5 +134,35 @@ TEST(TakeoffCommand, ALineThatTakesNothingWhileTheAutopilotLiftsIsQuiet) {
   EXPECT_LE(blocked, 11) << "200 ms";
 }
 
+// A take-off while a live map is as old as its mapper's rate makes it (docs/faults.md row 13).
+class LiveTakeOff : public testing::Test {
+ protected:
+  Lockstep rig_{{0.7, Vec3(5, -3, 0.2)}, Medium::udp};
+  std::int64_t age_ns_ = 250'000'000;  // a mapper of 5 Hz, and what its map takes
+
+  void SetUp() override {
+    rig_.map_settings.live = true;
+    rig_.restart();
+    rig_.spoil = [this](OdometrySample&) { rig_.channels->map_ns.store(rig_.now_ns() - age_ns_); };
+    rig_.ticks(60);
+    rig_.channels->orders.push({track::Request::enable});
+    ASSERT_GT(rig_.ticks_until(Mode::tracking, 250), 0) << to_string(rig_.reason());
+    rig_.offer(rig_.rise(), true, true);
+    ASSERT_GT(rig_.ticks_until(Mode::lifting, 3), 0) << to_string(rig_.reason());
+  }
+};
+
+// Its clearance is that to the floor, which age times closing_speed passes at once.
+TEST_F(LiveTakeOff, IsNotEndedByTheFloorThatItLeaves) {
+  EXPECT_GT(rig_.ticks_until(Mode::tracking, 500), 0) << to_string(rig_.reason());
+  EXPECT_EQ(rig_.reason(), Reason::lifted_off);
+}
+
+TEST_F(LiveTakeOff, LandsWithAMapOlderThanASecond) {
+  age_ns_ = 1'100'000'000;
+  EXPECT_GT(rig_.ticks_until(Mode::land, 3), 0) << to_string(rig_.mode());
+  EXPECT_EQ(rig_.reason(), Reason::map_late);
+}
+
 }  // namespace
 }  // namespace backwash::daemon::test

@@ -116,6 +116,31 @@ TEST(WindowClouds, AnotherFrameIsRefusedByName) {
                                               HasSubstr("header.frame_id 'camera_init', wanted 'map' (frames.map)")));
 }
 
+// Two processes, each with a clock of its own.
+TEST(WindowClouds, AFreeCloudWhoseClockIsAheadOfTheOccupiedOnesIsRefusedByName) {
+  constexpr dds::Guid kOther{8};
+  WindowClouds clouds(told_window());
+  const auto at = [&](bool free, double stamp, double received) -> std::string {
+    Points points = wall_cloud();
+    points.t = stamp;
+    const auto cloud = clouds.judge(free, points.message(), free ? kOther : kMapper, kVehicleAt,
+                                    static_cast<std::int64_t>(std::lround(received * 1e9)));
+    return cloud ? "taken" : cloud.error();
+  };
+  EXPECT_EQ(at(true, 500, 99), "taken") << "nothing is occupied yet";
+  clouds.forget(true);
+  EXPECT_EQ(at(false, 100, 100.05), "taken");
+  EXPECT_EQ(at(false, 100.1, 100.75), "taken") << "one that took longer";
+  const std::string why = at(true, 110, 100.8);
+  EXPECT_THAT(why, AllOf(HasSubstr("rt/rog_map/free of writer 08000000"), HasSubstr("its clock is 9.25 s ahead"),
+                         HasSubstr("that of rt/rog_map/occ, wanted one clock")));
+  EXPECT_EQ(at(true, 101.7, 100.8), "taken") << "within what latencies differ by";
+  EXPECT_EQ(at(true, 101.8, 104.9), "taken") << "late ones free less";
+  clouds.forget(false);
+  EXPECT_EQ(at(false, 200, 105), "taken") << "another mapper's clock";
+  EXPECT_EQ(at(true, 200, 105.1), "taken");
+}
+
 TEST(WindowClouds, AnotherResolutionIsRefusedByNameWhetherFinerOrCoarser) {
   EXPECT_THAT(Judged().refused(wall_cloud(0.05)),
               HasSubstr("its points lie 0.05 m apart, wanted 0.1 m (map.window.resolution"));

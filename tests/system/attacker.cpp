@@ -3,6 +3,7 @@
 //   attacker DOMAIN send STEP …               STEP: VERB[=X,Y,Z] or +MILLISECONDS; no step waits for an answer. Each
 //                                             answer is a line: time (s, monotonic), verb, result, reason
 //   attacker DOMAIN flood SECONDS             commands of a stranger, as fast as they go
+//   attacker DOMAIN receipts SECONDS          answers each part of a map in the daemon's name: the map is in use
 //   attacker DOMAIN relay FROM TO WHAT VALUE X  odometry from one topic to another; as soon as the vehicle is beyond X,
 //                                             turn: by VALUE rad; velocity: VALUE m/s along the body's x axis
 #include <Eigen/Geometry>
@@ -105,6 +106,26 @@ int flood(const dds::Participant& participant, double seconds) {
   return 0;
 }
 
+/// Whoever hears a part knows its transfer.
+int forge_receipts(const dds::Participant& participant, double seconds) {
+  auto writer = dds::make_writer<dds::MapReceipt>(participant, kNamespace);
+  auto parts = dds::make_reader<dds::MapPart>(participant, kNamespace);
+  unsigned forged = 0;
+  for (const double end = now_s() + seconds; now_s() < end; std::this_thread::sleep_for(1ms))
+    parts.take([&](const dds::MapPart& part) {
+      char nothing[] = "";
+      dds::MapReceipt receipt{};
+      receipt.transfer = part.transfer;
+      receipt.newest = part.sent;
+      receipt.state = backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED;
+      receipt.reason = nothing;
+      writer.write(receipt);
+      ++forged;
+    });
+  std::printf("%u receipts forged\n", forged);
+  return 0;
+}
+
 int relay(const dds::Participant& participant, const std::string& from, const std::string& to, const std::string& what,
           double value, double x) {
   dds::Reader<dds::Odometry> reader(participant, dds::TopicOf<dds::Odometry>::type(), from, dds::Delivery::latest);
@@ -144,6 +165,7 @@ int main(int argc, char** argv) {
   const std::string mode = argv[2];
   if (mode == "send") return send(participant, argc - 3, argv + 3);
   if (mode == "flood" && argc == 4) return flood(participant, std::atof(argv[3]));
+  if (mode == "receipts" && argc == 4) return forge_receipts(participant, std::atof(argv[3]));
   if (mode == "relay" && argc == 8)
     return relay(participant, argv[3], argv[4], argv[5], std::atof(argv[6]), std::atof(argv[7]));
   return 64;

@@ -4,7 +4,7 @@ import struct
 
 MODES = {"passive": 0, "enabling": 1, "tracking": 2, "hold": 3, "land": 4, "quiet": 5, "lifting": 6}
 STARTED, SEGMENT_ACCEPTED, ODOMETRY_LOST, LANDED, LAND_REQUESTED, STOP_REQUESTED, AIR_ROUGHER = 0, 4, 6, 16, 18, 35, 46
-MAP, COMMAND, ACK, TICK, SEGMENT, TICK_INPUT, LOST, WORLD, FAILURE = 3, 4, 5, 8, 9, 11, 13, 15, 16
+MAP, COMMAND, ACK, TICK, SEGMENT, TICK_INPUT, LOST, SCAN, WORLD, FAILURE = 3, 4, 5, 8, 9, 11, 13, 14, 15, 16
 AIR_CONSTANTS, AIR = 18, 19
 CLASSES = ["free_air", "ground", "wall", "corner", "none"]
 ARMED, LANDED_KNOWN, ON_GROUND = 1 << 4, 1 << 14, 1 << 15
@@ -73,8 +73,16 @@ class RawLog:
 
     def free_cube(self):
         """A map that knows one thing: the cube from (-1.6, -1.6, -1.6) to the origin is free."""
-        data = b"\x03\x00" + b"\x00\xc0" * 10 + b"\x00\x40"
-        self.record(MAP, struct.pack("<dII", 0.1, 1, 1) + data)
+        self.map(b"\x03\x00" + b"\x00\xc0" * 10 + b"\x00\x40")
+
+    def map(self, octomap):
+        """A map of 0.1 m that was accepted, as OctoMap's binary tree."""
+        self.record(MAP, struct.pack("<dII", 0.1, 1, 1) + octomap)
+
+    def window(self):
+        """Both clouds of a mapper's window."""
+        self.record(SCAN, b"free window of 500 voxels, 0 new voxels")
+        self.record(SCAN, b"occupied window of 90 voxels, 7 new voxels")
 
     def write(self, path, most=None):
         with open(path, "wb") as file:
