@@ -62,6 +62,7 @@ make_sysroot() {
 
 cmake --preset release -B "build/$arch" --toolchain "$PWD/toolchains/$arch.cmake" -DBACKWASH_SYSROOT="$sysroot" >"build/$arch.log" 2>&1 ||
   { tail -n 20 "build/$arch.log" >&2; exit 70; }
+"$compiler" --sysroot="$sysroot" -O2 -shared -fPIC -o "build/$arch/qemu_gaps.so" toolchains/qemu_gaps.c
 # build TARGET …
 build() {
   NINJA_STATUS='[%f/%t] ' cmake --build "build/$arch" --target "$@" 2>&1 | tee -a "build/$arch.log" | show "building for $arch"
@@ -80,11 +81,10 @@ case ${1:-} in
     parts=("${@:2}")
     [[ ${#parts[@]} -gt 0 ]] || parts=(sync files map field reach plan track log config bridge)
     build "${parts[@]/#/test_}"
-    "$compiler" --sysroot="$sysroot" -O2 -shared -fPIC -o "build/$arch/termios2.so" toolchains/termios2.c
     failed=()
     for part in "${parts[@]}"; do
       echo "test_$part for $arch"
-      attended "qemu-${qemu}-static" -L "$sysroot" -E "LD_PRELOAD=$PWD/build/$arch/termios2.so" \
+      attended "qemu-${qemu}-static" -L "$sysroot" -E "LD_PRELOAD=$PWD/build/$arch/qemu_gaps.so" \
         "build/$arch/tests/test_$part" --gtest_brief=1 --gtest_filter="-$(left_out "$part")" || failed+=("$part")
     done
     [[ ${#failed[@]} -eq 0 ]] || { echo "build: failed: ${failed[*]}" >&2; exit 1; }

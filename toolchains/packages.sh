@@ -33,11 +33,13 @@ done
 
 # What apt takes for them, and nothing of the sysroot that they were linked with.
 root=$work/root
-debs=("$others"/backwash_*.deb "$others"/backwash-bench_*.deb)
-mmdebstrap --quiet --variant=extract --architectures=$debian --include="$(printf '%s\n' "${debs[@]}" | paste -sd,)" \
-  --setup-hook="mkdir -p \"\$1$others\" && cp ${debs[*]} \"\$1$others\"" \
-  --aptopt='APT::Install-Recommends "false"' bookworm "$root" >"$work/mmdebstrap.log" 2>&1 ||
-  { tail -n 20 "$work/mmdebstrap.log" >&2; die "apt does not install them"; }
+mkdir "$work/archive"
+cp "$others"/*.deb "$work/archive"
+(cd "$work/archive" && dpkg-scanpackages --multiversion . >Packages 2>/dev/null)
+mmdebstrap --quiet --variant=extract --architectures=$debian --include=backwash,backwash-bench \
+  --aptopt='APT::Install-Recommends "false"' bookworm "$root" "deb [trusted=yes] copy:$work/archive ./" \
+  'deb http://deb.debian.org/debian bookworm main' >"$work/mmdebstrap.log" 2>&1 ||
+  { cat "$work/mmdebstrap.log" >&2; die "apt does not install them"; }
 rm -rf "$root/dev" "$root/tmp"
 for program in backwash backwashctl backwashd backwash-bench; do
   said=$("qemu-$qemu-static" -L "$root" "$root/usr/bin/$program" --version) || die "$program does not run"

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// qemu-user 7.2 knows no TCGETS2 and no TCSETS2 (ENOSYS), by which a serial port gets a speed of any value. Preloaded, this
-// answers them for pseudo-terminals, which have a speed in name alone: all but the speed is set through TCSETS.
+// What qemu-user 7.2 does not pass on, answered by a library that is preloaded:
+// - TCGETS2 and TCSETS2 (ENOSYS), by which a serial port gets a speed of any value: for pseudo-terminals, which have a speed
+//   in name alone, all but the speed is set through TCSETS.
+// - IP_MULTICAST_IF (EOPNOTSUPP): taken and not set, the route decides. Right where only one interface is up.
 #define _GNU_SOURCE
 #include <asm/termbits.h>
 #include <dlfcn.h>
+#include <netinet/in.h>
 #include <stdarg.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
-#include <sys/ioctl.h>
 
 enum { kTerminals = 4096 };
 static unsigned speeds[kTerminals]; // by number of the pseudo-terminal; 0: as it was opened
@@ -51,4 +55,11 @@ int ioctl(int fd, unsigned long request, ...) {
   const int result = real(fd, TCSETS, &narrow);
   if (result == 0 && (wide->c_cflag & CBAUD) == BOTHER) *speed_of(fd) = wide->c_ospeed;
   return result;
+}
+
+int setsockopt(int fd, int level, int option, const void* value, socklen_t size) {
+  static int (*real)(int, int, int, const void*, socklen_t);
+  if (!real) *(void**)&real = dlsym(RTLD_NEXT, "setsockopt");
+  if (level == IPPROTO_IP && option == IP_MULTICAST_IF) return 0;
+  return real(fd, level, option, value, size);
 }
