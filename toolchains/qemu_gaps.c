@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What qemu-user 7.2 does not pass on, answered by a library that is preloaded:
-// - TCGETS2 and TCSETS2 (ENOSYS), by which a serial port gets a speed of any value: for pseudo-terminals, which have a speed
+// - TCGETS2 and TCSETS2 (ENOSYS), by which a serial port gets a speed of any value: for pseudo-terminals, which have a
+// speed
 //   in name alone, all but the speed is set through TCSETS.
 // - IP_MULTICAST_IF (EOPNOTSUPP): taken and not set, the route decides. Right where only one interface is up.
 #define _GNU_SOURCE
@@ -15,7 +16,7 @@
 #include <sys/sysmacros.h>
 
 enum { kTerminals = 4096 };
-static unsigned speeds[kTerminals]; // by number of the pseudo-terminal; 0: as it was opened
+static unsigned speeds[kTerminals];  // by number of the pseudo-terminal; 0: as it was opened
 
 static int (*real_ioctl(void))(int, unsigned long, ...) {
   static int (*real)(int, unsigned long, ...);
@@ -37,7 +38,7 @@ int ioctl(int fd, unsigned long request, ...) {
   void* argument = va_arg(arguments, void*);
   va_end(arguments);
   int (*const real)(int, unsigned long, ...) = real_ioctl();
-  const unsigned long get = request & 0xffffffffUL; // an int's sign may have been spread
+  const unsigned long get = request & 0xffffffffUL;  // an int's sign may have been spread
   if (get != TCGETS2 && get != TCSETS2) return real(fd, request, argument);
   struct termios2* wide = argument;
   struct termios narrow;
