@@ -24,3 +24,6 @@ set(CMAKE_EXE_LINKER_FLAGS_INIT
 # Whatever the build runs of its own (man pages, names of tests) and ctest's tests.
 set(CMAKE_CROSSCOMPILING_EMULATOR qemu-${BACKWASH_QEMU}-static -L "${BACKWASH_SYSROOT}")
 set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE ${BACKWASH_DEBIAN})
+# dpkg-shlibdeps finds libraries in the sysroot. Debian's folder of libraries, which CMake takes on Debian itself alone.
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${BACKWASH_SYSROOT}/usr/lib/${BACKWASH_TRIPLET};${BACKWASH_SYSROOT}/lib/${BACKWASH_TRIPLET};${BACKWASH_SYSROOT}/lib")
+set(CMAKE_INSTALL_LIBDIR "lib/${BACKWASH_TRIPLET}" CACHE PATH "as dpkg-architecture names it")

@@ -104,7 +104,8 @@ std::optional<PerDirection> fixed_point(const HalfWidths& half_widths, double fr
     // Holds by itself but for rounding in the ellipsoid's scalar root, which must not make the iteration cycle.
     for (std::size_t d = 0; d < kDirections; ++d) w_bar.w[d] = std::max(found.w[d], w_bar.w[d]);
     const PerDirection h = half_widths(w_bar);
-    if (box(h).maxCoeff() > free_distance + around.resolution()) return std::nullopt;
+    // An infinite bound's may be no numbers: those exceed it, too.
+    if (!(box(h).array() <= free_distance + around.resolution()).all()) return std::nullopt;
     const auto wider = around.meeting(box(h));
     if (wider == over) return h;
     over = wider;
@@ -127,6 +128,7 @@ class ClearTest {
 
   /// True only where a set that holds this one is not clear. `free_distance`: of the set's centre.
   bool blocked(const NearbyVoxels& around, double free_distance, const PerDirection& half_widths) const noexcept {
+    if (!box(half_widths).allFinite()) return true;  // no voxels have such numbers
     if (far(free_distance, box(half_widths))) return false;
     const Octagon o(half_widths);
     const double t = taken_ * (1 - 1e-9);

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A program's man page and bash completion, made of what its --help says and of nothing else.
 
-documents.py PAGE OUT_DIR PROGRAM     PAGE: NAME.SECTION; writes OUT_DIR/PAGE.gz and OUT_DIR/NAME
+documents.py PAGE OUT_DIR [EMULATOR …] PROGRAM     PAGE: NAME.SECTION; writes OUT_DIR/PAGE.gz and OUT_DIR/NAME
 """
 import gzip
 import pathlib
@@ -14,10 +14,10 @@ SEE_ALSO = {"backwash": "backwashd(8), backwashctl(1)", "backwashctl": "backwash
             "backwash-bench": "backwashd(8), backwash(1)"}
 
 
-def help_of(program: str, name: str, *verb: str) -> str:
+def help_of(program: list[str], name: str, *verb: str) -> str:
     """What --help prints, without what is the machine's: the program's path, and the user and host of a default."""
-    text = subprocess.run([program, *verb, "--help"], capture_output=True, text=True, check=True).stdout
-    return re.sub(r"=\S+@\S+", "=USER@HOST ", text.replace(program, name))
+    text = subprocess.run([*program, *verb, "--help"], capture_output=True, text=True, check=True).stdout
+    return re.sub(r"=\S+@\S+", "=USER@HOST ", text.replace(program[-1], name))
 
 
 def verbs_of(text: str) -> list[str]:
@@ -67,10 +67,10 @@ complete -o filenames -F {function} {name}
 
 
 def main() -> int:
-    if len(sys.argv) != 4:
+    if len(sys.argv) < 4:
         print(__doc__, file=sys.stderr)
         return 64
-    (name, section), out, program = sys.argv[1].rsplit(".", 1), pathlib.Path(sys.argv[2]), sys.argv[3]
+    (name, section), out, program = sys.argv[1].rsplit(".", 1), pathlib.Path(sys.argv[2]), sys.argv[3:]
     texts = {"": help_of(program, name)}
     for verb in verbs_of(texts[""]):
         texts[verb] = help_of(program, name, verb)

@@ -3,10 +3,11 @@
 """What the packages consist of, as CycloneDX 1.5: the shared libraries that the programs name, and the headers that are
 compiled in, each as the Debian package that it is of, with its version.
 
-sbom.py OUT VERSION PROGRAM …
+sbom.py [--sysroot DIR] OUT VERSION PROGRAM …     DIR: of another architecture, as toolchains/build.sh makes it
 """
 import hashlib
 import json
+import os
 import pathlib
 import re
 import subprocess
@@ -22,11 +23,19 @@ def run(*command: str) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
-def packages_of(program: str) -> set[str]:
+def libraries_of(program: str, sysroot: str) -> list[tuple[str, str]]:
+    """Names and paths of what the loader loads, or of every library of a sysroot, whose loader does not run here."""
+    if not sysroot:
+        return re.findall(r"^\s*(\S+) => (\S+)", run("ldd", program), re.M)
+    return [(path.name, str(path)) for folder in ("lib", "usr/lib") for depth in ("*", "*/*")
+            for path in sorted(pathlib.Path(sysroot, folder).glob(f"{depth}.so.*"))]
+
+
+def packages_of(program: str, sysroot: str) -> set[str]:
     """Debian packages of the libraries that a program names itself."""
     named = set(re.findall(r"\(NEEDED\).*\[(.*)\]", run("readelf", "-d", program)))
     found = set()
-    for library, path in re.findall(r"^\s*(\S+) => (\S+)", run("ldd", program), re.M):
+    for library, path in libraries_of(program, sysroot):
         if library in named:
             found.add(owner(path))
             named.remove(library)
@@ -60,11 +69,15 @@ def installed(package: str) -> bool:
 
 
 def main() -> int:
-    if len(sys.argv) < 4:
+    words, sysroot = sys.argv[1:], ""
+    if words[:1] == ["--sysroot"]:
+        sysroot, words = "".join(words[1:2]), words[2:]
+        os.environ["DPKG_ADMINDIR"] = f"{sysroot}/var/lib/dpkg"
+    if len(words) < 3:
         print(__doc__, file=sys.stderr)
         return 64
-    out, version, programs = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3:]
-    linked = sorted(set().union(*map(packages_of, programs)))
+    out, version, programs = pathlib.Path(words[0]), words[1], words[2:]
+    linked = sorted(set().union(*(packages_of(p, sysroot) for p in programs)))
     compiled = sorted(p for p in COMPILED_IN if installed(p))
     components = [component(p, "linked") for p in linked] + [component(p, "compiled in") for p in compiled]
     whole = {"type": "application", "bom-ref": "backwash", "name": "backwash", "version": version,

@@ -132,8 +132,17 @@ TEST(BoundCode, AnInfiniteBoundLeavesNoPlaceToHover) {
     const auto world = plan::build_world(grid, model, *config::load_vehicle("builtin:quad-5in"), method);
     EXPECT_EQ(world->bounds.at({10, 10, 10}).w[kX], std::numeric_limits<double>::infinity());
     EXPECT_FALSE(world->hover.safe({10, 10, 10}));
+    EXPECT_FALSE(hover_extent(world->reach, world->grid, world->distance, world->bounds, Vec3::Constant(1.05)).bounded);
     EXPECT_FALSE(hover_set(world->reach, world->grid, world->distance, world->bounds, Vec3::Constant(1.05)).safe());
   }
+}
+
+// Casts of what is no number to voxels differ from processor to processor: on one of them it was safe to hover there.
+TEST(BoundCode, AnInfiniteBoundHasAnInfiniteEllipsoid) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const HoverEllipsoid ellipsoid(*config::load_vehicle("builtin:quad-5in"));
+  for (const Vec3& w_bar : {Vec3(1, 1, kInfinity), Vec3(kInfinity, 1, 1), Vec3(kInfinity, kInfinity, kInfinity)})
+    EXPECT_EQ(ellipsoid.half_axes(w_bar), Vec3::Constant(kInfinity));
 }
 
 }  // namespace
