@@ -54,6 +54,9 @@ double lateral_clearance(const World& world, const reach::ReachTube& tube) {
     PerDirection h = tube[n].half_widths_interval;
     if (world.constant_margin) h.fill(*world.constant_margin);
     for (std::size_t d = 0; d < kDirections; ++d) h[d] += std::abs(unit(static_cast<Direction>(d)).dot(to - from)) / 2;
+    // Wider than the grid, without a bound, or no number: it meets the outside, and no voxels have such numbers.
+    const double all = grid.size().maxCoeff() * a;
+    if (!std::ranges::all_of(h, [&](double width) { return width < all; })) return -body;
 
     // Layers beside the body and the set: from the first free one under the centre, so that the floor does not count.
     const Index3 center = grid.index(middle);

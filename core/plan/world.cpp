@@ -91,8 +91,9 @@ map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& boun
   const double h = std::max(w * std::max(world.reach.horizontal.h_inf, world.reach.vertical.h_inf),
                             world.constant_margin.value_or(0.0));
   const auto& vehicle = world.reach.vehicle;
-  const auto voxels = [&](double metres) {
-    return Index3::Constant(static_cast<int>(std::ceil(metres / grid.resolution())) + 2).eval();
+  const auto voxels = [&](double metres) {  // of an infinite bound, or one that is no number: all
+    const double most = grid.size().maxCoeff(), count = std::ceil(metres / grid.resolution());
+    return Index3::Constant(static_cast<int>(count < most ? count : most) + 2).eval();
   };
   map::VoxelBox box = grown(field, voxels(h), grid.size());
   const map::VoxelBox near =

@@ -158,10 +158,10 @@ HoverEllipsoid::HoverEllipsoid(const Vehicle& vehicle) : vehicle_(vehicle) {
 }
 
 Vec3 HoverEllipsoid::half_axes(const Vec3& w_bar) const {
-  if (!(w_bar.minCoeff() >= kLeastBound)) return hover_ellipsoid(vehicle_, w_bar).diagonal().cwiseSqrt();
   const Vec3 root = root_trace_.cwiseProduct(w_bar);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (!(root.sum() < kInfinity)) return Vec3::Constant(kInfinity);  // its share of an axis would be no number
+  if (!(w_bar.minCoeff() >= kLeastBound)) return hover_ellipsoid(vehicle_, w_bar).diagonal().cwiseSqrt();
   const double sum = root.sum(), at = std::asin(std::sqrt(root.z() / sum)) * 2 / std::numbers::pi * kShares;
   const auto n = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(kShares - 1));
   const Eigen::Vector2d u = square_[n] + (at - static_cast<double>(n)) * (square_[n + 1] - square_[n]);

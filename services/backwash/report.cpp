@@ -24,12 +24,17 @@ struct ReportOptions {
   const std::string& log() const { return logs.front(); }
 };
 
-/// One take-off and one route, recorded to their end with the truth beside them: what `fly` flies.
+/// One take-off and one route, recorded to their end with the truth beside them, all of it in the log's last map: what
+/// `fly` flies.
 bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
   const auto segments = std::ranges::count_if(
       log.records, [](const log::RawRecord& r) { return r.header.kind == log::RecordKind::segment; });
   // What a window showed is not in the log: the world of its sets cannot be made again.
-  return story.by_truth && segments == 2 && story.pieces.size() >= 2 && story.maps.window_clouds == 0;
+  const auto& maps = story.maps;
+  const bool in_last_map = !maps.stretches.empty() && std::ranges::all_of(maps.stretches, [&](const auto& s) {
+    return s.map == maps.accepted_s.size() && s.clearance_m;
+  });
+  return story.by_truth && segments == 2 && story.pieces.size() >= 2 && maps.window_clouds == 0 && in_last_map;
 }
 
 /// Any flight, by what the daemon recorded of it.

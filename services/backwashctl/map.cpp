@@ -76,10 +76,12 @@ class Transfer {
     while (const auto number = sending.next(now_ns())) write(*number);
     waitset_.wait(0.002);
     receipts_.departed();  // so that known() is of now
-    const auto writers = receipts_.known();
     receipts_.take([&](const dds::MapReceipt& receipt, const dds::Guid& writer) {
       if (receipt.transfer != part_.transfer || several_) return;
-      several_ = (writer_ && *writer_ != writer) ||
+      const auto writers = receipts_.known();
+      // A daemon that restarted answers by a writer of its own, once the one before is gone.
+      const bool before = writer_ && std::ranges::find(writers, *writer_) != writers.end();
+      several_ = (before && *writer_ != writer) ||
                  (receipt.state == backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED && writers.size() > 1);
       writer_ = writer;
       if (several_) return;

@@ -94,7 +94,7 @@ std::optional<std::string> WindowClouds::wrong_stamp(bool free, std::int64_t sta
   // Else what it frees would count as later than what is seen to be occupied, however old it is.
   if (free && occupied_late_ns_ && *occupied_late_ns_ - late_ns > kClocks_ns)
     return "header.stamp: its clock is " + number(seconds(*occupied_late_ns_ - late_ns), " s") + " ahead of that of " +
-           told_.occupied + ", wanted one clock";
+           told_.occupied + ", or those come so much later after their stamps; wanted one clock and alike delays";
   return std::nullopt;
 }
 
@@ -143,7 +143,8 @@ tl::expected<WindowCloud, std::string> WindowClouds::judge(bool free, const dds:
   }
   result.first = newest_ns_[free] == INT64_MIN;
   newest_ns_[free] = stamp_ns;
-  if (!free) occupied_late_ns_ = std::min(occupied_late_ns_.value_or(late_ns), late_ns);
+  // A new writer's clock counts from its first cloud on; until then the one before is believed.
+  if (!free) occupied_late_ns_ = result.first ? late_ns : std::min(occupied_late_ns_.value_or(late_ns), late_ns);
   return result;
 }
 

@@ -27,10 +27,7 @@ class WindowClouds {
   /// One line of a good cloud of which a third or more lay outside the window, or nothing: of the last that was judged.
   const std::optional<std::string>& beyond() const noexcept { return beyond_; }
   /// The writer of this kind is gone: another one's stamps count from anew.
-  void forget(bool free) noexcept {
-    newest_ns_[free] = INT64_MIN;
-    if (!free) occupied_late_ns_.reset();
-  }
+  void forget(bool free) noexcept { newest_ns_[free] = INT64_MIN; }
 
  private:
   std::optional<std::string> wrong(bool free, const dds::PointCloud& message, const Cloud& cloud) const;

@@ -12,6 +12,7 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
+#include "core/plan/planner.hpp"
 #include "core/plan/world.hpp"
 #include "tests/support/rounded_up.hpp"
 #include "tests/support/stored_field.hpp"
@@ -134,6 +135,14 @@ TEST(BoundCode, AnInfiniteBoundLeavesNoPlaceToHover) {
     EXPECT_FALSE(world->hover.safe({10, 10, 10}));
     EXPECT_FALSE(hover_extent(world->reach, world->grid, world->distance, world->bounds, Vec3::Constant(1.05)).bounded);
     EXPECT_FALSE(hover_set(world->reach, world->grid, world->distance, world->bounds, Vec3::Constant(1.05)).safe());
+    const State there{Vec3::Constant(1.05)};
+    const std::vector<Setpoint> held(10, Setpoint{there.p_W});
+    EXPECT_LT(plan::lateral_clearance(*world, tube_over_field(world->reach, there, held.front(), held, world->bounds)),
+              0);
+    map::OccupancyGrid changed = grid;
+    changed.set({5, 5, 5}, map::Cell::occupied);
+    const auto updated = plan::update_world(*world, changed, {{5, 5, 5}, {5, 5, 5}}, model);
+    EXPECT_FALSE(updated->hover.safe({10, 10, 10}));
   }
 }
 
@@ -141,7 +150,8 @@ TEST(BoundCode, AnInfiniteBoundLeavesNoPlaceToHover) {
 TEST(BoundCode, AnInfiniteBoundHasAnInfiniteEllipsoid) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const HoverEllipsoid ellipsoid(*config::load_vehicle("builtin:quad-5in"));
-  for (const Vec3& w_bar : {Vec3(1, 1, kInfinity), Vec3(kInfinity, 1, 1), Vec3(kInfinity, kInfinity, kInfinity)})
+  for (const Vec3& w_bar :
+       {Vec3(1, 1, kInfinity), Vec3(kInfinity, 1, 0), Vec3(0, kInfinity, 1), Vec3(kInfinity, kInfinity, kInfinity)})
     EXPECT_EQ(ellipsoid.half_axes(w_bar), Vec3::Constant(kInfinity));
 }
 

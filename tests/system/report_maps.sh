@@ -70,6 +70,15 @@ open("truth.csv", "w").write("t_s,x_m,y_m,z_m\n" + "".join(f"{1 + 0.02 * k},-2.4
 story, _ = told(log, 0, "--truth", "truth.csv")
 assert story["judged_by"] == "truth" and story["ticks_not_judged"] == 100, story
 
+# A later map says nothing of a flight before it: an obstacle that has gone was touched, one that has come was not.
+for then, later, touched in ((BESIDE_OCCUPIED, BESIDE_FREE, True), (BESIDE_FREE, BESIDE_OCCUPIED, False)):
+    log = outwards(cubes(FREE | then))
+    log.map(cubes(FREE | later))
+    open("truth.csv", "w").write("t_s,x_m,y_m,z_m\n" + "".join(f"{1 + 0.02 * k},-2.4,-0.8,-0.8\n" for k in range(log.number)))
+    for options in ((), ("--truth", "truth.csv")):
+        story, _ = told(log, 1 if touched else 0, *options)
+        assert story["touched"] == touched, (options, story)
+
 # A whole map and a window: by the map where it knows the place; what it does not know was no obstacle that was touched.
 for seen, name in (({"window": True}, "the mapper's window"), ({"scans": True}, "scans")):
     story, text = told(outwards(cubes(FREE), **seen), 0, *(["--out", "both.html", "--force"] if drawn else []))
