@@ -45,7 +45,8 @@ bool Tracker::accept(const AcceptedSegment& segment, const State& measured, doub
   return true;
 }
 
-// The stop's second command is the first that differs from the segment's: whoever has it knew of the stop.
+// The stop's second command is the first that differs from the segment's: whoever has it knew of the stop. The own ones
+// and those at rest never differ: a segment that leaves those flies what the stop does.
 bool Tracker::leaves_stop(const AcceptedSegment& segment) const noexcept {
   if (segment.branch < stop_->branch + 2 || segment.commands.size() < segment.branch) return false;
   for (std::size_t k = std::min(next_, stop_->branch + 1); k < segment.branch; ++k)
