@@ -61,27 +61,53 @@ show() {
   [[ ! -t 2 ]] || printf '\r\e[K' >&2
 }
 
-# Installs what is missing of packages.txt; apt's own words go to build/apt.log. Takes well under a second when nothing is.
+# lacks WORDS: this machine cannot give what was to be installed; what needs it does not run, and says these words.
+lacks() {
+  echo "$*" >>build/lacking
+  echo "setup: $*" >&2
+  exit 77
+}
+
+# Installs what is missing of a list of packages; apt's own words go to build/apt.log. Takes well under a second when nothing is.
+# A line command:NAME is a package that is not wanted where there is a command of that name.
 install_packages() {
-  local wanted missing=() sudo=()
+  local wanted package missing=() sudo=()
   wanted=$(sed 's/#.*//' "$1" | xargs)
+  mkdir -p build
   for package in $wanted; do
+    [[ $package != command:* ]] || { package=${package#*:}; command -v "$package" >/dev/null && continue; }
     [[ $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || missing+=("$package")
   done
   [[ ${#missing[@]} -eq 0 ]] && return
   echo "installing ${#missing[@]} packages (build/apt.log): ${missing[*]}" >&2
   if [[ $(id -u) -ne 0 ]]; then
-    command -v sudo >/dev/null || { echo "setup: not root and no sudo: install as root: apt-get install ${missing[*]}" >&2; exit 77; }
+    command -v sudo >/dev/null || lacks "right: not root and no sudo: install as root: apt-get install ${missing[*]}"
     sudo=(sudo)
     sudo -v # asks for the password here, not in the log
   fi
-  mkdir -p build
   apt() { attended "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq "$@" >>build/apt.log 2>&1; }
   if ! apt update || ! apt install -y --no-install-recommends "${missing[@]}"; then
     tail -n 20 build/apt.log >&2
+    apt update -o APT::Update::Error-Mode=any || lacks "network: Debian's mirrors: $(tail -n 1 build/apt.log)"
     echo "setup: apt-get failed: build/apt.log" >&2
     exit 70
   fi
+}
+
+# The libraries that tests hold ours against: tests/peers/package.json in build/peers.
+install_peers() {
+  cmp -s tests/peers/package.json build/peers/installed.json && return
+  echo "installing tests/peers/package.json (build/npm.log)" >&2
+  rm -rf build/peers
+  mkdir -p build/peers
+  cp tests/peers/package.json build/peers/
+  if ! attended npm install --prefix build/peers --no-audit --no-fund --ignore-scripts >build/npm.log 2>&1; then
+    tail -n 20 build/npm.log >&2
+    npm ping >/dev/null 2>&1 || lacks "network: npm's registry: $(grep -m 1 '^npm error' build/npm.log)"
+    echo "setup: npm failed: build/npm.log" >&2
+    exit 70
+  fi
+  cp tests/peers/package.json build/peers/installed.json
 }
 
 # Configures and builds a preset; further arguments go to the build. Its output, build/PRESET.log, appears only if it fails.

@@ -51,7 +51,7 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   telemetry_ = {};
   queue_.clear();
   budget_.forget();
-  clock_ = {};
+  clock_ = {}, offset_ = {};
   timesync_asked_ns_.reset(), signed_rightly_ = false;
   return port;
 }
@@ -150,9 +150,9 @@ template <class Message>
 Time AutopilotLink::taken(const Message& m, Time now) const noexcept {
   if constexpr (requires { m.time_boot_ms; }) {
     constexpr std::int64_t kLongestTrip_ns = 10'000'000, kPerMillisecond = 1'000'000;
-    const auto clock = clock_.best();
-    if (!clock || clock->round_trip_ns > kLongestTrip_ns) return now;
-    const auto there_ms = static_cast<std::uint32_t>((nanoseconds_of(now) + clock->offset_ns) / kPerMillisecond);
+    const auto clock = offset_.at(now);
+    if (!clock || clock->value.round_trip_ns > kLongestTrip_ns) return now;
+    const auto there_ms = static_cast<std::uint32_t>((nanoseconds_of(now) + clock->value.offset_ns) / kPerMillisecond);
     const auto age_ms = static_cast<std::int32_t>(there_ms - m.time_boot_ms);  // its 32 bits wrap after 49 days
     return age_ms > 0 ? now - milliseconds(age_ms) : now;
   }
@@ -175,13 +175,10 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
     timesync_asked_ns_.reset();
     const std::int64_t round_trip = now_ns - m.ts1;
     if (round_trip < 0) return;
+    if (!offset_.at(now)) clock_ = {};  // the two clocks have drifted since
     clock_.add({m.tc1 - (m.ts1 + round_trip / 2), round_trip});
+    offset_.take(*clock_.best(), now);
   }
-}
-
-std::optional<Time::duration> AutopilotLink::heartbeat_age(Time now) const noexcept {
-  if (!telemetry_.status) return std::nullopt;
-  return now - telemetry_.status->at;
 }
 
 std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
@@ -267,8 +264,9 @@ bool AutopilotLink::send_command(std::uint16_t command, const std::array<float, 
 bool AutopilotLink::send_arm(bool arm) noexcept { return send_command(kCommandArm, {arm ? 1.0F : 0.0F}); }
 
 bool AutopilotLink::send_follow_setpoints() noexcept {
-  if (!telemetry_.status) return false;
-  switch (telemetry_.status->value.autopilot) {
+  const auto status = telemetry_.status.at(now_);
+  if (!status) return false;
+  switch (status->value.autopilot) {
     case Autopilot::kPx4:
       return send_command(kCommandSetMode, {kCustomModeEnabled, kPx4MainModeOffboard});
     case Autopilot::kArduPilot:

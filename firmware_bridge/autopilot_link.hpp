@@ -70,13 +70,14 @@ class AutopilotLink {
   tl::expected<void, PortError> poll(Time now) noexcept;
 
   const Telemetry& telemetry() const noexcept { return telemetry_; }
-  /// The controller's clock, as send_timesync() has measured it since the port was opened. While it is good to 5 ms,
-  /// what telemetry() says has the time at which the controller took it, however old, otherwise that of its arrival.
-  std::optional<ClockOffset> clock() const noexcept { return clock_.best(); }
+  /// The controller's clock, as send_timesync() has measured it within the last kClockUseBy_ms. While it is good to
+  /// 5 ms, what telemetry() says has the time at which the controller took it, however old, otherwise that of its
+  /// arrival.
+  Latest<ClockOffset> clock(Time now) const noexcept { return offset_.at(now); }
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
   /// Time since the vehicle's last heartbeat; absent: there was none.
-  std::optional<Time::duration> heartbeat_age(Time now) const noexcept;
+  std::optional<Time::duration> heartbeat_age(Time now) const noexcept { return telemetry_.status.age(now); }
   /// The gravest fault now; absent: none, or still within the first two seconds.
   std::optional<LinkFault> fault(Time now) const noexcept;
   /// Called with each frame that was accepted from the line, and each that was handed to the port's queue: for a raw
@@ -109,7 +110,7 @@ class AutopilotLink {
   /// COMMAND_LONG to the flight controller.
   bool send_command(std::uint16_t command, const std::array<float, 7>& parameters) noexcept;
   bool send_arm(bool arm) noexcept;
-  /// PX4's offboard or ArduPilot's guided mode; false also when the autopilot is neither.
+  /// PX4's offboard or ArduPilot's guided mode; false also when the autopilot is neither, or silent.
   bool send_follow_setpoints() noexcept;
   /// ArduPilot's own take-off, to a height above where it was armed, m.
   bool send_takeoff(double height) noexcept;
@@ -154,6 +155,8 @@ class AutopilotLink {
   std::optional<Time> blocked_;  // since when the port has taken nothing of what waits
   std::optional<std::uint8_t> heard_;
   ClockFilter clock_;
+  static constexpr int kClockUseBy_ms = 10'000;  // all that the filter keeps; 0.5 ms at 50 ppm
+  Fact<ClockOffset, kClockUseBy_ms> offset_;     // the filter's best
   std::optional<std::int64_t> timesync_asked_ns_;
   std::uint8_t sequence_ = 0;
   std::optional<mavlink::Signing> signing_;

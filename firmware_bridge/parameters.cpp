@@ -12,9 +12,9 @@ namespace backwash::firmware_bridge {
 namespace {
 
 enum class Kind : std::uint8_t {
-  at_most,  // above 0 and at most `bound`
-  one_of,   // an integer n with bit n of `bound`
-  bits,     // an integer with all bits of `bound`
+  time_out,  // s, above 0; control is not taken beyond `bound`; unwise where it and `late` are beyond kLastMotion
+  one_of,    // an integer n with bit n of `bound`
+  bits,      // an integer with all bits of `bound`
   // Against the vehicle file; `bound`: units of the parameter in one of ours.
   k_d_horizontal,  // velocity gain
   k_p_horizontal,  // position gain: k_p over the velocity gain
@@ -32,7 +32,8 @@ struct Rule {
   bool required;
   Kind kind;
   double bound;
-  const char* advice;  // of the first three kinds
+  const char* advice;  // of one_of and bits
+  double late = 0;     // s: how much later than a time_out says the autopilot may act
 };
 
 constexpr int any(std::initializer_list<int> allowed) {
@@ -42,8 +43,8 @@ constexpr int any(std::initializer_list<int> allowed) {
 }
 
 constexpr Rule kPx4[] = {
-    {"COM_OF_LOSS_T", true, Kind::at_most, 0.5,
-     "set COM_OF_LOSS_T to 0.5 s or less: for so long the vehicle flies on when the set-points stop"},
+    // Looked at ten times a second, and acted upon by the commander's next loop of 10 ms.
+    {"COM_OF_LOSS_T", true, Kind::time_out, 0.5, "", 0.11},
     {"COM_OBL_RC_ACT", true, Kind::one_of, any({4, 5}),
      "set COM_OBL_RC_ACT to 4 (land) or 5 (hold): 0 to 2 drift, 3 climbs and returns, 6 and 7 drop the vehicle"},
     {"MPC_XY_VEL_P_ACC", true, Kind::k_d_horizontal, 1, ""},
@@ -69,8 +70,7 @@ constexpr Rule kPx4[] = {
 };
 
 constexpr Rule kArduPilot[] = {
-    {"GUID_TIMEOUT", true, Kind::at_most, 0.3,
-     "set GUID_TIMEOUT to 0.3 s or less: for so long the vehicle flies on when the set-points stop"},
+    {"GUID_TIMEOUT", true, Kind::time_out, 0.3, ""},
     {"PSC_VELXY_P", true, Kind::k_d_horizontal, 1, ""},
     {"PSC_POSXY_P", true, Kind::k_p_horizontal, 1, ""},
     {"PSC_VELZ_P", true, Kind::k_d_vertical, 1, ""},
@@ -151,6 +151,8 @@ double wanted(const Rule& rule, const Against& against) {
       return rule.bound * std::atan(std::numbers::sqrt2 * vehicle.limits.a_max / kGravity) * 180 / std::numbers::pi;
     case Kind::delay:
       return rule.bound * against.untold_delay;
+    case Kind::time_out:
+      return std::min(rule.bound, kLastMotion - rule.late);
     default:
       return rule.bound;
   }
@@ -163,7 +165,7 @@ bool good(const Rule& rule, double value, double velocity, const Against& agains
   // The link carries floats: 0.3 comes as 0.30000001, 1.3 as 1.29999995.
   const auto [told, limit] = std::pair(static_cast<float>(value), static_cast<float>(want));
   switch (rule.kind) {
-    case Kind::at_most:
+    case Kind::time_out:
       return value > 0 && told <= limit;
     case Kind::one_of:
       return value >= 0 && value < 31 && value == std::floor(value) &&
@@ -189,10 +191,21 @@ bool good(const Rule& rule, double value, double velocity, const Against& agains
   return false;
 }
 
+// Control is not taken without it; a time-out that only makes the last motion longer than it should be is told.
+bool required(const Rule& rule, std::optional<double> value, const Against& against) {
+  if (rule.kind == Kind::delay) return rule.required && against.untold_delay > 0;
+  const bool only_unwise = rule.kind == Kind::time_out && value && *value > 0 &&
+                           static_cast<float>(*value) <= static_cast<float>(rule.bound);
+  return rule.required && !only_unwise;
+}
+
 std::string advice(const Rule& rule, const Against& against) {
   const std::string name(rule.name);
   switch (rule.kind) {
-    case Kind::at_most:
+    case Kind::time_out:
+      return formatted("set %s above 0 and to %.3g s at most: for its time%s the vehicle flies on when the daemon dies",
+                       name.c_str(), wanted(rule, against),
+                       rule.late > 0 ? formatted(", and up to %.3g s more,", rule.late).c_str() : "");
     case Kind::one_of:
     case Kind::bits:
       return rule.advice;
@@ -228,8 +241,7 @@ std::vector<ParameterFinding> judge_parameters(Autopilot autopilot, const Parame
   double velocity = 1;  // of the last velocity gain, which stands before its position gain
   for (const Rule& rule : rules(autopilot)) {
     const auto value = values[findings.size()];
-    const bool required = rule.required && (rule.kind != Kind::delay || untold_delay > 0);
-    ParameterFinding finding{rule.name, required, false, value, {}};
+    ParameterFinding finding{rule.name, required(rule, value, against), false, value, {}};
     finding.good = value && good(rule, *value, velocity, against);
     if (rule.kind == Kind::k_d_horizontal || rule.kind == Kind::k_d_vertical)
       velocity = value.value_or(0) / wanted(rule, against);

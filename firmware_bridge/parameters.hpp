@@ -37,6 +37,9 @@ std::vector<ParameterFinding> judge_parameters(Autopilot autopilot, const Parame
                                                const Vehicle& vehicle, double untold_delay = 0);
 inline constexpr double kGainTolerance = 0.10;
 
+/// From our last set-point to when the autopilot no longer follows it, s, at most (docs/faults.md row 36).
+inline constexpr double kLastMotion = 0.5;
+
 /// How old odometry may be at most when it reaches us, s (docs/faults.md row 1): more is no delay of a VIO's.
 inline constexpr double kLatestVio = 0.08;
 

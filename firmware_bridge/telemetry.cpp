@@ -60,8 +60,8 @@ std::optional<double> share(std::int8_t percent) noexcept {
 void Telemetry::take(const mavlink::Heartbeat& m, Time now) noexcept {
   const VehicleStatus s{autopilot_of(m.autopilot), (m.base_mode & kSafetyArmed) != 0, follows_setpoints(m),
                         m.custom_mode, m.system_status};
-  if (status && now - status->at >= kHeartbeatTimeout) restarted();  // it may have
-  status = {s, now};
+  if (const auto age = status.age(now); age && *age >= kHeartbeatTimeout) restarted();  // it may have
+  status.take(s, now);
 }
 
 bool Telemetry::in_order(std::optional<std::uint32_t>& last_ms, std::uint32_t now_ms) noexcept {
@@ -82,7 +82,7 @@ void Telemetry::take(const mavlink::LocalPositionNed& m, Time now) noexcept {
     ++broken;
     return;
   }
-  if (in_order(position_ms_, m.time_boot_ms)) local_state = {s, now};
+  if (in_order(position_ms_, m.time_boot_ms)) local_state.take(s, now);
 }
 
 void Telemetry::take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
@@ -93,7 +93,7 @@ void Telemetry::take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_
     return;
   }
   const VehicleAttitude a{mavlink::swap_ned_frd(q_NF.normalized()), mavlink::swap_frd(omega_F)};
-  if (in_order(attitude_ms_, time_boot_ms)) attitude = {a, now};
+  if (in_order(attitude_ms_, time_boot_ms)) attitude.take(a, now);
 }
 
 void Telemetry::take(const mavlink::AttitudeQuaternion& m, Time now) noexcept {
@@ -107,11 +107,11 @@ void Telemetry::take(const mavlink::Attitude& m, Time now) noexcept {
 }
 
 void Telemetry::take(const mavlink::Odometry& m, Time now) noexcept {
-  reset_counter = {m.reset_counter, now};
+  reset_counter.take(m.reset_counter, now);
   // x, y and z on the diagonal of the upper triangle; the first is NaN where nothing is known.
   const double variance = std::max({m.pose_covariance[0], m.pose_covariance[6], m.pose_covariance[11]});
   if (std::isfinite(m.pose_covariance[0]) && std::isfinite(variance) && variance > 0)
-    position_sigma = {std::sqrt(variance), now};
+    position_sigma.take(std::sqrt(variance), now);
 }
 
 void Telemetry::take(const mavlink::BatteryStatus& m, Time now) noexcept {
@@ -122,14 +122,14 @@ void Telemetry::take(const mavlink::BatteryStatus& m, Time now) noexcept {
   for (const auto cell : m.voltages) millivolts += cell == kNoCell ? 0 : cell;
   for (const auto cell : m.voltages_ext) millivolts += cell == kNoCell ? 0 : cell;
   if (millivolts > 0) b.voltage = millivolts / 1000;
-  battery = {b, now};
+  battery.take(b, now);
 }
 
 void Telemetry::take(const mavlink::SysStatus& m, Time now) noexcept {
   if (battery_status_seen_) return;
   Battery b{std::nullopt, share(m.battery_remaining), amperes(m.current_battery)};
   if (m.voltage_battery != kNoVoltage && m.voltage_battery != 0) b.voltage = m.voltage_battery / 1000.0;
-  if (b.voltage || b.remaining) battery = {b, now};
+  if (b.voltage || b.remaining) battery.take(b, now);
 }
 
 void Telemetry::take(const mavlink::ExtendedSysState& m, Time now) noexcept {
@@ -137,7 +137,7 @@ void Telemetry::take(const mavlink::ExtendedSysState& m, Time now) noexcept {
     ++broken;
     return;
   }
-  landed_state = {static_cast<LandedState>(m.landed_state), now};
+  landed_state.take(static_cast<LandedState>(m.landed_state), now);
 }
 
 void Telemetry::take(const mavlink::CommandAck& m, Time now) noexcept {
@@ -169,7 +169,8 @@ void Telemetry::take(const mavlink::Statustext& m, Time now) noexcept {
 void Telemetry::take(const mavlink::ParamValue& m, Time now) noexcept {
   constexpr std::uint8_t kInt32 = 6;
   double value = static_cast<double>(m.param_value);
-  const bool px4 = status && status->value.autopilot == Autopilot::kPx4;
+  const auto from = status.at(now);
+  const bool px4 = from && from->value.autopilot == Autopilot::kPx4;
   if (px4 && m.param_type == kInt32) value = std::bit_cast<std::int32_t>(m.param_value);
   const bool number = std::isfinite(value);
   if (!number) ++broken;

@@ -14,8 +14,6 @@ namespace backwash::firmware_bridge {
 /// Monotonic time; the caller passes it in, so that tests can count it in ticks.
 using Time = std::chrono::steady_clock::time_point;
 
-inline constexpr auto kHeartbeatTimeout = std::chrono::milliseconds(1500);  ///< docs/faults.md row 21
-
 /// A value and when it arrived here.
 template <class T>
 struct Received {
@@ -24,6 +22,27 @@ struct Received {
 };
 template <class T>
 using Latest = std::optional<Received<T>>;
+
+/// What the controller says of itself, which counts for so many ms: nobody gets at an older one, and what is unknown
+/// is for each reader to bear (docs/faults.md row 56).
+template <class T, int kUseBy_ms>
+class Fact {
+ public:
+  static constexpr std::chrono::milliseconds kUseBy{kUseBy_ms};
+  void take(const T& value, Time at) noexcept { newest_ = {value, at}; }
+  Latest<T> at(Time now) const noexcept { return newest_ && now - newest_->at <= kUseBy ? newest_ : std::nullopt; }
+  /// However old; absent before the first.
+  std::optional<Time::duration> age(Time now) const noexcept {
+    return newest_ ? std::optional(now - newest_->at) : std::nullopt;
+  }
+
+ private:
+  Latest<T> newest_;
+};
+/// ms. Of what an autopilot says once a second at least: as long as its heartbeat may be missing (row 21). Its pose:
+/// until LAND (row 42). Its battery: two of PX4's own messages may be lost.
+inline constexpr int kSecondly_ms = 1500, kPoseUseBy_ms = 1000, kBatteryUseBy_ms = 5000;
+inline constexpr std::chrono::milliseconds kHeartbeatTimeout{kSecondly_ms};  ///< docs/faults.md row 21
 
 /// kPlain: a controller behind a PlainPort.
 enum class Autopilot : std::uint8_t { kUnknown, kArduPilot, kPx4, kPlain };
@@ -67,16 +86,19 @@ struct StatusLine {
 
 /// The newest of everything that the flight controller said, converted to z-up and FLU. What never came is absent; what
 /// came broken (not finite, no unit quaternion, further than 10 km or faster than 100 m/s or 100 rad/s) or after its
-/// successor is dropped and counted. Real-time: take() is wait-free, no allocation.
+/// successor is dropped and counted. What holds until the controller says otherwise, as answers and parameters, has no
+/// use-by; none of it outlives a restart. Real-time: take() is wait-free, no allocation.
 class Telemetry {
  public:
-  Latest<VehicleStatus> status;
-  Latest<State> local_state;  ///< in the controller's own local frame L, z-up (p_W, v_W stand for p_L, v_L)
-  Latest<VehicleAttitude> attitude;
-  Latest<std::uint8_t> reset_counter;  ///< of the controller's estimator, from ODOMETRY; a change: L has moved
-  Latest<double> position_sigma;       ///< of local_state as the controller says, from ODOMETRY, m
-  Latest<Battery> battery;
-  Latest<LandedState> landed_state;
+  Fact<VehicleStatus, kSecondly_ms> status;
+  Fact<State, kPoseUseBy_ms>
+      local_state;  ///< in the controller's own local frame L, z-up (p_W, v_W stand for p_L, v_L)
+  Fact<VehicleAttitude, kPoseUseBy_ms> attitude;
+  /// Of the controller's estimator, from ODOMETRY; a change: L has moved.
+  Fact<std::uint8_t, kSecondly_ms> reset_counter;
+  Fact<double, kSecondly_ms> position_sigma;  ///< of local_state as the controller says, from ODOMETRY, m
+  Fact<Battery, kBatteryUseBy_ms> battery;
+  Fact<LandedState, kSecondly_ms> landed_state;
   Latest<StatusLine> text;
   /// Its local frame lies somewhere on the globe, as ArduPilot asks for before arming; not known after a restart, as
   /// with parameter().

@@ -1,25 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/adapt/bets.hpp"
 
-#include <algorithm>
-
 namespace backwash::adapt {
 namespace {
 
-constexpr double kNearly = 0.9;  // of a block: groups end on samples
 constexpr double kFull = 1e200;  // a detector says no more
 
-/// Mean over the axes of the squared innovation over its largest expectation under the factor v.
-double excess(const Innovation& i, double v) noexcept {
-  double sum = 0;
-  for (int axis = 0; axis < 3; ++axis) sum += std::min(kMostSquare, i.square[axis] / (v * i.most + i.beside[axis]));
-  return sum / 3;
+/// Largest expectation of the square under the factor v, m².
+double most(const ErrorSquare& e, int axis, double v) noexcept {
+  return v * e.promised[axis] + e.noise[axis] + e.granted[axis];
 }
 
-/// The same over its smallest expectation: no noise, no steady push.
-double shortfall(const Innovation& i, double v) noexcept {
+/// Over the smallest expectation: no noise, no steady push.
+double shortfall(const ErrorSquare& e, double v) noexcept {
   double sum = 0;
-  for (int axis = 0; axis < 3; ++axis) sum += std::min(Bets::kMostCalm, i.square[axis] / (v * i.least));
+  for (int axis = 0; axis < 3; ++axis)
+    sum += std::min(Bets::kMostCalm, e.square[axis] / (v * e.least * e.promised[axis]));
   return sum / 3;
 }
 
@@ -32,6 +28,12 @@ double mean_value(const std::array<Wealth, n>& bets) noexcept {
 
 }  // namespace
 
+double excess(const ErrorSquare& e, double v) noexcept {
+  double sum = 0;
+  for (int axis = 0; axis < 3; ++axis) sum += std::min(kMostSquare, e.square[axis] / most(e, axis, v));
+  return sum / 3;
+}
+
 double Bets::detect(Detector& since, double x, double seconds) noexcept {
   double mean = 0;
   for (std::size_t j = 0; j < kStakes.size(); ++j) {
@@ -41,40 +43,24 @@ double Bets::detect(Detector& since, double x, double seconds) noexcept {
   return mean;
 }
 
-void Bets::bet_watched(const Innovation& innovation, bool ends) noexcept {
-  watched_square_ += excess(innovation, watched_);
-  if (!ends) return;
-  rose_ = rose_ || detect(watch_, watched_square_ / in_block_, block_s_) >= kReturnLength;
-  watched_square_ = 0;
-}
-
-void Bets::bet_rougher(const Innovation& innovation, bool ends) noexcept {
+void Bets::bet_rougher(const ErrorSquare& error) noexcept {
   for (std::size_t k = 0; k < kRougher.size(); ++k) {
-    square_[k] += excess(innovation, kRougher[k]);
-    if (!ends) continue;
-    const double x = square_[k] / in_block_;
-    square_[k] = 0;
+    const double x = excess(error, kRougher[k]);
     for (std::size_t j = 0; j < kStakes.size(); ++j) rougher_[k][j].times(1 + kStakes[j] * (x - 1));
-    const double change = detect(since_[k], x, block_s_);
-    const double value = mean_value(rougher_[k]);
+    const double change = detect(since_[k], x, error.seconds), value = mean_value(rougher_[k]);
     if (k == 0) highest_ = std::max(highest_, value), highest_change_ = std::max(highest_change_, change);
     if (k == above_ && (value >= refuted_ || change >= kRunLength)) ++above_;
   }
 }
 
-bool Bets::add_pair(const Innovation& pair) noexcept {
-  const std::size_t before = below_;
+void Bets::bet_calmer(const ErrorSquare& error) noexcept {
   for (std::size_t k = 0; k < kCalmer.size(); ++k) {
-    const double x = shortfall(pair, kCalmer[k]);
+    const double x = shortfall(error, kCalmer[k]);
     for (std::size_t j = 0; j < kCalmStakes.size(); ++j)
       calmer_[k][j].times(1 + kCalmStakes[j] / (kMostCalm - 1 + kBeyond) * (1 - kBeyond - x));
     if (k == below_ && mean_value(calmer_[k]) >= refuted_) ++below_;
   }
-  if (!(watched_ > 0)) return below_ != before;
-  const bool risen = detect(pair_watch_, excess(pair, watched_), pair.seconds) >= kReturnLength;
-  const bool rises = risen && !rose_;
-  rose_ = rose_ || risen;
-  return rises || below_ != before;
+  if (watched_ > 0) rose_ = detect(watch_, excess(error, watched_), error.seconds) >= kReturnLength || rose_;
 }
 
 void Bets::forget_calmer() noexcept {
@@ -82,12 +68,13 @@ void Bets::forget_calmer() noexcept {
   watched_ = 0, rose_ = false;
 }
 
-void Bets::add(const Innovation& innovation) noexcept {
-  seconds_ += innovation.seconds, block_s_ += innovation.seconds, ++in_block_;
-  const bool ends = block_s_ > kNearly * innovation.block_s;
-  bet_rougher(innovation, ends);
-  if (watched_ > 0) bet_watched(innovation, ends);
-  if (ends) in_block_ = 0, block_s_ = 0;
+bool Bets::add(const ErrorSquare& error) noexcept {
+  const auto known = std::tuple(above(), below(), rose_);
+  seconds_ += error.seconds, ++count_;
+  for (int axis = 0; axis < 3; ++axis) beyond_ += error.square[axis] > kLevel * kLevel * most(error, axis, 1);
+  bet_rougher(error);
+  bet_calmer(error);
+  return known != std::tuple(above(), below(), rose_);
 }
 
 std::optional<double> Bets::above() const noexcept {

@@ -2,62 +2,58 @@
 #include "core/adapt/in_flight.hpp"
 
 #include <algorithm>
-
-#include "core/types/time.hpp"
+#include <cmath>
+#include <utility>
 
 namespace backwash::adapt {
 namespace {
 
-constexpr double kAnew = 2 * Innovations::kLongestInterval;  // s: a gap to all that follows time
-
-Gusts by_differences(Gusts gusts) {
-  gusts.differences = true;
-  return gusts;
-}
-
-Disturbance disturbance_of(const InFlightConstants& constants) {
+Vehicle vehicle_of(const InFlightConstants& constants) {
   Vehicle vehicle;
   vehicle.controller = constants.controller;
-  return Disturbance(vehicle);
+  return vehicle;
 }
+
+constexpr double kMostOfIt = 0.5;
+constexpr double kSurelyShown = 28;  // χ² of nine: 1e-3 where there is nothing
 
 }  // namespace
 
 InFlight::InFlight(const InFlightConstants& constants)
-    : disturbance_(disturbance_of(constants)),
-      adaptation_(by_differences(constants.gusts), constants.alpha),
+    : error_(vehicle_of(constants), constants.gusts),
+      alpha_(constants.alpha),
       calmest_(constants.calmest),
-      grown_(larger(constants.start, kModelledAir)),
-      factors_(grown_) {}
-
-// Since the tick before, by the stamps; nothing where there is none to compare with.
-std::optional<Vec3> InFlight::acceleration(const AirTick& tick) noexcept {
-  const double dt = last_ && last_->frame == tick.frame ? seconds(tick.stamp_ns - last_->stamp_ns) : 0;
-  const bool follows = dt > 0 && dt <= Disturbance::kGap;
-  t_s_ += follows ? dt : kAnew;
-  const Vec3 a_W = follows ? Vec3((tick.state.v_W - last_->state.v_W) / dt) : Vec3(Vec3::Zero());
-  last_ = tick;
-  return follows ? std::optional(a_W) : std::nullopt;
+      constant_(error_.kp(), false),
+      motion_(error_.kp(), true),
+      kept_(larger(constants.start, kModelledAir)) {
+  forget();
 }
 
-std::optional<Vec3> InFlight::noise(const Vec3& w_W) noexcept {
-  if (last_w_) squares_ += (w_W - *last_w_).cwiseAbs2(), ++steps_;
-  last_w_ = w_W;
-  return steps_ >= kLeastSteps ? std::optional<Vec3>(squares_ / (2 * steps_)) : std::nullopt;
+// Given the error before, the square of the next is the promised one and what is left of that error at most, and of a
+// steady push; what is left of the errors is foretold by no constant.
+bool InFlight::bet(const ErrorSample& sample) noexcept {
+  const std::array<ErrorSample, 3> kinds{sample, constant_.add(sample), motion_.add(sample)};
+  constexpr double kLeft = ControlError::kForgotten * ControlError::kForgotten;
+  bool changed = false;
+  for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
+    const ErrorSample& s = kinds[kind];
+    ErrorSquare square{s.seconds, s.e_W.cwiseAbs2(), s.promised, s.noise, kLeft * before_[kind], error_.least()};
+    before_[kind] = square.square;
+    if (kind == 0) square.granted += error_.steady().cwiseAbs2();
+    if (!sample.air) continue;
+    const auto k = static_cast<std::size_t>(*sample.air);
+    sums_[k][kind] += excess(square, 1);
+    if (kind == 0) changed = errors_[k].add(square), ++samples_[k];
+    if (kind == 2) changed = rest_[k].add(square) || changed;
+  }
+  return changed;
 }
 
 bool InFlight::add(const AirTick& tick) noexcept {
-  const auto a_W = acceleration(tick);
-  if (!a_W) last_w_.reset();
-  const auto w_W = disturbance_.add({t_s_, tick.state, a_W.value_or(Vec3::Zero()), tick.command});
-  if (!w_W || !w_W->allFinite()) {
-    last_w_.reset();
-    return false;
-  }
-  const auto measured = noise(*w_W);
-  if (!measured) return false;
+  flown_ = true;
   const AirFactors before = factors_;
-  if (adaptation_.add({t_s_, *w_W, tick.sigma, tick.air, *measured})) {
+  const auto sample = error_.add(tick);
+  if (sample && bet(*sample)) {
     judge_calm();
     if (!frozen_) grow();
   }
@@ -65,8 +61,24 @@ bool InFlight::add(const AirTick& tick) noexcept {
   return factors_ != before;
 }
 
+Cause InFlight::cause(AirClass air) const noexcept {
+  const auto k = static_cast<std::size_t>(air);
+  if (!above(air)) return Cause::none;
+  const auto& [as_is, less_constant, left] = sums_[k];
+  const auto most = [&](double of, double without) {  // of what errors are beyond the promise
+    return of > samples_[k] && of - without >= kMostOfIt * (of - samples_[k]);
+  };
+  if (of(air).above() && most(as_is, less_constant)) return Cause::constant;
+  if (most(less_constant, left)) return Cause::motion;
+  const double rest = std::max(1.0, left / samples_[k]);
+  const bool loop_is_known =
+      motion_.shown(rest) < kSurelyShown && motion_.would_show(error_.lag_of(rest), rest) > 2 * kSurelyShown;
+  return rest_[k].above() && loop_is_known ? Cause::air : Cause::unknown;
+}
+
 void InFlight::grow() noexcept {
-  grown_ = larger(grown_, adaptation_.factors());
+  for (std::size_t k = 0; k < kAirClasses; ++k)
+    grown_[k] = std::max(grown_[k], above(static_cast<AirClass>(k)).value_or(1));
   combine();
 }
 
@@ -74,17 +86,16 @@ void InFlight::grow() noexcept {
 // so at the next rest. Sets of frozen factors return too: what was shrunk was right in calmer air alone.
 void InFlight::judge_calm() noexcept {
   for (std::size_t k = 0; k < kAirClasses; ++k) {
-    const auto air = static_cast<AirClass>(k);
-    const Bets& bets = adaptation_.of(air);
-    if (bets.rose() || bets.above()) {
+    Bets& bets = errors_[k];
+    if (bets.rose() || above(static_cast<AirClass>(k))) {
       calm_[k] = shown_[k] = 1;
-      adaptation_.forget_calmer(air);
+      bets.forget_calmer();
       continue;
     }
     const double factor = std::max(calmest_, bets.below().value_or(1));
     if (!(factor < shown_[k])) continue;
     shown_[k] = factor;
-    adaptation_.watch(air, factor);
+    bets.watch(factor);
   }
   combine();
 }
@@ -100,26 +111,30 @@ void InFlight::combine() noexcept {
   for (std::size_t k = 0; k < kAirClasses; ++k) factors_[k] = grown_[k] > 1 ? grown_[k] : calm_[k];
 }
 
+// All but what is kept.
 void InFlight::forget() noexcept {
-  adaptation_.reset();
-  factors_ = grown_ = calm_ = shown_ = kModelledAir;
-  last_.reset(), last_w_.reset();
-  squares_.setZero(), steps_ = 0;
+  error_.forget();
+  errors_.fill(Bets(alpha_)), rest_.fill(Bets(alpha_));
+  constant_ = Remainder(error_.kp(), false), motion_ = Remainder(error_.kp(), true);
+  before_.fill(Vec3::Zero()), sums_ = {}, samples_ = {};
+  grown_ = kept_, calm_ = shown_ = kModelledAir;
+  combine();
 }
 
 bool InFlight::end() noexcept {
-  if (!last_) return false;
-  last_.reset(), last_w_.reset();
-  const AirFactors before = factors_;
-  calm_ = shown_ = kModelledAir;
-  for (std::size_t k = 0; k < kAirClasses; ++k) adaptation_.forget_calmer(static_cast<AirClass>(k));
-  combine();
-  return factors_ != before;
+  if (!std::exchange(flown_, false)) return false;
+  const AirFactors before = factors_, kept = kept_;
+  for (std::size_t k = 0; k < kAirClasses && !frozen_; ++k)
+    if (cause(static_cast<AirClass>(k)) == Cause::air) kept_[k] = std::max(kept_[k], *rest_[k].above());
+  const AirFactors grown = frozen_ ? grown_ : kept_;
+  forget();
+  grown_ = grown, combine();
+  return factors_ != before || kept_ != kept;
 }
 
 bool InFlight::carry_out(AirOrder order) noexcept {
   const AirFactors before = factors_;
-  if (order == AirOrder::reset) forget();
+  if (order == AirOrder::reset) kept_ = kModelledAir, forget();
   if (order == AirOrder::freeze) frozen_ = true;
   if (order == AirOrder::thaw) frozen_ = false, grow();
   return factors_ != before;

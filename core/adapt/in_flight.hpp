@@ -1,88 +1,91 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "core/adapt/adaptation.hpp"
-#include "core/adapt/disturbance.hpp"
+#include "core/adapt/bets.hpp"
+#include "core/adapt/cause.hpp"
+#include "core/adapt/remainder.hpp"
 
 namespace backwash::adapt {
 
 /// What the updates of a flight depend on beside its ticks.
 struct InFlightConstants {
   decltype(Vehicle::controller) controller{};
-  Gusts gusts;                      ///< the noise is measured in flight
+  Gusts gusts;
   double alpha = kAlpha;            ///< in (0, 1)
   AirFactors start = kModelledAir;  ///< what earlier flights have learnt, each ≥ 1
   double calmest = 1;               ///< factors fall so far at most, in (0, 1]; 1: none falls below 1
 };
 
-/// What one tick adds: the newest good odometry, the set-point of the tick that took it, and the model at its place.
-struct AirTick {
-  std::int64_t stamp_ns = 0;  ///< of the odometry
-  std::uint64_t frame = 0;    ///< another one: state and set-point are of a frame that moved meanwhile
-  State state;
-  Setpoint command;
-  Vec3 sigma = Vec3::Zero();  ///< modelled variance along x, y, z of W, (m/s²)²; 0: the map has none there
-  AirClass air = AirClass::none;
-  bool rests = false;  ///< at the end of a verified way or stop, and measured to be at rest: sets may shrink
-};
-
 /// What an operator asks of what a flight learns.
 enum class AirOrder : std::uint32_t {
-  reset,   ///< as modelled, as if nothing had been flown: the one thing that lets a factor fall
+  reset,   ///< as modelled, as if nothing had been flown: the one thing that lets a kept factor fall
   freeze,  ///< the factors stay as they are; evidence goes on being counted
   thaw     ///< they follow the evidence again, at once that of meanwhile
 };
 inline constexpr std::uint32_t kAirOrders = 3;
 
-/// Adaptation in flight: acceleration by differences of the velocity, and its noise as the flight shows it, half the
-/// mean square of the steps of the disturbance so far: three times the noise of a velocity over dt², which covers what
-/// neighbouring groups share. Factors above 1 never fall, but by an order. A named class that is shown to be calmer
-/// than modelled gets a factor below 1 in a tick at rest, and 1 again as soon as it is shown to be rougher than that.
-/// Of two with equal ticks and orders every number is equal, bit for bit.
+/// What a flight learns of its errors, class of air by class (docs/model.md section 7). Sets grow by the factor that
+/// the errors show, whatever the cause; only of air it outlives the flight. Factors above 1 never fall in flight, but
+/// by an order. A named class that is shown to be calmer than modelled gets a factor below 1 in a tick at rest, and 1
+/// again as soon as it is shown to be rougher than that. Of two with equal ticks and orders every number is equal, bit
+/// for bit.
 class InFlight {
  public:
-  static constexpr int kLeastSteps = 50;  ///< of which the noise is measured before anything is bet
-
+  /// Made before the flight, in some 10 ms. Errors: those of ControlError.
   explicit InFlight(const InFlightConstants& constants);
 
-  /// One tick; whether a factor changed. A stamp that does not rise, a gap and a frame that moved let it begin anew;
-  /// what has been learnt stays. Real-time: wait-free, no allocation.
+  /// One tick; whether a factor changed. Real-time: wait-free, no allocation.
   bool add(const AirTick& tick) noexcept;
-
   /// Does what is asked; whether a factor changed. Whoever asks sees to it that nothing flies on sets that shrink.
   /// Real-time: wait-free, no allocation.
   bool carry_out(AirOrder order) noexcept;
   bool frozen() const noexcept { return frozen_; }
-  /// The flight has ended: the next one begins with no calmer air than the model's, and shows it anew; whether a factor
-  /// changed. Nothing happens without a tick since the last one ended. Real-time: wait-free, no allocation.
+  /// The flight has ended: the next one begins with what is kept, and learns anew; whether a factor or what is
+  /// kept changed. Nothing happens without a tick since the last one ended. Real-time: wait-free, no allocation.
   bool end() noexcept;
 
   /// ≥ calmest; ≥ what it began with until a reset.
   const AirFactors& factors() const noexcept { return factors_; }
-  const Bets& of(AirClass air) const noexcept { return adaptation_.of(air); }
-  std::uint64_t refused() const noexcept { return adaptation_.refused(); }  ///< samples
+  /// What outlives flights, each ≥ 1: of rougher air, from the end of the flight that showed it.
+  const AirFactors& kept() const noexcept { return kept_; }
+  Cause cause(AirClass air) const noexcept;
+  /// Bets on the errors as they are, and on what neither a constant nor the motion explains.
+  const Bets& of(AirClass air) const noexcept { return errors_[static_cast<std::size_t>(air)]; }
+  const Bets& rest_of(AirClass air) const noexcept { return rest_[static_cast<std::size_t>(air)]; }
+  /// Of both the larger: the factor that was refuted, and the evidence. Real-time: wait-free, no allocation.
+  std::optional<double> above(AirClass air) const noexcept {
+    return std::max(of(air).above(), rest_of(air).above());  // nothing is less than any
+  }
+  double ln_evidence(AirClass air) const noexcept {
+    return std::max(of(air).ln_evidence(), rest_of(air).ln_evidence());
+  }
+  double ln_changed(AirClass air) const noexcept { return std::max(of(air).ln_changed(), rest_of(air).ln_changed()); }
+  std::uint64_t refused() const noexcept { return error_.refused(); }  ///< ticks
+  Vec3 noise() const noexcept { return error_.noise(); }               ///< variance of the measured position, m²
+  double spacing_s() const noexcept { return error_.spacing_s(); }     ///< from one sample to the next
 
  private:
-  std::optional<Vec3> acceleration(const AirTick& tick) noexcept;
-  std::optional<Vec3> noise(const Vec3& w_W) noexcept;
+  using AllBets = std::array<Bets, kAirClasses>;
+  bool bet(const ErrorSample& sample) noexcept;
   void grow() noexcept;
   void judge_calm() noexcept;
   void settle() noexcept;
   void combine() noexcept;
   void forget() noexcept;
 
-  Disturbance disturbance_;
-  Adaptation adaptation_;
-  double calmest_;
-  AirFactors grown_, calm_ = kModelledAir;  // ≥ 1 and never falling; ≤ 1
-  AirFactors shown_ = kModelledAir;         // ≤ calm_, and watched: what calm_ becomes at rest
+  ControlError error_;
+  double alpha_, calmest_;
+  AllBets errors_, rest_;  // on errors as they are; on what is left of them
+  Remainder constant_, motion_;
+  /// Of the errors, of them less a constant, less the motion's part too: squares of the sample before, and by class
+  /// the sums over their expectation as modelled.
+  std::array<Vec3, 3> before_;
+  std::array<std::array<double, 3>, kAirClasses> sums_;
+  std::array<double, kAirClasses> samples_;
+  AirFactors kept_, grown_, calm_ = kModelledAir;  // grown_ ≥ kept_ ≥ 1, rising in flight; calm_ ≤ 1
+  AirFactors shown_ = kModelledAir;                // ≤ calm_, and watched: what calm_ becomes at rest
   AirFactors factors_;
-  bool frozen_ = false;
-  std::optional<AirTick> last_;
-  double t_s_ = 0;               // rises, whatever the stamps do
-  std::optional<Vec3> last_w_;   // of the tick before
-  Vec3 squares_ = Vec3::Zero();  // of the steps of w
-  int steps_ = 0;
+  bool frozen_ = false, flown_ = false;
 };
 
 }  // namespace backwash::adapt

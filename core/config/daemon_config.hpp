@@ -58,6 +58,7 @@ struct Daemon {
     int system = 1;                        ///< MAVLink system id of the vehicle
     std::optional<SecretKey> signing_key;  ///< of MAVLink's signatures, both ways; absent: none are made or asked for
   } link;
+  std::optional<double> risk;  ///< of a touch, in each flight and each minute at rest; none: the worst case is kept
   struct {
     int priority = 0;         ///< SCHED_FIFO priority of the control thread; 0: ordinary scheduling
     std::optional<int> cpu;   ///< processor that the control thread is bound to; none: any
@@ -81,8 +82,8 @@ struct Daemon {
 };
 
 /// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
-/// The tables frames, odometry, map, gpio and adaptation, link.protocol and link.signing_key_file may be left out:
-/// their defaults are above. The key file is read here, so that a start with a bad one ends before any port opens.
+/// The tables frames, odometry, map, reach, gpio and adaptation, link.protocol and link.signing_key_file may be left
+/// out: their defaults are above. The key file is read here, so that a start with a bad one ends before any port opens.
 /// `builtin:backwashd` is the shipped example.
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
 

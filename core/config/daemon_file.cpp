@@ -3,7 +3,7 @@
 #include <iterator>
 #include <tuple>
 
-#include "core/config/daemon_config.hpp"
+#include "core/config/daemon_parts.hpp"
 #include "core/config/ros_name.hpp"
 #include "core/config/strict_table.hpp"
 
@@ -15,10 +15,7 @@ constexpr std::string_view kWindow[] = {"map.window.occupied", "map.window.free"
 constexpr std::string_view kProtocol = "link.protocol";
 constexpr std::string_view kShare = "link.share";
 constexpr std::string_view kSigningKeyFile = "link.signing_key_file";
-constexpr std::string_view kOdometry[] = {"odometry.profile", "odometry.twist", "odometry.child", "odometry.message"};
-constexpr std::string_view kProfile = kOdometry[0], kTwist = kOdometry[1], kChild = kOdometry[2],
-                           kMessage = kOdometry[3];
-constexpr std::string_view kRateLeast = "odometry.rate_least";
+constexpr std::string_view kReach[] = {"reach.method"};
 constexpr std::string_view kAdaptation[] = {"adaptation.enabled", "adaptation.file"};
 constexpr std::string_view kGpio[] = {"gpio.chip", "gpio.stop_switch", "gpio.strobe", "gpio.led"};
 
@@ -83,84 +80,6 @@ tl::expected<void, ConfigError> read_gpio(const StrictTable& file, Daemon& d) {
   return {};
 }
 
-using TextKey = std::pair<std::string_view, std::string*>;
-
-tl::expected<void, ConfigError> read_texts(const StrictTable& file, std::span<const TextKey> keys, bool needed) {
-  for (const auto& [key, target] : keys) {
-    if (!needed && !file.has(key)) continue;
-    auto text = file.text(key);
-    if (!text) return tl::unexpected(text.error());
-    *target = std::move(*text);
-  }
-  return {};
-}
-
-/// One of the names of an enumeration.
-template <typename Enum>
-std::optional<Enum> named(std::string_view text, std::span<const Enum> all) {
-  const auto found = std::ranges::find(all, text, [](Enum e) { return config::name(e); });
-  return found == all.end() ? std::nullopt : std::optional(*found);
-}
-
-/// What a custom estimator sends: messages of poses alone have no twist.
-tl::expected<void, ConfigError> read_custom(const StrictTable& file, const std::string& twist,
-                                            const std::string& message, Daemon::Odometry& odometry) {
-  constexpr Twist kTwists[] = {Twist::body, Twist::world, Twist::none};
-  const auto type = named<PoseMessage>(message, kPoseMessages);
-  if (!type)
-    return tl::unexpected(file.error(kMessage, "needs \"odometry\", \"pose\", \"pose_with_covariance\" or \"tf\""));
-  odometry.message = *type;
-  const bool poses = *type != PoseMessage::odometry;
-  if (poses) odometry.twist = Twist::none;
-  if (twist.empty()) return {};
-  const auto frame = named<Twist>(twist, kTwists);
-  if (!frame) return tl::unexpected(file.error(kTwist, "needs \"body\", \"world\" or \"none\""));
-  if (poses && *frame != Twist::none)
-    return tl::unexpected(file.error(kTwist, "needs \"none\": message = \"" + message + "\" has poses alone"));
-  odometry.twist = *frame;
-  return {};
-}
-
-/// The profile's frames where none are given, and its twist; a custom one's own.
-tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d) {
-  std::string name = "ros", twist, message = "odometry";
-  const TextKey own[] = {{kProfile, &name}, {kTwist, &twist}, {kChild, &d.odometry.child}, {kMessage, &message}};
-  if (auto read = read_texts(file, own, false); !read) return read;
-  const auto profiles = odometry_profiles();
-  const auto profile = std::ranges::find(profiles, name, &OdometryProfile::name);
-  if (profile == profiles.end()) {
-    std::string all;
-    for (const auto& p : profiles) all += (all.empty() ? "\"" : ", \"") + std::string(p.name) + '"';
-    return tl::unexpected(file.error(kProfile, "needs one of " + all));
-  }
-  if (name != "custom") {
-    for (const auto key : {kTwist, kChild, kMessage})
-      if (file.has(key)) return tl::unexpected(file.error(key, "needs profile = \"custom\""));
-    d.odometry.child = profile->child;
-  }
-  if (!file.has("frames.odometry") && d.frames.map != profile->frame) d.frames.odometry = profile->frame;
-  d.odometry.twist = profile->twist;
-  if (!file.has(kRateLeast)) d.odometry.timing.rate_least = profile->rate_least;
-  return read_custom(file, twist, message, d.odometry);
-}
-
-/// `sent`: dds.tf. Who takes poses and closures from rt/tf would hear itself there.
-tl::expected<void, ConfigError> read_frames(const StrictTable& file, const std::string& sent, Daemon& d) {
-  if (d.frames.map == d.frames.odometry || d.frames.map == d.frames.body || d.frames.odometry == d.frames.body)
-    return tl::unexpected(file.error("frames", "needs three different names"));
-  // Of odometry a child frame says nothing of what is placed: VINS-Fusion's is its world.
-  const std::string& child = d.odometry.child;
-  if (d.odometry.message == PoseMessage::tf && (child == d.frames.map || child == d.frames.odometry))
-    return tl::unexpected(file.error(kChild, "needs the vehicle's frame, none of the map or of the odometry"));
-  if (sent == "none") return {};
-  if (sent != "map" && sent != "vehicle")
-    return tl::unexpected(file.error("dds.tf", "needs \"none\", \"map\" or \"vehicle\""));
-  if (d.odometry.message == PoseMessage::tf)
-    return tl::unexpected(file.error("dds.tf", "needs \"none\": with odometry.message = \"tf\" others send them"));
-  d.dds.tf = sent == "map" ? Transforms::map : Transforms::vehicle;
-  return {};
-}
-
 tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {
   if (auto good = read_signing_key(file, d); !good) return good;
   const auto endpoint = link_device(d.link.device);
@@ -170,6 +89,20 @@ tl::expected<void, ConfigError> read_link(const StrictTable& file, Daemon& d) {
         "needs a path, or udp:, udpin: or tcp: with a numeric IPv4 address and a port, as udp:127.0.0.1:14580"));
   d.link.endpoint = *endpoint;
   return read_protocol(file, d);
+}
+
+/// A risk is stated where the method asks for one, and nowhere else.
+tl::expected<void, ConfigError> read_risk(const StrictTable& file, double risk, Daemon& d) {
+  std::string method = "tight";
+  const TextKey own[] = {{kReach[0], &method}};
+  if (auto read = read_texts(file, own, false); !read) return read;
+  if (method != "tight" && method != "risk")
+    return tl::unexpected(file.error(kReach[0], "needs \"tight\", the worst case, or \"risk\""));
+  if ((method == "risk") != file.has("reach.risk"))
+    return tl::unexpected(method == "risk" ? file.error(kReach[0], "needs reach.risk too, as 0.001")
+                                           : file.error("reach.risk", "needs reach.method = \"risk\""));
+  if (method == "risk") d.risk = risk;
+  return {};
 }
 
 /// A window is declared by its table.
@@ -200,7 +133,7 @@ tl::expected<void, ConfigError> read_flags(const StrictTable& file, Daemon& d) {
 
 /// Numbers of the file that a Daemon does not hold as they are.
 struct Converted {
-  double domain = 0, baud = 0, share = 0, system = 0, priority = 0, cpu = 0;
+  double domain = 0, baud = 0, share = 0, system = 0, priority = 0, cpu = 0, risk = 0;
 };
 
 /// Every number of the file; no keys but theirs and `others`.
@@ -230,6 +163,7 @@ tl::expected<void, ConfigError> read_numbers(const StrictTable& file, std::span<
       {"odometry.sensor_yaw", &d.odometry.sensor_turned.z(), {-3.15, 3.15}, kOptional},
       {kRateLeast, &d.odometry.timing.rate_least, {9, 500}, kOptional},
       {"odometry.latency", &d.odometry.timing.latency, {0, 0.2}, kOptional},
+      {"reach.risk", &c.risk, {1e-6, 0.5}, kOptional},
       {"adaptation.alpha", &d.adaptation.alpha, {1e-6, 0.1}, kOptional},
       {"adaptation.calmest", &d.adaptation.calmest, {0.1, 1}, kOptional},
       {"control.cpu", &c.cpu, {-1, 1023}},
@@ -276,8 +210,8 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   const TextKey optional[] = {{"dds.security", &d.dds.security}, {"dds.tf", &tf},
                               {"frames.map", &d.frames.map},     {"frames.odometry", &d.frames.odometry},
                               {"frames.body", &d.frames.body},   {kAdaptation[1], &d.adaptation.file}};
-  std::vector<std::string_view> others{kLive, kAdaptation[0], kAdaptation[1], kProtocol, kSigningKeyFile};
-  others.insert(others.end(), std::begin(kOdometry), std::end(kOdometry));
+  std::vector<std::string_view> others{kLive, kReach[0], kAdaptation[0], kAdaptation[1], kProtocol, kSigningKeyFile};
+  others.insert(others.end(), std::begin(kOdometryTexts), std::end(kOdometryTexts));
   others.insert(others.end(), std::begin(kGpio), std::end(kGpio));
   others.insert(others.end(), std::begin(kWindow), std::end(kWindow));
   for (const auto& [key, target] : texts) others.push_back(key);
@@ -291,6 +225,7 @@ tl::expected<Daemon, ConfigError> load_daemon(const std::string& path) {
   if (auto good = read_gpio(*file, d); !good) return tl::unexpected(good.error());
   if (auto good = read_frames(*file, tf, d); !good) return tl::unexpected(good.error());
   if (auto read = read_window(*file, d); !read) return tl::unexpected(read.error());
+  if (auto read = read_risk(*file, converted.risk, d); !read) return tl::unexpected(read.error());
   if (auto read = read_flags(*file, d); !read) return tl::unexpected(read.error());
   if (auto good = convert(*file, converted, d); !good) return tl::unexpected(good.error());
   return d;

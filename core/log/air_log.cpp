@@ -6,11 +6,22 @@
 #include <utility>
 
 #include "core/log/replayed_air.hpp"
+#include "core/types/time.hpp"
 
 namespace backwash::log {
 namespace {
 
 constexpr double kAtRest = 0.2;  // m/s; what hovering in gusts moves with
+constexpr std::int64_t kSameClock_ns = 1'000'000'000;
+
+/// Since the newest good odometry was taken, s: by its stamp, where that is of our clock; else since it came, and what
+/// the configuration says that it is late by.
+double age(const track::FlightTick& flight, std::int64_t now_ns) noexcept {
+  const track::OdometrySample& s = *flight.odometry();
+  const std::int64_t way = s.received_ns - s.stamp_ns;
+  if (way >= 0 && way < kSameClock_ns) return std::max(0.0, seconds(now_ns - s.stamp_ns));
+  return std::max(0.0, flight.odometry_age() + flight.timing().latency);
+}
 
 }  // namespace
 
@@ -52,18 +63,20 @@ std::optional<adapt::InFlightConstants> decode(const RawRecord& record) noexcept
 
 bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept {
   const Mode mode = out.supervisor.mode;
-  return out.fresh && (mode == Mode::tracking || mode == Mode::hold) && in.autopilot.armed &&
-         !in.autopilot.landed.value_or(false);
+  return (mode == Mode::tracking || mode == Mode::hold) && in.autopilot.armed && out.landed == false &&
+         out.supervisor.send_setpoint;
 }
 
 bool ended(adapt::InFlight& air, const track::TickInput& in) noexcept { return !in.autopilot.armed && air.end(); }
 
-bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out, AirRecord& r) noexcept {
+bool learn(adapt::InFlight& air, const track::TickInput& in, const track::FlightTick& flight,
+           const track::TickOutput& out, AirRecord& r) noexcept {
   const track::OdometrySample& s = *flight.odometry();
   const auto place = static_cast<AirClass>(std::min<std::uint32_t>(r.air, kAirClasses - 1));
   // The last command is at rest, and everything up to it was found clear.
   const bool rests = flight.tracker().segment() != 0 && flight.tracker().finished() && s.state.v_W.norm() < kAtRest;
-  const bool changed = air.add({s.stamp_ns,
+  const bool changed = air.add({in.now_ns,
+                                out.fresh ? std::optional(age(flight, in.now_ns)) : std::nullopt,
                                 std::uint64_t{s.closures} << 8 | out.odometry_resets,
                                 s.state,
                                 out.command,
@@ -75,7 +88,7 @@ bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::T
 }
 
 double evidence(const AirRecord& r, double alpha) noexcept {
-  const double rougher = r.ln_evidence / std::log(static_cast<double>(kAirClasses) / alpha);
+  const double rougher = r.ln_evidence / std::log(adapt::kBets / alpha);
   const double became = 1 + r.ln_changed / std::log(adapt::kRunLength);
   return std::max({0.0, rougher, became});
 }
@@ -117,11 +130,11 @@ std::optional<Difference> ReplayedAir::step(const track::TickInput& in, const tr
   auto first = carry_out_orders(in, hash);
   if (air_) ended(*air_, in);
   const AirRecord* logged = std::exchange(next_, nullptr);
-  if (const bool adds = air_ && flown(in, out); adds != (logged != nullptr))
+  if (const bool adds = air_ && flown(in, out) && flight.odometry(); adds != (logged != nullptr))
     return first ? first : Difference{tick, offset_, "air", adds ? 0.0 : 1.0, adds ? 1.0 : 0.0};
   if (!logged) return first;
   AirRecord again = *logged;
-  learn(*air_, flight, out, again);
+  learn(*air_, in, flight, out, again);
   auto difference = compare(kAirDecisions, *logged, again, hash);
   if (difference) difference->offset = offset_;
   return first ? first : difference;

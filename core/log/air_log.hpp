@@ -13,18 +13,17 @@ CalmAirConstantsRecord constants(const adapt::InFlightConstants& constants) noex
 /// no number, or one out of its range.
 std::optional<adapt::InFlightConstants> decode(const RawRecord& record) noexcept;
 
-/// Whether a tick adds anything: its odometry is new and good, and set-points are flown, off the ground. Real-time:
-/// wait-free, no allocation.
+/// Whether a tick adds anything: its set-point is flown, off the ground. Real-time: wait-free, no allocation.
 bool flown(const track::TickInput& in, const track::TickOutput& out) noexcept;
 
-/// What is known to be calm ends with the flight, when the vehicle is disarmed; whether a factor changed. Real-time:
-/// wait-free, no allocation.
+/// What was learnt ends with the flight, when the vehicle is disarmed, but for what is kept; whether a factor changed.
+/// Real-time: wait-free, no allocation.
 bool ended(adapt::InFlight& air, const track::TickInput& in) noexcept;
 
 /// Adds a tick that was flown() to what is learnt, with Σ and class of the record, and writes what was decided into it;
 /// whether a factor changed. Real-time: wait-free, no allocation.
-bool learn(adapt::InFlight& air, const track::FlightTick& flight, const track::TickOutput& out,
-           AirRecord& record) noexcept;
+bool learn(adapt::InFlight& air, const track::TickInput& in, const track::FlightTick& flight,
+           const track::TickOutput& out, AirRecord& record) noexcept;
 
 /// That a class is rougher than modelled: of the martingale and of the detector (docs/model.md 7-6, 7-7) the larger
 /// one, each over what it takes. 0 is none, 1 is enough.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/log/ros_messages.hpp"
 
+#include <Eigen/Geometry>
+
 #include <cmath>
 
 #include "core/log/cdr_writer.hpp"

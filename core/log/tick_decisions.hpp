@@ -21,7 +21,6 @@ struct Decided {
 struct Learnt {
   const adapt::InFlight& air;
   AirClass place;
-  const adapt::Bets& here() const noexcept { return air.of(place); }
 };
 
 /// What became of an order about it.
@@ -96,9 +95,9 @@ inline constexpr auto kDecisions = std::tuple{
 /// The same of the air: the factors, and the evidence of the class at the place.
 inline constexpr auto kAirDecisions = std::tuple{
     Decision{"factors", &AirRecord::factors, [](const Learnt& l) { return l.air.factors(); }},
-    Decision{"ln_evidence", &AirRecord::ln_evidence, [](const Learnt& l) { return l.here().ln_evidence(); }},
-    Decision{"ln_changed", &AirRecord::ln_changed, [](const Learnt& l) { return l.here().ln_changed(); }},
-    Decision{"seconds", &AirRecord::seconds, [](const Learnt& l) { return l.here().seconds(); }},
+    Decision{"ln_evidence", &AirRecord::ln_evidence, [](const Learnt& l) { return l.air.ln_evidence(l.place); }},
+    Decision{"ln_changed", &AirRecord::ln_changed, [](const Learnt& l) { return l.air.ln_changed(l.place); }},
+    Decision{"seconds", &AirRecord::seconds, [](const Learnt& l) { return l.air.of(l.place).seconds(); }},
     Decision{"frozen", &AirRecord::frozen, [](const Learnt& l) { return l.air.frozen(); }},
 };
 inline constexpr auto kAirOrderDecisions = std::tuple{

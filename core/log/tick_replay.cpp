@@ -155,6 +155,7 @@ std::vector<std::uint8_t> encode(const track::AcceptedSegment& s) {
     rows.add(stop.commands);
     rows.add(stop.tube);
   }
+  if (s.worst != 1) rows.add(s.worst), rows.add(s.worst_at_rest);
   return rows.bytes();
 }
 
@@ -179,7 +180,9 @@ tl::expected<std::unique_ptr<track::AcceptedSegment>, LogError> decode_offer(std
     in.good = in.good && own_sets == own_commands + 1 && stop.branch <= commands;
     s->stops.push_back(std::move(stop));
   }
-  if (!in.done() || sets != commands + 1) return bad("is not an offered segment: its sizes disagree");
+  if (!in.done()) s->worst = in.number(), s->worst_at_rest = in.number();
+  if (!in.done() || sets != commands + 1 || !(s->worst >= 1) || !(s->worst_at_rest >= 1))
+    return bad("is not an offered segment: its sizes disagree");
   return s;
 }
 

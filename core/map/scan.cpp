@@ -42,7 +42,9 @@ void LiveMap::pass(const Vec3& from, const Vec3& to) {
 
 void LiveMap::take_along(const LiveMap& other, const Index3& low) noexcept {
   for_each_voxel(all_of(grid_.size()), [&](const Index3& v) {
-    if (grid_.occupied(v) && other.found(low + v)) misses_[grid_.linear(v)] = kFound;
+    if (!other.found(low + v)) return;
+    grid_.set(v, Cell::occupied);
+    misses_[grid_.linear(v)] = kFound;
   });
 }
 

@@ -10,10 +10,10 @@
 
 namespace backwash::map {
 
-/// What a scan changed in the grid.
+/// What a scan, or a mapper's window, changed in the grid.
 struct ScanChange {
   VoxelBox box;                  ///< around all voxels whose content changed; empty: none did
-  std::vector<Index3> occupied;  ///< voxels that were not occupied before
+  std::vector<Index3> occupied;  ///< of them those that are occupied now, or not known any more
 };
 
 /// A grid that takes in range scans while flying. Within one scan occupied wins over free. A voxel that a point lies in
@@ -35,8 +35,12 @@ class LiveMap {
   }
   /// Whether the voxel is occupied and a scan has found it so.
   bool found(const Index3& v) const noexcept { return grid_.inside(v) && (misses_[grid_.linear(v)] & kFound) != 0; }
-  /// Takes along what scans have found in another grid of the lattice, where it is occupied in this one: `low` is the
-  /// voxel of that grid at this one's first.
+  /// What scans have found so far is as if another had said it.
+  void forget_found() noexcept {
+    for (std::uint8_t& misses : misses_) misses &= static_cast<std::uint8_t>(~kFound);
+  }
+  /// Takes along what scans have found in another grid of the lattice: it is occupied in this one, until scans see
+  /// through it. `low` is the voxel of that grid at this one's first.
   void take_along(const LiveMap& other, const Index3& low) noexcept;
   /// Casts a ray from the sensor to each point (m in W); the last voxel of a ray is not passed. Points farther than
   /// `max_range` (m) only free the way up to there. Precondition: the sensor is inside the grid and max_range < 1 km.

@@ -57,7 +57,7 @@ reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& mod
   return hover_set(reach, part, distance, bounds, p_W);
 }
 
-/// why_blocked() without a world. A set from too little of the field is too small: what it says is blocked is. Where
+/// why_no_rest() without a world. A set from too little of the field is too small: what it says is blocked is. Where
 /// it leaves what was computed, more is, up to kMostReach.
 std::optional<std::string> why_blocked(const map::OccupancyGrid& grid, const Model& model,
                                        const reach::Reachability& reach, std::optional<double> constant_margin,
@@ -74,7 +74,7 @@ std::optional<std::string> why_blocked(const map::OccupancyGrid& grid, const Mod
 
 }  // namespace
 
-std::optional<std::string> why_blocked(const World& world, const Vec3& p_W, double least_clearance) {
+std::optional<std::string> why_no_rest(const World& world, const Vec3& p_W, double least_clearance) {
   if (auto why = why_not_free(world.grid, p_W)) return why;
   const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin);
   return why_not_clear(set, p_W, least_clearance);
@@ -84,7 +84,7 @@ std::optional<std::string> why_blocked_now(const World& world, const PlanStart& 
   auto tube =
       reach::tube_over_field(world.reach, start.estimated, start.command, std::span(&start.command, 1), world.bounds);
   tube.pop_back();
-  const double clearance = tube_clearance(world, tube);
+  const double clearance = tube_clearance(world, tube, 0, least_clearance);
   if (clearance > least_clearance) return std::nullopt;
   return to_text(start.estimated.p_W) + ", where the vehicle is now, is not clear: the clearance is " +
          to_text(clearance, 3) + " m";
@@ -103,7 +103,8 @@ std::optional<Plan> refused_at_once(const map::OccupancyGrid& grid, const Model&
     plan.message = end + *why;
     return plan;
   };
-  if (auto plan = refused(PlanStatus::start_blocked, "start ", start.command.p_W)) return plan;
+  if (!model.bound.stated)  // by a risk a start is asked less than a place of rest
+    if (auto plan = refused(PlanStatus::start_blocked, "start ", start.command.p_W)) return plan;
   return refused(PlanStatus::goal_blocked, "goal ", goal_W);
 }
 

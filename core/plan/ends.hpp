@@ -8,9 +8,14 @@
 
 namespace backwash::plan {
 
-/// Why hovering at p is not safe, one line; nothing where it is: the place must be free, its hover set bounded, and its
-/// clearance more than `least_clearance` (m).
-std::optional<std::string> why_blocked(const World& world, const Vec3& p_W, double least_clearance);
+/// Why the vehicle may not be left at rest at p, one line; nothing where it may: the place must be free, its hover set
+/// bounded, and its clearance more than `least_clearance`, m.
+std::optional<std::string> why_no_rest(const World& world, const Vec3& p_W, double least_clearance);
+/// The one question that every place of rest is asked: a start, a goal, the top of a take-off, where a replanned way
+/// ends. What comes to rest by a tube asks it by tube_to_rest() (rest.hpp).
+inline bool may_rest_at(const World& world, const Vec3& p_W, double least_clearance) {
+  return !why_no_rest(world, p_W, least_clearance);
+}
 
 /// Why the first set, of the vehicle where it is now, is not clear: whatever is commanded changes nothing there.
 std::optional<std::string> why_blocked_now(const World& world, const PlanStart& start, double least_clearance);

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "core/plan/ends.hpp"
 #include "core/plan/refinement.hpp"
+#include "core/plan/rest.hpp"
 #include "core/reach/clearance.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::plan {
 
@@ -20,6 +23,19 @@ Plan refused(Plan plan, PlanStatus status, std::string message) {
   plan.status = status;
   plan.message = std::move(message);
   return plan;
+}
+
+/// Why nothing is begun from there, where the vehicle has hovered. By a stated risk the sets of a moment are asked: it
+/// is left, and a minute there would be no safer.
+std::optional<std::string> why_not_from(const World& world, const Vec3& p_W, double least_clearance) {
+  if (!world.bounds.model().stated || !world.grid.free(world.grid.index(p_W)))
+    return why_no_rest(world, p_W, least_clearance);
+  std::vector<Setpoint> hover(1, {p_W, Vec3::Zero(), Vec3::Zero(), 0});
+  hold_until_settled(world.reach, hover);
+  const auto tube = reach::tube_over_field(world.reach, {p_W, Vec3::Zero()}, hover.front(), hover, world.bounds);
+  const double clearance = nearest_approach(world, tube).clearance;
+  if (clearance > least_clearance) return std::nullopt;
+  return to_text(p_W) + " is not clear: the clearance of hovering is " + to_text(clearance, 3) + " m";
 }
 
 /// A cap on states is a budget like the deadline: it says nothing about whether a path exists.
@@ -68,11 +84,11 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
   const auto deadline =
       begun + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.deadline_s));
   Plan result;
-  if (const auto why = why_blocked(world, start.command.p_W, options.least_clearance_m))
+  if (const auto why = why_not_from(world, start.command.p_W, options.least_clearance_m))
     return refused(result, PlanStatus::start_blocked, "start " + *why);
   if (const auto why = why_blocked_now(world, start, options.least_clearance_m))
     return refused(result, PlanStatus::start_blocked, "start " + *why);
-  if (const auto why = why_blocked(world, goal_W, options.least_clearance_m))
+  if (const auto why = why_no_rest(world, goal_W, options.least_clearance_m))
     return refused(result, PlanStatus::goal_blocked, "goal " + *why);
 
   const auto path = search(SafeView(world.safe, {world.grid.index(start.command.p_W), world.grid.index(goal_W)}),
@@ -91,11 +107,27 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
   if (!refined.found) return refused(result, PlanStatus::infeasible, refined.why);
   Refined& found = *refined.found;
   result.metrics = measured(result.metrics, found.trajectory, found.clearance_m);
+  result.metrics.risk = found.risk;
   result.status = PlanStatus::ok;
   result.trajectory = std::move(found.trajectory);
   result.commands = facing_ahead(std::move(found.commands), {start.command.yaw, 0}, options.yaw);
   result.tube = std::move(found.tube);
   return result;
+}
+
+Model model_for(Model model, const Vehicle& vehicle, double risk) {
+  if (reach::has_integrator(vehicle))
+    throw std::invalid_argument("no risk is known of a loop with controller.velocity_integrator");
+  if (!model.extension.empty()) throw std::invalid_argument("no risk is known of an extended model");
+  constexpr double kMoment = 0.05;  // s that a flight is as near as its sets allow: a choice of where to look
+  const auto reach = sets_of(vehicle, reach::Method::tight);
+  auto& bound = model.bound;
+  const double worst = bound.kappa, a_minute = reach::kappa_of(reach, bound.tau_w, risk, 60);
+  if (!(worst >= a_minute))
+    throw std::invalid_argument("bound.kappa is below what the risk asks for, " + to_text(a_minute, 2));
+  bound.kappa = reach::kappa_of(reach, bound.tau_w, risk, kMoment);
+  bound.stated = StatedRisk{risk, a_minute / bound.kappa, worst / bound.kappa};
+  return model;
 }
 
 Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
@@ -128,8 +160,23 @@ Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
   return {least - taken, tube[where].center, tube[where].t};
 }
 
-double tube_clearance(const World& world, const reach::ReachTube& tube) {
-  return nearest_approach(world, tube).clearance;
+reach::Risk risk_of(const World& world, const reach::ReachTube& tube, std::size_t from, double apart) {
+  const BoundModel& model = world.bounds.model();
+  if (!model.stated) return {};
+  return reach::risk_of_touching(world.reach, world.grid, world.distance, model, tube, model.stated->touch, from,
+                                 apart);
+}
+
+bool keeps(const World& world, const reach::Risk& risk) noexcept {
+  const auto& stated = world.bounds.model().stated;
+  return !stated || (risk.total <= stated->touch && risk.a_minute <= stated->touch);
+}
+
+double tube_clearance(const World& world, const reach::ReachTube& tube, std::size_t from, double apart) {
+  from = std::min(from, tube.size() - 1);
+  const double clearance =
+      nearest_approach(world, {tube.begin() + static_cast<std::ptrdiff_t>(from), tube.end()}).clearance;
+  return clearance > 0 && !keeps(world, risk_of(world, tube, from, apart)) ? 0 : clearance;
 }
 
 }  // namespace backwash::plan

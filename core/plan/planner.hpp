@@ -8,6 +8,7 @@
 #include "core/plan/bspline_optimizer.hpp"
 #include "core/plan/world.hpp"
 #include "core/plan/yaw.hpp"
+#include "core/reach/risk.hpp"
 
 namespace backwash::plan {
 
@@ -41,13 +42,20 @@ struct PlanMetrics {
   double min_clearance_m = 0;  ///< over the verified swept tube (docs/model.md section 4)
   double search_ms = 0, optimise_ms = 0, verify_ms = 0;
   std::size_t expanded = 0, evaluations = 0;
+  reach::Risk risk{};  ///< where one was stated
 };
+
+/// The model by which a stated risk is kept in place of the worst case (docs/model.md 5.3-5): what is kept clear in its
+/// world is a first guess, and what flies is asked keeps(). Errors: of reach::kappa_of(); throws
+/// std::invalid_argument for a loop with an integrator, an extended model, and a κ below what a minute at rest asks
+/// for.
+Model model_for(Model model, const Vehicle& vehicle, double risk);
 
 struct Plan {
   PlanStatus status = PlanStatus::no_path;
   std::string message;  ///< one line: why not, and where; empty when ok
   BSpline trajectory;
-  std::vector<Setpoint> commands;  ///< every 20 ms, followed by one second of holding the goal
+  std::vector<Setpoint> commands;  ///< every 20 ms, then the goal is held until the loop has settled
   reach::ReachTube tube;           ///< verified: one entry more than commands
   PlanMetrics metrics;
 };
@@ -66,23 +74,30 @@ struct Approach {
 /// The smallest clearance of a tube swept through the world: prism query over each interval with the centre's motion,
 /// less body.radius and estimation.position; with a constant margin, ball of that radius. Precondition: not empty.
 Approach nearest_approach(const World& world, const reach::ReachTube& tube);
-/// Its clearance, m.
-double tube_clearance(const World& world, const reach::ReachTube& tube);
+/// What a tube risks from entry `from` on, and a minute of resting at its end; none where the model states no risk.
+/// `apart`: that the frames are apart, m.
+reach::Risk risk_of(const World& world, const reach::ReachTube& tube, std::size_t from = 0, double apart = 0);
+/// Whether that is no more than what the world's model states.
+bool keeps(const World& world, const reach::Risk& risk) noexcept;
+/// Clearance of a tube from entry `from` on, m: none, 0, is left of it where its risk does not keep what is stated.
+double tube_clearance(const World& world, const reach::ReachTube& tube, std::size_t from = 0, double apart = 0);
 
-/// Lowest clear hover height z_safe (m, W) of the column through p, and the floor below it; nothing if there is none.
+/// Lowest height z_safe (m, W) of the column through p at which the vehicle may rest with more than `least_clearance`
+/// (m; may_rest_at()), and the floor below it; nothing if there is none.
 /// Take-off and landing move vertically in this column (docs/model.md section 4).
 struct TakeoffColumn {
   double z_floor;  ///< top of the first obstacle below, m
   double z_safe;   ///< m
 };
-std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W);
+std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W, double least_clearance);
 
 /// Vertical commands from `from` to `to` (same column), rest to rest, minimum-jerk profile within the limits.
 std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
 
 /// Clearance that a take-off tube must have (docs/model.md section 4): beside it only while its centre is below z_safe
-/// (m, W), all around from there on, m.
-double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe);
+/// (m, W), all around from there on and where it comes to rest, m; from entry `from` on. Precondition: not empty.
+double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe, std::size_t from = 0,
+                         double apart = 0);
 
 /// Smallest lateral clearance of a vertical tube: obstacles beside it, not the floor below (docs/model.md section 4),
 /// m.

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "core/plan/rest.hpp"
+
 namespace backwash::plan {
 
 namespace {
@@ -15,7 +17,6 @@ constexpr double kFirstMargin = 0.02;                ///< m beyond the tube, in 
 constexpr double kMoreMargin = 0.02;                 ///< m, after each round that fails verification
 constexpr std::size_t kFailures = 4;                 ///< of verification, per pace
 constexpr double kWorthwhile = 0.005;                ///< share of the cost that a round of polishing must gain
-constexpr std::size_t kHoldCommands = 50;            ///< verified hover at the goal: one second
 constexpr double kQuickenings[] = {1.0, 0.5, 0.25};  ///< share of what the limits leave
 constexpr double kPaces[] = {1.0, 0.7, 0.45};        ///< share of the searched path's speed
 
@@ -64,6 +65,21 @@ std::string touching(const Approach& nearest) {
   char buffer[128];
   std::snprintf(buffer, sizeof buffer, "the tube touches at (%.2f, %.2f, %.2f): clearance %.3f m", p.x(), p.y(), p.z(),
                 nearest.clearance);
+  return buffer;
+}
+
+std::string too_risky(const World& world, const reach::Risk& risk) {
+  const Vec3& p = risk.center_W;
+  const double stated = world.bounds.model().stated->touch;
+  char buffer[200];
+  if (risk.total > stated)
+    std::snprintf(buffer, sizeof buffer,
+                  "the risk of touching is %.2g or more, %.2g is stated; %.0f %% of it is about (%.2f, %.2f, %.2f)",
+                  risk.total, stated, 100 * risk.largest / risk.total, p.x(), p.y(), p.z());
+  else
+    std::snprintf(buffer, sizeof buffer,
+                  "the risk of touching is %.2g in a minute of resting at its end, %.2g is stated", risk.a_minute,
+                  stated);
   return buffer;
 }
 
@@ -133,10 +149,8 @@ class Refiner {
 
   Refined fly(const BSpline& spline) const {
     Refined flight{spline, spline.commands(), {}, 0};
-    const Setpoint hold = flight.commands.back();
-    flight.commands.insert(flight.commands.end(), kHoldCommands, hold);
-    flight.tube =
-        reach::tube_over_field(world_.reach, start_.estimated, start_.command, flight.commands, world_.bounds);
+    hold_until_settled(world_.reach, flight.commands);
+    flight.tube = tube_to_rest(world_, start_.estimated, start_.command, flight.commands);
     return flight;
   }
 
@@ -153,9 +167,14 @@ class Refiner {
   bool verified(Refined& candidate) {
     const auto begun = Clock::now();
     const Approach nearest = nearest_approach(world_, candidate.tube);
-    result_.verify_ms += ms_since(begun);
     candidate.clearance_m = nearest.clearance;
     const bool clear = nearest.clearance > options_.least_clearance_m;
+    if (clear) candidate.risk = risk_of(world_, candidate.tube, 0, options_.least_clearance_m);
+    result_.verify_ms += ms_since(begun);
+    if (clear && !keeps(world_, candidate.risk)) {
+      result_.why = too_risky(world_, candidate.risk);
+      return false;
+    }
     if (clear && stretch_needed(candidate.trajectory, limits_) <= 1) return true;
     result_.why = clear ? "no timing keeps the limits from this start" : touching(nearest);
     return false;

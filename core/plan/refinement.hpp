@@ -12,9 +12,10 @@ namespace backwash::plan {
 /// A trajectory that passed verification.
 struct Refined {
   BSpline trajectory;
-  std::vector<Setpoint> commands;  ///< every 20 ms, followed by one second of holding the goal
+  std::vector<Setpoint> commands;  ///< every 20 ms, then the goal is held until the loop has settled
   reach::ReachTube tube;           ///< of these commands
   double clearance_m;              ///< of the swept tube
+  reach::Risk risk{};              ///< where one was stated
 };
 
 struct Refinement {

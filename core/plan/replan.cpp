@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/plan/ends.hpp"
+#include "core/plan/rest.hpp"
 #include "core/plan/stop.hpp"
 
 namespace backwash::plan {
@@ -11,7 +13,6 @@ namespace {
 
 constexpr double kAtGoal = 1e-6;       ///< m
 constexpr double kLeastAdvance = 0.2;  ///< m: a nearer local goal is not worth a new path
-constexpr std::size_t kHold = 50;      ///< commands that a stop is held for
 
 /// The grid with its unknown voxels free.
 map::OccupancyGrid hopeful(map::OccupancyGrid grid) {
@@ -24,16 +25,13 @@ map::OccupancyGrid hopeful(map::OccupancyGrid grid) {
 /// joined with the start.
 std::optional<Index3> local_goal(const World& world, const std::vector<Index3>& way, const Vec3& from_W, double horizon,
                                  double least_clearance) {
-  const auto clear = [&](const Index3& v) {
-    return least_clearance <= 0 || reach::hover_set(world.reach, world.grid, world.distance, world.bounds,
-                                                    world.grid.center(v), world.constant_margin)
-                                           .clearance > least_clearance;
-  };
   const SafeView safe(world.safe, {world.grid.index(from_W)});
   std::optional<Index3> farthest;
   for (const Index3& v : way) {
     if ((world.grid.center(v) - from_W).norm() > horizon) break;
-    if (world.safe.passable(v) && safe.may_join(way.front(), v) && clear(v)) farthest = v;
+    if (world.safe.passable(v) && safe.may_join(way.front(), v) &&
+        may_rest_at(world, world.grid.center(v), least_clearance))
+      farthest = v;
   }
   return farthest;
 }
@@ -43,18 +41,13 @@ struct Candidate {
   Route route;
   double clearance;
 };
-Candidate verified(const World& world, const Route& flying, std::vector<Setpoint> commands, std::size_t now) {
+Candidate verified(const World& world, const Route& flying, std::vector<Setpoint> commands, std::size_t now,
+                   double apart) {
+  hold_until_settled(world.reach, commands);
   Candidate c{{flying.start, flying.previous, std::move(commands), {}}, 0};
-  c.route.tube = reach::tube_over_field(world.reach, flying.start, flying.previous, c.route.commands, world.bounds);
-  const auto from = c.route.tube.begin() + static_cast<std::ptrdiff_t>(std::min(now, c.route.tube.size() - 1));
-  c.clearance = tube_clearance(world, {from, c.route.tube.end()});
+  c.route.tube = tube_to_rest(world, flying.start, flying.previous, c.route.commands);
+  c.clearance = tube_clearance(world, c.route.tube, now, apart);
   return c;
-}
-
-std::vector<Setpoint> stop(const Route& flying, std::size_t branch, double a_max) {
-  auto commands = stop_along(flying.commands, branch, a_max);
-  commands.insert(commands.end(), kHold, Setpoint(commands.back()));
-  return commands;
 }
 
 }  // namespace
@@ -89,7 +82,7 @@ Replan replan(const World& world, const Route& flying, std::size_t now, std::siz
   const double least = options.limits.least_clearance_m;
   std::vector<Setpoint> held = flying.commands;
   while (held.size() <= branch) held.push_back({held.back().p_W, Vec3::Zero(), Vec3::Zero(), held.back().yaw});
-  Candidate kept = verified(world, flying, std::move(held), now);
+  Candidate kept = verified(world, flying, std::move(held), now, least);
   const Setpoint from = kept.route.commands[branch];
   if (ends_at_goal(flying) && kept.clearance > least) return take(Replan::Kind::kept, std::move(kept));
 
@@ -110,13 +103,14 @@ Replan replan(const World& world, const Route& flying, std::size_t now, std::siz
           branch > 0 ? (from.yaw - before[branch - 1].yaw) / kControlPeriod : 0.0;  // of the command given
       const auto turned = facing_ahead(planned.commands, {from.yaw - rate * kControlPeriod, rate}, options.limits.yaw);
       commands.insert(commands.end(), turned.begin(), turned.end());
-      Candidate extended = verified(world, flying, std::move(commands), now);
+      Candidate extended = verified(world, flying, std::move(commands), now, least);
       if (extended.clearance > least) return take(Replan::Kind::extended, std::move(extended));
       result.message = "the new path's tube from the route's start is not clear";
     }
   }
   if (kept.clearance > least) return take(Replan::Kind::kept, std::move(kept));
-  Candidate stopped = verified(world, flying, stop(kept.route, branch, options.limits.a_max), now);
+  Candidate stopped =
+      verified(world, flying, stop_along(kept.route.commands, branch, options.limits.a_max), now, least);
   if (stopped.clearance > least) return take(Replan::Kind::stopping, std::move(stopped));
   return take(Replan::Kind::unsafe, kept.clearance > stopped.clearance ? std::move(kept) : std::move(stopped));
 }

@@ -2,7 +2,7 @@
 // Take-off and landing: the vertical corridor below the lowest clear hover height (docs/model.md section 4).
 #include <algorithm>
 
-#include "core/plan/planner.hpp"
+#include "core/plan/ends.hpp"
 
 namespace backwash::plan {
 
@@ -10,7 +10,7 @@ namespace {
 constexpr double kLateralCap = 1.0;  ///< m
 }
 
-std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W) {
+std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W, double least_clearance) {
   const auto& grid = world.grid;
   Index3 v = grid.index(p_W);
   if (!p_W.allFinite() || !grid.free(v)) return std::nullopt;
@@ -19,8 +19,7 @@ std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W)
   const double z_floor = grid.origin().z() + a * v.z();
   for (; grid.free(v); ++v.z()) {
     const Vec3 hover_W(p_W.x(), p_W.y(), grid.center(v).z());
-    if (reach::hover_set(world.reach, grid, world.distance, world.bounds, hover_W, world.constant_margin).safe())
-      return TakeoffColumn{z_floor, hover_W.z()};
+    if (may_rest_at(world, hover_W, least_clearance)) return TakeoffColumn{z_floor, hover_W.z()};
   }
   return std::nullopt;
 }
@@ -84,10 +83,12 @@ double lateral_clearance(const World& world, const reach::ReachTube& tube) {
   return least;
 }
 
-double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe) {
-  const auto clear = std::find_if(tube.begin(), tube.end(), [&](const auto& s) { return s.center.p_W.z() >= z_safe; });
-  const double beside = lateral_clearance(world, {tube.begin(), clear});
-  return clear == tube.end() ? beside : std::min(beside, tube_clearance(world, {clear, tube.end()}));
+double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe, std::size_t from,
+                         double apart) {
+  const auto first = tube.begin() + static_cast<std::ptrdiff_t>(std::min(from, tube.size() - 1));
+  const auto clear = std::find_if(first, tube.end() - 1, [&](const auto& s) { return s.center.p_W.z() >= z_safe; });
+  return std::min(lateral_clearance(world, {first, clear}),
+                  tube_clearance(world, tube, static_cast<std::size_t>(clear - tube.begin()), apart));
 }
 
 }  // namespace backwash::plan

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/plan/verified_stops.hpp"
 
+#include "core/plan/rest.hpp"
 #include "core/plan/stop.hpp"
 
 namespace backwash::plan {
@@ -8,15 +9,14 @@ namespace backwash::plan {
 std::vector<Stop> verified_stops(const World& world, const State& start, const Setpoint& previous,
                                  const std::vector<Setpoint>& commands, std::size_t from, std::size_t every,
                                  const std::function<double(const reach::ReachTube&)>& clearance) {
-  constexpr double kRest = 2.0;  // s: then the last set is as wide as the hover set
   std::size_t moving = commands.size();
   while (moving > 0 && commands[moving - 1].v_W.isZero()) --moving;
   std::vector<Stop> stops;
   const auto verify_stop = [&](std::size_t branch) {
     // stop_along() uses half of the limit it is given.
     auto stopped = stop_along(commands, branch, 2 * world.reach.vehicle.limits.a_max);
-    stopped.insert(stopped.end(), static_cast<std::size_t>(kRest / kControlPeriod), Setpoint(stopped.back()));
-    const auto tube = reach::tube_over_field(world.reach, start, previous, stopped, world.bounds);
+    hold_until_settled(world.reach, stopped);
+    const auto tube = tube_to_rest(world, start, previous, stopped);
     if (!(clearance(tube) > 0)) return;
     const auto own = static_cast<std::ptrdiff_t>(branch);
     stops.push_back({branch, {stopped.begin() + own, stopped.end()}, {tube.begin() + own, tube.end()}});

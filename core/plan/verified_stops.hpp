@@ -11,7 +11,7 @@ namespace backwash::plan {
 /// A way to rest that leaves a flight at its command `branch`, on the flight's own path, with its own verified tube.
 struct Stop {
   std::size_t branch = 0;          ///< first command that is the stop's and not the flight's
-  std::vector<Setpoint> commands;  ///< from there on: braking, then 2 s at rest; 20 ms apart
+  std::vector<Setpoint> commands;  ///< from there on: braking, then rest until the loop has settled
   reach::ReachTube tube;           ///< entries `branch` … end: one more than commands
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <stdexcept>
 
 #include "core/reach/error_dynamics.hpp"
@@ -32,8 +33,7 @@ double in_range(double delay, const char* name) {
 }  // namespace
 
 CentrePredictor::CentrePredictor(const Vehicle& vehicle, Loop loop, const State& start, const Vec3& a_W,
-                                 const Setpoint& previous)
-    : state_(start), a_W_(a_W) {
+                                 const Setpoint& previous) {
   AxisLoop horizontal = axis_loop(vehicle, false, loop), vertical = axis_loop(vehicle, true, loop);
   double delay = in_range(horizontal.feedback_delay, "feedback_delay");
   if (delay > 0) delay = std::max(delay, kMinFeedbackDelay);
@@ -45,21 +45,28 @@ CentrePredictor::CentrePredictor(const Vehicle& vehicle, Loop loop, const State&
 
   const Periods latency = periods(in_range(vehicle.controller.latency, "latency"));
   command_delay_ = latency.whole;
-  r_.fill(kp_.cwiseProduct(previous.p_W) + kd_.cwiseProduct(previous.v_W) + previous.a_W);
+  sample_delay_ = 0;
+  add_subintervals(horizontal, vertical, latency.rest);
+  begin(start, a_W, previous);
+}
+
+void CentrePredictor::begin(const State& start, const Vec3& a_W, const Setpoint& previous) noexcept {
+  state_ = start, a_W_ = a_W, push_W_.setZero();
   x_.row(0) = start.p_W;
   x_.row(1) = start.v_W;
   x_.row(2) = a_W;
-  held_.fill(feedback(x_));
-  sample_delay_ = 0;
-  add_subintervals(horizontal, vertical, latency.rest);
+  r_.fill(kp_.cwiseProduct(previous.p_W) + kd_.cwiseProduct(previous.v_W) + previous.a_W);
+  const Vec3 u = feedback(x_);
+  held_.fill(u);
+  std::ranges::fill(past_, FeedbackPiece{kControlPeriod, u, Vec3::Zero(), u, Vec3::Zero()});
 }
 
 namespace {
 
-/// Where the pieces of a period begin, cut at two instants and nowhere longer than `longest`, s; its end comes last.
-std::vector<double> pieces_of_period(double switch_time, double measured_at, double longest) {
+/// Where the pieces of a period begin, cut at some instants and nowhere longer than `longest`, s; its end comes last.
+std::vector<double> pieces_of_period(std::initializer_list<double> cuts, double longest) {
   std::vector<double> knots{0, kControlPeriod};
-  for (const double t : {switch_time, measured_at})
+  for (const double t : cuts)
     if (t > kSameInstant && t < kControlPeriod - kSameInstant) knots.push_back(t);
   std::sort(knots.begin(), knots.end());
   std::vector<double> starts;
@@ -86,7 +93,10 @@ void CentrePredictor::add_subintervals(const AxisLoop& horizontal, const AxisLoo
     measured_at = d.rest > 0 ? kControlPeriod - d.rest : 0.0;
   }
   const double longest = kind_ == Feedback::delayed ? std::min(kLongestSegment, delay) : kControlPeriod;
-  const auto starts = pieces_of_period(switch_time, measured_at, longest);
+  // Where a command or a push jumps, the feedback has a kink `delay` later.
+  const double pushed = periods(delay).rest, switched = periods(switch_time + delay).rest;
+  const auto starts = kind_ == Feedback::delayed ? pieces_of_period({switch_time, pushed, switched}, longest)
+                                                 : pieces_of_period({switch_time, measured_at}, longest);
   for (std::size_t i = 0; i + 1 < starts.size(); ++i) {
     const double length = starts[i + 1] - starts[i];
     const bool closed = kind_ == Feedback::immediate;
@@ -118,8 +128,7 @@ void CentrePredictor::add_subintervals(const AxisLoop& horizontal, const AxisLoo
     subintervals_[k].start = locate(i, starts[k] - delay, kSameInstant);
     subintervals_[k].end = locate(i, starts[k + 1] - delay, -kSameInstant);
   }
-  const Vec3 u = feedback(x_);
-  past_.assign(static_cast<std::size_t>(longest_back) + 1, {kControlPeriod, u, Vec3::Zero(), u, Vec3::Zero()});
+  past_.resize(static_cast<std::size_t>(longest_back) + 1);
 }
 
 Vec3 CentrePredictor::feedback(const Axes& x) const noexcept {

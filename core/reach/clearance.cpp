@@ -27,11 +27,11 @@ Supports tight_supports(const PerDirection& h) noexcept {
           std::min({s, x + y, d + 2 * x, d + 2 * y}), std::min({d, x + y, s + 2 * x, s + 2 * y})};
 }
 
-/// The octagon ⊕ a voxel's square, around the origin. Lengths in voxels.
+/// The octagon ⊕ a rectangle, that of a voxel or a larger one, around the origin. Lengths in voxels.
 class FatOctagon {
  public:
-  explicit FatOctagon(const Supports& s) noexcept
-      : x_(s.x + 0.5), y_(s.y + 0.5), sum_(s.sum + 1), difference_(s.difference + 1) {
+  explicit FatOctagon(const Supports& s, double half_x = 0.5, double half_y = 0.5) noexcept
+      : x_(s.x + half_x), y_(s.y + half_y), sum_(s.sum + half_x + half_y), difference_(s.difference + half_x + half_y) {
     // Half of the corners, counter-clockwise from the right edge's lower end; the others are their mirror images.
     corners_ = {Vec2{x_, x_ - difference_}, Vec2{x_, sum_ - x_}, Vec2{sum_ - y_, y_}, Vec2{y_ - difference_, y_},
                 Vec2{-x_, difference_ - x_}};
@@ -274,11 +274,13 @@ std::size_t first_blocked(std::span<const TubeStep> tube, std::size_t from, cons
     const Vec3 off = (cube.center - step.center.p_W - half).cwiseAbs();
     const Vec3 box(step.half_widths_interval[kX], step.half_widths_interval[kY], step.half_widths_interval[kZ]);
     // Farther away along an axis than counts: most entries.
-    const Vec3 gap = off - half.cwiseAbs() - box - Vec3::Constant(cube.edge / 2);
+    const Vec3 half_cube = Vec3::Constant(cube.edge / 2) + cube.more / 2;
+    const Vec3 gap = off - half.cwiseAbs() - box - half_cube;
     if (gap.maxCoeff() > taken) continue;
     const Supports s = swept_supports(step.half_widths_interval, half);
-    const double a = cube.edge, above = std::max(0.0, off.z() - s.z - a / 2);
-    const FatOctagon octagon({s.x / a, s.y / a, 0, s.sum / a, s.difference / a});
+    const double a = cube.edge, above = std::max(0.0, off.z() - s.z - half_cube.z());
+    const FatOctagon octagon({s.x / a, s.y / a, 0, s.sum / a, s.difference / a}, 0.5 + cube.more.x() / (2 * a),
+                             0.5 + cube.more.y() / (2 * a));
     const Vec3 p = cube.center - step.center.p_W - half;
     const double beside2 = a * a * octagon.squared_distance(p.head<2>() / a);
     if (beside2 + above * above <= taken * taken) return n;

@@ -36,10 +36,11 @@ bool prism_clear(const map::OccupancyGrid& grid, const map::OccupancySums& sums,
 double swept_prism_distance(const map::OccupancyGrid& grid, const Vec3& from_W, const Vec3& to_W,
                             const PerDirection& half_widths, double limit);
 
-/// An axis-aligned cube, m in W: a voxel, or some in one.
+/// An axis-aligned cube, m in W: a voxel, or some in one; with `more` a box, longer than a cube by that along x, y, z.
 struct Cube {
   Vec3 center = Vec3::Zero();
   double edge = 0;
+  Vec3 more = Vec3::Zero();
 };
 
 /// First entry of a tube from `from` on whose set, swept until the next entry as in swept_prism_distance, comes within

@@ -46,15 +46,15 @@ MatrixAll generator(const AxisLoop& axis, double tau_w) {
 
 }  // namespace
 
-ColouredStep::ColouredStep(const AxisLoop& loop, double tau_w) : axis(loop) {
+ColouredStep::ColouredStep(const AxisLoop& loop, double tau_w, double step) : axis(loop), period(step) {
   if (!(tau_w > 0)) throw std::invalid_argument("chance-constrained sets need a correlation time tau_w above 0");
   if (axis.feedback_delay > 0) axis.feedback_delay = std::max(axis.feedback_delay, kMinFeedbackDelay);
   const MatrixAll A = generator(axis, tau_w);
-  const MatrixAll whole = (A * kPhase).exp();
+  const MatrixAll whole = (A * period).exp();
   // ∫₀^h e^{Aτ}BBᵀe^{Aᵀτ} dτ by Simpson's rule over h/2^k, then doubled: stable for the fast states of short delays,
   // where exp(−A h) of the usual block exponential overflows.
   constexpr int kDoublings = 14;
-  double h = std::ldexp(kPhase, -kDoublings);
+  double h = std::ldexp(period, -kDoublings);
   const auto shape = [&](double at) -> MatrixAll {
     const Eigen::Matrix<double, kAll, 1> b = std::sqrt(2 / tau_w) * (A * at).exp().col(kAll - 1);
     return b * b.transpose();
@@ -69,6 +69,24 @@ ColouredStep::ColouredStep(const AxisLoop& loop, double tau_w) : axis(loop) {
   rho = whole(kStates, kStates);
   noise = N.topLeftCorner<kStates, kStates>();
   noise_to_xi = N.topRightCorner<kStates, 1>();
+}
+
+// Σ_k A^k N A^kᵀ, doubled.
+SteadyError steady_error(const ColouredStep& step, double below) {
+  MatrixAll A = MatrixAll::Zero(), P;
+  A << step.E, step.g, Eigen::RowVectorXd::Zero(kAll - 1), step.rho;
+  P << step.noise, step.noise_to_xi, step.noise_to_xi.transpose(), 1 - step.rho * step.rho;
+  MatrixAll power = A;
+  for (int k = 0; k < 24; ++k) {
+    P += (power * P * power.transpose()).eval();
+    power = (power * power).eval();
+  }
+  constexpr double kLongest = 120;                     // s
+  Eigen::Matrix<double, kAll, 1> with_now = P.col(0);  // covariance of the states with e of before
+  int memory = 0;
+  for (int k = 0; k * step.period < kLongest; ++k, with_now = (A * with_now).eval())
+    if (std::abs(with_now[0]) >= below * P(0, 0)) memory = k + 1;
+  return {P(0, 0), memory * step.period};
 }
 
 double ErrorCovariance::turn_rate() const noexcept {
@@ -97,16 +115,16 @@ void ErrorCovariance::advance(double s) noexcept {
   const double after = position_deviation();
   started_ = before == 0 && after > 0;
   if (started_) {
-    turned_ = 2 * kPhase * turn_rate();  // the rate falls like 1/√t from the start
+    turned_ = 2 * m.period * turn_rate();  // the rate falls like 1/√t from the start
   } else {
     // Where σ_e almost vanishes the rate is a spike that the trapezoid may miss; the angle between e before and after,
     // seen as vectors, is not.
     const double cosine = before * after > 0 ? std::clamp(with_before / (before * after), -1.0, 1.0) : 1.0;
-    turned_ = std::max(kPhase / 2 * (rate_before + turn_rate()), std::acos(cosine));
+    turned_ = std::max(m.period / 2 * (rate_before + turn_rate()), std::acos(cosine));
   }
   // A chord's error, δ²/8·|ë|, with |ë| of both ends doubled for what it does in between.
   const double bend = 2 * std::max(bend_before, acceleration_deviation(s));
-  largest_ = std::max(before, after) + kPhase * kPhase / 8 * bend;
+  largest_ = std::max(before, after) + m.period * m.period / 8 * bend;
 }
 
 double exit_level(double turned, double level_before, double probability) {

@@ -35,8 +35,10 @@ void refuse(const AxisLoop& axis, const char* why) {
 
 namespace {
 
-// The geometric bound c_j ≤ A ρ^{j−1} of least sum on the excess of the shares over their chords.
+// The geometric bound c_j ≤ A ρ^{j−1} of least sum on the excess of the shares over their chords. What may be rounding,
+// 1e-9 of the hover set over all ages, counts as none: of an old age it would be raised by ρ^{1−j}.
 void bound_chord_excess(AxisResponse& response) {
+  const double rounding = 1e-9 * response.h_inf / static_cast<double>(response.S.size());
   std::vector<double> excess;  // age 1, 2, …
   for (std::size_t j = 1; j < response.S.size(); ++j) {
     double largest = 0;
@@ -45,14 +47,18 @@ void bound_chord_excess(AxisResponse& response) {
       const double chord = (1 - phi) * response.G[j - 1] + phi * response.G[j];
       largest = std::max(largest, (response.S[j][m - 1] - chord) / (4 * phi * (1 - phi)));
     }
-    excess.push_back(largest);
+    excess.push_back(largest > rounding ? largest : 0);
   }
   double least = std::numeric_limits<double>::infinity();
-  for (double rho = 0.5; rho < 0.9995; rho += 0.0005) {
+  const auto try_decay = [&](double rho) {
     double A = 0, power = 1;
     for (const double c : excess) A = std::max(A, c / power), power *= rho;
     if (A / (1 - rho) < least) least = A / (1 - rho), response.chord_excess = A, response.chord_decay = rho;
-  }
+  };
+  for (double rho = 0.5; rho < 0.9995; rho += 0.0005) try_decay(rho);
+  // A loop that hardly damps remembers for minutes.
+  const double slowest = 0.1 / static_cast<double>(response.S.size());
+  for (double gap = 0.0005; gap > slowest; gap *= 0.95) try_decay(1 - gap);
 }
 
 }  // namespace

@@ -83,6 +83,8 @@ class CentrePredictor {
   /// Starts at `start` with acceleration `a_W` (m/s²; commanded_acceleration() when it is not known). Errors: throws
   /// std::invalid_argument for a negative or too long latency or feedback delay.
   CentrePredictor(const Vehicle& vehicle, Loop loop, const State& start, const Vec3& a_W, const Setpoint& previous);
+  /// From here as if made anew. Real-time: wait-free, no allocation.
+  void begin(const State& start, const Vec3& a_W, const Setpoint& previous) noexcept;
   /// Issues the command of the next period and moves on by 20 ms. `push_W`: mean acceleration d by the air, held over
   /// the period, m/s²: v̇ = a + d. Real-time: wait-free, no allocation.
   State step(const Setpoint& command, const Vec3& push_W = Vec3::Zero()) noexcept;

@@ -8,14 +8,15 @@
 #include "core/reach/block_extents.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
+#include "core/reach/rest.hpp"
 
 namespace backwash::reach {
 namespace {
 
 /// Half widths of the infinite-time set under a constant bound, m. Both kinds grow with the bound.
 struct ConstantHalfWidths {
-  explicit ConstantHalfWidths(const Reachability& reach)
-      : horizontal(reach.horizontal.h_inf), vertical(reach.vertical.h_inf) {}
+  explicit ConstantHalfWidths(const Reachability& reach, double times = 1)
+      : horizontal(times * reach.horizontal.h_inf), vertical(times * reach.vertical.h_inf) {}
   PerDirection operator()(const DisturbanceBound& w_bar) const noexcept {
     PerDirection h;
     for (std::size_t d = 0; d < kDirections; ++d) h[d] = (d == kZ ? vertical : horizontal) * w_bar.w[d];
@@ -180,7 +181,8 @@ class ClearTest {
 }  // namespace
 
 HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                      const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin) {
+                      const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin,
+                      const ReachTube* arrival) {
   HoverSet set;
   set.clearance = -body_and_estimation(reach.vehicle);
   if (!grid.free(grid.index(p_W))) return set;
@@ -194,14 +196,23 @@ HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid,
     set.bounded = true;
     return set;
   }
-  const auto paper = [&](const DisturbanceBound& w_bar) {
-    return supports(hover_ellipsoid(reach.vehicle, channels(w_bar)).diagonal().cwiseSqrt());
-  };
   const NearbyVoxels around(grid, v, c_W);
   const NetDisturbance net(reach, bounds);
-  const auto h = reach.method == Method::tight
-                     ? fixed_point(ConstantHalfWidths(reach), distance.at(v), bounds, net, around, v, push_W)
-                     : fixed_point(paper, distance.at(v), bounds, net, around, v, push_W);
+  const auto smallest = [&](const auto& half_widths) {
+    return fixed_point(half_widths, distance.at(v), bounds, net, around, v, push_W);
+  };
+  std::optional<PerDirection> h;
+  if (reach.method == Method::paper) {
+    h = smallest([&](const DisturbanceBound& w_bar) {
+      auto widths = supports(hover_ellipsoid(reach.vehicle, channels(w_bar)).diagonal().cwiseSqrt());
+      for (std::size_t d = 0; arrival && d < kDirections; ++d)
+        widths[d] = std::max(widths[d], arrival->back().half_widths_interval[d]);
+      return widths;
+    });
+  } else {
+    h = arrival ? smallest(WidthsAtRest(reach, *arrival, c_W, bounds.model()))
+                : smallest(ConstantHalfWidths(reach, bounds.model().at_rest()));
+  }
   if (!h) return set;
   set.bounded = true;
   set.half_widths = *h;

@@ -31,9 +31,12 @@ HoverSet hover_set(const Reachability& reach, const map::OccupancyGrid& grid, co
                    const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin = std::nullopt,
                    const map::OccupancySums* sums = nullptr);
 
-/// The same set without its clearance, which is the dear part: `clearance` is that of touching.
+/// The same set without its clearance, which is the dear part: `clearance` is that of touching. `arrival`: the set
+/// holds for ever after this tube, whose commands come to rest at p (rest.hpp); null: the vehicle has always hovered
+/// there.
 HoverSet hover_extent(const Reachability& reach, const map::OccupancyGrid& grid, const map::DistanceField& distance,
-                      const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin = std::nullopt);
+                      const BoundField& bounds, const Vec3& p_W, std::optional<double> constant_margin = std::nullopt,
+                      const ReachTube* arrival = nullptr);
 
 /// Whether hovering at each voxel's centre is safe: hover_set(…).safe(), without the sets' clearances (hover_set gives
 /// them where they are asked for). For method paper the sets come from a table that is rounded up by up to 3e-5.

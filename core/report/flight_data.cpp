@@ -63,7 +63,7 @@ DataTable clearance_table(const sim::Flight& flight, const plan::World& world) {
     for (std::size_t k = 0; k < piece->samples.size(); ++k) {
       const bool judged = piece == &flight.route && k + 1 < tube.size();
       table.rows.push_back({piece->samples[k].t, piece->clearance_m[k],
-                            judged ? plan::tube_clearance(world, {tube[k], tube[k + 1]}) : kNoValue});
+                            judged ? plan::nearest_approach(world, {tube[k], tube[k + 1]}).clearance : kNoValue});
     }
   }
   return thinned(std::move(table));

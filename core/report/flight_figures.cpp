@@ -180,7 +180,8 @@ Figure clearance_figure(const sim::Flight& flight, const plan::World& world) {
   script << "EOD\n$set << EOD\n";
   const auto& tube = flight.route.accepted.tube;
   for (std::size_t k = 0; k + 1 < tube.size(); ++k) {
-    script << flight.route.samples[k].t << ' ' << plan::tube_clearance(world, {tube[k], tube[k + 1]}) << '\n';
+    script << flight.route.samples[k].t << ' ' << plan::nearest_approach(world, {tube[k], tube[k + 1]}).clearance
+           << '\n';
   }
   script << "EOD\n"
          << kAxes << "set xlabel 'time, s'\nset ylabel 'clearance, m'\nset yrange [0:*]\nset xrange [0:"

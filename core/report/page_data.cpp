@@ -223,7 +223,7 @@ std::string scene_html(const Scene& scene) {
     words += "; obstacles up to " + to_text(scene.faces->around_m, 0) +
              " m around the path, where free space meets them: a ceiling does not hide the room below it.";
     if (scene.faces->left_out > 0)
-      words += " " + std::to_string(scene.faces->left_out) + " of " +
+      words += std::string(" ") + std::to_string(scene.faces->left_out) + " of " +
                std::to_string(scene.faces->left_out + scene.faces->faces.size()) +
                " rectangles are left out, the nearest of them " + to_text(scene.faces->beyond_m, 1) +
                " m from the path.";

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/map/octomap_message.hpp"
+#include "core/plan/rest.hpp"
 #include "core/report/recorded_parts.hpp"
 
 namespace backwash::report {
@@ -84,7 +85,7 @@ tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawR
   piece.accepted.commands = segment.commands;
   const State start{vec(segment.head.start_p), vec(segment.head.start_v)};
   auto& tube = piece.accepted.tube;
-  tube = reach::tube_over_field(world.reach, start, segment.previous, segment.commands, world.bounds);
+  tube = plan::tube_to_rest(world, start, segment.previous, segment.commands);
   std::vector<std::int64_t> times;
   const auto ticks = ticks_of(log, segment.head.id, times);
   if (ticks.empty()) return bad("no tick of segment " + std::to_string(segment.head.id));
@@ -113,9 +114,9 @@ tl::expected<sim::FlightPiece, log::LogError> piece_of(std::span<const log::RawR
     if (tick.judged && !fits)
       return bad("tick " + std::to_string(tick.tick) + " was judged against another set than its commands give");
     const double t = static_cast<double>(times[k]) * 1e-9;
-    if (back == 0)
+    if (back == 0 && !world.bounds.model().stated)
       judged = judged_against(vec(tick.p), set.center.p_W, set.half_widths);
-    else if (tick.judged)  // what was found holds until the next pose
+    else if (tick.judged)  // what was found holds until the next pose; by a risk it was the worst case's
       judged = as_recorded(tick);
     const sim::FlightSample s = sample_of(tick, t, t_zero, truth);
     piece.samples.push_back(s);
@@ -163,7 +164,7 @@ tl::expected<sim::Flight, log::LogError> recorded_flight(std::span<const log::Ra
                  " commands, its head says " + std::to_string(s.head.commands));
   const RecordedSegment &up = segments[0], &route = segments[1];
 
-  const auto column = plan::takeoff_column(world, up.commands.back().p_W);
+  const auto column = plan::takeoff_column(world, up.commands.back().p_W, 0);
   if (!column) return bad("the map has no floor below the take-off");
   std::vector<std::int64_t> times;
   if (ticks_of(log, up.head.id, times).empty()) return bad("no tick of the take-off");

@@ -36,13 +36,17 @@ std::vector<std::string> AirNews::take(const log::RawRecord& record) {
   if (const auto* row = kind == air ? log::payload<log::AirRecord>(record) : nullptr)
     for (std::size_t k = 0; k < kAirClasses; ++k) {
       const std::string of = std::string("air of class ") + to_string(static_cast<AirClass>(k));
-      if (row->factors[k] < factors_[k])
-        news.push_back(of + " is calmer: below " + to_text(row->factors[k], 2) + " times the model's variance");
+      if (row->factors[k] < factors_[k] && row->factors[k] >= 1)
+        news.push_back(of + ": what a flight showed has ended with it, a factor of " + to_text(row->factors[k], 2) +
+                       " is kept");
+      else if (row->factors[k] < factors_[k])
+        news.push_back(of + " is calmer: errors have below " + to_text(row->factors[k], 2) +
+                       " times the variance promised");
       else if (row->factors[k] > factors_[k] && row->factors[k] <= 1)
         news.push_back(of + " is no longer as calm as shown: its sets are the model's again");
       else if (row->factors[k] > factors_[k])
-        news.push_back(of + " is rougher: above " + to_text(row->factors[k], 2) +
-                       " times the model's variance, ln evidence " + to_text(row->ln_evidence, 1));
+        news.push_back(of + ": errors have above " + to_text(row->factors[k], 2) +
+                       " times the variance promised, ln evidence " + to_text(row->ln_evidence, 1));
       factors_[k] = row->factors[k];
     }
   const std::string text(record.bytes.begin(), record.bytes.end());

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <limits>
 
+#include "core/plan/ends.hpp"
+#include "core/plan/rest.hpp"
 #include "core/reach/integrator.hpp"
 #include "core/types/text.hpp"
 
@@ -22,8 +24,7 @@ std::string obstacle_to_hover(const plan::World& world, const std::string& name,
   if (!world.grid.inside(v)) return where + "lies outside the map; choose a point in it";
   if (world.grid.occupied(v)) return where + "lies in an occupied voxel; choose free space";
   if (!world.grid.free(v)) return where + "lies in unknown space; choose space that the map knows to be free";
-  const auto set = reach::hover_set(world.reach, world.grid, world.distance, world.bounds, p_W, world.constant_margin);
-  if (set.safe()) return {};
+  if (plan::may_rest_at(world, p_W, 0)) return {};
   return where + "is not hover-safe: " + to_text(world.distance.exact(world.grid, p_W), 3) +
          " m to the nearest obstacle, body and reachable set need more; choose a more open point";
 }
@@ -62,6 +63,8 @@ std::string obstacle_to_take_off(const reach::ReachTube& tube, double clearance)
 FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
                       double z_safe, std::size_t hover_from, int hover_number) {
   FlightPiece piece{std::move(accepted), {}, {}, {}};
+  if (const auto& stated = world.bounds.model().stated)
+    piece.accepted.worst = stated->worst, piece.accepted.worst_at_rest = stated->worst / stated->at_rest;
   track::Tracker tracker(piece.accepted.commands.front(), world.reach.vehicle);
   tracker.accept(piece.accepted, piece.accepted.tube.front().center);  // its tube was propagated from the state of now
   for (std::size_t k = 0; k < piece.accepted.tube.size(); ++k) {
@@ -90,7 +93,7 @@ MethodTube method_tube(const plan::World& world, const reach::Reachability& reac
   const auto begin = Clock::now();
   MethodTube method{reach::tube_over_field(reach, start, previous, commands, world.bounds), 0, 0, 0};
   method.tube_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-  method.clearance_m = plan::tube_clearance(world, method.tube);
+  method.clearance_m = plan::nearest_approach(world, method.tube).clearance;
   for (const auto& step : method.tube) {
     const auto& h = step.half_widths;
     const double axis = reach.method == reach::Method::paper ? step.r_max : std::max({h[kX], h[kY], h[kZ]});
@@ -100,7 +103,7 @@ MethodTube method_tube(const plan::World& world, const reach::Reachability& reac
 }
 
 tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const FlightOptions& options) {
-  const auto column = plan::takeoff_column(world, options.start_W);
+  const auto column = plan::takeoff_column(world, options.start_W, 0);
   if (!column) {
     return refuse("start " + to_text(options.start_W) +
                   " has no known floor to take off from; choose a start above one");
@@ -111,8 +114,8 @@ tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const Fl
   rise.commands = plan::vertical_commands(rise.ground.p_W, options.start_W, options.limits.v_max, options.limits.a_max);
   rise.risen = rise.commands.size();
   append(rise.commands, hold_commands(options.start_W, options.settle_s));
-  const auto tube =
-      reach::tube_over_field(world.reach, {rise.ground.p_W, Vec3::Zero()}, rise.ground, rise.commands, world.bounds);
+  plan::hold_until_settled(world.reach, rise.commands);
+  const auto tube = plan::tube_to_rest(world, {rise.ground.p_W, Vec3::Zero()}, rise.ground, rise.commands);
   rise.clearance_m = plan::takeoff_clearance(world, tube, column->z_safe);
   if (auto why = obstacle_to_take_off(tube, rise.clearance_m); !why.empty()) return refuse(why);
   return rise;
@@ -129,7 +132,7 @@ tl::expected<Flight, FlightRefused> fly(const plan::World& world, const Vehicle&
   const Simulation simulation{.terms = options.terms};
   ClosedLoop loop(world.grid, vehicle, {rise->ground.p_W, Vec3::Zero()}, options.seed, simulation);
   auto commands = rise->commands;
-  auto tube = reach::tube_over_field(world.reach, loop.estimated(), rise->ground, commands, world.bounds);
+  auto tube = plan::tube_to_rest(world, loop.estimated(), rise->ground, commands);
   if (auto why = obstacle_to_take_off(tube, plan::takeoff_clearance(world, tube, z_safe)); !why.empty())
     return refuse(why);
   if (options.sigma_scale != 1) tube = scaled_tube(world, tube, rise->ground, commands, bounds, options.sigma_scale);

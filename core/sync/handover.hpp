@@ -44,7 +44,7 @@ class Handover {
   /// Hands an object back to be freed. Null is allowed. Precondition: at most one object is held beyond the one taken
   /// last, as when a new one takes an old one's place. Real-time: wait-free, no allocation.
   void give_back(const T* object) noexcept {
-    if (object) returned_.push(object);
+    if (object) returned_.push_or_count(object);  // there is room: take() has seen to it
   }
 
  private:

@@ -20,7 +20,7 @@ class RecordRing {
 
  public:
   /// False, and counted, if the ring is full. Real-time: wait-free, no allocation.
-  bool push(const T& record) noexcept {
+  [[nodiscard]] bool push(const T& record) noexcept {
     if (room() == 0) {
       lost_.fetch_add(1, std::memory_order_relaxed);
       return false;
@@ -30,6 +30,8 @@ class RecordRing {
     tail_.store(tail + 1, std::memory_order_release);
     return true;
   }
+  /// As push(), of what may be lost: whoever reads lost() tells how much was. Real-time: wait-free, no allocation.
+  void push_or_count(const T& record) noexcept { static_cast<void>(push(record)); }
   /// The oldest record, or nothing. Real-time: wait-free, no allocation.
   std::optional<T> pop() noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);

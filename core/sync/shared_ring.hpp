@@ -24,7 +24,7 @@ class SharedRing {
     for (std::size_t n = 0; n < kCapacity; ++n) cells_[n].turn.store(n, std::memory_order_relaxed);
   }
   /// False, and counted, if the ring is full. Real-time: lock-free, no allocation.
-  bool push(const T& record) noexcept {
+  [[nodiscard]] bool push(const T& record) noexcept {
     std::size_t at = tail_.load(std::memory_order_relaxed);
     for (;;) {
       const auto ahead = static_cast<std::ptrdiff_t>(cells_[at % kCapacity].turn.load(std::memory_order_acquire) - at);
@@ -42,6 +42,8 @@ class SharedRing {
     cell.turn.store(at + 1, std::memory_order_release);
     return true;
   }
+  /// As push(), of what may be lost: whoever reads lost() tells how much was. Real-time: lock-free, no allocation.
+  void push_or_count(const T& record) noexcept { static_cast<void>(push(record)); }
   /// The oldest record, or nothing. One thread only. Real-time: wait-free, no allocation.
   std::optional<T> pop() noexcept {
     Cell& cell = cells_[head_ % kCapacity];

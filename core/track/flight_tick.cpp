@@ -93,7 +93,8 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) no
   facts.outside_map = in.surroundings.outside;
   facts.map_late = in.surroundings.late;
   facts.map_missing = in.surroundings.missing;
-  facts.battery_low = in.autopilot.battery && *in.autopilot.battery < battery_land_;
+  if (in.autopilot.battery) battery_low_ = *in.autopilot.battery < battery_land_;
+  facts.battery_low = battery_low_;
   facts.port_open = in.autopilot.port_open;
   facts.transmit_failed = in.autopilot.transmit_failed;
   facts.missed_periods = in.missed_periods;
@@ -131,13 +132,35 @@ void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexc
   }
 }
 
-// In the air, as it says itself where it does, and as high as the take-off that was accepted ends: an autopilot may
+// The floor is where the vehicle stands disarmed, as long as it was not asked to arm: its heartbeat may tell of that a
+// second late. Higher or lower by more than the two estimates explain, or on a flight, it has left it.
+void FlightTick::watch_floor(const TickInput& in, const TickOutput& out) noexcept {
+  left_floor_ = in.autopilot.armed && (left_floor_ || (segment_ && !segment_->arms));
+  // Armed and not seen: it may be anywhere since.
+  if (in.autopilot.armed && odometry_age_ > supervisor_.hold_after()) floor_.reset();
+  if (!out.fresh) return;
+  const double z = gate_.last()->state.p_W.z();
+  if (!in.autopilot.armed && arming_ == 0 && in.autopilot.landed.value_or(false)) floor_ = z;
+  const bool off = floor_ && std::abs(z - *floor_) > apart(in);
+  if (in.autopilot.armed && off) left_floor_ = true;
+  // In other hands it may have come back to where it stood. Its word is taken again, but no more to stop its motors.
+  if (left_floor_ && !was_commanding_ && !off && in.autopilot.landed.value_or(false))
+    left_floor_ = false, floor_.reset();
+}
+
+// What the autopilot says of the ground is believed where the height does not contradict it; motors are stopped where
+// it is known and agrees (docs/faults.md row 56).
+bool FlightTick::stands(const TickInput& in) const noexcept {
+  return in.autopilot.landed.value_or(false) && floor_ && !left_floor_ && odometry_age_ <= supervisor_.hold_after();
+}
+
+// In the air, as it says itself, and as high as the take-off that was accepted ends: an autopilot may
 // call itself in the air a second before it leaves the ground. For a second, so that its control has come to rest.
 bool FlightTick::lifted(const TickInput& in) noexcept {
   const auto* top = tracker_.last_set();
   const double below = top ? std::max(kLeastBelow, top->half_widths[kZ]) : 0;
   const bool there = mode() == Mode::lifting && top && gate_.last() && in.autopilot.armed &&
-                     in.autopilot.in_air.value_or(true) &&
+                     in.autopilot.in_air.value_or(false) &&
                      gate_.last()->state.p_W.z() > tracker_.at(SIZE_MAX).p_W.z() - below;
   settled_ = there ? settled_ + 1 : 0;
   return settled_ > kSettled;
@@ -147,24 +170,25 @@ bool FlightTick::lifted(const TickInput& in) noexcept {
 // the ground stops them again, unless somebody else started them; the autopilot itself refuses to disarm in the air.
 void FlightTick::ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept {
   const bool followed = before == Mode::tracking || before == Mode::hold || before == Mode::lifting;
-  const bool stands = in.autopilot.landed.value_or(false);
   const bool runs = arming_ > 0 || (followed && in.autopilot.armed);
   arming_ = in.autopilot.armed ? 0 : std::max(0, arming_ - 1);
-  abandoned_ = std::max(0, abandoned_ - 1);
   const auto& s = out.supervisor;
+  const bool left = s.reason == Reason::operator_request || s.reason == Reason::landed;
+  const bool ours = (s.mode != Mode::passive || left) && s.mode != Mode::quiet;  // neither quiet nor a pilot's
+  // Motors that turn on the floor wait for the word that it stands, however late that is.
+  const bool waits = abandoned_ > 0 && in.autopilot.armed && floor_ && !left_floor_ && !stands(in);
+  abandoned_ = waits ? kArmingTicks : std::max(0, abandoned_ - 1);
   const bool ends = in.request == Request::stop || in.request == Request::disable ||
                     (before == Mode::lifting && s.mode == Mode::land);
-  if (stands && runs && ends) abandoned_ = kArmingTicks;
-  if (out.accepted) abandoned_ = 0;
+  if (runs && ends) abandoned_ = kArmingTicks;
+  if (out.accepted || !ours) abandoned_ = 0;
   out.arm = out.accepted && s.mode == Mode::lifting && !in.autopilot.armed;
   if (out.arm) arming_ = kArmingTicks;
   lift_ticks_ = s.mode == Mode::lifting ? lift_ticks_ + 1 : 0;
   if (lift_ticks_ > 0 && in.autopilot.lifts_itself && in.autopilot.armed && !in.autopilot.takeoff_taken &&
       lift_ticks_ % kTakeoffEvery == 2)
     out.takeoff = tracker_.at(SIZE_MAX).p_W.z() - tracker_.at(0).p_W.z();
-  const bool left = s.reason == Reason::operator_request || s.reason == Reason::landed;
-  const bool ours = (s.mode != Mode::passive || left) && s.mode != Mode::quiet;  // neither quiet nor a pilot's
-  out.disarm = ours && abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands && in.autopilot.armed;
+  out.disarm = ours && abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands(in) && in.autopilot.armed;
 }
 
 TickOutput FlightTick::step(const TickInput& in) noexcept {
@@ -175,6 +199,7 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   take_odometry(in, sample, out);
   align(in, out.fresh);
   take_segment(in, out);
+  watch_floor(in, out);
   judge(in, out);
   odometry_age_ = last_good_ns_ ? seconds(in.now_ns - *last_good_ns_) : std::numeric_limits<double>::infinity();
   const Mode before = mode();
@@ -197,6 +222,7 @@ TickOutput FlightTick::step(const TickInput& in) noexcept {
   out.command_local = alignment_.to_local(command_);
   out.finite = finite(out.command_local);
   out.supervisor.send_setpoint = out.supervisor.send_setpoint && out.finite;
+  out.landed = left_floor_ ? std::optional(false) : in.autopilot.landed;
   ask_of_motors(in, before, out);
   feed(in, out);
   return out;

@@ -10,11 +10,12 @@
 
 namespace backwash::track {
 
-/// What the autopilot said last, as far as a tick decides by it.
+/// What the autopilot says, as far as a tick decides by it. What it has not said lately enough is not known.
 struct AutopilotFacts {
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row did not get out
-  bool armed = false, offboard = false;
+  bool armed = false;            ///< unless it says that it is not
+  bool offboard = false;
   std::optional<bool> landed, in_air;                              ///< as it says itself; neither: between the two
   bool lifts_itself = false;                                       ///< ArduPilot: takes off by a command of its own
   bool takeoff_taken = false;                                      ///< and has acknowledged that one since it was asked
@@ -67,6 +68,8 @@ struct TickOutput {
   bool fresh = false;                                           ///< there was a good sample
   bool arm = false;                                             ///< ask the autopilot to arm
   bool disarm = false;                                          ///< ask it to disarm: it stands on the ground
+  /// On the ground or not, by the autopilot's words and the vehicle's height; none: nobody knows.
+  std::optional<bool> landed;
   std::optional<double> takeoff;     ///< ask it to take off by itself to this height above here, m
   bool forward_odometry = false;     ///< the tick's sample is good: the autopilot's estimator gets it
   std::uint8_t odometry_resets = 0;  ///< times that the odometry began anew elsewhere
@@ -106,6 +109,7 @@ class FlightTick {
   const FrameAlignment& alignment() const noexcept { return alignment_; }
   const Tracker& tracker() const noexcept { return tracker_; }
   double odometry_age() const noexcept { return odometry_age_; }  ///< s, at the last tick, beyond the latency
+  const OdometryTiming& timing() const noexcept { return timing_; }
   /// s without a good sample until HOLD.
   double odometry_lost_after() const noexcept { return supervisor_.hold_after(); }
   /// A segment of another one is refused.
@@ -115,11 +119,13 @@ class FlightTick {
   void take_closure(std::optional<OdometrySample>& sample) noexcept;
   void take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample, TickOutput& out) noexcept;
   void align(const TickInput& in, bool fresh) noexcept;
+  void watch_floor(const TickInput& in, const TickOutput& out) noexcept;
   void take_segment(const TickInput& in, TickOutput& out) noexcept;
   void judge(const TickInput& in, TickOutput& out) noexcept;
   SupervisorInput facts(const TickInput& in, const TickOutput& out) noexcept;
   void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
   void ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept;
+  bool stands(const TickInput& in) const noexcept;
   bool lifted(const TickInput& in) noexcept;
   void feed(const TickInput& in, TickOutput& out) noexcept;
   void drop_segment(TickOutput& out) noexcept;
@@ -146,6 +152,11 @@ class FlightTick {
   Epoch epoch_;
   int arming_ = 0;     ///< ticks left in which the autopilot may yet say that it armed
   int abandoned_ = 0;  ///< ticks left in which motors that start for a take-off that was stopped are stopped again
+  /// Height at which the vehicle stood when it was last seen disarmed, m, map frame; none: it was not seen, or the
+  /// odometry began anew since. And whether it was elsewhere since, or a flight was begun.
+  std::optional<double> floor_;
+  bool left_floor_ = false;
+  bool battery_low_ = false;           ///< when it was last said
   std::uint32_t closures_ = 0;         ///< of the map frame that is flown in
   RigidShift map_from_odom_;           ///< of that
   std::uint32_t closure_refused_ = 0;  ///< the last one that is not flown; closures_: none

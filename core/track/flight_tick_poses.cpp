@@ -64,6 +64,7 @@ void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
   gate_.rebase(D);
   alignment_.rebase(D);
   tracker_.rebase(D, closures_);
+  if (floor_) *floor_ += D.t.z();
   command_ = D.setpoint(command_);
 }
 
@@ -78,7 +79,8 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
   }
   using Verdict = OdometryGate::Verdict;
   // A pose that repeats to the last bit is frozen in the air even if nothing is to move; standing, it may be still.
-  const bool flies = in.autopilot.armed && in.autopilot.landed == false, lifts = mode() == Mode::lifting;
+  const bool flies = in.autopilot.armed && (left_floor_ || in.autopilot.landed == false);
+  const bool lifts = mode() == Mode::lifting;
   off_ground_ = lifts && flies ? off_ground_ + 1 : 0;
   const bool moving = lifts ? off_ground_ > kLeavesGround : command_.v_W.norm() > 0.05 || flies;
   out.verdict = gate_.take(*sample, moving);
@@ -92,6 +94,7 @@ void FlightTick::take_odometry(const TickInput& in, const std::optional<Odometry
                          (out.fresh && seconds(in.now_ns - *last_good_ns_) > supervisor_.hold_after());
   if (!elsewhere || was_commanding_) return;
   gate_.forget();
+  floor_.reset();
   if (out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent) ++odometry_resets_;
 }
 

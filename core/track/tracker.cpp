@@ -71,8 +71,8 @@ void Tracker::rebase(const RigidShift& D, std::uint32_t closures) noexcept {
 double Tracker::clearance() const noexcept {
   if (!segment_) return 0;
   const auto& ahead = segment_->clearance_ahead;
-  if (ahead.empty()) return segment_->clearance;
-  return ahead[std::min(next_ / AcceptedSegment::kClearanceEvery, ahead.size() - 1)];
+  const std::size_t second = next_ / AcceptedSegment::kClearanceEvery;
+  return (ahead.empty() ? segment_->clearance : ahead[std::min(second, ahead.size() - 1)]) - segment_->apart_m;
 }
 
 const plan::Stop* Tracker::next_stop() const noexcept {
@@ -91,6 +91,9 @@ bool Tracker::brake() noexcept {
 std::size_t Tracker::end() const noexcept {
   return stop_ ? stop_->branch + stop_->commands.size() : segment_->commands.size();
 }
+
+// The last entry is the set of a place of rest (docs/model.md 5.2-8).
+double Tracker::worst(std::size_t k) const noexcept { return k < end() ? segment_->worst : segment_->worst_at_rest; }
 
 const reach::TubeStep& Tracker::set(std::size_t k) const noexcept {
   k = std::min(k, end());
@@ -114,19 +117,20 @@ Inside Tracker::judge(const Vec3& measured_W, double age) const noexcept {
   if (!(age > 0)) {
     const reach::TubeStep& predicted = set(next_);
     return judge(measured_W, predicted.center.p_W,
-                 next_ > end() ? predicted.half_widths_interval : predicted.half_widths);
+                 next_ > end() ? predicted.half_widths_interval : predicted.half_widths, worst(next_));
   }
   const double at = std::max(0.0, static_cast<double>(next_ + past_) - age / kControlPeriod);
   const auto before = static_cast<std::size_t>(at);
   const double share = at - static_cast<double>(before);
   const Vec3 &from = set(before).center.p_W, &to = set(before + 1).center.p_W;
-  return judge(measured_W, from + share * (to - from), set(before).half_widths_interval);
+  return judge(measured_W, from + share * (to - from), set(before).half_widths_interval, worst(before));
 }
 
-Inside Tracker::judge(const Vec3& measured_W, const Vec3& center, const PerDirection& half_widths) const noexcept {
+Inside Tracker::judge(const Vec3& measured_W, const Vec3& center, const PerDirection& half_widths,
+                      double worst) const noexcept {
   Inside result;
   result.judged = true;
-  result.half_widths = half_widths;
+  for (std::size_t d = 0; d < kDirections; ++d) result.half_widths[d] = worst * half_widths[d];
   // A loop closure moves the map and not the vehicle: the error is judged in the frame that the sets are in.
   result.center = shift_.point(center);
   const Vec3 e = shift_.inverse().rotate(measured_W - result.center);
@@ -141,10 +145,10 @@ Inside Tracker::judge(const Vec3& measured_W, const Vec3& center, const PerDirec
 bool Tracker::within(const Vec3& measured_W) const noexcept {
   if (!segment_) return false;
   const Vec3 p = shift_.inverse().point(measured_W);
-  return std::ranges::any_of(segment_->tube, [&p](const reach::TubeStep& set) {
+  return std::ranges::any_of(segment_->tube, [&p, this](const reach::TubeStep& set) {
     for (std::size_t d = 0; d < kDirections; ++d) {
       const double e = unit(static_cast<Direction>(d)).dot(p - set.center.p_W);
-      if (!(std::abs(e) <= set.half_widths_interval[d])) return false;
+      if (!(std::abs(e) <= segment_->worst * set.half_widths_interval[d])) return false;
     }
     return true;
   });

@@ -9,6 +9,7 @@
 #include "core/plan/verified_stops.hpp"
 #include "core/reach/reach_tube.hpp"
 #include "core/track/rebase.hpp"
+#include "core/types/air_class.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -39,6 +40,12 @@ struct AcceptedSegment {
                                     ///< lifted to where it ends
   std::int64_t seen_ns = 0;         ///< reception of the newest data in the map that it was verified in
   double clearance = 0;             ///< smallest of its swept tube in the map it was verified in, m
+  /// By how much the autopilot's frame was off the map when the vehicle rested last, m. No set shrinks that error, so
+  /// that clearance is left for it, on the way and at rest. In motion most of what is measured is delay.
+  double apart_m = 0;
+  AirFactors air = kModelledAir;  ///< of the world that it and its stops were verified in
+  /// By a stated risk a position is judged by sets so many times as wide, on the way and at rest: κ of the worst case.
+  double worst = 1, worst_at_rest = 1;
   /// Entry n: the same of its sets from command kClearanceEvery · n on, rising; may be empty.
   std::vector<double> clearance_ahead{};
   static constexpr std::size_t kClearanceEvery = 50;
@@ -87,7 +94,8 @@ class Tracker {
   const RigidShift& shift() const noexcept { return shift_; }
   std::uint32_t closures() const noexcept { return closures_; }
   /// Judges the measured position against the set predicted for the moment that it is of, `age` s before this tick
-  /// (docs/model.md 4-15). Real-time: wait-free, no allocation.
+  /// (docs/model.md 4-15), that of the worst case: by a stated risk, errors leave the planner's sets as promised.
+  /// Real-time: wait-free, no allocation.
   Inside judge(const Vec3& measured_W, double age = 0) const noexcept;
   /// Judges the measured position against the accepted tube as a whole: the region that was found clear, whenever the
   /// vehicle is where in it. Real-time: wait-free, no allocation; 3 ns per set.
@@ -104,8 +112,9 @@ class Tracker {
   std::uint64_t segment() const noexcept { return segment_ ? segment_->id : 0; }
   std::int64_t seen_ns() const noexcept { return segment_ ? segment_->seen_ns : 0; }
   std::size_t index() const noexcept { return next_; }  ///< of the command that the next step() gives
-  /// Of the accepted tube from the next command on, to a second, m.
+  /// Of the accepted tube from the next command on, to a second, beyond what the frames are apart, m.
   double clearance() const noexcept;
+  double apart_m() const noexcept { return segment_ ? segment_->apart_m : 0; }  ///< the segment's
   const Setpoint& held() const noexcept { return hold_; }
 
  private:
@@ -113,7 +122,9 @@ class Tracker {
   Setpoint command(std::size_t k) const noexcept;  // in the segment's frame, at rest past the end
   bool leaves_stop(const AcceptedSegment& segment) const noexcept;
   const reach::TubeStep& set(std::size_t k) const noexcept;
-  Inside judge(const Vec3& measured_W, const Vec3& center, const PerDirection& half_widths) const noexcept;
+  double worst(std::size_t k) const noexcept;
+  Inside judge(const Vec3& measured_W, const Vec3& center, const PerDirection& half_widths,
+               double worst) const noexcept;
 
   const AcceptedSegment* segment_ = nullptr;
   const plan::Stop* stop_ = nullptr;  ///< of segment_: what is flown from its branch on

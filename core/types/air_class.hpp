@@ -29,6 +29,16 @@ constexpr double factor_of(const AirFactors& factors, AirClass air) noexcept {
   const double unnamed = factors[static_cast<std::size_t>(AirClass::none)];
   return unnamed > 1 && unnamed > known ? unnamed : known;
 }
+/// By this share a factor may be above that of the sets which are flown. Below the model's none may: that was shown
+/// for the air of then.
+inline constexpr double kAirStep = 0.05;
+/// Whether sets made with these factors are large enough for the air as it is known now. Where not, a world is made
+/// anew, and until it is there no new way begins (docs/faults.md row 54).
+constexpr bool covers(const AirFactors& made, const AirFactors& now) noexcept {
+  for (std::size_t k = 0; k < kAirClasses; ++k)
+    if (!(now[k] <= (made[k] < 1 ? 1 : 1 + kAirStep) * made[k])) return false;
+  return true;
+}
 /// The larger factor of each class.
 constexpr AirFactors larger(AirFactors a, const AirFactors& b) noexcept {
   for (std::size_t k = 0; k < kAirClasses; ++k) a[k] = a[k] > b[k] ? a[k] : b[k];

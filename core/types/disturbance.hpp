@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "core/types/geometry.hpp"
 
 namespace backwash {
@@ -40,12 +42,21 @@ struct DisturbanceBound {
   PerDirection w{};  ///< m/s²
 };
 
+/// A risk that is kept in place of the worst case (docs/model.md 5.3-5): κ of the bounds is made for it.
+struct StatedRisk {
+  double touch = 0;    ///< probability of a touch, at most, in each way from the vehicle on and each minute at rest
+  double at_rest = 1;  ///< sets at rest are so many times as wide: a minute asks for more than a moment
+  double worst = 1;    ///< the file's κ over that of the bounds, ≥ 1; over that of rest: worst / at_rest, ≥ 1
+};
+
 /// How a variance becomes a bound (docs/model.md section 3); the `[bound]` table of a model file.
 struct BoundModel {
-  double kappa = 3.0;            ///< bound in standard deviations
-  double mean_horizontal = 0.0;  ///< largest steady push in any horizontal direction, m/s²
-  double mean_vertical = 0.0;    ///< largest steady push along z, m/s²
-  double tau_w = 0.15;           ///< correlation time of the disturbance, s (chance-constrained mode)
+  double kappa = 3.0;                  ///< bound in standard deviations
+  double mean_horizontal = 0.0;        ///< largest steady push in any horizontal direction, m/s²
+  double mean_vertical = 0.0;          ///< largest steady push along z, m/s²
+  double tau_w = 0.15;                 ///< correlation time of the disturbance, s (chance-constrained mode)
+  std::optional<StatedRisk> stated{};  ///< of no file: plan::model_for(). Without it the worst case is kept
+  double at_rest() const noexcept { return stated ? stated->at_rest : 1; }
 };
 
 /// w̄_n = mean_n + κ √(nᵀΣn) in the five directions (docs/model.md section 3): the one conversion from variance to

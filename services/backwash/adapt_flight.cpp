@@ -5,30 +5,18 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/adapt/disturbance.hpp"
 #include "core/field/disturbance_field.hpp"
 #include "core/log/log_columns.hpp"
 #include "core/log/raw_flight.hpp"
 #include "core/report/recorded_flight.hpp"
 #include "core/study/windows/gates.hpp"
-#include "core/study/windows/texture.hpp"
 #include "services/backwash/study_flights.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
 namespace {
 
-/// Adds the acceleration, by differences of the velocity.
-void differentiate(log::FlightLog& log) {
-  for (const char axis : {'x', 'y', 'z'}) {
-    const auto& v = log.column(std::string("v") + axis + "_mps");
-    std::vector<double> a(v.size());
-    for (std::size_t k = 1; k < v.size(); ++k) a[k] = (v[k] - v[k - 1]) / (log.t_s[k] - log.t_s[k - 1]);
-    log.columns[std::string("a") + axis + "_mps2"] = a;
-  }
-}
-
-log::FlightLog read(const std::string& path, bool& accelerometer) {
+log::FlightLog read(const std::string& path) {
   auto log = read_flight(path);
   for (const std::string prefix : {"", "v", "cmd_"}) {
     const std::string unit = prefix == "v" ? "_mps" : "_m";
@@ -40,8 +28,6 @@ log::FlightLog read(const std::string& path, bool& accelerometer) {
     if (!(log.t_s[k] > log.t_s[k - 1]))
       throw Failure(kBadData, path + ":" + std::to_string(k + 2) + ": t_s does not rise; sort the rows by time");
   if (log.t_s.size() < 2) throw Failure(kBadData, path + ":1: fewer than two rows");
-  accelerometer = log::has_xyz(log, "a", "_mps2");
-  if (!accelerometer) differentiate(log);
   return log;
 }
 
@@ -78,34 +64,6 @@ std::vector<Place> places_of(const std::vector<Vec3>& path, const field::Proximi
   return places;
 }
 
-/// Variance of the sensor per sample: the part that neighbouring samples of a window do not share. Of differentiated
-/// velocities half the mean square of their steps, which is more than their noise.
-Vec3 noise_of(const std::vector<adapt::AirSample>& samples, bool accelerometer) {
-  std::vector<study::Residual> windows;
-  Vec3 steps = Vec3::Zero();
-  double seconds = 0, count = 0;
-  for (std::size_t k = 1; k < samples.size(); ++k) {
-    const double dt = samples[k].t_s - samples[k - 1].t_s;
-    if (dt > adapt::Disturbance::kGap) continue;
-    steps += (samples[k].w_W - samples[k - 1].w_W).cwiseAbs2(), seconds += dt, count += 1;
-  }
-  if (!(count > 0)) return Vec3::Zero();
-  if (!accelerometer) return steps / (2 * count);
-  const auto length = static_cast<std::size_t>(std::lround(study::kWindowRules.window_length * count / seconds));
-  for (std::size_t begin = 0; begin + length <= samples.size(); begin += length) {
-    study::Residual window{{}, samples[begin + length / 2].sigma};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      double mean = 0;
-      for (std::size_t k = begin; k < begin + length; ++k)
-        mean += samples[k].w_W[static_cast<long>(axis)] / static_cast<double>(length);
-      for (std::size_t k = begin; k < begin + length; ++k)
-        window.x[axis].push_back(samples[k].w_W[static_cast<long>(axis)] - mean);
-    }
-    windows.push_back(std::move(window));
-  }
-  return windows.empty() ? Vec3(steps / (2 * count)) : study::texture_of(windows, count / seconds).white;
-}
-
 /// The floor z = 0 below a path and free space above it, where there is no map.
 map::OccupancyGrid floor_below(const std::vector<Vec3>& path) {
   constexpr double kEdge = 0.1, kBeside = 2.5, kMost = 60;
@@ -127,11 +85,32 @@ std::optional<map::OccupancyGrid> own_map(const std::string& path) {
   return grid ? std::optional(std::move(*grid)) : std::nullopt;
 }
 
+/// What a tick at `t` sends, `row` being the last one at or before it: the mean of what is held over the tick; between
+/// rows that are farther apart than ticks, what lies on the line from one to the next.
+Setpoint command_at(const log::FlightLog& log, double t, std::size_t row) {
+  constexpr double kNearly = 0.99, kParts = 4;
+  const bool v = log::has_xyz(log, "cmd_v", "_mps"), a = log::has_xyz(log, "cmd_a", "_mps2");
+  Setpoint mean;
+  const auto add = [&](std::size_t k, double share) {
+    mean.p_W += share * log::xyz(log, "cmd_", "_m", k);
+    if (v) mean.v_W += share * log::xyz(log, "cmd_v", "_mps", k);
+    if (a) mean.a_W += share * log::xyz(log, "cmd_a", "_mps2", k);
+  };
+  const double interval = log.t_s[row + 1] - log.t_s[row], on = (t - log.t_s[row]) / interval;
+  if (interval > kNearly * kControlPeriod) return add(row, 1 - on), add(row + 1, on), mean;
+  for (double part = 0.5; part < kParts; ++part) {
+    while (row + 1 < log.t_s.size() && log.t_s[row + 1] <= t + part / kParts * kControlPeriod) ++row;
+    add(row, 1 / kParts);
+  }
+  return mean;
+}
+
 }  // namespace
 
 FlownAir read_air(const std::string& path, const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid) {
   FlownAir air;
-  const auto log = read(path, air.accelerometer);
+  const auto log = read(path);
+  air.accelerometer = log::has_xyz(log, "a", "_mps2");
   air.attitude = log.has("qw") && log.has("qx") && log.has("qy") && log.has("qz");
   std::vector<Vec3> flown;
   for (std::size_t k = 0; k < log.t_s.size(); ++k) flown.push_back(log::xyz(log, "", "_m", k));
@@ -139,24 +118,25 @@ FlownAir read_air(const std::string& path, const Vehicle& vehicle, const Model& 
   if (!grid && !floor) floor = floor_below(flown);
   const auto places = places_of(flown, field::ProximityField(grid ? *grid : *floor, model));
   const auto gated = gated_rows(log, vehicle);
-  const bool v = log::has_xyz(log, "cmd_v", "_mps"), a = log::has_xyz(log, "cmd_a", "_mps2");
-  adapt::Disturbance disturbance(vehicle);
-  for (std::size_t k = 0; k < log.t_s.size(); ++k) {
-    const Setpoint command{log::xyz(log, "cmd_", "_m", k), v ? log::xyz(log, "cmd_v", "_mps", k) : Vec3::Zero(),
-                           a ? log::xyz(log, "cmd_a", "_mps2", k) : Vec3::Zero(), 0};
-    const auto w =
-        gated[k]
-            ? std::nullopt
-            : disturbance.add(
-                  {log.t_s[k], {flown[k], log::xyz(log, "v", "_mps", k)}, log::xyz(log, "a", "_mps2", k), command});
-    if (!w || !(places[k].sigma.minCoeff() > 0)) {
-      ++air.left_out;
-      continue;
-    }
-    air.samples.push_back({log.t_s[k], *w, places[k].sigma, air.attitude ? places[k].air : AirClass::none});
+  constexpr double kSame = 1e-6, kGap = 0.5;  // s
+  std::size_t row = 0;
+  std::optional<std::size_t> used;
+  air.left_out = static_cast<std::size_t>(std::ranges::count(gated, 1));
+  air.rows = log.t_s.size() - air.left_out;
+  for (std::int64_t k = 0;; ++k) {
+    const double t = log.t_s.front() + static_cast<double>(k) * kControlPeriod;
+    while (row + 1 < log.t_s.size() && log.t_s[row + 1] <= t + kSame) ++row;
+    if (row + 1 == log.t_s.size()) return air;
+    if (gated[row] || t - log.t_s[row] > kGap) continue;
+    adapt::AirTick tick;
+    tick.now_ns = std::llround(t * 1e9);
+    if (used != row) tick.age_s = std::max(0.0, t - log.t_s[row]);
+    used = row;
+    tick.state = {flown[row], log::xyz(log, "v", "_mps", row)};
+    tick.command = command_at(log, t, row);
+    tick.sigma = places[row].sigma, tick.air = air.attitude ? places[row].air : AirClass::none;
+    air.ticks.push_back(tick);
   }
-  air.noise = noise_of(air.samples, air.accelerometer);
-  return air;
 }
 
 }  // namespace backwash::services

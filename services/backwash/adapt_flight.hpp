@@ -4,20 +4,20 @@
 #include <string>
 #include <vector>
 
-#include "core/adapt/adaptation.hpp"
+#include "core/adapt/in_flight.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 
 namespace backwash::services {
 
-/// The air of a flight, as core/adapt takes it.
+/// A flight as core/adapt takes it, at the daemon's rate: set-points as they were held, the newest position of each
+/// tick.
 struct FlownAir {
-  std::vector<adapt::AirSample> samples;
-  Vec3 noise = Vec3::Zero();  ///< of the sensor, variance per sample, (m/s²)²
-  std::size_t left_out = 0;   ///< rows: not free by the map, standing, frozen, saturated, or before delays have passed
-  bool attitude = true;       ///< logged; else every sample is of no class
-  bool accelerometer = true;  ///< logged; else velocities were differentiated
+  std::vector<adapt::AirTick> ticks;
+  std::size_t rows = 0, left_out = 0;  ///< that are used; standing, frozen or saturated
+  bool attitude = true;                ///< logged; else every tick is of no class
+  bool accelerometer = true;           ///< logged; nothing is taken from it
 };
 
 /// Reads a flight log (CSV, ULog, DataFlash) or the daemon's raw log (.bwlog). `grid` may be null: the map in the

@@ -9,11 +9,13 @@
 #include <functional>
 #include <map>
 #include <set>
+#include <stdexcept>
 
 #include "core/config/config.hpp"
 #include "core/config/simulation_terms.hpp"
 #include "core/files/read_file.hpp"
 #include "core/map/load_map.hpp"
+#include "core/plan/planner.hpp"
 
 namespace backwash::services {
 
@@ -67,6 +69,23 @@ std::vector<SimulationTerm> read_simulation(const std::string& path) {
 }
 Vehicle read_vehicle(const std::string& path) { return read_and_remember(path, config::load_vehicle); }
 
+std::pair<Vehicle, Model> read_both(const std::string& vehicle_path, const std::string& model,
+                                    std::optional<double> risk) {
+  std::pair<Vehicle, Model> both;
+  both.first = read_vehicle(vehicle_path);
+  const std::string model_path = model_of(vehicle_path, model);
+  both.second = read_model(model_path);
+  // Names an unstable loop before anything else is asked of it.
+  read_reachability(both.first, reach::Method::tight, reach::Loop::vehicle, vehicle_path);
+  try {
+    if (risk) both.second = plan::model_for(both.second, both.first, *risk);
+  } catch (const std::invalid_argument& e) {
+    throw Failure(kConfiguration, (both.second.extension.empty() ? vehicle_path : model_path) + ":1: " + e.what() +
+                                      "; leave it out, or --risk");
+  }
+  return both;
+}
+
 log::FlightLog read_table(const std::string& path, const std::string& time_column) {
   auto table = log::read_csv(path, time_column);
   if (table) return std::move(*table);
@@ -84,6 +103,14 @@ Option add_method(Command& command, reach::Method& target) {
   const std::vector<std::pair<std::string, reach::Method>> methods = {{"tight", reach::Method::tight},
                                                                       {"paper", reach::Method::paper}};
   return add_choice(command, "--method", target, methods, "tight: exact supports; paper: ellipsoids");
+}
+
+Option add_risk(Command& command, std::optional<double>& target) {
+  return command
+      .add_option("--risk", target,
+                  "largest risk of touching in a flight, and in a minute at rest, in place of the worst case; of the "
+                  "exact sets, no integrator, no extended model")
+      .check(within(1e-6, 0.5));
 }
 
 std::string model_of(const std::string& vehicle, const std::string& model) {

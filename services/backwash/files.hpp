@@ -27,6 +27,9 @@ Model read_model(const std::string& path);
 /// What an extended model adds to the simulation; nothing for others.
 std::vector<SimulationTerm> read_simulation(const std::string& path);
 Vehicle read_vehicle(const std::string& path);
+/// Both, with the model of a stated risk if there is one (plan::model_for). `model`: as model_of() takes it.
+std::pair<Vehicle, Model> read_both(const std::string& vehicle_path, const std::string& model,
+                                    std::optional<double> risk);
 /// What a model or vehicle file held when it was read, the name of a built-in one; empty if it changed meanwhile, or
 /// was not read.
 std::string content_when_read(const std::string& path);
@@ -40,6 +43,8 @@ T read_or_fail(tl::expected<T, log::LogError> read) {
 
 /// Adds `--method`: tight or paper.
 Option add_method(Command& command, reach::Method& target);
+/// --risk NUMBER.
+Option add_risk(Command& command, std::optional<double>& target);
 
 /// The model that a flight of this vehicle uses: the one given, or a built-in vehicle's own. Throws Failure 64 for
 /// another file.

@@ -68,6 +68,9 @@ void print_text(const sim::Flight& flight, const sim::FlightSummary& s, const re
   std::printf("largest error/bound  x %.2f, y %.2f, z %.2f\n", s.largest_ratio.x(), s.largest_ratio.y(),
               s.largest_ratio.z());
   std::printf("inside the set       %zu of %zu samples\n", s.inside, s.samples);
+  if (m.risk.total > 0)
+    std::printf("risk                 %.2g of touching at most on the way, %.2g in a minute at its end\n", m.risk.total,
+                m.risk.a_minute);
   std::printf("planning             search %.1f ms, optimisation %.1f ms, verification %.1f ms\n", m.search_ms,
               m.optimise_ms, m.verify_ms);
   for (const auto& [name, method] : {std::pair{"exact supports", &flight.tight}, {"ellipsoids", &flight.paper}}) {

@@ -18,6 +18,7 @@ namespace {
 struct FlyOptions {
   std::string map = "builtin:apartment", vehicle = "builtin:quad-5in", model, report, log;
   std::optional<Vec3> start, goal;
+  std::optional<double> risk;
   std::uint64_t seed = 1;
   double sigma_scale = 1;
   bool json = false, force = false, ends = false;
@@ -75,11 +76,8 @@ int run(const FlyOptions& options) {
   if (options.start.has_value() != options.goal.has_value())
     throw Failure(kUsage, "give both --start and --goal, or neither");
   check_outputs({options.report, options.log}, options.force);
-  const auto vehicle = read_vehicle(options.vehicle);
+  const auto [vehicle, model] = read_both(options.vehicle, options.model, options.risk);
   const std::string model_path = model_of(options.vehicle, options.model);
-  const auto model = read_model(model_path);
-  read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle,
-                    options.vehicle);  // names an unstable loop first
   auto grid = read_map(options.map);
   if (const auto known = known_ends(options); options.ends && known) return print_ends(*known);
   const auto world = world_of({std::move(grid), model, model_path, vehicle, options.vehicle});
@@ -118,6 +116,7 @@ Verb fly_verb(Command& app) {
   command.add_option("--sigma-scale", options->sigma_scale, "judge with sets of the variance times this")
       .check(within(1e-6, 1e6))
       .capture_default_str();
+  add_risk(command, options->risk);
   command.add_option("--report", options->report, "HTML page to write");
   command.add_option("--log", options->log, "flight log to write, CSV");
   command.add_flag("--json", options->json, "one JSON object on stdout");

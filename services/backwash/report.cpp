@@ -20,6 +20,7 @@ namespace {
 struct ReportOptions {
   std::vector<std::string> logs;  ///< parts of one; the first names it
   std::string truth, vehicle = "builtin:quad-5in", model, because, out;
+  std::optional<double> risk;
   bool json = false, force = false;
   const std::string& log() const { return logs.front(); }
 };
@@ -42,7 +43,7 @@ int tell(const ReportOptions& options, std::span<const log::RawRecord> log, cons
          const map::OccupancyGrid* map, const Vehicle& vehicle) {
   if (!options.out.empty()) {
     const std::string model_path = model_of(options.vehicle, options.model);
-    const auto model = read_model(model_path);
+    const auto model = read_both(options.vehicle, model_path, options.risk).second;
     const auto world = map ? world_of({*map, model, model_path, vehicle, options.vehicle}) : nullptr;
     progress("drawing the report");
     const auto page =
@@ -60,9 +61,8 @@ int tell(const ReportOptions& options, std::span<const log::RawRecord> log, cons
 /// A flight such as `fly`'s: its sets are propagated again and must be those that were logged.
 int judge(const ReportOptions& options, const std::vector<log::RawRecord>& log, const log::FlightLog& truth,
           const FlightStory& story) {
-  const auto vehicle = read_vehicle(options.vehicle);
+  const auto [vehicle, model] = read_both(options.vehicle, options.model, options.risk);
   const std::string model_path = model_of(options.vehicle, options.model);
-  const auto model = read_model(model_path);
   const auto world = world_of({read_or_fail(report::recorded_map(log)), model, model_path, vehicle, options.vehicle});
   const auto flight = read_or_fail(report::recorded_flight(log, truth, *world));
   const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
@@ -95,8 +95,7 @@ std::optional<log::FlightLog> read_truth(const std::string& path) {
 
 int run(const ReportOptions& options) {
   check_output(options.out, options.force);
-  const auto vehicle = read_vehicle(options.vehicle);
-  read_model(model_of(options.vehicle, options.model));
+  const auto vehicle = read_both(options.vehicle, options.model, options.risk).first;
   const auto log = read_or_fail(log::read_raw_logs(with_later_parts(options.logs)));
   const auto truth = read_truth(options.truth);
   const auto map = report::recorded_map(log.records);
@@ -121,6 +120,7 @@ Verb report_verb(Command& app) {
                      "log of the truth by backwash-bench, CSV; without it measured positions are judged");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();
   command.add_option("--model", options->model, "model file or builtin:NAME; a built-in vehicle has its own");
+  add_risk(command, options->risk);
   command.add_option("--because", options->because, "what ended the flight, as you know it: told first");
   command.add_option("--out", options->out, "HTML page to write");
   command.add_flag("--json", options->json, "one JSON object on stdout");

@@ -66,7 +66,7 @@ std::optional<study::Design> designed(const DesignOptions& options, const study:
   if (options.points.empty()) return std::nullopt;
   progress("the next flight");
   const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, run_shown);
-  if (const auto why = plan::why_blocked(*world, *options.start, 0))
+  if (const auto why = plan::why_no_rest(*world, *options.start, 0))
     throw Failure(kUnavailable, "--start " + *why + ": begin where hovering is safe");
   auto design = study::design(seen, result, *world, model, *options.start, options.flight_time);
   if (const auto* chosen = design.chosen()) write_file(options.points, study::points_csv(chosen->points), force);

@@ -73,12 +73,12 @@ std::string key_of(const WorldInput& input) {
                     vehicle = content_when_read(input.vehicle_path);
   if (program.empty() || model.empty() || vehicle.empty()) return "";
   const auto& grid = input.grid;
-  const double numbers[] = {grid.origin().x(), grid.origin().y(), grid.origin().z(), grid.resolution(),
-                            input.margin.value_or(-1)};
+  const double numbers[] = {grid.origin().x(), grid.origin().y(),         grid.origin().z(),
+                            grid.resolution(), input.margin.value_or(-1), input.model.bound.kappa};
   std::string all = program;
   const int options[] = {field::run_native<VectorBytes>(), static_cast<int>(input.method)};
   all +=
-      bytes_of(options, 2) + sha256(model) + sha256(vehicle) + bytes_of(numbers, 5) + bytes_of(grid.size().data(), 3);
+      bytes_of(options, 2) + sha256(model) + sha256(vehicle) + bytes_of(numbers, 6) + bytes_of(grid.size().data(), 3);
   all += sha256({reinterpret_cast<const char*>(grid.cells().data()), grid.cell_count()});
   return sha256(all);
 }

@@ -45,7 +45,8 @@ class Transfer {
   Transfer(const Options& options, const MapOptions& map, const map::OccupancyGrid& grid)
       : map_(map),
         data_(map::encode_octomap(grid)),
-        participant_(static_cast<std::uint32_t>(options.domain), options.interface, {}, judged(options.security)),
+        participant_(static_cast<std::uint32_t>(options.domain), options.interface,
+                     {.topics = dds::topics(options.name_space)}, judged(options.security)),
         receipts_(dds::make_reader<dds::MapReceipt>(participant_, options.name_space)),
         waitset_(participant_) {
     waitset_.add(receipts_);

@@ -57,10 +57,11 @@ StatusCopy copy_of(const dds::Status& status) {
   return copy;
 }
 
-Station::Station(const Options& options)
+Station::Station(const Options& options, const std::vector<std::string>& more)
     : options_(options),
       session_(draw_session()),
-      participant_(static_cast<std::uint32_t>(options.domain), options.interface, {}, judged(options.security)),
+      participant_(static_cast<std::uint32_t>(options.domain), options.interface,
+                   {.topics = dds::topics(options.name_space, more)}, judged(options.security)),
       acks_(dds::make_reader<dds::Ack>(participant_, options.name_space)),
       statuses_(dds::make_reader<dds::Status>(participant_, options.name_space)),
       waitset_(participant_) {

@@ -73,7 +73,8 @@ inline std::optional<double> measured(double told) noexcept { return told < 0 ? 
 class Station {
  public:
   /// Throws StartError 78 for credentials that are not good, dds::Error for an interface that is none.
-  explicit Station(const Options& options);
+  /// `more`: topics outside of the name space that readers of this process have.
+  explicit Station(const Options& options, const std::vector<std::string>& more = {});
   /// Ends the session if it has one. The middleware says only once that a writer is gone, and with DDS Security that
   /// may be lost: the next process would be refused until the lease of 2 s is over.
   ~Station();

@@ -198,19 +198,19 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
   station.status(1.0);
   station.status(1.0);
   std::string last = "no status";
-  bool superseded = false;
+  bool superseded = false, set_out = false;
   const bool reached = station.wait(patience_s_, done, [&](const StatusCopy& s) {
     last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task) +
            (s.autopilot_says.empty() ? "" : "; the autopilot says: " + s.autopilot_says);
     superseded = station.superseded(s);
     if (superseded || s.task.starts_with(kRefusedTask)) return true;
-    // On its way to a goal it goes on by itself after an obstacle.
+    // On its way to a goal it goes on by itself after an obstacle. A hold that was there before is not its end.
     const bool on_its_way =
         verb == backwash_msgs_msg_dds__COMMAND_GOTO || verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING ||
         verb == backwash_msgs_msg_dds__COMMAND_FOLLOW || verb == backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING;
-    const bool held = s.in(Mode::hold) && !(on_its_way && s.because(Reason::obstacle_ahead));
-    const bool lands = verb == backwash_msgs_msg_dds__COMMAND_LAND;
-    const bool lost = s.in(Mode::quiet) || held || (s.in(Mode::passive) && !lands);
+    set_out = set_out || !s.in(Mode::hold);
+    const bool held = set_out && s.in(Mode::hold) && !(on_its_way && s.because(Reason::obstacle_ahead));
+    const bool lost = s.in(Mode::quiet) || held || (s.in(Mode::passive) && verb != backwash_msgs_msg_dds__COMMAND_LAND);
     return lost && verb != backwash_msgs_msg_dds__COMMAND_HOLD && verb != backwash_msgs_msg_dds__COMMAND_STOP;
   });
   if (interrupted()) return fail("interrupted; the session is over, the daemon is " + last);
@@ -253,7 +253,7 @@ int Verbs::follow() {
 }
 
 int Verbs::goals() {
-  Station station(options_);
+  Station station(options_, {"rt" + goal_topic_});
   goal_rules_.facing = heading_ == "goal";
   return serve_goals(station, "rt" + goal_topic_, goal_rules_, json_);
 }

@@ -103,6 +103,7 @@ struct AirView {
   AirClass here = AirClass::none;  ///< of the newest place that was flown through
   AirFactors factors = kModelledAir;
   std::array<double, kAirClasses> ln_evidence{}, seconds{};  ///< core/adapt/bets.hpp
+  std::array<adapt::Cause, kAirClasses> causes{};            ///< of factors above 1
 };
 
 /// What the control thread shows to the others, once a tick.
@@ -110,7 +111,8 @@ struct ControlView {
   std::int64_t t_ns = 0;
   Mode mode = Mode::passive;
   Reason reason = Reason::started;
-  bool armed = false, offboard = false, landed = true, aligned = false;
+  bool armed = false, offboard = false, aligned = false;                     ///< as in track::AutopilotFacts
+  std::optional<bool> landed;                                                ///< as in track::TickOutput
   std::optional<firmware_bridge::ClockOffset> clock;                         ///< the autopilot's
   static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< an age before the first, s
   double odometry_age = kNever, heartbeat_age = kNever, pose_age = kNever;   ///< s; pose: the autopilot's
@@ -137,7 +139,7 @@ struct ControlView {
   double untold_delay = 0;                        ///< of the autopilot's line, s
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
-  firmware_bridge::Latest<firmware_bridge::Battery> battery;  ///< the autopilot's
+  firmware_bridge::Latest<firmware_bridge::Battery> battery;  ///< the autopilot's, while it says it
   std::optional<AirView> air;                                 ///< none: nothing is learnt in flight
   TimingHistogram tick, lateness, odometry_to_wire;
 };
@@ -156,7 +158,8 @@ struct ControlEvent {
     page_fault,
     rougher,
     calmer,
-    air_kept
+    air_kept,
+    battery_silent
   } kind = Kind::transition;
   std::int64_t t_ns = 0;
   Mode mode = Mode::passive;
@@ -164,6 +167,7 @@ struct ControlEvent {
   std::uint64_t count = 0;             ///< periods missed, pages faulted
   AirClass air = AirClass::none;       ///< whose factor changed
   double factor = 1, ln_evidence = 0;  ///< to what, and on what
+  adapt::Cause cause = adapt::Cause::none;
 };
 
 /// A port that was opened again. The control thread swaps its lost one in, so that closing it is not its work.
@@ -199,6 +203,8 @@ struct SwitchReading {
   std::atomic<std::int64_t> at_ns{0};
 };
 
+inline constexpr std::size_t kVoxelRecords = 8;
+
 /// A sign of life of the control thread, for the strobe and the status LED.
 struct Pulse {
   std::atomic<std::uint64_t> ticks{0};
@@ -209,28 +215,29 @@ struct Pulse {
 using AtomicTime = sync::AtomicOptional<std::int64_t, INT64_MIN>;
 
 struct Channels {
-  sync::LatestValue<OdometrySample> odometry;              // DDS reader → control
-  sync::RecordRing<OdometrySample, 512> poses;             // DDS reader → map reader
-  sync::LatestValue<track::RigidShift> map_from_odom;      // DDS reader → map reader: the newest loop closure
-  sync::LatestValue<Line> refused, refused_map;            // DDS reader, map reader → status: the newest, and why
-  sync::RecordRing<CommandMessage, 64> commands;           // DDS reader → mission
-  sync::Handover<MapMessage> maps;                         // map reader → map worker
-  sync::LatestValue<MapVerdict> map_verdict;               // map worker → map reader: of the last that came in parts
-  sync::LatestValue<MapWriter> map_writer;                 // map worker → map reader: of the first good map of a term
-  sync::RecordRing<Scan*, 16> scans;                       // map reader → map worker, which frees them
-  sync::RecordRing<WindowCloud*, 16> windows;              // map reader → map worker, which frees them
-  Worlds worlds;                                           // map worker → each
-  sync::RecordRing<NewVoxels, 8> scan_voxels, map_voxels;  // map reader, map worker → control
-  AtomicTime map_ns;                                       // map worker: reception of the newest data in the snapshot
-  std::atomic<std::uint64_t> blocked_segment{0};           // planner → control: not clear in the newest world
-  std::atomic<std::uint64_t> rough_segment{0};             // the same, in the air as the flight has learnt it
-  sync::LatestValue<HandedAir> air;                        // control → map worker: each time that a factor changed
-  sync::LatestValue<AirFactors> air_kept;                  // control → air file: the same
-  sync::RecordRing<adapt::AirOrder, 16> air_orders;        // mission → control
-  sync::RecordRing<track::Order, 64> orders;               // mission → control
-  sync::Handover<PlanJob> jobs;                            // mission → planner
-  sync::RecordRing<PlanOutcome, 16> outcomes;              // planner → mission
-  sync::Handover<track::AcceptedSegment> segments;         // planner → control
+  sync::LatestValue<OdometrySample> odometry;          // DDS reader → control
+  sync::RecordRing<OdometrySample, 512> poses;         // DDS reader → map reader
+  sync::LatestValue<track::RigidShift> map_from_odom;  // DDS reader → map reader: the newest loop closure
+  sync::LatestValue<Line> refused, refused_map;        // DDS reader, map reader → status: the newest, and why
+  sync::RecordRing<CommandMessage, 64> commands;       // DDS reader → mission
+  sync::Handover<MapMessage> maps;                     // map reader → map worker
+  sync::LatestValue<MapVerdict> map_verdict;           // map worker → map reader: of the last that came in parts
+  sync::LatestValue<MapWriter> map_writer;             // map worker → map reader: of the first good map of a term
+  sync::RecordRing<Scan*, 16> scans;                   // map reader → map worker, which frees them
+  sync::RecordRing<WindowCloud*, 16> windows;          // map reader → map worker, which frees them
+  Worlds worlds;                                       // map worker → each
+  /// Map reader, map worker → control, which takes what finds no room to be everywhere.
+  sync::RecordRing<NewVoxels, kVoxelRecords> scan_voxels, map_voxels;
+  AtomicTime map_ns;                                 // map worker: reception of the newest data in the snapshot
+  std::atomic<std::uint64_t> blocked_segment{0};     // planner → control: not clear in the newest world
+  std::atomic<std::uint64_t> rough_segment{0};       // the same, in the air as the flight has learnt it
+  sync::LatestValue<HandedAir> air;                  // control → map worker: each time that a factor changed
+  sync::LatestValue<AirFactors> air_kept;            // control → air file: the same
+  sync::RecordRing<adapt::AirOrder, 16> air_orders;  // mission → control
+  sync::RecordRing<track::Order, 64> orders;         // mission → control
+  sync::Handover<PlanJob> jobs;                      // mission → planner
+  sync::RecordRing<PlanOutcome, 16> outcomes;        // planner → mission
+  sync::Handover<track::AcceptedSegment> segments;   // planner → control
   sync::LatestValue<ControlView> view_mission, view_planner, view_status;  // control → each
   std::atomic<bool> world_moves{false};  // map worker → planner: the newest world goes along with a mapper's window
   std::atomic<bool> map_partial{false};  // map worker → planner: the newest world is what is around the vehicle alone

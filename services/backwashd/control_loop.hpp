@@ -91,7 +91,9 @@ inline constexpr std::uint64_t kAliveTicks = 10;
 
 /// Gives every thread that starts from now on, the middleware's too, a stack of 512 KiB: locked memory is resident, and
 /// the usual 8 MiB of each of 22 threads were half of what the daemon held. Large allocations get mappings of their
-/// own, which return to the system when they end: a world's remains do not stay. Before other threads start.
+/// own, which return to the system when they end, and all threads have one heap: a world's remains do not stay.
+/// What flies allocates nothing; what else allocates may wait for a thread of lower priority. Before other threads
+/// start.
 void limit_memory();
 
 /// Locks the process's memory, what it has and what it will have. Where RLIMIT_MEMLOCK is finite (and CAP_IPC_LOCK is

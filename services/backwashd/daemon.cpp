@@ -237,6 +237,11 @@ int run(const Settings& settings) {
       spdlog::info("backwashd runs: {} on {}, DDS domain {}, namespace {}, raw log {}", settings.vehicle.name,
                    settings.daemon.link.device, settings.daemon.dds.domain, settings.daemon.dds.name_space,
                    flight->log);
+      if (const auto& risk = settings.model.bound.stated)
+        spdlog::info(
+            "a risk of {} is kept on each way and in each minute at rest; a position is judged by sets {:.2f} times as "
+            "wide",
+            risk->touch, risk->worst);
       if (const auto& c = settings.credentials) tell_of(*c);
       bool ready = false;  // the first ticks are on time only if the rest has started
       wait_for_end(signals, flight->failure, [&] {

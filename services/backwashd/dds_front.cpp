@@ -24,6 +24,13 @@ std::string topic_of(const config::Daemon& config) {
   return dds::topic(config.dds.name_space, dds::TopicOf<T>::kName);
 }
 
+/// Topics outside of the name space.
+std::vector<std::string> others_of(const config::Daemon& config) {
+  std::vector<std::string> all{config.dds.odometry_topic};
+  if (config.dds.tf != config::Transforms::none) all.push_back(dds::kTf);
+  return all;
+}
+
 /// From a stamp to now by the clock that the sender stamps with, s: this machine's monotonic one, or its wall clock.
 /// Nothing: it is neither. For what is told before a flight alone: nothing that flies asks the wall clock.
 std::optional<double> on_the_way(std::int64_t stamp_ns) {
@@ -53,7 +60,10 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
                    spdlog::warn("DDS: {} ({} more left out)", printable(line, 240), left_out);
                  }),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface,
-                   {.priority = priority, .max_sample_bytes = kMaxSampleBytes}, config.dds.security),
+                   {.priority = priority,
+                    .max_sample_bytes = kMaxSampleBytes,
+                    .topics = dds::topics(config.dds.name_space, others_of(config))},
+                   config.dds.security),
       poses_(participant_, config),
       closures_(dds::make_reader<dds::TransformStamped>(participant_, config.dds.name_space)),
       commands_(dds::make_reader<dds::Command>(participant_, config.dds.name_space)),
@@ -95,9 +105,11 @@ void DdsFront::take_odometry(const dds::Odometry& m, const dds::Guid& writer) {
   look_at_odometry(m);
   const auto sample = localization_.odometry(m, now_ns());
   if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
+  tell_closures();
   if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
   channels_.odometry.write(*sample);
-  channels_.poses.push(*sample);
+  if (!channels_.poses.push(*sample))
+    refusals_.add(poses_lost_, [] { return "a pose to place scans by: 512 others wait for the map reader"; });
   transforms_.add(*sample);
 }
 
@@ -116,7 +128,11 @@ void DdsFront::take_closure(const dds::TransformStamped& m, const dds::Guid& wri
   const auto taken = localization_.loop_closure(m);
   if (!taken) return refusals_.add(channels_.closures_refused, [&] { return taken.error(); });
   if (closure_writer_.bind(writer)) spdlog::info("loop closures are taken from writer {}", dds::text(writer));
-  channels_.loop_closures = localization_.closures();
+  tell_closures();
+}
+
+void DdsFront::tell_closures() {
+  if (channels_.loop_closures.exchange(localization_.closures()) == localization_.closures()) return;
   channels_.map_from_odom.write(*localization_.map_from_odom());
   transforms_.close(*localization_.map_from_odom());
 }
@@ -158,7 +174,7 @@ void DdsFront::take_command(const dds::Command& m, const dds::Guid& writer) {
                     c.position.y(), c.position.z(), c.yaw, dds::text(writer).c_str());
   const std::size_t size = std::min(static_cast<std::size_t>(std::max(length, 0)), record.bytes.size() - 1);
   record.header = {now_ns(), log::RecordKind::command, static_cast<std::uint32_t>(size)};
-  channels_.command_log.push(record);
+  channels_.command_log.push_or_count(record);
   if (channels_.commands.push(c)) return;
   if (stops) stop_ = c;
   refusals_.add(channels_.commands_refused, [] { return "a command: 64 others wait to be answered"; });

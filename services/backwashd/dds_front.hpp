@@ -48,6 +48,7 @@ class DdsFront {
   void take_odometry(const dds::Odometry& message, const dds::Guid& writer);
   void look_at_odometry(const dds::Odometry& message);
   void take_closures();
+  void tell_closures();
   void take_closure(const dds::TransformStamped& message, const dds::Guid& writer);
   void let_closures_go(std::span<const dds::Guid> departed);
   void take_commands();
@@ -61,6 +62,7 @@ class DdsFront {
   Localization localization_;
   OdometryCheck check_;
   Refusals refusals_;
+  std::atomic<std::uint64_t> poses_lost_{0};
   BoundWriter odometry_writer_{"odometry"}, closure_writer_{"a loop closure"};
   OtherDaemons others_{now_ns()};
   std::atomic<bool> commanding_{false};                       // status → reader

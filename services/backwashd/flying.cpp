@@ -5,30 +5,22 @@
 #include <cstring>
 
 #include "core/log/raw_log.hpp"
+#include "core/plan/rest.hpp"
 
 namespace backwash::daemon {
-namespace {
-
-constexpr double kHoldAfter = 2.0;  // s of hover at the end, so that the last set is the hover set's
-
-}  // namespace
-
-void append_hold(std::vector<Setpoint>& commands) {
-  Setpoint hold = commands.back();
-  hold.v_W = hold.a_W = Vec3::Zero();
-  commands.insert(commands.end(), static_cast<std::size_t>(kHoldAfter / kControlPeriod), hold);
-}
-
 double clearance_from(const Flying& flying, const plan::World& world, const reach::ReachTube& tube, std::size_t from) {
-  const reach::ReachTube ahead(tube.begin() + static_cast<std::ptrdiff_t>(std::min(from, tube.size() - 1)), tube.end());
-  return flying.z_safe ? plan::takeoff_clearance(world, ahead, *flying.z_safe) : plan::tube_clearance(world, ahead);
+  const double apart = flying.segment.apart_m;
+  return flying.z_safe ? plan::takeoff_clearance(world, tube, *flying.z_safe, from, apart)
+                       : plan::tube_clearance(world, tube, from, apart);
 }
 
 void verify(Flying& flying, const plan::World& world, std::size_t now) {
   auto& s = flying.segment;
-  s.tube = reach::tube_over_field(world.reach, flying.start, flying.previous, s.commands, world.bounds);
+  s.tube = plan::tube_to_rest(world, flying.start, flying.previous, s.commands);
   s.clearance = clearance_from(flying, world, s.tube, now);
-  flying.air = world.air.factors;
+  s.air = world.air.factors;
+  if (const auto& stated = world.bounds.model().stated)
+    s.worst = stated->worst, s.worst_at_rest = stated->worst / stated->at_rest;
 }
 
 void add_guards(Flying& flying, const plan::World& world, std::size_t now) {
@@ -36,9 +28,9 @@ void add_guards(Flying& flying, const plan::World& world, std::size_t now) {
   s.clearance_ahead.clear();
   for (std::size_t k = 0; k < s.commands.size(); k += track::AcceptedSegment::kClearanceEvery)
     s.clearance_ahead.push_back(clearance_from(flying, world, s.tube, std::max(k, now)));
-  flying.segment.stops =
-      plan::verified_stops(world, flying.start, flying.previous, flying.segment.commands, now, kStopEvery,
-                           [&](const reach::ReachTube& tube) { return clearance_from(flying, world, tube, now); });
+  flying.segment.stops = plan::verified_stops(
+      world, flying.start, flying.previous, flying.segment.commands, now, kStopEvery,
+      [&](const reach::ReachTube& tube) { return clearance_from(flying, world, tube, now) - flying.segment.apart_m; });
 }
 
 void add_own_stop(Flying& flying, std::size_t branch) {

@@ -16,21 +16,19 @@ struct Flying {
   State start;        ///< estimated when its first command was given
   Setpoint previous;  ///< command active before that
   plan::PlanMetrics metrics;
-  std::optional<double> z_safe;   ///< of a take-off: below it only what is beside counts, m
-  bool held = false;              ///< told to hold: a loop closure moves the map alone, not the vehicle
-  AirFactors air = kModelledAir;  ///< of the world that it and its stops were verified in
+  std::optional<double> z_safe;  ///< of a take-off: below it only what is beside counts, m
+  bool held = false;             ///< told to hold: a loop closure moves the map alone, not the vehicle
+
+  bool clear() const noexcept { return segment.clearance > segment.apart_m; }
 };
 
 constexpr std::size_t kStopEvery = 10;  ///< commands (0.2 s) between verified stops
 
-/// Lets the last command be held at rest for as long as the last set takes to become the hover set's.
-void append_hold(std::vector<Setpoint>& commands);
-
 /// Smallest clearance (m) of the sets from number `from` on, swept through the world.
 double clearance_from(const Flying& flying, const plan::World& world, const reach::ReachTube& tube, std::size_t from);
 
-/// Propagates the segment's tube from its start through the world and takes its clearance from command `now` on; > 0:
-/// it may fly. One propagation: milliseconds.
+/// Propagates the segment's tube from its start through the world to rest, and takes its clearance from command `now`
+/// on: clear() then says whether it may fly. One propagation: milliseconds.
 void verify(Flying& flying, const plan::World& world, std::size_t now = 0);
 
 /// Adds to a verified segment what guards it in flight: the stops that leave it at command `now` or later, every 0.2 s,

@@ -28,15 +28,21 @@ void tell(const ControlEvent& event, const ServiceManager& manager) {
     case ControlEvent::Kind::page_fault:
       return spdlog::warn("{} page faults in a control tick", event.count);
     case ControlEvent::Kind::calmer:
-      return spdlog::info("air of class {} is calmer: its variance is below {:.2f} times the model's; sets shrink",
+      if (event.factor >= 1)
+        return spdlog::info(
+            "errors in air of class {}: what the flight showed ends with it; a factor of {:.2f} is kept",
+            to_string(event.air), event.factor);
+      return spdlog::info("errors in air of class {} have below {:.2f} times the variance promised; sets shrink",
                           to_string(event.air), event.factor);
     case ControlEvent::Kind::rougher:
       if (!(event.factor > 1))
         return spdlog::info("air of class {} is no longer as calm as shown: its sets are the model's again",
                             to_string(event.air));
-      return spdlog::warn(
-          "air of class {} is rougher: its variance is above {:.2f} times the model's, ln evidence {:.1f}",
-          to_string(event.air), event.factor, event.ln_evidence);
+      return spdlog::warn("errors in air of class {} have {}{:.2f} times the variance promised, ln evidence {:.1f}; {}",
+                          to_string(event.air), event.factor >= adapt::Bets::kRougher.back() ? "at least " : "above ",
+                          event.factor, event.ln_evidence, adapt::explained(event.cause));
+    case ControlEvent::Kind::battery_silent:
+      return spdlog::warn("the autopilot does not say any more what is left in its battery: no LAND will come of it");
     case ControlEvent::Kind::air_kept:
       return spdlog::warn("the factors of the air were not reset: the vehicle was armed meanwhile");
   }
@@ -108,6 +114,8 @@ std::string traffic(const AutopilotLink& link) {
 
 void LinkWatch::step() {
   while (const auto event = channels_.events.pop()) tell(*event, manager_);
+  if (const std::uint64_t lost = channels_.events.lost(), before = std::exchange(events_lost_, lost); lost != before)
+    spdlog::warn("{} events of the control thread were not told: 256 waited", lost - before);
   const std::uint32_t losses = channels_.port_losses.load(std::memory_order_relaxed);
   const std::optional<LinkFault> fault = channels_.link_fault.load(std::memory_order_relaxed);
   if (std::exchange(losses_, losses) != losses)

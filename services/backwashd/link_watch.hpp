@@ -34,8 +34,9 @@ class LinkWatch {
   decltype(config::Daemon::link) link_;
   const ServiceManager& manager_;  ///< told each transition
   std::optional<firmware_bridge::LinkFault> fault_;
-  std::uint32_t losses_ = 0;  ///< that were told
-  std::uint32_t mended_ = 0;  ///< for which a fresh port was offered: a loss of that one is the next
+  std::uint32_t losses_ = 0;       ///< that were told
+  std::uint64_t events_lost_ = 0;  ///< the same
+  std::uint32_t mended_ = 0;       ///< for which a fresh port was offered: a loss of that one is the next
 };
 
 /// Thread body: step() every 50 ms.

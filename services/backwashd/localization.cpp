@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "services/backwashd/text.hpp"
@@ -124,6 +125,8 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
     return tl::unexpected<std::string>("the velocity is not known yet: it comes from the poses of the last 0.2 s");
   s.state.v_W = *v_W;
   if (text(m.header.frame_id) == frames_.odometry) {
+    p_O_ = s.state.p_W;
+    settle();
     s.map_from_odom = *map_from_odom_;
     s.closures = closures_;
     s.state = map_from_odom_->state(s.state);
@@ -133,6 +136,20 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
     return tl::unexpected<std::string>("the odometry is not finite, further than 10 km or faster than 100 m/s");
   s.q = {attitude.w(), attitude.x(), attitude.y(), attitude.z()};
   return s;
+}
+
+/// The newest transform is in use unless it is no closure where the vehicle is now: far on it may be one.
+void Localization::settle() {
+  if (!newest_ || (map_from_odom_ && p_O_ && step_to(*newest_) <= max_sigma_)) return;
+  const bool repeats = map_from_odom_ && map_from_odom_->yaw == newest_->yaw && map_from_odom_->t == newest_->t;
+  if (!repeats) map_from_odom_ = *newest_, ++closures_;
+  newest_.reset();
+}
+
+/// By how much a transform moves the vehicle, and what is a metre away from it: obstacles beyond count for nothing.
+double Localization::step_to(const track::RigidShift& newest) const {
+  const track::RigidShift step = map_from_odom_->inverse() * newest;
+  return (step.point(*p_O_) - *p_O_).norm() + std::abs(std::remainder(step.yaw, 2 * std::numbers::pi)) * 1.0;
 }
 
 tl::expected<void, std::string> Localization::loop_closure(const dds::TransformStamped& m) {
@@ -151,9 +168,8 @@ tl::expected<void, std::string> Localization::loop_closure(const dds::TransformS
         "the loop closure tilts the vertical by more than 1 degree; both frames must be z-up");
   const track::RigidShift newest{
       std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z())), translation};
-  if (map_from_odom_ && map_from_odom_->yaw == newest.yaw && map_from_odom_->t == newest.t) return {};
-  map_from_odom_ = newest;
-  ++closures_;
+  newest_ = newest;
+  settle();
   return {};
 }
 

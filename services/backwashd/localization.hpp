@@ -27,15 +27,19 @@ class Localization {
   /// number is −1, is not known. A pose that is not finite, beyond 10 km or 100 m/s, or no rotation is refused; whether
   /// it is credible is for the odometry gate.
   tl::expected<OdometrySample, std::string> odometry(const dds::Odometry& message, std::int64_t received_ns);
-  /// From now on, odometry is brought into the map by this transform; it turns about z only. A message that repeats the
-  /// last transform changes nothing.
+  /// From now on, odometry is brought into the map by this transform; it turns about z only. One that differs from the
+  /// one in use by no more than max_sigma, where the vehicle is, is no closure: the estimate may be off by as much. It
+  /// changes nothing, and no plan is refused for it, until it differs by more: by what follows, or where a turn that
+  /// was nothing here has come to matter.
   tl::expected<void, std::string> loop_closure(const dds::TransformStamped& message);
   std::uint32_t closures() const noexcept { return closures_; }
-  /// The newest; nothing before the first.
+  /// The one in use; nothing before the first.
   const std::optional<track::RigidShift>& map_from_odom() const noexcept { return map_from_odom_; }
 
  private:
   std::string unusable(const dds::Odometry& message) const;
+  void settle();
+  double step_to(const track::RigidShift& newest) const;
   std::optional<Vec3> velocity(const dds::Odometry& message, std::int64_t stamp_ns, const Vec3& p_W,
                                const Eigen::Quaterniond& attitude, const Vec3& lever);
 
@@ -46,6 +50,8 @@ class Localization {
   track::PoseVelocity velocity_;       // in the VIO's own frame: no loop closure moves it
   bool velocity_of_odometry_ = false;  // whether that is frames.odometry
   std::optional<track::RigidShift> map_from_odom_;
+  std::optional<track::RigidShift> newest_;  // not in use: no closure where the vehicle was last
+  std::optional<Vec3> p_O_;                  // there, in the VIO's own frame
   std::uint32_t closures_ = 0;
 };
 

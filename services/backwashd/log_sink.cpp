@@ -107,7 +107,7 @@ void LogSink::log(const spdlog::details::log_msg& message) noexcept {
       for (const char escaped : {'\\', 'x', kHex[byte >> 4], kHex[byte & 15]}) line.text[line.size++] = escaped;
     }
   }
-  ring_.push(line);
+  ring_.push_or_count(line);
 }
 
 std::string LogSink::format(const Line& line) const {

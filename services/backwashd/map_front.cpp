@@ -38,7 +38,9 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
       placement_(config),
       refusals_(channels.refused_map),
       assembly_(kMaxMapBytes, config.frames.map),
-      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface, {.apart = true},
+      participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface,
+                   {.apart = true,
+                    .topics = dds::topics(config.dds.name_space, {config.map.window.occupied, config.map.window.free})},
                    config.dds.security),
       maps_(dds::make_reader<dds::Octomap>(participant_, config.dds.name_space)),
       scans_(dds::make_reader<dds::PointCloud>(participant_, config.dds.name_space)),
@@ -79,7 +81,7 @@ void MapFront::take_scans() {
     if (world_) {
       const NewVoxels voxels = new_voxels(world_->world->grid, *scan, sensor_range_);
       fresh = voxels.count;
-      if (fresh > 0) channels_.scan_voxels.push(voxels);
+      if (fresh > 0) channels_.scan_voxels.push_or_count(voxels);
     }
     recorder_.append(log::RecordKind::scan, "scan of " + std::to_string(scan->points_W.size()) + " points, " +
                                                 std::to_string(fresh) + " new voxels");

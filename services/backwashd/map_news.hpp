@@ -38,15 +38,18 @@ struct Scan {
   std::vector<Vec3> points_W;  ///< m
   Vec3 sensor_W = Vec3::Zero();
   std::int64_t received_ns = 0;
+  std::uint32_t closures = 0;  ///< loop closures that its map frame has seen
 };
 
-/// Cubes of the map's lattice that a scan found occupied and the newest snapshot does not.
+/// Boxes of the map's lattice that are not free any more, by a scan, a window or a map, and that the newest snapshot
+/// has as free: each a cube, or longer by `more` edges along x, y, z.
 struct NewVoxels {
   static constexpr std::size_t kMost = 256;
   std::int64_t received_ns = 0;
   double edge = 0;  ///< m
   std::size_t count = 0;
-  std::array<std::array<double, 3>, kMost> centers{};  ///< m
+  std::array<std::array<double, 3>, kMost> centers{};     ///< m
+  std::array<std::array<std::int32_t, 3>, kMost> more{};  ///< edges
 };
 
 /// What a mapper says of the voxels around the vehicle: a cloud of those that are occupied, or of those that are free.

@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -20,82 +21,110 @@ void MapWorker::tell_let_go(const WindowKeeper::Changes& changes) {
   spdlog::info("{} ({} parts are held)", line, window_->parts());
 }
 
+void MapWorker::look_at(map::OccupancyGrid grid) {
+  map::LiveMap live(std::move(grid));
+  if (live_)
+    live.take_along(
+        *live_,
+        ((live.grid().origin() - live_->grid().origin()) / live.grid().resolution()).array().round().cast<int>());
+  live_.emplace(std::move(live));
+  said_ = gone_ = {};
+}
+
 /// A world at another place, where the vehicle has come to the edge of the one in use, or anew of what is known. False:
 /// there is no need, or nothing to make one of.
-bool MapWorker::move_world(bool anew, std::int64_t seen_ns) {
+bool MapWorker::move_world(bool anew) {
   if (const auto newest = channels_.vehicle_W.read_new()) vehicle_W_ = *newest;
   if (!vehicle_W_) return false;
-  const bool along = live_ && !anew;
-  auto grid = window_->moved(*vehicle_W_, along ? &live_->grid() : nullptr);
+  auto grid = window_->moved(*vehicle_W_, live_ && !anew ? &live_->grid() : nullptr);
   if (!grid) return false;
   const auto begun = now_ns();
-  const Index3 size = grid->size();
-  map::LiveMap live(*grid);
-  if (along)
-    live.take_along(*live_,
-                    ((grid->origin() - live_->grid().origin()) / grid->resolution()).array().round().cast<int>());
-  live_.emplace(std::move(live));
+  const std::int64_t seen_ns = std::max(heard_ns_, channels_.map_ns.load().value_or(0));
+  look_at(std::move(*grid));
+  if (world_) tell_control(news(world_->grid, live_->grid(), seen_ns));
   channels_.world_moves = true;
-  publish(made(std::move(*grid)), seen_ns);
+  publish(built(live_->grid()), seen_ns);
+  const Index3& size = world_->grid.size();
   spdlog::info("world of the window made around the vehicle: {} x {} x {} voxels in {} ms", size.x(), size.y(),
                size.z(), (now_ns() - begun) / 1'000'000);
   return true;
 }
 
-void MapWorker::take_cloud(const WindowCloud& cloud, map::VoxelBox& said, map::VoxelBox& gone) {
+void MapWorker::note(const map::ScanChange& change, map::VoxelBox& box, std::int64_t received_ns) {
+  if (change.box.empty()) return;
+  box.add(change.box.low);
+  box.add(change.box.high);
+  if (!world_) return;
+  for (const Index3& v : change.occupied) noted_.push_back(world_->grid.index(live_->grid().center(v)));
+  noted_ns_ = std::max(noted_ns_, received_ns);
+}
+
+void MapWorker::take_cloud(const WindowCloud& cloud) {
   if (!window_) return;
   const auto changes = window_->take(cloud, live_ ? &*live_ : nullptr);
   ++channels_.scans_accepted;
   tell_let_go(changes);
-  for (const auto& [change, box] : {std::pair(&changes.said, &said), std::pair(&changes.gone, &gone)}) {
-    if (change->box.empty()) continue;
-    if (!change->occupied.empty()) channels_.map_voxels.push(as_new_voxels(world_->grid, *change, cloud.received_ns));
-    box->add(change->box.low);
-    box->add(change->box.high);
-  }
+  note(changes.said, said_, cloud.received_ns);
+  note(changes.gone, gone_, cloud.received_ns);
+  if (!cloud.free) heard_ns_ = std::max(heard_ns_, cloud.received_ns);
 }
 
-/// Scans and clouds that came meanwhile are taken in together, in the order in which they came: the last word counts.
-/// One thread hands them over. None is left that came before one that is taken, so that a snapshot holds all that is
-/// older than it says. The age of the map is that of the newest scan or occupied cloud: free voxels alone say nothing
+void MapWorker::take_scan(const Scan& scan) {
+  // What was found before a loop closure lies where the map was then: the next map speaks for it.
+  if (std::exchange(closures_, scan.closures) != scan.closures && live_) live_->forget_found();
+  if (!live_ || !live_->grid().inside(live_->grid().index(scan.sensor_W))) {
+    ++channels_.scans_rejected;  // no map yet, or the sensor is outside of it
+    return;
+  }
+  note(live_->insert(scan.points_W, scan.sensor_W, settings_.sensor_range), said_, scan.received_ns);
+  ++channels_.scans_accepted;
+  heard_ns_ = std::max(heard_ns_, scan.received_ns);
+}
+
+/// In the order in which they came: the last word counts. One thread hands them over. None is left that came before one
+/// that is taken. The age of the map is that of the newest scan, occupied cloud or map: free voxels alone say nothing
 /// of what has come.
-bool MapWorker::take_news() {
-  const auto begun = now_ns();
+bool MapWorker::hear() {
   std::vector<std::unique_ptr<Scan>> scans;
   std::vector<std::unique_ptr<WindowCloud>> clouds;
   for (bool more = true; std::exchange(more, false);) {
     while (const auto next = channels_.windows.pop()) clouds.emplace_back(*next);
     while (const auto next = channels_.scans.pop()) scans.emplace_back(*next), more = true;
   }
-  // Without news the vehicle may have come to the edge of its world all the same.
-  if (scans.empty() && clouds.empty()) return window_ && move_world(false, channels_.map_ns.load().value_or(0));
-  map::VoxelBox said, gone;
-  std::optional<std::int64_t> newest_ns;
-  const auto newer = [&](std::int64_t ns) { newest_ns = std::max(newest_ns.value_or(ns), ns); };
   auto cloud = clouds.begin();
   const auto clouds_before = [&](std::int64_t ns) {
-    for (; cloud != clouds.end() && (*cloud)->received_ns < ns; ++cloud) {
-      take_cloud(**cloud, said, gone);
-      if (!(*cloud)->free) newer((*cloud)->received_ns);
-    }
+    for (; cloud != clouds.end() && (*cloud)->received_ns < ns; ++cloud) take_cloud(**cloud);
   };
   for (const auto& scan : scans) {
     clouds_before(scan->received_ns);
-    if (take_scan(*scan, said)) newer(scan->received_ns);
+    take_scan(*scan);
   }
   clouds_before(INT64_MAX);
-  const std::int64_t seen_ns = newest_ns.value_or(channels_.map_ns.load().value_or(0));
-  auto world = world_;
-  for (const auto* box : {&said, &gone})
-    if (!box->empty()) world = plan::update_world(*world, live_->grid(), *box, model_, parallel_);
-  if (world != world_) {
-    publish(std::move(world), seen_ns);
+  if (!noted_.empty()) tell_control(news(world_->grid, std::exchange(noted_, {}), noted_ns_));  // in one record
+  return !scans.empty() || !clouds.empty();
+}
+
+/// Scans and clouds that came meanwhile are in one world together.
+bool MapWorker::take_news() {
+  const auto begun = now_ns();
+  const bool heard = hear();
+  // Without news the vehicle may have come to the edge of its world all the same.
+  if (window_ && move_world(false)) return true;
+  const std::int64_t seen_ns = std::max(heard_ns_, channels_.map_ns.load().value_or(heard_ns_));
+  const std::array boxes{std::exchange(said_, {}), std::exchange(gone_, {})};
+  if (!boxes[0].empty() || !boxes[1].empty()) {
+    const auto update = [&, grid = live_->grid()] {
+      World world = world_;
+      for (const map::VoxelBox& box : boxes)
+        if (!box.empty()) world = plan::update_world(*world, grid, box, model_, parallel_);
+      return world;
+    };
+    publish(made(update), seen_ns);
     spdlog::debug("map updated in {} ms", (now_ns() - begun) / 1'000'000);
-  } else if (newest_ns && world_) {
-    channels_.map_ns.store(*newest_ns);  // the snapshot says what they say
+    return true;
   }
-  if (window_) move_world(false, seen_ns);
-  return true;
+  if (heard && world_ && seen_ns > channels_.map_ns.load()) publish(world_, seen_ns);  // it says what they say
+  return heard;
 }
 
 }  // namespace backwash::daemon

@@ -26,6 +26,8 @@ constexpr std::uint64_t kMostOrders = 16;  // on their way at once; a STOP alway
 Decision only(std::uint8_t result, std::string what) { return {Answer{result, std::move(what)}, {}, {}}; }
 Decision refused(std::string why) { return only(kRefused, std::move(why)); }
 
+constexpr const char* kGroundUnknown = "the autopilot does not say whether the vehicle stands on the ground";
+
 bool flies(Mode mode) { return mode == Mode::tracking || mode == Mode::hold; }
 
 }  // namespace
@@ -56,7 +58,7 @@ std::string Mission::judge_place() const {
   const Index3 v = world_->grid.index(view_.state.p_W);
   if (!world_->grid.inside(v)) return "the vehicle is outside the map";
   if (!world_->grid.free(v)) return "the vehicle is in a voxel that is not free";
-  if (view_.landed && !plan::takeoff_column(*world_, view_.state.p_W))
+  if (view_.landed.value_or(false) && !plan::takeoff_column(*world_, view_.state.p_W, view_.residual_m))
     return "there is no clear hover height above a known floor here";
   return "";
 }
@@ -175,7 +177,7 @@ Decision Mission::enable() {
   if (order_under_way()) return refused("the last order is still being carried out: ask again");
   if (view_.mode == Mode::hold)
     return refused(std::string("already hold (") + to_string(view_.reason) + ")" +
-                   (view_.landed ? ": land ends it, then enable" : ""));
+                   (view_.landed.value_or(false) ? ": land ends it, then enable" : ""));
   if (track::commanding(view_.mode)) return refused(std::string("already ") + to_string(view_.mode));
   if (!may_fly(view_.stop_switch)) return refused(refusal(view_.stop_switch));
   if (!other_daemon_.empty()) return refused(other_daemon_);
@@ -197,7 +199,8 @@ Decision Mission::enable() {
 Decision Mission::take_off(const CommandMessage& command) {
   if (view_.mode == Mode::lifting) return refused("taking off already");
   if (view_.mode != Mode::tracking) return refused("not enabled");
-  if (!view_.landed) return refused("already in the air");
+  if (!view_.landed) return refused(kGroundUnknown);
+  if (!*view_.landed) return refused("already in the air");
   if (!view_.finished) return refused("already taking off");
   return start(PlanJob::Kind::takeoff, {command.position, {}});
 }
@@ -212,7 +215,8 @@ Decision Mission::go_to(const CommandMessage& command) {
 Decision Mission::fly(std::deque<Goal> route) {
   if (view_.mode == Mode::lifting) return refused("taking off: wait until it is in the air");
   if (!flies(view_.mode)) return refused("not enabled");
-  if (view_.landed) return refused("on the ground: take off first");
+  if (!view_.landed) return refused(kGroundUnknown);
+  if (*view_.landed) return refused("on the ground: take off first");
   if (!view_.finished) return refused("flying: hold first");
   Decision decision = start(PlanJob::Kind::go_to, route.front());
   if (decision.job) {
@@ -240,7 +244,7 @@ Decision Mission::hold() {
 Decision Mission::stop(const CommandMessage& command) {
   const bool idle = view_.mode == Mode::passive || view_.mode == Mode::quiet;
   const bool pending = order_under_way();
-  const bool standing = view_.landed && !view_.armed;
+  const bool standing = view_.landed.value_or(false) && !view_.armed;
   const Mode mode = view_.mode;
   Decision decision = order(Request::stop, standing ? "disabling" : "stopping");
   if (mode == Mode::land) decision.answer = {kRefused, "landing: the autopilot lands, and ends that by itself"};

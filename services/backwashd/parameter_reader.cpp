@@ -3,11 +3,12 @@
 
 namespace backwash::daemon {
 
-void ParameterReader::step(firmware_bridge::AutopilotLink& link, bool may_ask, bool may_repeat,
-                           ControlView& view) noexcept {
+void ParameterReader::step(firmware_bridge::AutopilotLink& link, firmware_bridge::Time now, bool may_ask,
+                           bool may_repeat, ControlView& view) noexcept {
   constexpr std::size_t kRounds = 3;
   const auto& telemetry = link.telemetry();
-  const auto kind = telemetry.status ? telemetry.status->value.autopilot : firmware_bridge::Autopilot::kUnknown;
+  const auto status = telemetry.status.at(now);
+  const auto kind = status ? status->value.autopilot : firmware_bridge::Autopilot::kUnknown;
   if (kind != view.autopilot) {
     view.autopilot = kind;
     view.parameters = {};

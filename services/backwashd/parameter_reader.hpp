@@ -14,7 +14,8 @@ class ParameterReader {
  public:
   /// Once a tick, after view.ticks: what the link knows into the view, and one question where `may_ask`. Without
   /// `may_repeat` only for what is not known. Real-time: wait-free, no allocation.
-  void step(firmware_bridge::AutopilotLink& link, bool may_ask, bool may_repeat, ControlView& view) noexcept;
+  void step(firmware_bridge::AutopilotLink& link, firmware_bridge::Time now, bool may_ask, bool may_repeat,
+            ControlView& view) noexcept;
 
  private:
   std::size_t next_ = 0, asked_ = 0;

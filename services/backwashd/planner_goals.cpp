@@ -16,9 +16,8 @@ constexpr double kPatience = 2.0;  // s at rest in which more of the way may bec
 constexpr double kReserve = 0.1;        // m of clearance towards what may turn out to be a wall
 constexpr double kLeastReserve = 0.02;  // m, where there is no room for that: for the set, larger since the start
 
-/// `apart_m`: at rest, the frame that the autopilot holds its position in is off the map by so much. Its controller
-/// does not see that error, so that no set shrinks it: clearance has to be left for it. In motion most of it is delay.
-plan::PlanOptions limits_of(const plan::World& world, double apart_m = 0) {
+/// `apart_m`: AcceptedSegment::apart_m.
+plan::PlanOptions limits_of(const plan::World& world, double apart_m) {
   plan::PlanOptions options{};
   options.least_clearance_m = apart_m;
   options.v_max = world.reach.vehicle.limits.v_max;
@@ -49,8 +48,8 @@ bool may_become_clear(const map::OccupancyGrid& grid, const Vec3& p_W) {
 /// Where the map ends the airflow of what is behind is not known: a way with something to spare comes first. From rest
 /// at last one with nothing to spare: what has come to light may have left nothing where the vehicle is already.
 plan::Replan PlannerWorker::onward(const plan::World& world, const plan::Route& route, std::size_t now,
-                                   std::size_t branch, const Vec3& goal_W) const {
-  plan::ReplanOptions options{limits_of(world)};
+                                   std::size_t branch, const Vec3& goal_W, double apart_m) const {
+  plan::ReplanOptions options{limits_of(world, apart_m)};
   plan::Replan next;
   for (const double reserve : {kReserve, kLeastReserve, 0.0}) {
     if (reserve == 0 && branch > 0) break;
@@ -79,9 +78,11 @@ std::optional<std::string> PlannerWorker::go_to(const PlanJob& job) {
     const std::uint32_t closures = view_.closures;
     const auto options = limits_of(*world, view_.residual_m);
     auto planned = plan::plan(*world, {view_.state, view_.command}, job.position, options);
-    spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m)",
+    const bool stated = world->bounds.model().stated.has_value();
+    spdlog::info("plan: {} ({:.0f} ms search, {:.0f} ms optimisation, {:.0f} ms verification, clearance {:.3f} m{})",
                  plan::to_string(planned.status), planned.metrics.search_ms, planned.metrics.optimise_ms,
-                 planned.metrics.verify_ms, planned.metrics.min_clearance_m);
+                 planned.metrics.verify_ms, planned.metrics.min_clearance_m,
+                 stated ? ", risk " + fmt::format("{:.2g}", planned.metrics.risk.total) : "");
     const bool hidden =
         planned.status == plan::PlanStatus::no_path ||
         (planned.status == plan::PlanStatus::goal_blocked && may_become_clear(world->grid, job.position));
@@ -113,7 +114,7 @@ std::optional<std::string> PlannerWorker::explore(const PlanJob& job) {
     const std::uint32_t closures = view_.closures;
     plan::Route here{view_.state, view_.command, {}, {}};
     here.commands.assign(1, {view_.command.p_W, Vec3::Zero(), Vec3::Zero(), view_.command.yaw});
-    auto next = onward(*world, here, 0, 0, job.position);
+    auto next = onward(*world, here, 0, 0, job.position, view_.residual_m);
     why = next.message;
     if (next.kind == plan::Replan::Kind::extended) {
       spdlog::info("towards a goal that is not known to be clear yet: {} commands", next.route.commands.size());

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/plan/stop.hpp"
+#include "core/reach/rest.hpp"
 #include "core/track/rebase.hpp"
 #include "services/backwashd/planner_worker.hpp"
 
@@ -20,10 +21,15 @@ constexpr std::size_t kRectifyAfter = 15;       // commands (0.3 s) that a recti
 constexpr std::size_t kStopAfter = 5;           // commands (0.1 s) before a stop that is chosen for the air
 constexpr std::size_t kStopsTried = 20;         // of them, one every 0.2 s
 constexpr double kBetter = 0.02;                // m that a later stop that is not clear has to be clearer by
-constexpr std::size_t kRunsOut = 300;           // commands: 3 s of motion and as much of hold
+constexpr std::size_t kRunsOut = 150;           // commands: 3 s of motion
 constexpr std::int64_t kLook_ns = 500'000'000;  // between looks at a flight that runs out, without a new world
 
 std::string metres(double d) { return std::to_string(d) + " m"; }
+
+std::string left(const plan::World& world, double clearance) {
+  const bool risky = clearance == 0 && world.bounds.model().stated;  // plan::tube_clearance()
+  return risky ? "the stated risk is not kept" : metres(clearance);
+}
 
 }  // namespace
 
@@ -53,8 +59,8 @@ bool PlannerWorker::pursues() {
     return false;
   }
   if (view_.finished) return false;  // the mission goes on from there
-  const std::size_t ahead = flying_->segment.commands.size() - std::min(flying_->segment.commands.size(), view_.index);
-  return new_world_ || (ahead < kRunsOut && view_.t_ns >= pursuit_->again_ns);
+  const std::size_t moving = flying_->segment.commands.size() - reach::settling_periods(world_->reach);
+  return new_world_ || (moving < view_.index + kRunsOut && view_.t_ns >= pursuit_->again_ns);
 }
 
 /// Extends the flight towards its goal in the newest world, around what has come to stand in its way; or finds that it
@@ -66,13 +72,13 @@ void PlannerWorker::pursue() {
   const bool braking = view_.braking;
   const plan::Route route{flying_->start, flying_->previous, flown_commands(*flying_, braking, view_.stop_branch), {}};
   const std::size_t now = view_.index, branch = now + p.lead;
-  auto next = onward(*world_, route, now, branch, p.goal_W);
+  auto next = onward(*world_, route, now, branch, p.goal_W, flying_->segment.apart_m);
   using Kind = plan::Replan::Kind;
   if (next.kind == Kind::kept && !braking) keep();
   if (next.kind == Kind::kept || (braking && next.kind != Kind::extended)) return;
   // The next world may be minutes away: until then what flies has to be clear in this one.
   if (next.kind == Kind::extended && too_calm()) return braking ? void() : verify_again();
-  if (next.kind == Kind::unsafe) return block("no way on is clear in the new map: " + metres(next.clearance_m));
+  if (next.kind == Kind::unsafe) return block("no way on is clear in the new map: " + left(*world_, next.clearance_m));
   auto commands = std::move(next.route.commands);
   if (next.reaches_goal && p.yaw) {
     const auto turn = plan::turned_to(commands.back(), *p.yaw, plan::YawLimits{});
@@ -81,7 +87,7 @@ void PlannerWorker::pursue() {
   Flying on = continued(branch, std::move(commands));
   on.metrics = next.metrics;
   verify(on, *world_, now);
-  if (!(on.segment.clearance > 0)) return braking ? void() : verify_again();
+  if (!on.clear()) return braking ? void() : verify_again();
   add_guards(on, *world_, now);
   // Nowhere to go on in rougher air: stopped as it is verified there, and held.
   const bool held = next.kind == Kind::stopping && !grown_air().empty() && !on.segment.stops.empty();
@@ -115,17 +121,18 @@ void PlannerWorker::block(const std::string& why) {
 /// offered once more, to rest by the first stop that is clear in it; if none is, by the first that no later one
 /// betters. What is to be said of it; "": its stops are of that air.
 std::string PlannerWorker::choose_stop() {
-  if (std::ranges::equal(flying_->air, world_->air.factors, std::greater_equal{})) return "";
+  if (std::ranges::equal(flying_->segment.air, world_->air.factors, std::greater_equal{})) return "";
   const bool offers = !flying_->segment.arms && front_.standing(view_) != PlanFront::Standing::ended;
   for (const std::size_t lead : {kStopAfter, kRectifyAfter}) {  // the second where the first came too late
     const bool same_frame = view_.closures == flying_->segment.closures;
     if (!offers || !same_frame || view_.segment != flying_->segment.id || view_.braking) break;
     auto best = rest_from(view_.index + lead);
     if (!best) break;  // it rests before that
-    const double clearance = best->segment.clearance;
+    const bool clear = best->clear();
+    const double lacks = best->segment.apart_m - best->segment.clearance;
     if (!offer(std::move(*best))) continue;
-    return clearance > 0 ? "; it rests by a stop that is clear in it"
-                         : "; no stop is clear in it, the one flown lacks " + metres(-clearance);
+    return clear ? "; it rests by a stop that is clear in it"
+                 : "; no stop is clear in it, the one flown lacks " + metres(lacks);
   }
   return "; its stops are those of calmer air";
 }
@@ -133,13 +140,12 @@ std::string PlannerWorker::choose_stop() {
 /// The flight, to rest by a stop that leaves it at `branch` or later, as choose_stop() says. Nothing: it ends before.
 std::optional<Flying> PlannerWorker::rest_from(std::size_t branch) {
   std::optional<Flying> best;
-  for (std::size_t n = 0; n < kStopsTried && !(best && best->segment.clearance > 0); ++n, branch += kStopEvery) {
+  for (std::size_t n = 0; n < kStopsTried && !(best && best->clear()); ++n, branch += kStopEvery) {
     auto commands = plan::stop_along(flying_->segment.commands, branch, 2 * world_->reach.vehicle.limits.a_max);
     if (commands.empty()) break;
     Flying next = continued(branch, std::move(commands));
     verify(next, *world_, view_.index);
-    const double clearance = next.segment.clearance;
-    if (!best || clearance > 0 || clearance > best->segment.clearance + kBetter) best = std::move(next);
+    if (!best || next.clear() || next.segment.clearance > best->segment.clearance + kBetter) best = std::move(next);
   }
   if (!best) return best;
   best->held = true;
@@ -166,8 +172,8 @@ std::string PlannerWorker::grown_air() const {
 void PlannerWorker::verify_again() {
   Flying again = *flying_;
   verify(again, *world_, view_.index);
-  if (!(again.segment.clearance > 0))
-    block("the rest of it is not clear in the new map: " + metres(again.segment.clearance));
+  if (!again.clear())
+    block("the rest of it is not clear in the new map: " + left(*world_, again.segment.clearance));
   else
     keep();
 }
@@ -175,12 +181,14 @@ void PlannerWorker::verify_again() {
 /// What flies is clear in the newest world. Where its stops were verified in calmer air than there is, it is offered
 /// once more as it is, with the stops that are clear now: a STOP must not brake on sets that the air does not allow.
 void PlannerWorker::keep() {
+  if (too_calm()) return;  // its world is being made
   const AirFactors before = std::exchange(air_, world_->air.factors);
   Flying next = *flying_;
   next.segment.continues = flying_->segment.id;
   next.segment.branch = view_.index + kRectifyAfter;
-  if (allowed(before, air_) || next.segment.arms || next.segment.branch >= next.segment.commands.size() ||
-      front_.standing(view_) == PlanFront::Standing::ended)
+  const auto kept = [](double made, double now) { return made >= std::min(now, 1.0); };
+  if (std::ranges::equal(before, air_, kept) || next.segment.arms ||
+      next.segment.branch >= next.segment.commands.size() || front_.standing(view_) == PlanFront::Standing::ended)
     return;
   verify(next, *world_, view_.index);
   add_guards(next, *world_, view_.index);
@@ -197,14 +205,13 @@ std::optional<std::string> PlannerWorker::rectify() {
   for (int attempt = 0; attempt < kTries; ++attempt) {
     const track::RigidShift D = view_.shift;
     const std::size_t branch = view_.index + kRectifyAfter;
-    Flying next{{0, flying_->segment.id, branch, moved_by_closure(branch), {}, {}, view_.closures},
-                D.state(flying_->start),
-                D.setpoint(flying_->previous),
-                flying_->metrics,
-                flying_->z_safe,
-                flying_->held};
+    Flying next = continued(branch, moved_by_closure(branch));
+    next.segment.closures = view_.closures;
+    next.start = D.state(flying_->start);
+    next.previous = D.setpoint(flying_->previous);
+    next.held = flying_->held;
     verify(next, *world_, view_.index);
-    if (!(next.segment.clearance > 0)) return "the way back is not clear: " + metres(next.segment.clearance);
+    if (!next.clear()) return "the way back is not clear: " + left(*world_, next.segment.clearance);
     add_guards(next, *world_, view_.index);
     spdlog::info("loop closure {}: {:.3f} m and {:.2f} degrees, {} from command {} on", view_.closures,
                  (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw * 180 / 3.14159265358979,
@@ -224,9 +231,7 @@ std::vector<Setpoint> PlannerWorker::moved_by_closure(std::size_t branch) const 
     for (Setpoint& command : commands) command = view_.shift.setpoint(command);
     return commands;
   }
-  commands = track::rectified(commands, branch, view_.shift, limits.v_max, limits.a_max);
-  if (commands.size() > flying_->segment.commands.size()) append_hold(commands);
-  return commands;
+  return track::rectified(commands, branch, view_.shift, limits.v_max, limits.a_max);
 }
 
 }  // namespace backwash::daemon

@@ -11,6 +11,8 @@
 #include <utility>
 
 #include "core/log/tick_log.hpp"
+#include "core/plan/ends.hpp"
+#include "core/plan/rest.hpp"
 #include "core/plan/stop.hpp"
 
 namespace backwash::daemon {
@@ -24,7 +26,8 @@ constexpr std::size_t kAnswerPauses = 100;  // for the control thread to take a 
 
 Setpoint at_rest(const Setpoint& s) { return {s.p_W, Vec3::Zero(), Vec3::Zero(), s.yaw}; }
 
-std::string not_clear(const std::string& what, double clearance) {
+std::string not_clear(const plan::World& world, const std::string& what, double clearance) {
+  if (clearance == 0 && world.bounds.model().stated) return what + " does not keep the stated risk";
   char line[128];
   std::snprintf(line, sizeof line, "%s is not clear enough: %.3f m", what.c_str(), clearance);
   return line;
@@ -42,7 +45,7 @@ bool PlannerWorker::step() {
   PlanOutcome outcome{job->id, !refused, {}};
   if (refused) std::snprintf(outcome.reason.data(), outcome.reason.size(), "%s", refused->c_str());
   channels_.jobs.give_back(job);
-  channels_.outcomes.push(outcome);
+  while (!channels_.outcomes.push(outcome) && !channels_.stop) pause_();  // the mission waits for each
   return true;
 }
 
@@ -50,10 +53,10 @@ void PlannerWorker::refresh() {
   channels_.segments.collect();
   if (const auto view = channels_.view_planner.read_new()) view_ = *view;
   if (const auto* world = channels_.worlds.planner.take()) {
+    new_world_ = new_world_ || world_ != world->world;
     world_ = world->world;
     seen_ns_ = world->seen_ns;
     channels_.worlds.planner.give_back(world);
-    new_world_ = true;
   }
 }
 
@@ -68,15 +71,10 @@ bool PlannerWorker::current() {
   return front_.standing(view_) == PlanFront::Standing::current;
 }
 
-/// Whether sets made with these factors are no smaller than the air now allows, or than the model's.
-bool PlannerWorker::allowed(const AirFactors& made, const AirFactors& now) {
-  return std::ranges::equal(made, now, [](double with, double least) { return with >= std::min(1.0, least); });
-}
-
-/// Whether the newest world has sets below the model's that the air does not allow any more: the map worker makes
-/// one anew at once, or after a map that it was at, which may take minutes.
+/// Whether the newest world has sets that are too small for the air by now: the map worker makes one anew at once, or
+/// after a map that it was at, which may take minutes.
 bool PlannerWorker::too_calm() const {
-  return !allowed(world_->air.factors, view_.air ? view_.air->factors : kModelledAir);
+  return !covers(world_->air.factors, view_.air ? view_.air->factors : kModelledAir);
 }
 
 /// Why the job could not be done; nothing when it is flying.
@@ -97,17 +95,18 @@ std::optional<std::string> PlannerWorker::perform(const PlanJob& job) {
 
 std::optional<std::string> PlannerWorker::take_off(const PlanJob& job) {
   const Vec3 here = view_.state.p_W;
-  const auto column = plan::takeoff_column(*world_, here);
+  const auto column = plan::takeoff_column(*world_, here, view_.residual_m);
   if (!column) return "there is no clear hover height above a known floor here";
   Vec3 lift = here, target = here;
   lift.z() = std::max(here.z() + kLeastLift, column->z_safe);
   target.z() = std::max(job.position.z(), lift.z());
   for (const Vec3& hover : {lift, target})
-    if (!world_->hover.safe(world_->grid.index(hover))) return "hovering at the height asked for is not safe";
+    if (!plan::may_rest_at(*world_, hover, view_.residual_m)) return "hovering at the height asked for is not safe";
   const std::uint32_t closures = view_.closures;
   Flying whole{{0, 0, 0, rise(here, target), {}, {}, closures}, view_.state, view_.command, {}, column->z_safe};
+  whole.segment.apart_m = view_.residual_m;
   verify(whole, *world_);
-  if (!(whole.segment.clearance > view_.residual_m)) return not_clear("the way up", whole.segment.clearance);
+  if (!whole.clear()) return not_clear(*world_, "the way up", whole.segment.clearance);
   if (auto why = fly(rise(here, lift), {}, column->z_safe, closures, true)) return why;
   if (auto why = lift_off(flying_->segment.id)) return why;
   // From here on the sets hold: from the state in which the autopilot has come to fly.
@@ -121,15 +120,17 @@ std::vector<Setpoint> PlannerWorker::rise(const Vec3& from, const Vec3& to) cons
   return commands;
 }
 
-/// Waits until the autopilot has lifted the vehicle; the supervisor gives it its time.
+/// Waits for as long as this lift-off is what the control thread is at: the supervisor gives it its time. What is not
+/// tracking without its segment after that was no end of it that a flight may begin from.
 std::optional<std::string> PlannerWorker::lift_off(std::uint64_t lift) {
-  while (!channels_.stop) {
-    if (!current()) return "the take-off ended: " + std::string(to_string(view_.reason));
-    if (view_.segment != lift && view_.mode == Mode::tracking) return std::nullopt;
+  const auto lifting = [&] { return view_.mode == Mode::lifting && view_.segment == lift; };
+  while (!channels_.stop && current() && lifting()) {
     if (std::exchange(new_world_, false)) verify_again();
     pause_();
   }
-  return kEnded;
+  if (channels_.stop) return kEnded;
+  if (current() && view_.mode == Mode::tracking && view_.segment != lift) return std::nullopt;
+  return "the take-off ended: " + std::string(to_string(view_.reason));
 }
 
 /// The current segment, slowed to rest on its own path from a little ahead of now. What rests already stays.
@@ -149,8 +150,8 @@ std::optional<std::string> PlannerWorker::brake() {
   Flying next = continued(branch, std::move(commands));
   next.held = true;
   verify(next, *world_, view_.index);
-  const double here = next.segment.clearance;
-  if (!(here > 0)) return brake_later() ? std::nullopt : std::optional(not_clear("braking here", here));
+  if (!next.clear())
+    return brake_later() ? std::nullopt : std::optional(not_clear(*world_, "braking here", next.segment.clearance));
   add_guards(next, *world_, view_.index);
   add_own_stops(next, branch);
   return offer(std::move(next)) ? std::nullopt : std::optional<std::string>("the flight was already past the branch");
@@ -167,7 +168,7 @@ bool PlannerWorker::brake_later() {
     Flying next = continued(stop.branch, flown_commands(*flying_, true, stop.branch));
     next.held = true;
     verify(next, *world_, view_.index);
-    if (!(next.segment.clearance > 0)) continue;
+    if (!next.clear()) continue;
     add_guards(next, *world_, view_.index);
     add_own_stops(next, stop.branch);
     const double after = kControlPeriod * static_cast<double>(stop.branch - view_.index);
@@ -177,7 +178,7 @@ bool PlannerWorker::brake_later() {
   }
   Flying whole = *flying_;
   verify(whole, *world_, view_.index);
-  const bool clear = whole.segment.clearance > 0;
+  const bool clear = whole.clear();
   flying_->held = flying_->held || clear;  // told once: a second order that cannot be followed does not take it back
   if (clear) spdlog::info("no rest before its end is clear: the flight comes to rest there");
   return clear;
@@ -188,7 +189,7 @@ bool PlannerWorker::brake_later() {
 /// A lift-off arms the vehicle when it is accepted: only here, where it was found clear.
 std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, const plan::PlanMetrics& metrics,
                                               std::optional<double> z_safe, std::uint32_t closures, bool lifts) {
-  append_hold(commands);
+  plan::hold_until_settled(world_->reach, commands);
   // A lift-off begins on the ground, where nothing moves however old the pose is.
   if (!lifts) commands.insert(commands.begin(), lead_, at_rest(commands.front()));
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
@@ -199,9 +200,9 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
     if (view_.closures != closures) return "a loop closure moved the map meanwhile";
     Flying next{{0, 0, 0, commands, {}, {}, closures}, view_.state, view_.command, metrics, z_safe};
     next.segment.arms = lifts;
+    next.segment.apart_m = view_.residual_m;
     verify(next, *world_);
-    if (!(next.segment.clearance > view_.residual_m))
-      return not_clear("the tube from the state estimated now", next.segment.clearance);
+    if (!next.clear()) return not_clear(*world_, "the tube from the state estimated now", next.segment.clearance);
     add_guards(next, *world_);
     if (offer(std::move(next))) return std::nullopt;
   }
@@ -213,12 +214,13 @@ std::optional<std::string> PlannerWorker::fly(std::vector<Setpoint> commands, co
 /// A segment that shares its start and its first commands with what flies, and so its map frame: where a loop closure
 /// came since, the control thread refuses it.
 Flying PlannerWorker::continued(std::size_t branch, std::vector<Setpoint> commands) {
-  append_hold(commands);
+  plan::hold_until_settled(world_->reach, commands);
   Flying next{{0, flying_->segment.id, branch, std::move(commands), {}, {}, flying_->segment.closures},
               flying_->start,
               flying_->previous,
               flying_->metrics,
               flying_->z_safe};
+  next.segment.apart_m = flying_->segment.apart_m;
   return next;
 }
 

@@ -62,7 +62,7 @@ class PlannerWorker {
   std::vector<Setpoint> rise(const Vec3& from, const Vec3& to) const;
   std::optional<std::string> lift_off(std::uint64_t lift);
   plan::Replan onward(const plan::World& world, const plan::Route& route, std::size_t now, std::size_t branch,
-                      const Vec3& goal_W) const;
+                      const Vec3& goal_W, double apart_m) const;
 
   void watch();
   bool pursues();
@@ -78,7 +78,6 @@ class PlannerWorker {
 
   void refresh();
   bool current();
-  static bool allowed(const AirFactors& made, const AirFactors& now);
   bool too_calm() const;
   Flying continued(std::size_t branch, std::vector<Setpoint> commands);
   bool offer(Flying next);

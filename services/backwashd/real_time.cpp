@@ -47,8 +47,11 @@ bool may_lock_beyond_limit() {
 }  // namespace
 
 void limit_memory() {
-  // The C library raises this threshold by itself; what a world leaves behind then stays, in holes of the heap.
+  // The C library raises this threshold by itself; what a world leaves behind then stays, in holes of the heap. It has
+  // a heap for each thread too: what one thread's worlds left behind is lost to the next thread, and more so the more
+  // processors there are.
   mallopt(M_MMAP_THRESHOLD, kOwnMapping);
+  mallopt(M_ARENA_MAX, 1);
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
   if (pthread_attr_setstacksize(&attributes, kStack) != 0 || pthread_setattr_default_np(&attributes) != 0)

@@ -11,6 +11,7 @@
 #include "services/backwashd/text.hpp"
 #include "services/dds/air_text.hpp"
 #include "services/dds/packet_filter.hpp"
+#include "services/dds/strangers.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -46,7 +47,8 @@ std::string to_string(const AirView& air) {
   dds::AirSaid said{air.frozen, {}};
   for (std::size_t k = 0; k < kAirClasses; ++k)
     if (air.seconds[k] > 0 || air.factors[k] > 1)
-      said.classes.push_back({to_string(static_cast<AirClass>(k)), air.factors[k], air.ln_evidence[k], air.seconds[k]});
+      said.classes.push_back({to_string(static_cast<AirClass>(k)), air.factors[k], air.ln_evidence[k], air.seconds[k],
+                              air.causes[k] == adapt::Cause::none ? "" : to_string(air.causes[k])});
   return to_text(said);
 }
 
@@ -84,9 +86,9 @@ StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
 void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
   s.state = dds::c_string(text.state);
   s.reason = dds::c_string(text.reason);
-  s.armed = view.armed;
+  s.armed = view.armed && view.heartbeat_age < ControlView::kNever;
   s.offboard = view.offboard;
-  s.landed = view.landed;
+  s.landed = view.landed.value_or(false);
   s.moving = !view.finished;
   s.frames_aligned = view.aligned;
   s.position = point(view.state.p_W);
@@ -131,7 +133,7 @@ void set_counts(dds::Status& s, const Channels& channels) {
   s.foreign_writers = channels.foreign_writers;
   s.map_age = channels.map_age(now_ns()).value_or(kNotKnown);
   s.commands_refused = channels.commands_refused;
-  s.parts_filtered = dds::filtered_parts();
+  s.parts_filtered = dds::filtered_parts() + dds::kept_out_parts();
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "services/backwashd/localization.hpp"
+#include "services/backwashd/map_change.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -42,6 +43,7 @@ std::optional<ScanPlacement::Pose> ScanPlacement::pose_at(std::int64_t stamp_ns)
   if (after == history_.end()) return history_.back();
   if (after == history_.begin()) return *after;
   const Pose &a = *std::prev(after), &b = *after;
+  if (b.stamp_ns - a.stamp_ns > most_apart_ns_) return std::nullopt;  // what was between is not known
   const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
   const Eigen::Quaterniond q = quaternion(a.q).slerp(share, quaternion(b.q));
   return Pose{stamp_ns, a.p + share * (b.p - a.p), {q.w(), q.x(), q.y(), q.z()}};
@@ -64,37 +66,16 @@ tl::expected<Scan, std::string> ScanPlacement::scan(const dds::PointCloud& m, st
   } else if (frame == frames_.odometry) {
     place = Eigen::Translation3d(map_from_odom_->t) * Eigen::AngleAxisd(map_from_odom_->yaw, Vec3::UnitZ());
   }
-  Scan scan{std::move(cloud->points), cloud->viewpoint ? place * *cloud->viewpoint : pose->p, received_ns};
+  Scan scan{std::move(cloud->points), cloud->viewpoint ? place * *cloud->viewpoint : pose->p, received_ns, closures_};
   for (Vec3& p : scan.points_W) p = place * p;
   return scan;
 }
 
 NewVoxels new_voxels(const map::OccupancyGrid& known, const Scan& scan, double max_range) {
   std::vector<Index3> voxels;
-  for (const Vec3& p : scan.points_W) {
-    if ((p - scan.sensor_W).norm() > max_range) continue;
-    const Index3 v = known.index(p);
-    if (known.inside(v) && !known.occupied(v)) voxels.push_back(v);
-  }
-  const auto less = [](const Index3& a, const Index3& b) {
-    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
-  };
-  int edge = 1;
-  for (;; edge *= 2) {
-    std::ranges::sort(voxels, less);
-    voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
-    if (voxels.size() <= NewVoxels::kMost) break;
-    for (Index3& v : voxels) v = v.array() / 2;  // inside the grid: never negative
-  }
-  NewVoxels result;
-  result.received_ns = scan.received_ns;
-  result.edge = edge * known.resolution();
-  result.count = voxels.size();
-  for (std::size_t n = 0; n < voxels.size(); ++n) {
-    const Vec3 c = known.origin() + result.edge * (voxels[n].cast<double>() + Vec3::Constant(0.5));
-    result.centers[n] = {c.x(), c.y(), c.z()};
-  }
-  return result;
+  for (const Vec3& p : scan.points_W)
+    if ((p - scan.sensor_W).norm() <= max_range) voxels.push_back(known.index(p));
+  return news(known, voxels, scan.received_ns);
 }
 
 }  // namespace backwash::daemon

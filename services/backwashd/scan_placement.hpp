@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <deque>
 #include <optional>
 #include <string>
@@ -17,7 +18,8 @@ namespace backwash::daemon {
 /// that reads those.
 class ScanPlacement {
  public:
-  explicit ScanPlacement(const config::Daemon& config) : frames_(config.frames) {}
+  explicit ScanPlacement(const config::Daemon& config)
+      : frames_(config.frames), most_apart_ns_(std::llround(2e9 / config.odometry.timing.rate_least)) {}
 
   /// A pose in the map. One behind a loop closure moves the poses before it into the new map frame.
   void add(const OdometrySample& sample);
@@ -41,14 +43,15 @@ class ScanPlacement {
   std::optional<Pose> pose_at(std::int64_t stamp_ns) const;
 
   decltype(config::Daemon::frames) frames_;
+  std::int64_t most_apart_ns_;  // of two poses: between them a scan has a place
   std::optional<track::RigidShift> map_from_odom_;
   std::uint32_t closures_ = 0;           // of the newest pose
   track::RigidShift history_from_odom_;  // of that pose
   std::deque<Pose> history_;             // of the last second, by rising stamps
 };
 
-/// The voxels of `known` that a point of the scan lies in and that are not occupied there, as cubes: at most
-/// NewVoxels::kMost, in larger cubes of the grid's lattice if there are more. O(points).
+/// The voxels of `known` that a point of the scan lies in and that are free there, as news() has them: a flight is
+/// verified through free voxels alone.
 NewVoxels new_voxels(const map::OccupancyGrid& known, const Scan& scan, double max_range);
 
 }  // namespace backwash::daemon

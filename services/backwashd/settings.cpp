@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
+#include "core/plan/planner.hpp"
 #include "core/track/pose_velocity.hpp"
 #include "services/backwashd/daemon.hpp"
 #include "services/backwashd/link_watch.hpp"
@@ -31,6 +33,13 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
         track::PoseVelocity::error(std::min(OdometryTiming::kUsual, daemon->odometry.timing.rate_least));
   auto model = config::load_model(daemon->model);
   if (!model) return wrong(model.error());
+  if (daemon->risk) {
+    try {
+      *model = plan::model_for(std::move(*model), *vehicle, *daemon->risk);
+    } catch (const std::invalid_argument& e) {
+      return tl::make_unexpected(StartError(kConfiguration, path + ": reach.method: " + e.what() + ": use \"tight\""));
+    }
+  }
   if (!daemon->adaptation.enabled)
     return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials)};
   if (!model->extension.empty())

@@ -19,13 +19,14 @@ float value(const std::optional<double>& said) { return said ? static_cast<float
 
 const dds::BatteryState* ShownBattery::next(const firmware_bridge::Latest<firmware_bridge::Battery>& said,
                                             firmware_bridge::Time now, std::int64_t wall_ns) {
-  if (!said || said_ == said->at || (sent_ && now - *sent_ < kEvery)) return nullptr;
-  said_ = said->at, sent_ = now;
+  if (said ? said_ == said->at || (sent_ && now - *sent_ < kEvery) : !said_) return nullptr;
+  said_ = said ? std::optional(said->at) : std::nullopt, sent_ = now;
   static const std::string nothing;
   char* const none = dds::c_string(nothing);
   constexpr std::int64_t kSecond_ns = 1'000'000'000;
-  const std::int64_t at_ns = wall_ns - std::chrono::duration_cast<std::chrono::nanoseconds>(now - said->at).count();
-  const auto& [voltage, remaining, current] = said->value;
+  const auto age = said ? now - said->at : firmware_bridge::Time::duration::zero();
+  const std::int64_t at_ns = wall_ns - std::chrono::duration_cast<std::chrono::nanoseconds>(age).count();
+  const auto [voltage, remaining, current] = said ? said->value : firmware_bridge::Battery{};
   message_ = {};
   message_.header.stamp = {static_cast<std::int32_t>(at_ns / kSecond_ns),
                            static_cast<std::uint32_t>(at_ns % kSecond_ns)};

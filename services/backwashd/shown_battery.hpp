@@ -18,7 +18,8 @@ class ShownBattery {
   ShownBattery& operator=(const ShownBattery&) = delete;
 
   /// What is to be sent at `now`, which is `wall_ns` by the wall clock: the newest that the autopilot said, stamped
-  /// with when that came here. Null: it has said nothing since the last one, or that was sent less than a second ago.
+  /// with when that came here; once, when it says nothing any more, that nothing is known. Null: it has said nothing
+  /// since the last one, or that was sent less than a second ago.
   const dds::BatteryState* next(const firmware_bridge::Latest<firmware_bridge::Battery>& said,
                                 firmware_bridge::Time now, std::int64_t wall_ns);
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "services/backwashd/map_change.hpp"
 #include "services/backwashd/text.hpp"
 
 namespace backwash::daemon {
@@ -149,12 +150,10 @@ tl::expected<WindowCloud, std::string> WindowClouds::judge(bool free, const dds:
 }
 
 NewVoxels new_voxels(const map::OccupancyGrid& known, const WindowCloud& cloud) {
-  Scan scan;
-  scan.received_ns = cloud.received_ns;
   const Index3 low = (known.origin() / known.resolution()).array().round().cast<int>();
-  for (const Index3& v : cloud.voxels)
-    if (known.free(v - low)) scan.points_W.push_back(known.center(v - low));
-  return new_voxels(known, scan, std::numeric_limits<double>::infinity());
+  std::vector<Index3> voxels;
+  for (const Index3& v : cloud.voxels) voxels.push_back(v - low);
+  return news(known, voxels, cloud.received_ns);
 }
 
 }  // namespace backwash::daemon

@@ -42,8 +42,7 @@ class WindowClouds {
   std::optional<std::string> beyond_;
 };
 
-/// The voxels of such a cloud that are free in a grid of the lattice, as a scan finds them: a flight is verified
-/// through free voxels alone.
+/// The voxels of such a cloud that are free in a grid of the lattice, as those of a scan.
 NewVoxels new_voxels(const map::OccupancyGrid& known, const WindowCloud& cloud);
 
 }  // namespace backwash::daemon

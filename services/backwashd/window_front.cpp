@@ -47,7 +47,7 @@ void WindowFront::take(Kind& kind, const map::OccupancyGrid* known, const std::o
     if (known && !kind.free) {
       const NewVoxels voxels = new_voxels(*known, *cloud);
       fresh = voxels.count;
-      if (fresh > 0) channels_.scan_voxels.push(voxels);
+      if (fresh > 0) channels_.scan_voxels.push_or_count(voxels);
     }
     recorder_.append(log::RecordKind::scan, std::string(kind.free ? "free" : "occupied") + " window of " +
                                                 std::to_string(cloud->voxels.size()) + " voxels, " +

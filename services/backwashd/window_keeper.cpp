@@ -13,7 +13,7 @@ Index3 low_of(const map::OccupancyGrid& grid) {
 
 void note(map::ScanChange& change, const Index3& v, map::Cell now) {
   change.box.add(v);
-  if (now == map::Cell::occupied) change.occupied.push_back(v);
+  if (now != map::Cell::free) change.occupied.push_back(v);
 }
 
 }  // namespace

@@ -33,8 +33,9 @@ std::map<std::string, double> gain_parameters(firmware_bridge::Autopilot autopil
 /// answers commands, follows offboard set-points only while they stream, and lands by itself when they stop for 0.5 s.
 class Autopilot {
  public:
-  static constexpr double kOffboardTimeout = 0.5;  ///< s without a set-point until the failsafe lands
-  static constexpr double kDescent = 0.5;          ///< m/s
+  static constexpr double kOffboardTimeout =
+      0.5;                                 ///< s without a set-point until the failsafe lands, as late as PX4's may
+  static constexpr double kDescent = 0.5;  ///< m/s
 
   /// Stands disarmed at `ground_W` (the vehicle's centre, map frame). `airflow`: factor on the variance of the air; 0
   /// is calm.
@@ -64,10 +65,10 @@ class Autopilot {
   bool follows_yaw = false;
   /// What PARAM_REQUEST_READ is answered from: safe indoors and the vehicle's gains until changed. Those whose name
   /// ends in _T or _DELAY or begins with MPC_ are floats.
-  std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.5}, {"COM_OBL_RC_ACT", 4},   {"COM_RC_OVERRIDE", 3},
-                                           {"NAV_DLL_ACT", 3},     {"NAV_RCL_ACT", 3},      {"EKF2_EV_DELAY", 0},
-                                           {"COM_LOW_BAT_ACT", 2}, {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3},
-                                           {"MPC_XY_VEL_MAX", 12}, {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 3},
+  std::map<std::string, double> parameters{{"COM_OF_LOSS_T", 0.39}, {"COM_OBL_RC_ACT", 4},   {"COM_RC_OVERRIDE", 3},
+                                           {"NAV_DLL_ACT", 3},      {"NAV_RCL_ACT", 3},      {"EKF2_EV_DELAY", 0},
+                                           {"COM_LOW_BAT_ACT", 2},  {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3},
+                                           {"MPC_XY_VEL_MAX", 12},  {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 3},
                                            {"MPC_TILTMAX_AIR", 45}};
   /// Remaining share that BATTERY_STATUS says, once a second; not set: that of a battery which flying drains
   /// (charge()).

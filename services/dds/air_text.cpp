@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/dds/air_text.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <string_view>
 
@@ -10,13 +11,15 @@ namespace {
 constexpr std::string_view kFrozen = "frozen: ", kModelled = "as modelled", kBetween = ", ", kNext = "), ";
 
 std::optional<AirSaid::Class> class_said(const std::string& text) {
-  char name[16];
+  char name[16], cause[16] = "";
   AirSaid::Class said;
-  int end = 0;
-  const int read =
-      std::sscanf(text.c_str(), "%15s %lf (%lf, %lf s)%n", name, &said.factor, &said.ln_evidence, &said.seconds, &end);
-  if (read != 4 || static_cast<std::size_t>(end) != text.size()) return std::nullopt;
-  said.name = name;
+  int factor = 0, caused = 0, end = 0;
+  if (std::sscanf(text.c_str(), "%15s %lf%n by %15s%n", name, &said.factor, &factor, cause, &caused) < 2)
+    return std::nullopt;
+  const std::size_t left = static_cast<std::size_t>(std::max(factor, caused));
+  const int read = std::sscanf(text.c_str() + left, " (%lf, %lf s)%n", &said.ln_evidence, &said.seconds, &end);
+  if (read != 2 || left + static_cast<std::size_t>(end) != text.size()) return std::nullopt;
+  said.name = name, said.cause = cause;
   return said;
 }
 
@@ -24,9 +27,10 @@ std::optional<AirSaid::Class> class_said(const std::string& text) {
 
 std::string to_text(const AirSaid& air) {
   std::string text;
-  for (const auto& [name, factor, ln_evidence, seconds] : air.classes) {
+  for (const auto& [name, factor, ln_evidence, seconds, cause] : air.classes) {
     char line[96];
-    std::snprintf(line, sizeof line, "%s %.2f (%.1f, %.0f s)", name.c_str(), factor, ln_evidence, seconds);
+    std::snprintf(line, sizeof line, "%s %.2f%s%s (%.1f, %.0f s)", name.c_str(), factor, cause.empty() ? "" : " by ",
+                  cause.c_str(), ln_evidence, seconds);
     if (!text.empty()) text += kBetween;
     text += line;
   }

@@ -12,7 +12,8 @@ struct AirSaid {
   struct Class {
     std::string name;
     double factor = 1, ln_evidence = 0;
-    double seconds = 0;  ///< of flight in it
+    double seconds = 0;   ///< of flight in it
+    std::string cause{};  ///< of a factor above 1; empty: none
   };
   bool frozen = false;
   std::vector<Class> classes;  ///< that were flown in or have a factor

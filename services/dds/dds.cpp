@@ -3,35 +3,17 @@
 
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
-#include <sys/socket.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdlib>
 #include <cstring>
-#include <span>
 #include <string_view>
 
-#include "services/dds/fragments.hpp"
 #include "services/dds/loopback.hpp"
-#include "services/dds/packet_filter.hpp"
 #include "services/dds/quality.hpp"
+#include "services/dds/receive.hpp"
 #include "services/dds/secured.hpp"
-
-// Takes the C library's place in every program that links this: the middleware receives by it and by nothing else.
-extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
-  const ssize_t received = syscall(SYS_recvmsg, socket, message, flags);
-  if (received <= 0 || message->msg_iovlen != 1 || (flags & MSG_PEEK)) return received;
-  const std::span datagram(static_cast<std::uint8_t*>(message->msg_iov[0].iov_base),
-                           std::min(static_cast<std::size_t>(received), message->msg_iov[0].iov_len));
-  const std::size_t heard = backwash::dds::heard_of(*message, datagram);
-  const auto now = std::chrono::steady_clock::now();
-  backwash::dds::note_fragments(datagram.first(heard), std::chrono::nanoseconds(now.time_since_epoch()).count());
-  return static_cast<ssize_t>(backwash::dds::filter_packet(datagram.first(heard)));
-}
 
 namespace backwash::dds {
 namespace {
@@ -66,11 +48,14 @@ std::string configuration(const std::string& interface, const Receiving& receivi
   const bool loopback = interface == "lo";
   return "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"" + interface +
          (loopback ? "\" multicast=\"true" : "") + "\"/></Interfaces><AllowMulticast>spdp</AllowMulticast></General>" +
-         (loopback ? "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>30"
-                     "</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>"
-                   : "") +
-         threads(receiving.priority) + "<Internal><MaxSampleSize>" + std::to_string(receiving.max_sample_bytes) +
-         "B</MaxSampleSize><SocketReceiveBufferSize max=\"" + kReceiveBuffer + "\"/>" +
+         // With an index each start has a port that an earlier one had: a new one each time would be a new address to
+         // whoever counts them (door.hpp).
+         "<Discovery><ParticipantIndex>auto</ParticipantIndex>" +
+         (loopback ? "<MaxAutoParticipantIndex>30</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers>"
+                   : "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>") +
+         "</Discovery>" + threads(receiving.priority) + "<Internal><MaxSampleSize>" +
+         std::to_string(receiving.max_sample_bytes) + "B</MaxSampleSize><SocketReceiveBufferSize max=\"" +
+         kReceiveBuffer + "\"/>" +
          // One receiving thread: the others' scheduling cannot be configured.
          (receiving.priority > 0 ? "<MultipleReceiveThreads>false</MultipleReceiveThreads>" : "") +
          "</Internal></Domain></CycloneDDS>";
@@ -89,6 +74,7 @@ std::string on_the_wire(std::uint32_t domain) {
 
 // The topic and its delivery; the caller owns both through `participant` and dds_delete_qos.
 Entity make_topic(Entity participant, const dds_topic_descriptor& type, const std::string& name) {
+  if (!expected(name)) throw Error("DDS: topic " + name + " was not named when its participant was made");
   return checked(dds_create_topic(participant, &type, name.c_str(), nullptr, nullptr), "topic " + name);
 }
 
@@ -104,13 +90,16 @@ Participant::Participant(std::uint32_t domain, const std::string& interface, con
   if (receiving.apart || !environment)
     domain_ =
         checked(dds_create_domain(number, (chosen + (receiving.apart ? on_the_wire(domain) : "")).c_str()), where);
+  expect_participant(!credentials.empty(), receiving.topics);
   dds_qos_t* const qos = secured(credentials);
   const dds_return_t participant = dds_create_participant(number, qos, nullptr);
   dds_delete_qos(qos);
   participant_ = checked(participant, "participant in " + where);
+  note_participant(participant_);
 }
 
 Participant::~Participant() {
+  forget_participant(participant_);
   dds_delete(participant_);
   if (domain_ > 0) dds_delete(domain_);
 }
@@ -150,7 +139,9 @@ const Guid& ReaderBase::writer(std::uint64_t publication) {
     dds_builtintopic_free_endpoint(endpoint);
   } else {  // gone before its sample was taken: as good as any other that will not come again
     std::memcpy(at->second.data(), &publication, sizeof publication);
+    return at->second;
   }
+  note_match(at->second);
   return at->second;
 }
 
@@ -214,7 +205,9 @@ WriterBase::WriterBase(const Participant& participant, const dds_topic_descripto
                        Delivery delivery) {
   const Entity handle = make_topic(participant.handle(), type, topic);
   dds_qos_t* qos = quality(delivery, Role::writer, type.m_typename);
-  const dds_return_t writer = dds_create_writer(participant.handle(), handle, qos, nullptr);
+  dds_listener_t* listener = match_listener();
+  const dds_return_t writer = dds_create_writer(participant.handle(), handle, qos, listener);
+  dds_delete_listener(listener);
   dds_delete_qos(qos);
   writer_ = checked(writer, "writer of " + topic);
 }

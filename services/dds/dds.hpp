@@ -54,6 +54,9 @@ struct Receiving {
   /// Sockets and threads that no other participant of this process uses: what floods one never waits before the other.
   /// One participant of a process and domain may be the one that is not apart.
   bool apart = false;
+  /// Whole names of all topics that it will ever have (topics.hpp): of endpoints of others, as many as a large system
+  /// has, the middleware never hears. None: it may have any, and hears of all, up to the door's count (door.hpp).
+  std::vector<std::string> topics = {};
 };
 
 /// One participant in a domain. Topic names get the prefix `rt` and the name space: rt/backwash/…

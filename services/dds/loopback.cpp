@@ -125,6 +125,14 @@ std::size_t by_loopback(Bytes datagram, IsOurs ours) noexcept {
   return changed;
 }
 
+Door::Source source_of(const msghdr& message) noexcept {
+  sockaddr_in from{};
+  if (!message.msg_name || message.msg_namelen < sizeof from) return {0, 0};
+  std::memcpy(&from, message.msg_name, sizeof from);
+  if (from.sin_family != AF_INET) return {0, 0};
+  return {alone ? INADDR_LOOPBACK : ntohl(from.sin_addr.s_addr), ntohs(from.sin_port)};
+}
+
 std::size_t heard_of(const msghdr& message, Bytes datagram) noexcept {
   if (!alone) return datagram.size();
   sockaddr_in from{};

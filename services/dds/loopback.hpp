@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <span>
 
+#include "services/dds/door.hpp"
+
 /// What `dds.interface = "lo"` means. libddsc 0.10.2 binds its sockets to every address of the machine whatever the
 /// interface, and takes no peer that names another address than a loopback one.
 namespace backwash::dds {
@@ -20,6 +22,10 @@ void loopback_alone() noexcept;
 /// The kernel takes no packet from outside that claims an address of this machine. Asks it for those addresses once a
 /// second at most, and only where a source is not a loopback one.
 std::size_t heard_of(const msghdr& message, std::span<std::uint8_t> datagram) noexcept;
+
+/// Who sent it, by IPv4; zeros if it is not known. After loopback_alone() that is this machine, 127.0.0.1, whichever of
+/// its addresses it used.
+Door::Source source_of(const msghdr& message) noexcept;
 
 /// Makes locators in the parameter list of discovery data 127.0.0.1 where `ours` says their address is this machine's;
 /// returns how many. For heard_of and its tests. Pure.

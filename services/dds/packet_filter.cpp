@@ -6,29 +6,16 @@
 #include <cstring>
 #include <optional>
 
+#include "services/dds/rtps.hpp"
+
 namespace backwash::dds {
 namespace {
 
-using Bytes = std::span<std::uint8_t>;
+using namespace rtps;
 
-constexpr std::size_t kHeader = 20, kSubmessageHeader = 4;
-constexpr std::uint8_t kPad = 0x01, kInfoTimestamp = 0x09, kData = 0x15, kDataFragment = 0x16;
-constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02;                 // flags
-constexpr std::uint8_t kPayload = 0x0c, kDataFlag = 0x04, kFragmentKey = 0x04;  // data or key; in fragments one flag
-constexpr std::uint16_t kPidPad = 0, kPidSentinel = 1, kMustUnderstand = 0x4000;
 constexpr std::uint16_t kTypePids[] = {0x0072, 0x0075};  // of DDS-XTypes: object, information
-constexpr std::uint32_t kParticipantMessage = 0x000200c2, kStatelessMessage = 0x000201c3, kTokenMessage = 0xff0202c3;
 
 std::atomic<std::uint64_t> filtered{0};
-
-std::uint16_t read16(const std::uint8_t* at, bool little) noexcept {
-  return static_cast<std::uint16_t>(little ? at[0] | at[1] << 8 : at[0] << 8 | at[1]);
-}
-
-std::uint32_t read32(const std::uint8_t* at, bool little) noexcept {
-  const std::uint32_t first = read16(at, little), second = read16(at + 2, little);
-  return little ? first | second << 16 : first << 16 | second;
-}
 
 // Makes parameters that describe types padding. The length of the list with its sentinel, or nothing if it has none.
 std::optional<std::size_t> filter_parameters(Bytes list, bool little) noexcept {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "backwash_msgs.h"
 #include "ros2.h"
@@ -148,6 +149,16 @@ struct TopicOf<BatteryState> {
 constexpr const char* kDiagnostics = "rt/diagnostics";
 /// ROS 2's one topic of transforms: of all robots of a domain, who differ in their frames.
 constexpr const char* kTf = "rt/tf";
+
+/// All topics of the vehicle with this name space, and diagnostics, and `more`: for Receiving::topics.
+inline std::vector<std::string> topics(const std::string& name_space, std::vector<std::string> more = {}) {
+  more.push_back(kDiagnostics);
+  const auto add = [&]<typename... T>(TopicOf<T>...) { (more.push_back(topic(name_space, TopicOf<T>::kName)), ...); };
+  add(TopicOf<Odometry>(), TopicOf<Octomap>(), TopicOf<PointCloud>(), TopicOf<Disturbance>(),
+      TopicOf<TransformStamped>(), TopicOf<Command>(), TopicOf<Ack>(), TopicOf<Status>(), TopicOf<MapPart>(),
+      TopicOf<MapReceipt>(), TopicOf<Tube>(), TopicOf<Path>(), TopicOf<MarkerArray>(), TopicOf<BatteryState>());
+  return more;
+}
 
 template <typename T>
 Reader<T> make_reader(const Participant& participant, const std::string& name_space) {

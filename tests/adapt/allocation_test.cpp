@@ -1,46 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <vector>
 
 #include "core/adapt/in_flight.hpp"
+#include "tests/gusts/flown_loop.hpp"
 #include "tests/support/allocations.hpp"
 
 namespace backwash::adapt {
 namespace {
 
 TEST(AdaptRealTime, ATickDoesNotAllocate) {
-  Adaptation adaptation{Gusts{}};
-  EXPECT_GT(test::allocations_during([] { ::operator delete(::operator new(1)); }), 0);  // the counter counts
-  double told = 0;
-  EXPECT_EQ(test::allocations_during([&] {
-              for (int k = 0; k < 3000; ++k) {
-                adaptation.add({0.02 * k, Vec3::Constant(k % 7 - 3), Vec3::Ones(), static_cast<AirClass>(k / 100 % 5)});
-                told += adaptation.factor(AirClass::wall) + adaptation.of(AirClass::wall).ln_evidence();
-              }
-            }),
-            0);
-  EXPECT_GT(told, 0);
-  const AirSample sample;
-  static_assert(noexcept(adaptation.add(sample))&& noexcept(adaptation.factor(AirClass::wall)));
-}
-
-TEST(AdaptRealTime, ATickInFlightDoesNotAllocate) {
   InFlightConstants constants;
-  constants.controller = {{10, 12}, {5.5, 6}, 0.02, 0, 0.05};
+  constants.controller = gusts::quad_5in();
+  constants.controller.feedback_delay = 0.03;
   InFlight air(constants);
+  gusts::Trial trial;
+  trial.factor = 8;
+  gusts::FlownLoop loop(constants.controller, trial);
+  std::vector<AirTick> ticks;
+  while (ticks.size() < 3000) ticks.push_back(loop.tick());
+  ticks[2000].frame = 1;                                                                 // it begins anew
+  EXPECT_GT(test::allocations_during([] { ::operator delete(::operator new(1)); }), 0);  // the counter counts
   int grown = 0;
   EXPECT_EQ(test::allocations_during([&] {
-              for (int k = 0; k < 3000; ++k) {
-                AirTick tick{20'000'000LL * k, 0, {}, {}, Vec3::Constant(0.01), AirClass::wall};
-                tick.state.v_W.x() = 0.2 * std::sin(0.2 * k);
-                grown += air.add(tick);
-              }
+              for (const AirTick& tick : ticks) grown += air.add(tick) + (air.cause(tick.air) == Cause::air);
+              air.end();
+              air.carry_out(AirOrder::reset);
             }),
             0);
   EXPECT_GT(grown, 0) << "the ticks in which a factor grows are among them";
-  const AirTick tick;
-  static_assert(noexcept(air.add(tick)));
+  static_assert(noexcept(air.add(ticks[0]))&& noexcept(air.cause(AirClass::wall))&& noexcept(air.end()));
 }
 
 }  // namespace

@@ -5,20 +5,18 @@
 
 #include <random>
 
-#include "core/adapt/adaptation.hpp"
+#include "core/adapt/in_flight.hpp"
 
 namespace backwash::adapt {
 namespace {
 
-/// An innovation whose square over its expectation is x on every axis.
-Innovation of_square(double x, AirClass air = AirClass::wall) {
-  return {air, 0.06, Vec3::Constant(x), Vec3::Zero(), 0.06, 1, 1};
-}
+/// An error whose square over its expectation is x on every axis.
+ErrorSquare of_square(double x) { return {0.06, Vec3::Constant(x), Vec3::Ones(), Vec3::Zero(), Vec3::Zero(), 1}; }
 
 TEST(Bets, NoSquareMakesTheEvidenceLessThanNothing) {
   for (const double x : {0.0, 1.0, 15.9, 16.0, 1e9, 1e300}) {
     Bets bets;
-    for (int k = 0; k < 5000; ++k) bets.add(of_square(x)), bets.add_pair(of_square(x));
+    for (int k = 0; k < 5000; ++k) bets.add(of_square(x));
     EXPECT_FALSE(std::isnan(bets.ln_evidence())) << x;
     EXPECT_FALSE(std::isnan(bets.ln_changed())) << x;
     EXPECT_GE(bets.ln_evidence(), 0) << x;
@@ -62,7 +60,7 @@ TEST(Bets, AFactorIsRefutedOnlyBelowWhatTheSquaresHold) {
     for (int f = 0; f < 60; ++f) {
       Bets bets;
       for (int k = 0; k < 2000; ++k) {
-        Innovation i = of_square(0);
+        ErrorSquare i = of_square(0);
         for (int axis = 0; axis < 3; ++axis) i.square[axis] = v * std::pow(normal(rng), 2);
         bets.add(i);
       }
@@ -79,11 +77,11 @@ TEST(Bets, CalmerAirIsSaidAfterAMinuteAndNeverTooCalm) {
   int early = 0, too_calm = 0, near = 0;
   for (int f = 0; f < 60; ++f) {
     Bets bets;
-    for (int k = 0; k < 3000; ++k) {
-      Innovation i = of_square(0);
-      bets.add(i);
+    for (int k = 0; k < 500; ++k) {
+      ErrorSquare i = of_square(0);
+      i.seconds = 0.36;
       for (int axis = 0; axis < 3; ++axis) i.square[axis] = 0.4 * std::pow(normal(rng), 2);
-      if (k % 6 == 0) bets.add_pair(i);
+      bets.add(i);
       early += bets.seconds() < kLeastCalm && bets.below();
     }
     too_calm += bets.below().value_or(1) < 0.4, near += bets.below().value_or(1) < 0.75;
@@ -98,65 +96,59 @@ TEST(Bets, NoiseAndPushAreGrantedToTheRougherSideAlone) {
   Bets granted, calm;
   for (int k = 0; k < 2000; ++k) {
     auto i = of_square(1.8);
-    i.beside = Vec3::Ones();
+    i.noise = Vec3::Constant(0.5), i.granted = Vec3::Constant(0.5);
     granted.add(i);
     i.square = Vec3::Constant(0.9);
-    calm.add(i), calm.add_pair(i);
+    calm.add(i);
   }
   EXPECT_FALSE(granted.above());
   EXPECT_FALSE(calm.below());
 }
 
-TEST(Bets, CalmerAirIsThatOfTheFormThatSaysLeastOfIt) {
+TEST(Bets, CalmerAirIsThatOfTheTimeThatSaysLeastOfIt) {
   Bets bets, calm;
   auto i = of_square(0.6);
   i.least = 0.5;
-  for (int k = 0; k < 2000; ++k) bets.add(i), bets.add_pair(i);
+  for (int k = 0; k < 2000; ++k) bets.add(i);
   i.square = Vec3::Constant(0.3);
-  for (int k = 0; k < 2000; ++k) calm.add(i), calm.add_pair(i);
+  for (int k = 0; k < 2000; ++k) calm.add(i);
   EXPECT_FALSE(bets.below());
   EXPECT_TRUE(calm.below());
 }
 
-// A pair tells of a square what the cap leaves of it: of a Gaussian's 0.858, so that 0.8 is asked.
+// A square tells what the cap leaves of it: of a Gaussian's 0.858, so that 0.8 is asked.
 TEST(Bets, ASquareBeyondTheCapCountsAsMuchAsTheCap) {
   Bets calm, wild;
   auto small = of_square(0.3), large = of_square(100);
   for (int k = 0; k < 2000; ++k) {
-    calm.add(small), wild.add(small);
-    calm.add_pair(small);
-    wild.add_pair(k % 4 == 0 ? large : small);
+    calm.add(small);
+    wild.add(k % 4 == 0 ? large : small);
   }
   EXPECT_TRUE(calm.below());
   EXPECT_FALSE(wild.below());
 }
 
-TEST(Bets, AirThatIsRougherThanWhatSetsWereShrunkToIsFoundByGroupsAndByPairs) {
-  for (const bool pairs : {false, true}) {
-    Bets bets;
-    bets.watch(0.5);
-    auto i = of_square(0.5);
-    for (int k = 0; k < 1000; ++k) pairs ? void(bets.add_pair(i)) : bets.add(i);
-    EXPECT_FALSE(bets.rose()) << "as calm as that";
-    i.square = Vec3::Constant(1.5);
-    double seconds = 0;
-    for (; !bets.rose() && seconds < 60; seconds += i.seconds) pairs ? void(bets.add_pair(i)) : bets.add(i);
-    EXPECT_LT(seconds, 2) << pairs;
-    EXPECT_FALSE(bets.above()) << "the model's variance is not refuted";
-    bets.forget_calmer();
-    EXPECT_FALSE(bets.rose());
-  }
+TEST(Bets, AirThatIsRougherThanWhatSetsWereShrunkToIsFound) {
+  Bets bets;
+  bets.watch(0.5);
+  auto i = of_square(0.5);
+  for (int k = 0; k < 1000; ++k) bets.add(i);
+  EXPECT_FALSE(bets.rose()) << "as calm as that";
+  i.square = Vec3::Constant(1.5);
+  double seconds = 0;
+  for (; !bets.rose() && seconds < 60; seconds += i.seconds) bets.add(i);
+  EXPECT_LT(seconds, 2);
+  EXPECT_FALSE(bets.above()) << "the model's variance is not refuted";
+  bets.forget_calmer();
+  EXPECT_FALSE(bets.rose());
 }
 
-TEST(Adaptation, SamplesWithoutAnAttitudeCountForNoClassThatHasAName) {
-  Adaptation adaptation{Gusts{}};
-  for (int k = 0; k < 2000; ++k)
-    adaptation.add({0.02 * k, Vec3::Constant(k % 6 < 3 ? 9 : -9), Vec3::Ones(), AirClass::none});
-  EXPECT_GT(adaptation.factor(AirClass::none), 2);
-  for (const AirClass air : {AirClass::free_air, AirClass::ground, AirClass::wall, AirClass::corner}) {
-    EXPECT_EQ(adaptation.factor(air), 1);
-    EXPECT_EQ(adaptation.of(air).seconds(), 0);
-  }
+TEST(Bets, OfASquareBeyondAllFactorsTheLastIsTold) {
+  Bets bets;
+  for (int k = 0; k < 500; ++k) bets.add(of_square(1e4));
+  EXPECT_EQ(bets.above(), 64);
+  EXPECT_EQ(bets.beyond(), 1500);
+  EXPECT_NEAR(bets.promised_beyond(), 15, 1e-9);
 }
 
 TEST(AirClass, WithoutAClassRougherAirCountsForAllAndNoneIsCalmerByIt) {

@@ -26,30 +26,16 @@ void move(GustyFlight& flight) {
 /// Flown at rest until its sets have shrunk.
 GustyFlight shrunk(std::uint64_t seed, double factor = 0.1) {
   GustyFlight flight(seed, may_shrink());
-  flight.factor = factor;
+  flight.factor() = factor;
   rest(flight);
   while (flight.wall() == 1 && flight.t < 400) flight.fly(1);
   EXPECT_LT(flight.wall(), 1);
   return flight;
 }
 
-TEST(CalmPairs, ShareNoSampleAndAreOfOneClass) {
-  Gusts gusts;  // τ 0.15 s: means of 0.6 s
-  for (const bool changes : {false, true}) {
-    Innovations pairs(gusts, MeansOf::pairs);
-    int count = 0;
-    for (int k = 0; k < 1201; ++k) {
-      const AirClass air = changes && (k + 29) / 30 % 2 == 0 ? AirClass::wall : AirClass::ground;
-      const auto pair = pairs.add({0.02 * k, Vec3(k % 60 < 30 ? 1 : -1, 0, 0), Vec3::Ones(), air});
-      count += pair.has_value();
-    }
-    EXPECT_EQ(count, changes ? 0 : 20) << "of 24 s";
-  }
-}
-
 TEST(CalmInFlight, FactorsFallAtRestAloneAfterAMinuteAndNotBelowWhatIsConfigured) {
   GustyFlight flight(3, may_shrink());
-  flight.factor = 0.1;
+  flight.factor() = 0.1;
   rest(flight);
   EXPECT_EQ(flight.fly(59).wall(), 1) << "within a minute";
   move(flight);
@@ -60,14 +46,14 @@ TEST(CalmInFlight, FactorsFallAtRestAloneAfterAMinuteAndNotBelowWhatIsConfigured
   others[static_cast<std::size_t>(AirClass::wall)] = 1;
   EXPECT_EQ(others, kModelledAir) << "of other classes nothing was shown";
   GustyFlight never(3);
-  never.factor = 0.1;
+  never.factor() = 0.1;
   rest(never);
   EXPECT_EQ(never.fly(260).wall(), 1) << "unless it is configured";
 }
 
 TEST(CalmInFlight, OfAirWithoutAClassNothingIsShrunk) {
   GustyFlight flight(4, may_shrink());
-  flight.factor = 0.1, flight.place = AirClass::none;
+  flight.factor() = 0.1, flight.place = AirClass::none;
   rest(flight);
   flight.fly(200);
   EXPECT_EQ(flight.learnt.factors(), kModelledAir);
@@ -78,27 +64,31 @@ TEST(CalmInFlight, AirAsModelledShrinksNoSet) {
   int told = 0;
   for (const gusts::Form form : gusts::kForms)
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-      GustyFlight flight(seed, may_shrink(), form);
+      gusts::Trial trial;
+      trial.form = form;
+      GustyFlight flight(seed, may_shrink(), trial);
       rest(flight);
       told += flight.fly(200).rises > 0;
     }
   EXPECT_LE(told, 2) << "of 30";
 }
 
-// Means are printed: a velocity's noise is small beside means of 0.6 s.
-TEST(CalmInFlight, CalmAirIsShownThroughTheNoiseOfAVelocity) {
-  for (const double noise : {0.0, 0.005, 0.01}) {
+// Means are printed. Noise of the position is not granted on this side: beside an error of 2 mm it hides what is calm.
+TEST(CalmInFlight, CalmAirIsShownThroughTheNoiseOfAPositionThatIsSmall) {
+  for (const double noise : {0.0, 0.0005, 0.001}) {
     double sum = 0;
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      GustyFlight flight(seed, may_shrink());
-      flight.factor = 0.2, flight.velocity_noise = noise;
+      gusts::Trial trial;
+      trial.position_noise = noise, trial.velocity_noise = 0.05;
+      GustyFlight flight(seed, may_shrink(), trial);
+      flight.factor() = 0.2;
       rest(flight);
       while (flight.wall() == 1 && flight.t < 300) flight.fly(1);
       EXPECT_LT(flight.t, 300) << noise;
       EXPECT_GT(flight.wall(), 0.2);
       sum += flight.t / 5;
     }
-    std::printf("x0.2, velocity noise %g m/s: sets shrink after %.0f s\n", noise, sum);
+    std::printf("x0.2, position noise %g m: sets shrink after %.0f s\n", noise, sum);
   }
 }
 
@@ -108,14 +98,14 @@ TEST(CalmInFlight, FactorsAreTheModelsAgainAsSoonAsItIsRougherThanWasShown) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       GustyFlight flight = shrunk(seed);
       move(flight);
-      flight.factor = factor;
+      flight.factor() = factor;
       const double from = flight.t;
       while (flight.wall() < 1 && flight.t < from + 120) flight.fly(0.1);
       EXPECT_GE(flight.wall(), 1);
       EXPECT_LT(flight.t - from, 30) << factor;
       sum += (flight.t - from) / 5;
       const double back = flight.t;
-      flight.factor = 0.1;
+      flight.factor() = 0.1;
       rest(flight);
       EXPECT_EQ(flight.fly(58).wall(), std::max(1.0, flight.wall())) << "shown anew, from " << back;
     }
@@ -125,7 +115,7 @@ TEST(CalmInFlight, FactorsAreTheModelsAgainAsSoonAsItIsRougherThanWasShown) {
 
 TEST(CalmInFlight, WhatWasShownBeforeItWasRougherCountsNoMore) {
   GustyFlight flight = shrunk(7);
-  flight.factor = 1;
+  flight.factor() = 1;
   while (flight.wall() < 1 && flight.t < 500) flight.fly(1);
   const int changes = flight.rises;
   EXPECT_EQ(flight.fly(100).wall(), 1) << "at rest all the time, in air as modelled";
@@ -135,9 +125,9 @@ TEST(CalmInFlight, WhatWasShownBeforeItWasRougherCountsNoMore) {
 TEST(CalmInFlight, AirThatWasCalmBeforeTheLastWayShrinksNothingAfterIt) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     GustyFlight flight(seed, may_shrink());
-    flight.factor = 0.1;
+    flight.factor() = 0.1;
     EXPECT_TRUE(flight.fly(100).learnt.of(AirClass::wall).below());
-    flight.factor = 1;
+    flight.factor() = 1;
     flight.fly(45);
     rest(flight);
     EXPECT_EQ(flight.fly(0.5).rises, 0) << seed;
@@ -148,11 +138,11 @@ TEST(CalmInFlight, AirThatWasShownToBeRougherThanTheModelShrinksNothing) {
   int found = 0;
   for (std::uint64_t seed = 1; seed <= 40 && found < 2; ++seed) {
     GustyFlight flight(seed, may_shrink());
-    flight.factor = 1.5;
-    while (!flight.learnt.of(AirClass::wall).above() && flight.t < 400) flight.fly(0.02);
-    if (flight.learnt.of(AirClass::wall).above() != 1) continue;  // of less than the next of the grid
+    flight.factor() = 1.5;
+    while (!flight.bets().above() && flight.t < 400) flight.fly(0.02);
+    if (flight.bets().above() != 1) continue;  // of less than the next of the grid
     ++found;
-    flight.factor = 0.1;
+    flight.factor() = 0.1;
     rest(flight);
     EXPECT_EQ(flight.fly(150).rises, 0) << seed;
   }
@@ -162,13 +152,13 @@ TEST(CalmInFlight, AirThatWasShownToBeRougherThanTheModelShrinksNothing) {
 TEST(CalmInFlight, FrozenFactorsFallNoFartherAndReturnAllTheSame) {
   GustyFlight frozen(5, may_shrink());
   frozen.learnt.carry_out(AirOrder::freeze);
-  frozen.factor = 0.1;
+  frozen.factor() = 0.1;
   rest(frozen);
   EXPECT_EQ(frozen.fly(200).wall(), 1);
   GustyFlight flight = shrunk(5);
   flight.learnt.carry_out(AirOrder::freeze);
   move(flight);
-  flight.factor = 2;
+  flight.factor() = 2;
   EXPECT_EQ(flight.fly(60).wall(), 1);
 }
 

@@ -9,7 +9,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 kind=$1 path=$2 build=$3 out=$4
 shift 4
-all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill restart pilot battery rc gcs link reboot
+all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill frozen line_off power_off restart pilot battery rc gcs link reboot
   stop_arming stop_takeoff stop_plan stop_replan stop_land stop_goto
   hold_stop_0.2 hold_stop_0.45 hold_stop_1.0 stop_hold hold_hold door_hold_stop door_hold_goto gap_hold_stop gap_hold_goto vio_gap_stop)
 [[ $# -gt 0 ]] || set -- "${all[@]}"
@@ -44,7 +44,7 @@ case $kind/$fault in
   px4/gcs) SETTINGS=${SETTINGS:-NAV_DLL_ACT=3 COM_DL_LOSS_T=5} ;;
 esac
 case $kind/$fault in
-  */link) RELAY=yes ;;
+  */link | */line_off) RELAY=yes ;;
   ardupilot/battery | ardupilot/gcs) STATION="tcp 5763" ;;
   px4/gcs) STATION="udp 18570" ;;
   px4/rc | px4/pilot) STATION="udp 18570 sticks" ;;
@@ -143,11 +143,14 @@ inject() {
       ;;
     vio_*) echo "$(sed 's/^vio_//; s/^jump$/jump 1 0.5 0/; s/^turn$/turn 1.57/' <<<"$fault")" >&7 ;;
     sigstop) kill -STOP "$autopilot_pid" && sleep 3 && kill -CONT "$autopilot_pid" ;;
-    kill)
+    kill | frozen) # what stands still is ended after 3 s, as by systemd's watchdog
+      [[ $fault == kill ]] || { kill -STOP "$daemon_pid" && sleep 3; }
       kill -KILL "$daemon_pid"
       sleep 3
       daemon "$vehicle" "$out/again.bwlog"
       ;;
+    line_off) echo cut >&8 ;;
+    power_off) kill -KILL "$daemon_pid" && echo stop >&7 ;; # the process of the VIO stays: it logs the truth
     restart) # at once, and taken in hand again; the row begins there, that of `kill` tells what is before
       kill -KILL "$daemon_pid"
       daemon "$vehicle" "$out/again.bwlog"
@@ -270,7 +273,7 @@ case $fault in
     inject
     ;;
 esac
-sleep 15
+[[ $fault == *_off ]] && sleep 25 || sleep 15 # ArduCopter lands 8 s after its last ODOMETRY
 kill -TERM "$daemon_pid" "$vio_pid" 2>/dev/null || true
 wait "$daemon_pid" "$vio_pid" 2>/dev/null || true
 said=$(tail -n +"$((from + 1))" "$log" |

@@ -19,7 +19,9 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "system"
 import raw_log  # noqa: E402
 
 AT_REST = 0.1  # m/s, for a second
+OVER = 0.05    # m/s, the way that was last commanded
 WITHIN = 12.0  # s
+BLIND = 20.0   # s, where nothing tells the autopilot any more where it is
 # Of a set-point in a tick, as tests/daemon/planner_test.cpp demands it, with the a_max of 1 m/s² of both vehicle files: how far
 # it may be from where the velocities before and after lead; and its velocity's step.
 OFF_WAY, VELOCITY_STEP = 3e-3, 3.5 / 2 * 0.02  # m, m/s
@@ -30,7 +32,7 @@ COMMAND, STOP, HOLD = 4, 8, 5
 STOPS = "hold: operator asks to stop"
 SAYS = {"hold": "", "stop": STOPS, "land": "land: operator asks to land", "vio_stop": "hold: odometry lost",
         "vio_freeze": "hold: odometry frozen|hold: odometry contradicts|hold: map and autopilot", "vio_jump": "hold: odometry jumped", "vio_turn": "hold: odometry jumped",
-        "sigstop": "quiet: no heartbeat|hold: autopilot's pose|quiet: port|hold: map and autopilot|hold: odometry lost", "kill": "passive: started",
+        "sigstop": "quiet: no heartbeat|hold: autopilot's pose|quiet: port|hold: map and autopilot|hold: odometry lost", "kill": "passive: started", "frozen": "passive: started", "line_off": "quiet: no heartbeat", "power_off": "",
         "restart": "land: operator asks to land", "pilot": "passive: autopilot left offboard",
         "battery": "land: battery low|passive: autopilot left offboard", "rc": "passive: autopilot left offboard",
         "gcs": "passive: autopilot left offboard", "link": "quiet: no heartbeat", "reboot": "tracking: lifted off", "stop_arming": "land: operator asks to stop|passive: ",
@@ -83,6 +85,15 @@ def sent(path, since, fault):
             f"ends in {ticks[-1].mode if ticks else 'nothing'}"), good
 
 
+def commanded(after):
+    """How long the vehicle goes on by what it was last told, s: until it slows down; until it moves that way no more."""
+    first = after[0]
+    speed = math.hypot(first["vx_mps"], first["vy_mps"])
+    along = [(r["t_s"] - first["t_s"], (r["vx_mps"] * first["vx_mps"] + r["vy_mps"] * first["vy_mps"]) / max(speed, 1e-9)) for r in after]
+    over = next((t for t, v in along if v <= OVER), math.inf)
+    return max((t for t, v in along if t <= over and v >= speed - AT_REST), default=0.0), over
+
+
 def main() -> int:
     autopilot, fault, path, at, contacts, said, raw, since = sys.argv[1:]
     at = float(at)
@@ -102,11 +113,12 @@ def main() -> int:
     moving = [r["t_s"] for r in after if speed(r) > AT_REST]
     rest = (moving[-1] - at) if moving else 0.0
     end = after[-1]
-    good = contacts == "0" and end["t_s"] - at > rest + 1 and rest < WITHIN
+    good = contacts == "0" and end["t_s"] - at > rest + 1 and rest < (BLIND if fault.endswith("_off") else WITHIN)
     good = good and any(text in said for text in (SAYS | SEVERAL)[fault].split("|"))
+    slows, over = commanded(after)
     wire, possible = sent(raw, float(since), fault)
     good = good and (fault not in SEVERAL or possible)
-    print(f"{'ok  ' if good else 'FAIL'} {autopilot:9} {fault:10}{apart} {speed(start):.2f} m/s, {run_out:.2f} m further, at rest after {rest:.1f} s "
+    print(f"{'ok  ' if good else 'FAIL'} {autopilot:9} {fault:10}{apart} {speed(start):.2f} m/s, {run_out:.2f} m further, slows after {slows:.2f} s, over after {over:.2f} s, at rest after {rest:.1f} s "
           f"at ({end['x_m']:.2f}, {end['y_m']:.2f}, {end['z_m']:.2f}) m, contacts {contacts}; {wire}; {said or 'nothing said'}")
     return 0 if good else 1
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Cost of a tick of core/adapt beside the same bets with a logarithm each, in one run.
+// Cost of a tick of core/adapt, of the daemon's with it, and of a world in rougher air.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -21,87 +21,45 @@ namespace {
 using namespace backwash;
 using namespace backwash::adapt;
 
-std::vector<AirSample> samples() {
+constexpr int kTicks = 6000;
+
+/// A flight along a line in noise; the loop late by 30 ms is the dearest: its centre goes in steps of 1 ms.
+std::vector<AirTick> flown() {
   std::mt19937_64 rng(1);
   std::normal_distribution<double> normal;
-  std::vector<AirSample> all;
-  for (int k = 0; k < 6000; ++k)
-    all.push_back(
-        {0.02 * k, 0.1 * Vec3(normal(rng), normal(rng), normal(rng)), Vec3(0.01, 0.02, 0.01), AirClass::wall});
-  return all;
+  std::vector<AirTick> ticks(kTicks);
+  for (int k = 0; k < kTicks; ++k) {
+    AirTick& tick = ticks[static_cast<std::size_t>(k)];
+    tick.now_ns = 20'000'000LL * k, tick.age_s = 0.01, tick.air = AirClass::wall;
+    tick.sigma = Vec3(0.01, 0.02, 0.01);
+    tick.command.p_W.x() = std::sin(0.01 * k), tick.command.v_W.x() = 0.5 * std::cos(0.01 * k);
+    tick.state.p_W = tick.command.p_W + 0.01 * Vec3(normal(rng), normal(rng), normal(rng));
+    tick.state.v_W = tick.command.v_W;
+  }
+  return ticks;
 }
 
-/// As the equations are written: every bet's logarithm in every innovation, every mean of exponentials. Bets that it is
-/// calmer, one in twelve correlation times, are left out.
-class LogEachBet {
- public:
-  double add(const Innovation& i) {
-    double told = 0;
-    for (std::size_t k = 0; k < Bets::kRougher.size(); ++k) {
-      double x = 0, sum = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        x += std::min(kMostSquare, i.square[axis] / (Bets::kRougher[k] * i.most + i.beside[axis])) / 3;
-      for (std::size_t j = 0; j < Bets::kStakes.size(); ++j) {
-        ln_[k][j] += std::log1p(Bets::kStakes[j] * (x - 1));
-        since_[k][j] = std::log(std::exp(since_[k][j]) + i.seconds) + std::log1p(Bets::kStakes[j] * (x - 1));
-        sum += std::exp(ln_[k][j]) + std::exp(since_[k][j]);
-      }
-      told += sum;
-    }
-    return told;
-  }
-
- private:
-  std::array<std::array<double, 3>, Bets::kRougher.size()> ln_{}, since_{};
-};
-
-constexpr const char* kBaseline = "log_each_bet";
-
-void log_each_bet(benchmark::State& state) {
-  const auto all = samples();
-  Innovations innovations{Gusts{}};
-  LogEachBet bets;
-  double t = 0;
-  for (auto _ : state)
-    for (AirSample sample : all) {
-      sample.t_s = t += 0.02;
-      if (const auto i = innovations.add(sample)) benchmark::DoNotOptimize(bets.add(*i));
-    }
-  state.counters["ticks"] = static_cast<double>(all.size());
+InFlight learner(double feedback_delay) {
+  InFlightConstants constants;
+  constants.controller = config::load_vehicle("builtin:quad-5in").value().controller;
+  constants.controller.feedback_delay = feedback_delay;
+  return InFlight(constants);
 }
 
 void tick(benchmark::State& state) {
-  const auto all = samples();
-  Adaptation adaptation{Gusts{}};
-  double t = 0;
-  for (auto _ : state)
-    for (AirSample sample : all) {
-      sample.t_s = t += 0.02;
-      benchmark::DoNotOptimize(adaptation.add(sample));
+  const auto ticks = flown();
+  InFlight air = learner(1e-3 * static_cast<double>(state.range(0)));
+  std::int64_t shift = 0;
+  for (auto _ : state) {
+    for (AirTick tick : ticks) {
+      tick.now_ns += shift;
+      benchmark::DoNotOptimize(air.add(tick));
     }
-  state.counters["ticks"] = static_cast<double>(all.size());
-}
-
-BENCHMARK(log_each_bet)->Name(kBaseline);
-BENCHMARK(tick)->Name("adaptation_add");
-
-/// Adds the cost of a tick, and what the baseline costs in it.
-class Ratios : public benchmark::ConsoleReporter {
- public:
-  Ratios() : ConsoleReporter(OO_None) {}
-  void ReportRuns(const std::vector<Run>& runs) override {
-    ConsoleReporter::ReportRuns(runs);
-    for (const Run& run : runs) {
-      const double seconds = run.cpu_accumulated_time / static_cast<double>(run.iterations);
-      const double ns = 1e9 * seconds / run.counters.at("ticks");
-      if (run.benchmark_name() == kBaseline) baseline_ = ns;
-      std::printf("%-20s %8.1f ns/tick, baseline/this %.1f\n", run.benchmark_name().c_str(), ns, baseline_ / ns);
-    }
+    shift += kTicks * 20'000'000LL;
   }
-
- private:
-  double baseline_ = 0;
-};
+  state.SetItemsProcessed(state.iterations() * kTicks);
+}
+BENCHMARK(tick)->Name("in_flight_add_delay_ms")->Arg(0)->Arg(30);
 
 double now() {
   timespec t{};
@@ -116,9 +74,7 @@ void spread_in_the_daemon() {
   const auto world =
       plan::with_air(*plan::build_world(map::builtin_scene("parallel-walls-2m", 0.1).value(), Model{}, vehicle),
                      kModelledAir, Model{});
-  InFlightConstants constants;
-  constants.controller = vehicle.controller;
-  InFlight air(constants);
+  InFlight air = learner(0);
   track::FlightTick flight(vehicle, 0);
   std::array<std::vector<double>, 2> ns;
   std::mt19937_64 rng(1);
@@ -140,7 +96,7 @@ void spread_in_the_daemon() {
       log::AirRecord r{};
       std::copy_n(place.sigma.data(), 3, r.sigma);
       r.air = static_cast<std::uint32_t>(place.air);
-      benchmark::DoNotOptimize(log::learn(air, flight, out, r));
+      benchmark::DoNotOptimize(log::learn(air, in, flight, out, r));
       std::memcpy(ring.data(), &r, sizeof r);
     }
     ns[learns].push_back(now() - before);
@@ -154,26 +110,26 @@ void spread_in_the_daemon() {
               at(0, 0.99), at(1, 0.5), at(1, 0.99));
 }
 
-/// Single ticks by the monotonic clock, its own cost in them.
-void spread() {
-  const auto all = samples();
-  Adaptation adaptation{Gusts{}};
+/// Single ticks by the monotonic clock, its own cost in them: most step the centre, each 42nd bets.
+void spread(double feedback_delay) {
+  const auto ticks = flown();
+  InFlight air = learner(feedback_delay);
   std::vector<double> ns, empty;
-  double t = 0;
-  for (int turn = 0; turn < 20; ++turn)
-    for (AirSample sample : all) {
-      sample.t_s = t += 0.02;
+  std::int64_t shift = 0;
+  for (int turn = 0; turn < 20; ++turn, shift += kTicks * 20'000'000LL)
+    for (AirTick tick : ticks) {
+      tick.now_ns += shift;
       const double before = now();
-      benchmark::DoNotOptimize(adaptation.add(sample));
+      benchmark::DoNotOptimize(air.add(tick));
       const double after = now();
       ns.push_back(after - before), empty.push_back(now() - after);
     }
   std::ranges::sort(ns), std::ranges::sort(empty);
   const auto at = [](const std::vector<double>& x, double share) {
-    return x[static_cast<std::size_t>(share * x.size())];
+    return x[static_cast<std::size_t>(share * static_cast<double>(x.size()))];
   };
-  std::printf("single ticks, ns: p50 %.0f, p99 %.0f, p99.9 %.0f; the clock alone: p50 %.0f, p99 %.0f\n", at(ns, 0.5),
-              at(ns, 0.99), at(ns, 0.999), at(empty, 0.5), at(empty, 0.99));
+  std::printf("single ticks, delay %g s, ns: p50 %.0f, p99 %.0f, p99.9 %.0f; the clock alone: p50 %.0f, p99 %.0f\n",
+              feedback_delay, at(ns, 0.5), at(ns, 0.99), at(ns, 0.999), at(empty, 0.5), at(empty, 0.99));
 }
 
 double cpu_ms() {
@@ -207,9 +163,9 @@ void worlds() {
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  Ratios reporter;
-  benchmark::RunSpecifiedBenchmarks(&reporter);
-  spread();
+  benchmark::RunSpecifiedBenchmarks();
+  spread(0);
+  spread(0.03);
   spread_in_the_daemon();
   worlds();
   return 0;

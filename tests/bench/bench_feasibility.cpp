@@ -39,7 +39,7 @@ void cost_of_set(benchmark::State& state, const std::string& map) {
 }
 BENCHMARK_CAPTURE(cost_of_set, forest, "builtin:forest-0")->Unit(benchmark::kMillisecond)->Iterations(1);
 BENCHMARK_CAPTURE(cost_of_set, apartment, "builtin:apartment")->Unit(benchmark::kMillisecond)->Iterations(5);
-BENCHMARK_CAPTURE(cost_of_set, geb079, BACKWASH_SHARED_DATA "/maps/geb079.bt")
+BENCHMARK_CAPTURE(cost_of_set, geb079, BACKWASH_SOURCE_DIR "/tests/data/maps/geb079.bt")
     ->Unit(benchmark::kMillisecond)
     ->Iterations(1);
 

@@ -168,7 +168,7 @@ void slice(benchmark::State& state) {
 }
 BENCHMARK(slice)->Unit(benchmark::kMillisecond);
 
-const std::string kBuilding = BACKWASH_SHARED_DATA "/maps/geb079.bt";
+const std::string kBuilding = BACKWASH_SOURCE_DIR "/tests/data/maps/geb079.bt";
 
 void whole_field_building(benchmark::State& state) {
   const auto grid = backwash::map::load_map(kBuilding);

@@ -22,7 +22,7 @@ namespace {
 using namespace backwash;
 using Boxes = std::vector<std::array<Vec3, 2>>;
 
-std::string map_file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
+std::string map_file = BACKWASH_SOURCE_DIR "/tests/data/maps/geb079.bt";
 
 const plan::World& world(reach::Method method) {
   static std::map<reach::Method, std::shared_ptr<const plan::World>> built;

@@ -84,7 +84,7 @@ enum Place { room, building, floor_of_offices };
 map::OccupancyGrid map_of(std::int64_t place) {
   if (place == room) return furnished_room();
   if (place == floor_of_offices) return office();
-  return map::load_map(BACKWASH_SHARED_DATA "/maps/geb079.bt").value();
+  return map::load_map(BACKWASH_SOURCE_DIR "/tests/data/maps/geb079.bt").value();
 }
 
 const Vehicle kVehicle = config::load_vehicle("builtin:quad-5in").value();

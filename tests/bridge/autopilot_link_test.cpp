@@ -43,10 +43,10 @@ TEST_F(LinkTest, IgnoresOtherSystemsAndComponents) {
   say_and_poll(mavlink::LocalPositionNed{.time_boot_ms = 1, .x = 9}, kStart, kVehicle + 1, 1);
   say_and_poll(mavlink::LocalPositionNed{.time_boot_ms = 1, .x = 9}, kStart, kVehicle, 197);
   say_and_poll(px4_heartbeat(true, 6), kStart, kVehicle + 1, 1);
-  EXPECT_FALSE(link_.telemetry().local_state);
-  EXPECT_FALSE(link_.telemetry().status->value.armed);
+  EXPECT_FALSE(link_.telemetry().local_state.at(kStart));
+  EXPECT_FALSE(link_.telemetry().status.at(kStart)->value.armed);
   say_and_poll(mavlink::LocalPositionNed{.time_boot_ms = 1, .x = 9});
-  EXPECT_TRUE(link_.telemetry().local_state);
+  EXPECT_TRUE(link_.telemetry().local_state.at(kStart));
 }
 
 TEST_F(LinkTest, PutsThePositionVelocityAccelerationAndYawOfASetpointOnTheWireInNed) {
@@ -191,16 +191,16 @@ TEST_F(LinkTest, AnswersTimesyncAndMeasuresTheOffset) {
   EXPECT_EQ(question.tc1, 0);
   EXPECT_EQ(question.ts1, 1'000'000'000'000);
   say_and_poll(mavlink::Timesync{.tc1 = 5'000'000, .ts1 = question.ts1 - 1}, kStart + 4ms);
-  EXPECT_FALSE(link_.clock()) << "an answer to somebody else's question";
+  EXPECT_FALSE(link_.clock(kStart)) << "an answer to somebody else's question";
   for (const std::int64_t absurd :
        {std::numeric_limits<std::int64_t>::min(), std::int64_t{-1}, std::numeric_limits<std::int64_t>::max()}) {
     say_and_poll(mavlink::Timesync{.tc1 = absurd, .ts1 = question.ts1}, kStart + 4ms);
-    EXPECT_FALSE(link_.clock()) << "a time that no clock shows";
+    EXPECT_FALSE(link_.clock(kStart)) << "a time that no clock shows";
   }
   say_and_poll(mavlink::Timesync{.tc1 = 5'000'000, .ts1 = question.ts1}, kStart + 4ms);
-  ASSERT_TRUE(link_.clock());
-  EXPECT_EQ(link_.clock()->round_trip_ns, 4'000'000);
-  EXPECT_EQ(link_.clock()->offset_ns, 5'000'000 - (1'000'000'000'000 + 2'000'000));
+  ASSERT_TRUE(link_.clock(kStart));
+  EXPECT_EQ(link_.clock(kStart)->value.round_trip_ns, 4'000'000);
+  EXPECT_EQ(link_.clock(kStart)->value.offset_ns, 5'000'000 - (1'000'000'000'000 + 2'000'000));
 }
 
 TEST_F(LinkTest, SendsATextOfAtMostFiftyCharacters) {
@@ -222,8 +222,9 @@ TEST(AutopilotLinkOverUdp, TalksToTheFirstPeerThatIsAFlightController) {
     ASSERT_TRUE(link.poll(kStart));
     ::usleep(1000);
   }
-  ASSERT_TRUE(link.telemetry().status);
-  EXPECT_TRUE(link.telemetry().status->value.armed && link.telemetry().status->value.follows_setpoints);
+  ASSERT_TRUE(link.telemetry().status.at(kStart));
+  EXPECT_TRUE(link.telemetry().status.at(kStart)->value.armed &&
+              link.telemetry().status.at(kStart)->value.follows_setpoints);
   ASSERT_TRUE(link.send_setpoint({}, kStart));
   std::array<std::uint8_t, 512> bytes;
   std::size_t size = 0;

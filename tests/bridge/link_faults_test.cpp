@@ -52,7 +52,7 @@ TEST_F(LinkTest, NoticesAnUnpluggedPortWithinOneTickAndStaysSilentAfterANewOne) 
   PseudoTerminal replacement;
   link_.reconnect(open(replacement.path()), kStart + 1s);
   EXPECT_FALSE(link_.vehicle());
-  EXPECT_FALSE(link_.telemetry().status);
+  EXPECT_FALSE(link_.telemetry().status.at(kStart));
   EXPECT_TRUE(link_.poll(kStart + 1s));
   EXPECT_FALSE(link_.send_setpoint({}, kStart + 1s)) << "passive until the vehicle is heard again";
   ::usleep(20'000);

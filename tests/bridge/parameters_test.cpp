@@ -115,6 +115,8 @@ TEST(Parameters, AFloatAtItsLimitIsGood) {
   named["MPC_XY_VEL_MAX"] = named["MPC_Z_VEL_MAX_UP"] = named["MPC_Z_VEL_MAX_DN"] = static_cast<double>(1.3F);
   EXPECT_EQ(forbidding_parameter(Autopilot::kPx4, values(Autopilot::kPx4, named), v), "");
   EXPECT_EQ(forbids(Autopilot::kArduPilot, kArduPilotGood, "GUID_TIMEOUT", static_cast<double>(0.3F)), "");
+  named["COM_OF_LOSS_T"] = static_cast<double>(0.39F);
+  EXPECT_TRUE(judge_parameters(Autopilot::kPx4, values(Autopilot::kPx4, named), v).front().good);
 }
 
 // k_p is a product: two gains that are each nearly right may not be.
@@ -127,14 +129,23 @@ TEST(Parameters, ThePositionGainIsJudgedTogetherWithTheVelocityGain) {
 
 TEST(Parameters, WhatIsOnlyUnwiseIsToldAndForbidsNothing) {
   for (const auto& [autopilot, name, value] :
-       {std::tuple(Autopilot::kPx4, "COM_RC_OVERRIDE", 1.0), std::tuple(Autopilot::kPx4, "NAV_DLL_ACT", 2.0),
-        std::tuple(Autopilot::kPx4, "COM_LOW_BAT_ACT", 3.0), std::tuple(Autopilot::kPx4, "EKF2_EV_CTRL", 7.0),
-        std::tuple(Autopilot::kPx4, "EKF2_HGT_REF", 0.0), std::tuple(Autopilot::kPx4, "NAV_RCL_ACT", 2.0),
-        std::tuple(Autopilot::kPx4, "EKF2_EV_DELAY", 81.0), std::tuple(Autopilot::kArduPilot, "BATT_FS_LOW_ACT", 2.0),
+       // 0.39 s and the 0.11 s that PX4 adds are the half second after which nothing follows us (docs/faults.md row 36)
+       {std::tuple(Autopilot::kPx4, "COM_OF_LOSS_T", 0.4),
+        std::tuple(Autopilot::kPx4, "COM_OF_LOSS_T", 0.5),
+        std::tuple(Autopilot::kPx4, "COM_RC_OVERRIDE", 1.0),
+        std::tuple(Autopilot::kPx4, "NAV_DLL_ACT", 2.0),
+        std::tuple(Autopilot::kPx4, "COM_LOW_BAT_ACT", 3.0),
+        std::tuple(Autopilot::kPx4, "EKF2_EV_CTRL", 7.0),
+        std::tuple(Autopilot::kPx4, "EKF2_HGT_REF", 0.0),
+        std::tuple(Autopilot::kPx4, "NAV_RCL_ACT", 2.0),
+        std::tuple(Autopilot::kPx4, "EKF2_EV_DELAY", 81.0),
+        std::tuple(Autopilot::kArduPilot, "BATT_FS_LOW_ACT", 2.0),
         std::tuple(Autopilot::kArduPilot, "BATT_FS_CRT_ACT", 5.0),
-        std::tuple(Autopilot::kArduPilot, "VISO_DELAY_MS", 100.0), std::tuple(Autopilot::kArduPilot, "VISO_TYPE", 0.0),
+        std::tuple(Autopilot::kArduPilot, "VISO_DELAY_MS", 100.0),
+        std::tuple(Autopilot::kArduPilot, "VISO_TYPE", 0.0),
         std::tuple(Autopilot::kArduPilot, "EK3_SRC1_POSXY", 3.0),
-        std::tuple(Autopilot::kArduPilot, "EK3_SRC1_POSZ", 1.0), std::tuple(Autopilot::kArduPilot, "EK3_SRC1_YAW", 1.0),
+        std::tuple(Autopilot::kArduPilot, "EK3_SRC1_POSZ", 1.0),
+        std::tuple(Autopilot::kArduPilot, "EK3_SRC1_YAW", 1.0),
         std::tuple(Autopilot::kArduPilot, "FS_EKF_ACTION", 2.0),
         std::tuple(Autopilot::kArduPilot, "FS_THR_ENABLE", 1.0),
         std::tuple(Autopilot::kArduPilot, "FS_GCS_ENABLE", 1.0),

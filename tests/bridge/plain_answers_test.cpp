@@ -42,11 +42,11 @@ TEST_F(PlainAnswers, AControllerThatDoesNotKnowTheGroundIsNeitherOnItNorInTheAir
   plain_state_t s{};
   say(s);
   EXPECT_EQ(link_.vehicle(), kVehicle);
-  EXPECT_FALSE(link_.telemetry().landed_state);
+  EXPECT_FALSE(link_.telemetry().landed_state.at(kStart));
   s.ground_known = true;
   say(s);
-  ASSERT_TRUE(link_.telemetry().landed_state);
-  EXPECT_EQ(link_.telemetry().landed_state->value, LandedState::kInAir);
+  ASSERT_TRUE(link_.telemetry().landed_state.at(kStart));
+  EXPECT_EQ(link_.telemetry().landed_state.at(kStart)->value, LandedState::kInAir);
 }
 
 TEST_F(PlainAnswers, AnAnswerToAnEarlierRequestIsNoneToThisOne) {

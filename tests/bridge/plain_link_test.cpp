@@ -40,27 +40,27 @@ TEST_F(PlainLinkTest, AControllersStateIsTelemetry) {
   poll_until(6);
   const auto& t = link_.telemetry();
   EXPECT_EQ(link_.vehicle(), kVehicle);
-  EXPECT_EQ(t.status->value.autopilot, Autopilot::kPlain);
-  EXPECT_TRUE(t.status->value.armed && t.status->value.follows_setpoints);
-  EXPECT_EQ(t.status->value.system_status, 4);
-  EXPECT_EQ(t.local_state->value.p_W, Vec3(1, -2, 3));
-  EXPECT_EQ(t.local_state->value.v_W, Vec3(0.5, 0.25, -0.125));
-  EXPECT_LT((t.attitude->value.q_LB * Vec3::UnitX() - Vec3::UnitY()).norm(), 1e-6);
-  EXPECT_LT((t.attitude->value.omega_B - Vec3(0.1, 0.2, -0.3)).norm(), 1e-6);
-  EXPECT_EQ(t.landed_state->value, LandedState::kInAir);
-  EXPECT_EQ(t.reset_counter->value, 3);
-  EXPECT_NEAR(*t.battery->value.voltage, 15.6, 1e-9);
-  EXPECT_NEAR(*t.battery->value.remaining, 0.87, 1e-9);
-  EXPECT_FALSE(t.battery->value.current);
+  EXPECT_EQ(t.status.at(kStart)->value.autopilot, Autopilot::kPlain);
+  EXPECT_TRUE(t.status.at(kStart)->value.armed && t.status.at(kStart)->value.follows_setpoints);
+  EXPECT_EQ(t.status.at(kStart)->value.system_status, 4);
+  EXPECT_EQ(t.local_state.at(kStart)->value.p_W, Vec3(1, -2, 3));
+  EXPECT_EQ(t.local_state.at(kStart)->value.v_W, Vec3(0.5, 0.25, -0.125));
+  EXPECT_LT((t.attitude.at(kStart)->value.q_LB * Vec3::UnitX() - Vec3::UnitY()).norm(), 1e-6);
+  EXPECT_LT((t.attitude.at(kStart)->value.omega_B - Vec3(0.1, 0.2, -0.3)).norm(), 1e-6);
+  EXPECT_EQ(t.landed_state.at(kStart)->value, LandedState::kInAir);
+  EXPECT_EQ(t.reset_counter.at(kStart)->value, 3);
+  EXPECT_NEAR(*t.battery.at(kStart)->value.voltage, 15.6, 1e-9);
+  EXPECT_NEAR(*t.battery.at(kStart)->value.remaining, 0.87, 1e-9);
+  EXPECT_FALSE(t.battery.at(kStart)->value.current);
   auto s = flying();
   s.sequence = 2;
   s.failsafe = s.on_ground = true;
   s.following = false;
   say(s);
   poll_until(12);
-  EXPECT_FALSE(t.status->value.follows_setpoints);
-  EXPECT_EQ(t.status->value.system_status, 5);
-  EXPECT_EQ(t.landed_state->value, LandedState::kOnGround);
+  EXPECT_FALSE(t.status.at(kStart)->value.follows_setpoints);
+  EXPECT_EQ(t.status.at(kStart)->value.system_status, 5);
+  EXPECT_EQ(t.landed_state.at(kStart)->value, LandedState::kOnGround);
 }
 
 TEST_F(PlainLinkTest, AControllerThatKnowsNoPoseYetIsHeardAndSentPoses) {
@@ -71,8 +71,8 @@ TEST_F(PlainLinkTest, AControllerThatKnowsNoPoseYetIsHeardAndSentPoses) {
   poll_until(3);  // HEARTBEAT, EXTENDED_SYS_STATE, BATTERY_STATUS
   const auto& t = link_.telemetry();
   EXPECT_EQ(link_.vehicle(), kVehicle);
-  EXPECT_TRUE(t.status && t.landed_state && t.battery);
-  EXPECT_FALSE(t.local_state || t.attitude || t.reset_counter);
+  EXPECT_TRUE(t.status.at(kStart) && t.landed_state.at(kStart) && t.battery.at(kStart));
+  EXPECT_FALSE(t.local_state.at(kStart) || t.attitude.at(kStart) || t.reset_counter.at(kStart));
   EXPECT_EQ(t.broken, 0U);
   VioSample vio{};
   vio.p_O = vio.v_B = Vec3::Zero();
@@ -90,7 +90,7 @@ TEST_F(PlainLinkTest, ARepeatedStateIsNoSignOfLife) {
   say(other);
   poll_until(12);
   EXPECT_EQ(link_.received().frames, 12U);
-  EXPECT_NEAR(*link_.telemetry().battery->value.remaining, 0.5, 1e-9);
+  EXPECT_NEAR(*link_.telemetry().battery.at(kStart)->value.remaining, 0.5, 1e-9);
 }
 
 TEST_F(PlainLinkTest, SetpointsAndPosesArriveAsTheyWereGiven) {

@@ -174,12 +174,12 @@ TEST_F(SignedLinkTest, ActsUponNoFrameThatIsUnsignedWronglySignedOrReplayed) {
   say_signed(px4_heartbeat(false, 1), controller_);
   poll_until_arrived(3);
   EXPECT_EQ(link_.vehicle(), kVehicle);
-  EXPECT_FALSE(link_.telemetry().status->value.armed);
+  EXPECT_FALSE(link_.telemetry().status.at(kStart)->value.armed);
   say(px4_heartbeat(true, 6));
   say_signed(px4_heartbeat(true, 6), stranger);
   far_.write(old);
   poll_until_arrived(6, kStart + 1s);
-  EXPECT_FALSE(link_.telemetry().status->value.armed);
+  EXPECT_FALSE(link_.telemetry().status.at(kStart)->value.armed);
   EXPECT_EQ(link_.heartbeat_age(kStart + 1s), 1s) << "a replayed heartbeat is no sign of life";
   const auto& counted = link_.signing()->counters();
   EXPECT_EQ(std::tuple(counted.good, counted.unsigned_frames, counted.wrong_signature, counted.replayed),

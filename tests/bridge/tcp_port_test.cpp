@@ -82,7 +82,7 @@ TEST(TcpPort, LosesAPeerThatVanishedWhileNothingWasSent) {
     const FileDescriptor far = listener.accepted();
     constexpr int kOn = 1;  // closed so, a connection is gone without a word
     if (::setsockopt(far.get(), IPPROTO_TCP, TCP_REPAIR, &kOn, sizeof kOn) != 0)
-      GTEST_SKIP() << "a connection cannot be made to vanish without CAP_NET_ADMIN";
+      GTEST_SKIP() << "right: a connection cannot be made to vanish without CAP_NET_ADMIN";
   }
   std::array<std::uint8_t, 16> bytes;
   auto n = port->read(bytes);

@@ -34,7 +34,7 @@ class LearnsInFlight : public testing::Test {
     rig_ = new LearningRig(8);
     rig_->take_off();
     rig_->start_route(2);
-    rig_->ticks(600);
+    rig_->ticks(1500);
   }
   static void TearDownTestSuite() { delete rig_; }
   static LearningRig* rig_;
@@ -48,7 +48,7 @@ TEST_F(LearnsInFlight, RougherAirIsHandedOverShownAndTold) {
   const auto kept = rig_->channels->air_kept.read_new();
   ASSERT_TRUE(handed && kept);
   EXPECT_EQ(handed->factors, rig_->view().air->factors);
-  EXPECT_EQ(*kept, handed->factors);
+  EXPECT_EQ(*kept, kModelledAir) << "of a flight that has not ended";
   double told = 0;
   while (const auto event = rig_->channels->events.pop())
     if (event->kind == ControlEvent::Kind::rougher) {
@@ -62,7 +62,7 @@ TEST_F(LearnsInFlight, RougherAirIsHandedOverShownAndTold) {
 TEST_F(LearnsInFlight, FactorsInTheRawLogOnlyGrow) {
   AirFactors before = kModelledAir;
   const auto records = of_kind(*rig_, RecordKind::air);
-  ASSERT_GT(records.size(), 700u);
+  ASSERT_GT(records.size(), 1600u);
   for (const auto& record : records) {
     const auto& r = *log::payload<log::AirRecord>(record);
     for (std::size_t k = 0; k < kAirClasses; ++k) EXPECT_GE(r.factors[k], before[k]) << r.tick;
@@ -158,7 +158,7 @@ TEST(LearnsInFlightOfTheBench, AirAsModelledIsNotCalledRougher) {
   EXPECT_EQ(told, 0);
 }
 
-// Samples come in every third tick alone, and are taken by their own stamps.
+// Samples come in every third tick alone; the set-points of the others count too.
 TEST(LearnsInFlightOfTheBench, OdometryThatMissesTicksIsReplayedToo) {
   LearningRig rig(4);
   rig.take_off();
@@ -170,7 +170,10 @@ TEST(LearnsInFlightOfTheBench, OdometryThatMissesTicksIsReplayedToo) {
   }
   EXPECT_EQ(log::replay(saved(rig), "log")->differing, 0u);
   const auto records = of_kind(rig, RecordKind::air);
-  EXPECT_GT(records.size(), 80u);
+  EXPECT_GT(records.size(), 200u);
+  std::size_t of_last = 0;
+  for (const auto& record : records) of_last += record.header.t_ns > rig.now_ns() - 150 * 20'000'000LL;
+  EXPECT_EQ(of_last, 150u);
 }
 
 std::vector<log::AirOrderRecord> orders_of(const Lockstep& rig) {
@@ -186,10 +189,10 @@ struct OrdersAboutTheAir : testing::Test {
     ask(adapt::AirOrder::freeze);
     rig.take_off();
     rig.start_route(2);
-    rig.ticks(600);
+    rig.ticks(1500);
   }
   void ask(adapt::AirOrder order) {
-    rig.channels->air_orders.push(order);
+    EXPECT_TRUE(rig.channels->air_orders.push(order));
     rig.tick();
   }
   LearningRig rig{8};
@@ -206,7 +209,7 @@ TEST_F(OrdersAboutTheAir, FrozenFactorsStayWhileEvidenceIsCountedAndThawedOnesFo
   const auto handed = rig.channels->air.read_new();
   ASSERT_TRUE(handed);
   EXPECT_EQ(handed->factors, rig.view().air->factors);
-  EXPECT_EQ(rig.channels->air_kept.read_new(), handed->factors);
+  EXPECT_EQ(rig.channels->air_kept.read_new(), kModelledAir);
 }
 
 TEST_F(OrdersAboutTheAir, AResetOfAnArmedVehicleIsNotDoneAndTold) {
@@ -225,6 +228,8 @@ TEST_F(OrdersAboutTheAir, AResetOfADisarmedOneForgetsFactorsAndEvidenceAndIsHand
   ASSERT_GT(rig.largest_factor(), 1);
   rig.in_hand().disarm();
   rig.ticks(100);
+  const AirFactors kept = rig.channels->air_kept.read_new().value();
+  EXPECT_EQ(rig.view().air->factors, kept) << "of a flight that ended";
   ask(adapt::AirOrder::reset);
   EXPECT_EQ(rig.view().air->factors, kModelledAir);
   EXPECT_EQ(*std::ranges::max_element(rig.view().air->ln_evidence), 0);
@@ -232,8 +237,8 @@ TEST_F(OrdersAboutTheAir, AResetOfADisarmedOneForgetsFactorsAndEvidenceAndIsHand
   const auto handed = rig.channels->air.read_new();
   ASSERT_TRUE(handed);
   EXPECT_EQ(handed->factors, kModelledAir);
-  EXPECT_EQ(handed->falls, 1u);
-  EXPECT_EQ(rig.channels->air_kept.read_new(), kModelledAir) << "a restart begins with it";
+  EXPECT_GE(handed->falls, 1u);
+  EXPECT_EQ(rig.channels->air_kept.read_new().value_or(kept), kModelledAir) << "a restart begins with it";
 }
 
 TEST_F(OrdersAboutTheAir, AReplayDecidesThemAgainAndNamesOneThatTheLogTellsOtherwise) {
@@ -266,8 +271,8 @@ TEST_F(OrdersAboutTheAir, AReplayDecidesThemAgainAndNamesOneThatTheLogTellsOther
 }
 
 TEST(AirText, SaysWhatItIsToldToTheDigitsThatItHas) {
-  const dds::AirSaid air{true, {{"ground", 1.4142, 8.24, 33.6}, {"none", 1, 0, 2}}};
-  EXPECT_EQ(dds::to_text(air), "frozen: ground 1.41 (8.2, 34 s), none 1.00 (0.0, 2 s)");
+  const dds::AirSaid air{true, {{"ground", 1.4142, 8.24, 33.6, "motion"}, {"none", 1, 0, 2}}};
+  EXPECT_EQ(dds::to_text(air), "frozen: ground 1.41 by motion (8.2, 34 s), none 1.00 (0.0, 2 s)");
   const auto said = dds::air_said(dds::to_text(air));
   ASSERT_TRUE(said && said->classes.size() == 2);
   EXPECT_TRUE(said->frozen);
@@ -275,11 +280,14 @@ TEST(AirText, SaysWhatItIsToldToTheDigitsThatItHas) {
   EXPECT_EQ(said->classes[0].factor, 1.41);
   EXPECT_EQ(said->classes[0].ln_evidence, 8.2);
   EXPECT_EQ(said->classes[0].seconds, 34);
+  EXPECT_EQ(said->classes[0].cause, "motion");
+  EXPECT_EQ(said->classes[1].cause, "");
   EXPECT_EQ(dds::to_text(*said), dds::to_text(air));
   EXPECT_EQ(dds::to_text({}), "as modelled");
   ASSERT_TRUE(dds::air_said("as modelled"));
   EXPECT_TRUE(dds::air_said("as modelled")->classes.empty());
-  for (const char* other : {"", "frozen: ", "ground 1.41 (8.2)", "ground 1.41 (8.2, 34 s) and more", "anything"})
+  for (const char* other : {"", "frozen: ", "ground 1.41 (8.2)", "ground 1.41 (8.2, 34 s) and more",
+                            "ground 1.41 by (8.2, 34 s)", "anything"})
     EXPECT_FALSE(dds::air_said(other)) << other;
 }
 

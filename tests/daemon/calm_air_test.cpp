@@ -11,6 +11,7 @@
 
 #include "core/log/air_log.hpp"
 #include "core/log/tick_log.hpp"
+#include "core/plan/rest.hpp"
 #include "tests/daemon/air_rig.hpp"
 
 namespace backwash::daemon::test {
@@ -103,6 +104,55 @@ TEST_F(CalmAir, EndsWithTheFlightAndIsShownAnewInTheNext) {
   ASSERT_TRUE(handed);
   EXPECT_EQ(handed->factors, kModelledAir);
   EXPECT_EQ(handed->falls, falls);
+}
+
+// The planner asks before it verifies, and the air may have changed since.
+TEST_F(CalmAir, ASegmentOfCalmerAirThanThereIsIsRefusedInTheTick) {
+  LearningRig rig(1);
+  rig.take_off();
+  const std::uint64_t flown = rig.view().segment;
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    rig.sets_of = kModelledAir;
+    rig.sets_of[k] = 0.99;
+    const std::uint64_t id = rig.offer(std::vector<Setpoint>(50, rig.view().command));
+    rig.tick();
+    EXPECT_EQ(rig.view().refused_segment, id);
+    EXPECT_EQ(rig.view().segment, flown);
+  }
+  rig.sets_of = {1, 1.5, 1, 1, 1};
+  const std::uint64_t id = rig.offer(std::vector<Setpoint>(50, rig.view().command));
+  rig.tick();
+  EXPECT_EQ(rig.view().segment, id);
+}
+
+// Of rougher air too: a new way is flown by sets of the air as it is known now, to the step of a world made anew.
+TEST_F(CalmAir, ASegmentOfSmootherAirThanIsKnownIsRefusedInTheTickUnlessItContinuesAFlight) {
+  auto learns = learning();
+  learns.start = {1, 1.5, 1, 1, 1.2};
+  LearningRig rig(1, 1, learns);
+  rig.sets_of = learns.start;
+  rig.take_off();
+  const std::uint64_t flown = rig.view().segment;
+  const std::vector<Setpoint> here(50, rig.view().command);
+  for (const AirFactors& made : {kModelledAir, AirFactors{1, 1.42, 1, 1, 1.2}, AirFactors{2, 2, 2, 2, 1.1}}) {
+    rig.sets_of = made;
+    const std::uint64_t id = rig.offer(here);
+    rig.tick();
+    EXPECT_EQ(rig.view().refused_segment, id);
+    EXPECT_EQ(rig.view().segment, flown);
+  }
+  rig.sets_of = {1, 1.45, 1, 1, 1.2};
+  const std::uint64_t id = rig.offer(here);
+  rig.tick();
+  EXPECT_EQ(rig.view().segment, id);
+  track::AcceptedSegment on;  // as it slows down, or is led back
+  on.id = id + 1, on.continues = id, on.branch = rig.view().index;
+  on.closures = rig.view().closures, on.epoch = rig.view().epoch;
+  on.commands = here;
+  on.tube = plan::tube_to_rest(rig.world(), rig.view().state, here[0], here);
+  rig.channels->segments.offer(std::make_unique<const track::AcceptedSegment>(on));
+  rig.tick();
+  EXPECT_EQ(rig.view().segment, on.id);
 }
 
 TEST_F(CalmAir, ShrinksNothingUnlessItIsConfigured) {

@@ -41,7 +41,7 @@ TEST(OffboardLeftFault, APilotWhoChangesTheModeWhileWeEnableIsNotOverridden) {
   rig.autopilot->mute = true;
   rig.say(heartbeat(false, kPosition));  // his change of before is none of ours
   rig.tick();
-  rig.channels->orders.push({track::Request::enable});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   rig.tick();
   ASSERT_EQ(rig.mode(), Mode::enabling) << to_string(rig.reason());
   rig.ticks(3);
@@ -60,7 +60,7 @@ TEST(OtherHandsFault, APilotOrAFailsafeIsNeverFoughtInAnyMode) {
     if (from == Mode::hold) {
       rig.tick(3);
     } else if (from == Mode::land) {
-      rig.channels->orders.push({track::Request::land});
+      EXPECT_TRUE(rig.channels->orders.push({track::Request::land}));
       rig.tick();
     }
     ASSERT_EQ(rig.mode(), from);
@@ -82,7 +82,7 @@ TEST(DisarmingFault, DisarmedDropsTheTrajectoryAndNeedsANewEnable) {
   EXPECT_EQ(rig.reason(), Reason::disarmed);
   EXPECT_EQ(rig.view().segment, 0u);
   for (int n = 0; n < 100; ++n) EXPECT_TRUE(rig.tick().setpoints.empty());
-  rig.channels->orders.push({track::Request::enable});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   // Enabled anew it holds where it is; the old trajectory is not resumed.
   const Vec3 here = rig.autopilot->truth().p_W;
@@ -108,7 +108,7 @@ TEST(LowBatteryFault, ALowBatteryAsksToLandOnce) {
   EXPECT_GE(asked, 1);
   EXPECT_EQ(rig.reason(), Reason::landed);
   // An operator who takes control again with the same battery is not landed a second time.
-  rig.channels->orders.push({track::Request::enable});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   rig.ticks(200);
   EXPECT_EQ(rig.mode(), Mode::tracking);

@@ -66,7 +66,7 @@ void EpochModel::tick(Daemon& d) {
   v.mode = out.supervisor.mode;
   v.reason = out.supervisor.reason;
   v.armed = d.in.autopilot.armed;
-  v.landed = d.in.autopilot.landed.value_or(true);
+  v.landed = out.landed;
   v.odometry_age = v.heartbeat_age = v.pose_age = 0;
   v.state = d.in.odometry->state;
   v.command = out.command;

@@ -15,7 +15,7 @@ namespace backwash::daemon::test {
 namespace {
 
 TEST(Traps, CountWhatTheyAreMeantToCount) {
-  if (!backwash::test::traps_work()) GTEST_SKIP() << "a sanitizer owns these functions";
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "sanitizer: it owns these functions";
   const auto before = backwash::test::trapped();
   static std::mutex mutex;
   {
@@ -41,7 +41,7 @@ TEST(Tick, NeitherAllocatesNorLocksNorReadsTheWallClockNorFaultsAPageInAWholeFli
   Lockstep rig;
   rig.take_off();
   rig.start_route(7);
-  rig.channels->orders.push({track::Request::land});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::land}));
   ASSERT_GT(rig.ticks_until(Mode::passive, 600), 0);
   EXPECT_EQ(rig.reason(), Reason::landed);
   EXPECT_GT(rig.view().inside, 340u);  // the lift-off is not judged
@@ -76,7 +76,7 @@ TEST(Tick, SendsOneFullSetpointEachTickWhileItCommandsAndAHeartbeatASecond) {
 // Row 15, the planner is late: nothing new comes, the verified tail is finished and held.
 // The control thread frees nothing: what it has finished with has to come back to the planner.
 TEST(Tick, GivesEverySegmentBackToBeFreed) {
-  if (!backwash::test::traps_work()) GTEST_SKIP() << "a sanitizer counts the memory";
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "sanitizer: it counts the memory";
   Lockstep rig;
   rig.take_off();
   const auto offers = [&](int count) {

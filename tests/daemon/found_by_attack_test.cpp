@@ -32,7 +32,7 @@ TEST(VioFreezeFault, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway
 TEST(VioFreezeFault, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOff) {
   Lockstep rig;
   rig.ticks(60);
-  rig.channels->orders.push({track::Request::enable});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   std::optional<OdometrySample> frozen;
   rig.spoil = [&](OdometrySample& s) {

@@ -50,7 +50,9 @@ Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond
       s.state = {seen.p_W + Vec3(-1, 0, 1.2), seen.v_W};  // within the map, however it is mirrored
       s.q = {attitude_seen.w(), attitude_seen.x(), attitude_seen.y(), attitude_seen.z()};
     };
-    if (n == 280) rig.channels->orders.push({track::Request::enable});
+    if (n == 280) {
+      EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
+    }
     const Wire& wire = rig.tick();
     commanded = commanded || !wire.setpoints.empty() || wire.commanded(kCommandMode);
     if (n == 280) return rig.reason();

@@ -42,7 +42,7 @@ TEST(PortLossFault, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
   EXPECT_EQ(rig.mode(), Mode::quiet);
   EXPECT_EQ(rig.channels->link_fault.load(), std::nullopt);
   // The line works again: an operator can take control anew.
-  rig.channels->orders.push({track::Request::enable});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   EXPECT_EQ(rig.ticks_until(Mode::enabling, 3), 1) << to_string(rig.reason());
 }
 
@@ -182,7 +182,7 @@ TEST(BaudRateFault, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
   rig.ticks(2);
   ASSERT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::kNoValidFrame);
   EXPECT_EQ(name(firmware_bridge::LinkFault::kNoValidFrame), "no valid frame (wrong baud rate?)");
-  rig.channels->orders.push({track::Request::enable});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   rig.tick();
   EXPECT_EQ(rig.mode(), Mode::passive);
   EXPECT_EQ(rig.reason(), Reason::autopilot_silent);

@@ -109,6 +109,42 @@ TEST(Localization, ALoopClosureCarriesOdometryIntoTheMap) {
   EXPECT_EQ(l.closures(), 2u);
 }
 
+// At 20 Hz, as graph-based estimators send it: to and fro, and adrift.
+TEST(Localization, StepsBelowTheEstimationErrorAreNoClosureUntilTheyAddUpToMore) {
+  auto l = localization();
+  ASSERT_TRUE(l.loop_closure(closure(about_z(0.3), {5, 6, 7})));
+  const auto at = [&] { return l.odometry(odometry(kOdom, {40, 0, 1}, about_z(0)), 0)->state.p_W; };
+  const Vec3 before = at();
+  for (int n = 0; n < 100; ++n) {
+    const double sign = n % 2 ? 1 : -1;
+    ASSERT_TRUE(l.loop_closure(closure(about_z(0.3 + sign * 1e-4), {5 + sign * 0.004, 6, 7})));
+    ASSERT_EQ(at(), before);
+  }
+  EXPECT_EQ(l.closures(), 1u);
+  for (int n = 1; n <= 100; ++n) ASSERT_TRUE(l.loop_closure(closure(about_z(0.3), {5, 6 + 0.001 * n, 7})));
+  EXPECT_EQ(l.closures(), 1u + 4u) << "one each 0.021 m";
+  EXPECT_NEAR(at().y() - before.y(), 0.084, 1e-9);
+  ASSERT_TRUE(l.loop_closure(closure(about_z(0.301), {5, 6.084, 7})));
+  EXPECT_EQ(l.closures(), 6u) << "turned by 0.001 rad, 40 m away from where the frames began";
+}
+
+// Said once, and nothing where the vehicle was then.
+TEST(Localization, ATurnIsAClosureWhereItHasComeToMatter) {
+  auto l = localization();
+  const auto at = [&](double x) { return l.odometry(odometry(kOdom, {x, 0, 1}, about_z(0)), 0)->state.p_W; };
+  ASSERT_TRUE(l.loop_closure(closure(about_z(0), kZero)));
+  at(0);
+  ASSERT_TRUE(l.loop_closure(closure(about_z(0.015), kZero)));
+  EXPECT_EQ(at(0.2).y(), 0);
+  EXPECT_EQ(l.closures(), 1u);
+  EXPECT_NEAR(at(10).y(), 10 * std::sin(0.015), 1e-9);
+  EXPECT_EQ(l.closures(), 2u);
+  auto before = localization();  // two before the first pose
+  ASSERT_TRUE(before.loop_closure(closure(about_z(0), kZero)));
+  ASSERT_TRUE(before.loop_closure(closure(about_z(0.015), kZero)));
+  EXPECT_EQ(before.closures(), 2u);
+}
+
 TEST(Localization, ALoopClosureThatTiltsOrIsNoTransformIsRefused) {
   auto l = localization();
   EXPECT_FALSE(l.loop_closure(closure(Quaternion(Eigen::AngleAxisd(0.05, Vec3::UnitX())), kZero)));

@@ -11,7 +11,7 @@
 #include "core/config/config.hpp"
 #include "core/log/tick_log.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/planner.hpp"
+#include "core/plan/rest.hpp"
 #include "core/sim/flight.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
 #include "tests/daemon/lockstep_line.hpp"
@@ -232,7 +232,8 @@ std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops, b
   const Setpoint& here = view().command;
   if (!arms) commands.insert(commands.begin(), timing_.lead(), {here.p_W, Vec3::Zero(), Vec3::Zero(), here.yaw});
   const State start = view().state;
-  segment->tube = reach::tube_over_field(world_->reach, start, view().command, commands, world_->bounds);
+  segment->air = sets_of;
+  segment->tube = plan::tube_to_rest(*world_, start, view().command, commands);
   if (with_stops)
     segment->stops = plan::verified_stops(*world_, start, view().command, commands, 0, 10,
                                           [&](const auto& tube) { return plan::lateral_clearance(*world_, tube); });
@@ -245,7 +246,7 @@ std::uint64_t Lockstep::offer(std::vector<Setpoint> commands, bool with_stops, b
 
 void Lockstep::take_off() {
   ticks(60);
-  channels->orders.push({track::Request::enable});
+  channels->orders.push_or_count({track::Request::enable});
   ASSERT_GT(ticks_until(Mode::tracking, 250), 0) << to_string(reason());
   offer(rise(), true, true);
   ASSERT_EQ(ticks_until(Mode::lifting, 3) > 0, true) << to_string(reason());
@@ -262,8 +263,7 @@ void Lockstep::take_off() {
 std::vector<Setpoint> Lockstep::rise() const {
   const auto& limits = vehicle_.limits;
   auto commands = plan::vertical_commands(view().command.p_W, kStart, limits.v_max, limits.a_max);
-  const auto hold = sim::hold_commands(kStart, 2.0);
-  commands.insert(commands.end(), hold.begin(), hold.end());
+  plan::hold_until_settled(world_->reach, commands);
   for (auto& c : commands) c.yaw = view().command.yaw;
   return commands;
 }

@@ -84,7 +84,8 @@ class Lockstep {
   /// Offers these commands from where the vehicle is now, planned in the present epoch; returns the id. `arms`: as a
   /// take-off.
   std::uint64_t offer(std::vector<Setpoint> commands, bool with_stops = true, bool arms = false);
-  /// Straight up from here to where routes start, and two seconds there.
+  AirFactors sets_of = kModelledAir;  ///< of what is offered
+  /// Straight up from here to where routes start, and held there.
   std::vector<Setpoint> rise() const;
   /// Commands of the planned route.
   const std::vector<Setpoint>& route() const { return route_; }

@@ -32,9 +32,10 @@ struct LongFlight {
   track::AcceptedSegment segment;
   track::TickInput in;
 
-  explicit LongFlight(std::size_t sets = 3000, double clearance = 0) {
+  explicit LongFlight(std::size_t sets = 3000, double clearance = 0, double apart = 0) {
     segment.id = 1;
     segment.clearance = clearance;
+    segment.apart_m = apart;
     segment.closures = closures;
     for (std::size_t k = 0; k <= sets; ++k) {
       const double t = 0.02 * static_cast<double>(k);
@@ -90,8 +91,8 @@ NewVoxels one(const Vec3& p) {
 }
 
 TEST(Lookout, FindsAVoxelInTheWayExactlyWhereTheSetsDo) {
-  LongFlight f;
-  const double taken = vehicle().body.radius + vehicle().estimation.position;
+  LongFlight f(3000, 0, 0.07);  // the frames were apart by that when it was verified
+  const double taken = vehicle().body.radius + vehicle().estimation.position + 0.07;
   const auto ahead = f.flight.tracker().ahead();
   const plan::Stop* stop = f.flight.tracker().next_stop();
   ASSERT_TRUE(stop);
@@ -105,7 +106,7 @@ TEST(Lookout, FindsAVoxelInTheWayExactlyWhereTheSetsDo) {
     // Near some set, of every run and of its ends.
     const auto& near = f.segment.tube[(n % 2 ? 32u * (rng() % 90) : rng() % 3000) + rng() % 2].center.p_W;
     const Vec3 p = (n % 5 ? near : f.segment.tube[rng() % 60].center.p_W) + Vec3(across(rng), across(rng), across(rng));
-    f.channels->scan_voxels.push(one(p));
+    EXPECT_TRUE(f.channels->scan_voxels.push(one(p)));
     const auto seen = f.lookout.look(f.flight, f.in.now_ns);
     const bool tube = in_way(ahead[0], p);
     ASSERT_EQ(seen.tube_blocked, tube) << p.transpose();
@@ -146,7 +147,7 @@ TEST(Lookout, MissesNoPartOfAVoxelThatIsTurnedAgainstTheSets) {
     }
     NewVoxels voxel = one(centre);
     voxel.edge = kEdge;
-    f.channels->scan_voxels.push(voxel);
+    EXPECT_TRUE(f.channels->scan_voxels.push(voxel));
     const bool seen = f.lookout.look(f.flight, f.in.now_ns).tube_blocked;
     EXPECT_TRUE(seen || !touches) << centre.transpose();
     by_a_corner_alone += touches && !in_way(back.point(centre), kEdge);
@@ -154,6 +155,29 @@ TEST(Lookout, MissesNoPartOfAVoxelThatIsTurnedAgainstTheSets) {
   }
   EXPECT_GT(by_a_corner_alone, 2);
   EXPECT_GT(clear, 50);
+}
+
+// What a scan found before a loop closure lies elsewhere in the map of after it: the way back is not held against it.
+TEST(Lookout, AVoxelOfBeforeALoopClosureIsNotHeldAgainstASegmentOfAfterIt) {
+  for (const bool closes : {false, true}) {
+    LongFlight f;
+    const Vec3 t(0, -0.6, 0), beside = f.segment.tube[30].center.p_W + t;
+    NewVoxels voxel = one(beside);
+    voxel.received_ns = 1;  // after the map of any segment here
+    EXPECT_TRUE(f.channels->scan_voxels.push(voxel));
+    EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked);
+    if (closes) f.closures = 2, f.closure.t = t, f.tick();
+    track::AcceptedSegment on = f.segment;  // through where the voxel was in the map of then
+    on.id = 2, on.continues = 1, on.branch = 20, on.closures = f.closures;
+    for (auto& c : on.commands) c.p_W += t;
+    for (auto& s : on.tube) s.center.p_W += t;
+    on.stops.clear();
+    f.in.segment = &on;
+    f.tick();
+    f.in.segment = nullptr;
+    ASSERT_EQ(f.flight.tracker().segment(), 2u);
+    EXPECT_EQ(f.lookout.look(f.flight, f.in.now_ns).tube_blocked, !closes);
+  }
 }
 
 // What the planner or the tick was told of: the vehicle brakes on a stop that leads away from the flight.
@@ -183,9 +207,9 @@ TEST(Lookout, WhileItBrakesTheStopIsWhatIsAheadAndTheBlockedFlightIsNoMore) {
   ASSERT_TRUE(f.flight.tracker().braking());
   EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked);
   for (auto* ring : {&f.channels->scan_voxels, &f.channels->map_voxels}) {
-    ring->push(one(f.segment.tube[2000].center.p_W));
+    EXPECT_TRUE(ring->push(one(f.segment.tube[2000].center.p_W)));
     EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked) << "it does not come to that";
-    ring->push(one(f.segment.stops[0].tube[30].center.p_W));
+    EXPECT_TRUE(ring->push(one(f.segment.stops[0].tube[30].center.p_W)));
     EXPECT_TRUE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked);
   }
 }
@@ -197,6 +221,18 @@ TEST(Lookout, ALiveMapThatNeverCameIsLateFromTheClocksFirstSecondOn) {
   Lookout lookout(*f.channels, vehicle(), live);
   ASSERT_EQ(f.channels->map_ns.load(), std::nullopt);
   for (const std::int64_t now : {std::int64_t{20'000'000}, f.in.now_ns}) EXPECT_TRUE(lookout.look(f.flight, now).late);
+}
+
+TEST(Lookout, AClosingObstacleHasWhatTheFramesLeaveOfTheClearanceAlone) {
+  for (const bool apart : {false, true}) {
+    LongFlight f(3000, 0.3, apart ? 0.2 : 0);
+    MapSettings live;
+    live.live = true;
+    live.closing_speed = 0.5;
+    Lookout lookout(*f.channels, vehicle(), live);
+    f.channels->map_ns.store(f.in.now_ns - 400'000'000);
+    EXPECT_EQ(lookout.look(f.flight, f.in.now_ns).late, apart);
+  }
 }
 
 double processor_s() {
@@ -219,7 +255,7 @@ TEST(Lookout, OfALongFlightCostsATickATenthOfWhatEachAgainstEachWould) {
     for (const auto& c : many.centers)
       ASSERT_EQ(reach::first_blocked(sets, 0, {{c[0], c[1], c[2]}, 0.1}, 0.18), sets.size());
     each = std::min(each, processor_s() - from);
-    f.channels->scan_voxels.push(many);
+    EXPECT_TRUE(f.channels->scan_voxels.push(many));
     from = processor_s();
     const auto seen = f.lookout.look(f.flight, f.in.now_ns);
     look = std::min(look, processor_s() - from);

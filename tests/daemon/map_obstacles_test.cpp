@@ -96,6 +96,48 @@ TEST_F(ObstacleFault, WhereMoreWasSeenThanIsKeptTheFlightCountsAsBlocked) {
   EXPECT_EQ(ticks_until(Mode::hold, 2), 1);
 }
 
+// Nobody knows where those were that found no room.
+TEST_F(ObstacleFault, WhatARingHasNoRoomForIsHeldInTheTickAndWhatItHasRoomForWithinTwo) {
+  for (auto* ring : {&channels_->scan_voxels, &channels_->map_voxels}) {
+    for (const bool lost : {false, true}) {
+      SetUp();
+      enable();
+      seen_ns_ = now_ns_;
+      fly();
+      for (int n = 0; n < 100; ++n) tick();
+      NewVoxels beside{now_ns_, 0.2, 1, {{{in_map().x() + 2, 1.5, 1}}}};
+      for (std::size_t n = 0; n < kVoxelRecords; ++n) ASSERT_TRUE(ring->push(beside));
+      if (lost) {
+        EXPECT_FALSE(ring->push(beside));
+      }
+      EXPECT_EQ(ticks_until(Mode::hold, 3), lost ? 1 : 4);
+      beside.centers[0] = {in_map().x() + 0.8, 0, 1};
+      for (std::size_t n = 1; !lost && n < kVoxelRecords; ++n) ASSERT_TRUE(ring->push({}));
+      if (!lost) {
+        ASSERT_TRUE(ring->push(beside));
+        EXPECT_LE(ticks_until(Mode::hold, 3), 2);
+      }
+      flight_ = track::FlightTick{kVehicle, 0};
+      odom_ = odom_before_ = {-2, 0, 1};
+    }
+  }
+}
+
+TEST_F(ObstacleFault, WhatWasLostIsHeldAgainstLaterFlightsUntilAWorldIsNewer) {
+  while (channels_->scan_voxels.push({})) {
+  }
+  tick();
+  const std::int64_t lost_ns = now_ns_;
+  for (const bool newer : {false, true}) {
+    flight_ = track::FlightTick{kVehicle, 0};
+    odom_ = odom_before_ = {-2, 0, 1};
+    enable();
+    seen_ns_ = lost_ns - !newer;
+    fly();
+    EXPECT_EQ(ticks_until(Mode::hold, 10), newer ? 11 : 1);
+  }
+}
+
 TEST_F(ObstacleFault, AFlightThatIsNotClearInTheNewestWorldIsBraked) {
   enable();
   fly();

@@ -15,7 +15,7 @@ TEST_F(MapWindowTest, WhatAScanHasFoundMeanwhileIsNotLetGoWithThePart) {
   const Vec3 far(-2.5, 0.1, 1.1);
   vehicle({-2.3, 0.5, 1.1});
   say(true, 5, [&](const Vec3& p) { return same_voxel(p, far); });
-  channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6});
+  EXPECT_TRUE(channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6}));
   step();
   ASSERT_EQ(at(far), Cell::occupied);
   vehicle({2.3, 0.5, 1.1});
@@ -30,7 +30,7 @@ TEST_F(MapWindowTest, WhatAScanHasFoundTooIsNotLetGoAsTheWindowsAlone) {
     const Vec3 far(-2.5, 0.1, 1.1);
     vehicle({-2.3, 0.5, 1.1});
     const auto scanned = [&] {
-      channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6});
+      EXPECT_TRUE(channels_->scans.push(new Scan{{far}, {-1.5, 0.1, 1.1}, 6}));
       step();
     };
     if (scan_first) scanned();
@@ -68,7 +68,7 @@ TEST_F(MapWindowTest, ScansAndCloudsThatWaitedAreTakenInTheOrderInWhichTheyCame)
   const auto seen = [](const Vec3& p) { return same_voxel(p, kSeenAt); };
   waits_ = true;
   say(true, 5, seen);
-  channels_->scans.push(new Scan{{kSeenAt}, {-0.5, 0.1, 1.1}, 6});
+  EXPECT_TRUE(channels_->scans.push(new Scan{{kSeenAt}, {-0.5, 0.1, 1.1}, 6}));
   step();
   EXPECT_EQ(at(kSeenAt), Cell::occupied) << "the scan is newer than the cloud of free voxels";
   EXPECT_EQ(channels_->map_ns.load(), 6);
@@ -78,7 +78,7 @@ TEST_F(MapWindowTest, ScansAndCloudsThatWaitedAreTakenInTheOrderInWhichTheyCame)
   EXPECT_EQ(at(kSeenAt), Cell::occupied) << "the cloud is newer than the scans";
   EXPECT_EQ(channels_->map_ns.load(), 12);
   say(false, 13, [](const Vec3&) { return false; });
-  channels_->scans.push(new Scan{{{0.9, 0.1, 1.1}}, {-0.5, 0.1, 1.1}, 14});
+  EXPECT_TRUE(channels_->scans.push(new Scan{{{0.9, 0.1, 1.1}}, {-0.5, 0.1, 1.1}, 14}));
   step();
   EXPECT_EQ(channels_->map_ns.load(), 14) << "an older cloud makes no scan older";
   expect_as_built();
@@ -102,7 +102,7 @@ TEST_F(MapWindowTest, WhatAScanHasFoundTooIsTakenAlongAsSuch) {
   const Vec3 found(-0.5, 0.1, 1.1);
   say(true, 1, [](const Vec3&) { return true; });
   say(false, 2, [&](const Vec3& p) { return same_voxel(p, found); });
-  channels_->scans.push(new Scan{{found}, {0.3, 0.1, 1.1}, 3});
+  EXPECT_TRUE(channels_->scans.push(new Scan{{found}, {0.3, 0.1, 1.1}, 3}));
   step();
   vehicle({0.9, 0, 1});  // the world moves, and the part is let go of in it
   say(false, 4, [](const Vec3&) { return false; });

@@ -49,7 +49,9 @@ class MapWindowTest : public MapWorkerTest {
     if (!waits_) step();
   }
   /// A scan that looks along x through kSeenAt.
-  void look_through(std::int64_t at_ns) { channels_->scans.push(new Scan{{{1.9, 0.1, 1.1}}, {-0.5, 0.1, 1.1}, at_ns}); }
+  void look_through(std::int64_t at_ns) {
+    EXPECT_TRUE(channels_->scans.push(new Scan{{{1.9, 0.1, 1.1}}, {-0.5, 0.1, 1.1}, at_ns}));
+  }
   map::Cell at(const Vec3& p) { return world()->grid.at(world()->grid.index(p)); }
   void expect_as_built() {
     Model model;

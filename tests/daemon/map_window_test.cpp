@@ -107,7 +107,7 @@ TEST_F(MapWindowTest, WithoutAWholeMapTheWorldIsWhatTheWindowHasSaidAndMovesWith
   say(false, 3, [](const Vec3&) { return false; });
   EXPECT_EQ(world(), first) << "the window is within that world";
   const Vec3 found(0.5, 0.1, 1.1);
-  channels_->scans.push(new Scan{{found}, {-0.3, 0.1, 1.1}, 3});
+  EXPECT_TRUE(channels_->scans.push(new Scan{{found}, {-0.3, 0.1, 1.1}, 3}));
   step();
   ASSERT_EQ(at(found), Cell::occupied);
   vehicle({0.9, 0, 1});

@@ -17,6 +17,17 @@
 
 namespace backwash::daemon {
 
+/// Whether the point is in one of the boxes.
+inline bool holds(const NewVoxels& voxels, const Vec3& p) {
+  for (std::size_t n = 0; n < voxels.count; ++n) {
+    const auto& [x, y, z] = voxels.centers[n];
+    const auto& [i, j, k] = voxels.more[n];
+    const Vec3 half = voxels.edge / 2 * Vec3(1 + i, 1 + j, 1 + k);
+    if (((p - Vec3(x, y, z)).cwiseAbs().array() <= half.array() + 1e-9).all()) return true;
+  }
+  return false;
+}
+
 /// A map worker alone; the test plays its senders and the control thread.
 class MapWorkerTest : public testing::Test {
  protected:
@@ -48,7 +59,7 @@ class MapWorkerTest : public testing::Test {
     return held_ ? held_->world.get() : nullptr;
   }
   void scan(const std::vector<Vec3>& points, const Vec3& sensor, std::int64_t received_ns) {
-    channels_->scans.push(new Scan{points, sensor, received_ns});
+    EXPECT_TRUE(channels_->scans.push(new Scan{points, sensor, received_ns}));
     EXPECT_TRUE(worker_.step() || channels_->scans_rejected > 0);
   }
 };

@@ -157,6 +157,12 @@ TEST_F(MissionRefusals, ATakeOffNeedsTrackingAndAFlightNeedsTheAir) {
   view_.mode = Mode::tracking;
   look();
   expect_nothing(give(gcs_.next(kGoto)), kRefused, "take off first");
+  view_.landed.reset();
+  look();
+  expect_nothing(give(gcs_.next(kTakeoff)), kRefused, "does not say");
+  expect_nothing(give(gcs_.next(kGoto)), kRefused, "does not say");
+  view_.landed = true;
+  look();
   EXPECT_TRUE(give(gcs_.next(kTakeoff)).job);
 }
 

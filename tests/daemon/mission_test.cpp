@@ -207,8 +207,8 @@ TEST_F(MissionTest, AnOrderThatTheControlThreadDoesNotTakeIsNotAcknowledged) {
   channels.worlds.offer({corridor()});
   while (channels.orders.push({})) {
   }
-  channels.commands.push(gcs_.next(kStop));
-  channels.commands.push(gcs_.next(kHold));
+  EXPECT_TRUE(channels.commands.push(gcs_.next(kStop)));
+  EXPECT_TRUE(channels.commands.push(gcs_.next(kHold)));
   std::vector<Answer> answers;
   Mission mission{Vehicle{}};
   std::thread thread([&] {

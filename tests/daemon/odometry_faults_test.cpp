@@ -221,7 +221,7 @@ TEST(VioFreezeFault, IdenticalPosesOnTheGroundAreNoFault) {
     s.state = frozen->state, s.q = frozen->q;
   };
   rig.ticks(25);
-  rig.channels->orders.push({track::Request::enable});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   EXPECT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   rig.ticks(25);
   EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());

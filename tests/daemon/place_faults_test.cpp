@@ -105,7 +105,7 @@ TEST(OutsideTheMapFault, BeyondEachOfTheMapsSixSidesEnablingIsRefused) {
       Lockstep rig({0.7, Vec3(5, -3, 0.2)}, Medium::udp);
       rig.ticks(60);
       rig.channels->worlds.offer({box_around(rig.view().state.p_W, side, beyond), rig.now_ns()});
-      rig.channels->orders.push({track::Request::enable});
+      EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
       rig.tick();
       EXPECT_EQ(rig.mode(), beyond < 0 ? Mode::passive : Mode::enabling) << side;
       if (beyond > 0) continue;
@@ -155,7 +155,9 @@ TEST_F(Maps, WithoutAMapOrWithAnEmptyOneNothingIsEverCommanded) {
     EXPECT_EQ(rig.channels->maps_rejected, 1u);
     rig.ticks(60);
     for (int n = 0; n < 150; ++n) {
-      if (n % 50 == 0) rig.channels->orders.push({track::Request::enable});
+      if (n % 50 == 0) {
+        EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
+      }
       const Wire& wire = rig.tick();
       ASSERT_EQ(rig.mode(), Mode::passive);
       ASSERT_TRUE(wire.setpoints.empty() && !wire.commanded(kCommandMode) && !wire.commanded(kCommandArm));

@@ -161,6 +161,37 @@ TEST_F(PlannerWatch, AFlightThatBeganInCalmerAirGetsStopsOfTheAirThatThereIs) {
   EXPECT_EQ(offers_.size(), 2u) << "once";
 }
 
+// A world that is rougher than the flight's and calmer than the air by now is no world to renew its stops in.
+TEST_F(PlannerWatch, StopsAreNotRenewedInAWorldThatIsTooCalmItself) {
+  fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
+  view_.air->factors = kModelledAir;
+  show();
+  world_ = plan::with_air(*world_, {0.5, 0.5, 0.5, 0.5, 1}, Model{});
+  channels_->worlds.offer({world_, kSeen_ns + 1});
+  planner_.step();
+  EXPECT_EQ(offers_.size(), 1u);
+  learn(kModelledAir);
+  planner_.step();
+  ASSERT_EQ(offers_.size(), 2u);
+  EXPECT_EQ(offers_[1].air, kModelledAir);
+}
+
+// Nor is a new way begun by the sets of a world that is smoother than the air by now.
+TEST_F(PlannerWatch, NothingNewIsFlownBySetsOfSmootherAirThanIsKnownYet) {
+  know(room());
+  stand({1.05, 2.05, 1.05});
+  learn({1, 1.2, 1, 1, 1});
+  view_.air->factors[1] = 1.25;
+  show();
+  EXPECT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "") << "no world is made anew for so little";
+  offers_.clear(), view_.segment = 0;
+  stand({1.05, 2.05, 1.05});
+  view_.air->factors[1] = 1.5;
+  show();
+  EXPECT_NE(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}).find("being made anew"), std::string::npos);
+  EXPECT_TRUE(offers_.empty());
+}
+
 TEST_F(PlannerWatch, StopsOfCalmerAirAreLookedAtUntilTheyAreRenewed) {
   fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
   learn(kModelledAir);

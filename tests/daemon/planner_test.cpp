@@ -92,8 +92,10 @@ class PlannerFlight : public testing::Test {
     auto scan = std::make_unique<Scan>(Scan{points, from, rig_.now_ns()});
     know();
     const NewVoxels voxels = new_voxels(known_->grid, *scan, settings_.sensor_range);
-    if (voxels.count > 0) rig_.channels->scan_voxels.push(voxels);
-    rig_.channels->scans.push(scan.release());
+    if (voxels.count > 0) {
+      EXPECT_TRUE(rig_.channels->scan_voxels.push(voxels));
+    }
+    EXPECT_TRUE(rig_.channels->scans.push(scan.release()));
   }
   static constexpr double kSees = 3;      // m
   static constexpr int kWorldEvery = 20;  // ticks between the map worker's turns

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the planner does about a flight under way: in a new world, after a loop closure, when it is to brake. In rougher
 // air: planner_air_test.cpp.
+#include "core/plan/rest.hpp"
 #include "core/plan/stop.hpp"
 #include "tests/daemon/planner_watch_rig.hpp"
 
@@ -163,9 +164,9 @@ TEST_F(PlannerWatch, WhereNoHarderStopIsClearAHoldsOwnWayIsTheStop) {
   const track::AcceptedSegment flown = offers_.at(0);
   const auto clear = [&](std::size_t branch, double a_max) {
     auto commands = plan::stop_along(flown.commands, branch, a_max);
-    append_hold(commands);
-    return plan::tube_clearance(*world_, reach::tube_over_field(world_->reach, {flown.commands[0].p_W, Vec3::Zero()},
-                                                                flown.commands[0], commands, world_->bounds)) > 0;
+    plan::hold_until_settled(world_->reach, commands);
+    const auto tube = plan::tube_to_rest(*world_, {flown.commands[0].p_W, Vec3::Zero()}, flown.commands[0], commands);
+    return plan::tube_clearance(*world_, tube) > 0;
   };
   const double a_max = world_->reach.vehicle.limits.a_max;
   std::size_t tried = 0;

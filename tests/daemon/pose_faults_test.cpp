@@ -201,7 +201,7 @@ TEST(AutopilotPoseFault, EnableIsRefusedOnAnOldPose) {
     rig.ticks(16);
     for (const int later : {0, 500}) {
       rig.ticks(later);
-      rig.channels->orders.push({track::Request::enable});
+      EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
       rig.ticks(2);
       EXPECT_EQ(rig.mode(), Mode::passive);
       EXPECT_EQ(rig.reason(), Reason::pose_silent);

@@ -89,7 +89,7 @@ TEST(Ending, EveryThreadIsGivenOrdinaryPriorityWhereAllowed) {
     let_all_run();
     return was_low && ::getpriority(PRIO_PROCESS, static_cast<id_t>(low)) == 0 ? 5 : 1;
   });
-  if (code == 100) GTEST_SKIP() << "RLIMIT_NICE does not allow it";
+  if (code == 100) GTEST_SKIP() << "right: RLIMIT_NICE does not allow it";
   EXPECT_EQ(code, 5);
 }
 
@@ -198,7 +198,7 @@ TEST(StandardOutputFault, AClosedStandardDescriptorIsNeverGivenToAPortOrLog) {
 
 // MCL_FUTURE under a finite limit: the memory for the next map would be refused in flight.
 TEST(MemoryLock, UnderAFiniteLimitOnlyWhatIsThereIsLockedOtherwiseLaterMemoryToo) {
-  if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns the C library's functions";
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "sanitizer: it owns the C library's functions";
   constexpr rlim_t kFinite = 8u << 20;
   const auto locks = [](bool capable) {
     return in_a_process([capable] {
@@ -215,7 +215,7 @@ TEST(MemoryLock, UnderAFiniteLimitOnlyWhatIsThereIsLockedOtherwiseLaterMemoryToo
   };
   EXPECT_EQ(locks(false), MCL_CURRENT);
   const int capable = locks(true);
-  if (capable == 100) GTEST_SKIP() << "CAP_IPC_LOCK is not there to lift the limit";
+  if (capable == 100) GTEST_SKIP() << "right: CAP_IPC_LOCK is not there to lift the limit";
   EXPECT_EQ(capable, MCL_CURRENT | MCL_FUTURE);
 }
 

@@ -26,7 +26,7 @@ class RecordedFolder : public testing::Test {
   void put(int records) {
     ControlRecord r;
     r.header = {now_ns(), log::RecordKind::frame_out, 100};
-    for (int n = 0; n < records; ++n) channels_->control_log.push(r);
+    for (int n = 0; n < records; ++n) channels_->control_log.push_or_count(r);
   }
 
   std::string folder_, path_;

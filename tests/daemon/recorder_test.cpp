@@ -107,7 +107,7 @@ TEST_F(RecorderFault, AStartOnAFullDiskLeavesNoEmptyLogs) {
 TEST_F(RecorderFault, ASmallDiskThatIsFullLosesRecordsUntilSomethingIsDeleted) {
   if (::unshare(CLONE_NEWNS) != 0 || ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
       ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=128k") != 0)
-    GTEST_SKIP() << "a file system cannot be mounted here: " << std::strerror(errno);
+    GTEST_SKIP() << "right: a file system cannot be mounted here: " << std::strerror(errno);
   {
     Recorder recorder(path_);
     put(10);
@@ -128,7 +128,7 @@ TEST_F(RecorderFault, ASmallDiskThatIsFullLosesRecordsUntilSomethingIsDeleted) {
 }
 
 TEST_F(RecorderFault, ADiskThatHangsDelaysNobodyAndHoldsNoMoreThanItsShareOfMemory) {
-  if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns write()";
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "sanitizer: it owns write()";
   constexpr std::size_t kMiB = 1u << 20;
   Recorder recorder(path_);
   std::atomic<bool> end{false};
@@ -152,7 +152,7 @@ TEST_F(RecorderFault, ADiskThatHangsDelaysNobodyAndHoldsNoMoreThanItsShareOfMemo
 }
 
 TEST_F(RecorderFault, EachChangeOfTheModeIsPutOnTheDiskByTheRecordersThread) {
-  if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns fdatasync()";
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "sanitizer: it owns fdatasync()";
   Recorder recorder(path_);
   const auto tick = [&](std::uint32_t mode) {
     log::TickRecord row{};
@@ -160,7 +160,7 @@ TEST_F(RecorderFault, EachChangeOfTheModeIsPutOnTheDiskByTheRecordersThread) {
     ControlRecord r;
     r.header = {now_ns(), log::RecordKind::tick, sizeof row};
     std::memcpy(r.bytes.data(), &row, sizeof row);
-    channels_->control_log.push(r);
+    EXPECT_TRUE(channels_->control_log.push(r));
     recorder.drain(*channels_);
     return backwash::test::disk_syncs();
   };

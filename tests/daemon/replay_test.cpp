@@ -25,7 +25,7 @@ class Replay : public testing::Test {
     rig.start_route(2);
     rig.tick(3);
     rig.ticks(100);
-    rig.channels->orders.push({track::Request::land});
+    EXPECT_TRUE(rig.channels->orders.push({track::Request::land}));
     rig.ticks(50);
     ticks_ = rig.view().ticks;
     path_ = testing::TempDir() + "replay_" + std::to_string(::getpid()) + ".bwlog";
@@ -152,6 +152,11 @@ TEST(Offer, ComesBackAsItWentIn) {
   EXPECT_EQ((*back)->commands[1].a_W, Vec3(7, 8, 9));
   for (std::size_t n = 0; n < bytes.size(); n += 8)
     EXPECT_FALSE(log::decode_offer(std::span(bytes).first(n))) << "cut at " << n;
+  s.worst = 2.5, s.worst_at_rest = 1.5;
+  EXPECT_EQ(log::decode_offer(log::encode(s)).value()->worst, 2.5);
+  EXPECT_EQ(log::decode_offer(log::encode(s)).value()->worst_at_rest, 1.5);
+  s.worst = 0.5;
+  EXPECT_FALSE(log::decode_offer(log::encode(s)));
 }
 
 }  // namespace

@@ -90,7 +90,7 @@ TEST(PoseFaults, RoughFlightsOnANoisyVioAreNeverHeld) {
             << to_string(rig.reason()) << ", seed " << seed << ", leg " << leg << ", tick " << n;
         worst_drift = std::max(worst_drift, rig.view().residual_rad);
       }
-      rig.channels->orders.push({track::Request::stop});
+      EXPECT_TRUE(rig.channels->orders.push({track::Request::stop}));
       for (int n = 0; n < 100; ++n, ++ticks) {
         vio.before_tick();
         rig.tick();

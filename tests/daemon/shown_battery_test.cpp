@@ -55,5 +55,14 @@ TEST(ShownBattery, IsSentOnceForEachNewsAndOnceASecondAtMost) {
   EXPECT_EQ(sent, 11);
 }
 
+TEST(ShownBattery, SaysOnceThatNothingIsKnownAnyMore) {
+  ShownBattery shown;
+  ASSERT_TRUE(shown.next(told({15, 0.5, {}}), kStart, kWall_ns));
+  const auto* m = shown.next({}, kStart + milliseconds(5'100), kWall_ns);
+  ASSERT_TRUE(m);
+  EXPECT_TRUE(std::isnan(m->percentage) && std::isnan(m->voltage));
+  EXPECT_FALSE(shown.next({}, kStart + milliseconds(10'000), kWall_ns));
+}
+
 }  // namespace
 }  // namespace backwash::daemon

@@ -49,7 +49,7 @@ struct LiftsItself : Lockstep {
   }
   /// Enabled, asked to take off and armed, on the ground.
   void lift() {
-    channels->orders.push({track::Request::enable});
+    EXPECT_TRUE(channels->orders.push({track::Request::enable}));
     ASSERT_GT(ticks_until(Mode::tracking, 250), 0) << to_string(reason());
     offer(rise(), true, true);
     ASSERT_GT(ticks_until(Mode::lifting, 3), 0) << to_string(reason());
@@ -85,7 +85,7 @@ TEST(TakeoffCommand, AStopOnTheGroundAsksToDisarmUnforced) {
   rig.lift();
   ASSERT_EQ(rig.mode(), Mode::lifting) << to_string(rig.reason());
   ASSERT_TRUE(rig.view().armed);
-  rig.channels->orders.push({track::Request::stop});
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::stop}));
   int asked = 0;
   for (int n = 0; n < 50; ++n) {
     rig.say(mavlink::ExtendedSysState{.landed_state = 1});
@@ -105,11 +105,11 @@ TEST(TakeoffCommand, AStopWhoseLandIsLostOnTheLineCanBeGivenAgain) {
     LiftsItself rig;
     rig.ticks(60);
     rig.lift();
-    rig.channels->orders.push({track::Request::stop});
+    EXPECT_TRUE(rig.channels->orders.push({track::Request::stop}));
     rig.ticks(100);
     ASSERT_EQ(rig.mode(), Mode::land) << to_string(rig.reason());
     ASSERT_TRUE(rig.view().offboard) << "GUIDED as before";
-    rig.channels->orders.push({again, 2});
+    EXPECT_TRUE(rig.channels->orders.push({again, 2}));
     int asked = 0;
     for (int n = 0; n < 20; ++n) asked += rig.tick().commanded(kCommandLand);
     EXPECT_EQ(asked, 2);
@@ -145,7 +145,7 @@ class LiveTakeOff : public testing::Test {
     rig_.restart();
     rig_.spoil = [this](OdometrySample&) { rig_.channels->map_ns.store(rig_.now_ns() - age_ns_); };
     rig_.ticks(60);
-    rig_.channels->orders.push({track::Request::enable});
+    EXPECT_TRUE(rig_.channels->orders.push({track::Request::enable}));
     ASSERT_GT(rig_.ticks_until(Mode::tracking, 250), 0) << to_string(rig_.reason());
     rig_.offer(rig_.rise(), true, true);
     ASSERT_GT(rig_.ticks_until(Mode::lifting, 3), 0) << to_string(rig_.reason());

@@ -80,7 +80,9 @@ class WindowFlight : public testing::Test {
       });
       if (!free && world_) {
         const NewVoxels voxels = new_voxels(world_->grid, *cloud);
-        if (voxels.count > 0) rig_.channels->scan_voxels.push(voxels);
+        if (voxels.count > 0) {
+          EXPECT_TRUE(rig_.channels->scan_voxels.push(voxels));
+        }
       }
       ASSERT_TRUE(rig_.channels->windows.push(cloud.release()));
     }

@@ -31,7 +31,7 @@ class WrittenLog : public RecordedFolder {
 };
 
 TEST_F(WrittenLog, WhatIsRecordedIsOnTheDiskASecondLaterInWhateverMode) {
-  if (!backwash::test::traps_work()) GTEST_SKIP() << "this build's sanitizer owns fdatasync()";
+  if (!backwash::test::traps_work()) GTEST_SKIP() << "sanitizer: it owns fdatasync()";
   Recorder recorder(path_);
   put(1);
   recorder.drain(*channels_);
@@ -47,7 +47,7 @@ TEST_F(WrittenLog, WhatIsRecordedIsOnTheDiskASecondLaterInWhateverMode) {
 TEST_F(WrittenLog, ADiskKeepsATwentiethForOthers) {
   if (::unshare(CLONE_NEWNS) != 0 || ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
       ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=4m") != 0)
-    GTEST_SKIP() << "a file system cannot be mounted here: " << std::strerror(errno);
+    GTEST_SKIP() << "right: a file system cannot be mounted here: " << std::strerror(errno);
   {
     Recorder recorder(path_);
     const std::vector<std::uint8_t> bytes(50'000);
@@ -71,7 +71,7 @@ class LogInParts : public WrittenLog {
     ControlRecord r;
     r.header = {now_ns(), kind, static_cast<std::uint32_t>(size)};
     std::memcpy(r.bytes.data(), bytes, size);
-    channels_->control_log.push(r);
+    EXPECT_TRUE(channels_->control_log.push(r));
   }
   void tick(Recorder& recorder, Mode mode) {
     log::TickInputRecord input{};

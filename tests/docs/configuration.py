@@ -83,7 +83,8 @@ def check_keys(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, s
         check_key_defaults(root, heading, file, {"vehicle_file": ("core/types/vehicle.hpp",), "model_file": (
             "core/types/model.hpp", "core/types/disturbance.hpp"), "daemon_file": ("core/config/daemon_config.hpp",)}[file], sections_of[heading])
         keys = keys_of_program(reads)
-        actual = keys_of_code((root / f"core/config/{file}.cpp").read_text())
+        parts = sorted((root / "core/config").glob(file.replace("_file", "_parts.*")))
+        actual = keys_of_code("".join(f.read_text() for f in [*parts, root / f"core/config/{file}.cpp"]))
         documented = {}
         for cells in rows(sections_of[heading]):
             if len(cells) == 6 and quoted(cells[0]):

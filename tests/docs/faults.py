@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 55
+ROWS = 56
 
 
 def known_tests(build: str) -> list[str]:

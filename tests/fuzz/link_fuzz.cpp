@@ -147,20 +147,20 @@ TEST(Fuzz, TheParserTakesNoBadFrameAndLosesHardlyAWholeOne) {
 bool finite(const std::optional<double>& v) { return !v || std::isfinite(*v); }
 
 /// Nothing that the tick may use can be broken, whatever was said.
-void expect_sane(const firmware_bridge::Telemetry& t) {
-  if (t.local_state) {
-    ASSERT_TRUE(t.local_state->value.p_W.allFinite() && t.local_state->value.v_W.allFinite());
+void expect_sane(const firmware_bridge::Telemetry& t, firmware_bridge::Time now) {
+  if (const auto said = t.local_state.at(now)) {
+    ASSERT_TRUE(said->value.p_W.allFinite() && said->value.v_W.allFinite());
   }
-  if (t.attitude) {
-    ASSERT_NEAR(t.attitude->value.q_LB.norm(), 1, 1e-6);
-    ASSERT_TRUE(t.attitude->value.omega_B.allFinite());
+  if (const auto said = t.attitude.at(now)) {
+    ASSERT_NEAR(said->value.q_LB.norm(), 1, 1e-6);
+    ASSERT_TRUE(said->value.omega_B.allFinite());
   }
-  if (t.battery) {
-    ASSERT_TRUE(finite(t.battery->value.voltage));
-    ASSERT_TRUE(!t.battery->value.remaining || (*t.battery->value.remaining >= 0 && *t.battery->value.remaining <= 1));
+  if (const auto said = t.battery.at(now)) {
+    ASSERT_TRUE(finite(said->value.voltage));
+    ASSERT_TRUE(!said->value.remaining || (*said->value.remaining >= 0 && *said->value.remaining <= 1));
   }
-  if (t.landed_state) {
-    ASSERT_LE(static_cast<int>(t.landed_state->value), 4);
+  if (const auto said = t.landed_state.at(now)) {
+    ASSERT_LE(static_cast<int>(said->value), 4);
   }
   if (t.text) {
     ASSERT_EQ(t.text->value.text.back(), '\0');
@@ -193,7 +193,7 @@ TEST(Fuzz, TheLinkKeepsNothingBrokenAndSendsNothingButAnswersToTimesync) {
     }
     now += std::chrono::milliseconds(20);
     ASSERT_TRUE(link.poll(now));
-    expect_sane(link.telemetry());
+    expect_sane(link.telemetry(), now);
     if (HasFatalFailure()) return;
     for (std::size_t size; (size = theirs->read(received).value()) > 0;)
       answers.feed(std::span(received).first(size), [&](const Frame& f) {
@@ -206,9 +206,9 @@ TEST(Fuzz, TheLinkKeepsNothingBrokenAndSendsNothingButAnswersToTimesync) {
               static_cast<unsigned long long>(link.received().frames), static_cast<unsigned long long>(t.broken),
               static_cast<unsigned long long>(t.out_of_order), static_cast<unsigned long long>(answered));
   EXPECT_EQ(link.vehicle(), 1);
-  EXPECT_TRUE(t.local_state && t.attitude && t.text);
+  EXPECT_TRUE(t.local_state.age(now) && t.attitude.age(now) && t.text);
   if (link.received().frames > 100'000) {  // rarer: a state out of five of 256, battery 0
-    EXPECT_TRUE(t.landed_state && t.battery);
+    EXPECT_TRUE(t.landed_state.age(now) && t.battery.age(now));
   }
   EXPECT_GT(t.broken, 0u);
   EXPECT_GT(answered, 0u);

@@ -194,18 +194,18 @@ TEST(Fuzz, TheLinkBehindAPlainLineKeepsNothingBroken) {
       before = link.received().bytes;
       ASSERT_TRUE(link.poll(start));
       const auto& t = link.telemetry();
-      if (t.local_state) {
-        ASSERT_LE(t.local_state->value.p_W.norm(), 1e4);
-        ASSERT_LE(t.local_state->value.v_W.norm(), 100);
+      if (const auto said = t.local_state.at(start)) {
+        ASSERT_LE(said->value.p_W.norm(), 1e4);
+        ASSERT_LE(said->value.v_W.norm(), 100);
       }
-      if (t.attitude) {
-        ASSERT_NEAR(t.attitude->value.q_LB.norm(), 1, 1e-6);
-        ASSERT_LE(t.attitude->value.omega_B.norm(), 100);
+      if (const auto said = t.attitude.at(start)) {
+        ASSERT_NEAR(said->value.q_LB.norm(), 1, 1e-6);
+        ASSERT_LE(said->value.omega_B.norm(), 100);
       }
     }
   }
   EXPECT_EQ(link.vehicle(), 1);
-  EXPECT_TRUE(link.telemetry().local_state && link.telemetry().attitude);
+  EXPECT_TRUE(link.telemetry().local_state.at(start) && link.telemetry().attitude.at(start));
   EXPECT_GT(link.received().frames, 1000u);
   EXPECT_GT(link.received().bad_crc, 100u) << "what the line damages is counted";
   EXPECT_GT(link.telemetry().broken, 0u);

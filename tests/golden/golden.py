@@ -7,7 +7,7 @@ golden.py compare BUILD FOLDER                            runs every case again;
     --only TEXT     the cases whose names begin so, and no others
     --within SHARE  numbers may differ by this share of themselves; the largest difference is said (a numerical method changed)
 
-Inputs: worlds of tests/study_worlds, simulated flights, maps (builtin and geb079 of liboctomap-dev), recordings of
+Inputs: worlds of tests/study_worlds, simulated flights, maps (builtin and geb079), recordings of
 ../shared/data where they are, and a raw log of the daemon: the one given, or of a flight in lockstep (test_daemon). They
 are made once and stay in FOLDER, so a changed generator is no difference. The flight in lockstep is flown again by every
 build, and its raw log compared record by record. Times that a clock measured and the version are taken out. What remains
@@ -30,7 +30,7 @@ import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared/data"
-GEB079 = [pathlib.Path("/usr/share/doc/liboctomap-dev/examples/data/geb079.bt"), DATA / "maps/geb079.bt"]
+GEB079 = ROOT / "tests/data/maps/geb079.bt"
 QUAD = "builtin:quad-5in"
 MODEL = "builtin:quad-5in"
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?")
@@ -102,8 +102,8 @@ def make_inputs(build: pathlib.Path, folder: pathlib.Path, raw: str, truth: str)
     for name, path in (("flight.bwlog", raw), ("truth.csv", truth)):
         if path:
             shutil.copy(path, inputs / name)
-    if map_file := next((m for m in GEB079 if m.is_file()), None):
-        shutil.copy(map_file, inputs / "geb079.bt")
+    if GEB079.is_file():
+        shutil.copy(GEB079, inputs / "geb079.bt")
 
 
 def study_cases(inputs: pathlib.Path) -> dict:

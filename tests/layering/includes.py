@@ -24,7 +24,7 @@ MAY = {
     "core/map": ["core/types", "core/files"],
     "core/field": FLIGHT[:2],
     "core/reach": FLIGHT[:3],
-    "core/adapt": ["core/types"],
+    "core/adapt": FLIGHT[:4],
     "core/plan": FLIGHT[:4],
     "core/track": FLIGHT[:5],
     "core/log": ["core/files", "core/adapt", *FLIGHT],

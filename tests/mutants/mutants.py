@@ -30,7 +30,7 @@ DRAWN = WORK / "drawn.json"
 BIN = TREE / "build" / "release" / "tests"
 # Those that a mutant must survive to count as living.
 PROGRAMS = ["test_config", "test_files", "test_track", "test_bridge", "test_map", "test_field", "test_reach", "test_adapt", "test_daemon",
-            "test_plan", "test_sim"]
+            "test_plan", "test_sim", "test_promises"]
 LEAST_SCORE = 0.97
 
 

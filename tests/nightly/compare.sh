@@ -9,9 +9,7 @@ out=${2:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}
 seed=${3:-1}
 flights=200
 mkdir -p "$out"
-scenes=(builtin)
-geb079=/usr/share/doc/liboctomap-dev/examples/data/geb079.bt
-if [[ -f $geb079 ]]; then scenes+=("$geb079"); else echo "geb079.bt is not there: built-in scenes only" >&2; fi
+scenes=(builtin "$(realpath "$(dirname "${BASH_SOURCE[0]}")/../data/maps/geb079.bt")")
 
 # A campaign: what was cut goes on with the next call of the same arguments. Another seed is another folder.
 campaign=$out/campaign-$seed

@@ -5,8 +5,9 @@
 #   page_cost.sh SOURCE_DIR BUILD_DIR [SECONDS]
 set -euo pipefail
 source_dir=$1 build=$2 seconds=${3:-8}
-source "$source_dir/tests/system/node_peer.sh"
-node_peer "$build" page_cost page_modules playwright-core@1.65.1
+source "$source_dir/tests/support/skip.sh"
+needs chromium
+needs_peers
 source "$source_dir/services/bench/session.sh"
 start_bench "$build/services" "$log" builtin:apartment 3.0,4.2,1.2 builtin:quad-5in
 start_daemon builtin:quad-5in "$work/flight.bwlog"

@@ -130,19 +130,20 @@ TEST(TakeoffClearance, IsBesideItBelowTheSafeHeightAndAllAroundAboveIt) {
   OccupancyGrid ceiling = open_room();
   fill_voxels(ceiling, {13, 18, 16}, {17, 22, 16});
   EXPECT_NEAR(takeoff_clearance(*world_around(ceiling), tube, 0.53), 1.6 - 1.2 - 0.05 - body(), 1e-9);
-  EXPECT_NEAR(takeoff_clearance(*world_around(ceiling), tube_along({up.begin(), up.begin() + 5}), 0.53), 1.0, 1e-9)
-      << "a tube that stays below the safe height is judged beside it";
+  EXPECT_NEAR(takeoff_clearance(*world_around(ceiling), tube_along({up.begin(), up.begin() + 5}), 0.53),
+              0.4 - 0.05 - body(), 1e-9)
+      << "a place of rest is not excused its floor";
 }
 
 TEST(TakeoffColumn, IsTheSameFromEveryHeightAboveItsFloor) {
   OccupancyGrid grid = open_room();
   fill_voxels(grid, {0, 0, 0}, {39, 39, 2});  // the floor's top at 0.3 m
   const auto world = world_around(grid);
-  const auto lowest = takeoff_column(*world, {1.5, 2, 0.35});
+  const auto lowest = takeoff_column(*world, {1.5, 2, 0.35}, 0);
   ASSERT_TRUE(lowest);
   EXPECT_NEAR(lowest->z_floor, 0.3, 1e-9);
   for (const double z : {0.7, 1.1, 1.6}) {
-    const auto column = takeoff_column(*world, {1.5, 2, z});
+    const auto column = takeoff_column(*world, {1.5, 2, z}, 0);
     ASSERT_TRUE(column) << z;
     EXPECT_NEAR(column->z_floor, 0.3, 1e-9);
     EXPECT_NEAR(column->z_safe, lowest->z_safe, 1e-9);

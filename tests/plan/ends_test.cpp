@@ -32,7 +32,7 @@ TEST(RefusedAtOnce, SaysOfAnyGoalWhatTheWorldSays) {
       Vec3 goal = grid.origin() + extent.cwiseProduct(Vec3(x, y, z));
       if (n % 5 == 0) goal.z() = 0.02;  // on the floor
       const auto said = refused_at_once(grid, kModel, vehicle, method, std::nullopt, at_rest(start), goal, kOptions);
-      const auto why = why_blocked(*world, goal, 0);
+      const auto why = why_no_rest(*world, goal, 0);
       ASSERT_EQ(said.has_value(), why.has_value()) << goal.transpose() << ": " << (why ? *why : said->message);
       if (!why) {
         ++clear;

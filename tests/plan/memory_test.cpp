@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <new>
 #include <sstream>
@@ -100,15 +99,13 @@ void expect_documented(const std::vector<double>& bytes, int column) {
 TEST(MemoryOfAWorld, IsThatOfTheTable) { expect_documented(bytes_per_voxel(bench::furnished_room(0.1)), 3); }
 
 TEST(MemoryOfAWorld, OfABuildingIsThatOfTheTable) {
-  const std::string file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "geb079.bt is absent";
+  const std::string file = BACKWASH_SOURCE_DIR "/tests/data/maps/geb079.bt";
   expect_documented(bytes_per_voxel(*map::load_map(file)), 4);
 }
 
 // Two worlds live while a map changes: the second holds what differs, and map and hover map, 2 bytes a voxel.
 TEST(MemoryOfAWorld, TwoOfABuildingInWhichACubicMetreChangedShareMostOfOne) {
-  const std::string file = BACKWASH_SHARED_DATA "/maps/geb079.bt";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "geb079.bt is absent";
+  const std::string file = BACKWASH_SOURCE_DIR "/tests/data/maps/geb079.bt";
   const Model model = *config::load_model("builtin:quad-5in");
   const long none = held;
   const auto world = build_world(*map::load_map(file), model, *config::load_vehicle("builtin:quad-5in"));

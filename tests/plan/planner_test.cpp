@@ -223,7 +223,7 @@ TEST(NearestApproach, FindsTheOneStepThatTouches) {
 
 TEST(TakeoffColumn, FindsTheFloorAndTheLowestClearHover) {
   const World& world = gap_world();
-  const auto column = takeoff_column(world, {1.5, 1.5, 0.3});
+  const auto column = takeoff_column(world, {1.5, 1.5, 0.3}, 0);
   ASSERT_TRUE(column);
   EXPECT_NEAR(column->z_floor, 0, 1e-9);
   EXPECT_GT(column->z_safe, 0.18);
@@ -232,8 +232,8 @@ TEST(TakeoffColumn, FindsTheFloorAndTheLowestClearHover) {
   };
   EXPECT_TRUE(safe(column->z_safe));
   EXPECT_FALSE(safe(column->z_safe - 0.1));
-  EXPECT_FALSE(takeoff_column(world, {3.05, 1, 0.8}));  // in the wall
-  EXPECT_FALSE(takeoff_column(world, {2.9, 1, 0.8}));   // too near to it at any height
+  EXPECT_FALSE(takeoff_column(world, {3.05, 1, 0.8}, 0));  // in the wall
+  EXPECT_FALSE(takeoff_column(world, {2.9, 1, 0.8}, 0));   // too near to it at any height
 }
 
 TEST(VerticalCommands, RestToRestWithinTheLimits) {
@@ -264,6 +264,32 @@ TEST(LateralClearance, IgnoresTheFloorButNotWhatStandsBeside) {
   EXPECT_NEAR(lateral_clearance(world, tube_at({1.5, 2, 0.1})), 1.0, 1e-9);                  // capped
   EXPECT_LT(lateral_clearance(world, tube_at({2.85, 1.5, 0.1})), 0);
   EXPECT_LT(lateral_clearance(world, tube_at({1.5, 2, 1.5})), 0);  // the ceiling is not the floor
+}
+
+TEST(Plan, HoldsAStatedRiskWhereTheWorstCaseFindsNoWay) {
+  Vehicle vehicle = test_vehicle();
+  vehicle.controller = {{1.71, 1.71}, {1.8, 1.8}, 0.02, 0, 0.1};  // PX4's own defaults
+  for (const double gap_from : {2.4, 2.8}) {
+    const auto with = [&](const Model& model) {
+      return plan(*build_world(room(gap_from), model, vehicle), at_rest(kStart), kGoal, {.v_max = 1.5, .a_max = 2});
+    };
+    EXPECT_NE(with({}).status, PlanStatus::ok);
+    for (const double risk : {1e-2, 1e-3}) {
+      const Plan p = with(model_for({}, vehicle, risk));
+      ASSERT_EQ(p.status, PlanStatus::ok) << p.message;
+      EXPECT_GT(p.metrics.risk.total, 0.001 * risk);
+      EXPECT_LE(p.metrics.risk.total, risk);
+    }
+    // What is verified holds the risk, not the sets that it was looked for with.
+    Model looked_for_with_more = model_for({}, vehicle, 1e-2);
+    looked_for_with_more.bound.stated->touch = 1e-9;
+    const Plan refused = with(looked_for_with_more);
+    EXPECT_EQ(refused.status, PlanStatus::infeasible);
+    EXPECT_NE(refused.message.find("the risk of touching is"), std::string::npos) << refused.message;
+    Model narrow;  // its worst case is less than what the risk asks for
+    narrow.bound.kappa = 0.5;
+    EXPECT_THROW(model_for(narrow, vehicle, 1e-3), std::invalid_argument);
+  }
 }
 
 }  // namespace

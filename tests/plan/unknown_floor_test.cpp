@@ -92,5 +92,27 @@ TEST(UnknownFloor, BelowTheLowestLayerOfAMapAFloorMayBeAsWell) {
   }
 }
 
+// What was learnt over a floor counts over one that is only taken for it: class and bounds are those of a known floor.
+TEST(UnknownFloor, InLearntAirIsTheGroundThatAKnownOneIs) {
+  OccupancyGrid known(Vec3::Zero(), 0.2, Index3(30, 30, 10), Cell::free), unknown = known;
+  for (int n = 0; n < 900; ++n) {
+    known.set({n % 30, n / 30, 0}, Cell::occupied);
+    unknown.set({n % 30, n / 30, 0}, Cell::unknown);
+  }
+  const auto learnt = [](const OccupancyGrid& grid) {
+    return with_air(*build_world(grid, floor_model(), quad_5in()), {1, 2, 1, 1, 1}, floor_model());
+  };
+  const auto over_known = learnt(known), over_unknown = learnt(unknown);
+  std::size_t ground = 0;
+  for (int k = 2; k < 8; ++k) {
+    const Index3 v(15, 15, k);
+    const AirClass air = over_known->air.classes[known.linear(v)];
+    ground += air == AirClass::ground;
+    EXPECT_EQ(over_unknown->air.classes[unknown.linear(v)], air) << k;
+    EXPECT_EQ(over_unknown->bounds.at(v).w, over_known->bounds.at(v).w) << k;
+  }
+  EXPECT_GT(ground, 1u);
+}
+
 }  // namespace
 }  // namespace backwash::plan

@@ -6,6 +6,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
+#include "core/reach/rest.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -46,26 +47,27 @@ TEST_F(VerifiedStops, AreThoseWhoseWholeSweptTubeIsClearAndNoOthers) {
   EXPECT_EQ(first.size(), all.size()) << "the tube is the whole one, from the flight's start";
 }
 
-TEST_F(VerifiedStops, BrakeWithinTheLimitOnTheFlightsOwnPathAndRestForTwoSeconds) {
+TEST_F(VerifiedStops, BrakeWithinTheLimitOnTheFlightsOwnPathAndRestUntilTheLoopHasSettled) {
+  const std::size_t rest = reach::settling_periods(world_->reach);
   std::size_t judged = 0;
   for (const Stop& s : stops([](const auto&) { return 1.0; })) {
     // The flight's own commands end at full speed: a stop that has no room before that is not judged.
     if (s.commands.back().p_W == commands_.back().p_W) continue;
     ++judged;
     ASSERT_EQ(s.tube.size(), s.commands.size() + 1);
-    ASSERT_GT(s.commands.size(), 103u);
+    ASSERT_GT(s.commands.size(), rest + 3);
     Setpoint before = commands_[s.branch];
     for (const Setpoint& c : s.commands) {
       EXPECT_LE((c.v_W - before.v_W).cwiseAbs().maxCoeff() / kControlPeriod, vehicle_.limits.a_max * (1 + 1e-9));
       EXPECT_NEAR(c.p_W.y(), 0, 1e-12);
       before = c;
     }
-    for (std::size_t n = s.commands.size() - 100; n < s.commands.size(); ++n) {
+    for (std::size_t n = s.commands.size() - rest; n < s.commands.size(); ++n) {
       EXPECT_EQ(s.commands[n].p_W, s.commands.back().p_W);
       EXPECT_EQ(s.commands[n].v_W, Vec3::Zero());
     }
-    // The braking itself ends when it has to: the rest after it is no longer than two seconds and a period.
-    EXPECT_NE(s.commands[s.commands.size() - 103].p_W, s.commands.back().p_W);
+    // The braking itself ends when it has to: the rest after it is no longer than that and a period.
+    EXPECT_NE(s.commands[s.commands.size() - rest - 3].p_W, s.commands.back().p_W);
   }
   EXPECT_GT(judged, 5u);
 }

@@ -34,6 +34,33 @@ TEST(ErrorCovariance, OfTheSecondOrderLoopSolvesTheStationaryLyapunovEquation) {
   }
 }
 
+// Of ë = −k_p e − k_d ė + w with w nearly white: e^{−ζωt}(cos ω_d t + ζω/ω_d sin ω_d t), and q/(2 k_p k_d).
+TEST(SteadyError, HasTheVarianceThatTheRecursionEndsInAndTheMemoryOfTheSecondOrderLoop) {
+  for (const auto& [kp, kd] : kGainSets)
+    for (const double below : {0.2, 0.02}) {
+      const ColouredStep step(AxisLoop{kp, kd, 0, 0}, 1e-3, kControlPeriod);
+      const SteadyError steady = steady_error(step, below);
+      ErrorCovariance error(step);
+      for (int i = 0; i < 50 * 60; ++i) error.advance(1);
+      EXPECT_NEAR(std::sqrt(steady.variance), error.position_deviation(), 1e-6 * error.position_deviation());
+      EXPECT_NEAR(steady.variance, 2e-3 / (2 * kp * kd), 0.05 * steady.variance);
+      const double decay = kd / 2, squared = kp - decay * decay;
+      const auto correlation = [&](double t) {
+        if (squared == 0) return std::exp(-decay * t) * (1 + decay * t);
+        if (squared > 0) {
+          const double w = std::sqrt(squared);
+          return std::exp(-decay * t) * (std::cos(w * t) + decay / w * std::sin(w * t));
+        }
+        const double w = std::sqrt(-squared);
+        return std::exp(-decay * t) * (std::cosh(w * t) + decay / w * std::sinh(w * t));
+      };
+      double last = 0;
+      for (double t = 0; t < 30; t += 1e-3)
+        if (std::abs(correlation(t)) >= below) last = t;
+      EXPECT_NEAR(steady.memory, last, 0.025 + 0.02 * last) << kp << ", " << kd;
+    }
+}
+
 // σ² = s² ∫∫ g(u) g(v) e^{−|u − v|/τ} du dv with g by Runge–Kutta and the true delay: what Padé stands in for.
 TEST(ErrorCovariance, OfALaggingAndDelayedLoopEqualsTheDoubleIntegralOfItsImpulseResponse) {
   for (const auto& [lag, delay] :

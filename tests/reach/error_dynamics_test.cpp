@@ -34,6 +34,13 @@ TEST(AxisResponse, HoverHalfWidthIsTheClosedForm) {
   }
 }
 
+// The rounding of an old share, taken for an excess, would be raised by ρ^−63,000 and make intervals of metres.
+TEST(AxisResponse, RoundingIsNoExcessOverTheChordOfASlowLoop) {
+  const AxisResponse slow = axis_response({0.11, 10.3, 0.014, 0.01}, Loop::vehicle);
+  EXPECT_GT(slow.G.size(), 60000u);
+  EXPECT_LT(slow.chord_excess / (1 - slow.chord_decay), 1e-3 * slow.h_inf);
+}
+
 // For the underdamped second-order loop, |g| integrates in closed form between its zeros at multiples of π/ω.
 TEST(AxisResponse, IntegralOfTheImpulseResponseIsExactWithoutDelay) {
   constexpr double kp = 20, kd = 4, sigma = kd / 2;

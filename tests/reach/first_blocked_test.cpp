@@ -56,6 +56,8 @@ std::vector<Vec2> corners(const PerDirection& h) {
   return kept;
 }
 
+Vec3 half_of(const Cube& cube) { return Vec3::Constant(cube.edge / 2) + cube.more / 2; }
+
 /// Whether some sampled point of the set along the motion lies within kTaken of the cube: then it is blocked for sure.
 bool touches(const TubeStep& step, const Vec3& to, const Cube& cube, std::mt19937_64& random) {
   const auto octagon = corners(step.half_widths_interval);
@@ -66,7 +68,7 @@ bool touches(const TubeStep& step, const Vec3& to, const Cube& cube, std::mt1993
     const Vec2 xy = n % 2 ? a : Vec2(t * a + (1 - t) * b);
     const double z = step.half_widths_interval[kZ] * (n % 3 ? (n % 3 == 1 ? 1 : -1) : uniform(random, -1, 1));
     const Vec3 p = step.center.p_W + s * (to - step.center.p_W) + Vec3(xy.x(), xy.y(), z);
-    const Vec3 off = ((p - cube.center).cwiseAbs() - Vec3::Constant(cube.edge / 2)).cwiseMax(0);
+    const Vec3 off = ((p - cube.center).cwiseAbs() - half_of(cube)).cwiseMax(0);
     if (off.norm() <= kTaken) return true;
   }
   return false;
@@ -97,7 +99,7 @@ bool separated(const TubeStep& step, const Vec3& to, const Cube& cube, std::mt19
     double reach = 0;
     for (const Vec2& c : octagon) reach = std::max(reach, n.head<2>().dot(c));
     reach += std::abs(n.z()) * wide[kZ];
-    if (n.dot(cube.center - step.center.p_W - half) - reach - cube.edge / 2 * n.lpNorm<1>() > kTaken) return true;
+    if (n.dot(cube.center - step.center.p_W - half) - reach - n.cwiseAbs().dot(half_of(cube)) > kTaken) return true;
   }
   return false;
 }
@@ -109,7 +111,8 @@ TEST(FirstBlocked, AgreesWithSampledPointsAndSeparatingPlanes) {
     const ReachTube tube = random_tube(random);
     const Vec3 near = tube[random() % tube.size()].center.p_W;
     const Cube cube{near + Vec3(uniform(random, -0.7, 0.7), uniform(random, -0.7, 0.7), uniform(random, -0.5, 0.5)),
-                    uniform(random, 0.05, 0.2)};
+                    uniform(random, 0.05, 0.2),
+                    round % 2 ? Vec3::Zero() : Vec3(uniform(random, 0, 1), uniform(random, 0, 0.5), 0.2)};
     const std::size_t first = first_blocked(tube, 0, cube, kTaken);
     for (std::size_t n = 0; n < tube.size(); ++n) {
       const Vec3 to = tube[std::min(n + 1, tube.size() - 1)].center.p_W;

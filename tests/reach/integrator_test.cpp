@@ -13,76 +13,10 @@
 #include "core/reach/chance.hpp"
 #include "core/reach/hover_set.hpp"
 #include "core/reach/reach_tube.hpp"
+#include "tests/reach/charged_loop.hpp"
 
 namespace backwash::reach {
 namespace {
-
-constexpr double kEuler = 5e-4;  // s
-
-/// PX4's default level gains, with a delay and a lag.
-constexpr AxisLoop kAxis{0.95 * 1.8, 1.8, 0.04, 0.1, 0.4};
-
-/// Oracle: one axis by Euler's method in steps of 0.5 ms, u = a_cmd + k_p e + k_d ė + i, i̇ = (k_i/k_d)(k_p e + k_d ė)
-/// with what was measured `feedback_delay` ago.
-class Loop1 {
- public:
-  explicit Loop1(const AxisLoop& axis)
-      : axis_(axis), past_(static_cast<std::size_t>(std::lround(axis.feedback_delay / kEuler)) + 1) {}
-  void step(double w, double p_cmd = 0, double v_cmd = 0, double a_cmd = 0) {
-    past_[at_] = {p, v};
-    at_ = (at_ + 1) % past_.size();
-    const double off = axis_.kp * (p_cmd - past_[at_][0]) + axis_.kd * (v_cmd - past_[at_][1]);
-    const double wanted = a_cmd + off + held;
-    held += kEuler * axis_.velocity_integrator / axis_.kd * off;
-    a += kEuler * (wanted - a) / axis_.attitude_lag;
-    p += kEuler * (v + kEuler / 2 * (a + w)), v += kEuler * (a + w);
-  }
-  double p = 0, v = 0, a = 0, held = 0;
-
- private:
-  AxisLoop axis_;
-  std::vector<std::array<double, 2>> past_;
-  std::size_t at_ = 0;
-};
-
-Vehicle vehicle_of(double integrator) {
-  Vehicle vehicle;
-  vehicle.controller.kp = {kAxis.kp, 4};
-  vehicle.controller.kd = {kAxis.kd, 4};
-  vehicle.controller.feedback_delay = kAxis.feedback_delay, vehicle.controller.attitude_lag = kAxis.attitude_lag;
-  vehicle.controller.velocity_integrator = {integrator, 5 * integrator};
-  vehicle.body.radius = 0.1;
-  vehicle.limits = {.v_max = 1, .a_max = 1};
-  return vehicle;
-}
-
-/// Free air, 8 m wide, with gusts of a deviation, m/s², a constant push and a steady one of unknown sign.
-struct OpenAir {
-  explicit OpenAir(const Vec3& push = Vec3::Zero(), double mean = 0, double gusts = 0.1)
-      : grid(Vec3::Constant(-4), 0.5, Index3::Constant(16), map::Cell::free),
-        distance(grid),
-        bounds(grid, {3, mean, mean, 0.15}, extension(push)) {
-    std::vector<std::size_t> all(grid.cell_count());
-    for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
-    bounds.update(map::all_of(grid.size()), all, [&](const auto& store) {
-      for (const std::size_t n : all) store(n, Variance::horizontal_vertical(gusts * gusts, gusts * gusts));
-    });
-  }
-  static field::Extension extension(const Vec3& push) {
-    Model model;
-    if (!push.isZero()) model.extension = {{Law::push, push, Vec3::Zero(), 0}};
-    return {map::OccupancyGrid(Vec3::Constant(-4), 0.5, Index3::Constant(16), map::Cell::free), model};
-  }
-  map::OccupancyGrid grid;
-  map::DistanceField distance;
-  BoundField bounds;
-};
-
-AxisLoop with_gain(double integrator) {
-  AxisLoop axis = kAxis;
-  axis.velocity_integrator = integrator;
-  return axis;
-}
 
 TEST(Integrator, HoldsOffASteadyPushAsItsKernelSays) {
   for (const double gain : {0.4, 2.0}) {
@@ -202,6 +136,57 @@ TEST(Integrator, SteadyPushesLessWhatIsHeldStayWithinTheirBound) {
     EXPECT_GT(largest, 0.8 * bound) << gain;
     EXPECT_GT(net(none).w[kX], bound);  // gusts are held, too
   }
+}
+
+/// What is held after an impulse of 1 m/s, by age in steps of kEuler.
+std::vector<double> held_after_a_hit(double gain) {
+  Loop1 loop(with_gain(gain));
+  loop.step(1 / kEuler);
+  std::vector<double> held;
+  for (double t = 0; t < 30; t += kEuler) held.push_back(loop.held), loop.step(0);
+  return held;
+}
+
+Reachability at_rest(double gain) {
+  Vehicle vehicle = vehicle_of(gain);
+  vehicle.controller.velocity_integrator.vertical = 1;
+  vehicle.limits.a_max = 0, vehicle.initial_error = {0, 0};
+  return Reachability(vehicle);
+}
+
+// At each moment the side that what is held now takes over worst: the bound is reached, its overshoot too.
+TEST(Integrator, PushesThatMakeItsOvershootAddToThemReachTheBound) {
+  constexpr double kGain = 4, kKnown = 0.3, kUnknown = 0.1;
+  const std::vector<double> held = held_after_a_hit(kGain);
+  Loop1 loop(with_gain(kGain));
+  for (std::size_t age = held.size(); age-- > 0;) loop.step(held[age] > 0 ? kKnown + kUnknown : -kUnknown);
+
+  DisturbanceBound none;
+  none.w.fill(kUnknown);
+  const OpenAir calm(Vec3(kKnown, 0, 0), kUnknown, 0);
+  const double bound = NetDisturbance(at_rest(kGain), calm.bounds)(none).w[kX];
+  const double net = kKnown + kUnknown + loop.held;
+  EXPECT_LE(net, bound);
+  EXPECT_GT(net, 0.98 * bound);
+}
+
+// Equation 4-17 by sums over the response: variance of what is held, and what of it works with the gust.
+TEST(Integrator, TheBoundOnGustsIsTheEquations) {
+  constexpr double kGain = 4, kTau = 3, kGusts = 0.3, kHere = 0.5;  // m/s²: deviation everywhere; bound here
+  double before = 0, squared = 0, with = 0, age = 1;
+  for (const double held : held_after_a_hit(kGain)) {
+    const double c = kEuler * std::abs(held);
+    squared += c * (c + 2 * before), before = (before + c) * std::exp(-kEuler / kTau);
+    with += age * std::max(0.0, kEuler * held), age *= std::exp(-kEuler / kTau);
+  }
+  DisturbanceBound here;
+  here.w.fill(kHere);
+  const OpenAir air(Vec3::Zero(), 0, kGusts, kTau);
+  const double most = 3 * kGusts, said = NetDisturbance(at_rest(kGain), air.bounds)(here).w[kX];
+  const double expected = std::sqrt(kHere * (kHere + 2 * with * most) + squared * most * most);
+  EXPECT_GE(said, expected);
+  EXPECT_LT(said, 1.03 * expected);
+  EXPECT_GT(expected, 1.02 * std::sqrt(kHere * kHere + squared * most * most)) << "what works with the gust counts";
 }
 
 TEST(Integrator, GustsLessWhatIsHeldHaveNoMoreThanTheSaidDeviation) {

@@ -169,7 +169,7 @@ TEST(Design, TurnsTheHeadingWhereTheRoomHasPlaceForItAndStartsWhereItIsTold) {
     const bool faces = std::ranges::any_of(flight.points, [](const Waypoint& p) { return p.yaw.has_value(); });
     EXPECT_LE(flight.points.size(), faces ? 32u : 64u) << flight.name << ": no more than follow takes";
     EXPECT_EQ(faces, flight.name.find("on the spot") != std::string::npos) << flight.name;
-    for (const Waypoint& p : flight.points) EXPECT_FALSE(plan::why_blocked(*world, p.p_W, 0)) << flight.name;
+    for (const Waypoint& p : flight.points) EXPECT_FALSE(plan::why_no_rest(*world, p.p_W, 0)) << flight.name;
     if (flight.name.starts_with("stand still")) {
       EXPECT_EQ(flight.flights, std::nullopt) << flight.name;
     }

@@ -15,5 +15,5 @@ for formatter in clang-format-14 clang-format; do
     exit
   fi
 done
-echo "skipped: clang-format 14 is not installed"
-exit 77
+echo "clang-format 14 is not there: ./check installs it (tests/packages.txt)" >&2
+exit 1

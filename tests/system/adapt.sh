@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # `backwash adapt` on logs that lack something: without an attitude the class is none, and it is said; at 10 Hz each sample counts for as
-# long as it stood; a number that is none is refused by its line.
+# long as it stood; accelerations change nothing, an offset is named; a number that is none is refused by its line.
 #   adapt.sh BACKWASH
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 printf 'start = [0, 0, 1]\n[[hover]]\np = [1, 0, 1]\ndwell = 40.0\n' >spec.toml
@@ -36,6 +36,15 @@ assert abs(bare["classes"][0]["seconds"] - sum(classes.values())) < 5, "what has
 slow, _ = adapt("slow.csv", rows=rows[::round(rate / 10)])
 assert abs(slow["samples"] * rate / 10 / whole["samples"] - 1) < 0.1, (rate, slow["samples"], whole["samples"])
 assert abs(sum(c["seconds"] for c in slow["classes"]) / sum(classes.values()) - 1) < 0.2, (slow, classes)
+
+# Errors are asked: no accelerometer, and a constant part is named.
+assert [c["cause"] for c in whole["classes"]] == ["none"] * len(classes) and all(c["beyond"] < 5 for c in whole["classes"]), whole
+shaken = [[str(50 * (-1) ** k) if name in ("ax_mps2", "ay_mps2", "az_mps2") else cell for name, cell in zip(header, row)]
+          for k, row in enumerate(rows)]
+assert adapt("shaken.csv", rows=shaken)[0]["classes"] == whole["classes"]
+sunk = [[str(float(cell) - 0.05) if name == "z_m" else cell for name, cell in zip(header, row)] for row in rows]
+low, text = adapt("sunk.csv", rows=sunk)
+assert low["classes"][0]["cause"] == "constant" and low["classes"][0]["factor"] > 1 and "most of it is constant" in text, (low, text)
 
 column = header.index("vx_mps")
 for bad in ("nan", "inf", ""):

@@ -9,7 +9,7 @@ failed=0
 refused() {
   local code=$1 words=$2 line
   shift 2
-  timeout 20 "$backwash" "$@" >stdout 2>stderr
+  prlimit --cpu=20 "$backwash" "$@" >stdout 2>stderr
   local got=$? below=
   [[ ${1:-} != vehicle ]] || below=" $2"
   line=$(cat stderr)

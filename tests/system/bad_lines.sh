@@ -15,7 +15,7 @@ failed=0
 refused() {
   local code=$1 words=$2 got
   shift 2
-  timeout 20 "$bin/$@" >stdout 2>stderr
+  prlimit --cpu=20 "$bin/$@" >stdout 2>stderr
   got=$?
   if [[ $got != "$code" || -s stdout || $(tail -n 1 stderr) != *"$words"* || $(wc -l <stderr) -gt 2 ]]; then
     echo "$*: wanted exit $code and one line with '$words'; got exit $got and:"

@@ -8,7 +8,7 @@ failed=0
 refused() { # CODE WORDS ARGUMENTS …
   local code=$1 words=$2 got
   shift 2
-  timeout 30 "$backwash" map "$@" >stdout 2>stderr
+  prlimit --cpu=30 "$backwash" map "$@" >stdout 2>stderr
   got=$?
   if [[ $got != "$code" || $(wc -l <stderr) != 1 || $(<stderr) != "backwash map"*": "*"$words"* || -e out.bt ]]; then
     echo "backwash map $*: wanted exit $code and one line with '$words', and no out.bt; got exit $got and: $(<stderr)"

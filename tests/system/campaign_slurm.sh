@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A campaign through a real slurmctld and slurmd of this script's own, without systemd: of an array one task is killed with -9, slurmd is
 # killed and started again in mid-array, what is missing is submitted again, and the merge is byte for byte the program's own rows.
-# The same through GNU parallel. What is not installed is skipped by name.
+# The same through GNU parallel.
 #   campaign_slurm.sh BACKWASH
 # slurmctld asks for an address that is not the loopback's: a network of its own has one, and nobody else's ports.
-if [[ -z ${own_network:-} && $(id -u) == 0 ]] && command -v ip >/dev/null && unshare -n true 2>/dev/null; then
-  exec env own_network=1 unshare -n bash -c 'ip link set lo up; ip address add 10.99.0.1/32 dev lo || true; exec "$0" "$@"' "$0" "$@"
-fi
-source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
-skip() { echo "skipped: $*"; exit 77; }
+source "$(dirname "${BASH_SOURCE[0]}")/../support/skip.sh"
 export PATH=$PATH:/usr/sbin
+if [[ ${2:-} != inside ]]; then
+  needs parallel slurmctld slurmd munged sbatch ip
+  needs_root
+  own_network "$0" "$1" inside
+fi
+ip address add 10.99.0.1/32 dev lo
+source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 rows=$here/campaign_rows.py
 plan() { # plan NAME SECONDS: eight shards of one row each, which take so long
   cp "$rows" rows.py
@@ -26,18 +29,11 @@ until_() {
   until "$@"; do ((SECONDS < end)) || { tail -n 20 "$work"/*.log >&2 || true; die "never came true: $*"; }; sleep 0.2; done
 }
 
-if command -v parallel >/dev/null; then
-  plan by_parallel 0.2
-  "$backwash" campaign run by_parallel 3
-  "$backwash" campaign submit by_parallel --parallel -j 2 >/dev/null 2>parallel.txt || die "GNU parallel: $(cat parallel.txt)"
-  cmp by_parallel/rows.jsonl alone.jsonl
-  [[ $(wc -l <by_parallel/parallel.log) == 8 ]] || die "seven shards were missing: $(cat by_parallel/parallel.log)"
-else
-  echo "skipped: no GNU parallel"
-fi
-
-for program in slurmctld slurmd munged sbatch; do command -v $program >/dev/null || skip "no $program"; done
-[[ $(id -u) == 0 ]] || skip "slurmd needs root"
+plan by_parallel 0.2
+"$backwash" campaign run by_parallel 3
+"$backwash" campaign submit by_parallel --parallel -j 2 >/dev/null 2>parallel.txt || die "GNU parallel: $(cat parallel.txt)"
+cmp by_parallel/rows.jsonl alone.jsonl
+[[ $(wc -l <by_parallel/parallel.log) == 8 ]] || die "seven shards were missing: $(cat by_parallel/parallel.log)"
 
 # Everything of it lies in $work, and listens on ports of its own.
 host=$(hostname -s) port=$((20000 + $$ % 20000))
@@ -100,7 +96,6 @@ for _ in $(seq 100); do
   { up || ! kill -0 $slurmctld 2>/dev/null; } && break
   sleep 0.3
 done
-up || ! grep -q 'getaddrinfo() failed' slurmctld.log || skip "slurmctld finds no address of this machine"
 until_ 1 up
 
 # A shard takes 3 s: two are at work, the first of them is killed; then slurmd is, and comes again.

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A ground station behind a bad line: 30 % loss, 50 to 100 ms of delay, 1 Mbit/s (bad_link.py; below row 46 of docs/faults.md). A map
 # arrives, or both ends are told how far it came; commands come through beside it, and the vehicle's own odometry does not notice.
-# In networks of its own: skipped without the right, or without TUN devices.
 #   daemon_bad_link.sh SOURCE_DIR BUILD_DIR [BYTES]     BYTES: of a further map, whose time is told; tests/nightly/bad_link.sh
 set -euo pipefail
 source_dir=$1 build=$2 large=${3:-}
 if [[ ${4:-} != inside ]]; then
-  [[ -c /dev/net/tun ]] && unshare --net true 2>/dev/null || { echo "no TUN devices or no network of its own here" >&2; exit 77; }
-  exec unshare --net bash -c 'ip link set lo up && exec "$@"' - "$0" "$source_dir" "$build" "$large" inside
+  source "$source_dir/tests/support/skip.sh"
+  own_network tun "$0" "$source_dir" "$build" "$large" inside
 fi
 source "$source_dir/services/bench/session.sh"
 unset CYCLONEDDS_URI

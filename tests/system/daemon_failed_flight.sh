@@ -4,7 +4,6 @@
 #   daemon_failed_flight.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=${1:?usage: daemon_failed_flight.sh SOURCE_DIR BUILD_DIR} build=$(realpath "${2:?}")
-command -v gnuplot >/dev/null || { echo "no gnuplot"; exit 77; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 die() { echo "$*"; cat "$work/said"; exit 1; }

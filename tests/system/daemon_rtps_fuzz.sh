@@ -8,11 +8,8 @@ set -euo pipefail
 source_dir=$1 build=$2 packets=$3 seed=${4:-1} mode=${5:-open}
 # The only peers must be ours: what is damaged goes to every port that is open.
 if [[ ${6:-} != inside ]]; then
-  if ! unshare --net true 2>/dev/null; then
-    echo "SKIPPED: needs the right to make a network namespace"
-    exit 77
-  fi
-  exec unshare --net bash -c 'ip link set lo up && exec "$@"' - "$0" "$source_dir" "$build" "$packets" "$seed" "$mode" inside
+  source "$source_dir/tests/support/skip.sh"
+  own_network "$0" "$source_dir" "$build" "$packets" "$seed" "$mode" inside
 fi
 source "$source_dir/services/bench/session.sh"
 status() { "$bin/backwashctl" --domain "$domain" "${ctl_options[@]}" status --json >"$work/$1.json"; }

@@ -4,6 +4,8 @@
 #   daemon_tf2.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
+source "$source_dir/tests/support/skip.sh"
+installed tf2_peer tests/packages.txt test -x "$build/tests/tf2_peer"
 source "$source_dir/services/bench/session.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --namespace elsewhere
 more_dds='tf = "vehicle"'

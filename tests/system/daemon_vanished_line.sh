@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # SIGTERM after the network interface of DDS has vanished (docs/faults.md, "The daemon and its computer"): libddsc 0.10.2 waits
 # for its own threads without end, and the daemon is gone within 2 s all the same, its raw log whole and its last lines said.
-# In a network of its own: skipped without the right, or without TUN devices.
 #   daemon_vanished_line.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
 if [[ ${3:-} != inside ]]; then
-  [[ -c /dev/net/tun ]] && unshare --net true 2>/dev/null || { echo "no TUN devices or no network of its own here" >&2; exit 77; }
-  exec unshare --net bash -c 'ip link set lo up && exec "$@"' - "$0" "$source_dir" "$build" inside
+  source "$source_dir/tests/support/skip.sh"
+  own_network tun "$0" "$source_dir" "$build" inside
 fi
 source "$source_dir/services/bench/session.sh"
 unset CYCLONEDDS_URI

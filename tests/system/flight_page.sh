@@ -2,22 +2,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The pages of flights in a real browser, without a network (tests/report/peer/look.cjs): nothing to complain about, nothing wider than the
 # window, nothing serious by axe; what the cursor and the files say is what the raw log says, read by other code; the scene turns; the
-# drawings are there on paper and without scripts. Skipped without node, npm, the registry or Chromium (apt-get install chromium).
+# drawings are there on paper and without scripts.
 #   flight_page.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
-command -v chromium >/dev/null || { echo "skipped: flight_page needs chromium"; exit 77; }
-for library in dygraphs/dygraph three/three; do
-  [[ -e /usr/share/javascript/$library.min.js ]] || { echo "skipped: flight_page needs libjs-dygraphs and libjs-three"; exit 77; }
-done
-source "$source_dir/tests/system/node_peer.sh"
-node_peer "$build" flight_page page_modules playwright-core@1.65.1 axe-core@4.14.1
+source "$source_dir/tests/support/skip.sh"
+needs chromium
+needs_peers
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
+export BACKWASH_DOMAIN=${BACKWASH_DOMAIN:-198}
 backwash=$build/services/backwash
 [[ $backwash == /* ]] || backwash=$PWD/$backwash
-modules=$(realpath "$modules")
-"$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 >/dev/null || { cat "$out/flight.log"; exit 1; }
+"$source_dir/tests/support/on_the_clock.sh" "$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 >/dev/null || { cat "$out/flight.log"; exit 1; }
 cd "$out"
 "$backwash" fly --map builtin:apartment --report simulated.html --quiet >/dev/null
 "$backwash" report --log flight.bwlog --out told.html --quiet >/dev/null # by what was logged alone

@@ -1,23 +1,24 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The daemon with its [gpio] lines on a real character device: Debian's kernel with its gpio-sim driver in a QEMU guest, and
-# gpio_guest_init.sh as the guest's first process. Skipped without QEMU or Debian's packages.
+# gpio_guest_init.sh as the guest's first process.
 #   gpio_guest.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2 cache=$2/gpio_guest
-skip() { echo "skipped: gpio_guest needs $*"; exit 77; }
-command -v qemu-system-x86_64 >/dev/null || skip "qemu-system-x86_64 (package qemu-system-x86)"
-for tool in make xz apt-get dpkg-deb; do command -v $tool >/dev/null || skip "$tool"; done
-[[ $(uname -m) == x86_64 ]] || skip "an x86-64 machine: the guest runs this build"
+source "$source_dir/tests/support/skip.sh"
+needs qemu-system-x86_64 make xz
+[[ $(uname -m) == x86_64 ]] || skip device "an x86-64 processor: the guest runs this build"
 
 # The kernel has no gpio-sim module: it is made of Debian's source package of the same kernel, in a folder of the build.
 # The interrupts of that driver use a function that only a kernel with them built in exports: the usual one does as well.
 prepare() {
   local image version series root=$cache/root deb
-  image=$(apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/.*Depends: \(linux-image-[0-9].*\)/\1/p') || return 1
-  version=${image#linux-image-} && series=$(cut -d. -f1,2 <<<"$version")
-  (cd "$cache" && timeout 300 apt-get download -qq "$image" "linux-headers-$version" "linux-headers-${version%-amd64}-common" \
-    "linux-kbuild-$series" "linux-source-$series" busybox-static) >/dev/null 2>&1 || return 1
+  of_debian apt-cache show linux-image-amd64
+  image=$(apt-cache depends linux-image-amd64 | sed -n 's/.*Depends: \(linux-image-[0-9].*\)/\1/p')
+  version=${image#linux-image-} series=$(cut -d. -f1,2 <<<"${image#linux-image-}")
+  cd "$cache"
+  of_debian apt-get download -qq "$image" "linux-headers-$version" "linux-headers-${version%-amd64}-common" \
+    "linux-kbuild-$series" "linux-source-$series" busybox-static
   for deb in "$cache"/*.deb; do
     [[ $deb == */linux-source* ]] || dpkg-deb -x "$deb" "$root"
   done
@@ -27,7 +28,7 @@ prepare() {
   sed -i 's/handle_simple_irq(irq_to_desc(\(.*\)));/generic_handle_irq(\1);/' "$cache/module/irq_sim.c"
   printf 'obj-m := gpio_guest.o\ngpio_guest-y := gpio-sim.o irq_sim.o\n' >"$cache/module/Makefile"
   sed -i "s|/usr/src|$root/usr/src|" "$root/usr/src/linux-headers-$version/Makefile"
-  make -C "$root/usr/src/linux-headers-$version" M="$cache/module" modules >"$cache/module.log" 2>&1 || return 1
+  make -C "$root/usr/src/linux-headers-$version" M="$cache/module" modules >"$cache/module.log" 2>&1 || failed "$(<"$cache/module.log")"
   cp "$root/boot/vmlinuz-$version" "$cache/vmlinuz"
   cp "$root/lib/modules/$version/kernel/fs/configfs/configfs.ko" "$cache/module/gpio_guest.ko" "$root/bin/busybox" "$cache/"
   rm -f "$cache"/*.deb
@@ -36,7 +37,7 @@ prepare() {
 if [[ ! -e $cache/ready ]]; then
   rm -rf "$cache"
   mkdir -p "$cache"
-  prepare || skip "Debian's packages of its kernel, their source, make and gcc"
+  (prepare)
 fi
 
 work=$(mktemp -d)

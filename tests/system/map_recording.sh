@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # `backwash map convert` of recordings that libraries of others wrote: the map is, bit for bit, that of the same points placed by matrices
-# (tests/maps/peer). What cannot be placed is refused by name. Skipped without node, npm or the registry.
+# (tests/maps/peer). What cannot be placed is refused by name.
 #   map_recording.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
-source "$source_dir/tests/system/node_peer.sh"
-node_peer "$build" map_recording mcap_modules @mcap/core@2.2.2 @foxglove/rosmsg2-serialization@3.1.0 @foxglove/rosmsg-msgs-common@3.2.3
+source "$source_dir/tests/support/skip.sh"
+needs_peers
+needs zstd lz4
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 cd "$out"
@@ -39,7 +40,6 @@ assert f"10 clouds of /points in frame '{frame}'" in notes and "1 of 11 clouds h
 PYTHON
 done
 for kind in zstd lz4; do
-  command -v $kind >/dev/null || { echo "$kind is not installed: compressed recordings are not tried" >&2; continue; }
   written $kind
   [[ $(stat -c %s $kind.mcap) -lt $(stat -c %s tf.mcap) ]] || die "$kind: not smaller"
   convert $kind.mcap -o $kind.bt >said

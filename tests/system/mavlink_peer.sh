@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The link against an independent MAVLink library, node-mavlink from the npm registry, as the flight controller: over a serial
 # line and over UDP, both directions, unsigned, signed, with another key, and unsigned where a key is asked for. Then the daemon
-# itself with a key (docs/faults.md row 29). Skipped without node, npm or the registry.
+# itself with a key (docs/faults.md row 29).
 #   mavlink_peer.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
-source "$source_dir/tests/system/node_peer.sh"
-node_peer "$build" mavlink_peer node_peer node-mavlink@2.3.0 mavlink-mappings@1.0.21-20250824-1
+source "$source_dir/tests/support/skip.sh"
+needs_peers
 source "$source_dir/services/bench/session.sh"
 key=000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f other=${key//0/f}
 

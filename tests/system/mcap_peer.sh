@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # `backwash export` of a flight of the real processes, against independent readers of MCAP and of ROS 2's messages from the npm
 # registry (tests/log/peer). What is in the file is what the raw log, read by other code, and the CSV say; replay, report, adapt and study
-# take the file as they take the raw log. Then `backwash merge` with a ULog of what the emulated PX4 said. Skipped without node, npm or the registry.
+# take the file as they take the raw log. Then `backwash merge` with a ULog of what the emulated PX4 said.
 #   mcap_peer.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
-source "$source_dir/tests/system/node_peer.sh"
-node_peer "$build" mcap_peer mcap_modules @mcap/core@2.2.2 @foxglove/rosmsg@5.0.5 @foxglove/rosmsg2-serialization@3.1.0 \
-  @foxglove/rosmsg-msgs-common@3.2.3 @foxglove/crc@0.0.3 @foxglove/schemas@2.1.0
+source "$source_dir/tests/support/skip.sh"
+needs_peers
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 backwash=$build/services/backwash

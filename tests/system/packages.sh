@@ -1,15 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Sourced by tests of what is installed; needs $source_dir, $build and $work. Skips, by name, what the machine lacks.
+# Sourced by tests of what is installed; needs $source_dir, $build and $work.
 
-skip() { echo "skipped: $(basename "$0" .sh) needs $*"; exit 77; }
+source "$source_dir/tests/support/skip.sh"
 die() { echo "$*" >&2; exit 1; }
-# needs TOOL PACKAGE …
-needs() {
-  while [[ $# -gt 0 ]]; do
-    command -v "$1" >/dev/null || skip "$1 (package $2)"
-    shift 2
-  done
-}
 
 # make_packages OUT: the .debs of the build.
 make_packages() {
@@ -32,8 +25,7 @@ make_root() {
   packages=$(printf '%s\n' systemd systemd-sysv dbus udev procps "$@" | sort -u | paste -sd,)
   kept=$build/root-$(sha256sum <<<"$packages" | cut -c1-12).tar
   if [[ ! -e $kept ]]; then
-    nice -n 5 mmdebstrap --quiet --variant=minbase --include="$packages" bookworm "$work/new.tar" 2>"$work/mmdebstrap.log" ||
-      skip "Debian's packages: $(tail -n 1 "$work/mmdebstrap.log")"
+    of_debian nice -n 5 mmdebstrap --quiet --variant=minbase --include="$packages" bookworm "$work/new.tar"
     rm -f "$build"/root-*.tar
     mv "$work/new.tar" "$kept"
   fi

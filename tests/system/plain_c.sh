@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The plain link's C code as a microcontroller takes it: the MISRA C:2012 rules that Debian's cppcheck knows, and C99 for
-# Cortex-M without any library (nothing undefined), its size below what its README says. The latter is skipped without
-# gcc-arm-none-eabi.
+# Cortex-M without any library (nothing undefined), its size below what its README says.
 #   plain_c.sh SOURCE_DIR
 set -euo pipefail
+source "$1/tests/support/skip.sh"
+needs cppcheck arm-none-eabi-gcc
 source=$1/firmware_bridge/plain
 # Rule 2.5 (unused macros) is about a program: these are for the user of the header.
 cppcheck --std=c99 --enable=warning,style,performance,portability --addon=misra --quiet --error-exitcode=1 \
   --suppress=misra-c2012-2.5 "$source/plain.c"
 echo "cppcheck with its MISRA addon: nothing found"
-command -v arm-none-eabi-gcc >/dev/null || { echo "skipped: Cortex-M needs gcc-arm-none-eabi"; exit 77; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 for cpu in cortex-m0 cortex-m4 cortex-m7; do

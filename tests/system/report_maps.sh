@@ -21,9 +21,9 @@ def cubes(bits):
 
 def told(log, code, *options):
     log.write("flight.bwlog", None)
-    ran = subprocess.run([backwash, "report", "flight.bwlog", "--json", "--quiet", *options], capture_output=True, text=True, timeout=60)
+    ran = subprocess.run([backwash, "report", "flight.bwlog", "--json", "--quiet", *options], capture_output=True, text=True)
     assert ran.returncode == code, (ran.returncode, ran.stderr)
-    text = subprocess.run([backwash, "report", "flight.bwlog", "--quiet"], capture_output=True, text=True, timeout=60).stdout
+    text = subprocess.run([backwash, "report", "flight.bwlog", "--quiet"], capture_output=True, text=True).stdout
     return json.loads(ran.stdout), text
 
 

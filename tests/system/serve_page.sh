@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # `backwashctl serve` in a real Chromium during a flight of the real processes (page/flight.cjs): the page sees the vehicle move, its
 # HOLD holds and its STOP stops, a second page is read-only, a reloaded one comes back, a silent daemon is said in red within 1 s.
-# Skipped without node, npm, the registry or Debian's chromium.
 #   serve_page.sh SOURCE_DIR BUILD_DIR [FOLDER_OF_SCREENSHOTS]
 set -euo pipefail
 source_dir=$1 build=$2
-source "$source_dir/tests/system/node_peer.sh"
-command -v chromium >/dev/null || { echo "skipped: serve_page needs chromium (Debian's package of that name)"; exit 77; }
-node_peer "$build" serve_page serve_modules playwright-core@1.65.1
+source "$source_dir/tests/support/skip.sh"
+needs chromium
+needs_peers
 source "$source_dir/services/bench/session.sh"
 
 start_bench "$build/services" "$log" builtin:thin-wall 2,-3,1.2 builtin:quad-5in

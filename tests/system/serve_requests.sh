@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # What reaches the door of `backwashctl serve` (page/requests.py): token, host, origin, method and size are asked for; garbage, slow clients
-# and 100 connections neither end it nor keep a STOP away; it ends within 2 s. Without a daemon and with one that flies.
+# and floods of strangers (page/floods.py) neither end it nor keep a STOP away; it ends within 2 s. Without a daemon and with one that flies.
 #   serve_requests.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2

@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Both units are good units (systemd-analyze verify, unknown keys are errors), as closed as systemd can tell (security
-# --offline, at most 1.6 of 10), and keep what the daemon's safety needs of them. Skipped without systemd-analyze.
+# --offline, at most 1.6 of 10), and keep what the daemon's safety needs of them.
 #   systemd_units.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
-command -v systemd-analyze >/dev/null || { echo "skipped: systemd_units needs systemd-analyze (package systemd)"; exit 77; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 die() { echo "$*" >&2; exit 1; }
@@ -40,7 +39,6 @@ printf '[Service]\nExecStart=/usr/bin/backwashd\n' >"$work/open.service"
 
 for file in sysusers.conf tmpfiles.conf; do
   tool=systemd-${file%.conf}
-  command -v "$tool" >/dev/null || continue
   mkdir -p "$root/etc"
   [[ $file == sysusers.conf ]] || { "systemd-sysusers" --root="$root" "$source_dir/systemd/sysusers.conf" >/dev/null; }
   "$tool" --root="$root" $([[ $tool == *tmpfiles ]] && echo --create) "$source_dir/systemd/$file" >"$work/said" 2>&1 || die "$file: $(<"$work/said")"

@@ -93,6 +93,7 @@ class Flown {
       s.received_ns = s.stamp_ns = in.now_ns - age_ns;
       s.state = frame_W.state(map_of(truth_L));
       s.state.p_W -= static_cast<double>(age_ns) * 1e-9 * s.state.v_W;
+      if (shakes && in.now_ns / 20'000'000 % 2) s.state.p_W.x() += 1e-9;
       s.q = quaternion(frame_W.yaw + turned_before(age_ns));
       s.closures = closures;
       s.map_from_odom = frame_W;
@@ -112,6 +113,12 @@ class Flown {
     in.segment = nullptr;
     return out;
   }
+  /// Orders to disarm in so many ticks.
+  int disarms(int ticks) {
+    int asked = 0;
+    for (int n = 0; n < ticks; ++n) asked += step().disarm;
+    return asked;
+  }
   static std::array<double, 4> quaternion(double yaw) { return {std::cos(yaw / 2), 0, 0, std::sin(yaw / 2)}; }
   /// Of a state in the controller's frame, before any loop closure.
   static State map_of(const State& local) { return RigidShift{kYaw, kT}.inverse().state(local); }
@@ -127,6 +134,7 @@ class Flown {
   RigidShift frame_W;             ///< map ← odometry, of the newest loop closure
   std::uint32_t closures = 0;
   bool vio_on = true, attitude_on = true;
+  bool shakes = true;  ///< to the last bit no two samples of a flying vehicle are alike
   std::int64_t attitude_at_ns = 0;
   std::int64_t age_ns = 0;          ///< of a sample when the tick sees it
   std::int64_t pose_age_ns = 0;     ///< the same of what the controller says

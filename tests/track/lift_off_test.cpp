@@ -51,7 +51,7 @@ TEST(LiftOff, IsOverInTheAirAtItsHeightAndNotBeforeBothAreSo) {
   EXPECT_EQ(f.out.released[0], &f.up) << "what comes next is a flight of its own, from the state in the air";
   Lifting silent;
   silent.settle(0.55, std::nullopt);
-  EXPECT_EQ(silent.out.supervisor.mode, Mode::tracking) << "an autopilot that never says it";
+  EXPECT_EQ(silent.out.supervisor.mode, Mode::lifting) << "nothing is done that is not said";
 }
 
 TEST(LiftOff, IsOverAfterOneSecondThereWithoutABreakAndWithItsMotorsOn) {
@@ -188,6 +188,19 @@ TEST(LiftOff, ThatStraysFromItsColumnLandsAfterThreeTicks) {
   }
   EXPECT_EQ(f.out.supervisor.reason, Reason::outside_column);
   EXPECT_EQ(outside, 3);
+}
+
+// The map moves by more than the column is wide, and up; physically nothing has moved.
+TEST(LiftOff, StaysInItsColumnAcrossALoopClosureAndIsOverAtItsHeight) {
+  Lifting f;
+  f.at(0.3, true);
+  f.closures = 1;  // the first one of all leaves the map where it is
+  f.at(0.3, true);
+  f.closures = 2, f.frame_W = {0.1, {0.5, -0.3, 0.4}};
+  for (int n = 0; n < 60; ++n) ASSERT_EQ(f.at(0.3, true).supervisor.mode, Mode::lifting) << n;
+  EXPECT_EQ(f.tick.tracker().closures(), 2u);
+  f.settle(0.55, true);
+  EXPECT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
 }
 
 TEST(LiftOff, ThatIsNotInTheAirAfterTwelveSecondsLandsAndIsDisarmedOnTheGround) {

@@ -184,10 +184,39 @@ TEST(LateOdometry, WhileNothingIsCommandedIsMeasuredAnew) {
 TEST(FrozenPose, IsFoundAtRestInTheAir) {
   for (const bool in_air : {true, false}) {
     Flown f(Flown::Until::tracking);
+    f.shakes = false;
     if (in_air) f.in.autopilot.landed = false;
     for (int n = 0; n < 10 && f.out.supervisor.mode == Mode::tracking; ++n) f.step();
     EXPECT_EQ(f.out.supervisor.reason, in_air ? Reason::odometry_frozen : Reason::autopilot_follows);
   }
+}
+
+// At rest for an obstacle a later plan leads on; once something else holds it there, only a later command does (row
+// 39).
+TEST(HoldAtRest, ThatChangesItsReasonIsToldAndEndsWhatWasPlannedInIt) {
+  Flown f;
+  f.in.autopilot.reset_counter = 1;
+  f.in.surroundings.tube_blocked = true;
+  ASSERT_EQ(f.step().supervisor.reason, Reason::obstacle_ahead);
+  f.in.surroundings.tube_blocked = false;
+  for (int n = 0; n < 300; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::hold);
+  const Setpoint rest = f.out.command;
+  ASSERT_TRUE(rest.v_W.isZero(0));
+  const Epoch before = f.tick.epoch();
+  AcceptedSegment planned = segment_of(std::vector<Setpoint>(400, rest));
+  planned.id = 2;
+  planned.epoch = before;
+  f.in.autopilot.reset_counter = 2;
+  f.step();
+  EXPECT_TRUE(f.out.supervisor.changed);
+  EXPECT_EQ(f.out.supervisor.reason, Reason::autopilot_reset);
+  EXPECT_EQ(f.tick.epoch().lapse, before.lapse + 1);
+  f.in.segment = &planned;
+  EXPECT_TRUE(f.step().refused);
+  EXPECT_EQ(f.out.supervisor.mode, Mode::hold);
+  EXPECT_LT((f.out.command.p_W - rest.p_W).norm(), 1e-9);
+  EXPECT_TRUE(f.offer(planned).accepted) << "of a later command";
 }
 
 // After a fault in flight the autopilot gets no odometry, in whose hands it may be, until it is disarmed.

@@ -71,6 +71,7 @@ TEST(TickReactions, AStopOnTheGroundStopsTheMotorsThereAndOnlyUntilTheNextTakeof
   Flown h = on_the_ground();
   AcceptedSegment again = take_off();
   again.id = 2;
+  for (auto& command : again.commands) command = again.commands[0], command.v_W.setZero();  // as high as before
   h.in.autopilot.landed = true;
   EXPECT_EQ(disarms(h,
                     [&] {
@@ -86,6 +87,99 @@ TEST(TickReactions, AStopOnTheGroundStopsTheMotorsThereAndOnlyUntilTheNextTakeof
                       h.in.autopilot.armed = true;
                     }),
             0);
+}
+
+// docs/faults.md row 56: by its word of now alone, and only where the vehicle is known to stand as it stood disarmed.
+TEST(TickReactions, MotorsAreStoppedWhereWordAndHeightOfNowAgreeThatItStands) {
+  const auto stopped_at = [](double height, const std::function<void(Flown&)>& then) {
+    Flown f = on_the_ground();
+    AcceptedSegment up = take_off();
+    const Vec3 ground_L = f.truth_L.p_W;
+    double z = 0;
+    const auto step = [&] {
+      const double by = std::clamp(height - z, -0.008, 0.008);
+      z += by;
+      f.out.command_local.p_W = ground_L + Vec3(0, 0, z);
+      f.out.command_local.v_W = Vec3(0, 0, by / kControlPeriod);
+      return f.step().disarm;
+    };
+    EXPECT_TRUE(f.offer(up).arm);
+    f.in.autopilot.armed = true;
+    for (int n = 0; n < 40; ++n) step();
+    EXPECT_EQ(f.out.supervisor.mode, Mode::lifting) << to_string(f.out.supervisor.reason);
+    then(f);
+    for (int n = 0; n < 10; ++n) step();
+    f.in.request = Request::stop;
+    int asked = 0;
+    for (int n = 0; n < 160; ++n) asked += step();
+    return asked;
+  };
+  const auto nothing = [](Flown&) {};
+  EXPECT_GE(stopped_at(0, nothing), 2);
+  EXPECT_EQ(stopped_at(0, [](Flown& f) { f.in.autopilot.landed.reset(); }), 0) << "its word is old";
+  EXPECT_EQ(stopped_at(0, [](Flown& f) { f.vio_on = false; }), 0) << "nobody knows how high it is";
+  EXPECT_GE(stopped_at(0.1, nothing), 2) << "as far as the two estimates may differ";
+  EXPECT_EQ(stopped_at(0.16, nothing), 0);
+  EXPECT_EQ(stopped_at(-0.16, nothing), 0) << "it fell from where it stood";
+}
+
+// The take-off is over by the STOP, the word of the ground comes later than motors are waited for.
+TEST(TickReactions, MotorsOfAnAbandonedTakeoffAreStoppedOnceItIsKnownAgainToStand) {
+  for (const std::optional<bool> meanwhile : {std::optional<bool>(), std::optional(false)}) {
+    Flown f = on_the_ground();
+    AcceptedSegment up = take_off();
+    ASSERT_TRUE(f.offer(up).arm);
+    f.in.autopilot.armed = true;
+    f.step();
+    f.in.autopilot.landed = meanwhile;
+    f.in.request = Request::stop;
+    EXPECT_EQ(f.disarms(500), 0);
+    ASSERT_EQ(f.out.supervisor.mode, Mode::land);
+    f.in.autopilot.landed = true;
+    EXPECT_GE(f.disarms(100), 2);
+    f.in.autopilot.armed = false;
+    f.in.autopilot.landed.reset();
+    f.disarms(200);
+    f.in.autopilot.armed = f.in.autopilot.landed.emplace(true);  // somebody else's
+    EXPECT_EQ(f.disarms(200), 0);
+    f.in.request = Request::stop;
+    EXPECT_EQ(f.disarms(200), 0);
+  }
+}
+
+TEST(TickReactions, MotorsOfAnAbandonedTakeoffThatAPilotTookOverAreHis) {
+  Flown f = on_the_ground();
+  f.in.autopilot.armed = true;
+  f.step();
+  f.in.autopilot.landed.reset();
+  f.in.request = Request::stop;
+  f.disarms(10);
+  ASSERT_EQ(f.out.supervisor.mode, Mode::hold);
+  f.in.autopilot.offboard = false;
+  f.step();
+  f.in.autopilot.landed = true;
+  f.in.request = Request::enable;
+  f.step();
+  f.in.autopilot.offboard = true;
+  EXPECT_EQ(f.disarms(200), 0);
+  EXPECT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
+}
+
+// Row 40: stopped before it armed, and its motors start when the lift-off is over already.
+TEST(TickReactions, MotorsThatStartAfterAnEndedTakeoffCountsAsLandedAreStopped) {
+  Flown f = on_the_ground();
+  AcceptedSegment up = take_off();
+  ASSERT_TRUE(f.offer(up).arm);
+  for (int n = 0; n < 100; ++n) f.step();
+  f.in.request = Request::stop;
+  EXPECT_EQ(f.step().supervisor.mode, Mode::land);
+  for (int n = 0; n < 60 && f.out.supervisor.mode == Mode::land; ++n) f.step();
+  ASSERT_EQ(f.out.supervisor.mode, Mode::passive);
+  ASSERT_EQ(f.out.supervisor.reason, Reason::landed);
+  f.in.autopilot.armed = true;
+  int disarmed = 0;
+  for (int n = 0; n < 30; ++n) disarmed += f.step().disarm;
+  EXPECT_GE(disarmed, 1);
 }
 
 }  // namespace

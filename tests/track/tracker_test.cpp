@@ -79,6 +79,22 @@ TEST(Tracker, JudgesAgainstTheSetOfTheTick) {
   }
 }
 
+// Errors leave the sets of a stated risk as it promises.
+TEST(Tracker, JudgesByTheWorstCaseWhatWasPlannedByARisk) {
+  auto s = segment(4);
+  s.worst = 3, s.worst_at_rest = 2;
+  Tracker tracker(start(), first_set());
+  ASSERT_TRUE(tracker.accept(s, kAtStart));
+  EXPECT_TRUE(tracker.judge(Vec3(0.29, 0, 1)).inside);
+  EXPECT_FALSE(tracker.judge(Vec3(0.31, 0, 1)).inside);
+  EXPECT_NEAR(tracker.judge(Vec3(0, 0, 1)).half_widths[kX], 0.3, 1e-12);
+  const double widest = 3 * s.tube.back().half_widths_interval[kX];
+  EXPECT_TRUE(tracker.within(Vec3(4 + widest - 0.01, 0, 1)));
+  EXPECT_FALSE(tracker.within(Vec3(4 + widest + 0.01, 0, 1)));
+  for (int k = 0; k < 5; ++k) tracker.step();
+  EXPECT_NEAR(tracker.judge(Vec3(4, 0, 1)).half_widths[kX], 2 * s.tube.back().half_widths_interval[kX], 1e-12);
+}
+
 TEST(Tracker, HoldsTheIntervalOfTheLastSetPastTheEnd) {
   Tracker tracker(start(), first_set());
   const auto s4 = segment(4);

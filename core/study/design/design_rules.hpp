@@ -19,7 +19,6 @@ struct DesignRules {
                            "chosen: more than three campaigns of 12; beyond, none is told"};
   Rule design_refit{"design_refit", 1e-6, "flights",
                     "derived: what no flown window tells is fitted to the new ones, at no cost"};
-  Rule design_hold{"design_hold", 2, "s", "derived: the daemon holds so long after each leg"};
   Rule design_plan_deadline{
       "design_plan_deadline", 1, "s",
       "measured: four times what 95 % of backwash compare's plans take, 247 ms (core/sim/compare.md)"};

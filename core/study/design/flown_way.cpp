@@ -11,7 +11,7 @@ FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way
   const auto refused = [](std::string why) { return FlownWay{{}, {}, std::move(why)}; };
   if (way.points.empty()) return refused(way.why_not);
   for (const Waypoint& p : way.points)
-    if (const auto why = plan::why_blocked(world, p.p_W, 0)) return refused(*why);
+    if (const auto why = plan::why_no_rest(world, p.p_W, 0)) return refused(*why);
   const auto& limits = world.reach.vehicle.limits;
   const plan::PlanOptions options{
       .v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kDesignRules.design_plan_deadline, .polish = 0};
@@ -39,8 +39,6 @@ FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way
     }
     flown.commands.insert(flown.commands.end(), commands.begin(), commands.end());
     now.p_W = goal.p_W, now.yaw = commands.back().yaw;
-    flown.commands.insert(flown.commands.end(), static_cast<std::size_t>(kDesignRules.design_hold / kControlPeriod),
-                          now);
     flown.points.push_back(goal);
     if (flown.commands.size() >= most) break;
   }

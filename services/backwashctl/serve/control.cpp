@@ -38,13 +38,13 @@ bool Control::full(bool admitted) const {
   return std::ranges::count_if(pages_, alike) >= static_cast<std::ptrdiff_t>(kPages);
 }
 
-std::optional<bool> Control::enter(const std::string& page) {
+bool Control::enter(const std::string& page) {
   const std::lock_guard lock(mutex_);
   forget(Clock::now());
   const auto known = pages_.find(page);
-  if (known != pages_.end() ? !known->second.left : full(false)) return std::nullopt;
+  if (known != pages_.end() ? !known->second.left : full(false)) return false;
   pages_[page].left.reset();
-  return pages_[page].admitted;
+  return true;
 }
 
 bool Control::admit(const std::string& page) {
@@ -58,6 +58,12 @@ bool Control::admit(const std::string& page) {
   else
     known->second.admitted = true;
   return true;
+}
+
+bool Control::admitted(const std::string& page) const {
+  const std::lock_guard lock(mutex_);
+  const auto known = pages_.find(page);
+  return known != pages_.end() && known->second.admitted;
 }
 
 void Control::leave(const std::string& page) {

@@ -31,12 +31,12 @@ class Control {
 
   explicit Control(Station& station) : station_(station) {}
 
-  /// A page, by the name that it drew for itself, listens. Nothing: there is one of that name, or there are too many.
-  /// Else whether it was admitted.
-  std::optional<bool> enter(const std::string& page);
+  /// A page, by the name that it drew for itself, listens. False: there is one of that name, or there are too many.
+  bool enter(const std::string& page);
   void leave(const std::string& page);
   /// A page that has the token is about to listen: pages without it cannot take its place. False: too many are.
   bool admit(const std::string& page);
+  bool admitted(const std::string& page) const;
 
   /// Takes a command of a page: {page, verb, goal, stops}. A goal is refused if a STOP has come since the page was told
   /// of that many. What becomes of it is in told().

@@ -17,14 +17,6 @@ bool is_ours(const std::string& host, int port) {
   return digits == std::to_string(port) && (name == "localhost" || inet_pton(AF_INET, name.c_str(), &address) == 1);
 }
 
-/// In a time that does not tell how much of it was right.
-bool same(const std::string& said, const std::string& token) {
-  unsigned differs = said.size() != token.size();
-  for (std::size_t n = 0; n < token.size(); ++n)
-    differs |= static_cast<unsigned>(n < said.size() ? said[n] : 0) ^ static_cast<unsigned>(token[n]);
-  return differs == 0;
-}
-
 }  // namespace
 
 Reply refusal(int status, const std::string& why) {
@@ -42,10 +34,17 @@ std::optional<Reply> refused(const Head& head, int port, const std::string& toke
   if (!head.fetch_site.empty() && head.fetch_site != "same-origin" && head.fetch_site != "none")
     return refusal(403, "asked for by another site: open the page that is served here");
   if (head.method == "GET") return std::nullopt;
-  if (!same(head.token, token)) return refusal(401, "read-only: open the page by the address that was printed");
+  if (!is_token(head.token, token)) return refusal(401, "read-only: open the page by the address that was printed");
   if (!head.content_encoding.empty() || !head.content_type.starts_with("application/json"))
     return refusal(415, "Content-Type must be application/json, without an encoding");
   return std::nullopt;
+}
+
+bool is_token(std::string_view said, const std::string& token) {
+  unsigned differs = said.size() != token.size();
+  for (std::size_t n = 0; n < token.size(); ++n)
+    differs |= static_cast<unsigned>(n < said.size() ? said[n] : 0) ^ static_cast<unsigned>(token[n]);
+  return differs == 0;
 }
 
 std::string draw_token() {

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace backwash::ctl {
 
@@ -26,6 +27,9 @@ struct Head {
 /// with our port: a page of another site that has its own name point here (DNS rebinding) calls us by that name. A
 /// browser must say that it asks for our own page. What changes something needs the token, as JSON.
 std::optional<Reply> refused(const Head& head, int port, const std::string& token);
+
+/// Whether that is the token, in a time that does not tell how much of it was right.
+bool is_token(std::string_view said, const std::string& token);
 
 /// 128 random bits in hexadecimal.
 std::string draw_token();

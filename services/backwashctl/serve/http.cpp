@@ -8,8 +8,9 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
-#include <thread>
+#include <optional>
 
+#include "services/backwashctl/serve/porch.hpp"
 #include "services/command_line/exit_code.hpp"
 
 namespace backwash::ctl {
@@ -104,7 +105,7 @@ class Connection : public httplib::Stream {
   char buffer_[4096];
 };
 
-/// The open connections whose client has not shown the token, by age. Each is taken out before its socket is closed.
+/// The requests of strangers that are being answered, by age. Each is taken out before its socket is closed.
 class Strangers {
  public:
   std::uint64_t add(int socket) {
@@ -131,64 +132,53 @@ class Strangers {
   std::uint64_t last_ = 0;
 };
 
-/// Of the connection that this thread was handed: whether it is one too many, and what keeps it.
-thread_local bool too_many = false;
-thread_local std::function<void()> keep;
-
-/// A thread for each connection that is allowed or leaves, and none that waits.
-class Workers : public httplib::ThreadPool {
- public:
-  Workers(std::atomic<std::size_t>& open, Strangers& strangers)
-      : ThreadPool(kConnections + kLeaving), open_(open), strangers_(strangers) {}
-  void enqueue(std::function<void()> job) override {
-    if (open_ < kConnections || (open_ < kConnections + kLeaving && strangers_.end_oldest())) {
-      ++open_;
-      return ThreadPool::enqueue(std::move(job));
-    }
-    too_many = true;
-    job();
-    too_many = false;
-  }
-
- private:
-  std::atomic<std::size_t>& open_;
-  Strangers& strangers_;
-};
-
+/// A thread for each request that has a place, or leaves one. None waits for another: those who show a key have places
+/// of their own.
 class Server : public httplib::Server {
  public:
-  Server() {
-    new_task_queue = [this] { return new Workers(open_, strangers_); };
-  }
-  void end() {
+  /// Answers until `stopped`.
+  void run(const std::function<bool(std::string_view)>& is_key, const std::function<bool()>& stopped) {
+    Porch porch(svr_sock_);
+    httplib::ThreadPool threads(kKnown + kStrangers + kLeaving);
+    while (!stopped())
+      porch.step(kSlice_ms, [&](int socket, std::string_view seen) {
+        const bool known = shows_key(seen, is_key);
+        if (!has_place(known)) return turn_away(socket);
+        ++(known ? known_ : strange_);
+        // Counted among the strangers here, in the order in which they came.
+        const auto number = known ? std::nullopt : std::optional(strangers_.add(socket));
+        threads.enqueue([this, socket, number] { serve(socket, number); });
+      });
     ends_ = true;
-    stop();
+    ::close(svr_sock_.exchange(INVALID_SOCKET));
+    threads.shutdown();
   }
 
  private:
-  bool process_and_close_socket(socket_t socket) override {
-    if (too_many) {
-      constexpr std::string_view kFull =
-          "HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
-      send(socket, kFull.data(), kFull.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
-      ::close(socket);
-      return false;
-    }
+  bool has_place(bool known) {
+    if (known) return known_ < kKnown;
+    return strange_ < kStrangers || (strange_ < kStrangers + kLeaving && strangers_.end_oldest());
+  }
+  static void turn_away(int socket) {
+    constexpr std::string_view kFull =
+        "HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
+    recv(socket, nullptr, kRequestBytes, MSG_TRUNC | MSG_DONTWAIT);  // what is unread would take the answer back
+    send(socket, kFull.data(), kFull.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    ::close(socket);
+  }
+  void serve(int socket, std::optional<std::uint64_t> stranger) {
     const int on = 1;
     setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     Connection connection(socket, ends_);
-    const std::uint64_t number = strangers_.add(socket);
-    keep = [this, number] { strangers_.remove(number); };
     bool closed = false;
-    const bool good = process_request(connection, true, closed, nullptr);
-    strangers_.remove(number);
+    process_request(connection, true, closed, nullptr);
+    if (stranger) strangers_.remove(*stranger);
     connection.close();
-    --open_;
-    return good;
+    --(stranger ? strange_ : known_);
   }
 
   Strangers strangers_;
-  std::atomic<std::size_t> open_{0};
+  std::atomic<std::size_t> known_{0}, strange_{0};
   std::atomic<bool> ends_{false};
 };
 
@@ -254,8 +244,6 @@ void add_site(httplib::Server& server, const Site& site) {
 
 }  // namespace
 
-void keep_connection() { keep(); }
-
 void serve_http(const Door& door, const Site& site, const std::function<void(int port)>& listening,
                 const std::function<bool()>& stopped) {
   Server server;
@@ -271,7 +259,6 @@ void serve_http(const Door& door, const Site& site, const std::function<void(int
   server.set_pre_routing_handler([&](const httplib::Request& request, httplib::Response& response) {
     const auto reply = refused(head_of(request), port, door.token);
     if (reply) answer(*reply, response);
-    if (!reply && request.method == "POST") keep();
     return reply ? httplib::Server::HandlerResponse::Handled : httplib::Server::HandlerResponse::Unhandled;
   });
   server.set_exception_handler(
@@ -284,15 +271,7 @@ void serve_http(const Door& door, const Site& site, const std::function<void(int
     throw StartError(kSystem, "serve: " + door.address + ":" + std::to_string(door.port) +
                                   " cannot be listened on: give an --address of this machine and a free --port");
   listening(port);
-  std::atomic<bool> over{false};
-  std::jthread thread([&] {
-    server.listen_after_bind();
-    over = true;
-  });
-  while (!stopped() && !over) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  // It cannot be stopped before it runs.
-  while (!server.is_running() && !over) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  server.end();
+  server.run([&](std::string_view key) { return is_token(key, door.token) || site.knows(std::string(key)); }, stopped);
 }
 
 }  // namespace backwash::ctl

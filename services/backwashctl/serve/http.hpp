@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "services/backwashctl/serve/gate.hpp"
+#include "services/backwashctl/serve/porch.hpp"
 
 /// HTTP for one page. cpp-httplib is seen by this unit's source alone.
 namespace backwash::ctl {
@@ -26,6 +27,7 @@ struct Site {
   std::map<std::string, std::function<Reply(const Asked&)>> reads;  ///< GET
   std::map<std::string, std::function<Reply(const Asked&)>> posts;  ///< with the token
   std::map<std::string, std::function<std::variant<Reply, NextEvents>(const Asked&)>> streams;
+  std::function<bool(const std::string& page)> knows;  ///< whether a page of that name was admitted
 };
 
 struct Door {
@@ -34,14 +36,13 @@ struct Door {
   std::string token;
 };
 
-/// Each connection is one request of at most kRequestBytes within kRequest_s, or a stream; at most kConnections at a
-/// time. For a further one the oldest that has not shown the token is closed; where all have, or kLeaving are still
-/// closing, it gets 503. A client that takes no bytes for kWrite_s is dropped.
-constexpr std::size_t kRequestBytes = 16 << 10, kBodyBytes = 4 << 10, kConnections = 48, kLeaving = 16;
+/// Each connection is one request of at most kRequestBytes within kRequest_s, or a stream. It waits in the Porch until
+/// its head is whole. kKnown of those that show a key (the token, or the name of a page that was admitted) are answered
+/// at a time, and kStrangers of the others: for a further one their oldest is closed, and it gets 503 while kLeaving
+/// are still closing. A client that takes no bytes for kWrite_s is dropped.
+constexpr std::size_t kRequestBytes = Porch::kHeadBytes, kBodyBytes = 4 << 10, kKnown = 32, kStrangers = 24,
+                      kLeaving = 8;
 constexpr double kRequest_s = 3, kWrite_s = 1;
-
-/// Called while a request is answered: its connection is not closed for a further one's sake.
-void keep_connection();
 
 /// Calls `listening` with the port, then serves until `stopped`. Throws StartError 71 where it cannot listen.
 void serve_http(const Door& door, const Site& site, const std::function<void(int port)>& listening,

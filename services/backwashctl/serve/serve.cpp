@@ -121,6 +121,7 @@ Site site_of(const Feed& feed, Control& control, Surroundings* surroundings) {
     const std::string path = file.name == "page.html" ? "/" : "/" + std::string(file.name);
     site.files[path] = {200, std::string(file.text), type_of(file.name)};
   }
+  site.knows = [&control](const std::string& page) { return control.admitted(page); };
   site.reads["/slice"] = [&feed, surroundings](const Asked& asked) { return slice(feed, surroundings, asked); };
   if (surroundings)
     site.posts["/preview"] = [surroundings](const Asked& asked) {
@@ -139,9 +140,7 @@ Site site_of(const Feed& feed, Control& control, Surroundings* surroundings) {
   site.streams["/events"] = [&feed, &control, surroundings](const Asked& asked) -> std::variant<Reply, NextEvents> {
     const std::string page = parameter(asked, "page");
     if (!is_name(page)) return refusal(400, "page must be 32 hexadecimal digits");
-    const auto entered = control.enter(page);
-    if (!entered) return refusal(409, "this page is open already, or too many are");
-    if (*entered) keep_connection();
+    if (!control.enter(page)) return refusal(409, "this page is open already, or too many are");
     const auto events = std::make_shared<PageEvents>(feed, control, surroundings, page);
     return [events] { return events->next(); };
   };

@@ -62,9 +62,12 @@ void speak(AutopilotLink& link, int tick, Time now) {
   if (tick % 5 == 0) link.send_odometry(vio);
 }
 
-void tell(const AutopilotLink& link) {
+void tell(const AutopilotLink& link, Time now) {
   const auto& t = link.telemetry();
-  const Vec3 p = t.local_state ? t.local_state->value.p_W : Vec3::Zero();
+  const auto status = t.status.at(now);
+  const auto position = t.local_state.at(now);
+  const auto battery = t.battery.at(now);
+  const Vec3 p = position ? position->value.p_W : Vec3::Zero();
   const auto ack = t.result_of(kCommandArm);
   const auto parameter = t.parameter("COM_OF_LOSS_T");
   const mavlink::SigningCounters none;
@@ -74,9 +77,9 @@ void tell(const AutopilotLink& link) {
               R"("voltage": %g, "clock": %d, "frames": %llu, "bad_crc": %llu, "skipped": %llu, "sent": %llu, )"
               R"("good": %llu, "unsigned": %llu, "wrong": %llu, "replayed": %llu})"
               "\n",
-              link.vehicle().value_or(0), t.status && t.status->value.armed, p.x(), p.y(), p.z(),
-              t.attitude.has_value(), ack ? ack->value.result : -1, parameter ? parameter->value : -1,
-              t.battery && t.battery->value.voltage ? *t.battery->value.voltage : -1, link.clock().has_value(),
+              link.vehicle().value_or(0), status && status->value.armed, p.x(), p.y(), p.z(),
+              t.attitude.at(now).has_value(), ack ? ack->value.result : -1, parameter ? parameter->value : -1,
+              battery && battery->value.voltage ? *battery->value.voltage : -1, link.clock(now).has_value(),
               count(link.received().frames), count(link.received().bad_crc), count(link.received().skipped_bytes),
               count(link.transmit().sent()), count(counted.good), count(counted.unsigned_frames),
               count(counted.wrong_signature), count(counted.replayed));
@@ -123,6 +126,6 @@ int main(int argc, char** argv) {
     if (!link.poll(now)) return 74;
     speak(link, tick, now);
   }
-  tell(link);
+  tell(link, std::chrono::steady_clock::now());
   return 0;
 }

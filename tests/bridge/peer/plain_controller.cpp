@@ -79,43 +79,57 @@ class Controller {
   void request(const plain_command_t& c) {
     ++requests_;
     asked_ = {c.sequence, 0, now_};
+    // Our duty, whatever the daemon believes (plain/README.md): nothing is disarmed that may be in the air.
+    if (c.request == PLAIN_REQUEST_DISARM && !on_ground()) return;
     if (c.request == PLAIN_REQUEST_FOLLOW) vehicle_.send_follow_setpoints(), asked_.command = kCommandSetMode;
     if (c.request == PLAIN_REQUEST_ARM) vehicle_.send_arm(true), asked_.command = kCommandArm;
     if (c.request == PLAIN_REQUEST_DISARM) vehicle_.send_arm(false), asked_.command = kCommandArm;
     if (c.request == PLAIN_REQUEST_LAND) vehicle_.send_land(), asked_.command = kCommandLand;
   }
 
+  bool on_ground() const {
+    const auto said = vehicle_.telemetry().landed_state.at(now_);
+    return said && said->value == LandedState::kOnGround;
+  }
+
   void say_state() {
     const auto& t = vehicle_.telemetry();
-    if (!t.status) return;
+    const auto status = t.status.at(now_);
+    if (!status) return;
     plain_state_t s{};
     s.sequence = ++sequence_;
-    s.armed = t.status->value.armed;
-    s.following = t.status->value.follows_setpoints;
-    s.ground_known = t.landed_state.has_value();
-    s.on_ground = s.ground_known && t.landed_state->value == LandedState::kOnGround;
-    s.reset_counter = t.reset_counter ? t.reset_counter->value : std::uint8_t{0};
-    if (const auto result = t.result_of(asked_.command); result && result->at >= asked_.at) {
+    s.armed = status->value.armed;
+    s.following = status->value.follows_setpoints;
+    s.ground_known = t.landed_state.at(now_).has_value();
+    s.on_ground = on_ground();
+    if (const auto resets = t.reset_counter.at(now_)) resets_ = resets->value;
+    s.reset_counter = resets_;
+    if (requests_ > 0 && asked_.command == 0) {
+      s.answered = asked_.sequence;
+      s.answer = PLAIN_ANSWER_REFUSED;
+    } else if (const auto result = t.result_of(asked_.command); result && result->at >= asked_.at) {
       s.answered = asked_.sequence;
       s.answer = result->value.result == 0 ? PLAIN_ANSWER_DONE : PLAIN_ANSWER_REFUSED;
     }
     const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(now_.time_since_epoch());
     s.time_ms = static_cast<std::uint32_t>(since.count());
-    s.pose_known = t.local_state && t.attitude;
-    if (s.pose_known) say_pose(t, s);
+    const auto position = t.local_state.at(now_);
+    const auto attitude = t.attitude.at(now_);
+    s.pose_known = position && attitude;
+    if (s.pose_known) say_pose(position->value, attitude->value, s);
     s.battery_percent = 255;
     std::array<std::uint8_t, PLAIN_STATE_SIZE> wire;
     plain_write_state(&s, wire.data());
     line_.write(wire);
   }
 
-  static void say_pose(const Telemetry& t, plain_state_t& s) {
-    store(t.local_state->value.p_W, s.position);
-    store(t.local_state->value.v_W, s.velocity);
-    const auto& q = t.attitude->value.q_LB;
+  static void say_pose(const State& position, const VehicleAttitude& attitude, plain_state_t& s) {
+    store(position.p_W, s.position);
+    store(position.v_W, s.velocity);
+    const auto& q = attitude.q_LB;
     const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
     for (int i = 0; i < 4; ++i) s.attitude[i] = static_cast<float>(wxyz[i]);
-    store(t.attitude->value.omega_B, s.rates);
+    store(attitude.omega_B, s.rates);
   }
 
   struct Asked {
@@ -128,6 +142,7 @@ class Controller {
   plain_receiver_t receiver_{};
   Asked asked_;
   std::uint16_t sequence_ = 0;
+  std::uint8_t resets_ = 0;
   int setpoints_ = 0, poses_ = 0, requests_ = 0, refused_ = 0;
 };
 

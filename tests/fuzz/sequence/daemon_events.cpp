@@ -44,24 +44,24 @@ void DaemonRig::apply(const Event& e) {
       other.verb = static_cast<std::uint8_t>(e.n);
       other.position = place(e);
       other.sequence = sequence_ + 1;
-      lock_.channels->commands.push(other);
+      lock_.channels->commands.push_or_count(other);
       return;
     }
     case Kind::repeated:
-      lock_.channels->commands.push(last_command_);
+      lock_.channels->commands.push_or_count(last_command_);
       return;
     case Kind::departed: {
       daemon::CommandMessage gone;
       gone.departed = true;
       gone.writer[0] = static_cast<std::uint8_t>(e.n % 3);
-      lock_.channels->commands.push(gone);
+      lock_.channels->commands.push_or_count(gone);
       return;
     }
     case Kind::old_number: {
       auto old = last_command_;
       old.sequence -= std::min<std::uint32_t>(old.sequence, 1 + sequence_ / 2);
       old.verb = static_cast<std::uint8_t>(e.n);
-      lock_.channels->commands.push(old);
+      lock_.channels->commands.push_or_count(old);
       return;
     }
     case Kind::new_session:
@@ -102,7 +102,7 @@ void DaemonRig::send(std::uint8_t verb, const Event& e) {
   c.waypoint[0] = {c.position.x(), c.position.y(), c.position.z()};
   c.waypoint[1] = {-c.position.x(), -c.position.y(), 1.2};
   last_command_ = c;
-  lock_.channels->commands.push(c);
+  lock_.channels->commands.push_or_count(c);
 }
 
 // An operator who wants to fly: enables, takes off, flies, now and then stops, holds or lands.
@@ -114,7 +114,7 @@ void DaemonRig::operate(const Event& e) {
   if (e.n < 18) return send(backwash_msgs_msg_dds__COMMAND_HOLD, e);
   if (e.n < 22) return send(backwash_msgs_msg_dds__COMMAND_LAND, e);
   if (!view.finished || plans_ >= kMostFlights) return;
-  if (view.landed) return send(backwash_msgs_msg_dds__COMMAND_TAKEOFF, e);
+  if (view.landed.value_or(true)) return send(backwash_msgs_msg_dds__COMMAND_TAKEOFF, e);
   send(e.n < 40 ? backwash_msgs_msg_dds__COMMAND_FOLLOW : backwash_msgs_msg_dds__COMMAND_GOTO, e);
 }
 
@@ -215,7 +215,7 @@ void DaemonRig::scan_box(const Vec3& at) {
   look();
   if (threads_->known) {
     const auto voxels = daemon::new_voxels(threads_->known->grid, *scan, 8);
-    if (voxels.count > 0) lock_.channels->scan_voxels.push(voxels);
+    if (voxels.count > 0) lock_.channels->scan_voxels.push_or_count(voxels);
   }
   if (lock_.channels->scans.push(scan.get())) scan.release();
   threads_->map.step();

@@ -160,7 +160,8 @@ void DaemonRig::read_switch() {
 
 // An estimator that follows the VIO leaps with it, as soon as it is told: the same place then has another number.
 void DaemonRig::hear_autopilot() {
-  const auto& said = lock_.link().telemetry().local_state;
+  const auto said =
+      lock_.link().telemetry().local_state.at(firmware_bridge::Time(std::chrono::nanoseconds(lock_.now_ns())));
   if (!said) return;
   if (autopilot_at_ && (said->value.p_W - *autopilot_at_).norm() > kLeap) watch_.frame_moved(tick_);
   autopilot_at_ = said->value.p_W;
