@@ -12,7 +12,7 @@ constexpr std::uint8_t kFlightController = 1;                    // MAV_COMP_ID_
 
 // Values of common.xml.
 constexpr std::uint8_t kTypeOnboardController = 18, kAutopilotInvalid = 8, kStateActive = 4, kMavlinkVersion = 3;
-constexpr float kCustomModeEnabled = 1, kPx4MainModeOffboard = 6, kCopterModeGuided = 4;
+constexpr float kCustomModeEnabled = 1;
 
 std::int64_t nanoseconds_of(Time t) noexcept { return duration_cast<nanoseconds>(t.time_since_epoch()).count(); }
 std::uint32_t milliseconds_of(Time t) noexcept {
@@ -39,8 +39,9 @@ std::string_view name(LinkFault fault) noexcept {
   return "unknown";
 }
 
-AutopilotLink::AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now)
-    : port_(std::move(port)), configured_vehicle_(vehicle), opened_at_(now) {}
+AutopilotLink::AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now,
+                             std::span<const AutopilotProfile* const> known)
+    : port_(std::move(port)), configured_vehicle_(vehicle), opened_at_(now), known_(known), telemetry_(known) {}
 
 Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   std::swap(port_, port);
@@ -48,10 +49,10 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   heard_.reset();
   lost_.reset(), blocked_.reset();
   parser_ = {};
-  telemetry_ = {};
+  telemetry_ = Telemetry(known_);
   queue_.clear();
   budget_.forget();
-  clock_ = {}, offset_ = {};
+  clock_ = {}, offset_ = {}, trips_ = {};
   timesync_asked_ns_.reset(), signed_rightly_ = false;
   return port;
 }
@@ -149,9 +150,9 @@ void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
 template <class Message>
 Time AutopilotLink::taken(const Message& m, Time now) const noexcept {
   if constexpr (requires { m.time_boot_ms; }) {
-    constexpr std::int64_t kLongestTrip_ns = 10'000'000, kPerMillisecond = 1'000'000;
+    constexpr std::int64_t kPerMillisecond = 1'000'000;
     const auto clock = offset_.at(now);
-    if (!clock || clock->value.round_trip_ns > kLongestTrip_ns) return now;
+    if (!clock) return now;
     const auto there_ms = static_cast<std::uint32_t>((nanoseconds_of(now) + clock->value.offset_ns) / kPerMillisecond);
     const auto age_ms = static_cast<std::int32_t>(there_ms - m.time_boot_ms);  // its 32 bits wrap after 49 days
     return age_ms > 0 ? now - milliseconds(age_ms) : now;
@@ -175,10 +176,18 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
     timesync_asked_ns_.reset();
     const std::int64_t round_trip = now_ns - m.ts1;
     if (round_trip < 0) return;
+    trips_[1] = std::exchange(trips_[0], {});
+    trips_[0].take(round_trip, now);
     if (!offset_.at(now)) clock_ = {};  // the two clocks have drifted since
     clock_.add({m.tc1 - (m.ts1 + round_trip / 2), round_trip});
     offset_.take(*clock_.best(), now);
   }
+}
+
+std::optional<std::int64_t> AutopilotLink::round_trip(Time now) const noexcept {
+  const auto newest = trips_[0].at(now), before = trips_[1].at(now);
+  if (!newest || !before) return std::nullopt;
+  return std::min(newest->value, before->value);
 }
 
 std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
@@ -244,11 +253,12 @@ bool AutopilotLink::send_statustext(std::uint8_t severity, std::string_view text
   return send(m);
 }
 
-bool AutopilotLink::send_parameter_request(std::string_view name) noexcept {
+bool AutopilotLink::send_parameter_request(std::size_t rule) noexcept {
+  const std::string_view name = telemetry_.ask(rule);
   mavlink::ParamRequestRead m{
       .param_index = -1, .target_system = heard_.value_or(0), .target_component = kFlightController, .param_id = {}};
   std::ranges::copy(name.substr(0, m.param_id.size()), m.param_id.begin());
-  return telemetry_.expect_parameter(name) && send(m);
+  return send(m);
 }
 
 bool AutopilotLink::send_timesync(Time now) noexcept {
@@ -265,18 +275,8 @@ bool AutopilotLink::send_arm(bool arm) noexcept { return send_command(kCommandAr
 
 bool AutopilotLink::send_follow_setpoints() noexcept {
   const auto status = telemetry_.status.at(now_);
-  if (!status) return false;
-  switch (status->value.autopilot) {
-    case Autopilot::kPx4:
-      return send_command(kCommandSetMode, {kCustomModeEnabled, kPx4MainModeOffboard});
-    case Autopilot::kArduPilot:
-      return send_command(kCommandSetMode, {kCustomModeEnabled, kCopterModeGuided});
-    case Autopilot::kPlain:
-      return send_command(kCommandSetMode, {kCustomModeEnabled, static_cast<float>(kPlainModeFollow)});
-    case Autopilot::kUnknown:
-      return false;
-  }
-  return false;
+  if (!status || !status->value.autopilot->follows) return false;
+  return send_command(kCommandSetMode, {kCustomModeEnabled, static_cast<float>(status->value.autopilot->follow)});
 }
 
 bool AutopilotLink::send_takeoff(double height) noexcept {

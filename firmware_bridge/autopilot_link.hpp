@@ -50,8 +50,9 @@ std::string_view name(LinkFault fault) noexcept;
 /// real-time: non-blocking system calls only, no allocation.
 class AutopilotLink {
  public:
-  /// `vehicle`: its system id; absent: that of the first flight controller heard.
-  AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now);
+  /// `vehicle`: its system id; absent: that of the first flight controller heard. `known`: the autopilots.
+  AutopilotLink(Port port, std::optional<std::uint8_t> vehicle, Time now,
+                std::span<const AutopilotProfile* const> known = autopilots());
 
   /// From now on each frame is signed, and a frame without a good signature is not acted upon (row 29). Its time goes
   /// on from `now` by the monotonic clock.
@@ -74,6 +75,9 @@ class AutopilotLink {
   /// 5 ms, what telemetry() says has the time at which the controller took it, however old, otherwise that of its
   /// arrival.
   Latest<ClockOffset> clock(Time now) const noexcept { return offset_.at(now); }
+  /// ns, of a TIMESYNC question and its answer: the shorter of the last two, none older than kClockUseBy_ms; absent:
+  /// not two yet.
+  std::optional<std::int64_t> round_trip(Time now) const noexcept;
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
   /// Time since the vehicle's last heartbeat; absent: there was none.
@@ -110,9 +114,9 @@ class AutopilotLink {
   /// COMMAND_LONG to the flight controller.
   bool send_command(std::uint16_t command, const std::array<float, 7>& parameters) noexcept;
   bool send_arm(bool arm) noexcept;
-  /// PX4's offboard or ArduPilot's guided mode; false also when the autopilot is neither, or silent.
+  /// For the mode in which the autopilot follows set-points; false also when it has none, or is silent.
   bool send_follow_setpoints() noexcept;
-  /// ArduPilot's own take-off, to a height above where it was armed, m.
+  /// The autopilot's own take-off (AutopilotProfile::lifts_itself), to a height above where it was armed, m.
   bool send_takeoff(double height) noexcept;
   /// The autopilot's own landing.
   bool send_land() noexcept;
@@ -123,8 +127,8 @@ class AutopilotLink {
   /// place does where there is no GPS: this one is in Zurich.
   bool send_origin() noexcept;
 
-  /// Asks for a parameter by name; Telemetry::parameter() has the answer.
-  bool send_parameter_request(std::string_view name) noexcept;
+  /// Asks for the parameter of this rule of telemetry().autopilot(); Telemetry::parameters() has the answer.
+  bool send_parameter_request(std::size_t rule) noexcept;
 
   /// Forgets what waits to be sent, here and in the kernel: QUIET means that not even an old set-point follows.
   void discard_unsent() noexcept;
@@ -145,6 +149,7 @@ class AutopilotLink {
   Port port_;
   std::optional<std::uint8_t> configured_vehicle_;
   Time opened_at_;
+  std::span<const AutopilotProfile* const> known_;
   std::optional<PortError> lost_;
   mavlink::Parser parser_;
   Telemetry telemetry_;
@@ -158,6 +163,7 @@ class AutopilotLink {
   static constexpr int kClockUseBy_ms = 10'000;  // all that the filter keeps; 0.5 ms at 50 ppm
   Fact<ClockOffset, kClockUseBy_ms> offset_;     // the filter's best
   std::optional<std::int64_t> timesync_asked_ns_;
+  std::array<Fact<std::int64_t, kClockUseBy_ms>, 2> trips_;  // ns, the newest first
   std::uint8_t sequence_ = 0;
   std::optional<mavlink::Signing> signing_;
   mavlink::SigningTime signing_start_ = 0;  // at signing_since_

@@ -42,6 +42,10 @@ double untold_delay(const LineRate& line, bool authenticated) noexcept {
          takes(mavlink::info<mavlink::Odometry>().full_length);
 }
 
+double line_allowed(const Vehicle& vehicle, double untold_delay) noexcept {
+  return std::max(kUsefulRoundTrip, vehicle.controller.latency + vehicle.controller.feedback_delay) + untold_delay;
+}
+
 void LineBudget::give(std::size_t bytes, bool odometry, Time now) noexcept {
   const std::size_t wire = line_.frame > 0 ? line_.frame : bytes;
   if (free_at_ <= now) odometry_ = false;

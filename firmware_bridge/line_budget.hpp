@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "core/types/vehicle.hpp"
 #include "firmware_bridge/telemetry.hpp"
 
 namespace backwash::firmware_bridge {
@@ -33,6 +34,11 @@ double least_rate(std::size_t frame, bool authenticated) noexcept;
 /// TIMESYNC question and its answer take less than kUsefulRoundTrip on it: then the autopilot finds out by itself.
 double untold_delay(const LineRate& line, bool authenticated) noexcept;
 inline constexpr double kUsefulRoundTrip = 0.010;  ///< s: PX4 takes no longer one (MAX_RTT_SAMPLE, Timesync.hpp)
+
+/// How long a question and its answer may take on a line, s: as long as set-point and ODOMETRY together may be under
+/// way for the sets to be true (the vehicle file's controller.latency and feedback_delay; kUsefulRoundTrip where they
+/// say less), and what the autopilot was told.
+double line_allowed(const Vehicle& vehicle, double untold_delay) noexcept;
 
 /// Thins ODOMETRY to what its line carries. A line is busy from when it is given a frame until all that it was given
 /// has left it. In one such time there is at most one ODOMETRY, so that no set-point waits behind two of them, and the

@@ -9,7 +9,9 @@ bool final_refusal(std::uint8_t result) noexcept { return result >= 2 && result 
 
 }  // namespace
 
-std::optional<MessageRequests::Wish> MessageRequests::next(const Latest<CommandResult>& answer, Time now) noexcept {
+std::optional<Stream> MessageRequests::next(const AutopilotProfile& autopilot, const Latest<CommandResult>& answer,
+                                            Time now) noexcept {
+  const std::size_t wishes = autopilot.streams.size() + (autopilot.estimator.rate_hz > 0 ? 1 : 0);
   if (asked_) {
     const bool answered = answer && answer->at >= *asked_;
     if (!answered && now - *asked_ < kAnswer) return std::nullopt;
@@ -17,9 +19,9 @@ std::optional<MessageRequests::Wish> MessageRequests::next(const Latest<CommandR
     asked_.reset();
     ++at_;
   }
-  const auto open = [this] {
-    while (at_ < kWishes.size() && denied_.test(at_)) ++at_;
-    return at_ < kWishes.size();
+  const auto open = [&] {
+    while (at_ < wishes && denied_.test(at_)) ++at_;
+    return at_ < wishes;
   };
   if (!open()) {
     if (now - *round_ < kRound) return std::nullopt;
@@ -32,7 +34,18 @@ std::optional<MessageRequests::Wish> MessageRequests::next(const Latest<CommandR
   if (!round_) round_ = now;
   if (last_) last_ = now;
   asked_ = now;
-  return kWishes[at_];
+  return at_ < autopilot.streams.size() ? autopilot.streams[at_] : autopilot.estimator;
+}
+
+std::optional<Stream> MessageRequests::late(const Telemetry& telemetry, Time now) noexcept {
+  const auto is_late = [&](const auto& fact) {
+    const auto age = fact.age(now);
+    return age && *age > kLate;
+  };
+  const bool position = is_late(telemetry.local_state);
+  if ((!position && !is_late(telemetry.attitude)) || (late_ && now - *late_ < kApart)) return std::nullopt;
+  late_ = now;
+  return position ? kPositionStream : kAttitudeStream;
 }
 
 }  // namespace backwash::firmware_bridge

@@ -32,6 +32,11 @@ std::optional<Vec3> swap_variance_ned(const std::optional<Vec3>& v) noexcept {
   return mavlink::swap_ned(*v).cwiseAbs();
 }
 
+std::int8_t quality(const std::optional<Vec3>& position_variance) noexcept {
+  const double worst = position_variance ? std::max(position_variance->maxCoeff(), 0.0) : 0;
+  return static_cast<std::int8_t>(std::lround(std::max(100 / (1 + worst / (kHalfQuality * kHalfQuality)), 1.0)));
+}
+
 }  // namespace
 
 bool all_finite(const VioSample& s) noexcept {
@@ -84,7 +89,8 @@ mavlink::Odometry odometry_message(const VioSample& s) noexcept {
       .frame_id = kFrameLocalFrd,
       .child_frame_id = kFrameBodyFrd,
       .reset_counter = s.reset_counter,
-      .estimator_type = kEstimatorVio};
+      .estimator_type = kEstimatorVio,
+      .quality = quality(s.position_variance_O)};
 }
 
 }  // namespace backwash::firmware_bridge

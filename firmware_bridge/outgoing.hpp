@@ -24,6 +24,10 @@ struct VioSample {
   std::uint8_t reset_counter = 0;                                ///< counts jumps of O, as loop closures make them
 };
 
+/// m, standard deviation of the worst axis at which ODOMETRY's quality is 50 %: 100 / (1 + (σ / this)²). One that says
+/// none has 100: only what passed every test is sent.
+inline constexpr double kHalfQuality = 0.1;
+
 /// What is given is a number; what is absent becomes NaN on purpose.
 bool all_finite(const VioSample& sample) noexcept;
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <utility>
 
+#include "firmware_bridge/autopilots/profile.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
 
 namespace backwash::firmware_bridge {
@@ -52,7 +53,7 @@ std::uint8_t request_of(const mavlink::CommandLong& m) noexcept {
     case kArm:
       return m.param1 == 1 ? PLAIN_REQUEST_ARM : PLAIN_REQUEST_DISARM;
     case kSetMode:
-      return m.param2 == static_cast<float>(kPlainModeFollow) ? PLAIN_REQUEST_FOLLOW : PLAIN_REQUEST_NONE;
+      return m.param2 == static_cast<float>(kPlain.follow) ? PLAIN_REQUEST_FOLLOW : PLAIN_REQUEST_NONE;
     case kLand:
       return PLAIN_REQUEST_LAND;
     default:
@@ -190,9 +191,9 @@ void PlainPort::tell_pose(const plain_state_t& s, std::span<std::uint8_t>& into)
 }
 
 void PlainPort::tell(const plain_state_t& s, std::span<std::uint8_t>& into) noexcept {
-  tell(mavlink::Heartbeat{.custom_mode = s.following ? kPlainModeFollow : 0,
+  tell(mavlink::Heartbeat{.custom_mode = s.following ? kPlain.follow : 0,
                           .type = kTypeQuadrotor,
-                          .autopilot = kAutopilotPlain,
+                          .autopilot = kPlain.number,
                           .base_mode = static_cast<std::uint8_t>(kCustomModeEnabled | (s.armed ? kSafetyArmed : 0)),
                           .system_status = s.failsafe ? kCritical
                                            : s.armed  ? kActive

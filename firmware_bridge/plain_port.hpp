@@ -14,8 +14,6 @@
 namespace backwash::firmware_bridge {
 
 /// HEARTBEAT.autopilot that stands for a controller behind a PlainPort. No MAVLink autopilot has this number.
-inline constexpr std::uint8_t kAutopilotPlain = 250;
-inline constexpr std::uint32_t kPlainModeFollow = 1;  ///< its custom_mode while it follows set-points
 
 /// A serial line to a controller that speaks the plain link (plain/README.md), as a port of MAVLink frames: what
 /// AutopilotLink writes is put on the line as plain frames, and what the controller says is read as MAVLink frames. So

@@ -1,38 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "firmware_bridge/telemetry.hpp"
 
+#include <utility>
+
 #include "firmware_bridge/mavlink/frames.hpp"
-#include "firmware_bridge/plain_port.hpp"
 
 namespace backwash::firmware_bridge {
 namespace {
 
-// Values of common.xml and of the autopilots' own mode numbers.
-constexpr std::uint8_t kAutopilotArduPilot = 3, kAutopilotPx4 = 12;
+// Values of common.xml.
 constexpr std::uint8_t kCustomModeEnabled = 1, kSafetyArmed = 128;
-constexpr std::uint32_t kPx4MainModeOffboard = 6, kCopterModeGuided = 4;
+constexpr std::uint32_t kPrearmCheck = 1U << 28;  // of SYS_STATUS's sensors
 constexpr std::uint16_t kNoCell = 65535, kNoVoltage = 65535;
-
-Autopilot autopilot_of(std::uint8_t number) noexcept {
-  if (number == kAutopilotPx4) return Autopilot::kPx4;
-  if (number == kAutopilotPlain) return Autopilot::kPlain;
-  return number == kAutopilotArduPilot ? Autopilot::kArduPilot : Autopilot::kUnknown;
-}
-
-bool follows_setpoints(const mavlink::Heartbeat& m) noexcept {
-  if ((m.base_mode & kCustomModeEnabled) == 0) return false;
-  switch (autopilot_of(m.autopilot)) {
-    case Autopilot::kPx4:
-      return (m.custom_mode >> 16 & 0xFF) == kPx4MainModeOffboard;
-    case Autopilot::kArduPilot:
-      return m.custom_mode == kCopterModeGuided;
-    case Autopilot::kPlain:
-      return m.custom_mode == kPlainModeFollow;
-    case Autopilot::kUnknown:
-      return false;
-  }
-  return false;
-}
 
 // What a local frame and a vehicle indoors never reach; a float resolves 1 mm at 10 km. Written so that what is no
 // number is not sane.
@@ -58,9 +37,11 @@ std::optional<double> share(std::int8_t percent) noexcept {
 }  // namespace
 
 void Telemetry::take(const mavlink::Heartbeat& m, Time now) noexcept {
-  const VehicleStatus s{autopilot_of(m.autopilot), (m.base_mode & kSafetyArmed) != 0, follows_setpoints(m),
-                        m.custom_mode, m.system_status};
-  if (const auto age = status.age(now); age && *age >= kHeartbeatTimeout) restarted();  // it may have
+  const AutopilotProfile& autopilot = profile_of(m.autopilot, among_);
+  const bool follows = (m.base_mode & kCustomModeEnabled) != 0 && autopilot.follows_in(m.custom_mode);
+  const VehicleStatus s{&autopilot, (m.base_mode & kSafetyArmed) != 0, follows, m.custom_mode, m.system_status};
+  const auto age = status.age(now);
+  if (std::exchange(autopilot_, &autopilot) != &autopilot || (age && *age >= kHeartbeatTimeout)) restarted();  // it may
   status.take(s, now);
 }
 
@@ -126,6 +107,8 @@ void Telemetry::take(const mavlink::BatteryStatus& m, Time now) noexcept {
 }
 
 void Telemetry::take(const mavlink::SysStatus& m, Time now) noexcept {
+  if ((m.onboard_control_sensors_present & kPrearmCheck) != 0)
+    would_arm.take((m.onboard_control_sensors_health & kPrearmCheck) != 0, now);
   if (battery_status_seen_) return;
   Battery b{std::nullopt, share(m.battery_remaining), amperes(m.current_battery)};
   if (m.voltage_battery != kNoVoltage && m.voltage_battery != 0) b.voltage = m.voltage_battery / 1000.0;
@@ -165,41 +148,60 @@ void Telemetry::take(const mavlink::Statustext& m, Time now) noexcept {
   text = {line, now};
 }
 
-// PX4 puts an integer's bytes where the float is; others convert.
-void Telemetry::take(const mavlink::ParamValue& m, Time now) noexcept {
-  constexpr std::uint8_t kInt32 = 6;
-  double value = static_cast<double>(m.param_value);
-  const auto from = status.at(now);
-  const bool px4 = from && from->value.autopilot == Autopilot::kPx4;
-  if (px4 && m.param_type == kInt32) value = std::bit_cast<std::int32_t>(m.param_value);
-  const bool number = std::isfinite(value);
-  if (!number) ++broken;
-  for (std::size_t n = 0; n < expected_; ++n) {
-    if (parameters_[n].name != m.param_id) continue;
-    parameters_[n].value.reset();  // what it was before is not believed any more
-    if (number) parameters_[n].value = {value, now};
-  }
+template <class Each>
+void Telemetry::each_named(const std::array<char, 16>& id, Each&& each) noexcept {
+  const std::span<const ParameterRule> rules = autopilot_->rules;
+  for (std::size_t n = 0; n < rules.size(); ++n)
+    for (std::uint8_t name = 0; name < rules[n].count(); ++name)
+      if (parameter_id(rules[n].names[name].name) == id) each(n, name);
 }
 
-bool Telemetry::expect_parameter(std::string_view name) noexcept {
-  const auto wanted = parameter_id(name);
-  const auto end = parameters_.begin() + static_cast<std::ptrdiff_t>(expected_);
-  if (std::find_if(parameters_.begin(), end, [&](const Parameter& p) { return p.name == wanted; }) != end) return true;
-  if (expected_ == parameters_.size()) return false;
-  parameters_[expected_++] = {wanted, {}};
-  return true;
+void Telemetry::take(const mavlink::ParamValue& m, Time) noexcept {
+  constexpr std::uint8_t kInt32 = 6;
+  double value = static_cast<double>(m.param_value);
+  if (autopilot_->integers_bytewise && m.param_type == kInt32) value = std::bit_cast<std::int32_t>(m.param_value);
+  const bool number = std::isfinite(value);
+  if (!number) ++broken;
+  each_named(m.param_id, [&](std::size_t rule, std::uint8_t name) {
+    parameters_[rule] = {};  // what it was before is not believed any more
+    if (!number) return;
+    parameters_[rule].value = value;
+    parameters_[rule].name = name;
+    if (autopilot_->rules[rule].count() > 1) generation_ = name;
+  });
+}
+
+void Telemetry::take(const mavlink::ParamError& m, Time) noexcept {
+  constexpr std::uint8_t kDoesNotExist = 1;
+  if (m.error != kDoesNotExist) return;
+  each_named(m.param_id, [&](std::size_t rule, std::uint8_t name) {
+    if (!parameters_[rule].value) parameters_[rule].lacks |= static_cast<std::uint8_t>(1u << name);
+  });
+}
+
+std::string_view Telemetry::ask(std::size_t rule) noexcept {
+  const ParameterRule& asked = autopilot_->rules[rule];
+  ParameterAnswer& answer = parameters_[rule];
+  std::size_t name = answer.value ? answer.name : (answer.asked + generation_) % asked.count();
+  if (answer.lacks >> name & 1) name = (name + 1) % asked.count();
+  if (!answer.value && answer.asked < UINT8_MAX) ++answer.asked;
+  return asked.names[name].name;
+}
+
+void Telemetry::take(const mavlink::AutopilotVersion& m, Time) noexcept {
+  const auto part = [&](int shift) { return static_cast<std::uint8_t>(m.flight_sw_version >> shift); };
+  version = {part(24), part(16), part(8)};
+}
+
+void Telemetry::take_estimator(std::uint16_t flags, Time now) noexcept {
+  constexpr unsigned kPosition = 8 + 16, kConstantPosition = 128;  // ESTIMATOR_STATUS_FLAGS, EKF_STATUS_FLAGS
+  estimator_follows.take((flags & kPosition) != 0 && (flags & kConstantPosition) == 0, now);
 }
 
 void Telemetry::restarted() noexcept {
-  for (Parameter& p : parameters_) p.value.reset();
+  parameters_ = {};
+  version.reset();
   has_origin = false;
-}
-
-Latest<double> Telemetry::parameter(std::string_view name) const noexcept {
-  const auto wanted = parameter_id(name);
-  for (std::size_t n = 0; n < expected_; ++n)
-    if (parameters_[n].name == wanted) return parameters_[n].value;
-  return std::nullopt;
 }
 
 }  // namespace backwash::firmware_bridge

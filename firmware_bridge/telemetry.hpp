@@ -7,7 +7,9 @@
 #include <string_view>
 
 #include "core/types/state.hpp"
+#include "firmware_bridge/autopilots/profile.hpp"
 #include "firmware_bridge/mavlink/messages.hpp"
+#include "firmware_bridge/parameters.hpp"
 
 namespace backwash::firmware_bridge {
 
@@ -44,14 +46,11 @@ class Fact {
 inline constexpr int kSecondly_ms = 1500, kPoseUseBy_ms = 1000, kBatteryUseBy_ms = 5000;
 inline constexpr std::chrono::milliseconds kHeartbeatTimeout{kSecondly_ms};  ///< docs/faults.md row 21
 
-/// kPlain: a controller behind a PlainPort.
-enum class Autopilot : std::uint8_t { kUnknown, kArduPilot, kPx4, kPlain };
-
 /// From HEARTBEAT.
 struct VehicleStatus {
-  Autopilot autopilot = Autopilot::kUnknown;
+  const AutopilotProfile* autopilot = &kUnknownAutopilot;  ///< never null
   bool armed = false;
-  bool follows_setpoints = false;  ///< PX4's offboard or ArduPilot's guided mode
+  bool follows_setpoints = false;  ///< it is in the mode in which it follows them
   std::uint32_t custom_mode = 0;
   std::uint8_t system_status = 0;  ///< MAV_STATE: 3 standby, 4 active, 5 critical (a failsafe acts), 6 emergency
 };
@@ -72,6 +71,11 @@ struct Battery {
 /// From EXTENDED_SYS_STATE.
 enum class LandedState : std::uint8_t { kUndefined, kOnGround, kInAir, kTakingOff, kLanding };
 
+/// From AUTOPILOT_VERSION.
+struct FirmwareVersion {
+  std::uint8_t major = 0, minor = 0, patch = 0;
+};
+
 /// From COMMAND_ACK.
 struct CommandResult {
   std::uint16_t command = 0;  ///< MAV_CMD
@@ -90,6 +94,9 @@ struct StatusLine {
 /// use-by; none of it outlives a restart. Real-time: take() is wait-free, no allocation.
 class Telemetry {
  public:
+  /// `among`: the autopilots that it knows.
+  explicit Telemetry(std::span<const AutopilotProfile* const> among = autopilots()) noexcept : among_(among) {}
+
   Fact<VehicleStatus, kSecondly_ms> status;
   Fact<State, kPoseUseBy_ms>
       local_state;  ///< in the controller's own local frame L, z-up (p_W, v_W stand for p_L, v_L)
@@ -99,7 +106,11 @@ class Telemetry {
   Fact<double, kSecondly_ms> position_sigma;  ///< of local_state as the controller says, from ODOMETRY, m
   Fact<Battery, kBatteryUseBy_ms> battery;
   Fact<LandedState, kSecondly_ms> landed_state;
+  /// Its estimator says of itself that it takes its position from a sensor.
+  Fact<bool, kBatteryUseBy_ms> estimator_follows;
+  Fact<bool, kBatteryUseBy_ms> would_arm;  ///< its own checks say so, from SYS_STATUS
   Latest<StatusLine> text;
+  std::optional<FirmwareVersion> version;  ///< absent: it has not said; not known after a restart
   /// Its local frame lies somewhere on the globe, as ArduPilot asks for before arming; not known after a restart, as
   /// with parameter().
   bool has_origin = false;
@@ -109,12 +120,14 @@ class Telemetry {
   /// Newest answer to this command, if any came since the start.
   Latest<CommandResult> result_of(std::uint16_t command) const noexcept;
 
-  /// The autopilot's value of a parameter that was asked for, if it came. Others, which stations ask for, are not kept;
-  /// after a silence of kHeartbeatTimeout, or when its clock is more than a second back, it may have restarted with
-  /// other values, and none is; nor is one whose newest value is no number.
-  Latest<double> parameter(std::string_view name) const noexcept;
-  /// This name will be asked for. False: there is no room for another one.
-  bool expect_parameter(std::string_view name) noexcept;
+  /// The autopilot that is heard, or was last.
+  const AutopilotProfile& autopilot() const noexcept { return *autopilot_; }
+  /// What it has said of its profile's parameters. Others, which stations ask for, are not kept; after a silence of
+  /// kHeartbeatTimeout, or when its clock is more than a second back, it may have restarted with other values, and none
+  /// is; nor is one whose newest value is no number.
+  const ParameterValues& parameters() const noexcept { return parameters_; }
+  /// The name by which the parameter of this rule is to be asked for now; counts the question.
+  std::string_view ask(std::size_t rule) noexcept;
 
   void take(const mavlink::Heartbeat& m, Time now) noexcept;
   void take(const mavlink::LocalPositionNed& m, Time now) noexcept;
@@ -128,23 +141,28 @@ class Telemetry {
   void take(const mavlink::Statustext& m, Time now) noexcept;
   void take(const mavlink::GpsGlobalOrigin&, Time) noexcept { has_origin = true; }
   void take(const mavlink::ParamValue& m, Time now) noexcept;
+  void take(const mavlink::ParamError& m, Time now) noexcept;
+  void take(const mavlink::AutopilotVersion& m, Time now) noexcept;
+  void take(const mavlink::EstimatorStatus& m, Time now) noexcept { take_estimator(m.flags, now); }
+  void take(const mavlink::EkfStatusReport& m, Time now) noexcept { take_estimator(m.flags, now); }
 
  private:
   void restarted() noexcept;
   void take_attitude(const Eigen::Quaterniond& q_NF, const Vec3& omega_F, std::uint32_t time_boot_ms,
                      Time now) noexcept;
+  void take_estimator(std::uint16_t flags, Time now) noexcept;
+  template <class Each>
+  void each_named(const std::array<char, 16>& id, Each&& each) noexcept;
   bool in_order(std::optional<std::uint32_t>& last_ms, std::uint32_t now_ms) noexcept;
 
   std::optional<std::uint32_t> position_ms_, attitude_ms_;  // sender's clock
   bool battery_status_seen_ = false;
   std::array<Latest<CommandResult>, 8> results_;
   std::size_t next_result_ = 0;
-  struct Parameter {
-    std::array<char, 16> name{};  // zero-filled; all 16 may be used
-    Latest<double> value;
-  };
-  std::array<Parameter, 48> parameters_;  // of two firmwares, should the controller be changed
-  std::size_t expected_ = 0;
+  std::span<const AutopilotProfile* const> among_;
+  const AutopilotProfile* autopilot_ = &kUnknownAutopilot;
+  ParameterValues parameters_{};
+  std::uint8_t generation_ = 0;  // which of two names the newest answer was of
 };
 
 }  // namespace backwash::firmware_bridge

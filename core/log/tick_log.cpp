@@ -30,6 +30,7 @@ enum Flag : std::uint32_t {
   kLiftsItself = 1u << 18,
   kTakeoffTaken = 1u << 19,
   kRougher = 1u << 20,
+  kLineSlow = 1u << 21,
 };
 
 /// Members of a TickInput into its record.
@@ -98,6 +99,7 @@ void each_member(Input& in, Record& r, const Direction& direction) noexcept {
   auto& a = in.autopilot;
   direction.flag(a.port_open, kPortOpen);
   direction.flag(a.transmit_failed, kTransmitFailed);
+  direction.flag(a.line_slow, kLineSlow);
   direction.flag(a.armed, kArmed);
   direction.flag(a.offboard, kOffboard);
   direction.flag(a.lifts_itself, kLiftsItself);

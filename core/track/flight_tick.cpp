@@ -97,6 +97,7 @@ SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) no
   facts.battery_low = battery_low_;
   facts.port_open = in.autopilot.port_open;
   facts.transmit_failed = in.autopilot.transmit_failed;
+  facts.line_slow = in.autopilot.line_slow;
   facts.missed_periods = in.missed_periods;
   return facts;
 }

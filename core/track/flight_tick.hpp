@@ -14,10 +14,11 @@ namespace backwash::track {
 struct AutopilotFacts {
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row did not get out
+  bool line_slow = false;        ///< what it says, or what it is told, takes longer than the sets are computed for
   bool armed = false;            ///< unless it says that it is not
   bool offboard = false;
   std::optional<bool> landed, in_air;                              ///< as it says itself; neither: between the two
-  bool lifts_itself = false;                                       ///< ArduPilot: takes off by a command of its own
+  bool lifts_itself = false;                                       ///< takes off by a command of its own
   bool takeoff_taken = false;                                      ///< and has acknowledged that one since it was asked
   double heartbeat_age = std::numeric_limits<double>::infinity();  ///< s
   struct Pose {

@@ -53,6 +53,7 @@ void Supervisor::note_link_and_operator(const SupervisorInput& in, Occurring& no
   now[Reason::port_lost] = !in.port_open;                                                                  // row 17
   now[Reason::transmit_full] = in.transmit_failed;                                                         // row 20
   now[Reason::autopilot_silent] = in.heartbeat_age > kHeartbeatLost;                                       // row 21
+  now[Reason::line_slow] = in.line_slow;                                                                   // row 58
   now[Reason::clock_stopped] = in.missed_periods >= kMissedQuiet;                                          // row 32
   now[Reason::deadline_missed] = in.missed_periods > 0 && missed_.front() >= period_ - 1 - kMissedWithin;  // row 32
   now[Reason::operator_request] = (in.request == Request::disable || in.request == Request::stop) &&
@@ -119,6 +120,9 @@ SupervisorOutput Supervisor::step(const SupervisorInput& in) noexcept {
         enter(Mode::enabling, Reason::enabled);
       else
         enter(mode_, *why);
+    } else if (again && in.armed && in.offboard && in.port_open && in.heartbeat_age <= kHeartbeatLost) {
+      // Nobody else has it in hand: there is nothing to stop on, and no stop is refused (row 36).
+      enter(Mode::land, in.request == Request::land ? Reason::land_requested : Reason::stop_requested);
     }
   } else {
     for (const Transition& t : transitions()) {

@@ -55,6 +55,7 @@ struct SupervisorInput {
   bool battery_low = false;     ///< below the configured share
   bool port_open = true;
   bool transmit_failed = false;  ///< two set-points in a row could not be sent
+  bool line_slow = false;        ///< the line adds more delay than the sets are computed for
   int missed_periods = 0;        ///< whole periods skipped before this tick
 };
 

@@ -22,6 +22,7 @@ constexpr Transition kTransitions[] = {
     {kEnabling, Reason::odometry_inconsistent, Mode::passive},
     {kEnabling, Reason::pose_silent, Mode::passive},
     {kEnabling, Reason::closure_refused, Mode::passive},
+    {kEnabling, Reason::line_slow, Mode::passive},
     {kEnabling, Reason::frame_mismatch_x, Mode::passive},
     {kEnabling, Reason::frame_mismatch_y, Mode::passive},
     {kEnabling, Reason::frame_mismatch_z, Mode::passive},
@@ -37,6 +38,7 @@ constexpr Transition kTransitions[] = {
     {kLifting, Reason::land_requested, Mode::land},
     {kLifting, Reason::stop_requested, Mode::land},
     {kLifting, Reason::pose_silent, Mode::land},
+    {kLifting, Reason::line_slow, Mode::land},
     {kLifting, Reason::odometry_jump, Mode::land},
     {kLifting, Reason::odometry_inconsistent, Mode::land},
     {kLifting, Reason::odometry_frozen, Mode::land},
@@ -65,6 +67,7 @@ constexpr Transition kTransitions[] = {
     {kFollowed, Reason::odometry_frozen, Mode::hold},
     {kFollowed, Reason::odometry_disorder, Mode::hold},
     {kFollowed, Reason::odometry_lost, Mode::hold},
+    {kFollowed, Reason::line_slow, Mode::hold},
     {kFollowed, Reason::frames_disagree, Mode::hold},
     {kFollowed, Reason::frames_apart, Mode::hold},
     {kFollowed, Reason::battery_low, Mode::land},
@@ -88,6 +91,7 @@ constexpr Reason kRefusals[] = {
     Reason::port_lost,        Reason::autopilot_silent,   Reason::odometry_lost,       Reason::pose_silent,
     Reason::map_missing,      Reason::outside_map,        Reason::frame_mismatch_x,    Reason::frame_mismatch_y,
     Reason::frame_mismatch_z, Reason::frame_mismatch_yaw, Reason::frame_mismatch_roll, Reason::frame_mismatch_pitch,
+    Reason::line_slow,
 };
 
 }  // namespace

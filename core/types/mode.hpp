@@ -69,6 +69,7 @@ enum class Reason : std::uint8_t {
   not_armed,
   frames_apart,
   air_rougher,
+  line_slow,
 };
 
 /// In what two descriptions of the same motion contradict each other: an axis of the map, or an angle.
@@ -125,10 +126,11 @@ inline constexpr std::array kReasonNames{
     "autopilot did not arm within 3 s",
     "map and autopilot frames come apart",
     "air rougher than the flight allows for",
+    "line to the autopilot slower than sets allow for",
 };
 inline constexpr int kModes = kModeNames.size(), kReasons = kReasonNames.size();
 static_assert(kModes == 1 + static_cast<int>(Mode::lifting));
-static_assert(kReasons == 1 + static_cast<int>(Reason::air_rougher));
+static_assert(kReasons == 1 + static_cast<int>(Reason::line_slow));
 static_assert(kMismatchNames.size() == 1 + static_cast<std::size_t>(Mismatch::pitch));
 
 /// How the status's task begins when the plan for the last command was refused; why follows.

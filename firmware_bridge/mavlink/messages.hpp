@@ -14,11 +14,12 @@ struct MessageList {};
 
 /// Every message that this codec knows, by id.
 using KnownMessages =
-    MessageList<Heartbeat, SysStatus, SystemTime, SetMode, ParamRequestRead, ParamValue, ParamSet, RawImu, Attitude,
-                AttitudeQuaternion, LocalPositionNed, ManualControl, CommandLong, CommandAck, SetPositionTargetLocalNed,
-                PositionTargetLocalNed, SetGpsGlobalOrigin, GpsGlobalOrigin, SimState, HilActuatorControls,
-                VisionPositionEstimate, HighresImu, HilSensor, HilGps, Timesync, HilStateQuaternion, ScaledImu2,
-                BatteryStatus, EstimatorStatus, ExtendedSysState, Statustext, ObstacleDistance, Odometry>;
+    MessageList<Heartbeat, SysStatus, SystemTime, SetMode, ParamRequestRead, ParamValue, ParamSet, ParamError, RawImu,
+                Attitude, AttitudeQuaternion, LocalPositionNed, ManualControl, CommandLong, CommandAck,
+                SetPositionTargetLocalNed, PositionTargetLocalNed, SetGpsGlobalOrigin, GpsGlobalOrigin, SimState,
+                HilActuatorControls, VisionPositionEstimate, HighresImu, HilSensor, HilGps, Timesync,
+                HilStateQuaternion, ScaledImu2, BatteryStatus, EstimatorStatus, EkfStatusReport, AutopilotVersion,
+                ExtendedSysState, Statustext, ObstacleDistance, Odometry>;
 
 /// MessageInfo of an id, or null when the message is unknown. Real-time: wait-free, no allocation.
 const MessageInfo* find_message(std::uint32_t id) noexcept;

@@ -201,6 +201,23 @@ struct ParamRequestRead {
   }
 };
 
+/// PARAM_ERROR: Why a question for a parameter is not answered: error as MAV_PARAM_ERROR, 1 there is none of this name.
+struct ParamError {
+  static constexpr std::uint32_t kId = 345;
+  static constexpr std::string_view kName = "PARAM_ERROR";
+  std::int16_t param_index = 0;
+  std::uint8_t target_system = 0, target_component = 0;
+  std::array<char, 16> param_id{};
+  std::uint8_t error = 0;
+  static constexpr auto fields() noexcept {
+    using M = ParamError;
+    return std::tuple{field("param_index", &M::param_index), field("target_system", &M::target_system),
+                      field("target_component", &M::target_component), field("param_id", &M::param_id),
+                      field("error", &M::error)};
+  }
+};
+static_assert(info<ParamError>().crc_extra == 209);  // work in progress in common.xml: as ArduPilot 4.7 sends it
+
 /// PARAM_SET: Sets a parameter; encoding as in ParamValue.
 struct ParamSet {
   static constexpr std::uint32_t kId = 23;

@@ -105,4 +105,48 @@ struct EstimatorStatus {
   }
 };
 
+/// EKF_STATUS_REPORT: of ArduPilot's estimator: flags as ESTIMATOR_STATUS's, innovations over their bounds.
+struct EkfStatusReport {
+  static constexpr std::uint32_t kId = 193;
+  static constexpr std::string_view kName = "EKF_STATUS_REPORT";
+  float velocity_variance = 0, pos_horiz_variance = 0, pos_vert_variance = 0, compass_variance = 0,
+        terrain_alt_variance = 0;
+  std::uint16_t flags = 0;
+  float airspeed_variance = 0;
+  static constexpr auto fields() noexcept {
+    using M = EkfStatusReport;
+    return std::tuple{
+        field("velocity_variance", &M::velocity_variance),       field("pos_horiz_variance", &M::pos_horiz_variance),
+        field("pos_vert_variance", &M::pos_vert_variance),       field("compass_variance", &M::compass_variance),
+        field("terrain_alt_variance", &M::terrain_alt_variance), field("flags", &M::flags),
+        extension("airspeed_variance", &M::airspeed_variance)};
+  }
+};
+
+/// AUTOPILOT_VERSION: flight_sw_version is major, minor, patch and type, a byte each, the first in the highest.
+struct AutopilotVersion {
+  static constexpr std::uint32_t kId = 148;
+  static constexpr std::string_view kName = "AUTOPILOT_VERSION";
+  std::uint64_t capabilities = 0, uid = 0;
+  std::uint32_t flight_sw_version = 0, middleware_sw_version = 0, os_sw_version = 0, board_version = 0;
+  std::uint16_t vendor_id = 0, product_id = 0;
+  std::array<std::uint8_t, 8> flight_custom_version{}, middleware_custom_version{}, os_custom_version{};
+  std::array<std::uint8_t, 18> uid2{};
+  static constexpr auto fields() noexcept {
+    using M = AutopilotVersion;
+    return std::tuple{field("capabilities", &M::capabilities),
+                      field("uid", &M::uid),
+                      field("flight_sw_version", &M::flight_sw_version),
+                      field("middleware_sw_version", &M::middleware_sw_version),
+                      field("os_sw_version", &M::os_sw_version),
+                      field("board_version", &M::board_version),
+                      field("vendor_id", &M::vendor_id),
+                      field("product_id", &M::product_id),
+                      field("flight_custom_version", &M::flight_custom_version),
+                      field("middleware_custom_version", &M::middleware_custom_version),
+                      field("os_custom_version", &M::os_custom_version),
+                      extension("uid2", &M::uid2)};
+  }
+};
+
 }  // namespace backwash::mavlink

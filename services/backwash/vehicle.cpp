@@ -9,6 +9,7 @@
 #include "core/files/read_file.hpp"
 #include "core/log/raw_log.hpp"
 #include "core/plan/gain_sweep.hpp"
+#include "firmware_bridge/autopilots/profile.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/vehicle_file.hpp"
@@ -24,19 +25,24 @@ struct VehicleOptions {
   bool json = false;
 };
 
-/// How a firmware names its gains: k_d is the velocity gain, k_p the product of the two.
-struct GainNames {
-  const char *xy_position, *xy_velocity, *z_position, *z_velocity;
-  const char *xy_integral, *z_integral;  ///< z: null where no parameter is it
-};
-constexpr GainNames kPx4{"MPC_XY_P",        "MPC_XY_VEL_P_ACC", "MPC_Z_P",
-                         "MPC_Z_VEL_P_ACC", "MPC_XY_VEL_I_ACC", "MPC_Z_VEL_I_ACC"};
-constexpr GainNames kArduPilot{"PSC_POSXY_P", "PSC_VELXY_P", "PSC_POSZ_P", "PSC_VELZ_P", "PSC_VELXY_I", nullptr};
+using firmware_bridge::Ask;
 
-/// Whose gains are tuned, and which of the firmware's could not be taken.
+/// Whose gains are tuned, what it says of them, and which could not be taken. k_d is the velocity gain, k_p the product
+/// of the two (Ask).
 struct Firmware {
-  GainNames names = kPx4;
+  const firmware_bridge::AutopilotProfile* autopilot = &firmware_bridge::kPx4;
+  std::map<std::string, double> values;
   std::string left_out;
+
+  /// Its parameter's name in these values, or the newest; empty where it has none for that.
+  std::string name(Ask ask) const {
+    std::string name;
+    for (const auto& rule : autopilot->rules)
+      if (rule.ask == ask)
+        for (std::size_t n = 0; n < rule.count(); ++n)
+          if (name = rule.names[n].name; values.contains(name)) return name;
+    return name;
+  }
 };
 
 /// NAME and number of each line of a parameter file: ArduPilot's (NAME,1 or NAME 1), PX4's (NAME=1), or a ground
@@ -59,43 +65,49 @@ std::map<std::string, double> read_parameters(const std::string& path) {
 }
 
 /// Integral gains that fly, both of them or neither: along z the file's where no parameter is it. What is left out.
-std::string take_integrals(const std::map<std::string, double>& values, const GainNames& names, Vehicle& vehicle) {
+std::string take_integrals(const Firmware& firmware, Vehicle& vehicle) {
   auto& own = vehicle.controller.velocity_integrator;
-  const auto gain = [&](const char* name, double without) {
-    const auto found = name ? values.find(name) : values.end();
-    return found == values.end() ? without : found->second;
+  const auto gain = [&](Ask ask, double without) {
+    const auto found = firmware.values.find(firmware.name(ask));
+    return found == firmware.values.end() ? without : found->second;
   };
-  const Vehicle::HorizontalVertical flown{gain(names.xy_integral, own.horizontal),
-                                          gain(names.z_integral, own.vertical)};
+  const Vehicle::HorizontalVertical flown{gain(Ask::k_i_horizontal, own.horizontal),
+                                          gain(Ask::k_i_vertical, own.vertical)};
   if ((flown.horizontal > 0) == (flown.vertical > 0)) {
     own = flown;
     return "";
   }
   char text[32];
   std::snprintf(text, sizeof text, "%g", flown.horizontal);
-  return std::string(names.xy_integral) + " " + text + " is left out: along z controller.velocity_integrator is " +
+  return firmware.name(Ask::k_i_horizontal) + " " + text + " is left out: along z controller.velocity_integrator is " +
          (flown.vertical > 0 ? "not 0" : "0") + ", and both integrate or neither does";
 }
 
 /// The gains that fly, in place of the vehicle file's.
 Firmware take_gains(const std::string& path, Vehicle& vehicle) {
-  const auto values = read_parameters(path);
-  for (const GainNames& names : {kPx4, kArduPilot}) {
-    if (!values.contains(names.xy_velocity)) continue;
-    const auto gain = [&](const char* name) {
-      const auto found = values.find(name);
-      if (found == values.end() || !(found->second > 0))
-        throw Failure(kBadData,
-                      path + ":1: " + name + " is missing or not above 0; save all parameters of the autopilot");
+  Firmware firmware{nullptr, read_parameters(path), {}};
+  std::string tried;
+  for (const auto* autopilot : firmware_bridge::autopilots()) {
+    firmware.autopilot = autopilot;
+    const std::string velocity = firmware.name(Ask::k_d_horizontal);
+    if (!firmware.values.contains(velocity)) {
+      if (!velocity.empty()) tried += (tried.empty() ? "" : " nor ") + velocity;
+      continue;
+    }
+    const auto gain = [&](Ask ask) {
+      const auto found = firmware.values.find(firmware.name(ask));
+      if (found == firmware.values.end() || !(found->second > 0))
+        throw Failure(kBadData, path + ":1: " + firmware.name(ask) +
+                                    " is missing or not above 0; save all parameters of the autopilot");
       return found->second;
     };
-    vehicle.controller.kd = {gain(names.xy_velocity), gain(names.z_velocity)};
-    vehicle.controller.kp = {gain(names.xy_position) * gain(names.xy_velocity),
-                             gain(names.z_position) * gain(names.z_velocity)};
-    return {names, take_integrals(values, names, vehicle)};
+    vehicle.controller.kd = {gain(Ask::k_d_horizontal), gain(Ask::k_d_vertical)};
+    vehicle.controller.kp = {gain(Ask::k_p_horizontal) * gain(Ask::k_d_horizontal),
+                             gain(Ask::k_p_vertical) * gain(Ask::k_d_vertical)};
+    firmware.left_out = take_integrals(firmware, vehicle);
+    return firmware;
   }
-  throw Failure(kBadData,
-                path + ":1: has neither MPC_XY_VEL_P_ACC nor PSC_VELXY_P; save all parameters of the autopilot");
+  throw Failure(kBadData, path + ":1: has neither " + tried + "; save all parameters of the autopilot");
 }
 
 /// Samples of a flight with the present gains, and how many of them lay in their set.
@@ -140,19 +152,20 @@ Json to_json(const plan::GainStep& s) {
 
 void print_text(const plan::GainSweep& sweep, const Firmware& firmware, const Vehicle& vehicle,
                 const std::optional<TuningEvidence>& evidence) {
-  const auto& [names, left_out] = firmware;
+  const std::string names[] = {firmware.name(Ask::k_p_horizontal), firmware.name(Ask::k_d_horizontal),
+                               firmware.name(Ask::k_p_vertical), firmware.name(Ask::k_d_vertical)};
   const auto& integral = vehicle.controller.velocity_integrator;
   if (integral.horizontal > 0)
     std::printf("integral gains of the velocity, which stay: %g along x and y, %g along z\n", integral.horizontal,
                 integral.vertical);
-  if (!left_out.empty()) std::printf("%s\n", left_out.c_str());
+  if (!firmware.left_out.empty()) std::printf("%s\n", firmware.left_out.c_str());
   if (evidence)
     std::printf(
         "the log: %zu of %zu samples inside the sets of the gains it was flown with%s\n", evidence->inside,
         evidence->judged,
         evidence->inside == evidence->judged ? "" : "; calibrate the model first: the sets below are too small");
-  std::printf("%7s %8s %8s %8s %8s  tightest place of the way\n", "factor", names.xy_position, names.xy_velocity,
-              names.z_position, names.z_velocity);
+  std::printf("%7s %8s %8s %8s %8s  tightest place of the way\n", "factor", names[0].c_str(), names[1].c_str(),
+              names[2].c_str(), names[3].c_str());
   for (const auto& s : sweep.steps) {
     const auto g = firmware_gains(s);
     std::printf("%7.2f %8.3g %8.3g %8.3g %8.3g  ", s.factor, g[0], g[1], g[2], g[3]);
@@ -173,8 +186,8 @@ void print_text(const plan::GainSweep& sweep, const Firmware& firmware, const Ve
   }
   const auto g = firmware_gains(*sweep.smallest);
   std::printf("smallest gains that let it through%s: %s %.3g, %s %.3g, %s %.3g, %s %.3g\n",
-              sweep.smallest->factor == sweep.steps.front().factor ? " (or smaller ones)" : "", names.xy_position, g[0],
-              names.xy_velocity, g[1], names.z_position, g[2], names.z_velocity, g[3]);
+              sweep.smallest->factor == sweep.steps.front().factor ? " (or smaller ones)" : "", names[0].c_str(), g[0],
+              names[1].c_str(), g[1], names[2].c_str(), g[2], names[3].c_str(), g[3]);
 }
 
 int run(const VehicleOptions& options) {

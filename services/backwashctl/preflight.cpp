@@ -40,10 +40,13 @@ std::vector<Finding> preflight(const StatusCopy& before, const StatusCopy& after
   const double lost_after = OdometryTiming::kHoldAfter + std::max(0.0, longer_gap);
   add("odometry age", n.odometry_age < lost_after, number("%.3f s", n.odometry_age),
       number("the VIO or the network is late: %.3f s without odometry is HOLD", lost_after));
-  add("heartbeat", n.heartbeat_age < 1.5, number("%.1f s old", std::min(n.heartbeat_age, 1e6)),
-      "check link.device, link.baud and link.system, and that the autopilot is on");
+  add("heartbeat",
+      n.heartbeat_age<1.5, controller(after) + ", " + number("%.1f s old", std::min(n.heartbeat_age, 1e6)),
+                      n.frames_refused> 0
+          ? "frames come without a good signature: give both sides the same key, or neither (link.signing_key)"
+          : "check link.device, link.baud and link.system, and that the autopilot is on");
   add("frames, position", n.frames_aligned != 0, number("residual %.3f m", n.frame_residual_m),
-      "the autopilot must follow the VIO (EKF2_EV_CTRL): the residual has to fall below 0.05 m and 3 degrees");
+      "the autopilot must follow the VIO: the residual has to fall below 0.05 m and 3 degrees");
   add("frames, motion", mismatch_named(after.mismatch) == Mismatch::none, after.mismatch,
       "move the vehicle by hand along x, y and z: the axis named is mirrored, turned or dead in VIO or autopilot");
   const double missed = rate(before.numbers.ticks_missed, n.ticks_missed);

@@ -33,13 +33,18 @@ const std::string& judged(const std::string& folder);
 /// A copy of the daemon's status that owns its strings.
 struct StatusCopy {
   dds::Status numbers{};  ///< its members that own memory are null
-  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says, air;
+  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says, air,
+      autopilot_version;
   std::vector<std::pair<std::string, double>> parameters;   ///< that the autopilot has told
   std::vector<std::pair<std::string, std::string>> advice;  ///< on those that are not good
 
   /// Whether state and reason are these. What a daemon of another version may say besides is none of them.
   bool in(Mode mode) const noexcept { return mode_named(state) == mode; }
   bool because(Reason why) const noexcept { return reason_named(reason) == why; }
+  /// Whether there is advice of this name: of a parameter, or dds::kAsking, dds::kArming.
+  bool advises(std::string_view name) const noexcept {
+    return std::ranges::any_of(advice, [&](const auto& each) { return each.first == name; });
+  }
 };
 
 /// All that a message says.
@@ -64,7 +69,13 @@ inline constexpr StatusText kStatusTexts[] = {
     {"autopilot", &dds::Status::autopilot, &StatusCopy::autopilot},
     {"autopilot_says", &dds::Status::autopilot_says, &StatusCopy::autopilot_says},
     {"air", &dds::Status::air, &StatusCopy::air},
+    {"autopilot_version", &dds::Status::autopilot_version, &StatusCopy::autopilot_version},
 };
+
+/// The autopilot and its firmware's version: "ardupilot 4.6.3".
+inline std::string controller(const StatusCopy& s) {
+  return s.autopilot + (s.autopilot_version.empty() ? "" : " " + s.autopilot_version);
+}
 
 /// An age or a delay of the status, s; −1 on the wire: nothing was measured for it yet.
 inline std::optional<double> measured(double told) noexcept { return told < 0 ? std::nullopt : std::optional(told); }

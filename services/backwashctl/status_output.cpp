@@ -60,6 +60,10 @@ nlohmann::json timing(const dds::Timing& t) { return {{"p50", t.p50}, {"p99", t.
 
 }  // namespace
 
+std::string text_of(const nlohmann::json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 nlohmann::json json_of(const StatusCopy& s) {
   const auto& n = s.numbers;
   nlohmann::json all{{"position", {n.position.x, n.position.y, n.position.z}},
@@ -77,12 +81,13 @@ nlohmann::json json_of(const StatusCopy& s) {
 
 void print(const StatusCopy& s) {
   const auto& n = s.numbers;
-  std::printf("%s: %s (%s)  %s %s  at (%.2f, %.2f, %.2f)  inside %llu of %llu  ticks %llu, %llu missed\n",
+  std::printf("%s: %s (%s)  %s %s  at (%.2f, %.2f, %.2f)  inside %llu of %llu  ticks %llu, %llu missed  by %s\n",
               s.vehicle.c_str(), s.state.c_str(), s.reason.c_str(), n.armed ? "armed" : "disarmed",
               n.landed ? "on the ground" : (n.moving ? "flying" : "hovering"), n.position.x, n.position.y, n.position.z,
               static_cast<unsigned long long>(n.samples_inside),
               static_cast<unsigned long long>(n.samples_inside + n.samples_outside),
-              static_cast<unsigned long long>(n.ticks), static_cast<unsigned long long>(n.ticks_missed));
+              static_cast<unsigned long long>(n.ticks), static_cast<unsigned long long>(n.ticks_missed),
+              controller(s).c_str());
   std::fflush(stdout);
 }
 

@@ -9,6 +9,8 @@ namespace backwash::ctl {
 
 /// The status as `status --json` prints it: the IDL's fields, with units in the names where they are not SI.
 nlohmann::json json_of(const StatusCopy& status);
+/// As text; what others said may be no UTF-8, and JSON is. `indent`: of each level, −1: one line.
+std::string text_of(const nlohmann::json& json, int indent);
 /// One line of it on stdout.
 void print(const StatusCopy& status);
 

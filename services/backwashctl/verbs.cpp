@@ -6,10 +6,9 @@
 #include <chrono>
 #include <cstdio>
 #include <iostream>
-#include <nlohmann/json.hpp>
+#include <thread>
 
 #include "services/backwashctl/answer.hpp"
-#include "services/backwashctl/preflight.hpp"
 #include "services/backwashctl/route.hpp"
 #include "services/backwashctl/status_output.hpp"
 #include "services/command_line/exit_code.hpp"
@@ -25,10 +24,7 @@ std::string default_station() {
   return std::string(user ? user : "operator") + "@" + host;
 }
 
-/// What others said may be no UTF-8; JSON is.
-std::string text_of(const nlohmann::json& json, int indent) {
-  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
-}
+constexpr std::string_view kNotToldYet = "no value of ";  // how such a refusal begins
 
 bool tracking(const StatusCopy& s) { return s.in(Mode::tracking); }
 bool rests(const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }
@@ -89,9 +85,13 @@ Command* Verbs::waiting(Command* sub, double patience_s) {
 }
 
 void Verbs::add_control(Command& app) {
-  waiting(verb(app, "enable", "take control: stream set-points until the autopilot follows", "enable --wait",
-               [this] { return command("enable", backwash_msgs_msg_dds__COMMAND_ENABLE, Vec3::Zero(), tracking); }),
-          10);
+  waiting(
+      verb(app, "enable", "take control: stream set-points until the autopilot follows, and would arm", "enable --wait",
+           [this] {
+             return command("enable", backwash_msgs_msg_dds__COMMAND_ENABLE, Vec3::Zero(),
+                            [](const StatusCopy& s) { return tracking(s) && !s.advises(dds::kArming); });
+           }),
+      10);
   verb(app, "disable", "give control back, on the ground", "disable",
        [this] { return command("disable", backwash_msgs_msg_dds__COMMAND_DISABLE, Vec3::Zero(), {}); });
   verb(app, "release", "end this station's session", "release",
@@ -188,7 +188,15 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
     if (outcome.accepted && wait_) outcome.done = false;
     return say(outcome, json_);
   };
-  const auto answer = station.send(verb, position, yaw_.value_or(0), waypoints_);
+  const auto send = [&] { return station.send(verb, position, yaw_.value_or(0), waypoints_); };
+  auto answer = send();
+  // What the autopilot has not told yet is waited for too.
+  const auto given_up = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience_s_);
+  while (wait_ && answer && answer->reason.starts_with(kNotToldYet) && !interrupted() &&
+         std::chrono::steady_clock::now() < given_up) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    answer = send();
+  }
   if (interrupted()) return fail("interrupted");
   if (!answer) return fail(nobody());
   if (answer->result != backwash_msgs_msg_dds__ACK_ACCEPTED) return fail("refused: " + answer->reason);
@@ -256,31 +264,6 @@ int Verbs::goals() {
   Station station(options_, {"rt" + goal_topic_});
   goal_rules_.facing = heading_ == "goal";
   return serve_goals(station, "rt" + goal_topic_, goal_rules_, json_);
-}
-
-int Verbs::check() {
-  constexpr double kWatch = 2.0;  // s
-  Station station(options_);
-  const auto before = station.status(options_.timeout_s);
-  auto after = before;
-  const auto begun = std::chrono::steady_clock::now();
-  const auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
-  while (after && !interrupted() && since() < kWatch) after = station.status(1.0);
-  if (!after) {
-    std::cerr << "backwashctl check: " << nobody() << "\n";
-    return kUnavailable;
-  }
-  bool all = true;
-  nlohmann::json lines = nlohmann::json::array();
-  for (const Finding& f : preflight(*before, *after, since())) {
-    all = all && f.good;
-    lines.push_back({{"name", f.name}, {"good", f.good}, {"found", f.found}, {"advice", f.advice}});
-    if (!json_)
-      std::cout << (f.good ? "good  " : "FAIL  ") << f.name << ": " << f.found << (f.good ? "" : " -> " + f.advice)
-                << "\n";
-  }
-  if (json_) std::cout << text_of({{"good", all}, {"findings", lines}}, 2) << "\n";
-  return all ? 0 : kUnavailable;
 }
 
 int Verbs::watch() {

@@ -134,9 +134,12 @@ struct ControlView {
   double residual_m = 0, residual_rad = 0;
   Mismatch mismatch = Mismatch::none;  ///< of the frames: then enabling is refused
   firmware_bridge::SwitchState stop_switch = firmware_bridge::SwitchState::absent;
-  firmware_bridge::Autopilot autopilot = firmware_bridge::Autopilot::kUnknown;
-  firmware_bridge::ParameterValues parameters{};  ///< of parameter_names(autopilot)
-  double untold_delay = 0;                        ///< of the autopilot's line, s
+  const firmware_bridge::AutopilotProfile* autopilot = &firmware_bridge::kUnknownAutopilot;
+  std::optional<firmware_bridge::FirmwareVersion> version;  ///< of the autopilot's firmware
+  firmware_bridge::ParameterValues parameters{};            ///< of the autopilot's rules
+  std::optional<bool> estimator_follows, would_arm;         ///< as the autopilot says of itself, while it says it
+  double untold_delay = 0;                                  ///< of the autopilot's line, s
+  std::optional<double> round_trip;  ///< of a question on that line, the shorter of the last two, s
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
   firmware_bridge::Latest<firmware_bridge::Battery> battery;  ///< the autopilot's, while it says it

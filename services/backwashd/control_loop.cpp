@@ -15,7 +15,7 @@
 namespace backwash::daemon {
 namespace {
 
-constexpr float kGpsGlobalOrigin = 49;
+constexpr float kGpsGlobalOrigin = 49, kAutopilotVersion = 148;
 constexpr std::int64_t kEnableWish_ns = 3'000'000'000;  // in which the autopilot is asked what enabling needs
 constexpr std::uint8_t kNotice = 5, kWarning = 4;       // severities of STATUSTEXT
 
@@ -41,7 +41,11 @@ firmware_bridge::Signal signal_of(Mode mode) noexcept {
 ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& link, const Vehicle& vehicle,
                          double battery_land, const MapSettings& map, const OdometryTiming& timing,
                          const std::optional<adapt::InFlightConstants>& air)
-    : channels_(channels), link_(link), flight_(vehicle, battery_land, timing), lookout_(channels, vehicle, map) {
+    : channels_(channels),
+      link_(link),
+      flight_(vehicle, battery_land, timing),
+      lookout_(channels, vehicle, map),
+      line_allowed_(firmware_bridge::line_allowed(vehicle, link.untold_delay())) {
   link_.tap(&ControlLoop::on_frame, this);
   const auto constants = log::constants(vehicle, battery_land, timing);
   record(log::RecordKind::constants, now_ns(), &constants,
@@ -99,7 +103,7 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
     facts.landed = said->value == LandedState::kOnGround;
     facts.in_air = said->value == LandedState::kInAir;
   }
-  facts.lifts_itself = status && status->value.autopilot == firmware_bridge::Autopilot::kArduPilot;
+  facts.lifts_itself = status && status->value.autopilot->lifts_itself;
   const auto taken = telemetry.result_of(firmware_bridge::kCommandTakeoff);
   facts.takeoff_taken =
       takeoff_asked_ns_ && taken && taken->value.result == 0 && ns_of(taken->at) >= *takeoff_asked_ns_;
@@ -113,6 +117,16 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   if (const auto said = telemetry.reset_counter.at(now)) facts.reset_counter = said->value;
   if (const auto said = telemetry.battery.at(now)) facts.battery = said->value.remaining;
   return facts;
+}
+
+// The way back shows itself at once, in the stamps of poses: each of 0.3 s is older than both ways may take. A question
+// shows both, twice a second.
+bool ControlLoop::line_slow(const track::AutopilotFacts& autopilot, std::int64_t now_ns) noexcept {
+  constexpr int kSlowTicks = 15;
+  const double age = autopilot.pose_age(now_ns);
+  slow_ = age > line_allowed_ && age < track::Supervisor::kPoseSilent ? slow_ + 1 : 0;
+  const auto trip = link_.round_trip(time_of(now_ns));
+  return slow_ >= kSlowTicks || (trip && seconds(*trip) > line_allowed_);
 }
 
 track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
@@ -135,6 +149,7 @@ track::TickInput ControlLoop::gather(std::int64_t now_ns, int missed) noexcept {
     channels_.segments.give_back(std::exchange(in.segment, nullptr));
   }
   in.autopilot = autopilot(now_ns);
+  in.autopilot.line_slow = line_slow(in.autopilot, now_ns);
   in.surroundings = lookout_.look(flight_, now_ns);
   const auto said = link_.telemetry().position_sigma.at(time_of(now_ns));
   if (in.odometry && in.odometry->position_variance) vio_sigma_ = std::sqrt(in.odometry->position_variance->maxCoeff());
@@ -162,13 +177,16 @@ void ControlLoop::forward_odometry(std::uint8_t resets) noexcept {
 void ControlLoop::ask_for_messages(std::int64_t now_ns) noexcept {
   const firmware_bridge::Time now = time_of(now_ns);
   const auto& answer = link_.telemetry().result_of(firmware_bridge::kCommandInterval);
-  if (const auto wish = requests_.next(answer, now)) link_.send_message_interval(wish->id, wish->rate_hz);
+  const auto& telemetry = link_.telemetry();
+  auto stream = requests_.late(telemetry, now);
+  if (!stream) stream = requests_.next(telemetry.autopilot(), answer, now);
+  if (stream) link_.send_message_interval(stream->id, stream->rate_hz);
 }
 
-// ArduPilot arms with a home alone, and has none without GPS until it is told an origin. One that it has stays.
+// One that arms only with a home has none without GPS until it is told an origin. One that it has stays.
 void ControlLoop::give_origin(const track::AutopilotFacts& autopilot) noexcept {
   constexpr int kAsked = 2;  // times without an answer
-  if (!autopilot.lifts_itself || autopilot.armed || link_.telemetry().has_origin) {
+  if (!link_.telemetry().autopilot().needs_origin || autopilot.armed || link_.telemetry().has_origin) {
     origin_asked_ = 0;
     return;
   }
@@ -213,6 +231,8 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (view_.ticks % (kTicksPerSecond / 2) == 13) link_.send_timesync(time_of(in.now_ns));
   if (!silent) ask_for_messages(in.now_ns);
   if (view_.ticks % (2 * kTicksPerSecond) == 1) give_origin(in.autopilot);
+  if (view_.ticks % (2 * kTicksPerSecond) == 51 && !link_.telemetry().version)
+    link_.send_command(firmware_bridge::kCommandMessage, {kAutopilotVersion});
 }
 
 // Transitions, missed deadlines and page faults, each to the operator; the tick itself to the raw log.

@@ -41,6 +41,7 @@ class ControlLoop {
   void poll(std::int64_t now_ns) noexcept;
   track::TickInput gather(std::int64_t now_ns, int missed) noexcept;
   track::AutopilotFacts autopilot(std::int64_t now_ns) const noexcept;
+  bool line_slow(const track::AutopilotFacts& autopilot, std::int64_t now_ns) noexcept;
   void learn(const track::TickInput& in, const track::TickOutput& out) noexcept;
   void carry_out(adapt::AirOrder order, const track::TickInput& in) noexcept;
   void hand_over_air() noexcept;
@@ -69,6 +70,8 @@ class ControlLoop {
   track::Orders orders_;
   SwitchReaction switch_;
   PilotReaction pilot_;
+  const double line_allowed_;        ///< s
+  int slow_ = 0;                     ///< ticks in a row whose newest pose is older than that
   std::optional<double> vio_sigma_;  ///< as the newest odometry that says it, m
   std::int64_t now_ns_ = 0;
   ControlView view_;

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "core/plan/planner.hpp"
+#include "core/types/formatted.hpp"
+#include "firmware_bridge/line_budget.hpp"
 #include "services/backwashd/switch_reaction.hpp"
 #include "services/dds/topics.hpp"
 
@@ -189,9 +191,17 @@ Decision Mission::enable() {
   if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");
   if (view_.pose_age > track::Supervisor::kPoseSilent)
     return refused("no pose from the autopilot: its estimator does not follow the VIO yet, or its stream is off");
+  if (view_.estimator_follows == false)
+    return refused(
+        "the autopilot's estimator says that it takes its position from no sensor: it does not follow the VIO");
+  if (const double allowed = firmware_bridge::line_allowed(vehicle_, view_.untold_delay); view_.round_trip > allowed)
+    return refused(
+        formatted("the line to the autopilot takes %.3f s there and back, and the sets allow for %.3f s: "
+                  "latency and feedback_delay of the vehicle file",
+                  *view_.round_trip, allowed));
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
   const std::string forbids =
-      firmware_bridge::forbidding_parameter(view_.autopilot, view_.parameters, vehicle_, view_.untold_delay);
+      firmware_bridge::forbidding_parameter(*view_.autopilot, view_.parameters, vehicle_, view_.untold_delay);
   if (!forbids.empty()) return refused(forbids);
   return order(Request::enable, "enabling");
 }
@@ -217,7 +227,8 @@ Decision Mission::fly(std::deque<Goal> route) {
   if (!flies(view_.mode)) return refused("not enabled");
   if (!view_.landed) return refused(kGroundUnknown);
   if (*view_.landed) return refused("on the ground: take off first");
-  if (!view_.finished) return refused("flying: hold first");
+  if (!view_.finished)
+    return refused(view_.mode == Mode::hold ? "it is still coming to rest: ask again" : "flying: hold first");
   Decision decision = start(PlanJob::Kind::go_to, route.front());
   if (decision.job) {
     route_ = std::move(route);
@@ -226,9 +237,15 @@ Decision Mission::fly(std::deque<Goal> route) {
   return decision;
 }
 
+/// Whether the vehicle flies in the mode in which it follows set-points, and nobody sends any: of a daemon that died,
+/// or went quiet.
+bool Mission::abandoned() const {
+  return (view_.mode == Mode::passive || view_.mode == Mode::quiet) && view_.armed && view_.offboard;
+}
+
 /// Also where it was asked for before: the line may have lost that.
 Decision Mission::land() {
-  const bool ours = flies(view_.mode) || view_.mode == Mode::lifting || view_.mode == Mode::land;
+  const bool ours = flies(view_.mode) || view_.mode == Mode::lifting || view_.mode == Mode::land || abandoned();
   return ours ? order(Request::land, "landing") : refused("not enabled");
 }
 
@@ -246,9 +263,11 @@ Decision Mission::stop(const CommandMessage& command) {
   const bool pending = order_under_way();
   const bool standing = view_.landed.value_or(false) && !view_.armed;
   const Mode mode = view_.mode;
-  Decision decision = order(Request::stop, standing ? "disabling" : "stopping");
+  Decision decision = order(Request::stop, abandoned() ? "landing: nothing is verified to stop on"
+                                           : standing  ? "disabling"
+                                                       : "stopping");
   if (mode == Mode::land) decision.answer = {kRefused, "landing: the autopilot lands, and ends that by itself"};
-  if (idle && !pending) decision.answer = {kRefused, "not enabled"};
+  if (idle && !pending && !abandoned()) decision.answer = {kRefused, "not enabled"};
   if (decision.answer->result == kAccepted) accepted_ = {command.session, command.sequence};
   return decision;
 }
@@ -272,7 +291,7 @@ Decision Mission::start(PlanJob::Kind kind, const Goal& goal) {
     if (job_) return refused("still planning the last command");
     // A station may have set it since: the autopilot tells each change, unasked.
     const std::string changed =
-        firmware_bridge::forbidding_parameter(view_.autopilot, view_.parameters, vehicle_, view_.untold_delay, false);
+        firmware_bridge::forbidding_parameter(*view_.autopilot, view_.parameters, vehicle_, view_.untold_delay, false);
     if (!changed.empty()) return refused(changed);
     if (order_under_way()) return refused("the last order is still being carried out: ask again");
   }

@@ -82,6 +82,7 @@ class Mission {
   Decision fly(std::deque<Goal> route);
   Decision follow(const CommandMessage& command);
   Decision hold();
+  bool abandoned() const;
   Decision land();
   Decision stop(const CommandMessage& command);
   Decision ask_of_air(adapt::AirOrder order) const;

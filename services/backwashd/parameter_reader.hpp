@@ -9,7 +9,7 @@
 namespace backwash::daemon {
 
 /// Reads from the autopilot the parameters on which our promises rest: each in turn ten times a second until it is
-/// known or was asked for three times, then one a second, for a station may have changed it.
+/// known or was asked for in vain, then one a second, for a station may have changed it.
 class ParameterReader {
  public:
   /// Once a tick, after view.ticks: what the link knows into the view, and one question where `may_ask`. Without
@@ -18,7 +18,7 @@ class ParameterReader {
             ControlView& view) noexcept;
 
  private:
-  std::size_t next_ = 0, asked_ = 0;
+  std::size_t next_ = 0;  // rule
 };
 
 }  // namespace backwash::daemon

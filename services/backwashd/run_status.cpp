@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The status's thread: what the other threads have said, as one message ten times a second.
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <thread>
 #include <vector>
 
+#include "firmware_bridge/line_budget.hpp"
 #include "services/backwashd/dds_front.hpp"
 #include "services/backwashd/shown_diagnostics.hpp"
 #include "services/backwashd/shown_segment.hpp"
@@ -12,6 +15,7 @@
 #include "services/dds/air_text.hpp"
 #include "services/dds/packet_filter.hpp"
 #include "services/dds/strangers.hpp"
+#include "services/dds/topics.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -20,20 +24,6 @@ constexpr double kNotKnown = -1;  // s: an age or a delay that nothing was measu
 
 dds::Timing timing(const TimingHistogram& h) {
   return {static_cast<float>(h.quantile(0.5)), static_cast<float>(h.quantile(0.99)), static_cast<float>(h.max_us)};
-}
-
-constexpr std::string_view name(firmware_bridge::Autopilot autopilot) {
-  switch (autopilot) {
-    case firmware_bridge::Autopilot::kArduPilot:
-      return "ardupilot";
-    case firmware_bridge::Autopilot::kPx4:
-      return "px4";
-    case firmware_bridge::Autopilot::kPlain:
-      return "plain";
-    case firmware_bridge::Autopilot::kUnknown:
-      break;
-  }
-  return "unknown";
 }
 
 /// A view of what the vector owns.
@@ -52,9 +42,29 @@ std::string to_string(const AirView& air) {
   return to_text(said);
 }
 
+/// What speaks against a flight beside parameters and poses.
+std::vector<std::pair<const char*, std::string>> doubts_of(const ControlView& view, const Vehicle& vehicle) {
+  std::vector<std::pair<const char*, std::string>> doubts;
+  const double allowed = firmware_bridge::line_allowed(vehicle, view.untold_delay);
+  if (view.round_trip > allowed)
+    doubts.emplace_back("line",
+                        fmt::format("{:.3f} s there and back, the sets allow for {:.3f} s: a faster line, or larger "
+                                    "controller.latency and feedback_delay in the vehicle file",
+                                    *view.round_trip, allowed));
+  if (view.estimator_follows == false)
+    doubts.emplace_back("estimator", "it takes its position from no sensor: it does not follow the VIO");
+  if (view.offboard && !view.armed && view.would_arm == false)  // by its checks for this mode
+    doubts.emplace_back(dds::kArming,
+                        "the autopilot would refuse it" +
+                            (view.warning ? ": " + printable(view.warning->value.text.data()) : std::string()));
+  return doubts;
+}
+
 /// Owns what a message only points to, until it is sent.
 struct StatusStrings {
-  std::string state, reason, mismatch, stop_switch, autopilot, warning, air;
+  std::string state, reason, mismatch, stop_switch, autopilot, version, warning, air;
+  std::string asking;
+  std::vector<std::pair<const char*, std::string>> doubts;
   std::vector<firmware_bridge::ParameterFinding> findings;
   std::vector<dds::Parameter> parameters;
   std::vector<dds::Advice> advice;
@@ -62,21 +72,35 @@ struct StatusStrings {
 
 StatusStrings strings_of(const ControlView& view, const Vehicle& vehicle) {
   constexpr auto kWarningShown = std::chrono::seconds(10);
-  StatusStrings text{to_string(view.mode),
-                     to_string(view.reason),
-                     to_string(view.mismatch),
-                     std::string(name(view.stop_switch)),
-                     std::string(name(view.autopilot)),
-                     {},
-                     view.air ? to_string(*view.air) : "",
-                     {},
-                     {},
-                     {}};
-  text.findings = firmware_bridge::judge_parameters(view.autopilot, view.parameters, vehicle, view.untold_delay);
+  StatusStrings text{
+      to_string(view.mode),
+      to_string(view.reason),
+      to_string(view.mismatch),
+      std::string(name(view.stop_switch)),
+      std::string(view.autopilot->name),
+      view.version ? fmt::format("{}.{}.{}", view.version->major, view.version->minor, view.version->patch) : "",
+      {},
+      view.air ? to_string(*view.air) : "",
+      {},
+      {},
+      {},
+      {},
+      {}};
+  text.doubts = doubts_of(view, vehicle);
+  text.findings = firmware_bridge::judge_parameters(*view.autopilot, view.parameters, vehicle, view.untold_delay);
+  for (const auto& [what, doubt] : text.doubts)
+    text.advice.push_back({const_cast<char*>(what), dds::c_string(doubt)});  // a literal
+  std::size_t asking = 0;
   for (const auto& finding : text.findings) {
+    asking += finding.asking;
+    if (finding.asking) continue;
     char* const name = const_cast<char*>(finding.name.data());  // a literal, which ends
     if (finding.value) text.parameters.push_back({name, *finding.value});
     if (!finding.good) text.advice.push_back({name, dds::c_string(finding.advice)});
+  }
+  if (asking > 0) {
+    text.asking = fmt::format("asking: {} of {} are known", text.findings.size() - asking, text.findings.size());
+    text.advice.push_back({const_cast<char*>(dds::kAsking), dds::c_string(text.asking)});
   }
   if (view.warning && firmware_bridge::Time::clock::now() - view.warning->at < kWarningShown)
     text.warning = printable(view.warning->value.text.data());
@@ -118,6 +142,7 @@ void set_view(dds::Status& s, const ControlView& view, StatusStrings& text) {
   s.autopilot = dds::c_string(text.autopilot);
   s.autopilot_says = dds::c_string(text.warning);
   s.air = dds::c_string(text.air);
+  s.autopilot_version = dds::c_string(text.version);
   s.parameters = sequence<decltype(s.parameters)>(text.parameters);
   s.advice = sequence<decltype(s.advice)>(text.advice);
 }

@@ -10,8 +10,8 @@ namespace backwash::bench {
 namespace {
 
 // clang-format off
-const Profile kProfile{
-    .autopilot = 3,                          // MAV_AUTOPILOT_ARDUPILOTMEGA
+const Behaviour kBehaviour{
+    .autopilot = firmware_bridge::kArduPilot,
     .parameters = {                          // ardupilot-flight.csv:30–112; angles and RTL_ALT: source
         {"GUID_TIMEOUT", 3}, {"VISO_TYPE", 1}, {"EK3_SRC1_POSXY", 6}, {"EK3_SRC1_VELXY", 6}, {"EK3_SRC1_POSZ", 6},
         {"EK3_SRC1_VELZ", 6}, {"EK3_SRC1_YAW", 6}, {"PSC_POSXY_P", 1}, {"PSC_VELXY_P", 2}, {"PSC_VELXY_I", 1},
@@ -28,7 +28,6 @@ const Profile kProfile{
                  {"EK3_SRC1_YAW", 2}, {"FS_GCS_ENABLE", 2}, {"FS_THR_ENABLE", 2}, {"FS_EKF_ACTION", 2},
                  {"FS_OPTIONS", 6}, {"DISARM_DELAY", 2}, {"ANGLE_MAX", 4}, {"RTL_ALT", 6},
                  {"BATT_LOW_TIMER", 2}, {"BATT_FS_LOW_ACT", 2}, {"BATT_FS_CRT_ACT", 2}, {"VISO_DELAY_MS", 4}, {"SIM_RC_FAIL", 2}},
-    .integers_by_value = true,               // ardupilot-flight.csv:35,101,104
     .parameter_period = 0.1,                 // ardupilot-flight.csv:30–88
     .intervals_ms = {},                      // HEARTBEAT alone until asked: ardupilot-flight.csv:1–33
     .drift = 0.005, .drift_rate = 0.0038, .drift_speed = 10,  // ardupilot-vio.csv:214–271: 0.04, 0.15, 0.49 m at 3, 5, 8 s
@@ -60,7 +59,7 @@ constexpr std::uint8_t kCritical = 2, kWarning = 4, kInfo = 6;  // severities
 
 class ArduCopter : public Firmware {
  public:
-  explicit ArduCopter(const Site& site) : Firmware(kProfile, site) {}
+  explicit ArduCopter(const Site& site) : Firmware(kBehaviour, site) {}
   const char* mode() const noexcept override { return mode_ == guided ? "guided" : mode_ == land ? "land" : "pilot"; }
 
  private:
@@ -211,11 +210,11 @@ class ArduCopter : public Firmware {
     other_failsafes(t);
     if (!armed_) return;
     const double still = on_ground_for(t);
-    if (!land_complete_ && mode_ == land && still > kProfile.landed_after) {
+    if (!land_complete_ && mode_ == land && still > kBehaviour.landed_after) {
       land_complete_ = true;
       landed_state_ = on_ground;
     }
-    const bool landed_by_itself = mode_ == land && still > kProfile.landed_after + kProfile.disarms_after;
+    const bool landed_by_itself = mode_ == land && still > kBehaviour.landed_after + kBehaviour.disarms_after;
     const bool idle = !take_off_ && t - armed_at_ > parameter("DISARM_DELAY");
     if (land_complete_ && (landed_by_itself || (idle && still > parameter("DISARM_DELAY")))) {
       disarm();
@@ -248,7 +247,7 @@ class ArduCopter : public Firmware {
     const bool by_position = mode_ == guided || mode_ == loiter || mode_ == rtl || mode_ == brake;
     return {.custom_mode = mode_,
             .type = 2,
-            .autopilot = kProfile.autopilot,
+            .autopilot = kBehaviour.autopilot.number,
             .base_mode = static_cast<std::uint8_t>(81 | (by_position ? 8 : 0) | (armed_ ? 128 : 0)),
             .system_status = static_cast<std::uint8_t>((lost_ && armed_) || failed() ? 5
                                                        : armed_ && !land_complete_   ? 4

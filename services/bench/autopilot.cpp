@@ -12,7 +12,7 @@ namespace backwash::bench {
 namespace {
 
 // Values of common.xml and of PX4's custom modes.
-constexpr std::uint8_t kQuadrotor = 2, kPx4 = 12, kArmedFlag = 128, kCustomFlag = 1, kActive = 4, kStandby = 3;
+constexpr std::uint8_t kQuadrotor = 2, kArmedFlag = 128, kCustomFlag = 1, kActive = 4, kStandby = 3;
 constexpr std::uint32_t kManual = 1u << 16, kOffboard = 6u << 16, kAutoLand = 4u << 16 | 6u << 24;
 constexpr std::uint16_t kSetMode = 176, kArm = 400, kLand = 21, kMessageInterval = 511;
 constexpr std::uint8_t kAccepted = 0, kTemporarilyRejected = 1, kUnsupported = 3;
@@ -24,17 +24,15 @@ Eigen::Matrix3d yaw_matrix(double yaw) { return Eigen::AngleAxisd(yaw, Vec3::Uni
 
 }  // namespace
 
-std::map<std::string, double> gain_parameters(firmware_bridge::Autopilot autopilot, const Vehicle& vehicle) {
-  const auto& [kp, kd] = std::pair(vehicle.controller.kp, vehicle.controller.kd);
-  if (autopilot == firmware_bridge::Autopilot::kPx4)
-    return {{"MPC_XY_P", kp.horizontal / kd.horizontal},
-            {"MPC_XY_VEL_P_ACC", kd.horizontal},
-            {"MPC_Z_P", kp.vertical / kd.vertical},
-            {"MPC_Z_VEL_P_ACC", kd.vertical}};
-  return {{"PSC_POSXY_P", kp.horizontal / kd.horizontal},
-          {"PSC_VELXY_P", kd.horizontal},
-          {"PSC_POSZ_P", kp.vertical / kd.vertical},
-          {"PSC_VELZ_P", kd.vertical}};
+void take_gains(const firmware_bridge::AutopilotProfile& autopilot, const Vehicle& vehicle,
+                std::map<std::string, double>& parameters) {
+  using firmware_bridge::Ask;
+  for (const auto& rule : autopilot.rules) {
+    if (rule.ask < Ask::k_d_horizontal || rule.ask > Ask::k_p_vertical) continue;
+    for (const auto& [name, scale] : rule.names)
+      if (const auto own = parameters.find(std::string(name)); own != parameters.end())
+        own->second = scale * firmware_bridge::wanted(rule, vehicle);
+  }
 }
 
 Autopilot::Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, const Vec3& ground_W,
@@ -45,7 +43,7 @@ Autopilot::Autopilot(const map::OccupancyGrid& grid, const Vehicle& vehicle, con
       system_(system) {
   vehicle_.set_motors(false);
   target_.p_W = ground_W;
-  parameters.merge(gain_parameters(firmware_bridge::Autopilot::kPx4, vehicle));
+  take_gains(firmware_bridge::kPx4, vehicle, parameters);
 }
 
 bool Autopilot::log_wire(const std::string& path) {
@@ -206,7 +204,7 @@ void Autopilot::telemetry(double, std::vector<std::uint8_t>& out) {
     const std::uint32_t custom = mode_ == Mode::offboard ? kOffboard : mode_ == Mode::land ? kAutoLand : kManual;
     send(mavlink::Heartbeat{.custom_mode = custom,
                             .type = kQuadrotor,
-                            .autopilot = kPx4,
+                            .autopilot = firmware_bridge::kPx4.number,
                             .base_mode = static_cast<std::uint8_t>(kCustomFlag | (armed_ ? kArmedFlag : 0)),
                             .system_status = armed_ ? kActive : kStandby,
                             .mavlink_version = 3},

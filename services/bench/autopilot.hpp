@@ -15,7 +15,7 @@
 #include "core/sim/quadrotor.hpp"
 #include "firmware_bridge/mavlink/frame.hpp"
 #include "firmware_bridge/mavlink/messages.hpp"
-#include "firmware_bridge/telemetry.hpp"
+#include "firmware_bridge/parameters.hpp"
 
 namespace backwash::bench {
 
@@ -25,8 +25,9 @@ struct LocalFrame {
   Vec3 origin = Vec3::Zero();  ///< m
 };
 
-/// The parameters that give a firmware the vehicle file's gains: k_p = P_pos·P_vel, k_d = P_vel.
-std::map<std::string, double> gain_parameters(firmware_bridge::Autopilot autopilot, const Vehicle& vehicle);
+/// The gains of `parameters`, by whichever of the autopilot's names they have, become the vehicle file's.
+void take_gains(const firmware_bridge::AutopilotProfile& autopilot, const Vehicle& vehicle,
+                std::map<std::string, double>& parameters);
 
 /// An emulated PX4-like flight controller: MAVLink on one side, the simulated vehicle in the airflow truth on the
 /// other. It flies on the odometry it is sent (its own inertial sensors bridge the time since the sample's stamp),
@@ -69,7 +70,8 @@ class Autopilot {
                                            {"NAV_DLL_ACT", 3},      {"NAV_RCL_ACT", 3},      {"EKF2_EV_DELAY", 0},
                                            {"COM_LOW_BAT_ACT", 2},  {"EKF2_EV_CTRL", 15},    {"EKF2_HGT_REF", 3},
                                            {"MPC_XY_VEL_MAX", 12},  {"MPC_Z_VEL_MAX_UP", 3}, {"MPC_Z_VEL_MAX_DN", 3},
-                                           {"MPC_TILTMAX_AIR", 45}};
+                                           {"MPC_TILTMAX_AIR", 45}, {"MPC_XY_P", 0},         {"MPC_XY_VEL_P_ACC", 0},
+                                           {"MPC_Z_P", 0},          {"MPC_Z_VEL_P_ACC", 0}};
   /// Remaining share that BATTERY_STATUS says, once a second; not set: that of a battery which flying drains
   /// (charge()).
   std::optional<double> battery;

@@ -65,10 +65,8 @@ std::unique_ptr<Autopilot> make_autopilot(const Options& o, const map::Occupancy
   if (o.autopilot == Options::Profile::ardupilot) autopilot = make_arducopter(site);
   if (o.autopilot == Options::Profile::px4) autopilot = make_px4(site);
   if (!autopilot) autopilot = std::make_unique<Autopilot>(grid, vehicle, ground, o.frame, o.seed, std::uint8_t{1});
-  const bool px4 = o.autopilot != Options::Profile::ardupilot;
-  for (const auto& [name, value] :
-       gain_parameters(px4 ? firmware_bridge::Autopilot::kPx4 : firmware_bridge::Autopilot::kArduPilot, vehicle))
-    autopilot->parameters[name] = value;
+  take_gains(o.autopilot == Options::Profile::ardupilot ? firmware_bridge::kArduPilot : firmware_bridge::kPx4, vehicle,
+             autopilot->parameters);
   for (const auto& [name, value] : o.parameters) autopilot->parameters[name] = value;
   return autopilot;
 }

@@ -24,13 +24,13 @@ Vehicle without_controller(Vehicle v) {
 
 }  // namespace
 
-Firmware::Firmware(const Profile& profile, const Site& site)
+Firmware::Firmware(const Behaviour& behaviour, const Site& site)
     : Autopilot(site.grid, without_controller(site.vehicle), site.ground_W, site.frame, site.seed, site.system,
                 site.airflow),
       uptime_(site.uptime),
-      profile_(profile),
+      behaviour_(behaviour),
       drag_(site.drag) {
-  parameters = profile.parameters;
+  parameters = behaviour.parameters;
   follows_yaw = true;
 }
 
@@ -48,25 +48,26 @@ void Firmware::on(const mavlink::Odometry& m, double t) {
 void Firmware::estimate(double t) {
   const double unfed = since(odometry_at_, t);
   if (unfed < kFed) {
-    const double share = 1 - std::exp(-kStep / profile_.fusion);
+    const double share = 1 - std::exp(-kStep / behaviour_.fusion);
     error_.p_W += share * (measured_.p_W - error_.p_W);
     error_.v_W += share * (measured_.v_W - error_.v_W);
     drift_ = 0;
   } else if (local_position_) {
-    const double more = std::min((profile_.drift + profile_.drift_rate * unfed) * kStep, profile_.drift_speed - drift_);
+    const double more =
+        std::min((behaviour_.drift + behaviour_.drift_rate * unfed) * kStep, behaviour_.drift_speed - drift_);
     drift_ += more;
-    error_.v_W += more * (yaw_matrix(-frame_.yaw) * profile_.drift_way);
+    error_.v_W += more * (yaw_matrix(-frame_.yaw) * behaviour_.drift_way);
     error_.p_W += kStep * error_.v_W;
   }
-  lost_ = lost_ ? unfed > kContinuous || since(odometry_since_, t) < profile_.estimator_found
-                : local_position_ && unfed > profile_.estimator_lost;
+  lost_ = lost_ ? unfed > kContinuous || since(odometry_since_, t) < behaviour_.estimator_found
+                : local_position_ && unfed > behaviour_.estimator_lost;
 }
 
 // Answers leave one by one, at multiples of the period. A name that it does not know is not answered at all.
 void Firmware::on(const mavlink::ParamRequestRead& m, double t) {
   const std::string name(m.param_id.begin(), std::ranges::find(m.param_id, char{0}));
   if (!parameters.contains(name)) return;
-  const double period = profile_.parameter_period;
+  const double period = behaviour_.parameter_period;
   const double next = std::ceil(t / period) * period;
   asked_.push_back({asked_.empty() ? next : std::max(next, asked_.back().due + period), name});
 }
@@ -75,7 +76,7 @@ void Firmware::on(const mavlink::ParamSet& m, double t) {
   const std::string name(m.param_id.begin(), std::ranges::find(m.param_id, char{0}));
   const auto found = parameters.find(name);
   if (found == parameters.end()) return;
-  const bool bytes = profile_.integers.contains(name) && !profile_.integers_by_value;
+  const bool bytes = behaviour_.integers.contains(name) && behaviour_.autopilot.integers_bytewise;
   found->second = bytes ? std::bit_cast<std::int32_t>(m.param_value) : static_cast<double>(m.param_value);
   on(mavlink::ParamRequestRead{-1, 0, 0, m.param_id}, t);
 }
@@ -129,9 +130,9 @@ void Firmware::fly(double t) {
 
 std::uint8_t Firmware::set_interval(std::uint32_t id, double us) {
   if (us > 0)
-    profile_.intervals_ms[id] = std::max(1, static_cast<int>(us * 1e-3));
+    behaviour_.intervals_ms[id] = std::max(1, static_cast<int>(us * 1e-3));
   else
-    profile_.intervals_ms.erase(id);
+    behaviour_.intervals_ms.erase(id);
   return 0;
 }
 
@@ -142,20 +143,21 @@ void Firmware::telemetry(double t, std::vector<std::uint8_t>& out) {
   acks_.clear(), texts_.clear(), syncs_.clear();
   for (; !asked_.empty() && asked_.front().due <= t; asked_.pop_front()) {
     const std::string& name = asked_.front().name;
-    const auto type = profile_.integers.find(name);
-    const bool integer = type != profile_.integers.end();
+    const auto type = behaviour_.integers.find(name);
+    const bool integer = type != behaviour_.integers.end();
     const double value = parameters.at(name);
     mavlink::ParamValue m{.param_count = 1, .param_type = integer ? type->second : kReal32};
-    m.param_value = integer && !profile_.integers_by_value ? std::bit_cast<float>(static_cast<std::int32_t>(value))
-                                                           : static_cast<float>(value);
+    m.param_value = integer && behaviour_.autopilot.integers_bytewise
+                        ? std::bit_cast<float>(static_cast<std::int32_t>(value))
+                        : static_cast<float>(value);
     std::copy_n(name.begin(), std::min(name.size(), m.param_id.size()), m.param_id.begin());
     send(m, out);
   }
   if (mute) return out.clear();
-  const bool asked = profile_.intervals_ms.contains(mavlink::Heartbeat::kId);
+  const bool asked = behaviour_.intervals_ms.contains(mavlink::Heartbeat::kId);
   if ((!asked && steps_ % 1000 == 0) || heartbeat_due_) send(heartbeat(), out);
   heartbeat_due_ = false;
-  for (const auto& [id, every] : profile_.intervals_ms) {
+  for (const auto& [id, every] : behaviour_.intervals_ms) {
     if (steps_ % every != 0) continue;
     if (id == mavlink::Heartbeat::kId) send(heartbeat(), out);
     if (id == mavlink::AttitudeQuaternion::kId && !silent_attitude) send_attitude(out);

@@ -11,12 +11,11 @@ namespace backwash::bench {
 
 /// What was measured of a real firmware and does not depend on what it is doing. The figures with their sources are in
 /// arducopter.cpp and px4.cpp.
-struct Profile {
-  std::uint8_t autopilot = 0;  ///< MAV_AUTOPILOT
+struct Behaviour {
+  const firmware_bridge::AutopilotProfile& autopilot;
   std::map<std::string, double> parameters;
   std::map<std::string, std::uint8_t>
       integers;                               ///< of these parameters, with their MAV_PARAM_TYPE; the others are floats
-  bool integers_by_value = false;             ///< in PARAM_VALUE; otherwise by their bytes
   double parameter_period = 0;                ///< s: answers leave at multiples of this
   std::map<std::uint32_t, int> intervals_ms;  ///< of messages that are sent unasked
   // Without ODOMETRY the estimate runs away: acceleration `drift + drift_rate·t` up to `drift_speed`, along drift_way.
@@ -46,7 +45,7 @@ struct Site {
 /// take-off and the failsafes. Its vehicle has the mass, thrust and attitude lag of the vehicle file, not its gains.
 class Firmware : public Autopilot {
  public:
-  Firmware(const Profile& profile, const Site& site);
+  Firmware(const Behaviour& behaviour, const Site& site);
 
  protected:
   enum LandedState : std::uint8_t { on_ground = 1, in_air = 2, taking_off = 3, landing = 4 };
@@ -99,7 +98,7 @@ class Firmware : public Autopilot {
 
   /// Its clock, which stamps its poses too.
   std::int64_t since_boot_ns() const noexcept { return steps_ * 1'000'000; }
-  Profile profile_;
+  Behaviour behaviour_;
   double drag_;
   struct Pending {
     double due;

@@ -10,8 +10,8 @@ namespace backwash::bench {
 namespace {
 
 // clang-format off
-const Profile kProfile{
-    .autopilot = 12,                         // MAV_AUTOPILOT_PX4
+const Behaviour kBehaviour{
+    .autopilot = firmware_bridge::kPx4,
     .parameters = {                          // px4-flight.csv:13–77; default COM_OBL_RC_ACT is 0; MPC_TILTMAX_AIR: source
         {"COM_OF_LOSS_T", 1}, {"COM_OBL_RC_ACT", 0}, {"COM_RC_IN_MODE", 4}, {"COM_RCL_EXCEPT", 4}, {"NAV_RCL_ACT", 0},
         {"NAV_DLL_ACT", 0}, {"COM_SPOOLUP_TIME", 1}, {"COM_DISARM_PRFLT", 10}, {"COM_DISARM_LAND", 2},
@@ -26,7 +26,6 @@ const Profile kProfile{
     .integers = {{"COM_OBL_RC_ACT", 6}, {"COM_RC_IN_MODE", 6}, {"COM_RCL_EXCEPT", 6}, {"NAV_RCL_ACT", 6},
                  {"NAV_DLL_ACT", 6}, {"COM_RC_OVERRIDE", 6}, {"COM_LOW_BAT_ACT", 6}, {"EKF2_EV_CTRL", 6},
                  {"EKF2_GPS_CTRL", 6}, {"EKF2_HGT_REF", 6}, {"EKF2_MAG_TYPE", 6}, {"EKF2_NOAID_TOUT", 6}, {"CBRK_SUPPLY_CHK", 6}},
-    .integers_by_value = false,              // px4-flight.csv:16–24
     .parameter_period = 0.001,               // px4-flight.csv:13–75
     .intervals_ms = {{mavlink::AttitudeQuaternion::kId, 20}, {mavlink::LocalPositionNed::kId, 33},
                      {mavlink::ExtendedSysState::kId, 200}, {mavlink::BatteryStatus::kId, 2000},
@@ -67,7 +66,7 @@ constexpr std::uint8_t kAccepted = 0, kTemporarilyRejected = 1, kUnsupported = 3
 
 class Px4 : public Firmware {
  public:
-  explicit Px4(const Site& site) : Firmware(kProfile, site) {}
+  explicit Px4(const Site& site) : Firmware(kBehaviour, site) {}
   const char* mode() const noexcept override {
     return mode_ == offboard ? "offboard" : mode_ == land ? "land" : "pilot";
   }
@@ -222,13 +221,13 @@ class Px4 : public Firmware {
   /// Landed, and after a while disarmed.
   void settle(double t) {
     if (!armed_) return;
-    if (phase_ == Phase::flight && on_ground_for(t) > (mode_ == position ? kSinkLanded : kProfile.landed_after)) {
+    if (phase_ == Phase::flight && on_ground_for(t) > (mode_ == position ? kSinkLanded : kBehaviour.landed_after)) {
       phase_ = Phase::ready;
       landed_state_ = on_ground;
       landed_at_ = t;
     }
     const bool landed_long =
-        phase_ == Phase::ready && landed_at_ > armed_at_ && since(landed_at_, t) > kProfile.disarms_after;
+        phase_ == Phase::ready && landed_at_ > armed_at_ && since(landed_at_, t) > kBehaviour.disarms_after;
     const bool idle = phase_ == Phase::ready && (!landed_at_ || *landed_at_ < armed_at_) &&
                       t - armed_at_ > parameter("COM_DISARM_PRFLT") + parameter("COM_SPOOLUP_TIME");  // -refused
     if (!landed_long && !idle) return;
@@ -245,7 +244,7 @@ class Px4 : public Firmware {
     const int base = mode_ == offboard ? (last_setpoint_ ? 17 : 1) : mode_ == position ? 81 : 29;
     return {.custom_mode = mode_,
             .type = 2,
-            .autopilot = kProfile.autopilot,
+            .autopilot = kBehaviour.autopilot.number,
             .base_mode = static_cast<std::uint8_t>(base | (armed_ ? 128 : 0)),
             .system_status = static_cast<std::uint8_t>(!armed_     ? (ready ? 3 : 0)
                                                        : failsafe_ ? 5

@@ -39,6 +39,9 @@ using MapReceipt = backwash_msgs_msg_dds__MapReceipt_;
 using Tube = backwash_msgs_msg_dds__ReachTube_;
 using TubeStep = backwash_msgs_msg_dds__ReachStep_;
 
+/// Names of a status's advice that are no parameters: some that are not known yet; arming would be refused.
+inline constexpr const char *kAsking = "parameters", *kArming = "arming";
+
 /// Topic `name` of the vehicle with this name space, as ROS 2 spells it on the wire: rt/NAMESPACE/NAME.
 inline std::string topic(const std::string& name_space, const std::string& name) {
   return "rt/" + name_space + "/" + name;

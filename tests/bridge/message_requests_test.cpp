@@ -19,7 +19,7 @@ class MessageRequestsTest : public testing::Test {
   static constexpr std::uint16_t kInterval = 511;
   void run(std::chrono::milliseconds time) {
     for (const auto end = now_ + time; now_ < end; now_ += 20ms) {
-      const auto wish = requests_.next(answer_, now_);
+      const auto wish = requests_.next(kUnknownAutopilot, answer_, now_);
       if (!wish) continue;
       ++asked_[wish->id];
       if (!answers_) continue;
@@ -37,7 +37,7 @@ class MessageRequestsTest : public testing::Test {
 
 TEST_F(MessageRequestsTest, EachIsAskedForAtOnceAndAgainEveryTwoSeconds) {
   run(200ms);
-  ASSERT_EQ(asked_.size(), MessageRequests::kWishes.size());
+  ASSERT_EQ(asked_.size(), std::size(kUsualStreams));
   run(19'500ms);
   for (const auto& [id, times] : asked_) EXPECT_EQ(times, 10) << id;
 }
@@ -46,7 +46,7 @@ TEST_F(MessageRequestsTest, LaterRoundsDoNotHoldUpASlowLine) {
   run(2s);
   for (int n = 0; n < 50; ++n) {
     asked_.clear();
-    run(300ms);
+    run(200ms);
     int asked = 0;
     for (const auto& [id, times] : asked_) asked += times;
     EXPECT_LE(asked, 1) << n;
@@ -69,12 +69,12 @@ TEST_F(MessageRequestsTest, WhatIsDeniedIsNotAskedForAgainUntilTheAutopilotIsAno
 }
 
 TEST_F(MessageRequestsTest, ADenialIsOfTheMessageThatWasAskedForAndOfNoOther) {
-  for (const auto& denied : MessageRequests::kWishes) {
+  for (const auto& denied : kUsualStreams) {
     asked_.clear();
     results_ = {{denied.id, kDenied}};
     requests_.forget();
     run(10s);
-    for (const auto& wish : MessageRequests::kWishes) EXPECT_EQ(asked_[wish.id] == 1, wish.id == denied.id) << wish.id;
+    for (const auto& wish : kUsualStreams) EXPECT_EQ(asked_[wish.id] == 1, wish.id == denied.id) << wish.id;
   }
 }
 
@@ -87,11 +87,40 @@ TEST_F(MessageRequestsTest, WhatIsPutOffIsAskedForAgain) {
 TEST_F(MessageRequestsTest, SilenceDelaysTheOthersAndDeniesNothing) {
   answers_ = false;
   run(20s);
-  for (const auto& wish : MessageRequests::kWishes) EXPECT_GE(asked_[wish.id], 8) << wish.id;
+  for (const auto& wish : kUsualStreams) EXPECT_GE(asked_[wish.id], 8) << wish.id;
+}
+
+// A station on the same line has asked for less: before its turn, at once, and again while that lasts.
+TEST_F(MessageRequestsTest, APoseThatIsLateIsAskedForBeforeItsTurn) {
+  Telemetry t;
+  const auto say = [&](std::uint32_t ms) {
+    t.take(mavlink::LocalPositionNed{.time_boot_ms = ms}, now_);
+    t.take(mavlink::AttitudeQuaternion{.time_boot_ms = ms, .q1 = 1}, now_);
+  };
+  EXPECT_FALSE(requests_.late(t, now_)) << "none came yet: it is asked for in its turn";
+  say(0);
+  for (std::uint32_t n = 1; n < 20; ++n) {
+    now_ += 20ms;
+    say(20 * n);
+    EXPECT_FALSE(requests_.late(t, now_));
+  }
+  const auto begin = now_;
+  std::vector<int> asked_ms;
+  for (; now_ < begin + 600ms; now_ += 20ms)
+    if (const auto stream = requests_.late(t, now_)) {
+      EXPECT_EQ(stream->id, kPositionStream.id);
+      asked_ms.push_back(static_cast<int>((now_ - begin) / 1ms));
+    }
+  EXPECT_EQ(asked_ms, (std::vector<int>{120, 320, 520}));
+  now_ += 150ms;
+  t.take(mavlink::LocalPositionNed{.time_boot_ms = 5000}, now_);
+  const auto other = requests_.late(t, now_);
+  ASSERT_TRUE(other) << "the position is back";
+  EXPECT_EQ(other->id, kAttitudeStream.id);
 }
 
 TEST_F(MessageRequestsTest, AnAutopilotThatDeniesEverythingIsLeftInPeace) {
-  for (const auto& wish : MessageRequests::kWishes) results_[wish.id] = kDenied;
+  for (const auto& wish : kUsualStreams) results_[wish.id] = kDenied;
   run(60s);
   for (const auto& [id, times] : asked_) EXPECT_EQ(times, 1) << id;
 }

@@ -32,13 +32,13 @@ TEST_F(MissionRefusals, NothingIsEnabledWhereSomethingIsMissingAndTheReasonIsTol
   const struct {
     std::function<void()> fault;
     const char* why;
-  } faults[] = {{[&] { view_.mismatch = Mismatch::yaw; }, "map and autopilot disagree"},
-                {[&] { view_.odometry_age = 0.2; }, "no odometry"},
-                {[&] { view_.heartbeat_age = 2; }, "no heartbeat"},
-                {[&] { view_.pose_age = 0.32; }, "no pose from the autopilot"},
-                {[&] { view_.autopilot = firmware_bridge::Autopilot::kArduPilot; },
-                 "no value of GUID_TIMEOUT from the autopilot yet"},
-                {[&] { view_.state.p_W.x() = 99; }, "outside the map"}};
+  } faults[] = {
+      {[&] { view_.mismatch = Mismatch::yaw; }, "map and autopilot disagree"},
+      {[&] { view_.odometry_age = 0.2; }, "no odometry"},
+      {[&] { view_.heartbeat_age = 2; }, "no heartbeat"},
+      {[&] { view_.pose_age = 0.32; }, "no pose from the autopilot"},
+      {[&] { view_.autopilot = &firmware_bridge::kArduPilot; }, "no value of GUID_TIMEOUT from the autopilot yet"},
+      {[&] { view_.state.p_W.x() = 99; }, "outside the map"}};
   for (const auto& [fault, why] : faults) {
     view_ = whole;
     fault();
@@ -101,11 +101,11 @@ TEST_F(MissionRefusals, NothingIsEnabledWhileTheOdometryIsDoubted) {
 
 // A station changed it after `enable`, and the autopilot has told so. What stops or lands is never refused for it.
 TEST_F(MissionRefusals, NoFlightBeginsOnAParameterThatHasBecomeUnsafe) {
-  view_.autopilot = firmware_bridge::Autopilot::kArduPilot;
+  view_.autopilot = &firmware_bridge::kArduPilot;
   look();
   EXPECT_EQ(result(give(gcs_.next(kGoto))), kAccepted) << "what is not known was judged by enable";
   EXPECT_EQ(result(give(gcs_.next(kStop))), kAccepted);
-  view_.parameters[0] = 3;  // GUID_TIMEOUT
+  view_.parameters[0].value = 3;  // GUID_TIMEOUT
   look();
   expect_nothing(give(gcs_.next(kGoto)), kRefused, "GUID_TIMEOUT is 3");
   expect_nothing(give(route(2)), kRefused, "GUID_TIMEOUT is 3");
@@ -115,7 +115,7 @@ TEST_F(MissionRefusals, NoFlightBeginsOnAParameterThatHasBecomeUnsafe) {
   view_.landed = true;
   look();
   expect_nothing(give(gcs_.next(kTakeoff)), kRefused, "GUID_TIMEOUT is 3");
-  view_.parameters[0] = 0.3;
+  view_.parameters[0].value = 0.3;
   look();
   EXPECT_TRUE(give(gcs_.next(kTakeoff)).job);
 }

@@ -182,13 +182,30 @@ TEST_F(MissionTest, ATakeoffThatIsFlownIsNotBegunAgain) {
   EXPECT_FALSE(again.job);
 }
 
+// After a restart in the air, or out of QUIET, with the autopilot still in our mode: nobody else has it in hand.
+TEST_F(MissionTest, NeitherLandNorStopIsRefusedToAnArmedVehicleInOurMode) {
+  for (const Mode mode : {Mode::passive, Mode::quiet}) {
+    for (const std::uint8_t verb : {kLand, kStop}) {
+      view_.mode = mode;
+      look();
+      const Decision decision = give(gcs_.next(verb));
+      EXPECT_EQ(result(decision), kAccepted) << int{verb};
+      ASSERT_TRUE(decision.order);
+      EXPECT_EQ(decision.order->request, verb == kLand ? track::Request::land : track::Request::stop);
+      view_.epoch.order = decision.order->number;
+    }
+  }
+}
+
 TEST_F(MissionTest, RefusesWhatTheModeDoesNotAllow) {
   view_.mode = Mode::passive;
+  view_.offboard = false;
   look();
   for (const std::uint8_t verb : {kTakeoff, kGoto, kHold, kLand, kStop})
     EXPECT_EQ(result(give(gcs_.next(verb))), kRefused) << int{verb};
   EXPECT_EQ(result(give(gcs_.next(99))), kInvalid);
   view_.mode = Mode::tracking;
+  view_.offboard = true;
   look();
   EXPECT_EQ(result(give(gcs_.next(kTakeoff))), kRefused) << "already in the air";
   EXPECT_EQ(result(give(gcs_.next(kDisable))), kRefused) << "armed";

@@ -9,8 +9,10 @@ namespace backwash::daemon::test {
 namespace {
 
 std::string forbids(const Lockstep& rig) {
-  return firmware_bridge::forbidding_parameter(rig.view().autopilot, rig.view().parameters, vehicle_5in());
+  return firmware_bridge::forbidding_parameter(*rig.view().autopilot, rig.view().parameters, vehicle_5in());
 }
+
+constexpr std::size_t kOfTheRig = 17;  // of PX4's rules, those whose parameter its emulation has
 
 struct ParameterReading : testing::Test {
   Lockstep rig_;
@@ -21,17 +23,17 @@ struct ParameterReading : testing::Test {
   }
   std::size_t known() const {
     return static_cast<std::size_t>(
-        std::ranges::count_if(rig_.view().parameters, [](const auto& value) { return value.has_value(); }));
+        std::ranges::count_if(rig_.view().parameters, [](const auto& answer) { return answer.value.has_value(); }));
   }
 };
 
 TEST_F(ParameterReading, AllAreKnownSoonAndThoseThatForbidComeFirst) {
-  for (int n = 0; n < 60 && rig_.view().autopilot == firmware_bridge::Autopilot::kUnknown; ++n) rig_.tick();
+  for (int n = 0; n < 60 && rig_.view().autopilot == &firmware_bridge::kUnknownAutopilot; ++n) rig_.tick();
   EXPECT_TRUE(forbids(rig_).starts_with("no value of COM_OF_LOSS_T")) << forbids(rig_);
   rig_.ticks(75);
   EXPECT_EQ(forbids(rig_), "");
   rig_.ticks(75);
-  EXPECT_EQ(known(), firmware_bridge::parameter_names(firmware_bridge::Autopilot::kPx4).size());
+  EXPECT_EQ(known(), kOfTheRig);
 }
 
 TEST_F(ParameterReading, AChangeByAStationIsSeenWhilePassive) {
@@ -58,14 +60,14 @@ TEST_F(ParameterReading, NothingOfBeforeASilenceIsLeftInTheTickThatEndsIt) {
   for (const int silent : {100, 103, 105}) {
     rig_.autopilot->parameters["COM_OBL_RC_ACT"] = 4;
     rig_.ticks(800);
-    ASSERT_EQ(rig_.view().parameters[kObl], 4);
+    ASSERT_EQ(rig_.view().parameters[kObl].value, 4);
     rig_.autopilot->mute = true;
     rig_.ticks(silent);
     rig_.autopilot->parameters["COM_OBL_RC_ACT"] = 3;
     ASSERT_GT(rig_.view().heartbeat_age, track::Supervisor::kHeartbeatLost);
     rig_.autopilot->mute = false;
     for (int n = 0; n < 100 && rig_.view().heartbeat_age > track::Supervisor::kHeartbeatLost; ++n) rig_.tick();
-    EXPECT_NE(rig_.view().parameters[kObl], 4) << silent;
+    EXPECT_NE(rig_.view().parameters[kObl].value, 4) << silent;
     EXPECT_NE(forbids(rig_), "") << silent;
   }
 }
@@ -136,7 +138,7 @@ TEST_F(ParameterReading, AnArmedVehicleIsAskedForNothing) {
     ASSERT_TRUE(rig.autopilot->armed());
     ASSERT_TRUE(rig.view().armed);
     EXPECT_TRUE(forbids(rig).starts_with("no value of")) << forbids(rig);
-    for (const auto& value : rig.view().parameters) EXPECT_FALSE(value);
+    for (const auto& answer : rig.view().parameters) EXPECT_FALSE(answer.value);
   }
 }
 
@@ -152,7 +154,7 @@ TEST_F(ParameterReading, OneThatItDoesNotKnowIsAskedForOnceASecondInTheEnd) {
   rig_.autopilot->parameters.erase("EKF2_HGT_REF");
   rig_.ticks(500);
   EXPECT_EQ(forbids(rig_), "");
-  EXPECT_EQ(known() + 1, firmware_bridge::parameter_names(firmware_bridge::Autopilot::kPx4).size());
+  EXPECT_EQ(known() + 1, kOfTheRig);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 56
+ROWS = 59
 
 
 def known_tests(build: str) -> list[str]:

@@ -39,6 +39,7 @@ MAY = {
                          STUDY + "windows", STUDY + "calibrate", STUDY + "effects", STUDY + "inference"],
     STUDY + "design": ["core/types", "core/map", "core/plan", "core/log", STUDY + "windows", STUDY + "effects",
                        STUDY + "inference", STUDY + "findings"],
+    "firmware_bridge/autopilots": [],
     "firmware_bridge": ["core/types"],
     "services/parallel": [],
     "services/command_line": [],
@@ -51,7 +52,7 @@ MAY = {
     "services/backwashctl": ["core/files", "core/config", *FLIGHT[:5], "services/security", "services/dds", "services/command_line"],
     "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/security", "services/dds",
                        "services/parallel", "services/command_line"],
-    "services/backwash": ["core", "services/security", "services/maps", "services/parallel", "services/command_line"],
+    "services/backwash": ["core", "firmware_bridge/autopilots", "services/security", "services/maps", "services/parallel", "services/command_line"],
     "services/package": ["core/config", *FLIGHT],  # the library's example
 }
 # The worlds with hidden effects share no code with what looks for them. These ask the study, and no world includes them.

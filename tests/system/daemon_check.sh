@@ -19,7 +19,7 @@ start_daemon builtin:quad-5in "$work/flight.bwlog"
 check unsafe
 [[ $code == 69 ]] || die "check exited with $code"
 for line in 'COM_OF_LOSS_T: 0.45 -> set COM_OF_LOSS_T above 0 and to 0.39 s' 'COM_OBL_RC_ACT: 3 -> set COM_OBL_RC_ACT to' \
-  'COM_RC_OVERRIDE: 1 -> add 2 to COM_RC_OVERRIDE' 'NAV_DLL_ACT: 2 -> set NAV_DLL_ACT to' \
+  'COM_RC_OVERRIDE: 1 -> set COM_RC_OVERRIDE to 3' 'NAV_DLL_ACT: 2 -> set NAV_DLL_ACT to' \
   'COM_LOW_BAT_ACT: 3 -> set COM_LOW_BAT_ACT to'; do
   grep -q "^FAIL  $line" "$work/unsafe" || die "check did not say: $line"
 done

@@ -31,7 +31,8 @@ for name in ("compute_us", "lateness_us"):
     for q in (0.5, 0.95):
         a, b = quantile(before, q), quantile(during, q)
         print(f"{name} p{100 * q:.0f}: {a:.0f} us before, {b:.0f} us during the flood, ratio {b / a:.2f}")
-        good = good and (b / a <= 1.5 or q > 0.5 and seconds < 10)
+        # Half a hundredth of the period: what a scheduler adds to a few microseconds of lateness is no slowness.
+        good = good and (b / a <= 1.5 or b - a < 100 or q > 0.5 and seconds < 10)
 assert len(during) > 40 * (seconds - 1), "the flood was too short"
 assert {t.mode for t in ticks if flood < t.t < end} == {"tracking"}
 assert good, "the flood slows the control thread"

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "core/track/supervisor.hpp"
+#include "tests/track/healthy.hpp"
+
 namespace backwash::track {
 namespace {
 
@@ -43,6 +46,25 @@ TEST(Orders, AnEnableBeforeAnEndIsGoneAndOneAfterItFollows) {
   EXPECT_EQ(enable.request, Request::enable);
   EXPECT_EQ(enable.number, 4u);
   EXPECT_EQ(orders.next().request, Request::none);
+}
+
+// A daemon that died, or went quiet, in flight: the autopilot may hover in our mode for ever.
+TEST(Orders, AnOperatorLandsAnArmedVehicleInOurModeThatNobodyCommands) {
+  for (const Request request : {Request::land, Request::stop}) {
+    for (const bool ours : {true, false}) {
+      Supervisor s;
+      SupervisorInput in = healthy();
+      in.armed = true, in.offboard = ours;
+      EXPECT_FALSE(s.step(in).send_heartbeat) << "it belongs to somebody else until an operator says so";
+      in.request = request;
+      auto out = s.step(in);
+      in.request = Request::none;
+      EXPECT_EQ(out.mode, ours ? Mode::land : Mode::passive);
+      bool asked = false;
+      for (int n = 0; n < 10; ++n) asked = asked || out.request_land, out = s.step(in);
+      EXPECT_EQ(asked, ours);
+    }
+  }
 }
 
 }  // namespace

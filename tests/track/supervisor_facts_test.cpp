@@ -54,6 +54,7 @@ TEST(SupervisorFacts, EachEndsTrackingInItsOwnWay) {
       {Mode::hold, Reason::odometry_frozen, [](auto& in) { in.odometry_frozen = true; }},
       {Mode::hold, Reason::odometry_disorder, [](auto& in) { in.odometry_disorder = true; }},
       {Mode::hold, Reason::odometry_lost, [](auto& in) { in.odometry_age = 0.081; }},
+      {Mode::hold, Reason::line_slow, [](auto& in) { in.line_slow = true; }},
       {Mode::hold, Reason::frames_disagree, [](auto& in) { in.frames_agree = false; }},
       {Mode::hold, Reason::frames_apart, [](auto& in) { in.frames_apart = true; }},
       {Mode::land, Reason::battery_low, [](auto& in) { in.battery_low = true; }},

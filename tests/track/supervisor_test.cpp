@@ -241,7 +241,7 @@ TEST(Supervisor, EveryModeAndReasonHasANameOfItsOwn) {
     EXPECT_LE(std::string(to_string(static_cast<Reason>(a))).size(), 50u);  // a STATUSTEXT holds it whole
     for (int b = 0; b < a; ++b) EXPECT_STRNE(to_string(static_cast<Reason>(a)), to_string(static_cast<Reason>(b)));
   }
-  EXPECT_STREQ(to_string(static_cast<Reason>(kReasons - 1)), "air rougher than the flight allows for");
+  EXPECT_STREQ(to_string(static_cast<Reason>(kReasons - 1)), "line to the autopilot slower than sets allow for");
   EXPECT_STREQ(to_string(static_cast<Reason>(kReasons)), "?");
 }
 

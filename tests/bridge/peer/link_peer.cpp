@@ -54,7 +54,7 @@ void speak(AutopilotLink& link, int tick, Time now) {
   if (tick % 10 == 1) link.send_timesync(now);
   if (tick % 50 == 2) link.send_arm(true);
   if (tick % 50 == 3) link.send_statustext(5, "of an independent peer");
-  if (tick % 50 == 4) link.send_parameter_request("COM_OF_LOSS_T");
+  if (tick % 50 == 4) link.send_parameter_request(0);
   VioSample vio{};
   vio.p_O = {4, 5, 6};
   vio.q_OB = Eigen::Quaterniond::Identity();
@@ -69,7 +69,7 @@ void tell(const AutopilotLink& link, Time now) {
   const auto battery = t.battery.at(now);
   const Vec3 p = position ? position->value.p_W : Vec3::Zero();
   const auto ack = t.result_of(kCommandArm);
-  const auto parameter = t.parameter("COM_OF_LOSS_T");
+  const auto parameter = t.parameters()[0].value;
   const mavlink::SigningCounters none;
   const auto& counted = link.signing() ? link.signing()->counters() : none;
   const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
@@ -78,7 +78,7 @@ void tell(const AutopilotLink& link, Time now) {
               R"("good": %llu, "unsigned": %llu, "wrong": %llu, "replayed": %llu})"
               "\n",
               link.vehicle().value_or(0), status && status->value.armed, p.x(), p.y(), p.z(),
-              t.attitude.at(now).has_value(), ack ? ack->value.result : -1, parameter ? parameter->value : -1,
+              t.attitude.at(now).has_value(), ack ? ack->value.result : -1, parameter.value_or(-1),
               battery && battery->value.voltage ? *battery->value.voltage : -1, link.clock(now).has_value(),
               count(link.received().frames), count(link.received().bad_crc), count(link.received().skipped_bytes),
               count(link.transmit().sent()), count(counted.good), count(counted.unsigned_frames),

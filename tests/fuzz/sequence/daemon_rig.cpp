@@ -64,10 +64,10 @@ void DaemonRig::fly(MakeAutopilot& make) {
                           .ground_W = ground,
                           .frame = lock_.local_frame,
                           .uptime = kUptime});
-  std::map<std::string, double> asked{{"GUID_TIMEOUT", 0.3}, {"WPNAV_ACCEL_Z", 250}, {"PSC_JERK_XY", 20},
-                                      {"PSC_JERK_Z", 20},    {"COM_OF_LOSS_T", 0.3}, {"COM_OBL_RC_ACT", 4}};
-  for (const auto kind : {firmware_bridge::Autopilot::kArduPilot, firmware_bridge::Autopilot::kPx4})
-    asked.merge(bench::gain_parameters(kind, vehicle));
+  const std::map<std::string, double> asked{{"GUID_TIMEOUT", 0.3}, {"WPNAV_ACCEL_Z", 250}, {"PSC_JERK_XY", 20},
+                                            {"PSC_JERK_Z", 20},    {"COM_OF_LOSS_T", 0.3}, {"COM_OBL_RC_ACT", 4}};
+  for (const auto* autopilot : firmware_bridge::autopilots())
+    bench::take_gains(*autopilot, vehicle, lock_.autopilot->parameters);
   for (auto& [name, value] : lock_.autopilot->parameters)
     if (const auto set = asked.find(name); set != asked.end()) value = set->second;
 }
